@@ -1,0 +1,203 @@
+//! The lattice: where points are, as integers, so that every decision is exact.
+
+use crate::point::{Endian, Layout, Position, Scalar, Schema};
+use crate::{Error, Result};
+
+/// Steps of the binary lattice per world unit where nothing decimal fits: 2^30.
+const BINARY: f64 = (1u64 << 30) as f64;
+/// The smallest decimal step.
+const SMALLEST_STEP: f64 = 1e-9;
+
+/// An isotropic lattice of i64 positions anchored at world 0, fixed by headers alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lattice {
+    /// World units of one step.
+    pub step: f64,
+    /// World coordinate of lattice position 0 (the fraction of a step that all offsets share).
+    pub shift: [f64; 3],
+    placement: Placement,
+}
+
+/// How a record's coordinates become a position.
+#[derive(Debug, Clone, PartialEq)]
+enum Placement {
+    /// position = stored · times + plus.
+    Integer { times: [i64; 3], plus: [i64; 3] },
+    /// position = round_half_even(world · per_unit).
+    Float { per_unit: f64 },
+}
+
+/// Why a record has no position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Misplaced {
+    /// A coordinate is NaN or infinite.
+    NotFinite,
+    /// A coordinate is 2^62 steps or more from world 0.
+    TooFar,
+}
+
+impl Lattice {
+    /// The lattice of records of `schema`. `step` overrides the step in world units.
+    pub fn of(schema: &Schema, step: Option<f64>) -> Result<Lattice> {
+        let axes = schema
+            .coordinates()
+            .ok_or_else(|| Error::pipeline("the input has no coordinates X, Y and Z"))?;
+        if let Some(step) = step {
+            if !(step.is_finite() && step > 0.0) {
+                return Err(Error::pipeline(format!(
+                    "the lattice step must be above 0, not {step}"
+                )));
+            }
+            return Ok(Lattice::binary(step, 1.0 / step));
+        }
+        let stored_whole = matches!(schema.layout, Layout::Las { .. })
+            && axes.iter().all(|d| d.scalar == Scalar::I32);
+        let decimal =
+            stored_whole.then(|| decimal(axes.map(|d| d.scale), axes.map(|d| d.origin))).flatten();
+        Ok(decimal.unwrap_or_else(|| Lattice::binary(1.0 / BINARY, BINARY)))
+    }
+
+    fn binary(step: f64, per_unit: f64) -> Lattice {
+        Lattice { step, shift: [0.0; 3], placement: Placement::Float { per_unit } }
+    }
+
+    /// World coordinates of a position.
+    pub fn world(&self, p: Position) -> [f64; 3] {
+        std::array::from_fn(|axis| p[axis] as f64 * self.step + self.shift[axis])
+    }
+
+    /// Whole steps nearest to a length in world units, at least 1.
+    pub fn steps(&self, length: f64) -> i64 {
+        ((length / self.step).round() as i64).max(1)
+    }
+
+    /// Positions of `records` (of the schema the lattice was made for), one after the other;
+    /// `misplaced` is told the index of each record that has none, which is left out.
+    pub fn place(
+        &self,
+        schema: &Schema,
+        records: &[u8],
+        mut place: impl FnMut(usize, Position),
+        mut misplaced: impl FnMut(usize, Misplaced),
+    ) {
+        let Some(axes) = schema.coordinates() else { return };
+        match self.placement {
+            Placement::Integer { times, plus } => {
+                let at = axes.map(|d| d.offset);
+                for (i, record) in records.chunks_exact(schema.stride).enumerate() {
+                    place(
+                        i,
+                        std::array::from_fn(|axis| {
+                            let mut stored = [0; 4];
+                            stored.copy_from_slice(&record[at[axis]..at[axis] + 4]);
+                            i64::from(i32::from_le_bytes(stored)) * times[axis] + plus[axis]
+                        }),
+                    );
+                }
+            }
+            Placement::Float { per_unit } => {
+                let endian: Endian = schema.endian;
+                for (i, record) in records.chunks_exact(schema.stride).enumerate() {
+                    let world = axes.map(|d| d.world(record, endian));
+                    match float_position(world, per_unit) {
+                        Ok(position) => place(i, position),
+                        Err(why) => misplaced(i, why),
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// 2^62: far enough from the ends of i64 that a box around a position can grow.
+const FARTHEST: f64 = (1u64 << 62) as f64;
+
+fn float_position(world: [f64; 3], per_unit: f64) -> Result<Position, Misplaced> {
+    let mut position = [0; 3];
+    for axis in 0..3 {
+        let steps = (world[axis] * per_unit).round_ties_even();
+        if !steps.is_finite() {
+            return Err(Misplaced::NotFinite);
+        }
+        if steps.abs() >= FARTHEST {
+            return Err(Misplaced::TooFar);
+        }
+        position[axis] = steps as i64;
+    }
+    Ok(position)
+}
+
+/// The decimal lattice of integer coordinates: one step that all scales are whole multiples of, and
+/// offsets that share their fraction of a step. None if there is no such step.
+fn decimal(scale: [f64; 3], origin: [f64; 3]) -> Option<Lattice> {
+    if scale.iter().chain(&origin).any(|v| !v.is_finite()) || scale.iter().any(|&s| s <= 0.0) {
+        return None;
+    }
+    let step = if scale[0] == scale[1] && scale[1] == scale[2] {
+        scale[0]
+    } else {
+        (0..=9)
+            .map(|digits| 1.0 / 10f64.powi(digits))
+            .find(|h| scale.iter().all(|s| multiple(*s, *h).is_some()))?
+    };
+    if step < SMALLEST_STEP {
+        return None;
+    }
+    let mut times = [0; 3];
+    let mut plus = [0; 3];
+    let mut shift = [0.0; 3];
+    for axis in 0..3 {
+        times[axis] = multiple(scale[axis], step)?;
+        let steps = origin[axis] / step;
+        let whole = steps.round();
+        // |raw · times + plus| stays below 2^62, as everywhere on the lattice.
+        if whole.abs() >= FARTHEST / 2.0 || times[axis] >= 1 << 29 {
+            return None;
+        }
+        plus[axis] = whole as i64;
+        // Decimal offsets are seldom exact in binary: a fraction below 1e-6 of a step is none.
+        let fraction = steps - whole;
+        shift[axis] = if fraction.abs() < 1e-6 { 0.0 } else { fraction * step };
+    }
+    Some(Lattice { step, shift, placement: Placement::Integer { times, plus } })
+}
+
+/// How many steps a scale is, if it is a whole number of them within the rounding of decimals.
+fn multiple(scale: f64, step: f64) -> Option<i64> {
+    let ratio = scale / step;
+    let whole = ratio.round();
+    (whole >= 1.0 && whole < 1e15 && (ratio - whole).abs() <= 1e-9 * whole).then_some(whole as i64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scales_of_one_decimal_step_are_whole_multiples() {
+        let lattice = decimal([0.01, 0.01, 0.001], [500_000.0, 4_100_000.0, 0.0]).unwrap();
+        assert_eq!(lattice.step, 0.001);
+        let Placement::Integer { times, plus } = lattice.placement else { panic!() };
+        assert_eq!((times, plus), ([10, 10, 1], [500_000_000, 4_100_000_000, 0]));
+    }
+
+    #[test]
+    fn equal_scales_need_not_be_decimal() {
+        assert_eq!(decimal([1.0 / 3.0; 3], [0.0; 3]).unwrap().step, 1.0 / 3.0);
+        assert!(decimal([1.0 / 3.0, 0.5, 0.5], [0.0; 3]).is_none());
+    }
+
+    #[test]
+    fn zero_negative_and_nan_scales_have_no_decimal_lattice() {
+        for scale in [0.0, -0.01, f64::NAN, f64::INFINITY, 1e-12] {
+            assert!(decimal([scale; 3], [0.0; 3]).is_none(), "{scale}");
+        }
+    }
+
+    #[test]
+    fn floats_round_half_to_even_and_far_ones_are_told() {
+        assert_eq!(float_position([0.5, 1.5, -0.5], 1.0), Ok([0, 2, 0]));
+        assert_eq!(float_position([f64::NAN, 0.0, 0.0], 1.0), Err(Misplaced::NotFinite));
+        assert_eq!(float_position([5e9, 0.0, 0.0], BINARY), Err(Misplaced::TooFar));
+    }
+}

@@ -1,0 +1,4 @@
+//! Geometry on plain slices: the lattice, nearest neighbours, the star of a point, planes and angles.
+//! Knows no tiles, no files.
+
+pub mod lattice;

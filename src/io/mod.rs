@@ -1,0 +1,1 @@
+//! Formats: one folder each, plain sources and sinks of records.

@@ -1,0 +1,13 @@
+//! pointmill reduces laser scans that do not fit in memory to the points that matter.
+
+mod error;
+pub mod geom;
+pub mod io;
+pub mod ops;
+pub mod pipeline;
+pub mod point;
+pub mod report;
+pub mod stage;
+pub mod tile;
+
+pub use error::{Error, ErrorKind, Result};

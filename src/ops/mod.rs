@@ -1,0 +1,1 @@
+//! The built-in stages that compute: one file each.

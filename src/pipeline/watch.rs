@@ -1,0 +1,27 @@
+//! How a run tells its progress and hears that it should stop.
+
+/// Told what a run does; called from several threads. The command line draws bars from it.
+pub trait Watch: Sync {
+    /// A phase begins; `total` is its amount of work in points, where known.
+    fn phase(&self, name: &'static str, total: Option<u64>);
+
+    /// `points` more of the phase are done.
+    fn advance(&self, points: u64);
+
+    /// Something the user should know, once.
+    fn warn(&self, message: &str);
+
+    /// True if the run should stop; asked between batches and tiles.
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// Watches nothing.
+pub struct Quiet;
+
+impl Watch for Quiet {
+    fn phase(&self, _name: &'static str, _total: Option<u64>) {}
+    fn advance(&self, _points: u64) {}
+    fn warn(&self, _message: &str) {}
+}

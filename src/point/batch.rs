@@ -1,0 +1,109 @@
+//! Points side by side, as their records.
+
+use std::sync::Arc;
+
+use super::Schema;
+
+/// Up to `capacity` records of one schema, refilled rather than rebuilt.
+///
+/// A record is the file's own bytes, `schema.stride` long. What the mill computed for a point and a
+/// writer may ask for travels beside the records.
+#[derive(Debug, Clone)]
+pub struct PointBatch {
+    schema: Arc<Schema>,
+    records: Vec<u8>,
+    capacity: usize,
+    /// Number of the source (file, or scan within a file) that the records came from. No decision
+    /// reads it.
+    pub source: u32,
+    /// Unit normals (one a record, NaN where there is none) when a stage computed them.
+    pub normals: Option<Vec<[f32; 3]>>,
+}
+
+impl PointBatch {
+    /// An empty batch that takes up to `capacity` records; allocates them at once.
+    pub fn new(schema: Arc<Schema>, capacity: usize) -> Self {
+        let records = Vec::with_capacity(capacity * schema.stride);
+        PointBatch { schema, records, capacity, source: 0, normals: None }
+    }
+
+    /// What the records hold.
+    pub fn schema(&self) -> &Arc<Schema> {
+        &self.schema
+    }
+
+    /// How many records it takes.
+    pub fn capacity(&self) -> usize {
+        self.capacity
+    }
+
+    /// How many records it holds.
+    pub fn len(&self) -> usize {
+        self.records.len() / self.schema.stride
+    }
+
+    /// True if it holds none.
+    pub fn is_empty(&self) -> bool {
+        self.records.is_empty()
+    }
+
+    /// All records, one after the other.
+    pub fn records(&self) -> &[u8] {
+        &self.records
+    }
+
+    /// All records, to change in place.
+    pub fn records_mut(&mut self) -> &mut [u8] {
+        &mut self.records
+    }
+
+    /// The records one by one, each `stride` bytes.
+    pub fn iter(&self) -> std::slice::ChunksExact<'_, u8> {
+        self.records.chunks_exact(self.schema.stride)
+    }
+
+    /// Forgets the records and what was computed for them; keeps the memory.
+    pub fn clear(&mut self) {
+        self.records.clear();
+        self.normals = None;
+    }
+
+    /// Makes the batch hold exactly `len ≤ capacity` records and returns their bytes for the
+    /// caller to fill; what they hold until then is unspecified.
+    pub fn refill(&mut self, len: usize) -> &mut [u8] {
+        assert!(len <= self.capacity, "a batch is refilled within its capacity");
+        self.normals = None;
+        self.records.resize(len * self.schema.stride, 0);
+        &mut self.records
+    }
+
+    /// Shortens the batch to its first `len` records.
+    pub fn truncate(&mut self, len: usize) {
+        self.records.truncate(len * self.schema.stride);
+        if let Some(normals) = &mut self.normals {
+            normals.truncate(len);
+        }
+    }
+
+    /// Appends records (a whole number of strides).
+    pub fn extend(&mut self, records: &[u8]) {
+        debug_assert_eq!(records.len() % self.schema.stride, 0);
+        self.records.extend_from_slice(records);
+    }
+
+    /// Keeps the records for which `keep(index, record)` holds, in order.
+    pub fn retain(&mut self, mut keep: impl FnMut(usize, &[u8]) -> bool) {
+        let stride = self.schema.stride;
+        let mut kept = 0;
+        for i in 0..self.len() {
+            if keep(i, &self.records[i * stride..(i + 1) * stride]) {
+                self.records.copy_within(i * stride..(i + 1) * stride, kept * stride);
+                if let Some(normals) = &mut self.normals {
+                    normals[kept] = normals[i];
+                }
+                kept += 1;
+            }
+        }
+        self.truncate(kept);
+    }
+}

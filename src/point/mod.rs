@@ -1,0 +1,10 @@
+//! Points side by side: what a record holds and how its fields are read. Knows no tiles, no files.
+
+mod batch;
+mod bounds;
+pub mod names;
+mod schema;
+
+pub use batch::PointBatch;
+pub use bounds::{Bounds, Position, distance2};
+pub use schema::{Bits, Dimension, Endian, Layout, Metadata, Scalar, Schema, Value};

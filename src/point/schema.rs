@@ -1,0 +1,289 @@
+//! What a record holds: typed fields at byte offsets, bit fields included.
+
+use std::any::Any;
+use std::sync::Arc;
+
+/// Type of a stored number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[allow(missing_docs, reason = "the names are the types")]
+pub enum Scalar {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    U64,
+    I64,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    /// Bytes of one number.
+    pub fn size(self) -> usize {
+        match self {
+            Scalar::U8 | Scalar::I8 => 1,
+            Scalar::U16 | Scalar::I16 => 2,
+            Scalar::U32 | Scalar::I32 | Scalar::F32 => 4,
+            Scalar::U64 | Scalar::I64 | Scalar::F64 => 8,
+        }
+    }
+
+    /// True for the two floating-point types.
+    pub fn is_float(self) -> bool {
+        matches!(self, Scalar::F32 | Scalar::F64)
+    }
+}
+
+/// Byte order of the numbers in a record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[allow(missing_docs, reason = "the names say it")]
+pub enum Endian {
+    Little,
+    Big,
+}
+
+/// A number as stored: before scale and origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs, reason = "the names say it")]
+pub enum Value {
+    Unsigned(u64),
+    Signed(i64),
+    Single(f32),
+    Double(f64),
+}
+
+impl Value {
+    /// The number as f64; exact for all but integers above 2^53.
+    pub fn as_f64(self) -> f64 {
+        match self {
+            Value::Unsigned(v) => v as f64,
+            Value::Signed(v) => v as f64,
+            Value::Single(v) => f64::from(v),
+            Value::Double(v) => v,
+        }
+    }
+}
+
+/// Some bits of a stored unsigned number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Bits {
+    /// Place of the lowest bit.
+    pub shift: u8,
+    /// How many bits.
+    pub width: u8,
+}
+
+/// One field of a record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dimension {
+    /// Shared name (see [`super::names`]) or the file's own.
+    pub name: String,
+    /// Type as stored.
+    pub scalar: Scalar,
+    /// Byte offset in the record.
+    pub offset: usize,
+    /// Which bits of the stored number, where it is not all of them.
+    pub bits: Option<Bits>,
+    /// World value = stored · scale + origin.
+    pub scale: f64,
+    /// World value = stored · scale + origin.
+    pub origin: f64,
+}
+
+impl Dimension {
+    /// A plain field: no bits, scale 1, origin 0.
+    pub fn new(name: impl Into<String>, scalar: Scalar, offset: usize) -> Self {
+        Dimension { name: name.into(), scalar, offset, bits: None, scale: 1.0, origin: 0.0 }
+    }
+
+    /// The same field narrowed to some bits of the stored number.
+    pub fn bits(mut self, shift: u8, width: u8) -> Self {
+        self.bits = Some(Bits { shift, width });
+        self
+    }
+
+    /// The same field with scale and origin.
+    pub fn scaled(mut self, scale: f64, origin: f64) -> Self {
+        (self.scale, self.origin) = (scale, origin);
+        self
+    }
+
+    /// The stored number.
+    pub fn get(&self, record: &[u8], endian: Endian) -> Value {
+        macro_rules! read {
+            ($t:ty) => {{
+                const N: usize = size_of::<$t>();
+                let mut bytes = [0u8; N];
+                bytes.copy_from_slice(&record[self.offset..self.offset + N]);
+                match endian {
+                    Endian::Little => <$t>::from_le_bytes(bytes),
+                    Endian::Big => <$t>::from_be_bytes(bytes),
+                }
+            }};
+        }
+        let narrow = |v: u64| match self.bits {
+            Some(b) => (v >> b.shift) & ((1 << b.width) - 1),
+            None => v,
+        };
+        match self.scalar {
+            Scalar::U8 => Value::Unsigned(narrow(u64::from(record[self.offset]))),
+            Scalar::U16 => Value::Unsigned(narrow(u64::from(read!(u16)))),
+            Scalar::U32 => Value::Unsigned(narrow(u64::from(read!(u32)))),
+            Scalar::U64 => Value::Unsigned(narrow(read!(u64))),
+            Scalar::I8 => Value::Signed(i64::from(read!(i8))),
+            Scalar::I16 => Value::Signed(i64::from(read!(i16))),
+            Scalar::I32 => Value::Signed(i64::from(read!(i32))),
+            Scalar::I64 => Value::Signed(read!(i64)),
+            Scalar::F32 => Value::Single(read!(f32)),
+            Scalar::F64 => Value::Double(read!(f64)),
+        }
+    }
+
+    /// The world value: stored · scale + origin, as multiplication and addition (never fused).
+    pub fn world(&self, record: &[u8], endian: Endian) -> f64 {
+        self.get(record, endian).as_f64() * self.scale + self.origin
+    }
+
+    /// Stores `value`, converted to the field's type. Returns false, storing nothing, if the field
+    /// cannot hold it: out of range, or not a whole number for an integer field.
+    #[must_use]
+    pub fn put(&self, record: &mut [u8], endian: Endian, value: Value) -> bool {
+        macro_rules! write {
+            ($v:expr) => {{
+                let v = $v;
+                let bytes = match endian {
+                    Endian::Little => v.to_le_bytes(),
+                    Endian::Big => v.to_be_bytes(),
+                };
+                record[self.offset..self.offset + bytes.len()].copy_from_slice(&bytes);
+                true
+            }};
+        }
+        match self.scalar {
+            Scalar::F64 => {
+                let v = value.as_f64();
+                let exact = match value {
+                    Value::Unsigned(u) => v as u128 == u128::from(u),
+                    Value::Signed(i) => v as i128 == i128::from(i),
+                    _ => true,
+                };
+                return exact && write!(v);
+            }
+            Scalar::F32 => {
+                if let Value::Single(v) = value {
+                    return write!(v);
+                }
+                let v = value.as_f64();
+                return (f64::from(v as f32) == v || v.is_nan()) && write!(v as f32);
+            }
+            _ => {}
+        }
+        let whole: i128 = match value {
+            Value::Unsigned(v) => i128::from(v),
+            Value::Signed(v) => i128::from(v),
+            Value::Single(_) | Value::Double(_) => {
+                let v = value.as_f64();
+                if v.fract() != 0.0 || v.abs() >= 1.8446744073709552e19 {
+                    return false; // NaN and infinities have a NaN fraction
+                }
+                v as i128
+            }
+        };
+        if let Some(bits) = self.bits {
+            let mask = ((1u128 << bits.width) - 1) as i128;
+            if whole < 0 || whole > mask {
+                return false;
+            }
+            let Value::Unsigned(old) =
+                (Dimension { bits: None, ..self.clone() }).get(record, endian)
+            else {
+                return false; // bits of a signed number: no format has them
+            };
+            let new = (i128::from(old) & !(mask << bits.shift)) | (whole << bits.shift);
+            let whole_field = Dimension { bits: None, ..self.clone() };
+            return whole_field.put(record, endian, Value::Unsigned(new as u64));
+        }
+        macro_rules! store {
+            ($t:ty) => {
+                match <$t>::try_from(whole) {
+                    Ok(v) => write!(v),
+                    Err(_) => false,
+                }
+            };
+        }
+        match self.scalar {
+            Scalar::U8 => store!(u8),
+            Scalar::I8 => store!(i8),
+            Scalar::U16 => store!(u16),
+            Scalar::I16 => store!(i16),
+            Scalar::U32 => store!(u32),
+            Scalar::I32 => store!(i32),
+            Scalar::U64 => store!(u64),
+            Scalar::I64 => store!(i64),
+            Scalar::F32 | Scalar::F64 => unreachable!("handled above"),
+        }
+    }
+}
+
+/// Which family of formats a record's bytes come from; a sink of the same family and an equal
+/// schema copies records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layout {
+    /// A LAS point record of this point data record format (0 to 10), extra bytes behind it.
+    Las {
+        /// Point data record format.
+        format: u8,
+    },
+    /// A PLY vertex: the file's properties in their order, binary (ASCII values are held as
+    /// little-endian binary of the declared type).
+    Ply,
+}
+
+/// What a record holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Schema {
+    /// Which family of formats the bytes come from.
+    pub layout: Layout,
+    /// Byte order of the numbers.
+    pub endian: Endian,
+    /// Bytes of a record.
+    pub stride: usize,
+    /// The fields in record order; `X`, `Y` and `Z` are always among them.
+    pub dimensions: Vec<Dimension>,
+}
+
+impl Schema {
+    /// The field called `name`.
+    pub fn find(&self, name: &str) -> Option<&Dimension> {
+        self.dimensions.iter().find(|d| d.name == name)
+    }
+
+    /// The coordinate fields, if all three are there.
+    pub fn coordinates(&self) -> Option<[&Dimension; 3]> {
+        let [x, y, z] = super::names::XYZ.map(|name| self.find(name));
+        Some([x?, y?, z?])
+    }
+}
+
+/// What a file says besides its points and that outputs carry on.
+#[derive(Clone, Default)]
+pub struct Metadata {
+    /// Coordinate reference system as text (WKT where the file has one).
+    pub crs: Option<String>,
+    /// Free text lines, such as the comments of a PLY header.
+    pub comments: Vec<String>,
+    /// The format's own header and records, known to sources and sinks of that format alone.
+    pub native: Option<Arc<dyn Any + Send + Sync>>,
+}
+
+impl std::fmt::Debug for Metadata {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Metadata")
+            .field("crs", &self.crs)
+            .field("comments", &self.comments)
+            .field("native", &self.native.is_some())
+            .finish()
+    }
+}

@@ -1,0 +1,46 @@
+//! What stages count while they work.
+
+use std::collections::BTreeMap;
+
+/// Counts that a tile or a stream reports; merged by addition, so that order does not matter.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Counts that are the same for every configuration, by name; they go into `result`.
+    pub counts: BTreeMap<&'static str, u64>,
+    /// Counts that depend on how the work was cut up, by name; they go into `run`.
+    pub work: BTreeMap<&'static str, u64>,
+    /// Records removed, by stage kind and reason.
+    pub removed: BTreeMap<(String, &'static str), u64>,
+}
+
+impl Tally {
+    /// Adds `n` to the count `name` of `result`. Count each position once: in the core of its tile.
+    pub fn count(&mut self, name: &'static str, n: u64) {
+        *self.counts.entry(name).or_default() += n;
+    }
+
+    /// Adds `n` to the count `name` of `run`.
+    pub fn work(&mut self, name: &'static str, n: u64) {
+        *self.work.entry(name).or_default() += n;
+    }
+
+    /// Enters `n` records as removed by `stage` for `reason`.
+    pub fn remove(&mut self, stage: &str, reason: &'static str, n: u64) {
+        if n > 0 {
+            *self.removed.entry((stage.to_owned(), reason)).or_default() += n;
+        }
+    }
+
+    /// Adds another tally.
+    pub fn merge(&mut self, other: &Tally) {
+        for (name, n) in &other.counts {
+            *self.counts.entry(name).or_default() += n;
+        }
+        for (name, n) in &other.work {
+            *self.work.entry(name).or_default() += n;
+        }
+        for (key, n) in &other.removed {
+            *self.removed.entry(key.clone()).or_default() += n;
+        }
+    }
+}

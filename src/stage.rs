@@ -1,0 +1,223 @@
+//! The roles a stage can play and what it tells the plan. Roles are closed, stages are open: an
+//! embedding program adds its own by implementing one of these traits.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::Result;
+use crate::geom::lattice::Lattice;
+use crate::point::{Bounds, Metadata, PointBatch, Schema};
+use crate::report::Tally;
+use crate::tile::{Levels, Tile};
+
+/// Opens the inputs of a source: headers only, no point.
+pub trait OpenSource: Send + Sync {
+    /// Reads every header, checks that the inputs agree, and bounds what they claim by their length.
+    fn open(&self) -> Result<Box<dyn Source>>;
+
+    /// Files that it reads, so that no output is written over one of them.
+    fn paths(&self) -> Vec<PathBuf> {
+        Vec::new()
+    }
+}
+
+/// Where records come from.
+pub trait Source: Send + Sync {
+    /// What every record holds.
+    fn schema(&self) -> &Arc<Schema>;
+
+    /// What outputs carry on besides points.
+    fn metadata(&self) -> &Metadata;
+
+    /// The files, in input order, as the report names them; empty when there are none.
+    fn inputs(&self) -> Vec<PathBuf> {
+        Vec::new()
+    }
+
+    /// How many points the headers claim, cut to what the files could hold at most.
+    fn points(&self) -> u64;
+
+    /// Bytes that reading one part holds besides the caller's batch (decoder state, read buffers,
+    /// the largest LAZ chunk where one must be held).
+    fn part_bytes(&self) -> u64;
+
+    /// How many parts there are. Parts are independent and numbered in input order.
+    fn parts(&self) -> usize;
+
+    /// Opens part `index < parts()`.
+    fn part(&self, index: usize) -> Result<Box<dyn Part + '_>>;
+
+    /// Warnings for the user that opening or reading gave rise to (dropped faces, odd headers).
+    fn warnings(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// A stretch of a source's records, in input order.
+pub trait Part: Send {
+    /// Refills `batch` with up to its capacity of the next records and sets its source number; an
+    /// empty batch is the end. After an error the part is not read again.
+    fn read(&mut self, batch: &mut PointBatch) -> Result<()>;
+}
+
+/// Changes or removes points as they stream by; knows no neighbours.
+pub trait Transform: Send + Sync {
+    /// What it reads and writes.
+    fn needs(&self) -> Needs;
+
+    /// Called for every batch, from several threads at once. Points that it removes are entered in
+    /// the ledger by the caller.
+    fn apply(&self, batch: &mut PointBatch) -> Result<()>;
+}
+
+/// Computes on a tile and its neighbourhood; independent of other tiles and of any order.
+pub trait TileOp: Send + Sync {
+    /// What it needs; asked again after [`settle`](TileOp::settle).
+    fn needs(&self) -> Needs;
+
+    /// Called once, after the decode and before the first tile, with what is known of the whole
+    /// scan: the place to fix figures that depend on it.
+    fn settle(&mut self, _scan: &ScanFacts) -> Result<()> {
+        Ok(())
+    }
+
+    /// Called for every tile, from several threads at once.
+    fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()>;
+
+    /// What it decided by itself, for the report and for `plan`: name and value.
+    fn decisions(&self) -> Vec<(String, serde_json::Value)> {
+        Vec::new()
+    }
+}
+
+/// Where records go. A sink writes below the path it is given; the run puts the finished file in
+/// its final place.
+pub trait Sink: Send {
+    /// Records that one [`Encode::encode`] takes; only the last may have fewer.
+    fn chunk_points(&self) -> usize;
+
+    /// Bytes that encoding one chunk holds, output included.
+    fn chunk_bytes(&self) -> u64;
+
+    /// The encoder, shared by all threads.
+    fn encoder(&self) -> Arc<dyn Encode>;
+
+    /// Writes one chunk; called in canonical order, from one thread at a time.
+    fn append(&mut self, chunk: Encoded) -> Result<()>;
+
+    /// Writes what depends on all points (header counts, chunk table) and flushes to disk.
+    fn finish(self: Box<Self>) -> Result<SinkSummary>;
+}
+
+/// The part of a sink that runs on several threads at once.
+pub trait Encode: Send + Sync {
+    /// Encodes up to `chunk_points` records of the source's schema.
+    fn encode(&self, batch: &PointBatch) -> Result<Encoded>;
+}
+
+/// An encoded chunk and the figures that a header needs.
+#[derive(Debug, Clone, Default)]
+pub struct Encoded {
+    /// The bytes to append.
+    pub bytes: Vec<u8>,
+    /// Points in them.
+    pub points: u64,
+    /// Smallest stored X, Y, Z (formats with integer coordinates).
+    pub lo: [i64; 3],
+    /// Largest stored X, Y, Z.
+    pub hi: [i64; 3],
+    /// Points by return number, 1 to 15 (formats that count them).
+    pub returns: [u64; 15],
+    /// Points that a conversion rounded, and by how much at most, in world units.
+    pub rounded: Option<(u64, f64)>,
+}
+
+/// What a sink says when it is done.
+#[derive(Debug, Clone, Default)]
+pub struct SinkSummary {
+    /// Points written.
+    pub points: u64,
+    /// Bytes of the finished file.
+    pub bytes: u64,
+    /// Things the user should know (rounding of a conversion, for example).
+    pub notes: Vec<String>,
+}
+
+/// Creates a sink once the source's schema is known.
+pub trait CreateSink: Send + Sync {
+    /// The final path of the output.
+    fn path(&self) -> &Path;
+
+    /// The order in which records are wanted.
+    fn order(&self) -> Order;
+
+    /// True if it writes the normals that a stage computed.
+    fn wants_normals(&self) -> bool;
+
+    /// Checks that the format holds every dimension (or that the user dropped it) and opens the
+    /// output at `staged`, a path beside the final one.
+    fn create(
+        &self,
+        staged: &Path,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+    ) -> Result<Box<dyn Sink>>;
+}
+
+/// Order of an output's records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Order {
+    /// Canonical where the pipeline has tile stages, input order where it streams.
+    #[default]
+    Auto,
+    /// Morton order of the lattice, then record bytes.
+    Canonical,
+    /// The order of the inputs; streaming pipelines only.
+    Input,
+}
+
+/// A stage in its role.
+pub enum Role {
+    /// Yields records.
+    Source(Box<dyn OpenSource>),
+    /// Streams.
+    Transform(Box<dyn Transform>),
+    /// Works on tiles.
+    TileOp(Box<dyn TileOp>),
+    /// Takes records.
+    Sink(Box<dyn CreateSink>),
+}
+
+/// Everything a plan can check before a run.
+#[derive(Debug, Clone, Default)]
+pub struct Needs {
+    /// Dimensions or columns read ("Normal" and "Cell" are columns).
+    pub reads: Vec<String>,
+    /// Dimensions or columns written.
+    pub writes: Vec<String>,
+    /// Nearest other positions that each position's result is computed from; 0 for none.
+    pub neighbors: usize,
+    /// Side in lattice steps of the cells whose points are decided together; 0 for none (or not
+    /// settled yet).
+    pub cell_side: i64,
+    /// True if cells of that side are octree nodes, so that no tile face cuts one.
+    pub cell_aligned: bool,
+    /// Working memory per position of the tile, rim included.
+    pub bytes_per_point: usize,
+    /// True if it removes points.
+    pub removes: bool,
+}
+
+/// What is known of the whole scan after the decode.
+pub struct ScanFacts<'a> {
+    /// Records.
+    pub points: u64,
+    /// Distinct positions.
+    pub positions: u64,
+    /// Tight box of the positions.
+    pub bounds: Bounds,
+    /// Where lattice steps are in the world.
+    pub lattice: &'a Lattice,
+    /// Occupied cubes of every power-of-two side.
+    pub levels: &'a Levels,
+}

@@ -1,0 +1,119 @@
+//! Morton order of lattice positions, and octree nodes as cubes of it.
+
+use std::cmp::Ordering;
+
+use crate::point::{Bounds, Position};
+
+/// Bit 63 set: i64 order becomes u64 order, and bit patterns become octree paths.
+const SIGN: u64 = 1 << 63;
+
+/// Morton order: interleaved bits, z above y above x on every level, anchored at the corner of the
+/// lattice (the most negative i64).
+pub fn morton_cmp(a: &Position, b: &Position) -> Ordering {
+    let x = (a[0] ^ b[0]) as u64;
+    let y = (a[1] ^ b[1]) as u64;
+    let z = (a[2] ^ b[2]) as u64;
+    // The axis whose difference has the highest bit decides; z wins equal bits, then y.
+    let mut axis = 2;
+    let mut highest = z;
+    if highest < y && highest < (highest ^ y) {
+        axis = 1;
+        highest = y;
+    }
+    if highest < x && highest < (highest ^ x) {
+        axis = 0;
+    }
+    // Flipping the sign bit of both keeps i64 order, so plain comparison is right on every axis.
+    a[axis].cmp(&b[axis])
+}
+
+/// The highest bit in which two positions differ on any axis; None if they are equal.
+pub fn split_level(a: Position, b: Position) -> Option<u32> {
+    let difference = ((a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2])) as u64;
+    difference.checked_ilog2()
+}
+
+/// An octree node: the cube of side 2^`level` that holds a position. Level 64 is all of the lattice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TileKey {
+    /// Smallest corner.
+    pub corner: Position,
+    /// Binary logarithm of the side in lattice steps.
+    pub level: u32,
+}
+
+impl TileKey {
+    /// The cube of side 2^`level` around `p`.
+    pub fn around(p: Position, level: u32) -> Self {
+        let mask = if level >= 64 { 0 } else { u64::MAX << level };
+        let corner = p.map(|v| (((v as u64 ^ SIGN) & mask) ^ SIGN) as i64);
+        TileKey { corner, level }
+    }
+
+    /// The smallest cube that holds both corners of `bounds`.
+    pub fn holding(bounds: &Bounds) -> Self {
+        let level = split_level(bounds.lo, bounds.hi).map_or(0, |bit| bit + 1);
+        TileKey::around(bounds.lo, level)
+    }
+
+    /// The eight halves in Morton order; None for a single position.
+    pub fn children(&self) -> Option<[TileKey; 8]> {
+        let level = self.level.checked_sub(1)?;
+        Some(std::array::from_fn(|octant| {
+            let corner = std::array::from_fn(|axis| {
+                let far = (octant >> axis & 1) as u64;
+                (((self.corner[axis] as u64 ^ SIGN) | (far << level)) ^ SIGN) as i64
+            });
+            TileKey { corner, level }
+        }))
+    }
+
+    /// The cube as a box.
+    pub fn cube(&self) -> Bounds {
+        let span = if self.level >= 64 { u64::MAX } else { (1 << self.level) - 1 };
+        Bounds {
+            lo: self.corner,
+            hi: self.corner.map(|v| (((v as u64 ^ SIGN) | span) ^ SIGN) as i64),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn interleaved(p: Position) -> [u8; 192] {
+        let mut bits = [0; 192];
+        for level in 0..64 {
+            for axis in 0..3 {
+                let bit = (p[axis] as u64 ^ SIGN) >> (63 - level) & 1;
+                bits[level * 3 + (2 - axis)] = bit as u8;
+            }
+        }
+        bits
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn morton_order_is_that_of_interleaved_bits(
+            a in proptest::array::uniform3(-20i64..20), b in proptest::array::uniform3(proptest::num::i64::ANY),
+            c in proptest::array::uniform3(-20i64..20),
+        ) {
+            for (p, q) in [(a, b), (a, c), (b, c), (a, a)] {
+                proptest::prop_assert_eq!(morton_cmp(&p, &q), interleaved(p).cmp(&interleaved(q)));
+            }
+        }
+
+        #[test]
+        fn a_cube_holds_what_it_was_made_around(p in proptest::array::uniform3(proptest::num::i64::ANY), level in 0u32..=64) {
+            let key = TileKey::around(p, level);
+            proptest::prop_assert!(key.cube().contains(p));
+            if let Some(children) = key.children() {
+                proptest::prop_assert_eq!(children.iter().filter(|c| c.cube().contains(p)).count(), 1);
+                for pair in children.windows(2) {
+                    proptest::prop_assert_eq!(morton_cmp(&pair[0].corner, &pair[1].corner), Ordering::Less);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! Occupied cubes of every power-of-two side, exactly, from one walk in Morton order.
+
+use super::key::split_level;
+use crate::point::Position;
+
+/// How many world-anchored cubes of side 2^j hold a position, for every j.
+///
+/// Two positions that follow each other in Morton order are in different cubes of side 2^j exactly
+/// when the highest bit in which they differ is at or above j; so one count per bit is enough.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Levels {
+    first: bool,
+    splits: [u64; 64],
+    positions: u64,
+}
+
+impl Default for Levels {
+    fn default() -> Self {
+        Levels { first: false, splits: [0; 64], positions: 0 }
+    }
+}
+
+impl Levels {
+    /// Counts the distinct position `p` that follows `before` (None for the very first) in Morton
+    /// order.
+    pub fn add(&mut self, before: Option<Position>, p: Position) {
+        self.positions += 1;
+        match before.and_then(|b| split_level(b, p)) {
+            Some(level) => self.splits[level as usize] += 1,
+            None => self.first = true,
+        }
+    }
+
+    /// Adds what another walk counted; exactly one of all walks began with `None`.
+    pub fn merge(&mut self, other: &Levels) {
+        self.first |= other.first;
+        self.positions += other.positions;
+        for (mine, theirs) in self.splits.iter_mut().zip(other.splits) {
+            *mine += theirs;
+        }
+    }
+
+    /// Distinct positions.
+    pub fn positions(&self) -> u64 {
+        self.positions
+    }
+
+    /// Occupied cubes of side 2^j.
+    pub fn occupied(&self, j: u32) -> u64 {
+        u64::from(self.first) + self.splits[j.min(63) as usize..].iter().sum::<u64>()
+    }
+
+    /// The smallest j for which positions ÷ occupied cubes of side 2^j ≥ `mean`; 62 if there is
+    /// none, 0 without positions.
+    pub fn smallest_side(&self, mean: u64) -> u32 {
+        (0..62).find(|&j| self.positions >= self.occupied(j).saturating_mul(mean)).unwrap_or(62)
+    }
+}
