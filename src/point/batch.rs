@@ -77,6 +77,13 @@ impl PointBatch {
         &mut self.records
     }
 
+    /// Makes room for `more` records behind the first `len` and returns their bytes to fill.
+    pub fn refill_after(&mut self, len: usize, more: usize) -> &mut [u8] {
+        assert!(len + more <= self.capacity, "a batch is refilled within its capacity");
+        self.records.resize((len + more) * self.schema.stride, 0);
+        &mut self.records[len * self.schema.stride..]
+    }
+
     /// Shortens the batch to its first `len` records.
     pub fn truncate(&mut self, len: usize) {
         self.records.truncate(len * self.schema.stride);

@@ -21,6 +21,12 @@ pub struct Bounds {
     pub hi: Position,
 }
 
+impl Default for Bounds {
+    fn default() -> Self {
+        Bounds::EMPTY
+    }
+}
+
 impl Bounds {
     /// The box that holds nothing.
     pub const EMPTY: Bounds = Bounds { lo: [i64::MAX; 3], hi: [i64::MIN; 3] };

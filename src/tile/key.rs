@@ -33,6 +33,27 @@ pub fn split_level(a: Position, b: Position) -> Option<u32> {
     difference.checked_ilog2()
 }
 
+/// Levels of the octree that one u64 key holds.
+const PREFIX_LEVELS: u32 = 21;
+
+/// The path of `p` through the upper 21 levels below a cube of side 2^`level` that holds it: for
+/// positions of that cube, keys compare as the positions do in Morton order, or are equal.
+pub fn morton_prefix(p: Position, level: u32) -> u64 {
+    let below = level.saturating_sub(PREFIX_LEVELS);
+    let [x, y, z] =
+        p.map(|v| spread(((v as u64 ^ SIGN) >> below.min(63)) & ((1 << PREFIX_LEVELS) - 1)));
+    x | y << 1 | z << 2
+}
+
+/// Bit i of a 21-bit number goes to bit 3i.
+fn spread(v: u64) -> u64 {
+    let v = (v | v << 32) & 0x001f_0000_0000_ffff;
+    let v = (v | v << 16) & 0x001f_0000_ff00_00ff;
+    let v = (v | v << 8) & 0x100f_00f0_0f00_f00f;
+    let v = (v | v << 4) & 0x10c3_0c30_c30c_30c3;
+    (v | v << 2) & 0x1249_2492_4924_9249
+}
+
 /// An octree node: the cube of side 2^`level` that holds a position. Level 64 is all of the lattice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TileKey {
@@ -101,6 +122,27 @@ mod tests {
         ) {
             for (p, q) in [(a, b), (a, c), (b, c), (a, a)] {
                 proptest::prop_assert_eq!(morton_cmp(&p, &q), interleaved(p).cmp(&interleaved(q)));
+            }
+        }
+
+        #[test]
+        fn prefixes_never_contradict_morton_order(
+            corner in proptest::array::uniform3(proptest::num::i64::ANY), level in 0u32..=64,
+            a in proptest::array::uniform3(proptest::num::u64::ANY), b in proptest::array::uniform3(proptest::num::u64::ANY),
+        ) {
+            let cube = TileKey::around(corner, level).cube();
+            let inside = |v: [u64; 3]| -> Position {
+                std::array::from_fn(|i| {
+                    let span = cube.hi[i].abs_diff(cube.lo[i]);
+                    let v = if span == u64::MAX { v[i] } else { v[i] % (span + 1) };
+                    cube.lo[i].wrapping_add(v as i64)
+                })
+            };
+            let (p, q) = (inside(a), inside(b));
+            let keys = morton_prefix(p, level).cmp(&morton_prefix(q, level));
+            proptest::prop_assert!(keys == Ordering::Equal || keys == morton_cmp(&p, &q));
+            if level <= PREFIX_LEVELS {
+                proptest::prop_assert_eq!(keys, morton_cmp(&p, &q));
             }
         }
 

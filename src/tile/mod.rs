@@ -1,14 +1,55 @@
 //! Octree tiles of scans larger than memory: one decode, a sorted spill, exact neighbourhoods.
 
+mod around;
+mod block;
+mod intake;
 mod key;
 mod levels;
+mod load;
+mod merge;
+mod remote;
+mod sealed;
+mod spill;
 
+pub use around::Around;
+pub use block::Block;
+pub use intake::{Intake, TileStore};
 pub use key::{TileKey, morton_cmp};
 pub use levels::Levels;
+pub use load::Loader;
+pub use merge::{merge_bytes, seal};
+pub use remote::Remote;
+pub use sealed::{CutError, Fetch, Reader, SealedTiles, index_bytes};
+pub use spill::{Folder, PIECE, Pieces, Spill, SpillArea};
 
 use std::ops::Range;
 
 use crate::point::{Bounds, Position};
+use crate::{Error, Result};
+
+/// Runs `work` on `threads` threads, each told its number, and returns the first error.
+pub fn parallel(threads: usize, work: impl Fn(usize) -> Result<()> + Sync) -> Result<()> {
+    if threads <= 1 {
+        return work(0);
+    }
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads)
+            .map(|n| {
+                scope.spawn({
+                    let work = &work;
+                    move || work(n)
+                })
+            })
+            .collect();
+        let mut result = Ok(());
+        for worker in workers {
+            let outcome =
+                worker.join().unwrap_or_else(|_| Err(Error::internal("a worker thread panicked")));
+            result = result.and(outcome);
+        }
+        result
+    })
+}
 
 /// The points of one cube, then a rim of its neighbours' points.
 ///
@@ -33,9 +74,54 @@ pub struct Tile {
     pub cells: Cells,
     /// What becomes of each position (meaningful in the core). Kept unless a stage says otherwise.
     pub fates: Vec<Fate>,
+    /// Where neighbours are found.
+    pub around: Around,
 }
 
 impl Tile {
+    /// An empty tile with memory for `capacity` positions.
+    pub fn with_capacity(capacity: usize) -> Self {
+        Tile {
+            cube: Bounds::EMPTY,
+            zone: Bounds::EMPTY,
+            positions: Vec::with_capacity(capacity),
+            copies: Vec::with_capacity(capacity),
+            core: 0..0,
+            normals: Vec::with_capacity(capacity),
+            cells: Cells::default(),
+            fates: Vec::with_capacity(capacity),
+            around: Around::default(),
+        }
+    }
+
+    /// A tile that is all of a small scan: `positions` distinct and in Morton order, one record
+    /// each.
+    pub fn of(positions: Vec<Position>) -> Self {
+        let bounds = Bounds::of(positions.iter().copied());
+        let n = positions.len();
+        Tile {
+            cube: bounds,
+            zone: bounds,
+            positions,
+            copies: vec![1; n],
+            core: 0..n,
+            normals: vec![[f32::NAN; 3]; n],
+            cells: Cells::default(),
+            fates: vec![Fate::Kept; n],
+            around: Around::default(),
+        }
+    }
+
+    fn clear(&mut self, cube: Bounds, zone: Bounds) {
+        (self.cube, self.zone) = (cube, zone);
+        self.core = 0..0;
+        self.positions.clear();
+        self.copies.clear();
+        self.normals.clear();
+        self.cells.clear();
+        self.fates.clear();
+    }
+
     /// True if columns must be right for position `i`.
     pub fn in_zone(&self, i: usize) -> bool {
         self.zone.contains(self.positions[i])

@@ -1,0 +1,117 @@
+//! Blocks: up to 256 positions that follow each other in Morton order, packed relative to their box.
+
+use super::spill::{Address, Spill};
+use crate::Result;
+use crate::point::{Bounds, Position};
+
+/// Positions in a block.
+pub const BLOCK: usize = 256;
+
+/// Where a block is and what it spans.
+#[derive(Debug, Clone, Copy)]
+pub struct Block {
+    /// Tight box of the positions.
+    pub bounds: Bounds,
+    /// The first of them in Morton order.
+    pub first: Position,
+    /// Number of the first position among all of the scan.
+    pub first_position: u64,
+    /// Number of the first position's first record among all (see `Sealed::records`).
+    pub first_record: u64,
+    address: Address,
+    len: u16,
+    width: u8,
+    has_copies: bool,
+}
+
+impl Block {
+    /// How many positions it has.
+    pub fn len(&self) -> usize {
+        usize::from(self.len)
+    }
+
+    fn bytes(&self) -> usize {
+        self.len() * (3 * usize::from(self.width) + if self.has_copies { 4 } else { 0 })
+    }
+
+    /// Packs positions in Morton order onto `out`. The address is that of the stretch which `out`
+    /// will become, once [`placed`](Block::placed).
+    pub fn pack(positions: &[Position], copies: &[u32], out: &mut Vec<u8>) -> (Block, usize) {
+        let bounds = Bounds::of(positions.iter().copied());
+        let extent = bounds.extent().into_iter().max().unwrap_or(0);
+        let width = match extent {
+            0..=0xff => 1,
+            0x100..=0xffff => 2,
+            0x1_0000..=0xffff_ffff => 4,
+            _ => 8,
+        };
+        let start = out.len();
+        for p in positions {
+            for axis in 0..3 {
+                let offset = p[axis].abs_diff(bounds.lo[axis]).to_le_bytes();
+                out.extend_from_slice(&offset[..width]);
+            }
+        }
+        let has_copies = copies.iter().any(|&n| n != 1);
+        if has_copies {
+            copies.iter().for_each(|n| out.extend_from_slice(&n.to_le_bytes()));
+        }
+        let block = Block {
+            bounds,
+            first: positions[0],
+            first_position: 0,
+            first_record: 0,
+            address: Address::default(),
+            len: positions.len() as u16,
+            width: width as u8,
+            has_copies,
+        };
+        (block, start)
+    }
+
+    /// Gives a packed block its address: `start` bytes into the stretch at `stretch`.
+    pub fn placed(&mut self, stretch: Address, start: usize) {
+        self.address = stretch.plus(start as u64);
+    }
+
+    /// Appends the positions to `positions` and, if asked, how many records share each.
+    pub fn read(
+        &self,
+        spill: &Spill,
+        buffer: &mut Vec<u8>,
+        positions: &mut Vec<Position>,
+        copies: Option<&mut Vec<u32>>,
+    ) -> Result<()> {
+        buffer.resize(self.bytes(), 0);
+        spill.read(self.address, buffer)?;
+        let width = usize::from(self.width);
+        let (packed, counts) = buffer.split_at(self.len() * 3 * width);
+        match width {
+            1 => self.unpack::<1>(packed, positions),
+            2 => self.unpack::<2>(packed, positions),
+            4 => self.unpack::<4>(packed, positions),
+            _ => self.unpack::<8>(packed, positions),
+        }
+        if let Some(copies) = copies {
+            if self.has_copies {
+                copies.extend(
+                    counts.chunks_exact(4).map(|c| u32::from_le_bytes([c[0], c[1], c[2], c[3]])),
+                );
+            } else {
+                copies.resize(copies.len() + self.len(), 1);
+            }
+        }
+        Ok(())
+    }
+
+    fn unpack<const W: usize>(&self, packed: &[u8], positions: &mut Vec<Position>) {
+        let lo = self.bounds.lo;
+        positions.extend(packed.chunks_exact(3 * W).map(|p| {
+            std::array::from_fn(|axis| {
+                let mut offset = [0; 8];
+                offset[..W].copy_from_slice(&p[axis * W..(axis + 1) * W]);
+                lo[axis].wrapping_add(u64::from_le_bytes(offset) as i64)
+            })
+        }));
+    }
+}

@@ -1,0 +1,405 @@
+//! Sorted runs become one canonical sequence of distinct positions, each with its records.
+//!
+//! The lattice is cut into ranges of Morton order that the threads merge independently, each by
+//! walking all runs at once; nothing is held but a block a run.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering as Atomic};
+
+use super::block::{BLOCK, Block};
+use super::intake::{Run, TileStore};
+use super::key::morton_cmp;
+use super::sealed::{SealedTiles, Sequence};
+use super::spill::{PIECE, Pieces, Spill, lock};
+use super::{Levels, parallel};
+use crate::point::Position;
+use crate::{Error, Result};
+
+/// Blocks of all runs that one range has, about.
+const RANGE_BLOCKS: usize = 256;
+/// Blocks packed before they are handed to the spill.
+const BLOCKS_AT_ONCE: usize = 64;
+
+/// Bytes that a thread holds while it merges `runs` runs of records of `stride` bytes.
+pub fn merge_bytes(runs: usize, stride: usize) -> u64 {
+    let cursor = BLOCK * size_of::<Position>() + stride + 256;
+    let emitter = BLOCKS_AT_ONCE * BLOCK * 28 + PIECE * 8 + BLOCK * 28;
+    (runs * cursor + emitter) as u64
+}
+
+/// Merges the runs of `store` on `threads` threads; `advance` is told of records merged and says
+/// whether to go on.
+pub fn seal(
+    store: TileStore,
+    threads: usize,
+    advance: &(dyn Fn(u64) -> Result<()> + Sync),
+) -> Result<SealedTiles> {
+    let runs = std::mem::take(&mut *lock(&store.runs));
+    let _working = store
+        .budget
+        .lease(merge_bytes(runs.len(), store.stride) * threads as u64, "merging sorted runs")?;
+    let borders = borders(&runs);
+    let out = Output {
+        positions: Spill::new(&store.area, "positions"),
+        refs: Pieces::new(&store.area, "order", size_of::<u64>()),
+    };
+    let ranges: Vec<Mutex<Option<Merged>>> =
+        (0..=borders.len()).map(|_| Mutex::default()).collect();
+    let next = AtomicUsize::new(0);
+    parallel(threads, |_| {
+        loop {
+            let range = next.fetch_add(1, Atomic::Relaxed);
+            let Some(slot) = ranges.get(range) else { return Ok(()) };
+            let from = range.checked_sub(1).map(|b| borders[b]);
+            let merged = merge_range(&store, &runs, from, borders.get(range).copied(), &out)?;
+            advance(merged.records)?;
+            *lock(slot) = Some(merged);
+        }
+    })?;
+    drop(runs);
+    let ranges = ranges.into_iter().filter_map(|slot| slot.into_inner().ok().flatten());
+    let sequence = join(ranges);
+    let index = sequence.blocks.len() as u64 * (size_of::<Block>() as u64 + 8);
+    let lease = store.budget.lease(index, "the index of the tiles")?;
+    Ok(SealedTiles::new(sequence, out.positions, out.refs, store.records, lease))
+}
+
+/// Positions at which one range ends and the next begins: every so many blocks' first positions.
+fn borders(runs: &[Run]) -> Vec<Position> {
+    let mut firsts: Vec<Position> =
+        runs.iter().flat_map(|run| run.blocks.iter().map(|block| block.first)).collect();
+    firsts.sort_unstable_by(morton_cmp);
+    let mut borders: Vec<Position> =
+        firsts.into_iter().skip(RANGE_BLOCKS).step_by(RANGE_BLOCKS).collect();
+    borders.dedup();
+    borders
+}
+
+struct Output {
+    positions: Spill,
+    refs: Pieces,
+}
+
+/// What a range came to.
+struct Merged {
+    blocks: Vec<Block>,
+    records: u64,
+    levels: Levels,
+    ends: Option<(Position, Position)>,
+}
+
+fn join(ranges: impl Iterator<Item = Merged>) -> Sequence {
+    let mut all = Sequence::default();
+    let mut last = None;
+    for range in ranges {
+        let Some((first, end)) = range.ends else { continue };
+        // A range does not know what came before it: its first position is counted here.
+        all.levels.add(last, first);
+        all.levels.merge(&range.levels);
+        last = Some(end);
+        all.records += range.records;
+        for mut block in range.blocks {
+            block.first_position = all.positions;
+            all.positions += block.len() as u64;
+            all.bounds = all.bounds.union(&block.bounds);
+            all.blocks.push(block);
+        }
+    }
+    all
+}
+
+fn merge_range(
+    store: &TileStore,
+    runs: &[Run],
+    from: Option<Position>,
+    until: Option<Position>,
+    out: &Output,
+) -> Result<Merged> {
+    let mut cursors = Vec::with_capacity(runs.len());
+    let mut most = 0;
+    for run in runs {
+        let mut cursor = Cursor::new(store, run);
+        most += cursor.seek(from, until)?;
+        cursors.push(cursor);
+    }
+    let mut heap: BinaryHeap<Head> = cursors
+        .iter()
+        .enumerate()
+        .filter_map(|(run, c)| Some(Head { position: c.head(until)?, run }))
+        .collect();
+    let mut emitter = Emitter::new(out, most);
+    let mut equal = Vec::new();
+    while let Some(head) = heap.pop() {
+        equal.clear();
+        equal.push(head.run);
+        while heap.peek().is_some_and(|next| next.position == head.position) {
+            equal.extend(heap.pop().map(|next| next.run));
+        }
+        emit_equal(&mut cursors, &mut equal.clone(), head.position, &mut emitter)?;
+        for &run in &equal {
+            if let Some(position) = cursors[run].head(until) {
+                heap.push(Head { position, run });
+            }
+        }
+    }
+    emitter.finish()
+}
+
+/// Emits the records of one position from the runs that have it, smallest record first.
+fn emit_equal(
+    cursors: &mut [Cursor<'_>],
+    runs: &mut Vec<usize>,
+    position: Position,
+    emitter: &mut Emitter<'_>,
+) -> Result<()> {
+    while runs.len() > 1 {
+        let mut smallest = 0;
+        for i in 0..runs.len() {
+            cursors[runs[i]].load_record()?;
+            if cursors[runs[i]].record < cursors[runs[smallest]].record {
+                smallest = i;
+            }
+        }
+        let cursor = &mut cursors[runs[smallest]];
+        emitter.emit(position, cursor.number())?;
+        cursor.advance()?;
+        if cursor.head(None) != Some(position) {
+            runs.swap_remove(smallest);
+        }
+    }
+    let cursor = &mut cursors[runs[0]];
+    while cursor.head(None) == Some(position) {
+        emitter.emit(position, cursor.number())?;
+        cursor.advance()?;
+    }
+    Ok(())
+}
+
+/// The next position of a run; the smallest is the greatest in a [`BinaryHeap`].
+struct Head {
+    position: Position,
+    run: usize,
+}
+
+impl Ord for Head {
+    fn cmp(&self, other: &Self) -> Ordering {
+        morton_cmp(&other.position, &self.position).then(other.run.cmp(&self.run))
+    }
+}
+impl PartialOrd for Head {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl PartialEq for Head {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Head {}
+
+/// A walk along a run.
+struct Cursor<'a> {
+    store: &'a TileStore,
+    run: &'a Run,
+    block: usize,
+    at: usize,
+    positions: Vec<Position>,
+    buffer: Vec<u8>,
+    /// The record at the head, once it was needed to order equal positions.
+    record: Vec<u8>,
+    record_of: Option<u64>,
+}
+
+impl<'a> Cursor<'a> {
+    fn new(store: &'a TileStore, run: &'a Run) -> Self {
+        Cursor {
+            store,
+            run,
+            block: 0,
+            at: 0,
+            positions: Vec::new(),
+            buffer: Vec::new(),
+            record: Vec::new(),
+            record_of: None,
+        }
+    }
+
+    /// Goes to the first record at or behind `from`; returns how many records the range until
+    /// `until` has at most.
+    fn seek(&mut self, from: Option<Position>, until: Option<Position>) -> Result<u64> {
+        let blocks = &self.run.blocks;
+        let before = |p: &Position| {
+            blocks.partition_point(|block| morton_cmp(&block.first, p) == Ordering::Less)
+        };
+        let end = until.as_ref().map_or(blocks.len(), before);
+        // Records equal to `from` may begin in the block before the first that begins at or behind it.
+        self.block = from.as_ref().map_or(0, |p| before(p).saturating_sub(1));
+        self.load()?;
+        if let Some(from) = from {
+            loop {
+                self.at =
+                    self.positions.partition_point(|p| morton_cmp(p, &from) == Ordering::Less);
+                if self.at < self.positions.len() || self.block >= blocks.len() {
+                    break;
+                }
+                self.block += 1;
+                self.load()?;
+            }
+        }
+        Ok((end.saturating_sub(self.block) * BLOCK) as u64)
+    }
+
+    fn load(&mut self) -> Result<()> {
+        self.at = 0;
+        self.positions.clear();
+        match self.run.blocks.get(self.block) {
+            Some(block) => {
+                block.read(&self.store.positions, &mut self.buffer, &mut self.positions, None)
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The position it stands at, if that is before `until`.
+    fn head(&self, until: Option<Position>) -> Option<Position> {
+        let head = *self.positions.get(self.at)?;
+        let inside = until.is_none_or(|end| morton_cmp(&head, &end) == Ordering::Less);
+        inside.then_some(head)
+    }
+
+    /// Number of the record it stands at, among all of the store.
+    fn number(&self) -> u64 {
+        self.run.first_record + (self.block * BLOCK + self.at) as u64
+    }
+
+    fn advance(&mut self) -> Result<()> {
+        self.at += 1;
+        if self.at == self.positions.len() {
+            self.block += 1;
+            self.load()?;
+        }
+        Ok(())
+    }
+
+    fn load_record(&mut self) -> Result<()> {
+        let number = self.number();
+        if self.record_of != Some(number) {
+            self.record.resize(self.store.stride, 0);
+            self.store.records.read(number, &mut self.record)?;
+            self.record_of = Some(number);
+        }
+        Ok(())
+    }
+}
+
+/// Packs what comes out of the merge into blocks and pieces.
+struct Emitter<'a> {
+    out: &'a Output,
+    merged: Merged,
+    positions: Vec<Position>,
+    copies: Vec<u32>,
+    packed: Vec<u8>,
+    unplaced: Vec<usize>,
+    refs: Vec<u8>,
+    first_ref: u64,
+    refs_stored: u64,
+    block_first: u64,
+}
+
+impl<'a> Emitter<'a> {
+    fn new(out: &'a Output, most_records: u64) -> Self {
+        Emitter {
+            out,
+            merged: Merged {
+                blocks: Vec::new(),
+                records: 0,
+                levels: Levels::default(),
+                ends: None,
+            },
+            positions: Vec::with_capacity(BLOCK),
+            copies: Vec::with_capacity(BLOCK),
+            packed: Vec::with_capacity(BLOCKS_AT_ONCE * BLOCK * 28),
+            unplaced: Vec::with_capacity(BLOCKS_AT_ONCE),
+            refs: Vec::with_capacity(PIECE * 8),
+            first_ref: out.refs.reserve(most_records),
+            refs_stored: 0,
+            block_first: 0,
+        }
+    }
+
+    fn emit(&mut self, position: Position, record: u64) -> Result<()> {
+        match (&mut self.merged.ends, self.copies.last_mut()) {
+            (Some((_, last)), Some(copies)) if *last == position => {
+                *copies = copies.checked_add(1).ok_or_else(|| {
+                    Error::new(crate::ErrorKind::Data, "more than 2^32 records share one position")
+                })?;
+            }
+            (ends, _) => {
+                match ends {
+                    None => *ends = Some((position, position)),
+                    Some((_, last)) => {
+                        self.merged.levels.add(Some(*last), position);
+                        *last = position;
+                    }
+                }
+                if self.positions.len() == BLOCK {
+                    self.close_block()?;
+                }
+                self.positions.push(position);
+                self.copies.push(1);
+            }
+        }
+        self.merged.records += 1;
+        self.refs.extend_from_slice(&record.to_le_bytes());
+        if self.refs.len() == PIECE * 8 {
+            self.store_refs()?;
+        }
+        Ok(())
+    }
+
+    fn store_refs(&mut self) -> Result<()> {
+        if !self.refs.is_empty() {
+            self.out.refs.put(self.first_ref + self.refs_stored, &self.refs)?;
+            self.refs_stored += (self.refs.len() / 8) as u64;
+            self.refs.clear();
+        }
+        Ok(())
+    }
+
+    fn close_block(&mut self) -> Result<()> {
+        if self.positions.is_empty() {
+            return Ok(());
+        }
+        let (mut block, start) = Block::pack(&self.positions, &self.copies, &mut self.packed);
+        block.first_record = self.first_ref + self.block_first;
+        self.block_first += self.copies.iter().map(|&n| u64::from(n)).sum::<u64>();
+        self.merged.blocks.push(block);
+        self.unplaced.push(start);
+        self.positions.clear();
+        self.copies.clear();
+        if self.unplaced.len() == BLOCKS_AT_ONCE { self.place() } else { Ok(()) }
+    }
+
+    fn place(&mut self) -> Result<()> {
+        if self.packed.is_empty() {
+            return Ok(());
+        }
+        let address = self.out.positions.append(&self.packed)?;
+        let begin = self.merged.blocks.len() - self.unplaced.len();
+        for (block, start) in self.merged.blocks[begin..].iter_mut().zip(self.unplaced.drain(..)) {
+            block.placed(address, start);
+        }
+        self.packed.clear();
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<Merged> {
+        self.close_block()?;
+        self.place()?;
+        self.store_refs()?;
+        Ok(self.merged)
+    }
+}

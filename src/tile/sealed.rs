@@ -1,0 +1,340 @@
+//! The decoded scan: distinct positions in Morton order, an index of tight boxes over them, and the
+//! records behind each.
+
+use std::cmp::Ordering;
+
+use super::block::{BLOCK, Block};
+use super::key::morton_cmp;
+use super::spill::{PIECE, Pieces, Spill};
+use super::{Levels, TileKey};
+use crate::budget::Lease;
+use crate::point::{Bounds, PointBatch, Position};
+use crate::{Error, Result};
+
+/// Children of an index node.
+const FANOUT: usize = 16;
+
+/// All positions of a scan, as the merge leaves them.
+#[derive(Debug, Default)]
+pub(super) struct Sequence {
+    pub blocks: Vec<Block>,
+    pub positions: u64,
+    pub records: u64,
+    pub bounds: Bounds,
+    pub levels: Levels,
+}
+
+/// The decoded scan, ready for tiles.
+#[derive(Debug)]
+pub struct SealedTiles {
+    sequence: Sequence,
+    /// Boxes of 16 blocks, of 16 of those, and so on up to one.
+    boxes: Vec<Vec<Bounds>>,
+    spill: Spill,
+    refs: Pieces,
+    records: Pieces,
+    _index: Lease,
+}
+
+/// What reading blocks needs and keeps from call to call.
+#[derive(Debug, Default)]
+pub struct Reader {
+    buffer: Vec<u8>,
+    positions: Vec<Position>,
+    copies: Vec<u32>,
+}
+
+impl SealedTiles {
+    pub(super) fn new(
+        sequence: Sequence,
+        spill: Spill,
+        refs: Pieces,
+        records: Pieces,
+        index: Lease,
+    ) -> Self {
+        let mut boxes: Vec<Vec<Bounds>> = Vec::new();
+        let mut level: Vec<Bounds> = sequence.blocks.iter().map(|b| b.bounds).collect();
+        while level.len() > 1 {
+            level = level
+                .chunks(FANOUT)
+                .map(|group| group.iter().fold(Bounds::EMPTY, |all, b| all.union(b)))
+                .collect();
+            boxes.push(level.clone());
+        }
+        SealedTiles { sequence, boxes, spill, refs, records, _index: index }
+    }
+
+    /// Distinct positions.
+    pub fn positions(&self) -> u64 {
+        self.sequence.positions
+    }
+
+    /// Records.
+    pub fn points(&self) -> u64 {
+        self.sequence.records
+    }
+
+    /// Tight box of all positions.
+    pub fn bounds(&self) -> Bounds {
+        self.sequence.bounds
+    }
+
+    /// Occupied cubes of every side.
+    pub fn levels(&self) -> &Levels {
+        &self.sequence.levels
+    }
+
+    /// How many blocks there are; they are numbered in Morton order.
+    pub fn blocks(&self) -> usize {
+        self.sequence.blocks.len()
+    }
+
+    /// Block `index`.
+    pub fn block(&self, index: usize) -> &Block {
+        &self.sequence.blocks[index]
+    }
+
+    /// Reads block `index`: its positions and how many records share each.
+    pub fn read<'r>(
+        &self,
+        index: usize,
+        reader: &'r mut Reader,
+    ) -> Result<(&'r [Position], &'r [u32])> {
+        reader.positions.clear();
+        reader.copies.clear();
+        self.sequence.blocks[index].read(
+            &self.spill,
+            &mut reader.buffer,
+            &mut reader.positions,
+            Some(&mut reader.copies),
+        )?;
+        Ok((&reader.positions, &reader.copies))
+    }
+
+    /// Calls `visit` with the number of every block whose box meets `region`, in Morton order.
+    pub fn blocks_meeting(
+        &self,
+        region: &Bounds,
+        mut visit: impl FnMut(usize) -> Result<()>,
+    ) -> Result<()> {
+        self.descend(self.boxes.len(), 0, region, &mut visit)
+    }
+
+    /// Node `node` of height `height`; nodes of height 0 are blocks.
+    fn descend(
+        &self,
+        height: usize,
+        node: usize,
+        region: &Bounds,
+        visit: &mut impl FnMut(usize) -> Result<()>,
+    ) -> Result<()> {
+        if !self.node_box(height, node).is_some_and(|bounds| bounds.meets(region)) {
+            return Ok(());
+        }
+        if height == 0 {
+            return visit(node);
+        }
+        (node * FANOUT..(node + 1) * FANOUT)
+            .try_for_each(|child| self.descend(height - 1, child, region, visit))
+    }
+
+    fn node_box(&self, height: usize, node: usize) -> Option<&Bounds> {
+        match height.checked_sub(1) {
+            None => self.sequence.blocks.get(node).map(|block| &block.bounds),
+            Some(above) => self.boxes[above].get(node),
+        }
+    }
+
+    /// The index node above all blocks: its height and number.
+    pub(super) fn root(&self) -> (usize, usize) {
+        (self.boxes.len(), 0)
+    }
+
+    /// The nodes right below one, as height and number; some may not exist.
+    pub(super) fn children(
+        &self,
+        (height, node): (usize, usize),
+    ) -> impl Iterator<Item = (usize, usize)> + use<> {
+        (node * FANOUT..(node + 1) * FANOUT).map(move |child| (height - 1, child))
+    }
+
+    /// Squared distance of `p` to a node's tight box; None if there is no such node.
+    pub(super) fn node_distance2(
+        &self,
+        (height, node): (usize, usize),
+        p: Position,
+    ) -> Option<u128> {
+        self.node_box(height, node).map(|bounds| bounds.distance2(p))
+    }
+
+    /// True if `region` holds more than `limit` positions; reads blocks only where their boxes
+    /// leave it open.
+    pub fn holds_more(&self, region: &Bounds, limit: u64, reader: &mut Reader) -> Result<bool> {
+        let (mut inside, mut open) = (0, Vec::new());
+        let mut open_count = 0;
+        self.blocks_meeting(region, |b| {
+            let block = self.block(b);
+            if region.holds(&block.bounds) {
+                inside += block.len() as u64;
+            } else {
+                open_count += block.len() as u64;
+                open.push(b);
+            }
+            Ok(())
+        })?;
+        if inside > limit || inside + open_count <= limit {
+            return Ok(inside > limit);
+        }
+        for b in open {
+            let (positions, _) = self.read(b, reader)?;
+            inside += positions.iter().filter(|p| region.contains(**p)).count() as u64;
+            if inside > limit {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Positions in `region`, exactly.
+    pub fn count(&self, region: &Bounds, reader: &mut Reader) -> Result<u64> {
+        let mut count = 0;
+        self.blocks_meeting(region, |b| {
+            let block = self.block(b);
+            if region.holds(&block.bounds) {
+                count += block.len() as u64;
+            } else {
+                let (positions, _) = self.read(b, reader)?;
+                count += positions.iter().filter(|p| region.contains(**p)).count() as u64;
+            }
+            Ok(())
+        })?;
+        Ok(count)
+    }
+
+    /// Cuts the scan into octree nodes, in Morton order, none without a position: nodes whose cube
+    /// grown by `reach` has at most `capacity` positions, or that have the smallest side allowed,
+    /// 2^`lowest`, or more than `reach` could ever shrink.
+    ///
+    /// A node of that side which still has too many is an error that names it and its count.
+    pub fn cut(&self, capacity: u64, reach: i64, lowest: u32) -> Result<Vec<TileKey>, CutError> {
+        let mut tiles = Vec::new();
+        if self.positions() == 0 {
+            return Ok(tiles);
+        }
+        let mut reader = Reader::default();
+        let mut open = vec![TileKey::holding(&self.bounds())];
+        while let Some(key) = open.pop() {
+            if !self.holds_more(&key.cube(), 0, &mut reader)? {
+                continue;
+            }
+            let zone = key.cube().grown(reach);
+            if !self.holds_more(&zone, capacity, &mut reader)? {
+                tiles.push(key);
+                continue;
+            }
+            match key.children().filter(|_| key.level > lowest) {
+                Some(children) => open.extend(children.iter().rev()),
+                None => {
+                    let positions = self.count(&zone, &mut reader)?;
+                    return Err(CutError::TooHeavy { key, positions });
+                }
+            }
+        }
+        Ok(tiles)
+    }
+
+    /// Number of the first block that can hold positions at or behind `p` in Morton order.
+    pub fn block_of(&self, p: &Position) -> usize {
+        self.sequence
+            .blocks
+            .partition_point(|block| morton_cmp(&block.first, p) != Ordering::Greater)
+            .saturating_sub(1)
+    }
+
+    /// Appends to `batch` the records with the given numbers (see [`Block::first_record`]), in the
+    /// order given, which must be ascending.
+    pub fn fetch(&self, numbers: &[u64], fetch: &mut Fetch, batch: &mut PointBatch) -> Result<()> {
+        fetch.sources.clear();
+        for (slot, &number) in numbers.iter().enumerate() {
+            let source = fetch.ref_of(&self.refs, number)?;
+            fetch.sources.push((source, slot as u32));
+        }
+        fetch.sources.sort_unstable();
+        let stride = batch.schema().stride;
+        let start = batch.len();
+        if start + numbers.len() > batch.capacity() {
+            return Err(Error::internal("more records fetched than the batch takes"));
+        }
+        let mut records =
+            batch.refill_after(start, numbers.len()).chunks_exact_mut(stride).collect::<Vec<_>>();
+        for group in fetch.sources.chunk_by(|a, b| a.0 / PIECE as u64 == b.0 / PIECE as u64) {
+            let (Some(&(first, _)), Some(&(last, _))) = (group.first(), group.last()) else {
+                continue;
+            };
+            fetch.records.resize((last - first + 1) as usize * stride, 0);
+            self.records.read(first, &mut fetch.records)?;
+            for &(source, slot) in group {
+                let at = (source - first) as usize * stride;
+                records[slot as usize].copy_from_slice(&fetch.records[at..at + stride]);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Why a scan could not be cut.
+#[derive(Debug)]
+pub enum CutError {
+    /// A cube of the smallest side holds more positions than fit.
+    TooHeavy {
+        /// The cube.
+        key: TileKey,
+        /// Positions in it and what is around it that its cells need.
+        positions: u64,
+    },
+    /// The spill could not be read.
+    Read(Error),
+}
+
+impl From<Error> for CutError {
+    fn from(error: Error) -> Self {
+        CutError::Read(error)
+    }
+}
+
+/// What fetching records needs and keeps from call to call.
+#[derive(Debug, Default)]
+pub struct Fetch {
+    sources: Vec<(u64, u32)>,
+    records: Vec<u8>,
+    refs: Vec<u8>,
+    refs_piece: Option<u64>,
+}
+
+impl Fetch {
+    /// Bytes that fetching `count` records of `stride` bytes holds.
+    pub fn bytes(count: usize, stride: usize) -> u64 {
+        (count * (size_of::<(u64, u32)>() + size_of::<&mut [u8]>()) + PIECE * (stride + 8)) as u64
+    }
+
+    /// Where the record numbered `number` in canonical order is stored.
+    fn ref_of(&mut self, refs: &Pieces, number: u64) -> Result<u64> {
+        const WINDOW: u64 = 256;
+        let window = number / WINDOW;
+        if self.refs_piece != Some(window) {
+            self.refs.resize(WINDOW as usize * 8, 0);
+            let stored = refs.stored_in(window * WINDOW)?.min(WINDOW as usize);
+            refs.read(window * WINDOW, &mut self.refs[..stored * 8])?;
+            self.refs_piece = Some(window);
+        }
+        let at = (number % WINDOW) as usize * 8;
+        let mut bytes = [0; 8];
+        bytes.copy_from_slice(&self.refs[at..at + 8]);
+        Ok(u64::from_le_bytes(bytes))
+    }
+}
+
+/// Memory that the index of `positions` positions takes, for a plan.
+pub fn index_bytes(positions: u64) -> u64 {
+    positions.div_ceil(BLOCK as u64) * (size_of::<Block>() as u64 + 8)
+}
