@@ -1,5 +1,25 @@
 //! What a run says it did: the ledger, the errors of tiles and scan, and how they are merged.
 
+mod deviations;
+mod document;
+mod figures;
+mod ledger;
+mod machine;
+mod moments;
+mod sums;
+mod survey;
+mod table;
 mod tally;
 
+pub use deviations::{Deviations, Histogram};
+pub use document::{Decision, FileFigures, Outcome, Phase, Report, RunFigures, result_bytes};
+pub use figures::{DeviationFigures, DeviationTotals, Pair, PlaneFigures, TileFigures, Totals};
+pub use ledger::{Ledger, Removed};
+pub use machine::{Machine, peak_memory, resident_now};
+pub use moments::{Moments, Plane};
+pub use sums::{Distances, FixedSum};
+pub use survey::{
+    FittedScan, FittedTile, PlaneDistances, ScanSurvey, TileSurvey, report_tile_level,
+};
+pub use table::Table;
 pub use tally::Tally;

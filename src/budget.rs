@@ -1,0 +1,360 @@
+//! The one place that counts bytes: memory is leased from the budget before it is allocated.
+
+use std::fmt;
+use std::fs;
+use std::path::{Component, Path};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::{Error, Result};
+
+const MIB: u64 = 1 << 20;
+
+/// What is taken for the machine's memory where the system does not tell.
+const ASSUMED_MEMORY: u64 = 4 << 30;
+
+/// A number of bytes that is shared by everything in a run that grows with its settings or its scan.
+/// Clones are the same budget.
+///
+/// What is leased: spill buffers, tiles and their rims, indices, stage arenas, encoder and decoder
+/// buffers, caches, mapped windows of files. What is not counted, and has to be left room for by
+/// whoever sets the limit: the program's own code and statics, stacks of threads, the allocator's
+/// slack, headers and VLRs, and small values of fixed size.
+///
+/// A lease never waits. Threads that wait for memory must take leases in tile order, or they can wait
+/// for each other; that order is the caller's job.
+#[derive(Debug, Clone)]
+pub struct Budget(Arc<Account>);
+
+#[derive(Debug)]
+struct Account {
+    limit: u64,
+    used: AtomicU64,
+    peak: AtomicU64,
+}
+
+impl Budget {
+    /// A budget of `limit` bytes.
+    pub fn new(limit: u64) -> Self {
+        Budget(Arc::new(Account { limit, used: AtomicU64::new(0), peak: AtomicU64::new(0) }))
+    }
+
+    /// Leases `bytes` for `what` (a noun that completes "the … needs").
+    ///
+    /// Fails with [`ErrorKind::Memory`](crate::ErrorKind::Memory) if less is free; the message names
+    /// what was asked for, what is free, and the budget that would do.
+    pub fn lease(&self, bytes: u64, what: &'static str) -> Result<Lease> {
+        self.try_lease(bytes, what).ok_or_else(|| self.refusal(bytes, what))
+    }
+
+    /// Leases `bytes` for `what`, or nothing if less is free.
+    pub fn try_lease(&self, bytes: u64, what: &'static str) -> Option<Lease> {
+        self.take(bytes).then(|| Lease { budget: self.clone(), bytes, what })
+    }
+
+    /// Bytes leased now.
+    pub fn used(&self) -> u64 {
+        self.0.used.load(Ordering::Relaxed)
+    }
+
+    /// Bytes not leased now.
+    pub fn free(&self) -> u64 {
+        self.0.limit.saturating_sub(self.used())
+    }
+
+    /// The most bytes that were leased at once.
+    pub fn peak(&self) -> u64 {
+        self.0.peak.load(Ordering::Relaxed)
+    }
+
+    /// The limit in bytes.
+    pub fn limit(&self) -> u64 {
+        self.0.limit
+    }
+
+    fn take(&self, bytes: u64) -> bool {
+        let within = |used: u64| used.checked_add(bytes).filter(|&sum| sum <= self.0.limit);
+        // Only counters: no other memory is ordered by them.
+        match self.0.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, within) {
+            Ok(before) => {
+                self.0.peak.fetch_max(before + bytes, Ordering::Relaxed);
+                true
+            }
+            Err(_) => false,
+        }
+    }
+
+    fn give_back(&self, bytes: u64) {
+        self.0.used.fetch_sub(bytes, Ordering::Relaxed);
+    }
+
+    fn refusal(&self, bytes: u64, what: &str) -> Error {
+        let used = self.used();
+        let enough = used.saturating_add(bytes);
+        Error::memory(format!(
+            "the {what} needs {} of memory, but {} of the budget of {} is free",
+            Bytes(bytes),
+            Bytes(self.0.limit.saturating_sub(used)),
+            Bytes(self.0.limit)
+        ))
+        .help(format!("set memory to at least {}", whole_mebibytes(enough)))
+    }
+}
+
+/// Bytes held of a [`Budget`]; they go back when it is dropped.
+#[derive(Debug)]
+#[must_use = "the bytes go back as soon as the lease is dropped"]
+pub struct Lease {
+    budget: Budget,
+    bytes: u64,
+    what: &'static str,
+}
+
+impl Lease {
+    /// Bytes held.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Leases `more` bytes; fails as [`Budget::lease`] does, and then holds what it held.
+    pub fn grow(&mut self, more: u64) -> Result<()> {
+        if !self.budget.take(more) {
+            return Err(self.budget.refusal(more, self.what));
+        }
+        self.bytes += more;
+        Ok(())
+    }
+
+    /// Gives `less` bytes back, at most what is held.
+    pub fn shrink(&mut self, less: u64) {
+        let less = less.min(self.bytes);
+        self.bytes -= less;
+        self.budget.give_back(less);
+    }
+
+    /// Grows or shrinks to `bytes`; fails as [`Lease::grow`] does.
+    pub fn resize(&mut self, bytes: u64) -> Result<()> {
+        match bytes.checked_sub(self.bytes) {
+            Some(more) => self.grow(more),
+            None => {
+                self.shrink(self.bytes - bytes);
+                Ok(())
+            }
+        }
+    }
+}
+
+impl Drop for Lease {
+    fn drop(&mut self) {
+        self.budget.give_back(self.bytes);
+    }
+}
+
+/// A number of bytes in the largest binary unit, to read: `1.5 GiB`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bytes(pub u64);
+
+impl fmt::Display for Bytes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let units = [(40, "TiB"), (30, "GiB"), (20, "MiB"), (10, "KiB")];
+        match units.into_iter().find(|&(bits, _)| self.0 >> bits > 0) {
+            None => write!(f, "{} B", self.0),
+            Some((bits, unit)) => {
+                let value = self.0 as f64 / (1u64 << bits) as f64;
+                let decimals = usize::from(value < 100.0 && value != value.trunc());
+                write!(f, "{value:.decimals$} {unit}")
+            }
+        }
+    }
+}
+
+/// A budget as one writes it, rounded up: `137MiB`.
+pub fn whole_mebibytes(bytes: u64) -> String {
+    format!("{}MiB", bytes.div_ceil(MIB).max(1))
+}
+
+/// The budget of a run that names none: half of the machine's memory or of the smallest limit of a
+/// control group around this process, whichever is less.
+pub fn default_limit() -> u64 {
+    let installed = fs::read_to_string("/proc/meminfo").ok().and_then(|text| total_memory(&text));
+    let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+    let limit = group_limit(Path::new("/sys/fs/cgroup"), &groups).unwrap_or(u64::MAX);
+    installed.unwrap_or(ASSUMED_MEMORY).min(limit) / 2
+}
+
+/// `MemTotal` of /proc/meminfo (proc(5)), in bytes.
+fn total_memory(meminfo: &str) -> Option<u64> {
+    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
+}
+
+/// The smallest memory limit of the control groups that /proc/self/cgroup names (cgroups(7)) and of
+/// those around them, mounted at `root`. A line is `hierarchy:controllers:path`; version 2 has number
+/// 0 and no controllers.
+fn group_limit(root: &Path, groups: &str) -> Option<u64> {
+    let mut smallest = None;
+    for line in groups.lines() {
+        let mut fields = line.splitn(3, ':');
+        let (Some(number), Some(controllers), Some(path)) =
+            (fields.next(), fields.next(), fields.next())
+        else {
+            continue;
+        };
+        let limits = if number == "0" && controllers.is_empty() {
+            // Beside version 1, version 2 is mounted at `unified`.
+            [(root.to_owned(), "memory.max"), (root.join("unified"), "memory.max")]
+                .map(|(mount, file)| limit_along(&mount, path, file))
+        } else if controllers.split(',').any(|name| name == "memory") {
+            [limit_along(&root.join("memory"), path, "memory.limit_in_bytes"), None]
+        } else {
+            continue;
+        };
+        smallest = limits.into_iter().flatten().chain(smallest).min();
+    }
+    smallest
+}
+
+/// The smallest figure in `file` of the group at `path` and of every group around it. A group that is
+/// not visible in this mount (a container's) is passed over.
+fn limit_along(mount: &Path, path: &str, file: &str) -> Option<u64> {
+    let names = Path::new(path).components().filter_map(|part| match part {
+        Component::Normal(name) => Some(name),
+        _ => None,
+    });
+    let mut folder = mount.to_owned();
+    let mut smallest = limit_in(&folder.join(file));
+    for name in names {
+        folder.push(name);
+        smallest = limit_in(&folder.join(file)).into_iter().chain(smallest).min();
+    }
+    smallest
+}
+
+/// The figure in a limit's file; None if there is none or it says `max`.
+fn limit_in(file: &Path) -> Option<u64> {
+    fs::read_to_string(file).ok()?.trim().parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ErrorKind;
+
+    #[test]
+    fn a_lease_is_returned_on_drop() {
+        let budget = Budget::new(100);
+        let a = budget.lease(60, "tile").unwrap();
+        let b = budget.clone().lease(40, "index").unwrap();
+        assert_eq!((budget.used(), budget.free(), budget.limit()), (100, 0, 100));
+        drop(a);
+        assert_eq!((budget.used(), b.bytes()), (40, 40));
+        drop(b);
+        assert_eq!((budget.used(), budget.peak()), (0, 100));
+    }
+
+    #[test]
+    fn a_refusal_names_what_was_asked_what_is_free_and_what_would_do() {
+        let budget = Budget::new(128 * MIB);
+        let _held = budget.lease(100 * MIB, "index").unwrap();
+        let error = budget.lease(40 * MIB + 1, "tile").unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Memory);
+        assert_eq!(
+            error.to_string(),
+            "the tile needs 40.0 MiB of memory, but 28 MiB of the budget of 128 MiB is free"
+        );
+        assert_eq!(error.remedy(), Some("set memory to at least 141MiB"));
+        assert_eq!(budget.used(), 100 * MIB);
+    }
+
+    #[test]
+    fn the_budget_that_a_refusal_names_would_do() {
+        let budget = Budget::new(10);
+        let error = budget.lease(3 * MIB, "tile").unwrap_err();
+        assert_eq!(error.remedy(), Some("set memory to at least 3MiB"));
+        assert!(Budget::new(3 * MIB).lease(3 * MIB, "tile").is_ok());
+    }
+
+    #[test]
+    fn sums_beyond_u64_are_refused_and_do_not_wrap() {
+        let budget = Budget::new(u64::MAX);
+        let mut lease = budget.lease(u64::MAX - 1, "tile").unwrap();
+        assert!(budget.try_lease(2, "tile").is_none());
+        assert!(lease.grow(u64::MAX).is_err());
+        assert_eq!(lease.bytes(), u64::MAX - 1);
+    }
+
+    #[test]
+    fn a_lease_grows_and_shrinks_within_the_budget() {
+        let budget = Budget::new(100);
+        let mut lease = budget.lease(10, "cache").unwrap();
+        lease.grow(90).unwrap();
+        assert!(lease.grow(1).is_err());
+        lease.shrink(30);
+        assert_eq!((lease.bytes(), budget.used()), (70, 70));
+        lease.resize(20).unwrap();
+        lease.resize(25).unwrap();
+        assert_eq!((lease.bytes(), budget.used()), (25, 25));
+        lease.shrink(1000);
+        assert_eq!((lease.bytes(), budget.used()), (0, 0));
+    }
+
+    #[test]
+    fn threads_never_hold_more_than_the_limit() {
+        let budget = Budget::new(1000);
+        let refused = AtomicU64::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    for i in 0..10_000 {
+                        match budget.try_lease(300 + i % 7, "tile") {
+                            Some(lease) => drop(lease),
+                            None => _ = refused.fetch_add(1, Ordering::Relaxed),
+                        }
+                        assert!(budget.used() <= 1000);
+                    }
+                });
+            }
+        });
+        assert_eq!(budget.used(), 0);
+        assert!((300..=1000).contains(&budget.peak()));
+    }
+
+    #[test]
+    fn bytes_are_shown_in_the_largest_unit() {
+        let text =
+            [0, 1023, 1024, 1536, 200 * MIB + 300_000, 3 << 39].map(|n| Bytes(n).to_string());
+        assert_eq!(text, ["0 B", "1023 B", "1 KiB", "1.5 KiB", "200 MiB", "1.5 TiB"]);
+    }
+
+    #[test]
+    fn the_default_is_half_of_some_memory() {
+        assert!(default_limit() > 16 * MIB && default_limit() <= u64::MAX / 2);
+        assert_eq!(
+            total_memory("MemTotal:       16316284 kB\nMemFree: 1 kB\n"),
+            Some(16316284 << 10)
+        );
+        assert_eq!(total_memory("MemFree: 1 kB\n"), None);
+    }
+
+    #[test]
+    fn the_smallest_limit_of_nested_groups_counts() {
+        let root = tempfile::tempdir().unwrap();
+        let write = |path: &str, text: &str| {
+            let path = root.path().join(path);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        };
+        assert_eq!(group_limit(root.path(), "0::/a/b\n"), None);
+        write("memory.max", "max\n");
+        write("a/memory.max", "5000\n");
+        write("a/b/memory.max", "max\n");
+        assert_eq!(group_limit(root.path(), "0::/a/b\n"), Some(5000));
+        assert_eq!(group_limit(root.path(), "0::/a/b/c\n"), Some(5000));
+        assert_eq!(group_limit(root.path(), "0::/\n"), None);
+        write("memory/memory.limit_in_bytes", "9223372036854771712\n");
+        write("memory/x/memory.limit_in_bytes", "4000\n");
+        let both = "9:name=systemd:/a\n4:cpu,memory:/x/y\n0::/../a\n";
+        assert_eq!(group_limit(root.path(), both), Some(4000));
+        assert_eq!(group_limit(root.path(), "4:memory:/elsewhere\n"), Some(9223372036854771712));
+    }
+}

@@ -1,0 +1,267 @@
+//! The report as a document: `result`, the same bytes for every configuration, and `run`.
+
+use std::collections::BTreeMap;
+use std::io::{self, BufRead, Write};
+
+use serde::Serialize;
+
+use super::figures::Totals;
+use super::ledger::Ledger;
+use super::machine::Machine;
+
+/// What a run says it did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// The same for every configuration of the run.
+    pub result: Outcome,
+    /// What is free to differ.
+    pub run: RunFigures,
+}
+
+/// What was decided, removed and measured: a function of the points and the pipeline alone. The
+/// report tiles belong to it, but are not held: there may be millions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The pipeline's stages with all their settings, defaults filled in.
+    pub pipeline: serde_json::Value,
+    /// World units of one lattice step.
+    pub lattice_step: f64,
+    /// World coordinates of lattice position 0.
+    pub lattice_shift: [f64; 3],
+    /// read = kept + removed.
+    pub ledger: Ledger,
+    /// What stages settled by themselves.
+    pub decisions: Vec<Decision>,
+    /// Counts by name.
+    pub counts: BTreeMap<String, u64>,
+    /// Side of the report tiles in world units; None if the pipeline streams, which has no tiles.
+    pub tile_side: Option<f64>,
+    /// Figures of the whole scan; None likewise.
+    pub totals: Option<Totals>,
+}
+
+/// Something that a stage settled by itself.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Decision {
+    /// Kind of the stage.
+    pub stage: String,
+    /// What was settled.
+    pub name: String,
+    /// To what.
+    pub value: serde_json::Value,
+}
+
+/// How the run went.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RunFigures {
+    /// Version of pointmill.
+    pub version: String,
+    /// Files read, in order.
+    pub inputs: Vec<FileFigures>,
+    /// Files written.
+    pub outputs: Vec<FileFigures>,
+    /// Where it ran.
+    pub machine: Machine,
+    /// Worker threads.
+    pub threads: usize,
+    /// The memory budget.
+    pub memory_bytes: u64,
+    /// The most that was leased of it at once.
+    pub leased_bytes: u64,
+    /// Peak resident memory of the process (VmHWM); None where the system does not tell.
+    pub peak_memory_bytes: Option<u64>,
+    /// Bytes spilled to disk.
+    pub spill_bytes: u64,
+    /// Wall-clock seconds in all.
+    pub seconds: f64,
+    /// Wall-clock seconds by phase, in the order of the run.
+    pub phases: Vec<Phase>,
+    /// Counts that depend on how the work was cut up (tiles, rim positions, …).
+    pub work: BTreeMap<String, u64>,
+    /// What the user was warned of.
+    pub warnings: Vec<String>,
+}
+
+/// A file and the records in it.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct FileFigures {
+    /// Path as given.
+    pub path: String,
+    /// Records.
+    pub points: u64,
+    /// Length; None where it is not known.
+    pub bytes: Option<u64>,
+}
+
+/// A phase of the run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Phase {
+    /// What was done.
+    pub name: String,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+}
+
+impl Report {
+    /// Writes the report as one JSON object, `result` first. `tiles` are the lines of
+    /// [`TileFigures::write_line`](super::TileFigures::write_line) in Morton order; they are copied
+    /// through a small buffer, however many they are.
+    ///
+    /// Fails where `out` or `tiles` does, and with [`io::ErrorKind::InvalidData`] if there are not
+    /// as many tiles as the totals say.
+    pub fn write(&self, out: &mut impl Write, tiles: &mut impl BufRead) -> io::Result<()> {
+        out.write_all(b"{\n\"result\": ")?;
+        self.result.write(out, tiles)?;
+        out.write_all(b",\n\"run\": ")?;
+        self.run.write(out)?;
+        out.write_all(b"\n}\n")
+    }
+}
+
+impl Outcome {
+    /// Writes `result` alone, as in [`Report::write`].
+    pub fn write(&self, out: &mut impl Write, tiles: &mut impl BufRead) -> io::Result<()> {
+        let lattice = LatticeFigures { step: self.lattice_step, shift: self.lattice_shift };
+        let mut object = Object::open(out)?;
+        object.entry("pipeline", &self.pipeline)?;
+        object.entry("lattice", &lattice)?;
+        object.entry("ledger", &self.ledger)?;
+        object.entry("decisions", &self.decisions)?;
+        object.entry("counts", &self.counts)?;
+        object.entry("totals", &self.totals)?;
+        object.entry("tile_side", &self.tile_side)?;
+        object.key("tiles")?;
+        let copied = copy_lines(object.out, tiles)?;
+        let expected = self.totals.map_or(0, |t| t.tiles);
+        if copied != expected {
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                format!("{copied} report tiles instead of {expected}"),
+            ));
+        }
+        object.close()
+    }
+
+    /// The canonical bytes of `result`, to compare runs by; holds all of `tiles`.
+    pub fn bytes(&self, tiles: &mut impl BufRead) -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        self.write(&mut bytes, tiles)?;
+        Ok(bytes)
+    }
+}
+
+/// The bytes of `result` in a report written by [`Report::write`]; None if it is not one.
+pub fn result_bytes(report: &[u8]) -> Option<&[u8]> {
+    // JSON text holds no line break within a string, so the line that opens `run` is unmistakable.
+    const RUN: &[u8] = b",\n\"run\": ";
+    let rest = report.strip_prefix(b"{\n\"result\": ")?;
+    let end = rest.windows(RUN.len()).position(|window| window == RUN)?;
+    rest.get(..end)
+}
+
+#[derive(Serialize)]
+struct LatticeFigures {
+    step: f64,
+    shift: [f64; 3],
+}
+
+impl RunFigures {
+    fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        let mut object = Object::open(out)?;
+        object.entry("version", &self.version)?;
+        object.entry("inputs", &self.inputs)?;
+        object.entry("outputs", &self.outputs)?;
+        object.entry("machine", &self.machine)?;
+        object.entry("threads", &self.threads)?;
+        object.entry("memory_bytes", &self.memory_bytes)?;
+        object.entry("leased_bytes", &self.leased_bytes)?;
+        object.entry("peak_memory_bytes", &self.peak_memory_bytes)?;
+        object.entry("spill_bytes", &self.spill_bytes)?;
+        object.entry("seconds", &self.seconds)?;
+        object.entry("phases", &self.phases)?;
+        object.entry("work", &self.work)?;
+        object.entry("warnings", &self.warnings)?;
+        object.close()
+    }
+}
+
+/// A JSON object written one entry a line, in the order of the calls.
+struct Object<'a, W> {
+    out: &'a mut W,
+    empty: bool,
+}
+
+impl<'a, W: Write> Object<'a, W> {
+    fn open(out: &'a mut W) -> io::Result<Self> {
+        out.write_all(b"{")?;
+        Ok(Object { out, empty: true })
+    }
+
+    fn key(&mut self, key: &str) -> io::Result<()> {
+        let before: &[u8] = if self.empty { b"\n" } else { b",\n" };
+        self.empty = false;
+        self.out.write_all(before)?;
+        serde_json::to_writer(&mut *self.out, key)?;
+        self.out.write_all(b": ")
+    }
+
+    fn entry(&mut self, key: &str, value: &impl Serialize) -> io::Result<()> {
+        self.key(key)?;
+        serde_json::to_writer(&mut *self.out, value)?;
+        Ok(())
+    }
+
+    fn close(self) -> io::Result<()> {
+        self.out.write_all(b"\n}")
+    }
+}
+
+/// Writes lines of JSON as one array; returns how many there were.
+fn copy_lines(out: &mut impl Write, lines: &mut impl BufRead) -> io::Result<u64> {
+    out.write_all(b"[")?;
+    let mut count = 0u64;
+    let mut within = false;
+    loop {
+        let block = match lines.fill_buf() {
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
+            block => block?,
+        };
+        if block.is_empty() {
+            break;
+        }
+        let length = block.len();
+        for piece in block.split_inclusive(|&b| b == b'\n') {
+            let text = piece.strip_suffix(b"\n").unwrap_or(piece);
+            if !within && !text.is_empty() {
+                out.write_all(if count == 0 { b"\n" } else { b",\n" })?;
+                count += 1;
+            }
+            out.write_all(text)?;
+            // A line may go on in the next block.
+            within = text.len() == piece.len();
+        }
+        lines.consume(length);
+    }
+    out.write_all(if count == 0 { b"]" } else { b"\n]" })?;
+    Ok(count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::BufReader;
+
+    #[test]
+    fn lines_become_an_array_whatever_the_buffer() {
+        let lines = b"{\"a\":1}\n{\"b\":[2,3]}\n\n{}\n";
+        for capacity in 1..30 {
+            let mut out = Vec::new();
+            let n = copy_lines(&mut out, &mut BufReader::with_capacity(capacity, &lines[..]));
+            assert_eq!(n.unwrap(), 3);
+            assert_eq!(out, b"[\n{\"a\":1},\n{\"b\":[2,3]},\n{}\n]");
+        }
+        let mut out = Vec::new();
+        assert_eq!(copy_lines(&mut out, &mut &b""[..]).unwrap(), 0);
+        assert_eq!(out, b"[]");
+    }
+}

@@ -1,0 +1,179 @@
+//! Sums of floats that come out the same in any order. Knows no points.
+
+/// Bits behind the point of a [`FixedSum`].
+const FRACTION: i32 = 64;
+/// Binary exponent of the last bit of a normal f64 whose exponent field is 0.
+const LAST_BIT: i32 = 1075;
+
+/// A sum of figures ≥ 0, each rounded once to a multiple of 2^-64 and then added exactly, in 256
+/// bits: any order and any split of the figures give the same sum.
+///
+/// Holds 2^64 figures below 2^128, and then stays at its largest value.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct FixedSum {
+    high: u128,
+    low: u128,
+}
+
+impl FixedSum {
+    /// The largest sum, where everything beyond ends.
+    const FULL: FixedSum = FixedSum { high: u128::MAX, low: u128::MAX };
+
+    /// Adds `figure` (finite, ≥ 0; its sign is not looked at) `times` times.
+    pub fn add(&mut self, figure: f64, times: u32) {
+        let bits = figure.to_bits();
+        let field = (bits >> 52 & 0x7ff) as i32;
+        let hidden = u64::from(field > 0) << 52;
+        let mantissa = bits & ((1 << 52) - 1) | hidden;
+        let shift = field.max(1) - LAST_BIT + FRACTION;
+        let product = u128::from(rounded(mantissa, shift)) * u128::from(times);
+        // A product has up to 85 bits: 43 more fit into 128.
+        if shift <= 43 {
+            self.plus(0, product << shift.max(0));
+        } else if shift < 128 {
+            self.plus(product >> (128 - shift), product << shift);
+        } else if shift < 171 {
+            self.plus(product << (shift - 128), 0);
+        } else {
+            *self = FixedSum::FULL;
+        }
+    }
+
+    /// Adds another sum.
+    pub fn merge(&mut self, other: &FixedSum) {
+        self.plus(other.high, other.low);
+    }
+
+    fn plus(&mut self, high: u128, low: u128) {
+        let (low, carry) = self.low.overflowing_add(low);
+        let sum = self.high.checked_add(high).and_then(|h| h.checked_add(u128::from(carry)));
+        *self = sum.map_or(FixedSum::FULL, |high| FixedSum { high, low });
+    }
+
+    /// The sum, rounded to f64 (relative error below 2^-51).
+    pub fn value(&self) -> f64 {
+        const TWO_64: f64 = (1u128 << 64) as f64;
+        self.high as f64 * TWO_64 + self.low as f64 / TWO_64
+    }
+}
+
+/// `mantissa` · 2^`shift` rounded half up where the shift is negative; else `mantissa` itself.
+fn rounded(mantissa: u64, shift: i32) -> u64 {
+    match shift {
+        0.. => mantissa,
+        -62..0 => (mantissa + (1 << (-shift - 1))) >> -shift,
+        _ => 0,
+    }
+}
+
+/// Distances of records to a plane: their number, their sum and that of their squares.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Distances {
+    count: u64,
+    sum: FixedSum,
+    squares: FixedSum,
+}
+
+impl Distances {
+    /// Adds `copies` records at `distance` (any sign) in lattice steps.
+    pub fn add(&mut self, distance: f64, copies: u32) {
+        self.count += u64::from(copies);
+        self.sum.add(distance, copies);
+        self.squares.add(distance * distance, copies);
+    }
+
+    /// Adds other distances.
+    pub fn merge(&mut self, other: &Distances) {
+        self.count += other.count;
+        self.sum.merge(&other.sum);
+        self.squares.merge(&other.squares);
+    }
+
+    /// Records.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// sqrt(Σd²/n) in lattice steps; None without records.
+    pub fn rms(&self) -> Option<f64> {
+        (self.count > 0).then(|| (self.squares.value() / self.count as f64).sqrt())
+    }
+
+    /// Σ|d|/n in lattice steps; None without records.
+    pub fn mean(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.sum.value() / self.count as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sum_of(figures: &[f64]) -> FixedSum {
+        let mut sum = FixedSum::default();
+        figures.iter().for_each(|&f| sum.add(f, 1));
+        sum
+    }
+
+    #[test]
+    fn whole_figures_are_summed_exactly() {
+        assert_eq!(sum_of(&[1.0, 2.0, 3.5]).value(), 6.5);
+        let big = 2f64.powi(100);
+        assert_eq!(sum_of(&[big, 0.5, big]).value(), 2.0 * big);
+        let mut difference = sum_of(&[big, 0.5]);
+        difference.merge(&sum_of(&[big]));
+        assert_eq!(difference, sum_of(&[0.5, big, big]));
+    }
+
+    #[test]
+    fn tiny_figures_round_to_the_nearest_step() {
+        let step = 2f64.powi(-64);
+        assert_eq!(sum_of(&[step]).value(), step);
+        assert_eq!(sum_of(&[0.75 * step]).value(), step);
+        assert_eq!(sum_of(&[0.25 * step]).value(), 0.0);
+        assert_eq!(sum_of(&[f64::MIN_POSITIVE, f64::from_bits(1)]).value(), 0.0);
+    }
+
+    #[test]
+    fn a_sum_that_is_full_stays_full_in_any_order() {
+        let big = 2f64.powi(500);
+        assert_eq!(sum_of(&[big, 1.0]), FixedSum::FULL);
+        assert_eq!(sum_of(&[1.0, big]), FixedSum::FULL);
+        let mut twice = FixedSum::FULL;
+        twice.merge(&FixedSum::FULL);
+        assert_eq!(twice, FixedSum::FULL);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn one_add_is_the_rounded_figure(
+            mantissa in 1f64..2.0, exponent in -11i32..127, times in 1u32..,
+        ) {
+            let figure = mantissa * 2f64.powi(exponent);
+            let mut sum = FixedSum::default();
+            sum.add(figure, 1);
+            proptest::prop_assert_eq!(sum.value(), figure);
+            let mut many = FixedSum::default();
+            many.add(figure, times);
+            let expected = figure * f64::from(times);
+            proptest::prop_assert!((many.value() - expected).abs() <= expected * 2f64.powi(-51));
+        }
+
+        #[test]
+        fn order_split_and_copies_change_no_bit(
+            figures in proptest::collection::vec((0f64..1e12, -30i32..60), 1..40), cut in 0usize..40,
+        ) {
+            let figures: Vec<f64> = figures.iter().map(|(f, e)| f * 2f64.powi(*e)).collect();
+            let whole = sum_of(&figures);
+            let (a, b) = figures.split_at(cut.min(figures.len()));
+            let mut merged = sum_of(&b.iter().rev().copied().collect::<Vec<_>>());
+            merged.merge(&sum_of(a));
+            proptest::prop_assert_eq!(merged, whole);
+            let (mut thrice, mut once) = (FixedSum::default(), whole);
+            figures.iter().for_each(|&f| thrice.add(f, 3));
+            once.merge(&whole);
+            once.merge(&whole);
+            proptest::prop_assert_eq!(thrice, once);
+        }
+    }
+}

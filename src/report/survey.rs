@@ -1,0 +1,307 @@
+//! The pass over all positions, after the last stage, that measures what the reduction did: planes
+//! per report tile and over the scan, and deviations of what was removed.
+//!
+//! A tile is walked twice, and so is the scan: moments first, then distances to the fitted planes.
+//!
+//! ```text
+//! ScanSurvey::new(bounds)                     per thread; merged
+//!   per tile: TileSurvey::new(key) ─ add… ─ fit ─ FittedTile ─ measure… ─ finish ─ TileFigures
+//!   and ScanSurvey::add for the same positions
+//! ScanSurvey::fit ─ FittedScan ─ part ─ measure… ─ merge ─ finish ─ Totals
+//! ```
+
+use super::deviations::{Deviations, Histogram};
+use super::figures::{
+    DeviationFigures, DeviationTotals, Pair, PlaneFigures, TileFigures, Totals, world_length,
+};
+use super::moments::{Moments, Plane};
+use super::sums::Distances;
+use crate::geom::lattice::Lattice;
+use crate::point::{Bounds, Position};
+use crate::tile::{Fate, Levels, TileKey};
+use crate::{Error, Result};
+
+/// Positions that an occupied report tile holds on average, at least.
+const POSITIONS_PER_TILE: u64 = 4096;
+
+/// Binary logarithm of the side of report tiles in lattice steps: the smallest for which an occupied
+/// one holds 4,096 positions on average.
+pub fn report_tile_level(levels: &Levels) -> u32 {
+    levels.smallest_side(POSITIONS_PER_TILE)
+}
+
+/// How many of the copies of a position are kept.
+fn kept(copies: u32, fate: Fate) -> u32 {
+    match fate {
+        Fate::Kept => copies,
+        Fate::KeptOnce => copies.min(1),
+        Fate::Represented { .. } => 0,
+    }
+}
+
+/// How many are removed, and how far they are from the surface: copies of a kept position are on it.
+fn removed(copies: u32, fate: Fate) -> (u32, f32) {
+    match fate {
+        Fate::Kept => (0, 0.0),
+        Fate::KeptOnce => (copies.saturating_sub(1), 0.0),
+        Fate::Represented { deviation } => (copies, deviation),
+    }
+}
+
+/// The first walk over a report tile: moments of its records before and after the reduction.
+#[derive(Debug, Clone)]
+pub struct TileSurvey {
+    key: TileKey,
+    moments: Pair<Moments>,
+    deviations: Deviations,
+}
+
+impl TileSurvey {
+    /// A survey of the records in the cube of `key`.
+    pub fn new(key: TileKey) -> Self {
+        let moments = Moments::for_bounds(&key.cube());
+        TileSurvey {
+            key,
+            moments: Pair { before: moments.clone(), after: moments },
+            deviations: Deviations::default(),
+        }
+    }
+
+    /// Adds `copies` records at `position`, which is in the cube.
+    pub fn add(&mut self, position: Position, copies: u32, fate: Fate) {
+        self.moments.before.add(position, copies);
+        self.moments.after.add(position, kept(copies, fate));
+        let (removed, deviation) = removed(copies, fate);
+        self.deviations.add(deviation, position, removed);
+    }
+
+    /// Adds what another walk over other records of the same tile saw.
+    pub fn merge(&mut self, other: &TileSurvey) {
+        self.moments.before.merge(&other.moments.before);
+        self.moments.after.merge(&other.moments.after);
+        self.deviations.merge(&other.deviations);
+    }
+
+    /// Ends the first walk: fits the planes.
+    pub fn fit(self) -> FittedTile {
+        FittedTile {
+            key: self.key,
+            points: Pair { before: self.moments.before.count(), after: self.moments.after.count() },
+            distances: PlaneDistances::to(&self.moments),
+            deviations: self.deviations,
+        }
+    }
+}
+
+/// The second walk over a report tile: distances of the same records to its planes.
+#[derive(Debug, Clone)]
+pub struct FittedTile {
+    key: TileKey,
+    points: Pair<u64>,
+    distances: PlaneDistances,
+    deviations: Deviations,
+}
+
+impl FittedTile {
+    /// Adds `copies` records at `position`, as in the first walk.
+    pub fn measure(&mut self, position: Position, copies: u32, fate: Fate) {
+        self.distances.measure(position, copies, fate);
+    }
+
+    /// The tile's figures in world units; its sums go into the totals of `scan`.
+    ///
+    /// Fails with [`ErrorKind::Internal`](crate::ErrorKind::Internal) if the two walks did not see
+    /// the same number of records.
+    pub fn finish(self, lattice: &Lattice, scan: &mut ScanSurvey) -> Result<TileFigures> {
+        self.distances.check(self.points)?;
+        scan.tiles += 1;
+        scan.tile_distances.before.merge(&self.distances.sums.before);
+        scan.tile_distances.after.merge(&self.distances.sums.after);
+        Ok(TileFigures {
+            corner: lattice.world(self.key.corner),
+            points: self.points,
+            plane: plane_figures(&self.distances.sums, lattice),
+            deviation: deviation_figures(&self.deviations, lattice),
+        })
+    }
+}
+
+/// What is summed over the whole scan in its first walk. Surveys of parts of the scan are merged, in
+/// any order.
+#[derive(Debug, Clone)]
+pub struct ScanSurvey {
+    moments: Pair<Moments>,
+    deviations: Deviations,
+    histogram: Histogram,
+    tiles: u64,
+    tile_distances: Pair<Distances>,
+}
+
+impl ScanSurvey {
+    /// Bytes that a survey holds, whatever the scan.
+    pub const BYTES: u64 = Histogram::BYTES + size_of::<ScanSurvey>() as u64;
+
+    /// A survey of a scan, or of a part of it; `bounds` is the box of the *whole* scan.
+    pub fn new(bounds: &Bounds) -> Self {
+        let moments = Moments::for_bounds(bounds);
+        ScanSurvey {
+            moments: Pair { before: moments.clone(), after: moments },
+            deviations: Deviations::default(),
+            histogram: Histogram::default(),
+            tiles: 0,
+            tile_distances: Pair::default(),
+        }
+    }
+
+    /// Adds `copies` records at `position`.
+    pub fn add(&mut self, position: Position, copies: u32, fate: Fate) {
+        self.moments.before.add(position, copies);
+        self.moments.after.add(position, kept(copies, fate));
+        let (removed, deviation) = removed(copies, fate);
+        if removed > 0 {
+            self.deviations.add(deviation, position, removed);
+            self.histogram.add(deviation, removed);
+        }
+    }
+
+    /// Adds what was summed over another part of the scan.
+    pub fn merge(&mut self, other: &ScanSurvey) {
+        self.moments.before.merge(&other.moments.before);
+        self.moments.after.merge(&other.moments.after);
+        self.deviations.merge(&other.deviations);
+        self.histogram.merge(&other.histogram);
+        self.tiles += other.tiles;
+        self.tile_distances.before.merge(&other.tile_distances.before);
+        self.tile_distances.after.merge(&other.tile_distances.after);
+    }
+
+    /// Ends the first walk: fits the planes of the scan.
+    pub fn fit(self) -> FittedScan {
+        let distances = PlaneDistances::to(&self.moments);
+        FittedScan { survey: self, distances }
+    }
+}
+
+/// The scan after its first walk. The second is made in parts, one for each thread, that are merged.
+#[derive(Debug, Clone)]
+pub struct FittedScan {
+    survey: ScanSurvey,
+    distances: PlaneDistances,
+}
+
+impl FittedScan {
+    /// An empty part of the second walk.
+    pub fn part(&self) -> PlaneDistances {
+        PlaneDistances { planes: self.distances.planes, sums: Pair::default() }
+    }
+
+    /// Adds a part of the second walk.
+    pub fn merge(&mut self, part: &PlaneDistances) {
+        self.distances.sums.before.merge(&part.sums.before);
+        self.distances.sums.after.merge(&part.sums.after);
+    }
+
+    /// The totals in world units.
+    ///
+    /// Fails with [`ErrorKind::Internal`](crate::ErrorKind::Internal) if the walks over the scan and
+    /// its tiles did not see the same number of records, or a stage reported a deviation that is no
+    /// number.
+    pub fn finish(self, lattice: &Lattice) -> Result<Totals> {
+        let FittedScan { survey, distances } = self;
+        let points =
+            Pair { before: survey.moments.before.count(), after: survey.moments.after.count() };
+        distances.check(points)?;
+        check_walks(points, &survey.tile_distances)?;
+        if survey.deviations.undefined() > 0 {
+            return Err(Error::internal(format!(
+                "{} removed records have a deviation that is no number",
+                survey.deviations.undefined()
+            )));
+        }
+        Ok(Totals {
+            tiles: survey.tiles,
+            points,
+            tile_plane: plane_figures(&survey.tile_distances, lattice),
+            scan_plane: plane_figures(&distances.sums, lattice),
+            deviation: deviation_totals(&survey.deviations, &survey.histogram, lattice),
+        })
+    }
+}
+
+/// Distances of records to the planes fitted before and after the reduction.
+#[derive(Debug, Clone)]
+pub struct PlaneDistances {
+    planes: Pair<Option<Plane>>,
+    sums: Pair<Distances>,
+}
+
+impl PlaneDistances {
+    fn to(moments: &Pair<Moments>) -> Self {
+        let planes =
+            Pair { before: Plane::fit(&moments.before), after: Plane::fit(&moments.after) };
+        PlaneDistances { planes, sums: Pair::default() }
+    }
+
+    /// Adds `copies` records at `position`, as in the first walk.
+    pub fn measure(&mut self, position: Position, copies: u32, fate: Fate) {
+        if let Some(plane) = &self.planes.before {
+            self.sums.before.add(plane.distance(position), copies);
+        }
+        let kept = kept(copies, fate);
+        if let Some(plane) = self.planes.after.as_ref().filter(|_| kept > 0) {
+            self.sums.after.add(plane.distance(position), kept);
+        }
+    }
+
+    fn check(&self, points: Pair<u64>) -> Result<()> {
+        check_walks(points, &self.sums)
+    }
+}
+
+fn check_walks(points: Pair<u64>, measured: &Pair<Distances>) -> Result<()> {
+    let second = Pair { before: measured.before.count(), after: measured.after.count() };
+    if second == points {
+        return Ok(());
+    }
+    Err(Error::internal(format!(
+        "the walks of the survey differ: {} records before and {} after the reduction in the first, \
+         {} and {} in the second",
+        points.before, points.after, second.before, second.after
+    )))
+}
+
+fn plane_figures(sums: &Pair<Distances>, lattice: &Lattice) -> Pair<Option<PlaneFigures>> {
+    let figures = |sums: &Distances| {
+        Some(PlaneFigures { rms: sums.rms()? * lattice.step, mean: sums.mean()? * lattice.step })
+    };
+    Pair { before: figures(&sums.before), after: figures(&sums.after) }
+}
+
+fn deviation_figures(deviations: &Deviations, lattice: &Lattice) -> Option<DeviationFigures> {
+    let (largest, at) = deviations.largest()?;
+    Some(DeviationFigures {
+        points: deviations.count(),
+        rms: deviations.rms()? * lattice.step,
+        max: world_length(largest, lattice),
+        at: lattice.world(at),
+    })
+}
+
+fn deviation_totals(
+    deviations: &Deviations,
+    histogram: &Histogram,
+    lattice: &Lattice,
+) -> Option<DeviationTotals> {
+    let DeviationFigures { points, rms, max, at } = deviation_figures(deviations, lattice)?;
+    // The upper edge of the last bin lies beyond the largest deviation.
+    let percentile = |percent| Some(world_length(histogram.percentile(percent)?, lattice).min(max));
+    Some(DeviationTotals {
+        points,
+        rms,
+        p50: percentile(50)?,
+        p95: percentile(95)?,
+        p99: percentile(99)?,
+        max,
+        at,
+    })
+}
