@@ -14,7 +14,7 @@ const WAVELENGTHS: [f64; 2] = [40.0, 1500.0];
 const STEEPNESS: f64 = 0.012;
 /// Mean height of the ground.
 const ELEVATION: f64 = 120.0;
-/// Side of the squares that hold one building or none; one square is around the origin.
+/// Side of the squares that hold one building or none.
 const PLOT: f64 = 45.0;
 /// Side of the squares that hold one tree or none.
 const GROVE: f64 = 9.0;
@@ -113,7 +113,7 @@ impl Landscape {
         if random.unit() >= 0.7 {
             return None;
         }
-        let center = [i as f64 * PLOT, j as f64 * PLOT];
+        let center = [i, j].map(|k| (k as f64 + 0.5) * PLOT);
         let half_width = random.between(4.0, 8.0);
         let eaves = random.between(3.0, 10.0);
         let pitch = libm::tan(random.between(15.0, 50.0) * (PI / 180.0));
@@ -135,7 +135,7 @@ impl Landscape {
         }
         let radius = random.between(1.5, 4.0);
         let room = GROVE / 2.0 - radius;
-        let center = [i, j].map(|k| k as f64 * GROVE + random.between(-room, room));
+        let center = [i, j].map(|k| (k as f64 + 0.5) * GROVE + random.between(-room, room));
         Some(Tree { center, radius, height: random.between(5.0, 19.0) })
     }
 }
@@ -162,7 +162,7 @@ impl View<'_> {
     }
 
     fn building(&mut self, plan: [f64; 2]) -> Option<Building> {
-        let at = plan.map(|v| nearest(v * (1.0 / PLOT)) as i64);
+        let at = square(plan, PLOT);
         match self.plot {
             Some((plot, building)) if plot == at => building,
             _ => self.plot.insert((at, self.landscape.building(at))).1,
@@ -170,7 +170,7 @@ impl View<'_> {
     }
 
     fn tree(&mut self, plan: [f64; 2]) -> Option<Tree> {
-        let at = plan.map(|v| nearest(v * (1.0 / GROVE)) as i64);
+        let at = square(plan, GROVE);
         match self.grove {
             Some((grove, tree)) if grove == at => tree,
             _ => self.grove.insert((at, self.landscape.tree(at))).1,
@@ -212,6 +212,11 @@ impl Tree {
         let outside = self.height * (0.45 + 0.55 * (1.0 - square).sqrt());
         Some(outside * (1.0 - 0.35 * depth * depth))
     }
+}
+
+/// The numbers along x and y of the square of `side` that holds `plan`.
+fn square(plan: [f64; 2], side: f64) -> [i64; 2] {
+    plan.map(|v| nearest(v * (1.0 / side) - 0.5) as i64)
 }
 
 /// A wave of height 1 at `turns`: the sine to 4e-6, by additions and multiplications alone.
@@ -282,7 +287,7 @@ mod tests {
                 if let Some(t) = landscape.tree([i, j]) {
                     trees += 1;
                     for (axis, cell) in [i, j].into_iter().enumerate() {
-                        let low = (cell as f64 - 0.5) * GROVE;
+                        let low = cell as f64 * GROVE;
                         assert!(t.center[axis] - t.radius >= low - 1e-9);
                         assert!(t.center[axis] + t.radius <= low + GROVE + 1e-9);
                     }
