@@ -1,1 +1,2 @@
 //! Formats: one folder each, plain sources and sinks of records.
+pub mod synthetic;
