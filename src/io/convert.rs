@@ -1,0 +1,385 @@
+//! Records of one format as records of another: every dimension goes where its name is, and what the
+//! target cannot hold is told, never changed. Knows no files.
+
+use crate::point::names::{self as n, XYZ};
+use crate::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
+use crate::{Error, Result};
+
+/// What a conversion of coordinates rounded.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Rounding {
+    /// Points of which a coordinate was rounded.
+    pub points: u64,
+    /// Largest difference in one coordinate, in world units.
+    pub largest: f64,
+}
+
+/// How records of one schema become records of another, decided once.
+#[derive(Debug, Clone)]
+pub struct Projection {
+    from: Schema,
+    to_endian: Endian,
+    to_stride: usize,
+    moves: Vec<Move>,
+}
+
+/// One step of a projection.
+#[derive(Debug, Clone)]
+enum Move {
+    /// Bytes that mean the same in both.
+    Copy { from: usize, to: usize, length: usize },
+    /// A number in the other byte order.
+    Swap { from: usize, to: usize, size: usize },
+    /// A stored number in another type; scale and origin are equal.
+    Stored { from: Dimension, to: Dimension },
+    /// A world value rounded to the target's steps (coordinates).
+    Rounded { from: Dimension, to: Dimension },
+    /// A world value that the target must hold.
+    Exact { from: Dimension, to: Dimension },
+}
+
+impl Projection {
+    /// The projection from one schema to another. A dimension of `to` that `from` lacks is 0; one of
+    /// `from` that `to` lacks is an error unless `drop` names it, and so is a name in `drop` that
+    /// `from` lacks. Coordinates cannot be dropped.
+    pub fn new(from: &Schema, to: &Schema, drop: &[String]) -> Result<Projection> {
+        check_drop(from, drop)?;
+        let lost: Vec<&str> = from
+            .dimensions
+            .iter()
+            .map(|d| d.name.as_str())
+            .filter(|name| to.find(name).is_none() && !drop.iter().any(|d| d == name))
+            .collect();
+        if !lost.is_empty() {
+            let format = match to.layout {
+                Layout::Las { format } => format!("LAS point format {format}"),
+                Layout::Ply => "this PLY output".to_owned(),
+            };
+            return Err(Error::pipeline(format!("{format} cannot hold {}", quoted(&lost)))
+                .help(format!("drop = {lost:?} leaves them out")));
+        }
+        let mut moves = Vec::new();
+        for target in &to.dimensions {
+            let source = from.find(&target.name).filter(|_| !drop.contains(&target.name));
+            if let Some(source) = source {
+                push(&mut moves, step(source, from.endian, target, to.endian));
+            }
+        }
+        Ok(Projection { from: from.clone(), to_endian: to.endian, to_stride: to.stride, moves })
+    }
+
+    /// Leaves room behind each record: records become `stride` bytes long, the new ones 0.
+    pub fn widen(&mut self, stride: usize) {
+        self.to_stride = self.to_stride.max(stride);
+    }
+
+    /// True if every record stays as it is, byte for byte.
+    pub fn is_copy(&self) -> bool {
+        let all = self.from.stride;
+        let whole =
+            matches!(self.moves[..], [Move::Copy { from: 0, to: 0, length }] if length == all);
+        whole && self.to_stride == all
+    }
+
+    /// Appends the projections of `records` to `out`. Fails on the first point with a value that its
+    /// target cannot hold, naming dimension, value and point.
+    pub fn project(&self, records: &[u8], out: &mut Vec<u8>) -> Result<Rounding> {
+        let start = out.len();
+        let points = records.len() / self.from.stride.max(1);
+        out.resize(start + points * self.to_stride, 0);
+        let mut rounding = Rounding::default();
+        let targets = out[start..].chunks_exact_mut(self.to_stride.max(1));
+        for (index, (record, target)) in
+            records.chunks_exact(self.from.stride.max(1)).zip(targets).enumerate()
+        {
+            let mut largest = 0f64;
+            for step in &self.moves {
+                match self.apply(step, record, target) {
+                    Ok(rounded) => largest = largest.max(rounded),
+                    Err(unfit) => return Err(self.refuse(unfit, index, record)),
+                }
+            }
+            rounding.points += u64::from(largest > 0.0);
+            rounding.largest = rounding.largest.max(largest);
+        }
+        Ok(rounding)
+    }
+
+    /// Applies one step; returns by how much it rounded.
+    fn apply<'a>(
+        &self,
+        step: &'a Move,
+        record: &[u8],
+        target: &mut [u8],
+    ) -> Result<f64, Unfit<'a>> {
+        let endian = self.from.endian;
+        match step {
+            Move::Copy { from, to, length } => {
+                target[*to..to + length].copy_from_slice(&record[*from..from + length]);
+                Ok(0.0)
+            }
+            Move::Swap { from, to, size } => {
+                let into = &mut target[*to..to + size];
+                into.copy_from_slice(&record[*from..from + size]);
+                into.reverse();
+                Ok(0.0)
+            }
+            Move::Stored { from, to } => {
+                let value = from.get(record, endian);
+                let held = to.put(target, self.to_endian, value);
+                if held { Ok(0.0) } else { Err(Unfit { to, value }) }
+            }
+            Move::Rounded { from, to } => {
+                let world = from.world(record, endian);
+                let value = Value::Double(world);
+                let (stored, back) = nearest(to, world);
+                if !to.put(target, self.to_endian, stored) {
+                    return Err(Unfit { to, value });
+                }
+                Ok((back - world).abs())
+            }
+            Move::Exact { from, to } => {
+                let world = from.world(record, endian);
+                let (stored, back) = nearest(to, world);
+                let single = matches!(from.scalar, Scalar::F32) && from.scale == 1.0;
+                let near = 1e-9 * world.abs().max(to.scale.abs());
+                let same = (single && back as f32 == world as f32) || (back - world).abs() <= near;
+                if same && to.put(target, self.to_endian, stored) {
+                    return Ok(0.0);
+                }
+                Err(Unfit { to, value: Value::Double(world) })
+            }
+        }
+    }
+
+    fn refuse(&self, unfit: Unfit, index: usize, record: &[u8]) -> Error {
+        let Unfit { to, value } = unfit;
+        let place = match self.from.coordinates() {
+            Some(axes) => {
+                let [x, y, z] = axes.map(|axis| axis.world(record, self.from.endian));
+                format!("point {index} of its batch, at ({x}, {y}, {z})")
+            }
+            None => format!("point {index} of its batch"),
+        };
+        let value = match value {
+            Value::Unsigned(v) => v.to_string(),
+            Value::Signed(v) => v.to_string(),
+            Value::Single(v) => v.to_string(),
+            Value::Double(v) => v.to_string(),
+        };
+        let name = &to.name;
+        let error = Error::new(
+            crate::ErrorKind::Data,
+            format!("{name} = {value} of {place} does not fit {}", room(to)),
+        );
+        if XYZ.contains(&name.as_str()) {
+            return error.help("a larger scale, or an offset nearer to the points, holds it");
+        }
+        error.help(format!("drop = [\"{name}\"] leaves the dimension out"))
+    }
+}
+
+/// A value that its target cannot hold.
+struct Unfit<'a> {
+    to: &'a Dimension,
+    value: Value,
+}
+
+/// The stored number whose world value is nearest to `world` (halves to the even one), and that
+/// world value.
+fn nearest(to: &Dimension, world: f64) -> (Value, f64) {
+    let steps = (world - to.origin) / to.scale;
+    let stored = if to.scalar.is_float() { steps } else { steps.round_ties_even() };
+    let stored = if to.scalar == Scalar::F32 { f64::from(stored as f32) } else { stored };
+    (Value::Double(stored), stored * to.scale + to.origin)
+}
+
+/// What a field holds, for a message.
+fn room(to: &Dimension) -> String {
+    let kind = match to.scalar {
+        Scalar::U8 => "unsigned 8-bit integer",
+        Scalar::I8 => "signed 8-bit integer",
+        Scalar::U16 => "unsigned 16-bit integer",
+        Scalar::I16 => "signed 16-bit integer",
+        Scalar::U32 => "unsigned 32-bit integer",
+        Scalar::I32 => "signed 32-bit integer",
+        Scalar::U64 => "unsigned 64-bit integer",
+        Scalar::I64 => "signed 64-bit integer",
+        Scalar::F32 => "32-bit float",
+        Scalar::F64 => "64-bit float",
+    };
+    match to.bits {
+        Some(bits) => format!("{} bit(s)", bits.width),
+        None if to.scale != 1.0 || to.origin != 0.0 => {
+            format!("steps of {} from {} as a {kind}", to.scale, to.origin)
+        }
+        None => format!("a {kind}"),
+    }
+}
+
+fn quoted(names: &[&str]) -> String {
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}
+
+fn check_drop(from: &Schema, drop: &[String]) -> Result<()> {
+    for name in drop {
+        if XYZ.contains(&name.as_str()) {
+            return Err(Error::pipeline(format!("drop names `{name}`: coordinates stay")));
+        }
+        if from.find(name).is_none() {
+            let all: Vec<&str> = from.dimensions.iter().map(|d| d.name.as_str()).collect();
+            return Err(Error::pipeline(format!(
+                "drop names `{name}`, which the input does not have; it has {}",
+                quoted(&all)
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn step(from: &Dimension, from_endian: Endian, to: &Dimension, to_endian: Endian) -> Move {
+    let size = from.scalar.size();
+    if from.scale == to.scale && from.origin == to.origin {
+        let alike = from.scalar == to.scalar && from.bits.is_none() && to.bits.is_none();
+        return match alike {
+            true if size == 1 || from_endian == to_endian => {
+                Move::Copy { from: from.offset, to: to.offset, length: size }
+            }
+            true => Move::Swap { from: from.offset, to: to.offset, size },
+            false => Move::Stored { from: from.clone(), to: to.clone() },
+        };
+    }
+    if XYZ.contains(&to.name.as_str()) {
+        return Move::Rounded { from: from.clone(), to: to.clone() };
+    }
+    Move::Exact { from: from.clone(), to: to.clone() }
+}
+
+/// Adds a step; bytes that follow those of the step before join it.
+fn push(moves: &mut Vec<Move>, step: Move) {
+    if let Move::Copy { from, to, length } = step
+        && let Some(Move::Copy { from: from_before, to: to_before, length: before }) =
+            moves.last_mut()
+        && *from_before + *before == from
+        && *to_before + *before == to
+    {
+        *before += length;
+        return;
+    }
+    moves.push(step);
+}
+
+/// The vertex that holds every dimension of `from`, little-endian: coordinates as `double`, exactly
+/// stored · scale + origin; bit fields each as `uchar`; other scaled dimensions (the scan angle of
+/// point formats 6 to 10, in degrees) as `double`; 64-bit integers, which PLY does not have, as
+/// `double` too, where a value that rounds is refused; all others in their own type. Known dimensions
+/// come first, in the order of their PLY names. That of a PLY record is the record's own.
+pub fn ply_schema(from: &Schema) -> Schema {
+    if from.layout == Layout::Ply {
+        return from.clone();
+    }
+    let mut sources: Vec<&Dimension> = from.dimensions.iter().collect();
+    sources.sort_by_key(|d| super::ply::rank(&d.name).unwrap_or(usize::MAX));
+    let mut stride = 0;
+    let dimensions = sources
+        .into_iter()
+        .map(|source| {
+            let scaled = source.scale != 1.0 || source.origin != 0.0;
+            let scalar = match source.scalar {
+                _ if XYZ.contains(&source.name.as_str()) || scaled => Scalar::F64,
+                Scalar::U64 | Scalar::I64 => Scalar::F64,
+                _ if source.bits.is_some_and(|bits| bits.width <= 8) => Scalar::U8,
+                own => own,
+            };
+            let dimension = Dimension::new(&source.name, scalar, stride);
+            stride += scalar.size();
+            dimension
+        })
+        .collect();
+    Schema { layout: Layout::Ply, endian: Endian::Little, stride, dimensions }
+}
+
+/// Dimensions beside X, Y and Z that all LAS point formats hold.
+const CORE: [&str; 12] = [
+    n::INTENSITY,
+    n::RETURN_NUMBER,
+    n::NUMBER_OF_RETURNS,
+    n::SCAN_DIRECTION_FLAG,
+    n::EDGE_OF_FLIGHT_LINE,
+    n::CLASSIFICATION,
+    n::SYNTHETIC,
+    n::KEY_POINT,
+    n::WITHHELD,
+    n::SCAN_ANGLE,
+    n::USER_DATA,
+    n::POINT_SOURCE_ID,
+];
+const COLOR: [&str; 3] = [n::RED, n::GREEN, n::BLUE];
+const WAVE: [&str; 7] = [
+    n::WAVE_DESCRIPTOR,
+    n::WAVE_OFFSET,
+    n::WAVE_SIZE,
+    n::WAVE_RETURN,
+    n::WAVE_DIRECTION[0],
+    n::WAVE_DIRECTION[1],
+    n::WAVE_DIRECTION[2],
+];
+
+/// The LAS point format that holds the dimensions of `from`, without those of `drop`, and its extra
+/// bytes: name and type of every dimension that LAS does not know.
+///
+/// It is the smallest of formats 6 to 10 (LAS 1.4 R15 §2.6), but one of formats 0 to 5 where the
+/// scan angle is an integer: whole degrees, which the 0.006° steps of the others would round. Fails on
+/// names that an extra-bytes descriptor cannot hold (32 bytes).
+pub fn las_schema(from: &Schema, drop: &[String]) -> Result<(u8, Vec<(String, Scalar)>)> {
+    check_drop(from, drop)?;
+    let has = |name: &str| from.find(name).is_some() && !drop.iter().any(|d| d == name);
+    let any = |names: &[&str]| names.iter().any(|name| has(name));
+    let (color, wave) = (any(&COLOR), any(&WAVE));
+    let whole_degrees = has(n::SCAN_ANGLE)
+        && from.find(n::SCAN_ANGLE).is_some_and(|angle| !angle.scalar.is_float())
+        && !any(&[n::NIR, n::OVERLAP, n::SCANNER_CHANNEL]);
+    let format = match (whole_degrees, wave, color, has(n::GPS_TIME)) {
+        (true, true, true, _) => 5,
+        (true, true, false, _) => 4,
+        (true, false, true, true) => 3,
+        (true, false, true, false) => 2,
+        (true, false, false, gps) => u8::from(gps),
+        (false, true, color, _) => {
+            if color || has(n::NIR) {
+                10
+            } else {
+                9
+            }
+        }
+        (false, false, _, _) if has(n::NIR) => 8,
+        (false, false, color, _) => {
+            if color {
+                7
+            } else {
+                6
+            }
+        }
+    };
+    let known = |name: &str| {
+        let sets: [&[&str]; 5] =
+            [&XYZ, &CORE, &COLOR, &WAVE, &[n::GPS_TIME, n::NIR, n::OVERLAP, n::SCANNER_CHANNEL]];
+        sets.iter().any(|set| set.contains(&name))
+    };
+    let extra: Vec<(String, Scalar)> = from
+        .dimensions
+        .iter()
+        .filter(|d| has(&d.name) && !known(&d.name))
+        .map(|d| (d.name.clone(), d.scalar))
+        .collect();
+    let long: Vec<&str> =
+        extra.iter().map(|(name, _)| name.as_str()).filter(|name| name.len() > 32).collect();
+    if !long.is_empty() {
+        return Err(Error::pipeline(format!(
+            "LAS cannot name extra bytes {}: a name has at most 32 bytes",
+            quoted(&long)
+        ))
+        .help(format!("drop = {long:?} leaves them out")));
+    }
+    Ok((format, extra))
+}

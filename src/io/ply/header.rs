@@ -1,0 +1,366 @@
+//! The header of a PLY file: text, line by line, to `end_header`.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::point::{Endian, Scalar};
+use crate::{Error, Result};
+
+/// The longest header that is read, in bytes.
+const LONGEST: u64 = 1 << 20;
+
+/// How the values of a PLY file are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Encoding {
+    /// Numbers as text, one vertex a line.
+    Ascii,
+    /// Numbers as bytes, lowest first.
+    BinaryLittleEndian,
+    /// Numbers as bytes, highest first.
+    BinaryBigEndian,
+}
+
+impl Encoding {
+    /// The word in the header's `format` line.
+    pub fn word(self) -> &'static str {
+        match self {
+            Encoding::Ascii => "ascii",
+            Encoding::BinaryLittleEndian => "binary_little_endian",
+            Encoding::BinaryBigEndian => "binary_big_endian",
+        }
+    }
+
+    /// Byte order in which records of such a file are held.
+    pub fn endian(self) -> Endian {
+        match self {
+            Encoding::Ascii | Encoding::BinaryLittleEndian => Endian::Little,
+            Encoding::BinaryBigEndian => Endian::Big,
+        }
+    }
+
+    fn of(word: &str) -> Option<Encoding> {
+        [Encoding::Ascii, Encoding::BinaryLittleEndian, Encoding::BinaryBigEndian]
+            .into_iter()
+            .find(|e| e.word() == word)
+    }
+}
+
+/// What a header says.
+#[derive(Debug, Clone)]
+pub(super) struct Header {
+    pub encoding: Encoding,
+    pub elements: Vec<Element>,
+    pub comments: Vec<String>,
+    pub obj_info: Vec<String>,
+    /// Byte where the first element's values begin.
+    pub body: u64,
+    /// How many lines the header has.
+    pub lines: u64,
+}
+
+/// A kind of thing in the file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Element {
+    pub name: String,
+    /// How many the header claims.
+    pub count: u64,
+    pub properties: Vec<Property>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Property {
+    pub name: String,
+    pub kind: Kind,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Kind {
+    Scalar(Scalar),
+    List { count: Scalar, item: Scalar },
+}
+
+/// The classic name of a type, which every reader knows. (`int64` and `uint64` are an extension.)
+pub(super) fn type_name(scalar: Scalar) -> &'static str {
+    match scalar {
+        Scalar::I8 => "char",
+        Scalar::U8 => "uchar",
+        Scalar::I16 => "short",
+        Scalar::U16 => "ushort",
+        Scalar::I32 => "int",
+        Scalar::U32 => "uint",
+        Scalar::I64 => "int64",
+        Scalar::U64 => "uint64",
+        Scalar::F32 => "float",
+        Scalar::F64 => "double",
+    }
+}
+
+fn scalar_of(word: &str) -> Option<Scalar> {
+    Some(match word {
+        "char" | "int8" => Scalar::I8,
+        "uchar" | "uint8" => Scalar::U8,
+        "short" | "int16" => Scalar::I16,
+        "ushort" | "uint16" => Scalar::U16,
+        "int" | "int32" => Scalar::I32,
+        "uint" | "uint32" => Scalar::U32,
+        "int64" => Scalar::I64,
+        "uint64" => Scalar::U64,
+        "float" | "float32" => Scalar::F32,
+        "double" | "float64" => Scalar::F64,
+        _ => return None,
+    })
+}
+
+impl Kind {
+    /// The type as a header words it.
+    pub fn word(self) -> String {
+        match self {
+            Kind::Scalar(scalar) => type_name(scalar).to_owned(),
+            Kind::List { count, item } => {
+                format!("list {} {}", type_name(count), type_name(item))
+            }
+        }
+    }
+}
+
+impl Element {
+    /// Its lines in a header.
+    pub fn lines(&self) -> String {
+        let mut lines = format!("element {} {}\n", self.name, self.count);
+        for property in &self.properties {
+            lines += &format!("property {} {}\n", property.kind.word(), property.name);
+        }
+        lines
+    }
+
+    /// Bytes of one of them in a binary file; None if it has lists.
+    pub fn size(&self) -> Option<u64> {
+        self.properties
+            .iter()
+            .map(|p| match p.kind {
+                Kind::Scalar(scalar) => Some(scalar.size() as u64),
+                Kind::List { .. } => None,
+            })
+            .sum()
+    }
+}
+
+impl Header {
+    /// Reads the header of `file`, which is `length` bytes long. Errors name the byte where the
+    /// offending line begins.
+    pub fn read(file: &File, path: &Path, length: u64) -> Result<Header> {
+        for limit in [1 << 16, LONGEST] {
+            let held = limit.min(length);
+            let mut bytes = vec![0; held as usize];
+            file.read_exact_at(&mut bytes, 0)
+                .map_err(|cause| Error::io(path, "read the header", cause))?;
+            if let Some(header) = parse(&bytes, held == length, path)? {
+                return Ok(header);
+            }
+            if held == length {
+                return Err(Error::data(path, "the header has no end_header").at_byte(length));
+            }
+        }
+        Err(Error::data(path, format!("the header is longer than {LONGEST} bytes"))
+            .at_byte(LONGEST))
+    }
+
+    /// Place of the vertex element.
+    pub fn vertex(&self) -> Option<usize> {
+        self.elements.iter().position(|e| e.name == "vertex")
+    }
+}
+
+/// The lines of a header. A file whose first line ends in a lone carriage return ends all header
+/// lines so; every other one ends them with a line feed, a carriage return before it being dropped.
+/// (The first line decides, because a binary body may begin with the byte of a line feed.)
+struct Lines<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    end: u8,
+}
+
+impl<'a> Lines<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        let first = bytes.iter().position(|b| matches!(b, b'\r' | b'\n'));
+        let lone = first.is_some_and(|i| bytes[i] == b'\r' && bytes.get(i + 1) != Some(&b'\n'));
+        Lines { bytes, at: 0, end: if lone { b'\r' } else { b'\n' } }
+    }
+}
+
+impl<'a> Iterator for Lines<'a> {
+    /// Where the line begins, the line, and whether it has its end.
+    type Item = (usize, &'a [u8], bool);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let start = self.at;
+        let rest = self.bytes.get(start..).filter(|rest| !rest.is_empty())?;
+        let (line, ended) = match rest.iter().position(|&b| b == self.end) {
+            Some(length) => (&rest[..length], true),
+            None => (rest, false),
+        };
+        self.at = start + line.len() + usize::from(ended);
+        Some((start, line.strip_suffix(b"\r").unwrap_or(line), ended))
+    }
+}
+
+/// Parses a header that `bytes` begin with; None if they hold no end of it. `whole` says that they
+/// are the whole file, whose last line needs no end.
+fn parse(bytes: &[u8], whole: bool, path: &Path) -> Result<Option<Header>> {
+    let fail = |at: usize, message: String| Error::data(path, message).at_byte(at as u64);
+    let mut lines = Lines::new(bytes);
+    // Asked of a line without an end too: what is no PLY is told as such, whatever its size.
+    if lines.next().is_none_or(|(_, line, _)| line.trim_ascii() != b"ply") {
+        return Err(fail(0, "not a PLY file: the first line is not `ply`".into()));
+    }
+    let mut header = Partial { lines: 1, ..Partial::default() };
+    while let Some((at, line, ended)) = lines.next() {
+        if !ended && !whole {
+            break;
+        }
+        header.lines += 1;
+        if line.trim_ascii() == b"end_header" {
+            let encoding = header
+                .encoding
+                .ok_or_else(|| fail(at, "the header has no `format` line".into()))?;
+            return Ok(Some(Header {
+                encoding,
+                elements: header.elements,
+                comments: header.comments,
+                obj_info: header.obj_info,
+                body: lines.at as u64,
+                lines: header.lines,
+            }));
+        }
+        header.line(line).map_err(|message| fail(at, message))?;
+    }
+    Ok(None)
+}
+
+/// A header as far as it is read.
+#[derive(Default)]
+struct Partial {
+    encoding: Option<Encoding>,
+    elements: Vec<Element>,
+    names: BTreeSet<String>,
+    comments: Vec<String>,
+    obj_info: Vec<String>,
+    lines: u64,
+}
+
+impl Partial {
+    fn line(&mut self, line: &[u8]) -> Result<(), String> {
+        let line = text(line);
+        let line = line.trim_start();
+        let (keyword, rest) =
+            line.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((line, ""));
+        let words: Vec<&str> = rest.split_ascii_whitespace().collect();
+        match (keyword, words.as_slice()) {
+            ("", _) => Ok(()),
+            ("comment", _) => {
+                self.comments.push(rest.to_owned());
+                Ok(())
+            }
+            ("obj_info", _) => {
+                self.obj_info.push(rest.to_owned());
+                Ok(())
+            }
+            ("format", words) => self.format(words),
+            ("element", words) => self.element(words),
+            ("property", words) => self.property(words),
+            _ => Err(format!(
+                "`{}` is no header keyword (format, comment, obj_info, element, property, end_header)",
+                shown(keyword)
+            )),
+        }
+    }
+
+    fn format(&mut self, words: &[&str]) -> Result<(), String> {
+        let &[encoding, version] = words else {
+            return Err("a `format` line is `format ENCODING 1.0`".into());
+        };
+        if self.encoding.is_some() {
+            return Err("a second `format` line".into());
+        }
+        if version != "1.0" {
+            return Err(format!("PLY version {} is not known; 1.0 is", shown(version)));
+        }
+        self.encoding = Some(Encoding::of(encoding).ok_or_else(|| {
+            format!(
+                "encoding `{}` is not known (ascii, binary_little_endian, binary_big_endian)",
+                shown(encoding)
+            )
+        })?);
+        Ok(())
+    }
+
+    fn element(&mut self, words: &[&str]) -> Result<(), String> {
+        let &[name, count] = words else {
+            return Err("an `element` line is `element NAME COUNT`".into());
+        };
+        let count = count
+            .parse()
+            .map_err(|_| format!("`{}` is no count of element `{}`", shown(count), shown(name)))?;
+        if self.elements.iter().any(|e| e.name == name) {
+            return Err(format!("a second element `{}`", shown(name)));
+        }
+        self.elements.push(Element { name: name.to_owned(), count, properties: Vec::new() });
+        self.names.clear();
+        Ok(())
+    }
+
+    fn property(&mut self, words: &[&str]) -> Result<(), String> {
+        let scalar = |word: &str| {
+            scalar_of(word).ok_or_else(|| format!("type `{}` is not known", shown(word)))
+        };
+        let (name, kind) = match *words {
+            ["list", count, item, name] => {
+                let (count, item) = (scalar(count)?, scalar(item)?);
+                if count.is_float() {
+                    return Err(format!("list `{}` has a count that is no integer", shown(name)));
+                }
+                (name, Kind::List { count, item })
+            }
+            [kind, name] => (name, Kind::Scalar(scalar(kind)?)),
+            _ => {
+                return Err("a `property` line is `property TYPE NAME` or \
+                            `property list COUNT_TYPE TYPE NAME`"
+                    .into());
+            }
+        };
+        let Some(element) = self.elements.last_mut() else {
+            return Err(format!("property `{}` stands before any element", shown(name)));
+        };
+        if !self.names.insert(name.to_owned()) {
+            return Err(format!(
+                "a second property `{}` of element `{}`",
+                shown(name),
+                shown(&element.name)
+            ));
+        }
+        element.properties.push(Property { name: name.to_owned(), kind });
+        Ok(())
+    }
+}
+
+/// A line as text: UTF-8, else Latin-1, so that no byte is lost.
+fn text(line: &[u8]) -> String {
+    match std::str::from_utf8(line) {
+        Ok(text) => text.to_owned(),
+        Err(_) => line.iter().map(|&b| char::from(b)).collect(),
+    }
+}
+
+/// A word of a file, short and printable, for a message.
+pub(super) fn shown(word: &str) -> String {
+    let mut short: String = word.chars().take(40).flat_map(char::escape_debug).collect();
+    if word.chars().count() > 40 {
+        short.push('…');
+    }
+    short
+}

@@ -1,0 +1,71 @@
+//! What a PLY file is, from its header alone.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::header::{Encoding, Header, Kind};
+use super::source::open;
+use crate::Result;
+
+/// What the header of a PLY file says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlyInfo {
+    /// How the values are written.
+    pub encoding: Encoding,
+    /// Length of the file.
+    pub bytes: u64,
+    /// Vertices that the header claims; 0 without an element `vertex`.
+    pub points: u64,
+    /// All elements, in file order.
+    pub elements: Vec<ElementInfo>,
+    /// Texts of the `comment` lines.
+    pub comments: Vec<String>,
+    /// Texts of the `obj_info` lines.
+    pub obj_info: Vec<String>,
+}
+
+/// One element of a PLY file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ElementInfo {
+    /// Its name.
+    pub name: String,
+    /// How many the header claims.
+    pub count: u64,
+    /// Its properties, in file order.
+    pub properties: Vec<PropertyInfo>,
+}
+
+/// One property of an element.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PropertyInfo {
+    /// Its name.
+    pub name: String,
+    /// Its type in the format's classic words (`float`, `list uchar int`).
+    #[serde(rename = "type")]
+    pub kind: String,
+}
+
+/// Reads the header of the PLY file at `path`. Fails if it cannot be read or is no PLY header; counts
+/// are told as claimed.
+pub fn describe(path: &Path) -> Result<PlyInfo> {
+    let (file, bytes) = open(path)?;
+    let header = Header::read(&file, path, bytes)?;
+    let points = header.vertex().map_or(0, |vertex| header.elements[vertex].count);
+    let word = |kind: Kind| kind.word();
+    let elements = header
+        .elements
+        .into_iter()
+        .map(|element| ElementInfo {
+            name: element.name,
+            count: element.count,
+            properties: element
+                .properties
+                .into_iter()
+                .map(|p| PropertyInfo { kind: word(p.kind), name: p.name })
+                .collect(),
+        })
+        .collect();
+    let (comments, obj_info) = (header.comments, header.obj_info);
+    Ok(PlyInfo { encoding: header.encoding, bytes, points, elements, comments, obj_info })
+}

@@ -1,0 +1,71 @@
+//! PLY: the vertices of polygon files, text or binary, of any scalar type.
+//!
+//! A record is a vertex in its file's own binary form; text is held as little-endian binary of the
+//! declared types. Properties become dimensions by their names ([`crate::point::names`]); a name that
+//! formats do not share is kept as it is. Format: Greg Turk, "The PLY Polygon File Format", 1994.
+
+mod ascii;
+mod header;
+mod info;
+mod names;
+mod sink;
+mod source;
+mod text;
+mod walk;
+
+use std::path::{Path, PathBuf};
+
+pub use header::Encoding;
+pub use info::{ElementInfo, PlyInfo, PropertyInfo, describe};
+pub(crate) use names::rank;
+
+use crate::Result;
+use crate::point::{Metadata, Schema};
+use crate::stage::{Sink, Source};
+
+/// What begins the comment that holds the coordinate reference system, and its further pieces.
+const CRS: &str = "crs: ";
+const CRS_MORE: &str = "crs+ ";
+
+/// How a PLY output is written.
+#[derive(Debug, Clone, Default)]
+pub struct PlyOptions {
+    /// Text or binary; that of the input where it is PLY, else little-endian, when not said.
+    pub encoding: Option<Encoding>,
+    /// Writes the normals of the batches as `nx`, `ny` and `nz`: in place where the input has them
+    /// as floating-point numbers, else as `float` behind the other properties.
+    pub normals: bool,
+    /// Dimensions that are left out.
+    pub drop: Vec<String>,
+    /// Carries the other elements (faces) of a single binary input whose encoding is kept. To be set
+    /// only where no vertex is removed, added or moved: it fails on a count that differs.
+    pub carry_rest: bool,
+}
+
+/// Opens PLY files that agree in encoding, vertex properties and coordinate reference system: their
+/// headers, and what stands before the vertices. Fails on a file that is no PLY, has no vertices
+/// with `x`, `y` and `z`, has lists in them, or is too short for the count it claims.
+pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
+    Ok(Box::new(source::PlySource::open(paths)?))
+}
+
+/// Creates a PLY file at `staged` for records of `schema`. Records of another format are converted
+/// to the properties of [`crate::io::convert::ply_schema`]. Fails if a dimension cannot be written
+/// or `drop` names none, or if the file cannot be created.
+pub fn create(
+    staged: &Path,
+    options: &PlyOptions,
+    schema: &Schema,
+    metadata: &Metadata,
+) -> Result<Box<dyn Sink>> {
+    Ok(Box::new(sink::PlySink::create(staged, options, schema, metadata)?))
+}
+
+/// The comment that brings every header of one file to one length, whatever its count of vertices.
+fn padding(points: u64) -> String {
+    ".".repeat(21 - points.to_string().len())
+}
+
+fn is_padding(comment: &str, points: u64) -> bool {
+    comment == padding(points)
+}

@@ -1,0 +1,417 @@
+//! Reads the vertices of PLY files.
+
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::ascii::AsciiPart;
+use super::header::{Element, Encoding, Header, Kind, Property, shown};
+use super::{names, walk};
+use crate::point::{Dimension, Layout, Metadata, PointBatch, Schema};
+use crate::stage::{Part, Source};
+use crate::{Error, Result};
+
+/// Vertices of one part of a binary file.
+const PART_POINTS: u64 = 1_000_000;
+
+/// What PLY outputs carry on besides points and text: how the input was written.
+#[derive(Debug)]
+pub(super) struct Native {
+    pub encoding: Encoding,
+    /// Dimension and property names.
+    pub properties: Vec<(String, String)>,
+    pub obj_info: Vec<String>,
+    /// What else is in the file; None if there were several, or if it is not binary.
+    pub rest: Option<Rest>,
+}
+
+/// The elements of a binary file other than its vertices.
+#[derive(Debug)]
+pub(super) struct Rest {
+    pub path: PathBuf,
+    pub before: Vec<Element>,
+    pub after: Vec<Element>,
+    /// Byte of the first element, of the first vertex, behind the last vertex, and of the file's end.
+    pub cuts: [u64; 4],
+    pub points: u64,
+}
+
+/// One file, its header read.
+pub(super) struct PlyFile {
+    pub path: PathBuf,
+    pub header: Header,
+    pub points: u64,
+    pub length: u64,
+    /// Byte of the first vertex in a binary file, of the first element in a text file.
+    pub body: u64,
+    /// Lines of text before the first vertex line, behind the header.
+    pub skipped_lines: u64,
+    /// Place of `vertex` among the elements.
+    pub vertex: usize,
+}
+
+impl PlyFile {
+    fn open(path: &Path) -> Result<PlyFile> {
+        let (file, length) = open(path)?;
+        let header = Header::read(&file, path, length)?;
+        let Some(vertex) = header.vertex() else {
+            let elements: Vec<String> =
+                header.elements.iter().map(|e| format!("`{}`", shown(&e.name))).collect();
+            let found = match elements.len() {
+                0 => "no element at all".to_owned(),
+                _ => elements.join(", "),
+            };
+            return Err(Error::data(path, format!("no element `vertex`: the file has {found}")));
+        };
+        let element = &header.elements[vertex];
+        check(path, element)?;
+        let before = &header.elements[..vertex];
+        let (body, skipped_lines) = match header.encoding {
+            Encoding::Ascii => (header.body, text_lines(before)),
+            encoding => (walk::past(&file, path, before, header.body, length, encoding)?, 0),
+        };
+        let file = PlyFile {
+            path: path.to_owned(),
+            points: element.count,
+            length,
+            body,
+            skipped_lines,
+            vertex,
+            header,
+        };
+        file.bound()?;
+        Ok(file)
+    }
+
+    fn properties(&self) -> &[Property] {
+        &self.header.elements[self.vertex].properties
+    }
+
+    /// Refuses a count of vertices that the file is too short for.
+    fn bound(&self) -> Result<()> {
+        let room = self.length.saturating_sub(self.body);
+        let holds = match self.header.elements[self.vertex].size() {
+            Some(size) if self.header.encoding != Encoding::Ascii => room / size.max(1),
+            // A value takes a digit and a separator, which the last may lack.
+            _ => (room + 1) / (2 * self.properties().len().max(1) as u64),
+        };
+        if self.points <= holds {
+            return Ok(());
+        }
+        Err(Error::data(
+            &self.path,
+            format!(
+                "the header claims {} vertices, the file ends after {holds} at most",
+                self.points
+            ),
+        )
+        .at_byte(self.length)
+        .help("the file is cut short, or its header is wrong"))
+    }
+}
+
+/// Opens a regular file for reading; its length in bytes.
+pub(super) fn open(path: &Path) -> Result<(File, u64)> {
+    let file = File::open(path).map_err(|cause| Error::io(path, "open", cause))?;
+    let facts = file.metadata().map_err(|cause| Error::io(path, "read its length", cause))?;
+    if !facts.is_file() {
+        return Err(Error::data(path, "not a regular file"));
+    }
+    Ok((file, facts.len()))
+}
+
+/// Lines that `elements` take in a text file. One without properties takes none.
+fn text_lines(elements: &[Element]) -> u64 {
+    elements
+        .iter()
+        .filter(|e| !e.properties.is_empty())
+        .fold(0, |lines, e| lines.saturating_add(e.count))
+}
+
+/// Refuses a vertex element that has lists or lacks a coordinate.
+fn check(path: &Path, vertex: &Element) -> Result<()> {
+    if let Some(list) = vertex.properties.iter().find(|p| matches!(p.kind, Kind::List { .. })) {
+        return Err(Error::data(
+            path,
+            format!(
+                "element `vertex` has a list, `{}`: vertices of varying size are not read",
+                shown(&list.name)
+            ),
+        ));
+    }
+    let missing: Vec<&str> = ["x", "y", "z"]
+        .into_iter()
+        .filter(|axis| {
+            let dimension = names::dimension_of(axis);
+            !vertex.properties.iter().any(|p| p.name == *axis || p.name == dimension)
+        })
+        .collect();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    Err(Error::data(path, format!("element `vertex` has no property {}", missing.join(", "))))
+}
+
+/// The vertices of one or several PLY files.
+pub(super) struct PlySource {
+    schema: Arc<Schema>,
+    metadata: Metadata,
+    files: Vec<PlyFile>,
+    /// For each file, the number of parts up to its end.
+    ends: Vec<usize>,
+    warnings: Vec<String>,
+}
+
+impl PlySource {
+    pub fn open(paths: &[PathBuf]) -> Result<PlySource> {
+        let files = paths.iter().map(|path| PlyFile::open(path)).collect::<Result<Vec<_>>>()?;
+        let Some(first) = files.first() else {
+            return Err(Error::pipeline("no PLY file to read"));
+        };
+        let texts: Vec<Texts> = files.iter().map(Texts::of).collect();
+        for (file, text) in files.iter().zip(&texts).skip(1) {
+            agree(first, file)?;
+            if text.crs != texts[0].crs || text.dimensions != texts[0].dimensions {
+                let what = if text.crs == texts[0].crs {
+                    "dimension names"
+                } else {
+                    "coordinate reference system"
+                };
+                return Err(disagree(first, file, what));
+            }
+        }
+        let schema = Arc::new(schema(first, &texts[0].dimensions));
+        if schema.coordinates().is_none() {
+            return Err(Error::data(&first.path, "a comment gives x, y or z another dimension"));
+        }
+        let metadata = metadata(&files, texts);
+        let mut parts = 0usize;
+        let ends = files
+            .iter()
+            .map(|file| {
+                let own = match file.header.encoding {
+                    Encoding::Ascii => u64::from(file.points > 0),
+                    _ => file.points.div_ceil(PART_POINTS),
+                };
+                parts = parts.saturating_add(usize::try_from(own).unwrap_or(usize::MAX));
+                parts
+            })
+            .collect();
+        let warnings = files.iter().flat_map(dropped).collect();
+        Ok(PlySource { schema, metadata, files, ends, warnings })
+    }
+}
+
+/// What the comments of a file say to us, and the others.
+struct Texts {
+    crs: Option<String>,
+    dimensions: Vec<String>,
+    comments: Vec<String>,
+}
+
+impl Texts {
+    fn of(file: &PlyFile) -> Texts {
+        let properties: Vec<&str> = file.properties().iter().map(|p| p.name.as_str()).collect();
+        let header = &file.header;
+        let dimensions = names::dimensions(&properties, &header.comments);
+        let mut crs: Option<String> = None;
+        let mut comments = Vec::new();
+        for comment in &header.comments {
+            let ours = names::read_comment(comment).is_some_and(|(p, _)| properties.contains(&p))
+                || super::is_padding(comment, file.points);
+            if let Some(text) = comment.strip_prefix(super::CRS).filter(|_| crs.is_none()) {
+                crs = Some(text.to_owned());
+            } else if let (Some(text), Some(crs)) =
+                (comment.strip_prefix(super::CRS_MORE), &mut crs)
+            {
+                crs.push_str(text);
+            } else if !ours {
+                comments.push(comment.clone());
+            }
+        }
+        Texts { crs, dimensions, comments }
+    }
+}
+
+/// Refuses two files whose vertices differ in kind.
+fn agree(first: &PlyFile, other: &PlyFile) -> Result<()> {
+    if first.header.encoding != other.header.encoding {
+        return Err(disagree(first, other, "encoding"));
+    }
+    if first.properties() != other.properties() {
+        return Err(disagree(first, other, "vertex properties"));
+    }
+    Ok(())
+}
+
+fn disagree(first: &PlyFile, other: &PlyFile, what: &str) -> Error {
+    Error::data(&other.path, format!("its {what} is not that of {}", first.path.display()))
+        .help("files that are read together agree in encoding, vertex properties and coordinate reference system; convert one of them first")
+}
+
+fn schema(file: &PlyFile, dimensions: &[String]) -> Schema {
+    let mut stride = 0;
+    let dimensions = file
+        .properties()
+        .iter()
+        .zip(dimensions)
+        .filter_map(|(property, name)| {
+            let Kind::Scalar(scalar) = property.kind else { return None };
+            let dimension = Dimension::new(name, scalar, stride);
+            stride += scalar.size();
+            Some(dimension)
+        })
+        .collect();
+    Schema { layout: Layout::Ply, endian: file.header.encoding.endian(), stride, dimensions }
+}
+
+/// Texts equal in all files are carried as they are, else the union, sorted: the order of the
+/// inputs changes nothing.
+fn union(lists: Vec<Vec<String>>) -> Vec<String> {
+    if lists.windows(2).all(|pair| pair[0] == pair[1]) {
+        return lists.into_iter().next().unwrap_or_default();
+    }
+    let mut all: Vec<String> = lists.into_iter().flatten().collect();
+    all.sort();
+    all.dedup();
+    all
+}
+
+fn metadata(files: &[PlyFile], mut texts: Vec<Texts>) -> Metadata {
+    let first = &files[0];
+    let properties = first
+        .properties()
+        .iter()
+        .zip(&texts[0].dimensions)
+        .map(|(property, dimension)| (dimension.clone(), property.name.clone()))
+        .collect();
+    let native = Native {
+        encoding: first.header.encoding,
+        properties,
+        obj_info: union(files.iter().map(|f| f.header.obj_info.clone()).collect()),
+        rest: rest(files),
+    };
+    Metadata {
+        crs: texts[0].crs.take(),
+        comments: union(texts.into_iter().map(|t| t.comments).collect()),
+        native: Some(Arc::new(native)),
+    }
+}
+
+fn rest(files: &[PlyFile]) -> Option<Rest> {
+    let [file] = files else { return None };
+    let elements = &file.header.elements;
+    let size = elements[file.vertex].size()?;
+    let (before, after) = (&elements[..file.vertex], &elements[file.vertex + 1..]);
+    if file.header.encoding == Encoding::Ascii || (before.is_empty() && after.is_empty()) {
+        return None;
+    }
+    let end = file.body + file.points * size; // within the file: bounded on opening
+    Some(Rest {
+        path: file.path.clone(),
+        before: before.to_vec(),
+        after: after.to_vec(),
+        cuts: [file.header.body, file.body, end, file.length],
+        points: file.points,
+    })
+}
+
+/// A warning for elements that are not milled.
+fn dropped(file: &PlyFile) -> Option<String> {
+    let others: Vec<String> = file
+        .header
+        .elements
+        .iter()
+        .filter(|e| e.name != "vertex" && e.count > 0)
+        .map(|e| format!("{} of `{}`", e.count, shown(&e.name)))
+        .collect();
+    (!others.is_empty()).then(|| {
+        format!(
+            "{}: {} are not points and are dropped (a binary PLY converted to PLY of the same \
+             encoding can carry them)",
+            file.path.display(),
+            others.join(", ")
+        )
+    })
+}
+
+impl Source for PlySource {
+    fn schema(&self) -> &Arc<Schema> {
+        &self.schema
+    }
+
+    fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    fn inputs(&self) -> Vec<PathBuf> {
+        self.files.iter().map(|f| f.path.clone()).collect()
+    }
+
+    fn points(&self) -> u64 {
+        self.files.iter().fold(0, |sum, f| sum.saturating_add(f.points))
+    }
+
+    fn part_bytes(&self) -> u64 {
+        match self.files[0].header.encoding {
+            Encoding::Ascii => AsciiPart::bytes(&self.schema),
+            _ => 0,
+        }
+    }
+
+    fn parts(&self) -> usize {
+        self.ends.last().copied().unwrap_or(0)
+    }
+
+    fn part(&self, index: usize) -> Result<Box<dyn Part + '_>> {
+        let number = self.ends.partition_point(|&end| end <= index);
+        let Some(file) = self.files.get(number) else {
+            return Err(Error::internal(format!("part {index} of {}", self.parts())));
+        };
+        let within = index - number.checked_sub(1).map_or(0, |before| self.ends[before]);
+        let (handle, length) = open(&file.path)?;
+        if length != file.length {
+            return Err(Error::data(&file.path, "the file changed its length while it was read"));
+        }
+        let source = number as u32;
+        if file.header.encoding == Encoding::Ascii {
+            return Ok(Box::new(AsciiPart::new(handle, file, &self.schema, source)));
+        }
+        let start = within as u64 * PART_POINTS;
+        Ok(Box::new(BinaryPart {
+            file: handle,
+            path: &file.path,
+            at: file.body + start * self.schema.stride as u64,
+            left: PART_POINTS.min(file.points - start),
+            source,
+        }))
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
+    }
+}
+
+/// A range of the vertices of a binary file, read straight into the batch.
+struct BinaryPart<'a> {
+    file: File,
+    path: &'a Path,
+    at: u64,
+    left: u64,
+    source: u32,
+}
+
+impl Part for BinaryPart<'_> {
+    fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
+        let points = self.left.min(batch.capacity() as u64);
+        batch.source = self.source;
+        let bytes = batch.refill(points as usize);
+        self.file
+            .read_exact_at(bytes, self.at)
+            .map_err(|cause| Error::io(self.path, "read vertices", cause).at_byte(self.at))?;
+        self.at += bytes.len() as u64;
+        self.left -= points;
+        Ok(())
+    }
+}

@@ -1,0 +1,186 @@
+//! Numbers as text: the shortest that reads back to the same value.
+
+use std::io::Write;
+
+use crate::point::{Dimension, Endian, Scalar, Value};
+
+/// The longest text of a number of this type, a blank behind it included.
+pub(super) fn longest(scalar: Scalar) -> usize {
+    match scalar {
+        Scalar::U8 => 4,
+        Scalar::I8 => 5,
+        Scalar::U16 => 6,
+        Scalar::I16 => 7,
+        Scalar::U32 => 11,
+        Scalar::I32 => 12,
+        Scalar::U64 | Scalar::I64 => 21,
+        Scalar::F32 => 20,
+        Scalar::F64 => 28,
+    }
+}
+
+/// Parses one number of type `scalar` into the beginning of `record`, little-endian. False if it is
+/// none or beyond the type's range. A whole number may be written with a fraction or an exponent for
+/// an integer type; a `float` is rounded from its text to f32 at once.
+pub(super) fn parse(token: &[u8], scalar: Scalar, record: &mut [u8]) -> bool {
+    let Ok(text) = std::str::from_utf8(token) else { return false };
+    macro_rules! whole {
+        ($t:ty) => {
+            match text.parse::<$t>() {
+                Ok(value) => write(record, &value.to_le_bytes()),
+                Err(_) => {
+                    let Some(value) = float::<f64>(text, f64::is_finite, f64::NAN) else {
+                        return false;
+                    };
+                    Dimension::new("", scalar, 0).put(record, Endian::Little, Value::Double(value))
+                        && value.abs() < EXACT
+                }
+            }
+        };
+    }
+    match scalar {
+        Scalar::U8 => whole!(u8),
+        Scalar::I8 => whole!(i8),
+        Scalar::U16 => whole!(u16),
+        Scalar::I16 => whole!(i16),
+        Scalar::U32 => whole!(u32),
+        Scalar::I32 => whole!(i32),
+        Scalar::U64 => whole!(u64),
+        Scalar::I64 => whole!(i64),
+        Scalar::F32 => float::<f32>(text, f32::is_finite, f32::NAN)
+            .is_some_and(|value| write(record, &value.to_le_bytes())),
+        Scalar::F64 => float::<f64>(text, f64::is_finite, f64::NAN)
+            .is_some_and(|value| write(record, &value.to_le_bytes())),
+    }
+}
+
+/// Beyond it a decimal text may stand for an integer that f64 rounds.
+const EXACT: f64 = (1u64 << 53) as f64;
+
+fn write(record: &mut [u8], bytes: &[u8]) -> bool {
+    record[..bytes.len()].copy_from_slice(bytes);
+    true
+}
+
+/// A floating-point number, correctly rounded; None if it is none, or if only rounding makes it
+/// infinite. Also knows what old C libraries write for what is no number.
+fn float<T: std::str::FromStr + Copy>(text: &str, finite: impl Fn(T) -> bool, nan: T) -> Option<T> {
+    match text.parse::<T>() {
+        Ok(value) => {
+            let digits = text.bytes().any(|b| b.is_ascii_digit());
+            (finite(value) || !digits).then_some(value)
+        }
+        Err(_) => {
+            let text = text.trim_start_matches(['-', '+']).to_ascii_lowercase();
+            let none = ["nan(ind)", "nan(snan)", "1.#ind", "1.#qnan", "1.#snan"];
+            none.iter().any(|start| text.starts_with(start)).then_some(nan)
+        }
+    }
+}
+
+/// Appends a number as text: the shortest that [`parse`] reads back to the same value (`nan`, `inf`
+/// and `-inf` for what is no finite number; the bits of a NaN are not kept).
+pub(super) fn print(value: Value, out: &mut Vec<u8>) {
+    let written = match value {
+        Value::Unsigned(v) => write!(out, "{v}"),
+        Value::Signed(v) => write!(out, "{v}"),
+        Value::Single(v) if v.is_nan() => write!(out, "nan"),
+        Value::Double(v) if v.is_nan() => write!(out, "nan"),
+        Value::Single(v) if plain(v.into()) => write!(out, "{v}"),
+        Value::Double(v) if plain(v) => write!(out, "{v}"),
+        Value::Single(v) => write!(out, "{v:e}"),
+        Value::Double(v) => write!(out, "{v:e}"),
+    };
+    debug_assert!(written.is_ok(), "memory takes every text");
+}
+
+/// True for what reads better without an exponent.
+fn plain(v: f64) -> bool {
+    v == 0.0 || v.is_infinite() || (1e-5..1e16).contains(&v.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str, scalar: Scalar) -> Option<Value> {
+        let mut record = [0; 8];
+        parse(text.as_bytes(), scalar, &mut record)
+            .then(|| Dimension::new("", scalar, 0).get(&record, Endian::Little))
+    }
+
+    #[test]
+    fn a_float_is_rounded_once() {
+        // Halfway between two f32 once rounded to f64, above it as written.
+        let text = "1.00000005960464477540";
+        assert_eq!(read(text, Scalar::F32), Some(Value::Single(1.0 + f32::EPSILON)));
+        assert_eq!(text.parse::<f64>().unwrap() as f32, 1.0);
+    }
+
+    #[test]
+    fn values_beyond_a_type_are_refused() {
+        let beyond = [
+            ("256", Scalar::U8),
+            ("-1", Scalar::U8),
+            ("128", Scalar::I8),
+            ("65536.0", Scalar::U16),
+            ("1e39", Scalar::F32),
+            ("-1e309", Scalar::F64),
+            ("1.5", Scalar::I32),
+            ("18446744073709551616", Scalar::U64),
+            ("1e17", Scalar::U64),
+            ("nan", Scalar::I32),
+            ("", Scalar::F64),
+            ("0x10", Scalar::U8),
+            ("1,5", Scalar::F64),
+        ];
+        for (text, scalar) in beyond {
+            assert_eq!(read(text, scalar), None, "{text} {scalar:?}");
+        }
+    }
+
+    #[test]
+    fn odd_but_clear_texts_are_read() {
+        assert_eq!(read("+7", Scalar::U8), Some(Value::Unsigned(7)));
+        assert_eq!(read("-797.000", Scalar::I32), Some(Value::Signed(-797)));
+        assert_eq!(read("5e2", Scalar::U16), Some(Value::Unsigned(500)));
+        assert_eq!(read("-INF", Scalar::F32), Some(Value::Single(f32::NEG_INFINITY)));
+        for nan in ["nan", "-nan", "-nan(ind)", "1.#QNAN", "-1.#IND00"] {
+            let Some(Value::Double(v)) = read(nan, Scalar::F64) else { panic!("{nan}") };
+            assert!(v.is_nan());
+        }
+    }
+
+    #[test]
+    fn the_longest_texts_fit_their_room() {
+        let doubles = [
+            f64::MIN,
+            -f64::from_bits(1),
+            -1.2345678901234567e-5,
+            -9999999999999998.0,
+            -1.2345678901234567e-300,
+            -0.000012345678901234567,
+            f64::NEG_INFINITY,
+        ];
+        for v in doubles {
+            let mut text = Vec::new();
+            print(Value::Double(v), &mut text);
+            assert!(text.len() < longest(Scalar::F64), "{v}");
+            assert_eq!(
+                read(std::str::from_utf8(&text).unwrap(), Scalar::F64),
+                Some(Value::Double(v))
+            );
+        }
+        for bits in (0..=u32::MAX).step_by(65_521) {
+            let v = f32::from_bits(bits);
+            let mut text = Vec::new();
+            print(Value::Single(v), &mut text);
+            assert!(text.len() < longest(Scalar::F32), "{v}");
+            let Some(Value::Single(back)) = read(std::str::from_utf8(&text).unwrap(), Scalar::F32)
+            else {
+                panic!("{v}")
+            };
+            assert!(back.to_bits() == bits || (back.is_nan() && v.is_nan()), "{v}");
+        }
+    }
+}
