@@ -20,14 +20,15 @@ pub use load::Loader;
 pub use merge::{merge_bytes, seal};
 pub use remote::Remote;
 pub use sealed::{CutError, Fetch, Reader, SealedTiles, index_bytes};
-pub use spill::{Folder, PIECE, Pieces, Spill, SpillArea};
+pub use spill::{Folder, PIECE, Pieces, Spill, SpillArea, lock};
 
 use std::ops::Range;
 
 use crate::point::{Bounds, Position};
-use crate::{Error, Result};
+use crate::{Error, ErrorKind, Result};
 
-/// Runs `work` on `threads` threads, each told its number, and returns the first error.
+/// Runs `work` on `threads` threads, each told its number, and returns the first error that is not
+/// merely a thread giving up because another failed.
 pub fn parallel(threads: usize, work: impl Fn(usize) -> Result<()> + Sync) -> Result<()> {
     if threads <= 1 {
         return work(0);
@@ -45,7 +46,10 @@ pub fn parallel(threads: usize, work: impl Fn(usize) -> Result<()> + Sync) -> Re
         for worker in workers {
             let outcome =
                 worker.join().unwrap_or_else(|_| Err(Error::internal("a worker thread panicked")));
-            result = result.and(outcome);
+            let given_up = matches!(&result, Err(e) if e.kind() == ErrorKind::Interrupted);
+            if result.is_ok() || given_up && outcome.is_err() {
+                result = outcome;
+            }
         }
         result
     })

@@ -212,11 +212,17 @@ impl SealedTiles {
     }
 
     /// Cuts the scan into octree nodes, in Morton order, none without a position: nodes whose cube
-    /// grown by `reach` has at most `capacity` positions, or that have the smallest side allowed,
-    /// 2^`lowest`, or more than `reach` could ever shrink.
+    /// grown by `reach` has at most `wanted` positions, or that have the smallest side allowed,
+    /// 2^`lowest`, and at most `most`.
     ///
-    /// A node of that side which still has too many is an error that names it and its count.
-    pub fn cut(&self, capacity: u64, reach: i64, lowest: u32) -> Result<Vec<TileKey>, CutError> {
+    /// A node of that side which has more is an error that names it and its count.
+    pub fn cut(
+        &self,
+        wanted: u64,
+        most: u64,
+        reach: i64,
+        lowest: u32,
+    ) -> Result<Vec<TileKey>, CutError> {
         let mut tiles = Vec::new();
         if self.positions() == 0 {
             return Ok(tiles);
@@ -228,11 +234,13 @@ impl SealedTiles {
                 continue;
             }
             let zone = key.cube().grown(reach);
-            if !self.holds_more(&zone, capacity, &mut reader)? {
+            let smallest = key.level <= lowest || key.level == 0;
+            let limit = if smallest { most } else { wanted.min(most) };
+            if !self.holds_more(&zone, limit, &mut reader)? {
                 tiles.push(key);
                 continue;
             }
-            match key.children().filter(|_| key.level > lowest) {
+            match key.children().filter(|_| !smallest) {
                 Some(children) => open.extend(children.iter().rev()),
                 None => {
                     let positions = self.count(&zone, &mut reader)?;

@@ -1,0 +1,405 @@
+//! The mill: decode into the tile store, then tile after tile through the stages, in canonical
+//! order into the sink.
+
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::clock::Clock;
+use super::outlet::{Hands, Outlet};
+use super::run::{Finished, Job, StopOnDrop};
+use super::shares::{BATCH, Demands, Shares};
+use super::survey::{FATE_BYTES, fate_code, survey};
+use crate::budget::whole_mebibytes;
+use crate::geom::lattice::{Lattice, Misplaced};
+use crate::point::PointBatch;
+use crate::report::{Decision, Tally};
+use crate::stage::{Encoded, ScanFacts, Sink, TileOp};
+use crate::tile::{
+    CutError, Fate, Fetch, Intake, Loader, PIECE, Pieces, SealedTiles, SpillArea, Tile, TileKey,
+    TileStore, lock, parallel, seal,
+};
+use crate::{Error, Result};
+
+/// Runs a pipeline with tile stages (or one that only sorts) into `sink`.
+pub(super) fn mill(
+    job: &mut Job<'_>,
+    lattice: &Lattice,
+    shares: &Shares,
+    demands: &Demands,
+    area: &Arc<SpillArea>,
+    sink: Box<dyn Sink>,
+    clock: &mut Clock<'_>,
+) -> Result<Finished> {
+    clock.phase("decode", Some(job.source.points()));
+    let (store, mut tally) = decode(job, lattice, shares, area)?;
+    tally.work("runs", store.runs() as u64);
+    clock.phase("merge", Some(tally.work.get("placed").copied().unwrap_or(0)));
+    let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
+    tally.count("positions", tiles.positions());
+    let decisions = settle(job, lattice, &tiles)?;
+    let keys = cut(job, lattice, shares, demands, &tiles)?;
+    tally.work("tiles", keys.len() as u64);
+    let levels: std::collections::BTreeSet<u32> = keys.iter().map(|key| key.level).collect();
+    tally.work("tile_levels", levels.len() as u64);
+    clock.phase("mill", Some(tiles.positions()));
+    let milled = grind(job, shares, area, &tiles, &keys, sink)?;
+    tally.merge(&milled.tally);
+    clock.phase("survey", Some(2 * tiles.positions()));
+    let measured = survey(job, lattice, &tiles, &milled.fates)?;
+    Ok(Finished {
+        read: tally.work.remove("read").unwrap_or(0),
+        kept: milled.kept,
+        written: milled.written,
+        tally,
+        decisions,
+        measured: Some(measured),
+    })
+}
+
+fn decode(
+    job: &Job<'_>,
+    lattice: &Lattice,
+    shares: &Shares,
+    area: &Arc<SpillArea>,
+) -> Result<(TileStore, Tally)> {
+    let _working = job.budget.lease(shares.work, "decoding")?;
+    let store = TileStore::new(area, &job.budget, job.source.schema().stride);
+    let total = Mutex::new(Tally::default());
+    let next = AtomicUsize::new(0);
+    parallel(job.threads, |_| {
+        let mut tally = Tally::default();
+        let mut intake = Intake::new(&store, job.run_records.unwrap_or(shares.run_records));
+        let mut batch = PointBatch::new(job.source.schema().clone(), BATCH);
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            if index >= job.source.parts() {
+                break;
+            }
+            let mut part = job.source.part(index)?;
+            while job.read(&mut *part, &mut batch, &mut tally)? {
+                take(job, lattice, &batch, &mut intake, &mut tally)?;
+            }
+        }
+        intake.flush()?;
+        lock(&total).merge(&tally);
+        Ok(())
+    })?;
+    let tally = std::mem::take(&mut *lock(&total));
+    Ok((store, tally))
+}
+
+/// Places a batch's records on the lattice and hands them to the intake.
+fn take(
+    job: &Job<'_>,
+    lattice: &Lattice,
+    batch: &PointBatch,
+    intake: &mut Intake<'_>,
+    tally: &mut Tally,
+) -> Result<()> {
+    let stride = batch.schema().stride;
+    let records = batch.records();
+    let (mut outcome, mut misplaced, mut placed) = (Ok(()), Vec::new(), 0);
+    lattice.place(
+        batch.schema(),
+        records,
+        |i, position| {
+            if outcome.is_ok() {
+                placed += 1;
+                outcome = intake.push(position, &records[i * stride..(i + 1) * stride]);
+            }
+        },
+        |i, why| misplaced.push((i, why)),
+    );
+    outcome?;
+    for (i, why) in misplaced {
+        if why == Misplaced::NotFinite && job.drop_nonfinite {
+            tally.remove(&job.source_kind, "not finite", 1);
+        } else {
+            return Err(job.misplaced(batch, i, why));
+        }
+    }
+    tally.work("placed", placed);
+    Ok(())
+}
+
+fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<Vec<Decision>> {
+    let facts = ScanFacts {
+        points: tiles.points(),
+        positions: tiles.positions(),
+        bounds: tiles.bounds(),
+        lattice,
+        levels: tiles.levels(),
+    };
+    let mut decisions = Vec::new();
+    for (kind, op) in job.ops.iter_mut() {
+        op.settle(&facts)?;
+        decisions.extend(op.decisions().into_iter().map(|(name, value)| Decision {
+            stage: kind.clone(),
+            name,
+            value,
+        }));
+    }
+    Ok(decisions)
+}
+
+/// How far beyond its cube a tile's columns must be right: the sides of the cells that its faces
+/// may cut, which add along the chain.
+fn reach(ops: &[(String, Box<dyn TileOp>)]) -> i64 {
+    ops.iter()
+        .map(|(_, op)| op.needs())
+        .filter(|needs| !needs.cell_aligned)
+        .fold(0, |sum, needs| sum.saturating_add(needs.cell_side))
+}
+
+fn neighbors(ops: &[(String, Box<dyn TileOp>)]) -> usize {
+    ops.iter().map(|(_, op)| op.needs().neighbors).max().unwrap_or(0)
+}
+
+/// Tiles are at least four cells wide, or their zones would be mostly their neighbours'.
+const CELLS_ACROSS: u64 = 4;
+
+fn cut(
+    job: &Job<'_>,
+    lattice: &Lattice,
+    shares: &Shares,
+    demands: &Demands,
+    tiles: &SealedTiles,
+) -> Result<Vec<TileKey>> {
+    let side = job.ops.iter().map(|(_, op)| op.needs().cell_side).max().unwrap_or(0);
+    let lowest = match u64::try_from(side).unwrap_or(0).saturating_mul(CELLS_ACROSS) {
+        0 => 0,
+        wide => wide.next_power_of_two().ilog2(),
+    };
+    // Half of a tile's memory is for its zone, the other half for its rim.
+    let most = (shares.tile_positions / 2) as u64;
+    let wanted = job.tile_points.map_or(most, |points| points as u64);
+    tiles.cut(wanted, most, reach(&job.ops), lowest).map_err(|error| match error {
+        CutError::Read(error) => error,
+        CutError::TooHeavy { key, positions } => {
+            let (lo, hi) = (lattice.world(key.cube().lo), lattice.world(key.cube().hi));
+            let limit = whole_mebibytes(demands.limit_for_tile(2 * positions));
+            Error::memory(format!(
+                "the cube from {lo:?} to {hi:?} and the cells around it hold {positions} positions, \
+                 more than the {most} that a tile may have"
+            ))
+            .help(format!("give --memory {limit} or more, fewer --threads, or a smaller cell side"))
+        }
+    })
+}
+
+/// What a tile leaves behind.
+struct Product {
+    /// First record and number of records of each kept position.
+    kept: Vec<(u64, u32)>,
+    /// Normals of the kept positions, if the sink wants them.
+    normals: Option<Vec<[f32; 3]>>,
+    /// Fates of all core positions, as stored.
+    fates: Vec<u8>,
+}
+
+/// Records that become one chunk of the output.
+struct Chunk {
+    records: Vec<u64>,
+    normals: Option<Vec<[f32; 3]>>,
+}
+
+struct Milled {
+    tally: Tally,
+    fates: Pieces,
+    kept: u64,
+    written: crate::stage::SinkSummary,
+}
+
+fn grind(
+    job: &Job<'_>,
+    shares: &Shares,
+    area: &Arc<SpillArea>,
+    tiles: &Arc<SealedTiles>,
+    keys: &[TileKey],
+    sink: Box<dyn Sink>,
+) -> Result<Milled> {
+    let _working = job.budget.lease(shares.work, "the mill")?;
+    let (encoder, chunk_points) = (sink.encoder(), sink.chunk_points());
+    let outlet: Outlet<Product, Chunk> = Outlet::new(sink, job.threads);
+    let fates = Pieces::new(area, "fates", FATE_BYTES);
+    fates.reserve(tiles.positions());
+    let cutter = Mutex::new(Cutter::new(&fates, chunk_points, job.wants_normals));
+    let commit = |product: Product| lock(&cutter).cut(product);
+    let encode = |chunk: Chunk, bench: &mut Bench| -> Result<Encoded> {
+        bench.batch.clear();
+        tiles.fetch(&chunk.records, &mut bench.fetch, &mut bench.batch)?;
+        bench.batch.normals = chunk.normals;
+        encoder.encode(&bench.batch)
+    };
+    let bench = || Bench {
+        fetch: Fetch::default(),
+        batch: PointBatch::new(job.source.schema().clone(), chunk_points),
+    };
+    let total = Mutex::new(Tally::default());
+    let next = AtomicUsize::new(0);
+    let capacity = job.tile_capacity(shares);
+    parallel(job.threads, |_| {
+        let guard = StopOnDrop::new(|| outlet.stop());
+        let mut bench = bench();
+        let mut encode = |chunk| encode(chunk, &mut bench);
+        let mut hands = Hands { commit: &commit, encode: &mut encode };
+        let mut worker = Worker::new(job, tiles, capacity);
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(&key) = keys.get(index) else { break };
+            let product = worker.mill(key)?;
+            let positions = (product.fates.len() / FATE_BYTES) as u64;
+            outlet.deliver((index as u64, 0), product, true, &mut hands)?;
+            job.advance(positions)?;
+        }
+        outlet.drain(&mut hands, |turn| turn.0 >= keys.len() as u64)?;
+        lock(&total).merge(&worker.tally);
+        guard.disarm();
+        Ok(())
+    })?;
+    let (rest, kept) = lock(&cutter).finish()?;
+    let mut bench = bench();
+    let mut encode = |chunk| encode(chunk, &mut bench);
+    let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
+    let tally = std::mem::take(&mut *lock(&total));
+    drop(cutter);
+    Ok(Milled { tally, fates, kept, written })
+}
+
+/// What a thread needs to encode chunks.
+struct Bench {
+    fetch: Fetch,
+    batch: PointBatch,
+}
+
+/// What a thread needs to mill tiles.
+struct Worker<'a> {
+    job: &'a Job<'a>,
+    loader: Loader,
+    reach: i64,
+    neighbors: usize,
+    tally: Tally,
+}
+
+impl<'a> Worker<'a> {
+    fn new(job: &'a Job<'a>, tiles: &Arc<SealedTiles>, capacity: usize) -> Self {
+        let neighbors = neighbors(&job.ops);
+        let mut loader = Loader::new(tiles, capacity);
+        if neighbors > 0 {
+            loader.tile().0.around.reserve(capacity);
+        }
+        Worker { job, loader, reach: reach(&job.ops), neighbors, tally: Tally::default() }
+    }
+
+    fn mill(&mut self, key: TileKey) -> Result<Product> {
+        self.loader.load(key, self.reach, self.neighbors)?;
+        let (tile, first_records) = self.loader.tile();
+        for (_, op) in &self.job.ops {
+            op.run(tile, &mut self.tally)?;
+        }
+        self.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
+        self.tally.work("unproven", tile.around.take_unproven());
+        self.tally.work("tied", tile.around.take_tied());
+        Ok(product(tile, first_records, self.job.wants_normals))
+    }
+}
+
+fn product(tile: &Tile, first_records: &[u64], wants_normals: bool) -> Product {
+    let core = tile.core.clone();
+    let mut product = Product {
+        kept: Vec::with_capacity(core.len()),
+        normals: wants_normals.then(|| Vec::with_capacity(core.len())),
+        fates: Vec::with_capacity(core.len() * FATE_BYTES),
+    };
+    for (&first, i) in first_records.iter().zip(core) {
+        let records = match tile.fates[i] {
+            Fate::Kept => tile.copies[i],
+            Fate::KeptOnce => 1,
+            Fate::Represented { .. } => 0,
+        };
+        product.fates.extend_from_slice(&fate_code(tile.fates[i]));
+        if records > 0 {
+            product.kept.push((first, records));
+            if let Some(normals) = &mut product.normals {
+                normals.push(tile.normals[i]);
+            }
+        }
+    }
+    product
+}
+
+/// Cuts kept records into chunks of the sink's size by their rank, and stores fates.
+struct Cutter<'a> {
+    fates: &'a Pieces,
+    fate_bytes: Vec<u8>,
+    fates_stored: u64,
+    chunk_points: usize,
+    open: Chunk,
+    kept: u64,
+}
+
+impl<'a> Cutter<'a> {
+    fn new(fates: &'a Pieces, chunk_points: usize, wants_normals: bool) -> Self {
+        Cutter {
+            fates,
+            fate_bytes: Vec::with_capacity(PIECE * FATE_BYTES),
+            fates_stored: 0,
+            chunk_points,
+            open: Chunk { records: Vec::new(), normals: wants_normals.then(Vec::new) },
+            kept: 0,
+        }
+    }
+
+    fn cut(&mut self, product: Product) -> Result<Vec<Chunk>> {
+        self.store_fates(&product.fates)?;
+        let mut full = Vec::new();
+        for (n, &(first, records)) in product.kept.iter().enumerate() {
+            for record in first..first + u64::from(records) {
+                self.open.records.push(record);
+                if let (Some(open), Some(normals)) = (&mut self.open.normals, &product.normals) {
+                    open.push(normals[n]);
+                }
+                if self.open.records.len() == self.chunk_points {
+                    full.push(self.close());
+                }
+            }
+        }
+        Ok(full)
+    }
+
+    fn close(&mut self) -> Chunk {
+        self.kept += self.open.records.len() as u64;
+        let normals = self.open.normals.as_mut().map(std::mem::take);
+        Chunk { records: std::mem::take(&mut self.open.records), normals }
+    }
+
+    fn store_fates(&mut self, mut fates: &[u8]) -> Result<()> {
+        while !fates.is_empty() {
+            let room = PIECE * FATE_BYTES - self.fate_bytes.len();
+            let (now, later) = fates.split_at(room.min(fates.len()));
+            self.fate_bytes.extend_from_slice(now);
+            fates = later;
+            if self.fate_bytes.len() == PIECE * FATE_BYTES {
+                self.flush_fates()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn flush_fates(&mut self) -> Result<()> {
+        if !self.fate_bytes.is_empty() {
+            self.fates.put(self.fates_stored, &self.fate_bytes)?;
+            self.fates_stored += (self.fate_bytes.len() / FATE_BYTES) as u64;
+            self.fate_bytes.clear();
+        }
+        Ok(())
+    }
+
+    /// The last chunk, and how many records are kept in all.
+    fn finish(&mut self) -> Result<(Vec<Chunk>, u64)> {
+        self.flush_fates()?;
+        let rest = if self.open.records.is_empty() { Vec::new() } else { vec![self.close()] };
+        Ok((rest, self.kept))
+    }
+}
