@@ -176,7 +176,7 @@ impl<'a> Division<'a> {
         part.iter().for_each(|&i| ends[octant(i)] += 1);
         let mut starts = [0; 8];
         for i in 1..8 {
-            starts[i] = starts[i - 1] + ends[i - 1];
+            starts[i] = ends[i - 1];
             ends[i] += ends[i - 1];
         }
         let mut next = starts;
