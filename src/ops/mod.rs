@@ -1,1 +1,7 @@
 //! The built-in stages that compute: one file each.
+
+mod cells;
+mod median;
+
+pub use cells::{Cells, Measure, Side, Split};
+pub use median::Median;

@@ -1,0 +1,189 @@
+//! Angles of normals to a direction, compared by their cosines: no arc cosine decides anything,
+//! because platform libraries differ in its last bits. Knows no tiles, no files.
+
+/// cos θ of the angle θ between the unit vector `reference` and `normal` (turned around first if
+/// `turned`), in [−1, 1]. A normal and its turned opposite have exactly the same cosine.
+pub fn cosine(reference: [f64; 3], normal: [f32; 3], turned: bool) -> f64 {
+    let [x, y, z] = normal.map(f64::from);
+    let dot = (reference[0] * x + reference[1] * y + reference[2] * z).clamp(-1.0, 1.0);
+    // Adding 0 makes −0 a 0, so that total order and equality agree.
+    (if turned { -dot } else { dot }) + 0.0
+}
+
+/// The widest range of angles that counts as agreement, prepared for comparing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MaxAngle {
+    cosine: f64,
+}
+
+impl MaxAngle {
+    /// The range `radians`, in [0, π].
+    pub fn new(radians: f64) -> Self {
+        MaxAngle { cosine: libm::cos(radians) }
+    }
+
+    /// True if θ_max − θ_min is larger, given cos θ_min ≥ cos θ_max: by
+    /// cos(θ_max − θ_min) = cos θ_max · cos θ_min + sin θ_max · sin θ_min. Ranges below about
+    /// 1e-8 rad cannot be told from none.
+    pub fn is_exceeded(self, cos_theta_min: f64, cos_theta_max: f64) -> bool {
+        let difference = cos_theta_min * cos_theta_max + sine(cos_theta_min) * sine(cos_theta_max);
+        cos_theta_min > cos_theta_max && difference < self.cosine
+    }
+}
+
+/// sin θ of a θ in [0, π] from its cosine.
+fn sine(cosine: f64) -> f64 {
+    (1.0 - cosine * cosine).max(0.0).sqrt()
+}
+
+/// Σ nnᵀ of normals, whatever their signs: xx, xy, xz, yy, yz, zz. Summed in the order given.
+pub fn outer_sum(normals: impl Iterator<Item = [f32; 3]>) -> [f64; 6] {
+    normals.fold([0.0; 6], |mut sum, normal| {
+        let [x, y, z] = normal.map(f64::from);
+        for (entry, product) in sum.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z]) {
+            *entry += product;
+        }
+        sum
+    })
+}
+
+/// Squarings after which [`dominant_axis`] stops: eigenvalues that agree to 1e-8 count as equal.
+const SQUARINGS: usize = 32;
+/// Trace of the square at which nothing but the largest eigenvalue is left.
+const CONVERGED: f64 = 1.0 - 1e-15;
+
+/// Direction (of no particular length) of an eigenvector of the largest eigenvalue of a positive
+/// semidefinite symmetric matrix (xx, xy, xz, yy, yz, zz), its largest component positive (of equal
+/// ones the first). Where the largest eigenvalue is multiple, one of its eigenvectors; zero for the
+/// zero matrix.
+///
+/// The matrix is squared until one eigenvalue is left: every column is then an eigenvector, also
+/// where two eigenvalues are equal, and the cells of agreeing normals need three or four squarings.
+pub fn dominant_axis(matrix: [f64; 6]) -> [f64; 3] {
+    let trace = matrix[0] + matrix[3] + matrix[5];
+    if !(trace > 0.0) {
+        return [0.0; 3];
+    }
+    let mut m = matrix.map(|entry| entry / trace);
+    for _ in 0..SQUARINGS {
+        let [xx, xy, xz, yy, yz, zz] = m;
+        let square = [
+            xx * xx + xy * xy + xz * xz,
+            xx * xy + xy * yy + xz * yz,
+            xx * xz + xy * yz + xz * zz,
+            xy * xy + yy * yy + yz * yz,
+            xy * xz + yy * yz + yz * zz,
+            xz * xz + yz * yz + zz * zz,
+        ];
+        let trace = square[0] + square[3] + square[5];
+        m = square.map(|entry| entry / trace);
+        if trace >= CONVERGED {
+            break;
+        }
+    }
+    let [xx, xy, xz, yy, yz, zz] = m;
+    let columns = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+    let axis = columns[largest([xx, yy, zz])];
+    if axis[largest(axis)] < 0.0 { axis.map(|v| -v) } else { axis }
+}
+
+/// The component of largest magnitude, of equal ones the first.
+fn largest(v: [f64; 3]) -> usize {
+    let [x, y, z] = v.map(f64::abs);
+    if x >= y && x >= z {
+        0
+    } else if y >= z {
+        1
+    } else {
+        2
+    }
+}
+
+/// True if `normal` is to be turned around to lie on the side of `axis`; one that is exactly
+/// perpendicular to it is turned so that its largest component is positive.
+pub fn is_turned(axis: [f64; 3], normal: [f32; 3]) -> bool {
+    let n = normal.map(f64::from);
+    let dot = axis[0] * n[0] + axis[1] * n[1] + axis[2] * n[2];
+    if dot == 0.0 { n[largest(n)] < 0.0 } else { dot < 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn unit() -> impl Strategy<Value = [f32; 3]> {
+        proptest::array::uniform3(-1.0f64..1.0).prop_filter_map("length", |v| {
+            let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
+            (length > 0.1).then(|| v.map(|c| (c / length) as f32))
+        })
+    }
+
+    fn column(m: [f64; 6], v: [f64; 3]) -> [f64; 3] {
+        [
+            m[0] * v[0] + m[1] * v[1] + m[2] * v[2],
+            m[1] * v[0] + m[3] * v[1] + m[4] * v[2],
+            m[2] * v[0] + m[4] * v[1] + m[5] * v[2],
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn the_range_test_is_that_of_arc_cosines(a in unit(), b in unit(), n in unit(), delta in 0.0f64..3.2) {
+            let delta = delta.min(std::f64::consts::PI);
+            let n = n.map(f64::from);
+            let (a, b) = (cosine(n, a, false), cosine(n, b, false));
+            let range = (a.acos() - b.acos()).abs();
+            prop_assume!((range - delta).abs() > 1e-6);
+            prop_assert_eq!(MaxAngle::new(delta).is_exceeded(a.max(b), a.min(b)), range > delta);
+        }
+
+        #[test]
+        fn a_turned_normal_has_the_cosine_of_its_opposite(n in unit(), reference in unit()) {
+            let reference = reference.map(f64::from);
+            let opposite = n.map(|v| -v);
+            prop_assert_eq!(cosine(reference, n, true).to_bits(), cosine(reference, opposite, false).to_bits());
+        }
+
+        #[test]
+        fn the_axis_is_an_eigenvector_of_the_largest_eigenvalue(normals in prop::collection::vec(unit(), 1..9)) {
+            let m = outer_sum(normals.iter().copied());
+            let axis = dominant_axis(m);
+            let length2: f64 = axis.iter().map(|v| v * v).sum();
+            let image = column(m, axis);
+            let value = (0..3).map(|i| image[i] * axis[i]).sum::<f64>() / length2;
+            for i in 0..3 {
+                prop_assert!((image[i] - value * axis[i]).abs() < 1e-7 * value * length2.sqrt());
+            }
+            for n in normals {
+                let quotient = (0..3).map(|i| column(m, n.map(f64::from))[i] * f64::from(n[i])).sum::<f64>();
+                prop_assert!(quotient <= value * (1.0 + 1e-6));
+            }
+            prop_assert!(axis[largest(axis)] > 0.0);
+        }
+    }
+
+    #[test]
+    fn equal_angles_have_no_range_even_for_zero() {
+        for c in [-1.0, -0.7, 0.0, 0.1, 0.999_999_9, 1.0] {
+            assert!(!MaxAngle::new(0.0).is_exceeded(c, c));
+        }
+        assert!(MaxAngle::new(0.0).is_exceeded(0.5, 0.499_999_9));
+        assert!(!MaxAngle::new(std::f64::consts::PI).is_exceeded(1.0, -1.0));
+    }
+
+    #[test]
+    fn an_axis_of_equal_eigenvalues_is_in_their_plane() {
+        let axis = dominant_axis(outer_sum([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0]].into_iter()));
+        assert_eq!((axis[0], axis[1], axis[2]), (0.5, 0.0, 0.0));
+        assert_eq!(dominant_axis([0.0; 6]), [0.0; 3]);
+    }
+
+    #[test]
+    fn a_perpendicular_normal_keeps_its_largest_component_positive() {
+        let x = [1.0, 0.0, 0.0];
+        assert!(is_turned(x, [0.0, -0.8, 0.6]));
+        assert!(!is_turned(x, [0.0, 0.8, -0.6]));
+        assert!(is_turned(x, [-0.1, 0.9, 0.0]));
+    }
+}

@@ -1,0 +1,180 @@
+//! What a pipeline file may say about cells.
+
+use std::f64::consts::PI;
+use std::fmt;
+
+use serde::Deserialize;
+use serde::de::{Deserializer, Error, Unexpected, Visitor};
+
+/// Side of the initial cells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Side {
+    /// The smallest power of two of lattice steps for which occupied cubes hold 32 positions on
+    /// average.
+    Auto,
+    /// World units, above 0; rounded to whole lattice steps.
+    Length(f64),
+}
+
+/// How a cell is divided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Split {
+    /// Between the position with the smallest angle and that with the largest: each position goes
+    /// with the nearer one, with the former if equally far (the paper's Algorithm 2).
+    Voronoi,
+    /// The cube in eight, down to one lattice position.
+    Octant,
+}
+
+/// What the range of angles of a cell is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Measure {
+    /// θ_max − θ_min of the angles to N (the paper's; blind to rotations about N).
+    Axis,
+}
+
+impl<'de> Deserialize<'de> for Side {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(SideVisitor)
+    }
+}
+
+struct SideVisitor;
+
+impl Visitor<'_> for SideVisitor {
+    type Value = Side;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("a length above 0 in the scan's unit, or \"auto\"")
+    }
+
+    fn visit_f64<E: Error>(self, length: f64) -> Result<Side, E> {
+        if length.is_finite() && length > 0.0 {
+            Ok(Side::Length(length))
+        } else {
+            Err(E::invalid_value(Unexpected::Float(length), &self))
+        }
+    }
+
+    fn visit_i64<E: Error>(self, length: i64) -> Result<Side, E> {
+        self.visit_f64(length as f64)
+    }
+
+    fn visit_u64<E: Error>(self, length: u64) -> Result<Side, E> {
+        self.visit_f64(length as f64)
+    }
+
+    fn visit_str<E: Error>(self, word: &str) -> Result<Side, E> {
+        match word {
+            "auto" => Ok(Side::Auto),
+            _ => Err(E::invalid_value(Unexpected::Str(word), &self)),
+        }
+    }
+}
+
+/// An angle from 0 to π: a number of radians, or text with a unit.
+pub(super) fn angle<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    deserializer.deserialize_any(AngleVisitor)
+}
+
+struct AngleVisitor;
+
+impl Visitor<'_> for AngleVisitor {
+    type Value = f64;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("an angle from 0 to pi: radians such as 0.1, or text such as \"6deg\"")
+    }
+
+    fn visit_f64<E: Error>(self, radians: f64) -> Result<f64, E> {
+        if (0.0..=PI).contains(&radians) {
+            Ok(radians)
+        } else if radians > PI && radians <= 180.0 {
+            Err(E::custom(format!(
+                "an angle is in radians, at most pi, and {radians} is more: \
+                 for degrees write \"{radians}deg\""
+            )))
+        } else {
+            Err(E::invalid_value(Unexpected::Float(radians), &self))
+        }
+    }
+
+    fn visit_i64<E: Error>(self, radians: i64) -> Result<f64, E> {
+        self.visit_f64(radians as f64)
+    }
+
+    fn visit_u64<E: Error>(self, radians: u64) -> Result<f64, E> {
+        self.visit_f64(radians as f64)
+    }
+
+    fn visit_str<E: Error>(self, text: &str) -> Result<f64, E> {
+        let refused = || E::invalid_value(Unexpected::Str(text), &self);
+        let (number, half_turn) = text
+            .strip_suffix("deg")
+            .map(|number| (number, 180.0))
+            .or_else(|| text.strip_suffix("rad").map(|number| (number, PI)))
+            .ok_or_else(refused)?;
+        let value: f64 = number.trim().parse().map_err(|_| refused())?;
+        if !(0.0..=half_turn).contains(&value) {
+            return Err(refused());
+        }
+        Ok(if half_turn == PI { value } else { value / half_turn * PI })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ops::Cells;
+
+    fn refusal(text: &str) -> String {
+        toml::from_str::<Cells>(text).expect_err(text).to_string()
+    }
+
+    #[test]
+    fn an_empty_stage_has_the_documented_defaults() {
+        let cells: Cells = toml::from_str("").unwrap();
+        assert_eq!((cells.side, cells.max_angle), (Side::Auto, 0.1));
+        assert_eq!((cells.min_points.get(), cells.split), (1, Split::Voronoi));
+        assert_eq!(cells.measure, Measure::Axis);
+    }
+
+    #[test]
+    fn angles_are_radians_or_have_a_unit() {
+        for (text, radians) in [
+            ("0.25", 0.25),
+            ("1", 1.0),
+            ("'180deg'", PI),
+            ("'6 deg'", 6.0 / 180.0 * PI),
+            ("'0.1rad'", 0.1),
+        ] {
+            let cells: Cells = toml::from_str(&format!("max_angle = {text}")).unwrap();
+            assert_eq!(cells.max_angle, radians, "{text}");
+        }
+        assert!(refusal("max_angle = 6").contains("write \"6deg\""));
+        for wrong in ["-0.1", "nan", "inf", "1000", "'6'", "'deg'", "'181deg'", "'-1rad'", "true"] {
+            assert!(refusal(&format!("max_angle = {wrong}")).contains("0 to pi"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn sides_are_lengths_or_auto() {
+        let side = |text: &str| toml::from_str::<Cells>(&format!("side = {text}")).unwrap().side;
+        assert_eq!(side("2"), Side::Length(2.0));
+        assert_eq!(side("0.25"), Side::Length(0.25));
+        assert_eq!(side("'auto'"), Side::Auto);
+        for wrong in ["0", "-1.0", "nan", "inf", "'big'", "[1]"] {
+            assert!(refusal(&format!("side = {wrong}")).contains("\"auto\""), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_cells_do_not_know_is_refused() {
+        assert!(refusal("measure = 'cone'").contains("axis"));
+        assert!(refusal("split = 'kd'").contains("octant"));
+        assert!(refusal("min_points = 0").contains("nonzero"));
+        assert!(refusal("max_angel = 0.1").contains("max_angle"));
+    }
+}

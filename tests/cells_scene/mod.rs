@@ -1,0 +1,242 @@
+//! Hand-made scans for the tests of `cells` and `median`, and both stages written as plainly as can
+//! be: recursive, on cloned lists, over the whole scan at once.
+#![allow(dead_code, reason = "each test uses its part")]
+
+use pointmill::geom::angle::{MaxAngle, cosine, dominant_axis, is_turned, outer_sum};
+use pointmill::geom::lattice::Lattice;
+use pointmill::ops::{Cells, Median, Side, Split};
+use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
+use pointmill::report::Tally;
+use pointmill::stage::{ScanFacts, TileOp};
+use pointmill::tile::{Cells as Partition, Fate, Levels, Tile, TileKey, morton_cmp};
+use proptest::prelude::*;
+
+pub const NONE: [f32; 3] = [f32::NAN; 3];
+const X: [f64; 3] = [1.0, 0.0, 0.0];
+
+/// A position, its normal and how many records share it.
+#[derive(Debug, Clone, Copy)]
+pub struct Point {
+    pub at: Position,
+    pub normal: [f32; 3],
+    pub copies: u32,
+}
+
+/// Distinct positions in Morton order.
+pub fn scan(points: impl IntoIterator<Item = (Position, [f32; 3], u32)>) -> Vec<Point> {
+    let mut scan: Vec<Point> =
+        points.into_iter().map(|(at, normal, copies)| Point { at, normal, copies }).collect();
+    scan.sort_by(|a, b| morton_cmp(&a.at, &b.at));
+    scan.dedup_by_key(|p| p.at);
+    scan
+}
+
+pub fn whole(scan: &[Point]) -> TileKey {
+    TileKey::holding(&Bounds::of(scan.iter().map(|p| p.at)))
+}
+
+/// The tile of `cube`, its zone grown by `side`, and nothing loaded beyond.
+pub fn tile(scan: &[Point], cube: Bounds, side: i64) -> Tile {
+    let zone = cube.grown(side);
+    let loaded: Vec<Point> = scan.iter().copied().filter(|p| zone.contains(p.at)).collect();
+    let start = loaded.iter().take_while(|p| !cube.contains(p.at)).count();
+    let count = loaded.iter().filter(|p| cube.contains(p.at)).count();
+    Tile {
+        cube,
+        zone,
+        positions: loaded.iter().map(|p| p.at).collect(),
+        copies: loaded.iter().map(|p| p.copies).collect(),
+        core: start..start + count,
+        normals: loaded.iter().map(|p| p.normal).collect(),
+        cells: Partition::default(),
+        fates: vec![Fate::Kept; loaded.len()],
+    }
+}
+
+pub fn cells(side: f64, max_angle: f64, split: Split) -> Cells {
+    let mut stage = Cells::default();
+    (stage.side, stage.max_angle, stage.split) = (Side::Length(side), max_angle, split);
+    stage
+}
+
+/// Settles the stage on `scan`, on a lattice of whole numbers.
+pub fn settle(mut stage: Cells, scan: &[Point]) -> Cells {
+    let axes = ["X", "Y", "Z"].iter().zip([0, 8, 16]);
+    let schema = Schema {
+        layout: Layout::Ply,
+        endian: Endian::Little,
+        stride: 24,
+        dimensions: axes.map(|(name, at)| Dimension::new(*name, Scalar::F64, at)).collect(),
+    };
+    let lattice = Lattice::of(&schema, Some(1.0)).unwrap();
+    let mut levels = Levels::default();
+    for (i, p) in scan.iter().enumerate() {
+        levels.add(i.checked_sub(1).map(|before| scan[before].at), p.at);
+    }
+    stage
+        .settle(&ScanFacts {
+            points: scan.iter().map(|p| u64::from(p.copies)).sum(),
+            positions: scan.len() as u64,
+            bounds: Bounds::of(scan.iter().map(|p| p.at)),
+            lattice: &lattice,
+            levels: &levels,
+        })
+        .unwrap();
+    stage
+}
+
+/// What a run over all tiles says: the fate of every position, and the tally.
+#[derive(Debug)]
+pub struct Outcome {
+    pub fates: Vec<(Position, Fate)>,
+    pub groups: Vec<Vec<Position>>,
+    pub tally: Tally,
+}
+
+impl Outcome {
+    pub fn kept(&self) -> Vec<Position> {
+        let kept = self.fates.iter().filter(|f| !matches!(f.1, Fate::Represented { .. }));
+        kept.map(|f| f.0).collect()
+    }
+
+    pub fn count(&self, name: &str) -> u64 {
+        self.tally.counts.get(name).copied().unwrap_or(0)
+    }
+}
+
+/// Runs both stages over the tiles of `cubes`.
+pub fn run(stage: &Cells, scan: &[Point], cubes: &[Bounds]) -> Outcome {
+    let side = stage.needs().cell_side;
+    let mut outcome = Outcome { fates: Vec::new(), groups: Vec::new(), tally: Tally::default() };
+    for cube in cubes {
+        let mut tile = tile(scan, *cube, side);
+        let mut tally = Tally::default();
+        stage.run(&mut tile, &mut tally).unwrap();
+        Median {}.run(&mut tile, &mut tally).unwrap();
+        outcome.tally.merge(&tally);
+        outcome.fates.extend(tile.core.clone().map(|i| (tile.positions[i], tile.fates[i])));
+        outcome.groups.extend(groups(&tile));
+    }
+    outcome
+}
+
+/// Runs both stages with the whole scan in one tile.
+pub fn run_whole(stage: Cells, scan: &[Point]) -> Outcome {
+    run(&settle(stage, scan), scan, &[whole(scan).cube()])
+}
+
+/// The positions of every group.
+pub fn groups(tile: &Tile) -> Vec<Vec<Position>> {
+    let positions = |group: std::ops::Range<usize>| {
+        tile.cells.members[group].iter().map(|&i| tile.positions[i as usize]).collect()
+    };
+    tile.cells.groups().map(positions).collect()
+}
+
+/// The partition of `scan`, written plainly: groups in no particular order.
+pub fn plain_groups(scan: &[Point], stage: &Cells, side: i64) -> Vec<Vec<Point>> {
+    let corner = |p: &Point| p.at.map(|v| v.div_euclid(side) * side);
+    let mut corners: Vec<Position> = scan.iter().map(corner).collect();
+    corners.sort_unstable();
+    corners.dedup();
+    let mut groups = Vec::new();
+    for c in corners {
+        let has_normal = |p: &&Point| corner(p) == c && !p.normal[0].is_nan();
+        let cell: Vec<Point> = scan.iter().filter(has_normal).copied().collect();
+        if !cell.is_empty() {
+            plain_divide(cell, (c, [side; 3]), stage, &mut groups);
+        }
+    }
+    groups
+}
+
+fn plain_cosines(cell: &[Point]) -> Vec<f64> {
+    let axis = dominant_axis(outer_sum(cell.iter().map(|p| p.normal)));
+    cell.iter().map(|p| cosine(X, p.normal, is_turned(axis, p.normal))).collect()
+}
+
+fn plain_divide(
+    cell: Vec<Point>,
+    cube: (Position, [i64; 3]),
+    stage: &Cells,
+    groups: &mut Vec<Vec<Point>>,
+) {
+    let cosines = plain_cosines(&cell);
+    let most = cosines.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let least = cosines.iter().copied().fold(f64::INFINITY, f64::min);
+    if cell.len() <= stage.min_points.get()
+        || !MaxAngle::new(stage.max_angle).is_exceeded(most, least)
+    {
+        groups.push(cell);
+        return;
+    }
+    match stage.split {
+        Split::Voronoi => {
+            let site = |c: f64| cell[cosines.iter().position(|&v| v == c).unwrap()];
+            let (a, b) = (site(most), site(least));
+            let far = |p: &Point, q: &Point| -> i128 {
+                (0..3).map(|i| (i128::from(p.at[i]) - i128::from(q.at[i])).pow(2)).sum()
+            };
+            let (near, rest) = cell.into_iter().partition(|p| far(p, &a) <= far(p, &b));
+            plain_divide(near, cube, stage, groups);
+            plain_divide(rest, cube, stage, groups);
+        }
+        Split::Octant => {
+            let (corner, sides) = cube;
+            for octant in 0..8 {
+                let upper: [bool; 3] = std::array::from_fn(|axis| octant >> axis & 1 == 1);
+                let lower = sides.map(|s| (s + 1) / 2);
+                let start =
+                    std::array::from_fn(|i| corner[i] + if upper[i] { lower[i] } else { 0 });
+                let span =
+                    std::array::from_fn(|i| if upper[i] { sides[i] - lower[i] } else { lower[i] });
+                let inside =
+                    |p: &&Point| (0..3).all(|i| (start[i]..start[i] + span[i]).contains(&p.at[i]));
+                let part: Vec<Point> = cell.iter().filter(inside).copied().collect();
+                if !part.is_empty() {
+                    plain_divide(part, (start, span), stage, groups);
+                }
+            }
+        }
+    }
+}
+
+/// The position that stays of a group, written plainly. Coordinates below 2^40 only.
+pub fn plain_median(group: &[Point]) -> Position {
+    let cosines = plain_cosines(group);
+    let mut sorted = cosines.clone();
+    sorted.sort_by(|a, b| b.total_cmp(a));
+    let median = sorted[(group.len() - 1) / 2];
+    let sum: [i128; 3] = std::array::from_fn(|i| group.iter().map(|p| i128::from(p.at[i])).sum());
+    let offset2 = |p: &Point| -> i128 {
+        (0..3).map(|i| (group.len() as i128 * i128::from(p.at[i]) - sum[i]).pow(2)).sum()
+    };
+    let alike = group.iter().zip(&cosines).filter(|(_, c)| **c == median);
+    alike.min_by_key(|(p, _)| offset2(p)).unwrap().0.at
+}
+
+/// Normals of a few exact directions (so that angles tie) and their opposites, of any direction,
+/// and none.
+pub fn any_normal() -> impl Strategy<Value = [f32; 3]> {
+    let few = prop::sample::select(vec![
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+        [0.6, 0.0, 0.8],
+        [-0.6, 0.0, 0.8],
+        [0.6, 0.0, -0.8],
+        [1.0, 0.0, 0.0],
+        [0.0, -1.0, 0.0],
+        [0.08, 0.0, 0.996_795],
+    ]);
+    let any = prop::array::uniform3(-1.0f64..1.0).prop_map(|v| {
+        let length = v.iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-9);
+        v.map(|c| (c / length) as f32)
+    });
+    prop_oneof![6 => few, 3 => any, 1 => Just(NONE)]
+}
+
+/// Scans of up to `most` positions in a box of `width` around `center`, dense enough to tie.
+pub fn any_scan(center: i64, width: i64, most: usize) -> impl Strategy<Value = Vec<Point>> {
+    let at = prop::array::uniform3(center - width / 2..center + width / 2);
+    prop::collection::vec((at, any_normal(), 1u32..4), most / 2..most).prop_map(scan)
+}
