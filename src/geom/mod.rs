@@ -2,3 +2,4 @@
 //! Knows no tiles, no files.
 
 pub mod lattice;
+pub mod nearest;
