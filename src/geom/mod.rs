@@ -3,3 +3,4 @@
 
 pub mod angle;
 pub mod lattice;
+pub mod nearest;

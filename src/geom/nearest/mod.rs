@@ -1,0 +1,225 @@
+//! The k nearest neighbours of every position of a set, exactly. Knows no tiles, no files.
+//!
+//! Nearest is by exact integer squared distance, ties by index. The search itself is done in 32-bit
+//! floats, 16 points at a time, and every point's answer is then proven or redone in integers:
+//!
+//! - Coordinates are relative to a run of 256 points in Morton order, which is near to whoever looks
+//!   at it. While all coordinates are integers up to 2^24, differences below 2^12 and sums of their
+//!   squares below 2^24 are exact, and what is farther gets a float of 2^24 or more (rounding is
+//!   monotonic). A set whose last float distance is below 2^24 is therefore exact, ties included.
+//! - Otherwise let e bound the error of a coordinate difference. The stored points of two runs are
+//!   off by half a unit in the last place each; moving a point to another frame rounds the shift and
+//!   the sum. The difference, its square and the two sums round five times more, each by a factor
+//!   within 1 ± 2^-24. For a true distance d and the float f of its square this leaves
+//!   |√f − d| ≤ √3·e + 2^-22·√f, with room to spare. The set of k is exact if the k-th √f plus its
+//!   error is below the (k+1)-th √f less its own: nothing unseen has a smaller float than that, or,
+//!   passed over by a box of positions, a smaller distance. Its order is then that of exact distances.
+//! - Whoever has no such gap is searched again in integers alone, within the exact distance of the
+//!   k candidates at hand.
+
+mod exact;
+mod kernel;
+mod refine;
+#[cfg(test)]
+mod tests;
+mod tree;
+mod walk;
+
+use exact::{ExactWalk, Neighbor};
+use kernel::{Batch, distance_of, rank_of};
+use refine::RUN;
+use tree::{EXACT, LANES, Node, Tree};
+use walk::Walk;
+pub use walk::Work;
+
+use crate::point::{Position, distance2};
+
+/// The relative error of the root of a float distance, doubled: see the module.
+const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
+
+/// The search of the k nearest neighbours within a set; its memory stays from set to set.
+///
+/// ```
+/// use pointmill::geom::nearest::Nearest;
+///
+/// let positions = [[0, 0, 0], [1, 0, 0], [5, 0, 0], [7, 0, 0]];
+/// let mut nearest = Nearest::new();
+/// nearest.build(&positions);
+/// let mut found = Vec::new();
+/// nearest.search(&positions, 2, |i| i == 2, |i, neighbors, distance2| {
+///     found.push((i, neighbors.to_vec(), distance2));
+/// });
+/// assert_eq!(found, [(2, vec![3, 1], 16)]);
+/// ```
+#[derive(Debug)]
+pub struct Nearest {
+    tree: Tree,
+    points: usize,
+    batch: Batch,
+    found: Vec<Neighbor>,
+    neighbors: Vec<u32>,
+    work: Work,
+}
+
+impl Default for Nearest {
+    fn default() -> Self {
+        Nearest::new()
+    }
+}
+
+impl Nearest {
+    /// Bytes that a set holds per position, besides [`FIXED_BYTES`](Self::FIXED_BYTES).
+    pub const BYTES_PER_POINT: usize = 19;
+    /// Bytes that any set holds, however small, besides about 180 for each neighbour asked for.
+    pub const FIXED_BYTES: usize = 16 << 10;
+
+    /// A search that holds no set yet.
+    pub fn new() -> Self {
+        Nearest {
+            tree: Tree::default(),
+            points: 0,
+            batch: Batch::new(),
+            found: Vec::new(),
+            neighbors: Vec::new(),
+            work: Work::default(),
+        }
+    }
+
+    /// Allocates for sets of up to `points`, so that building them allocates nothing more.
+    pub fn reserve(&mut self, points: usize) {
+        self.tree.reserve(points);
+    }
+
+    /// Takes a set of fewer than 2^32 distinct positions, each coordinate within ±2^62. Any order
+    /// gives right answers; Morton order gives them fast.
+    pub fn build(&mut self, positions: &[Position]) {
+        self.points = positions.len();
+        self.tree.build(positions);
+    }
+
+    /// For every index `i` with `wanted(i)`, in an order of its own choice, calls
+    /// `visit(i, neighbors, distance2)`: the indices of the min(k, n − 1) nearest other positions
+    /// in order of (exact squared distance, index), and the exact squared distance of the last in
+    /// lattice steps, 0 if there is none.
+    ///
+    /// # Panics
+    ///
+    /// If `positions` are not as many as at the last [`build`](Self::build); they must be the same.
+    pub fn search(
+        &mut self,
+        positions: &[Position],
+        k: usize,
+        mut wanted: impl FnMut(usize) -> bool,
+        mut visit: impl FnMut(usize, &[u32], u128),
+    ) {
+        assert_eq!(positions.len(), self.points, "a search is of the positions it was built of");
+        self.work = Work::default();
+        let k = k.min(positions.len().saturating_sub(1));
+        if k == 0 {
+            (0..positions.len()).filter(|&i| wanted(i)).for_each(|i| visit(i, &[], 0));
+            return;
+        }
+        let others = positions.len() - 1;
+        self.batch.fit((k + 1).min(others));
+        for leaf in 0..self.tree.leaves.len() {
+            let mut active = 0;
+            for (lane, &rank) in self.tree.leaves[leaf].rank.iter().enumerate() {
+                if (rank as usize) < positions.len() && wanted(rank as usize) {
+                    active |= 1 << lane;
+                }
+            }
+            if active == 0 {
+                continue;
+            }
+            let kept = if self.likely_exact(leaf, k) { k } else { (k + 1).min(others) };
+            self.batch.start(active, kept);
+            let error = Walk::new(&self.tree, &mut self.batch, &mut self.work, leaf).run();
+            while active != 0 {
+                let lane = active.trailing_zeros() as usize;
+                active &= active - 1;
+                let query = self.tree.leaves[leaf].rank[lane];
+                let distance2 = self.settle(positions, k, query, lane, error);
+                visit(query as usize, &self.neighbors, distance2);
+            }
+        }
+    }
+
+    /// How many points of the last search floats could not prove.
+    pub fn redone(&self) -> u64 {
+        self.work.redone
+    }
+
+    /// What the last search did.
+    pub fn work(&self) -> Work {
+        self.work
+    }
+
+    /// True if the k nearest of a leaf's points will likely be exact in floats, so that none more is
+    /// needed to prove them. A wrong guess costs a redo.
+    fn likely_exact(&self, leaf: usize, k: usize) -> bool {
+        let node: &Node = self.tree.node(0, leaf / LANES);
+        let child = leaf % LANES;
+        let diagonal2 = (0..3).fold(0.0, |sum, axis| {
+            let side = node.hi[axis][child] - node.lo[axis][child];
+            sum + side * side
+        });
+        node.error == 0 && diagonal2 * (1 + k / LANES) as f32 <= (EXACT / 4) as f32
+    }
+
+    /// Proves or redoes what the batch found for the point of `lane`: leaves its neighbours in
+    /// `neighbors` and returns the last one's squared distance.
+    fn settle(
+        &mut self,
+        positions: &[Position],
+        k: usize,
+        query: u32,
+        lane: usize,
+        error: f64,
+    ) -> u128 {
+        self.work.queries += 1;
+        let list = self.batch.list(lane);
+        let last = distance_of(list[k - 1]);
+        self.neighbors.clear();
+        self.neighbors.extend(list[..k].iter().map(|&key| rank_of(key)));
+        if error == 0.0 && last < EXACT as f32 {
+            return last as u128;
+        }
+        let proven = k == positions.len() - 1
+            || (self.batch.kept > k && gap(last, distance_of(list[k]), error));
+        let at = positions[query as usize];
+        self.found.clear();
+        self.found.extend(
+            self.neighbors.iter().map(|&rank| (distance2(at, positions[rank as usize]), rank)),
+        );
+        self.found.sort_unstable();
+        if !proven {
+            self.work.redone += 1;
+            ExactWalk {
+                tree: &self.tree,
+                positions,
+                work: &mut self.work,
+                query,
+                k,
+                limit: self.found[k - 1],
+                found: &mut self.found,
+            }
+            .run();
+        }
+        self.neighbors.clear();
+        self.neighbors.extend(self.found.iter().map(|&(_, rank)| rank));
+        self.found[k - 1].0
+    }
+}
+
+/// True if a float distance `last` is a smaller distance than `next`, whatever rounding did.
+fn gap(last: f32, next: f32, error: f64) -> bool {
+    let (last, next) = (f64::from(last).sqrt(), f64::from(next).sqrt());
+    let error = error * 1.733;
+    last * (1.0 + ROUNDING) + error < next * (1.0 - ROUNDING) - error
+}
+
+// The figure for the memory plan: 16 bytes a point in leaves, an eighth of that in nodes and boxes.
+const _: () = {
+    let run = RUN / LANES * size_of::<tree::Leaf>() + size_of::<Node>() * 17 / 16 + 48;
+    assert!(run <= RUN * Nearest::BYTES_PER_POINT);
+};

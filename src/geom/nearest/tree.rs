@@ -1,0 +1,198 @@
+//! The tree: leaves of 16 points side by side, nodes of 16 boxes side by side.
+//!
+//! Every node has a frame of its own, anchored at the middle of its box, so that 32-bit floats are
+//! exact (or as fine as the node is small) wherever in the world it lies and however far away the
+//! farthest point of the set is.
+
+use super::refine::{RUN, Run};
+use crate::point::{Bounds, Position};
+
+/// Points in a leaf, boxes in a node.
+pub(super) const LANES: usize = 16;
+/// Integers up to here are exact in f32.
+pub(super) const EXACT: i64 = 1 << 24;
+/// Levels of a tree of 2^32 points at most.
+const MAX_LEVELS: usize = 8;
+
+/// Up to 16 points in the frame of their node; unused lanes are infinitely far.
+#[derive(Debug, Clone)]
+#[repr(align(64))]
+pub(super) struct Leaf {
+    /// x, y and z.
+    pub at: [[f32; LANES]; 3],
+    /// Index of each point in the positions.
+    pub rank: [u32; LANES],
+}
+
+/// Up to 16 boxes in the node's frame. The children of level 0 are leaves.
+#[derive(Debug, Clone)]
+#[repr(align(64))]
+pub(super) struct Node {
+    /// Smallest x, y and z. In level 0 the extremes of the leaf's stored floats; above, rounded
+    /// outward, so that the positions themselves are inside.
+    pub lo: [[f32; LANES]; 3],
+    /// Largest x, y and z.
+    pub hi: [[f32; LANES]; 3],
+    /// Smallest rank in each child; set in level 0 only.
+    pub first: [u32; LANES],
+    /// The position that is 0 in this frame.
+    pub origin: Position,
+    /// No position of the node is farther from the origin on any axis.
+    pub reach: i64,
+    /// No stored point is farther from its position on any axis; 0 when all are exact.
+    pub error: i64,
+    /// How many children there are.
+    pub children: u32,
+}
+
+/// All leaves and nodes; the memory stays from build to build.
+#[derive(Debug, Default)]
+pub(super) struct Tree {
+    pub leaves: Vec<Leaf>,
+    pub nodes: Vec<Node>,
+    /// Where each level starts in `nodes`, and where the last one ends.
+    starts: [usize; MAX_LEVELS + 1],
+    pub levels: usize,
+    /// Exact boxes of the level being built.
+    boxes: Vec<Bounds>,
+}
+
+impl Tree {
+    /// Leaves, nodes and boxes of a tree of `points`.
+    fn sizes(points: usize) -> (usize, usize, usize) {
+        let mut level = points.div_ceil(RUN);
+        let (mut nodes, boxes) = (level, level);
+        while level > 1 {
+            level = level.div_ceil(LANES);
+            nodes += level;
+        }
+        (points.div_ceil(LANES), nodes, boxes)
+    }
+
+    /// Bytes of a tree of `points`.
+    pub fn bytes(points: usize) -> usize {
+        let (leaves, nodes, boxes) = Tree::sizes(points);
+        leaves * size_of::<Leaf>() + nodes * size_of::<Node>() + boxes * size_of::<Bounds>()
+    }
+
+    /// Makes room for `points`, so that building with as many or fewer allocates nothing.
+    pub fn reserve(&mut self, points: usize) {
+        let (leaves, nodes, boxes) = Tree::sizes(points);
+        self.leaves.reserve_exact(leaves.saturating_sub(self.leaves.len()));
+        self.nodes.reserve_exact(nodes.saturating_sub(self.nodes.len()));
+        self.boxes.reserve_exact(boxes.saturating_sub(self.boxes.len()));
+    }
+
+    /// Room held, in leaves, nodes and boxes.
+    #[cfg(test)]
+    pub fn capacity(&self) -> [usize; 3] {
+        [self.leaves.capacity(), self.nodes.capacity(), self.boxes.capacity()]
+    }
+
+    /// Rebuilds the tree over `positions`.
+    pub fn build(&mut self, positions: &[Position]) {
+        self.leaves.clear();
+        self.nodes.clear();
+        self.boxes.clear();
+        self.reserve(positions.len());
+        let mut run = Run::new();
+        for (start, of_run) in (0..).step_by(RUN).zip(positions.chunks(RUN)) {
+            let (node, bounds) = self.add_run(&mut run, start, of_run);
+            self.nodes.push(node);
+            self.boxes.push(bounds);
+        }
+        self.starts = [0; MAX_LEVELS + 1];
+        self.levels = usize::from(!positions.is_empty());
+        self.starts[1] = self.nodes.len();
+        while self.boxes.len() > 1 {
+            self.add_level();
+            self.levels += 1;
+            self.starts[self.levels] = self.nodes.len();
+        }
+    }
+
+    /// Leaves of one run, and the node above them.
+    fn add_run(&mut self, run: &mut Run, start: u32, positions: &[Position]) -> (Node, Bounds) {
+        let bounds = Bounds::of(positions.iter().copied());
+        let mut node = Node::over(&bounds);
+        // Rounded to nearest, a float below 2^(m+1) is off by at most 2^(m-24).
+        node.error = match node.reach {
+            0..=EXACT => 0,
+            reach => 1 << (reach.ilog2() - 24),
+        };
+        run.fill(start, positions, node.origin);
+        run.refine(positions.len());
+        for (i, first) in (0..positions.len()).step_by(LANES).enumerate() {
+            let leaf = run.leaf(first, positions.len());
+            for axis in 0..3 {
+                let used = &leaf.at[axis][..LANES.min(positions.len() - first)];
+                node.lo[axis][i] = used.iter().fold(f32::INFINITY, |lo, &v| lo.min(v));
+                node.hi[axis][i] = used.iter().fold(f32::NEG_INFINITY, |hi, &v| hi.max(v));
+            }
+            node.first[i] = leaf.rank.iter().fold(u32::MAX, |least, &r| least.min(r));
+            self.leaves.push(leaf);
+            node.children += 1;
+        }
+        (node, bounds)
+    }
+
+    /// One level above the highest; leaves its boxes in `boxes`.
+    fn add_level(&mut self) {
+        let parents = self.boxes.len().div_ceil(LANES);
+        for parent in 0..parents {
+            let first = parent * LANES;
+            let children = &self.boxes[first..self.boxes.len().min(first + LANES)];
+            let bounds = children.iter().fold(Bounds::EMPTY, |all, b| all.union(b));
+            let mut node = Node::over(&bounds);
+            for (i, child) in children.iter().enumerate() {
+                for axis in 0..3 {
+                    node.lo[axis][i] = below(child.lo[axis].wrapping_sub(node.origin[axis]));
+                    node.hi[axis][i] = above(child.hi[axis].wrapping_sub(node.origin[axis]));
+                }
+                node.children += 1;
+            }
+            self.nodes.push(node);
+            self.boxes[parent] = bounds;
+        }
+        self.boxes.truncate(parents);
+    }
+
+    /// Node `index` of `level`; its children are `16 · index ..` one level below.
+    pub fn node(&self, level: usize, index: usize) -> &Node {
+        &self.nodes[self.starts[level] + index]
+    }
+}
+
+impl Node {
+    /// A node over `bounds`, still without children.
+    fn over(bounds: &Bounds) -> Node {
+        let origin: Position =
+            std::array::from_fn(|axis| i64::midpoint(bounds.lo[axis], bounds.hi[axis]));
+        let reach = (0..3).fold(0, |reach: i64, axis| {
+            let up = bounds.hi[axis].saturating_sub(origin[axis]);
+            let down = origin[axis].saturating_sub(bounds.lo[axis]);
+            reach.max(up).max(down)
+        });
+        Node {
+            lo: [[f32::INFINITY; LANES]; 3],
+            hi: [[f32::NEG_INFINITY; LANES]; 3],
+            first: [u32::MAX; LANES],
+            origin,
+            reach,
+            error: 0,
+            children: 0,
+        }
+    }
+}
+
+/// The largest f32 not above `v`.
+pub(super) fn below(v: i64) -> f32 {
+    let rounded = v as f32;
+    if i128::from(v) < rounded as i128 { rounded.next_down() } else { rounded }
+}
+
+/// The smallest f32 not below `v`.
+pub(super) fn above(v: i64) -> f32 {
+    let rounded = v as f32;
+    if i128::from(v) > rounded as i128 { rounded.next_up() } else { rounded }
+}

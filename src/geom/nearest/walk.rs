@@ -1,0 +1,170 @@
+//! The walk of one leaf's points through the tree: from their own leaf upward, and from every
+//! ancestor down into whatever is near enough to matter.
+
+use super::kernel::{Batch, box_distances};
+use super::tree::{EXACT, LANES, Tree, above, below};
+use crate::point::Position;
+
+/// Above level 0, boxes are measured against bounds this much larger. Their distances are those of
+/// true positions up to five roundings, (1 + 2^-24)^5, so that nothing as near as the bound is passed
+/// over, neither by float nor by integer distance.
+const WIDENED: f32 = 1.0 + 1.0 / (1 << 20) as f32;
+
+/// What a search did, for tests and for tuning.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub struct Work {
+    /// Points that searched.
+    pub queries: u64,
+    /// Points that the search in floats could not prove, redone in integers.
+    pub redone: u64,
+    /// Nodes of 16 boxes that a leaf's points looked at together, or a redone point alone.
+    pub nodes: u64,
+    /// Leaves of 16 points that a leaf's points looked at together, or a redone point alone.
+    pub leaves: u64,
+}
+
+/// One leaf's points on their way.
+pub(super) struct Walk<'a> {
+    tree: &'a Tree,
+    batch: &'a mut Batch,
+    work: &'a mut Work,
+    leaf: usize,
+    /// Level-0 node of the leaf.
+    home: usize,
+    /// Exact box of the leaf's points.
+    lo: Position,
+    hi: Position,
+    /// No coordinate difference that was computed is off by more than this, besides its own
+    /// relative rounding: 0 while all coordinates are exact integers.
+    error: f64,
+}
+
+impl<'a> Walk<'a> {
+    /// The points of `leaf`; the batch has been started.
+    pub fn new(tree: &'a Tree, batch: &'a mut Batch, work: &'a mut Work, leaf: usize) -> Self {
+        let home = leaf / LANES;
+        let node = tree.node(0, home);
+        let child = leaf % LANES;
+        let lo = std::array::from_fn(|axis| {
+            let stored = node.origin[axis].saturating_add(node.lo[axis][child] as i64);
+            stored.saturating_sub(node.error)
+        });
+        let hi = std::array::from_fn(|axis| {
+            let stored = node.origin[axis].saturating_add(node.hi[axis][child] as i64);
+            stored.saturating_add(node.error)
+        });
+        Walk { tree, batch, work, leaf, home, lo, hi, error: 0.0 }
+    }
+
+    /// Fills the batch with the nearest by float distance, and returns the largest error of a
+    /// coordinate difference, in lattice steps: see [`super`].
+    pub fn run(mut self) -> f64 {
+        self.batch.at = self.tree.leaves[self.leaf].at;
+        self.batch.meet_home(&self.tree.leaves[self.leaf]);
+        self.visit_run(self.home, Some(self.leaf % LANES));
+        let mut child = self.home;
+        for level in 1..self.tree.levels {
+            let parent = child / LANES;
+            self.descend(level, parent, Some(child % LANES));
+            child = parent;
+        }
+        self.error
+    }
+
+    /// Visits the children of a node above level 0, nearest first, except `skip`.
+    fn descend(&mut self, level: usize, index: usize, skip: Option<usize>) {
+        self.work.nodes += 1;
+        let node = self.tree.node(level, index);
+        let lo = std::array::from_fn(|i| below(self.lo[i].saturating_sub(node.origin[i])));
+        let hi = std::array::from_fn(|i| above(self.hi[i].saturating_sub(node.origin[i])));
+        let distances = box_distances(&node.lo, &node.hi, lo, hi);
+        let mut left = lanes(node.children, skip);
+        while let Some(child) = nearest(&distances, left, self.reach()) {
+            left &= !(1 << child);
+            if level == 1 {
+                self.visit_run(index * LANES + child, None);
+            } else {
+                self.descend(level - 1, index * LANES + child, None);
+            }
+        }
+    }
+
+    /// Visits the leaves of a level-0 node, nearest first, except `skip`.
+    fn visit_run(&mut self, index: usize, skip: Option<usize>) {
+        self.work.nodes += 1;
+        self.enter(index);
+        let node = self.tree.node(0, index);
+        let own = self.tree.node(0, self.home);
+        let child = self.leaf % LANES;
+        let shift = self.shift(index);
+        // The same sums as the points' own, and monotonic: a box around the points as stored.
+        let lo = std::array::from_fn(|axis| own.lo[axis][child] + shift[axis]);
+        let hi = std::array::from_fn(|axis| own.hi[axis][child] + shift[axis]);
+        let distances = box_distances(&node.lo, &node.hi, lo, hi);
+        let mut left = lanes(node.children, skip);
+        let mut farthest = self.batch.farthest();
+        while let Some(child) = nearest(&distances, left, farthest) {
+            left &= !(1 << child);
+            self.work.leaves += 1;
+            let leaf = &self.tree.leaves[index * LANES + child];
+            let lo = std::array::from_fn(|axis| node.lo[axis][child]);
+            let hi = std::array::from_fn(|axis| node.hi[axis][child]);
+            if self.batch.meet(leaf, lo, hi, node.first[child]) {
+                farthest = self.batch.farthest();
+            }
+        }
+    }
+
+    /// From the frame of the home node to that of another.
+    fn shift(&self, index: usize) -> [f32; 3] {
+        let (home, other) = (self.tree.node(0, self.home), self.tree.node(0, index));
+        std::array::from_fn(|axis| home.origin[axis].wrapping_sub(other.origin[axis]) as f32)
+    }
+
+    /// Moves the points into the frame of a level-0 node and notes what that costs in precision.
+    fn enter(&mut self, index: usize) {
+        let points = &self.tree.leaves[self.leaf].at;
+        let shift = self.shift(index);
+        for axis in 0..3 {
+            for i in 0..LANES {
+                self.batch.at[axis][i] = points[axis][i] + shift[axis];
+            }
+        }
+        let (home, other) = (self.tree.node(0, self.home), self.tree.node(0, index));
+        let far = shift.iter().fold(0.0, |far: f64, s| far.max(f64::from(s.abs())));
+        let reach = far + home.reach as f64;
+        let mut error = (home.error + other.error) as f64;
+        if index != self.home && reach > EXACT as f64 {
+            // Rounding of the shift, at most 2^-24 of it, and of the sum; second orders are less
+            // than the 2^-20 added.
+            error += (far + reach) * f64::from(WIDENED) / EXACT as f64;
+        }
+        self.error = self.error.max(error);
+    }
+
+    /// How far boxes above level 0 matter.
+    fn reach(&self) -> f32 {
+        (self.batch.farthest() * WIDENED).min(f32::MAX)
+    }
+}
+
+/// The first `children` lanes as a mask, without `skip`.
+fn lanes(children: u32, skip: Option<usize>) -> u32 {
+    let all = (1 << children) - 1;
+    skip.map_or(all, |lane| all & !(1 << lane))
+}
+
+/// The lane of `left` with the smallest distance, if that is not above `reach`.
+fn nearest(distances: &[f32; LANES], mut left: u32, reach: f32) -> Option<usize> {
+    let mut best = None;
+    let mut least = reach;
+    while left != 0 {
+        let lane = left.trailing_zeros() as usize & (LANES - 1);
+        left &= left - 1;
+        if distances[lane] <= least && (best.is_none() || distances[lane] < least) {
+            best = Some(lane);
+            least = distances[lane];
+        }
+    }
+    best
+}
