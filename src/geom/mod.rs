@@ -2,3 +2,5 @@
 //! Knows no tiles, no files.
 
 pub mod lattice;
+pub mod plane;
+pub mod star;

@@ -1,1 +1,3 @@
 //! The built-in stages that compute: one file each.
+
+pub mod normals;
