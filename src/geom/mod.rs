@@ -4,3 +4,5 @@
 pub mod angle;
 pub mod lattice;
 pub mod nearest;
+pub mod plane;
+pub mod star;

@@ -2,6 +2,7 @@
 
 mod cells;
 mod median;
+pub mod normals;
 
 pub use cells::{Cells, Measure, Side, Split};
 pub use median::Median;

@@ -1,0 +1,262 @@
+//! Planes through neighbourhoods: exact moments of integer offsets, and eigenvectors of symmetric
+//! 3 × 3 matrices in closed form. Knows no tiles, no stages.
+//!
+//! Every function gives the same bits on every platform: integers, and f64 with additions,
+//! multiplications, divisions and square roots alone.
+
+/// A symmetric 3 × 3 matrix, its upper triangle row by row: xx, xy, xz, yy, yz, zz.
+pub type Symmetric = [f64; 6];
+
+/// Bits that scatter entries keep: two of them multiply within i128 with room for a difference.
+const ENTRY_BITS: u32 = 62;
+/// Newton steps for the isolated root; the start is within 0.015 and four steps reach 1e-16.
+const ROOT_STEPS: usize = 4;
+
+/// The covariance of a position and its neighbours, from exact integer moments.
+///
+/// Exact as long as n²·d² < 2^62 for n positions and a largest offset d; beyond, entries are
+/// rounded once to 62 bits. Offsets themselves are rounded (to multiples of a power of two) only
+/// where n·d ≥ 2^62.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Covariance {
+    /// n·Σxy − Σx·Σy, divided by 2^`exponent`.
+    scatter: [i64; 6],
+    exponent: u32,
+    count: u64,
+}
+
+impl Covariance {
+    /// The covariance of the neighbours at `offsets` (steps from p) and of p itself, at offset 0.
+    pub fn of(offsets: &[[i64; 3]]) -> Covariance {
+        let count = offsets.len() as u64 + 1;
+        let widest = offsets.iter().flatten().fold(0, |all, v| all | v.unsigned_abs());
+        let excess = (bits(widest) + bits(count)).saturating_sub(ENTRY_BITS);
+        let scatter = if excess == 0 {
+            scatter(count, offsets.iter().copied())
+        } else {
+            let rounded = |o: &[i64; 3]| o.map(|v| shift_rounded(i128::from(v), excess));
+            scatter(count, offsets.iter().map(rounded))
+        };
+        // No entry exceeds the largest on the diagonal.
+        let largest = scatter[0].max(scatter[3]).max(scatter[5]);
+        let shift = (128 - largest.leading_zeros()).saturating_sub(ENTRY_BITS);
+        let scatter = if shift == 0 {
+            scatter.map(|v| v as i64)
+        } else {
+            scatter.map(|v| shift_rounded(v, shift))
+        };
+        Covariance { scatter, exponent: 2 * excess + shift, count }
+    }
+
+    /// The covariance (of the population) in steps².
+    pub fn matrix(&self) -> Symmetric {
+        let n = self.count as f64;
+        let unit = (1u128 << self.exponent) as f64 / (n * n);
+        self.scatter.map(|v| v as f64 * unit)
+    }
+
+    /// The adjugate, up to a positive factor: what turns a first estimate of the normal into that
+    /// of the least-squares height function over it. Each entry is exact but for one rounding.
+    pub fn adjugate(&self) -> Symmetric {
+        let [xx, xy, xz, yy, yz, zz] = self.scatter.map(i128::from);
+        [
+            yy * zz - yz * yz,
+            xz * yz - xy * zz,
+            xy * yz - xz * yy,
+            xx * zz - xz * xz,
+            xy * xz - xx * yz,
+            xx * yy - xy * xy,
+        ]
+        .map(to_f64)
+    }
+}
+
+/// n·Σxy − Σx·Σy of the offsets and 0; the caller sees to n·d < 2^62.
+fn scatter(count: u64, offsets: impl Iterator<Item = [i64; 3]>) -> [i128; 6] {
+    let mut sum = [0i64; 3];
+    let mut product = [0i128; 6];
+    for o in offsets {
+        let [x, y, z] = o.map(i128::from);
+        for (total, v) in sum.iter_mut().zip(o) {
+            *total += v;
+        }
+        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
+        for (total, v) in product.iter_mut().zip(products) {
+            *total += v;
+        }
+    }
+    let n = i128::from(count);
+    let [x, y, z] = sum.map(i128::from);
+    let means = [x * x, x * y, x * z, y * y, y * z, z * z];
+    std::array::from_fn(|i| n * product[i] - means[i])
+}
+
+/// How many bits `v` takes.
+fn bits(v: u64) -> u32 {
+    u64::BITS - v.leading_zeros()
+}
+
+/// v / 2^shift, rounded to nearest, halves upwards; `shift` is at least 1 and the result fits.
+fn shift_rounded(v: i128, shift: u32) -> i64 {
+    (((v >> (shift - 1)) + 1) >> 1) as i64
+}
+
+/// The nearest f64; the short way for the usual small values.
+pub(super) fn to_f64(v: i128) -> f64 {
+    i64::try_from(v).map_or_else(|_| v as f64, |v| v as f64)
+}
+
+/// True if 0 and all offsets lie on one line; exact.
+pub fn collinear(offsets: &[[i64; 3]]) -> bool {
+    let Some(first) = offsets.iter().find(|o| **o != [0; 3]) else { return true };
+    let d = first.map(i128::from);
+    offsets.iter().all(|o| {
+        let o = o.map(i128::from);
+        // Products of two i64 fit; their difference need not.
+        d[0] * o[1] == d[1] * o[0] && d[0] * o[2] == d[2] * o[0] && d[1] * o[2] == d[2] * o[1]
+    })
+}
+
+/// The smallest eigenvalue of a symmetric matrix and its unit eigenvector.
+///
+/// The eigenvector errs by a few roundings times the matrix's norm over the gap to the next
+/// eigenvalue; where two are equal it is a vector of their common eigenspace. The value errs by a
+/// few roundings of the norm and may so be slightly negative for a singular matrix. A matrix that is
+/// a multiple of the identity, or not finite, has the z axis.
+///
+/// The root of the characteristic cubic that is farthest from the other two is well conditioned and
+/// comes first; what remains is a 2 × 2 problem in the plane across its eigenvector.
+pub fn smallest(matrix: Symmetric) -> (f64, [f64; 3]) {
+    const ANY: [f64; 3] = [0.0, 0.0, 1.0];
+    if !matrix.iter().all(|v| v.is_finite()) {
+        return (f64::NAN, ANY);
+    }
+    let size = matrix.iter().fold(0.0f64, |size, v| size.max(v.abs()));
+    if size < f64::MIN_POSITIVE {
+        return (0.0, ANY);
+    }
+    // Scaling by a power of two is exact: the exponent field of `size` alone.
+    let unit = f64::from_bits(size.to_bits() & 0x7ff0_0000_0000_0000);
+    let [xx, xy, xz, yy, yz, zz] = matrix.map(|v| v / unit);
+    let mean = (xx + yy + zz) / 3.0;
+    let (dx, dy, dz) = (xx - mean, yy - mean, zz - mean);
+    let squares = dx * dx + dy * dy + dz * dz + 2.0 * (xy * xy + xz * xz + yz * yz);
+    let radius = (squares / 6.0).sqrt();
+    if radius == 0.0 {
+        return (mean * unit, ANY);
+    }
+    // The traceless part over `radius`: its eigenvalues are the roots of t³ − 3t − det.
+    let m = [dx, xy, xz, dy, yz, dz].map(|v| v / radius);
+    let (root, vector) = isolated(&m);
+    let (root, vector) = if root < 0.0 { (root, vector) } else { smallest_across(&m, vector) };
+    ((mean + radius * root) * unit, vector)
+}
+
+/// The unit eigenvector of the largest eigenvalue, as [`smallest`] in every other respect.
+pub fn largest_eigenvector(matrix: Symmetric) -> [f64; 3] {
+    smallest(matrix.map(|v| -v)).1
+}
+
+/// The eigenvalue farthest from the two others, and its unit eigenvector, of a matrix with trace 0
+/// and squared norm 6.
+fn isolated(m: &Symmetric) -> (f64, [f64; 3]) {
+    let [xx, xy, xz, yy, yz, zz] = *m;
+    let determinant =
+        xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
+    let d = determinant.abs().min(2.0);
+    const SQRT_3: f64 = 1.732_050_807_568_877_2;
+    let mut t = SQRT_3 + (2.0 - SQRT_3) * (0.5 * d);
+    for _ in 0..ROOT_STEPS {
+        let square = t * t;
+        t -= (t * (square - 3.0) - d) / (3.0 * square - 3.0);
+    }
+    let root = if determinant < 0.0 { -t } else { t };
+    let (xx, yy, zz) = (xx - root, yy - root, zz - root);
+    // Columns of the adjugate are multiples of the eigenvector; the longest has the largest
+    // diagonal entry.
+    let (ax, ay, az) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
+    let (axy, axz, ayz) = (xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz);
+    let column = if ax >= ay && ax >= az {
+        [ax, axy, axz]
+    } else if ay >= az {
+        [axy, ay, ayz]
+    } else {
+        [axz, ayz, az]
+    };
+    (root, unit(column).unwrap_or([0.0, 0.0, 1.0]))
+}
+
+/// The smallest eigenvalue, and its unit eigenvector, of `m` in the plane across `axis`.
+fn smallest_across(m: &Symmetric, axis: [f64; 3]) -> (f64, [f64; 3]) {
+    let (u, v) = across(axis);
+    let (mu, mv) = (product(m, u), product(m, v));
+    let (a, b, d) = (dot(u, mu), dot(u, mv), dot(v, mv));
+    let half = 0.5 * (a - d);
+    let radius = (half * half + b * b).sqrt();
+    let (x, y) = if half >= 0.0 { (-b, half + radius) } else { (radius - half, -b) };
+    let vector = unit(std::array::from_fn(|i| x * u[i] + y * v[i])).unwrap_or(u);
+    (0.5 * (a + d) - radius, vector)
+}
+
+/// Two unit vectors that make a right-handed frame with the unit vector `axis` as third. Axes of
+/// the coordinate system give axes.
+pub(super) fn across(axis: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+    let size = axis.map(f64::abs);
+    let least = if size[0] <= size[1] && size[0] <= size[2] {
+        0
+    } else if size[1] <= size[2] {
+        1
+    } else {
+        2
+    };
+    let mut u = axis.map(|v| -v * axis[least]);
+    u[least] += 1.0;
+    let length = dot(u, u).sqrt();
+    let u = u.map(|v| v / length);
+    (u, cross(axis, u))
+}
+
+/// `matrix` times `v`.
+pub fn product(matrix: &Symmetric, v: [f64; 3]) -> [f64; 3] {
+    let [xx, xy, xz, yy, yz, zz] = *matrix;
+    [
+        xx * v[0] + xy * v[1] + xz * v[2],
+        xy * v[0] + yy * v[1] + yz * v[2],
+        xz * v[0] + yz * v[1] + zz * v[2],
+    ]
+}
+
+/// The scalar product.
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The vector product.
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// The vector at length 1; none if it is 0 or not finite. Lengths from 1e-150 to 1e150 are told
+/// from 0.
+pub fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
+    let length = dot(v, v).sqrt();
+    (length > 0.0 && length.is_finite()).then(|| v.map(|c| c / length))
+}
+
+/// The one of `v` and −v whose component of largest magnitude (the first of equal ones) is
+/// positive; zeros lose their sign.
+pub fn canonical<T>(v: [T; 3]) -> [T; 3]
+where
+    T: Copy + PartialOrd + std::ops::Neg<Output = T> + Default + std::ops::Add<Output = T>,
+{
+    let zero = T::default();
+    let size = v.map(|c| if c < zero { -c } else { c });
+    let mut largest = 0;
+    for axis in 1..3 {
+        if size[axis] > size[largest] {
+            largest = axis;
+        }
+    }
+    // −0 + 0 = 0
+    v.map(|c| if v[largest] < zero { -c } else { c } + zero)
+}

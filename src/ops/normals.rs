@@ -1,0 +1,156 @@
+//! Surface normals from the nearest neighbours of every position: the first step of the reduction.
+
+use serde::{Deserialize, Deserializer};
+
+use crate::geom::plane::{self, Covariance};
+use crate::geom::star::Star;
+use crate::{Error, Result};
+
+/// Fewest neighbours that the stage takes; two make a plane, but no estimate of a surface.
+pub const MIN_NEIGHBORS: usize = 3;
+/// Most neighbours that the stage takes.
+pub const MAX_NEIGHBORS: usize = 64;
+
+/// The stage `normals`: a unit normal for every position, from its k nearest other positions.
+///
+/// Positions with fewer than two others in the whole scan, or with neighbours on one line, have
+/// none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Normals {
+    /// How many nearest other positions the fit uses (k), besides the position itself; 3 to 64.
+    #[serde(deserialize_with = "checked_neighbors")]
+    pub neighbors: usize,
+    /// How a normal is estimated.
+    pub method: Method,
+}
+
+impl Default for Normals {
+    fn default() -> Self {
+        Normals { neighbors: 10, method: Method::default() }
+    }
+}
+
+impl Normals {
+    /// Refuses a number of neighbours outside 3 to 64. Reading a pipeline file does the same.
+    pub fn check(&self) -> Result<()> {
+        check_neighbors(self.neighbors as u64).map_err(Error::pipeline)
+    }
+}
+
+fn check_neighbors(neighbors: u64) -> Result<(), String> {
+    if (MIN_NEIGHBORS as u64..=MAX_NEIGHBORS as u64).contains(&neighbors) {
+        return Ok(());
+    }
+    Err(format!("neighbors must be {MIN_NEIGHBORS} to {MAX_NEIGHBORS}, not {neighbors}"))
+}
+
+fn checked_neighbors<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
+    let neighbors = u64::deserialize(from)?;
+    check_neighbors(neighbors).map_err(serde::de::Error::custom)?;
+    Ok(neighbors as usize)
+}
+
+/// How a normal is estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Least-squares height function z = ax + by + c over a first estimate: the mean normal of the
+    /// Delaunay triangles around the point (the paper's Algorithm 1, after Várady).
+    #[default]
+    Varady,
+    /// The plane of regression: the eigenvector of the smallest eigenvalue of the covariance.
+    Pca,
+}
+
+/// The outcome for one position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Estimate {
+    /// The unit normal, its component of largest magnitude (the first of equal ones) positive.
+    Normal([f32; 3]),
+    /// Fewer than 3 distinct positions, or all on one line.
+    None,
+}
+
+/// Why `pca` stood in for the method asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fallback {
+    /// No Delaunay triangle around the point has an area in the plane of regression.
+    NoTriangle,
+    /// The first estimate lies in the plane that it should be normal to.
+    Perpendicular,
+}
+
+/// Estimates normals by one method; holds scratch memory, so keep one for each thread.
+#[derive(Debug, Default)]
+pub struct Estimator {
+    method: Method,
+    star: Star,
+}
+
+impl Estimator {
+    /// An estimator by `method`.
+    pub fn new(method: Method) -> Self {
+        Estimator { method, star: Star::default() }
+    }
+
+    /// The normal at a position whose neighbours are at `offsets` from it, in lattice steps: none of
+    /// them 0, all distinct, in Morton order, each smaller than 2^63.
+    ///
+    /// The result is a function of `offsets` alone, the same bits on every platform.
+    pub fn estimate(&mut self, offsets: &[[i64; 3]]) -> (Estimate, Option<Fallback>) {
+        if offsets.len() < 2 || plane::collinear(offsets) {
+            return (Estimate::None, None);
+        }
+        let covariance = Covariance::of(offsets);
+        let (_, flat) = plane::smallest(covariance.matrix());
+        let (normal, fallback) = match self.method {
+            Method::Pca => (flat, None),
+            Method::Varady => match self.varady(offsets, &covariance, flat) {
+                Ok(normal) => (normal, None),
+                Err(why) => (flat, Some(why)),
+            },
+        };
+        (Estimate::Normal(plane::canonical(normal.map(|c| c as f32))), fallback)
+    }
+
+    /// adj(C)·n_f, which is (−a, −b, 1) of the height function over the first estimate n_f, turned
+    /// back from its frame.
+    fn varady(
+        &mut self,
+        offsets: &[[i64; 3]],
+        covariance: &Covariance,
+        flat: [f64; 3],
+    ) -> Result<[f64; 3], Fallback> {
+        let first = self.star.normal(offsets, flat).ok_or(Fallback::NoTriangle)?;
+        let fitted = plane::product(&covariance.adjugate(), first);
+        plane::unit(fitted).ok_or(Fallback::Perpendicular)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_ten_neighbors_and_varady() {
+        let stage: Normals = toml::from_str("").unwrap();
+        assert_eq!(stage, Normals { neighbors: 10, method: Method::Varady });
+        let stage: Normals = toml::from_str("neighbors = 64\nmethod = \"pca\"").unwrap();
+        assert_eq!(stage, Normals { neighbors: 64, method: Method::Pca });
+    }
+
+    #[test]
+    fn neighbors_outside_the_range_are_refused_with_the_range() {
+        for wrong in ["2", "65", "0"] {
+            let error = toml::from_str::<Normals>(&format!("neighbors = {wrong}")).unwrap_err();
+            assert!(error.message().contains("3 to 64"), "{error}");
+            assert!(error.span().is_some());
+        }
+        assert!(toml::from_str::<Normals>("neighbors = -1").is_err());
+        assert!(toml::from_str::<Normals>("neighbours = 10").is_err());
+        assert!(toml::from_str::<Normals>("method = \"quadric\"").is_err());
+        let error = Normals { neighbors: 2, method: Method::Pca }.check().unwrap_err();
+        assert_eq!(error.to_string(), "neighbors must be 3 to 64, not 2");
+    }
+}
