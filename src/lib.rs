@@ -1,5 +1,6 @@
 //! pointmill reduces laser scans that do not fit in memory to the points that matter.
 
+pub mod cli;
 mod error;
 pub mod geom;
 pub mod io;
