@@ -1,6 +1,7 @@
 //! pointmill reduces laser scans that do not fit in memory to the points that matter.
 
 pub mod budget;
+pub mod cli;
 mod error;
 pub mod geom;
 pub mod io;

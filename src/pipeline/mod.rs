@@ -1,5 +1,33 @@
 //! From a pipeline file to a finished run: parse, plan, run.
 
+mod builtin;
+mod clock;
+mod connect;
+mod draft;
+mod inputs;
+mod keys;
+mod kinds;
+mod mill;
+mod mistake;
+mod node;
+mod outlet;
+mod plan;
+mod registry;
+mod run;
+mod scratch;
+mod set;
+mod settings;
+mod shares;
+mod stream;
+mod survey;
+mod text;
 mod watch;
 
+pub use inputs::expand;
+pub use kinds::{Encoding, Format, OutputOrder, Read, Scene, Synth, Write};
+pub use plan::Plan;
+pub use registry::{Registry, StageKind, StagePlace};
+pub use set::Set;
+pub use settings::{Nonfinite, Overrides, RunSettings, Simd, parse_bytes};
+pub use text::{Pipeline, PlacedStage};
 pub use watch::{Quiet, Watch};

@@ -1,0 +1,193 @@
+//! What can be typed.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::pipeline::{Overrides, parse_bytes};
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    done
+  1    the run failed: I/O, bad data, over budget
+  2    the command or the pipeline is wrong
+  130  interrupted
+
+Results go to stdout, progress and messages to stderr.";
+
+/// Reduces laser scans that do not fit in memory to the points that matter.
+#[derive(Debug, Parser)]
+#[command(name = "pointmill", version, after_help = EXIT_CODES, propagate_version = true)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Run a pipeline file
+    Run(Run),
+    /// Reduce scans to the points that matter: a run of pipelines/reduce.toml
+    Reduce(Reduce),
+    /// Convert between LAS, LAZ and PLY: a run of pipelines/convert.toml
+    Convert(Convert),
+    /// Say what the headers of files say
+    Info(Info),
+    /// Show how a pipeline would be run, without a run
+    Plan(Plan),
+    /// Make a scan up
+    Synth(Synth),
+}
+
+/// Common to all commands that run a pipeline.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Run options")]
+pub(super) struct Common {
+    /// Bound of the peak memory, such as 512MiB or 2GiB [default: half of what there is]
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
+    pub memory: Option<u64>,
+    /// Threads that work at once [default: all processors]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// Folder for what does not fit in memory [default: beside the output]
+    #[arg(long, value_name = "DIR")]
+    pub scratch: Option<PathBuf>,
+    /// Draw progress bars: only on a terminal, or never
+    #[arg(long, value_name = "WHEN", default_value = "auto")]
+    pub progress: Progress,
+    /// Write the report to this file
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+}
+
+impl Common {
+    /// What takes the place of the pipeline's `[run]` settings.
+    pub fn overrides(&self) -> Overrides {
+        Overrides {
+            memory: self.memory,
+            threads: self.threads,
+            scratch: self.scratch.clone(),
+            report: self.report.clone(),
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Progress {
+    /// Where stderr is a terminal
+    Auto,
+    /// Nowhere
+    Never,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Run {
+    /// The pipeline file
+    #[arg(value_name = "PIPELINE")]
+    pub pipeline: PathBuf,
+    /// Put a value in the place of the file's: the stage by its name or kind (KIND.N, from 1, where
+    /// there are several), or `run`
+    #[arg(long = "set", value_name = "STAGE.KEY=VALUE")]
+    pub sets: Vec<String>,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Plan {
+    /// The pipeline file
+    #[arg(value_name = "PIPELINE")]
+    pub pipeline: PathBuf,
+    /// Put a value in the place of the file's, as in `run`
+    #[arg(long = "set", value_name = "STAGE.KEY=VALUE")]
+    pub sets: Vec<String>,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Reduce {
+    /// LAS, LAZ or PLY files, patterns or folders
+    #[arg(value_name = "IN", required = true)]
+    pub inputs: Vec<String>,
+    /// The reduced file: .las, .laz or .ply
+    #[arg(short, long, value_name = "OUT")]
+    pub output: String,
+    /// Largest range of normal angles in a cell, in radians or as 6deg [default: 0.1]
+    #[arg(long, value_name = "ANGLE")]
+    pub max_angle: Option<String>,
+    /// Nearest other positions that a normal is computed from [default: 10]
+    #[arg(long, value_name = "K")]
+    pub neighbors: Option<u64>,
+    /// Side of the cells before any split, in the scan's unit [default: auto]
+    #[arg(long, value_name = "SIDE")]
+    pub side: Option<String>,
+    /// A cell with this many points or fewer is not split [default: 1]
+    #[arg(long, value_name = "N")]
+    pub min_points: Option<u64>,
+    /// How a cell is split: voronoi or octant [default: voronoi]
+    #[arg(long, value_name = "HOW")]
+    pub split: Option<String>,
+    /// How a normal is computed: varady or pca [default: varady]
+    #[arg(long, value_name = "HOW")]
+    pub method: Option<String>,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Convert {
+    /// LAS, LAZ or PLY files, patterns or folders
+    #[arg(value_name = "IN", required = true)]
+    pub inputs: Vec<String>,
+    /// A file, which takes all inputs, or a folder (that exists, or with a slash behind), which
+    /// takes one output an input
+    #[arg(short, long, value_name = "OUT|DIR")]
+    pub output: String,
+    /// Format: las, laz or ply [default: by extension; in a folder, the input's]
+    #[arg(long, value_name = "FORMAT")]
+    pub to: Option<String>,
+    /// Scale of LAS coordinates [default: the input's; PLY to LAS must say it]
+    #[arg(long, value_name = "SCALE", allow_negative_numbers = true)]
+    pub scale: Option<f64>,
+    /// Dimensions that may get lost, such as GpsTime,UserData
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub drop: Vec<String>,
+    /// Encoding of PLY: ascii or binary [default: the input's]
+    #[arg(long, value_name = "HOW")]
+    pub encoding: Option<String>,
+    #[command(flatten)]
+    pub common: Common,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Info {
+    /// LAS, LAZ or PLY files, patterns or folders
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<String>,
+    /// Print a JSON list with one object a file
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Synth {
+    /// What is scanned: plane, part or als
+    #[arg(value_name = "KIND")]
+    pub scene: String,
+    /// How many points
+    #[arg(short = 'n', long = "points", value_name = "N")]
+    pub points: u64,
+    /// The file: .las, .laz or .ply
+    #[arg(short, long, value_name = "OUT")]
+    pub output: String,
+    /// Equal seeds give equal scans [default: 0]
+    #[arg(long, value_name = "SEED")]
+    pub seed: Option<u64>,
+    /// Standard deviation of the noise in world units [default: the scene's own]
+    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
+    pub noise: Option<f64>,
+    #[command(flatten)]
+    pub common: Common,
+}

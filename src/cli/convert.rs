@@ -1,0 +1,134 @@
+//! `convert`: all inputs to one file, or each to its own.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use super::arguments::Convert;
+use super::print;
+use super::progress::Bars;
+use super::run::{given, mill, mill_under, number};
+use crate::pipeline::{Format, Pipeline, Registry, Watch, expand};
+use crate::{Error, ErrorKind, Result};
+
+/// The pipeline of `convert`, which users copy.
+const CONVERT: &str = include_str!("../../pipelines/convert.toml");
+
+/// Converts all inputs into one file, or each into a file of its own in a folder.
+pub(super) fn convert(arguments: &Convert, registry: &Registry) -> Result<()> {
+    let folder = Path::new(&arguments.output);
+    if !(arguments.output.ends_with('/') || folder.is_dir()) {
+        let one = pipeline(arguments, json!(arguments.inputs), json!(arguments.output), registry);
+        return mill(one?, &arguments.common).map(|_report| ());
+    }
+    let inputs = expand(&arguments.inputs)?;
+    if inputs.len() > 1 && arguments.common.report.is_some() {
+        return Err(Error::pipeline("--report is for one output; this makes several"));
+    }
+    // Every pipeline is checked before the first is run.
+    let mut runs = Vec::new();
+    for (input, output) in outputs(&inputs, folder, arguments.to.as_deref())? {
+        let one = pipeline(arguments, text(&input)?, text(&output)?, registry)?;
+        runs.push((input, one));
+    }
+    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create the folder", e))?;
+    run_all(runs, arguments)
+}
+
+/// Runs one pipeline after the other. One that fails is told at once and does not keep the others
+/// from running; the error in the end is of the first failure's kind.
+fn run_all(runs: Vec<(PathBuf, Pipeline)>, arguments: &Convert) -> Result<()> {
+    let bars = Bars::new(arguments.common.progress);
+    let total = runs.len();
+    let mut failures: Vec<ErrorKind> = Vec::new();
+    for (input, pipeline) in runs {
+        if bars.cancelled() {
+            return Err(Error::interrupted());
+        }
+        match mill_under(pipeline, &arguments.common, &bars) {
+            Ok(_report) => {}
+            Err(error) if total == 1 || error.kind() == ErrorKind::Interrupted => {
+                return Err(error);
+            }
+            Err(error) => {
+                failures.push(error.kind());
+                print::error(&error.at(input));
+            }
+        }
+    }
+    match failures.first() {
+        Some(kind) => {
+            Err(Error::new(*kind, format!("{} of {total} conversions failed", failures.len())))
+        }
+        None => Ok(()),
+    }
+}
+
+fn pipeline(
+    arguments: &Convert,
+    inputs: Value,
+    output: Value,
+    registry: &Registry,
+) -> Result<Pipeline> {
+    let sets = given([
+        ("IN", "read.path", Some(inputs)),
+        ("-o", "write.path", Some(output)),
+        ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
+        ("--scale", "write.scale", arguments.scale.map(number)),
+        ("--drop", "write.drop", (!arguments.drop.is_empty()).then(|| json!(arguments.drop))),
+        ("--encoding", "write.encoding", arguments.encoding.as_deref().map(Value::from)),
+    ]);
+    Pipeline::parse_with(CONVERT, "pipelines/convert.toml", registry, &sets)
+}
+
+/// The output in `folder` of every input: its name, with the extension of the format that is asked
+/// for, or its own. No two may be the same.
+fn outputs(inputs: &[PathBuf], folder: &Path, to: Option<&str>) -> Result<Vec<(PathBuf, PathBuf)>> {
+    let mut taken: BTreeMap<PathBuf, &Path> = BTreeMap::new();
+    let mut all = Vec::new();
+    for input in inputs {
+        let own = || Format::of(input).map(Format::extension);
+        let name = input.file_name().map(Path::new);
+        let (Some(name), Some(extension)) = (name, to.or_else(own)) else {
+            let told = format!("{}: its name says no format", input.display());
+            return Err(Error::pipeline(told).help("say --to las, laz or ply"));
+        };
+        let output = folder.join(name.with_extension(extension));
+        if let Some(other) = taken.insert(output.clone(), input) {
+            let (a, b, output) = (other.display(), input.display(), output.display());
+            return Err(Error::pipeline(format!("{a} and {b} would both become {output}")));
+        }
+        all.push((input.clone(), output));
+    }
+    Ok(all)
+}
+
+fn text(path: &Path) -> Result<Value> {
+    let told = || Error::pipeline("the name is not UTF-8 text").at(path);
+    Ok(json!(path.to_str().ok_or_else(told)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(inputs: &[&str], to: Option<&str>) -> Result<Vec<String>> {
+        let inputs: Vec<PathBuf> = inputs.iter().map(PathBuf::from).collect();
+        let outputs = outputs(&inputs, Path::new("out"), to)?;
+        Ok(outputs.into_iter().map(|(_, output)| output.display().to_string()).collect())
+    }
+
+    #[test]
+    fn outputs_keep_names_and_take_the_extension() {
+        assert_eq!(of(&["a/x.y.las", "b.PLY"], Some("laz")).unwrap(), ["out/x.y.laz", "out/b.laz"]);
+        assert_eq!(of(&["a/x.LAS", "b.ply"], None).unwrap(), ["out/x.las", "out/b.ply"]);
+    }
+
+    #[test]
+    fn outputs_of_one_name_or_no_format_are_refused() {
+        let told = of(&["a/x.las", "b/x.laz"], Some("ply")).unwrap_err().to_string();
+        assert_eq!(told, "a/x.las and b/x.laz would both become out/x.ply");
+        assert!(of(&["x.txt"], None).is_err());
+    }
+}

@@ -1,0 +1,57 @@
+//! Printing that survives a reader who has gone.
+
+use std::fmt::Display;
+use std::io::{self, ErrorKind, Write};
+
+use crate::{Error, Result};
+
+/// Prints a result and a line's end on stdout. A reader who has gone (`| head`) wants no more: that
+/// is no error.
+pub(super) fn result(text: impl Display) -> Result<()> {
+    let mut stdout = io::stdout().lock();
+    match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::io("stdout", "write", e)),
+        _ => Ok(()),
+    }
+}
+
+/// Prints a warning on stderr.
+pub(super) fn warning(message: &str) {
+    line(&format!("warning: {message}"));
+}
+
+/// Prints an error on stderr: place and message, the causes beneath it, what the user can do.
+pub(super) fn error(error: &Error) {
+    line(&rendered(error));
+}
+
+fn rendered(error: &Error) -> String {
+    let mut text = format!("error: {error}");
+    let mut cause = std::error::Error::source(error);
+    let mut indent = 2;
+    while let Some(inner) = cause {
+        text += &format!("\n{:indent$}{inner}", "");
+        cause = inner.source();
+        indent += 2;
+    }
+    if let Some(help) = error.remedy() {
+        text += &format!("\nhelp: {help}");
+    }
+    text
+}
+
+fn line(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}"); // nobody is left to tell that stderr is gone
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_says_place_cause_and_remedy() {
+        let cause = io::Error::new(ErrorKind::NotFound, "no such file");
+        let told = Error::io("a.laz", "open", cause).help("look in b");
+        assert_eq!(rendered(&told), "error: a.laz: cannot open\n  no such file\nhelp: look in b");
+    }
+}

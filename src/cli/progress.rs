@@ -1,0 +1,112 @@
+//! Progress bars on a terminal's stderr; warnings above them.
+
+use std::io::IsTerminal;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+
+use super::arguments::Progress;
+use super::{interrupt, print};
+use crate::pipeline::Watch;
+
+const KNOWN: &str =
+    "{prefix:<10} {wide_bar} {pos_points} of {len_points} points, {rate}, {eta} left";
+const UNKNOWN: &str = "{prefix:<10} {spinner} {pos_points} points, {rate}, {elapsed}";
+
+/// Draws one bar, of the phase that a run is in, and hears Ctrl-C.
+pub(super) struct Bars {
+    drawn: bool,
+    bar: Mutex<Option<ProgressBar>>,
+    cancelled: Arc<AtomicBool>,
+}
+
+impl Bars {
+    /// Bars that are drawn if `progress` allows and stderr is a terminal. Takes Ctrl-C over.
+    pub fn new(progress: Progress) -> Self {
+        let drawn = progress == Progress::Auto && std::io::stderr().is_terminal();
+        Bars { drawn, bar: Mutex::new(None), cancelled: interrupt::flag() }
+    }
+
+    /// Removes the bar, so that what is printed next stands alone.
+    pub fn clear(&self) {
+        if let Some(bar) = self.bar().take() {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn bar(&self) -> std::sync::MutexGuard<'_, Option<ProgressBar>> {
+        self.bar.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Watch for Bars {
+    fn phase(&self, name: &'static str, total: Option<u64>) {
+        self.clear();
+        if !self.drawn {
+            return;
+        }
+        let target = ProgressDrawTarget::stderr_with_hz(10);
+        let bar = ProgressBar::with_draw_target(total, target).with_prefix(name);
+        bar.set_style(style(total.is_some()));
+        bar.enable_steady_tick(Duration::from_millis(200));
+        *self.bar() = Some(bar);
+    }
+
+    fn advance(&self, points: u64) {
+        if let Some(bar) = &*self.bar() {
+            bar.inc(points);
+        }
+    }
+
+    fn warn(&self, message: &str) {
+        match &*self.bar() {
+            Some(bar) => bar.suspend(|| print::warning(message)),
+            None => print::warning(message),
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+}
+
+fn style(total_known: bool) -> ProgressStyle {
+    ProgressStyle::with_template(if total_known { KNOWN } else { UNKNOWN })
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
+        .with_key("pos_points", |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+            let _ = write!(out, "{}", HumanCount(state.pos()));
+        })
+        .with_key("len_points", |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+            let _ = write!(out, "{}", HumanCount(state.len().unwrap_or_default()));
+        })
+        .with_key("rate", |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+            let _ = write!(out, "{:.2} Mpts/s", state.per_sec() / 1e6);
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_templates_are_well_formed() {
+        for template in [KNOWN, UNKNOWN] {
+            assert!(ProgressStyle::with_template(template).is_ok(), "{template}");
+        }
+    }
+
+    #[test]
+    fn a_bar_that_is_drawn_nowhere_counts() {
+        let bars = Bars { drawn: true, bar: Mutex::new(None), cancelled: Arc::default() };
+        bars.phase("decode", Some(10));
+        bars.bar().as_ref().unwrap().set_draw_target(ProgressDrawTarget::hidden());
+        bars.advance(4);
+        bars.advance(3);
+        assert_eq!(bars.bar().as_ref().unwrap().position(), 7);
+        bars.clear();
+        assert!(bars.bar().is_none());
+        assert!(!bars.cancelled());
+    }
+}

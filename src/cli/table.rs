@@ -1,0 +1,100 @@
+//! JSON facts as text that people read: keys in a column, lists of objects as tables.
+
+use serde_json::{Map, Value};
+
+/// The lines of an object's keys and values, indented by `indent`.
+pub(super) fn render(value: &Value, indent: usize) -> String {
+    let mut lines = Vec::new();
+    match value {
+        Value::Object(object) => fields(object, indent, &mut lines),
+        other => lines.push(format!("{:indent$}{}", "", plain(other))),
+    }
+    lines.join("\n")
+}
+
+fn fields(object: &Map<String, Value>, indent: usize, lines: &mut Vec<String>) {
+    let width = object.keys().map(|key| key.chars().count()).max().unwrap_or(0);
+    for (key, value) in object {
+        let label = format!("{:indent$}{key}", "");
+        match value {
+            Value::Null => {}
+            Value::Object(inner) if !inner.is_empty() => {
+                lines.push(label);
+                fields(inner, indent + 2, lines);
+            }
+            Value::Array(list) if list.iter().any(Value::is_object) => {
+                lines.push(label);
+                rows(list, indent + 2, lines);
+            }
+            other => {
+                let text = plain(other);
+                let pad = width + indent + 2;
+                for (i, line) in text.lines().enumerate() {
+                    let label = if i == 0 { label.as_str() } else { "" };
+                    lines.push(format!("{label:pad$}{line}"));
+                }
+            }
+        }
+    }
+}
+
+/// A list of objects as a table, with the keys of all of them as its columns.
+fn rows(list: &[Value], indent: usize, lines: &mut Vec<String>) {
+    let mut columns: Vec<&str> = Vec::new();
+    for key in list.iter().filter_map(Value::as_object).flat_map(Map::keys) {
+        if !columns.contains(&key.as_str()) {
+            columns.push(key);
+        }
+    }
+    let cell = |row: &Value, column: &str| row.get(column).map(plain).unwrap_or_default();
+    let mut table = vec![columns.iter().map(|c| (*c).to_owned()).collect::<Vec<String>>()];
+    table.extend(list.iter().map(|row| columns.iter().map(|c| cell(row, c)).collect()));
+    let width = |i: usize| table.iter().map(|row| row[i].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns.len()).map(width).collect();
+    for row in &table {
+        let cells: Vec<String> =
+            row.iter().zip(&widths).map(|(cell, width)| format!("{cell:width$}")).collect();
+        lines.push(format!("{:indent$}{}", "", cells.join("  ")).trim_end().to_owned());
+    }
+}
+
+/// A value on one line, control characters escaped: files hold what they like.
+fn plain(value: &Value) -> String {
+    match value {
+        Value::Null => String::new(),
+        Value::Bool(true) => "yes".to_owned(),
+        Value::Bool(false) => "no".to_owned(),
+        Value::String(text) => text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect(),
+        Value::Array(list) if list.iter().all(|v| !v.is_array() && !v.is_object()) => {
+            list.iter().map(plain).collect::<Vec<_>>().join(", ")
+        }
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn facts_read_as_columns() {
+        let facts = json!({
+            "points": 5, "compressed": true, "crs": null, "max": [1.5, 2], "none": [],
+            "box": { "x": 1 }, "dimensions": [{"name": "X", "type": "i32"}, {"name": "Red"}],
+            "text": "a\u{1b}[31mb",
+        });
+        let expected = "
+  box
+    x  1
+  compressed  yes
+  dimensions
+    name  type
+    X     i32
+    Red
+  max         1.5, 2
+  points      5
+  text        a [31mb";
+        assert_eq!(format!("\n{}", render(&facts, 2)), expected);
+    }
+}

@@ -1,0 +1,151 @@
+//! The stage kinds that a pipeline file may name: a value, so that a program can add its own.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::keys;
+use super::mistake::Mistake;
+use super::node::{Node, Value};
+use crate::stage::Role;
+use crate::{Error, Result};
+
+/// What a `[[stage]]` of a pipeline file may be. The struct's fields are the stage's keys.
+///
+/// Keys that are no field are refused whatever the struct says; a field without a serde default is
+/// a key that must be given. `flatten` and `untagged` hide keys and places and are not supported.
+pub trait StageKind: DeserializeOwned + Serialize {
+    /// Its name in a file: one plain word, or two with a hyphen.
+    const KIND: &'static str;
+
+    /// What it does, in one sentence.
+    const ABOUT: &'static str;
+
+    /// Keys that say where files are rather than what is computed: they stay out of the report's
+    /// `pipeline`, which must not depend on where a scan lies and how it is split into files.
+    const PLACES: &'static [&'static str] = &[];
+
+    /// Puts the stage in its role. Called once every key fits its field; an error is told with the
+    /// stage's place in the file, or that of a key if it went through [`StagePlace::blame`].
+    fn build(self, at: &StagePlace) -> Result<Role>;
+}
+
+/// Where in a pipeline file a stage stands.
+///
+/// Relative paths in a pipeline file are relative to the working directory, as they are on the
+/// command line, so that `--set read.path=…` and the file mean the same.
+#[derive(Debug)]
+pub struct StagePlace {
+    file: String,
+    line: usize,
+    blamed: RefCell<Option<String>>,
+}
+
+impl StagePlace {
+    /// A stage at line `line` (from 1) of `file`.
+    pub fn new(file: impl Into<String>, line: usize) -> Self {
+        StagePlace { file: file.into(), line, blamed: RefCell::new(None) }
+    }
+
+    /// The pipeline file, as the user named it.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// The line of its `kind`, from 1.
+    pub fn line(&self) -> usize {
+        self.line
+    }
+
+    /// Returns `error`, noting that the value of `key` is to blame for it.
+    pub fn blame(&self, key: &str, error: Error) -> Error {
+        self.blamed.replace(Some(key.to_owned()));
+        error
+    }
+}
+
+/// The stage kinds that a pipeline file may name.
+#[derive(Clone, Default)]
+pub struct Registry {
+    kinds: BTreeMap<&'static str, Kind>,
+}
+
+type Read = fn(&Node, &StagePlace) -> Result<(Role, serde_json::Value), Vec<Mistake>>;
+
+#[derive(Clone, Copy)]
+struct Kind {
+    about: &'static str,
+    read: Read,
+}
+
+impl Registry {
+    /// No kinds.
+    pub fn empty() -> Self {
+        Registry::default()
+    }
+
+    /// The same and `K`, which takes the place of a kind of that name.
+    #[must_use]
+    pub fn with<K: StageKind>(mut self) -> Self {
+        self.kinds.insert(K::KIND, Kind { about: K::ABOUT, read: read::<K> });
+        self
+    }
+
+    /// The kinds by name, each with what it does.
+    pub fn kinds(&self) -> impl Iterator<Item = (&'static str, &'static str)> + '_ {
+        self.kinds.iter().map(|(name, kind)| (*name, kind.about))
+    }
+
+    /// True if there is a kind of that name.
+    pub fn has(&self, kind: &str) -> bool {
+        self.kinds.contains_key(kind)
+    }
+
+    /// Builds a stage from its keys; none if there is no such kind.
+    pub(super) fn build(
+        &self,
+        kind: &str,
+        keys: &Node,
+        at: &StagePlace,
+    ) -> Option<Result<(Role, serde_json::Value), Vec<Mistake>>> {
+        self.kinds.get(kind).map(|kind| (kind.read)(keys, at))
+    }
+}
+
+fn read<K: StageKind>(
+    keys: &Node,
+    at: &StagePlace,
+) -> Result<(Role, serde_json::Value), Vec<Mistake>> {
+    let stage: K = keys::read(K::KIND, keys)?;
+    let wrong = |error: Error| vec![Mistake::of(keys.place.clone(), &error)];
+    let canonical = canonical(&stage).map_err(wrong)?;
+    stage.build(at).map(|role| (role, canonical)).map_err(|error| {
+        let blamed = at.blamed.borrow();
+        let entries = match &keys.value {
+            Value::Table(entries) => entries.as_slice(),
+            _ => &[],
+        };
+        let entry = entries.iter().find(|e| Some(&e.key) == blamed.as_ref());
+        vec![Mistake::of(entry.map_or(&keys.place, |e| &e.node.place).clone(), &error)]
+    })
+}
+
+/// The stage's keys with all defaults filled in, sorted by name; those without a value and those
+/// that name files are left out.
+fn canonical<K: StageKind>(stage: &K) -> Result<serde_json::Value> {
+    let value = serde_json::to_value(stage).map_err(|e| {
+        Error::internal(format!("cannot list the keys of `{}`", K::KIND)).because(e)
+    })?;
+    Ok(match value {
+        serde_json::Value::Object(keys) => keys
+            .into_iter()
+            .filter(|(key, value)| !value.is_null() && !K::PLACES.contains(&key.as_str()))
+            .collect::<BTreeMap<_, _>>()
+            .into_iter()
+            .collect::<serde_json::Map<_, _>>()
+            .into(),
+        _ => serde_json::Map::new().into(),
+    })
+}

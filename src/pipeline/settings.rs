@@ -1,0 +1,201 @@
+//! The `[run]` settings of a pipeline file and what a command line puts in their place.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Deserializer, de};
+
+/// The `[run]` table. What is `None` is decided by the plan.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RunSettings {
+    /// Bound of the process's peak resident memory, in bytes; none: half of what the machine or its
+    /// control group has.
+    #[serde(deserialize_with = "some_bytes")]
+    pub memory: Option<u64>,
+    /// Threads that work at once; none: all processors.
+    pub threads: Option<NonZeroUsize>,
+    /// Folder for what does not fit in memory; none: beside the output.
+    pub scratch: Option<PathBuf>,
+    /// Where the report is written; none: nowhere.
+    pub report: Option<PathBuf>,
+    /// Lattice step in world units; none: as the inputs' headers have it.
+    #[serde(deserialize_with = "some_step")]
+    pub lattice: Option<f64>,
+    /// What becomes of points whose coordinates are not finite.
+    pub nonfinite: Nonfinite,
+    /// Most points a tile's cube holds, for tests; none: as the memory allows.
+    pub tile_points: Option<NonZeroUsize>,
+    /// Which of the equal code paths runs, for tests.
+    pub simd: Simd,
+}
+
+/// What becomes of points whose coordinates are not finite.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Nonfinite {
+    /// The run fails and names the first.
+    #[default]
+    Refuse,
+    /// They are removed, entered in the ledger as such.
+    Drop,
+}
+
+/// Which of the equal code paths runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Simd {
+    /// The fastest that the processor has.
+    #[default]
+    Auto,
+    /// The one that every processor has.
+    Portable,
+}
+
+/// What a command line or a program puts in the place of `[run]` settings.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Overrides {
+    /// For [`RunSettings::memory`], in bytes.
+    pub memory: Option<u64>,
+    /// For [`RunSettings::threads`].
+    pub threads: Option<NonZeroUsize>,
+    /// For [`RunSettings::scratch`].
+    pub scratch: Option<PathBuf>,
+    /// For [`RunSettings::report`].
+    pub report: Option<PathBuf>,
+}
+
+impl RunSettings {
+    /// These settings with those of `overrides` that are given.
+    pub fn with(self, overrides: &Overrides) -> RunSettings {
+        let over = overrides.clone();
+        RunSettings {
+            memory: over.memory.or(self.memory),
+            threads: over.threads.or(self.threads),
+            scratch: over.scratch.or(self.scratch),
+            report: over.report.or(self.report),
+            ..self
+        }
+    }
+}
+
+/// Bytes in a unit; the first of each is the one that messages use.
+const UNITS: [(&str, u64); 9] = [
+    ("B", 1),
+    ("KiB", 1 << 10),
+    ("MiB", 1 << 20),
+    ("GiB", 1 << 30),
+    ("TiB", 1 << 40),
+    ("kB", 1_000),
+    ("MB", 1_000_000),
+    ("GB", 1_000_000_000),
+    ("TB", 1_000_000_000_000),
+];
+
+/// Reads a size: `512MiB`, `1.5 GiB`, `2GB`, or bytes without a unit. A fraction of a byte is cut off.
+///
+/// The error says what a size looks like.
+///
+/// ```
+/// assert_eq!(pointmill::pipeline::parse_bytes("1.5GiB"), Ok(1_610_612_736));
+/// assert!(pointmill::pipeline::parse_bytes("2G").is_err());
+/// ```
+pub fn parse_bytes(text: &str) -> Result<u64, String> {
+    let refused = || {
+        let units: Vec<&str> = UNITS.iter().map(|(unit, _)| *unit).collect();
+        let text: String = text.chars().take(40).collect();
+        format!("`{text}` is no size such as 512MiB or 2GiB (units: {})", units.join(", "))
+    };
+    let text = text.trim();
+    let split = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let (number, unit) = (&text[..split], text[split..].trim_start());
+    let scale = match unit {
+        "" => 1,
+        _ => UNITS.iter().find(|(name, _)| *name == unit).ok_or_else(refused)?.1,
+    };
+    let (whole, fraction) = number.split_once('.').unwrap_or((number, "0"));
+    let fraction = &fraction[..fraction.len().min(9)];
+    let parse = |digits: &str| digits.parse::<u64>().map_err(|_| refused());
+    let part = u128::from(parse(fraction)?) * u128::from(scale) / 10u128.pow(fraction.len() as u32);
+    let bytes = u128::from(parse(whole)?) * u128::from(scale) + part;
+    match u64::try_from(bytes) {
+        Ok(0) => Err(format!("{}: a size is at least one byte", refused())),
+        Ok(bytes) => Ok(bytes),
+        Err(_) => Err(format!("{}: too large", refused())),
+    }
+}
+
+fn some_bytes<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u64>, D::Error> {
+    struct Size;
+    impl de::Visitor<'_> for Size {
+        type Value = u64;
+
+        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            f.write_str("a size such as \"2GiB\", or bytes")
+        }
+
+        fn visit_str<E: de::Error>(self, text: &str) -> Result<u64, E> {
+            parse_bytes(text).map_err(E::custom)
+        }
+
+        fn visit_u64<E: de::Error>(self, bytes: u64) -> Result<u64, E> {
+            match bytes {
+                0 => Err(E::invalid_value(de::Unexpected::Unsigned(0), &self)),
+                _ => Ok(bytes),
+            }
+        }
+
+        fn visit_i64<E: de::Error>(self, bytes: i64) -> Result<u64, E> {
+            match u64::try_from(bytes) {
+                Ok(bytes) => self.visit_u64(bytes),
+                Err(_) => Err(E::invalid_value(de::Unexpected::Signed(bytes), &self)),
+            }
+        }
+    }
+    from.deserialize_any(Size).map(Some)
+}
+
+fn some_step<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    let step = f64::deserialize(from)?;
+    if step.is_finite() && step > 0.0 {
+        return Ok(Some(step));
+    }
+    Err(de::Error::invalid_value(de::Unexpected::Float(step), &"a number above 0"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_have_binary_and_decimal_units() {
+        for (text, bytes) in [
+            ("1", 1),
+            ("1024", 1024),
+            ("1B", 1),
+            ("1KiB", 1 << 10),
+            ("512MiB", 512 << 20),
+            ("2GiB", 2 << 30),
+            (" 2 GiB ", 2 << 30),
+            ("1.5GiB", 3 << 29),
+            ("3TiB", 3 << 40),
+            ("1kB", 1000),
+            ("1MB", 1_000_000),
+            ("0.25GB", 250_000_000),
+            ("1TB", 1_000_000_000_000),
+            ("18446744073709551615", u64::MAX),
+        ] {
+            assert_eq!(parse_bytes(text), Ok(bytes), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_size_is_refused() {
+        let wrong = ["", "GiB", "2G", "2gib", "-1", "1e3", "1.2.3GiB", "1,5GiB", "0", "0.1B", "１"];
+        for text in wrong {
+            assert!(parse_bytes(text).is_err(), "{text}");
+        }
+        assert!(parse_bytes("99999999TiB").unwrap_err().ends_with("too large"));
+        assert!(parse_bytes("18446744073709551616").is_err());
+    }
+}

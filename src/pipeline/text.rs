@@ -1,0 +1,245 @@
+//! From a pipeline file's text to its stages in their roles, or to every mistake in it.
+
+use std::fmt;
+use std::path::Path;
+
+use super::draft::{self, Draft, StageDraft};
+use super::keys;
+use super::mistake::{self, Mistake, SourceText};
+use super::node;
+use super::registry::{Registry, StagePlace};
+use super::set::Set;
+use super::settings::RunSettings;
+use crate::stage::{Order, Role};
+use crate::{Error, Result};
+
+/// A pipeline that is right as far as its text tells: one source, then stages that work, then sinks.
+#[derive(Debug)]
+pub struct Pipeline {
+    /// The file it came from, as the user named it.
+    pub origin: String,
+    /// The `[run]` table.
+    pub settings: RunSettings,
+    /// The stages from top to bottom: a source, any number of transforms and tile ops, one sink or
+    /// more, which take from the last stage that is no sink.
+    pub stages: Vec<PlacedStage>,
+}
+
+/// A stage and where it stands in its file.
+pub struct PlacedStage {
+    /// Its kind.
+    pub kind: String,
+    /// The name that the file gives it.
+    pub name: Option<String>,
+    /// The stage that it says it takes from.
+    pub from: Option<String>,
+    /// Line of its `kind`, from 1.
+    pub line: usize,
+    /// What it does.
+    pub role: Role,
+    /// Its keys with all defaults filled in, those that name files left out.
+    pub keys: serde_json::Value,
+}
+
+impl fmt::Debug for PlacedStage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.kind, self.keys)
+    }
+}
+
+impl Pipeline {
+    /// Reads a pipeline; `origin` is the name of its file for errors.
+    ///
+    /// The error tells every mistake of the text at once. Files that stages name are looked up, not
+    /// opened.
+    pub fn parse(text: &str, origin: &str, registry: &Registry) -> Result<Pipeline> {
+        Pipeline::parse_with(text, origin, registry, &[])
+    }
+
+    /// Reads a pipeline in which the values of `sets`, in their order, take the place of the text's.
+    pub fn parse_with(
+        text: &str,
+        origin: &str,
+        registry: &Registry,
+        sets: &[Set],
+    ) -> Result<Pipeline> {
+        let file = SourceText { origin: origin.to_owned(), text: text.to_owned() };
+        let sources: Vec<SourceText> =
+            std::iter::once(file).chain(sets.iter().map(Set::source)).collect();
+        let told = |mistakes| mistake::tell(mistakes, &sources);
+        let entries = node::parse(text, 0).map_err(told)?;
+        let mut draft = draft::read(entries, text.len(), registry);
+        for (i, set) in sets.iter().enumerate() {
+            draft.apply(set, i + 1);
+        }
+        let (pipeline, mistakes) = build(draft, text, origin, registry);
+        if mistakes.is_empty() { Ok(pipeline) } else { Err(told(mistakes)) }
+    }
+
+    /// Reads the pipeline file at `path`, as [`parse_with`](Pipeline::parse_with).
+    pub fn read(path: &Path, registry: &Registry, sets: &[Set]) -> Result<Pipeline> {
+        let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read the pipeline", e))?;
+        let text = String::from_utf8(bytes).map_err(|e| {
+            let valid = e.utf8_error().valid_up_to() as u64;
+            Error::pipeline("the pipeline is not UTF-8 text").at(path).at_byte(valid)
+        })?;
+        Pipeline::parse_with(&text, &path.display().to_string(), registry, sets)
+    }
+}
+
+fn build(
+    mut draft: Draft,
+    text: &str,
+    origin: &str,
+    registry: &Registry,
+) -> (Pipeline, Vec<Mistake>) {
+    let mut mistakes = std::mem::take(&mut draft.mistakes);
+    let settings = keys::read("[run]", &draft.run).unwrap_or_else(|wrong| {
+        mistakes.extend(wrong);
+        RunSettings::default()
+    });
+    check_names(&draft.stages, registry, &mut mistakes);
+    let mut stages = Vec::new();
+    for stage in &draft.stages {
+        match place(stage, text, origin, registry) {
+            Ok(placed) => stages.push(placed),
+            Err(wrong) => mistakes.extend(wrong),
+        }
+    }
+    if mistakes.is_empty() {
+        check_chain(&draft.stages, &stages, &mut mistakes);
+        check_files(&draft.stages, &stages, &settings, &mut mistakes);
+    }
+    (Pipeline { origin: origin.to_owned(), settings, stages }, mistakes)
+}
+
+fn place(
+    stage: &StageDraft,
+    text: &str,
+    origin: &str,
+    registry: &Registry,
+) -> Result<PlacedStage, Vec<Mistake>> {
+    let (kind, at) = &stage.kind;
+    let line = text.as_bytes()[..at.start.min(text.len())].iter().filter(|&&b| b == b'\n').count();
+    let place = StagePlace::new(origin, line + 1);
+    let Some(built) = registry.build(kind, &stage.keys, &place) else {
+        let kinds = registry.kinds().map(|(kind, _)| kind);
+        let told = format!("there is no stage `{kind}`");
+        return Err(vec![Mistake::word(at.clone(), told, kind, "stages", kinds)]);
+    };
+    let (role, keys) = built?;
+    let text = |part: &Option<(String, node::Place)>| part.as_ref().map(|(text, _)| text.clone());
+    Ok(PlacedStage {
+        kind: kind.clone(),
+        name: text(&stage.name),
+        from: text(&stage.from),
+        line: place.line(),
+        role,
+        keys,
+    })
+}
+
+/// Names are words of their own: no two alike, none that already means something.
+fn check_names(stages: &[StageDraft], registry: &Registry, mistakes: &mut Vec<Mistake>) {
+    for (i, stage) in stages.iter().enumerate() {
+        let Some((name, at)) = &stage.name else { continue };
+        let taken = |s: &StageDraft| s.name.as_ref().is_some_and(|(other, _)| other == name);
+        let word = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
+        let wrong = if name.is_empty() || !name.chars().all(word) {
+            "a name is made of letters, digits, - and _"
+        } else if name == "run" || registry.has(name) {
+            "the name means something else already"
+        } else if stages[..i].iter().any(taken) {
+            "another stage above has this name"
+        } else {
+            continue;
+        };
+        mistakes.push(Mistake::new(at.clone(), wrong));
+    }
+}
+
+/// A source, stages that work, sinks: the chain that can be run.
+fn check_chain(drafts: &[StageDraft], stages: &[PlacedStage], mistakes: &mut Vec<Mistake>) {
+    let mut wrong = |i: usize, told: &str| {
+        mistakes.push(Mistake::new(drafts[i].kind.1.clone(), told));
+    };
+    let mut sinks = 0;
+    for (i, stage) in stages.iter().enumerate() {
+        match (&stage.role, i) {
+            (Role::Source(_), 0) => {}
+            (Role::Source(_), _) => wrong(i, "a second source is not possible yet"),
+            (_, 0) => wrong(i, "the first stage must be a source, such as `read`"),
+            (Role::Sink(_), _) => sinks += 1,
+            _ if sinks > 0 => wrong(i, "a stage behind a sink is not possible yet"),
+            _ => {}
+        }
+    }
+    match stages.len().checked_sub(1) {
+        Some(last) if sinks == 0 => wrong(last, "nothing takes these points: end with `write`"),
+        _ => {}
+    }
+    check_from(drafts, stages, mistakes);
+    let tiles = stages.iter().any(|s| matches!(s.role, Role::TileOp(_)));
+    for (draft, stage) in drafts.iter().zip(stages) {
+        let Role::Sink(sink) = &stage.role else { continue };
+        if tiles && sink.order() == Order::Input {
+            let told = "the input's order is kept only where no stage works on tiles";
+            let note = "leave `order` out: the order is canonical";
+            mistakes.push(Mistake::new(draft.kind.1.clone(), told).note(note));
+        }
+    }
+}
+
+/// `from` names an earlier stage; as long as pipelines are chains, the one that is above anyway.
+fn check_from(drafts: &[StageDraft], stages: &[PlacedStage], mistakes: &mut Vec<Mistake>) {
+    let mut above: Option<usize> = None;
+    for (i, stage) in stages.iter().enumerate() {
+        if let Some((from, at)) = &drafts[i].from {
+            let name = |s: &PlacedStage| s.name.clone();
+            let earlier: Vec<String> = stages[..i].iter().filter_map(name).collect();
+            if !earlier.contains(from) {
+                let told = format!("no earlier stage is named `{from}`");
+                mistakes.push(Mistake::word(at.clone(), told, from, "names", earlier));
+            } else if above.and_then(|a| stages[a].name.as_ref()) != Some(from) {
+                let told = "taking from another stage than the one above is not possible yet";
+                mistakes.push(Mistake::new(at.clone(), told));
+            }
+        }
+        if !matches!(stage.role, Role::Sink(_)) {
+            above = Some(i);
+        }
+    }
+}
+
+/// No file is written twice, and none over an input.
+fn check_files(
+    drafts: &[StageDraft],
+    stages: &[PlacedStage],
+    settings: &RunSettings,
+    mistakes: &mut Vec<Mistake>,
+) {
+    let same = |a: &Path, b: &Path| {
+        a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+    };
+    let mut inputs = Vec::new();
+    let mut outputs: Vec<&Path> = settings.report.as_deref().into_iter().collect();
+    for (draft, stage) in drafts.iter().zip(stages) {
+        match &stage.role {
+            Role::Source(source) => inputs.extend(source.paths()),
+            Role::Sink(sink) => {
+                let path = sink.path();
+                let told = if inputs.iter().any(|input| same(input, path)) {
+                    format!("{} is an input: it cannot be written over", path.display())
+                } else if outputs.iter().any(|output| same(output, path)) {
+                    format!("{} is written twice", path.display())
+                } else {
+                    outputs.push(path);
+                    continue;
+                };
+                let at = draft.value_of("path").unwrap_or(&draft.kind.1);
+                mistakes.push(Mistake::new(at.clone(), told));
+            }
+            _ => {}
+        }
+    }
+}

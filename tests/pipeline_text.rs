@@ -1,0 +1,495 @@
+//! Pipeline files: what is read, and how every mistake is told.
+
+use std::path::Path;
+
+use pointmill::pipeline::{
+    Nonfinite, Pipeline, Registry, Set, Simd, StageKind, StagePlace, Synth, Write,
+};
+use pointmill::report::Tally;
+use pointmill::stage::{Needs, Role, TileOp};
+use pointmill::tile::Tile;
+use pointmill::{Error, ErrorKind, Result};
+use serde::{Deserialize, Serialize};
+
+/// A tile stage with a key of every sort.
+#[derive(Serialize, Deserialize)]
+struct Thin {
+    #[serde(default)]
+    angle: f64,
+    #[serde(default)]
+    neighbors: u32,
+    #[serde(default)]
+    pick: Option<Pick>,
+    #[serde(default)]
+    names: Vec<String>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Pick {
+    Center,
+    Median,
+    First,
+}
+
+impl StageKind for Thin {
+    const KIND: &'static str = "thin";
+    const ABOUT: &'static str = "Thins.";
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        if self.angle > 3.2 {
+            let told = Error::pipeline("an angle is at most π").help("write it as 6deg");
+            return Err(at.blame("angle", told));
+        }
+        Ok(Role::TileOp(Box::new(Nothing)))
+    }
+}
+
+struct Nothing;
+
+impl TileOp for Nothing {
+    fn needs(&self) -> Needs {
+        Needs::default()
+    }
+
+    fn run(&self, _: &mut Tile, _: &mut Tally) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// `synth`, `thin` and `write`.
+fn registry() -> Registry {
+    Registry::empty().with::<Synth>().with::<Thin>().with::<Write>()
+}
+
+const GOOD: &str = "\
+[[stage]]
+kind = \"synth\"
+scene = \"part\"
+points = 1_000
+
+[[stage]]
+kind = \"thin\"
+neighbors = 12
+
+[[stage]]
+kind = \"write\"
+path = \"out.laz\"
+";
+
+fn parse(text: &str) -> Result<Pipeline> {
+    Pipeline::parse(text, "p.toml", &registry())
+}
+
+fn with(sets: &[&str]) -> Result<Pipeline> {
+    let sets = sets.iter().map(|s| Set::parse(s)).collect::<Result<Vec<_>>>()?;
+    Pipeline::parse_with(GOOD, "p.toml", &registry(), &sets)
+}
+
+/// What is told of a wrong pipeline.
+fn told(text: &str) -> String {
+    let error = parse(text).expect_err("the pipeline is wrong");
+    assert_eq!(error.kind(), ErrorKind::Pipeline);
+    format!("{error}\n")
+}
+
+#[test]
+fn a_pipeline_reads_top_to_bottom() {
+    let pipeline = parse(GOOD).unwrap();
+    let kinds: Vec<&str> = pipeline.stages.iter().map(|s| s.kind.as_str()).collect();
+    assert_eq!(kinds, ["synth", "thin", "write"]);
+    let lines: Vec<usize> = pipeline.stages.iter().map(|s| s.line).collect();
+    assert_eq!(lines, [2, 7, 11]);
+    assert!(matches!(pipeline.stages[0].role, Role::Source(_)));
+    assert!(matches!(pipeline.stages[1].role, Role::TileOp(_)));
+    let Role::Sink(sink) = &pipeline.stages[2].role else { panic!("write is a sink") };
+    assert_eq!(sink.path(), Path::new("out.laz"));
+}
+
+#[test]
+fn canonical_keys_have_defaults_but_no_places() {
+    let pipeline = parse(GOOD).unwrap();
+    let keys: Vec<String> = pipeline.stages.iter().map(|s| s.keys.to_string()).collect();
+    assert_eq!(keys[0], r#"{"points":1000,"scene":"part","seed":0}"#);
+    assert_eq!(keys[1], r#"{"angle":0.0,"names":[],"neighbors":12}"#);
+    assert_eq!(keys[2], r#"{"dimensions":[],"drop":[]}"#);
+}
+
+#[test]
+fn settings_are_read() {
+    let run = "[run]\nmemory = \"1.5GiB\"\nthreads = 3\nscratch = \"s\"\nreport = \"r.json\"\n\
+               lattice = 0.001\nnonfinite = \"drop\"\ntile_points = 5000\nsimd = \"portable\"\n";
+    let settings = parse(&format!("{run}{GOOD}")).unwrap().settings;
+    assert_eq!(settings.memory, Some(1_610_612_736));
+    assert_eq!(settings.threads.unwrap().get(), 3);
+    assert_eq!(settings.scratch.as_deref(), Some(Path::new("s")));
+    assert_eq!(settings.report.as_deref(), Some(Path::new("r.json")));
+    assert_eq!(settings.lattice, Some(0.001));
+    assert_eq!(settings.nonfinite, Nonfinite::Drop);
+    assert_eq!(settings.tile_points.unwrap().get(), 5000);
+    assert_eq!(settings.simd, Simd::Portable);
+    assert_eq!(
+        parse(&format!("[run]\nmemory = 4096\n{GOOD}")).unwrap().settings.memory,
+        Some(4096)
+    );
+}
+
+#[test]
+fn every_mistake_is_told_at_once_with_its_place() {
+    let text = "\
+[run]
+memory = \"2G\"
+thraeds = 4
+
+[[stage]]
+kind = \"synth\"
+scene = \"alps\"
+pionts = 1_000
+
+[[stage]]
+kind = \"thinn\"
+
+[[stage]]
+kind = \"thin\"
+neighbours = 12
+neighbors = -3
+angle = \"wide\"
+pick = \"middle\"
+names = [\"a\", 7]
+
+[[stages]]
+kind = \"write\"
+";
+    let expected = "\
+11 mistakes
+p.toml:2:10: `memory`: `2G` is no size such as 512MiB or 2GiB (units: B, KiB, MiB, GiB, TiB, kB, MB, GB, TB)
+  2 | memory = \"2G\"
+    |          ^^^^
+p.toml:3:1: `[run]` has no key `thraeds`
+  3 | thraeds = 4
+    | ^^^^^^^
+    = did you mean `threads`? keys: lattice, memory, nonfinite, report, scratch, simd, threads, tile_points
+p.toml:6:8: `synth` needs `points`
+  6 | kind = \"synth\"
+    |        ^^^^^^^
+p.toml:7:9: `scene` cannot be `alps`
+  7 | scene = \"alps\"
+    |         ^^^^^^
+    = did you mean `als`? valid: als, part, plane
+p.toml:8:1: `synth` has no key `pionts`
+  8 | pionts = 1_000
+    | ^^^^^^
+    = did you mean `points`? keys: noise, points, scene, seed
+p.toml:11:8: there is no stage `thinn`
+  11 | kind = \"thinn\"
+     |        ^^^^^^^
+     = did you mean `thin`? stages: synth, thin, write
+p.toml:15:1: `thin` has no key `neighbours`
+  15 | neighbours = 12
+     | ^^^^^^^^^^
+     = did you mean `neighbors`? keys: angle, names, neighbors, pick
+p.toml:16:13: `neighbors`: takes a whole number from 0, not -3
+  16 | neighbors = -3
+     |             ^^
+p.toml:17:9: `angle`: takes a number, not the text \"wide\"
+  17 | angle = \"wide\"
+     |         ^^^^^^
+p.toml:18:8: `pick` cannot be `middle`
+  18 | pick = \"middle\"
+     |        ^^^^^^^^
+     = valid: center, first, median
+p.toml:19:15: `names`: takes a text in quotes, not 7
+  19 | names = [\"a\", 7]
+     |               ^
+p.toml:21:3: a pipeline file has no `stages`
+  21 | [[stages]]
+     |   ^^^^^^
+     = did you mean `[[stage]]`? tables: [[stage]], [run]
+";
+    assert_eq!(told(text), expected.replace("11 mistakes", "12 mistakes"));
+}
+
+#[test]
+fn one_mistake_is_told_alone() {
+    let expected = "\
+p.toml:8:1: `thin` has no key `neighbor`
+  8 | neighbor = 12
+    | ^^^^^^^^
+    = did you mean `neighbors`? keys: angle, names, neighbors, pick
+";
+    assert_eq!(told(&GOOD.replace("neighbors", "neighbor")), expected);
+}
+
+#[test]
+fn what_a_stage_refuses_is_told_at_the_key_it_blames() {
+    let expected = "\
+p.toml:8:9: an angle is at most π
+  8 | angle = 6
+    |         ^
+    = write it as 6deg
+";
+    assert_eq!(told(&GOOD.replace("neighbors = 12", "angle = 6")), expected);
+}
+
+#[test]
+fn text_that_is_not_toml_is_told_with_its_place() {
+    let text = told("[[stage]]\nkind = \"synth\nscene = part\n");
+    assert!(text.contains("p.toml:2:"), "{text}");
+    assert!(text.contains("p.toml:3:9: not TOML"), "{text}");
+}
+
+#[test]
+fn dates_and_numbers_that_are_not_finite_are_refused() {
+    assert!(told(&GOOD.replace("12", "1979-05-27")).contains("p.toml:8:13: no key takes a date"));
+    for number in ["nan", "inf", "-inf", "1e999"] {
+        let text = told(&GOOD.replace("neighbors = 12", &format!("angle = {number}")));
+        assert!(text.starts_with("p.toml:8:9: no key takes a number that is not finite"), "{text}");
+    }
+    let huge = told(&GOOD.replace("12", "99999999999999999999999"));
+    assert!(huge.contains("p.toml:8:13: `neighbors`: the whole number is too large"), "{huge}");
+}
+
+#[test]
+fn a_chain_that_cannot_be_run_is_refused() {
+    let synth = "[[stage]]\nkind = \"synth\"\nscene = \"part\"\npoints = 9\n";
+    let thin = "[[stage]]\nkind = \"thin\"\n";
+    let write = "[[stage]]\nkind = \"write\"\npath = \"a.laz\"\n";
+    let again = "[[stage]]\nkind = \"write\"\npath = \"b.ply\"\n";
+    for (text, expected) in [
+        (String::new(), "p.toml:1:1: a pipeline needs stages"),
+        (format!("{thin}{write}"), "p.toml:2:8: the first stage must be a source, such as `read`"),
+        (format!("{synth}{synth}{write}"), "p.toml:6:8: a second source is not possible yet"),
+        (format!("{synth}{write}{thin}"), "p.toml:9:8: a stage behind a sink is not possible yet"),
+        (format!("{synth}{thin}"), "p.toml:6:8: nothing takes these points: end with `write`"),
+        (format!("{synth}{write}{write}"), "p.toml:10:8: a.laz is written twice"),
+        (
+            format!("[run]\nreport = \"a.laz\"\n{synth}{write}"),
+            "p.toml:9:8: a.laz is written twice",
+        ),
+        (
+            format!("{synth}{thin}{write}order = \"input\"\n"),
+            "p.toml:8:8: the input's order is kept only where no stage works on tiles",
+        ),
+        ("run = 3\n".to_owned() + GOOD, "p.toml:1:1: `run` is a table: write [run]"),
+        ("stage = 3\n".to_owned(), "p.toml:1:1: a stage is one of several tables: write [[stage]]"),
+        (format!("[[stage]]\npath = \"x\"\n{GOOD}"), "p.toml:1:1: a stage needs `kind`"),
+        (format!("[[stage]]\nkind = 3\n{GOOD}"), "p.toml:2:8: `kind` takes a text in quotes"),
+    ] {
+        let told = told(&text);
+        assert!(told.starts_with(expected), "{expected}\n{told}");
+    }
+    assert!(parse(&format!("{synth}{write}{again}")).is_ok());
+    assert!(parse(&format!("{synth}{write}order = \"input\"\n")).is_ok());
+}
+
+#[test]
+fn from_names_an_earlier_stage() {
+    let synth = "[[stage]]\nkind = \"synth\"\nname = \"scan\"\nscene = \"part\"\npoints = 9\n";
+    let thin = "[[stage]]\nkind = \"thin\"\nname = \"less\"\nfrom = \"scan\"\n";
+    let write =
+        |from: &str| format!("[[stage]]\nkind = \"write\"\npath = \"a.laz\"\nfrom = \"{from}\"\n");
+    let good = parse(&format!("{synth}{thin}{}", write("less"))).unwrap();
+    assert_eq!(good.stages[1].from.as_deref(), Some("scan"));
+    assert_eq!(good.stages[1].name.as_deref(), Some("less"));
+    let other = told(&format!("{synth}{thin}{}", write("scan")));
+    assert!(other.contains("than the one above is not possible yet"), "{other}");
+    let unknown = told(&format!("{synth}{thin}{}", write("lest")));
+    assert!(unknown.contains("did you mean `less`? names: less, scan"), "{unknown}");
+    for (name, wrong) in [
+        ("run", "means something else"),
+        ("thin", "means something else"),
+        ("a.b", "is made of letters"),
+        ("", "is made of letters"),
+        ("less", "another stage above"),
+    ] {
+        let text = format!("{synth}{thin}{}name = \"{name}\"\n", write("less"));
+        assert!(told(&text).contains(wrong), "{name}");
+    }
+}
+
+#[test]
+fn an_input_is_never_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = folder.path().join("scan.laz");
+    std::fs::write(&scan, b"").unwrap();
+    let text = format!(
+        "[[stage]]\nkind = \"read\"\npath = \"{scan}\"\n[[stage]]\nkind = \"write\"\npath = \"{other}\"\n",
+        scan = scan.display(),
+        other = folder.path().join(".").join("scan.laz").display(),
+    );
+    let registry = registry().with::<pointmill::pipeline::Read>();
+    let told = Pipeline::parse(&text, "p.toml", &registry).unwrap_err().to_string();
+    assert!(told.starts_with("p.toml:6:8: ") && told.contains("is an input"), "{told}");
+}
+
+#[test]
+fn inputs_are_looked_up_and_their_formats_agree() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["b.laz", "a.las", "c.ply", "d.xyz"] {
+        std::fs::write(folder.path().join(name), b"").unwrap();
+    }
+    let registry = registry().with::<pointmill::pipeline::Read>();
+    let at = |name: &str| format!("\"{}\"", folder.path().join(name).display());
+    let read = |path: &str| {
+        let text = format!(
+            "[[stage]]\nkind = \"read\"\npath = {path}\n[[stage]]\nkind = \"write\"\npath = \"out.laz\"\n"
+        );
+        Pipeline::parse(&text, "p.toml", &registry).map(|pipeline| {
+            let Role::Source(source) = &pipeline.stages[0].role else { panic!("read is a source") };
+            assert_eq!(pipeline.stages[0].keys.to_string(), "{}");
+            source.paths()
+        })
+    };
+    let both = ["a.las", "b.laz"].map(|name| folder.path().join(name));
+    assert_eq!(read(&at("*.la?")).unwrap(), both);
+    for (path, expected) in [
+        (at("*.e57"), "p.toml:3:8: no file matches"),
+        (at("[ab]*.laz/"), "p.toml:3:8: no file matches"),
+        (format!("[{}, {}]", at("a.las"), at("c.ply")), "cannot be read together"),
+        (at("d.xyz"), "names no format"),
+        ("[]".to_owned(), "p.toml:3:8: no input is named"),
+        ("3".to_owned(), "p.toml:3:8: `path`: takes a path or a list of paths, not 3"),
+    ] {
+        let told = read(&path).unwrap_err().to_string();
+        assert!(told.contains(expected), "{path}: {told}");
+    }
+}
+
+#[test]
+fn keys_of_write_fit_its_format() {
+    let told_of = |keys: &str| told(&GOOD.replace("path = \"out.laz\"", keys));
+    for (keys, expected) in [
+        ("path = \"out.xyz\"", "p.toml:12:8: the extension of `out.xyz` names no format"),
+        ("path = \"a.ply\"\nscale = 1", "p.toml:13:9: `scale` is for las and laz"),
+        ("path = \"a.laz\"\nencoding = \"ascii\"", "p.toml:13:12: `encoding` is for ply"),
+        ("path = \"a.laz\"\nscale = [1, 2]", "p.toml:13:9: `scale`: takes a number above 0, or"),
+        ("path = \"a.laz\"\nscale = [1, 2, 3, 4]", "`scale`: has 1 values too many"),
+        ("path = \"a.laz\"\nscale = [1, 0, 1]", "p.toml:13:13: `scale`: takes a number above 0"),
+        ("path = \"a.laz\"\ndimensions = [\"NormalX\"]", "p.toml:13:14: `dimensions`: takes [] or"),
+        ("path = \"a.laz\"\norder = \"random\"", "valid: canonical, input"),
+        ("format = \"las\"", "`write` needs `path`"),
+    ] {
+        let told = told_of(keys);
+        assert!(told.contains(expected), "{keys}: {told}");
+    }
+    let right = "path = \"out.dat\"\nformat = \"las\"\nscale = [0.01, 0.01, 0.001]\n\
+                 dimensions = [\"NormalX\", \"NormalY\", \"NormalZ\"]";
+    let pipeline = parse(&GOOD.replace("path = \"out.laz\"", right)).unwrap();
+    let Role::Sink(sink) = &pipeline.stages[2].role else { panic!("write is a sink") };
+    assert!(sink.wants_normals());
+}
+
+#[test]
+fn arguments_take_the_place_of_values() {
+    let pipeline = with(&[
+        "thin.neighbors=20",
+        "thin.1.angle = 0.5",
+        "thin.pick=median",
+        "thin.names=[\"a=b\"]",
+        "write.path=other.las",
+        "run.memory=64MiB",
+        "run.threads=2",
+        "thin.neighbors=21",
+    ])
+    .unwrap();
+    let expected = r#"{"angle":0.5,"names":["a=b"],"neighbors":21,"pick":"median"}"#;
+    assert_eq!(pipeline.stages[1].keys.to_string(), expected);
+    assert_eq!(pipeline.settings.memory, Some(64 << 20));
+    assert_eq!(pipeline.settings.threads.unwrap().get(), 2);
+    let Role::Sink(sink) = &pipeline.stages[2].role else { panic!("write is a sink") };
+    assert_eq!(sink.path(), Path::new("other.las"));
+}
+
+#[test]
+fn an_argument_mends_the_file() {
+    let broken = GOOD.replace("neighbors = 12", "neighbors = \"many\"");
+    assert!(parse(&broken).is_err());
+    let sets = [Set::parse("thin.neighbors=4").unwrap()];
+    assert!(Pipeline::parse_with(&broken, "p.toml", &registry(), &sets).is_ok());
+}
+
+#[test]
+fn several_stages_of_a_kind_are_told_apart() {
+    let text = GOOD.replace(
+        "[[stage]]\nkind = \"write\"",
+        "[[stage]]\nkind = \"thin\"\nname = \"last\"\n\n[[stage]]\nkind = \"write\"",
+    );
+    let set = |sets: &[&str]| {
+        let sets: Vec<Set> = sets.iter().map(|s| Set::parse(s).unwrap()).collect();
+        Pipeline::parse_with(&text, "p.toml", &registry(), &sets)
+    };
+    let good = set(&["thin.1.angle=1", "thin.2.neighbors=2", "last.angle=2"]).unwrap();
+    assert_eq!(good.stages[1].keys.to_string(), r#"{"angle":1.0,"names":[],"neighbors":12}"#);
+    assert_eq!(good.stages[2].keys.to_string(), r#"{"angle":2.0,"names":[],"neighbors":2}"#);
+    let told = set(&["thin.angle=1"]).unwrap_err().to_string();
+    let expected = "\
+--set: 2 stages are `thin`
+   | thin.angle=1
+   | ^^^^
+   = write: thin.1, thin.2";
+    assert_eq!(told, expected);
+}
+
+#[test]
+fn mistakes_of_an_argument_point_into_it() {
+    let told = |set: &str| with(&[set]).map(|_| ()).unwrap_err().to_string();
+    let expected = "\
+--set: `thin` has no key `neighbours`
+   | thin.neighbours=12
+   |      ^^^^^^^^^^
+   = did you mean `neighbors`? keys: angle, names, neighbors, pick";
+    assert_eq!(told("thin.neighbours=12"), expected);
+    let expected = "\
+--set: `neighbors`: takes a whole number from 0, not the text \"ten\"
+   | thin.neighbors=ten
+   |                ^^^";
+    assert_eq!(told("thin.neighbors=ten"), expected);
+    let expected = "\
+--set: this pipeline has no stage `thn`
+   | thn.neighbors=3
+   | ^^^
+   = did you mean `thin`? stages: run, synth, thin, write";
+    assert_eq!(told("thn.neighbors=3"), expected);
+    for (set, expected) in [
+        ("neighbors=3", "the value has no address"),
+        (".neighbors=3", "the value has no address"),
+        ("thin.kind=write", "`kind` is for the pipeline file alone"),
+        ("thin.0.angle=1", "no stage `thin.0`"),
+        ("thin.2.angle=1", "no stage `thin.2`"),
+        ("run.memory=-3", "takes a size such as \"2GiB\", or bytes, not -3"),
+        ("run.simd=avx", "valid: auto, portable"),
+        ("thin.angle=nan", "not finite"),
+        ("thin.angle=4", "an angle is at most π"),
+        ("thin.neighbors", "there is no `=`"),
+        ("ä.ö=ü", "no stage `ä`"),
+    ] {
+        let told = told(set);
+        assert!(told.contains(expected), "{set}: {told}");
+    }
+}
+
+#[test]
+fn a_file_of_nonsense_is_told_in_short() {
+    let text: String = (0..100).map(|i| format!("[word{i}]\n")).collect();
+    let told = told(&text);
+    assert!(told.starts_with("101 mistakes\n"), "{told}");
+    assert!(told.ends_with("and 81 more\n"), "{told}");
+    let long = told_len(&format!("{}[", "x".repeat(100_000)));
+    assert!(long < 1000, "{long}");
+}
+
+fn told_len(text: &str) -> usize {
+    told(text).len()
+}
+
+#[test]
+fn a_pipeline_file_is_named_when_it_cannot_be_read() {
+    let missing = Pipeline::read(Path::new("/no/such.toml"), &registry(), &[]).unwrap_err();
+    assert_eq!(missing.kind(), ErrorKind::Io);
+    assert_eq!(missing.path(), Some(Path::new("/no/such.toml")));
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("p.toml");
+    std::fs::write(&file, b"a = \"\xff\"").unwrap();
+    let binary = Pipeline::read(&file, &registry(), &[]).unwrap_err();
+    assert_eq!((binary.kind(), binary.byte()), (ErrorKind::Pipeline, Some(5)));
+}
