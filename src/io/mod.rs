@@ -1,1 +1,3 @@
 //! Formats: one folder each, plain sources and sinks of records.
+
+pub mod las;
