@@ -2,6 +2,7 @@
 
 pub mod convert;
 mod describe;
+pub mod las;
 pub mod ply;
 pub mod synthetic;
 
