@@ -4,6 +4,8 @@ pub mod convert;
 mod describe;
 pub mod las;
 pub mod ply;
+mod project;
 pub mod synthetic;
 
 pub use describe::describe;
+pub use project::Projected;

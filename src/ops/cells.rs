@@ -6,7 +6,7 @@ mod settings;
 
 use std::num::NonZeroUsize;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::point::Position;
@@ -45,7 +45,7 @@ const SORTING_BYTES: usize = 32;
 /// separates only a few their cost is quadratic. No surface does that; to bound the time of data
 /// that does, parts more than 64 + 2 log₂ m divisions deep are cut in eight instead
 /// (`cells_cut_deep` of the report counts the initial cells with such parts).
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Cells {
     /// Side of the initial cells: a length in world units, rounded to whole lattice steps, or "auto":

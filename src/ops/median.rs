@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::Result;
 use crate::geom::angle::cosine;
@@ -21,7 +21,7 @@ const BYTES: usize = 16;
 /// one nearest to the centre of mass of the cell's positions, then the first in Morton order. Copies
 /// weigh as one position and are removed as coincident. A position without a normal is in no cell
 /// and keeps one record.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Median {}
 

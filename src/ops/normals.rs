@@ -15,7 +15,7 @@ pub const MAX_NEIGHBORS: usize = 64;
 ///
 /// Positions with fewer than two others in the whole scan, or with neighbours on one line, have
 /// none.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Normals {
     /// How many nearest other positions the fit uses (k), besides the position itself; 3 to 64.
@@ -38,6 +38,42 @@ impl Normals {
     }
 }
 
+impl TileOp for Normals {
+    fn needs(&self) -> Needs {
+        Needs {
+            reads: names::XYZ.map(str::to_owned).to_vec(),
+            writes: vec!["Normal".into()],
+            neighbors: self.neighbors,
+            ..Needs::default()
+        }
+    }
+
+    fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
+        let mut estimator = Estimator::new(self.method);
+        let mut normals = std::mem::take(&mut tile.normals);
+        let core = tile.core.clone();
+        let (mut without, mut no_triangle, mut perpendicular) = (0, 0, 0);
+        let outcome = tile.each_neighborhood(self.neighbors, |i, offsets| {
+            let (estimate, fallback) = estimator.estimate(offsets);
+            let counted = u64::from(core.contains(&i));
+            match estimate {
+                Estimate::Normal(normal) => normals[i] = normal,
+                Estimate::None => without += counted,
+            }
+            match fallback {
+                Some(Fallback::NoTriangle) => no_triangle += counted,
+                Some(Fallback::Perpendicular) => perpendicular += counted,
+                None => {}
+            }
+        });
+        tile.normals = normals;
+        tally.count("no_normal", without);
+        tally.count("fallback_no_triangle", no_triangle);
+        tally.count("fallback_perpendicular", perpendicular);
+        outcome
+    }
+}
+
 fn check_neighbors(neighbors: u64) -> Result<(), String> {
     if (MIN_NEIGHBORS as u64..=MAX_NEIGHBORS as u64).contains(&neighbors) {
         return Ok(());
@@ -52,7 +88,7 @@ fn checked_neighbors<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Err
 }
 
 /// How a normal is estimated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
     /// Least-squares height function z = ax + by + c over a first estimate: the mean normal of the

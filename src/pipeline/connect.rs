@@ -3,34 +3,36 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::kinds::{Format, Synth, Write};
-use crate::point::{Metadata, Schema};
+use super::kinds::{Encoding, Format, Synth, Write};
+use crate::io::{Projected, convert, las, ply, synthetic};
+use crate::point::{Layout, Metadata, Schema, names};
 use crate::stage::{CreateSink, OpenSource, Order, Sink, Source};
 use crate::{Error, Result};
 
 /// The source that reads `files`, each of its format; all LAS and LAZ, or all PLY.
-pub fn read(files: Vec<PathBuf>, formats: Vec<Format>) -> Box<dyn OpenSource> {
-    Box::new(Files { files, _formats: formats })
+pub fn read(files: Vec<PathBuf>, formats: &[Format]) -> Box<dyn OpenSource> {
+    Box::new(Files { ply: formats.first() == Some(&Format::Ply), files })
 }
 
 /// The source that makes a scan up.
-pub fn synth(_synth: Synth) -> Box<dyn OpenSource> {
-    Box::new(Files { files: Vec::new(), _formats: Vec::new() })
+pub fn synth(synth: &Synth) -> Box<dyn OpenSource> {
+    let Synth { scene, points, seed, noise } = *synth;
+    Box::new(synthetic::Synthetic { scene, points, seed, noise })
 }
 
 /// The sink that writes a file of `format`.
 pub fn write(write: Write, format: Format) -> Box<dyn CreateSink> {
-    Box::new(Output { write, _format: format })
+    Box::new(Output { write, format })
 }
 
 struct Files {
     files: Vec<PathBuf>,
-    _formats: Vec<Format>,
+    ply: bool,
 }
 
 impl OpenSource for Files {
     fn open(&self) -> Result<Box<dyn Source>> {
-        Err(Error::internal("formats are not connected"))
+        if self.ply { ply::open(&self.files) } else { las::open(&self.files) }
     }
 
     fn paths(&self) -> Vec<PathBuf> {
@@ -40,7 +42,7 @@ impl OpenSource for Files {
 
 struct Output {
     write: Write,
-    _format: Format,
+    format: Format,
 }
 
 impl CreateSink for Output {
@@ -56,7 +58,73 @@ impl CreateSink for Output {
         !self.write.dimensions.is_empty()
     }
 
-    fn create(&self, _: &Path, _: &Arc<Schema>, _: &Metadata) -> Result<Box<dyn Sink>> {
-        Err(Error::internal("formats are not connected"))
+    fn create(
+        &self,
+        staged: &Path,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+    ) -> Result<Box<dyn Sink>> {
+        let created = match (self.format, schema.layout) {
+            (Format::Ply, _) => self.ply(staged, schema, metadata),
+            (_, Layout::Las { .. }) => self.las(staged, schema, metadata),
+            (_, Layout::Ply) => self.las_of_ply(staged, schema, metadata),
+        };
+        created.map_err(|error| if error.path() == Some(staged) { error } else { error.at(&self.write.path) })
+    }
+}
+
+impl Output {
+    fn ply(&self, staged: &Path, schema: &Schema, metadata: &Metadata) -> Result<Box<dyn Sink>> {
+        let encoding = self.write.encoding.map(|encoding| match encoding {
+            Encoding::Ascii => ply::Encoding::Ascii,
+            Encoding::Binary => ply::Encoding::Little,
+        });
+        let options = ply::PlyOptions {
+            encoding,
+            normals: self.wants_normals(),
+            drop: self.write.drop.clone(),
+            carry_rest: false,
+        };
+        ply::create(staged, &options, schema, metadata)
+    }
+
+    fn las_options(&self) -> las::LasOptions {
+        las::LasOptions { compressed: self.format == Format::Laz, normals: self.wants_normals() }
+    }
+
+    /// LAS records stay as they are, unless another scale is asked for.
+    fn las(&self, staged: &Path, schema: &Arc<Schema>, metadata: &Metadata) -> Result<Box<dyn Sink>> {
+        if !self.write.drop.is_empty() {
+            return Err(Error::pipeline("`drop` is for conversions between LAS and PLY")
+                .help("a LAS output holds every dimension of a LAS input: leave `drop` out"));
+        }
+        let mut scaled = (**schema).clone();
+        for (axis, name) in names::XYZ.into_iter().enumerate() {
+            if let Some(dimension) = scaled.dimensions.iter_mut().find(|d| d.name == name) {
+                dimension.scale = self.write.scale.map_or(dimension.scale, |scale| scale[axis]);
+                dimension.origin = self.write.offset.map_or(dimension.origin, |offset| offset[axis]);
+            }
+        }
+        if scaled == **schema {
+            return las::create(staged, &self.las_options(), schema, metadata);
+        }
+        let projection = convert::Projection::new(schema, &scaled, &[])?;
+        let scaled = Arc::new(scaled);
+        let sink = las::create(staged, &self.las_options(), &scaled, metadata)?;
+        Ok(Box::new(Projected::new(sink, projection, scaled)))
+    }
+
+    fn las_of_ply(&self, staged: &Path, schema: &Schema, metadata: &Metadata) -> Result<Box<dyn Sink>> {
+        let scale = self.write.scale.ok_or_else(|| {
+            Error::pipeline("a PLY scan written as LAS needs a `scale` for its coordinates")
+                .help("give scale = 0.001, or what the scan's precision is, in its own unit")
+        })?;
+        let (format, extra) = convert::las_schema(schema, &self.write.drop)?;
+        let offset = self.write.offset.unwrap_or([0.0; 3]);
+        let layout = Arc::new(las::layout(format, &extra, scale, offset));
+        let projection = convert::Projection::new(schema, &layout, &self.write.drop)?;
+        let fresh = las::fresh(&layout, metadata.crs.as_deref());
+        let sink = las::create(staged, &self.las_options(), &layout, &fresh)?;
+        Ok(Box::new(Projected::new(sink, projection, layout)))
     }
 }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize, de};
 
 use super::registry::{StageKind, StagePlace};
 use super::{connect, inputs};
+use crate::io::synthetic::Scene;
 use crate::stage::{Order, Role};
 use crate::{Error, Result, point::names};
 
@@ -77,7 +78,7 @@ impl StageKind for Read {
             let told = format!("{a} and {b} cannot be read together: LAS and PLY records differ");
             return Err(blame(Error::pipeline(told).help(help)));
         }
-        Ok(Role::Source(connect::read(files, formats)))
+        Ok(Role::Source(connect::read(files, &formats)))
     }
 }
 
@@ -97,24 +98,12 @@ pub struct Synth {
     pub noise: Option<f64>,
 }
 
-/// What a synthetic scan shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Scene {
-    /// A plane.
-    Plane,
-    /// A machine part: box, hole and dome, with sharp edges.
-    Part,
-    /// An airborne scan: terrain, gabled roofs and trees, in strips.
-    Als,
-}
-
 impl StageKind for Synth {
     const KIND: &'static str = "synth";
     const ABOUT: &'static str = "Makes a scan of a plane, a machine part or a landscape up.";
 
     fn build(self, _at: &StagePlace) -> Result<Role> {
-        Ok(Role::Source(connect::synth(self)))
+        Ok(Role::Source(connect::synth(&self)))
     }
 }
 
@@ -133,6 +122,9 @@ pub struct Write {
     /// Scale of LAS coordinates per axis, in world units; none: the input's.
     #[serde(default, deserialize_with = "some_scale")]
     pub scale: Option<[f64; 3]>,
+    /// Offset of LAS coordinates per axis, in world units; none: the input's, or 0.
+    #[serde(default)]
+    pub offset: Option<[f64; 3]>,
     /// Order of the records; none: canonical, or the input's where the pipeline streams.
     #[serde(default)]
     pub order: Option<OutputOrder>,
@@ -190,6 +182,7 @@ impl StageKind for Write {
         };
         match format {
             Format::Ply if self.scale.is_some() => return Err(only("scale", "las and laz")),
+            Format::Ply if self.offset.is_some() => return Err(only("offset", "las and laz")),
             Format::Las | Format::Laz if self.encoding.is_some() => {
                 return Err(only("encoding", "ply"));
             }

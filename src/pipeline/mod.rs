@@ -24,7 +24,7 @@ mod text;
 mod watch;
 
 pub use inputs::expand;
-pub use kinds::{Encoding, Format, OutputOrder, Read, Scene, Synth, Write};
+pub use kinds::{Encoding, Format, OutputOrder, Read, Synth, Write};
 pub use plan::Plan;
 pub use registry::{Registry, StageKind, StagePlace};
 pub use set::Set;

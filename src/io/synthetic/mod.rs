@@ -14,7 +14,7 @@ use std::ops::Range;
 use std::str::FromStr;
 use std::sync::Arc;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{OpenSource, Part, Source};
@@ -28,7 +28,7 @@ const MOST_POINTS: u64 = 10_000_000_000_000;
 const MOST_NOISE: f64 = 1000.0;
 
 /// What is scanned.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scene {
     /// A tilted square plane, 400 points a square unit of its plan, in random order.

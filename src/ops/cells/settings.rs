@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::fmt;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde::de::{Deserializer, Error, Unexpected, Visitor};
 
 /// Side of the initial cells.
@@ -17,7 +17,7 @@ pub enum Side {
 }
 
 /// How a cell is divided.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
     /// Between the position with the smallest angle and that with the largest: each position goes
@@ -28,11 +28,20 @@ pub enum Split {
 }
 
 /// What the range of angles of a cell is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Measure {
     /// θ_max − θ_min of the angles to N (the paper's; blind to rotations about N).
     Axis,
+}
+
+impl Serialize for Side {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Side::Auto => serializer.serialize_str("auto"),
+            Side::Length(length) => serializer.serialize_f64(*length),
+        }
+    }
 }
 
 impl<'de> Deserialize<'de> for Side {

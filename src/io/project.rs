@@ -1,0 +1,76 @@
+//! A sink of one record layout behind records of another.
+
+use std::sync::Arc;
+
+use super::convert::Projection;
+use crate::point::{PointBatch, Schema};
+use crate::stage::{Encode, Encoded, Sink, SinkSummary};
+use crate::{Error, Result};
+
+/// Projects every record before `inner` takes it, and tells at the end what that rounded.
+pub struct Projected {
+    inner: Box<dyn Sink>,
+    encoder: Arc<ProjectingEncoder>,
+    rounded: (u64, f64),
+}
+
+struct ProjectingEncoder {
+    projection: Projection,
+    to: Arc<Schema>,
+    inner: Arc<dyn Encode>,
+}
+
+impl Projected {
+    /// Records go through `projection` and, as records of `to`, into `inner`.
+    pub fn new(inner: Box<dyn Sink>, projection: Projection, to: Arc<Schema>) -> Self {
+        let encoder = ProjectingEncoder { projection, to, inner: inner.encoder() };
+        Projected { inner, encoder: Arc::new(encoder), rounded: (0, 0.0) }
+    }
+}
+
+impl Encode for ProjectingEncoder {
+    fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
+        let mut records = Vec::with_capacity(batch.len() * self.to.stride);
+        let rounding = self.projection.project(batch.records(), &mut records)?;
+        let mut projected = PointBatch::new(self.to.clone(), batch.len());
+        projected.extend(&records);
+        projected.normals = batch.normals.clone();
+        let mut encoded = self.inner.encode(&projected)?;
+        encoded.rounded = Some((rounding.points, rounding.largest));
+        Ok(encoded)
+    }
+}
+
+impl Sink for Projected {
+    fn chunk_points(&self) -> usize {
+        self.inner.chunk_points()
+    }
+
+    fn chunk_bytes(&self) -> u64 {
+        // The projected records, twice: as made and in their batch.
+        self.inner.chunk_bytes() + 2 * (self.inner.chunk_points() * self.encoder.to.stride) as u64
+    }
+
+    fn encoder(&self) -> Arc<dyn Encode> {
+        self.encoder.clone()
+    }
+
+    fn append(&mut self, chunk: Encoded) -> Result<()> {
+        let (points, largest) = chunk.rounded.ok_or_else(|| {
+            Error::internal("a chunk came to a projecting sink from another encoder")
+        })?;
+        self.rounded = (self.rounded.0 + points, self.rounded.1.max(largest));
+        self.inner.append(chunk)
+    }
+
+    fn finish(self: Box<Self>) -> Result<SinkSummary> {
+        let (points, largest) = self.rounded;
+        let mut summary = self.inner.finish()?;
+        if points > 0 {
+            summary.notes.push(format!(
+                "coordinates of {points} points were rounded to the output's scale, by at most {largest:.3e}"
+            ));
+        }
+        Ok(summary)
+    }
+}
