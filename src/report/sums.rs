@@ -66,7 +66,8 @@ fn rounded(mantissa: u64, shift: i32) -> u64 {
     }
 }
 
-/// Distances of records to a plane: their number, their sum and that of their squares.
+/// Distances of records to a plane: their number, their sum and that of their squares. Each distance
+/// is rounded to 2^-32 of a step first, so that positions on the plane have none.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Distances {
     count: u64,
@@ -77,6 +78,7 @@ pub struct Distances {
 impl Distances {
     /// Adds `copies` records at `distance` (any sign) in lattice steps.
     pub fn add(&mut self, distance: f64, copies: u32) {
+        let distance = without_dust(distance);
         self.count += u64::from(copies);
         self.sum.add(distance, copies);
         self.squares.add(distance * distance, copies);
@@ -103,6 +105,13 @@ impl Distances {
     pub fn mean(&self) -> Option<f64> {
         (self.count > 0).then(|| self.sum.value() / self.count as f64)
     }
+}
+
+/// A distance rounded to 2^-32; from 2^19 on it has no finer digits than that to speak of.
+fn without_dust(distance: f64) -> f64 {
+    // Beside this number the last bit of an f64 is worth 2^-32.
+    const COARSE: f64 = 1.5 * (1u64 << 20) as f64;
+    if distance.abs() < (1u64 << 19) as f64 { (distance + COARSE) - COARSE } else { distance }
 }
 
 #[cfg(test)]
@@ -132,6 +141,21 @@ mod tests {
         assert_eq!(sum_of(&[0.75 * step]).value(), step);
         assert_eq!(sum_of(&[0.25 * step]).value(), 0.0);
         assert_eq!(sum_of(&[f64::MIN_POSITIVE, f64::from_bits(1)]).value(), 0.0);
+    }
+
+    #[test]
+    fn what_rounding_leaves_of_a_distance_of_zero_is_dropped() {
+        let step = 2f64.powi(-32);
+        for (distance, kept) in [
+            (1e-16, 0.0),
+            (-0.4 * step, 0.0),
+            (0.6 * step, step),
+            (-7.25, -7.25),
+            (524_287.0 + step, 524_287.0 + step),
+            (1e300, 1e300),
+        ] {
+            assert_eq!(without_dust(distance), kept, "{distance}");
+        }
     }
 
     #[test]

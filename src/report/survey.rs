@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! ScanSurvey::new(bounds)                     per thread; merged
-//!   per tile: TileSurvey::new(key) ─ add… ─ fit ─ FittedTile ─ measure… ─ finish ─ TileFigures
+//!   per tile: ScanSurvey::tile(key) ─ add… ─ fit ─ FittedTile ─ measure… ─ finish ─ TileFigures
 //!   and ScanSurvey::add for the same positions
 //! ScanSurvey::fit ─ FittedScan ─ part ─ measure… ─ merge ─ finish ─ Totals
 //! ```
@@ -25,9 +25,11 @@ use crate::{Error, Result};
 const POSITIONS_PER_TILE: u64 = 4096;
 
 /// Binary logarithm of the side of report tiles in lattice steps: the smallest for which an occupied
-/// one holds 4,096 positions on average.
+/// one holds 4,096 positions on average. Where none does, the smallest for which they are fewest.
 pub fn report_tile_level(levels: &Levels) -> u32 {
-    levels.smallest_side(POSITIONS_PER_TILE)
+    let level = levels.smallest_side(POSITIONS_PER_TILE);
+    let fewest = levels.occupied(level);
+    (0..level).find(|&j| levels.occupied(j) == fewest).unwrap_or(level)
 }
 
 /// How many of the copies of a position are kept.
@@ -48,6 +50,11 @@ fn removed(copies: u32, fate: Fate) -> (u32, f32) {
     }
 }
 
+fn no_moments(bounds: &Bounds) -> Pair<Moments> {
+    let moments = Moments::for_bounds(bounds);
+    Pair { before: moments.clone(), after: moments }
+}
+
 /// The first walk over a report tile: moments of its records before and after the reduction.
 #[derive(Debug, Clone)]
 pub struct TileSurvey {
@@ -57,14 +64,8 @@ pub struct TileSurvey {
 }
 
 impl TileSurvey {
-    /// A survey of the records in the cube of `key`.
-    pub fn new(key: TileKey) -> Self {
-        let moments = Moments::for_bounds(&key.cube());
-        TileSurvey {
-            key,
-            moments: Pair { before: moments.clone(), after: moments },
-            deviations: Deviations::default(),
-        }
+    fn new(key: TileKey, bounds: &Bounds) -> Self {
+        TileSurvey { key, moments: no_moments(bounds), deviations: Deviations::default() }
     }
 
     /// Adds `copies` records at `position`, which is in the cube.
@@ -130,6 +131,7 @@ impl FittedTile {
 /// any order.
 #[derive(Debug, Clone)]
 pub struct ScanSurvey {
+    bounds: Bounds,
     moments: Pair<Moments>,
     deviations: Deviations,
     histogram: Histogram,
@@ -143,9 +145,9 @@ impl ScanSurvey {
 
     /// A survey of a scan, or of a part of it; `bounds` is the box of the *whole* scan.
     pub fn new(bounds: &Bounds) -> Self {
-        let moments = Moments::for_bounds(bounds);
         ScanSurvey {
-            moments: Pair { before: moments.clone(), after: moments },
+            bounds: *bounds,
+            moments: no_moments(bounds),
             deviations: Deviations::default(),
             histogram: Histogram::default(),
             tiles: 0,
@@ -153,7 +155,17 @@ impl ScanSurvey {
         }
     }
 
-    /// Adds `copies` records at `position`.
+    /// A survey of the report tile `key`.
+    pub fn tile(&self, key: TileKey) -> TileSurvey {
+        let mut bounds = key.cube();
+        for axis in 0..3 {
+            bounds.lo[axis] = bounds.lo[axis].max(self.bounds.lo[axis]);
+            bounds.hi[axis] = bounds.hi[axis].min(self.bounds.hi[axis]);
+        }
+        TileSurvey::new(key, &bounds)
+    }
+
+    /// Adds `copies` records at `position`, which is in the bounds.
     pub fn add(&mut self, position: Position, copies: u32, fate: Fate) {
         self.moments.before.add(position, copies);
         self.moments.after.add(position, kept(copies, fate));
