@@ -192,6 +192,26 @@ fn a_second_walk_that_misses_records_is_told() {
 }
 
 #[test]
+fn a_scan_that_misses_what_its_tiles_saw_is_told() {
+    let (p, fate) = ([1, 2, 3], represented(1.0));
+    let mut scan = ScanSurvey::new(&Bounds::of([p]));
+    let mut tile = scan.tile(TileKey::around(p, 4));
+    tile.add(p, 5, fate);
+    let mut tile = tile.fit();
+    tile.measure(p, 5, fate);
+    tile.finish(&lattice(1.0), &mut scan).unwrap();
+    let mut scan = scan.fit();
+    let mut part = scan.part();
+    part.measure(p, 5, fate);
+    scan.merge(&part);
+    let error = scan.finish(&lattice(1.0)).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Internal);
+    assert!(
+        error.to_string().ends_with("5 records before and 0 after the reduction, but 0 removed")
+    );
+}
+
+#[test]
 fn a_deviation_that_is_no_number_is_an_internal_error() {
     let error = survey(&[([0; 3], 3, represented(f32::NAN))], 4, 1).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Internal);
@@ -263,6 +283,29 @@ proptest! {
         let mut merged = of(&mut b.iter().rev());
         merged.merge(&of(&mut a.iter()));
         prop_assert_eq!(merged, of(&mut positions.iter()));
+    }
+
+    #[test]
+    fn moments_of_tiles_with_their_own_origins_are_those_of_the_whole(
+        positions in prop::collection::vec((prop::array::uniform3(0i64..1 << 43), 1u32..), 1..60),
+        far in prop::array::uniform3(-(1i64 << 61)..1 << 61), cut in 0usize..60,
+    ) {
+        let positions: Vec<(Position, u32)> = positions
+            .into_iter()
+            .map(|(p, copies)| (std::array::from_fn(|a| p[a] + far[a]), copies))
+            .collect();
+        let of = |part: &[(Position, u32)]| {
+            let mut moments = Moments::for_bounds(&Bounds::of(part.iter().map(|p| p.0)));
+            part.iter().for_each(|&(p, copies)| moments.add(p, copies));
+            moments
+        };
+        let whole = of(&positions);
+        let mut absorbed = Moments::for_bounds(&Bounds::of(positions.iter().map(|p| p.0)));
+        let (a, b) = positions.split_at(cut.min(positions.len()));
+        absorbed.absorb(&of(b));
+        absorbed.absorb(&of(a));
+        prop_assert!(whole.is_exact());
+        prop_assert_eq!(absorbed, whole);
     }
 
     #[test]
