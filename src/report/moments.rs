@@ -42,17 +42,26 @@ impl Moments {
         }
         let at = self.relative(position);
         self.count += u64::from(copies);
-        // One multiplication of 64 bits a product is the fast road, and nearly every position's.
-        let weighted = at.map(|v| i128::from(v) * i128::from(copies));
-        for (sum, v) in self.sum.iter_mut().zip(weighted) {
-            *sum = sum.wrapping_add(v);
+        // One copy, the usual case, is kept apart: its products take one multiplication each.
+        if copies == 1 {
+            self.plus(|v| v, at);
+        } else {
+            let weight = i128::from(copies);
+            self.plus(|v| v.wrapping_mul(weight), at);
         }
-        for (product, (a, b)) in self.products.iter_mut().zip(PAIRS) {
-            let term = if copies == 1 {
-                i128::from(at[a]) * i128::from(at[b])
-            } else {
-                weighted[a].wrapping_mul(i128::from(at[b]))
-            };
+    }
+
+    /// Adds the first and second moments of `at`, each as `weighed`.
+    #[inline(always)]
+    fn plus(&mut self, weighed: impl Fn(i128) -> i128, at: [i64; 3]) {
+        let [x, y, z] = at;
+        let first = [x, y, z].map(|v| weighed(v.into()));
+        let second = [(x, x), (x, y), (x, z), (y, y), (y, z), (z, z)]
+            .map(|(a, b)| weighed(i128::from(a) * i128::from(b)));
+        for (sum, term) in self.sum.iter_mut().zip(first) {
+            *sum = sum.wrapping_add(term);
+        }
+        for (product, term) in self.products.iter_mut().zip(second) {
             *product = product.wrapping_add(term);
         }
     }
@@ -78,6 +87,33 @@ impl Moments {
         }
         for (mine, theirs) in self.products.iter_mut().zip(other.products) {
             *mine = mine.wrapping_add(theirs);
+        }
+    }
+
+    /// True if no coordinate is rounded.
+    pub fn is_exact(&self) -> bool {
+        self.shift == 0
+    }
+
+    /// Adds moments of a part of the box, both exact, as if their positions were added here.
+    pub fn absorb(&mut self, part: &Moments) {
+        debug_assert!(self.is_exact() && part.is_exact(), "exact moments");
+        let n = i128::from(part.count);
+        let by: [i128; 3] =
+            std::array::from_fn(|a| i128::from(part.origin[a]) - i128::from(self.origin[a]));
+        self.count += part.count;
+        for (product, (theirs, (a, b))) in
+            self.products.iter_mut().zip(part.products.into_iter().zip(PAIRS))
+        {
+            // Σ(x + s)(y + t) = Σxy + tΣx + sΣy + nst; terms may wrap, the sum cannot.
+            let moved = theirs
+                .wrapping_add(by[b].wrapping_mul(part.sum[a]))
+                .wrapping_add(by[a].wrapping_mul(part.sum[b]))
+                .wrapping_add(n.wrapping_mul(by[a]).wrapping_mul(by[b]));
+            *product = product.wrapping_add(moved);
+        }
+        for ((sum, theirs), by) in self.sum.iter_mut().zip(part.sum).zip(by) {
+            *sum = sum.wrapping_add(theirs).wrapping_add(n.wrapping_mul(by));
         }
     }
 

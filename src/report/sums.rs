@@ -44,6 +44,16 @@ impl FixedSum {
         self.plus(other.high, other.low);
     }
 
+    /// Adds `last`, in units of the last bit, `times` times.
+    fn plus_times(&mut self, last: u128, times: u32) {
+        if times == 1 {
+            return self.plus(0, last);
+        }
+        let upper = (last >> 64) * u128::from(times);
+        self.plus(upper >> 64, upper << 64);
+        self.plus(0, u128::from(last as u64) * u128::from(times));
+    }
+
     fn plus(&mut self, high: u128, low: u128) {
         let (low, carry) = self.low.overflowing_add(low);
         let sum = self.high.checked_add(high).and_then(|h| h.checked_add(u128::from(carry)));
@@ -66,7 +76,8 @@ fn rounded(mantissa: u64, shift: i32) -> u64 {
     }
 }
 
-/// Distances of records to a plane: their number, their sum and that of their squares.
+/// Distances of records to a plane: their number, their sum and that of their squares. Each distance
+/// is rounded to 2^-32 of a step first, so that positions on the plane have none.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Distances {
     count: u64,
@@ -78,8 +89,15 @@ impl Distances {
     /// Adds `copies` records at `distance` (any sign) in lattice steps.
     pub fn add(&mut self, distance: f64, copies: u32) {
         self.count += u64::from(copies);
-        self.sum.add(distance, copies);
-        self.squares.add(distance * distance, copies);
+        let distance = distance.abs();
+        if distance < NEAR {
+            let steps = u128::from(fine_steps(distance));
+            self.sum.plus_times(steps << 32, copies);
+            self.squares.plus_times(steps * steps, copies);
+        } else {
+            self.sum.add(distance, copies);
+            self.squares.add(distance * distance, copies);
+        }
     }
 
     /// Adds other distances.
@@ -103,6 +121,15 @@ impl Distances {
     pub fn mean(&self) -> Option<f64> {
         (self.count > 0).then(|| self.sum.value() / self.count as f64)
     }
+}
+
+/// Below this, a distance is a whole number of 2^-32 steps; beyond, an f64 has hardly finer digits.
+const NEAR: f64 = (1u64 << 19) as f64;
+
+/// A distance in 0..[`NEAR`] in units of 2^-32, rounded half to even.
+fn fine_steps(distance: f64) -> u64 {
+    // The last bit of an f64 from 2^20 to 2^21 is worth 2^-32, so that its mantissa is the answer.
+    (distance + (1u64 << 20) as f64).to_bits() & ((1 << 52) - 1)
 }
 
 #[cfg(test)]
@@ -132,6 +159,27 @@ mod tests {
         assert_eq!(sum_of(&[0.75 * step]).value(), step);
         assert_eq!(sum_of(&[0.25 * step]).value(), 0.0);
         assert_eq!(sum_of(&[f64::MIN_POSITIVE, f64::from_bits(1)]).value(), 0.0);
+    }
+
+    #[test]
+    fn what_rounding_leaves_of_a_distance_of_zero_is_dropped() {
+        let step = 2f64.powi(-32);
+        for (distance, kept) in [
+            (1e-16, 0.0),
+            (-0.4 * step, 0.0),
+            (0.6 * step, step),
+            (-7.25, 7.25),
+            (524_287.0 + step, 524_287.0 + step),
+            (-524_288.0, 524_288.0),
+            (2f64.powi(63), 2f64.powi(63)),
+        ] {
+            let mut distances = Distances::default();
+            distances.add(distance, 3);
+            assert_eq!(distances.mean(), Some(kept), "{distance}");
+            let mut thrice = Distances::default();
+            (0..3).for_each(|_| thrice.add(distance, 1));
+            assert_eq!(distances, thrice);
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! ScanSurvey::new(bounds)                     per thread; merged
-//!   per tile: TileSurvey::new(key) ─ add… ─ fit ─ FittedTile ─ measure… ─ finish ─ TileFigures
+//!   per tile: ScanSurvey::tile(key) ─ add… ─ fit ─ FittedTile ─ measure… ─ finish ─ TileFigures
 //!   and ScanSurvey::add for the same positions
 //! ScanSurvey::fit ─ FittedScan ─ part ─ measure… ─ merge ─ finish ─ Totals
 //! ```
@@ -25,9 +25,11 @@ use crate::{Error, Result};
 const POSITIONS_PER_TILE: u64 = 4096;
 
 /// Binary logarithm of the side of report tiles in lattice steps: the smallest for which an occupied
-/// one holds 4,096 positions on average.
+/// one holds 4,096 positions on average. Where none does, the smallest for which they are fewest.
 pub fn report_tile_level(levels: &Levels) -> u32 {
-    levels.smallest_side(POSITIONS_PER_TILE)
+    let level = levels.smallest_side(POSITIONS_PER_TILE);
+    let fewest = levels.occupied(level);
+    (0..level).find(|&j| levels.occupied(j) == fewest).unwrap_or(level)
 }
 
 /// How many of the copies of a position are kept.
@@ -48,6 +50,11 @@ fn removed(copies: u32, fate: Fate) -> (u32, f32) {
     }
 }
 
+fn no_moments(bounds: &Bounds) -> Pair<Moments> {
+    let moments = Moments::for_bounds(bounds);
+    Pair { before: moments.clone(), after: moments }
+}
+
 /// The first walk over a report tile: moments of its records before and after the reduction.
 #[derive(Debug, Clone)]
 pub struct TileSurvey {
@@ -57,14 +64,8 @@ pub struct TileSurvey {
 }
 
 impl TileSurvey {
-    /// A survey of the records in the cube of `key`.
-    pub fn new(key: TileKey) -> Self {
-        let moments = Moments::for_bounds(&key.cube());
-        TileSurvey {
-            key,
-            moments: Pair { before: moments.clone(), after: moments },
-            deviations: Deviations::default(),
-        }
+    fn new(key: TileKey, bounds: &Bounds) -> Self {
+        TileSurvey { key, moments: no_moments(bounds), deviations: Deviations::default() }
     }
 
     /// Adds `copies` records at `position`, which is in the cube.
@@ -86,8 +87,8 @@ impl TileSurvey {
     pub fn fit(self) -> FittedTile {
         FittedTile {
             key: self.key,
-            points: Pair { before: self.moments.before.count(), after: self.moments.after.count() },
             distances: PlaneDistances::to(&self.moments),
+            moments: self.moments,
             deviations: self.deviations,
         }
     }
@@ -97,7 +98,7 @@ impl TileSurvey {
 #[derive(Debug, Clone)]
 pub struct FittedTile {
     key: TileKey,
-    points: Pair<u64>,
+    moments: Pair<Moments>,
     distances: PlaneDistances,
     deviations: Deviations,
 }
@@ -113,13 +114,18 @@ impl FittedTile {
     /// Fails with [`ErrorKind::Internal`](crate::ErrorKind::Internal) if the two walks did not see
     /// the same number of records.
     pub fn finish(self, lattice: &Lattice, scan: &mut ScanSurvey) -> Result<TileFigures> {
-        self.distances.check(self.points)?;
+        let points = counts(&self.moments);
+        check_walks(points, &self.distances.sums)?;
         scan.tiles += 1;
+        if scan.takes_moments_from_tiles() {
+            scan.moments.before.absorb(&self.moments.before);
+            scan.moments.after.absorb(&self.moments.after);
+        }
         scan.tile_distances.before.merge(&self.distances.sums.before);
         scan.tile_distances.after.merge(&self.distances.sums.after);
         Ok(TileFigures {
             corner: lattice.world(self.key.corner),
-            points: self.points,
+            points,
             plane: plane_figures(&self.distances.sums, lattice),
             deviation: deviation_figures(&self.deviations, lattice),
         })
@@ -130,6 +136,7 @@ impl FittedTile {
 /// any order.
 #[derive(Debug, Clone)]
 pub struct ScanSurvey {
+    bounds: Bounds,
     moments: Pair<Moments>,
     deviations: Deviations,
     histogram: Histogram,
@@ -143,9 +150,9 @@ impl ScanSurvey {
 
     /// A survey of a scan, or of a part of it; `bounds` is the box of the *whole* scan.
     pub fn new(bounds: &Bounds) -> Self {
-        let moments = Moments::for_bounds(bounds);
         ScanSurvey {
-            moments: Pair { before: moments.clone(), after: moments },
+            bounds: *bounds,
+            moments: no_moments(bounds),
             deviations: Deviations::default(),
             histogram: Histogram::default(),
             tiles: 0,
@@ -153,15 +160,33 @@ impl ScanSurvey {
         }
     }
 
-    /// Adds `copies` records at `position`.
+    /// A survey of the report tile `key`.
+    pub fn tile(&self, key: TileKey) -> TileSurvey {
+        let mut bounds = key.cube();
+        for axis in 0..3 {
+            bounds.lo[axis] = bounds.lo[axis].max(self.bounds.lo[axis]);
+            bounds.hi[axis] = bounds.hi[axis].min(self.bounds.hi[axis]);
+        }
+        TileSurvey::new(key, &bounds)
+    }
+
+    /// Adds `copies` records at `position`, which is in the bounds and also added to its tile.
     pub fn add(&mut self, position: Position, copies: u32, fate: Fate) {
-        self.moments.before.add(position, copies);
-        self.moments.after.add(position, kept(copies, fate));
+        if !self.takes_moments_from_tiles() {
+            self.moments.before.add(position, copies);
+            self.moments.after.add(position, kept(copies, fate));
+        }
         let (removed, deviation) = removed(copies, fate);
         if removed > 0 {
             self.deviations.add(deviation, position, removed);
             self.histogram.add(deviation, removed);
         }
+    }
+
+    /// Exact moments of tiles are those of the scan but for the origin, which saves a sum per record.
+    /// Where the scan is so large that its moments are rounded, every position adds its own.
+    fn takes_moments_from_tiles(&self) -> bool {
+        self.moments.before.is_exact()
     }
 
     /// Adds what was summed over another part of the scan.
@@ -208,16 +233,10 @@ impl FittedScan {
     /// number.
     pub fn finish(self, lattice: &Lattice) -> Result<Totals> {
         let FittedScan { survey, distances } = self;
-        let points =
-            Pair { before: survey.moments.before.count(), after: survey.moments.after.count() };
-        distances.check(points)?;
+        let points = counts(&survey.moments);
+        check_walks(points, &distances.sums)?;
         check_walks(points, &survey.tile_distances)?;
-        if survey.deviations.undefined() > 0 {
-            return Err(Error::internal(format!(
-                "{} removed records have a deviation that is no number",
-                survey.deviations.undefined()
-            )));
-        }
+        check_removed(points, &survey.deviations)?;
         Ok(Totals {
             tiles: survey.tiles,
             points,
@@ -252,10 +271,10 @@ impl PlaneDistances {
             self.sums.after.add(plane.distance(position), kept);
         }
     }
+}
 
-    fn check(&self, points: Pair<u64>) -> Result<()> {
-        check_walks(points, &self.sums)
-    }
+fn counts(moments: &Pair<Moments>) -> Pair<u64> {
+    Pair { before: moments.before.count(), after: moments.after.count() }
 }
 
 fn check_walks(points: Pair<u64>, measured: &Pair<Distances>) -> Result<()> {
@@ -267,6 +286,25 @@ fn check_walks(points: Pair<u64>, measured: &Pair<Distances>) -> Result<()> {
         "the walks of the survey differ: {} records before and {} after the reduction in the first, \
          {} and {} in the second",
         points.before, points.after, second.before, second.after
+    )))
+}
+
+fn check_removed(points: Pair<u64>, deviations: &Deviations) -> Result<()> {
+    let undefined = deviations.undefined();
+    if undefined > 0 {
+        return Err(Error::internal(format!(
+            "{undefined} removed records have a deviation that is no number"
+        )));
+    }
+    if points.after.checked_add(deviations.count()) == Some(points.before) {
+        return Ok(());
+    }
+    Err(Error::internal(format!(
+        "the survey of the scan and those of its tiles differ: {} records before and {} after the \
+         reduction, but {} removed",
+        points.before,
+        points.after,
+        deviations.count()
     )))
 }
 
