@@ -1,9 +1,13 @@
 //! Surface normals from the nearest neighbours of every position: the first step of the reduction.
 
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::geom::plane::{self, Covariance};
 use crate::geom::star::Star;
+use crate::point::names;
+use crate::report::Tally;
+use crate::stage::{Needs, TileOp};
+use crate::tile::Tile;
 use crate::{Error, Result};
 
 /// Fewest neighbours that the stage takes; two make a plane, but no estimate of a surface.

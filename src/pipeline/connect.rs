@@ -77,7 +77,7 @@ impl Output {
     fn ply(&self, staged: &Path, schema: &Schema, metadata: &Metadata) -> Result<Box<dyn Sink>> {
         let encoding = self.write.encoding.map(|encoding| match encoding {
             Encoding::Ascii => ply::Encoding::Ascii,
-            Encoding::Binary => ply::Encoding::Little,
+            Encoding::Binary => ply::Encoding::BinaryLittleEndian,
         });
         let options = ply::PlyOptions {
             encoding,

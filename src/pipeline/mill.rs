@@ -169,7 +169,7 @@ fn cut(
     let side = job.ops.iter().map(|(_, op)| op.needs().cell_side).max().unwrap_or(0);
     let lowest = match u64::try_from(side).unwrap_or(0).saturating_mul(CELLS_ACROSS) {
         0 => 0,
-        wide => wide.next_power_of_two().ilog2(),
+        wide => wide.checked_next_power_of_two().map_or(64, u64::ilog2),
     };
     // Half of a tile's memory is for its zone, the other half for its rim.
     let most = (shares.tile_positions / 2) as u64;

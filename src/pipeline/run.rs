@@ -10,7 +10,7 @@ use super::clock::Clock;
 use super::mill::mill;
 use super::plan::Plan;
 use super::scratch::{Scratch, free_space};
-use super::settings::Nonfinite;
+use super::settings::{Nonfinite, Spill};
 use super::shares::Shares;
 use super::stream::stream;
 use super::survey::Measured;
@@ -127,10 +127,25 @@ pub(super) struct Finished {
     pub measured: Option<Measured>,
 }
 
+/// A run that is done. Displayed as a few lines for the terminal.
+#[derive(Debug)]
+pub struct Done {
+    /// What it says it did; its tiles are in the file alone.
+    pub report: Report,
+    /// The file of the whole report, if one was wanted.
+    pub report_path: Option<PathBuf>,
+}
+
+impl std::fmt::Display for Done {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.report.table(self.report_path.as_deref()).fmt(f)
+    }
+}
+
 impl Plan {
     /// Runs the plan. Outputs appear under their names when all of it is done; an error or a stop
     /// that `watch` asks for leaves nothing behind.
-    pub fn run(mut self, watch: &dyn Watch) -> Result<Report> {
+    pub fn run(mut self, watch: &dyn Watch) -> Result<Done> {
         let mut clock = Clock::new(watch);
         let path = self.sink.path().to_owned();
         let staging = Arc::new(Scratch::below(&existing_folder(&path)?));
@@ -145,7 +160,10 @@ impl Plan {
             Some(folder) => Arc::new(Scratch::below(folder)),
             None => staging.clone(),
         };
-        let kept_in_memory = if self.settings.spills() { 0 } else { shares.kept_in_memory };
+        let kept_in_memory = match self.settings.spill {
+            Spill::Auto => shares.kept_in_memory,
+            Spill::Always => 0,
+        };
         let area = SpillArea::new(budget.clone(), kept_in_memory, Box::new(spill.clone()));
         let mut job = Job {
             source: &*self.source,
@@ -191,7 +209,7 @@ impl Plan {
         drop(area);
         let (report, tiles) = self.account(finished, run, clock, &budget)?;
         self.publish(&staged, &path, &report, &tiles)?;
-        Ok(report)
+        Ok(Done { report, report_path: self.settings.report })
     }
 
     /// The report of a finished run, once its ledger balances, and the lines of its tiles.

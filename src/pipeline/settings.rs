@@ -28,6 +28,8 @@ pub struct RunSettings {
     pub tile_points: Option<NonZeroUsize>,
     /// Which of the equal code paths runs, for tests.
     pub simd: Simd,
+    /// Whether points may stay in memory, for tests.
+    pub spill: Spill,
 }
 
 /// What becomes of points whose coordinates are not finite.
@@ -39,6 +41,17 @@ pub enum Nonfinite {
     Refuse,
     /// They are removed, entered in the ledger as such.
     Drop,
+}
+
+/// Where decoded points wait for the mill.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Spill {
+    /// In memory as far as it goes, on disk beyond.
+    #[default]
+    Auto,
+    /// On disk, all of them.
+    Always,
 }
 
 /// Which of the equal code paths runs.

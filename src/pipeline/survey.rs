@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::run::Job;
 use crate::geom::lattice::Lattice;
 use crate::point::Position;
-use crate::report::{ScanSurvey, TileSurvey, Totals, report_tile_level};
+use crate::report::{ScanSurvey, Totals, report_tile_level};
 use crate::tile::{Fate, Pieces, Reader, SealedTiles, TileKey, lock, parallel};
 use crate::{Error, Result};
 
@@ -175,7 +175,7 @@ impl Walk<'_> {
         while at.0 < end {
             stretch.load(self, at.0)?;
             let key = TileKey::around(stretch.positions[at.1].0, self.level);
-            let mut tile = TileSurvey::new(key);
+            let mut tile = scan.tile(key);
             let (next, seen) = self.visit(&mut stretch, at, key, |p, copies, fate| {
                 tile.add(p, copies, fate);
                 scan.add(p, copies, fate);

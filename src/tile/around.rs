@@ -9,6 +9,7 @@ use super::sealed::SealedTiles;
 use super::{Bounds, Position, Tile};
 use crate::Result;
 use crate::geom::nearest::Nearest;
+use crate::point::distance2;
 
 /// The search of a tile, and how to look beyond it.
 #[derive(Debug, Default)]
@@ -21,9 +22,22 @@ pub struct Around {
     offsets: Vec<Position>,
     /// Neighbourhoods that what was loaded could not prove, since the last [`Around::take_unproven`].
     unproven: u64,
+    /// Neighbourhoods whose two farthest are equally far, likewise.
+    tied: u64,
 }
 
 impl Around {
+    /// Allocates for tiles of up to `points` positions.
+    pub fn reserve(&mut self, points: usize) {
+        self.search.reserve(points);
+    }
+
+    /// How many neighbourhoods had their two farthest members at the same distance; begins again
+    /// at 0.
+    pub fn take_tied(&mut self) -> u64 {
+        std::mem::take(&mut self.tied)
+    }
+
     /// How many neighbourhoods had to be searched for beyond the tile; begins again at 0.
     pub fn take_unproven(&mut self) -> u64 {
         std::mem::take(&mut self.unproven)
@@ -45,7 +59,7 @@ impl Tile {
         mut visit: impl FnMut(usize, &[Position]),
     ) -> Result<()> {
         let Tile { positions, zone, around, .. } = self;
-        let Around { search, remote, beyond, ranks, offsets, unproven } = around;
+        let Around { search, remote, beyond, ranks, offsets, unproven, tied } = around;
         let mut outcome = Ok(());
         search.build(positions);
         search.search(
@@ -72,6 +86,9 @@ impl Tile {
                         offsets.iter_mut().for_each(|q| *q = offset(p, *q));
                     }
                     _ => {
+                        if let [.., before, _] = *neighbors {
+                            *tied += u64::from(distance2(p, positions[before as usize]) == d2);
+                        }
                         ranks.clear();
                         ranks.extend_from_slice(neighbors);
                         ranks.sort_unstable();

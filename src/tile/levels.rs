@@ -50,9 +50,15 @@ impl Levels {
         u64::from(self.first) + self.splits[j.min(63) as usize..].iter().sum::<u64>()
     }
 
-    /// The smallest j for which positions ÷ occupied cubes of side 2^j ≥ `mean`; 62 if there is
-    /// none, 0 without positions.
+    /// The smallest j for which positions ÷ occupied cubes of side 2^j ≥ `mean`; where a scan is too
+    /// small for that, the smallest j from which on larger cubes hold no more.
     pub fn smallest_side(&self, mean: u64) -> u32 {
-        (0..62).find(|&j| self.positions >= self.occupied(j).saturating_mul(mean)).unwrap_or(62)
+        let fewest = self.occupied(62);
+        (0..62)
+            .find(|&j| {
+                let occupied = self.occupied(j);
+                self.positions >= occupied.saturating_mul(mean) || occupied == fewest
+            })
+            .unwrap_or(62)
     }
 }

@@ -42,7 +42,7 @@ pub fn parallel(threads: usize, work: impl Fn(usize) -> Result<()> + Sync) -> Re
                 })
             })
             .collect();
-        let mut result = Ok(());
+        let mut result: Result<()> = Ok(());
         for worker in workers {
             let outcome =
                 worker.join().unwrap_or_else(|_| Err(Error::internal("a worker thread panicked")));
