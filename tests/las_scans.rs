@@ -1,0 +1,114 @@
+//! Real files: all that can be read is read and survives LAS → LAZ → LAS; damage is told.
+
+mod las_support;
+
+use las_support::{BROKEN, LAS, LAZ, manifest, read, scans, write};
+use pointmill::io::las::{describe, open};
+use pointmill::stage::Source;
+
+/// Files above this are read in part.
+const PARTLY: u64 = 300_000;
+const PART: usize = 20_000;
+
+#[test]
+fn every_readable_scan_has_the_points_of_the_manifest_and_survives_a_round_trip() {
+    let Some(folder) = scans() else { return };
+    let temporary = tempfile::tempdir().unwrap();
+    let mut tested = 0;
+    for scan in manifest(&folder) {
+        if BROKEN.contains(&scan.name.as_str()) {
+            continue;
+        }
+        let source = open(std::slice::from_ref(&scan.path)).unwrap_or_else(|e| panic!("{e:?}"));
+        if let Some(points) = scan.points {
+            assert_eq!(source.points(), points, "{}", scan.name);
+        }
+        let whole = source.points() <= PARTLY;
+        let limit = if whole { usize::MAX / 4096 } else { PART };
+        let records = read(&*source, limit).unwrap_or_else(|e| panic!("{e:?}"));
+        if whole {
+            assert_eq!(records.len() as u64, source.points() * source.schema().stride as u64);
+        }
+        for warning in source.warnings() {
+            println!("{warning}");
+        }
+        round_trip(&scan.name, &*source, &records, temporary.path());
+        tested += 1;
+    }
+    assert!(tested > 100, "only {tested} scans");
+}
+
+/// LAS → LAZ → LAS: records, header and records beside the points are the same bytes again.
+fn round_trip(name: &str, source: &dyn Source, records: &[u8], folder: &std::path::Path) {
+    let [one, two, three] = ["1.las", "2.laz", "3.las"].map(|file| folder.join(file));
+    write(&one, LAS, source.schema(), source.metadata(), records).unwrap();
+    let plain = open(std::slice::from_ref(&one)).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+    assert_eq!(plain.schema(), source.schema(), "{name}");
+    write(&two, LAZ, plain.schema(), plain.metadata(), records).unwrap();
+    let packed = open(std::slice::from_ref(&two)).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+    let unpacked = read(&*packed, usize::MAX / 4096).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+    assert!(unpacked == records, "{name}: records differ");
+    write(&three, LAS, packed.schema(), packed.metadata(), &unpacked).unwrap();
+    let bytes = [&one, &three].map(|path| std::fs::read(path).unwrap());
+    assert!(bytes[0] == bytes[1], "{name}: LAS → LAZ → LAS changed the file");
+}
+
+#[test]
+fn a_plain_file_written_again_keeps_all_but_recomputed_fields() {
+    let Some(folder) = scans() else { return };
+    let temporary = tempfile::tempdir().unwrap();
+    let mut tested = 0;
+    for scan in manifest(&folder) {
+        let plain = scan.name.ends_with(".las") && !BROKEN.contains(&scan.name.as_str());
+        if !plain || scan.points.is_none_or(|n| n > PARTLY) {
+            continue;
+        }
+        let source = open(std::slice::from_ref(&scan.path)).unwrap();
+        let records = read(&*source, usize::MAX / 4096).unwrap();
+        let path = temporary.path().join("again.las");
+        write(&path, LAS, source.schema(), source.metadata(), &records).unwrap();
+        let (old, new) = (std::fs::read(&scan.path).unwrap(), std::fs::read(&path).unwrap());
+        let start = u32::from_le_bytes(old[96..100].try_into().unwrap()) as usize;
+        let size = usize::from(u16::from_le_bytes(old[94..96].try_into().unwrap()));
+        // Counts (107 to 131, 247 to 375) and box (179 to 227) follow the points, the extended
+        // records (235 to 247) the end of the points.
+        assert!(old[..107] == new[..107], "{}", scan.name);
+        assert!(old[131..179] == new[131..179], "{}", scan.name);
+        assert!(old[size..start + records.len()] == new[size..start + records.len()]);
+        tested += 1;
+    }
+    assert!(tested > 40, "only {tested} scans");
+}
+
+#[test]
+fn broken_scans_fail_with_path_and_place() {
+    let Some(folder) = scans() else { return };
+    for name in BROKEN {
+        let path = folder.join(name);
+        let result = open(std::slice::from_ref(&path)).and_then(|s| read(&*s, 1 << 22).map(drop));
+        let error = result.expect_err(name);
+        println!("{error:?}");
+        assert_eq!(error.path(), Some(path.as_path()));
+        assert!(error.byte().is_some(), "{error:?}");
+    }
+}
+
+#[test]
+fn every_scan_describes_itself() {
+    let Some(folder) = scans() else { return };
+    for scan in manifest(&folder) {
+        if BROKEN.contains(&scan.name.as_str()) {
+            continue;
+        }
+        let about = describe(&scan.path).unwrap();
+        assert_eq!(about.kind == "LAZ", about.compressor != "none", "{}", scan.name);
+        assert!(about.dimensions.len() >= 15);
+        serde_json::to_string(&about).unwrap();
+    }
+    let copc = describe(&folder.join("laspy/simple.copc.laz")).unwrap();
+    assert!(copc.warnings.iter().any(|w| w.contains("COPC")));
+    let wkt = describe(&folder.join("laspy/1_4_w_evlr.laz")).unwrap();
+    assert!(wkt.crs.is_some() && wkt.evlrs.len() == 1);
+    let keys = describe(&folder.join("pdal/las/test_utm16.las")).unwrap();
+    assert_eq!(keys.crs.as_deref(), Some("EPSG:26916"));
+}
