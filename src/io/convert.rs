@@ -32,6 +32,8 @@ enum Move {
     Swap { from: usize, to: usize, size: usize },
     /// A stored number in another type; scale and origin are equal.
     Stored { from: Dimension, to: Dimension },
+    /// A stored number into some bits of a byte.
+    Narrow { from: Dimension, to: Dimension, shift: u8, mask: u8 },
     /// A world value rounded to the target's steps (coordinates).
     Rounded { from: Dimension, to: Dimension },
     /// A world value that the target must hold.
@@ -129,6 +131,15 @@ impl Projection {
                 let held = to.put(target, self.to_endian, value);
                 if held { Ok(0.0) } else { Err(Unfit { to, value }) }
             }
+            Move::Narrow { from, to, shift, mask } => {
+                let value = from.get(record, endian);
+                let Some(bits) = small(value).filter(|bits| bits <= mask) else {
+                    return Err(Unfit { to, value });
+                };
+                let byte = &mut target[to.offset];
+                *byte = *byte & !(mask << shift) | bits << shift;
+                Ok(0.0)
+            }
             Move::Rounded { from, to } => {
                 let world = from.world(record, endian);
                 let value = Value::Double(world);
@@ -194,6 +205,18 @@ fn nearest(to: &Dimension, world: f64) -> (Value, f64) {
     (Value::Double(stored), stored * to.scale + to.origin)
 }
 
+/// A value as a byte, if it is one.
+fn small(value: Value) -> Option<u8> {
+    match value {
+        Value::Unsigned(v) => u8::try_from(v).ok(),
+        Value::Signed(v) => u8::try_from(v).ok(),
+        Value::Single(_) | Value::Double(_) => {
+            let v = value.as_f64();
+            (v.fract() == 0.0 && (0.0..256.0).contains(&v)).then_some(v as u8)
+        }
+    }
+}
+
 /// What a field holds, for a message.
 fn room(to: &Dimension) -> String {
     let kind = match to.scalar {
@@ -246,13 +269,23 @@ fn step(from: &Dimension, from_endian: Endian, to: &Dimension, to_endian: Endian
                 Move::Copy { from: from.offset, to: to.offset, length: size }
             }
             true => Move::Swap { from: from.offset, to: to.offset, size },
-            false => Move::Stored { from: from.clone(), to: to.clone() },
+            false => stored(from, to),
         };
     }
     if XYZ.contains(&to.name.as_str()) {
         return Move::Rounded { from: from.clone(), to: to.clone() };
     }
     Move::Exact { from: from.clone(), to: to.clone() }
+}
+
+fn stored(from: &Dimension, to: &Dimension) -> Move {
+    let (from, to) = (from.clone(), to.clone());
+    match to.bits {
+        Some(bits) if to.scalar == Scalar::U8 && bits.shift + bits.width <= 8 && bits.width < 8 => {
+            Move::Narrow { from, to, shift: bits.shift, mask: (1 << bits.width) - 1 }
+        }
+        _ => Move::Stored { from, to },
+    }
 }
 
 /// Adds a step; bytes that follow those of the step before join it.

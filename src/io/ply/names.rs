@@ -122,16 +122,21 @@ fn numbered(name: &str, taken: impl Fn(&str) -> bool) -> String {
     free
 }
 
-/// The comment that tells the dimension of `property`, where its name alone does not.
+/// The comment that tells the dimension of `property`, where its name alone does not. A name that
+/// no header line can hold has none.
 pub(super) fn comment(property: &str, dimension: &str) -> Option<String> {
-    (dimension_of(property) != dimension).then(|| format!("{PREFIX}{property}: {dimension}"))
+    let comment = format!("{PREFIX}{property}: {dimension}");
+    (dimension_of(property) != dimension && read_comment(&comment).is_some()).then_some(comment)
 }
 
 /// Property and dimension in a comment of ours.
 pub(super) fn read_comment(comment: &str) -> Option<(&str, &str)> {
     let (property, dimension) = comment.strip_prefix(PREFIX)?.split_once(": ")?;
-    (!property.is_empty() && !dimension.is_empty() && !property.contains(char::is_whitespace))
-        .then_some((property, dimension))
+    let one_word = !property.is_empty() && !property.contains(char::is_whitespace);
+    let one_line = !dimension.is_empty()
+        && dimension.trim() == dimension
+        && !dimension.contains(char::is_control);
+    (one_word && one_line).then_some((property, dimension))
 }
 
 #[cfg(test)]
