@@ -54,10 +54,11 @@ const PANEL: f64 = 6000.0;
 const MARGIN: f64 = 150.0;
 const TITLE: f64 = 420.0;
 /// Diameter of a dot, the same.
-const DOT: u32 = 24;
-/// Direction from which the scan is seen: turned about the vertical, raised above the horizon.
-const AZIMUTH_DEG: f64 = 35.0;
-const ELEVATION_DEG: f64 = 35.0;
+const DOT: u32 = 28;
+/// Sine and cosine of the angle by which the view is turned about the vertical, and of the angle by
+/// which it is raised above the horizon: 37°, by numbers that are the same on every machine.
+const TURNED: [f64; 2] = [0.6, 0.8];
+const RAISED: [f64; 2] = [0.6, 0.8];
 /// Low to high: dark blue over green to yellow.
 const COLORS: [&str; 10] = [
     "#2b2f77", "#31508c", "#33708e", "#2f8f8b", "#3aa981", "#63c06c", "#98cf55", "#cbd545",
@@ -134,8 +135,7 @@ struct View {
 
 impl View {
     fn of(points: &[[f64; 3]]) -> View {
-        let (sin_a, cos_a) = AZIMUTH_DEG.to_radians().sin_cos();
-        let (sin_e, cos_e) = ELEVATION_DEG.to_radians().sin_cos();
+        let ([sin_a, cos_a], [sin_e, cos_e]) = (TURNED, RAISED);
         let axes = [
             [cos_a, sin_a, 0.0],
             [-sin_a * sin_e, cos_a * sin_e, cos_e],
