@@ -1,0 +1,280 @@
+//! Where the chunks of a LAZ file are. Every claim is held against the file's length before it
+//! costs memory.
+
+use laz::decoders::ArithmeticDecoder;
+use laz::decompressors::IntegerDecompressorBuilder;
+
+use super::file::{InputFile, Window};
+use super::guard::unpanicked;
+use super::header::Header;
+use super::laz::{Compression, Compressor};
+use crate::Result;
+
+/// Points that one compressed byte can hold at most: a point costs six symbols or more, and no
+/// symbol costs less than 2^-9 bits.
+const POINTS_PER_BYTE: u64 = 1 << 12;
+/// Bytes in front of the first chunk, which say where the chunk table is.
+const TABLE_OFFSET_BYTES: u64 = 8;
+
+/// One chunk: its stretch of the file and its points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Chunk {
+    /// First byte.
+    pub start: u64,
+    /// Byte behind the last.
+    pub end: u64,
+    /// Points to read.
+    pub points: u64,
+    /// True if the chunk holds no others.
+    pub whole: bool,
+}
+
+/// The chunks of a file.
+#[derive(Debug, Clone)]
+pub enum Chunks {
+    /// Known one by one: they can be read in any order.
+    Known(Vec<Chunk>),
+    /// Known to follow each other: they are read in one go.
+    InARow {
+        /// All of them; `points` as the header claims.
+        all: Chunk,
+        /// Points of each but the last.
+        chunk_points: u64,
+    },
+}
+
+impl Chunks {
+    /// Finds the chunks of `file`. The second value is a warning, if there is one.
+    pub fn read(
+        file: &InputFile,
+        header: &Header,
+        compression: &Compression,
+    ) -> Result<(Self, Option<String>)> {
+        let points = header.points();
+        let start = u64::from(header.points_start());
+        if points == 0 {
+            return Ok((Chunks::Known(Vec::new()), None));
+        }
+        if compression.compressor == Compressor::PointWise {
+            let all = Chunk { start, end: file.len(), points, whole: false };
+            return plausible(file, all).map(|()| (Chunks::Known(vec![all]), None));
+        }
+        let first = start + TABLE_OFFSET_BYTES;
+        if first > file.len() {
+            return Err(file
+                .wrong(file.len(), "the file ends before its first point")
+                .help("the copy or download is incomplete"));
+        }
+        let why = match table(file, start, points, compression) {
+            Ok(found) => return Ok(found),
+            Err(why) => why,
+        };
+        match (compression.compressor, compression.chunk_points) {
+            (Compressor::Layered, _) => {
+                let chunks = walk(file, first, points, compression)?;
+                Ok((Chunks::Known(chunks), Some(format!("{}: {why}", file.path().display()))))
+            }
+            (_, Some(chunk_points)) => {
+                let all = Chunk { start: first, end: file.len(), points, whole: false };
+                plausible(file, all)?;
+                let chunk_points = u64::from(chunk_points);
+                let warning = format!("{}: {why}; it is read by one thread", file.path().display());
+                Ok((Chunks::InARow { all, chunk_points }, Some(warning)))
+            }
+            (_, None) => Err(file
+                .wrong(start, format!("{why}, and chunks of varying size need one"))
+                .help("the copy or download is incomplete")),
+        }
+    }
+
+    /// Points to read.
+    pub fn points(&self) -> u64 {
+        match self {
+            Chunks::Known(chunks) => chunks.iter().map(|c| c.points).sum(),
+            Chunks::InARow { all, .. } => all.points,
+        }
+    }
+
+    /// Bytes of the largest chunk (of them all where they are not known).
+    pub fn largest(&self) -> u64 {
+        match self {
+            Chunks::Known(chunks) => chunks.iter().map(|c| c.end - c.start).max().unwrap_or(0),
+            Chunks::InARow { all, .. } => all.end - all.start,
+        }
+    }
+}
+
+fn plausible(file: &InputFile, all: Chunk) -> Result<()> {
+    let most = all.end.saturating_sub(all.start).saturating_mul(POINTS_PER_BYTE);
+    if all.points <= most {
+        return Ok(());
+    }
+    Err(file
+        .wrong(all.start, format!("{} points cannot be in the bytes left from here", all.points))
+        .help("the file is cut off, or its header's count is damaged"))
+}
+
+/// The chunks as the chunk table says, or why it cannot be used.
+fn table(
+    file: &InputFile,
+    start: u64,
+    points: u64,
+    compression: &Compression,
+) -> Result<(Chunks, Option<String>), String> {
+    let at = table_start(file, start).ok_or("the file has no chunk table")?;
+    let mut window = Window::new(file.clone(), at, file.len());
+    let variable = compression.chunk_points.is_none();
+    let entries =
+        unpanicked(|| entries(&mut window, at - start - TABLE_OFFSET_BYTES, points, compression))
+            .ok_or("the chunk table is damaged")??;
+    let mut chunks = Vec::new();
+    let (mut byte, mut left, mut unread) = (start + TABLE_OFFSET_BYTES, points, 0u64);
+    for (bytes, held) in entries {
+        if left == 0 {
+            unread += if variable { held } else { 1 };
+        } else if held > 0 {
+            // The table of fixed chunks does not say how many points the last one has.
+            let whole = if variable { held <= left } else { true };
+            let points = held.min(left);
+            chunks.push(Chunk { start: byte, end: byte + bytes, points, whole });
+            unread += if variable { held - points } else { 0 };
+            left -= points;
+        }
+        byte += bytes;
+    }
+    if left > 0 {
+        return Err("the chunk table holds fewer points than the header claims".to_owned());
+    }
+    let warning = (unread > 0).then(|| {
+        let what = if variable { "points" } else { "chunks" };
+        format!(
+            "{}: {unread} {what} behind the {points} points of the header are not read",
+            file.path().display()
+        )
+    });
+    Ok((Chunks::Known(chunks), warning))
+}
+
+/// Where the chunk table is: told in front of the first chunk, or, by writers that could not go
+/// back, at the end of the file.
+fn table_start(file: &InputFile, start: u64) -> Option<u64> {
+    let inside = |at: u64| {
+        let room = start + TABLE_OFFSET_BYTES..=file.len().checked_sub(8)?;
+        room.contains(&at).then_some(at)
+    };
+    let told = |byte: u64| {
+        let bytes = file.bytes(byte, 8).ok()?;
+        Some(u64::from_le_bytes(bytes.try_into().ok()?))
+    };
+    let front = told(start)?;
+    if let Some(at) = inside(front) {
+        return Some(at);
+    }
+    let unset = front as i64 <= start as i64;
+    unset.then(|| told(file.len().checked_sub(8)?)).flatten().and_then(inside)
+}
+
+/// Bytes and points of every chunk, as the table at the window's place says. Stops as soon as they
+/// exceed the `room` that chunks have, so that the list never outgrows the file.
+fn entries(
+    window: &mut Window,
+    room: u64,
+    points: u64,
+    compression: &Compression,
+) -> Result<Vec<(u64, u64)>, String> {
+    use std::io::Read;
+    let cut = |_| "the chunk table is cut off".to_owned();
+    let mut head = [0; 8];
+    window.read_exact(&mut head).map_err(cut)?;
+    let claimed = u32::from_le_bytes([head[4], head[5], head[6], head[7]]);
+    if head[..4] != [0; 4] {
+        return Err("the chunk table is of an unknown version".to_owned());
+    }
+    let smallest = compression.stride as u64;
+    if u64::from(claimed) > room / smallest {
+        return Err(format!(
+            "the chunk table claims {claimed} chunks, more than there is room for"
+        ));
+    }
+    let mut integers = IntegerDecompressorBuilder::new().bits(32).contexts(2).build_initialized();
+    let mut decoder = ArithmeticDecoder::new(window);
+    decoder.read_init_bytes().map_err(cut)?;
+    let mut all = Vec::new();
+    let (mut last_bytes, mut last_points, mut used) = (0i32, 0i32, 0u64);
+    for _ in 0..claimed {
+        let held = match compression.chunk_points {
+            Some(fixed) => u64::from(fixed),
+            None => {
+                last_points = integers.decompress(&mut decoder, last_points, 0).map_err(cut)?;
+                u64::from(last_points as u32)
+            }
+        };
+        last_bytes = integers.decompress(&mut decoder, last_bytes, 1).map_err(cut)?;
+        let bytes = u64::from(last_bytes as u32);
+        used += bytes;
+        if used > room || (held > 0 && held <= points && bytes < smallest && bytes > 0) {
+            return Err("the chunk table's sizes cannot be".to_owned());
+        }
+        all.push((bytes, held));
+    }
+    Ok(all)
+}
+
+/// The chunks of a layered file without a usable table: each says how long its layers are.
+fn walk(
+    file: &InputFile,
+    first: u64,
+    points: u64,
+    compression: &Compression,
+) -> Result<Vec<Chunk>> {
+    let (mut start, mut left) = (first, points);
+    let mut chunks = Vec::new();
+    while left > 0 {
+        let head = layered_head(file, start, file.len(), compression)?;
+        let held = head.points.min(left);
+        let end = start + head.bytes;
+        chunks.push(Chunk { start, end, points: held, whole: held == head.points });
+        left -= held;
+        start = end;
+    }
+    Ok(chunks)
+}
+
+/// What a layered chunk says of itself behind its first point.
+#[derive(Debug, Clone, Copy)]
+pub struct LayeredHead {
+    /// Points in it, above 0.
+    pub points: u64,
+    /// Bytes of it; within the file.
+    pub bytes: u64,
+}
+
+/// Reads the head of the layered chunk at `start`, which must not reach beyond `end`: the decoder
+/// allocates what the layers claim.
+pub fn layered_head(
+    file: &InputFile,
+    start: u64,
+    end: u64,
+    compression: &Compression,
+) -> Result<LayeredHead> {
+    let at = start + compression.stride as u64;
+    let cut = |byte: u64| {
+        file.wrong(byte, "the compressed points end inside a chunk")
+            .help("the file is cut off or damaged; ask for it again")
+    };
+    let len = 4 + 4 * compression.layers;
+    if at + len as u64 > end.min(file.len()) {
+        return Err(cut(end.min(file.len())));
+    }
+    let head = file.bytes(at, len)?;
+    let mut words = head.as_chunks().0.iter().map(|b| u64::from(u32::from_le_bytes(*b)));
+    let points = words.next().unwrap_or(0);
+    if points == 0 {
+        return Err(file.wrong(at, "a chunk says that it is empty and has a point"));
+    }
+    let bytes = at + len as u64 - start + words.sum::<u64>();
+    if start + bytes > end.min(file.len()) {
+        return Err(cut(at));
+    }
+    Ok(LayeredHead { points, bytes })
+}

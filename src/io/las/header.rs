@@ -1,0 +1,309 @@
+//! The public header block (LAS 1.4 R15, section 2.4), kept as its bytes: what is not recomputed is
+//! carried exactly.
+
+use super::file::InputFile;
+use super::format;
+use crate::{Error, Result};
+
+/// Byte offsets of the fields.
+pub mod at {
+    #![allow(missing_docs, reason = "the names are the specification's")]
+    pub const SOURCE_ID: usize = 4;
+    pub const GLOBAL_ENCODING: usize = 6;
+    pub const GUID: usize = 8;
+    pub const VERSION: usize = 24;
+    pub const SYSTEM: usize = 26;
+    pub const SOFTWARE: usize = 58;
+    pub const DAY: usize = 90;
+    pub const YEAR: usize = 92;
+    pub const HEADER_SIZE: usize = 94;
+    pub const POINTS_START: usize = 96;
+    pub const VLRS: usize = 100;
+    pub const FORMAT: usize = 104;
+    pub const RECORD_LENGTH: usize = 105;
+    pub const LEGACY_POINTS: usize = 107;
+    pub const LEGACY_RETURNS: usize = 111;
+    pub const SCALE: usize = 131;
+    pub const OFFSET: usize = 155;
+    pub const BOX: usize = 179;
+    pub const WAVEFORM_START: usize = 227;
+    pub const EVLR_START: usize = 235;
+    pub const EVLRS: usize = 243;
+    pub const POINTS: usize = 247;
+    pub const RETURNS: usize = 255;
+}
+
+/// Bits of the global encoding field.
+pub mod encoding {
+    /// GPS times are standard time minus 1e9 rather than week time.
+    pub const GPS_STANDARD: u16 = 1;
+    /// Waveform packets are in this file.
+    pub const WAVEFORM_INTERNAL: u16 = 2;
+    /// The CRS is WKT.
+    pub const WKT: u16 = 16;
+}
+
+/// The bit of the format byte that says LAZ.
+pub const COMPRESSED: u8 = 0x80;
+
+/// The public header block of one file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Header {
+    bytes: Vec<u8>,
+}
+
+impl Header {
+    /// Bytes of the header of LAS 1.`minor`.
+    pub fn size_of(minor: u8) -> usize {
+        match minor {
+            0..=2 => 227,
+            3 => 235,
+            _ => 375,
+        }
+    }
+
+    /// A header of zeros with signature, version, size, format and record length.
+    pub fn blank(minor: u8, format: u8, record_length: u16) -> Self {
+        let size = Self::size_of(minor);
+        let mut header = Header { bytes: vec![0; size] };
+        header.put(0, b"LASF");
+        header.put(at::VERSION, &[1, minor]);
+        header.put(at::HEADER_SIZE, &(size as u16).to_le_bytes());
+        header.put(at::FORMAT, &[format]);
+        header.put(at::RECORD_LENGTH, &record_length.to_le_bytes());
+        header
+    }
+
+    /// Reads the header of `file` and checks it against the file's length.
+    pub fn read(file: &InputFile) -> Result<Self> {
+        let smallest = Self::size_of(0);
+        if file.len() < smallest as u64 {
+            return Err(file
+                .wrong(file.len(), "the file ends inside the LAS header")
+                .help("a LAS header has at least 227 bytes; the file is cut off or not LAS"));
+        }
+        let bytes = file.bytes(0, smallest)?;
+        if &bytes[..4] != b"LASF" {
+            return Err(file
+                .wrong(0, "this is not a LAS or LAZ file: it does not begin with LASF")
+                .help("give the file the extension of its real format"));
+        }
+        let (major, minor) = (bytes[at::VERSION], bytes[at::VERSION + 1]);
+        if major != 1 || minor > 4 {
+            return Err(file
+                .wrong(at::VERSION as u64, format!("LAS {major}.{minor} is not known"))
+                .help("LAS 1.0 to 1.4 are read"));
+        }
+        let size = u16::from_le_bytes([bytes[at::HEADER_SIZE], bytes[at::HEADER_SIZE + 1]]);
+        let needed = Self::size_of(minor);
+        if usize::from(size) < needed || u64::from(size) > file.len() {
+            return Err(file.wrong(
+                at::HEADER_SIZE as u64,
+                format!(
+                    "a header of {size} bytes cannot be: LAS 1.{minor} has {needed} and the file \
+                     {} bytes",
+                    file.len()
+                ),
+            ));
+        }
+        let header = Header { bytes: file.bytes(0, usize::from(size))? };
+        header.check(file).map(|()| header)
+    }
+
+    /// What the rest of the reader relies on.
+    fn check(&self, file: &InputFile) -> Result<()> {
+        let start = u64::from(self.points_start());
+        if start < self.bytes.len() as u64 || start > file.len() {
+            return Err(file.wrong(
+                at::POINTS_START as u64,
+                format!(
+                    "points cannot start at byte {start}: the header has {} bytes and the file {}",
+                    self.bytes.len(),
+                    file.len()
+                ),
+            ));
+        }
+        let Some(least) = format::record_size(self.format()) else {
+            return Err(file
+                .wrong(at::FORMAT as u64, format!("point format {} is not known", self.format()))
+                .help("point formats 0 to 10 are read"));
+        };
+        if self.record_length() < least {
+            return Err(file.wrong(
+                at::RECORD_LENGTH as u64,
+                format!(
+                    "records of {} bytes cannot hold point format {}, which needs {least}",
+                    self.record_length(),
+                    self.format()
+                ),
+            ));
+        }
+        let whole = self.scale().iter().chain(&self.offset()).all(|v| v.is_finite());
+        if self.points() > 0 && (!whole || self.scale().contains(&0.0)) {
+            return Err(file.wrong(
+                at::SCALE as u64,
+                format!("scale {:?} with offset {:?} places no point", self.scale(), self.offset()),
+            ));
+        }
+        Ok(())
+    }
+
+    /// All bytes, those a writer added behind the standard fields included.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// Bytes behind the standard fields of the version.
+    pub fn custom(&self) -> &[u8] {
+        &self.bytes[Self::size_of(self.minor())..]
+    }
+
+    /// `N` bytes of a field.
+    pub fn get<const N: usize>(&self, at: usize) -> [u8; N] {
+        std::array::from_fn(|i| self.bytes[at + i])
+    }
+
+    /// Replaces a field's bytes.
+    pub fn put(&mut self, at: usize, bytes: &[u8]) {
+        self.bytes[at..at + bytes.len()].copy_from_slice(bytes);
+    }
+
+    /// Replaces the header by one of LAS 1.`minor` with the same fields and `custom` behind them.
+    pub fn resized(&self, minor: u8, custom: &[u8]) -> Self {
+        let size = Self::size_of(minor);
+        let mut bytes = self.bytes[..Self::size_of(self.minor()).min(size)].to_vec();
+        bytes.resize(size, 0);
+        bytes.extend_from_slice(custom);
+        let len = u16::try_from(bytes.len()).unwrap_or(u16::MAX);
+        bytes.truncate(usize::from(len));
+        let mut header = Header { bytes };
+        header.put(at::VERSION, &[1, minor]);
+        header.put(at::HEADER_SIZE, &len.to_le_bytes());
+        header
+    }
+
+    /// The minor version: LAS 1.`minor`.
+    pub fn minor(&self) -> u8 {
+        self.bytes[at::VERSION + 1]
+    }
+
+    /// Point data record format, without the bits that say LAZ.
+    pub fn format(&self) -> u8 {
+        self.bytes[at::FORMAT] & 0x3f
+    }
+
+    /// True if the points are LAZ.
+    pub fn compressed(&self) -> bool {
+        self.bytes[at::FORMAT] & COMPRESSED != 0
+    }
+
+    /// Bytes of a record.
+    pub fn record_length(&self) -> u16 {
+        u16::from_le_bytes(self.get(at::RECORD_LENGTH))
+    }
+
+    /// Where the points start.
+    pub fn points_start(&self) -> u32 {
+        u32::from_le_bytes(self.get(at::POINTS_START))
+    }
+
+    /// Variable length records claimed.
+    pub fn vlrs(&self) -> u32 {
+        u32::from_le_bytes(self.get(at::VLRS))
+    }
+
+    /// Points claimed: the 64-bit count where the version has one.
+    pub fn points(&self) -> u64 {
+        if self.minor() >= 4 {
+            u64::from_le_bytes(self.get(at::POINTS))
+        } else {
+            u64::from(u32::from_le_bytes(self.get(at::LEGACY_POINTS)))
+        }
+    }
+
+    /// Where the extended variable length records start and how many are claimed.
+    pub fn evlrs(&self) -> (u64, u32) {
+        if self.minor() < 4 {
+            return (0, 0);
+        }
+        (u64::from_le_bytes(self.get(at::EVLR_START)), u32::from_le_bytes(self.get(at::EVLRS)))
+    }
+
+    /// Where the record of waveform packets starts; 0 for none.
+    pub fn waveform_start(&self) -> u64 {
+        if self.minor() < 3 { 0 } else { u64::from_le_bytes(self.get(at::WAVEFORM_START)) }
+    }
+
+    /// The global encoding bits (see [`encoding`]); 0 for LAS 1.0 and 1.1, which have none.
+    pub fn encoding(&self) -> u16 {
+        if self.minor() < 2 { 0 } else { u16::from_le_bytes(self.get(at::GLOBAL_ENCODING)) }
+    }
+
+    /// World units of one stored unit, per axis.
+    pub fn scale(&self) -> [f64; 3] {
+        self.floats(at::SCALE)
+    }
+
+    /// World coordinates of stored 0.
+    pub fn offset(&self) -> [f64; 3] {
+        self.floats(at::OFFSET)
+    }
+
+    /// The claimed box: smallest corner, then largest. A hint that may lie.
+    pub fn bounds(&self) -> [[f64; 3]; 2] {
+        let pairs: [[f64; 2]; 3] = std::array::from_fn(|axis| {
+            [0, 8].map(|half| f64::from_le_bytes(self.get(at::BOX + 16 * axis + half)))
+        });
+        [pairs.map(|[_, lo]| lo), pairs.map(|[hi, _]| hi)]
+    }
+
+    /// Sets the box.
+    pub fn put_bounds(&mut self, lo: [f64; 3], hi: [f64; 3]) {
+        for axis in 0..3 {
+            self.put(at::BOX + 16 * axis, &hi[axis].to_le_bytes());
+            self.put(at::BOX + 16 * axis + 8, &lo[axis].to_le_bytes());
+        }
+    }
+
+    /// Sets three floats.
+    pub fn put_floats(&mut self, at: usize, values: [f64; 3]) {
+        for (axis, value) in values.iter().enumerate() {
+            self.put(at + 8 * axis, &value.to_le_bytes());
+        }
+    }
+
+    fn floats(&self, at: usize) -> [f64; 3] {
+        std::array::from_fn(|axis| f64::from_le_bytes(self.get(at + 8 * axis)))
+    }
+
+    /// Sets the counts of points, in all and by return: the legacy fields too, which LAS 1.4 wants
+    /// zero for formats 6 to 10 and for counts beyond them.
+    pub fn put_counts(&mut self, points: u64, returns: &[u64; 15]) -> Result<()> {
+        let narrow = u32::try_from(points).ok();
+        if self.minor() < 4 && narrow.is_none() {
+            return Err(Error::pipeline(format!(
+                "{points} points do not fit in LAS 1.{}, which counts to 4,294,967,295",
+                self.minor()
+            ))
+            .help("split the output, or start from inputs of LAS 1.4"));
+        }
+        let legacy = narrow.filter(|_| self.minor() < 4 || self.format() < 6);
+        self.put(at::LEGACY_POINTS, &legacy.unwrap_or(0).to_le_bytes());
+        for (i, &count) in returns.iter().take(5).enumerate() {
+            let count = if legacy.is_some() { count as u32 } else { 0 };
+            self.put(at::LEGACY_RETURNS + 4 * i, &count.to_le_bytes());
+        }
+        if self.minor() >= 4 {
+            self.put(at::POINTS, &points.to_le_bytes());
+            for (i, count) in returns.iter().enumerate() {
+                self.put(at::RETURNS + 8 * i, &count.to_le_bytes());
+            }
+        }
+        Ok(())
+    }
+
+    /// A text field without its trailing zeros, bytes that are no UTF-8 replaced.
+    pub fn text(&self, at: usize) -> String {
+        super::vlr::text(&self.get::<32>(at))
+    }
+}

@@ -1,0 +1,220 @@
+//! One LAS or LAZ file as its header says it is, proven against its length.
+
+use std::path::{Path, PathBuf};
+
+use super::chunks::Chunks;
+use super::extra::{DESCRIPTOR_BYTES, Descriptor};
+use super::file::InputFile;
+use super::format;
+use super::header::Header;
+use super::laz::{Compression, LASZIP};
+use super::vlr::{Evlr, VLR_HEAD, Vlr, read_evlrs, read_vlrs};
+use super::{chunks, crs};
+use crate::point::Schema;
+use crate::{Error, Result};
+
+/// User and number of the record that names the extra bytes.
+pub const EXTRA_BYTES: (&str, u16) = ("LASF_Spec", 4);
+/// User of the records of a COPC index.
+const COPC: &str = "copc";
+
+/// How the points are stored.
+#[derive(Debug, Clone)]
+pub enum Storage {
+    /// As they are.
+    Plain,
+    /// As LAZ.
+    Laz(Compression, Chunks),
+}
+
+/// One LAS or LAZ file.
+#[derive(Debug, Clone)]
+pub struct Input {
+    /// Its path.
+    pub path: PathBuf,
+    /// Its length in bytes.
+    pub len: u64,
+    /// Its public header block.
+    pub header: Header,
+    /// Its variable length records, all of them.
+    pub vlrs: Vec<Vlr>,
+    /// Bytes between them and the points.
+    pub gap: Vec<u8>,
+    /// Its extended records, all of them.
+    pub evlrs: Vec<Evlr>,
+    /// How the points are stored.
+    pub storage: Storage,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+impl Input {
+    /// Reads everything but the points of `path`.
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = InputFile::open(path)?;
+        let header = Header::read(&file)?;
+        let (vlrs, gap, warning) = read_vlrs(&file, &header)?;
+        let mut warnings: Vec<String> = warning.into_iter().collect();
+        let evlrs = read_evlrs(&file, &header)?;
+        let storage = storage(&file, &header, &vlrs, &mut warnings)?;
+        if vlrs.iter().any(|v| v.user() == COPC) {
+            warnings.push(format!(
+                "{}: outputs do not carry the COPC index, which would be wrong there",
+                path.display()
+            ));
+        }
+        let path = path.to_owned();
+        Ok(Input { path, len: file.len(), header, vlrs, gap, evlrs, storage, warnings })
+    }
+
+    /// Opens the file again to read points.
+    pub fn reopen(&self) -> Result<InputFile> {
+        let file = InputFile::open(&self.path)?;
+        if file.len() != self.len {
+            return Err(Error::data(&self.path, "the file changed while it was read"));
+        }
+        Ok(file)
+    }
+
+    /// Points to read.
+    pub fn points(&self) -> u64 {
+        match &self.storage {
+            Storage::Plain => self.header.points(),
+            Storage::Laz(_, chunks) => chunks.points(),
+        }
+    }
+
+    /// Bytes behind the standard fields of a record.
+    pub fn extra_len(&self) -> usize {
+        let least = format::record_size(self.header.format()).unwrap_or(0);
+        usize::from(self.header.record_length().saturating_sub(least))
+    }
+
+    /// What records hold.
+    pub fn schema(&self) -> Schema {
+        let header = &self.header;
+        format::schema(
+            header.format(),
+            &self.descriptors(),
+            self.extra_len(),
+            header.scale(),
+            header.offset(),
+        )
+    }
+
+    /// Place among the records of the one that names the extra bytes: the first that describes them
+    /// all, else the first.
+    pub fn extra_record(&self) -> Option<usize> {
+        extra_record(&self.vlrs, self.extra_len())
+    }
+
+    /// The descriptors of the extra bytes.
+    pub fn descriptors(&self) -> Vec<Descriptor> {
+        self.extra_record().map_or(Vec::new(), |i| Descriptor::all(self.vlrs[i].payload()))
+    }
+
+    /// The records that outputs carry: not those that describe how this file stores its points.
+    pub fn carried_vlrs(&self) -> Vec<Vlr> {
+        let own = |v: &&Vlr| !v.is(LASZIP.0, LASZIP.1) && v.user() != COPC;
+        self.vlrs.iter().filter(own).cloned().collect()
+    }
+
+    /// The extended records that outputs carry.
+    pub fn carried_evlrs(&self) -> Vec<Evlr> {
+        self.evlrs.iter().filter(|v| v.user() != COPC).cloned().collect()
+    }
+
+    /// The coordinate reference system as text.
+    pub fn crs(&self) -> Result<Option<String>> {
+        crs::text(&self.vlrs, &self.evlrs)
+    }
+}
+
+/// See [`Input::extra_record`].
+pub fn extra_record(vlrs: &[Vlr], extra: usize) -> Option<usize> {
+    let described = |v: &Vlr| -> usize {
+        v.payload().as_chunks::<DESCRIPTOR_BYTES>().0.iter().map(|d| Descriptor(*d).size()).sum()
+    };
+    let ours = |v: &&Vlr| v.is(EXTRA_BYTES.0, EXTRA_BYTES.1);
+    let exact = vlrs.iter().position(|v| ours(&v) && described(v) == extra);
+    exact.or_else(|| vlrs.iter().position(|v| ours(&v)))
+}
+
+fn storage(
+    file: &InputFile,
+    header: &Header,
+    vlrs: &[Vlr],
+    warnings: &mut Vec<String>,
+) -> Result<Storage> {
+    let record = vlrs.iter().position(|v| v.is(LASZIP.0, LASZIP.1));
+    if !header.compressed() {
+        return plain(file, header).map(|()| Storage::Plain);
+    }
+    let Some(record) = record else {
+        return Err(file
+            .wrong(
+                super::header::at::FORMAT as u64,
+                "the header says LAZ and there is no record that says how",
+            )
+            .help("the file is damaged: LASzip writes a record 'laszip encoded'"));
+    };
+    let before: usize = vlrs[..record].iter().map(Vlr::len).sum();
+    let at = (header.bytes().len() + before + VLR_HEAD) as u64;
+    let (format, stride) = (header.format(), header.record_length());
+    let compression = Compression::read(file, &vlrs[record], at, format, stride)?;
+    let (mut chunks, warning) = Chunks::read(file, header, &compression)?;
+    warnings.extend(warning);
+    check_last(file, &compression, &mut chunks, warnings)?;
+    Ok(Storage::Laz(compression, chunks))
+}
+
+/// The bytes of plain points must be there.
+fn plain(file: &InputFile, header: &Header) -> Result<()> {
+    let start = u64::from(header.points_start());
+    let (points, each) = (header.points(), u64::from(header.record_length()));
+    let held = (file.len() - start) / each;
+    if points <= held {
+        return Ok(());
+    }
+    Err(file
+        .wrong(
+            file.len(),
+            format!(
+                "the file ends after {held} of the {points} points that its header claims, \
+                 {each} bytes each from byte {start}"
+            ),
+        )
+        .help("the copy or download is incomplete, or the header's count is damaged"))
+}
+
+/// The table of fixed layered chunks does not say how many points the last one has; the chunk does.
+fn check_last(
+    file: &InputFile,
+    compression: &Compression,
+    chunks: &mut Chunks,
+    warnings: &mut Vec<String>,
+) -> Result<()> {
+    let Chunks::Known(chunks) = chunks else { return Ok(()) };
+    let Some(last) = chunks.last_mut().filter(|_| compression.layers > 0) else { return Ok(()) };
+    let head = chunks::layered_head(file, last.start, last.end, compression)?;
+    if head.points < last.points {
+        return Err(file
+            .wrong(
+                last.start + compression.stride as u64,
+                format!(
+                    "the last chunk has {} of the {} points that the header's count leaves for it",
+                    head.points, last.points
+                ),
+            )
+            .help("the header's count of points is damaged, or the file is cut off"));
+    }
+    if head.points > last.points && last.whole {
+        last.whole = false;
+        warnings.push(format!(
+            "{}: {} points behind those that the header counts are not read",
+            file.path().display(),
+            head.points - last.points
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,239 @@
+//! Several files as one: what they must share, and what becomes of what they do not. Nothing here
+//! depends on the order of the inputs.
+
+use std::cmp::Ordering;
+
+use super::crs;
+use super::extra::Descriptor;
+use super::format::{has_gps_time, has_waveforms};
+use super::header::{Header, at, encoding};
+use super::input::{EXTRA_BYTES, Input};
+use super::native::Native;
+use super::read::Shift;
+use super::vlr::{Evlr, Vlr};
+use crate::{Error, Result};
+
+/// Offsets whose distance is this close to whole steps differ by whole steps: decimal offsets are
+/// seldom exact in binary.
+const WHOLE: f64 = 1e-6;
+
+/// One header and one list of records for all inputs, and how far each must be shifted.
+pub fn merge(inputs: &[Input]) -> Result<(Native, Vec<Shift>)> {
+    let [first, others @ ..] = inputs else {
+        return Err(Error::pipeline("there is no input file"));
+    };
+    if others.is_empty() {
+        return Ok((Native::of(first), vec![Shift::default()]));
+    }
+    for other in others {
+        agree(first, other)?;
+    }
+    let (offset, shifts) = shifts(inputs)?;
+    let evlrs = union_evlrs(inputs)?;
+    waveforms(inputs, &evlrs)?;
+    let mut header = header(inputs);
+    header.put_floats(at::OFFSET, offset);
+    let gap = if others.iter().all(|i| i.gap == first.gap) { first.gap.clone() } else { vec![] };
+    Ok((Native { header, vlrs: union_vlrs(inputs), gap, evlrs }, shifts))
+}
+
+/// Refuses two files that cannot be one.
+fn agree(a: &Input, b: &Input) -> Result<()> {
+    let (one, two) = (&a.header, &b.header);
+    same(a, b, "point format", one.format(), two.format())?;
+    same(a, b, "record length", one.record_length(), two.record_length())?;
+    same(a, b, "scale", one.scale(), two.scale())?;
+    if has_gps_time(one.format()) {
+        let kind = |h: &Header| match h.encoding() & encoding::GPS_STANDARD {
+            0 => "GPS week time",
+            _ => "adjusted standard GPS time",
+        };
+        same(a, b, "GPS time type", kind(one), kind(two))?;
+    }
+    if described(a) != described(b) {
+        return Err(refuse(a, b, "their extra bytes are described differently".to_owned()));
+    }
+    if crs::identity(&a.vlrs, &a.evlrs)? != crs::identity(&b.vlrs, &b.evlrs)? {
+        let text = |input: &Input| -> Result<String> {
+            Ok(input.crs()?.unwrap_or_else(|| "none".to_owned()))
+        };
+        let (one, two) = (text(a)?, text(b)?);
+        return Err(refuse(a, b, format!("their CRS differ: {} and {}", short(&one), short(&two))));
+    }
+    Ok(())
+}
+
+fn same<T: PartialEq + std::fmt::Debug>(
+    a: &Input,
+    b: &Input,
+    what: &str,
+    one: T,
+    two: T,
+) -> Result<()> {
+    if one == two {
+        return Ok(());
+    }
+    Err(refuse(a, b, format!("their {what} differs: {one:?} and {two:?}")))
+}
+
+fn refuse(a: &Input, b: &Input, why: String) -> Error {
+    let (one, two) = (a.path.display(), b.path.display());
+    Error::data(&b.path, format!("{one} and {two} cannot be read as one scan: {why}"))
+        .help("bring the files to one form first, or run them one by one")
+}
+
+fn short(text: &str) -> String {
+    let (head, tail) = super::vlr::split_at_room(text, 60);
+    if tail.is_empty() { head.to_owned() } else { format!("{head}…") }
+}
+
+/// The descriptors without what is a statistic of one file.
+fn described(input: &Input) -> Vec<Descriptor> {
+    input.descriptors().iter().map(Descriptor::without_range).collect()
+}
+
+/// The smallest offset of all inputs per axis, and each input's whole steps to it.
+fn shifts(inputs: &[Input]) -> Result<([f64; 3], Vec<Shift>)> {
+    let first = &inputs[0];
+    let scale = first.header.scale();
+    let smallest: [f64; 3] = std::array::from_fn(|axis| {
+        inputs.iter().map(|i| i.header.offset()[axis]).min_by(f64::total_cmp).unwrap_or(0.0)
+    });
+    let mut shifts = Vec::new();
+    for input in inputs {
+        let mut shift = [0; 3];
+        for axis in 0..3 {
+            let offset = input.header.offset()[axis];
+            if offset == smallest[axis] {
+                continue;
+            }
+            let steps = (offset - smallest[axis]) / scale[axis];
+            let whole = steps.round();
+            let rounding = 4.0 * f64::EPSILON * (offset / scale[axis]).abs();
+            // Stored coordinates are i32: a shift of 2^32 steps leaves none of them room.
+            if !((steps - whole).abs() <= WHOLE + rounding && whole.abs() < 2f64.powi(32)) {
+                let other = inputs.iter().find(|i| i.header.offset()[axis] == smallest[axis]);
+                let why = format!(
+                    "their offsets {:?} and {offset:?} on axis {} do not differ by whole steps \
+                     of {:?}, or by too many",
+                    smallest[axis],
+                    ["x", "y", "z"][axis],
+                    scale[axis]
+                );
+                return Err(refuse(other.unwrap_or(first), input, why));
+            }
+            shift[axis] = whole as i64;
+        }
+        shifts.push(Shift(shift));
+    }
+    Ok((smallest, shifts))
+}
+
+/// Fields that all inputs share are carried; the others become neutral, the version and the date
+/// the largest.
+fn header(inputs: &[Input]) -> Header {
+    let headers = || inputs.iter().map(|i| &i.header);
+    let first = &inputs[0].header;
+    let minor = headers().map(Header::minor).max().unwrap_or(4);
+    let custom = first.custom();
+    let custom = if headers().all(|h| h.custom() == custom) { custom } else { &[] };
+    let mut merged = first.resized(minor, custom);
+    let common = |at: usize, len: usize| {
+        let field = &first.bytes()[at..at + len];
+        headers().all(|h| &h.bytes()[at..at + len] == field)
+    };
+    let mut neutral = |at: usize, len: usize, otherwise: &[u8]| {
+        if !common(at, len) {
+            let mut field = otherwise.to_vec();
+            field.resize(len, 0);
+            merged.put(at, &field);
+        }
+    };
+    neutral(at::SOURCE_ID, 2, &[]);
+    neutral(at::GUID, 16, &[]);
+    neutral(at::SYSTEM, 32, b"MERGE");
+    neutral(at::SOFTWARE, 32, &[]);
+    let encodings = headers().fold(0, |all, h| all | h.encoding());
+    merged.put(at::GLOBAL_ENCODING, &encodings.to_le_bytes());
+    let date = |h: &Header| (h.get::<2>(at::YEAR), h.get::<2>(at::DAY));
+    let latest =
+        headers().map(date).max_by_key(|(y, d)| (u16::from_le_bytes(*y), u16::from_le_bytes(*d)));
+    if let Some((year, day)) = latest {
+        merged.put(at::YEAR, &year);
+        merged.put(at::DAY, &day);
+    }
+    if minor >= 3 && headers().any(|h| h.waveform_start() != first.waveform_start()) {
+        merged.put(at::WAVEFORM_START, &[0; 8]);
+    }
+    merged
+}
+
+/// Equal lists as they are, else the union in the order of user, number and bytes.
+fn union_vlrs(inputs: &[Input]) -> Vec<Vlr> {
+    let lists: Vec<Vec<Vlr>> = inputs.iter().map(carried_without_ranges(inputs)).collect();
+    if lists.iter().all(|list| *list == lists[0]) {
+        return lists.into_iter().next().unwrap_or_default();
+    }
+    let mut all: Vec<Vlr> = lists.into_iter().flatten().collect();
+    all.sort_by(Vlr::order);
+    all.dedup();
+    all
+}
+
+/// Where the ranges in the descriptors of extra bytes differ, none holds for all points: they are
+/// left out, so that one record remains.
+fn carried_without_ranges(inputs: &[Input]) -> impl Fn(&Input) -> Vec<Vlr> {
+    let first = inputs[0].descriptors();
+    let differ = inputs.iter().any(|i| i.descriptors() != first);
+    move |input| {
+        let plain = described(input).iter().flat_map(|d| *d.bytes()).collect::<Vec<u8>>();
+        let mut vlrs = input.carried_vlrs();
+        if let Some(record) =
+            super::input::extra_record(&vlrs, input.extra_len()).filter(|_| differ)
+        {
+            vlrs[record] = Vlr::new(EXTRA_BYTES.0, EXTRA_BYTES.1, "Extra bytes", plain);
+        }
+        vlrs
+    }
+}
+
+fn union_evlrs(inputs: &[Input]) -> Result<Vec<Evlr>> {
+    let lists: Vec<Vec<Evlr>> = inputs.iter().map(Input::carried_evlrs).collect();
+    let mut equal = true;
+    for list in &lists[1..] {
+        equal &= list.len() == lists[0].len();
+        for (a, b) in list.iter().zip(&lists[0]) {
+            equal = equal && a.order(b)? == Ordering::Equal;
+        }
+    }
+    if equal {
+        return Ok(lists.into_iter().next().unwrap_or_default());
+    }
+    let mut failure = None;
+    let mut order = |a: &Evlr, b: &Evlr| match a.order(b) {
+        Ok(order) => order,
+        Err(error) => {
+            failure.get_or_insert(error);
+            Ordering::Equal
+        }
+    };
+    let mut all: Vec<Evlr> = lists.into_iter().flatten().collect();
+    all.sort_by(&mut order);
+    all.dedup_by(|a, b| order(a, b) == Ordering::Equal);
+    failure.map_or(Ok(all), Err)
+}
+
+/// Records refer to waveforms by their place in one block: two blocks cannot be one.
+fn waveforms(inputs: &[Input], evlrs: &[Evlr]) -> Result<()> {
+    let inside = |i: &&Input| {
+        has_waveforms(i.header.format()) && i.header.encoding() & encoding::WAVEFORM_INTERNAL != 0
+    };
+    let blocks = evlrs.iter().filter(|e| e.is("LASF_Spec", 65535)).count();
+    let Some(one) = inputs.iter().find(inside) else { return Ok(()) };
+    let other = inputs.iter().find(|i| !inside(i));
+    if blocks <= 1 && other.is_none() {
+        return Ok(());
+    }
+    let other = other.or_else(|| inputs.iter().find(|i| i.path != one.path)).unwrap_or(one);
+    Err(refuse(one, other, "each has waveforms of its own".to_owned()))
+}

@@ -1,0 +1,29 @@
+//! LAS 1.0 to 1.4 and LAZ, every point format: records byte for byte, headers and variable length
+//! records carried. Knows no tiles and no stages but the two roles it plays.
+//!
+//! [`open`] reads one or several files as a source, [`create`] writes a sink, [`describe`] tells
+//! what a file says of itself. A COPC file is read as the LAZ it is.
+
+mod chunks;
+mod crs;
+mod describe;
+mod encode;
+mod extra;
+mod file;
+mod format;
+mod guard;
+mod header;
+mod input;
+mod laz;
+mod merge;
+mod native;
+mod read;
+mod sink;
+mod source;
+mod vlr;
+
+pub use describe::{Description, ExtraBytes, Record, describe};
+pub use format::layout;
+pub use native::fresh;
+pub use sink::{LasOptions, create};
+pub use source::open;

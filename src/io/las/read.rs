@@ -1,0 +1,218 @@
+//! Reading records straight into a batch: plain ones by position, compressed ones chunk by chunk.
+
+use std::io;
+use std::sync::Arc;
+
+use laz::record::RecordDecompressor;
+
+use super::chunks::{Chunk, layered_head};
+use super::file::{InputFile, Window};
+use super::guard::unpanicked;
+use super::laz::{Compression, Compressor};
+use crate::point::PointBatch;
+use crate::stage::Part;
+use crate::{Error, Result};
+
+/// How far a file's stored coordinates are moved so that all inputs share one offset.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Shift(pub [i64; 3]);
+
+impl Shift {
+    /// Moves the coordinates of all records; False if one would leave i32.
+    fn apply(self, records: &mut [u8], stride: usize) -> bool {
+        if self.0 == [0; 3] {
+            return true;
+        }
+        records.chunks_exact_mut(stride).all(|record| {
+            let stored = record.first_chunk_mut::<12>();
+            stored.is_some_and(|stored| {
+                stored.as_chunks_mut().0.iter_mut().zip(self.0).all(|(bytes, by)| {
+                    let moved = i64::from(i32::from_le_bytes(*bytes)).checked_add(by);
+                    let Some(moved) = moved.and_then(|v| i32::try_from(v).ok()) else {
+                        return false;
+                    };
+                    *bytes = moved.to_le_bytes();
+                    true
+                })
+            })
+        })
+    }
+
+    fn overflow(file: &InputFile) -> Error {
+        Error::data(
+            file.path(),
+            "a point is too far from the other inputs' offset for its stored coordinates",
+        )
+        .help("bring the files to one offset first, or reduce them one by one")
+    }
+}
+
+/// A stretch of plain records.
+pub struct PlainPart {
+    /// The file.
+    pub file: InputFile,
+    /// Number of the file among the inputs.
+    pub source: u32,
+    /// Position of the next record.
+    pub at: u64,
+    /// Records left.
+    pub left: u64,
+    /// See [`Shift`].
+    pub shift: Shift,
+}
+
+impl Part for PlainPart {
+    fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
+        let n = self.left.min(batch.capacity() as u64) as usize;
+        batch.source = self.source;
+        let stride = batch.schema().stride;
+        let records = batch.refill(n);
+        self.file.read_at(records, self.at)?;
+        if !self.shift.apply(records, stride) {
+            return Err(Shift::overflow(&self.file));
+        }
+        self.at += (n * stride) as u64;
+        self.left -= n as u64;
+        Ok(())
+    }
+}
+
+/// Chunks of compressed records.
+pub struct LazPart {
+    file: InputFile,
+    source: u32,
+    shift: Shift,
+    compression: Arc<Compression>,
+    decoder: Box<dyn RecordDecompressor<Window> + Send>,
+    chunks: std::vec::IntoIter<Chunk>,
+    /// The chunk being read and how many of its points are left.
+    now: Option<(Chunk, u64)>,
+    /// Points after which the next chunk begins, where no table says it.
+    in_a_row: Option<u64>,
+}
+
+impl LazPart {
+    /// Reads `chunks` one after the other. With `in_a_row`, they are one stretch of chunks of that
+    /// many points.
+    pub fn new(
+        file: InputFile,
+        source: u32,
+        shift: Shift,
+        compression: Arc<Compression>,
+        chunks: Vec<Chunk>,
+        in_a_row: Option<u64>,
+    ) -> Self {
+        let decoder = compression.decoder(Window::new(file.clone(), 0, 0));
+        let chunks = chunks.into_iter();
+        LazPart { file, source, shift, compression, decoder, chunks, now: None, in_a_row }
+    }
+
+    /// The chunk to read from and how many points to take from it at most; None at the end.
+    fn current(&mut self) -> Result<Option<(Chunk, u64)>> {
+        if let Some((chunk, left)) = self.now {
+            if left > 0 {
+                return Ok(Some((chunk, left)));
+            }
+            self.check_end(chunk)?;
+            if let Some(each) = self.in_a_row
+                && chunk.points > each
+            {
+                let start = self.decoder.get().position();
+                let rest = Chunk { start, points: chunk.points - each, ..chunk };
+                return self.begin(rest).map(Some);
+            }
+        }
+        match self.chunks.next() {
+            Some(chunk) => self.begin(chunk).map(Some),
+            None => {
+                self.now = None;
+                Ok(None)
+            }
+        }
+    }
+
+    fn begin(&mut self, chunk: Chunk) -> Result<(Chunk, u64)> {
+        if self.compression.compressor == Compressor::Layered {
+            let head = layered_head(&self.file, chunk.start, chunk.end, &self.compression)?;
+            if head.points < chunk.points || (chunk.whole && head.points > chunk.points) {
+                let (has, wanted) = (head.points, chunk.points);
+                return Err(self.damaged(chunk, &format!("it has {has} points, not {wanted}")));
+            }
+        }
+        self.decoder.get_mut().move_to(chunk.start, chunk.end);
+        self.compression.reset(&mut *self.decoder)?;
+        let left = self.in_a_row.map_or(chunk.points, |each| each.min(chunk.points));
+        self.now = Some((chunk, left));
+        Ok((chunk, left))
+    }
+
+    /// A chunk of interleaved points ends where its decoder does: the only checksum there is.
+    fn check_end(&self, chunk: Chunk) -> Result<()> {
+        let known = self.in_a_row.is_none() && chunk.whole;
+        let at = self.decoder.get().position();
+        if known && self.compression.compressor == Compressor::Chunked && at != chunk.end {
+            return Err(self.damaged(chunk, "its points end before its bytes"));
+        }
+        Ok(())
+    }
+
+    fn damaged(&self, chunk: Chunk, why: &str) -> Error {
+        self.file
+            .wrong(chunk.start, format!("the chunk of compressed points here is damaged: {why}"))
+            .help("the file is cut off or damaged; ask for it again")
+    }
+
+    fn failed(&self, chunk: Chunk, error: Option<io::Error>) -> Error {
+        let Some(error) = error else { return self.damaged(chunk, "its bytes make no points") };
+        if error.kind() == io::ErrorKind::UnexpectedEof {
+            return self.damaged(chunk, "its bytes end before its points");
+        }
+        match error.downcast::<Error>() {
+            Ok(ours) => ours,
+            Err(error) => self.damaged(chunk, "it cannot be decoded").because(error),
+        }
+    }
+}
+
+impl Part for LazPart {
+    fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
+        let stride = batch.schema().stride;
+        let capacity = batch.capacity();
+        batch.source = self.source;
+        batch.refill(capacity);
+        let mut filled = 0;
+        while filled < capacity {
+            let Some((chunk, left)) = self.current()? else { break };
+            let n = left.min((capacity - filled) as u64) as usize;
+            let out = &mut batch.records_mut()[filled * stride..(filled + n) * stride];
+            match unpanicked(|| self.decoder.decompress_many(out)) {
+                Some(Ok(())) => {}
+                Some(Err(error)) => return Err(self.failed(chunk, Some(error))),
+                None => return Err(self.failed(chunk, None)),
+            }
+            if !self.shift.apply(out, stride) {
+                return Err(Shift::overflow(&self.file));
+            }
+            self.now = Some((chunk, left - n as u64));
+            filled += n;
+        }
+        batch.truncate(filled);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shifts_are_exact_and_overflow_is_told() {
+        let mut records = vec![0u8; 40];
+        records[0..4].copy_from_slice(&(i32::MAX - 5).to_le_bytes());
+        assert!(Shift([5, -7, 0]).apply(&mut records, 20));
+        assert_eq!(records[0..4], i32::MAX.to_le_bytes());
+        assert_eq!(records[24..28], (-7i32).to_le_bytes());
+        assert!(!Shift([1, 0, 0]).apply(&mut records, 20));
+        assert!(!Shift([0, 0, i64::MAX]).apply(&mut records, 20));
+    }
+}

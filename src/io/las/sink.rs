@@ -1,0 +1,280 @@
+//! Writing LAS and LAZ: the input's header and records around records that are copied byte for
+//! byte. What depends on the points is recomputed, all else is carried.
+
+use std::fs::File;
+use std::io::{Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use laz::laszip::{ChunkTable, ChunkTableEntry};
+use laz::{LazVlr, LazVlrBuilder};
+
+use super::encode::{LasEncoder, Normals};
+use super::extra::{Descriptor, with_normals};
+use super::format::record_size;
+use super::header::{COMPRESSED, Header, at, encoding};
+use super::input::{EXTRA_BYTES, extra_record};
+use super::laz::{CHUNK_POINTS, Compression};
+use super::native::Native;
+use super::vlr::Vlr;
+use crate::point::{Layout, Metadata, Schema};
+use crate::stage::{Encode, Encoded, Sink, SinkSummary};
+use crate::{Error, Result};
+
+/// What a LAS output is to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct LasOptions {
+    /// LAZ rather than LAS.
+    pub compressed: bool,
+    /// Write the normals that a stage computed: into the dimensions `NormalX`, `NormalY` and
+    /// `NormalZ` if the input has them, which overwrites them, else as three f32 extra bytes behind
+    /// the record. A position without a normal gets NaN (0 in integer dimensions).
+    pub normals: bool,
+}
+
+/// Opens a LAS or LAZ output at `staged` for records of `schema`, which is in a LAS layout.
+///
+/// Header and records come from `metadata` where it is that of LAS inputs, else they are made anew
+/// (see [`fresh`](super::fresh)). Recomputed are the counts of points, the box, the places of
+/// points, extended records and waveforms (where these are in the file), the LAZ bit and its record,
+/// and with `normals` the record length and the descriptors of extra bytes.
+///
+/// # Errors
+///
+/// A schema of another layout, records or variable length records too long for their fields, and
+/// what the operating system refuses.
+pub fn create(
+    staged: &Path,
+    options: &LasOptions,
+    schema: &Arc<Schema>,
+    metadata: &Metadata,
+) -> Result<Box<dyn Sink>> {
+    let Layout::Las { format } = schema.layout else {
+        return Err(Error::internal("records are to be converted to a LAS layout first"));
+    };
+    let carried = metadata.native.as_ref().and_then(|n| n.downcast_ref::<Native>());
+    let mut native = match carried.filter(|native| native.fits(schema)) {
+        Some(native) => native.clone(),
+        None => Native::fresh(schema, metadata.crs.as_deref()),
+    };
+    if let Some(axes) = schema.coordinates() {
+        native.header.put_floats(at::SCALE, axes.map(|d| d.scale));
+        native.header.put_floats(at::OFFSET, axes.map(|d| d.origin));
+    }
+    let normals = Normals::plan(schema, options.normals);
+    let stride = u16::try_from(schema.stride + normals.appended_bytes())
+        .map_err(|_| too_long("a record of point format ", format))?;
+    if normals == Normals::Appended {
+        describe_normals(&mut native, format, schema)?;
+    }
+    native.header.put(at::RECORD_LENGTH, &stride.to_le_bytes());
+    let mut format_byte = format;
+    let mut compression = None;
+    if options.compressed {
+        let (how, record) = Compression::write(format, stride)?;
+        native.vlrs.push(record);
+        format_byte |= COMPRESSED;
+        compression = Some(how);
+    }
+    native.header.put(at::FORMAT, &[format_byte]);
+    let encoder = Arc::new(LasEncoder::new(format, schema, normals, compression));
+    Ok(Box::new(LasSink::begin(staged, native, encoder)?))
+}
+
+fn too_long(what: &str, format: u8) -> Error {
+    Error::pipeline(format!("{what}{format} would exceed 65,535 bytes, the most that LAS can say"))
+        .help("drop some extra dimensions")
+}
+
+/// Adds the descriptors of the normals behind those of all extra bytes before them.
+fn describe_normals(native: &mut Native, format: u8, schema: &Schema) -> Result<()> {
+    let extra = schema.stride - usize::from(record_size(format).unwrap_or(0));
+    let record = extra_record(&native.vlrs, extra);
+    let known = record.map_or(Vec::new(), |i| Descriptor::all(native.vlrs[i].payload()));
+    let payload: Vec<u8> = with_normals(&known, extra).iter().flat_map(|d| *d.bytes()).collect();
+    if u16::try_from(payload.len()).is_err() {
+        return Err(too_long("the extra bytes' descriptors of point format ", format));
+    }
+    match record {
+        Some(i) => native.vlrs[i] = native.vlrs[i].with_payload(payload),
+        None => {
+            native.vlrs.push(Vlr::new(EXTRA_BYTES.0, EXTRA_BYTES.1, "Extra bytes", payload));
+        }
+    }
+    Ok(())
+}
+
+/// A LAS or LAZ file being written.
+struct LasSink {
+    path: PathBuf,
+    file: File,
+    /// Bytes written.
+    at: u64,
+    native: Native,
+    encoder: Arc<LasEncoder>,
+    table: ChunkTable,
+    last_was_short: bool,
+    points: u64,
+    returns: [u64; 15],
+    lo: [i64; 3],
+    hi: [i64; 3],
+}
+
+impl LasSink {
+    fn begin(path: &Path, mut native: Native, encoder: Arc<LasEncoder>) -> Result<Self> {
+        let records: usize = native.vlrs.iter().map(Vlr::len).sum();
+        let start = native.header.bytes().len() + records + native.gap.len();
+        let (Ok(start), Ok(vlrs)) = (u32::try_from(start), u32::try_from(native.vlrs.len())) else {
+            return Err(Error::pipeline("the variable length records exceed 4 GiB"));
+        };
+        native.header.put(at::POINTS_START, &start.to_le_bytes());
+        native.header.put(at::VLRS, &vlrs.to_le_bytes());
+        let file = File::create(path).map_err(|e| Error::io(path, "create it", e))?;
+        let mut sink = LasSink {
+            path: path.to_owned(),
+            file,
+            at: 0,
+            native,
+            encoder,
+            table: ChunkTable::default(),
+            last_was_short: false,
+            points: 0,
+            returns: [0; 15],
+            lo: [i64::MAX; 3],
+            hi: [i64::MIN; 3],
+        };
+        let mut head = sink.native.header.bytes().to_vec();
+        head.extend(sink.native.vlrs.iter().flat_map(Vlr::bytes));
+        head.extend_from_slice(&sink.native.gap);
+        if sink.encoder.compression.is_some() {
+            head.extend((-1i64).to_le_bytes()); // the chunk table's place, set when it is known
+        }
+        sink.write(&head)?;
+        Ok(sink)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> Result<()> {
+        self.file.write_all(bytes).map_err(|e| Error::io(&self.path, "write it", e))?;
+        self.at += bytes.len() as u64;
+        Ok(())
+    }
+
+    fn rewrite(&mut self, at: u64, bytes: &[u8]) -> Result<()> {
+        self.file
+            .seek(SeekFrom::Start(at))
+            .and_then(|_| self.file.write_all(bytes))
+            .map_err(|e| Error::io(&self.path, "write it", e))
+    }
+
+    /// The chunk table at the end of the points, and its place in front of them.
+    fn write_table(&mut self) -> Result<()> {
+        let start = u64::from(self.native.header.points_start());
+        let place = self.at;
+        let vlr: LazVlr = LazVlrBuilder::default()
+            .with_point_format(0, 0)
+            .map_err(|e| Error::internal("the chunk table cannot be made").because(e))?
+            .with_fixed_chunk_size(CHUNK_POINTS)
+            .build();
+        let mut bytes = Vec::new();
+        self.table
+            .write_to(&mut bytes, &vlr)
+            .map_err(|e| Error::internal("the chunk table cannot be made").because(e))?;
+        self.write(&bytes)?;
+        self.rewrite(start, &place.to_le_bytes())?;
+        self.file
+            .seek(SeekFrom::Start(self.at))
+            .map(drop)
+            .map_err(|e| Error::io(&self.path, "write it", e))
+    }
+
+    /// The extended records at the end of the file. Where the header says that the waveforms are
+    /// one of them, it says so of its new place.
+    fn write_evlrs(&mut self) -> Result<()> {
+        let evlrs = std::mem::take(&mut self.native.evlrs);
+        let header = &self.native.header;
+        let internal = header.encoding() & encoding::WAVEFORM_INTERNAL != 0;
+        let waveforms = header.waveform_start();
+        let start = if evlrs.is_empty() { 0 } else { self.at };
+        let count = u32::try_from(evlrs.len())
+            .map_err(|_| Error::pipeline("there are more than 4,294,967,295 extended records"))?;
+        for evlr in &evlrs {
+            let is_waveforms = evlr.position() == waveforms || evlr.is("LASF_Spec", 65535);
+            if internal && is_waveforms && self.native.header.minor() >= 3 {
+                let here = self.at;
+                self.native.header.put(at::WAVEFORM_START, &here.to_le_bytes());
+            }
+            evlr.stream(|bytes| self.write(bytes))?;
+        }
+        if self.native.header.minor() >= 4 {
+            self.native.header.put(at::EVLR_START, &start.to_le_bytes());
+            self.native.header.put(at::EVLRS, &count.to_le_bytes());
+        }
+        Ok(())
+    }
+
+    /// Counts and box; a file without points has a box of zeros.
+    fn settle_header(&mut self) -> Result<()> {
+        let header: &mut Header = &mut self.native.header;
+        header.put_counts(self.points, &self.returns)?;
+        let (scale, offset) = (header.scale(), header.offset());
+        let (mut lo, mut hi) = ([0.0; 3], [0.0; 3]);
+        if self.points > 0 {
+            for axis in 0..3 {
+                let world = |stored: i64| stored as f64 * scale[axis] + offset[axis];
+                let (a, b) = (world(self.lo[axis]), world(self.hi[axis]));
+                (lo[axis], hi[axis]) = (a.min(b), a.max(b));
+            }
+        }
+        header.put_bounds(lo, hi);
+        Ok(())
+    }
+}
+
+impl Sink for LasSink {
+    fn chunk_points(&self) -> usize {
+        CHUNK_POINTS as usize
+    }
+
+    fn chunk_bytes(&self) -> u64 {
+        self.encoder.chunk_bytes()
+    }
+
+    fn encoder(&self) -> Arc<dyn Encode> {
+        self.encoder.clone()
+    }
+
+    fn append(&mut self, chunk: Encoded) -> Result<()> {
+        if chunk.points == 0 {
+            return Ok(());
+        }
+        if self.last_was_short && self.encoder.compression.is_some() {
+            return Err(Error::internal("only the last chunk may have fewer points"));
+        }
+        self.last_was_short = chunk.points < u64::from(CHUNK_POINTS);
+        self.table.push(ChunkTableEntry {
+            point_count: chunk.points,
+            byte_count: chunk.bytes.len() as u64,
+        });
+        self.points += chunk.points;
+        for (sum, count) in self.returns.iter_mut().zip(chunk.returns) {
+            *sum += count;
+        }
+        for axis in 0..3 {
+            self.lo[axis] = self.lo[axis].min(chunk.lo[axis]);
+            self.hi[axis] = self.hi[axis].max(chunk.hi[axis]);
+        }
+        self.write(&chunk.bytes)
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<SinkSummary> {
+        if self.encoder.compression.is_some() {
+            self.write_table()?;
+        }
+        self.write_evlrs()?;
+        self.settle_header()?;
+        let header = self.native.header.bytes().to_vec();
+        self.rewrite(0, &header)?;
+        self.file.sync_all().map_err(|e| Error::io(&self.path, "write it to disk", e))?;
+        Ok(SinkSummary { points: self.points, bytes: self.at, notes: Vec::new() })
+    }
+}

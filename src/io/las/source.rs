@@ -1,0 +1,165 @@
+//! LAS and LAZ files as a source: one or several, read in independent parts.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::chunks::{Chunk, Chunks};
+use super::file::WINDOW_BYTES;
+use super::input::{Input, Storage};
+use super::merge::merge;
+use super::read::{LazPart, PlainPart, Shift};
+use crate::point::{Metadata, Schema};
+use crate::stage::{Part, Source};
+use crate::{Error, Result};
+
+/// Plain records of one part.
+const PLAIN_POINTS: u64 = 1 << 18;
+/// Small chunks are read together until a part has this many points.
+const PART_POINTS: u64 = 50_000;
+
+/// Opens LAS and LAZ files as one scan: headers and records only, no point.
+///
+/// # Errors
+///
+/// A file that is not LAS, is damaged, or claims more than its length can hold is named with the
+/// byte; files that do not agree (point format, record length, extra bytes, scale, GPS time type,
+/// CRS; offsets apart from whole steps) are named both.
+pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
+    let inputs = paths.iter().map(|path| Input::open(path)).collect::<Result<Vec<_>>>()?;
+    let (native, shifts) = merge(&inputs)?;
+    let mut schema = inputs[0].schema();
+    for (axis, dimension) in schema.dimensions.iter_mut().take(3).enumerate() {
+        dimension.origin = native.header.offset()[axis];
+    }
+    let warnings = inputs.iter().flat_map(|i| i.warnings.clone()).collect();
+    let metadata =
+        Metadata { crs: inputs[0].crs()?, comments: Vec::new(), native: Some(Arc::new(native)) };
+    let files: Vec<Opened> = inputs.into_iter().zip(shifts).map(Opened::new).collect();
+    let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i)).collect();
+    Ok(Box::new(LasSource { files, parts, schema: Arc::new(schema), metadata, warnings }))
+}
+
+/// LAS and LAZ files opened together.
+struct LasSource {
+    files: Vec<Opened>,
+    parts: Vec<PartPlace>,
+    schema: Arc<Schema>,
+    metadata: Metadata,
+    warnings: Vec<String>,
+}
+
+struct Opened {
+    input: Input,
+    shift: Shift,
+    compression: Option<Arc<super::laz::Compression>>,
+}
+
+/// Which file a part is of, and its stretch there: records of a plain file, chunks of a LAZ.
+struct PartPlace {
+    file: usize,
+    first: u64,
+    count: u64,
+}
+
+impl Opened {
+    fn new((input, shift): (Input, Shift)) -> Self {
+        let compression = match &input.storage {
+            Storage::Plain => None,
+            Storage::Laz(compression, _) => Some(Arc::new(compression.clone())),
+        };
+        Opened { input, shift, compression }
+    }
+
+    fn parts(&self, file: usize) -> Vec<PartPlace> {
+        let place = |first, count| PartPlace { file, first, count };
+        match &self.input.storage {
+            Storage::Plain => {
+                let points = self.input.points();
+                (0..points.div_ceil(PLAIN_POINTS))
+                    .map(|i| i * PLAIN_POINTS)
+                    .map(|first| place(first, PLAIN_POINTS.min(points - first)))
+                    .collect()
+            }
+            Storage::Laz(_, Chunks::InARow { .. }) => vec![place(0, 1)],
+            Storage::Laz(_, Chunks::Known(chunks)) => {
+                let mut parts = Vec::new();
+                let (mut first, mut points) = (0, 0);
+                for (i, chunk) in chunks.iter().enumerate() {
+                    points += chunk.points;
+                    if points >= PART_POINTS || i + 1 == chunks.len() {
+                        parts.push(place(first as u64, (i + 1 - first) as u64));
+                        (first, points) = (i + 1, 0);
+                    }
+                }
+                parts
+            }
+        }
+    }
+
+    fn part_bytes(&self) -> u64 {
+        let Some(compression) = &self.compression else { return 0 };
+        let held = match &self.input.storage {
+            Storage::Laz(_, chunks) if compression.layers > 0 => chunks.largest(),
+            _ => 0,
+        };
+        held + WINDOW_BYTES as u64 + compression.state_bytes()
+    }
+
+    fn open(&self, place: &PartPlace) -> Result<Box<dyn Part>> {
+        let file = self.input.reopen()?;
+        let (shift, source) = (self.shift, place.file as u32);
+        let (first, count) = (place.first as usize, place.count as usize);
+        let (chunks, in_a_row): (Vec<Chunk>, _) = match &self.input.storage {
+            Storage::Plain => {
+                let header = &self.input.header;
+                let each = u64::from(header.record_length());
+                let at = u64::from(header.points_start()) + place.first * each;
+                return Ok(Box::new(PlainPart { file, source, at, left: place.count, shift }));
+            }
+            Storage::Laz(_, Chunks::InARow { all, chunk_points }) => {
+                (vec![*all], Some(*chunk_points))
+            }
+            Storage::Laz(_, Chunks::Known(chunks)) => (chunks[first..first + count].to_vec(), None),
+        };
+        let compression = self
+            .compression
+            .clone()
+            .ok_or_else(|| Error::internal("a LAZ file without its compression"))?;
+        Ok(Box::new(LazPart::new(file, source, shift, compression, chunks, in_a_row)))
+    }
+}
+
+impl Source for LasSource {
+    fn schema(&self) -> &Arc<Schema> {
+        &self.schema
+    }
+
+    fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    fn inputs(&self) -> Vec<PathBuf> {
+        self.files.iter().map(|f| f.input.path.clone()).collect()
+    }
+
+    fn points(&self) -> u64 {
+        self.files.iter().fold(0, |all, f| all.saturating_add(f.input.points()))
+    }
+
+    fn part_bytes(&self) -> u64 {
+        self.files.iter().map(Opened::part_bytes).max().unwrap_or(0)
+    }
+
+    fn parts(&self) -> usize {
+        self.parts.len()
+    }
+
+    fn part(&self, index: usize) -> Result<Box<dyn Part + '_>> {
+        let place = &self.parts[index];
+        self.files[place.file].open(place)
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
+    }
+}

@@ -1,0 +1,291 @@
+//! Variable length records (LAS 1.4 R15, sections 2.5 and 2.7), carried as their bytes. Extended
+//! ones stay in their file until they are written: one may hold gigabytes of waveforms.
+
+use std::cmp::Ordering;
+use std::path::PathBuf;
+
+use super::file::InputFile;
+use super::header::{Header, at, encoding};
+use crate::Result;
+
+/// Bytes of a record's head.
+pub const VLR_HEAD: usize = 54;
+/// Bytes of an extended record's head.
+pub const EVLR_HEAD: usize = 60;
+/// Bytes between the records and the points that are carried; more are dropped with a warning.
+const GAP_CARRIED: u64 = 64 << 10;
+
+/// A text field: its bytes up to the first zero, those that are no UTF-8 replaced.
+pub fn text(bytes: &[u8]) -> String {
+    let end = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
+    String::from_utf8_lossy(&bytes[..end]).trim_end().to_owned()
+}
+
+/// `text` cut to at most `room` bytes at a character, and the rest.
+pub fn split_at_room(text: &str, room: usize) -> (&str, &str) {
+    let fits = |&end: &usize| text.is_char_boundary(end);
+    text.split_at((0..=room.min(text.len())).rev().find(fits).unwrap_or(0))
+}
+
+/// A variable length record.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Vlr {
+    head: [u8; VLR_HEAD],
+    payload: Vec<u8>,
+}
+
+impl Vlr {
+    /// A new record; `payload` must be shorter than 64 KiB.
+    pub fn new(user: &str, record: u16, description: &str, payload: Vec<u8>) -> Self {
+        let mut head = [0; VLR_HEAD];
+        for (field, at, room) in [(user, 2, 16), (description, 22, 32)] {
+            let (field, _) = split_at_room(field, room);
+            head[at..at + field.len()].copy_from_slice(field.as_bytes());
+        }
+        head[18..20].copy_from_slice(&record.to_le_bytes());
+        Vlr { head, payload: Vec::new() }.with_payload(payload)
+    }
+
+    /// The same record with another payload (shorter than 64 KiB).
+    pub fn with_payload(&self, payload: Vec<u8>) -> Self {
+        debug_assert!(u16::try_from(payload.len()).is_ok());
+        let mut head = self.head;
+        head[20..22].copy_from_slice(&(payload.len() as u16).to_le_bytes());
+        Vlr { head, payload }
+    }
+
+    /// Who defined it.
+    pub fn user(&self) -> String {
+        text(&self.head[2..18])
+    }
+
+    /// Its number among those of its user.
+    pub fn record(&self) -> u16 {
+        u16::from_le_bytes([self.head[18], self.head[19]])
+    }
+
+    /// What it says it is.
+    pub fn description(&self) -> String {
+        text(&self.head[22..])
+    }
+
+    /// What it holds.
+    pub fn payload(&self) -> &[u8] {
+        &self.payload
+    }
+
+    /// True if it is record `record` of `user`.
+    pub fn is(&self, user: &str, record: u16) -> bool {
+        self.record() == record && self.user() == user
+    }
+
+    /// Head and payload as in the file.
+    pub fn bytes(&self) -> impl Iterator<Item = u8> + '_ {
+        self.head.iter().chain(&self.payload).copied()
+    }
+
+    /// Bytes in the file.
+    pub fn len(&self) -> usize {
+        VLR_HEAD + self.payload.len()
+    }
+
+    /// The order of a union of records: user, number, bytes.
+    pub fn order(&self, other: &Self) -> Ordering {
+        (self.user(), self.record())
+            .cmp(&(other.user(), other.record()))
+            .then_with(|| self.bytes().cmp(other.bytes()))
+    }
+}
+
+/// An extended variable length record: its head, and where its payload is.
+#[derive(Debug, Clone)]
+pub struct Evlr {
+    head: [u8; EVLR_HEAD],
+    path: PathBuf,
+    start: u64,
+}
+
+impl Evlr {
+    /// Who defined it.
+    pub fn user(&self) -> String {
+        text(&self.head[2..18])
+    }
+
+    /// Its number among those of its user.
+    pub fn record(&self) -> u16 {
+        u16::from_le_bytes([self.head[18], self.head[19]])
+    }
+
+    /// What it says it is.
+    pub fn description(&self) -> String {
+        text(&self.head[28..])
+    }
+
+    /// True if it is record `record` of `user`.
+    pub fn is(&self, user: &str, record: u16) -> bool {
+        self.record() == record && self.user() == user
+    }
+
+    /// Bytes of the payload, which the file has.
+    pub fn payload_len(&self) -> u64 {
+        let mut bytes = [0; 8];
+        bytes.copy_from_slice(&self.head[20..28]);
+        u64::from_le_bytes(bytes)
+    }
+
+    /// Bytes of head and payload.
+    pub fn len(&self) -> u64 {
+        EVLR_HEAD as u64 + self.payload_len()
+    }
+
+    /// Opened anew for each use: a survey of thousands of files must not hold them all open.
+    fn open(&self) -> Result<InputFile> {
+        InputFile::open(&self.path)
+    }
+
+    /// Where its head stands in its file.
+    pub fn position(&self) -> u64 {
+        self.start
+    }
+
+    /// The payload if it has at most `limit` bytes.
+    pub fn payload(&self, limit: usize) -> Result<Option<Vec<u8>>> {
+        match usize::try_from(self.payload_len()) {
+            Ok(len) if len <= limit => {
+                self.open()?.bytes(self.start + EVLR_HEAD as u64, len).map(Some)
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// Hands head and payload to `take`, at most 64 KiB at a time.
+    pub fn stream(&self, mut take: impl FnMut(&[u8]) -> Result<()>) -> Result<()> {
+        let file = self.open()?;
+        let mut at = self.start;
+        let end = self.start + self.len();
+        while at < end {
+            let len = (end - at).min(64 << 10) as usize;
+            take(&file.bytes(at, len)?)?;
+            at += len as u64;
+        }
+        Ok(())
+    }
+
+    /// The order of a union of records: user, number, bytes.
+    pub fn order(&self, other: &Self) -> Result<Ordering> {
+        let heads = (self.user(), self.record())
+            .cmp(&(other.user(), other.record()))
+            .then_with(|| self.head.cmp(&other.head));
+        if heads != Ordering::Equal {
+            return Ok(heads);
+        }
+        let (one, two) = (self.open()?, other.open()?);
+        let (mut done, len) = (0, self.len());
+        while done < len {
+            let n = (len - done).min(64 << 10) as usize;
+            let bytes = one.bytes(self.start + done, n)?;
+            let order = bytes.cmp(&two.bytes(other.start + done, n)?);
+            if order != Ordering::Equal {
+                return Ok(order);
+            }
+            done += n as u64;
+        }
+        Ok(Ordering::Equal)
+    }
+}
+
+/// The variable length records of a file and the bytes between them and the points (a point start
+/// signature in LAS 1.0). The second value is a warning, if there is one.
+pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>, Option<String>)> {
+    let start = header.bytes().len() as u64;
+    let end = u64::from(header.points_start());
+    let claimed = header.vlrs();
+    if u64::from(claimed) > (end - start) / VLR_HEAD as u64 {
+        return Err(file
+            .wrong(
+                at::VLRS as u64,
+                format!(
+                    "{claimed} variable length records do not fit between the header and the \
+                     points at byte {end}"
+                ),
+            )
+            .help("the record count or the start of the points is damaged"));
+    }
+    let mut vlrs = Vec::new();
+    let mut at = start;
+    for i in 0..claimed {
+        if end - at < VLR_HEAD as u64 {
+            return Err(file.wrong(at, format!("record {i} of {claimed} begins behind the points")));
+        }
+        let mut head = [0; VLR_HEAD];
+        file.read_at(&mut head, at)?;
+        let len = u16::from_le_bytes([head[20], head[21]]);
+        at += VLR_HEAD as u64;
+        if u64::from(len) > end - at {
+            return Err(file
+                .wrong(
+                    at - VLR_HEAD as u64,
+                    format!("record {i} of {claimed} has {len} bytes and runs into the points"),
+                )
+                .help("the record count, this length or the start of the points is damaged"));
+        }
+        vlrs.push(Vlr { head, payload: file.bytes(at, usize::from(len))? });
+        at += u64::from(len);
+    }
+    let gap = end - at;
+    if gap > GAP_CARRIED {
+        let warning = format!(
+            "{}: {gap} bytes between the records and the points are not carried",
+            file.path().display()
+        );
+        return Ok((vlrs, Vec::new(), Some(warning)));
+    }
+    Ok((vlrs, file.bytes(at, gap as usize)?, None))
+}
+
+/// The extended records of a file. LAS 1.3 has at most one, the waveform packets.
+pub fn read_evlrs(file: &InputFile, header: &Header) -> Result<Vec<Evlr>> {
+    let (mut at, mut claimed) = header.evlrs();
+    let mut field = at::EVLRS as u64;
+    let internal = header.encoding() & encoding::WAVEFORM_INTERNAL != 0;
+    if header.minor() == 3 && internal && header.waveform_start() > 0 {
+        (at, claimed) = (header.waveform_start(), 1);
+        field = at::WAVEFORM_START as u64;
+    }
+    if claimed == 0 {
+        return Ok(Vec::new());
+    }
+    let room = file.len().saturating_sub(at);
+    if u64::from(claimed) > room / EVLR_HEAD as u64 || at < header.bytes().len() as u64 {
+        return Err(file
+            .wrong(
+                field,
+                format!(
+                    "{claimed} extended records from byte {at} do not fit in a file of {} bytes",
+                    file.len()
+                ),
+            )
+            .help("the file is cut off, or its header is damaged"));
+    }
+    let mut evlrs = Vec::new();
+    for i in 0..claimed {
+        let mut head = [0; EVLR_HEAD];
+        file.read_at(&mut head, at)?;
+        let evlr = Evlr { head, path: file.path().to_owned(), start: at };
+        let room = file.len().saturating_sub(at + EVLR_HEAD as u64);
+        if evlr.payload_len() > room {
+            return Err(file
+                .wrong(
+                    at + 20,
+                    format!(
+                        "extended record {i} of {claimed} claims {} bytes and the file has {room}",
+                        evlr.payload_len()
+                    ),
+                )
+                .help("the file is cut off, or this length is damaged"));
+        }
+        at += evlr.len();
+        evlrs.push(evlr);
+    }
+    Ok(evlrs)
+}
