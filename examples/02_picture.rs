@@ -1,27 +1,41 @@
 //! Reach for this when you want to see what a reduction keeps: draws a scan and its reduction side
 //! by side, from one oblique view, coloured by height, as an SVG of dots.
 //!
-//! `cargo run --release --example 02_picture -- picture.svg`
+//! `cargo run --release --example 02_picture -- picture.svg scan.laz reduced.laz`
+//!
+//! Without files, the picture is of a computed scan and every sixth point of it.
 
 #![allow(clippy::print_stdout, reason = "an example shows its results")]
 
 use std::error::Error;
 use std::fmt::Write;
 
+use pointmill::io::las;
 use pointmill::io::synthetic::{Scene, Synthetic};
 use pointmill::point::PointBatch;
-use pointmill::stage::OpenSource;
+use pointmill::stage::{OpenSource, Source};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let scan = Synthetic { scene: Scene::Als, points: 20_000, seed: 1, noise: None };
-    let scan = positions(&scan)?;
-    let kept: Vec<[f64; 3]> = scan.iter().step_by(6).copied().collect();
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (scan, kept, what) = match &arguments[..] {
+        [_, scan, reduced] => {
+            let [scan, reduced] = [scan, reduced].map(|path| las::open(&[path.into()]));
+            (positions(&*scan?)?, positions(&*reduced?)?, "reduced")
+        }
+        [] | [_] => {
+            let scan = Synthetic { scene: Scene::Als, points: 20_000, seed: 1, noise: None };
+            let scan = positions(&*scan.open()?)?;
+            let kept = scan.iter().step_by(6).copied().collect();
+            (scan, kept, "every sixth point")
+        }
+        _ => return Err("usage: 02_picture [PICTURE.svg [SCAN REDUCED]]".into()),
+    };
     let share = 100.0 * kept.len() as f64 / scan.len() as f64;
     let picture = draw(&[
         (format!("scan: {} points", scan.len()), &scan),
-        (format!("every sixth point: {} ({share:.1} %)", kept.len()), &kept),
+        (format!("{what}: {} points ({share:.1} %)", kept.len()), &kept),
     ]);
-    match std::env::args().nth(1) {
+    match arguments.first() {
         Some(path) => std::fs::write(path, picture)?,
         None => println!("{} bytes of SVG; give a path to keep it", picture.len()),
     }
@@ -29,8 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// World coordinates of all points of a source: a picture's worth, so they are simply collected.
-fn positions(open: &dyn OpenSource) -> Result<Vec<[f64; 3]>, Box<dyn Error>> {
-    let source = open.open()?;
+fn positions(source: &dyn Source) -> Result<Vec<[f64; 3]>, Box<dyn Error>> {
     let schema = source.schema();
     let axes = schema.coordinates().ok_or("the scan has no coordinates")?;
     let mut batch = PointBatch::new(schema.clone(), 8192);
@@ -54,10 +67,11 @@ const PANEL: f64 = 6000.0;
 const MARGIN: f64 = 150.0;
 const TITLE: f64 = 420.0;
 /// Diameter of a dot, the same.
-const DOT: u32 = 24;
-/// Direction from which the scan is seen: turned about the vertical, raised above the horizon.
-const AZIMUTH_DEG: f64 = 35.0;
-const ELEVATION_DEG: f64 = 35.0;
+const DOT: u32 = 28;
+/// Sine and cosine of the angle by which the view is turned about the vertical, and of the angle by
+/// which it is raised above the horizon: 37°, by numbers that are the same on every machine.
+const TURNED: [f64; 2] = [0.6, 0.8];
+const RAISED: [f64; 2] = [0.6, 0.8];
 /// Low to high: dark blue over green to yellow.
 const COLORS: [&str; 10] = [
     "#2b2f77", "#31508c", "#33708e", "#2f8f8b", "#3aa981", "#63c06c", "#98cf55", "#cbd545",
@@ -134,8 +148,7 @@ struct View {
 
 impl View {
     fn of(points: &[[f64; 3]]) -> View {
-        let (sin_a, cos_a) = AZIMUTH_DEG.to_radians().sin_cos();
-        let (sin_e, cos_e) = ELEVATION_DEG.to_radians().sin_cos();
+        let ([sin_a, cos_a], [sin_e, cos_e]) = (TURNED, RAISED);
         let axes = [
             [cos_a, sin_a, 0.0],
             [-sin_a * sin_e, cos_a * sin_e, cos_e],

@@ -20,8 +20,8 @@ const WIDEST: f64 = 480.0;
 const SWATH: f64 = 1.25;
 /// Full opening angle in steps of 0.006°: 40°.
 const OPENING: f64 = 40.0 / 0.006;
-/// Seconds of adjusted standard GPS time at the first pulse, between pulses and between strips.
-const START: f64 = 3.0e8;
+/// Seconds of the GPS week at the first pulse, seconds between pulses and between strips.
+const START: f64 = 100_000.0;
 const PULSE: f64 = 2.0e-6;
 const TURN: f64 = 300.0;
 

@@ -16,6 +16,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use crate::io::las;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{OpenSource, Part, Source};
 use crate::{Error, Result};
@@ -142,9 +143,10 @@ impl OpenSource for Synthetic {
                 (Surface::Als(Box::new(als)), als::SCALE, als::ORIGIN)
             }
         };
+        let schema = las::layout(record::FORMAT, &[], [scale; 3], origin);
         Ok(Box::new(Scan {
-            schema: Arc::new(record::schema(scale, origin)),
-            metadata: Metadata::default(),
+            metadata: las::fresh(&schema, None),
+            schema: Arc::new(schema),
             points: self.points,
             surface,
         }))

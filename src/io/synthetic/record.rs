@@ -1,35 +1,9 @@
 //! The record that every scene makes: LAS point data record format 6 without extra bytes.
 
-use crate::point::{Dimension, Endian, Layout, Scalar, Schema, names};
-
+/// Point data record format (LAS 1.4 R15, table 12).
+pub const FORMAT: u8 = 6;
 /// Bytes of a record.
 pub const STRIDE: usize = 30;
-
-/// Point data record format 6 (LAS 1.4 R15, table 12) with one scale for all axes.
-pub fn schema(scale: f64, origin: [f64; 3]) -> Schema {
-    let field = Dimension::new;
-    let mut dimensions: Vec<Dimension> = (0..3)
-        .map(|axis| field(names::XYZ[axis], Scalar::I32, 4 * axis).scaled(scale, origin[axis]))
-        .collect();
-    dimensions.extend([
-        field(names::INTENSITY, Scalar::U16, 12),
-        field(names::RETURN_NUMBER, Scalar::U8, 14).bits(0, 4),
-        field(names::NUMBER_OF_RETURNS, Scalar::U8, 14).bits(4, 4),
-        field(names::SYNTHETIC, Scalar::U8, 15).bits(0, 1),
-        field(names::KEY_POINT, Scalar::U8, 15).bits(1, 1),
-        field(names::WITHHELD, Scalar::U8, 15).bits(2, 1),
-        field(names::OVERLAP, Scalar::U8, 15).bits(3, 1),
-        field(names::SCANNER_CHANNEL, Scalar::U8, 15).bits(4, 2),
-        field(names::SCAN_DIRECTION_FLAG, Scalar::U8, 15).bits(6, 1),
-        field(names::EDGE_OF_FLIGHT_LINE, Scalar::U8, 15).bits(7, 1),
-        field(names::CLASSIFICATION, Scalar::U8, 16),
-        field(names::USER_DATA, Scalar::U8, 17),
-        field(names::SCAN_ANGLE, Scalar::I16, 18).scaled(0.006, 0.0),
-        field(names::POINT_SOURCE_ID, Scalar::U16, 20),
-        field(names::GPS_TIME, Scalar::F64, 22),
-    ]);
-    Schema { layout: Layout::Las { format: 6 }, endian: Endian::Little, stride: STRIDE, dimensions }
-}
 
 /// The fields of a record that a scene sets; the others are 0.
 #[derive(Clone, Copy)]
@@ -46,7 +20,7 @@ pub struct Record {
     /// In steps of 0.006°.
     pub scan_angle: i16,
     pub point_source_id: u16,
-    /// Adjusted standard GPS time in seconds.
+    /// Seconds of the GPS week.
     pub gps_time: f64,
 }
 
@@ -100,11 +74,13 @@ pub fn stored(local: [f64; 3], per_unit: f64) -> [i32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::point::Value;
+    use crate::io::las;
+    use crate::point::{Value, names};
 
     #[test]
     fn a_stored_record_reads_back_by_the_names_of_its_fields() {
-        let schema = schema(0.001, [350_000.0, 0.0, -5.0]);
+        let schema = las::layout(FORMAT, &[], [0.001; 3], [350_000.0, 0.0, -5.0]);
+        assert_eq!(schema.stride, STRIDE);
         let record = Record {
             position: [-1, 2_000, i32::MAX],
             intensity: 65_535,
@@ -116,7 +92,7 @@ mod tests {
             user_data: 9,
             scan_angle: -3_000,
             point_source_id: 513,
-            gps_time: 3.0e8,
+            gps_time: 3.0e5,
         };
         let mut bytes = [0; STRIDE];
         record.store(&mut bytes);
@@ -136,7 +112,7 @@ mod tests {
         assert_eq!(read(names::USER_DATA).0, Value::Unsigned(9));
         assert_eq!(read(names::SCAN_ANGLE).1, -18.0);
         assert_eq!(read(names::POINT_SOURCE_ID).0, Value::Unsigned(513));
-        assert_eq!(read(names::GPS_TIME).0, Value::Double(3.0e8));
+        assert_eq!(read(names::GPS_TIME).0, Value::Double(3.0e5));
     }
 
     #[test]
