@@ -46,10 +46,11 @@ impl ExactWalk<'_> {
             if distances[child] > self.limit.0 {
                 return;
             }
+            let child = node.first_child as usize + child;
             if level == 0 {
-                self.meet(index * LANES + child);
+                self.meet(child);
             } else {
-                self.descend(level - 1, index * LANES + child);
+                self.descend(level - 1, child);
             }
         }
     }
