@@ -186,16 +186,7 @@ impl Nearest {
         self.found.sort_unstable();
         if !proven {
             self.work.redone += 1;
-            ExactWalk {
-                tree: &self.tree,
-                positions,
-                work: &mut self.work,
-                query,
-                k,
-                limit: self.found[k - 1],
-                found: &mut self.found,
-            }
-            .run();
+            ExactWalk::new(&self.tree, positions, &mut self.work, query, &mut self.found).run();
         }
         self.neighbors.clear();
         self.neighbors.extend(self.found.iter().map(|&(_, rank)| rank));

@@ -377,6 +377,17 @@ fn any_set() -> impl Strategy<Value = Vec<Position>> {
     prop::collection::vec(position, 0..700).prop_map(set)
 }
 
+#[test]
+fn floats_are_rounded_outward() {
+    for v in [0, 1, EXACT, EXACT + 1, EXACT + 3, (1 << 40) + 1, (1 << 62) - 1, i64::MAX] {
+        for v in [v, -v] {
+            let (below, above) = (tree::below(v), tree::above(v));
+            assert!(below as i128 <= i128::from(v) && i128::from(v) <= above as i128, "{v}");
+            assert!(below == above || below.next_up() == above, "{v}");
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
 

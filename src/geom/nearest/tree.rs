@@ -227,11 +227,13 @@ fn far_apart(run: &[Position]) -> Option<usize> {
 /// The largest f32 not above `v`.
 pub(super) fn below(v: i64) -> f32 {
     let rounded = v as f32;
-    if i128::from(v) < rounded as i128 { rounded.next_down() } else { rounded }
+    // 2^63 itself is no i64: the cast would stop short of it.
+    let up = rounded >= -(i64::MIN as f32) || rounded as i64 > v;
+    if up { rounded.next_down() } else { rounded }
 }
 
 /// The smallest f32 not below `v`.
 pub(super) fn above(v: i64) -> f32 {
     let rounded = v as f32;
-    if i128::from(v) > rounded as i128 { rounded.next_up() } else { rounded }
+    if (rounded as i64) < v { rounded.next_up() } else { rounded }
 }

@@ -8,7 +8,7 @@ use crate::point::Position;
 /// Above level 0, boxes are measured against bounds this much larger. Their distances are those of
 /// true positions up to five roundings, (1 + 2^-24)^5, so that nothing as near as the bound is passed
 /// over, neither by float nor by integer distance.
-const WIDENED: f32 = 1.0 + 1.0 / (1 << 20) as f32;
+pub(super) const WIDENED: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 
 /// What a search did, for tests and for tuning.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
@@ -157,13 +157,13 @@ impl<'a> Walk<'a> {
 }
 
 /// The first `children` lanes as a mask, without `skip`.
-fn lanes(children: u32, skip: Option<usize>) -> u32 {
+pub(super) fn lanes(children: u32, skip: Option<usize>) -> u32 {
     let all = (1 << children) - 1;
     skip.map_or(all, |lane| all & !(1 << lane))
 }
 
 /// The lane of `left` with the smallest distance, if that is not above `reach`.
-fn nearest(distances: &[f32; LANES], mut left: u32, reach: f32) -> Option<usize> {
+pub(super) fn nearest(distances: &[f32; LANES], mut left: u32, reach: f32) -> Option<usize> {
     let mut best = None;
     let mut least = reach;
     while left != 0 {
