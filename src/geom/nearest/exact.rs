@@ -1,7 +1,8 @@
 //! The search of one point in integers alone: slower, and right whatever floats could not tell.
 
-use super::tree::{LANES, Node, Tree};
-use super::walk::Work;
+use super::kernel::box_distances;
+use super::tree::{Tree, above, below};
+use super::walk::{WIDENED, Work, lanes, nearest};
 use crate::point::{Position, distance2};
 
 /// A neighbour by exact squared distance, then rank: ordered like that.
@@ -9,47 +10,62 @@ pub(super) type Neighbor = (u128, u32);
 
 /// One point on its way through the tree, from the root.
 pub(super) struct ExactWalk<'a> {
-    pub tree: &'a Tree,
-    pub positions: &'a [Position],
-    pub work: &'a mut Work,
+    tree: &'a Tree,
+    positions: &'a [Position],
+    work: &'a mut Work,
     /// The point that searches.
-    pub query: u32,
+    query: u32,
     /// How many neighbours it wants.
-    pub k: usize,
+    k: usize,
     /// No neighbour that it wants is beyond this one.
-    pub limit: Neighbor,
-    /// What it found, in order; room for `k`.
-    pub found: &'a mut Vec<Neighbor>,
+    limit: Neighbor,
+    /// A float that no box is farther than whose points are within the limit.
+    reach: f32,
+    /// What it found, in order.
+    found: &'a mut Vec<Neighbor>,
 }
 
-impl ExactWalk<'_> {
-    /// Fills `found` with the `k` nearest others.
+impl<'a> ExactWalk<'a> {
+    /// The search of `query` for `k` neighbours, of which none is beyond the last of `candidates`;
+    /// the answer takes their place.
+    pub fn new(
+        tree: &'a Tree,
+        positions: &'a [Position],
+        work: &'a mut Work,
+        query: u32,
+        candidates: &'a mut Vec<Neighbor>,
+    ) -> Self {
+        let limit = candidates.last().copied().unwrap_or_default();
+        let k = candidates.len();
+        candidates.clear();
+        let reach = reach(limit.0);
+        ExactWalk { tree, positions, work, query, k, limit, reach, found: candidates }
+    }
+
+    /// Finds the `k` nearest others.
     pub fn run(mut self) {
-        self.found.clear();
         if self.tree.levels > 0 {
             self.descend(self.tree.levels - 1, 0);
         }
     }
 
+    /// Boxes are measured in floats, with everything rounded towards the point.
     fn descend(&mut self, level: usize, index: usize) {
         self.work.nodes += 1;
         let node = self.tree.node(level, index);
-        let children = node.children as usize;
         let at = self.positions[self.query as usize];
-        let mut distances = [0; LANES];
-        for (child, distance) in distances[..children].iter_mut().enumerate() {
-            *distance = box_distance2(node, child, at);
-        }
-        let mut left = (1u32 << children) - 1;
-        while let Some(child) = nearest(&distances, left) {
+        let from = |i: usize| at[i].wrapping_sub(node.origin[i]);
+        let lo = std::array::from_fn(|i| below(from(i).saturating_sub(node.error)));
+        let hi = std::array::from_fn(|i| above(from(i).saturating_add(node.error)));
+        let distances = box_distances(&node.lo, &node.hi, lo, hi);
+        let mut left = lanes(node.children, None);
+        while let Some(child) = nearest(&distances, left, self.reach) {
             left &= !(1 << child);
-            if distances[child] > self.limit.0 {
-                return;
-            }
+            let child = node.first_child as usize + child;
             if level == 0 {
-                self.meet(index * LANES + child);
+                self.meet(child);
             } else {
-                self.descend(level - 1, index * LANES + child);
+                self.descend(level - 1, child);
             }
         }
     }
@@ -69,24 +85,13 @@ impl ExactWalk<'_> {
             self.found.insert(place, neighbor);
             if self.found.len() == self.k {
                 self.limit = self.found[self.k - 1];
+                self.reach = reach(self.limit.0);
             }
         }
     }
 }
 
-/// The lane of `left` with the smallest distance.
-fn nearest(distances: &[u128; LANES], left: u32) -> Option<usize> {
-    (0..LANES).filter(|lane| left >> lane & 1 == 1).min_by_key(|&lane| distances[lane])
-}
-
-/// Exact squared distance of a position to a child's box (all stored floats are integers), or less
-/// by the error of stored points.
-fn box_distance2(node: &Node, child: usize, at: Position) -> u128 {
-    (0..3).fold(0u128, |sum, axis| {
-        let q = i128::from(at[axis]) - i128::from(node.origin[axis]);
-        let lo = node.lo[axis][child] as i128 - i128::from(node.error);
-        let hi = node.hi[axis][child] as i128 + i128::from(node.error);
-        let gap = (lo - q).max(q - hi).max(0) as u128;
-        sum.saturating_add(gap.saturating_mul(gap))
-    })
+/// The float of a squared distance, widened as boxes of true positions need.
+fn reach(distance2: u128) -> f32 {
+    ((distance2 as f32).next_up() * WIDENED).min(f32::MAX)
 }

@@ -27,7 +27,6 @@ mod walk;
 
 use exact::{ExactWalk, Neighbor};
 use kernel::{Batch, distance_of, rank_of};
-use refine::RUN;
 use tree::{EXACT, LANES, Node, Tree};
 use walk::Walk;
 pub use walk::Work;
@@ -71,7 +70,7 @@ impl Nearest {
     /// Bytes that a set holds per position, besides [`FIXED_BYTES`](Self::FIXED_BYTES).
     pub const BYTES_PER_POINT: usize = 19;
     /// Bytes that any set holds, however small, besides about 180 for each neighbour asked for.
-    pub const FIXED_BYTES: usize = 16 << 10;
+    pub const FIXED_BYTES: usize = 32 << 10;
 
     /// A search that holds no set yet.
     pub fn new() -> Self {
@@ -121,25 +120,30 @@ impl Nearest {
         }
         let others = positions.len() - 1;
         self.batch.fit((k + 1).min(others));
-        for leaf in 0..self.tree.leaves.len() {
-            let mut active = 0;
-            for (lane, &rank) in self.tree.leaves[leaf].rank.iter().enumerate() {
-                if (rank as usize) < positions.len() && wanted(rank as usize) {
-                    active |= 1 << lane;
+        for run in 0..self.tree.runs() {
+            for child in 0..self.tree.node(0, run).children as usize {
+                let ranks =
+                    self.tree.leaves[self.tree.node(0, run).first_child as usize + child].rank;
+                let mut active = 0;
+                for (lane, &rank) in ranks.iter().enumerate() {
+                    if (rank as usize) < positions.len() && wanted(rank as usize) {
+                        active |= 1 << lane;
+                    }
                 }
-            }
-            if active == 0 {
-                continue;
-            }
-            let kept = if self.likely_exact(leaf, k) { k } else { (k + 1).min(others) };
-            self.batch.start(active, kept);
-            let error = Walk::new(&self.tree, &mut self.batch, &mut self.work, leaf).run();
-            while active != 0 {
-                let lane = active.trailing_zeros() as usize;
-                active &= active - 1;
-                let query = self.tree.leaves[leaf].rank[lane];
-                let distance2 = self.settle(positions, k, query, lane, error);
-                visit(query as usize, &self.neighbors, distance2);
+                if active == 0 {
+                    continue;
+                }
+                let node = self.tree.node(0, run);
+                let kept = if likely_exact(node, child, k) { k } else { (k + 1).min(others) };
+                self.batch.start(active, kept);
+                let error =
+                    Walk::new(&self.tree, &mut self.batch, &mut self.work, run, child).run();
+                while active != 0 {
+                    let lane = active.trailing_zeros() as usize;
+                    active &= active - 1;
+                    let distance2 = self.settle(positions, k, ranks[lane], lane, error);
+                    visit(ranks[lane] as usize, &self.neighbors, distance2);
+                }
             }
         }
     }
@@ -152,18 +156,6 @@ impl Nearest {
     /// What the last search did.
     pub fn work(&self) -> Work {
         self.work
-    }
-
-    /// True if the k nearest of a leaf's points will likely be exact in floats, so that none more is
-    /// needed to prove them. A wrong guess costs a redo.
-    fn likely_exact(&self, leaf: usize, k: usize) -> bool {
-        let node: &Node = self.tree.node(0, leaf / LANES);
-        let child = leaf % LANES;
-        let diagonal2 = (0..3).fold(0.0, |sum, axis| {
-            let side = node.hi[axis][child] - node.lo[axis][child];
-            sum + side * side
-        });
-        node.error == 0 && diagonal2 * (1 + k / LANES) as f32 <= (EXACT / 4) as f32
     }
 
     /// Proves or redoes what the batch found for the point of `lane`: leaves its neighbours in
@@ -194,21 +186,22 @@ impl Nearest {
         self.found.sort_unstable();
         if !proven {
             self.work.redone += 1;
-            ExactWalk {
-                tree: &self.tree,
-                positions,
-                work: &mut self.work,
-                query,
-                k,
-                limit: self.found[k - 1],
-                found: &mut self.found,
-            }
-            .run();
+            ExactWalk::new(&self.tree, positions, &mut self.work, query, &mut self.found).run();
         }
         self.neighbors.clear();
         self.neighbors.extend(self.found.iter().map(|&(_, rank)| rank));
         self.found[k - 1].0
     }
+}
+
+/// True if the k nearest of a leaf's points will likely be exact in floats, so that none more is
+/// needed to prove them. A wrong guess costs a redo.
+fn likely_exact(node: &Node, child: usize, k: usize) -> bool {
+    let diagonal2 = (0..3).fold(0.0, |sum, axis| {
+        let side = node.hi[axis][child] - node.lo[axis][child];
+        sum + side * side
+    });
+    node.error == 0 && diagonal2 * (1 + k / LANES) as f32 <= (EXACT / 4) as f32
 }
 
 /// True if a float distance `last` is a smaller distance than `next`, whatever rounding did.
@@ -217,9 +210,3 @@ fn gap(last: f32, next: f32, error: f64) -> bool {
     let error = error * 1.733;
     last * (1.0 + ROUNDING) + error < next * (1.0 - ROUNDING) - error
 }
-
-// The figure for the memory plan: 16 bytes a point in leaves, an eighth of that in nodes and boxes.
-const _: () = {
-    let run = RUN / LANES * size_of::<tree::Leaf>() + size_of::<Node>() * 17 / 16 + 48;
-    assert!(run <= RUN * Nearest::BYTES_PER_POINT);
-};

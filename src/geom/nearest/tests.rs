@@ -117,9 +117,15 @@ fn moved(positions: &[Position], by: Position) -> Vec<Position> {
 #[test]
 fn random_sets_of_any_size_have_their_nearest() {
     for n in [0, 1, 2, 10, 11, 12, 17, 255, 256, 257, 300, 5000] {
-        for extent in [40, 5_000, 1 << 20, 1 << 24, 1 << 31, 1 << 40, 1 << 62] {
-            for k in KS {
-                compare(&uniform(n, extent, n as u64 + extent as u64), k, 60);
+        for (i, extent) in
+            [40, 5_000, 1 << 20, 1 << 24, 1 << 31, 1 << 40, 1 << 62].into_iter().enumerate()
+        {
+            let positions = uniform(n, extent, n as u64 + extent as u64);
+            // All pairings on small sets, every k and every extent on large ones.
+            for k in
+                KS.into_iter().skip(if n < 1000 { 0 } else { i }).take(if n < 1000 { 7 } else { 1 })
+            {
+                compare(&positions, k, 60);
             }
         }
     }
@@ -279,8 +285,8 @@ fn ties_without_end_stay_linear() {
         assert!(met.ties > 5, "{met:?}");
         (met.work.leaves + met.work.nodes) as f64 / positions.len() as f64
     };
-    let (small, large) = (work(16), work(40));
-    assert!(large < small * 1.5 && large < 12.0, "{small} and {large} boxes a point");
+    let (small, large) = (work(24), work(40));
+    assert!(large < small * 1.4 && large < 4.0, "{small} and {large} boxes a point");
 }
 
 #[test]
@@ -369,6 +375,17 @@ fn any_set() -> impl Strategy<Value = Vec<Position>> {
         ]),
     ];
     prop::collection::vec(position, 0..700).prop_map(set)
+}
+
+#[test]
+fn floats_are_rounded_outward() {
+    for v in [0, 1, EXACT, EXACT + 1, EXACT + 3, (1 << 40) + 1, (1 << 62) - 1, i64::MAX] {
+        for v in [v, -v] {
+            let (below, above) = (tree::below(v), tree::above(v));
+            assert!(below as i128 <= i128::from(v) && i128::from(v) <= above as i128, "{v}");
+            assert!(below == above || below.next_up() == above, "{v}");
+        }
+    }
 }
 
 proptest! {

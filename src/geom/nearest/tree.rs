@@ -43,6 +43,8 @@ pub(super) struct Node {
     pub error: i64,
     /// How many children there are.
     pub children: u32,
+    /// The first child: a leaf in level 0, above it a node of the level below.
+    pub first_child: u32,
 }
 
 /// All leaves and nodes; the memory stays from build to build.
@@ -58,15 +60,16 @@ pub(super) struct Tree {
 }
 
 impl Tree {
-    /// Leaves, nodes and boxes of a tree of `points`.
+    /// Leaves, nodes and boxes of a tree of `points`, at most.
     fn sizes(points: usize) -> (usize, usize, usize) {
-        let mut level = points.div_ceil(RUN);
+        let cuts = most_cuts(points);
+        let mut level = points.div_ceil(RUN) + cuts;
         let (mut nodes, boxes) = (level, level);
         while level > 1 {
             level = level.div_ceil(LANES);
             nodes += level;
         }
-        (points.div_ceil(LANES), nodes, boxes)
+        (points.div_ceil(LANES) + cuts, nodes, boxes)
     }
 
     /// Bytes of a tree of `points`.
@@ -96,10 +99,19 @@ impl Tree {
         self.boxes.clear();
         self.reserve(positions.len());
         let mut run = Run::new();
-        for (start, of_run) in (0..).step_by(RUN).zip(positions.chunks(RUN)) {
-            let (node, bounds) = self.add_run(&mut run, start, of_run);
+        let (mut start, mut cuts) = (0, most_cuts(positions.len()));
+        while start < positions.len() {
+            let mut of_run = &positions[start..positions.len().min(start + RUN)];
+            if cuts > 0
+                && let Some(end) = far_apart(of_run)
+            {
+                of_run = &of_run[..end];
+                cuts -= 1;
+            }
+            let (node, bounds) = self.add_run(&mut run, start as u32, of_run);
             self.nodes.push(node);
             self.boxes.push(bounds);
+            start += of_run.len();
         }
         self.starts = [0; MAX_LEVELS + 1];
         self.levels = usize::from(!positions.is_empty());
@@ -120,6 +132,7 @@ impl Tree {
             0..=EXACT => 0,
             reach => 1 << (reach.ilog2() - 24),
         };
+        node.first_child = self.leaves.len() as u32;
         run.fill(start, positions, node.origin);
         run.refine(positions.len());
         for (i, first) in (0..positions.len()).step_by(LANES).enumerate() {
@@ -144,6 +157,7 @@ impl Tree {
             let children = &self.boxes[first..self.boxes.len().min(first + LANES)];
             let bounds = children.iter().fold(Bounds::EMPTY, |all, b| all.union(b));
             let mut node = Node::over(&bounds);
+            node.first_child = first as u32;
             for (i, child) in children.iter().enumerate() {
                 for axis in 0..3 {
                     node.lo[axis][i] = below(child.lo[axis].wrapping_sub(node.origin[axis]));
@@ -157,9 +171,14 @@ impl Tree {
         self.boxes.truncate(parents);
     }
 
-    /// Node `index` of `level`; its children are `16 · index ..` one level below.
+    /// Node `index` of `level`; its parent is node `index / 16` one level above.
     pub fn node(&self, level: usize, index: usize) -> &Node {
         &self.nodes[self.starts[level] + index]
+    }
+
+    /// The nodes above the leaves.
+    pub fn runs(&self) -> usize {
+        self.starts[1]
     }
 }
 
@@ -181,18 +200,40 @@ impl Node {
             reach,
             error: 0,
             children: 0,
+            first_child: 0,
         }
     }
+}
+
+/// How many runs may end early, so that a far point does not cost its run the precision. What more
+/// there is is found all the same, only slower.
+fn most_cuts(points: usize) -> usize {
+    (points / 4096 + 16).min(points.saturating_sub(1))
+}
+
+/// Where a run is best cut, if its frame rounds and its first points are near to each other but
+/// not to the next.
+fn far_apart(run: &[Position]) -> Option<usize> {
+    let reach = |run: &[Position]| Node::over(&Bounds::of(run.iter().copied())).reach;
+    let whole = reach(run);
+    if whole <= EXACT {
+        return None;
+    }
+    let far = |a: Position, b: Position| (0..3).any(|i| a[i].abs_diff(b[i]) >= whole as u64 / 4);
+    let cut = (1..run.len()).find(|&i| far(run[i - 1], run[i]))?;
+    (reach(&run[..cut]) < whole / 16).then_some(cut)
 }
 
 /// The largest f32 not above `v`.
 pub(super) fn below(v: i64) -> f32 {
     let rounded = v as f32;
-    if i128::from(v) < rounded as i128 { rounded.next_down() } else { rounded }
+    // 2^63 itself is no i64: the cast would stop short of it.
+    let up = rounded >= -(i64::MIN as f32) || rounded as i64 > v;
+    if up { rounded.next_down() } else { rounded }
 }
 
 /// The smallest f32 not below `v`.
 pub(super) fn above(v: i64) -> f32 {
     let rounded = v as f32;
-    if i128::from(v) > rounded as i128 { rounded.next_up() } else { rounded }
+    if (rounded as i64) < v { rounded.next_up() } else { rounded }
 }

@@ -8,7 +8,7 @@ use crate::point::Position;
 /// Above level 0, boxes are measured against bounds this much larger. Their distances are those of
 /// true positions up to five roundings, (1 + 2^-24)^5, so that nothing as near as the bound is passed
 /// over, neither by float nor by integer distance.
-const WIDENED: f32 = 1.0 + 1.0 / (1 << 20) as f32;
+pub(super) const WIDENED: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 
 /// What a search did, for tests and for tuning.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
@@ -28,9 +28,12 @@ pub(super) struct Walk<'a> {
     tree: &'a Tree,
     batch: &'a mut Batch,
     work: &'a mut Work,
-    leaf: usize,
     /// Level-0 node of the leaf.
     home: usize,
+    /// Which of its children the leaf is.
+    child: usize,
+    /// The points in the frame of their own node.
+    points: &'a [[f32; LANES]; 3],
     /// Exact box of the leaf's points.
     lo: Position,
     hi: Position,
@@ -40,11 +43,16 @@ pub(super) struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    /// The points of `leaf`; the batch has been started.
-    pub fn new(tree: &'a Tree, batch: &'a mut Batch, work: &'a mut Work, leaf: usize) -> Self {
-        let home = leaf / LANES;
+    /// The points of leaf `child` of the level-0 node `home`; the batch has been started.
+    pub fn new(
+        tree: &'a Tree,
+        batch: &'a mut Batch,
+        work: &'a mut Work,
+        home: usize,
+        child: usize,
+    ) -> Self {
         let node = tree.node(0, home);
-        let child = leaf % LANES;
+        let points = &tree.leaves[node.first_child as usize + child].at;
         let lo = std::array::from_fn(|axis| {
             let stored = node.origin[axis].saturating_add(node.lo[axis][child] as i64);
             stored.saturating_sub(node.error)
@@ -53,15 +61,16 @@ impl<'a> Walk<'a> {
             let stored = node.origin[axis].saturating_add(node.hi[axis][child] as i64);
             stored.saturating_add(node.error)
         });
-        Walk { tree, batch, work, leaf, home, lo, hi, error: 0.0 }
+        Walk { tree, batch, work, home, child, points, lo, hi, error: 0.0 }
     }
 
     /// Fills the batch with the nearest by float distance, and returns the largest error of a
     /// coordinate difference, in lattice steps: see [`super`].
     pub fn run(mut self) -> f64 {
-        self.batch.at = self.tree.leaves[self.leaf].at;
-        self.batch.meet_home(&self.tree.leaves[self.leaf]);
-        self.visit_run(self.home, Some(self.leaf % LANES));
+        let first = self.tree.node(0, self.home).first_child as usize;
+        self.batch.at = *self.points;
+        self.batch.meet_home(&self.tree.leaves[first + self.child]);
+        self.visit_run(self.home, Some(self.child));
         let mut child = self.home;
         for level in 1..self.tree.levels {
             let parent = child / LANES;
@@ -81,10 +90,11 @@ impl<'a> Walk<'a> {
         let mut left = lanes(node.children, skip);
         while let Some(child) = nearest(&distances, left, self.reach()) {
             left &= !(1 << child);
+            let child = node.first_child as usize + child;
             if level == 1 {
-                self.visit_run(index * LANES + child, None);
+                self.visit_run(child, None);
             } else {
-                self.descend(level - 1, index * LANES + child, None);
+                self.descend(level - 1, child, None);
             }
         }
     }
@@ -95,18 +105,17 @@ impl<'a> Walk<'a> {
         self.enter(index);
         let node = self.tree.node(0, index);
         let own = self.tree.node(0, self.home);
-        let child = self.leaf % LANES;
         let shift = self.shift(index);
         // The same sums as the points' own, and monotonic: a box around the points as stored.
-        let lo = std::array::from_fn(|axis| own.lo[axis][child] + shift[axis]);
-        let hi = std::array::from_fn(|axis| own.hi[axis][child] + shift[axis]);
+        let lo = std::array::from_fn(|axis| own.lo[axis][self.child] + shift[axis]);
+        let hi = std::array::from_fn(|axis| own.hi[axis][self.child] + shift[axis]);
         let distances = box_distances(&node.lo, &node.hi, lo, hi);
         let mut left = lanes(node.children, skip);
         let mut farthest = self.batch.farthest();
         while let Some(child) = nearest(&distances, left, farthest) {
             left &= !(1 << child);
             self.work.leaves += 1;
-            let leaf = &self.tree.leaves[index * LANES + child];
+            let leaf = &self.tree.leaves[node.first_child as usize + child];
             let lo = std::array::from_fn(|axis| node.lo[axis][child]);
             let hi = std::array::from_fn(|axis| node.hi[axis][child]);
             if self.batch.meet(leaf, lo, hi, node.first[child]) {
@@ -123,11 +132,10 @@ impl<'a> Walk<'a> {
 
     /// Moves the points into the frame of a level-0 node and notes what that costs in precision.
     fn enter(&mut self, index: usize) {
-        let points = &self.tree.leaves[self.leaf].at;
         let shift = self.shift(index);
         for axis in 0..3 {
             for i in 0..LANES {
-                self.batch.at[axis][i] = points[axis][i] + shift[axis];
+                self.batch.at[axis][i] = self.points[axis][i] + shift[axis];
             }
         }
         let (home, other) = (self.tree.node(0, self.home), self.tree.node(0, index));
@@ -149,13 +157,13 @@ impl<'a> Walk<'a> {
 }
 
 /// The first `children` lanes as a mask, without `skip`.
-fn lanes(children: u32, skip: Option<usize>) -> u32 {
+pub(super) fn lanes(children: u32, skip: Option<usize>) -> u32 {
     let all = (1 << children) - 1;
     skip.map_or(all, |lane| all & !(1 << lane))
 }
 
 /// The lane of `left` with the smallest distance, if that is not above `reach`.
-fn nearest(distances: &[f32; LANES], mut left: u32, reach: f32) -> Option<usize> {
+pub(super) fn nearest(distances: &[f32; LANES], mut left: u32, reach: f32) -> Option<usize> {
     let mut best = None;
     let mut least = reach;
     while left != 0 {
