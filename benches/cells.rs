@@ -36,7 +36,8 @@ fn plane(roughness: f64) -> Tile {
     positions.dedup();
     let normals = (0..positions.len() as u64)
         .map(|i| {
-            let (x, y) = (roughness * noise(i * 3 + 1 << 40), roughness * noise(i * 3 + 2 << 40));
+            let (x, y) =
+                (roughness * noise(i * 3 + (1 << 40)), roughness * noise(i * 3 + (2 << 40)));
             let length = (x * x + y * y + 1.0).sqrt() * noise(i).signum();
             [x / length, y / length, 1.0 / length].map(|v| v as f32)
         })

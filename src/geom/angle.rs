@@ -49,8 +49,9 @@ pub fn outer_sum(normals: impl Iterator<Item = [f32; 3]>) -> [f64; 6] {
 
 /// Squarings after which [`dominant_axis`] stops: eigenvalues that agree to 1e-8 count as equal.
 const SQUARINGS: usize = 32;
-/// Trace of the square at which nothing but the largest eigenvalue is left.
-const CONVERGED: f64 = 1.0 - 1e-15;
+/// Trace of the square, of a matrix of trace 1, at which nothing but the largest eigenvalue is left
+/// in the square: the others are at most 1e-16 of it.
+const CONVERGED: f64 = 1.0 - 1e-8;
 
 /// Direction (of no particular length) of an eigenvector of the largest eigenvalue of a positive
 /// semidefinite symmetric matrix (xx, xy, xz, yy, yz, zz), its largest component positive (of equal
@@ -61,10 +62,10 @@ const CONVERGED: f64 = 1.0 - 1e-15;
 /// where two eigenvalues are equal, and the cells of agreeing normals need three or four squarings.
 pub fn dominant_axis(matrix: [f64; 6]) -> [f64; 3] {
     let trace = matrix[0] + matrix[3] + matrix[5];
-    if !(trace > 0.0) {
+    if trace <= 0.0 {
         return [0.0; 3];
     }
-    let mut m = matrix.map(|entry| entry / trace);
+    let mut m = matrix.map(|entry| entry * (1.0 / trace));
     for _ in 0..SQUARINGS {
         let [xx, xy, xz, yy, yz, zz] = m;
         let square = [
@@ -76,7 +77,7 @@ pub fn dominant_axis(matrix: [f64; 6]) -> [f64; 3] {
             xz * xz + yz * yz + zz * zz,
         ];
         let trace = square[0] + square[3] + square[5];
-        m = square.map(|entry| entry / trace);
+        m = square.map(|entry| entry * (1.0 / trace));
         if trace >= CONVERGED {
             break;
         }

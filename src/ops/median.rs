@@ -72,6 +72,9 @@ impl TileOp for Median {
 /// The position of `group` with the lower median angle. `angles` is memory to work in.
 fn median(tile: &Tile, group: Range<usize>, angles: &mut Vec<(f64, u32)>) -> usize {
     let Partition { members, turned, reference, .. } = &tile.cells;
+    if let [only] = members[group.clone()] {
+        return only as usize;
+    }
     angles.clear();
     angles.extend(group.clone().map(|at| {
         let i = members[at];
@@ -126,8 +129,8 @@ impl Center {
         let mut center = Center { count: 0, sum: [0; 3] };
         for p in positions {
             center.count += 1;
-            for axis in 0..3 {
-                center.sum[axis] += i128::from(p[axis]);
+            for (sum, v) in center.sum.iter_mut().zip(p) {
+                *sum += i128::from(v);
             }
         }
         center
@@ -136,9 +139,9 @@ impl Center {
     /// Exact squared distance of `p`, times n²: the upper and the lower 128 bits.
     fn distance2(&self, p: Position) -> (u128, u128) {
         let mut total = (0, 0);
-        for axis in 0..3 {
+        for (sum, v) in self.sum.iter().zip(p) {
             // Below 2^32 positions of 63 bits: an offset has less than 97.
-            let offset = (self.count * i128::from(p[axis]) - self.sum[axis]).unsigned_abs();
+            let offset = (self.count * i128::from(v) - sum).unsigned_abs();
             total = add(total, square(offset));
         }
         total

@@ -1,6 +1,6 @@
 //! Hand-made scans for the tests of `cells` and `median`, and both stages written as plainly as can
 //! be: recursive, on cloned lists, over the whole scan at once.
-#![allow(dead_code, reason = "each test uses its part")]
+#![allow(dead_code, clippy::unwrap_used, reason = "each test uses its part; tests may panic")]
 
 use pointmill::geom::angle::{MaxAngle, cosine, dominant_axis, is_turned, outer_sum};
 use pointmill::geom::lattice::Lattice;

@@ -97,6 +97,11 @@ impl<'a> Division<'a> {
     /// of equal ones the first, if the part is to be divided.
     fn survey(&self, part: &[u32], turned: &mut [bool]) -> Option<Extremes> {
         let normal = |i: u32| self.normals[i as usize];
+        if let ([only], [turned]) = (part, &mut *turned) {
+            // Half of all parts where cells are divided to the last; its own normal is the axis.
+            *turned = is_turned([0.0; 3], normal(*only));
+            return None;
+        }
         let axis = dominant_axis(outer_sum(part.iter().map(|&i| normal(i))));
         let mut smallest = (f64::NEG_INFINITY, 0);
         let mut largest = (f64::INFINITY, 0);
@@ -166,20 +171,18 @@ impl<'a> Division<'a> {
     /// Parts the members by the octants of the smallest octant of the initial cell that holds them.
     fn cut_in_eight(&mut self, start: usize, part: &mut [u32], depth: u32) {
         let positions = self.positions;
-        let bounds = Bounds::of(part.iter().map(|&i| positions[i as usize]));
-        let Some(middle) = middle(&bounds, self.rule.side) else { return };
+        let tight = Bounds::of(part.iter().map(|&i| positions[i as usize]));
+        let Some(middle) = middle(&tight, self.rule.side) else { return };
         let octant = |i: u32| {
             let p = positions[i as usize];
             (0..3).fold(0, |octant, axis| octant | usize::from(p[axis] >= middle[axis]) << axis)
         };
-        let mut ends = [0; 8];
-        part.iter().for_each(|&i| ends[octant(i)] += 1);
-        let mut starts = [0; 8];
-        for i in 1..8 {
-            starts[i] = ends[i - 1];
-            ends[i] += ends[i - 1];
+        let mut bounds = [0; 9];
+        part.iter().for_each(|&i| bounds[octant(i) + 1] += 1);
+        for i in 0..8 {
+            bounds[i + 1] += bounds[i];
         }
-        let mut next = starts;
+        let mut next = bounds;
         let spare = &mut self.spare[..part.len()];
         spare.copy_from_slice(part);
         for &mut i in spare {
@@ -187,12 +190,9 @@ impl<'a> Division<'a> {
             part[next[octant]] = i;
             next[octant] += 1;
         }
-        for i in (0..8).rev().filter(|&i| starts[i] < ends[i]) {
-            self.stack.push(Part {
-                start: start + starts[i],
-                end: start + ends[i],
-                depth: depth + 1,
-            });
+        for octant in bounds.windows(2).rev().filter(|octant| octant[0] < octant[1]) {
+            let (start, end) = (start + octant[0], start + octant[1]);
+            self.stack.push(Part { start, end, depth: depth + 1 });
         }
     }
 }

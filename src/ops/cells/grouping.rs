@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use super::corner;
 use crate::point::{Bounds, Position};
 use crate::tile::Cells as Partition;
 
@@ -27,20 +26,19 @@ impl Grouping<'_> {
         if self.side.count_ones() == 1 {
             return self.nodes(cells);
         }
-        let first = Bounds::of(self.positions[self.core.clone()].iter().copied());
-        let (lo, hi) = (corner(first.lo, self.side), corner(first.hi, self.side));
-        let bounds = Bounds { lo, hi: hi.map(|v| v.saturating_add(self.side - 1)) };
-        let cells_from_lo = |p: Position, axis: usize| {
-            p[axis].div_euclid(self.side) - lo[axis].div_euclid(self.side)
-        };
-        if (0..3).all(|axis| cells_from_lo(hi, axis) < PACKED_CELLS) {
-            self.sorted(cells, &bounds, |p| {
-                (0..3)
-                    .fold(0, |key, axis| key * PACKED_CELLS as u64 + cells_from_lo(p, axis) as u64)
-            })
+        let core = Bounds::of(self.positions[self.core.clone()].iter().copied());
+        let (lo, hi) = (self.cell(core.lo), self.cell(core.hi));
+        if (0..3).all(|axis| hi[axis] - lo[axis] < PACKED_CELLS) {
+            let packed = |key, (v, lo)| key * PACKED_CELLS + (v - lo);
+            self.sorted(cells, lo, hi, |cell| cell.into_iter().zip(lo).fold(0, packed))
         } else {
-            self.sorted(cells, &bounds, |p| corner(p, self.side))
+            self.sorted(cells, lo, hi, |cell| cell)
         }
+    }
+
+    /// Which cell along each axis, from world 0, a position is in.
+    fn cell(&self, p: Position) -> [i64; 3] {
+        p.map(|v| v.div_euclid(self.side))
     }
 
     /// Cells that are octree nodes follow one another in Morton order.
@@ -71,29 +69,47 @@ impl Grouping<'_> {
         crossing + self.close(cells)
     }
 
-    /// Other cells are found by sorting the positions of `bounds` by cell.
+    /// Other cells are scattered over Morton order in runs, which are brought together by sorting.
     fn sorted<K: Ord>(
         &self,
         cells: &mut Partition,
-        bounds: &Bounds,
-        key: impl Fn(Position) -> K,
+        lo: [i64; 3],
+        hi: [i64; 3],
+        key: impl Fn([i64; 3]) -> K,
     ) -> u64 {
-        let inside = |i: &usize| self.has_normal(*i) && bounds.contains(self.positions[*i]);
-        let mut keyed: Vec<(K, u32)> =
-            Vec::with_capacity((0..self.positions.len()).filter(inside).count());
-        keyed.extend(
-            (0..self.positions.len()).filter(inside).map(|i| (key(self.positions[i]), i as u32)),
-        );
-        keyed.sort_unstable();
-        cells.members.reserve_exact(keyed.len());
+        let mut runs = Vec::new();
+        self.runs(|cell, run| {
+            if (0..3).all(|axis| lo[axis] <= cell[axis] && cell[axis] <= hi[axis]) {
+                runs.push((key(cell), run.start as u32, run.end as u32));
+            }
+        });
+        runs.sort_unstable();
+        let length = |(_, start, end): &(K, u32, u32)| (end - start) as usize;
+        cells.members.reserve_exact(runs.iter().map(length).sum());
         let mut crossing = 0;
-        for (i, (cell, member)) in keyed.iter().enumerate() {
-            if i > 0 && keyed[i - 1].0 != *cell {
+        for (i, (cell, start, end)) in runs.iter().enumerate() {
+            if i > 0 && runs[i - 1].0 != *cell {
                 crossing += self.close(cells);
             }
-            cells.members.push(*member);
+            cells.members.extend((*start..*end).filter(|&i| self.has_normal(i as usize)));
         }
         crossing + self.close(cells)
+    }
+
+    /// Calls `each` for every run of positions that are in one cell.
+    fn runs(&self, mut each: impl FnMut([i64; 3], Range<usize>)) {
+        let mut start = 0;
+        while start < self.positions.len() {
+            let cell = self.cell(self.positions[start]);
+            let corner = cell.map(|v| v * self.side);
+            let same = |p: &Position| {
+                (0..3).all(|axis| p[axis].wrapping_sub(corner[axis]) as u64 <= self.side as u64 - 1)
+            };
+            let end =
+                start + 1 + self.positions[start + 1..].iter().take_while(|p| same(p)).count();
+            each(cell, start..end);
+            start = end;
+        }
     }
 
     /// Ends the group of the members since the last one, or drops them if none is in the core.
