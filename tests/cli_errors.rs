@@ -1,5 +1,7 @@
 //! The command as users meet it: help, exit codes, and where mistakes are told.
 
+#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
+
 use std::fs;
 use std::path::Path;
 

@@ -1,5 +1,7 @@
 //! Pipeline files: what is read, and how every mistake is told.
 
+#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
+
 use std::path::Path;
 
 use pointmill::pipeline::{
@@ -169,9 +171,6 @@ p.toml:3:1: `[run]` has no key `thraeds`
   3 | thraeds = 4
     | ^^^^^^^
     = did you mean `threads`? keys: lattice, memory, nonfinite, report, scratch, simd, threads, tile_points
-p.toml:6:8: `synth` needs `points`
-  6 | kind = \"synth\"
-    |        ^^^^^^^
 p.toml:7:9: `scene` cannot be `alps`
   7 | scene = \"alps\"
     |         ^^^^^^
@@ -204,9 +203,9 @@ p.toml:19:15: `names`: takes a text in quotes, not 7
 p.toml:21:3: a pipeline file has no `stages`
   21 | [[stages]]
      |   ^^^^^^
-     = did you mean `[[stage]]`? tables: [[stage]], [run]
+     = did you mean `stage`? tables: run, stage
 ";
-    assert_eq!(told(text), expected.replace("11 mistakes", "12 mistakes"));
+    assert_eq!(told(text), expected);
 }
 
 #[test]
@@ -367,7 +366,7 @@ fn keys_of_write_fit_its_format() {
         ("path = \"a.laz\"\nscale = [1, 0, 1]", "p.toml:13:13: `scale`: takes a number above 0"),
         ("path = \"a.laz\"\ndimensions = [\"NormalX\"]", "p.toml:13:14: `dimensions`: takes [] or"),
         ("path = \"a.laz\"\norder = \"random\"", "valid: canonical, input"),
-        ("format = \"las\"", "`write` needs `path`"),
+        ("format = \"las\"", "p.toml:11:8: `write` needs `path`"),
     ] {
         let told = told_of(keys);
         assert!(told.contains(expected), "{keys}: {told}");

@@ -5,11 +5,12 @@ use std::io::{self, ErrorKind, Write};
 
 use crate::{Error, Result};
 
-/// Prints a result and a line's end on stdout. A reader who has gone (`| head`) wants no more: that
+/// Prints a result and one line's end on stdout. A reader who has gone (`| head`) wants no more: that
 /// is no error.
 pub(super) fn result(text: impl Display) -> Result<()> {
+    let text = text.to_string();
     let mut stdout = io::stdout().lock();
-    match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
+    match writeln!(stdout, "{}", text.trim_end()).and_then(|()| stdout.flush()) {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::io("stdout", "write", e)),
         _ => Ok(()),
     }

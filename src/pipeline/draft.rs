@@ -64,7 +64,7 @@ pub(super) fn read(entries: Vec<Entry>, len: usize, registry: &Registry) -> Draf
                 format!("a pipeline file has no `{word}`"),
                 word,
                 "tables",
-                ["[run]", "[[stage]]"],
+                ["run", "stage"],
             )),
         }
     }

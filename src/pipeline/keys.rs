@@ -291,7 +291,8 @@ impl<'de> de::SeqAccess<'de> for &mut Items<'de> {
         seed: T,
     ) -> Result<Option<T::Value>, Fault> {
         let Some(node) = self.items.next() else { return Ok(None) };
-        seed.deserialize(Reader { node, unknown: self.unknown }).map(Some)
+        let item = seed.deserialize(Reader { node, unknown: self.unknown });
+        item.map(Some).map_err(|fault| fault.at(&node.place))
     }
 
     fn size_hint(&self) -> Option<usize> {

@@ -252,14 +252,29 @@ fn some_scale<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D:
         fn visit_seq<A: de::SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
             let mut scale = [0.0; 3];
             for (i, axis) in scale.iter_mut().enumerate() {
-                let length = |_| de::Error::invalid_length(i, &Scale);
-                let value: f64 = list.next_element()?.ok_or(()).map_err(length)?;
-                *axis = Scale.visit_f64(value)?[0];
+                let next: Option<Positive> = list.next_element()?;
+                *axis = next.ok_or_else(|| de::Error::invalid_length(i, &Scale))?.0;
             }
             Ok(scale)
         }
     }
     from.deserialize_any(Scale).map(Some)
+}
+
+/// A number above 0, refused at its own place.
+struct Positive(f64);
+
+impl<'de> Deserialize<'de> for Positive {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let number = f64::deserialize(from)?;
+        match number.is_finite() && number > 0.0 {
+            true => Ok(Positive(number)),
+            false => {
+                let found = de::Unexpected::Float(number);
+                Err(de::Error::invalid_value(found, &"a number above 0"))
+            }
+        }
+    }
 }
 
 fn all_or_none<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {

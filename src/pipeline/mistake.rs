@@ -140,12 +140,12 @@ pub(super) fn advice<S: AsRef<str>>(
     }
 }
 
-/// The valid word that a misspelt one was meant to be, if one is near: a third of its letters wrong
+/// The valid word that a misspelt one was meant to be, if one is near: two letters in five wrong
 /// at most, the first in the list among equals.
 fn nearest<'a>(word: &str, valid: &'a [String]) -> Option<&'a String> {
     let near = valid.iter().map(|v| (distance(word, v), v)).min_by_key(|(d, _)| *d)?;
     let letters = word.chars().count().max(near.1.chars().count());
-    (near.0 <= (letters / 3).max(1) && near.0 < letters).then_some(near.1)
+    (near.0 <= (2 * letters / 5).max(1) && near.0 < letters).then_some(near.1)
 }
 
 /// Letters to change, add, drop or swap with their neighbour until one word, its case aside, is the
