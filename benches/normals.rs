@@ -1,5 +1,7 @@
 //! Nanoseconds a normal, by method, on neighbourhoods of ten: `cargo bench --bench normals`.
 
+#![allow(clippy::print_stdout, reason = "figures are what it is for")]
+
 use std::hint::black_box;
 use std::time::Instant;
 

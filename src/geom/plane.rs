@@ -253,11 +253,6 @@ pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The vector product.
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
 /// The vector at length 1; none if it is 0 or not finite. Lengths from 1e-150 to 1e150 are told
 /// from 0.
 pub fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
