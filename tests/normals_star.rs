@@ -1,6 +1,8 @@
 //! The star of a point and the fit over it, against a library triangulation of the same
 //! neighbourhood and a least-squares fit in its rotated frame.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 mod normals_support;
 
 use normals_support::{Random, Vec3, angle, around, covariance, cross, dot, frame, jacobi};
@@ -228,6 +230,53 @@ fn of_neighbours_above_each_other_the_morton_first_counts() {
     let alone = star.normal(&with([7, 7])[..4], up).unwrap();
     assert_eq!(star.normal(&with([7, 2]), up).unwrap(), alone);
     assert_ne!(star.normal(&with([2, 7]), up).unwrap(), alone);
+}
+
+#[test]
+fn of_neighbours_in_one_direction_the_nearest_counts() {
+    let mut star = Star::default();
+    let up = [0.0, 0.0, 1.0];
+    // All directions, so that one is where counting directions begins; p inside or on the border.
+    for turn in 0..8 {
+        let turned = |x: i64, y: i64, z: i64| -> [i64; 3] {
+            let (mut x, mut y) = (x, y);
+            for _ in 0..turn % 4 {
+                (x, y) = (-y, x);
+            }
+            if turn >= 4 { [x - y, x + y, z] } else { [x, y, z] }
+        };
+        let rest = [turned(7, 5, 1), turned(-6, 7, 0), turned(-5, -8, 2)];
+        for rest in [&rest[..], &rest[..2]] {
+            let with = |more: &[[i64; 3]]| [more, rest].concat();
+            let (near, far) = (turned(0, -3, 1), turned(0, -30, -4));
+            let expected = star.normal(&with(&[near]), up);
+            assert!(expected.is_some() && expected != star.normal(&with(&[far]), up));
+            assert_eq!(star.normal(&with(&[near, far]), up), expected);
+            assert_eq!(star.normal(&with(&[far, near]), up), expected);
+        }
+    }
+}
+
+#[test]
+fn neighbours_in_the_direction_where_counting_begins_are_one_direction() {
+    // A tilted plane and neighbours far above it: rounding puts some of one direction at the
+    // beginning and some at the end.
+    let up = normalised([2.0, 1.0, 2.0]);
+    let at = |x: i64, y: i64, z: i64| -> [i64; 3] {
+        let axes = [[11, -2, -10], [-2, 14, -5], [2, 1, 2]];
+        std::array::from_fn(|i| x * axes[0][i] + y * axes[1][i] + z * axes[2][i])
+    };
+    let mut star = Star::default();
+    let rest = [at(7, 5, 1), at(-6, 7, 0), at(-5, -8, 2)];
+    for near in 1..30 {
+        for far in near + 1..31 {
+            let (near, far) = (at(0, -near, 301 * far), at(0, -far, 103 * near));
+            let expected = star.normal(&[&[near], &rest[..]].concat(), up).unwrap();
+            let both = [[near, far], [far, near]]
+                .map(|two| star.normal(&[&two, &rest[..]].concat(), up).unwrap());
+            assert!(both.iter().all(|n| angle(*n, expected) < 1e-15), "{near:?} {far:?}");
+        }
+    }
 }
 
 #[test]

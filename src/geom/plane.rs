@@ -9,8 +9,10 @@ pub type Symmetric = [f64; 6];
 
 /// Bits that scatter entries keep: two of them multiply within i128 with room for a difference.
 const ENTRY_BITS: u32 = 62;
-/// Newton steps for the isolated root; the start is within 0.015 and four steps reach 1e-16.
-const ROOT_STEPS: usize = 4;
+/// 2·cos(acos(r)/3) for r in [0, 1] to 1e-4: from there two Newton steps reach 1e-16.
+const ROOT_START: [f64; 4] = [1.732_132_66, 0.330_660_7, -0.081_382_39, 0.018_639_37];
+const ROOT_STEPS: usize = 2;
+const TWO_64: f64 = 18_446_744_073_709_551_616.0;
 
 /// The covariance of a position and its neighbours, from exact integer moments.
 ///
@@ -31,11 +33,13 @@ impl Covariance {
         let count = offsets.len() as u64 + 1;
         let widest = offsets.iter().flatten().fold(0, |all, v| all | v.unsigned_abs());
         let excess = (bits(widest) + bits(count)).saturating_sub(ENTRY_BITS);
-        let scatter = if excess == 0 {
-            scatter(count, offsets.iter().copied())
+        let scatter = if 2 * bits(widest) + bits(count) <= ENTRY_BITS {
+            scatter_small(offsets)
+        } else if excess == 0 {
+            scatter(offsets.iter().copied())
         } else {
             let rounded = |o: &[i64; 3]| o.map(|v| shift_rounded(i128::from(v), excess));
-            scatter(count, offsets.iter().map(rounded))
+            scatter(offsets.iter().map(rounded))
         };
         // No entry exceeds the largest on the diagonal.
         let largest = scatter[0].max(scatter[3]).max(scatter[5]);
@@ -56,7 +60,7 @@ impl Covariance {
     }
 
     /// The adjugate, up to a positive factor: what turns a first estimate of the normal into that
-    /// of the least-squares height function over it. Each entry is exact but for one rounding.
+    /// of the least-squares height function over it. Each entry is exact but for its rounding.
     pub fn adjugate(&self) -> Symmetric {
         let [xx, xy, xz, yy, yz, zz] = self.scatter.map(i128::from);
         [
@@ -72,23 +76,44 @@ impl Covariance {
 }
 
 /// n·Σxy − Σx·Σy of the offsets and 0; the caller sees to n·d < 2^62.
-fn scatter(count: u64, offsets: impl Iterator<Item = [i64; 3]>) -> [i128; 6] {
+fn scatter(offsets: impl Iterator<Item = [i64; 3]>) -> [i128; 6] {
+    let mut count = 1i128;
     let mut sum = [0i64; 3];
     let mut product = [0i128; 6];
     for o in offsets {
-        let [x, y, z] = o.map(i128::from);
+        count += 1;
+        let products = products(o.map(i128::from));
         for (total, v) in sum.iter_mut().zip(o) {
             *total += v;
         }
-        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
         for (total, v) in product.iter_mut().zip(products) {
             *total += v;
         }
     }
-    let n = i128::from(count);
-    let [x, y, z] = sum.map(i128::from);
-    let means = [x * x, x * y, x * z, y * y, y * z, z * z];
-    std::array::from_fn(|i| n * product[i] - means[i])
+    let means = products(sum.map(i128::from));
+    std::array::from_fn(|i| count * product[i] - means[i])
+}
+
+/// The same with shorter sums; the caller sees to n·d² < 2^62.
+fn scatter_small(offsets: &[[i64; 3]]) -> [i128; 6] {
+    let mut sum = [0i64; 3];
+    let mut product = [0i64; 6];
+    for &o in offsets {
+        let products = products(o);
+        for (total, v) in sum.iter_mut().zip(o) {
+            *total += v;
+        }
+        for (total, v) in product.iter_mut().zip(products) {
+            *total += v;
+        }
+    }
+    let means = products(sum.map(i128::from));
+    let count = offsets.len() as i128 + 1;
+    std::array::from_fn(|i| count * i128::from(product[i]) - means[i])
+}
+
+fn products<T: Copy + std::ops::Mul<Output = T>>([x, y, z]: [T; 3]) -> [T; 6] {
+    [x * x, x * y, x * z, y * y, y * z, z * z]
 }
 
 /// How many bits `v` takes.
@@ -101,9 +126,12 @@ fn shift_rounded(v: i128, shift: u32) -> i64 {
     (((v >> (shift - 1)) + 1) >> 1) as i64
 }
 
-/// The nearest f64; the short way for the usual small values.
+/// The nearest f64 within i64, and within two roundings of it beyond.
 pub(super) fn to_f64(v: i128) -> f64 {
-    i64::try_from(v).map_or_else(|_| v as f64, |v| v as f64)
+    match i64::try_from(v) {
+        Ok(v) => v as f64,
+        Err(_) => (v >> 64) as i64 as f64 * TWO_64 + v as u64 as f64,
+    }
 }
 
 /// True if 0 and all offsets lie on one line; exact.
@@ -137,7 +165,8 @@ pub fn smallest(matrix: Symmetric) -> (f64, [f64; 3]) {
     }
     // Scaling by a power of two is exact: the exponent field of `size` alone.
     let unit = f64::from_bits(size.to_bits() & 0x7ff0_0000_0000_0000);
-    let [xx, xy, xz, yy, yz, zz] = matrix.map(|v| v / unit);
+    let scale = 1.0 / unit;
+    let [xx, xy, xz, yy, yz, zz] = matrix.map(|v| v * scale);
     let mean = (xx + yy + zz) / 3.0;
     let (dx, dy, dz) = (xx - mean, yy - mean, zz - mean);
     let squares = dx * dx + dy * dy + dz * dz + 2.0 * (xy * xy + xz * xz + yz * yz);
@@ -146,7 +175,8 @@ pub fn smallest(matrix: Symmetric) -> (f64, [f64; 3]) {
         return (mean * unit, ANY);
     }
     // The traceless part over `radius`: its eigenvalues are the roots of t³ − 3t − det.
-    let m = [dx, xy, xz, dy, yz, dz].map(|v| v / radius);
+    let scale = 1.0 / radius;
+    let m = [dx, xy, xz, dy, yz, dz].map(|v| v * scale);
     let (root, vector) = isolated(&m);
     let (root, vector) = if root < 0.0 { (root, vector) } else { smallest_across(&m, vector) };
     ((mean + radius * root) * unit, vector)
@@ -164,8 +194,8 @@ fn isolated(m: &Symmetric) -> (f64, [f64; 3]) {
     let determinant =
         xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
     let d = determinant.abs().min(2.0);
-    const SQRT_3: f64 = 1.732_050_807_568_877_2;
-    let mut t = SQRT_3 + (2.0 - SQRT_3) * (0.5 * d);
+    let r = 0.5 * d;
+    let mut t = ROOT_START[0] + r * (ROOT_START[1] + r * (ROOT_START[2] + r * ROOT_START[3]));
     for _ in 0..ROOT_STEPS {
         let square = t * t;
         t -= (t * (square - 3.0) - d) / (3.0 * square - 3.0);
@@ -198,22 +228,14 @@ fn smallest_across(m: &Symmetric, axis: [f64; 3]) -> (f64, [f64; 3]) {
     (0.5 * (a + d) - radius, vector)
 }
 
-/// Two unit vectors that make a right-handed frame with the unit vector `axis` as third. Axes of
-/// the coordinate system give axes.
-pub(super) fn across(axis: [f64; 3]) -> ([f64; 3], [f64; 3]) {
-    let size = axis.map(f64::abs);
-    let least = if size[0] <= size[1] && size[0] <= size[2] {
-        0
-    } else if size[1] <= size[2] {
-        1
-    } else {
-        2
-    };
-    let mut u = axis.map(|v| -v * axis[least]);
-    u[least] += 1.0;
-    let length = dot(u, u).sqrt();
-    let u = u.map(|v| v / length);
-    (u, cross(axis, u))
+/// Two unit vectors that make a right-handed frame with the unit vector `axis` as third; no root, no
+/// case but the sign of z (Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6, 2017). Axes
+/// of the coordinate system give axes.
+pub(super) fn across([x, y, z]: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+    let sign = 1.0f64.copysign(z);
+    let a = -1.0 / (sign + z);
+    let b = x * y * a;
+    ([1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y])
 }
 
 /// `matrix` times `v`.
@@ -229,11 +251,6 @@ pub fn product(matrix: &Symmetric, v: [f64; 3]) -> [f64; 3] {
 /// The scalar product.
 pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// The vector product.
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// The vector at length 1; none if it is 0 or not finite. Lengths from 1e-150 to 1e150 are told

@@ -9,6 +9,11 @@ use super::plane::{across, dot, to_f64, unit};
 /// straight above each other, scan edges that are straight lines) come out as a few 2^-53. They are
 /// taken for what they are up to 2^-40; nothing measured lies between.
 const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
+/// The bits of a key that hold a neighbour's place; those above hold its direction, to 2^-46 of a
+/// turn: nearer ones count as equal.
+const PLACE: u64 = (1 << 18) - 1;
+/// Neighbours up to which sorting by counting is faster.
+const FEW: usize = 24;
 
 /// Finds first estimates of normals from the triangles around a point; holds scratch memory only.
 ///
@@ -18,6 +23,10 @@ const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
 /// ends with a polygon around p whatever the rounding does.
 #[derive(Debug, Default)]
 pub struct Star {
+    /// In Morton order.
+    projected: Vec<Inverted>,
+    /// Direction, then place in `projected`.
+    keys: Vec<u64>,
     /// By direction around p, then the hull's vertices.
     points: Vec<Inverted>,
 }
@@ -29,10 +38,8 @@ struct Inverted {
     y: f64,
     /// |x| + |y|
     size: f64,
-    /// Grows with the direction, counter-clockwise; 0 to 4.
-    direction: f64,
     /// Place among the offsets: Morton order.
-    rank: usize,
+    rank: u32,
 }
 
 impl Star {
@@ -40,13 +47,12 @@ impl Star {
     /// `normal`, the unit normal of the plane to project to. None if there is no triangle.
     ///
     /// `offsets` are the neighbours relative to p, in steps, in Morton order, none of them 0 and all
-    /// smaller than 2^63. Normals are summed counter-clockwise from the vertex of smallest rank.
-    /// Points cocircular with a triangle are left out, as are triangles that the projection turns
-    /// into lines.
+    /// smaller than 2^63; no more than the first 2^18 count. Normals are summed counter-clockwise
+    /// from the vertex of smallest rank. Points cocircular with a triangle are left out, as are
+    /// triangles that the projection turns into lines.
     pub fn normal(&mut self, offsets: &[[i64; 3]], normal: [f64; 3]) -> Option<[f64; 3]> {
         self.project(offsets, normal);
-        self.points
-            .sort_unstable_by(|a, b| a.direction.total_cmp(&b.direction).then(a.rank.cmp(&b.rank)));
+        self.sort_by_direction();
         self.keep_nearest_per_direction();
         let closed = self.hull();
         self.mean_normal(offsets, normal, closed)
@@ -55,19 +61,40 @@ impl Star {
     /// Projects and inverts all neighbours that are not straight above or below p.
     fn project(&mut self, offsets: &[[i64; 3]], normal: [f64; 3]) {
         let (u, v) = across(normal);
-        self.points.clear();
-        for (rank, offset) in offsets.iter().enumerate() {
+        self.projected.clear();
+        self.keys.clear();
+        for (rank, offset) in (0..=PLACE as u32).zip(offsets) {
             let o = offset.map(|c| c as f64);
             let (x, y) = (dot(o, u), dot(o, v));
             let square = x * x + y * y;
             if square <= ROUNDING * ROUNDING * dot(o, o) {
                 continue;
             }
-            let (x, y) = (x / square, y / square);
-            let size = x.abs() + y.abs();
-            let slope = y / size;
-            let direction = if x >= 0.0 { 1.0 + slope } else { 3.0 - slope };
-            self.points.push(Inverted { x, y, size, direction, rank });
+            // Grows with the direction, counter-clockwise: 4 to 8, so that its exponent is the same
+            // for all (8 itself wraps round to 4, the same direction).
+            let slope = y / (x.abs() + y.abs());
+            let direction = if x >= 0.0 { 5.0 + slope } else { 7.0 - slope };
+            self.keys.push(direction.to_bits() << 12 & !PLACE | self.projected.len() as u64);
+            let inverse = 1.0 / square;
+            let (x, y) = (x * inverse, y * inverse);
+            self.projected.push(Inverted { x, y, size: x.abs() + y.abs(), rank });
+        }
+    }
+
+    /// Brings the neighbours into counter-clockwise order, those of one direction in Morton order.
+    fn sort_by_direction(&mut self) {
+        self.points.clear();
+        if self.keys.len() > FEW {
+            self.keys.sort_unstable();
+            let in_order = self.keys.iter().map(|key| self.projected[(key & PLACE) as usize]);
+            self.points.extend(in_order);
+            return;
+        }
+        // Counting the smaller ones has no branch to mispredict.
+        self.points.extend_from_slice(&self.projected);
+        for (key, point) in self.keys.iter().zip(&self.projected) {
+            let place = self.keys.iter().map(|other| usize::from(other < key)).sum::<usize>();
+            self.points[place] = *point;
         }
     }
 
@@ -148,8 +175,8 @@ impl Star {
                 continue;
             }
             let next = if i + 1 == count { 0 } else { i + 1 };
-            let (a, b) = (self.points[i].rank, self.points[next].rank);
-            let area = exact_cross(offsets[a], offsets[b]);
+            let [a, b] = [i, next].map(|v| offsets[self.points[v].rank as usize]);
+            let area = exact_cross(a, b);
             let length = dot(area, area).sqrt();
             if dot(area, normal) > ROUNDING * length {
                 for axis in 0..3 {

@@ -1,5 +1,6 @@
 //! What the tests of normals share: seeded numbers and solvers written another way.
 #![allow(dead_code, reason = "each test file uses its part")]
+#![allow(clippy::needless_range_loop, reason = "matrices read best by index")]
 
 pub type Vec3 = [f64; 3];
 
