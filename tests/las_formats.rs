@@ -1,5 +1,7 @@
 //! Every point format, plain and compressed, with and without extra bytes: what goes in comes out.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
+
 mod las_support;
 
 use std::sync::Arc;
