@@ -1,5 +1,7 @@
 //! Every point format, plain and compressed, with and without extra bytes: what goes in comes out.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
+
 mod las_support;
 
 use std::sync::Arc;
@@ -161,4 +163,18 @@ fn normals_that_nobody_computed_are_refused() {
     batch.extend(&[0; 20]);
     let error = sink.encoder().encode(&batch).unwrap_err();
     assert!(error.to_string().contains("no stage computes them"), "{error}");
+}
+
+#[test]
+fn wkt_is_carried_and_another_crs_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.las");
+    let schema = Arc::new(layout(7, &[], [0.01; 3], [0.0; 3]));
+    for (crs, carried) in [("PROJCS[\"Lambert-93\"]", true), ("EPSG:2154", false)] {
+        let metadata = fresh(&schema, Some(crs));
+        let summary = write(&path, LAS, &schema, &metadata, &[]).unwrap();
+        let about = pointmill::io::las::describe(&path).unwrap();
+        assert_eq!(about.crs.is_some(), carried);
+        assert_eq!(summary.notes.is_empty(), carried, "{:?}", summary.notes);
+    }
 }

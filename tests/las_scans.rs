@@ -1,5 +1,7 @@
 //! Real files: all that can be read is read and survives LAS → LAZ → LAS; damage is told.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
+
 mod las_support;
 
 use las_support::{BROKEN, LAS, LAZ, manifest, read, scans, write};
@@ -106,9 +108,34 @@ fn every_scan_describes_itself() {
         serde_json::to_string(&about).unwrap();
     }
     let copc = describe(&folder.join("laspy/simple.copc.laz")).unwrap();
-    assert!(copc.warnings.iter().any(|w| w.contains("COPC")));
+    assert!(copc.warnings.iter().any(|w| w.contains("copc")));
     let wkt = describe(&folder.join("laspy/1_4_w_evlr.laz")).unwrap();
     assert!(wkt.crs.is_some() && wkt.evlrs.len() == 1);
     let keys = describe(&folder.join("pdal/las/test_utm16.las")).unwrap();
     assert_eq!(keys.crs.as_deref(), Some("EPSG:26916"));
+}
+
+#[test]
+fn plain_and_compressed_files_of_the_same_points_decode_alike() {
+    let Some(folder) = scans() else { return };
+    let pairs = [
+        "laz-rs/point10",
+        "laz-rs/point-color",
+        "laz-rs/point-time",
+        "laz-rs/point-time-color",
+        "laz-rs/extra-bytes",
+        "laz-rs/point-version-1-point-wise",
+        "loaders.gl/las/pdrf4-1.3",
+        "loaders.gl/las/pdrf7-v4-1.4",
+        "laspy/1_4_w_evlr",
+        "pasture/10_points_format_5",
+        "pasture/10_points_format_8",
+    ];
+    for name in pairs {
+        let [plain, packed] = ["las", "laz"].map(|extension| {
+            let path = folder.join(format!("{name}.{extension}"));
+            read(&*open(&[path]).unwrap(), usize::MAX / 4096).unwrap()
+        });
+        assert!(!plain.is_empty() && plain == packed, "{name}");
+    }
 }

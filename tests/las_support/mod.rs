@@ -1,5 +1,6 @@
 //! What the tests of LAS share: whole files in and out, by the roles that a run uses.
 #![allow(dead_code, reason = "each test file uses a part of it")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

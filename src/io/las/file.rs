@@ -118,11 +118,6 @@ impl Window {
         self.behind - (self.buffer.len() - self.next) as u64
     }
 
-    /// Bytes left before the end of the stretch.
-    pub fn left(&self) -> u64 {
-        self.end.saturating_sub(self.position())
-    }
-
     fn jump(&mut self, to: u64) {
         let first = self.behind - self.buffer.len() as u64;
         if (first..self.behind).contains(&to) && self.behind <= self.end {

@@ -1,5 +1,6 @@
 //! One LAS or LAZ file as its header says it is, proven against its length.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::chunks::Chunks;
@@ -15,8 +16,11 @@ use crate::{Error, Result};
 
 /// User and number of the record that names the extra bytes.
 pub const EXTRA_BYTES: (&str, u16) = ("LASF_Spec", 4);
-/// User of the records of a COPC index.
-const COPC: &str = "copc";
+/// True for records that index the points of one file by their order: COPC's, and the LAX index of
+/// LAStools. Elsewhere they would point at the wrong points.
+fn is_index(user: &str, record: u16) -> bool {
+    user == "copc" || (user == "LAStools" && record == 30)
+}
 
 /// How the points are stored.
 #[derive(Debug, Clone)]
@@ -57,9 +61,13 @@ impl Input {
         let mut warnings: Vec<String> = warning.into_iter().collect();
         let evlrs = read_evlrs(&file, &header)?;
         let storage = storage(&file, &header, &vlrs, &mut warnings)?;
-        if vlrs.iter().any(|v| v.user() == COPC) {
+        let named = vlrs.iter().map(|v| (v.user(), v.record()));
+        let named = named.chain(evlrs.iter().map(|v| (v.user(), v.record())));
+        let indexes: BTreeSet<String> =
+            named.filter(|(user, record)| is_index(user, *record)).map(|(user, _)| user).collect();
+        for user in indexes {
             warnings.push(format!(
-                "{}: outputs do not carry the COPC index, which would be wrong there",
+                "{}: outputs do not carry the spatial index ({user}), which would be wrong there",
                 path.display()
             ));
         }
@@ -115,13 +123,14 @@ impl Input {
 
     /// The records that outputs carry: not those that describe how this file stores its points.
     pub fn carried_vlrs(&self) -> Vec<Vlr> {
-        let own = |v: &&Vlr| !v.is(LASZIP.0, LASZIP.1) && v.user() != COPC;
+        let own = |v: &&Vlr| !v.is(LASZIP.0, LASZIP.1) && !is_index(&v.user(), v.record());
         self.vlrs.iter().filter(own).cloned().collect()
     }
 
     /// The extended records that outputs carry.
     pub fn carried_evlrs(&self) -> Vec<Evlr> {
-        self.evlrs.iter().filter(|v| v.user() != COPC).cloned().collect()
+        let own = |v: &&Evlr| !is_index(&v.user(), v.record());
+        self.evlrs.iter().filter(own).cloned().collect()
     }
 
     /// The coordinate reference system as text.

@@ -151,7 +151,7 @@ impl LazPart {
         let known = self.in_a_row.is_none() && chunk.whole;
         let at = self.decoder.get().position();
         if known && self.compression.compressor == Compressor::Chunked && at != chunk.end {
-            return Err(self.damaged(chunk, "its points end before its bytes"));
+            return Err(self.damaged(chunk, "the header's points end before its bytes"));
         }
         Ok(())
     }

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use laz::laszip::{ChunkTable, ChunkTableEntry};
 use laz::{LazVlr, LazVlrBuilder};
 
+use super::crs;
 use super::encode::{LasEncoder, Normals};
 use super::extra::{Descriptor, with_normals};
 use super::format::record_size;
@@ -53,10 +54,14 @@ pub fn create(
         return Err(Error::internal("records are to be converted to a LAS layout first"));
     };
     let carried = metadata.native.as_ref().and_then(|n| n.downcast_ref::<Native>());
+    let mut notes = Vec::new();
     let mut native = match carried.filter(|native| native.fits(schema)) {
         Some(native) => native.clone(),
         None => Native::fresh(schema, metadata.crs.as_deref()),
     };
+    if let (Some(crs), None) = (&metadata.crs, crs::text(&native.vlrs, &native.evlrs)?) {
+        notes.push(format!("the CRS is not carried, for LAS takes WKT of 64 KiB at most: {crs}"));
+    }
     if let Some(axes) = schema.coordinates() {
         native.header.put_floats(at::SCALE, axes.map(|d| d.scale));
         native.header.put_floats(at::OFFSET, axes.map(|d| d.origin));
@@ -78,7 +83,7 @@ pub fn create(
     }
     native.header.put(at::FORMAT, &[format_byte]);
     let encoder = Arc::new(LasEncoder::new(format, schema, normals, compression));
-    Ok(Box::new(LasSink::begin(staged, native, encoder)?))
+    Ok(Box::new(LasSink::begin(staged, native, encoder, notes)?))
 }
 
 fn too_long(what: &str, format: u8) -> Error {
@@ -118,10 +123,16 @@ struct LasSink {
     returns: [u64; 15],
     lo: [i64; 3],
     hi: [i64; 3],
+    notes: Vec<String>,
 }
 
 impl LasSink {
-    fn begin(path: &Path, mut native: Native, encoder: Arc<LasEncoder>) -> Result<Self> {
+    fn begin(
+        path: &Path,
+        mut native: Native,
+        encoder: Arc<LasEncoder>,
+        notes: Vec<String>,
+    ) -> Result<Self> {
         let records: usize = native.vlrs.iter().map(Vlr::len).sum();
         let start = native.header.bytes().len() + records + native.gap.len();
         let (Ok(start), Ok(vlrs)) = (u32::try_from(start), u32::try_from(native.vlrs.len())) else {
@@ -142,6 +153,7 @@ impl LasSink {
             returns: [0; 15],
             lo: [i64::MAX; 3],
             hi: [i64::MIN; 3],
+            notes,
         };
         let mut head = sink.native.header.bytes().to_vec();
         head.extend(sink.native.vlrs.iter().flat_map(Vlr::bytes));
@@ -259,6 +271,8 @@ impl Sink for LasSink {
         for (sum, count) in self.returns.iter_mut().zip(chunk.returns) {
             *sum += count;
         }
+        // Refuses a count that the version cannot say as soon as it is reached.
+        self.native.header.put_counts(self.points, &self.returns)?;
         for axis in 0..3 {
             self.lo[axis] = self.lo[axis].min(chunk.lo[axis]);
             self.hi[axis] = self.hi[axis].max(chunk.hi[axis]);
@@ -275,6 +289,6 @@ impl Sink for LasSink {
         let header = self.native.header.bytes().to_vec();
         self.rewrite(0, &header)?;
         self.file.sync_all().map_err(|e| Error::io(&self.path, "write it to disk", e))?;
-        Ok(SinkSummary { points: self.points, bytes: self.at, notes: Vec::new() })
+        Ok(SinkSummary { points: self.points, bytes: self.at, notes: self.notes })
     }
 }
