@@ -1,4 +1,5 @@
 //! PLY files of other programs, and what becomes of them when they are cut short or damaged.
+#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
 
 mod ply_support;
 
@@ -133,9 +134,10 @@ proptest! {
         which in 0..2usize,
         damage in prop::collection::vec((any::<prop::sample::Index>(), 0..6u8, any::<u8>()), 1..6),
     ) {
-        const WORDS: [&str; 12] = [
+        const WORDS: [&str; 16] = [
             "18446744073709551615", "4294967295", "-1", "list ", "vertex", "\n", "\r", "double ",
             "element vertex 99999999999\n", "property list uint double x\n", "nan", "end_header\n",
+            "comment crs: ", "comment crs+ ", "\ncomment dimension x: ", "comment .",
         ];
         let mut bytes = samples().swap_remove(which);
         for (at, how, with) in damage {
@@ -165,6 +167,9 @@ proptest! {
                 let again = read(&out, 64).unwrap();
                 prop_assert_eq!(again.2.len(), all.len());
                 prop_assert_eq!(&again.0.dimensions, &schema.dimensions);
+                let comments = metadata.comments.iter().map(|c| c.replace('\r', " "));
+                prop_assert_eq!(again.1.comments, comments.collect::<Vec<_>>());
+                prop_assert_eq!(again.1.crs, metadata.crs.map(|crs| crs.replace('\r', " ")));
             }
             Err(error) => prop_assert_eq!(error.kind(), ErrorKind::Data, "{:?}", error),
         }

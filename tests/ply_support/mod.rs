@@ -1,4 +1,5 @@
 //! What the PLY tests share: files from bytes, all records of a source, a sink run to its end.
+#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use std::path::{Path, PathBuf};

@@ -4,8 +4,8 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
+use super::file::PlyFile;
 use super::header::{shown, type_name};
-use super::source::PlyFile;
 use super::text;
 use crate::point::{PointBatch, Scalar, Schema};
 use crate::stage::Part;
@@ -40,7 +40,7 @@ impl<'a> AsciiPart<'a> {
     }
 
     pub fn new(handle: File, file: &'a PlyFile, schema: &'a Schema, source: u32) -> Self {
-        let properties = &file.header.elements[file.vertex].properties;
+        let properties = file.properties();
         AsciiPart {
             path: &file.path,
             lines: Lines {

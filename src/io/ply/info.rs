@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::file::open;
 use super::header::{Encoding, Header, Kind};
-use super::source::open;
 use crate::Result;
 
 /// What the header of a PLY file says.

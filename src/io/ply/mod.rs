@@ -5,6 +5,7 @@
 //! formats do not share is kept as it is. Format: Greg Turk, "The PLY Polygon File Format", 1994.
 
 mod ascii;
+mod file;
 mod header;
 mod info;
 mod names;

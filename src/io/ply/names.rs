@@ -131,12 +131,18 @@ pub(super) fn comment(property: &str, dimension: &str) -> Option<String> {
 
 /// Property and dimension in a comment of ours.
 pub(super) fn read_comment(comment: &str) -> Option<(&str, &str)> {
-    let (property, dimension) = comment.strip_prefix(PREFIX)?.split_once(": ")?;
-    let one_word = !property.is_empty() && !property.contains(char::is_whitespace);
+    let property = property_told(comment)?;
+    let (_, dimension) = comment.split_once(": ")?;
     let one_line = !dimension.is_empty()
         && dimension.trim() == dimension
         && !dimension.contains(char::is_control);
-    (one_word && one_line).then_some((property, dimension))
+    one_line.then_some((property, dimension))
+}
+
+/// The property that a comment in the form of ours speaks of, whether or not it names a dimension.
+pub(super) fn property_told(comment: &str) -> Option<&str> {
+    let (property, _) = comment.strip_prefix(PREFIX)?.split_once(": ")?;
+    (!property.is_empty() && !property.contains(char::is_whitespace)).then_some(property)
 }
 
 #[cfg(test)]

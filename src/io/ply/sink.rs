@@ -6,8 +6,9 @@ use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::file::open;
 use super::header::{Element, Encoding, Kind, Property};
-use super::source::{Native, Rest, open};
+use super::source::{Native, Rest};
 use super::{CRS, CRS_MORE, PlyOptions, names, padding, text};
 use crate::io::convert::{Projection, ply_schema};
 use crate::point::names::NORMAL;
@@ -47,8 +48,11 @@ struct Plan {
 
 /// The header, but for the count of vertices.
 struct Headings {
-    before: String,
+    /// To the end of the coordinate reference system, which the padding ends.
+    start: String,
     comments: String,
+    /// Elements before the vertices.
+    before: String,
     vertex: Element,
     after: String,
 }
@@ -57,9 +61,9 @@ impl Headings {
     /// Always of one length: the padding takes what the count leaves.
     fn text(&self, points: u64) -> String {
         let vertex = Element { count: points, ..self.vertex.clone() };
-        let Headings { before, comments, after, .. } = self;
+        let Headings { start, comments, before, after, .. } = self;
         let (padding, vertex) = (padding(points), vertex.lines());
-        format!("{comments}comment {padding}\n{before}{vertex}{after}end_header\n")
+        format!("{start}comment {padding}\n{comments}{before}{vertex}{after}end_header\n")
     }
 }
 
@@ -135,13 +139,17 @@ fn carried(
         .before
         .iter()
         .chain(&rest.after)
+        .filter(|e| e.count > 0)
         .map(|e| format!("{} of `{}`", e.count, e.name))
         .collect();
-    let elements = elements.join(", ");
-    if kept {
-        return (Some(native.clone()), vec![format!("{elements} are carried as they are")]);
+    let note = |fate: &str| match elements.len() {
+        0 => Vec::new(),
+        _ => vec![format!("{} are {fate}", elements.join(", "))],
+    };
+    match kept {
+        true => (Some(native.clone()), note("carried as they are")),
+        false => (None, note("dropped: the encoding changes")),
     }
-    (None, vec![format!("{elements} are dropped: the encoding changes")])
 }
 
 impl Plan {
@@ -237,23 +245,21 @@ fn headings(
         let (_, property) = native?.properties.iter().find(|(d, _)| d == name)?;
         Some(property.clone())
     });
-    let mut comments = format!("ply\nformat {} 1.0\n", plan.encoding.word());
-    let mut line = |keyword: &str, text: &str| {
-        // A line end within a text would begin a line of its own.
-        for text in text.split(['\n', '\r']) {
-            comments += &format!("{keyword} {text}\n");
-        }
-    };
-    metadata.comments.iter().for_each(|comment| line("comment", comment));
-    native.iter().flat_map(|n| &n.obj_info).for_each(|info| line("obj_info", info));
+    // A line end within a text would begin a line of its own.
+    let line =
+        |keyword: &str, text: &str| format!("{keyword} {}\n", text.replace(['\n', '\r'], " "));
+    let mut start = format!("ply\nformat {} 1.0\n", plan.encoding.word());
     for (n, piece) in metadata.crs.iter().flat_map(|crs| pieces(crs)).enumerate() {
-        line("comment", &format!("{}{piece}", if n == 0 { CRS } else { CRS_MORE }));
+        start += &line("comment", &format!("{}{piece}", if n == 0 { CRS } else { CRS_MORE }));
     }
-    for (property, dimension) in properties.iter().zip(&dimensions) {
-        if let Some(comment) = names::comment(property, dimension) {
-            line("comment", &comment);
-        }
-    }
+    let mut comments: String = properties
+        .iter()
+        .zip(&dimensions)
+        .filter_map(|(property, dimension)| names::comment(property, dimension))
+        .map(|comment| line("comment", &comment))
+        .collect();
+    comments.extend(metadata.comments.iter().map(|comment| line("comment", comment)));
+    comments.extend(native.iter().flat_map(|n| &n.obj_info).map(|info| line("obj_info", info)));
     let lines = |elements: &[Element]| elements.iter().map(Element::lines).collect::<String>();
     let rest: Option<&Rest> = rest.and_then(|native| native.rest.as_ref());
     let properties = properties
@@ -265,6 +271,7 @@ fn headings(
         before: rest.map(|r| lines(&r.before)).unwrap_or_default(),
         after: rest.map(|r| lines(&r.after)).unwrap_or_default(),
         vertex: Element { name: "vertex".into(), count: 0, properties },
+        start,
         comments,
     }
 }
@@ -357,8 +364,9 @@ mod tests {
     fn a_header_has_one_length_for_every_count() {
         let vertex = Element { name: "vertex".into(), count: 0, properties: Vec::new() };
         let header = Headings {
+            start: "ply\n".into(),
+            comments: String::new(),
             before: String::new(),
-            comments: "ply\n".into(),
             vertex,
             after: String::new(),
         };

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::ascii::AsciiPart;
-use super::header::{Element, Encoding, Header, Kind, Property, shown};
-use super::{names, walk};
+use super::file::{PlyFile, open};
+use super::header::{Element, Encoding, Kind, shown};
+use super::names;
 use crate::point::{Dimension, Layout, Metadata, PointBatch, Schema};
 use crate::stage::{Part, Source};
 use crate::{Error, Result};
@@ -35,122 +36,6 @@ pub(super) struct Rest {
     /// Byte of the first element, of the first vertex, behind the last vertex, and of the file's end.
     pub cuts: [u64; 4],
     pub points: u64,
-}
-
-/// One file, its header read.
-pub(super) struct PlyFile {
-    pub path: PathBuf,
-    pub header: Header,
-    pub points: u64,
-    pub length: u64,
-    /// Byte of the first vertex in a binary file, of the first element in a text file.
-    pub body: u64,
-    /// Lines of text before the first vertex line, behind the header.
-    pub skipped_lines: u64,
-    /// Place of `vertex` among the elements.
-    pub vertex: usize,
-}
-
-impl PlyFile {
-    fn open(path: &Path) -> Result<PlyFile> {
-        let (file, length) = open(path)?;
-        let header = Header::read(&file, path, length)?;
-        let Some(vertex) = header.vertex() else {
-            let elements: Vec<String> =
-                header.elements.iter().map(|e| format!("`{}`", shown(&e.name))).collect();
-            let found = match elements.len() {
-                0 => "no element at all".to_owned(),
-                _ => elements.join(", "),
-            };
-            return Err(Error::data(path, format!("no element `vertex`: the file has {found}")));
-        };
-        let element = &header.elements[vertex];
-        check(path, element)?;
-        let before = &header.elements[..vertex];
-        let (body, skipped_lines) = match header.encoding {
-            Encoding::Ascii => (header.body, text_lines(before)),
-            encoding => (walk::past(&file, path, before, header.body, length, encoding)?, 0),
-        };
-        let file = PlyFile {
-            path: path.to_owned(),
-            points: element.count,
-            length,
-            body,
-            skipped_lines,
-            vertex,
-            header,
-        };
-        file.bound()?;
-        Ok(file)
-    }
-
-    fn properties(&self) -> &[Property] {
-        &self.header.elements[self.vertex].properties
-    }
-
-    /// Refuses a count of vertices that the file is too short for.
-    fn bound(&self) -> Result<()> {
-        let room = self.length.saturating_sub(self.body);
-        let holds = match self.header.elements[self.vertex].size() {
-            Some(size) if self.header.encoding != Encoding::Ascii => room / size.max(1),
-            // A value takes a digit and a separator, which the last may lack.
-            _ => (room + 1) / (2 * self.properties().len().max(1) as u64),
-        };
-        if self.points <= holds {
-            return Ok(());
-        }
-        Err(Error::data(
-            &self.path,
-            format!(
-                "the header claims {} vertices, the file ends after {holds} at most",
-                self.points
-            ),
-        )
-        .at_byte(self.length)
-        .help("the file is cut short, or its header is wrong"))
-    }
-}
-
-/// Opens a regular file for reading; its length in bytes.
-pub(super) fn open(path: &Path) -> Result<(File, u64)> {
-    let file = File::open(path).map_err(|cause| Error::io(path, "open", cause))?;
-    let facts = file.metadata().map_err(|cause| Error::io(path, "read its length", cause))?;
-    if !facts.is_file() {
-        return Err(Error::data(path, "not a regular file"));
-    }
-    Ok((file, facts.len()))
-}
-
-/// Lines that `elements` take in a text file. One without properties takes none.
-fn text_lines(elements: &[Element]) -> u64 {
-    elements
-        .iter()
-        .filter(|e| !e.properties.is_empty())
-        .fold(0, |lines, e| lines.saturating_add(e.count))
-}
-
-/// Refuses a vertex element that has lists or lacks a coordinate.
-fn check(path: &Path, vertex: &Element) -> Result<()> {
-    if let Some(list) = vertex.properties.iter().find(|p| matches!(p.kind, Kind::List { .. })) {
-        return Err(Error::data(
-            path,
-            format!(
-                "element `vertex` has a list, `{}`: vertices of varying size are not read",
-                shown(&list.name)
-            ),
-        ));
-    }
-    let missing: Vec<&str> = ["x", "y", "z"]
-        .into_iter()
-        .filter(|axis| {
-            let dimension = names::dimension_of(axis);
-            !vertex.properties.iter().any(|p| p.name == *axis || p.name == dimension)
-        })
-        .collect();
-    if missing.is_empty() {
-        return Ok(());
-    }
-    Err(Error::data(path, format!("element `vertex` has no property {}", missing.join(", "))))
 }
 
 /// The vertices of one or several PLY files.
@@ -217,16 +102,21 @@ impl Texts {
         let dimensions = names::dimensions(&properties, &header.comments);
         let mut crs: Option<String> = None;
         let mut comments = Vec::new();
+        // Only pieces right behind the first belong to it: other comments are free to look alike.
+        let mut more = false;
         for comment in &header.comments {
-            let ours = names::read_comment(comment).is_some_and(|(p, _)| properties.contains(&p))
-                || super::is_padding(comment, file.points);
-            if let Some(text) = comment.strip_prefix(super::CRS).filter(|_| crs.is_none()) {
+            if let (Some(text), None) = (comment.strip_prefix(super::CRS), &crs) {
                 crs = Some(text.to_owned());
-            } else if let (Some(text), Some(crs)) =
-                (comment.strip_prefix(super::CRS_MORE), &mut crs)
-            {
-                crs.push_str(text);
-            } else if !ours {
+                more = true;
+                continue;
+            }
+            if let (Some(text), true) = (comment.strip_prefix(super::CRS_MORE), more) {
+                crs.get_or_insert_default().push_str(text);
+                continue;
+            }
+            more = false;
+            let of_ours = names::property_told(comment).is_some_and(|p| properties.contains(&p));
+            if !of_ours && !super::is_padding(comment, file.points) {
                 comments.push(comment.clone());
             }
         }

@@ -1,0 +1,122 @@
+//! The layouts that hold what another layout holds.
+
+use super::{check_drop, quoted};
+use crate::io::ply;
+use crate::point::names::{self as n, XYZ};
+use crate::point::{Dimension, Endian, Layout, Scalar, Schema};
+use crate::{Error, Result};
+
+/// The vertex that holds every dimension of `from`, little-endian: coordinates as `double`, exactly
+/// stored · scale + origin; bit fields each as `uchar`; other scaled dimensions (the scan angle of
+/// point formats 6 to 10, in degrees) as `double`; 64-bit integers, which PLY does not have, as
+/// `double` too, where a value that rounds is refused; all others in their own type. Known dimensions
+/// come first, in the order of their PLY names. That of a PLY record is the record's own.
+pub fn ply_schema(from: &Schema) -> Schema {
+    if from.layout == Layout::Ply {
+        return from.clone();
+    }
+    let mut sources: Vec<&Dimension> = from.dimensions.iter().collect();
+    sources.sort_by_key(|d| ply::rank(&d.name).unwrap_or(usize::MAX));
+    let mut stride = 0;
+    let dimensions = sources
+        .into_iter()
+        .map(|source| {
+            let scaled = source.scale != 1.0 || source.origin != 0.0;
+            let scalar = match source.scalar {
+                _ if XYZ.contains(&source.name.as_str()) || scaled => Scalar::F64,
+                Scalar::U64 | Scalar::I64 => Scalar::F64,
+                _ if source.bits.is_some_and(|bits| bits.width <= 8) => Scalar::U8,
+                own => own,
+            };
+            let dimension = Dimension::new(&source.name, scalar, stride);
+            stride += scalar.size();
+            dimension
+        })
+        .collect();
+    Schema { layout: Layout::Ply, endian: Endian::Little, stride, dimensions }
+}
+
+/// Dimensions beside X, Y and Z that all LAS point formats hold.
+const CORE: [&str; 12] = [
+    n::INTENSITY,
+    n::RETURN_NUMBER,
+    n::NUMBER_OF_RETURNS,
+    n::SCAN_DIRECTION_FLAG,
+    n::EDGE_OF_FLIGHT_LINE,
+    n::CLASSIFICATION,
+    n::SYNTHETIC,
+    n::KEY_POINT,
+    n::WITHHELD,
+    n::SCAN_ANGLE,
+    n::USER_DATA,
+    n::POINT_SOURCE_ID,
+];
+const COLOR: [&str; 3] = [n::RED, n::GREEN, n::BLUE];
+const WAVE: [&str; 7] = [
+    n::WAVE_DESCRIPTOR,
+    n::WAVE_OFFSET,
+    n::WAVE_SIZE,
+    n::WAVE_RETURN,
+    n::WAVE_DIRECTION[0],
+    n::WAVE_DIRECTION[1],
+    n::WAVE_DIRECTION[2],
+];
+
+/// The LAS point format that holds the dimensions of `from`, without those of `drop`, and its extra
+/// bytes: name and type of every dimension that LAS does not know.
+///
+/// It is the smallest of formats 6 to 10 (LAS 1.4 R15 §2.6), but one of formats 0 to 5 where the
+/// scan angle is an integer: whole degrees, which the 0.006° steps of the others would round. Fails on
+/// names that an extra-bytes descriptor cannot hold (32 bytes).
+pub fn las_schema(from: &Schema, drop: &[String]) -> Result<(u8, Vec<(String, Scalar)>)> {
+    check_drop(from, drop)?;
+    let has = |name: &str| from.find(name).is_some() && !drop.iter().any(|d| d == name);
+    let any = |names: &[&str]| names.iter().any(|name| has(name));
+    let (color, wave) = (any(&COLOR), any(&WAVE));
+    let whole_degrees = has(n::SCAN_ANGLE)
+        && from.find(n::SCAN_ANGLE).is_some_and(|angle| !angle.scalar.is_float())
+        && !any(&[n::NIR, n::OVERLAP, n::SCANNER_CHANNEL]);
+    let format = match (whole_degrees, wave, color, has(n::GPS_TIME)) {
+        (true, true, true, _) => 5,
+        (true, true, false, _) => 4,
+        (true, false, true, true) => 3,
+        (true, false, true, false) => 2,
+        (true, false, false, gps) => u8::from(gps),
+        (false, true, color, _) => {
+            if color || has(n::NIR) {
+                10
+            } else {
+                9
+            }
+        }
+        (false, false, _, _) if has(n::NIR) => 8,
+        (false, false, color, _) => {
+            if color {
+                7
+            } else {
+                6
+            }
+        }
+    };
+    let known = |name: &str| {
+        let sets: [&[&str]; 5] =
+            [&XYZ, &CORE, &COLOR, &WAVE, &[n::GPS_TIME, n::NIR, n::OVERLAP, n::SCANNER_CHANNEL]];
+        sets.iter().any(|set| set.contains(&name))
+    };
+    let extra: Vec<(String, Scalar)> = from
+        .dimensions
+        .iter()
+        .filter(|d| has(&d.name) && !known(&d.name))
+        .map(|d| (d.name.clone(), d.scalar))
+        .collect();
+    let long: Vec<&str> =
+        extra.iter().map(|(name, _)| name.as_str()).filter(|name| name.len() > 32).collect();
+    if !long.is_empty() {
+        return Err(Error::pipeline(format!(
+            "LAS cannot name extra bytes {}: a name has at most 32 bytes",
+            quoted(&long)
+        ))
+        .help(format!("drop = {long:?} leaves them out")));
+    }
+    Ok((format, extra))
+}
