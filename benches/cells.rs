@@ -89,7 +89,7 @@ fn main() {
             let stage = settled(side, split, &tile);
             let mut best = [f64::INFINITY; 2];
             let mut tally = Tally::default();
-            for _ in 0..3 {
+            for _ in 0..7 {
                 tally = Tally::default();
                 tile.fates.fill(Fate::Kept);
                 let start = Instant::now();

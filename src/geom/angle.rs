@@ -1,6 +1,11 @@
 //! Angles of normals to a direction, compared by their cosines: no arc cosine decides anything,
 //! because platform libraries differ in its last bits. Knows no tiles, no files.
 
+/// True if a normal is one: positions without are marked by NaN.
+pub fn is_known(normal: [f32; 3]) -> bool {
+    normal.iter().all(|component| component.is_finite())
+}
+
 /// cos θ of the angle θ between the unit vector `reference` and `normal` (turned around first if
 /// `turned`), in [−1, 1]. A normal and its turned opposite have exactly the same cosine.
 pub fn cosine(reference: [f64; 3], normal: [f32; 3], turned: bool) -> f64 {
@@ -49,8 +54,8 @@ pub fn outer_sum(normals: impl Iterator<Item = [f32; 3]>) -> [f64; 6] {
 
 /// Squarings after which [`dominant_axis`] stops: eigenvalues that agree to 1e-8 count as equal.
 const SQUARINGS: usize = 32;
-/// Trace of the square, of a matrix of trace 1, at which nothing but the largest eigenvalue is left
-/// in the square: the others are at most 1e-16 of it.
+/// Trace of the square over the square of the trace at which nothing but the largest eigenvalue is
+/// left in the square: the others are at most 1e-16 of it.
 const CONVERGED: f64 = 1.0 - 1e-8;
 
 /// Direction (of no particular length) of an eigenvector of the largest eigenvalue of a positive
@@ -65,7 +70,8 @@ pub fn dominant_axis(matrix: [f64; 6]) -> [f64; 3] {
     if trace <= 0.0 {
         return [0.0; 3];
     }
-    let mut m = matrix.map(|entry| entry * (1.0 / trace));
+    let mut m = matrix.map(|entry| entry / trace);
+    let mut trace = 1.0;
     for _ in 0..SQUARINGS {
         let [xx, xy, xz, yy, yz, zz] = m;
         let square = [
@@ -76,10 +82,15 @@ pub fn dominant_axis(matrix: [f64; 6]) -> [f64; 3] {
             xy * xz + yy * yz + yz * zz,
             xz * xz + yz * yz + zz * zz,
         ];
-        let trace = square[0] + square[3] + square[5];
-        m = square.map(|entry| entry * (1.0 / trace));
-        if trace >= CONVERGED {
+        let before = trace;
+        (m, trace) = (square, square[0] + square[3] + square[5]);
+        if trace >= CONVERGED * (before * before) {
             break;
+        }
+        // A square's trace is a third of the trace's square or more: rare, and far from underflow.
+        if trace < 1e-60 {
+            m = m.map(|entry| entry / trace);
+            trace = 1.0;
         }
     }
     let [xx, xy, xz, yy, yz, zz] = m;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
-use crate::geom::angle::cosine;
+use crate::geom::angle::{cosine, is_known};
 use crate::point::Position;
 use crate::report::Tally;
 use crate::stage::{Needs, TileOp};
@@ -39,7 +39,7 @@ impl TileOp for Median {
         let core = tile.core.clone();
         let (mut coincident, mut represented) = (0, 0);
         for i in core.clone() {
-            if tile.normals[i][0].is_nan() {
+            if !is_known(tile.normals[i]) {
                 coincident += keep_once(tile, i);
             }
         }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::geom::angle::is_known;
 use crate::point::{Bounds, Position};
 use crate::tile::Cells as Partition;
 
@@ -57,6 +58,7 @@ impl Grouping<'_> {
             last += 1;
         }
         cells.members.reserve_exact(last - first);
+        cells.ends.reserve_exact(last - first);
         let mut crossing = 0;
         for i in first..last {
             if i > first && !same(i - 1, i) {
@@ -77,15 +79,21 @@ impl Grouping<'_> {
         hi: [i64; 3],
         key: impl Fn([i64; 3]) -> K,
     ) -> u64 {
-        let mut runs = Vec::new();
+        let inside =
+            |cell: [i64; 3]| (0..3).all(|axis| lo[axis] <= cell[axis] && cell[axis] <= hi[axis]);
+        // Counted first: growing would hold more than the stage says it needs.
+        let mut count = 0;
+        self.runs(|cell, _| count += usize::from(inside(cell)));
+        let mut runs = Vec::with_capacity(count);
         self.runs(|cell, run| {
-            if (0..3).all(|axis| lo[axis] <= cell[axis] && cell[axis] <= hi[axis]) {
+            if inside(cell) {
                 runs.push((key(cell), run.start as u32, run.end as u32));
             }
         });
         runs.sort_unstable();
         let length = |(_, start, end): &(K, u32, u32)| (end - start) as usize;
         cells.members.reserve_exact(runs.iter().map(length).sum());
+        cells.ends.reserve_exact(runs.len());
         let mut crossing = 0;
         for (i, (cell, start, end)) in runs.iter().enumerate() {
             if i > 0 && runs[i - 1].0 != *cell {
@@ -103,7 +111,7 @@ impl Grouping<'_> {
             let cell = self.cell(self.positions[start]);
             let corner = cell.map(|v| v * self.side);
             let same = |p: &Position| {
-                (0..3).all(|axis| p[axis].wrapping_sub(corner[axis]) as u64 <= self.side as u64 - 1)
+                (0..3).all(|axis| (p[axis].wrapping_sub(corner[axis]) as u64) < self.side as u64)
             };
             let end =
                 start + 1 + self.positions[start + 1..].iter().take_while(|p| same(p)).count();
@@ -129,6 +137,6 @@ impl Grouping<'_> {
     }
 
     fn has_normal(&self, i: usize) -> bool {
-        !self.normals[i][0].is_nan()
+        is_known(self.normals[i])
     }
 }
