@@ -24,10 +24,14 @@ impl Pipeline {
 impl Plan {
     /// Runs it.
     pub fn run(self, watch: &dyn Watch) -> Result<Report> {
-        watch.phase("decode", Some(1));
+        watch.phase("decode", Some(1_000_000));
         watch.warn("the run is not connected");
-        if watch.cancelled() {
-            return Err(Error::interrupted());
+        for _ in 0..20 {
+            std::thread::sleep(std::time::Duration::from_millis(100));
+            watch.advance(50_000);
+            if watch.cancelled() {
+                return Err(Error::interrupted());
+            }
         }
         Err(Error::internal("the run is not connected"))
     }
