@@ -12,7 +12,7 @@ fn stopped_by(signal: &str) {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).unwrap_or("0");
     if u64::from_str_radix(ignored.trim(), 16).unwrap() & 1 == 1 {
-        println!("not tested: SIGHUP is ignored (nohup)");
+        eprintln!("not tested: SIGHUP is ignored (nohup)");
         return;
     }
     let at = tempfile::tempdir().unwrap();
