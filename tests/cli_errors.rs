@@ -133,6 +133,8 @@ fn flags_of_reduce_are_told_as_they_were_typed() {
     refused(at.path(), &["reduce", "*.las", "-o", "b.laz"], &["IN: no file matches `*.las`"]);
     refused(at.path(), &["reduce", "a.laz", "-o", "b"], &["-o: the extension of `b` names no"]);
     refused(at.path(), &["reduce", "a.laz", "-o", "./a.laz"], &["-o: ./a.laz is an input"]);
+    reduce(&["--report", "a.laz"], &["--report: a.laz is an input"]);
+    reduce(&["--report", "./b.laz"], &["--report: ./b.laz is written twice"]);
 }
 
 #[test]

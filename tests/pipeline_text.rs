@@ -263,7 +263,7 @@ fn a_chain_that_cannot_be_run_is_refused() {
         (format!("{synth}{write}{write}"), "p.toml:10:8: a.laz is written twice"),
         (
             format!("[run]\nreport = \"a.laz\"\n{synth}{write}"),
-            "p.toml:9:8: a.laz is written twice",
+            "p.toml:2:10: a.laz is written twice",
         ),
         (
             format!("{synth}{thin}{write}order = \"input\"\n"),

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::pipeline::{Overrides, parse_bytes};
+use crate::pipeline::{Overrides, Set, parse_bytes};
+use crate::{Error, Result};
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -53,7 +54,7 @@ pub(super) struct Common {
     /// Folder for what does not fit in memory [default: beside the output]
     #[arg(long, value_name = "DIR")]
     pub scratch: Option<PathBuf>,
-    /// Draw progress bars: only on a terminal, or never
+    /// Draw progress bars: where stderr is a terminal, or never
     #[arg(long, value_name = "WHEN", default_value = "auto")]
     pub progress: Progress,
     /// Write the report to this file
@@ -62,22 +63,30 @@ pub(super) struct Common {
 }
 
 impl Common {
-    /// What takes the place of the pipeline's `[run]` settings.
+    /// What takes the place of the pipeline's `[run]` settings. The report is not among it: see
+    /// [`sets`](Common::sets).
     pub fn overrides(&self) -> Overrides {
         Overrides {
             memory: self.memory,
             threads: self.threads,
             scratch: self.scratch.clone(),
-            report: self.report.clone(),
+            report: None,
         }
+    }
+
+    /// Values put in the place of the pipeline's: `--report`, so that it is compared with the
+    /// inputs and outputs.
+    pub fn sets(&self) -> Result<Vec<Set>> {
+        let Some(path) = &self.report else { return Ok(Vec::new()) };
+        let told = || Error::pipeline("the name is not UTF-8 text").at(path);
+        let text = path.to_str().ok_or_else(told)?;
+        Ok(vec![Set::argument("--report", "run.report", text.into())])
     }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Progress {
-    /// Where stderr is a terminal
     Auto,
-    /// Nowhere
     Never,
 }
 

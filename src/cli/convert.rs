@@ -71,7 +71,7 @@ fn pipeline(
     output: Value,
     registry: &Registry,
 ) -> Result<Pipeline> {
-    let sets = given([
+    let stages = given([
         ("IN", "read.path", Some(inputs)),
         ("-o", "write.path", Some(output)),
         ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
@@ -79,6 +79,7 @@ fn pipeline(
         ("--drop", "write.drop", (!arguments.drop.is_empty()).then(|| json!(arguments.drop))),
         ("--encoding", "write.encoding", arguments.encoding.as_deref().map(Value::from)),
     ]);
+    let sets = [stages, arguments.common.sets()?].concat();
     Pipeline::parse_with(CONVERT, "pipelines/convert.toml", registry, &sets)
 }
 

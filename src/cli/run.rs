@@ -22,34 +22,35 @@ kind = \"write\"
 
 /// Runs a pipeline file and prints its closing table.
 pub(super) fn run(arguments: &Run, registry: &Registry) -> Result<()> {
-    let sets = parse_sets(&arguments.sets)?;
+    let sets = parse_sets(&arguments.sets, &arguments.common)?;
     let pipeline = Pipeline::read(&arguments.pipeline, registry, &sets)?;
     print::result(mill(pipeline, &arguments.common)?)
 }
 
 /// Runs `pipelines/reduce.toml` on other files and prints the closing table.
 pub(super) fn reduce(arguments: &Reduce, registry: &Registry) -> Result<()> {
-    let sets = reduce_sets(arguments);
+    let sets = [reduce_sets(arguments), arguments.common.sets()?].concat();
     let pipeline = Pipeline::parse_with(REDUCE, "pipelines/reduce.toml", registry, &sets)?;
     print::result(mill(pipeline, &arguments.common)?)
 }
 
 /// Writes a made-up scan.
 pub(super) fn synth(arguments: &Synth, registry: &Registry) -> Result<()> {
-    let sets = given([
+    let stages = given([
         ("KIND", "synth.scene", Some(json!(arguments.scene))),
         ("-n", "synth.points", Some(json!(arguments.points))),
         ("-o", "write.path", Some(json!(arguments.output))),
         ("--seed", "synth.seed", arguments.seed.map(Value::from)),
         ("--noise", "synth.noise", arguments.noise.map(number)),
     ]);
+    let sets = [stages, arguments.common.sets()?].concat();
     let pipeline = Pipeline::parse_with(SYNTH, "synth", registry, &sets)?;
     mill(pipeline, &arguments.common).map(|_report| ())
 }
 
 /// Prints how a pipeline would be run.
 pub(super) fn plan(arguments: &Plan, registry: &Registry) -> Result<()> {
-    let sets = parse_sets(&arguments.sets)?;
+    let sets = parse_sets(&arguments.sets, &arguments.common)?;
     let pipeline = Pipeline::read(&arguments.pipeline, registry, &sets)?;
     print::result(pipeline.plan(&arguments.common.overrides())?)
 }
@@ -84,8 +85,9 @@ pub(super) fn number(value: f64) -> Value {
     serde_json::Number::from_f64(value).map_or_else(|| json!(value.to_string()), Value::from)
 }
 
-fn parse_sets(sets: &[String]) -> Result<Vec<Set>> {
-    sets.iter().map(|set| Set::parse(set)).collect()
+fn parse_sets(sets: &[String], common: &Common) -> Result<Vec<Set>> {
+    let sets = sets.iter().map(|set| Set::parse(set)).collect::<Result<Vec<Set>>>()?;
+    Ok([sets, common.sets()?].concat())
 }
 
 fn reduce_sets(arguments: &Reduce) -> Vec<Set> {

@@ -28,14 +28,6 @@ pub(super) struct StageDraft {
     pub keys: Node,
 }
 
-impl StageDraft {
-    /// Where the value of `key` is written, if it is.
-    pub fn value_of(&self, key: &str) -> Option<&Place> {
-        let Value::Table(entries) = &self.keys.value else { return None };
-        entries.iter().find(|e| e.key == key).map(|e| &e.node.place)
-    }
-}
-
 /// Sorts the tables of a file whose first text is `len` bytes long.
 pub(super) fn read(entries: Vec<Entry>, len: usize, registry: &Registry) -> Draft {
     let whole = Place::new(0, 0..0);

@@ -34,6 +34,14 @@ pub(super) struct Node {
     pub value: Value,
 }
 
+impl Node {
+    /// Where the value of `key` is written, if this is a table that has it.
+    pub fn at(&self, key: &str) -> Option<&Place> {
+        let Value::Table(entries) = &self.value else { return None };
+        entries.iter().find(|e| e.key == key).map(|e| &e.node.place)
+    }
+}
+
 /// What a key can be given.
 #[derive(Debug, Clone)]
 pub(super) enum Value {

@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 
 use super::keys;
 use super::mistake::Mistake;
-use super::node::{Node, Value};
+use super::node::Node;
 use crate::stage::Role;
 use crate::{Error, Result};
 
@@ -123,12 +123,8 @@ fn read<K: StageKind>(
     let canonical = canonical(&stage).map_err(wrong)?;
     stage.build(at).map(|role| (role, canonical)).map_err(|error| {
         let blamed = at.blamed.borrow();
-        let entries = match &keys.value {
-            Value::Table(entries) => entries.as_slice(),
-            _ => &[],
-        };
-        let entry = entries.iter().find(|e| Some(&e.key) == blamed.as_ref());
-        vec![Mistake::of(entry.map_or(&keys.place, |e| &e.node.place).clone(), &error)]
+        let place = blamed.as_deref().and_then(|key| keys.at(key)).unwrap_or(&keys.place);
+        vec![Mistake::of(place.clone(), &error)]
     })
 }
 

@@ -1,12 +1,12 @@
 //! From a pipeline file's text to its stages in their roles, or to every mistake in it.
 
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::draft::{self, Draft, StageDraft};
 use super::keys;
 use super::mistake::{self, Mistake, SourceText};
-use super::node;
+use super::node::{self, Node, Place};
 use super::registry::{Registry, StagePlace};
 use super::set::Set;
 use super::settings::RunSettings;
@@ -108,7 +108,7 @@ fn build(
     }
     if mistakes.is_empty() {
         check_chain(&draft.stages, &stages, &mut mistakes);
-        check_files(&draft.stages, &stages, &settings, &mut mistakes);
+        check_files(&draft.run, &draft.stages, &stages, &settings, &mut mistakes);
     }
     (Pipeline { origin: origin.to_owned(), settings, stages }, mistakes)
 }
@@ -128,7 +128,7 @@ fn place(
         return Err(vec![Mistake::word(at.clone(), told, kind, "stages", kinds)]);
     };
     let (role, keys) = built?;
-    let text = |part: &Option<(String, node::Place)>| part.as_ref().map(|(text, _)| text.clone());
+    let text = |part: &Option<(String, Place)>| part.as_ref().map(|(text, _)| text.clone());
     Ok(PlacedStage {
         kind: kind.clone(),
         name: text(&stage.name),
@@ -213,33 +213,48 @@ fn check_from(drafts: &[StageDraft], stages: &[PlacedStage], mistakes: &mut Vec<
 
 /// No file is written twice, and none over an input.
 fn check_files(
+    run: &Node,
     drafts: &[StageDraft],
     stages: &[PlacedStage],
     settings: &RunSettings,
     mistakes: &mut Vec<Mistake>,
 ) {
-    let same = |a: &Path, b: &Path| {
-        a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
-    };
-    let mut inputs = Vec::new();
-    let mut outputs: Vec<&Path> = settings.report.as_deref().into_iter().collect();
+    let mut inputs: Vec<PathBuf> = Vec::new();
+    let mut outputs: Vec<(&Path, &Place)> = Vec::new();
     for (draft, stage) in drafts.iter().zip(stages) {
         match &stage.role {
-            Role::Source(source) => inputs.extend(source.paths()),
+            Role::Source(source) => inputs.extend(source.paths().iter().map(|p| resolved(p))),
             Role::Sink(sink) => {
-                let path = sink.path();
-                let told = if inputs.iter().any(|input| same(input, path)) {
-                    format!("{} is an input: it cannot be written over", path.display())
-                } else if outputs.iter().any(|output| same(output, path)) {
-                    format!("{} is written twice", path.display())
-                } else {
-                    outputs.push(path);
-                    continue;
-                };
-                let at = draft.value_of("path").unwrap_or(&draft.kind.1);
-                mistakes.push(Mistake::new(at.clone(), told));
+                outputs.push((sink.path(), draft.keys.at("path").unwrap_or(&draft.kind.1)));
             }
             _ => {}
         }
+    }
+    if let Some(report) = &settings.report {
+        outputs.push((report, run.at("report").unwrap_or(&run.place)));
+    }
+    let mut taken: Vec<PathBuf> = Vec::new();
+    for (path, at) in outputs {
+        let file = resolved(path);
+        if inputs.contains(&file) {
+            let told = format!("{} is an input: it cannot be written over", path.display());
+            mistakes.push(Mistake::new(at.clone(), told));
+        } else if taken.contains(&file) {
+            let told = format!("{} is written twice", path.display());
+            mistakes.push(Mistake::new(at.clone(), told));
+        }
+        taken.push(file);
+    }
+}
+
+/// The file that `path` means, links and dots resolved as far as it exists.
+fn resolved(path: &Path) -> PathBuf {
+    if let Ok(file) = path.canonicalize() {
+        return file;
+    }
+    let folder = path.parent().map(|p| if p == Path::new("") { Path::new(".") } else { p });
+    match (folder.map(Path::canonicalize), path.file_name()) {
+        (Some(Ok(folder)), Some(name)) => folder.join(name),
+        _ => path.to_owned(),
     }
 }
