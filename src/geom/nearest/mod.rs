@@ -69,8 +69,14 @@ impl Default for Nearest {
 impl Nearest {
     /// Bytes that a set holds per position, besides [`FIXED_BYTES`](Self::FIXED_BYTES).
     pub const BYTES_PER_POINT: usize = 19;
-    /// Bytes that any set holds, however small, besides about 180 for each neighbour asked for.
+    /// Bytes that any set holds, however small, besides 1 KiB and up to 256 for each
+    /// neighbour asked for.
     pub const FIXED_BYTES: usize = 32 << 10;
+
+    /// Bytes that a search of `k` neighbours in a set of `points` holds, to the byte.
+    pub fn bytes(points: usize, k: usize) -> usize {
+        Tree::bytes(points) + Batch::bytes(k + 1) + k * (size_of::<Neighbor>() + size_of::<u32>())
+    }
 
     /// A search that holds no set yet.
     pub fn new() -> Self {
@@ -120,6 +126,8 @@ impl Nearest {
         }
         let others = positions.len() - 1;
         self.batch.fit((k + 1).min(others));
+        self.found.reserve_exact(k.saturating_sub(self.found.len()));
+        self.neighbors.reserve_exact(k.saturating_sub(self.neighbors.len()));
         for run in 0..self.tree.runs() {
             for child in 0..self.tree.node(0, run).children as usize {
                 let ranks =

@@ -310,7 +310,14 @@ fn building_again_within_the_reserve_allocates_nothing() {
             "{points}: {bytes}"
         );
         assert!(Tree::bytes(points - 1) <= bytes);
+        for k in KS {
+            assert!(Nearest::bytes(points, k) - bytes <= k * 256 + 1024);
+        }
         nearest.reserve(points);
+        let sizes = [size_of::<tree::Leaf>(), size_of::<Node>(), 48];
+        let allocated: usize =
+            nearest.tree.capacity().iter().zip(sizes).map(|(n, size)| n * size).sum();
+        assert_eq!(allocated, bytes, "what is promised is what is held");
         let held = nearest.tree.capacity();
         for n in [points, points / 2, 0, points.min(3)] {
             nearest.build(&uniform(n, 1 << 20, 1));
