@@ -1,6 +1,6 @@
 //! The search of one point in integers alone: slower, and right whatever floats could not tell.
 
-use super::kernel::box_distances;
+use super::kernel::{at_most, box_distances};
 use super::tree::{Tree, above, below};
 use super::walk::{WIDENED, Work, lanes, nearest};
 use crate::point::{Position, distance2};
@@ -58,7 +58,7 @@ impl<'a> ExactWalk<'a> {
         let lo = std::array::from_fn(|i| below(from(i).saturating_sub(node.error)));
         let hi = std::array::from_fn(|i| above(from(i).saturating_add(node.error)));
         let distances = box_distances(&node.lo, &node.hi, lo, hi);
-        let mut left = lanes(node.children, None);
+        let mut left = lanes(node.children, None) & at_most(&distances, self.reach);
         while let Some(child) = nearest(&distances, left, self.reach) {
             left &= !(1 << child);
             let child = node.first_child as usize + child;

@@ -6,6 +6,8 @@
 //! Squared distances are ((dx·dx) + dy·dy) + dz·dz everywhere, boxes included: rounding is
 //! monotonic, so no point of a box gets a smaller float than its box does.
 
+#![allow(clippy::needless_range_loop, reason = "one index walks several arrays of lanes")]
+
 use super::tree::{LANES, Leaf};
 
 /// What is farther than any point: no candidate yet.
@@ -31,6 +33,19 @@ pub(super) struct Batch {
 
 /// Merges the candidates of the lanes in a mask into an ascending list.
 type Insert = fn(best: &mut [f64], distances: &[f32; LANES], ranks: &[u32; LANES], hits: u32);
+
+/// The width of lists of `most` candidates, and how to insert there.
+fn shape(most: usize) -> (usize, Insert) {
+    match most {
+        0..=4 => (4, insert::<4>),
+        5..=8 => (8, insert::<8>),
+        9..=12 => (12, insert::<12>),
+        13..=16 => (16, insert::<16>),
+        17..=24 => (24, insert::<24>),
+        25..=32 => (32, insert::<32>),
+        _ => (most, insert_any),
+    }
+}
 
 /// A candidate as a number that sorts by distance, then rank: the float's bits above the rank's.
 /// Positive floats sort like their bits, so the 64 bits can be compared as an f64, for which vector
@@ -77,18 +92,15 @@ impl Batch {
 
     /// Makes room for `most` candidates a point.
     pub fn fit(&mut self, most: usize) {
-        let (width, insert): (usize, Insert) = match most {
-            0..=4 => (4, insert::<4>),
-            5..=8 => (8, insert::<8>),
-            9..=12 => (12, insert::<12>),
-            13..=16 => (16, insert::<16>),
-            17..=24 => (24, insert::<24>),
-            25..=32 => (32, insert::<32>),
-            _ => (most, insert_any),
-        };
-        (self.width, self.insert) = (width, insert);
+        (self.width, self.insert) = shape(most);
         self.best.clear();
+        self.best.reserve_exact(self.width * LANES);
         self.best.resize(self.width * LANES, NONE);
+    }
+
+    /// Bytes of the lists for `most` candidates a point.
+    pub fn bytes(most: usize) -> usize {
+        shape(most).0 * LANES * size_of::<f64>()
     }
 
     /// Forgets all candidates; the lanes of `wanted` search for `kept`.
@@ -104,7 +116,14 @@ impl Batch {
     /// The largest bound of the batch.
     #[inline(always)]
     pub fn farthest(&self) -> f32 {
-        self.bound.iter().fold(-1.0, |a, &b| larger(a, b))
+        // Halves against halves: a plain fold would wait for every comparison.
+        let mut all = self.bound;
+        for half in [8, 4, 2, 1] {
+            for i in 0..half {
+                all[i] = larger(all[i], all[i + half]);
+            }
+        }
+        all[0]
     }
 
     /// The best keys of a lane.
@@ -192,7 +211,7 @@ fn distances(leaf: &Leaf, q: [f32; 3]) -> [f32; LANES] {
 
 /// The lanes not above `bound`.
 #[inline(always)]
-fn at_most(distances: &[f32; LANES], bound: f32) -> u32 {
+pub(super) fn at_most(distances: &[f32; LANES], bound: f32) -> u32 {
     let mut mask = 0;
     for i in 0..LANES {
         mask |= u32::from(distances[i] <= bound) << i;

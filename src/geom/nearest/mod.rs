@@ -33,7 +33,7 @@ pub use walk::Work;
 
 use crate::point::{Position, distance2};
 
-/// The relative error of the root of a float distance, doubled: see the module.
+/// The relative error of the root of a float distance, 2.5 · 2^-24, rounded up.
 const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
 
 /// The search of the k nearest neighbours within a set; its memory stays from set to set.
@@ -69,8 +69,14 @@ impl Default for Nearest {
 impl Nearest {
     /// Bytes that a set holds per position, besides [`FIXED_BYTES`](Self::FIXED_BYTES).
     pub const BYTES_PER_POINT: usize = 19;
-    /// Bytes that any set holds, however small, besides about 180 for each neighbour asked for.
+    /// Bytes that any set holds, however small, besides 1 KiB and up to 256 for each
+    /// neighbour asked for.
     pub const FIXED_BYTES: usize = 32 << 10;
+
+    /// Bytes that a search of `k` neighbours in a set of `points` holds, to the byte.
+    pub fn bytes(points: usize, k: usize) -> usize {
+        Tree::bytes(points) + Batch::bytes(k + 1) + k * (size_of::<Neighbor>() + size_of::<u32>())
+    }
 
     /// A search that holds no set yet.
     pub fn new() -> Self {
@@ -118,33 +124,43 @@ impl Nearest {
             (0..positions.len()).filter(|&i| wanted(i)).for_each(|i| visit(i, &[], 0));
             return;
         }
-        let others = positions.len() - 1;
-        self.batch.fit((k + 1).min(others));
+        self.batch.fit((k + 1).min(positions.len() - 1));
+        self.found.reserve_exact(k.saturating_sub(self.found.len()));
+        self.neighbors.reserve_exact(k.saturating_sub(self.neighbors.len()));
         for run in 0..self.tree.runs() {
             for child in 0..self.tree.node(0, run).children as usize {
-                let ranks =
-                    self.tree.leaves[self.tree.node(0, run).first_child as usize + child].rank;
-                let mut active = 0;
-                for (lane, &rank) in ranks.iter().enumerate() {
-                    if (rank as usize) < positions.len() && wanted(rank as usize) {
-                        active |= 1 << lane;
-                    }
-                }
-                if active == 0 {
-                    continue;
-                }
-                let node = self.tree.node(0, run);
-                let kept = if likely_exact(node, child, k) { k } else { (k + 1).min(others) };
-                self.batch.start(active, kept);
-                let error =
-                    Walk::new(&self.tree, &mut self.batch, &mut self.work, run, child).run();
-                while active != 0 {
-                    let lane = active.trailing_zeros() as usize;
-                    active &= active - 1;
-                    let distance2 = self.settle(positions, k, ranks[lane], lane, error);
-                    visit(ranks[lane] as usize, &self.neighbors, distance2);
-                }
+                self.search_leaf(positions, k, (run, child), &mut wanted, &mut visit);
             }
+        }
+    }
+
+    /// Searches for the wanted points of leaf `child` of the level-0 node `run`.
+    fn search_leaf(
+        &mut self,
+        positions: &[Position],
+        k: usize,
+        (run, child): (usize, usize),
+        wanted: &mut impl FnMut(usize) -> bool,
+        visit: &mut impl FnMut(usize, &[u32], u128),
+    ) {
+        let node = self.tree.node(0, run);
+        let ranks = self.tree.leaves[node.first_child as usize + child].rank;
+        let mut active = 0;
+        for (lane, &rank) in ranks.iter().enumerate() {
+            // Unused lanes have a rank beyond all positions.
+            if (rank as usize) < positions.len() && wanted(rank as usize) {
+                active |= 1 << lane;
+            }
+        }
+        if active == 0 {
+            return;
+        }
+        let one_more = (k + 1).min(positions.len() - 1);
+        self.batch.start(active, if likely_exact(node, child, k) { k } else { one_more });
+        let error = Walk::new(&self.tree, &mut self.batch, &mut self.work, run, child).run();
+        for (lane, &rank) in ranks.iter().enumerate().filter(|(lane, _)| active >> lane & 1 == 1) {
+            let distance2 = self.settle(positions, k, rank, lane, error);
+            visit(rank as usize, &self.neighbors, distance2);
         }
     }
 
@@ -207,6 +223,7 @@ fn likely_exact(node: &Node, child: usize, k: usize) -> bool {
 /// True if a float distance `last` is a smaller distance than `next`, whatever rounding did.
 fn gap(last: f32, next: f32, error: f64) -> bool {
     let (last, next) = (f64::from(last).sqrt(), f64::from(next).sqrt());
-    let error = error * 1.733;
+    // √3, rounded up: the error of three coordinates together.
+    let error = error * 1.7321;
     last * (1.0 + ROUNDING) + error < next * (1.0 - ROUNDING) - error
 }

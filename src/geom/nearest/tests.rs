@@ -277,27 +277,20 @@ fn only_the_wanted_are_visited() {
     assert_eq!(visited, wanted);
 }
 
-#[test]
-fn ties_without_end_stay_linear() {
-    let work = |side| {
-        let positions = grid(side, 10);
-        let met = compare(&positions, 10, 20);
-        assert!(met.ties > 5, "{met:?}");
-        (met.work.leaves + met.work.nodes) as f64 / positions.len() as f64
-    };
-    let (small, large) = (work(24), work(40));
-    assert!(large < small * 1.4 && large < 4.0, "{small} and {large} boxes a point");
+/// Nodes and leaves visited per point of a lattice, which must be full of ties.
+fn boxes_visited(lattice: &[Position]) -> f64 {
+    let met = compare(lattice, 10, 20);
+    assert!(met.ties > 5, "{met:?}");
+    (met.work.leaves + met.work.nodes) as f64 / lattice.len() as f64
 }
 
 #[test]
-fn a_flat_lattice_of_ties_stays_linear() {
-    let work = |side: i64| {
-        let positions = set((0..side * side).map(|i| [i % side * 250, i / side * 250, 0]));
-        let met = compare(&positions, 10, 20);
-        (met.work.leaves + met.work.nodes) as f64 / positions.len() as f64
-    };
-    let (small, large) = (work(64), work(256));
-    assert!(large < small * 1.5 && large < 6.0, "{small} and {large} boxes a point");
+fn ties_without_end_stay_linear() {
+    let (small, large) = (boxes_visited(&grid(24, 10)), boxes_visited(&grid(40, 10)));
+    assert!(large < small * 1.4 && large < 4.0, "{small} and {large} boxes a point");
+    let flat = |side: i64| set((0..side * side).map(|i| [i % side * 250, i / side * 250, 0]));
+    let (small, large) = (boxes_visited(&flat(64)), boxes_visited(&flat(256)));
+    assert!(large < small * 1.5 && large < 1.5, "{small} and {large} boxes a point");
 }
 
 #[test]
@@ -310,7 +303,14 @@ fn building_again_within_the_reserve_allocates_nothing() {
             "{points}: {bytes}"
         );
         assert!(Tree::bytes(points - 1) <= bytes);
+        for k in KS {
+            assert!(Nearest::bytes(points, k) - bytes <= k * 256 + 1024);
+        }
         nearest.reserve(points);
+        let sizes = [size_of::<tree::Leaf>(), size_of::<Node>(), 48];
+        let allocated: usize =
+            nearest.tree.capacity().iter().zip(sizes).map(|(n, size)| n * size).sum();
+        assert_eq!(allocated, bytes, "what is promised is what is held");
         let held = nearest.tree.capacity();
         for n in [points, points / 2, 0, points.min(3)] {
             nearest.build(&uniform(n, 1 << 20, 1));

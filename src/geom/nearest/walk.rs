@@ -1,7 +1,7 @@
 //! The walk of one leaf's points through the tree: from their own leaf upward, and from every
 //! ancestor down into whatever is near enough to matter.
 
-use super::kernel::{Batch, box_distances};
+use super::kernel::{Batch, at_most, box_distances};
 use super::tree::{EXACT, LANES, Tree, above, below};
 use crate::point::Position;
 
@@ -87,7 +87,7 @@ impl<'a> Walk<'a> {
         let lo = std::array::from_fn(|i| below(self.lo[i].saturating_sub(node.origin[i])));
         let hi = std::array::from_fn(|i| above(self.hi[i].saturating_sub(node.origin[i])));
         let distances = box_distances(&node.lo, &node.hi, lo, hi);
-        let mut left = lanes(node.children, skip);
+        let mut left = lanes(node.children, skip) & at_most(&distances, self.reach());
         while let Some(child) = nearest(&distances, left, self.reach()) {
             left &= !(1 << child);
             let child = node.first_child as usize + child;
@@ -110,8 +110,8 @@ impl<'a> Walk<'a> {
         let lo = std::array::from_fn(|axis| own.lo[axis][self.child] + shift[axis]);
         let hi = std::array::from_fn(|axis| own.hi[axis][self.child] + shift[axis]);
         let distances = box_distances(&node.lo, &node.hi, lo, hi);
-        let mut left = lanes(node.children, skip);
         let mut farthest = self.batch.farthest();
+        let mut left = lanes(node.children, skip) & at_most(&distances, farthest);
         while let Some(child) = nearest(&distances, left, farthest) {
             left &= !(1 << child);
             self.work.leaves += 1;
@@ -133,11 +133,11 @@ impl<'a> Walk<'a> {
     /// Moves the points into the frame of a level-0 node and notes what that costs in precision.
     fn enter(&mut self, index: usize) {
         let shift = self.shift(index);
-        for axis in 0..3 {
-            for i in 0..LANES {
-                self.batch.at[axis][i] = self.points[axis][i] + shift[axis];
-            }
+        let mut at = *self.points;
+        for (lanes, shift) in at.iter_mut().zip(shift) {
+            lanes.iter_mut().for_each(|v| *v += shift);
         }
+        self.batch.at = at;
         let (home, other) = (self.tree.node(0, self.home), self.tree.node(0, index));
         let far = shift.iter().fold(0.0, |far: f64, s| far.max(f64::from(s.abs())));
         let reach = far + home.reach as f64;
@@ -164,15 +164,15 @@ pub(super) fn lanes(children: u32, skip: Option<usize>) -> u32 {
 
 /// The lane of `left` with the smallest distance, if that is not above `reach`.
 pub(super) fn nearest(distances: &[f32; LANES], mut left: u32, reach: f32) -> Option<usize> {
-    let mut best = None;
-    let mut least = reach;
+    if left == 0 {
+        return None;
+    }
+    let mut best = left.trailing_zeros() as usize & (LANES - 1);
+    left &= left - 1;
     while left != 0 {
         let lane = left.trailing_zeros() as usize & (LANES - 1);
         left &= left - 1;
-        if distances[lane] <= least && (best.is_none() || distances[lane] < least) {
-            best = Some(lane);
-            least = distances[lane];
-        }
+        best = if distances[lane] < distances[best] { lane } else { best };
     }
-    best
+    (distances[best] <= reach).then_some(best)
 }
