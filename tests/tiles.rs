@@ -176,7 +176,8 @@ fn tiles_share_the_scan_out_and_their_neighborhoods_are_those_of_the_whole_scan(
             tile.each_neighborhood(k, |i, offsets| {
                 seen += 1;
                 let p = positions[i];
-                let at_face = (0..3).any(|a| p[a].abs_diff(zone.lo[a]) < 20 || zone.hi[a].abs_diff(p[a]) < 20);
+                let at_face = (0..3)
+                    .any(|a| p[a].abs_diff(zone.lo[a]) < 20 || zone.hi[a].abs_diff(p[a]) < 20);
                 if !at_face && seen % 16 != 0 {
                     return;
                 }

@@ -33,6 +33,10 @@ macro_rules! tile_op {
     };
 }
 
-tile_op!(Normals, "normals", "Computes a surface normal at every point from its nearest neighbours.");
+tile_op!(
+    Normals,
+    "normals",
+    "Computes a surface normal at every point from its nearest neighbours."
+);
 tile_op!(Cells, "cells", "Divides the scan into cells whose normals agree.");
 tile_op!(Median, "median", "Keeps the median point of every cell.");

@@ -69,7 +69,9 @@ impl CreateSink for Output {
             (_, Layout::Las { .. }) => self.las(staged, schema, metadata),
             (_, Layout::Ply) => self.las_of_ply(staged, schema, metadata),
         };
-        created.map_err(|error| if error.path() == Some(staged) { error } else { error.at(&self.write.path) })
+        created.map_err(|error| {
+            if error.path() == Some(staged) { error } else { error.at(&self.write.path) }
+        })
     }
 }
 
@@ -93,7 +95,12 @@ impl Output {
     }
 
     /// LAS records stay as they are, unless another scale is asked for.
-    fn las(&self, staged: &Path, schema: &Arc<Schema>, metadata: &Metadata) -> Result<Box<dyn Sink>> {
+    fn las(
+        &self,
+        staged: &Path,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+    ) -> Result<Box<dyn Sink>> {
         if !self.write.drop.is_empty() {
             return Err(Error::pipeline("`drop` is for conversions between LAS and PLY")
                 .help("a LAS output holds every dimension of a LAS input: leave `drop` out"));
@@ -102,7 +109,8 @@ impl Output {
         for (axis, name) in names::XYZ.into_iter().enumerate() {
             if let Some(dimension) = scaled.dimensions.iter_mut().find(|d| d.name == name) {
                 dimension.scale = self.write.scale.map_or(dimension.scale, |scale| scale[axis]);
-                dimension.origin = self.write.offset.map_or(dimension.origin, |offset| offset[axis]);
+                dimension.origin =
+                    self.write.offset.map_or(dimension.origin, |offset| offset[axis]);
             }
         }
         if scaled == **schema {
@@ -114,7 +122,12 @@ impl Output {
         Ok(Box::new(Projected::new(sink, projection, scaled)))
     }
 
-    fn las_of_ply(&self, staged: &Path, schema: &Schema, metadata: &Metadata) -> Result<Box<dyn Sink>> {
+    fn las_of_ply(
+        &self,
+        staged: &Path,
+        schema: &Schema,
+        metadata: &Metadata,
+    ) -> Result<Box<dyn Sink>> {
         let scale = self.write.scale.ok_or_else(|| {
             Error::pipeline("a PLY scan written as LAS needs a `scale` for its coordinates")
                 .help("give scale = 0.001, or what the scan's precision is, in its own unit")

@@ -103,7 +103,8 @@ impl<R, P> Outlet<R, P> {
             state = self.commit_waiting(state, hands)?;
             let (progress, next) = self.encode_one(state, hands)?;
             state = next;
-            let all = done(state.turn) && state.chunks.is_empty() && state.appended == state.numbered;
+            let all =
+                done(state.turn) && state.chunks.is_empty() && state.appended == state.numbered;
             if all && !state.committing {
                 self.changed.notify_all();
                 return Ok(());

@@ -109,7 +109,9 @@ fn sort(stages: Vec<PlacedStage>) -> Result<Sorted> {
             }
             Role::Source(source) => sorted.source = Some((kind, source)),
             _ if sorted.source.is_none() => return misplaced("the first stage is a source"),
-            Role::Sink(_) if sorted.sink.is_some() => return misplaced("a pipeline has one output"),
+            Role::Sink(_) if sorted.sink.is_some() => {
+                return misplaced("a pipeline has one output");
+            }
             Role::Sink(sink) => sorted.sink = Some(sink),
             _ if sorted.sink.is_some() => return misplaced("the last stage writes"),
             Role::Transform(_) if !sorted.ops.is_empty() => {
@@ -201,7 +203,13 @@ impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let shares = self.demands.divide().map_err(|_| fmt::Error)?;
         let inputs = self.source.inputs();
-        writeln!(f, "source   {} ({} files, {} points by their headers)", self.source_kind, inputs.len(), self.source.points())?;
+        writeln!(
+            f,
+            "source   {} ({} files, {} points by their headers)",
+            self.source_kind,
+            inputs.len(),
+            self.source.points()
+        )?;
         for (kind, _) in &self.transforms {
             writeln!(f, "streams  {kind}")?;
         }

@@ -41,7 +41,12 @@ pub(super) struct Job<'a> {
 
 impl Job<'_> {
     /// Reads the next batch of a part through the transforms; false at its end.
-    pub fn read(&self, part: &mut dyn Part, batch: &mut PointBatch, tally: &mut Tally) -> Result<bool> {
+    pub fn read(
+        &self,
+        part: &mut dyn Part,
+        batch: &mut PointBatch,
+        tally: &mut Tally,
+    ) -> Result<bool> {
         batch.clear();
         part.read(batch)?;
         let read = batch.len() as u64;
@@ -52,9 +57,9 @@ impl Job<'_> {
         for (kind, transform) in &self.transforms {
             let before = batch.len();
             transform.apply(batch)?;
-            let removed = before.checked_sub(batch.len()).ok_or_else(|| {
-                Error::internal(format!("the stage {kind} made points up"))
-            })?;
+            let removed = before
+                .checked_sub(batch.len())
+                .ok_or_else(|| Error::internal(format!("the stage {kind} made points up")))?;
             tally.remove(kind, "removed", removed as u64);
         }
         self.advance(read)?;
@@ -78,16 +83,19 @@ impl Job<'_> {
         let record = &batch.records()[index * schema.stride..(index + 1) * schema.stride];
         let point = schema.coordinates().map(|axes| axes.map(|d| d.world(record, schema.endian)));
         let (what, help) = match why {
-            Misplaced::NotFinite => (
-                "is not finite",
-                "set nonfinite = \"drop\" under [run] to leave such points out",
-            ),
+            Misplaced::NotFinite => {
+                ("is not finite", "set nonfinite = \"drop\" under [run] to leave such points out")
+            }
             Misplaced::TooFar => (
                 "lies beyond the lattice",
                 "set a larger `lattice` step under [run], or move the scan nearer to its origin",
             ),
         };
-        let error = Error::new(ErrorKind::Data, format!("the point {:?} {what}", point.unwrap_or_default())).help(help);
+        let error = Error::new(
+            ErrorKind::Data,
+            format!("the point {:?} {what}", point.unwrap_or_default()),
+        )
+        .help(help);
         match self.source.inputs().get(batch.source as usize) {
             Some(path) => error.at(path),
             None => error,
@@ -174,7 +182,10 @@ impl Plan {
             threads: self.threads,
             drop_nonfinite: self.settings.nonfinite == Nonfinite::Drop,
             tile_points: self.settings.tile_points.map(usize::from),
-            run_records: self.settings.tile_points.map(|n| n.get().saturating_mul(4).min(shares.run_records)),
+            run_records: self
+                .settings
+                .tile_points
+                .map(|n| n.get().saturating_mul(4).min(shares.run_records)),
             wants_normals: self.sink.wants_normals(),
             watch,
         };
@@ -280,7 +291,9 @@ fn existing_folder(path: &Path) -> Result<PathBuf> {
     if folder.is_dir() {
         return Ok(folder);
     }
-    Err(Error::new(ErrorKind::Io, "the folder of the output does not exist").at(folder).help("create it first"))
+    Err(Error::new(ErrorKind::Io, "the folder of the output does not exist")
+        .at(folder)
+        .help("create it first"))
 }
 
 fn input_figures(source: &dyn Source) -> Vec<FileFigures> {

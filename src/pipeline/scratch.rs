@@ -82,7 +82,9 @@ fn make(parent: &Path) -> Result<Made> {
         let folder = parent.join(format!("{PREFIX}{}-{attempt}", std::process::id()));
         match fs::create_dir(&folder) {
             Ok(()) => break folder,
-            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && attempt < 10_000 => attempt += 1,
+            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && attempt < 10_000 => {
+                attempt += 1
+            }
             Err(e) => {
                 return Err(Error::io(parent, "create a scratch folder here", e)
                     .help("make the folder writable, or name another with --scratch"));
@@ -133,7 +135,11 @@ mod tests {
     use super::*;
 
     fn scratch_folders(parent: &Path) -> usize {
-        fs::read_dir(parent).unwrap().flatten().filter(|e| e.file_name().to_string_lossy().starts_with(PREFIX)).count()
+        fs::read_dir(parent)
+            .unwrap()
+            .flatten()
+            .filter(|e| e.file_name().to_string_lossy().starts_with(PREFIX))
+            .count()
     }
 
     #[test]

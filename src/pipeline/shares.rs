@@ -88,7 +88,8 @@ impl Demands {
 
     /// Bytes of a tile per position it holds, the product that it leaves behind included.
     pub fn tile_bytes_per_point(&self) -> usize {
-        let search = if self.ops.iter().any(|n| n.neighbors > 0) { Nearest::BYTES_PER_POINT } else { 0 };
+        let search =
+            if self.ops.iter().any(|n| n.neighbors > 0) { Nearest::BYTES_PER_POINT } else { 0 };
         let columns: usize = self.ops.iter().map(|n| n.bytes_per_point).sum();
         Loader::BYTES_PER_POINT + search + columns + 2 * PRODUCT_BYTES
     }
@@ -99,7 +100,8 @@ impl Demands {
     }
 
     fn work(&self, run_records: u64, tile_positions: u64) -> u64 {
-        let decode = self.decode_fixed() + run_records * Intake::bytes_per_record(self.stride) as u64;
+        let decode =
+            self.decode_fixed() + run_records * Intake::bytes_per_record(self.stride) as u64;
         let mill = self.mill_fixed() + tile_positions * self.tile_bytes_per_point() as u64;
         self.threads as u64 * decode.max(mill)
     }
@@ -125,7 +127,8 @@ impl Demands {
         let most = (THREAD_MOST * self.threads as u64).max(least);
         let work = (least + spare / 4 * 3).min(most);
         let share = work / self.threads as u64;
-        let fit = |fixed: u64, each: usize| (share.saturating_sub(fixed) / each.max(1) as u64) as usize;
+        let fit =
+            |fixed: u64, each: usize| (share.saturating_sub(fixed) / each.max(1) as u64) as usize;
         Ok(Shares {
             base,
             work,
@@ -174,8 +177,8 @@ mod tests {
     fn a_refusal_names_a_limit_that_does() {
         let error = demands(32 << 20).divide().unwrap_err();
         let help = error.remedy().unwrap().to_owned();
-        let mebibytes: u64 = help
-            .split_once("--memory ").unwrap().1.split_once("MiB").unwrap().0.parse().unwrap();
+        let mebibytes: u64 =
+            help.split_once("--memory ").unwrap().1.split_once("MiB").unwrap().0.parse().unwrap();
         assert!(demands(mebibytes << 20).divide().is_ok(), "{help}");
         assert!(demands((mebibytes - 2) << 20).divide().is_err(), "{help}");
     }

@@ -6,16 +6,20 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::outlet::{Hands, Outlet};
 use super::run::{Finished, Job, StopOnDrop};
 use super::shares::BATCH;
+use crate::Result;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::PointBatch;
 use crate::report::Tally;
 use crate::stage::{Encoded, Sink};
 use crate::tile::{lock, parallel};
-use crate::Result;
 
 /// Streams all parts of the source into `sink`. With a lattice, points that have no position on it
 /// are removed.
-pub(super) fn stream(job: &Job<'_>, sink: Box<dyn Sink>, lattice: Option<&Lattice>) -> Result<Finished> {
+pub(super) fn stream(
+    job: &Job<'_>,
+    sink: Box<dyn Sink>,
+    lattice: Option<&Lattice>,
+) -> Result<Finished> {
     let (encoder, chunk_points) = (sink.encoder(), sink.chunk_points());
     let outlet: Outlet<PointBatch, PointBatch> = Outlet::new(sink, job.threads);
     let schema = job.source.schema();

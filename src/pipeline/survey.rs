@@ -68,10 +68,8 @@ pub(super) fn survey(
         all.1.insert(range, lines);
         Ok(positions)
     })?;
-    let (scan, lines) = std::mem::replace(
-        &mut *lock(&all),
-        (ScanSurvey::new(&tiles.bounds()), BTreeMap::new()),
-    );
+    let (scan, lines) =
+        std::mem::replace(&mut *lock(&all), (ScanSurvey::new(&tiles.bounds()), BTreeMap::new()));
     let fitted = Mutex::new(scan.fit());
     let empty = lock(&fitted).part();
     each_range(job, ranges, |range| {
@@ -97,7 +95,11 @@ pub(super) fn survey(
 }
 
 /// Calls `work` for every range, on all threads; it returns how many positions it did.
-fn each_range(job: &Job<'_>, ranges: usize, work: impl Fn(usize) -> Result<u64> + Sync) -> Result<()> {
+fn each_range(
+    job: &Job<'_>,
+    ranges: usize,
+    work: impl Fn(usize) -> Result<u64> + Sync,
+) -> Result<()> {
     let next = AtomicUsize::new(0);
     parallel(job.threads, |_| {
         loop {
@@ -168,7 +170,9 @@ impl Walk<'_> {
             stretch.load(self, before)?;
             if let Some(&(last, _)) = stretch.positions.last() {
                 // The tile that reaches into this range belongs to the one before.
-                at = self.visit(&mut stretch, at, TileKey::around(last, self.level), |_, _, _| {})?.0;
+                at = self
+                    .visit(&mut stretch, at, TileKey::around(last, self.level), |_, _, _| {})?
+                    .0;
             }
         }
         let mut positions = 0;

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 use std::fmt;
 
-use serde::{Deserialize, Serialize};
 use serde::de::{Deserializer, Error, Unexpected, Visitor};
+use serde::{Deserialize, Serialize};
 
 /// Side of the initial cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
