@@ -51,6 +51,7 @@ fn plane(roughness: f64) -> Tile {
         normals,
         cells: Partition::default(),
         fates: vec![Fate::Kept; positions.len()],
+        around: Default::default(),
         positions,
     }
 }

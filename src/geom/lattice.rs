@@ -166,7 +166,8 @@ fn decimal(scale: [f64; 3], origin: [f64; 3]) -> Option<Lattice> {
 fn multiple(scale: f64, step: f64) -> Option<i64> {
     let ratio = scale / step;
     let whole = ratio.round();
-    (whole >= 1.0 && whole < 1e15 && (ratio - whole).abs() <= 1e-12 * whole).then_some(whole as i64)
+    let whole_number = (1.0..1e15).contains(&whole) && (ratio - whole).abs() <= 1e-12 * whole;
+    whole_number.then_some(whole as i64)
 }
 
 #[cfg(test)]

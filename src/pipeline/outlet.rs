@@ -62,11 +62,6 @@ impl<R, P> Outlet<R, P> {
         }
     }
 
-    /// Products and chunks that it may hold besides what the threads work on.
-    pub fn held(threads: usize) -> usize {
-        threads + 1
-    }
-
     /// Delivers the product at `place`; `last` if none of the same tile or part follows.
     pub fn deliver(
         &self,

@@ -45,9 +45,9 @@ impl Bounds {
 
     /// Grows to hold `p`.
     pub fn add(&mut self, p: Position) {
-        for axis in 0..3 {
-            self.lo[axis] = self.lo[axis].min(p[axis]);
-            self.hi[axis] = self.hi[axis].max(p[axis]);
+        for (axis, v) in p.into_iter().enumerate() {
+            self.lo[axis] = self.lo[axis].min(v);
+            self.hi[axis] = self.hi[axis].max(v);
         }
     }
 

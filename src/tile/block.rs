@@ -25,7 +25,8 @@ pub struct Block {
 }
 
 impl Block {
-    /// How many positions it has.
+    /// How many positions it has: at least one.
+    #[allow(clippy::len_without_is_empty, reason = "no block is empty")]
     pub fn len(&self) -> usize {
         usize::from(self.len)
     }
@@ -47,9 +48,8 @@ impl Block {
         };
         let start = out.len();
         for p in positions {
-            for axis in 0..3 {
-                let offset = p[axis].abs_diff(bounds.lo[axis]).to_le_bytes();
-                out.extend_from_slice(&offset[..width]);
+            for (v, lo) in p.iter().zip(bounds.lo) {
+                out.extend_from_slice(&v.abs_diff(lo).to_le_bytes()[..width]);
             }
         }
         let has_copies = copies.iter().any(|&n| n != 1);

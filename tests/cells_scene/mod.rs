@@ -50,6 +50,7 @@ pub fn tile(scan: &[Point], cube: Bounds, side: i64) -> Tile {
         normals: loaded.iter().map(|p| p.normal).collect(),
         cells: Partition::default(),
         fates: vec![Fate::Kept; loaded.len()],
+        around: Default::default(),
     }
 }
 
