@@ -15,7 +15,7 @@ use proptest::prelude::*;
 /// them; None where the variable is not set.
 fn scans() -> Option<BTreeMap<PathBuf, u64>> {
     let Some(folder) = std::env::var_os("POINTMILL_SCANS").map(PathBuf::from) else {
-        println!("POINTMILL_SCANS is not set: nothing is tested");
+        eprintln!("POINTMILL_SCANS is not set: nothing is tested");
         return None;
     };
     let manifest = std::fs::read_to_string(folder.join("MANIFEST.tsv")).unwrap();

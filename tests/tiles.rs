@@ -1,7 +1,9 @@
 //! The tile store against brute force: every position once, canonical order, exact neighbours.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
+
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use pointmill::budget::Budget;
 use pointmill::geom::lattice::Lattice;
@@ -71,7 +73,7 @@ fn record(p: Position, tag: u32) -> Vec<u8> {
 }
 
 #[derive(Debug)]
-struct Scratch(tempfile::TempDir, Mutex<u32>);
+struct Scratch(tempfile::TempDir);
 
 impl Folder for Scratch {
     fn file(&self, name: &str) -> pointmill::Result<PathBuf> {
@@ -86,7 +88,7 @@ fn sealed(
     memory: u64,
 ) -> (Arc<SealedTiles>, u64, usize) {
     let budget = Budget::new(1 << 30);
-    let folder = Box::new(Scratch(tempfile::tempdir().unwrap(), Mutex::new(0)));
+    let folder = Box::new(Scratch(tempfile::tempdir().unwrap()));
     let area = SpillArea::new(budget.clone(), memory, folder);
     let store = TileStore::new(&area, &budget, schema().stride);
     parallel(threads, |thread| {
