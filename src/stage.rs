@@ -155,12 +155,14 @@ pub trait CreateSink: Send + Sync {
     fn wants_normals(&self) -> bool;
 
     /// Checks that the format holds every dimension (or that the user dropped it) and opens the
-    /// output at `staged`, a path beside the final one.
+    /// output at `staged`, a path beside the final one. With `whole`, every record of the source
+    /// will come, in its order: what refers to records by number stays true.
     fn create(
         &self,
         staged: &Path,
         schema: &Arc<Schema>,
         metadata: &Metadata,
+        whole: bool,
     ) -> Result<Box<dyn Sink>>;
 }
 

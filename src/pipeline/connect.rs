@@ -63,9 +63,10 @@ impl CreateSink for Output {
         staged: &Path,
         schema: &Arc<Schema>,
         metadata: &Metadata,
+        whole: bool,
     ) -> Result<Box<dyn Sink>> {
         let created = match (self.format, schema.layout) {
-            (Format::Ply, _) => self.ply(staged, schema, metadata),
+            (Format::Ply, _) => self.ply(staged, schema, metadata, whole),
             (_, Layout::Las { .. }) => self.las(staged, schema, metadata),
             (_, Layout::Ply) => self.las_of_ply(staged, schema, metadata),
         };
@@ -76,7 +77,13 @@ impl CreateSink for Output {
 }
 
 impl Output {
-    fn ply(&self, staged: &Path, schema: &Schema, metadata: &Metadata) -> Result<Box<dyn Sink>> {
+    fn ply(
+        &self,
+        staged: &Path,
+        schema: &Schema,
+        metadata: &Metadata,
+        whole: bool,
+    ) -> Result<Box<dyn Sink>> {
         let encoding = self.write.encoding.map(|encoding| match encoding {
             Encoding::Ascii => ply::Encoding::Ascii,
             Encoding::Binary => ply::Encoding::BinaryLittleEndian,
@@ -85,7 +92,7 @@ impl Output {
             encoding,
             normals: self.wants_normals(),
             drop: self.write.drop.clone(),
-            carry_rest: false,
+            carry_rest: whole,
         };
         ply::create(staged, &options, schema, metadata)
     }

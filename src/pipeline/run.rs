@@ -158,7 +158,11 @@ impl Plan {
         let path = self.sink.path().to_owned();
         let staging = Arc::new(Scratch::below(&existing_folder(&path)?));
         let staged = staging.path("output")?;
-        let sink = self.sink.create(&staged, self.source.schema(), self.source.metadata())?;
+        let whole = !self.mills
+            && self.transforms.is_empty()
+            && self.settings.nonfinite == Nonfinite::Refuse;
+        let (schema, metadata) = (self.source.schema(), self.source.metadata());
+        let sink = self.sink.create(&staged, schema, metadata, whole)?;
         self.demands.chunk = (sink.chunk_points(), sink.chunk_bytes());
         let mut warnings = self.source.warnings();
         let shares = self.demands.divide()?;

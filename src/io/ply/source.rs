@@ -218,8 +218,8 @@ fn dropped(file: &PlyFile) -> Option<String> {
         .collect();
     (!others.is_empty()).then(|| {
         format!(
-            "{}: {} are not points and are dropped (a binary PLY converted to PLY of the same \
-             encoding can carry them)",
+            "{}: {} are not points: a binary PLY converted to PLY of the same encoding carries \
+             them, all other outputs drop them",
             file.path.display(),
             others.join(", ")
         )
