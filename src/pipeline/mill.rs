@@ -286,6 +286,10 @@ impl<'a> Worker<'a> {
     fn new(job: &'a Job<'a>, tiles: &Arc<SealedTiles>, capacity: usize) -> Self {
         let neighbors = neighbors(&job.ops);
         let mut loader = Loader::new(tiles, capacity);
+        if let Some(points) = job.tile_points {
+            // Half for the zone, half for the rim, as where memory decides.
+            loader.limit_rim(points.saturating_mul(2));
+        }
         if neighbors > 0 {
             loader.tile().0.around.reserve(capacity);
         }

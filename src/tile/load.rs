@@ -12,7 +12,8 @@ use crate::point::Bounds;
 pub struct Loader {
     tiles: Arc<SealedTiles>,
     reader: Reader,
-    capacity: usize,
+    /// Positions up to which a tile gets a rim.
+    rim_limit: usize,
     tile: Tile,
     /// For each position of the core, the number of its first record.
     first_records: Vec<u64>,
@@ -27,10 +28,16 @@ impl Loader {
         Loader {
             tiles: tiles.clone(),
             reader: Reader::default(),
-            capacity,
+            rim_limit: capacity,
             tile: Tile::with_capacity(capacity),
             first_records: Vec::with_capacity(capacity),
         }
+    }
+
+    /// Gives no tile a rim that makes it more than `positions`; what that leaves unproven is searched
+    /// for in the whole scan.
+    pub fn limit_rim(&mut self, positions: usize) {
+        self.rim_limit = self.rim_limit.min(positions);
     }
 
     /// Loads the positions of `key`'s cube, of the `reach` around it that later stages look at
@@ -92,10 +99,10 @@ impl Loader {
             _ => *spacings.select_nth_unstable_by(typical, f64::total_cmp).1,
         };
         let mut width = (1.5 * (neighbors as f64).sqrt() * spacing).min(4e18) as i64 + 1;
-        let capacity = self.capacity as u64;
+        let limit = self.rim_limit as u64;
         loop {
             let region = zone.grown(width);
-            if width == 0 || !self.tiles.holds_more(&region, capacity, &mut self.reader)? {
+            if width == 0 || !self.tiles.holds_more(&region, limit, &mut self.reader)? {
                 return Ok(region);
             }
             width /= 2;
