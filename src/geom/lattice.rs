@@ -115,10 +115,11 @@ const FARTHEST: f64 = (1u64 << 62) as f64;
 fn float_position(world: [f64; 3], per_unit: f64) -> Result<Position, Misplaced> {
     let mut position = [0; 3];
     for axis in 0..3 {
-        let steps = (world[axis] * per_unit).round_ties_even();
-        if !steps.is_finite() {
+        if !world[axis].is_finite() {
             return Err(Misplaced::NotFinite);
         }
+        // A finite coordinate may be too far for the product, which is infinite then.
+        let steps = (world[axis] * per_unit).round_ties_even();
         if steps.abs() >= FARTHEST {
             return Err(Misplaced::TooFar);
         }
@@ -200,5 +201,6 @@ mod tests {
         assert_eq!(float_position([0.5, 1.5, -0.5], 1.0), Ok([0, 2, 0]));
         assert_eq!(float_position([f64::NAN, 0.0, 0.0], 1.0), Err(Misplaced::NotFinite));
         assert_eq!(float_position([5e9, 0.0, 0.0], BINARY), Err(Misplaced::TooFar));
+        assert_eq!(float_position([0.0, -f64::MAX, 0.0], BINARY), Err(Misplaced::TooFar));
     }
 }

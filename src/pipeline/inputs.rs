@@ -1,5 +1,7 @@
 //! Which files a list of paths, patterns and folders means.
 
+use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
@@ -16,16 +18,20 @@ use crate::{Error, Result};
 ///   their paths; one that matches none is an error;
 /// - else it is a file that does not exist (yet): opening it will tell.
 ///
-/// A file meant twice is an error: its points would be read twice.
+/// Upper and lower case differ, and `*` and `?` do not match a dot at the beginning of a name, as in
+/// a shell. A file meant twice, by whatever names, is an error: its points would be read twice.
 pub fn expand<P: AsRef<str>>(paths: &[P]) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = Vec::new();
+    let mut named = BTreeSet::new();
     for path in paths.iter().map(AsRef::as_ref) {
-        let meant = one(path)?;
-        if let Some(twice) = meant.iter().find(|file| files.contains(file)) {
-            let twice = twice.display();
-            return Err(Error::pipeline(format!("`{path}` means {twice}, which is named before")));
+        for file in one(path)? {
+            if !named.insert(file.canonicalize().unwrap_or_else(|_| file.clone())) {
+                let twice = file.display();
+                let told = format!("`{path}` means {twice}, which is named before");
+                return Err(Error::pipeline(told));
+            }
+            files.push(file);
         }
-        files.extend(meant);
     }
     if files.is_empty() {
         return Err(Error::pipeline("no input is named"));
@@ -45,24 +51,89 @@ fn one(path: &str) -> Result<Vec<PathBuf>> {
             _ => Ok(vec![literal.to_owned()]),
         };
     }
-    let options = glob::MatchOptions { require_literal_leading_dot: true, ..Default::default() };
-    let wrong =
-        |e: glob::PatternError| Error::pipeline(format!("`{path}` is no pattern: {}", e.msg));
     let mut files = Vec::new();
-    for entry in glob::glob_with(path, options).map_err(wrong)? {
-        let entry = entry.map_err(|e| {
-            let place = e.path().to_owned();
-            Error::io(place, "list the folder", e.into())
-        })?;
-        if !entry.is_dir() {
-            files.push(entry);
-        }
-    }
+    let start = if path.starts_with('/') { Path::new("/") } else { Path::new("") };
+    walk(start, &steps(path)?, &mut files)?;
     if files.is_empty() {
         return Err(Error::pipeline(format!("no file matches `{path}`")));
     }
     sort(&mut files);
+    files.dedup();
     Ok(files)
+}
+
+/// What one component of a pattern means.
+enum Step<'a> {
+    /// The one of this name.
+    Name(&'a str),
+    /// All whose names match.
+    Matching(glob::Pattern),
+    /// Any number of folders.
+    Below,
+}
+
+fn steps(path: &str) -> Result<Vec<Step<'_>>> {
+    let mut steps = Vec::new();
+    for part in path.split('/').filter(|part| !part.is_empty()) {
+        steps.push(match part {
+            "**" if matches!(steps.last(), Some(Step::Below)) => continue,
+            "**" => Step::Below,
+            _ if !part.contains(['*', '?', '[']) => Step::Name(part),
+            _ => Step::Matching(
+                glob::Pattern::new(part)
+                    .map_err(|e| Error::pipeline(format!("`{path}` is no pattern: {}", e.msg)))?,
+            ),
+        });
+    }
+    Ok(steps)
+}
+
+/// Collects the files that `steps` lead to from `at`.
+fn walk(at: &Path, steps: &[Step<'_>], files: &mut Vec<PathBuf>) -> Result<()> {
+    let Some((step, rest)) = steps.split_first() else {
+        if !at.is_dir() && at.exists() {
+            files.push(at.to_owned());
+        }
+        return Ok(());
+    };
+    match step {
+        Step::Name(name) => walk(&at.join(name), rest, files),
+        Step::Matching(pattern) => {
+            for name in entries(at)? {
+                // Bytes that are no text match `*` and `?` as the character that stands for such.
+                let text = name.to_string_lossy();
+                let hidden = text.starts_with('.') && !pattern.as_str().starts_with('.');
+                if !hidden && pattern.matches(&text) {
+                    walk(&at.join(name), rest, files)?;
+                }
+            }
+            Ok(())
+        }
+        Step::Below => {
+            walk(at, rest, files)?;
+            for name in entries(at)? {
+                let inner = at.join(&name);
+                // A link could lead back up.
+                if !name.as_bytes().starts_with(b".") && inner.is_dir() && !inner.is_symlink() {
+                    walk(&inner, steps, files)?;
+                }
+            }
+            Ok(())
+        }
+    }
+}
+
+/// Names in a folder; none where there is no such folder.
+fn entries(folder: &Path) -> Result<Vec<OsString>> {
+    let folder = if folder == Path::new("") { Path::new(".") } else { folder };
+    let failed = |e| Error::io(folder, "list the folder", e);
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    fs::read_dir(folder)
+        .map_err(failed)?
+        .map(|entry| entry.map(|e| e.file_name()).map_err(failed))
+        .collect()
 }
 
 fn folder(path: &Path) -> Result<Vec<PathBuf>> {
@@ -119,6 +190,40 @@ mod tests {
     }
 
     #[test]
+    fn patterns_tell_case_leave_hidden_ones_out_and_go_through_folders() {
+        let at = folder_of(&["a.laz", "A.laz", "b.LAZ", ".c.laz"]);
+        for inner in ["x/y", "x/.z", "w"] {
+            fs::create_dir_all(at.path().join(inner)).unwrap();
+            fs::write(at.path().join(inner).join("d.laz"), b"").unwrap();
+        }
+        std::os::unix::fs::symlink("..", at.path().join("x/up")).unwrap();
+        let found = |pattern: &str| -> Vec<String> {
+            let files = expand(&[at.path().join(pattern).to_str().unwrap()]).unwrap();
+            let inner = |f: PathBuf| f.strip_prefix(at.path()).unwrap().display().to_string();
+            files.into_iter().map(inner).collect()
+        };
+        assert_eq!(found("*.laz"), ["A.laz", "a.laz"]);
+        assert_eq!(found("*.LAZ"), ["b.LAZ"]);
+        assert_eq!(found(".*.laz"), [".c.laz"]);
+        assert_eq!(found("[a-c]*"), ["a.laz", "b.LAZ"]);
+        assert_eq!(found("**/*.laz"), ["A.laz", "a.laz", "w/d.laz", "x/y/d.laz"]);
+        assert_eq!(found("**/**/d.laz"), ["w/d.laz", "x/y/d.laz"]);
+        assert_eq!(found("x/.*/d.*"), ["x/.z/d.laz"]);
+        assert_eq!(found("[x]/../w/*"), ["x/../w/d.laz"]);
+        assert!(expand(&[at.path().join("x/**").to_str().unwrap()]).is_err(), "folders alone");
+        assert!(expand(&[at.path().join("none/*").to_str().unwrap()]).is_err());
+    }
+
+    #[test]
+    fn names_that_are_no_text_are_found_too() {
+        let at = folder_of(&["a.laz"]);
+        let name = std::ffi::OsStr::from_bytes(b"\xff.laz");
+        fs::write(at.path().join(name), b"").unwrap();
+        let files = expand(&[at.path().join("*.laz").to_str().unwrap()]).unwrap();
+        assert_eq!(files, [at.path().join("a.laz"), at.path().join(name)]);
+    }
+
+    #[test]
     fn a_file_that_exists_wins_over_the_pattern() {
         let at = folder_of(&["a[1].laz", "a1.laz"]);
         assert_eq!(names(at.path(), &["a[1].laz"]).unwrap(), ["a[1].laz"]);
@@ -132,6 +237,7 @@ mod tests {
         let told = |paths: &[&str]| names(at.path(), paths).unwrap_err().to_string();
         assert!(told(&["*.las"]).contains("/*.las`"));
         assert!(told(&["a.laz", "*.laz"]).contains("a.laz, which is named before"));
+        assert!(told(&["a.laz", "./a.laz"]).contains("./a.laz, which is named before"));
         assert!(told(&["[.laz"]).contains("no pattern"));
         let empty = folder_of(&["a.txt"]);
         assert!(names(empty.path(), &[""]).unwrap_err().to_string().contains("has no las"));

@@ -157,6 +157,9 @@ impl Plan {
         let mut clock = Clock::new(watch);
         let path = self.sink.path().to_owned();
         let staging = Arc::new(Scratch::below(&existing_folder(&path)?));
+        if let Some(report) = &self.settings.report {
+            existing_folder(report)?;
+        }
         let staged = staging.path("output")?;
         let whole = !self.mills
             && self.transforms.is_empty()
@@ -291,6 +294,12 @@ fn existing_folder(path: &Path) -> Result<PathBuf> {
     let folder = Scratch::parent_of(path);
     if path.is_dir() {
         return Err(Error::pipeline("this is a folder, not a file to write").at(path));
+    }
+    if path.exists() && !path.is_file() {
+        // An output takes the place of what has its name: of /dev/null, for all programs to come.
+        return Err(Error::pipeline("this is no regular file: an output would replace it")
+            .at(path)
+            .help("write to a file of its own"));
     }
     if folder.is_dir() {
         return Ok(folder);

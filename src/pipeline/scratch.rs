@@ -4,7 +4,8 @@
 //! folder and the lock falls open; the next run beside it removes it.
 
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
@@ -77,33 +78,53 @@ impl Drop for Scratch {
 }
 
 fn make(parent: &Path) -> Result<Made> {
-    let mut attempt = 0u32;
-    let folder = loop {
+    // A run that starts at the same time may take a folder without a lock for a killed run's and
+    // remove it; then the next number is tried.
+    for attempt in 0..10_000u32 {
         let folder = parent.join(format!("{PREFIX}{}-{attempt}", std::process::id()));
         match fs::create_dir(&folder) {
-            Ok(()) => break folder,
-            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && attempt < 10_000 => {
-                attempt += 1
-            }
+            Ok(()) => {}
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => continue,
             Err(e) => {
                 return Err(Error::io(parent, "create a scratch folder here", e)
                     .help("make the folder writable, or name another with --scratch"));
             }
         }
-    };
-    let path = folder.join(MARKER);
-    let marker = File::create(&path).and_then(|mut marker| {
-        marker.lock()?;
-        let about = serde_json::json!({
-            "about": "scratch of a pointmill run; safe to remove when no run uses it",
-            "version": env!("CARGO_PKG_VERSION"),
-            "process": std::process::id(),
-        });
-        writeln!(marker, "{about}")?;
-        Ok(marker)
+        let path = folder.join(MARKER);
+        match mark(&path) {
+            Ok(marker) if is_still(&marker, &path) => {
+                return Ok(Made { folder, files: 0, _marker: marker });
+            }
+            Err(e) if e.kind() != ErrorKind::NotFound => {
+                let _ = fs::remove_dir_all(&folder); // the error says more than a second one could
+                return Err(Error::io(&path, "mark the scratch folder", e));
+            }
+            _ => {}
+        }
+    }
+    let told = "there are too many scratch folders here; remove those that no run uses";
+    Err(Error::new(crate::ErrorKind::Io, told).at(parent))
+}
+
+/// A marker file at `path`, locked.
+fn mark(path: &Path) -> std::io::Result<File> {
+    let mut marker = File::create(path)?;
+    marker.lock()?;
+    let about = serde_json::json!({
+        "about": "scratch of a pointmill run; safe to remove when no run uses it",
+        "version": env!("CARGO_PKG_VERSION"),
+        "process": std::process::id(),
     });
-    let marker = marker.map_err(|e| Error::io(&path, "mark the scratch folder", e))?;
-    Ok(Made { folder, files: 0, _marker: marker })
+    writeln!(marker, "{about}")?;
+    Ok(marker)
+}
+
+/// True if the open `file` is the one at `path`.
+fn is_still(file: &File, path: &Path) -> bool {
+    match (file.metadata(), fs::metadata(path)) {
+        (Ok(open), Ok(named)) => (open.dev(), open.ino()) == (named.dev(), named.ino()),
+        _ => false,
+    }
 }
 
 /// Removes scratch folders in `parent` whose runs are gone. What cannot be read or removed is left.
@@ -113,13 +134,18 @@ fn remove_stale(parent: &Path) {
             continue;
         }
         let folder = entry.path();
-        let free = match File::open(folder.join(MARKER)) {
-            Ok(marker) => marker.try_lock().is_ok(),
+        match File::open(folder.join(MARKER)) {
+            // The lock is held until all is gone: a run that was about to take it then finds its
+            // marker missing.
+            Ok(marker) => {
+                if marker.try_lock().is_ok() {
+                    let _ = fs::remove_dir_all(&folder);
+                }
+            }
             // A run killed before it could mark its folder; `remove_dir` spares any that is not empty.
-            Err(_) => fs::remove_dir(&folder).is_ok(),
-        };
-        if free {
-            let _ = fs::remove_dir_all(folder);
+            Err(_) => {
+                let _ = fs::remove_dir(&folder);
+            }
         }
     }
 }
@@ -150,6 +176,25 @@ mod tests {
         fs::write(scratch.path("a").unwrap(), "x").unwrap();
         assert_eq!(scratch_folders(parent.path()), 1);
         drop(scratch);
+        assert_eq!(scratch_folders(parent.path()), 0);
+    }
+
+    #[test]
+    fn runs_that_start_at_once_do_not_take_each_other_for_killed() {
+        let parent = tempfile::tempdir().unwrap();
+        std::thread::scope(|threads| {
+            for _ in 0..4 {
+                threads.spawn(|| {
+                    for _ in 0..200 {
+                        let scratch = Scratch::below(parent.path());
+                        let file = scratch.path("a").unwrap();
+                        fs::write(&file, "x").unwrap();
+                        remove_stale(parent.path());
+                        assert_eq!(fs::read(&file).unwrap(), b"x");
+                    }
+                });
+            }
+        });
         assert_eq!(scratch_folders(parent.path()), 0);
     }
 
