@@ -55,7 +55,7 @@ impl Format {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Read {
-    /// A file, a pattern, a folder, or a list of them; see [`expand`](super::expand).
+    /// A file, a pattern, a folder, or a list of them.
     #[serde(deserialize_with = "one_or_more")]
     pub path: Vec<String>,
     /// Format of all of them; none: as their extensions say.
