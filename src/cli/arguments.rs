@@ -160,6 +160,9 @@ pub(super) struct Convert {
     /// Scale of LAS coordinates [default: the input's; PLY to LAS must say it]
     #[arg(long, value_name = "SCALE", allow_negative_numbers = true)]
     pub scale: Option<f64>,
+    /// Offset of LAS coordinates on each axis [default: the input's, or 0]
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_negative_numbers = true)]
+    pub offset: Vec<f64>,
     /// Dimensions that may get lost, such as GpsTime,UserData
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub drop: Vec<String>,

@@ -76,6 +76,11 @@ fn pipeline(
         ("-o", "write.path", Some(output)),
         ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
         ("--scale", "write.scale", arguments.scale.map(number)),
+        (
+            "--offset",
+            "write.offset",
+            (!arguments.offset.is_empty()).then(|| json!(arguments.offset)),
+        ),
         ("--drop", "write.drop", (!arguments.drop.is_empty()).then(|| json!(arguments.drop))),
         ("--encoding", "write.encoding", arguments.encoding.as_deref().map(Value::from)),
     ]);

@@ -3,19 +3,26 @@
 use std::time::Instant;
 
 use super::Watch;
-use crate::report::Phase;
+use crate::report::{Phase, cpu_seconds};
 
 /// Wall-clock times of phases, one after the other.
 pub(super) struct Clock<'a> {
     watch: &'a dyn Watch,
     start: Instant,
+    cpu_before: Option<f64>,
     open: Option<(&'static str, Instant)>,
     phases: Vec<Phase>,
 }
 
 impl<'a> Clock<'a> {
     pub fn new(watch: &'a dyn Watch) -> Self {
-        Clock { watch, start: Instant::now(), open: None, phases: Vec::new() }
+        Clock {
+            watch,
+            start: Instant::now(),
+            cpu_before: cpu_seconds(),
+            open: None,
+            phases: Vec::new(),
+        }
     }
 
     /// Ends the phase that runs and begins `name`, which has `total` points to do.
@@ -32,9 +39,10 @@ impl<'a> Clock<'a> {
         }
     }
 
-    /// Seconds in all and by phase.
-    pub fn finish(mut self) -> (f64, Vec<Phase>) {
+    /// Wall-clock seconds in all, CPU seconds in all, and wall-clock seconds by phase.
+    pub fn finish(mut self) -> (f64, Option<f64>, Vec<Phase>) {
         self.end();
-        (self.start.elapsed().as_secs_f64(), self.phases)
+        let cpu = self.cpu_before.and_then(|before| Some(cpu_seconds()? - before));
+        (self.start.elapsed().as_secs_f64(), cpu, self.phases)
     }
 }

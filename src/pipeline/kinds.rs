@@ -198,6 +198,11 @@ impl StageKind for Write {
             Format::Las | Format::Laz if self.encoding.is_some() => {
                 return Err(only("encoding", "ply"));
             }
+            _ if self.offset.is_some_and(|offset| offset.iter().any(|v| !v.is_finite())) => {
+                return Err(
+                    at.blame("offset", Error::pipeline("an offset is three finite numbers"))
+                );
+            }
             _ => {}
         }
         Ok(Role::Sink(connect::write(self, format)))

@@ -242,7 +242,7 @@ impl Plan {
         let ledger = Ledger::new(finished.read, finished.kept, &finished.tally);
         ledger.check()?;
         ledger.check_written(self.sink.path(), finished.written.points)?;
-        (run.seconds, run.phases) = clock.finish();
+        (run.seconds, run.cpu_seconds, run.phases) = clock.finish();
         run.leased_bytes = budget.peak();
         run.peak_memory_bytes = peak_memory();
         run.work = finished.tally.work.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect();

@@ -74,6 +74,8 @@ pub struct RunFigures {
     pub spill_bytes: u64,
     /// Wall-clock seconds in all.
     pub seconds: f64,
+    /// CPU seconds of all threads, user and system; None where the system does not tell.
+    pub cpu_seconds: Option<f64>,
     /// Wall-clock seconds by phase, in the order of the run.
     pub phases: Vec<Phase>,
     /// Counts that depend on how the work was cut up (tiles, rim positions, …).
@@ -178,6 +180,7 @@ impl RunFigures {
         object.entry("peak_memory_bytes", &self.peak_memory_bytes)?;
         object.entry("spill_bytes", &self.spill_bytes)?;
         object.entry("seconds", &self.seconds)?;
+        object.entry("cpu_seconds", &self.cpu_seconds)?;
         object.entry("phases", &self.phases)?;
         object.entry("work", &self.work)?;
         object.entry("warnings", &self.warnings)?;

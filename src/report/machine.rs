@@ -39,6 +39,22 @@ pub fn resident_now() -> Option<u64> {
     kibibytes(&fs::read_to_string("/proc/self/status").ok()?, "VmRSS")
 }
 
+/// CPU seconds, user and system, that this process has used so far on all its threads; None where
+/// the system does not tell.
+pub fn cpu_seconds() -> Option<f64> {
+    let ticks = cpu_ticks(&fs::read_to_string("/proc/self/stat").ok()?)?;
+    Some(ticks as f64 / rustix::param::clock_ticks_per_second() as f64)
+}
+
+/// utime + stime of /proc/self/stat (proc(5)): fields 14 and 15, the second of which, the name in
+/// parentheses, may hold blanks.
+fn cpu_ticks(stat: &str) -> Option<u64> {
+    let (_, behind_name) = stat.rsplit_once(')')?;
+    let mut fields = behind_name.split_whitespace().skip(11);
+    let (user, system): (u64, u64) = (fields.next()?.parse().ok()?, fields.next()?.parse().ok()?);
+    user.checked_add(system)
+}
+
 /// A figure of the form `name:  123 kB`, in bytes.
 fn kibibytes(text: &str, name: &str) -> Option<u64> {
     let figure = field(text, name)?.strip_suffix("kB")?.trim();
@@ -56,6 +72,13 @@ fn field<'a>(text: &'a str, name: &str) -> Option<&'a str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cpu_time_is_read_behind_any_name() {
+        let stat = "7 (a ) name) R 1 2 3 4 5 6 7 8 9 10 250 30 0 0 20 0";
+        assert_eq!(cpu_ticks(stat), Some(280));
+        assert_eq!(cpu_ticks("7 (short) R 1"), None);
+    }
 
     #[test]
     fn figures_of_the_status_file_are_read_in_bytes() {

@@ -15,7 +15,7 @@ pub use deviations::{Deviations, Histogram};
 pub use document::{Decision, FileFigures, Outcome, Phase, Report, RunFigures, result_bytes};
 pub use figures::{DeviationFigures, DeviationTotals, Pair, PlaneFigures, TileFigures, Totals};
 pub use ledger::{Ledger, Removed};
-pub use machine::{Machine, peak_memory, resident_now};
+pub use machine::{Machine, cpu_seconds, peak_memory, resident_now};
 pub use moments::{Moments, Plane};
 pub use sums::{Distances, FixedSum};
 pub use survey::{

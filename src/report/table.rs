@@ -69,6 +69,9 @@ fn totals_lines(f: &mut fmt::Formatter<'_>, totals: &Totals) -> fmt::Result {
 
 fn time_line(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result {
     write!(f, "\ntime       {:.1} s", report.run.seconds)?;
+    if let Some(cpu) = report.run.cpu_seconds {
+        write!(f, " ({cpu:.1} s of CPU)")?;
+    }
     for (i, phase) in report.run.phases.iter().enumerate() {
         let before = if i == 0 { ": " } else { ", " };
         write!(f, "{before}{} {:.1}", phase.name, phase.seconds)?;
