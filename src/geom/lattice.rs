@@ -61,9 +61,16 @@ impl Lattice {
         Lattice { step, shift: [0.0; 3], placement: Placement::Float { per_unit } }
     }
 
-    /// World coordinates of a position.
+    /// World coordinates of a position. Where a world unit is a whole number of steps they are
+    /// divided, which rounds to the decimal that one expects: 12.345 and not 12.345000000000001.
     pub fn world(&self, p: Position) -> [f64; 3] {
-        std::array::from_fn(|axis| p[axis] as f64 * self.step + self.shift[axis])
+        let per_unit = 1.0 / self.step;
+        let whole = per_unit == per_unit.round();
+        std::array::from_fn(|axis| {
+            let steps = p[axis] as f64;
+            let at = if whole { steps / per_unit } else { steps * self.step };
+            at + self.shift[axis]
+        })
     }
 
     /// Whole steps nearest to a length in world units, at least 1.
@@ -187,6 +194,15 @@ mod tests {
     fn equal_scales_need_not_be_decimal() {
         assert_eq!(decimal([1.0 / 3.0; 3], [0.0; 3]).unwrap().step, 1.0 / 3.0);
         assert!(decimal([1.0 / 3.0, 0.5, 0.5], [0.0; 3]).is_none());
+    }
+
+    #[test]
+    fn decimal_positions_are_decimal_in_the_world() {
+        let lattice = decimal([0.001; 3], [0.0; 3]).unwrap();
+        assert_eq!(lattice.world([5_600_037_884, -31_351, 7]), [5_600_037.884, -31.351, 0.007]);
+        assert_ne!(5_600_037_884.0 * 0.001, 5_600_037.884, "a product rounds otherwise");
+        let lattice = decimal([2.5; 3], [0.0; 3]).unwrap();
+        assert_eq!(lattice.world([3, -1, 0]), [7.5, -2.5, 0.0]);
     }
 
     #[test]

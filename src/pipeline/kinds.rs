@@ -45,11 +45,17 @@ impl Format {
     }
 }
 
-/// Reads files.
+/// The source of most pipelines. Several files are one scan; all are LAS or LAZ, or all are PLY.
+///
+/// Headers are read, compared and held against the files' lengths before any point is. Files that
+/// do not fit together are refused by name: LAS inputs agree in point format, record length, extra
+/// bytes, scales, GPS time type and coordinate reference system, PLY inputs in encoding, vertex
+/// properties and coordinate reference system. LAS offsets may differ by whole steps; the output has
+/// the smallest.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Read {
-    /// A file, a pattern, a folder, or a list of them; see [`expand`](super::expand).
+    /// A file, a pattern, a folder, or a list of them.
     #[serde(deserialize_with = "one_or_more")]
     pub path: Vec<String>,
     /// Format of all of them; none: as their extensions say.
@@ -82,7 +88,8 @@ impl StageKind for Read {
     }
 }
 
-/// Makes a scan up.
+/// A source that needs no file: for trying, for tests, and to see what a setting does where the
+/// truth is known. It streams at any size, and equal keys give equal bytes on every machine.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Synth {
@@ -107,7 +114,12 @@ impl StageKind for Synth {
     }
 }
 
-/// Writes a file.
+/// The end of every pipeline. The file grows in a scratch folder beside its place and appears under
+/// its name when it is complete; it never replaces an input.
+///
+/// A record that is kept is the input's, byte for byte, wherever the format can hold it; LAS header
+/// fields that depend on the points are computed again and all others carried. From LAS to PLY or
+/// back every field keeps its name; one that cannot be held is an error unless `drop` names it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Write {

@@ -4,6 +4,7 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Cursor, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Watch;
 use super::clock::Clock;
@@ -36,6 +37,8 @@ pub(super) struct Job<'a> {
     pub tile_points: Option<usize>,
     pub run_records: Option<usize>,
     pub wants_normals: bool,
+    /// Records read from each input.
+    pub read_of: Vec<AtomicU64>,
     pub watch: &'a dyn Watch,
 }
 
@@ -54,6 +57,9 @@ impl Job<'_> {
             return Ok(false);
         }
         tally.work("read", read);
+        if let Some(input) = self.read_of.get(batch.source as usize) {
+            input.fetch_add(read, Ordering::Relaxed);
+        }
         for (kind, transform) in &self.transforms {
             let before = batch.len();
             transform.apply(batch)?;
@@ -194,6 +200,7 @@ impl Plan {
                 .tile_points
                 .map(|n| n.get().saturating_mul(4).min(shares.run_records)),
             wants_normals: self.sink.wants_normals(),
+            read_of: self.source.inputs().iter().map(|_| AtomicU64::new(0)).collect(),
             watch,
         };
         let finished = match &self.lattice {
@@ -206,12 +213,13 @@ impl Plan {
                 stream(&job, sink, lattice.as_ref())?
             }
         };
+        let read_of = std::mem::take(&mut job.read_of);
         drop(job);
         warnings.extend(finished.written.notes.iter().cloned());
         warnings.iter().for_each(|warning| watch.warn(warning));
         let run = RunFigures {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            inputs: input_figures(&*self.source),
+            inputs: input_figures(&*self.source, read_of),
             outputs: vec![FileFigures {
                 path: path.display().to_string(),
                 points: finished.written.points,
@@ -309,13 +317,13 @@ fn existing_folder(path: &Path) -> Result<PathBuf> {
         .help("create it first"))
 }
 
-fn input_figures(source: &dyn Source) -> Vec<FileFigures> {
-    let figures = |path: PathBuf| FileFigures {
+fn input_figures(source: &dyn Source, read_of: Vec<AtomicU64>) -> Vec<FileFigures> {
+    let figures = |(path, read): (PathBuf, AtomicU64)| FileFigures {
         bytes: fs::metadata(&path).ok().map(|m| m.len()),
         path: path.display().to_string(),
-        points: 0,
+        points: read.into_inner(),
     };
-    source.inputs().into_iter().map(figures).collect()
+    source.inputs().into_iter().zip(read_of).map(figures).collect()
 }
 
 /// Refuses a run whose spill would not fit on the scratch disk.

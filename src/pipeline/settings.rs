@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Deserializer, de};
 
-/// The `[run]` table. What is `None` is decided by the plan.
+/// What a run may use and where it leaves things. No setting but `lattice` and `nonfinite` changes
+/// what is computed. All are optional; arguments of the same name take their place.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RunSettings {

@@ -68,7 +68,7 @@ impl Native {
     }
 }
 
-/// Metadata for points in a LAS layout that come from no LAS file (see [`Native::fresh`]).
+/// Metadata for points in a LAS layout that come from no LAS file (see `Native::fresh`).
 pub fn fresh(schema: &Schema, crs: Option<&str>) -> Metadata {
     Metadata {
         crs: crs.map(str::to_owned),

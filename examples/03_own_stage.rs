@@ -1,0 +1,130 @@
+//! Reach for this when the built-in stages do not do what you need: a transform (keep one class of
+//! points as they stream by) and a tile op (of every cell the lowest point, in the place of
+//! `median`), added to the registry and named by a pipeline text like any other stage.
+//!
+//! `cargo run --release --example 03_own_stage`
+
+#![allow(clippy::print_stdout, reason = "an example shows its results")]
+
+use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry, StageKind, StagePlace};
+use pointmill::point::{PointBatch, names};
+use pointmill::report::Tally;
+use pointmill::stage::{Needs, Role, TileOp, Transform};
+use pointmill::tile::{Fate, Tile};
+use pointmill::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// Keeps the points of one class. The fields are the stage's keys in a pipeline file.
+#[derive(Debug, Serialize, Deserialize)]
+struct Class {
+    class: u8,
+}
+
+impl StageKind for Class {
+    const KIND: &'static str = "class";
+    const ABOUT: &'static str = "Keeps the points of one class.";
+
+    fn build(self, _: &StagePlace) -> Result<Role> {
+        Ok(Role::Transform(Box::new(self)))
+    }
+}
+
+impl Transform for Class {
+    // What a stage reads is checked before the run: an input without classes is refused there.
+    fn needs(&self) -> Needs {
+        Needs { reads: vec![names::CLASSIFICATION.into()], removes: true, ..Needs::default() }
+    }
+
+    fn apply(&self, batch: &mut PointBatch) -> Result<()> {
+        let schema = batch.schema().clone();
+        let dimension = schema
+            .find(names::CLASSIFICATION)
+            .ok_or_else(|| Error::internal("the plan let records without a class pass"))?;
+        let class = f64::from(self.class);
+        batch.retain(|_, record| dimension.get(record, schema.endian).as_f64() == class);
+        Ok(())
+    }
+}
+
+/// Keeps the lowest point of every cell.
+#[derive(Debug, Serialize, Deserialize)]
+struct Lowest {}
+
+impl StageKind for Lowest {
+    const KIND: &'static str = "lowest";
+    const ABOUT: &'static str = "Keeps the lowest point of every cell.";
+
+    fn build(self, _: &StagePlace) -> Result<Role> {
+        Ok(Role::TileOp(Box::new(self)))
+    }
+}
+
+impl TileOp for Lowest {
+    fn needs(&self) -> Needs {
+        Needs { reads: vec!["Cell".into(), "Normal".into()], removes: true, ..Needs::default() }
+    }
+
+    // A cell may reach beyond the tile. All its members are there, whichever tile looks at it, so
+    // every tile comes to the same choice; each says what becomes of the positions in its own core.
+    fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
+        let Tile { cells, core, positions, normals, copies, fates, .. } = tile;
+        let mut removed = 0;
+        for group in cells.groups() {
+            let members = cells.members[group].iter().map(|&i| i as usize);
+            // Positions are distinct and indices follow Morton order, so this breaks all ties.
+            let Some(lowest) = members.clone().min_by_key(|&i| (positions[i][2], i)) else {
+                continue;
+            };
+            for i in members.filter(|i| core.contains(i) && *i != lowest) {
+                let along = |axis: usize| {
+                    (positions[i][axis] - positions[lowest][axis]) as f32 * normals[lowest][axis]
+                };
+                let deviation = (along(0) + along(1) + along(2)).abs();
+                fates[i] = Fate::Represented { deviation };
+                removed += u64::from(copies[i]);
+            }
+        }
+        // The ledger must balance: what a stage removes, it enters.
+        tally.remove(Lowest::KIND, "represented", removed);
+        Ok(())
+    }
+}
+
+const PIPELINE: &str = r#"
+[[stage]]
+kind = "synth"
+scene = "als"
+points = 100_000
+
+[[stage]]
+kind = "class"
+class = 2           # ground
+
+[[stage]]
+kind = "normals"
+
+[[stage]]
+kind = "cells"
+max_angle = 0.3
+
+[[stage]]
+kind = "lowest"
+
+[[stage]]
+kind = "write"
+path = "ground.laz"
+"#;
+
+fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let text = PIPELINE.replace("ground.laz", &folder.path().join("ground.laz").to_string_lossy());
+    let registry = Registry::builtin().with::<Class>().with::<Lowest>();
+    let plan = Pipeline::parse(&text, "ground.toml", &registry)?.plan(&Overrides::default())?;
+    let done = plan.run(&Quiet)?;
+
+    println!("{done}");
+    for removed in &done.report.result.ledger.removed {
+        println!("{} removed {} points as {}", removed.stage, removed.records, removed.reason);
+    }
+    Ok(())
+}

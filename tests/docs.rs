@@ -1,0 +1,352 @@
+//! The pages of docs/ that the code generates are those in the repository, and the keys that
+//! docs/formats.md names are those that a real report and real descriptions have.
+//!
+//! `POINTMILL_WRITE_DOCS=1 cargo test --test docs` writes the generated pages again.
+
+mod docs_support;
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use docs_support::{Enum, Field, enum_of, item_docs, struct_of};
+use pointmill::ops::normals::Normals;
+use pointmill::ops::{Cells, Median};
+use pointmill::pipeline::{
+    Overrides, Pipeline, Quiet, Read, Registry, RunSettings, StageKind, Synth, Write,
+};
+use serde_json::Value;
+
+const SAYS_SO: &str = "written by `POINTMILL_WRITE_DOCS=1 cargo test --test docs`; do not edit";
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn source(file: &str) -> String {
+    fs::read_to_string(root().join(file)).unwrap_or_else(|e| panic!("{file}: {e}"))
+}
+
+/// Compares the page with the one in the repository, or writes it.
+fn keep(page: &str, text: &str) {
+    let path = root().join("docs").join(page);
+    if std::env::var_os("POINTMILL_WRITE_DOCS").is_some() {
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, text).unwrap();
+        return;
+    }
+    let kept = fs::read_to_string(&path).unwrap_or_default();
+    assert!(kept == text, "docs/{page} is not what the code says: it is {SAYS_SO}");
+}
+
+/// A stage and where its documentation is.
+struct Page {
+    kind: &'static str,
+    about: &'static str,
+    file: &'static str,
+    /// Names of the files that define the words which its keys take.
+    words: &'static [&'static str],
+    /// A further section: heading, file, function whose documentation it is.
+    more: Option<(&'static str, &'static str, &'static str)>,
+    /// The keys that must be given.
+    required: &'static str,
+    /// The stage's keys when just those are.
+    keys: fn(&str) -> Option<Value>,
+}
+
+fn keys_of<K: StageKind>(text: &str) -> Option<Value> {
+    toml::from_str::<K>(text).ok().map(|stage| serde_json::to_value(stage).unwrap())
+}
+
+fn page<K: StageKind>(file: &'static str, required: &'static str) -> Page {
+    let (kind, about) = (K::KIND, K::ABOUT);
+    Page { kind, about, file, words: &[], more: None, required, keys: keys_of::<K> }
+}
+
+const KINDS: &str = "src/pipeline/kinds.rs";
+
+fn pages() -> Vec<Page> {
+    let expand = ("What a path means", "src/pipeline/inputs.rs", "expand");
+    vec![
+        Page { more: Some(expand), ..page::<Read>(KINDS, "path = 'scan.laz'") },
+        Page {
+            words: &["src/io/synthetic/mod.rs"],
+            ..page::<Synth>(KINDS, "scene = 'als'\npoints = 1000")
+        },
+        page::<Normals>("src/ops/normals.rs", ""),
+        Page { words: &["src/ops/cells/settings.rs"], ..page::<Cells>("src/ops/cells.rs", "") },
+        page::<Median>("src/ops/median.rs", ""),
+        page::<Write>(KINDS, "path = 'out.laz'"),
+    ]
+}
+
+fn title(kind: &str) -> String {
+    kind.split('-').map(|word| word[..1].to_uppercase() + &word[1..]).collect()
+}
+
+/// What a value of a field may be, in words, and the words that it takes, if it takes words.
+fn sort_of(subject: &str, field: &Field, files: &[String]) -> (String, Option<Enum>) {
+    let inner = field.kind.strip_prefix("Option<").and_then(|t| t.strip_suffix('>'));
+    let plain = inner.unwrap_or(&field.kind);
+    let said = match (subject, field.name.as_str(), plain) {
+        ("read", "path", _) => "text, or a list of texts",
+        ("cells", "side", _) => "a length, or `\"auto\"`",
+        ("cells", "max_angle", _) => "a number of radians, or text with a unit",
+        ("write", "scale", _) => "a number, or three",
+        ("run", "memory", _) => "a size such as `\"2GiB\"`, or a number of bytes",
+        (_, _, "usize" | "u64") => "a whole number",
+        (_, _, "NonZeroUsize") => "a whole number from 1",
+        (_, _, "f64") => "a number",
+        (_, _, "[f64; 3]") => "three numbers",
+        (_, _, "PathBuf") => "a path",
+        (_, _, "Vec<String>") => "a list of texts",
+        (_, _, name) => {
+            let words = files.iter().find_map(|text| enum_of(text, name)).unwrap_or_else(|| {
+                panic!("{subject}.{}: say in tests/docs.rs what a {name} is", field.name)
+            });
+            let list: Vec<String> =
+                words.words.iter().map(|(word, _)| format!("`\"{word}\"`")).collect();
+            return (list.join(", "), Some(words));
+        }
+    };
+    (said.to_owned(), None)
+}
+
+/// The table of keys, and lists of the words that they take.
+fn keys_section(
+    subject: &str,
+    fields: &[Field],
+    files: &[String],
+    default: impl Fn(&Field, Option<&Enum>) -> String,
+) -> String {
+    let mut table = "| key | value | default | |\n|---|---|---|---|\n".to_owned();
+    let mut lists = String::new();
+    for field in fields {
+        let (said, words) = sort_of(subject, field, files);
+        let default = default(field, words.as_ref());
+        let docs = field.docs.replace('\n', " ").replace('|', "\\|");
+        let _ = writeln!(table, "| `{}` | {said} | {default} | {docs} |", field.name);
+        let Some(words) = words else { continue };
+        let _ = writeln!(lists, "\n`{}`:\n", field.name);
+        for (word, docs) in &words.words {
+            let _ = writeln!(lists, "- `\"{word}\"`: {}", docs.replace('\n', "\n  "));
+        }
+    }
+    table + &lists
+}
+
+fn stage_page(page: &Page) -> String {
+    let text = source(page.file);
+    let (docs, fields) = struct_of(&text, &title(page.kind));
+    let files: Vec<String> =
+        [text].into_iter().chain(page.words.iter().map(|f| source(f))).collect();
+    let given: toml::Table = toml::from_str(page.required).unwrap();
+    let defaults = (page.keys)(page.required).expect("the required keys do");
+    let keys = defaults.as_object().unwrap();
+    let names: BTreeSet<&str> = fields.iter().map(|f| f.name.as_str()).collect();
+    assert_eq!(names, keys.keys().map(String::as_str).collect(), "{}: fields and keys", page.kind);
+    for key in given.keys() {
+        let mut fewer = given.clone();
+        fewer.remove(key);
+        let without = (page.keys)(&toml::to_string(&fewer).unwrap());
+        assert!(without.is_none(), "{}: `{key}` need not be given", page.kind);
+    }
+    let takes = |field: &Field, words: Option<&Enum>| {
+        for (word, _) in words.iter().flat_map(|words| &words.words) {
+            let mut set = given.clone();
+            set.insert(field.name.clone(), word.clone().into());
+            let taken = (page.keys)(&toml::to_string(&set).unwrap());
+            assert!(taken.is_some(), "{}: {} = {word:?} is refused", page.kind, field.name);
+        }
+    };
+    let default = |field: &Field, words: Option<&Enum>| {
+        takes(field, words);
+        match &keys[&field.name] {
+            _ if given.contains_key(&field.name) => "must be given".to_owned(),
+            Value::Null => "none".to_owned(),
+            value => format!("`{value}`"),
+        }
+    };
+    let mut out = format!("# {}\n\n<!-- {SAYS_SO} -->\n\n{}\n\n{docs}\n", page.kind, page.about);
+    out += "\n## Keys\n\n";
+    match fields.is_empty() {
+        true => out += "It has none.\n",
+        false => out += &keys_section(page.kind, &fields, &files, default),
+    }
+    if let Some((heading, file, function)) = page.more {
+        let _ = write!(out, "\n## {heading}\n\n{}\n", item_docs(&source(file), "fn", function));
+    }
+    out += "\nEvery stage may also have a `name`, by which `--set` and `from` mean it.\n";
+    out
+}
+
+#[test]
+fn every_stage_has_a_page_that_says_what_the_code_does() {
+    let pages = pages();
+    let kinds: BTreeSet<&str> = pages.iter().map(|page| page.kind).collect();
+    let registry = Registry::builtin();
+    assert_eq!(kinds, registry.kinds().map(|(kind, _)| kind).collect(), "a page for every stage");
+    let mut index = format!("# Stages\n\n<!-- {SAYS_SO} -->\n\n| stage | |\n|---|---|\n");
+    for page in &pages {
+        let text = stage_page(page);
+        assert!(text.len() > 400, "{}: {text}", page.kind);
+        keep(&format!("stages/{}.md", page.kind), &text);
+        let _ = writeln!(index, "| [{0}]({0}.md) | {1} |", page.kind, page.about);
+    }
+    index += "\nWhat stands above all of them: [the `[run]` table](../run.md).\n";
+    keep("stages/README.md", &index);
+    let stored = fs::read_dir(root().join("docs/stages")).unwrap().count();
+    assert_eq!(stored, pages.len() + 1, "docs/stages has pages of no stage");
+}
+
+#[test]
+fn the_run_table_has_a_page_that_says_what_the_code_does() {
+    let text = source("src/pipeline/settings.rs");
+    let (docs, fields) = struct_of(&text, "RunSettings");
+    assert!(fields.len() >= 8, "fields were not read");
+    let default = |field: &Field, words: Option<&Enum>| match (words, &field.kind) {
+        (Some(words), _) => {
+            let word = words.default.as_ref().expect("an enum of settings has a default");
+            let set: RunSettings = toml::from_str(&format!("{} = '{word}'", field.name)).unwrap();
+            assert_eq!(set, RunSettings::default(), "{} = {word}", field.name);
+            format!("`\"{word}\"`")
+        }
+        (None, kind) => {
+            assert!(kind.starts_with("Option<"), "{}: what is its default?", field.name);
+            "none".to_owned()
+        }
+    };
+    let table = keys_section("run", &fields, &[text.clone()], default);
+    let out = format!(
+        "# The `[run]` table\n\n<!-- {SAYS_SO} -->\n\n{docs}\n\n{table}\n## Sizes\n\n{}\n",
+        item_docs(&text, "fn", "parse_bytes")
+    );
+    keep("run.md", &out);
+}
+
+fn help(command: Option<&str>) -> String {
+    let mut pointmill = Command::cargo_bin("pointmill").unwrap();
+    let output = pointmill.arg("help").args(command).output().unwrap();
+    assert!(output.status.success());
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.lines().map(str::trim_end).collect::<Vec<_>>().join("\n").trim_end().to_owned()
+}
+
+#[test]
+fn the_command_line_has_a_page_that_says_what_help_says() {
+    let top = help(None);
+    let commands: Vec<&str> = top
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .take_while(|line| line.starts_with("  "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|command| *command != "help")
+        .collect();
+    assert!(commands.len() >= 6, "{commands:?}");
+    let mut out = format!("# The command line\n\n<!-- {SAYS_SO} -->\n\n```\n{top}\n```\n");
+    for command in commands {
+        let _ = write!(out, "\n## {command}\n\n```\n{}\n```\n", help(Some(command)));
+    }
+    keep("cli.md", &out);
+}
+
+/// The keys of a value, as paths: `ledger.removed[].stage`.
+fn key_paths(value: &Value, path: &str, into: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(object) => {
+            for (key, value) in object {
+                let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                into.insert(path.clone());
+                key_paths(value, &path, into);
+            }
+        }
+        Value::Array(list) => {
+            list.iter().for_each(|value| key_paths(value, &format!("{path}[]"), into));
+        }
+        _ => {}
+    }
+}
+
+/// The keys that a section of docs/formats.md names: code at the beginning of a table's rows. True
+/// for those of which it says "not always".
+fn documented(section: &str) -> Vec<(String, bool)> {
+    let text = source("docs/formats.md");
+    let heading = format!("\n## {section}\n");
+    let (_, after) = text.split_once(&heading).unwrap_or_else(|| panic!("no section {section}"));
+    let section = after.split("\n## ").next().unwrap_or(after);
+    let key = |row: &str| {
+        let (key, _) = row.strip_prefix("| `")?.split_once('`')?;
+        Some((key.to_owned(), row.contains("not always")))
+    };
+    section.lines().filter_map(key).collect()
+}
+
+/// Every key of `value` is named in the section, and every key named is one, unless it says that it
+/// is not always there. Below a key `x.*` are keys of free choice.
+fn agree(value: &Value, section: &str) {
+    let mut there = BTreeSet::new();
+    key_paths(value, "", &mut there);
+    let documented = documented(section);
+    let free: Vec<&str> = documented.iter().filter_map(|(key, _)| key.strip_suffix('*')).collect();
+    there.retain(|path| !free.iter().any(|free| path.starts_with(free)));
+    let named: BTreeSet<&str> = documented.iter().map(|(key, _)| key.as_str()).collect();
+    let unnamed: Vec<&String> =
+        there.iter().filter(|path| !named.contains(path.as_str())).collect();
+    assert!(unnamed.is_empty(), "docs/formats.md does not name {unnamed:?} under {section}");
+    let must = documented.iter().filter(|(key, not_always)| !not_always && !key.ends_with('*'));
+    let missing: Vec<&String> =
+        must.map(|(key, _)| key).filter(|key| !there.contains(*key)).collect();
+    assert!(missing.is_empty(), "there are no {missing:?}, which docs/formats.md names");
+    assert!(there.len() >= 8, "{section}: too few keys to prove anything");
+}
+
+/// Reduces a made-up scan to `output` with a report, which is returned.
+fn reduce(folder: &Path, output: &str) -> Value {
+    let at = |name: &str| folder.join(name).display().to_string();
+    let text = format!(
+        "[run]\nreport = '{}'\nmemory = '256MiB'\nthreads = 2\n\
+         [[stage]]\nkind = 'read'\npath = '{}'\n[[stage]]\nkind = 'normals'\n\
+         [[stage]]\nkind = 'cells'\n[[stage]]\nkind = 'median'\n\
+         [[stage]]\nkind = 'write'\npath = '{}'\ndimensions = ['NormalX', 'NormalY', 'NormalZ']\n",
+        at("report.json"),
+        at("scan.laz"),
+        at(output)
+    );
+    let pipeline = Pipeline::parse(&text, "docs.toml", &Registry::builtin()).unwrap();
+    pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
+    serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn the_formats_that_are_documented_are_those_that_are_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = folder.path().join("scan.laz");
+    let text = format!(
+        "[[stage]]\nkind = 'synth'\nscene = 'als'\npoints = 20000\n\
+         [[stage]]\nkind = 'write'\npath = '{}'\n",
+        scan.display()
+    );
+    let pipeline = Pipeline::parse(&text, "docs.toml", &Registry::builtin()).unwrap();
+    pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
+
+    let report = reduce(folder.path(), "reduced.laz");
+    agree(&report, "report.json");
+    for (section, counts) in [("Counts", "/result/counts"), ("Work", "/run/work")] {
+        let there: BTreeSet<String> =
+            report.pointer(counts).unwrap().as_object().unwrap().keys().cloned().collect();
+        let named = documented(section);
+        let all: BTreeSet<String> = named.iter().map(|(key, _)| key.clone()).collect();
+        let must = named.into_iter().filter(|(_, not_always)| !not_always).map(|(key, _)| key);
+        assert!(there.is_subset(&all), "{section}: {there:?}");
+        assert!(must.collect::<BTreeSet<_>>().is_subset(&there), "{section}: {there:?}");
+    }
+    agree(
+        &pointmill::io::describe(&folder.path().join("reduced.laz")).unwrap(),
+        "info: LAS and LAZ",
+    );
+    reduce(folder.path(), "reduced.ply");
+    agree(&pointmill::io::describe(&folder.path().join("reduced.ply")).unwrap(), "info: PLY");
+}
