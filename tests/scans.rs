@@ -1,0 +1,274 @@
+//! Real scans through the whole pipeline: what can be read is reduced and read back, what is broken
+//! is told; nothing panics, hangs, or allocates by a number that a file claims.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
+
+mod scans_support;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::collections::{BTreeMap, VecDeque};
+use std::panic::catch_unwind;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, mpsc};
+use std::time::{Duration, Instant};
+
+use pointmill::io::{las, ply};
+use pointmill::pipeline::Format;
+use pointmill::point::PointBatch;
+use scans_support::{Setup, accounted, assert_contained, convert, open, read_some, reduce};
+use serde_json::json;
+
+/// The system's allocator, which remembers the largest request.
+struct Watched;
+
+static LARGEST: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: every call goes to the system's allocator as it came.
+#[allow(unsafe_code, reason = "the trait asks for it")]
+unsafe impl GlobalAlloc for Watched {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        LARGEST.fetch_max(layout.size(), Ordering::Relaxed);
+        // SAFETY: as the caller promises.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        LARGEST.fetch_max(layout.size(), Ordering::Relaxed);
+        // SAFETY: as the caller promises.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        LARGEST.fetch_max(size, Ordering::Relaxed);
+        // SAFETY: as the caller promises.
+        unsafe { System.realloc(at, layout, size) }
+    }
+
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        // SAFETY: as the caller promises.
+        unsafe { System.dealloc(at, layout) }
+    }
+}
+
+#[global_allocator]
+static WATCHED: Watched = Watched;
+
+/// The budget of every run, and more than any of its allocations. What the test itself holds of a scan
+/// counts in it.
+const MEMORY: u64 = 512 << 20;
+/// Scans above are cut to their first points.
+const MOST: usize = if cfg!(debug_assertions) { 50_000 } else { 300_000 };
+/// Scans up to this are reduced in two ways that must agree.
+const TWICE: usize = 20_000;
+/// No scan takes longer, by far.
+const PATIENCE: Duration = Duration::from_secs(180);
+
+/// Files that must be refused: damaged ones, and PLY files without vertices of x, y and z.
+const REFUSED: [&str; 17] = [
+    "laszip/broken_coder.laz",
+    "laszip/broken_type.laz",
+    "pasture/10_points_format_10.laz",
+    "pasture/10_points_format_9.laz",
+    "pdal/las/bad_vlr_count.las",
+    "pdal/las/garbage_nVariableLength.las",
+    "pdal/las/permutations/1.2-no-points.las",
+    "pdal/ply/no_vertex.ply",
+    "pdal/ply/sized_dims.ply",
+    "pdal/ply/unsized_dims.ply",
+    "ply-rs-bw/all_atomic_types_ok_ascii.ply",
+    "ply-rs-bw/exponent_values_ok_ascii.ply",
+    "ply-rs-bw/header_min_ok_ascii.ply",
+    "ply-rs-bw/leading_spaces_ok_ascii.ply",
+    "ply-rs-bw/single_elements_err_ascii.ply",
+    "ply-rs-bw/single_elements_ok_ascii.ply",
+    "trimesh/emptyIO/ply_empty_header.ply",
+];
+
+/// A file of the folder and what its manifest says.
+#[derive(Debug, Clone)]
+struct Scan {
+    path: PathBuf,
+    name: String,
+    /// Points, where the reader behind the manifest could count them.
+    points: Option<u64>,
+}
+
+/// The LAS, LAZ and PLY files in the folder that the environment names; None if it names none.
+fn scans() -> Option<Vec<Scan>> {
+    let Some(folder) = std::env::var_os("POINTMILL_SCANS").map(PathBuf::from) else {
+        println!("POINTMILL_SCANS names no folder of scans: nothing was tested");
+        return None;
+    };
+    let manifest = std::fs::read_to_string(folder.join("MANIFEST.tsv")).expect("a manifest");
+    let mut rows = manifest.lines().map(|line| line.split('\t').collect::<Vec<_>>());
+    let head = rows.next().unwrap();
+    let column = |name: &str| head.iter().position(|c| *c == name).unwrap();
+    let (path, points, notes) = (column("path"), column("points"), column("good_for"));
+    let told: BTreeMap<&str, Option<u64>> = rows
+        .clone()
+        .map(|row| (row[path], row[points].parse().ok().filter(|_| !row[notes].contains("broken"))))
+        .collect();
+    let mut files = Vec::new();
+    walk(&folder, &mut files);
+    let scan = |file: PathBuf| {
+        let name = file.strip_prefix(&folder).unwrap().to_str().unwrap().to_owned();
+        let points = told.get(name.as_str()).copied().flatten();
+        Scan { path: file, name, points }
+    };
+    let scans: Vec<Scan> = files.into_iter().map(scan).collect();
+    let known = scans.iter().filter(|scan| scan.points.is_some()).count();
+    assert!(known > 140, "the manifest tells the points of {known} scans");
+    Some(scans)
+}
+
+fn walk(folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            walk(&path, files);
+        } else if Format::of(&path).is_some() {
+            files.push(path);
+        }
+    }
+}
+
+/// Does `work` for every scan, two at a time, and tells the first that panics or takes too long.
+fn for_each(scans: Vec<Scan>, work: fn(&Scan) -> String) -> Vec<String> {
+    let total = scans.len();
+    let queue = Arc::new(Mutex::new(VecDeque::from(scans)));
+    let (sender, results) = mpsc::channel();
+    for _ in 0..2 {
+        let (queue, sender) = (queue.clone(), sender.clone());
+        std::thread::spawn(move || {
+            loop {
+                let Some(scan) = queue.lock().unwrap().pop_front() else { break };
+                let _ = sender.send((scan.name.clone(), None));
+                let begun = Instant::now();
+                let done = catch_unwind(|| work(&scan)).map_err(drop);
+                if sender.send((scan.name, Some((done, begun.elapsed())))).is_err() {
+                    break;
+                }
+            }
+        });
+    }
+    let (mut running, mut done, mut slowest) = (Vec::new(), Vec::new(), Vec::new());
+    while done.len() < total {
+        let Ok((name, outcome)) = results.recv_timeout(PATIENCE) else {
+            panic!("no end after {PATIENCE:?}: {running:?}");
+        };
+        match outcome {
+            None => running.push(name),
+            Some((Err(()), _)) => panic!("{name} failed, as told above"),
+            Some((Ok(told), took)) => {
+                running.retain(|n| *n != name);
+                slowest.push((took, name));
+                done.push(told);
+            }
+        }
+    }
+    slowest.sort();
+    slowest.iter().rev().take(5).for_each(|(took, name)| println!("{name}: {took:.1?}"));
+    done
+}
+
+/// The scan itself, or a file of its first points where it has more than [`MOST`].
+fn cropped(scan: &Scan, folder: &Path) -> PathBuf {
+    let paths = [scan.path.clone()];
+    let source = open(&paths).unwrap_or_else(|e| panic!("{e:?}"));
+    if source.points() <= MOST as u64 {
+        return scan.path.clone();
+    }
+    let (schema, records) = read_some(&paths, MOST).unwrap_or_else(|e| panic!("{e:?}"));
+    let path = folder.join("cropped").with_extension(scan.path.extension().unwrap());
+    let mut sink = if Format::of(&path) == Some(Format::Ply) {
+        ply::create(&path, &ply::PlyOptions::default(), &schema, source.metadata())
+    } else {
+        let compressed = Format::of(&path) == Some(Format::Laz);
+        let options = las::LasOptions { compressed, normals: false };
+        las::create(&path, &options, &schema, source.metadata())
+    }
+    .unwrap();
+    let (encoder, chunk) = (sink.encoder(), sink.chunk_points());
+    let mut batch = PointBatch::new(schema.clone(), chunk);
+    for records in records.chunks(chunk * schema.stride) {
+        batch.clear();
+        batch.extend(records);
+        sink.append(encoder.encode(&batch).unwrap()).unwrap();
+    }
+    assert_eq!(sink.finish().unwrap().points, MOST as u64);
+    path
+}
+
+/// Reduces and converts a scan; a line about it.
+fn reduces_and_reads_back(scan: &Scan) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let input = [cropped(scan, folder.path())];
+    let (schema, all) = read_some(&input, usize::MAX).unwrap();
+    let points = all.len() / schema.stride;
+    if let Some(told) = scan.points {
+        assert_eq!(points as u64, told.min(MOST as u64), "{}: points of the manifest", scan.name);
+    }
+    let output = folder.path().join("out").with_extension(scan.path.extension().unwrap());
+    let spilled = Setup::new(&[
+        ("run.spill", json!("always")),
+        ("run.tile_points", json!(if points <= TWICE { 500 } else { 10_000 })),
+    ]);
+    let done = reduce(&input, &output, &spilled.threads(1).memory(MEMORY))
+        .unwrap_or_else(|e| panic!("{}: {e:?}", scan.name));
+    let kept = accounted(&scan.name, &done, &output, points as u64);
+    assert_eq!(kept.is_empty(), points == 0, "{}", scan.name);
+    let (schema_out, _) = read_some(std::slice::from_ref(&output), 1).unwrap();
+    assert_eq!(schema_out, schema, "{}", scan.name);
+    assert_contained(&scan.name, &kept, &all, schema.stride);
+    if points <= TWICE {
+        let bytes = std::fs::read(&output).unwrap();
+        let done = reduce(&input, &output, &Setup::new(&[]).memory(MEMORY)).unwrap();
+        accounted(&scan.name, &done, &output, points as u64);
+        let same = std::fs::read(&output).unwrap() == bytes;
+        assert!(same, "{}: tiles, threads or spill changed the output", scan.name);
+        let done = convert(&input, &output, &Setup::new(&[]).memory(MEMORY)).unwrap();
+        let copied = accounted(&scan.name, &done, &output, points as u64);
+        assert!(copied == all, "{}: a copy differs", scan.name);
+    }
+    format!("{}: {points} -> {}", scan.name, kept.len() / schema.stride)
+}
+
+#[test]
+fn every_readable_scan_is_reduced_to_records_of_its_own() {
+    let Some(scans) = scans() else { return };
+    let readable: Vec<Scan> =
+        scans.into_iter().filter(|scan| !REFUSED.contains(&scan.name.as_str())).collect();
+    assert!(readable.len() > 150, "only {} scans", readable.len());
+    for_each(readable, reduces_and_reads_back).iter().for_each(|line| println!("{line}"));
+    let largest = LARGEST.load(Ordering::Relaxed);
+    println!("the largest allocation: {largest} bytes");
+}
+
+/// Reduces and converts what cannot be read; a line about it.
+fn is_refused(scan: &Scan) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out").with_extension(scan.path.extension().unwrap());
+    let mut told = Vec::new();
+    for run in [reduce, convert] {
+        let outcome =
+            run(std::slice::from_ref(&scan.path), &output, &Setup::new(&[]).memory(MEMORY));
+        let error = outcome.expect_err(&scan.name);
+        assert_eq!(error.path(), Some(scan.path.as_path()), "{error:?}");
+        assert_eq!(error.kind(), pointmill::ErrorKind::Data, "{error:?}");
+        scans_support::assert_holds(folder.path(), &[]);
+        told.push(error.to_string());
+    }
+    told.remove(0)
+}
+
+#[test]
+fn every_broken_scan_is_refused_with_its_path() {
+    let Some(scans) = scans() else { return };
+    let broken: Vec<Scan> =
+        scans.into_iter().filter(|scan| REFUSED.contains(&scan.name.as_str())).collect();
+    assert_eq!(broken.len(), REFUSED.len());
+    for_each(broken, is_refused).iter().for_each(|line| println!("{line}"));
+    let largest = LARGEST.load(Ordering::Relaxed);
+    assert!((largest as u64) < MEMORY, "an allocation of {largest} bytes");
+}
