@@ -3,6 +3,8 @@
 //!
 //! `POINTMILL_WRITE_DOCS=1 cargo test --test docs` writes the generated pages again.
 
+#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
+
 mod docs_support;
 
 use std::collections::BTreeSet;
@@ -218,7 +220,7 @@ fn the_run_table_has_a_page_that_says_what_the_code_does() {
             "none".to_owned()
         }
     };
-    let table = keys_section("run", &fields, &[text.clone()], default);
+    let table = keys_section("run", &fields, std::slice::from_ref(&text), default);
     let out = format!(
         "# The `[run]` table\n\n<!-- {SAYS_SO} -->\n\n{docs}\n\n{table}\n## Sizes\n\n{}\n",
         item_docs(&text, "fn", "parse_bytes")
@@ -349,4 +351,29 @@ fn the_formats_that_are_documented_are_those_that_are_written() {
     );
     reduce(folder.path(), "reduced.ply");
     agree(&pointmill::io::describe(&folder.path().join("reduced.ply")).unwrap(), "info: PLY");
+}
+
+/// Where the links of a page lead, anchors and web addresses left out.
+fn links(text: &str) -> Vec<&str> {
+    let targets = text.split("](").skip(1).filter_map(|behind| behind.split(')').next());
+    let files = targets.map(|link| link.split('#').next().unwrap_or(link));
+    files.filter(|link| !link.is_empty() && !link.contains("://")).collect()
+}
+
+#[test]
+fn links_lead_to_files() {
+    let mut pages: Vec<PathBuf> = ["README.md", "CONTRIBUTING.md"].map(|p| root().join(p)).into();
+    for folder in ["docs", "docs/stages"] {
+        let files = fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path());
+        pages.extend(files.filter(|path| path.extension().is_some_and(|e| e == "md")));
+    }
+    let mut count = 0;
+    for page in &pages {
+        for link in links(&fs::read_to_string(page).unwrap()) {
+            let to = page.parent().unwrap().join(link);
+            assert!(to.exists(), "{}: there is no {link}", page.display());
+            count += 1;
+        }
+    }
+    assert!(count >= 20, "{count} links in {} pages: were they read?", pages.len());
 }

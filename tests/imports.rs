@@ -1,6 +1,8 @@
 //! Imports point down: every path to another module of the crate leads to a lower layer. The picture
 //! of the layers is in docs/architecture.md.
 
+#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

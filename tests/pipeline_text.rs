@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use pointmill::pipeline::{
-    Nonfinite, Pipeline, Registry, Set, Simd, StageKind, StagePlace, Synth, Write,
+    Nonfinite, Overrides, Pipeline, Registry, Set, Simd, StageKind, StagePlace, Synth, Write,
 };
 use pointmill::report::Tally;
 use pointmill::stage::{Needs, Role, TileOp};
@@ -170,7 +170,7 @@ p.toml:2:10: `memory`: `2G` is no size such as 512MiB or 2GiB (units: B, KiB, Mi
 p.toml:3:1: `[run]` has no key `thraeds`
   3 | thraeds = 4
     | ^^^^^^^
-    = did you mean `threads`? keys: lattice, memory, nonfinite, report, scratch, simd, threads, tile_points
+    = did you mean `threads`? keys: lattice, memory, nonfinite, report, scratch, simd, spill, threads, tile_points
 p.toml:7:9: `scene` cannot be `alps`
   7 | scene = \"alps\"
     |         ^^^^^^
@@ -491,4 +491,54 @@ fn a_pipeline_file_is_named_when_it_cannot_be_read() {
     std::fs::write(&file, b"a = \"\xff\"").unwrap();
     let binary = Pipeline::read(&file, &registry(), &[]).unwrap_err();
     assert_eq!((binary.kind(), binary.byte()), (ErrorKind::Pipeline, Some(5)));
+}
+
+/// A tile stage that removes points by their neighbours, and one that does so by cubes alone.
+macro_rules! removing {
+    ($stage:ident, $kind:literal, $neighbors:literal) => {
+        #[derive(Serialize, Deserialize)]
+        struct $stage {}
+
+        impl StageKind for $stage {
+            const KIND: &'static str = $kind;
+            const ABOUT: &'static str = "Removes.";
+
+            fn build(self, _: &StagePlace) -> Result<Role> {
+                Ok(Role::TileOp(Box::new(self)))
+            }
+        }
+
+        impl TileOp for $stage {
+            fn needs(&self) -> Needs {
+                Needs { neighbors: $neighbors, removes: true, ..Needs::default() }
+            }
+
+            fn run(&self, _: &mut Tile, _: &mut Tally) -> Result<()> {
+                Ok(())
+            }
+        }
+    };
+}
+removing!(Lonely, "lonely", 5);
+removing!(Cubes, "cubes", 0);
+
+#[test]
+fn a_neighbourhood_after_any_removal_is_a_second_pass() {
+    let registry = Registry::builtin().with::<Lonely>().with::<Cubes>();
+    let plan = |stages: &[&str]| {
+        let mut text = "[[stage]]\nkind = 'synth'\nscene = 'plane'\npoints = 9\n".to_owned();
+        for kind in stages {
+            text += &format!("[[stage]]\nkind = '{kind}'\n");
+        }
+        text += "[[stage]]\nkind = 'write'\npath = 'never-written.las'\n";
+        Pipeline::parse(&text, "p.toml", &registry).unwrap().plan(&Overrides::default())
+    };
+    for removal in ["lonely", "cubes"] {
+        let told = plan(&[removal, "normals", "cells", "median"]).err().expect(removal);
+        assert_eq!(told.kind(), ErrorKind::Pipeline);
+        assert!(told.to_string().contains("second pass"), "{told}");
+        assert!(told.to_string().contains(removal), "{told}");
+        assert!(plan(&["normals", "cells", "median", removal]).is_err() == (removal == "lonely"));
+    }
+    assert!(plan(&["normals", "cells", "median"]).is_ok());
 }

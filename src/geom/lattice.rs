@@ -64,8 +64,8 @@ impl Lattice {
     /// World coordinates of a position. Where a world unit is a whole number of steps they are
     /// divided, which rounds to the decimal that one expects: 12.345 and not 12.345000000000001.
     pub fn world(&self, p: Position) -> [f64; 3] {
-        let per_unit = 1.0 / self.step;
-        let whole = per_unit == per_unit.round();
+        let per_unit = (1.0 / self.step).round();
+        let whole = 1.0 / per_unit == self.step;
         std::array::from_fn(|axis| {
             let steps = p[axis] as f64;
             let at = if whole { steps / per_unit } else { steps * self.step };
@@ -201,6 +201,8 @@ mod tests {
         let lattice = decimal([0.001; 3], [0.0; 3]).unwrap();
         assert_eq!(lattice.world([5_600_037_884, -31_351, 7]), [5_600_037.884, -31.351, 0.007]);
         assert_ne!(5_600_037_884.0 * 0.001, 5_600_037.884, "a product rounds otherwise");
+        let lattice = decimal([1e-5; 3], [0.0; 3]).unwrap();
+        assert_eq!(lattice.world([-3_135_136, 1, 0]), [-31.35136, 1e-5, 0.0]);
         let lattice = decimal([2.5; 3], [0.0; 3]).unwrap();
         assert_eq!(lattice.world([3, -1, 0]), [7.5, -2.5, 0.0]);
     }

@@ -137,11 +137,12 @@ fn check_columns(
 ) -> Result<()> {
     let mut there: BTreeSet<String> = schema.dimensions.iter().map(|d| d.name.clone()).collect();
     let mut removed_by: Option<&str> = None;
+    // What a transform removes is gone before the tiles are cut: no neighbourhood ever saw it.
     let needs = transforms
         .iter()
-        .map(|(kind, t)| (kind, t.needs()))
-        .chain(ops.iter().map(|(kind, op)| (kind, op.needs())));
-    for (kind, needs) in needs {
+        .map(|(kind, t)| (kind, t.needs(), false))
+        .chain(ops.iter().map(|(kind, op)| (kind, op.needs(), true)));
+    for (kind, needs, on_tiles) in needs {
         let Needs { reads, writes, neighbors, removes, .. } = needs;
         if let Some(missing) = reads.iter().find(|name| !there.contains(*name)) {
             let help = match COLUMNS.iter().position(|column| column == missing) {
@@ -160,7 +161,7 @@ fn check_columns(
             .help("write the reduced scan and run a second pipeline on it"));
         }
         there.extend(writes);
-        if removes && neighbors == 0 && COLUMNS.iter().any(|c| there.contains(*c)) {
+        if removes && on_tiles {
             removed_by = Some(kind);
         }
     }

@@ -60,7 +60,7 @@ pub fn enum_of(text: &str, name: &str) -> Option<Enum> {
         }
         words.push((word, docs_above(&lines[..at])));
     }
-    assert!(words.len() >= 1, "the enum {name} was not read");
+    assert!(!words.is_empty(), "the enum {name} was not read");
     Some(Enum { words, default })
 }
 
