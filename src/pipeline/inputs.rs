@@ -53,7 +53,11 @@ fn one(path: &str) -> Result<Vec<PathBuf>> {
     }
     let mut files = Vec::new();
     let start = if path.starts_with('/') { Path::new("/") } else { Path::new("") };
-    walk(start, &steps(path)?, &mut files)?;
+    let steps = steps(path)?;
+    // A slash at the end asks for folders.
+    if !path.ends_with('/') {
+        walk(start, &steps, &mut files)?;
+    }
     if files.is_empty() {
         return Err(Error::pipeline(format!("no file matches `{path}`")));
     }
