@@ -11,7 +11,6 @@ use super::mill::mill;
 use super::plan::Plan;
 use super::scratch::{Scratch, free_space};
 use super::settings::{Nonfinite, Spill};
-use super::shares::Shares;
 use super::stream::stream;
 use super::survey::Measured;
 use crate::budget::{Budget, Bytes};
@@ -70,11 +69,6 @@ impl Job<'_> {
     pub fn advance(&self, points: u64) -> Result<()> {
         self.watch.advance(points);
         if self.watch.cancelled() { Err(Error::interrupted()) } else { Ok(()) }
-    }
-
-    /// Positions that a tile's arena takes.
-    pub fn tile_capacity(&self, shares: &Shares) -> usize {
-        shares.tile_positions
     }
 
     /// The error of a record that has no place on the lattice.
@@ -159,7 +153,6 @@ impl Plan {
         let staging = Arc::new(Scratch::below(&existing_folder(&path)?));
         let staged = staging.path("output")?;
         let sink = self.sink.create(&staged, self.source.schema(), self.source.metadata())?;
-        self.demands.chunk = (sink.chunk_points(), sink.chunk_bytes());
         let mut warnings = self.source.warnings();
         let shares = self.demands.divide()?;
         let budget = Budget::new(self.demands.limit);
@@ -196,6 +189,7 @@ impl Plan {
             }
             lattice => {
                 clock.phase("convert", Some(self.source.points()));
+                let _working = budget.lease(shares.work, "streaming")?;
                 stream(&job, sink, lattice.as_ref())?
             }
         };
