@@ -143,6 +143,15 @@ pub struct SinkSummary {
     pub notes: Vec<String>,
 }
 
+/// How much a sink encodes at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ChunkSize {
+    /// See [`Sink::chunk_points`].
+    pub points: usize,
+    /// See [`Sink::chunk_bytes`].
+    pub bytes: u64,
+}
+
 /// Creates a sink once the source's schema is known.
 pub trait CreateSink: Send + Sync {
     /// The final path of the output.
@@ -153,6 +162,10 @@ pub trait CreateSink: Send + Sync {
 
     /// True if it writes the normals that a stage computed.
     fn wants_normals(&self) -> bool;
+
+    /// The chunks of the output that [`create`](CreateSink::create) would open, for a plan of the
+    /// memory. Fails where `create` would refuse the schema.
+    fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize>;
 
     /// Checks that the format holds every dimension (or that the user dropped it) and opens the
     /// output at `staged`, a path beside the final one. With `whole`, every record of the source

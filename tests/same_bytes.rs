@@ -117,7 +117,7 @@ fn a_landscape_reduces_to_the_same_bytes() {
 fn a_part_with_sharp_edges_reduces_to_the_same_bytes() {
     // As PLY: the lattice is the binary one, records have floating-point coordinates.
     let folder = tempfile::tempdir().unwrap();
-    let stored = Scan::synthetic(Scene::Part, 40_000, 3).snapped(125);
+    let stored = Scan::synthetic(Scene::Part, 40_000, 3).snapped(12_500);
     let files = stored.write_split(folder.path(), 1, &mut Random(0));
     let ply = run(folder.path(), &files, "", "ply", Settings::PLAIN).unwrap();
     let scan = Scan::read(&ply.output, usize::MAX).with_copies_and_an_outlier(2);
@@ -139,7 +139,7 @@ fn a_part_with_sharp_edges_reduces_to_the_same_bytes() {
 fn a_city_on_a_grid_of_a_centimetre_reduces_to_the_same_bytes() {
     let Some(scans) = scans() else { return };
     let city = Scan::read(&scans.join("big/marblemm_city_10M.laz"), 400_000).crop(40_000);
-    let tile_points = &[300, 1000, 2500];
+    let tile_points = &[300, 700, 1500];
     let families = [
         (reduction("", "side = 0.37"), format!("laz\n{NORMALS}")),
         (reduction("", ""), "las".to_owned()),

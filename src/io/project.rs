@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::convert::Projection;
 use crate::point::{PointBatch, Schema};
-use crate::stage::{Encode, Encoded, Sink, SinkSummary};
+use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
 /// Projects every record before `inner` takes it, and tells at the end what that rounded.
@@ -25,6 +25,12 @@ impl Projected {
     pub fn new(inner: Box<dyn Sink>, projection: Projection, to: Arc<Schema>) -> Self {
         let encoder = ProjectingEncoder { projection, to, inner: inner.encoder() };
         Projected { inner, encoder: Arc::new(encoder), rounded: (0, 0.0) }
+    }
+
+    /// The chunks of such a sink around one of the chunks `inner`, which takes records of `to`.
+    pub fn chunk(inner: ChunkSize, to: &Schema) -> ChunkSize {
+        // The projected records, twice: as made and in their batch.
+        ChunkSize { bytes: inner.bytes + 2 * (inner.points * to.stride) as u64, ..inner }
     }
 }
 
@@ -47,8 +53,8 @@ impl Sink for Projected {
     }
 
     fn chunk_bytes(&self) -> u64 {
-        // The projected records, twice: as made and in their batch.
-        self.inner.chunk_bytes() + 2 * (self.inner.chunk_points() * self.encoder.to.stride) as u64
+        let (points, bytes) = (self.inner.chunk_points(), self.inner.chunk_bytes());
+        Projected::chunk(ChunkSize { points, bytes }, &self.encoder.to).bytes
     }
 
     fn encoder(&self) -> Arc<dyn Encode> {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::kinds::{Encoding, Format, Synth, Write};
 use crate::io::{Projected, convert, las, ply, synthetic};
 use crate::point::{Layout, Metadata, Schema, names};
-use crate::stage::{CreateSink, OpenSource, Order, Sink, Source};
+use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Sink, Source};
 use crate::{Error, Result};
 
 /// The source that reads `files`, each of its format; all LAS and LAZ, or all PLY.
@@ -58,6 +58,20 @@ impl CreateSink for Output {
         !self.write.dimensions.is_empty()
     }
 
+    fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize> {
+        let chunk = match self.format {
+            Format::Ply => ply::chunk(&self.ply_options(false), schema, metadata),
+            Format::Las | Format::Laz => self.las_target(schema, metadata).and_then(|target| {
+                let chunk = las::chunk(&self.las_options(), &target.schema)?;
+                Ok(match target.projection {
+                    Some(_) => Projected::chunk(chunk, &target.schema),
+                    None => chunk,
+                })
+            }),
+        };
+        chunk.map_err(|error| error.at(&self.write.path))
+    }
+
     fn create(
         &self,
         staged: &Path,
@@ -65,10 +79,9 @@ impl CreateSink for Output {
         metadata: &Metadata,
         whole: bool,
     ) -> Result<Box<dyn Sink>> {
-        let created = match (self.format, schema.layout) {
-            (Format::Ply, _) => self.ply(staged, schema, metadata, whole),
-            (_, Layout::Las { .. }) => self.las(staged, schema, metadata),
-            (_, Layout::Ply) => self.las_of_ply(staged, schema, metadata),
+        let created = match self.format {
+            Format::Ply => ply::create(staged, &self.ply_options(whole), schema, metadata),
+            Format::Las | Format::Laz => self.las(staged, schema, metadata),
         };
         created.map_err(|error| {
             if error.path() == Some(staged) { error } else { error.at(&self.write.path) }
@@ -76,38 +89,54 @@ impl CreateSink for Output {
     }
 }
 
+/// What a LAS output's records are, and how the input's become them.
+struct Target {
+    schema: Arc<Schema>,
+    metadata: Metadata,
+    projection: Option<convert::Projection>,
+}
+
 impl Output {
-    fn ply(
-        &self,
-        staged: &Path,
-        schema: &Schema,
-        metadata: &Metadata,
-        whole: bool,
-    ) -> Result<Box<dyn Sink>> {
+    fn ply_options(&self, whole: bool) -> ply::PlyOptions {
         let encoding = self.write.encoding.map(|encoding| match encoding {
             Encoding::Ascii => ply::Encoding::Ascii,
             Encoding::Binary => ply::Encoding::BinaryLittleEndian,
         });
-        let options = ply::PlyOptions {
+        ply::PlyOptions {
             encoding,
             normals: self.wants_normals(),
             drop: self.write.drop.clone(),
             carry_rest: whole,
-        };
-        ply::create(staged, &options, schema, metadata)
+        }
     }
 
     fn las_options(&self) -> las::LasOptions {
         las::LasOptions { compressed: self.format == Format::Laz, normals: self.wants_normals() }
     }
 
-    /// LAS records stay as they are, unless another scale is asked for.
     fn las(
         &self,
         staged: &Path,
         schema: &Arc<Schema>,
         metadata: &Metadata,
     ) -> Result<Box<dyn Sink>> {
+        let Target { schema, metadata, projection } = self.las_target(schema, metadata)?;
+        let sink = las::create(staged, &self.las_options(), &schema, &metadata)?;
+        Ok(match projection {
+            Some(projection) => Box::new(Projected::new(sink, projection, schema)),
+            None => sink,
+        })
+    }
+
+    fn las_target(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<Target> {
+        match schema.layout {
+            Layout::Las { .. } => self.las_of_las(schema, metadata),
+            Layout::Ply => self.las_of_ply(schema, metadata),
+        }
+    }
+
+    /// LAS records stay as they are, unless another scale is asked for.
+    fn las_of_las(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<Target> {
         if !self.write.drop.is_empty() {
             return Err(Error::pipeline("`drop` is for conversions between LAS and PLY")
                 .help("a LAS output holds every dimension of a LAS input: leave `drop` out"));
@@ -120,21 +149,15 @@ impl Output {
                     self.write.offset.map_or(dimension.origin, |offset| offset[axis]);
             }
         }
+        let metadata = metadata.clone();
         if scaled == **schema {
-            return las::create(staged, &self.las_options(), schema, metadata);
+            return Ok(Target { schema: schema.clone(), metadata, projection: None });
         }
-        let projection = convert::Projection::new(schema, &scaled, &[])?;
-        let scaled = Arc::new(scaled);
-        let sink = las::create(staged, &self.las_options(), &scaled, metadata)?;
-        Ok(Box::new(Projected::new(sink, projection, scaled)))
+        let projection = Some(convert::Projection::new(schema, &scaled, &[])?);
+        Ok(Target { schema: Arc::new(scaled), metadata, projection })
     }
 
-    fn las_of_ply(
-        &self,
-        staged: &Path,
-        schema: &Schema,
-        metadata: &Metadata,
-    ) -> Result<Box<dyn Sink>> {
+    fn las_of_ply(&self, schema: &Schema, metadata: &Metadata) -> Result<Target> {
         let scale = self.write.scale.ok_or_else(|| {
             Error::pipeline("a PLY scan written as LAS needs a `scale` for its coordinates")
                 .help("give scale = 0.001, or what the scan's precision is, in its own unit")
@@ -142,9 +165,8 @@ impl Output {
         let (format, extra) = convert::las_schema(schema, &self.write.drop)?;
         let offset = self.write.offset.unwrap_or([0.0; 3]);
         let layout = Arc::new(las::layout(format, &extra, scale, offset));
-        let projection = convert::Projection::new(schema, &layout, &self.write.drop)?;
-        let fresh = las::fresh(&layout, metadata.crs.as_deref());
-        let sink = las::create(staged, &self.las_options(), &layout, &fresh)?;
-        Ok(Box::new(Projected::new(sink, projection, layout)))
+        let projection = Some(convert::Projection::new(schema, &layout, &self.write.drop)?);
+        let metadata = las::fresh(&layout, metadata.crs.as_deref());
+        Ok(Target { schema: layout, metadata, projection })
     }
 }

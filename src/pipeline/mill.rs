@@ -38,12 +38,14 @@ pub(super) fn mill(
     let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
     tally.count("positions", tiles.positions());
     let decisions = settle(job, lattice, &tiles)?;
-    let keys = cut(job, lattice, shares, demands, &tiles)?;
+    let (keys, capacity) = cut(job, lattice, shares, demands, &tiles)?;
     tally.work("tiles", keys.len() as u64);
     let levels: std::collections::BTreeSet<u32> = keys.iter().map(|key| key.level).collect();
     tally.work("tile_levels", levels.len() as u64);
     clock.phase("mill", Some(tiles.positions()));
-    let milled = grind(job, shares, area, &tiles, &keys, sink)?;
+    let working = job.budget.lease(demands.mill_bytes(capacity as u64), "the mill")?;
+    let milled = grind(job, capacity, area, &tiles, &keys, sink)?;
+    drop(working);
     tally.merge(&milled.tally);
     clock.phase("survey", Some(2 * tiles.positions()));
     let measured = survey(job, lattice, &tiles, &milled.fates)?;
@@ -159,33 +161,55 @@ fn neighbors(ops: &[(String, Box<dyn TileOp>)]) -> usize {
 /// Tiles are at least four cells wide, or their zones would be mostly their neighbours'.
 const CELLS_ACROSS: u64 = 4;
 
+/// The tiles of the scan and the positions that an arena for them takes: as planned, or, where a cube
+/// that cannot be cut holds more, what the memory left after the decode can give.
 fn cut(
     job: &Job<'_>,
     lattice: &Lattice,
     shares: &Shares,
     demands: &Demands,
     tiles: &SealedTiles,
-) -> Result<Vec<TileKey>> {
+) -> Result<(Vec<TileKey>, usize)> {
     let side = job.ops.iter().map(|(_, op)| op.needs().cell_side).max().unwrap_or(0);
     let lowest = match u64::try_from(side).unwrap_or(0).saturating_mul(CELLS_ACROSS) {
         0 => 0,
         wide => wide.checked_next_power_of_two().map_or(64, u64::ilog2),
     };
-    // Half of a tile's memory is for its zone, the other half for its rim.
-    let most = (shares.tile_positions / 2) as u64;
-    let wanted = job.tile_points.map_or(most, |points| points as u64);
-    tiles.cut(wanted, most, reach(&job.ops), lowest).map_err(|error| match error {
-        CutError::Read(error) => error,
-        CutError::TooHeavy { key, positions } => {
-            let (lo, hi) = (lattice.world(key.cube().lo), lattice.world(key.cube().hi));
-            let limit = whole_mebibytes(demands.limit_for_tile(2 * positions));
-            Error::memory(format!(
-                "the cube from {lo:?} to {hi:?} and the cells around it hold {positions} positions, \
-                 more than the {most} that a tile may have"
-            ))
-            .help(format!("give --memory {limit} or more, fewer --threads, or a smaller cell side"))
+    let wanted = job.tile_points.map_or(zone_of(shares.tile_positions), |points| points as u64);
+    let reach = reach(&job.ops);
+    let free = demands.tile_positions(job.budget.free());
+    let mut capacity = shares.tile_positions;
+    loop {
+        // Around all positions there is no rim.
+        let all = capacity as u64 >= tiles.positions();
+        let most = if all { tiles.positions() } else { zone_of(capacity) };
+        match tiles.cut(wanted, most, reach, lowest) {
+            Ok(keys) => return Ok((keys, capacity)),
+            Err(CutError::Read(error)) => return Err(error),
+            Err(CutError::TooHeavy { .. }) if capacity < free => capacity = free,
+            Err(CutError::TooHeavy { key, positions }) => {
+                let tile = (2 * positions + 1).min(tiles.positions());
+                let limit = demands.limit_for_tile(tile);
+                return Err(too_heavy(lattice, key, (positions, most), limit));
+            }
         }
-    })
+    }
+}
+
+/// Positions of a tile's zone: half of its memory is for them, the other half for the rim.
+fn zone_of(tile_positions: usize) -> u64 {
+    (tile_positions / 2) as u64
+}
+
+/// The error of a cube that cannot be cut and holds more positions than the most that fit.
+fn too_heavy(lattice: &Lattice, key: TileKey, (positions, most): (u64, u64), limit: u64) -> Error {
+    let (lo, hi) = (lattice.world(key.cube().lo), lattice.world(key.cube().hi));
+    let limit = whole_mebibytes(limit);
+    Error::memory(format!(
+        "the cube from {lo:?} to {hi:?} and the cells around it hold {positions} positions, more \
+         than the {most} that a tile may have"
+    ))
+    .help(format!("give --memory {limit} or more, fewer --threads, or a smaller cell side"))
 }
 
 /// What a tile leaves behind.
@@ -213,13 +237,12 @@ struct Milled {
 
 fn grind(
     job: &Job<'_>,
-    shares: &Shares,
+    capacity: usize,
     area: &Arc<SpillArea>,
     tiles: &Arc<SealedTiles>,
     keys: &[TileKey],
     sink: Box<dyn Sink>,
 ) -> Result<Milled> {
-    let _working = job.budget.lease(shares.work, "the mill")?;
     let (encoder, chunk_points) = (sink.encoder(), sink.chunk_points());
     let outlet: Outlet<Product, Chunk> = Outlet::new(sink, job.threads);
     let fates = Pieces::new(area, "fates", FATE_BYTES);
@@ -238,7 +261,6 @@ fn grind(
     };
     let total = Mutex::new(Tally::default());
     let next = AtomicUsize::new(0);
-    let capacity = job.tile_capacity(shares);
     parallel(job.threads, |_| {
         let guard = StopOnDrop::new(|| outlet.stop());
         let mut bench = bench();

@@ -75,16 +75,12 @@ impl<R, P> Outlet<R, P> {
         loop {
             state = self.commit_waiting(state, hands)?;
             let must_wait = place > state.turn && state.waiting.len() > self.window;
-            let (progress, next) = if state.chunks.len() > self.window || must_wait {
-                self.encode_one(state, hands)?
-            } else {
+            if state.chunks.len() <= self.window && !must_wait {
                 return Ok(());
-            };
+            }
+            let (progress, next) = self.encode_one(state, hands)?;
             state = next;
             if !progress {
-                if !must_wait {
-                    return Ok(());
-                }
                 state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
             }
         }
@@ -157,12 +153,18 @@ impl<R, P> Outlet<R, P> {
         if state.stopped { Err(Error::interrupted()) } else { Ok(state) }
     }
 
-    /// Encodes one chunk if there is one and appends what is complete; says whether it did.
+    /// Encodes one chunk if there is one and appends what is complete; says whether it did. It does
+    /// not while many encoded chunks wait for one before them, which another thread has: the file may
+    /// be slow.
     fn encode_one<'s>(
         &'s self,
         mut state: MutexGuard<'s, State<R, P>>,
         hands: &mut Hands<'_, R, P>,
     ) -> Result<(bool, MutexGuard<'s, State<R, P>>)> {
+        let next = state.chunks.front().map(|(number, _)| *number);
+        if state.encoded.len() > self.window && next != Some(state.appended) {
+            return Ok((false, state));
+        }
         let Some((number, chunk)) = state.chunks.pop_front() else { return Ok((false, state)) };
         drop(state);
         let encoded = (hands.encode)(chunk);

@@ -77,8 +77,9 @@ impl Pipeline {
             None => std::thread::available_parallelism().map_or(1, usize::from),
         };
         let limit = settings.memory.unwrap_or_else(default_limit);
-        let needs = sorted.ops.iter().map(|(_, op)| op.needs()).collect();
-        let demands = Demands::of(&*source, limit, threads, needs);
+        let chunk = sink.chunk(source.schema(), source.metadata())?;
+        let ops = sorted.ops.iter().map(|(_, op)| op.needs()).collect();
+        let demands = Demands { mills, ops, ..Demands::of(&*source, chunk, limit, threads) };
         demands.divide()?;
         Ok(Plan {
             settings,

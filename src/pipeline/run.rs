@@ -12,7 +12,6 @@ use super::mill::mill;
 use super::plan::Plan;
 use super::scratch::{Scratch, free_space};
 use super::settings::{Nonfinite, Spill};
-use super::shares::Shares;
 use super::stream::stream;
 use super::survey::Measured;
 use crate::budget::{Budget, Bytes};
@@ -76,11 +75,6 @@ impl Job<'_> {
     pub fn advance(&self, points: u64) -> Result<()> {
         self.watch.advance(points);
         if self.watch.cancelled() { Err(Error::interrupted()) } else { Ok(()) }
-    }
-
-    /// Positions that a tile's arena takes.
-    pub fn tile_capacity(&self, shares: &Shares) -> usize {
-        shares.tile_positions
     }
 
     /// The error of a record that has no place on the lattice.
@@ -172,7 +166,6 @@ impl Plan {
             && self.settings.nonfinite == Nonfinite::Refuse;
         let (schema, metadata) = (self.source.schema(), self.source.metadata());
         let sink = self.sink.create(&staged, schema, metadata, whole)?;
-        self.demands.chunk = (sink.chunk_points(), sink.chunk_bytes());
         let mut warnings = self.source.warnings();
         let shares = self.demands.divide()?;
         let budget = Budget::new(self.demands.limit);
@@ -210,6 +203,7 @@ impl Plan {
             }
             lattice => {
                 clock.phase("convert", Some(self.source.points()));
+                let _working = budget.lease(shares.work, "streaming")?;
                 stream(&job, sink, lattice.as_ref())?
             }
         };

@@ -1,8 +1,8 @@
 //! How a run divides its memory: what it can tell before any work, as a pure function.
 
 use crate::budget::{Bytes, whole_mebibytes};
-use crate::stage::{Needs, Source};
-use crate::tile::{Fetch, Intake, Loader, Remote, index_bytes};
+use crate::stage::{ChunkSize, Needs, Source};
+use crate::tile::{Fetch, Intake, Loader, Remote, index_bytes, merge_bytes};
 use crate::{Error, Result, geom::nearest::Nearest};
 
 /// Records that a batch of the decode takes.
@@ -30,8 +30,10 @@ pub struct Demands {
     pub points: u64,
     /// Bytes that reading a part holds.
     pub part_bytes: u64,
-    /// Records that the sink takes at once, and bytes that encoding them holds.
-    pub chunk: (usize, u64),
+    /// What the sink encodes at once.
+    pub chunk: ChunkSize,
+    /// True if the run needs tiles; else it streams.
+    pub mills: bool,
     /// What the tile stages need.
     pub ops: Vec<Needs>,
 }
@@ -41,7 +43,7 @@ pub struct Demands {
 pub struct Shares {
     /// Not leased to anyone: the program itself.
     pub base: u64,
-    /// Work of all threads: decode first, then the mill.
+    /// Work of all threads: decode first, then the merge, then the mill.
     pub work: u64,
     /// The index of the scan.
     pub index: u64,
@@ -54,18 +56,18 @@ pub struct Shares {
 }
 
 impl Demands {
-    /// What a source demands, before its sink is known.
-    pub fn of(source: &dyn Source, limit: u64, threads: usize, ops: Vec<Needs>) -> Self {
-        let stride = source.schema().stride;
+    /// The demands of `source` into chunks of `chunk`.
+    pub fn of(source: &dyn Source, chunk: ChunkSize, limit: u64, threads: usize) -> Self {
         Demands {
             limit,
             resident: crate::report::resident_now().unwrap_or(8 << 20),
             threads,
-            stride,
+            stride: source.schema().stride,
             points: source.points(),
             part_bytes: source.part_bytes(),
-            chunk: (50_000, 3 * 50_000 * stride as u64),
-            ops,
+            chunk,
+            mills: false,
+            ops: Vec::new(),
         }
     }
 
@@ -78,12 +80,33 @@ impl Demands {
         self.part_bytes + (BATCH * self.stride + Intake::fixed_bytes(self.stride)) as u64
     }
 
+    /// Bytes that a thread holds while it merges runs of `run_records`.
+    fn merge(&self, run_records: u64) -> u64 {
+        let runs = self.points / run_records.max(1) + self.threads as u64;
+        merge_bytes(usize::try_from(runs).unwrap_or(usize::MAX), self.stride)
+    }
+
+    /// Records of a run for which neither the decode, which holds one, nor the merge, which holds a
+    /// bit of each, takes more than they must.
+    fn fewest_records(&self) -> u64 {
+        let each = Intake::bytes_per_record(self.stride).max(1) as u64;
+        let run = merge_bytes(1, self.stride) - merge_bytes(0, self.stride);
+        (self.points.saturating_mul(run) / each).isqrt().max(FEWEST as u64)
+    }
+
     /// Bytes that a thread holds in the mill, besides its tile: one chunk that it encodes and one
     /// that waits.
     fn mill_fixed(&self) -> u64 {
-        let (points, bytes) = self.chunk;
+        let ChunkSize { points, bytes } = self.chunk;
         let batch = points as u64 * (self.stride as u64 + 12);
         Remote::BYTES + 2 * (bytes + points as u64 * 20) + batch + Fetch::bytes(points, self.stride)
+    }
+
+    /// Bytes that a thread of a stream holds: batches read and waiting for their turn, chunks filled,
+    /// waiting, being encoded and encoded.
+    fn stream(&self) -> u64 {
+        let records = self.chunk.points as u64 * self.stride as u64;
+        self.part_bytes + 3 * (BATCH * self.stride) as u64 + 3 * records + 2 * self.chunk.bytes
     }
 
     /// Bytes of a tile per position it holds, the product that it leaves behind included.
@@ -96,50 +119,103 @@ impl Demands {
 
     fn index(&self) -> u64 {
         // That of the runs and that of the merged scan exist side by side for a moment.
-        2 * index_bytes(self.points)
+        if self.mills { 2 * index_bytes(self.points) } else { 0 }
     }
 
     fn work(&self, run_records: u64, tile_positions: u64) -> u64 {
         let decode =
             self.decode_fixed() + run_records * Intake::bytes_per_record(self.stride) as u64;
-        let mill = self.mill_fixed() + tile_positions * self.tile_bytes_per_point() as u64;
-        self.threads as u64 * decode.max(mill)
+        let each = decode.max(self.merge(run_records));
+        (self.threads as u64 * each).max(self.mill_bytes(tile_positions))
     }
 
-    /// The limit that would do for tiles of `positions` positions, rim included.
+    /// Bytes that the threads hold in the mill with tiles of `positions` positions, rim included.
+    pub fn mill_bytes(&self, positions: u64) -> u64 {
+        let tile = positions.saturating_mul(self.tile_bytes_per_point() as u64);
+        (self.threads as u64).saturating_mul(self.mill_fixed().saturating_add(tile))
+    }
+
+    /// Positions that each thread's tile may hold where the mill has `bytes`.
+    pub fn tile_positions(&self, bytes: u64) -> usize {
+        let share = (bytes / self.threads as u64).saturating_sub(self.mill_fixed());
+        (share / self.tile_bytes_per_point() as u64) as usize
+    }
+
+    fn least(&self) -> u64 {
+        match self.mills {
+            true => self.work(self.fewest_records(), FEWEST as u64),
+            false => self.threads as u64 * self.stream(),
+        }
+    }
+
+    /// A limit that does for tiles of `positions` positions, rim included.
     pub fn limit_for_tile(&self, positions: u64) -> u64 {
-        (self.base() + self.index() + self.work(FEWEST as u64, positions)) * 21 / 20
+        let (least, mill) = (self.least(), self.mill_bytes(positions));
+        // Where a share of the limit suffices, or where all that is kept in memory leaves enough.
+        let share = least.saturating_add(mill.saturating_sub(least) / SPARE.0 * SPARE.1 + SPARE.1);
+        let kept = self.points.saturating_mul(self.stride as u64 + KEPT_BYTES).saturating_add(mill);
+        let fits = mill <= self.most_work(least);
+        let work = if fits { share.min(kept) } else { kept };
+        (self.base() + self.index()).saturating_add(work).saturating_add(1 << 20)
+    }
+
+    fn most_work(&self, least: u64) -> u64 {
+        (THREAD_MOST * self.threads as u64).max(least)
     }
 
     /// Divides the limit; an error names the one that would do.
     pub fn divide(&self) -> Result<Shares> {
-        let least = self.work(FEWEST as u64, FEWEST as u64);
-        let base = self.base();
-        let needed = base + self.index() + least;
+        let (base, index, least) = (self.base(), self.index(), self.least());
+        let needed = base + index + least;
         let Some(spare) = self.limit.checked_sub(needed) else {
-            return Err(Error::memory(format!(
-                "a memory budget of {} is too small: {} threads on records of {} bytes and an index \
-                 of {} points need {}",
-                Bytes(self.limit), self.threads, self.stride, self.points, Bytes(needed)
-            ))
-            .help(format!("give --memory {} or more, or fewer --threads", whole_mebibytes(needed))));
+            return Err(self.refusal(needed));
         };
-        let most = (THREAD_MOST * self.threads as u64).max(least);
-        let work = (least + spare / 4 * 3).min(most);
+        if !self.mills {
+            let (run_records, tile_positions) = (0, 0);
+            let kept_in_memory = 0;
+            return Ok(Shares {
+                base,
+                work: least,
+                index,
+                kept_in_memory,
+                run_records,
+                tile_positions,
+            });
+        }
+        let work = (least + spare / SPARE.1 * SPARE.0).min(self.most_work(least));
         let share = work / self.threads as u64;
-        let fit =
-            |fixed: u64, each: usize| (share.saturating_sub(fixed) / each.max(1) as u64) as usize;
+        let each = Intake::bytes_per_record(self.stride).max(1) as u64;
         Ok(Shares {
             base,
             work,
-            index: self.index(),
+            index,
             kept_in_memory: least + spare - work,
-            run_records: fit(self.decode_fixed(), Intake::bytes_per_record(self.stride)),
-            tile_positions: fit(self.mill_fixed(), self.tile_bytes_per_point()),
+            run_records: (share.saturating_sub(self.decode_fixed()) / each) as usize,
+            tile_positions: self.tile_positions(work),
         })
+    }
+
+    fn refusal(&self, needed: u64) -> Error {
+        let Demands { threads, stride, points, .. } = self;
+        let index = match self.mills {
+            true => format!(" and an index of {points} points"),
+            false => String::new(),
+        };
+        Error::memory(format!(
+            "a memory budget of {} is too small: {threads} threads on records of {stride} bytes\
+             {index} need {}",
+            Bytes(self.limit),
+            Bytes(needed)
+        ))
+        .help(format!("give --memory {} or more, or fewer --threads", whole_mebibytes(needed)))
     }
 }
 
+/// The part of the memory to spare that goes to work, up to what it makes use of: 3 of 4.
+const SPARE: (u64, u64) = (3, 4);
+/// Bytes that a record kept in memory takes at most besides its own: its place in the order, its
+/// position in a run and in the merged scan, its copies, its fate.
+const KEPT_BYTES: u64 = 8 + 24 + 24 + 4 + 4;
 /// Bytes that a tile leaves behind for each of its positions: what is kept, its normal, its fate.
 const PRODUCT_BYTES: usize = 16 + 12 + 4;
 
@@ -155,7 +231,8 @@ mod tests {
             stride: 30,
             points: 10_000_000,
             part_bytes: 1 << 20,
-            chunk: (50_000, 4_500_000),
+            chunk: ChunkSize { points: 50_000, bytes: 4_500_000 },
+            mills: true,
             ops: vec![Needs { neighbors: 10, bytes_per_point: 40, ..Needs::default() }],
         }
     }
@@ -171,6 +248,26 @@ mod tests {
             assert!(sum <= mib << 20, "{mib} MiB: {shares:?}");
             assert!(shares.run_records >= FEWEST && shares.tile_positions >= FEWEST, "{shares:?}");
         }
+    }
+
+    #[test]
+    fn the_limit_for_a_heavy_tile_leaves_that_tile_its_memory() {
+        for positions in [20_000, 1_000_000, 30_000_000] {
+            let named = demands(0).limit_for_tile(positions);
+            let there = demands(named);
+            let shares = there.divide().unwrap();
+            // What is kept in memory is no more than the scan.
+            let kept = shares.kept_in_memory.min(there.points * (30 + KEPT_BYTES));
+            let free = named - shares.base - shares.index - kept;
+            assert!(there.tile_positions(free) as u64 >= positions, "{positions}: {shares:?}");
+        }
+    }
+
+    #[test]
+    fn a_stream_needs_no_index() {
+        let stream = Demands { mills: false, ..demands(48 << 20) };
+        assert!(demands(48 << 20).divide().is_err());
+        assert_eq!(stream.divide().unwrap().index, 0);
     }
 
     #[test]

@@ -44,7 +44,8 @@ pub struct LasEncoder {
     stride: usize,
     /// Bits of the byte at 14 that hold the return number.
     return_bits: u8,
-    normals: Normals,
+    /// Where normals go.
+    pub normals: Normals,
     /// How records are compressed, if they are.
     pub compression: Option<Compression>,
 }

@@ -25,5 +25,5 @@ mod vlr;
 pub use describe::{Description, ExtraBytes, Record, describe};
 pub use format::layout;
 pub use native::fresh;
-pub use sink::{LasOptions, create};
+pub use sink::{LasOptions, chunk, create};
 pub use source::open;

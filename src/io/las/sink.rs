@@ -19,7 +19,7 @@ use super::laz::{CHUNK_POINTS, Compression};
 use super::native::Native;
 use super::vlr::Vlr;
 use crate::point::{Layout, Metadata, Schema};
-use crate::stage::{Encode, Encoded, Sink, SinkSummary};
+use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
 /// What a LAS output is to be.
@@ -50,9 +50,8 @@ pub fn create(
     schema: &Arc<Schema>,
     metadata: &Metadata,
 ) -> Result<Box<dyn Sink>> {
-    let Layout::Las { format } = schema.layout else {
-        return Err(Error::internal("records are to be converted to a LAS layout first"));
-    };
+    let format = format_of(schema)?;
+    let (encoder, laszip) = encoder(options, schema)?;
     let carried = metadata.native.as_ref().and_then(|n| n.downcast_ref::<Native>());
     let mut notes = Vec::new();
     let mut native = match carried.filter(|native| native.fits(schema)) {
@@ -66,24 +65,46 @@ pub fn create(
         native.header.put_floats(at::SCALE, axes.map(|d| d.scale));
         native.header.put_floats(at::OFFSET, axes.map(|d| d.origin));
     }
-    let normals = Normals::plan(schema, options.normals);
-    let stride = u16::try_from(schema.stride + normals.appended_bytes())
-        .map_err(|_| too_long("a record of point format ", format))?;
-    if normals == Normals::Appended {
+    if encoder.normals == Normals::Appended {
         describe_normals(&mut native, format, schema)?;
     }
+    let stride = record_length(schema, &encoder.normals)?;
     native.header.put(at::RECORD_LENGTH, &stride.to_le_bytes());
-    let mut format_byte = format;
-    let mut compression = None;
+    let compressed = if laszip.is_some() { COMPRESSED } else { 0 };
+    native.header.put(at::FORMAT, &[format | compressed]);
+    native.vlrs.extend(laszip);
+    Ok(Box::new(LasSink::begin(staged, native, Arc::new(encoder), notes)?))
+}
+
+/// The chunks of the sink that [`create`] would open.
+pub fn chunk(options: &LasOptions, schema: &Schema) -> Result<ChunkSize> {
+    let encoder = encoder(options, schema)?.0;
+    Ok(ChunkSize { points: CHUNK_POINTS as usize, bytes: encoder.chunk_bytes() })
+}
+
+/// The encoder of records of `schema`, and the laszip record that tells how it compresses.
+fn encoder(options: &LasOptions, schema: &Schema) -> Result<(LasEncoder, Option<Vlr>)> {
+    let format = format_of(schema)?;
+    let normals = Normals::plan(schema, options.normals);
+    let (mut compression, mut laszip) = (None, None);
     if options.compressed {
-        let (how, record) = Compression::write(format, stride)?;
-        native.vlrs.push(record);
-        format_byte |= COMPRESSED;
-        compression = Some(how);
+        let (how, record) = Compression::write(format, record_length(schema, &normals)?)?;
+        (compression, laszip) = (Some(how), Some(record));
     }
-    native.header.put(at::FORMAT, &[format_byte]);
-    let encoder = Arc::new(LasEncoder::new(format, schema, normals, compression));
-    Ok(Box::new(LasSink::begin(staged, native, encoder, notes)?))
+    Ok((LasEncoder::new(format, schema, normals, compression), laszip))
+}
+
+fn format_of(schema: &Schema) -> Result<u8> {
+    match schema.layout {
+        Layout::Las { format } => Ok(format),
+        Layout::Ply => Err(Error::internal("records are to be converted to a LAS layout first")),
+    }
+}
+
+/// Bytes of a record as written.
+fn record_length(schema: &Schema, normals: &Normals) -> Result<u16> {
+    u16::try_from(schema.stride + normals.appended_bytes())
+        .map_err(|_| too_long("a record of point format ", format_of(schema).unwrap_or_default()))
 }
 
 fn too_long(what: &str, format: u8) -> Error {

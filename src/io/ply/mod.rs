@@ -22,7 +22,7 @@ pub(crate) use names::rank;
 
 use crate::Result;
 use crate::point::{Metadata, Schema};
-use crate::stage::{Sink, Source};
+use crate::stage::{ChunkSize, Sink, Source};
 
 /// What begins the comment that holds the coordinate reference system, and its further pieces.
 const CRS: &str = "crs: ";
@@ -60,6 +60,12 @@ pub fn create(
     metadata: &Metadata,
 ) -> Result<Box<dyn Sink>> {
     Ok(Box::new(sink::PlySink::create(staged, options, schema, metadata)?))
+}
+
+/// The chunks of the sink that [`create`] would open; fails on what it would refuse of `schema` and
+/// `options`.
+pub fn chunk(options: &PlyOptions, schema: &Schema, metadata: &Metadata) -> Result<ChunkSize> {
+    sink::PlySink::chunk(options, schema, metadata)
 }
 
 /// The comment that brings every header of one file to one length, whatever its count of vertices.

@@ -13,7 +13,7 @@ use super::{CRS, CRS_MORE, PlyOptions, names, padding, text};
 use crate::io::convert::{Projection, ply_schema};
 use crate::point::names::NORMAL;
 use crate::point::{Dimension, Layout, Metadata, PointBatch, Scalar, Schema, Value};
-use crate::stage::{Encode, Encoded, Sink, SinkSummary};
+use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
 /// Records of one encoded chunk.
@@ -74,11 +74,7 @@ impl PlySink {
         schema: &Schema,
         metadata: &Metadata,
     ) -> Result<PlySink> {
-        let native = metadata
-            .native
-            .clone()
-            .and_then(|native| native.downcast::<Native>().ok())
-            .filter(|_| schema.layout == Layout::Ply);
+        let native = native_of(schema, metadata);
         let plan = Plan::new(options, schema, native.as_deref())?;
         let (rest, notes) = carried(options, &plan, native.as_ref());
         let header = headings(&plan, metadata, native.as_deref(), rest.as_deref());
@@ -100,6 +96,12 @@ impl PlySink {
             sink.carry(&rest, 0)?;
         }
         Ok(sink)
+    }
+
+    /// The chunks of the sink that `create` would open.
+    pub fn chunk(options: &PlyOptions, schema: &Schema, metadata: &Metadata) -> Result<ChunkSize> {
+        let native = native_of(schema, metadata);
+        Ok(Plan::new(options, schema, native.as_deref())?.chunk())
     }
 
     fn carries(&self) -> Option<Arc<Native>> {
@@ -124,6 +126,12 @@ impl PlySink {
         }
         Ok(())
     }
+}
+
+/// What PLY inputs of such records say of themselves.
+fn native_of(schema: &Schema, metadata: &Metadata) -> Option<Arc<Native>> {
+    let native = metadata.native.clone().filter(|_| schema.layout == Layout::Ply)?;
+    native.downcast::<Native>().ok()
 }
 
 /// The input's other elements, if they can be carried, or a note that they are not.
@@ -178,6 +186,11 @@ impl Plan {
         }
         let projection = (!projection.is_copy()).then_some(projection);
         Ok(Plan { encoding, vertex, projection, normals })
+    }
+
+    fn chunk(&self) -> ChunkSize {
+        let bytes = (CHUNK_POINTS as u64).saturating_mul(self.bytes_per_point() as u64);
+        ChunkSize { points: CHUNK_POINTS, bytes }
     }
 
     /// Bytes that encoding one record holds at most.
@@ -321,7 +334,7 @@ impl Sink for PlySink {
     }
 
     fn chunk_bytes(&self) -> u64 {
-        (CHUNK_POINTS as u64).saturating_mul(self.plan.bytes_per_point() as u64)
+        self.plan.chunk().bytes
     }
 
     fn encoder(&self) -> Arc<dyn Encode> {
