@@ -28,13 +28,10 @@ use crate::point::{Bounds, Position};
 use crate::{Error, ErrorKind, Result};
 
 /// Runs `work` on `threads` threads, each told its number, and returns the first error that is not
-/// merely a thread giving up because another failed.
+/// merely a thread giving up because another failed. A panic is an error, on one thread too.
 pub fn parallel(threads: usize, work: impl Fn(usize) -> Result<()> + Sync) -> Result<()> {
-    if threads <= 1 {
-        return work(0);
-    }
     std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads)
+        let workers: Vec<_> = (0..threads.max(1))
             .map(|n| {
                 scope.spawn({
                     let work = &work;
