@@ -20,7 +20,7 @@ use crate::point::PointBatch;
 use crate::report::{
     Decision, FileFigures, Ledger, Machine, Outcome, Report, RunFigures, Tally, peak_memory,
 };
-use crate::stage::{Part, SinkSummary, Source, TileOp, Transform};
+use crate::stage::{Input, Part, SinkSummary, Source, TileOp, Transform};
 use crate::tile::SpillArea;
 use crate::{Error, ErrorKind, Result};
 
@@ -97,7 +97,7 @@ impl Job<'_> {
         )
         .help(help);
         match self.source.inputs().get(batch.source as usize) {
-            Some(path) => error.at(path),
+            Some(input) => error.at(&input.path),
             None => error,
         }
     }
@@ -297,10 +297,10 @@ fn existing_folder(path: &Path) -> Result<PathBuf> {
 }
 
 fn input_figures(source: &dyn Source) -> Vec<FileFigures> {
-    let figures = |path: PathBuf| FileFigures {
-        bytes: fs::metadata(&path).ok().map(|m| m.len()),
-        path: path.display().to_string(),
-        points: 0,
+    let figures = |input: Input| FileFigures {
+        bytes: fs::metadata(&input.path).ok().map(|m| m.len()),
+        path: input.path.display().to_string(),
+        points: input.points,
     };
     source.inputs().into_iter().map(figures).collect()
 }
