@@ -38,15 +38,19 @@ pub(super) fn mill(
     let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
     tally.count("positions", tiles.positions());
     let decisions = settle(job, lattice, &tiles)?;
-    let keys = cut(job, lattice, shares, demands, &tiles)?;
+    let (keys, capacity) = cut(job, lattice, shares, demands, area, &tiles)?;
     tally.work("tiles", keys.len() as u64);
     let levels: std::collections::BTreeSet<u32> = keys.iter().map(|key| key.level).collect();
     tally.work("tile_levels", levels.len() as u64);
     clock.phase("mill", Some(tiles.positions()));
-    let milled = grind(job, shares, area, &tiles, &keys, sink)?;
+    let work = shares.work.max(demands.mill_work(capacity as u64));
+    let milled = {
+        let _working = job.budget.lease(work, "mill")?;
+        grind(job, capacity, area, &tiles, &keys, sink)?
+    };
     tally.merge(&milled.tally);
     clock.phase("survey", Some(2 * tiles.positions()));
-    let measured = survey(job, lattice, &tiles, &milled.fates)?;
+    let measured = survey(job, lattice, area, &tiles, &milled.fates)?;
     Ok(Finished {
         read: tally.work.remove("read").unwrap_or(0),
         kept: milled.kept,
@@ -67,7 +71,7 @@ fn decode(
     let store = TileStore::new(area, &job.budget, job.source.schema().stride);
     let total = Mutex::new(Tally::default());
     let next = AtomicUsize::new(0);
-    parallel(job.threads, |_| {
+    job.parallel(|| {
         let mut tally = Tally::default();
         let mut intake = Intake::new(&store, job.run_records.unwrap_or(shares.run_records));
         let mut batch = PointBatch::new(job.source.schema().clone(), BATCH);
@@ -159,26 +163,41 @@ fn neighbors(ops: &[(String, Box<dyn TileOp>)]) -> usize {
 /// Tiles are at least four cells wide, or their zones would be mostly their neighbours'.
 const CELLS_ACROSS: u64 = 4;
 
+/// The tiles, and how many positions the largest of them holds at most, rim included.
 fn cut(
     job: &Job<'_>,
     lattice: &Lattice,
     shares: &Shares,
     demands: &Demands,
+    area: &SpillArea,
     tiles: &SealedTiles,
-) -> Result<Vec<TileKey>> {
+) -> Result<(Vec<TileKey>, usize)> {
     let side = job.ops.iter().map(|(_, op)| op.needs().cell_side).max().unwrap_or(0);
     let lowest = match u64::try_from(side).unwrap_or(0).saturating_mul(CELLS_ACROSS) {
         0 => 0,
         wide => wide.checked_next_power_of_two().map_or(64, u64::ilog2),
     };
     // Half of a tile's memory is for its zone, the other half for its rim.
-    let most = (shares.tile_positions / 2) as u64;
-    let wanted = job.tile_points.map_or(most, |points| points as u64);
-    tiles.cut(wanted, most, reach(&job.ops), lowest).map_err(|error| match error {
+    let usual = shares.tile_positions / 2;
+    let wanted = job.tile_points.unwrap_or(usual) as u64;
+    let attempt = |most: usize| tiles.cut(wanted, most as u64, reach(&job.ops), lowest);
+    let mut most = usual;
+    let mut outcome = attempt(most);
+    // Where the cells are heavy, tiles have what the points in memory leave.
+    let roomy = demands.tile_positions(job.budget.free()) / 2;
+    while let Err(CutError::TooHeavy { positions, .. }) = &outcome
+        && *positions <= roomy as u64
+    {
+        most = (2 * most).max(*positions as usize).min(roomy);
+        outcome = attempt(most);
+    }
+    outcome.map(|keys| (keys, 2 * most)).map_err(|error| match error {
         CutError::Read(error) => error,
         CutError::TooHeavy { key, positions } => {
             let (lo, hi) = (lattice.world(key.cube().lo), lattice.world(key.cube().hi));
-            let limit = whole_mebibytes(demands.limit_for_tile(2 * positions));
+            // All that is spilled now could stay in memory then, beside such tiles.
+            let needed = job.budget.used() + area.written() + demands.mill_work(2 * positions);
+            let limit = whole_mebibytes(needed.saturating_add(needed / 20));
             Error::memory(format!(
                 "the cube from {lo:?} to {hi:?} and the cells around it hold {positions} positions, \
                  more than the {most} that a tile may have"
@@ -234,13 +253,12 @@ struct Milled {
 
 fn grind(
     job: &Job<'_>,
-    shares: &Shares,
+    capacity: usize,
     area: &Arc<SpillArea>,
     tiles: &Arc<SealedTiles>,
     keys: &[TileKey],
     sink: Box<dyn Sink>,
 ) -> Result<Milled> {
-    let _working = job.budget.lease(shares.work, "the mill")?;
     let (encoder, chunk_points) = (sink.encoder(), sink.chunk_points());
     let outlet: Outlet<Product, Chunk> = Outlet::new(sink, job.threads);
     let fates = Pieces::new(area, "fates", FATE_BYTES);
@@ -261,7 +279,6 @@ fn grind(
     };
     let total = Mutex::new(Tally::default());
     let next = AtomicUsize::new(0);
-    let capacity = job.tile_capacity(shares);
     parallel(job.threads, |_| {
         let guard = StopOnDrop::new(|| outlet.stop());
         let mut bench = bench();

@@ -38,14 +38,6 @@ impl Scratch {
         Scratch { parent: parent.to_owned(), made: Mutex::default() }
     }
 
-    /// The folder that outputs at `path` are staged in: the one that holds it.
-    pub fn parent_of(path: &Path) -> PathBuf {
-        match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
-            _ => PathBuf::from("."),
-        }
-    }
-
     /// The folder it is made in.
     pub fn parent(&self) -> &Path {
         &self.parent

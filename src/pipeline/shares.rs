@@ -34,6 +34,8 @@ pub struct Demands {
     pub chunk: (usize, u64),
     /// What the tile stages need.
     pub ops: Vec<Needs>,
+    /// True if the run needs tiles; else it streams, which needs no index.
+    pub mills: bool,
 }
 
 /// The division.
@@ -41,7 +43,7 @@ pub struct Demands {
 pub struct Shares {
     /// Not leased to anyone: the program itself.
     pub base: u64,
-    /// Work of all threads: decode first, then the mill.
+    /// Work of all threads: decode first, then the mill; or streaming.
     pub work: u64,
     /// The index of the scan.
     pub index: u64,
@@ -55,7 +57,13 @@ pub struct Shares {
 
 impl Demands {
     /// What a source demands, before its sink is known.
-    pub fn of(source: &dyn Source, limit: u64, threads: usize, ops: Vec<Needs>) -> Self {
+    pub fn of(
+        source: &dyn Source,
+        limit: u64,
+        threads: usize,
+        ops: Vec<Needs>,
+        mills: bool,
+    ) -> Self {
         let stride = source.schema().stride;
         Demands {
             limit,
@@ -66,6 +74,7 @@ impl Demands {
             part_bytes: source.part_bytes(),
             chunk: (50_000, 3 * 50_000 * stride as u64),
             ops,
+            mills,
         }
     }
 
@@ -95,48 +104,71 @@ impl Demands {
         Loader::BYTES_PER_POINT + search + columns + 2 * PRODUCT_BYTES
     }
 
+    /// Bytes that a thread holds while it streams: a batch that it reads and two that wait for their
+    /// turn, a chunk that fills, one that waits and one that it encodes, and two that are encoded.
+    fn stream_bytes(&self) -> u64 {
+        let (points, bytes) = self.chunk;
+        self.part_bytes + 3 * ((BATCH + points) * self.stride) as u64 + 2 * bytes
+    }
+
     fn index(&self) -> u64 {
         // That of the runs and that of the merged scan exist side by side for a moment.
-        2 * index_bytes(self.points)
+        if self.mills { index_bytes(self.points).saturating_mul(2) } else { 0 }
     }
 
     fn work(&self, run_records: u64, tile_positions: u64) -> u64 {
+        if !self.mills {
+            return self.threads as u64 * self.stream_bytes();
+        }
         let decode =
             self.decode_fixed() + run_records * Intake::bytes_per_record(self.stride) as u64;
-        let mill = self.mill_fixed() + tile_positions * self.tile_bytes_per_point() as u64;
-        self.threads as u64 * decode.max(mill)
+        (self.threads as u64 * decode).max(self.mill_work(tile_positions))
     }
 
-    /// The limit that would do for tiles of `positions` positions, rim included.
-    pub fn limit_for_tile(&self, positions: u64) -> u64 {
-        (self.base() + self.index() + self.work(FEWEST as u64, positions)) * 21 / 20
+    /// Bytes that all threads hold in the mill with tiles of `positions` positions, rim included.
+    pub fn mill_work(&self, positions: u64) -> u64 {
+        let tile = positions.saturating_mul(self.tile_bytes_per_point() as u64);
+        (self.threads as u64).saturating_mul(self.mill_fixed().saturating_add(tile))
+    }
+
+    /// How many positions each thread's tile holds where all of them have `work` bytes.
+    pub fn tile_positions(&self, work: u64) -> usize {
+        let tile = (work / self.threads.max(1) as u64).saturating_sub(self.mill_fixed());
+        (tile / self.tile_bytes_per_point().max(1) as u64) as usize
     }
 
     /// Divides the limit; an error names the one that would do.
     pub fn divide(&self) -> Result<Shares> {
         let least = self.work(FEWEST as u64, FEWEST as u64);
         let base = self.base();
-        let needed = base + self.index() + least;
+        let needed = base.saturating_add(self.index()).saturating_add(least);
         let Some(spare) = self.limit.checked_sub(needed) else {
             return Err(Error::memory(format!(
-                "a memory budget of {} is too small: {} threads on records of {} bytes and an index \
-                 of {} points need {}",
-                Bytes(self.limit), self.threads, self.stride, self.points, Bytes(needed)
+                "a memory budget of {} is too small: {} threads on records of {} bytes{} need {}",
+                Bytes(self.limit),
+                self.threads,
+                self.stride,
+                match self.mills {
+                    true => format!(" and an index of {} points", self.points),
+                    false => String::new(),
+                },
+                Bytes(needed)
             ))
-            .help(format!("give --memory {} or more, or fewer --threads", whole_mebibytes(needed))));
+            .help(format!(
+                "give --memory {} or more, or fewer --threads",
+                whole_mebibytes(needed)
+            )));
         };
-        let most = (THREAD_MOST * self.threads as u64).max(least);
+        let most = if self.mills { (THREAD_MOST * self.threads as u64).max(least) } else { least };
         let work = (least + spare / 4 * 3).min(most);
-        let share = work / self.threads as u64;
-        let fit =
-            |fixed: u64, each: usize| (share.saturating_sub(fixed) / each.max(1) as u64) as usize;
+        let run = (work / self.threads as u64).saturating_sub(self.decode_fixed());
         Ok(Shares {
             base,
             work,
             index: self.index(),
             kept_in_memory: least + spare - work,
-            run_records: fit(self.decode_fixed(), Intake::bytes_per_record(self.stride)),
-            tile_positions: fit(self.mill_fixed(), self.tile_bytes_per_point()),
+            run_records: (run / Intake::bytes_per_record(self.stride) as u64) as usize,
+            tile_positions: self.tile_positions(work),
         })
     }
 }
@@ -158,6 +190,7 @@ mod tests {
             part_bytes: 1 << 20,
             chunk: (50_000, 4_500_000),
             ops: vec![Needs { neighbors: 10, bytes_per_point: 40, ..Needs::default() }],
+            mills: true,
         }
     }
 
@@ -172,6 +205,26 @@ mod tests {
             assert!(sum <= mib << 20, "{mib} MiB: {shares:?}");
             assert!(shares.run_records >= FEWEST && shares.tile_positions >= FEWEST, "{shares:?}");
         }
+    }
+
+    #[test]
+    fn a_stream_needs_no_index_however_many_points_there_are() {
+        let endless = Demands { mills: false, points: u64::MAX, ..demands(64 << 20) };
+        let shares = endless.divide().unwrap();
+        assert_eq!(shares.index, 0);
+        assert!(shares.base + shares.work <= 64 << 20);
+        let needs_index = Demands { mills: true, ..endless };
+        assert!(needs_index.divide().is_err(), "and no sum overflows");
+    }
+
+    #[test]
+    fn tiles_take_what_their_work_allows() {
+        let demands = demands(1 << 30);
+        for positions in [0, 1, 20_000, 5_000_000] {
+            let work = demands.mill_work(positions as u64);
+            assert_eq!(demands.tile_positions(work), positions);
+        }
+        assert_eq!(demands.tile_positions(0), 0);
     }
 
     #[test]
