@@ -53,7 +53,10 @@ impl Error {
 
     /// A refusal of the operating system at `path`; `doing` completes "cannot …".
     pub fn io(path: impl AsRef<Path>, doing: &str, cause: std::io::Error) -> Self {
-        Error::new(ErrorKind::Io, format!("cannot {doing}")).at(path).because(cause)
+        use std::io::ErrorKind::{QuotaExceeded, StorageFull};
+        let is_full = matches!(cause.kind(), QuotaExceeded | StorageFull);
+        let error = Error::new(ErrorKind::Io, format!("cannot {doing}")).at(path).because(cause);
+        if is_full { error.help("free some disk space, or write elsewhere") } else { error }
     }
 
     /// Content of `path` that its format does not allow.
@@ -84,6 +87,14 @@ impl Error {
     /// Adds the file that the error is about.
     pub fn at(mut self, path: impl AsRef<Path>) -> Self {
         self.0.path.get_or_insert_with(|| path.as_ref().to_owned());
+        self
+    }
+
+    /// The same error about `to` if it is one about `from`, a file that the user never named.
+    pub fn readdress(mut self, from: &Path, to: &Path) -> Self {
+        if self.path() == Some(from) {
+            self.0.path = Some(to.to_owned());
+        }
         self
     }
 

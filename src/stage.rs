@@ -30,7 +30,7 @@ pub trait Source: Send + Sync {
     fn metadata(&self) -> &Metadata;
 
     /// The files, in input order, as the report names them; empty when there are none.
-    fn inputs(&self) -> Vec<PathBuf> {
+    fn inputs(&self) -> Vec<Input> {
         Vec::new()
     }
 
@@ -51,6 +51,15 @@ pub trait Source: Send + Sync {
     fn warnings(&self) -> Vec<String> {
         Vec::new()
     }
+}
+
+/// A file that a source reads.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Input {
+    /// Its path, as given.
+    pub path: PathBuf,
+    /// Its points; a source that does not find as many while it reads fails.
+    pub points: u64,
 }
 
 /// A stretch of a source's records, in input order.

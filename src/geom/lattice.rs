@@ -125,12 +125,13 @@ fn float_position(world: [f64; 3], per_unit: f64) -> Result<Position, Misplaced>
         if !world[axis].is_finite() {
             return Err(Misplaced::NotFinite);
         }
-        // A finite coordinate may be too far for the product, which is infinite then.
+        // Infinite where a finite coordinate overflows; NaN where the steps are infinitely small.
         let steps = (world[axis] * per_unit).round_ties_even();
-        if steps.abs() >= FARTHEST {
+        if steps.abs() < FARTHEST {
+            position[axis] = steps as i64;
+        } else {
             return Err(Misplaced::TooFar);
         }
-        position[axis] = steps as i64;
     }
     Ok(position)
 }
@@ -220,5 +221,17 @@ mod tests {
         assert_eq!(float_position([f64::NAN, 0.0, 0.0], 1.0), Err(Misplaced::NotFinite));
         assert_eq!(float_position([5e9, 0.0, 0.0], BINARY), Err(Misplaced::TooFar));
         assert_eq!(float_position([0.0, -f64::MAX, 0.0], BINARY), Err(Misplaced::TooFar));
+        assert_eq!(float_position([0.0, f64::INFINITY, 0.0], BINARY), Err(Misplaced::NotFinite));
+    }
+
+    #[test]
+    fn a_finite_point_is_never_taken_for_one_that_is_not() {
+        // With `nonfinite = "drop"` such a point would vanish.
+        assert_eq!(float_position([1e305, 0.0, 0.0], BINARY), Err(Misplaced::TooFar));
+        assert_eq!(float_position([0.0, 0.0, 0.0], f64::INFINITY), Err(Misplaced::TooFar));
+        assert_eq!(
+            float_position([-4294967295.0, 0.0, 0.0], BINARY).unwrap()[0],
+            -0x3fff_ffff_c000_0000
+        );
     }
 }

@@ -48,7 +48,7 @@ pub(super) fn mill(
     drop(working);
     tally.merge(&milled.tally);
     clock.phase("survey", Some(2 * tiles.positions()));
-    let measured = survey(job, lattice, &tiles, &milled.fates)?;
+    let measured = survey(job, lattice, area, &tiles, &milled.fates)?;
     Ok(Finished {
         read: tally.work.remove("read").unwrap_or(0),
         kept: milled.kept,
@@ -69,7 +69,7 @@ fn decode(
     let store = TileStore::new(area, &job.budget, job.source.schema().stride);
     let total = Mutex::new(Tally::default());
     let next = AtomicUsize::new(0);
-    parallel(job.threads, |_| {
+    job.parallel(|| {
         let mut tally = Tally::default();
         let mut intake = Intake::new(&store, job.run_records.unwrap_or(shares.run_records));
         let mut batch = PointBatch::new(job.source.schema().clone(), BATCH);
@@ -222,10 +222,31 @@ struct Product {
     fates: Vec<u8>,
 }
 
-/// Records that become one chunk of the output.
+/// Records that become one chunk of the output, as a product has them: a position with a million
+/// copies is one entry of each chunk that it fills.
 struct Chunk {
-    records: Vec<u64>,
+    /// First record and number of records of each position.
+    records: Vec<(u64, u32)>,
+    /// Normals of the positions, if the sink wants them.
     normals: Option<Vec<[f32; 3]>>,
+}
+
+impl Chunk {
+    fn empty(wants_normals: bool) -> Self {
+        Chunk { records: Vec::new(), normals: wants_normals.then(Vec::new) }
+    }
+
+    /// Replaces `numbers` by the numbers of its records.
+    fn number(&self, numbers: &mut Vec<u64>) {
+        numbers.clear();
+        numbers.extend(self.records.iter().flat_map(|&(first, n)| first..first + u64::from(n)));
+    }
+
+    /// The normal of each record.
+    fn spread_normals(&self) -> Option<Vec<[f32; 3]>> {
+        let each = self.records.iter().map(|&(_, n)| n as usize).zip(self.normals.as_ref()?);
+        Some(each.flat_map(|(n, &normal)| std::iter::repeat_n(normal, n)).collect())
+    }
 }
 
 struct Milled {
@@ -251,11 +272,13 @@ fn grind(
     let commit = |product: Product| lock(&cutter).cut(product);
     let encode = |chunk: Chunk, bench: &mut Bench| -> Result<Encoded> {
         bench.batch.clear();
-        tiles.fetch(&chunk.records, &mut bench.fetch, &mut bench.batch)?;
-        bench.batch.normals = chunk.normals;
+        chunk.number(&mut bench.numbers);
+        tiles.fetch(&bench.numbers, &mut bench.fetch, &mut bench.batch)?;
+        bench.batch.normals = chunk.spread_normals();
         encoder.encode(&bench.batch)
     };
     let bench = || Bench {
+        numbers: Vec::with_capacity(chunk_points),
         fetch: Fetch::default(),
         batch: PointBatch::new(job.source.schema().clone(), chunk_points),
     };
@@ -291,6 +314,7 @@ fn grind(
 
 /// What a thread needs to encode chunks.
 struct Bench {
+    numbers: Vec<u64>,
     fetch: Fetch,
     batch: PointBatch,
 }
@@ -361,7 +385,10 @@ struct Cutter<'a> {
     fate_bytes: Vec<u8>,
     fates_stored: u64,
     chunk_points: usize,
+    wants_normals: bool,
     open: Chunk,
+    /// Records that the open chunk takes until it is full.
+    room: usize,
     kept: u64,
 }
 
@@ -372,7 +399,9 @@ impl<'a> Cutter<'a> {
             fate_bytes: Vec::with_capacity(PIECE * FATE_BYTES),
             fates_stored: 0,
             chunk_points,
-            open: Chunk { records: Vec::new(), normals: wants_normals.then(Vec::new) },
+            wants_normals,
+            open: Chunk::empty(wants_normals),
+            room: chunk_points,
             kept: 0,
         }
     }
@@ -380,13 +409,16 @@ impl<'a> Cutter<'a> {
     fn cut(&mut self, product: Product) -> Result<Vec<Chunk>> {
         self.store_fates(&product.fates)?;
         let mut full = Vec::new();
-        for (n, &(first, records)) in product.kept.iter().enumerate() {
-            for record in first..first + u64::from(records) {
-                self.open.records.push(record);
+        for (n, &(mut first, mut left)) in product.kept.iter().enumerate() {
+            while left > 0 {
+                let now = left.min(u32::try_from(self.room).unwrap_or(u32::MAX));
+                self.open.records.push((first, now));
                 if let (Some(open), Some(normals)) = (&mut self.open.normals, &product.normals) {
                     open.push(normals[n]);
                 }
-                if self.open.records.len() == self.chunk_points {
+                (first, left) = (first + u64::from(now), left - now);
+                self.room -= now as usize;
+                if self.room == 0 {
                     full.push(self.close());
                 }
             }
@@ -395,9 +427,9 @@ impl<'a> Cutter<'a> {
     }
 
     fn close(&mut self) -> Chunk {
-        self.kept += self.open.records.len() as u64;
-        let normals = self.open.normals.as_mut().map(std::mem::take);
-        Chunk { records: std::mem::take(&mut self.open.records), normals }
+        self.kept += (self.chunk_points - self.room) as u64;
+        self.room = self.chunk_points;
+        std::mem::replace(&mut self.open, Chunk::empty(self.wants_normals))
     }
 
     fn store_fates(&mut self, mut fates: &[u8]) -> Result<()> {

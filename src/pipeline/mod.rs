@@ -12,6 +12,7 @@ mod mistake;
 mod node;
 mod outlet;
 mod plan;
+mod publish;
 mod registry;
 mod run;
 mod scratch;

@@ -4,14 +4,15 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::path::Path;
 
+use super::publish::check_place;
 use super::settings::{Overrides, RunSettings};
 use super::shares::Demands;
-use super::text::{Pipeline, PlacedStage};
+use super::text::{Pipeline, PlacedStage, resolved};
 use crate::budget::{Bytes, default_limit};
 use crate::geom::lattice::Lattice;
 use crate::point::Schema;
 use crate::stage::{CreateSink, Needs, Order, Role, Source, TileOp, Transform};
-use crate::{Error, Result};
+use crate::{Error, ErrorKind, Result};
 
 /// A pipeline ready to run.
 pub struct Plan {
@@ -43,8 +44,8 @@ struct Sorted {
 impl Pipeline {
     /// Opens the inputs' headers and fits the stages to them and to the memory.
     ///
-    /// Fails if the stages do not fit each other, the inputs disagree, an output is an input, or
-    /// the memory cannot do.
+    /// Fails if the stages do not fit each other, the inputs disagree, an output is an input or
+    /// cannot appear where it should, or the memory cannot do.
     pub fn plan(self, overrides: &Overrides) -> Result<Plan> {
         let settings = self.settings.with(overrides);
         let stages = self
@@ -62,8 +63,17 @@ impl Pipeline {
                 refuse_overwrite(&input, report)?;
             }
         }
-        if settings.report.as_deref() == Some(sink.path()) {
-            return Err(Error::pipeline("the report would replace the output").at(sink.path()));
+        check_place(sink.path())?;
+        if let Some(report) = &settings.report {
+            check_place(report)?;
+            if resolved(report) == resolved(sink.path()) {
+                return Err(Error::pipeline("the report would replace the output").at(report));
+            }
+        }
+        if let Some(folder) = settings.scratch.as_ref().filter(|folder| !folder.is_dir()) {
+            return Err(Error::new(ErrorKind::Io, "the folder for scratch does not exist")
+                .at(folder)
+                .help("create it first, or name another with --scratch"));
         }
         let source = open.open()?;
         check_columns(&sorted.transforms, &sorted.ops, &*sink, source.schema())?;

@@ -1,27 +1,29 @@
 //! Running a plan: begin, stream or mill, account, publish.
 
 use std::fs::{self, File};
-use std::io::{BufWriter, Cursor, Write};
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::Watch;
 use super::clock::Clock;
 use super::mill::mill;
 use super::plan::Plan;
+use super::publish::Staged;
 use super::scratch::{Scratch, free_space};
 use super::settings::{Nonfinite, Spill};
+use super::shares::Demands;
 use super::stream::stream;
-use super::survey::Measured;
+use super::survey::{Lines, Measured};
 use crate::budget::{Budget, Bytes};
 use crate::geom::lattice::Misplaced;
 use crate::point::PointBatch;
 use crate::report::{
     Decision, FileFigures, Ledger, Machine, Outcome, Report, RunFigures, Tally, peak_memory,
 };
-use crate::stage::{Part, SinkSummary, Source, TileOp, Transform};
-use crate::tile::SpillArea;
+use crate::stage::{Input, Part, SinkSummary, Source, TileOp, Transform};
+use crate::tile::{SpillArea, parallel};
 use crate::{Error, ErrorKind, Result};
 
 /// What every phase of a run needs.
@@ -36,9 +38,9 @@ pub(super) struct Job<'a> {
     pub tile_points: Option<usize>,
     pub run_records: Option<usize>,
     pub wants_normals: bool,
-    /// Records read from each input.
-    pub read_of: Vec<AtomicU64>,
     pub watch: &'a dyn Watch,
+    /// Set once a thread has failed.
+    pub failed: AtomicBool,
 }
 
 impl Job<'_> {
@@ -56,9 +58,6 @@ impl Job<'_> {
             return Ok(false);
         }
         tally.work("read", read);
-        if let Some(input) = self.read_of.get(batch.source as usize) {
-            input.fetch_add(read, Ordering::Relaxed);
-        }
         for (kind, transform) in &self.transforms {
             let before = batch.len();
             transform.apply(batch)?;
@@ -74,7 +73,18 @@ impl Job<'_> {
     /// Tells of progress, and hears whether to go on.
     pub fn advance(&self, points: u64) -> Result<()> {
         self.watch.advance(points);
-        if self.watch.cancelled() { Err(Error::interrupted()) } else { Ok(()) }
+        let stop = self.watch.cancelled() || self.failed.load(Ordering::Relaxed);
+        if stop { Err(Error::interrupted()) } else { Ok(()) }
+    }
+
+    /// Runs `work` on all threads; once one has failed, [`advance`](Job::advance) stops the others.
+    pub fn parallel(&self, work: impl Fn() -> Result<()> + Sync) -> Result<()> {
+        parallel(self.threads, |_| {
+            let guard = StopOnDrop::new(|| self.failed.store(true, Ordering::Relaxed));
+            work()?;
+            guard.disarm();
+            Ok(())
+        })
     }
 
     /// The error of a record that has no place on the lattice.
@@ -97,7 +107,7 @@ impl Job<'_> {
         )
         .help(help);
         match self.source.inputs().get(batch.source as usize) {
-            Some(path) => error.at(path),
+            Some(input) => error.at(&input.path),
             None => error,
         }
     }
@@ -155,30 +165,45 @@ impl Plan {
     /// that `watch` asks for leaves nothing behind.
     pub fn run(mut self, watch: &dyn Watch) -> Result<Done> {
         let mut clock = Clock::new(watch);
-        let path = self.sink.path().to_owned();
-        let staging = Arc::new(Scratch::below(&existing_folder(&path)?));
-        if let Some(report) = &self.settings.report {
-            existing_folder(report)?;
+        let output = Staged::beside(self.sink.path())?;
+        let staged_report = self.settings.report.as_deref().map(Staged::beside).transpose()?;
+        let (finished, run) =
+            self.work(&output, &mut clock, watch).map_err(|error| output.tell(error))?;
+        let (report, tiles) = self.account(finished, run, clock)?;
+        if let Some(staged) = &staged_report {
+            write_report(staged.file(), &report, &tiles).map_err(|error| staged.tell(error))?;
         }
-        let staged = staging.path("output")?;
+        drop(tiles);
+        output.publish()?;
+        staged_report.map_or(Ok(()), Staged::publish)?;
+        Ok(Done { report, report_path: self.settings.report })
+    }
+
+    /// Streams or mills into the staged output.
+    fn work(
+        &mut self,
+        output: &Staged,
+        clock: &mut Clock<'_>,
+        watch: &dyn Watch,
+    ) -> Result<(Finished, RunFigures)> {
+        let (schema, metadata) = (self.source.schema(), self.source.metadata());
         let whole = !self.mills
             && self.transforms.is_empty()
             && self.settings.nonfinite == Nonfinite::Refuse;
-        let (schema, metadata) = (self.source.schema(), self.source.metadata());
-        let sink = self.sink.create(&staged, schema, metadata, whole)?;
-        let mut warnings = self.source.warnings();
+        let sink = self.sink.create(output.file(), schema, metadata, whole)?;
         let shares = self.demands.divide()?;
         let budget = Budget::new(self.demands.limit);
-        let _base = budget.lease(shares.base, "the program")?;
+        let _base = budget.lease(shares.base, "program")?;
         let spill = match &self.settings.scratch {
             Some(folder) => Arc::new(Scratch::below(folder)),
-            None => staging.clone(),
+            None => output.scratch().clone(),
         };
         let kept_in_memory = match self.settings.spill {
             Spill::Auto => shares.kept_in_memory,
             Spill::Always => 0,
         };
         let area = SpillArea::new(budget.clone(), kept_in_memory, Box::new(spill.clone()));
+        let tile_points = self.settings.tile_points.map(usize::from);
         let mut job = Job {
             source: &*self.source,
             source_kind: self.source_kind.clone(),
@@ -187,49 +212,43 @@ impl Plan {
             budget: budget.clone(),
             threads: self.threads,
             drop_nonfinite: self.settings.nonfinite == Nonfinite::Drop,
-            tile_points: self.settings.tile_points.map(usize::from),
-            run_records: self
-                .settings
-                .tile_points
-                .map(|n| n.get().saturating_mul(4).min(shares.run_records)),
+            tile_points,
+            run_records: tile_points.map(|n| n.saturating_mul(4).min(shares.run_records)),
             wants_normals: self.sink.wants_normals(),
-            read_of: self.source.inputs().iter().map(|_| AtomicU64::new(0)).collect(),
             watch,
+            failed: AtomicBool::new(false),
         };
         let finished = match &self.lattice {
             Some(lattice) if self.mills => {
-                check_disk(&self, &spill, kept_in_memory)?;
-                mill(&mut job, lattice, &shares, &self.demands, &area, sink, &mut clock)?
+                check_disk(&self.demands, &spill, kept_in_memory)?;
+                mill(&mut job, lattice, &shares, &self.demands, &area, sink, clock)?
             }
             lattice => {
                 clock.phase("convert", Some(self.source.points()));
-                let _working = budget.lease(shares.work, "streaming")?;
-                stream(&job, sink, lattice.as_ref())?
+                stream(&job, &shares, sink, lattice.as_ref())?
             }
         };
-        let read_of = std::mem::take(&mut job.read_of);
         drop(job);
+        let mut warnings = self.source.warnings();
         warnings.extend(finished.written.notes.iter().cloned());
         warnings.iter().for_each(|warning| watch.warn(warning));
         let run = RunFigures {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            inputs: input_figures(&*self.source, read_of),
+            inputs: input_figures(&*self.source),
             outputs: vec![FileFigures {
-                path: path.display().to_string(),
+                path: self.sink.path().display().to_string(),
                 points: finished.written.points,
                 bytes: Some(finished.written.bytes),
             }],
             machine: Machine::this(),
             threads: self.threads,
             memory_bytes: self.demands.limit,
+            leased_bytes: budget.peak(),
             spill_bytes: area.written(),
             warnings,
             ..RunFigures::default()
         };
-        drop(area);
-        let (report, tiles) = self.account(finished, run, clock, &budget)?;
-        self.publish(&staged, &path, &report, &tiles)?;
-        Ok(Done { report, report_path: self.settings.report })
+        Ok((finished, run))
     }
 
     /// The report of a finished run, once its ledger balances, and the lines of its tiles.
@@ -238,18 +257,18 @@ impl Plan {
         finished: Finished,
         mut run: RunFigures,
         clock: Clock<'_>,
-        budget: &Budget,
-    ) -> Result<(Report, Vec<u8>)> {
+    ) -> Result<(Report, Option<Lines>)> {
         let ledger = Ledger::new(finished.read, finished.kept, &finished.tally);
         ledger.check()?;
         ledger.check_written(self.sink.path(), finished.written.points)?;
         (run.seconds, run.cpu_seconds, run.phases) = clock.finish();
-        run.leased_bytes = budget.peak();
         run.peak_memory_bytes = peak_memory();
         run.work = finished.tally.work.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect();
         let (tile_side, totals, tiles) = match finished.measured {
-            Some(measured) => (Some(measured.tile_side), Some(measured.totals), measured.tiles),
-            None => (None, None, Vec::new()),
+            Some(measured) => {
+                (Some(measured.tile_side), Some(measured.totals), Some(measured.tiles))
+            }
+            None => (None, None, None),
         };
         let lattice = self.lattice.as_ref();
         let result = Outcome {
@@ -264,67 +283,35 @@ impl Plan {
         };
         Ok((Report { result, run }, tiles))
     }
-
-    /// Gives the output its name, and writes the report where one is wanted.
-    fn publish(&self, staged: &Path, path: &Path, report: &Report, tiles: &[u8]) -> Result<()> {
-        let staged_report = match &self.settings.report {
-            Some(to) => Some((to, stage_report(to, report, tiles)?)),
-            None => None,
-        };
-        fs::rename(staged, path).map_err(|e| Error::io(path, "put the output in place", e))?;
-        if let Some((to, (_scratch, from))) = staged_report {
-            fs::rename(from, to).map_err(|e| Error::io(to, "put the report in place", e))?;
-        }
-        Ok(())
-    }
 }
 
-fn stage_report(to: &Path, report: &Report, tiles: &[u8]) -> Result<(Scratch, PathBuf)> {
-    let scratch = Scratch::below(&existing_folder(to)?);
-    let staged = scratch.path("report")?;
+/// Writes the report to `staged` and brings it to disk.
+fn write_report(staged: &Path, report: &Report, tiles: &Option<Lines>) -> Result<()> {
     let write = || {
-        let mut out = BufWriter::new(File::create(&staged)?);
-        report.write(&mut out, &mut Cursor::new(tiles))?;
-        out.into_inner().map_err(std::io::IntoInnerError::into_error)?.flush()
+        let mut out = BufWriter::new(File::create(staged)?);
+        match tiles {
+            Some(lines) => report.write(&mut out, &mut lines.reader())?,
+            None => report.write(&mut out, &mut std::io::empty())?,
+        }
+        out.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()
     };
-    write().map_err(|e| Error::io(to, "write the report", e))?;
-    Ok((scratch, staged))
+    write().map_err(|e| Error::io(staged, "write the report", e))
 }
 
-/// The folder that `path` is to appear in, which must be there.
-fn existing_folder(path: &Path) -> Result<PathBuf> {
-    let folder = Scratch::parent_of(path);
-    if path.is_dir() {
-        return Err(Error::pipeline("this is a folder, not a file to write").at(path));
-    }
-    if path.exists() && !path.is_file() {
-        // An output takes the place of what has its name: of /dev/null, for all programs to come.
-        return Err(Error::pipeline("this is no regular file: an output would replace it")
-            .at(path)
-            .help("write to a file of its own"));
-    }
-    if folder.is_dir() {
-        return Ok(folder);
-    }
-    Err(Error::new(ErrorKind::Io, "the folder of the output does not exist")
-        .at(folder)
-        .help("create it first"))
-}
-
-fn input_figures(source: &dyn Source, read_of: Vec<AtomicU64>) -> Vec<FileFigures> {
-    let figures = |(path, read): (PathBuf, AtomicU64)| FileFigures {
-        bytes: fs::metadata(&path).ok().map(|m| m.len()),
-        path: path.display().to_string(),
-        points: read.into_inner(),
+fn input_figures(source: &dyn Source) -> Vec<FileFigures> {
+    let figures = |input: Input| FileFigures {
+        bytes: fs::metadata(&input.path).ok().map(|m| m.len()),
+        path: input.path.display().to_string(),
+        points: input.points,
     };
-    source.inputs().into_iter().zip(read_of).map(figures).collect()
+    source.inputs().into_iter().map(figures).collect()
 }
 
 /// Refuses a run whose spill would not fit on the scratch disk.
-fn check_disk(plan: &Plan, spill: &Scratch, kept_in_memory: u64) -> Result<()> {
+fn check_disk(demands: &Demands, spill: &Scratch, kept_in_memory: u64) -> Result<()> {
     // Records, their order, packed positions twice (runs and merged scan) and fates.
-    let each = plan.demands.stride as u64 + 8 + 2 * 8 + 4;
-    let needed = (plan.demands.points * each).saturating_sub(kept_in_memory);
+    let each = demands.stride as u64 + 8 + 2 * 8 + 4;
+    let needed = demands.points.saturating_mul(each).saturating_sub(kept_in_memory);
     match free_space(spill.parent()) {
         Some(free) if free < needed => Err(Error::memory(format!(
             "the scan will spill about {}, and only {} are free here",

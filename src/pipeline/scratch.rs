@@ -1,10 +1,11 @@
 //! Scratch folders: where a run spills and where its outputs grow before they get their names.
 //!
 //! A folder is `.pointmill-…` with a marker file that the run keeps locked. A killed run leaves the
-//! folder and the lock falls open; the next run beside it removes it.
+//! folder and the lock falls open; the next run beside it removes it. The marker is the last file to
+//! go, so that a folder whose removal was cut short is still known for what it is.
 
 use std::fs::{self, File};
-use std::io::{ErrorKind, Write};
+use std::io::{self, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -37,14 +38,6 @@ impl Scratch {
         Scratch { parent: parent.to_owned(), made: Mutex::default() }
     }
 
-    /// The folder that outputs at `path` are staged in: the one that holds it.
-    pub fn parent_of(path: &Path) -> PathBuf {
-        match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
-            _ => PathBuf::from("."),
-        }
-    }
-
     /// The folder it is made in.
     pub fn parent(&self) -> &Path {
         &self.parent
@@ -72,59 +65,61 @@ impl Drop for Scratch {
     fn drop(&mut self) {
         if let Some(made) = lock(&self.made).take() {
             // Nothing more can be done about a folder that will not go; the next run tries again.
-            let _ = fs::remove_dir_all(made.folder);
+            let _ = remove(&made.folder);
         }
     }
 }
 
 fn make(parent: &Path) -> Result<Made> {
-    // A run that starts at the same time may take a folder without a lock for a killed run's and
-    // remove it; then the next number is tried.
-    for attempt in 0..10_000u32 {
+    let mut attempt = 0u32;
+    loop {
         let folder = parent.join(format!("{PREFIX}{}-{attempt}", std::process::id()));
+        attempt += 1;
         match fs::create_dir(&folder) {
             Ok(()) => {}
-            Err(e) if e.kind() == ErrorKind::AlreadyExists => continue,
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists && attempt < ATTEMPTS => continue,
             Err(e) => {
                 return Err(Error::io(parent, "create a scratch folder here", e)
                     .help("make the folder writable, or name another with --scratch"));
             }
         }
-        let path = folder.join(MARKER);
-        match mark(&path) {
-            Ok(marker) if is_still(&marker, &path) => {
-                return Ok(Made { folder, files: 0, _marker: marker });
+        match mark(&folder) {
+            Ok(Some(marker)) => return Ok(Made { folder, files: 0, _marker: marker }),
+            Ok(None) if attempt < ATTEMPTS => {}
+            Ok(None) => return Err(Error::internal("scratch folders vanish").at(parent)),
+            Err(e) => {
+                let _ = remove(&folder);
+                return Err(Error::io(&folder, "mark the scratch folder", e));
             }
-            Err(e) if e.kind() != ErrorKind::NotFound => {
-                let _ = fs::remove_dir_all(&folder); // the error says more than a second one could
-                return Err(Error::io(&path, "mark the scratch folder", e));
-            }
-            _ => {}
         }
     }
-    let told = "there are too many scratch folders here; remove those that no run uses";
-    Err(Error::new(crate::ErrorKind::Io, told).at(parent))
 }
 
-/// A marker file at `path`, locked.
-fn mark(path: &Path) -> std::io::Result<File> {
-    let mut marker = File::create(path)?;
-    marker.lock()?;
+/// Folders that are tried: names of dead runs may be taken, and another run may take a new folder
+/// for that of a dead one.
+const ATTEMPTS: u32 = 10_000;
+
+/// Puts the marker into a new folder and locks it. None if another run removed it before it was
+/// locked.
+fn mark(folder: &Path) -> io::Result<Option<File>> {
+    let path = folder.join(MARKER);
+    let mut marker = match File::create_new(&path) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
+        marker => marker?,
+    };
+    // Where a file system has no locks, no other run can lock it either and take it for dead.
+    let _ = marker.lock();
+    let (ours, there) = (marker.metadata()?, fs::metadata(&path));
+    if !there.is_ok_and(|there| (there.dev(), there.ino()) == (ours.dev(), ours.ino())) {
+        return Ok(None);
+    }
     let about = serde_json::json!({
         "about": "scratch of a pointmill run; safe to remove when no run uses it",
         "version": env!("CARGO_PKG_VERSION"),
         "process": std::process::id(),
     });
     writeln!(marker, "{about}")?;
-    Ok(marker)
-}
-
-/// True if the open `file` is the one at `path`.
-fn is_still(file: &File, path: &Path) -> bool {
-    match (file.metadata(), fs::metadata(path)) {
-        (Ok(open), Ok(named)) => (open.dev(), open.ino()) == (named.dev(), named.ino()),
-        _ => false,
-    }
+    Ok(Some(marker))
 }
 
 /// Removes scratch folders in `parent` whose runs are gone. What cannot be read or removed is left.
@@ -135,19 +130,30 @@ fn remove_stale(parent: &Path) {
         }
         let folder = entry.path();
         match File::open(folder.join(MARKER)) {
-            // The lock is held until all is gone: a run that was about to take it then finds its
-            // marker missing.
-            Ok(marker) => {
-                if marker.try_lock().is_ok() {
-                    let _ = fs::remove_dir_all(&folder);
-                }
+            // The lock is held until the folder is gone: a run that has just made it waits for that.
+            Ok(marker) if marker.try_lock().is_ok() => {
+                let _ = remove(&folder);
             }
+            Ok(_) => {}
             // A run killed before it could mark its folder; `remove_dir` spares any that is not empty.
             Err(_) => {
                 let _ = fs::remove_dir(&folder);
             }
         }
     }
+}
+
+/// Removes a scratch folder, its marker last.
+fn remove(folder: &Path) -> io::Result<()> {
+    let marker = folder.join(MARKER);
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path != marker {
+            fs::remove_file(path)?;
+        }
+    }
+    fs::remove_file(marker)?;
+    fs::remove_dir(folder)
 }
 
 /// Bytes free for this user on the file system of `folder`; None where the system does not tell.
@@ -214,5 +220,43 @@ mod tests {
         Scratch::below(parent.path());
         assert!(!dead.exists() && foreign.join("mine.txt").exists());
         assert_eq!(scratch_folders(parent.path()), 2, "the living one and the foreign one");
+    }
+
+    #[test]
+    fn a_removal_that_was_cut_short_is_finished_by_the_next_run() {
+        let parent = tempfile::tempdir().unwrap();
+        let dead = parent.path().join(format!("{PREFIX}1-0"));
+        fs::create_dir(&dead).unwrap();
+        fs::write(dead.join(MARKER), "{}").unwrap();
+        fs::write(dead.join("1-records"), "data").unwrap();
+        // What stops a removal half-way: a folder where files are expected.
+        fs::create_dir(dead.join("2-refuses")).unwrap();
+        assert!(remove(&dead).is_err());
+        assert!(dead.join(MARKER).exists(), "the marker goes last");
+        fs::remove_dir(dead.join("2-refuses")).unwrap();
+        Scratch::below(parent.path());
+        assert!(!dead.exists());
+    }
+
+    #[test]
+    fn runs_that_begin_together_never_take_each_others_folders() {
+        let parent = tempfile::tempdir().unwrap();
+        let made = std::sync::atomic::AtomicU32::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..6 {
+                scope.spawn(|| {
+                    for _ in 0..150 {
+                        let scratch = Scratch::below(parent.path());
+                        let path = scratch.path("a").unwrap();
+                        fs::write(&path, "mine").unwrap();
+                        remove_stale(parent.path());
+                        assert_eq!(fs::read_to_string(path).unwrap(), "mine");
+                        made.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                    }
+                });
+            }
+        });
+        assert_eq!(made.into_inner(), 900);
+        assert_eq!(scratch_folders(parent.path()), 0);
     }
 }

@@ -95,11 +95,12 @@ impl Demands {
     }
 
     /// Bytes that a thread holds in the mill, besides its tile: one chunk that it encodes and one
-    /// that waits.
+    /// that waits (of each position: first record, number of records, normal), and the records of
+    /// the former with their numbers and normals.
     fn mill_fixed(&self) -> u64 {
         let ChunkSize { points, bytes } = self.chunk;
-        let batch = points as u64 * (self.stride as u64 + 12);
-        Remote::BYTES + 2 * (bytes + points as u64 * 20) + batch + Fetch::bytes(points, self.stride)
+        let batch = points as u64 * (self.stride as u64 + 8 + 12);
+        Remote::BYTES + 2 * (bytes + points as u64 * 28) + batch + Fetch::bytes(points, self.stride)
     }
 
     /// Bytes that a thread of a stream holds: batches read and waiting for their turn, chunks filled,

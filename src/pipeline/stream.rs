@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::outlet::{Hands, Outlet};
 use super::run::{Finished, Job, StopOnDrop};
-use super::shares::BATCH;
+use super::shares::{BATCH, Shares};
 use crate::Result;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::PointBatch;
@@ -17,9 +17,11 @@ use crate::tile::{lock, parallel};
 /// are removed.
 pub(super) fn stream(
     job: &Job<'_>,
+    shares: &Shares,
     sink: Box<dyn Sink>,
     lattice: Option<&Lattice>,
 ) -> Result<Finished> {
+    let _working = job.budget.lease(shares.work, "streaming")?;
     let (encoder, chunk_points) = (sink.encoder(), sink.chunk_points());
     let outlet: Outlet<PointBatch, PointBatch> = Outlet::new(sink, job.threads);
     let schema = job.source.schema();

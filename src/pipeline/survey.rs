@@ -1,15 +1,15 @@
 //! The last walk over the decoded scan: what the reduction did to each report tile and to all.
 
 use std::collections::BTreeMap;
-use std::io::Write;
-use std::sync::Mutex;
+use std::io::{self, BufReader, Read};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 use super::run::Job;
 use crate::geom::lattice::Lattice;
 use crate::point::Position;
-use crate::report::{ScanSurvey, Totals, report_tile_level};
-use crate::tile::{Fate, Pieces, Reader, SealedTiles, TileKey, lock, parallel};
+use crate::report::{ScanSurvey, TileFigures, Totals, report_tile_level};
+use crate::tile::{Address, Fate, Pieces, Reader, SealedTiles, Spill, SpillArea, TileKey, lock};
 use crate::{Error, Result};
 
 /// Bytes of a stored fate.
@@ -37,6 +37,69 @@ fn fate_of(code: [u8; FATE_BYTES]) -> Fate {
     }
 }
 
+/// Lines of the report's tiles, in order, wherever points are kept: there may be millions.
+pub(super) struct Lines {
+    spill: Spill,
+    stretches: Vec<(Address, usize)>,
+}
+
+impl Lines {
+    /// Reads the lines one stretch after the other.
+    pub fn reader(&self) -> BufReader<LineReader<'_>> {
+        BufReader::with_capacity(LINES_AT_ONCE, LineReader { lines: self, stretch: 0, at: 0 })
+    }
+}
+
+/// See [`Lines::reader`].
+pub(super) struct LineReader<'a> {
+    lines: &'a Lines,
+    stretch: usize,
+    at: usize,
+}
+
+impl Read for LineReader<'_> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let Some(&(address, length)) = self.lines.stretches.get(self.stretch) else {
+            return Ok(0);
+        };
+        let now = (length - self.at).min(into.len());
+        let read = self.lines.spill.read(address.plus(self.at as u64), &mut into[..now]);
+        read.map_err(io::Error::other)?;
+        self.at += now;
+        if self.at == length {
+            (self.stretch, self.at) = (self.stretch + 1, 0);
+        }
+        Ok(now)
+    }
+}
+
+/// Lines are handed to the spill in stretches of about this size.
+const LINES_AT_ONCE: usize = 1 << 18;
+
+/// The lines of the tiles that begin in one range.
+struct RangeLines<'a> {
+    spill: &'a Spill,
+    open: Vec<u8>,
+    stretches: Vec<(Address, usize)>,
+}
+
+impl RangeLines<'_> {
+    fn add(&mut self, figures: &TileFigures) -> Result<()> {
+        figures
+            .write_line(&mut self.open)
+            .map_err(|e| Error::internal("a report line could not be written").because(e))?;
+        if self.open.len() >= LINES_AT_ONCE { self.store() } else { Ok(()) }
+    }
+
+    fn store(&mut self) -> Result<()> {
+        if !self.open.is_empty() {
+            self.stretches.push((self.spill.append(&self.open)?, self.open.len()));
+            self.open.clear();
+        }
+        Ok(())
+    }
+}
+
 /// What was measured.
 pub(super) struct Measured {
     /// Side of the report tiles in world units.
@@ -44,28 +107,32 @@ pub(super) struct Measured {
     /// Figures of the scan.
     pub totals: Totals,
     /// Lines of the report's tiles, in order.
-    pub tiles: Vec<u8>,
+    pub tiles: Lines,
 }
 
 /// Measures the reduction of `tiles` whose positions have the given fates, on all threads.
 pub(super) fn survey(
     job: &Job<'_>,
     lattice: &Lattice,
+    area: &Arc<SpillArea>,
     tiles: &SealedTiles,
     fates: &Pieces,
 ) -> Result<Measured> {
     let level = report_tile_level(tiles.levels());
     let walk = Walk { tiles, fates, level };
     let ranges = tiles.blocks().div_ceil(BLOCKS);
-    let _working = job.budget.lease(2 * ScanSurvey::BYTES * job.threads as u64, "the survey")?;
+    let each = 2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64);
+    let _working = job.budget.lease(each * job.threads as u64, "survey")?;
+    let spill = Spill::new(area, "report");
     let all = Mutex::new((ScanSurvey::new(&tiles.bounds()), BTreeMap::new()));
     each_range(job, ranges, |range| {
         let mut scan = ScanSurvey::new(&tiles.bounds());
-        let mut lines = Vec::new();
+        let mut lines = RangeLines { spill: &spill, open: Vec::new(), stretches: Vec::new() };
         let positions = walk.tiles_from(range, lattice, &mut scan, &mut lines)?;
+        lines.store()?;
         let mut all = lock(&all);
         all.0.merge(&scan);
-        all.1.insert(range, lines);
+        all.1.insert(range, lines.stretches);
         Ok(positions)
     })?;
     let (scan, lines) =
@@ -90,7 +157,7 @@ pub(super) fn survey(
     Ok(Measured {
         tile_side: (level as f64).exp2() * lattice.step,
         totals: fitted.finish(lattice)?,
-        tiles: lines.into_values().flatten().collect(),
+        tiles: Lines { spill, stretches: lines.into_values().flatten().collect() },
     })
 }
 
@@ -101,7 +168,7 @@ fn each_range(
     work: impl Fn(usize) -> Result<u64> + Sync,
 ) -> Result<()> {
     let next = AtomicUsize::new(0);
-    parallel(job.threads, |_| {
+    job.parallel(|| {
         loop {
             let range = next.fetch_add(1, Ordering::Relaxed);
             if range >= ranges {
@@ -161,7 +228,7 @@ impl Walk<'_> {
         range: usize,
         lattice: &Lattice,
         scan: &mut ScanSurvey,
-        lines: &mut Vec<u8>,
+        lines: &mut RangeLines<'_>,
     ) -> Result<u64> {
         let end = ((range + 1) * BLOCKS).min(self.tiles.blocks());
         let mut stretch = Stretch::default();
@@ -170,9 +237,7 @@ impl Walk<'_> {
             stretch.load(self, before)?;
             if let Some(&(last, _)) = stretch.positions.last() {
                 // The tile that reaches into this range belongs to the one before.
-                at = self
-                    .visit(&mut stretch, at, TileKey::around(last, self.level), |_, _, _| {})?
-                    .0;
+                at = self.end_of(TileKey::around(last, self.level), at.0, &mut stretch)?;
             }
         }
         let mut positions = 0;
@@ -186,15 +251,33 @@ impl Walk<'_> {
             })?;
             let mut fitted = tile.fit();
             self.visit(&mut stretch, at, key, |p, copies, fate| fitted.measure(p, copies, fate))?;
-            let figures = fitted.finish(lattice, scan)?;
-            figures
-                .write_line(&mut *lines)
-                .and_then(|()| lines.flush())
-                .map_err(|e| Error::internal("a report line could not be written").because(e))?;
+            lines.add(&fitted.finish(lattice, scan)?)?;
             positions += seen;
             at = next;
         }
         Ok(positions)
+    }
+
+    /// The first position behind the cube of `key`, which reaches to the beginning of block `from` or
+    /// into it.
+    fn end_of(&self, key: TileKey, from: usize, stretch: &mut Stretch) -> Result<(usize, usize)> {
+        let cube = key.cube();
+        let (mut inside, mut behind) = (from, self.tiles.blocks());
+        while inside < behind {
+            let middle = inside + (behind - inside) / 2;
+            match cube.contains(self.tiles.block(middle).first) {
+                true => inside = middle + 1,
+                false => behind = middle,
+            }
+        }
+        if inside == from {
+            return Ok((from, 0));
+        }
+        // The last block that begins in the cube may end behind it.
+        stretch.load(self, inside - 1)?;
+        let end = stretch.positions.partition_point(|(p, _)| cube.contains(*p));
+        let whole = end == stretch.positions.len();
+        Ok(if whole { (inside, 0) } else { (inside - 1, end) })
     }
 
     /// Visits the positions of the cube of `key` from block and index `at` on; returns where they

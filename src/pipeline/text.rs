@@ -248,7 +248,7 @@ fn check_files(
 }
 
 /// The file that `path` means, links and dots resolved as far as it exists.
-fn resolved(path: &Path) -> PathBuf {
+pub(super) fn resolved(path: &Path) -> PathBuf {
     if let Ok(file) = path.canonicalize() {
         return file;
     }

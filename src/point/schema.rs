@@ -161,24 +161,18 @@ impl Dimension {
                 true
             }};
         }
-        match self.scalar {
-            Scalar::F64 => {
-                let v = value.as_f64();
-                let exact = match value {
-                    Value::Unsigned(u) => v as u128 == u128::from(u),
-                    Value::Signed(i) => v as i128 == i128::from(i),
-                    _ => true,
-                };
-                return exact && write!(v);
-            }
-            Scalar::F32 => {
-                if let Value::Single(v) = value {
-                    return write!(v);
-                }
-                let v = value.as_f64();
-                return (f64::from(v as f32) == v || v.is_nan()) && write!(v as f32);
-            }
-            _ => {}
+        if self.scalar.is_float() {
+            let v = value.as_f64();
+            let exact = match value {
+                Value::Unsigned(u) => v as u128 == u128::from(u),
+                Value::Signed(i) => v as i128 == i128::from(i),
+                _ => true,
+            };
+            return match (self.scalar, value) {
+                (Scalar::F64, _) => exact && write!(v),
+                (_, Value::Single(v)) => write!(v),
+                _ => exact && (f64::from(v as f32) == v || v.is_nan()) && write!(v as f32),
+            };
         }
         let whole: i128 = match value {
             Value::Unsigned(v) => i128::from(v),
@@ -222,7 +216,7 @@ impl Dimension {
             Scalar::I32 => store!(i32),
             Scalar::U64 => store!(u64),
             Scalar::I64 => store!(i64),
-            Scalar::F32 | Scalar::F64 => unreachable!("handled above"),
+            Scalar::F32 | Scalar::F64 => false, // handled above
         }
     }
 }
@@ -285,5 +279,31 @@ impl std::fmt::Debug for Metadata {
             .field("comments", &self.comments)
             .field("native", &self.native.is_some())
             .finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn floats_take_the_integers_that_they_hold_and_no_others() {
+        let put = |scalar, value| {
+            let mut record = [0; 8];
+            let field = Dimension::new("v", scalar, 0);
+            let held = field.put(&mut record, Endian::Big, value);
+            held.then(|| field.get(&record, Endian::Big).as_f64())
+        };
+        let beyond = (1 << 53) + 1;
+        for scalar in [Scalar::F32, Scalar::F64] {
+            assert_eq!(put(scalar, Value::Unsigned(1 << 60)), Some((1u64 << 60) as f64));
+            assert_eq!(put(scalar, Value::Signed(-5)), Some(-5.0));
+            assert_eq!(put(scalar, Value::Unsigned(beyond)), None, "{scalar:?}");
+            assert_eq!(put(scalar, Value::Signed(-(beyond as i64))), None, "{scalar:?}");
+            assert_eq!(put(scalar, Value::Unsigned(u64::MAX)), None, "{scalar:?}");
+        }
+        assert_eq!(put(Scalar::F32, Value::Signed((1 << 24) + 1)), None);
+        assert_eq!(put(Scalar::F32, Value::Double(0.1)), None);
+        assert!(put(Scalar::F32, Value::Double(f64::NAN)).unwrap().is_nan());
     }
 }

@@ -57,7 +57,7 @@ impl TileStore {
 
     fn add(&self, run: Run) -> Result<()> {
         let bytes = run.blocks.len() as u64 * INDEX_BYTES;
-        lock(&self.index).push(self.budget.lease(bytes, "the index of the sorted runs")?);
+        lock(&self.index).push(self.budget.lease(bytes, "index of the sorted runs")?);
         lock(&self.runs).push(run);
         Ok(())
     }

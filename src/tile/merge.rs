@@ -17,15 +17,18 @@ use super::{Levels, parallel};
 use crate::point::Position;
 use crate::{Error, Result};
 
-/// Blocks of all runs that one range has, about.
+/// Blocks of all runs that one range has, about, at least.
 const RANGE_BLOCKS: usize = 256;
+/// Blocks of one run that a range has, about, at least: where it begins and ends, blocks of every
+/// run are read for a part of them.
+const RANGE_BLOCKS_EACH: usize = 4;
 /// Blocks packed before they are handed to the spill.
 const BLOCKS_AT_ONCE: usize = 64;
 
 /// Bytes that a thread holds while it merges `runs` runs of records of `stride` bytes.
 pub fn merge_bytes(runs: usize, stride: usize) -> u64 {
     let cursor = BLOCK * size_of::<Position>() + stride + 256;
-    let emitter = BLOCKS_AT_ONCE * BLOCK * 28 + PIECE * 8 + BLOCK * 28;
+    let emitter = BLOCKS_AT_ONCE * BLOCK * 28 + PIECE * 8 + 2 * BLOCK * 28;
     (runs * cursor + emitter) as u64
 }
 
@@ -39,8 +42,12 @@ pub fn seal(
     let runs = std::mem::take(&mut *lock(&store.runs));
     let _working = store
         .budget
-        .lease(merge_bytes(runs.len(), store.stride) * threads as u64, "merging sorted runs")?;
+        .lease(merge_bytes(runs.len(), store.stride) * threads as u64, "merging of sorted runs")?;
     let borders = borders(&runs);
+    // The merge leaves no more blocks than the runs have, but for one that is not full in each range.
+    let blocks = runs.iter().map(|run| run.blocks.len()).sum::<usize>() + borders.len() + 1;
+    let each = size_of::<Block>() as u64 + 8;
+    let mut lease = store.budget.lease(blocks as u64 * each, "index of the tiles")?;
     let out = Output {
         positions: Spill::new(&store.area, "positions"),
         refs: Pieces::new(&store.area, "order", size_of::<u64>()),
@@ -48,21 +55,25 @@ pub fn seal(
     let ranges: Vec<Mutex<Option<Merged>>> =
         (0..=borders.len()).map(|_| Mutex::default()).collect();
     let next = AtomicUsize::new(0);
+    let merge = |range: usize, slot: &Mutex<Option<Merged>>| -> Result<()> {
+        let from = range.checked_sub(1).map(|b| borders[b]);
+        let merged = merge_range(&store, &runs, from, borders.get(range).copied(), &out)?;
+        advance(merged.records)?;
+        *lock(slot) = Some(merged);
+        Ok(())
+    };
     parallel(threads, |_| {
         loop {
             let range = next.fetch_add(1, Atomic::Relaxed);
             let Some(slot) = ranges.get(range) else { return Ok(()) };
-            let from = range.checked_sub(1).map(|b| borders[b]);
-            let merged = merge_range(&store, &runs, from, borders.get(range).copied(), &out)?;
-            advance(merged.records)?;
-            *lock(slot) = Some(merged);
+            // Whoever fails leaves the others no range.
+            merge(range, slot).inspect_err(|_| next.store(ranges.len(), Atomic::Relaxed))?;
         }
     })?;
     drop(runs);
     let ranges = ranges.into_iter().filter_map(|slot| slot.into_inner().ok().flatten());
-    let sequence = join(ranges);
-    let index = sequence.blocks.len() as u64 * (size_of::<Block>() as u64 + 8);
-    let lease = store.budget.lease(index, "the index of the tiles")?;
+    let sequence = join(ranges, blocks);
+    lease.resize(sequence.blocks.len() as u64 * each)?;
     Ok(SealedTiles::new(sequence, out.positions, out.refs, store.records, lease))
 }
 
@@ -71,8 +82,8 @@ fn borders(runs: &[Run]) -> Vec<Position> {
     let mut firsts: Vec<Position> =
         runs.iter().flat_map(|run| run.blocks.iter().map(|block| block.first)).collect();
     firsts.sort_unstable_by(morton_cmp);
-    let mut borders: Vec<Position> =
-        firsts.into_iter().skip(RANGE_BLOCKS).step_by(RANGE_BLOCKS).collect();
+    let each = RANGE_BLOCKS.max(RANGE_BLOCKS_EACH * runs.len());
+    let mut borders: Vec<Position> = firsts.into_iter().skip(each).step_by(each).collect();
     borders.dedup();
     borders
 }
@@ -90,8 +101,9 @@ struct Merged {
     ends: Option<(Position, Position)>,
 }
 
-fn join(ranges: impl Iterator<Item = Merged>) -> Sequence {
-    let mut all = Sequence::default();
+fn join(ranges: impl Iterator<Item = Merged>, most_blocks: usize) -> Sequence {
+    let blocks = Vec::with_capacity(most_blocks);
+    let mut all = Sequence { blocks, ..Sequence::default() };
     let mut last = None;
     for range in ranges {
         let Some((first, end)) = range.ends else { continue };
@@ -118,10 +130,11 @@ fn merge_range(
     out: &Output,
 ) -> Result<Merged> {
     let mut cursors = Vec::with_capacity(runs.len());
+    let mut buffer = Vec::new();
     let mut most = 0;
     for run in runs {
         let mut cursor = Cursor::new(store, run);
-        most += cursor.seek(from, until)?;
+        most += cursor.seek(from, until, &mut buffer)?;
         cursors.push(cursor);
     }
     let mut heap: BinaryHeap<Head> = cursors
@@ -137,7 +150,7 @@ fn merge_range(
         while heap.peek().is_some_and(|next| next.position == head.position) {
             equal.extend(heap.pop().map(|next| next.run));
         }
-        emit_equal(&mut cursors, &mut equal.clone(), head.position, &mut emitter)?;
+        emit_equal(&mut cursors, &mut equal.clone(), head.position, &mut emitter, &mut buffer)?;
         for &run in &equal {
             if let Some(position) = cursors[run].head(until) {
                 heap.push(Head { position, run });
@@ -153,6 +166,7 @@ fn emit_equal(
     runs: &mut Vec<usize>,
     position: Position,
     emitter: &mut Emitter<'_>,
+    buffer: &mut Vec<u8>,
 ) -> Result<()> {
     while runs.len() > 1 {
         let mut smallest = 0;
@@ -164,7 +178,7 @@ fn emit_equal(
         }
         let cursor = &mut cursors[runs[smallest]];
         emitter.emit(position, cursor.number())?;
-        cursor.advance()?;
+        cursor.advance(buffer)?;
         if cursor.head(None) != Some(position) {
             runs.swap_remove(smallest);
         }
@@ -172,7 +186,7 @@ fn emit_equal(
     let cursor = &mut cursors[runs[0]];
     while cursor.head(None) == Some(position) {
         emitter.emit(position, cursor.number())?;
-        cursor.advance()?;
+        cursor.advance(buffer)?;
     }
     Ok(())
 }
@@ -207,7 +221,6 @@ struct Cursor<'a> {
     block: usize,
     at: usize,
     positions: Vec<Position>,
-    buffer: Vec<u8>,
     /// The record at the head, once it was needed to order equal positions.
     record: Vec<u8>,
     record_of: Option<u64>,
@@ -221,7 +234,6 @@ impl<'a> Cursor<'a> {
             block: 0,
             at: 0,
             positions: Vec::new(),
-            buffer: Vec::new(),
             record: Vec::new(),
             record_of: None,
         }
@@ -229,7 +241,12 @@ impl<'a> Cursor<'a> {
 
     /// Goes to the first record at or behind `from`; returns how many records the range until
     /// `until` has at most.
-    fn seek(&mut self, from: Option<Position>, until: Option<Position>) -> Result<u64> {
+    fn seek(
+        &mut self,
+        from: Option<Position>,
+        until: Option<Position>,
+        buffer: &mut Vec<u8>,
+    ) -> Result<u64> {
         let blocks = &self.run.blocks;
         let before = |p: &Position| {
             blocks.partition_point(|block| morton_cmp(&block.first, p) == Ordering::Less)
@@ -237,7 +254,7 @@ impl<'a> Cursor<'a> {
         let end = until.as_ref().map_or(blocks.len(), before);
         // Records equal to `from` may begin in the block before the first that begins at or behind it.
         self.block = from.as_ref().map_or(0, |p| before(p).saturating_sub(1));
-        self.load()?;
+        self.load(buffer)?;
         if let Some(from) = from {
             loop {
                 self.at =
@@ -246,19 +263,18 @@ impl<'a> Cursor<'a> {
                     break;
                 }
                 self.block += 1;
-                self.load()?;
+                self.load(buffer)?;
             }
         }
         Ok((end.saturating_sub(self.block) * BLOCK) as u64)
     }
 
-    fn load(&mut self) -> Result<()> {
+    /// Reads the block that it is at; `buffer` is memory to work in, which all cursors share.
+    fn load(&mut self, buffer: &mut Vec<u8>) -> Result<()> {
         self.at = 0;
         self.positions.clear();
         match self.run.blocks.get(self.block) {
-            Some(block) => {
-                block.read(&self.store.positions, &mut self.buffer, &mut self.positions, None)
-            }
+            Some(block) => block.read(&self.store.positions, buffer, &mut self.positions, None),
             None => Ok(()),
         }
     }
@@ -275,11 +291,11 @@ impl<'a> Cursor<'a> {
         self.run.first_record + (self.block * BLOCK + self.at) as u64
     }
 
-    fn advance(&mut self) -> Result<()> {
+    fn advance(&mut self, buffer: &mut Vec<u8>) -> Result<()> {
         self.at += 1;
         if self.at == self.positions.len() {
             self.block += 1;
-            self.load()?;
+            self.load(buffer)?;
         }
         Ok(())
     }

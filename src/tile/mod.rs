@@ -20,7 +20,7 @@ pub use load::Loader;
 pub use merge::{merge_bytes, seal};
 pub use remote::Remote;
 pub use sealed::{CutError, Fetch, Reader, SealedTiles, index_bytes};
-pub use spill::{Folder, PIECE, Pieces, Spill, SpillArea, lock};
+pub use spill::{Address, Folder, PIECE, Pieces, Spill, SpillArea, lock};
 
 use std::ops::Range;
 
@@ -28,24 +28,25 @@ use crate::point::{Bounds, Position};
 use crate::{Error, ErrorKind, Result};
 
 /// Runs `work` on `threads` threads, each told its number, and returns the first error that is not
-/// merely a thread giving up because another failed.
+/// merely a thread giving up because another failed. A panic is an error, on one thread too.
 pub fn parallel(threads: usize, work: impl Fn(usize) -> Result<()> + Sync) -> Result<()> {
-    if threads <= 1 {
-        return work(0);
-    }
     std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads)
+        let workers: Vec<_> = (0..threads.max(1))
             .map(|n| {
-                scope.spawn({
-                    let work = &work;
-                    move || work(n)
-                })
+                let work = &work;
+                std::thread::Builder::new().spawn_scoped(scope, move || work(n))
             })
             .collect();
         let mut result: Result<()> = Ok(());
         for worker in workers {
-            let outcome =
-                worker.join().unwrap_or_else(|_| Err(Error::internal("a worker thread panicked")));
+            let outcome = match worker.map(|worker| worker.join()) {
+                Ok(Ok(outcome)) => outcome,
+                Ok(Err(_)) => Err(Error::internal("a worker thread panicked")),
+                Err(cause) => {
+                    let told = "the system refuses to start so many threads";
+                    Err(Error::new(ErrorKind::Io, told).because(cause).help("give fewer --threads"))
+                }
+            };
             let given_up = matches!(&result, Err(e) if e.kind() == ErrorKind::Interrupted);
             if result.is_ok() || given_up && outcome.is_err() {
                 result = outcome;

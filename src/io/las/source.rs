@@ -9,7 +9,7 @@ use super::input::{Input, Storage};
 use super::merge::merge;
 use super::read::{LazPart, PlainPart, Shift};
 use crate::point::{Metadata, Schema};
-use crate::stage::{Part, Source};
+use crate::stage::{self, Part, Source};
 use crate::{Error, Result};
 
 /// Plain records of one part.
@@ -138,8 +138,10 @@ impl Source for LasSource {
         &self.metadata
     }
 
-    fn inputs(&self) -> Vec<PathBuf> {
-        self.files.iter().map(|f| f.input.path.clone()).collect()
+    fn inputs(&self) -> Vec<stage::Input> {
+        let input =
+            |f: &Opened| stage::Input { path: f.input.path.clone(), points: f.input.points() };
+        self.files.iter().map(input).collect()
     }
 
     fn points(&self) -> u64 {

@@ -10,7 +10,7 @@ use super::file::{PlyFile, open};
 use super::header::{Element, Encoding, Kind, shown};
 use super::names;
 use crate::point::{Dimension, Layout, Metadata, PointBatch, Schema};
-use crate::stage::{Part, Source};
+use crate::stage::{Input, Part, Source};
 use crate::{Error, Result};
 
 /// Vertices of one part of a binary file.
@@ -235,8 +235,8 @@ impl Source for PlySource {
         &self.metadata
     }
 
-    fn inputs(&self) -> Vec<PathBuf> {
-        self.files.iter().map(|f| f.path.clone()).collect()
+    fn inputs(&self) -> Vec<Input> {
+        self.files.iter().map(|f| Input { path: f.path.clone(), points: f.points }).collect()
     }
 
     fn points(&self) -> u64 {

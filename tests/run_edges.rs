@@ -1,0 +1,472 @@
+//! Runs at the edge of what can be: nothing to do, far away, too heavy, one place, no room, trouble
+//! in the middle. Each ends with an answer or an error, and leaves nothing behind.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use pointmill::pipeline::{
+    Done, Overrides, Pipeline, Quiet, Registry, StageKind, StagePlace, Watch,
+};
+use pointmill::point::PointBatch;
+use pointmill::report::Tally;
+use pointmill::stage::{Needs, Role, TileOp, Transform};
+use pointmill::tile::Tile;
+use pointmill::{Error, ErrorKind, Result};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+const REDUCE: &str =
+    "[[stage]]\nkind = 'normals'\n[[stage]]\nkind = 'cells'\n[[stage]]\nkind = 'median'\n";
+
+/// A folder with a pipeline that reads `in.ply` or another source and writes `out.ply`.
+struct Case {
+    at: tempfile::TempDir,
+}
+
+impl Case {
+    fn new() -> Self {
+        Case { at: tempfile::tempdir().unwrap() }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.at.path().join(name)
+    }
+
+    /// Writes `in.ply`: positions and a number each.
+    fn ply(&self, points: &[([f64; 3], u32)]) {
+        let mut bytes = format!(
+            "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty \
+             double y\nproperty double z\nproperty uint tag\nend_header\n",
+            points.len()
+        )
+        .into_bytes();
+        for (p, tag) in points {
+            p.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+            bytes.extend(tag.to_le_bytes());
+        }
+        fs::write(self.path("in.ply"), bytes).unwrap();
+    }
+
+    /// The records of `out.ply`.
+    fn written(&self) -> Vec<([f64; 3], u32)> {
+        let bytes = fs::read(self.path("out.ply")).unwrap();
+        let head = b"end_header\n";
+        let body = bytes.windows(head.len()).position(|w| w == head).unwrap() + head.len();
+        let float = |at: &[u8]| f64::from_le_bytes(at.try_into().unwrap());
+        let record = |r: &[u8]| {
+            let p = [float(&r[..8]), float(&r[8..16]), float(&r[16..24])];
+            (p, u32::from_le_bytes(r[24..].try_into().unwrap()))
+        };
+        bytes[body..].chunks_exact(28).map(record).collect()
+    }
+
+    /// Reads `in.ply`, does `stages`, writes `out.ply` and `report.json`.
+    fn text(&self, run: &str, stages: &str, write: &str) -> String {
+        let read =
+            format!("[[stage]]\nkind = 'read'\npath = '{}'\n", self.path("in.ply").display());
+        let write = format!(
+            "[[stage]]\nkind = 'write'\npath = '{}'\n{write}\n",
+            self.path("out.ply").display()
+        );
+        let report = self.path("report.json");
+        format!("[run]\nreport = '{}'\n{run}\n{read}{stages}{write}", report.display())
+    }
+
+    fn run(&self, run: &str, stages: &str, write: &str) -> Result<Done> {
+        execute(&self.text(run, stages, write), &Overrides::default(), &Quiet)
+    }
+
+    fn report(&self) -> Value {
+        serde_json::from_slice(&fs::read(self.path("report.json")).unwrap()).unwrap()
+    }
+
+    fn left(&self) -> Vec<String> {
+        let mut names: Vec<String> = fs::read_dir(self.at.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+fn execute(text: &str, overrides: &Overrides, watch: &dyn Watch) -> Result<Done> {
+    let registry = Registry::builtin().with::<Trouble>();
+    Pipeline::parse(text, "test.toml", &registry)?.plan(overrides)?.run(watch)
+}
+
+#[test]
+fn scans_of_no_point_or_few_reduce_to_themselves() {
+    for n in 0..6 {
+        for threads in [1, 4] {
+            let case = Case::new();
+            let points: Vec<_> = (0..n).map(|i| ([f64::from(i), 0.5, -1.0], i)).collect::<Vec<_>>();
+            let points: Vec<_> = points.into_iter().map(|(p, i)| (p, i as u32)).collect();
+            case.ply(&points);
+            case.run(&format!("threads = {threads}"), REDUCE, "").unwrap();
+            let mut written = case.written();
+            written.sort_by_key(|(_, tag)| *tag);
+            assert_eq!(written, points, "points on a line have no normal: all stay");
+            assert_eq!(case.report()["result"]["ledger"]["kept"], n);
+            case.run(&format!("threads = {threads}"), "", "").unwrap();
+            assert_eq!(case.written(), points, "a stream of {n}");
+            assert_eq!(case.left(), ["in.ply", "out.ply", "report.json"]);
+        }
+    }
+}
+
+#[test]
+fn the_far_ends_of_the_lattice_are_places_like_any_other() {
+    // Patches at the corners of ±(2^32 − 2) world units, nearly 2^62 steps away, and around 0.
+    let far = 4_294_967_294.0f64;
+    let mut points = Vec::new();
+    for corner in 0..8u32 {
+        let base = [0, 1, 2].map(|axis| if corner >> axis & 1 == 1 { far } else { -far });
+        for i in 0..40u32 {
+            let offset = [i % 7, i / 7 % 7, (i * i) % 3].map(|v| f64::from(v) / 4.0);
+            let p = std::array::from_fn(|axis| base[axis] - offset[axis] * base[axis].signum());
+            points.push((p, points.len() as u32));
+        }
+    }
+    for i in 0..60u32 {
+        let p = [i % 8, i / 8, i % 3].map(|v| f64::from(v) / 8.0 - 0.5);
+        points.push((p, points.len() as u32));
+    }
+    let mut answers = BTreeSet::new();
+    for (threads, tile, spill) in [(1, 100_000, "auto"), (3, 4, "always"), (2, 1, "auto")] {
+        let case = Case::new();
+        case.ply(&points);
+        let run = format!("threads = {threads}\ntile_points = {tile}\nspill = '{spill}'");
+        case.run(&run, &REDUCE.replace("'cells'", "'cells'\nside = 1.5"), "").unwrap();
+        let report = fs::read(case.path("report.json")).unwrap();
+        let result = pointmill::report::result_bytes(&report).unwrap().to_vec();
+        if tile < 100 {
+            assert!(case.report()["run"]["work"]["tiles"].as_u64().unwrap() >= 9);
+        }
+        answers.insert((fs::read(case.path("out.ply")).unwrap(), result));
+    }
+    assert_eq!(answers.len(), 1);
+}
+
+#[test]
+fn a_position_with_very_many_records_keeps_them_all_in_order() {
+    let case = Case::new();
+    let n = 200_000u32;
+    let mut points: Vec<_> =
+        (0..n).map(|i| ([1.0, 2.0, 3.0], i.wrapping_mul(2_654_435_761))).collect();
+    points.extend((0..500).map(|i| ([f64::from(i), -1.0, 0.0], i)));
+    case.ply(&points);
+    case.run("threads = 2\nmemory = '96MiB'\ntile_points = 5000", "", "order = 'canonical'")
+        .unwrap();
+    let written = case.written();
+    assert_eq!(written.len(), points.len());
+    let copies: Vec<_> =
+        written.iter().filter(|(p, _)| p[1] == 2.0).map(|(_, tag)| tag.to_le_bytes()).collect();
+    assert_eq!(copies.len(), n as usize);
+    assert!(copies.is_sorted(), "equal positions are in the order of their bytes");
+    assert_eq!(case.report()["result"]["ledger"]["kept"], n + 500);
+}
+
+#[test]
+fn the_memory_that_a_heavy_cell_is_said_to_need_does() {
+    let at = tempfile::tempdir().unwrap();
+    let (out, file) = (at.path().join("out.las"), at.path().join("heavy.toml"));
+    let text = format!(
+        "[run]\nthreads = 1\n[[stage]]\nkind = 'synth'\nscene = 'plane'\npoints = 100000\n\
+         [[stage]]\nkind = 'normals'\nmethod = 'pca'\n[[stage]]\nkind = 'cells'\nside = 1e6\n\
+         max_angle = 3.1\n[[stage]]\nkind = 'median'\n[[stage]]\nkind = 'write'\npath = '{}'\n",
+        out.display()
+    );
+    fs::write(&file, text).unwrap();
+    // What is resident before the run counts: each run is a process of its own.
+    let with = |mebibytes: u64| {
+        let run = Command::new(env!("CARGO_BIN_EXE_pointmill"))
+            .args([Path::new("run"), &file])
+            .args(["--memory", &format!("{mebibytes}MiB")])
+            .output()
+            .unwrap();
+        (run.status.code(), String::from_utf8(run.stderr).unwrap())
+    };
+    let named = |told: &str| -> u64 {
+        let number = told.split_once("--memory ").unwrap_or_else(|| panic!("{told}")).1;
+        number.split_once("MiB").unwrap().0.parse().unwrap()
+    };
+    let (_, small) = with(1);
+    let (code, heavy) = with(named(&small) + 2);
+    assert_eq!(code, Some(1), "{heavy}");
+    assert!(heavy.contains("the cube from"), "{heavy}");
+    assert!(!out.exists());
+    let (code, told) = with(named(&heavy));
+    assert_eq!(code, Some(0), "{told}");
+    assert!(out.exists());
+}
+
+#[test]
+fn a_stream_of_any_length_needs_no_memory_for_an_index() {
+    let at = tempfile::tempdir().unwrap();
+    let text = format!(
+        "[run]\nthreads = 2\nmemory = '128MiB'\n[[stage]]\nkind = 'synth'\nscene = 'als'\n\
+         points = 4000000000\n[[stage]]\nkind = 'write'\npath = '{}'\n",
+        at.path().join("out.laz").display()
+    );
+    let pipeline = Pipeline::parse(&text, "test.toml", &Registry::builtin()).unwrap();
+    let plan = pipeline.plan(&Overrides::default()).unwrap();
+    assert!(plan.to_string().contains("memory   128 MiB"));
+}
+
+#[test]
+fn points_that_are_not_finite_can_be_dropped_and_finite_ones_never_are() {
+    let case = Case::new();
+    let good = [([0.0; 3], 0), ([1.0; 3], 1)];
+    case.ply(&[good[0], ([f64::NAN, 0.0, 0.0], 7), good[1], ([0.0, f64::INFINITY, 0.0], 8)]);
+    for write in ["", "order = 'canonical'"] {
+        case.run("nonfinite = 'drop'", "", write).unwrap();
+        assert_eq!(case.written(), good);
+        let removed = &case.report()["result"]["ledger"]["removed"][0];
+        assert_eq!((&removed["reason"], &removed["records"]), (&"not finite".into(), &2.into()));
+    }
+    let error = case.run("", "", "order = 'canonical'").unwrap_err();
+    assert!(
+        error.to_string().contains("in.ply: the point [NaN, 0.0, 0.0] is not finite"),
+        "{error}"
+    );
+    assert!(error.remedy().unwrap().contains("drop"));
+    case.ply(&[good[0], ([1e305, 0.0, 0.0], 1)]);
+    let error = case.run("nonfinite = 'drop'", "", "order = 'canonical'").unwrap_err();
+    assert!(error.to_string().contains("beyond the lattice"), "{error}");
+    assert!(error.remedy().unwrap().contains("lattice"));
+    case.run("nonfinite = 'drop'", "", "").unwrap();
+    assert_eq!(case.written().len(), 2, "a stream needs no lattice for a finite point");
+}
+
+#[test]
+fn a_lattice_step_that_is_asked_for_is_the_one_that_decides() {
+    let case = Case::new();
+    case.ply(&[
+        ([0.4, 0.0, 0.0], 3),
+        ([0.2, 0.0, 0.0], 2),
+        ([0.6, 0.0, 0.0], 0),
+        ([-0.4, 0.0, 0.0], 1),
+    ]);
+    case.run("lattice = 1.0", "", "order = 'canonical'").unwrap();
+    let result = case.report()["result"].clone();
+    assert_eq!(result["lattice"]["step"], 1.0);
+    assert_eq!(result["counts"]["positions"], 2);
+    let tags: Vec<u32> = case.written().iter().map(|(_, tag)| *tag).collect();
+    assert_eq!(tags.last(), Some(&0), "0.6 is at 1, all others at 0, in the order of their bytes");
+}
+
+#[test]
+fn every_report_tile_is_surveyed_once_however_uneven_the_scan() {
+    let case = Case::new();
+    let mut points = Vec::new();
+    for x in 0..60 {
+        for y in 0..60 {
+            for z in 0..50 {
+                points.push(([f64::from(x) - 7.0, f64::from(y), f64::from(z) - 31.0], 0));
+            }
+        }
+    }
+    // Far apart, each alone in its tile: they make the tiles large, and the block falls into few.
+    for i in 0..30u32 {
+        points.push(([f64::from(i) * 4096.0 + 3.0, -5000.0 - f64::from(i * i), 0.0], i));
+    }
+    case.ply(&points);
+    let mut results = BTreeSet::new();
+    for threads in [1, 4] {
+        case.run(&format!("lattice = 1.0\nthreads = {threads}"), "", "order = 'canonical'")
+            .unwrap();
+        let result = case.report()["result"].clone();
+        let side = result["tile_side"].as_f64().unwrap();
+        let cubes: BTreeSet<[i64; 3]> =
+            points.iter().map(|(p, _)| p.map(|v| (v / side).floor() as i64)).collect();
+        let tiles = result["tiles"].as_array().unwrap();
+        assert_eq!(tiles.len(), cubes.len());
+        let before: u64 = tiles.iter().map(|t| t["points"]["before"].as_u64().unwrap()).sum();
+        assert_eq!(before, points.len() as u64);
+        results.insert(result.to_string());
+    }
+    assert_eq!(results.len(), 1);
+}
+
+#[test]
+fn the_report_says_how_many_points_each_input_has() {
+    let at = tempfile::tempdir().unwrap();
+    for (name, points) in [("a.laz", 1200), ("b.laz", 345)] {
+        let text = format!(
+            "[[stage]]\nkind = 'synth'\nscene = 'plane'\npoints = {points}\nseed = {points}\n\
+             [[stage]]\nkind = 'write'\npath = '{}'\n",
+            at.path().join(name).display()
+        );
+        execute(&text, &Overrides::default(), &Quiet).unwrap();
+    }
+    let (out, report) = (at.path().join("out.las"), at.path().join("report.json"));
+    let text = format!(
+        "[[stage]]\nkind = 'read'\npath = '{}'\n[[stage]]\nkind = 'write'\npath = '{}'\n",
+        at.path().join("*.laz").display(),
+        out.display()
+    );
+    let overrides = Overrides { report: Some(report.clone()), ..Overrides::default() };
+    execute(&text, &overrides, &Quiet).unwrap();
+    let report: Value = serde_json::from_slice(&fs::read(report).unwrap()).unwrap();
+    let points = |which: &str| -> Vec<u64> {
+        let files = report["run"][which].as_array().unwrap();
+        files.iter().map(|file| file["points"].as_u64().unwrap()).collect()
+    };
+    assert_eq!((points("inputs"), points("outputs")), (vec![1200, 345], vec![1545]));
+}
+
+#[test]
+fn what_cannot_be_written_is_refused_before_any_work() {
+    let case = Case::new();
+    case.ply(&[([0.0; 3], 0)]);
+    fs::write(case.path("out.ply"), "old").unwrap();
+    let text = case.text("", REDUCE, "");
+    let told = |overrides: Overrides| execute(&text, &overrides, &Quiet).unwrap_err();
+    let report = |path: PathBuf| told(Overrides { report: Some(path), ..Overrides::default() });
+    let same = report(case.path(".").join("out.ply"));
+    assert!(same.to_string().ends_with("the report would replace the output"), "{same}");
+    let missing = report(case.path("none/report.json"));
+    assert!(missing.to_string().ends_with("none: the folder of the output does not exist"));
+    assert!(report(PathBuf::from("/dev/null")).to_string().contains("device"));
+    let scratch = told(Overrides { scratch: Some(case.path("none")), ..Overrides::default() });
+    assert!(scratch.to_string().ends_with("none: the folder for scratch does not exist"));
+    std::os::unix::fs::symlink(case.path("in.ply"), case.path("link.json")).unwrap();
+    fs::hard_link(case.path("in.ply"), case.path("hard.json")).unwrap();
+    for name in ["link.json", "hard.json"] {
+        assert!(report(case.path(name)).to_string().contains("an input"), "{name}");
+    }
+    assert_eq!(fs::read(case.path("out.ply")).unwrap(), b"old");
+    assert_eq!(case.left(), ["hard.json", "in.ply", "link.json", "out.ply"]);
+}
+
+/// A stage that fails or panics at its n-th call.
+#[derive(Debug, Serialize, Deserialize)]
+struct Trouble {
+    after: u64,
+    panics: bool,
+    tiles: bool,
+    #[serde(skip)]
+    calls: Arc<AtomicU64>,
+}
+
+impl Trouble {
+    fn meet(&self) -> Result<()> {
+        match self.calls.fetch_add(1, Ordering::Relaxed) == self.after {
+            // Unlike `panic!`, says nothing on stderr.
+            true if self.panics => std::panic::resume_unwind(Box::new("trouble")),
+            true => Err(Error::new(ErrorKind::Data, "trouble")),
+            false => Ok(()),
+        }
+    }
+}
+
+impl StageKind for Trouble {
+    const KIND: &'static str = "trouble";
+    const ABOUT: &'static str = "Fails.";
+
+    fn build(self, _at: &StagePlace) -> Result<Role> {
+        Ok(if self.tiles { Role::TileOp(Box::new(self)) } else { Role::Transform(Box::new(self)) })
+    }
+}
+
+impl Transform for Trouble {
+    fn needs(&self) -> Needs {
+        Needs::default()
+    }
+    fn apply(&self, _batch: &mut PointBatch) -> Result<()> {
+        self.meet()
+    }
+}
+
+impl TileOp for Trouble {
+    fn needs(&self) -> Needs {
+        Needs::default()
+    }
+    fn run(&self, _tile: &mut Tile, _tally: &mut Tally) -> Result<()> {
+        self.meet()
+    }
+}
+
+#[test]
+fn trouble_in_a_stage_ends_the_run_and_leaves_nothing_behind() {
+    let case = Case::new();
+    let points: Vec<_> =
+        (0..60_000u32).map(|i| ([f64::from(i % 300), f64::from(i / 300), 0.0], i)).collect();
+    case.ply(&points);
+    fs::write(case.path("out.ply"), "old").unwrap();
+    for threads in [1, 3] {
+        for (tiles, order) in [(false, "input"), (false, "canonical"), (true, "canonical")] {
+            for (panics, kind) in [(false, ErrorKind::Data), (true, ErrorKind::Internal)] {
+                let stage = format!(
+                    "[[stage]]\nkind = 'trouble'\nafter = 4\npanics = {panics}\ntiles = {tiles}\n"
+                );
+                let run = format!("threads = {threads}\ntile_points = 3000\nspill = 'always'");
+                let write = format!("order = '{order}'");
+                let error = case.run(&run, &stage, &write).unwrap_err();
+                assert_eq!(error.kind(), kind, "{threads} {tiles} {order}: {error}");
+                assert_eq!(case.left(), ["in.ply", "out.ply"]);
+            }
+        }
+    }
+    assert_eq!(fs::read(case.path("out.ply")).unwrap(), b"old");
+}
+
+/// Asks to stop after so many reports of progress.
+struct Impatient(AtomicU64);
+
+impl Watch for Impatient {
+    fn phase(&self, _name: &'static str, _total: Option<u64>) {}
+    fn advance(&self, _points: u64) {
+        let _ = self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1));
+    }
+    fn warn(&self, _message: &str) {}
+    fn cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed) == 0
+    }
+}
+
+#[test]
+fn a_run_stops_in_every_phase_when_it_is_asked_to() {
+    let case = Case::new();
+    let points: Vec<_> = (0..30_000u32)
+        .map(|i| ([f64::from(i % 200), f64::from(i / 200), f64::from(i % 2)], i))
+        .collect();
+    case.ply(&points);
+    let run = "threads = 2\ntile_points = 2000\nspill = 'always'";
+    let text = case.text(run, REDUCE, "");
+    let mut stops = 0;
+    for patience in (1..).step_by(3) {
+        let watch = Impatient(AtomicU64::new(patience));
+        match execute(&text, &Overrides::default(), &watch) {
+            Err(error) => assert_eq!(error.kind(), ErrorKind::Interrupted, "{error}"),
+            Ok(_) => break,
+        }
+        stops += 1;
+        assert_eq!(case.left(), ["in.ply"], "patience {patience}");
+    }
+    assert!(stops >= 5, "{stops} stops");
+    assert_eq!(case.left(), ["in.ply", "out.ply", "report.json"]);
+}
+
+#[test]
+fn scratch_may_be_elsewhere_and_goes_away_from_there() {
+    let case = Case::new();
+    let elsewhere = tempfile::tempdir().unwrap();
+    case.ply(
+        &(0..5000u32).map(|i| ([f64::from(i % 70), f64::from(i / 70), 0.0], i)).collect::<Vec<_>>(),
+    );
+    let seen = |path: &Path| fs::read_dir(path).unwrap().count();
+    let text = case.text("spill = 'always'", REDUCE, "");
+    let overrides =
+        Overrides { scratch: Some(elsewhere.path().to_owned()), ..Overrides::default() };
+    execute(&text, &overrides, &Quiet).unwrap();
+    assert!(case.report()["run"]["spill_bytes"].as_u64().unwrap() > 0);
+    assert_eq!((seen(elsewhere.path()), seen(case.at.path())), (0, 3));
+}
