@@ -85,15 +85,15 @@ mod tests {
             "text": "a\u{1b}[31mb",
         });
         let expected = "
+  points      5
+  compressed  yes
+  max         1.5, 2
   box
     x  1
-  compressed  yes
   dimensions
     name  type
     X     i32
     Red
-  max         1.5, 2
-  points      5
   text        a [31mb";
         assert_eq!(format!("\n{}", render(&facts, 2)), expected);
     }

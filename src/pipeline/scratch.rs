@@ -99,12 +99,15 @@ fn make(parent: &Path) -> Result<Made> {
 /// for that of a dead one.
 const ATTEMPTS: u32 = 10_000;
 
-/// Puts the marker into a new folder and locks it. None if another run removed it before it was
+/// Puts the marker into a new folder and locks it. None if another run took the folder before it was
 /// locked.
 fn mark(folder: &Path) -> io::Result<Option<File>> {
     let path = folder.join(MARKER);
     let mut marker = match File::create_new(&path) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
+        // The folder is gone, or was removed and made anew by a run that then marked it.
+        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::AlreadyExists) => {
+            return Ok(None);
+        }
         marker => marker?,
     };
     // Where a file system has no locks, no other run can lock it either and take it for dead.

@@ -266,8 +266,8 @@ mod tests {
 
     #[test]
     fn a_stream_needs_no_index() {
-        let stream = Demands { mills: false, ..demands(48 << 20) };
-        assert!(demands(48 << 20).divide().is_err());
+        let stream = Demands { mills: false, ..demands(54 << 20) };
+        assert!(demands(54 << 20).divide().is_err());
         assert_eq!(stream.divide().unwrap().index, 0);
     }
 
