@@ -10,6 +10,7 @@ use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use pointmill::io::las;
 use pointmill::pipeline::{
     Done, Overrides, Pipeline, Quiet, Registry, StageKind, StagePlace, Watch,
 };
@@ -344,6 +345,44 @@ fn what_cannot_be_written_is_refused_before_any_work() {
     }
     assert_eq!(fs::read(case.path("out.ply")).unwrap(), b"old");
     assert_eq!(case.left(), ["hard.json", "in.ply", "link.json", "out.ply"]);
+}
+
+#[test]
+fn offsets_move_no_point_and_scales_tell_what_they_round() {
+    let at = tempfile::tempdir().unwrap();
+    let path = |name: &str| at.path().join(name).display().to_string();
+    let write = |source: &str, keys: &str, name: &str| {
+        let text = format!(
+            "[run]\nreport = '{}'\n[[stage]]\n{source}\n[[stage]]\nkind = 'write'\npath = '{}'\n{keys}\n",
+            path("report.json"),
+            path(name)
+        );
+        execute(&text, &Overrides::default(), &Quiet)?;
+        let report = fs::read(path("report.json")).unwrap();
+        let report: Value = serde_json::from_slice(&report).unwrap();
+        Ok::<Value, Error>(report["run"]["warnings"].clone())
+    };
+    let none: Value = Vec::<Value>::new().into();
+    let synth = "kind = 'synth'\nscene = 'als'\npoints = 3000";
+    assert_eq!(write(synth, "", "a.las").unwrap(), none);
+    let read = format!("kind = 'read'\npath = '{}'", path("a.las"));
+    let moved = write(&read, "offset = [349123.0, 5600000.5, 1.0]", "b.las").unwrap();
+    assert_eq!(moved, none, "an offset of whole steps rounds nothing");
+    let back = format!("kind = 'read'\npath = '{}'", path("b.las"));
+    let schema = las::open(&[path("a.las").into()]).unwrap().schema().clone();
+    let offset = schema.coordinates().unwrap().map(|d| d.origin);
+    write(&back, &format!("offset = {offset:?}"), "c.las").unwrap();
+    assert_eq!(fs::read(path("a.las")).unwrap(), fs::read(path("c.las")).unwrap());
+    let told = write(&read, "scale = 0.5", "d.las").unwrap();
+    assert!(told[0].as_str().unwrap().contains("were rounded"), "{told}");
+    for wrong in ["offset = [nan, 0.0, 0.0]", "offset = [0.0, 0.0, inf]", "scale = 0.0"] {
+        let error = write(&read, wrong, "e.las").unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Pipeline, "{wrong}: {error}");
+    }
+    assert!(
+        write(&read, "drop = ['Intensity']", "e.las").unwrap_err().to_string().contains("drop")
+    );
+    assert!(!Path::new(&path("e.las")).exists());
 }
 
 /// A stage that fails or panics at its n-th call.

@@ -148,7 +148,11 @@ impl Projection {
                 let world = from.world(record, endian);
                 let (stored, back) = nearest(to, world);
                 if to.put(target, self.to_endian, stored) {
-                    return Ok((back - world).abs());
+                    // What the arithmetic of scales and offsets rounds is not the point's place.
+                    let largest = world.abs().max(from.origin.abs()).max(to.origin.abs());
+                    let rounded = (back - world).abs();
+                    let told = rounded > 4.0 * f64::EPSILON * largest;
+                    return Ok(if told { rounded } else { 0.0 });
                 }
                 Err(Unfit { to, value: Value::Double(world) })
             }

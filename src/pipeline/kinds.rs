@@ -135,7 +135,7 @@ pub struct Write {
     #[serde(default, deserialize_with = "some_scale")]
     pub scale: Option<[f64; 3]>,
     /// Offset of LAS coordinates per axis, in world units; none: the input's, or 0.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "some_offset")]
     pub offset: Option<[f64; 3]>,
     /// Order of the records; none: canonical, or the input's where the pipeline streams.
     #[serde(default)]
@@ -276,6 +276,14 @@ fn some_scale<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D:
         }
     }
     from.deserialize_any(Scale).map(Some)
+}
+
+fn some_offset<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D::Error> {
+    let offset = <[f64; 3]>::deserialize(from)?;
+    match offset.iter().find(|v| !v.is_finite()) {
+        Some(&v) => Err(de::Error::invalid_value(de::Unexpected::Float(v), &"finite numbers")),
+        None => Ok(Some(offset)),
+    }
 }
 
 /// A number above 0, refused at its own place.
