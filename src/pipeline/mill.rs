@@ -6,18 +6,19 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::clock::Clock;
+use super::cutter::{Chunk, Cutter, Product};
 use super::outlet::{Hands, Outlet};
 use super::run::{Finished, Job, StopOnDrop};
 use super::shares::{BATCH, Demands, Shares};
-use super::survey::{FATE_BYTES, fate_code, survey};
+use super::survey::{FATE_BYTES, survey};
 use crate::budget::whole_mebibytes;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::PointBatch;
 use crate::report::{Decision, Tally};
 use crate::stage::{Encoded, ScanFacts, Sink, TileOp};
 use crate::tile::{
-    CutError, Fate, Fetch, Intake, Loader, PIECE, Pieces, SealedTiles, SpillArea, Tile, TileKey,
-    TileStore, lock, parallel, seal,
+    CutError, Fetch, Intake, Loader, Pieces, SealedTiles, SpillArea, TileKey, TileStore, lock,
+    parallel, seal,
 };
 use crate::{Error, Result};
 
@@ -212,43 +213,6 @@ fn too_heavy(lattice: &Lattice, key: TileKey, (positions, most): (u64, u64), lim
     .help(format!("give --memory {limit} or more, fewer --threads, or a smaller cell side"))
 }
 
-/// What a tile leaves behind.
-struct Product {
-    /// First record and number of records of each kept position.
-    kept: Vec<(u64, u32)>,
-    /// Normals of the kept positions, if the sink wants them.
-    normals: Option<Vec<[f32; 3]>>,
-    /// Fates of all core positions, as stored.
-    fates: Vec<u8>,
-}
-
-/// Records that become one chunk of the output, as a product has them: a position with a million
-/// copies is one entry of each chunk that it fills.
-struct Chunk {
-    /// First record and number of records of each position.
-    records: Vec<(u64, u32)>,
-    /// Normals of the positions, if the sink wants them.
-    normals: Option<Vec<[f32; 3]>>,
-}
-
-impl Chunk {
-    fn empty(wants_normals: bool) -> Self {
-        Chunk { records: Vec::new(), normals: wants_normals.then(Vec::new) }
-    }
-
-    /// Replaces `numbers` by the numbers of its records.
-    fn number(&self, numbers: &mut Vec<u64>) {
-        numbers.clear();
-        numbers.extend(self.records.iter().flat_map(|&(first, n)| first..first + u64::from(n)));
-    }
-
-    /// The normal of each record.
-    fn spread_normals(&self) -> Option<Vec<[f32; 3]>> {
-        let each = self.records.iter().map(|&(_, n)| n as usize).zip(self.normals.as_ref()?);
-        Some(each.flat_map(|(n, &normal)| std::iter::repeat_n(normal, n)).collect())
-    }
-}
-
 struct Milled {
     tally: Tally,
     fates: Pieces,
@@ -294,7 +258,7 @@ fn grind(
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(&key) = keys.get(index) else { break };
             let product = worker.mill(key)?;
-            let positions = (product.fates.len() / FATE_BYTES) as u64;
+            let positions = product.positions();
             outlet.deliver((index as u64, 0), product, true, &mut hands)?;
             job.advance(positions)?;
         }
@@ -351,113 +315,6 @@ impl<'a> Worker<'a> {
         self.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
         self.tally.work("unproven", tile.around.take_unproven());
         self.tally.work("tied", tile.around.take_tied());
-        Ok(product(tile, first_records, self.job.wants_normals))
-    }
-}
-
-fn product(tile: &Tile, first_records: &[u64], wants_normals: bool) -> Product {
-    let core = tile.core.clone();
-    let mut product = Product {
-        kept: Vec::with_capacity(core.len()),
-        normals: wants_normals.then(|| Vec::with_capacity(core.len())),
-        fates: Vec::with_capacity(core.len() * FATE_BYTES),
-    };
-    for (&first, i) in first_records.iter().zip(core) {
-        let records = match tile.fates[i] {
-            Fate::Kept => tile.copies[i],
-            Fate::KeptOnce => 1,
-            Fate::Represented { .. } => 0,
-        };
-        product.fates.extend_from_slice(&fate_code(tile.fates[i]));
-        if records > 0 {
-            product.kept.push((first, records));
-            if let Some(normals) = &mut product.normals {
-                normals.push(tile.normals[i]);
-            }
-        }
-    }
-    product
-}
-
-/// Cuts kept records into chunks of the sink's size by their rank, and stores fates.
-struct Cutter<'a> {
-    fates: &'a Pieces,
-    fate_bytes: Vec<u8>,
-    fates_stored: u64,
-    chunk_points: usize,
-    wants_normals: bool,
-    open: Chunk,
-    /// Records that the open chunk takes until it is full.
-    room: usize,
-    kept: u64,
-}
-
-impl<'a> Cutter<'a> {
-    fn new(fates: &'a Pieces, chunk_points: usize, wants_normals: bool) -> Self {
-        Cutter {
-            fates,
-            fate_bytes: Vec::with_capacity(PIECE * FATE_BYTES),
-            fates_stored: 0,
-            chunk_points,
-            wants_normals,
-            open: Chunk::empty(wants_normals),
-            room: chunk_points,
-            kept: 0,
-        }
-    }
-
-    fn cut(&mut self, product: Product) -> Result<Vec<Chunk>> {
-        self.store_fates(&product.fates)?;
-        let mut full = Vec::new();
-        for (n, &(mut first, mut left)) in product.kept.iter().enumerate() {
-            while left > 0 {
-                let now = left.min(u32::try_from(self.room).unwrap_or(u32::MAX));
-                self.open.records.push((first, now));
-                if let (Some(open), Some(normals)) = (&mut self.open.normals, &product.normals) {
-                    open.push(normals[n]);
-                }
-                (first, left) = (first + u64::from(now), left - now);
-                self.room -= now as usize;
-                if self.room == 0 {
-                    full.push(self.close());
-                }
-            }
-        }
-        Ok(full)
-    }
-
-    fn close(&mut self) -> Chunk {
-        self.kept += (self.chunk_points - self.room) as u64;
-        self.room = self.chunk_points;
-        std::mem::replace(&mut self.open, Chunk::empty(self.wants_normals))
-    }
-
-    fn store_fates(&mut self, mut fates: &[u8]) -> Result<()> {
-        while !fates.is_empty() {
-            let room = PIECE * FATE_BYTES - self.fate_bytes.len();
-            let (now, later) = fates.split_at(room.min(fates.len()));
-            self.fate_bytes.extend_from_slice(now);
-            fates = later;
-            if self.fate_bytes.len() == PIECE * FATE_BYTES {
-                self.flush_fates()?;
-            }
-        }
-        Ok(())
-    }
-
-    fn flush_fates(&mut self) -> Result<()> {
-        if !self.fate_bytes.is_empty() {
-            self.fates.put(self.fates_stored, &self.fate_bytes)?;
-            self.fates_stored += (self.fate_bytes.len() / FATE_BYTES) as u64;
-            self.fate_bytes.clear();
-        }
-        Ok(())
-    }
-
-    /// The last chunk, and how many records are kept in all.
-    fn finish(&mut self) -> Result<(Vec<Chunk>, u64)> {
-        self.flush_fates()?;
-        let rest = if self.open.records.is_empty() { Vec::new() } else { vec![self.close()] };
-        Ok((rest, self.kept))
+        Ok(Product::of(tile, first_records, self.job.wants_normals))
     }
 }

@@ -229,10 +229,16 @@ impl Plan {
             }
         };
         drop(job);
+        let run = self.figures(&finished, &budget, area.written());
+        run.warnings.iter().for_each(|warning| watch.warn(warning));
+        Ok((finished, run))
+    }
+
+    /// What is known of the run when its output is written.
+    fn figures(&self, finished: &Finished, budget: &Budget, spill_bytes: u64) -> RunFigures {
         let mut warnings = self.source.warnings();
         warnings.extend(finished.written.notes.iter().cloned());
-        warnings.iter().for_each(|warning| watch.warn(warning));
-        let run = RunFigures {
+        RunFigures {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             inputs: input_figures(&*self.source),
             outputs: vec![FileFigures {
@@ -244,11 +250,10 @@ impl Plan {
             threads: self.threads,
             memory_bytes: self.demands.limit,
             leased_bytes: budget.peak(),
-            spill_bytes: area.written(),
+            spill_bytes,
             warnings,
             ..RunFigures::default()
-        };
-        Ok((finished, run))
+        }
     }
 
     /// The report of a finished run, once its ledger balances, and the lines of its tiles.
