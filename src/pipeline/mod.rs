@@ -3,6 +3,7 @@
 mod builtin;
 mod clock;
 mod connect;
+mod cut;
 mod draft;
 mod inputs;
 mod keys;
