@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use crate::tile::{Folder, lock};
-use crate::{Error, Result};
+use crate::{Error, ErrorKind, Result};
 
 const PREFIX: &str = ".pointmill-";
 const MARKER: &str = "pointmill-scratch.json";
@@ -76,12 +76,32 @@ impl Drop for Scratch {
     }
 }
 
+/// How often a folder that another run took for a dead one's is made again.
+const ATTEMPTS: u32 = 100;
+
 fn make(parent: &Path) -> Result<Made> {
+    for _ in 0..ATTEMPTS {
+        let folder = make_folder(parent)?;
+        let path = folder.join(MARKER);
+        match mark(&path) {
+            Ok(marker) if path.exists() => return Ok(Made { folder, files: 0, _marker: marker }),
+            // Another run found it before it was marked and locked, and removed it.
+            Ok(_) => {}
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
+            Err(e) => return Err(Error::io(&path, "mark the scratch folder", e)),
+        }
+    }
+    Err(Error::new(ErrorKind::Io, "something removes the scratch folder as soon as it is made")
+        .at(parent)
+        .help("name another folder with --scratch"))
+}
+
+fn make_folder(parent: &Path) -> Result<PathBuf> {
     let mut attempt = 0u32;
-    let folder = loop {
+    loop {
         let folder = parent.join(format!("{PREFIX}{}-{attempt}", std::process::id()));
         match fs::create_dir(&folder) {
-            Ok(()) => break folder,
+            Ok(()) => return Ok(folder),
             Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && attempt < 10_000 => {
                 attempt += 1
             }
@@ -90,20 +110,20 @@ fn make(parent: &Path) -> Result<Made> {
                     .help("make the folder writable, or name another with --scratch"));
             }
         }
-    };
-    let path = folder.join(MARKER);
-    let marker = File::create(&path).and_then(|mut marker| {
-        marker.lock()?;
-        let about = serde_json::json!({
-            "about": "scratch of a pointmill run; safe to remove when no run uses it",
-            "version": env!("CARGO_PKG_VERSION"),
-            "process": std::process::id(),
-        });
-        writeln!(marker, "{about}")?;
-        Ok(marker)
+    }
+}
+
+/// Writes the marker and locks it.
+fn mark(path: &Path) -> std::io::Result<File> {
+    let mut marker = File::create(path)?;
+    marker.lock()?;
+    let about = serde_json::json!({
+        "about": "scratch of a pointmill run; safe to remove when no run uses it",
+        "version": env!("CARGO_PKG_VERSION"),
+        "process": std::process::id(),
     });
-    let marker = marker.map_err(|e| Error::io(&path, "mark the scratch folder", e))?;
-    Ok(Made { folder, files: 0, _marker: marker })
+    writeln!(marker, "{about}")?;
+    Ok(marker)
 }
 
 /// Removes scratch folders in `parent` whose runs are gone. What cannot be read or removed is left.
@@ -113,13 +133,15 @@ fn remove_stale(parent: &Path) {
             continue;
         }
         let folder = entry.path();
-        let free = match File::open(folder.join(MARKER)) {
-            Ok(marker) => marker.try_lock().is_ok(),
-            // A run killed before it could mark its folder; `remove_dir` spares any that is not empty.
-            Err(_) => fs::remove_dir(&folder).is_ok(),
-        };
-        if free {
-            let _ = fs::remove_dir_all(folder);
+        match File::open(folder.join(MARKER)) {
+            Ok(marker) => {
+                // Held until the folder is gone: its run, if it is just beginning, waits and sees.
+                if marker.try_lock().is_ok() {
+                    let _ = fs::remove_dir_all(folder);
+                }
+            }
+            // A run killed before it could mark its folder; this spares any that is not empty.
+            Err(_) => _ = fs::remove_dir(folder),
         }
     }
 }
@@ -169,5 +191,23 @@ mod tests {
         Scratch::below(parent.path());
         assert!(!dead.exists() && foreign.join("mine.txt").exists());
         assert_eq!(scratch_folders(parent.path()), 2, "the living one and the foreign one");
+    }
+    #[test]
+    fn runs_that_begin_side_by_side_spare_each_other() {
+        let parent = tempfile::tempdir().unwrap();
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    for _ in 0..200 {
+                        let scratch = Scratch::below(parent.path());
+                        let path = scratch.path("a").unwrap();
+                        fs::write(&path, "mine").unwrap();
+                        remove_stale(parent.path());
+                        assert_eq!(fs::read(&path).unwrap(), b"mine");
+                    }
+                });
+            }
+        });
+        assert_eq!(scratch_folders(parent.path()), 0);
     }
 }
