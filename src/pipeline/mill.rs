@@ -11,6 +11,7 @@ use super::outlet::{Hands, Outlet};
 use super::run::{Finished, Job, StopOnDrop};
 use super::shares::{BATCH, Demands, Shares};
 use super::survey::{FATE_BYTES, fate_code, survey};
+use crate::Result;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::PointBatch;
 use crate::report::{Decision, Tally};
@@ -19,7 +20,6 @@ use crate::tile::{
     Fate, Fetch, Intake, Loader, PIECE, Pieces, SealedTiles, SpillArea, Tile, TileKey, TileStore,
     lock, parallel, seal,
 };
-use crate::Result;
 
 /// Runs a pipeline with tile stages (or one that only sorts) into `sink`.
 pub(super) fn mill(

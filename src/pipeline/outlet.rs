@@ -208,3 +208,77 @@ impl<R, P> State<R, P> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU64, Ordering};
+    use std::time::Duration;
+
+    use super::*;
+    use crate::stage::Encode;
+    use crate::tile::parallel;
+
+    /// A file so slow that everything else waits for it.
+    struct Slow {
+        waiting: Arc<AtomicU64>,
+        written: Vec<u64>,
+    }
+
+    impl Sink for Slow {
+        fn chunk_points(&self) -> usize {
+            1
+        }
+        fn chunk_bytes(&self) -> u64 {
+            1
+        }
+        fn encoder(&self) -> Arc<dyn Encode> {
+            unreachable!("the test encodes by itself")
+        }
+        fn append(&mut self, chunk: Encoded) -> Result<()> {
+            std::thread::sleep(Duration::from_millis(2));
+            self.waiting.fetch_sub(1, Ordering::SeqCst);
+            self.written.push(chunk.points);
+            Ok(())
+        }
+        fn finish(self: Box<Self>) -> Result<SinkSummary> {
+            assert!(self.written.is_sorted(), "{:?}", self.written);
+            Ok(SinkSummary { points: self.written.len() as u64, ..SinkSummary::default() })
+        }
+    }
+
+    #[test]
+    fn a_slow_file_does_not_pile_up_what_is_encoded_for_it() {
+        const THREADS: usize = 3;
+        const PRODUCTS: u64 = 150;
+        let waiting = Arc::new(AtomicU64::new(0));
+        let most = AtomicU64::new(0);
+        let sink = Slow { waiting: waiting.clone(), written: Vec::new() };
+        let outlet: Outlet<u64, u64> = Outlet::new(Box::new(sink), THREADS);
+        let next = AtomicU64::new(0);
+        let commit = |product: u64| Ok(vec![2 * product, 2 * product + 1]);
+        let encode = |chunk: u64| {
+            most.fetch_max(waiting.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+            Ok(Encoded { points: chunk, ..Encoded::default() })
+        };
+        parallel(THREADS, |_| {
+            let mut encode = encode;
+            let mut hands = Hands { commit: &commit, encode: &mut encode };
+            loop {
+                let product = next.fetch_add(1, Ordering::SeqCst);
+                if product >= PRODUCTS {
+                    return outlet.drain(&mut hands, |turn| turn.0 >= PRODUCTS);
+                }
+                outlet.deliver((product, 0), product, true, &mut hands)?;
+            }
+        })
+        .unwrap();
+        let mut encode = encode;
+        let mut hands = Hands { commit: &commit, encode: &mut encode };
+        let written = outlet.close(Vec::new(), &mut hands).unwrap();
+        assert_eq!(written.points, 2 * PRODUCTS);
+        // The window, those being encoded, and the one being appended.
+        let most = most.into_inner();
+        assert!((2..=2 * THREADS as u64 + 2).contains(&most), "{most} chunks at once");
+    }
+}
