@@ -213,6 +213,22 @@ fn a_cube_that_cannot_be_cut_is_named_with_its_count() {
 }
 
 #[test]
+fn of_several_cubes_too_heavy_the_heaviest_is_named() {
+    // Four cubes of side 16 in a row; the third holds twice as many as the others.
+    let thin = |x: i64| (0..100).map(move |i| [x * 16 + i % 10, i / 10, 0]);
+    let more = (0..100).map(|i| [32 + i % 10, i / 10, 5]);
+    let scan: Vec<Position> = (0..4).flat_map(thin).chain(more).collect();
+    let (tiles, _, _) = sealed(&scan, 1, 1_000, 1 << 20);
+    match tiles.cut(50, 90, 0, 4) {
+        Err(pointmill::tile::CutError::TooHeavy { key, positions }) => {
+            assert_eq!((key.corner, positions), ([32, 0, 0], 200));
+        }
+        other => panic!("{other:?}"),
+    }
+    assert_eq!(tiles.cut(50, 200, 0, 4).unwrap().len(), 4);
+}
+
+#[test]
 fn an_empty_scan_has_no_tiles() {
     let (tiles, _, _) = sealed(&[], 2, 10, 0);
     assert_eq!((tiles.positions(), tiles.blocks()), (0, 0));

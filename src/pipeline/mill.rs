@@ -5,22 +5,21 @@ use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use super::chunks::{Chunk, Cutter, Product};
 use super::clock::Clock;
-use super::cutter::{Chunk, Cutter, Product};
+use super::cut::{cut, neighbors, reach};
 use super::outlet::{Hands, Outlet};
 use super::run::{Finished, Job, StopOnDrop};
 use super::shares::{BATCH, Demands, Shares};
 use super::survey::{FATE_BYTES, survey};
-use crate::budget::whole_mebibytes;
+use crate::Result;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::PointBatch;
 use crate::report::{Decision, Tally};
-use crate::stage::{Encoded, ScanFacts, Sink, TileOp};
+use crate::stage::{Encoded, ScanFacts, Sink};
 use crate::tile::{
-    CutError, Fetch, Intake, Loader, Pieces, SealedTiles, SpillArea, TileKey, TileStore, lock,
-    parallel, seal,
+    Fetch, Intake, Loader, Pieces, SealedTiles, SpillArea, TileKey, TileStore, lock, parallel, seal,
 };
-use crate::{Error, Result};
 
 /// Runs a pipeline with tile stages (or one that only sorts) into `sink`.
 pub(super) fn mill(
@@ -144,73 +143,6 @@ fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<V
         }));
     }
     Ok(decisions)
-}
-
-/// How far beyond its cube a tile's columns must be right: the sides of the cells that its faces
-/// may cut, which add along the chain.
-fn reach(ops: &[(String, Box<dyn TileOp>)]) -> i64 {
-    ops.iter()
-        .map(|(_, op)| op.needs())
-        .filter(|needs| !needs.cell_aligned)
-        .fold(0, |sum, needs| sum.saturating_add(needs.cell_side))
-}
-
-fn neighbors(ops: &[(String, Box<dyn TileOp>)]) -> usize {
-    ops.iter().map(|(_, op)| op.needs().neighbors).max().unwrap_or(0)
-}
-
-/// Tiles are at least four cells wide, or their zones would be mostly their neighbours'.
-const CELLS_ACROSS: u64 = 4;
-
-/// The tiles of the scan and the positions that an arena for them takes: as planned, or, where a cube
-/// that cannot be cut holds more, what the memory left after the decode can give.
-fn cut(
-    job: &Job<'_>,
-    lattice: &Lattice,
-    shares: &Shares,
-    demands: &Demands,
-    tiles: &SealedTiles,
-) -> Result<(Vec<TileKey>, usize)> {
-    let side = job.ops.iter().map(|(_, op)| op.needs().cell_side).max().unwrap_or(0);
-    let lowest = match u64::try_from(side).unwrap_or(0).saturating_mul(CELLS_ACROSS) {
-        0 => 0,
-        wide => wide.checked_next_power_of_two().map_or(64, u64::ilog2),
-    };
-    let wanted = job.tile_points.map_or(zone_of(shares.tile_positions), |points| points as u64);
-    let reach = reach(&job.ops);
-    let free = demands.tile_positions(job.budget.free());
-    let mut capacity = shares.tile_positions;
-    loop {
-        // Around all positions there is no rim.
-        let all = capacity as u64 >= tiles.positions();
-        let most = if all { tiles.positions() } else { zone_of(capacity) };
-        match tiles.cut(wanted, most, reach, lowest) {
-            Ok(keys) => return Ok((keys, capacity)),
-            Err(CutError::Read(error)) => return Err(error),
-            Err(CutError::TooHeavy { .. }) if capacity < free => capacity = free,
-            Err(CutError::TooHeavy { key, positions }) => {
-                let tile = (2 * positions + 1).min(tiles.positions());
-                let limit = demands.limit_for_tile(tile);
-                return Err(too_heavy(lattice, key, (positions, most), limit));
-            }
-        }
-    }
-}
-
-/// Positions of a tile's zone: half of its memory is for them, the other half for the rim.
-fn zone_of(tile_positions: usize) -> u64 {
-    (tile_positions / 2) as u64
-}
-
-/// The error of a cube that cannot be cut and holds more positions than the most that fit.
-fn too_heavy(lattice: &Lattice, key: TileKey, (positions, most): (u64, u64), limit: u64) -> Error {
-    let (lo, hi) = (lattice.world(key.cube().lo), lattice.world(key.cube().hi));
-    let limit = whole_mebibytes(limit);
-    Error::memory(format!(
-        "the cube from {lo:?} to {hi:?} and the cells around it hold {positions} positions, more \
-         than the {most} that a tile may have"
-    ))
-    .help(format!("give --memory {limit} or more, fewer --threads, or a smaller cell side"))
 }
 
 struct Milled {

@@ -1,9 +1,10 @@
 //! From a pipeline file to a finished run: parse, plan, run.
 
 mod builtin;
+mod chunks;
 mod clock;
 mod connect;
-mod cutter;
+mod cut;
 mod draft;
 mod inputs;
 mod keys;

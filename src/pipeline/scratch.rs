@@ -112,8 +112,7 @@ fn mark(folder: &Path) -> io::Result<Option<File>> {
     };
     // Where a file system has no locks, no other run can lock it either and take it for dead.
     let _ = marker.lock();
-    let (ours, there) = (marker.metadata()?, fs::metadata(&path));
-    if !there.is_ok_and(|there| (there.dev(), there.ino()) == (ours.dev(), ours.ino())) {
+    if !is_at(&marker, &path) {
         return Ok(None);
     }
     let about = serde_json::json!({
@@ -125,6 +124,14 @@ fn mark(folder: &Path) -> io::Result<Option<File>> {
     Ok(Some(marker))
 }
 
+/// True if the open `file` is the one that is at `path` now.
+fn is_at(file: &File, path: &Path) -> bool {
+    match (file.metadata(), fs::metadata(path)) {
+        (Ok(open), Ok(there)) => (open.dev(), open.ino()) == (there.dev(), there.ino()),
+        _ => false,
+    }
+}
+
 /// Removes scratch folders in `parent` whose runs are gone. What cannot be read or removed is left.
 fn remove_stale(parent: &Path) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
@@ -134,7 +141,8 @@ fn remove_stale(parent: &Path) {
         let folder = entry.path();
         match File::open(folder.join(MARKER)) {
             // The lock is held until the folder is gone: a run that has just made it waits for that.
-            Ok(marker) if marker.try_lock().is_ok() => {
+            // A marker that is no longer there was that of an earlier folder of the same name.
+            Ok(marker) if marker.try_lock().is_ok() && is_at(&marker, &folder.join(MARKER)) => {
                 let _ = remove(&folder);
             }
             Ok(_) => {}

@@ -266,9 +266,9 @@ mod tests {
 
     #[test]
     fn a_stream_needs_no_index() {
-        let stream = Demands { mills: false, ..demands(54 << 20) };
-        assert!(demands(54 << 20).divide().is_err());
-        assert_eq!(stream.divide().unwrap().index, 0);
+        let shares = Demands { mills: false, ..demands(64 << 20) }.divide().unwrap();
+        assert_eq!((shares.index, shares.kept_in_memory), (0, 0));
+        assert!(shares.base + shares.work <= 64 << 20);
     }
 
     #[test]

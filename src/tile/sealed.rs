@@ -215,7 +215,7 @@ impl SealedTiles {
     /// grown by `reach` has at most `wanted` positions, or that have the smallest side allowed,
     /// 2^`lowest`, and at most `most`.
     ///
-    /// A node of that side which has more is an error that names it and its count.
+    /// If nodes of that side have more, the error names the one that has most and its count.
     pub fn cut(
         &self,
         wanted: u64,
@@ -228,6 +228,7 @@ impl SealedTiles {
             return Ok(tiles);
         }
         let mut reader = Reader::default();
+        let mut heaviest: Option<(u64, TileKey)> = None;
         let mut open = vec![TileKey::holding(&self.bounds())];
         while let Some(key) = open.pop() {
             if !self.holds_more(&key.cube(), 0, &mut reader)? {
@@ -244,11 +245,16 @@ impl SealedTiles {
                 Some(children) => open.extend(children.iter().rev()),
                 None => {
                     let positions = self.count(&zone, &mut reader)?;
-                    return Err(CutError::TooHeavy { key, positions });
+                    if heaviest.is_none_or(|(most, _)| positions > most) {
+                        heaviest = Some((positions, key));
+                    }
                 }
             }
         }
-        Ok(tiles)
+        match heaviest {
+            Some((positions, key)) => Err(CutError::TooHeavy { key, positions }),
+            None => Ok(tiles),
+        }
     }
 
     /// Number of the first block that can hold positions at or behind `p` in Morton order.
