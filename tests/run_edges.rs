@@ -37,6 +37,27 @@ fn scans_of_no_point_or_few_reduce_to_themselves() {
 }
 
 #[test]
+fn unequal_coordinates_that_share_a_position_are_counted() {
+    let case = Case::new();
+    // Three positions: one of equal copies, one of coordinates that differ by less than a step of
+    // 2^-30, one alone.
+    let points = [
+        ([0.5, 0.0, 0.0], 1),
+        ([0.5, 0.0, 0.0], 2),
+        ([2.0, 1.0, 0.0], 3),
+        ([2.0 + 1e-12, 1.0, 0.0], 4),
+        ([9.0, 9.0, 9.0], 5),
+    ];
+    case.ply(&points);
+    case.run("", REDUCE, "").unwrap();
+    let counts = &case.report()["result"]["counts"];
+    assert_eq!(
+        (counts["positions"].as_u64(), counts["unequal_coordinates"].as_u64()),
+        (Some(3), Some(1))
+    );
+}
+
+#[test]
 fn the_far_ends_of_the_lattice_are_places_like_any_other() {
     // Patches at the corners of ±(2^32 − 2) world units, nearly 2^62 steps away, and around 0.
     let far = 4_294_967_294.0f64;

@@ -57,6 +57,11 @@ impl Lattice {
         Ok(decimal.unwrap_or_else(|| Lattice::binary(1.0 / BINARY, BINARY)))
     }
 
+    /// True if positions are rounded, so that unequal coordinates may share one.
+    pub fn rounds(&self) -> bool {
+        matches!(self.placement, Placement::Float { .. })
+    }
+
     fn binary(step: f64, per_unit: f64) -> Lattice {
         Lattice { step, shift: [0.0; 3], placement: Placement::Float { per_unit } }
     }

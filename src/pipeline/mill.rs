@@ -9,6 +9,7 @@ use super::chunks::{Chunk, Cutter, Product};
 use super::clock::Clock;
 use super::cut::{cut, neighbors, reach};
 use super::outlet::{Hands, Outlet};
+use super::rounded::Rounded;
 use super::run::{Finished, Job, StopOnDrop};
 use super::shares::{BATCH, Demands, Shares};
 use super::survey::{FATE_BYTES, survey};
@@ -44,7 +45,7 @@ pub(super) fn mill(
     tally.work("tile_levels", levels.len() as u64);
     clock.phase("mill", Some(tiles.positions()));
     let working = job.budget.lease(demands.mill_bytes(capacity as u64), "the mill")?;
-    let milled = grind(job, capacity, area, &tiles, &keys, sink)?;
+    let milled = grind(job, lattice, capacity, area, &tiles, &keys, sink)?;
     drop(working);
     tally.merge(&milled.tally);
     clock.phase("survey", Some(2 * tiles.positions()));
@@ -154,6 +155,7 @@ struct Milled {
 
 fn grind(
     job: &Job<'_>,
+    lattice: &Lattice,
     capacity: usize,
     area: &Arc<SpillArea>,
     tiles: &Arc<SealedTiles>,
@@ -185,7 +187,7 @@ fn grind(
         let mut bench = bench();
         let mut encode = |chunk| encode(chunk, &mut bench);
         let mut hands = Hands { commit: &commit, encode: &mut encode };
-        let mut worker = Worker::new(job, tiles, capacity);
+        let mut worker = Worker::new(job, lattice, tiles, capacity);
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(&key) = keys.get(index) else { break };
@@ -221,11 +223,18 @@ struct Worker<'a> {
     loader: Loader,
     reach: i64,
     neighbors: usize,
+    /// Where positions are rounded, and unequal coordinates that share one are counted.
+    rounded: Option<Rounded<'a>>,
     tally: Tally,
 }
 
 impl<'a> Worker<'a> {
-    fn new(job: &'a Job<'a>, tiles: &Arc<SealedTiles>, capacity: usize) -> Self {
+    fn new(
+        job: &'a Job<'a>,
+        lattice: &Lattice,
+        tiles: &'a Arc<SealedTiles>,
+        capacity: usize,
+    ) -> Self {
         let neighbors = neighbors(&job.ops);
         let mut loader = Loader::new(tiles, capacity);
         if let Some(points) = job.tile_points {
@@ -235,7 +244,9 @@ impl<'a> Worker<'a> {
         if neighbors > 0 {
             loader.tile().0.around.reserve(capacity);
         }
-        Worker { job, loader, reach: reach(&job.ops), neighbors, tally: Tally::default() }
+        let rounded = lattice.rounds().then(|| Rounded::new(tiles, job.source.schema()));
+        let reach = reach(&job.ops);
+        Worker { job, loader, reach, neighbors, rounded, tally: Tally::default() }
     }
 
     fn mill(&mut self, key: TileKey) -> Result<Product> {
@@ -243,6 +254,11 @@ impl<'a> Worker<'a> {
         let (tile, first_records) = self.loader.tile();
         for (_, op) in &self.job.ops {
             op.run(tile, &mut self.tally)?;
+        }
+        if let Some(rounded) = &mut self.rounded {
+            let copies = tile.copies[tile.core.clone()].iter().copied();
+            let unequal = rounded.count(first_records.iter().copied().zip(copies))?;
+            self.tally.count("unequal_coordinates", unequal);
         }
         self.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
         self.tally.work("unproven", tile.around.take_unproven());

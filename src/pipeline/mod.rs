@@ -16,6 +16,7 @@ mod outlet;
 mod plan;
 mod publish;
 mod registry;
+mod rounded;
 mod run;
 mod scratch;
 mod set;

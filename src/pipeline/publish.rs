@@ -26,6 +26,17 @@ impl Staged {
         Ok(Staged { path: path.to_owned(), file, scratch })
     }
 
+    /// The same for another file of the run, in this one's scratch folder where both are beside it.
+    pub fn also(&self, path: &Path) -> Result<Self> {
+        if folder_of(path) != folder_of(&self.path) {
+            return Staged::beside(path);
+        }
+        check_place(path)?;
+        let scratch = self.scratch.clone();
+        let file = scratch.path("report")?;
+        Ok(Staged { path: path.to_owned(), file, scratch })
+    }
+
     /// Where the file grows.
     pub fn file(&self) -> &Path {
         &self.file
@@ -59,7 +70,7 @@ pub fn check_place(path: &Path) -> Result<()> {
             return Err(Error::pipeline("this is a folder, not a file to write").at(path));
         }
         Ok(there) if !there.is_file() => {
-            return Err(Error::pipeline("this is a device or a pipe, which a file would replace")
+            return Err(Error::pipeline("this is no regular file: an output would replace it")
                 .at(path)
                 .help("write to a file"));
         }

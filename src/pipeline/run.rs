@@ -166,7 +166,8 @@ impl Plan {
     pub fn run(mut self, watch: &dyn Watch) -> Result<Done> {
         let mut clock = Clock::new(watch);
         let output = Staged::beside(self.sink.path())?;
-        let staged_report = self.settings.report.as_deref().map(Staged::beside).transpose()?;
+        let staged_report =
+            self.settings.report.as_deref().map(|path| output.also(path)).transpose()?;
         let (finished, run) =
             self.work(&output, &mut clock, watch).map_err(|error| output.tell(error))?;
         let (report, tiles) = self.account(finished, run, clock)?;
