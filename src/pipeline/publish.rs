@@ -144,7 +144,7 @@ mod tests {
                 .ends_with("none: the folder of the output does not exist")
         );
         assert!(told(at.path()).contains("a folder, not a file"));
-        assert!(told(Path::new("/dev/null")).contains("a device or a pipe"));
+        assert!(told(Path::new("/dev/null")).contains("no regular file"));
         assert_eq!(names(at.path()), [""; 0]);
     }
 
