@@ -2,6 +2,7 @@
 //! Knows no tiles, no files.
 
 pub mod angle;
+pub mod few;
 pub mod lattice;
 pub mod nearest;
 pub mod plane;

@@ -4,6 +4,8 @@
 //! Every function gives the same bits on every platform: integers, and f64 with additions,
 //! multiplications, divisions and square roots alone.
 
+use std::ops::{Mul, Sub};
+
 /// A symmetric 3 × 3 matrix, its upper triangle row by row: xx, xy, xz, yy, yz, zz.
 pub type Symmetric = [f64; 6];
 
@@ -31,11 +33,15 @@ impl Covariance {
     /// The covariance of the neighbours at `offsets` (steps from p) and of p itself, at offset 0.
     pub fn of(offsets: &[[i64; 3]]) -> Covariance {
         let count = offsets.len() as u64 + 1;
-        let widest = offsets.iter().flatten().fold(0, |all, v| all | v.unsigned_abs());
+        let mut widest = 0;
+        for o in offsets {
+            widest |= o[0].unsigned_abs() | o[1].unsigned_abs() | o[2].unsigned_abs();
+        }
+        if 2 * (bits(widest) + bits(count)) <= ENTRY_BITS {
+            return Covariance { scatter: scatter_small(offsets), exponent: 0, count };
+        }
         let excess = (bits(widest) + bits(count)).saturating_sub(ENTRY_BITS);
-        let scatter = if 2 * bits(widest) + bits(count) <= ENTRY_BITS {
-            scatter_small(offsets)
-        } else if excess == 0 {
+        let scatter = if excess == 0 {
             scatter(offsets.iter().copied())
         } else {
             let rounded = |o: &[i64; 3]| o.map(|v| shift_rounded(i128::from(v), excess));
@@ -52,27 +58,56 @@ impl Covariance {
         Covariance { scatter, exponent: 2 * excess + shift, count }
     }
 
+    /// The covariance of `count` positions, p included, from n·Σxy − Σx·Σy, each below 2^62.
+    pub fn of_scatter(scatter: [i64; 6], count: usize) -> Covariance {
+        Covariance { scatter, exponent: 0, count: count as u64 }
+    }
+
+    /// True if all positions lie on one line; exact where the covariance is.
+    pub fn is_of_a_line(&self) -> bool {
+        let [xx, _, _, yy, _, zz] = self.adjugate();
+        xx == 0.0 && yy == 0.0 && zz == 0.0
+    }
+
     /// The covariance (of the population) in steps².
     pub fn matrix(&self) -> Symmetric {
         let n = self.count as f64;
-        let unit = (1u128 << self.exponent) as f64 / (n * n);
+        let unit = power_of_two(self.exponent) / (n * n);
         self.scatter.map(|v| v as f64 * unit)
     }
 
     /// The adjugate, up to a positive factor: what turns a first estimate of the normal into that
     /// of the least-squares height function over it. Each entry is exact but for its rounding.
     pub fn adjugate(&self) -> Symmetric {
-        let [xx, xy, xz, yy, yz, zz] = self.scatter.map(i128::from);
-        [
-            yy * zz - yz * yz,
-            xz * yz - xy * zz,
-            xy * yz - xz * yy,
-            xx * zz - xz * xz,
-            xy * xz - xx * yz,
-            xx * yy - xy * xy,
-        ]
-        .map(to_f64)
+        // No entry exceeds the largest on the diagonal.
+        let [xx, _, _, yy, _, zz] = self.scatter;
+        if (xx | yy | zz) < 1 << 31 {
+            adjugate(self.scatter).map(|v| v as f64)
+        } else {
+            adjugate(self.scatter.map(i128::from)).map(to_f64)
+        }
     }
+}
+
+/// The adjugate of a symmetric matrix; the caller sees to products of two entries having room for
+/// a difference.
+fn adjugate<T>([xx, xy, xz, yy, yz, zz]: [T; 6]) -> [T; 6]
+where
+    T: Copy + Mul<Output = T> + Sub<Output = T>,
+{
+    [
+        yy * zz - yz * yz,
+        xz * yz - xy * zz,
+        xy * yz - xz * yy,
+        xx * zz - xz * xz,
+        xy * xz - xx * yz,
+        xx * yy - xy * xy,
+    ]
+}
+
+/// 2^`exponent`, below 2^1023.
+fn power_of_two(exponent: u32) -> f64 {
+    f64::from_bits(u64::from(1023 + exponent) << 52)
 }
 
 /// n·Σxy − Σx·Σy of the offsets and 0; the caller sees to n·d < 2^62.
@@ -94,25 +129,27 @@ fn scatter(offsets: impl Iterator<Item = [i64; 3]>) -> [i128; 6] {
     std::array::from_fn(|i| count * product[i] - means[i])
 }
 
-/// The same with shorter sums; the caller sees to n·d² < 2^62.
-fn scatter_small(offsets: &[[i64; 3]]) -> [i128; 6] {
+/// The same in i64; the caller sees to n²·d² < 2^62.
+fn scatter_small(offsets: &[[i64; 3]]) -> [i64; 6] {
     let mut sum = [0i64; 3];
     let mut product = [0i64; 6];
     for &o in offsets {
         let products = products(o);
-        for (total, v) in sum.iter_mut().zip(o) {
-            *total += v;
+        for axis in 0..3 {
+            sum[axis] += o[axis];
         }
-        for (total, v) in product.iter_mut().zip(products) {
-            *total += v;
+        for i in 0..6 {
+            product[i] += products[i];
         }
     }
-    let means = products(sum.map(i128::from));
-    let count = offsets.len() as i128 + 1;
-    std::array::from_fn(|i| count * i128::from(product[i]) - means[i])
+    let count = offsets.len() as i64 + 1;
+    let means = products(sum);
+    std::array::from_fn(|i| count * product[i] - means[i])
 }
 
-fn products<T: Copy + std::ops::Mul<Output = T>>([x, y, z]: [T; 3]) -> [T; 6] {
+/// xx, xy, xz, yy, yz, zz.
+#[inline(always)]
+pub fn products<T: Copy + Mul<Output = T>>([x, y, z]: [T; 3]) -> [T; 6] {
     [x * x, x * y, x * z, y * y, y * z, z * z]
 }
 
@@ -139,9 +176,11 @@ pub fn collinear(offsets: &[[i64; 3]]) -> bool {
     let Some(first) = offsets.iter().find(|o| **o != [0; 3]) else { return true };
     let d = first.map(i128::from);
     offsets.iter().all(|o| {
-        let o = o.map(i128::from);
-        // Products of two i64 fit; their difference need not.
-        d[0] * o[1] == d[1] * o[0] && d[0] * o[2] == d[2] * o[0] && d[1] * o[2] == d[2] * o[1]
+        // Most differ on the first two axes already. Products of two i64 fit; their difference
+        // need not.
+        let [x, y] = [i128::from(o[0]), i128::from(o[1])];
+        let z = i128::from(o[2]);
+        d[0] * y == d[1] * x && d[0] * z == d[2] * x && d[1] * z == d[2] * y
     })
 }
 
@@ -159,79 +198,133 @@ pub fn smallest(matrix: Symmetric) -> (f64, [f64; 3]) {
     if !matrix.iter().all(|v| v.is_finite()) {
         return (f64::NAN, ANY);
     }
-    let size = matrix.iter().fold(0.0f64, |size, v| size.max(v.abs()));
-    if size < f64::MIN_POSITIVE {
+    if matrix.iter().all(|v| v.abs() < f64::MIN_POSITIVE) {
         return (0.0, ANY);
     }
-    // Scaling by a power of two is exact: the exponent field of `size` alone.
-    let unit = f64::from_bits(size.to_bits() & 0x7ff0_0000_0000_0000);
-    let scale = 1.0 / unit;
-    let [xx, xy, xz, yy, yz, zz] = matrix.map(|v| v * scale);
-    let mean = (xx + yy + zz) / 3.0;
-    let (dx, dy, dz) = (xx - mean, yy - mean, zz - mean);
-    let squares = dx * dx + dy * dy + dz * dz + 2.0 * (xy * xy + xz * xz + yz * yz);
-    let radius = (squares / 6.0).sqrt();
+    let Traceless { mean, radius, unit, matrix } = Traceless::of(matrix);
     if radius == 0.0 {
         return (mean * unit, ANY);
     }
-    // The traceless part over `radius`: its eigenvalues are the roots of t³ − 3t − det.
-    let scale = 1.0 / radius;
-    let m = [dx, xy, xz, dy, yz, dz].map(|v| v * scale);
-    let (root, vector) = isolated(&m);
-    let (root, vector) = if root < 0.0 { (root, vector) } else { smallest_across(&m, vector) };
+    let (root, far) = isolated(&matrix);
+    let far = if is_nan(far) { ANY } else { far };
+    if root < 0.0 {
+        return ((mean + radius * root) * unit, far);
+    }
+    let (root, vector) = smallest_across(&matrix, far);
+    let vector = if is_nan(vector) { across(far).0 } else { vector };
     ((mean + radius * root) * unit, vector)
 }
 
-/// The unit eigenvector of the largest eigenvalue, as [`smallest`] in every other respect.
+/// The eigenvector of [`smallest`], or NaN where it is a matter of choice, of a matrix that is
+/// finite and not 0. Without a branch: loops over matrices become vector instructions.
+#[inline(always)]
+pub fn smallest_vector(matrix: Symmetric) -> [f64; 3] {
+    let Traceless { matrix, .. } = Traceless::of(matrix);
+    let (root, far) = isolated(&matrix);
+    let (_, vector) = smallest_across(&matrix, far);
+    select3(root < 0.0, far, vector)
+}
+
+/// The eigenvector of the largest eigenvalue, as [`smallest`] in every other respect.
 pub fn largest_eigenvector(matrix: Symmetric) -> [f64; 3] {
     smallest(matrix.map(|v| -v)).1
 }
 
-/// The eigenvalue farthest from the two others, and its unit eigenvector, of a matrix with trace 0
-/// and squared norm 6.
+/// A symmetric matrix as (mean·I + radius·M)·unit, with M of trace 0 and squared norm 6: its
+/// eigenvalues are the roots of t³ − 3t − det M.
+struct Traceless {
+    mean: f64,
+    radius: f64,
+    unit: f64,
+    matrix: Symmetric,
+}
+
+impl Traceless {
+    #[inline(always)]
+    fn of(matrix: Symmetric) -> Traceless {
+        let size = matrix.iter().fold(0.0, |size, v| select(v.abs() > size, v.abs(), size));
+        // Scaling by a power of two is exact: the exponent field of `size` alone.
+        let unit = f64::from_bits(size.to_bits() & 0x7ff0_0000_0000_0000);
+        let scale = 1.0 / unit;
+        let [xx, xy, xz, yy, yz, zz] = matrix.map(|v| v * scale);
+        let mean = (xx + yy + zz) / 3.0;
+        let (dx, dy, dz) = (xx - mean, yy - mean, zz - mean);
+        let squares = dx * dx + dy * dy + dz * dz + 2.0 * (xy * xy + xz * xz + yz * yz);
+        let radius = (squares / 6.0).sqrt();
+        let scale = 1.0 / radius;
+        let matrix = [dx * scale, xy * scale, xz * scale, dy * scale, yz * scale, dz * scale];
+        Traceless { mean, radius, unit, matrix }
+    }
+}
+
+fn is_nan(v: [f64; 3]) -> bool {
+    v[0].is_nan()
+}
+
+/// One of two finished values: no branch.
+#[inline(always)]
+pub fn select(condition: bool, a: f64, b: f64) -> f64 {
+    if condition { a } else { b }
+}
+
+#[inline(always)]
+fn select3(condition: bool, [ax, ay, az]: [f64; 3], [bx, by, bz]: [f64; 3]) -> [f64; 3] {
+    [select(condition, ax, bx), select(condition, ay, by), select(condition, az, bz)]
+}
+
+/// The eigenvalue farthest from the two others, and its unit eigenvector (NaN if rounding leaves
+/// none), of a matrix with trace 0 and squared norm 6.
+#[inline(always)]
 fn isolated(m: &Symmetric) -> (f64, [f64; 3]) {
     let [xx, xy, xz, yy, yz, zz] = *m;
     let determinant =
         xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-    let d = determinant.abs().min(2.0);
+    let d = select(determinant.abs() < 2.0, determinant.abs(), 2.0);
     let r = 0.5 * d;
     let mut t = ROOT_START[0] + r * (ROOT_START[1] + r * (ROOT_START[2] + r * ROOT_START[3]));
     for _ in 0..ROOT_STEPS {
         let square = t * t;
         t -= (t * (square - 3.0) - d) / (3.0 * square - 3.0);
     }
-    let root = if determinant < 0.0 { -t } else { t };
+    // Adding 0 makes −0 a 0.
+    let root = t.copysign(determinant + 0.0);
     let (xx, yy, zz) = (xx - root, yy - root, zz - root);
     // Columns of the adjugate are multiples of the eigenvector; the longest has the largest
     // diagonal entry.
     let (ax, ay, az) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
     let (axy, axz, ayz) = (xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz);
-    let column = if ax >= ay && ax >= az {
-        [ax, axy, axz]
-    } else if ay >= az {
-        [axy, ay, ayz]
-    } else {
-        [axz, ayz, az]
-    };
-    (root, unit(column).unwrap_or([0.0, 0.0, 1.0]))
+    let column = select3(ay >= az, [axy, ay, ayz], [axz, ayz, az]);
+    let column = select3(ax >= select(ay >= az, ay, az), [ax, axy, axz], column);
+    (root, unit_or_nan(column))
 }
 
-/// The smallest eigenvalue, and its unit eigenvector, of `m` in the plane across `axis`.
+/// The smallest eigenvalue, and its unit eigenvector (NaN if both are equal), of `m` in the plane
+/// across `axis`.
+#[inline(always)]
 fn smallest_across(m: &Symmetric, axis: [f64; 3]) -> (f64, [f64; 3]) {
     let (u, v) = across(axis);
     let (mu, mv) = (product(m, u), product(m, v));
     let (a, b, d) = (dot(u, mu), dot(u, mv), dot(v, mv));
     let half = 0.5 * (a - d);
     let radius = (half * half + b * b).sqrt();
-    let (x, y) = if half >= 0.0 { (-b, half + radius) } else { (radius - half, -b) };
-    let vector = unit(std::array::from_fn(|i| x * u[i] + y * v[i])).unwrap_or(u);
-    (0.5 * (a + d) - radius, vector)
+    let x = select(half >= 0.0, -b, radius - half);
+    let y = select(half >= 0.0, half + radius, -b);
+    let vector = [x * u[0] + y * v[0], x * u[1] + y * v[1], x * u[2] + y * v[2]];
+    (0.5 * (a + d) - radius, unit_or_nan(vector))
+}
+
+/// The vector at length 1; NaN if it is 0.
+#[inline(always)]
+fn unit_or_nan(v: [f64; 3]) -> [f64; 3] {
+    let length = dot(v, v).sqrt();
+    [v[0] / length, v[1] / length, v[2] / length]
 }
 
 /// Two unit vectors that make a right-handed frame with the unit vector `axis` as third; no root, no
 /// case but the sign of z (Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6, 2017). Axes
 /// of the coordinate system give axes.
-pub(super) fn across([x, y, z]: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+#[inline(always)]
+pub fn across([x, y, z]: [f64; 3]) -> ([f64; 3], [f64; 3]) {
     let sign = 1.0f64.copysign(z);
     let a = -1.0 / (sign + z);
     let b = x * y * a;
@@ -239,6 +332,7 @@ pub(super) fn across([x, y, z]: [f64; 3]) -> ([f64; 3], [f64; 3]) {
 }
 
 /// `matrix` times `v`.
+#[inline(always)]
 pub fn product(matrix: &Symmetric, v: [f64; 3]) -> [f64; 3] {
     let [xx, xy, xz, yy, yz, zz] = *matrix;
     [
@@ -249,7 +343,8 @@ pub fn product(matrix: &Symmetric, v: [f64; 3]) -> [f64; 3] {
 }
 
 /// The scalar product.
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+#[inline(always)]
+pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 

@@ -1,7 +1,7 @@
 //! The star of a point: the Delaunay triangles incident to it in the plane of its neighbourhood,
 //! found as a convex hull. Knows no tiles, no stages.
 
-use super::plane::{across, dot, to_f64, unit};
+use super::plane::{across, dot, select, to_f64, unit};
 
 /// Relative size below which a computed quantity counts as 0.
 ///
@@ -12,8 +12,6 @@ const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
 /// The bits of a key that hold a neighbour's place; those above hold its direction, to 2^-46 of a
 /// turn: nearer ones count as equal.
 const PLACE: u64 = (1 << 18) - 1;
-/// Neighbours up to which sorting by counting is faster.
-const FEW: usize = 24;
 
 /// Finds first estimates of normals from the triangles around a point; holds scratch memory only.
 ///
@@ -27,19 +25,59 @@ pub struct Star {
     projected: Vec<Inverted>,
     /// Direction, then place in `projected`.
     keys: Vec<u64>,
-    /// By direction around p, then the hull's vertices.
+    /// By direction around p.
     points: Vec<Inverted>,
+    /// Those on the hull.
+    vertices: Vec<Inverted>,
+}
+
+/// A neighbour in the plane, relative to p.
+#[derive(Debug, Clone, Copy)]
+pub struct Projected {
+    /// The inverted projection; NaN if the neighbour is straight above or below p.
+    pub x: f64,
+    /// Likewise.
+    pub y: f64,
+    /// Square of the distance to p in the plane, before the inversion.
+    pub square: f64,
+    /// Grows with the direction, counter-clockwise: 4 to 8, so that its exponent is the same for
+    /// all. No neighbour is at 8 itself, which is the direction of 4.
+    pub direction: f64,
+}
+
+impl Projected {
+    /// Projects a neighbour at `offset` to the plane of the unit vectors `u` and `v`, without a
+    /// branch: loops over neighbours become vector instructions.
+    #[inline(always)]
+    pub fn of(offset: [f64; 3], u: [f64; 3], v: [f64; 3]) -> Projected {
+        let (x, y) = (dot(offset, u), dot(offset, v));
+        let square = x * x + y * y;
+        let slope = y / (x.abs() + y.abs());
+        let direction = select(x >= 0.0, 5.0 + slope, 7.0 - slope);
+        let direction = select(direction == 8.0, 4.0, direction);
+        let upright = square <= ROUNDING * ROUNDING * dot(offset, offset);
+        let inverse = select(upright, f64::NAN, 1.0 / square);
+        Projected { x: x * inverse, y: y * inverse, square, direction }
+    }
 }
 
 /// A neighbour, projected and inverted.
 #[derive(Debug, Clone, Copy)]
-struct Inverted {
+pub struct Inverted {
     x: f64,
     y: f64,
     /// |x| + |y|
     size: f64,
     /// Place among the offsets: Morton order.
     rank: u32,
+}
+
+impl Inverted {
+    /// The neighbour of the given place in Morton order.
+    #[inline(always)]
+    pub fn new(x: f64, y: f64, rank: u32) -> Inverted {
+        Inverted { x, y, size: x.abs() + y.abs(), rank }
+    }
 }
 
 impl Star {
@@ -52,10 +90,37 @@ impl Star {
     /// triangles that the projection turns into lines.
     pub fn normal(&mut self, offsets: &[[i64; 3]], normal: [f64; 3]) -> Option<[f64; 3]> {
         self.project(offsets, normal);
-        self.sort_by_direction();
+        self.keys.sort_unstable();
+        let Star { projected, keys, points, .. } = self;
+        points.clear();
+        points.extend(keys.iter().map(|key| projected[(key & PLACE) as usize]));
         self.keep_nearest_per_direction();
-        let closed = self.hull();
-        self.mean_normal(offsets, normal, closed)
+        let closed = self.turns_left_throughout();
+        self.hull(closed.then(|| self.nearest()));
+        self.mean_normal(normal, closed, |rank| offsets[rank as usize], exact_cross)
+    }
+
+    /// Takes neighbours that have been projected with [`Projected::of`] and sorted by direction, for
+    /// [`normal_inside`](Self::normal_inside).
+    pub fn place(&mut self, sorted: impl ExactSizeIterator<Item = Inverted>) {
+        self.points.clear();
+        self.points.extend(sorted);
+    }
+
+    /// What [`normal`](Self::normal) returns for the neighbours last placed, if p is inside of their
+    /// polygon and no two are in one direction, else None. `nearest` is the place of the nearest one,
+    /// if known. `offset` gives offsets by rank; none is larger than 2^26.
+    pub fn normal_inside(
+        &mut self,
+        nearest: Option<usize>,
+        normal: [f64; 3],
+        offset: impl Fn(u32) -> [f64; 3],
+    ) -> Option<Option<[f64; 3]>> {
+        if !self.turns_left_throughout() {
+            return None;
+        }
+        self.hull(Some(nearest.unwrap_or_else(|| self.nearest())));
+        Some(self.mean_normal(normal, true, offset, cross))
     }
 
     /// Projects and inverts all neighbours that are not straight above or below p.
@@ -64,38 +129,21 @@ impl Star {
         self.projected.clear();
         self.keys.clear();
         for (rank, offset) in (0..=PLACE as u32).zip(offsets) {
-            let o = offset.map(|c| c as f64);
-            let (x, y) = (dot(o, u), dot(o, v));
-            let square = x * x + y * y;
-            if square <= ROUNDING * ROUNDING * dot(o, o) {
-                continue;
+            let at = Projected::of(offset.map(|c| c as f64), u, v);
+            if !at.x.is_nan() {
+                let place = self.projected.len() as u64;
+                self.keys.push(at.direction.to_bits() << 12 & !PLACE | place);
+                self.projected.push(Inverted::new(at.x, at.y, rank));
             }
-            // Grows with the direction, counter-clockwise: 4 to 8, so that its exponent is the same
-            // for all (8 itself wraps round to 4, the same direction).
-            let slope = y / (x.abs() + y.abs());
-            let direction = if x >= 0.0 { 5.0 + slope } else { 7.0 - slope };
-            self.keys.push(direction.to_bits() << 12 & !PLACE | self.projected.len() as u64);
-            let inverse = 1.0 / square;
-            let (x, y) = (x * inverse, y * inverse);
-            self.projected.push(Inverted { x, y, size: x.abs() + y.abs(), rank });
         }
     }
 
-    /// Brings the neighbours into counter-clockwise order, those of one direction in Morton order.
-    fn sort_by_direction(&mut self) {
-        self.points.clear();
-        if self.keys.len() > FEW {
-            self.keys.sort_unstable();
-            let in_order = self.keys.iter().map(|key| self.projected[(key & PLACE) as usize]);
-            self.points.extend(in_order);
-            return;
-        }
-        // Counting the smaller ones has no branch to mispredict.
-        self.points.extend_from_slice(&self.projected);
-        for (key, point) in self.keys.iter().zip(&self.projected) {
-            let place = self.keys.iter().map(|other| usize::from(other < key)).sum::<usize>();
-            self.points[place] = *point;
-        }
+    /// True if every point is less than half a turn counter-clockwise of the one before it, and no
+    /// two are in one direction: p is then inside of their polygon.
+    fn turns_left_throughout(&self) -> bool {
+        let [first, .., last] = &self.points[..] else { return false };
+        let pairs = self.points.windows(2);
+        pairs.fold(last.turns_left_to(first), |all, pair| all & pair[0].turns_left_to(&pair[1]))
     }
 
     /// Of neighbours in one direction only the nearest can be in a triangle; of equal ones the
@@ -118,73 +166,72 @@ impl Star {
         }
     }
 
-    /// Reduces the points, sorted by direction, to the vertices of the hull without 0. True if 0 is
-    /// inside; otherwise the first and last vertices are 0's neighbours on the hull.
-    fn hull(&mut self) -> bool {
-        let count = self.points.len();
-        if count == 0 {
-            return false;
-        }
-        // A gap of half a turn or more leaves 0 on the hull: begin after it.
-        let gap =
-            (0..count).find(|&i| !self.points[i].turns_left_to(&self.points[(i + 1) % count]));
-        let start = match gap {
-            Some(before) => before + 1,
-            // The nearest neighbour is a vertex whatever the others are.
-            None => (0..count)
-                .fold(0, |best, i| if self.points[i].hides(&self.points[best]) { i } else { best }),
-        };
-        self.points.rotate_left(start % count);
-        let mut vertices = 1;
-        for i in 1..count {
-            let next = self.points[i];
-            vertices = self.without_right_turns(vertices, &next);
-            self.points[vertices] = next;
-            vertices += 1;
-        }
-        if gap.is_none() {
-            vertices = self.without_right_turns(vertices, &self.points[0].clone());
-        }
-        self.points.truncate(vertices);
-        gap.is_none()
+    /// The place of the neighbour nearest to p.
+    fn nearest(&self) -> usize {
+        let points = &self.points;
+        (0..points.len()).fold(0, |best, i| if points[i].hides(&points[best]) { i } else { best })
     }
 
-    /// How many of the first `vertices` points remain if `next` follows: the last are dropped until
-    /// the path turns left.
-    fn without_right_turns(&self, mut vertices: usize, next: &Inverted) -> usize {
-        while vertices >= 2
-            && !left_turn(&self.points[vertices - 2], &self.points[vertices - 1], next)
-        {
-            vertices -= 1;
+    /// Finds the vertices of the hull of the points, sorted by direction, and 0. If 0 is inside, the
+    /// place of the `nearest` neighbour is told, which is a vertex whatever the others are.
+    /// Otherwise the first and last vertices are 0's neighbours on the hull.
+    fn hull(&mut self, nearest: Option<usize>) {
+        let Star { points, vertices, .. } = self;
+        vertices.clear();
+        let count = points.len();
+        let start = nearest.unwrap_or_else(|| {
+            // A gap of half a turn or more leaves 0 on the hull: begin after it.
+            let before = (0..count).find(|&i| !points[i].turns_left_to(&points[(i + 1) % count]));
+            before.map_or(0, |before| (before + 1) % count)
+        });
+        for next in points[start..].iter().chain(&points[..start]) {
+            drop_right_turns(vertices, next);
+            vertices.push(*next);
         }
-        vertices
+        if let (Some(_), Some(&first)) = (nearest, vertices.first()) {
+            drop_right_turns(vertices, &first);
+        }
     }
 
-    /// Sums the unit normals of the triangles of p and two consecutive vertices.
-    fn mean_normal(
+    /// Sums the unit normals of the triangles of p and two consecutive vertices, given their offsets
+    /// and how to multiply two of them.
+    #[inline(always)]
+    fn mean_normal<T: Copy>(
         &self,
-        offsets: &[[i64; 3]],
         normal: [f64; 3],
         closed: bool,
+        offset: impl Fn(u32) -> T,
+        cross: impl Fn(T, T) -> [f64; 3],
     ) -> Option<[f64; 3]> {
-        let count = self.points.len();
-        let first = (0..count).min_by_key(|&i| self.points[i].rank)?;
+        let vertices = &self.vertices[..];
+        // Rank and place in one number: a minimum without branches.
+        let ranks = vertices.iter().zip(0u64..).map(|(v, i)| u64::from(v.rank) << 32 | i);
+        let first = ranks.min()? as u32 as usize;
         let mut sum = [0.0; 3];
-        for i in (first..count).chain(0..first) {
-            if i + 1 == count && !closed {
-                continue;
-            }
-            let next = if i + 1 == count { 0 } else { i + 1 };
-            let [a, b] = [i, next].map(|v| offsets[self.points[v].rank as usize]);
-            let area = exact_cross(a, b);
+        let mut a = offset(vertices[first].rank);
+        for next in (first + 1..vertices.len()).chain(0..=first) {
+            let b = offset(vertices[next].rank);
+            let area = cross(a, b);
+            a = b;
             let length = dot(area, area).sqrt();
-            if dot(area, normal) > ROUNDING * length {
+            let counts = closed || next != 0;
+            if dot(area, normal) > ROUNDING * length && counts {
                 for axis in 0..3 {
                     sum[axis] += area[axis] / length;
                 }
             }
         }
         unit(sum)
+    }
+}
+
+/// Drops the last vertices until the path turns left to `next`.
+#[inline(always)]
+fn drop_right_turns(vertices: &mut Vec<Inverted>, next: &Inverted) {
+    while let [.., a, b] = &vertices[..]
+        && !left_turn(a, b, next)
+    {
+        vertices.pop();
     }
 }
 
@@ -214,6 +261,13 @@ impl Inverted {
 fn left_turn(a: &Inverted, b: &Inverted, c: &Inverted) -> bool {
     let turn = (b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x);
     turn > ROUNDING * (a.size + b.size) * (b.size + c.size)
+}
+
+/// The vector product.
+#[inline(always)]
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    let minor = |i: usize, j: usize| a[i] * b[j] - a[j] * b[i];
+    [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
 /// The vector product of two offsets, each component rounded once.

@@ -1,5 +1,7 @@
 //! Surface normals from the nearest neighbours of every position: the first step of the reduction.
 
+mod bundle;
+
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::geom::plane::{self, Covariance};
@@ -9,6 +11,8 @@ use crate::report::Tally;
 use crate::stage::{Needs, TileOp};
 use crate::tile::Tile;
 use crate::{Error, Result};
+
+use bundle::Bundle;
 
 /// Fewest neighbours that the stage takes; two make a plane, but no estimate of a surface.
 pub const MIN_NEIGHBORS: usize = 3;
@@ -57,8 +61,7 @@ impl TileOp for Normals {
         let mut normals = std::mem::take(&mut tile.normals);
         let core = tile.core.clone();
         let (mut without, mut no_triangle, mut perpendicular) = (0, 0, 0);
-        let outcome = tile.each_neighborhood(self.neighbors, |i, offsets| {
-            let (estimate, fallback) = estimator.estimate(offsets);
+        let mut settle = |i: usize, (estimate, fallback): Outcome| {
             let counted = u64::from(core.contains(&i));
             match estimate {
                 Estimate::Normal(normal) => normals[i] = normal,
@@ -69,7 +72,11 @@ impl TileOp for Normals {
                 Some(Fallback::Perpendicular) => perpendicular += counted,
                 None => {}
             }
+        };
+        let outcome = tile.each_neighborhood(self.neighbors, |i, offsets| {
+            estimator.take(i, offsets, &mut settle);
         });
+        estimator.finish(&mut settle);
         tile.normals = normals;
         tally.count("no_normal", without);
         tally.count("fallback_no_triangle", no_triangle);
@@ -121,56 +128,124 @@ pub enum Fallback {
     Perpendicular,
 }
 
+/// What came of a neighbourhood.
+pub type Outcome = (Estimate, Option<Fallback>);
+
 /// Estimates normals by one method; holds scratch memory, so keep one for each thread.
 #[derive(Debug, Default)]
 pub struct Estimator {
     method: Method,
     star: Star,
+    bundle: Bundle,
 }
 
 impl Estimator {
     /// An estimator by `method`.
     pub fn new(method: Method) -> Self {
-        Estimator { method, star: Star::default() }
+        Estimator { method, ..Estimator::default() }
     }
 
     /// The normal at a position whose neighbours are at `offsets` from it, in lattice steps: none of
     /// them 0, all distinct, in Morton order, each smaller than 2^63.
     ///
     /// The result is a function of `offsets` alone, the same bits on every platform.
-    pub fn estimate(&mut self, offsets: &[[i64; 3]]) -> (Estimate, Option<Fallback>) {
-        if offsets.len() < 2 || plane::collinear(offsets) {
-            return (Estimate::None, None);
-        }
-        let covariance = Covariance::of(offsets);
-        let (_, flat) = plane::smallest(covariance.matrix());
-        let (normal, fallback) = match self.method {
-            Method::Pca => (flat, None),
-            Method::Varady => match self.varady(offsets, &covariance, flat) {
-                Ok(normal) => (normal, None),
-                Err(why) => (flat, Some(why)),
-            },
-        };
-        (Estimate::Normal(plane::canonical(normal.map(|c| c as f32))), fallback)
+    pub fn estimate(&mut self, offsets: &[[i64; 3]]) -> Outcome {
+        alone(self.method, &mut self.star, offsets)
     }
 
-    /// adj(C)·n_f, which is (−a, −b, 1) of the height function over the first estimate n_f, turned
-    /// back from its frame.
-    fn varady(
+    /// Takes the neighbourhood of `owner` to [`estimate`](Self::estimate) it with others, which is
+    /// faster; calls `settle` with owners and outcomes when there are enough.
+    pub fn take(
         &mut self,
+        owner: usize,
         offsets: &[[i64; 3]],
-        covariance: &Covariance,
-        flat: [f64; 3],
-    ) -> Result<[f64; 3], Fallback> {
-        let first = self.star.normal(offsets, flat).ok_or(Fallback::NoTriangle)?;
-        let fitted = plane::product(&covariance.adjugate(), first);
-        plane::unit(fitted).ok_or(Fallback::Perpendicular)
+        settle: &mut impl FnMut(usize, Outcome),
+    ) {
+        if !self.bundle.take(owner, offsets) {
+            settle(owner, self.estimate(offsets));
+        } else if self.bundle.is_full() {
+            self.finish(settle);
+        }
     }
+
+    /// Calls `settle` for what was taken and is not settled yet.
+    pub fn finish(&mut self, settle: &mut impl FnMut(usize, Outcome)) {
+        self.bundle.estimate(self.method, &mut self.star, settle);
+    }
+}
+
+fn alone(method: Method, star: &mut Star, offsets: &[[i64; 3]]) -> Outcome {
+    if offsets.len() < 2 || plane::collinear(offsets) {
+        return (Estimate::None, None);
+    }
+    let covariance = Covariance::of(offsets);
+    let (_, flat) = plane::smallest(covariance.matrix());
+    match method {
+        Method::Pca => (settled(flat), None),
+        Method::Varady => varady(&covariance, flat, star.normal(offsets, flat)),
+    }
+}
+
+/// adj(C)·n_f, which is (−a, −b, 1) of the height function over the first estimate n_f, turned back
+/// from its frame; `flat`, the normal of the plane of regression, where that fails.
+fn varady(covariance: &Covariance, flat: [f64; 3], first: Option<[f64; 3]>) -> Outcome {
+    let Some(first) = first else { return (settled(flat), Some(Fallback::NoTriangle)) };
+    match plane::unit(plane::product(&covariance.adjugate(), first)) {
+        Some(normal) => (settled(normal), None),
+        None => (settled(flat), Some(Fallback::Perpendicular)),
+    }
+}
+
+fn settled(normal: [f64; 3]) -> Estimate {
+    Estimate::Normal(plane::canonical(normal.map(|c| c as f32)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    /// Noisy surfaces, grids full of ties and cocircular points, lines, walls, far points; most with
+    /// equally many neighbours.
+    fn neighborhoods() -> impl Strategy<Value = Vec<Vec<[i64; 3]>>> {
+        let count = prop::sample::select(vec![1usize, 2, 3, 8, 10, 10, 10, 16, 64, 66]);
+        count.prop_flat_map(|count| prop::collection::vec(neighborhood(count), 1..40))
+    }
+
+    fn neighborhood(count: usize) -> impl Strategy<Value = Vec<[i64; 3]>> {
+        let width = prop::sample::select(vec![2i64, 4, 40, 1000, 1 << 21, 1 << 23, 1 << 40]);
+        let height = prop::sample::select(vec![0i64, 1, 30]);
+        (width, height, 0usize..3).prop_flat_map(move |(width, height, up)| {
+            let one = (-width..=width, -width..=width, -height..=height);
+            prop::collection::vec(one, count).prop_map(move |offsets| {
+                let mut offsets: Vec<_> = offsets.into_iter().map(|(x, y, z)| [x, y, z]).collect();
+                offsets.sort_unstable();
+                offsets.dedup();
+                offsets.retain(|o| *o != [0; 3]);
+                offsets.iter_mut().for_each(|o| o.swap(2, up));
+                offsets
+            })
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn normals_estimated_together_are_those_estimated_alone(
+            neighborhoods in neighborhoods(), pca: bool,
+        ) {
+            let method = if pca { Method::Pca } else { Method::Varady };
+            let mut estimator = Estimator::new(method);
+            let mut together = vec![None; neighborhoods.len()];
+            let mut settle = |i: usize, outcome| together[i] = Some(outcome);
+            for (i, offsets) in neighborhoods.iter().enumerate() {
+                estimator.take(i, offsets, &mut settle);
+            }
+            estimator.finish(&mut settle);
+            for (offsets, together) in neighborhoods.iter().zip(together) {
+                prop_assert_eq!(Some(estimator.estimate(offsets)), together, "{:?}", offsets);
+            }
+        }
+    }
 
     #[test]
     fn defaults_are_ten_neighbors_and_varady() {

@@ -6,10 +6,13 @@ pub type Position = [i64; 3];
 /// Exact squared distance of two positions, in lattice steps squared; saturates where the
 /// difference of two coordinates exceeds 2^63.
 pub fn distance2(a: Position, b: Position) -> u128 {
-    (0..3).fold(0u128, |sum, axis| {
-        let d = u128::from(a[axis].abs_diff(b[axis]));
-        sum.saturating_add(d.saturating_mul(d))
-    })
+    let [x, y, z] = [a[0].abs_diff(b[0]), a[1].abs_diff(b[1]), a[2].abs_diff(b[2])];
+    if (x | y | z) >> 31 == 0 {
+        return u128::from(x * x + y * y + z * z);
+    }
+    [x, y, z]
+        .into_iter()
+        .fold(0u128, |sum, d| sum.saturating_add(u128::from(d).saturating_mul(u128::from(d))))
 }
 
 /// A box of lattice positions; both corners belong to it. Empty when `lo > hi` on any axis.

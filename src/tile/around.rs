@@ -8,6 +8,7 @@ use super::remote::Remote;
 use super::sealed::SealedTiles;
 use super::{Bounds, Position, Tile};
 use crate::Result;
+use crate::geom::few::{FEW, places};
 use crate::geom::nearest::Nearest;
 use crate::point::distance2;
 
@@ -16,14 +17,51 @@ use crate::point::distance2;
 pub struct Around {
     search: Nearest,
     remote: Remote,
-    /// The whole scan and the box of it that is loaded; None if the tile is all there is.
-    beyond: Option<(Arc<SealedTiles>, Bounds)>,
+    /// None if the tile is all there is.
+    beyond: Option<Beyond>,
     ranks: Vec<u32>,
     offsets: Vec<Position>,
     /// Neighbourhoods that what was loaded could not prove, since the last [`Around::take_unproven`].
     unproven: u64,
     /// Neighbourhoods whose two farthest are equally far, likewise.
     tied: u64,
+}
+
+/// The whole scan, and what of it is not loaded.
+#[derive(Debug)]
+struct Beyond {
+    tiles: Arc<SealedTiles>,
+    /// The box that is loaded, without limits where the scan has nothing beyond.
+    loaded: Bounds,
+}
+
+impl Beyond {
+    /// None if the scan has nothing beyond `loaded`.
+    fn new(tiles: &Arc<SealedTiles>, loaded: Bounds) -> Option<Beyond> {
+        let scan = tiles.bounds();
+        let mut open = loaded;
+        for axis in 0..3 {
+            if loaded.lo[axis] <= scan.lo[axis] {
+                open.lo[axis] = i64::MIN;
+            }
+            if loaded.hi[axis] >= scan.hi[axis] {
+                open.hi[axis] = i64::MAX;
+            }
+        }
+        (!loaded.holds(&scan)).then(|| Beyond { tiles: tiles.clone(), loaded: open })
+    }
+
+    /// True if no position that is not loaded can be among the nearest of `p`, of which the farthest
+    /// found is at squared distance `d2`: on the first plane not loaded, one at exactly the same
+    /// distance might win the tie.
+    fn proves(&self, p: Position, d2: u128) -> bool {
+        let Bounds { lo, hi } = self.loaded;
+        let gap = (0..3).fold(u64::MAX, |gap, axis| {
+            gap.min(p[axis].abs_diff(lo[axis])).min(p[axis].abs_diff(hi[axis]))
+        });
+        let gap = u128::from(gap) + 1;
+        d2 < gap.saturating_mul(gap)
+    }
 }
 
 impl Around {
@@ -46,7 +84,7 @@ impl Around {
 
 impl Tile {
     pub(super) fn surround(&mut self, tiles: &Arc<SealedTiles>, loaded: Bounds) {
-        self.around.beyond = Some((tiles.clone(), loaded));
+        self.around.beyond = Beyond::new(tiles, loaded);
     }
 
     /// Calls `visit` for every position of the zone with its index in the tile and the offsets,
@@ -71,14 +109,12 @@ impl Tile {
                     return;
                 }
                 let p = positions[i];
-                offsets.clear();
+                let enough = neighbors.len() == k;
                 match beyond {
-                    Some((tiles, loaded))
-                        if !proven(p, d2, neighbors.len() == k, loaded, &tiles.bounds()) =>
-                    {
+                    Some(beyond) if !(enough && beyond.proves(p, d2)) => {
                         *unproven += 1;
-                        let bound = (neighbors.len() == k).then_some(d2);
-                        match remote.nearest(tiles, p, k, bound) {
+                        offsets.clear();
+                        match remote.nearest(&beyond.tiles, p, k, enough.then_some(d2)) {
                             Ok(found) => offsets.extend(found),
                             Err(error) => return outcome = Err(error),
                         }
@@ -89,10 +125,7 @@ impl Tile {
                         if let [.., before, _] = *neighbors {
                             *tied += u64::from(distance2(p, positions[before as usize]) == d2);
                         }
-                        ranks.clear();
-                        ranks.extend_from_slice(neighbors);
-                        ranks.sort_unstable();
-                        offsets.extend(ranks.iter().map(|&q| offset(p, positions[q as usize])));
+                        in_morton_order(p, neighbors, positions, ranks, offsets);
                     }
                 }
                 visit(i, offsets);
@@ -102,21 +135,28 @@ impl Tile {
     }
 }
 
-fn offset(p: Position, q: Position) -> Position {
-    std::array::from_fn(|axis| q[axis] - p[axis])
+/// The offsets from `p` of neighbours given by rank. `ranks` is memory to work in.
+fn in_morton_order(
+    p: Position,
+    neighbors: &[u32],
+    positions: &[Position],
+    ranks: &mut Vec<u32>,
+    offsets: &mut Vec<Position>,
+) {
+    if neighbors.len() <= FEW {
+        offsets.resize(neighbors.len(), p);
+        for (&rank, place) in neighbors.iter().zip(places(neighbors)) {
+            offsets[place as usize] = offset(p, positions[rank as usize]);
+        }
+        return;
+    }
+    ranks.clear();
+    ranks.extend_from_slice(neighbors);
+    ranks.sort_unstable();
+    offsets.clear();
+    offsets.extend(ranks.iter().map(|&rank| offset(p, positions[rank as usize])));
 }
 
-/// True if no position outside of `loaded` can be among the nearest of `p`, of which the farthest
-/// found is at squared distance `d2` (and of which `enough` were found). A face beyond which the
-/// scan has nothing leaves nothing to prove; on the first plane not loaded a position at exactly the
-/// same distance might win the tie.
-fn proven(p: Position, d2: u128, enough: bool, loaded: &Bounds, scan: &Bounds) -> bool {
-    let clear = |gap: u64| enough && d2 < u128::from(gap) * u128::from(gap);
-    (0..3).all(|axis| {
-        let below =
-            loaded.lo[axis] <= scan.lo[axis] || clear(p[axis].abs_diff(loaded.lo[axis]) + 1);
-        let above =
-            loaded.hi[axis] >= scan.hi[axis] || clear(p[axis].abs_diff(loaded.hi[axis]) + 1);
-        below && above
-    })
+fn offset(p: Position, q: Position) -> Position {
+    std::array::from_fn(|axis| q[axis] - p[axis])
 }
