@@ -132,8 +132,8 @@ fn outputs_that_cannot_be_are_told_before_any_work_and_leave_nothing() {
             fails(at, &[command, "a.las", "-o", output], code, parts);
             assert_holds(at, &there);
         };
-        told("no/such/out.las", 1, &["no/such: ", "folder of the output does not exist", "help: "]);
-        told("file/out.las", 1, &["file: ", "folder of the output does not exist"]);
+        told("no/such/out.las", 1, &["no/such: ", "the folder does not exist", "help: "]);
+        told("file/out.las", 1, &["file: ", "the folder does not exist"]);
         told("socket.las", 2, &["socket.las: this is no regular file"]);
         let report = ["--report", "no/report.json"];
         fails(at, &[&[command, "a.las", "-o", "out.las"], &report[..]].concat(), 1, &["no: "]);

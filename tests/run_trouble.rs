@@ -31,7 +31,7 @@ fn what_cannot_be_written_is_refused_before_any_work() {
     let same = report(case.path(".").join("out.ply"));
     assert!(same.to_string().ends_with("the report would replace the output"), "{same}");
     let missing = report(case.path("none/report.json"));
-    assert!(missing.to_string().ends_with("none: the folder of the output does not exist"));
+    assert!(missing.to_string().ends_with("none: the folder does not exist"));
     assert!(report(PathBuf::from("/dev/null")).to_string().contains("device"));
     let scratch = told(Overrides { scratch: Some(case.path("none")), ..Overrides::default() });
     assert!(scratch.to_string().ends_with("none: the folder for scratch does not exist"));

@@ -142,7 +142,26 @@ pub(super) struct Reduce {
     #[arg(long, value_name = "HOW")]
     pub method: Option<String>,
     #[command(flatten)]
+    pub written: Written,
+    #[command(flatten)]
     pub common: Common,
+}
+
+/// How the output is written.
+#[derive(Debug, Args)]
+pub(super) struct Written {
+    /// Scale of LAS coordinates [default: the input's; PLY to LAS must say it]
+    #[arg(long, value_name = "SCALE", allow_negative_numbers = true)]
+    pub scale: Option<f64>,
+    /// Offset of LAS coordinates on each axis [default: the input's, or 0]
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true)]
+    pub offset: Vec<f64>,
+    /// Dimensions that may get lost, such as GpsTime,UserData
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub drop: Vec<String>,
+    /// Encoding of PLY: ascii or binary [default: the input's]
+    #[arg(long, value_name = "HOW")]
+    pub encoding: Option<String>,
 }
 
 #[derive(Debug, Args)]
@@ -157,18 +176,8 @@ pub(super) struct Convert {
     /// Format: las, laz or ply [default: by extension; in a folder, the input's]
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
-    /// Scale of LAS coordinates [default: the input's; PLY to LAS must say it]
-    #[arg(long, value_name = "SCALE", allow_negative_numbers = true)]
-    pub scale: Option<f64>,
-    /// Offset of LAS coordinates on each axis [default: the input's, or 0]
-    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_negative_numbers = true)]
-    pub offset: Vec<f64>,
-    /// Dimensions that may get lost, such as GpsTime,UserData
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
-    pub drop: Vec<String>,
-    /// Encoding of PLY: ascii or binary [default: the input's]
-    #[arg(long, value_name = "HOW")]
-    pub encoding: Option<String>,
+    #[command(flatten)]
+    pub written: Written,
     #[command(flatten)]
     pub common: Common,
 }

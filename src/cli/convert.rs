@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::arguments::Convert;
 use super::print;
 use super::progress::Bars;
-use super::run::{given, mill, mill_under, number};
+use super::run::{given, mill, mill_under, written};
 use crate::pipeline::{Format, Pipeline, Registry, Watch, expand};
 use crate::{Error, ErrorKind, Result};
 
@@ -32,8 +32,14 @@ pub(super) fn convert(arguments: &Convert, registry: &Registry) -> Result<()> {
         let one = pipeline(arguments, text(&input)?, text(&output)?, registry)?;
         runs.push((input, one));
     }
+    let is_new = !folder.is_dir();
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create the folder", e))?;
-    run_all(runs, arguments)
+    let outcome = run_all(runs, arguments);
+    if outcome.is_err() && is_new {
+        // Left behind if any output is in it, which is as it should be.
+        let _ = std::fs::remove_dir(folder);
+    }
+    outcome
 }
 
 /// Runs one pipeline after the other. One that fails is told at once and does not keep the others
@@ -75,16 +81,8 @@ fn pipeline(
         ("IN", "read.path", Some(inputs)),
         ("-o", "write.path", Some(output)),
         ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
-        ("--scale", "write.scale", arguments.scale.map(number)),
-        (
-            "--offset",
-            "write.offset",
-            (!arguments.offset.is_empty()).then(|| json!(arguments.offset)),
-        ),
-        ("--drop", "write.drop", (!arguments.drop.is_empty()).then(|| json!(arguments.drop))),
-        ("--encoding", "write.encoding", arguments.encoding.as_deref().map(Value::from)),
     ]);
-    let sets = [stages, arguments.common.sets()?].concat();
+    let sets = [stages, written(&arguments.written), arguments.common.sets()?].concat();
     Pipeline::parse_with(CONVERT, "pipelines/convert.toml", registry, &sets)
 }
 

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::arguments::{Common, Plan, Reduce, Run, Synth};
+use super::arguments::{Common, Plan, Reduce, Run, Synth, Written};
 use super::print;
 use super::progress::Bars;
 use crate::Result;
@@ -29,7 +29,8 @@ pub(super) fn run(arguments: &Run, registry: &Registry) -> Result<()> {
 
 /// Runs `pipelines/reduce.toml` on other files and prints the closing table.
 pub(super) fn reduce(arguments: &Reduce, registry: &Registry) -> Result<()> {
-    let sets = [reduce_sets(arguments), arguments.common.sets()?].concat();
+    let written = written(&arguments.written);
+    let sets = [reduce_sets(arguments), written, arguments.common.sets()?].concat();
     let pipeline = Pipeline::parse_with(REDUCE, "pipelines/reduce.toml", registry, &sets)?;
     print::result(mill(pipeline, &arguments.common)?)
 }
@@ -100,6 +101,17 @@ fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
         ("--min-points", "cells.min_points", arguments.min_points.map(Value::from)),
         ("--split", "cells.split", arguments.split.clone().map(Value::from)),
         ("--method", "normals.method", arguments.method.clone().map(Value::from)),
+    ])
+}
+
+/// How the output is written, as the keys of `write`.
+pub(super) fn written(arguments: &Written) -> Vec<Set> {
+    let list = |given: bool, value: Value| given.then_some(value);
+    given([
+        ("--scale", "write.scale", arguments.scale.map(number)),
+        ("--offset", "write.offset", list(!arguments.offset.is_empty(), json!(arguments.offset))),
+        ("--drop", "write.drop", list(!arguments.drop.is_empty(), json!(arguments.drop))),
+        ("--encoding", "write.encoding", arguments.encoding.as_deref().map(Value::from)),
     ])
 }
 

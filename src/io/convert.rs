@@ -172,7 +172,7 @@ impl Projection {
         let place = match self.from.coordinates() {
             Some(axes) => {
                 let [x, y, z] = axes.map(|axis| axis.world(record, self.from.endian));
-                format!("point {index} of its batch, at ({x}, {y}, {z})")
+                format!("the point at ({x}, {y}, {z})")
             }
             None => format!("point {index} of its batch"),
         };
@@ -188,7 +188,16 @@ impl Projection {
             format!("{name} = {value} of {place} does not fit {}", room(to)),
         );
         if XYZ.contains(&name.as_str()) {
-            return error.help("a larger scale, or an offset nearer to the points, holds it");
+            // Whole thousands near the point: a scan around it fits, and its digits stay readable.
+            let near = self.from.coordinates().map(|axes| {
+                axes.map(|axis| (axis.world(record, self.from.endian) / 1000.0).round() * 1000.0)
+            });
+            return error.help(match near {
+                Some([x, y, z]) if [x, y, z].iter().all(|v| v.is_finite()) => {
+                    format!("give an offset near the points (offset = [{x:?}, {y:?}, {z:?}]), or a larger scale")
+                }
+                _ => "give a larger scale, or an offset nearer to the points".to_owned(),
+            });
         }
         error.help(format!("drop = [\"{name}\"] leaves the dimension out"))
     }

@@ -80,9 +80,7 @@ pub fn check_place(path: &Path) -> Result<()> {
     if folder.is_dir() {
         return Ok(());
     }
-    Err(Error::new(ErrorKind::Io, "the folder of the output does not exist")
-        .at(folder)
-        .help("create it first"))
+    Err(Error::new(ErrorKind::Io, "the folder does not exist").at(folder).help("create it first"))
 }
 
 fn folder_of(path: &Path) -> PathBuf {
@@ -139,10 +137,7 @@ mod tests {
     fn places_where_no_file_can_appear_are_refused_before_any_work() {
         let at = tempfile::tempdir().unwrap();
         let told = |path: &Path| Staged::beside(path).unwrap_err().to_string();
-        assert!(
-            told(&at.path().join("none/out.las"))
-                .ends_with("none: the folder of the output does not exist")
-        );
+        assert!(told(&at.path().join("none/out.las")).ends_with("none: the folder does not exist"));
         assert!(told(at.path()).contains("a folder, not a file"));
         assert!(told(Path::new("/dev/null")).contains("no regular file"));
         assert_eq!(names(at.path()), [""; 0]);

@@ -208,7 +208,11 @@ impl Demands {
             Bytes(self.limit),
             Bytes(needed)
         ))
-        .help(format!("give --memory {} or more, or fewer --threads", whole_mebibytes(needed)))
+        .help(format!(
+            "give --memory {} or more{}",
+            whole_mebibytes(needed),
+            if self.threads > 1 { ", or fewer --threads" } else { "" }
+        ))
     }
 }
 
