@@ -95,7 +95,8 @@ mod tests {
     fn the_peak_is_at_least_what_is_resident_and_sees_an_allocation() {
         let before = resident_now().unwrap();
         assert!(peak_memory().unwrap() >= before);
-        let held = vec![1u8; 64 << 20];
+        // Used, or an optimised build would leave it out.
+        let held = std::hint::black_box(vec![1u8; 64 << 20]);
         let peak = peak_memory().unwrap();
         assert!(peak >= held.len() as u64, "{peak}");
     }
