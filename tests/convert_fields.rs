@@ -226,7 +226,7 @@ fn what_the_target_cannot_hold_is_named() {
         records.extend(record(&source, &[("X", 1.0), (name, value)]));
         let error = projection.project(&records, &mut Vec::new()).unwrap_err();
         let told = error.to_string();
-        assert!(told.contains(message) && told.contains("point 2"), "{told}");
+        assert!(told.contains(message) && told.contains("of the point at ("), "{told}");
         assert!(error.remedy().is_some());
     }
 }

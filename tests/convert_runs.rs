@@ -154,7 +154,12 @@ fn outputs_that_cannot_be_are_told_before_any_work_and_leave_nothing() {
         + scans_support::REDUCE.split_once("[run]").unwrap().1;
     fs::write(at.join("p.toml"), pipeline).unwrap();
     let sets = ["--set", "read.path=a.las", "--set", "write.path=out.las"];
-    fails(at, &[&["run", "p.toml"], &sets[..], &scratch[..]].concat(), 1, &["file: cannot create"]);
+    fails(
+        at,
+        &[&["run", "p.toml"], &sets[..], &scratch[..]].concat(),
+        1,
+        &["file: the folder for scratch does not exist"],
+    );
     fs::remove_file(at.join("p.toml")).unwrap();
     assert_holds(at, &there);
     assert_eq!(fs::read(at.join("file")).unwrap(), b"in the way");

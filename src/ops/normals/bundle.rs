@@ -64,6 +64,12 @@ impl Bundle {
         star: &mut Star,
         settle: &mut impl FnMut(usize, Outcome),
     ) {
+        if self.neighbors < 2 {
+            // A scan of one or two positions has no surface.
+            self.owners.drain(..).for_each(|owner| settle(owner, (Estimate::None, None)));
+            self.offsets.clear();
+            return;
+        }
         let exact = self.spread();
         let scatter = self.scatter();
         let flat = flat(&scatter, self.neighbors + 1);
