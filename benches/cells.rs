@@ -43,17 +43,9 @@ fn plane(roughness: f64) -> Tile {
         })
         .collect();
     let cube = TileKey::holding(&Bounds::of(positions.iter().copied())).cube();
-    Tile {
-        cube,
-        zone: cube,
-        copies: vec![1; positions.len()],
-        core: 0..positions.len(),
-        normals,
-        cells: Partition::default(),
-        fates: vec![Fate::Kept; positions.len()],
-        around: Default::default(),
-        positions,
-    }
+    let mut tile = Tile::of(positions);
+    (tile.cube, tile.zone, tile.normals) = (cube, cube, normals);
+    tile
 }
 
 fn settled(side: i64, split: Split, tile: &Tile) -> Cells {

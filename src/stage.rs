@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::Result;
 use crate::geom::lattice::Lattice;
-use crate::point::{Bounds, Metadata, PointBatch, Schema};
+use crate::point::{Bounds, Mark, Metadata, PointBatch, Schema};
 use crate::report::Tally;
 use crate::tile::{Levels, Tile};
 
@@ -91,12 +91,67 @@ pub trait TileOp: Send + Sync {
     }
 
     /// Called for every tile, from several threads at once.
+    ///
+    /// It decides for the positions that [`Tile::is_chosen`] holds; keys that every stage takes may
+    /// limit it to some classes or flags. Others are there to be seen, if at all.
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()>;
 
     /// What it decided by itself, for the report and for `plan`: name and value.
     fn decisions(&self) -> Vec<(String, serde_json::Value)> {
         Vec::new()
     }
+
+    /// True if it wants to look at a sample of the scan, after `settle` and before the first tile, to
+    /// say what is to be expected.
+    fn wants_sample(&self) -> bool {
+        false
+    }
+
+    /// Called for each of a few hundred small cubes, spread evenly over the records, in order, after
+    /// the stages above have run on it. What it returns goes to [`forecast`](TileOp::forecast).
+    fn sample(&self, _tile: &mut Tile) -> Result<Vec<f64>> {
+        Ok(Vec::new())
+    }
+
+    /// Says what is to be expected of the whole scan, a function of what the samples said, in order.
+    fn forecast(&mut self, _samples: &[Vec<f64>]) -> Forecast {
+        Forecast::default()
+    }
+}
+
+/// What a stage expects before it runs.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Forecast {
+    /// Figures for the report: name and value.
+    pub decisions: Vec<(String, serde_json::Value)>,
+    /// What the user should hear before the run.
+    pub warning: Option<String>,
+}
+
+/// Decides by figures of the whole scan, in two phases: it gathers over all tiles, concludes, and
+/// then runs as a [`TileOp`], on columns that the first phase left rather than on another search.
+pub trait ScanOp: TileOp {
+    /// What the first phase needs. Columns that it writes, and columns that stages above wrote and
+    /// [`TileOp::needs`] reads, are kept for the second.
+    fn gather_needs(&self) -> Needs;
+
+    /// The first phase, called for every tile, from several threads at once. What it appends to
+    /// `found` is stored in the order of the tiles, which is that of their positions; the sequence
+    /// over all tiles must not depend on how they are cut, or only sums of it may be used.
+    fn gather(&self, tile: &mut Tile, found: &mut Vec<[u64; 2]>, tally: &mut Tally) -> Result<()>;
+
+    /// Called once, between the phases.
+    fn conclude(&mut self, found: &dyn Gathered) -> Result<()>;
+}
+
+/// What the tiles of a [`ScanOp`]'s first phase found, wherever it is stored.
+pub trait Gathered {
+    /// Calls `visit` with all of it, stretch after stretch in the order of the tiles; as often as one
+    /// likes.
+    fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()>;
+
+    /// Records that the stage decides about.
+    fn records(&self) -> u64;
 }
 
 /// Where records go. A sink writes below the path it is given; the run puts the finished file in
@@ -208,6 +263,8 @@ pub enum Role {
     Transform(Box<dyn Transform>),
     /// Works on tiles.
     TileOp(Box<dyn TileOp>),
+    /// Works on tiles twice: gathers, then decides.
+    ScanOp(Box<dyn ScanOp>),
     /// Takes records.
     Sink(Box<dyn CreateSink>),
 }
@@ -215,7 +272,7 @@ pub enum Role {
 /// Everything a plan can check before a run.
 #[derive(Debug, Clone, Default)]
 pub struct Needs {
-    /// Dimensions or columns read ("Normal" and "Cell" are columns).
+    /// Dimensions or columns read ("Normal", "Cell" and "Figure" are columns).
     pub reads: Vec<String>,
     /// Dimensions or columns written.
     pub writes: Vec<String>,
@@ -230,6 +287,11 @@ pub struct Needs {
     pub bytes_per_point: usize,
     /// True if it removes points.
     pub removes: bool,
+    /// How it marks records instead of removing any, if it does.
+    pub mark: Option<Mark>,
+    /// How often the stages from the last that wrote "Normal" to this one are applied, each time to
+    /// what the time before left; 0 is 1.
+    pub passes: usize,
 }
 
 /// What is known of the whole scan after the decode.

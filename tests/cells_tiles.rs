@@ -29,7 +29,7 @@ fn tiles(scan: &[Point], most: usize) -> Vec<Bounds> {
 fn bits(fates: &[(pointmill::point::Position, Fate)]) -> Vec<([i64; 3], Option<u32>, bool)> {
     let deviation = |fate: Fate| match fate {
         Fate::Represented { deviation } => Some(deviation.to_bits()),
-        Fate::Kept | Fate::KeptOnce => None,
+        Fate::Kept | Fate::KeptOnce | Fate::Removed => None,
     };
     fates.iter().map(|&(p, fate)| (p, deviation(fate), fate == Fate::KeptOnce)).collect()
 }

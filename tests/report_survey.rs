@@ -4,7 +4,9 @@
 
 use pointmill::geom::lattice::Lattice;
 use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
-use pointmill::report::{Moments, Pair, Plane, ScanSurvey, TileFigures, Totals, report_tile_level};
+use pointmill::report::{
+    Lot, Moments, Pair, Plane, ScanSurvey, TileFigures, Totals, report_tile_level,
+};
 use pointmill::tile::{Fate, Levels, TileKey, morton_cmp};
 use pointmill::{ErrorKind, Result};
 use proptest::prelude::*;
@@ -40,10 +42,10 @@ fn survey(records: &[Record], level: u32, threads: usize) -> Result<(Vec<TileFig
     for (i, tile) in records.chunk_by(same).enumerate() {
         let part = &mut parts[i % threads];
         let mut survey = part.tile(TileKey::around(tile[0].0, level));
-        tile.iter().for_each(|&(p, n, fate)| survey.add(p, n, fate));
-        tile.iter().for_each(|&(p, n, fate)| part.add(p, n, fate));
+        tile.iter().for_each(|&(p, n, fate)| survey.add(p, Lot::of(n, fate)));
+        tile.iter().for_each(|&(p, n, fate)| part.add(p, Lot::of(n, fate)));
         let mut fitted = survey.fit();
-        tile.iter().for_each(|&(p, n, fate)| fitted.measure(p, n, fate));
+        tile.iter().for_each(|&(p, n, fate)| fitted.measure(p, Lot::of(n, fate)));
         tiles.push(fitted.finish(&lattice, part)?);
     }
     let mut scan = parts.pop().unwrap();
@@ -51,7 +53,7 @@ fn survey(records: &[Record], level: u32, threads: usize) -> Result<(Vec<TileFig
     let mut scan = scan.fit();
     for stretch in records.chunks(records.len().div_ceil(threads)).rev() {
         let mut part = scan.part();
-        stretch.iter().rev().for_each(|&(p, n, fate)| part.measure(p, n, fate));
+        stretch.iter().rev().for_each(|&(p, n, fate)| part.measure(p, Lot::of(n, fate)));
         scan.merge(&part);
     }
     Ok((tiles, scan.finish(&lattice)?))
@@ -185,7 +187,7 @@ fn nothing_surveyed_is_nothing_reported() {
 fn a_second_walk_that_misses_records_is_told() {
     let mut scan = ScanSurvey::new(&Bounds::of([[1, 2, 3]]));
     let mut tile = scan.tile(TileKey::around([0; 3], 4));
-    tile.add([1, 2, 3], 5, Fate::KeptOnce);
+    tile.add([1, 2, 3], Lot::of(5, Fate::KeptOnce));
     let error = tile.fit().finish(&lattice(1.0), &mut scan).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Internal);
     assert!(error.to_string().contains("5 records before and 1 after"), "{error}");
@@ -196,13 +198,13 @@ fn a_scan_that_misses_what_its_tiles_saw_is_told() {
     let (p, fate) = ([1, 2, 3], represented(1.0));
     let mut scan = ScanSurvey::new(&Bounds::of([p]));
     let mut tile = scan.tile(TileKey::around(p, 4));
-    tile.add(p, 5, fate);
+    tile.add(p, Lot::of(5, fate));
     let mut tile = tile.fit();
-    tile.measure(p, 5, fate);
+    tile.measure(p, Lot::of(5, fate));
     tile.finish(&lattice(1.0), &mut scan).unwrap();
     let mut scan = scan.fit();
     let mut part = scan.part();
-    part.measure(p, 5, fate);
+    part.measure(p, Lot::of(5, fate));
     scan.merge(&part);
     let error = scan.finish(&lattice(1.0)).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Internal);

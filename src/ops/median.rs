@@ -108,7 +108,7 @@ fn represent(tile: &mut Tile, i: usize, kept: usize) -> u64 {
     let records = match tile.fates[i] {
         Fate::Kept => u64::from(tile.copies[i]),
         Fate::KeptOnce => 1,
-        Fate::Represented { .. } => return 0,
+        Fate::Removed | Fate::Represented { .. } => return 0,
     };
     let normal = tile.normals[kept].map(f64::from);
     let (p, q) = (tile.positions[i], tile.positions[kept]);

@@ -27,7 +27,7 @@ impl Product {
             let records = match tile.fates[i] {
                 Fate::Kept => tile.copies[i],
                 Fate::KeptOnce => 1,
-                Fate::Represented { .. } => 0,
+                Fate::Removed | Fate::Represented { .. } => 0,
             };
             product.fates.extend_from_slice(&fate_code(tile.fates[i]));
             if records > 0 {

@@ -130,6 +130,7 @@ fn sort(stages: Vec<PlacedStage>) -> Result<Sorted> {
             }
             Role::Transform(transform) => sorted.transforms.push((kind, transform)),
             Role::TileOp(op) => sorted.ops.push((kind, op)),
+            Role::ScanOp(_) => return misplaced("stages of two phases are not run yet"),
         }
     }
     Ok(sorted)

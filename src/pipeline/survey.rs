@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use super::run::Job;
 use crate::geom::lattice::Lattice;
 use crate::point::Position;
-use crate::report::{ScanSurvey, TileFigures, Totals, report_tile_level};
+use crate::report::{Lot, ScanSurvey, TileFigures, Totals, report_tile_level};
 use crate::tile::{Address, Fate, Pieces, Reader, SealedTiles, Spill, SpillArea, TileKey, lock};
 use crate::{Error, Result};
 
@@ -16,6 +16,7 @@ use crate::{Error, Result};
 pub(super) const FATE_BYTES: usize = size_of::<f32>();
 const KEPT: f32 = -1.0;
 const KEPT_ONCE: f32 = -2.0;
+const REMOVED: f32 = -3.0;
 /// Blocks that a thread surveys at once.
 const BLOCKS: usize = 256;
 
@@ -24,6 +25,7 @@ pub(super) fn fate_code(fate: Fate) -> [u8; FATE_BYTES] {
     match fate {
         Fate::Kept => KEPT,
         Fate::KeptOnce => KEPT_ONCE,
+        Fate::Removed => REMOVED,
         Fate::Represented { deviation } => deviation,
     }
     .to_le_bytes()
@@ -33,6 +35,7 @@ fn fate_of(code: [u8; FATE_BYTES]) -> Fate {
     match f32::from_le_bytes(code) {
         KEPT => Fate::Kept,
         KEPT_ONCE => Fate::KeptOnce,
+        REMOVED => Fate::Removed,
         deviation => Fate::Represented { deviation },
     }
 }
@@ -146,7 +149,7 @@ pub(super) fn survey(
         for block in range * BLOCKS..((range + 1) * BLOCKS).min(tiles.blocks()) {
             stretch.load(&walk, block)?;
             for (&(p, fate), &copies) in stretch.positions.iter().zip(&stretch.copies) {
-                part.measure(p, copies, fate);
+                part.measure(p, Lot::of(copies, fate));
             }
             positions += stretch.positions.len() as u64;
         }
@@ -246,11 +249,13 @@ impl Walk<'_> {
             let key = TileKey::around(stretch.positions[at.1].0, self.level);
             let mut tile = scan.tile(key);
             let (next, seen) = self.visit(&mut stretch, at, key, |p, copies, fate| {
-                tile.add(p, copies, fate);
-                scan.add(p, copies, fate);
+                tile.add(p, Lot::of(copies, fate));
+                scan.add(p, Lot::of(copies, fate));
             })?;
             let mut fitted = tile.fit();
-            self.visit(&mut stretch, at, key, |p, copies, fate| fitted.measure(p, copies, fate))?;
+            self.visit(&mut stretch, at, key, |p, copies, fate| {
+                fitted.measure(p, Lot::of(copies, fate));
+            })?;
             lines.add(&fitted.finish(lattice, scan)?)?;
             positions += seen;
             at = next;

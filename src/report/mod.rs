@@ -19,7 +19,7 @@ pub use machine::{Machine, cpu_seconds, peak_memory, resident_now};
 pub use moments::{Moments, Plane};
 pub use sums::{Distances, FixedSum};
 pub use survey::{
-    FittedScan, FittedTile, PlaneDistances, ScanSurvey, TileSurvey, report_tile_level,
+    FittedScan, FittedTile, Lot, PlaneDistances, ScanSurvey, TileSurvey, report_tile_level,
 };
 pub use table::Table;
 pub use tally::Tally;

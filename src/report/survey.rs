@@ -32,21 +32,32 @@ pub fn report_tile_level(levels: &Levels) -> u32 {
     (0..level).find(|&j| levels.occupied(j) == fewest).unwrap_or(level)
 }
 
-/// How many of the copies of a position are kept.
-fn kept(copies: u32, fate: Fate) -> u32 {
-    match fate {
-        Fate::Kept => copies,
-        Fate::KeptOnce => copies.min(1),
-        Fate::Represented { .. } => 0,
-    }
+/// What became of the records of a position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lot {
+    /// Records.
+    pub copies: u32,
+    /// Those of them that are kept.
+    pub kept: u32,
+    /// How far the others are from the surface of what stands for them, in lattice steps; None where
+    /// nothing does.
+    pub deviation: Option<f32>,
 }
 
-/// How many are removed, and how far they are from the surface: copies of a kept position are on it.
-fn removed(copies: u32, fate: Fate) -> (u32, f32) {
-    match fate {
-        Fate::Kept => (0, 0.0),
-        Fate::KeptOnce => (copies.saturating_sub(1), 0.0),
-        Fate::Represented { deviation } => (copies, deviation),
+impl Lot {
+    /// The lot of `copies` records that share a fate: copies of a kept position are on the surface.
+    pub fn of(copies: u32, fate: Fate) -> Lot {
+        let (kept, deviation) = match fate {
+            Fate::Kept => (copies, None),
+            Fate::KeptOnce => (copies.min(1), Some(0.0)),
+            Fate::Removed => (0, None),
+            Fate::Represented { deviation } => (0, Some(deviation)),
+        };
+        Lot { copies, kept, deviation }
+    }
+
+    fn removed(self) -> u32 {
+        self.copies.saturating_sub(self.kept)
     }
 }
 
@@ -68,12 +79,13 @@ impl TileSurvey {
         TileSurvey { key, moments: no_moments(bounds), deviations: Deviations::default() }
     }
 
-    /// Adds `copies` records at `position`, which is in the cube.
-    pub fn add(&mut self, position: Position, copies: u32, fate: Fate) {
-        self.moments.before.add(position, copies);
-        self.moments.after.add(position, kept(copies, fate));
-        let (removed, deviation) = removed(copies, fate);
-        self.deviations.add(deviation, position, removed);
+    /// Adds the records at `position`, which is in the cube.
+    pub fn add(&mut self, position: Position, lot: Lot) {
+        self.moments.before.add(position, lot.copies);
+        self.moments.after.add(position, lot.kept);
+        if let Some(deviation) = lot.deviation {
+            self.deviations.add(deviation, position, lot.removed());
+        }
     }
 
     /// Adds what another walk over other records of the same tile saw.
@@ -104,9 +116,9 @@ pub struct FittedTile {
 }
 
 impl FittedTile {
-    /// Adds `copies` records at `position`, as in the first walk.
-    pub fn measure(&mut self, position: Position, copies: u32, fate: Fate) {
-        self.distances.measure(position, copies, fate);
+    /// Adds the records at `position`, as in the first walk.
+    pub fn measure(&mut self, position: Position, lot: Lot) {
+        self.distances.measure(position, lot);
     }
 
     /// The tile's figures in world units; its sums go into the totals of `scan`.
@@ -140,6 +152,8 @@ pub struct ScanSurvey {
     moments: Pair<Moments>,
     deviations: Deviations,
     histogram: Histogram,
+    /// Removed records that nothing stands for.
+    unrepresented: u64,
     tiles: u64,
     tile_distances: Pair<Distances>,
 }
@@ -155,6 +169,7 @@ impl ScanSurvey {
             moments: no_moments(bounds),
             deviations: Deviations::default(),
             histogram: Histogram::default(),
+            unrepresented: 0,
             tiles: 0,
             tile_distances: Pair::default(),
         }
@@ -170,16 +185,19 @@ impl ScanSurvey {
         TileSurvey::new(key, &bounds)
     }
 
-    /// Adds `copies` records at `position`, which is in the bounds and also added to its tile.
-    pub fn add(&mut self, position: Position, copies: u32, fate: Fate) {
+    /// Adds the records at `position`, which is in the bounds and also added to its tile.
+    pub fn add(&mut self, position: Position, lot: Lot) {
         if !self.takes_moments_from_tiles() {
-            self.moments.before.add(position, copies);
-            self.moments.after.add(position, kept(copies, fate));
+            self.moments.before.add(position, lot.copies);
+            self.moments.after.add(position, lot.kept);
         }
-        let (removed, deviation) = removed(copies, fate);
-        if removed > 0 {
-            self.deviations.add(deviation, position, removed);
-            self.histogram.add(deviation, removed);
+        match (lot.removed(), lot.deviation) {
+            (0, _) => {}
+            (removed, None) => self.unrepresented += u64::from(removed),
+            (removed, Some(deviation)) => {
+                self.deviations.add(deviation, position, removed);
+                self.histogram.add(deviation, removed);
+            }
         }
     }
 
@@ -195,6 +213,7 @@ impl ScanSurvey {
         self.moments.after.merge(&other.moments.after);
         self.deviations.merge(&other.deviations);
         self.histogram.merge(&other.histogram);
+        self.unrepresented += other.unrepresented;
         self.tiles += other.tiles;
         self.tile_distances.before.merge(&other.tile_distances.before);
         self.tile_distances.after.merge(&other.tile_distances.after);
@@ -236,7 +255,7 @@ impl FittedScan {
         let points = counts(&survey.moments);
         check_walks(points, &distances.sums)?;
         check_walks(points, &survey.tile_distances)?;
-        check_removed(points, &survey.deviations)?;
+        check_removed(points, &survey.deviations, survey.unrepresented)?;
         Ok(Totals {
             tiles: survey.tiles,
             points,
@@ -261,14 +280,13 @@ impl PlaneDistances {
         PlaneDistances { planes, sums: Pair::default() }
     }
 
-    /// Adds `copies` records at `position`, as in the first walk.
-    pub fn measure(&mut self, position: Position, copies: u32, fate: Fate) {
+    /// Adds the records at `position`, as in the first walk.
+    pub fn measure(&mut self, position: Position, lot: Lot) {
         if let Some(plane) = &self.planes.before {
-            self.sums.before.add(plane.distance(position), copies);
+            self.sums.before.add(plane.distance(position), lot.copies);
         }
-        let kept = kept(copies, fate);
-        if let Some(plane) = self.planes.after.as_ref().filter(|_| kept > 0) {
-            self.sums.after.add(plane.distance(position), kept);
+        if let Some(plane) = self.planes.after.as_ref().filter(|_| lot.kept > 0) {
+            self.sums.after.add(plane.distance(position), lot.kept);
         }
     }
 }
@@ -289,22 +307,21 @@ fn check_walks(points: Pair<u64>, measured: &Pair<Distances>) -> Result<()> {
     )))
 }
 
-fn check_removed(points: Pair<u64>, deviations: &Deviations) -> Result<()> {
+fn check_removed(points: Pair<u64>, deviations: &Deviations, unrepresented: u64) -> Result<()> {
     let undefined = deviations.undefined();
     if undefined > 0 {
         return Err(Error::internal(format!(
             "{undefined} removed records have a deviation that is no number"
         )));
     }
-    if points.after.checked_add(deviations.count()) == Some(points.before) {
+    let removed = deviations.count() + unrepresented;
+    if points.after.checked_add(removed) == Some(points.before) {
         return Ok(());
     }
     Err(Error::internal(format!(
         "the survey of the scan and those of its tiles differ: {} records before and {} after the \
-         reduction, but {} removed",
-        points.before,
-        points.after,
-        deviations.count()
+         reduction, but {removed} removed",
+        points.before, points.after
     )))
 }
 

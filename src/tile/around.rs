@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::key::morton_cmp;
 use super::remote::Remote;
 use super::sealed::SealedTiles;
-use super::{Bounds, Position, Tile};
+use super::{Bounds, Position, Tile, chosen};
 use crate::Result;
 use crate::geom::few::{FEW, places};
 use crate::geom::nearest::Nearest;
@@ -87,7 +87,7 @@ impl Tile {
         self.around.beyond = Beyond::new(tiles, loaded);
     }
 
-    /// Calls `visit` for every position of the zone with its index in the tile and the offsets,
+    /// Calls `visit` for every chosen position of the zone with its index in the tile and the offsets,
     /// in Morton order of the positions they lead to, of the `k` nearest *other* positions of the
     /// whole scan: nearest by exact squared distance, ties by Morton order. Fewer only if the scan
     /// has fewer.
@@ -96,14 +96,14 @@ impl Tile {
         k: usize,
         mut visit: impl FnMut(usize, &[Position]),
     ) -> Result<()> {
-        let Tile { positions, zone, around, .. } = self;
+        let Tile { positions, zone, around, selections, limits, .. } = self;
         let Around { search, remote, beyond, ranks, offsets, unproven, tied } = around;
         let mut outcome = Ok(());
         search.build(positions);
         search.search(
             positions,
             k,
-            |i| zone.contains(positions[i]),
+            |i| zone.contains(positions[i]) && chosen(selections, *limits, i),
             |i, neighbors, d2| {
                 if outcome.is_err() {
                     return;

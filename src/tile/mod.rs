@@ -69,18 +69,25 @@ pub struct Tile {
     pub zone: Bounds,
     /// All positions loaded.
     pub positions: Vec<Position>,
-    /// How many records share each position.
+    /// How many records of each position are decided about: 0 for one that is only seen.
     pub copies: Vec<u32>,
     /// Those of `cube`.
     pub core: Range<usize>,
     /// Unit normals; NaN where there is none or it was not asked for.
     pub normals: Vec<[f32; 3]>,
+    /// What a first phase found for each position of the core; NaN where it found nothing.
+    pub figures: Vec<f64>,
     /// The partition into cells, once a stage made one.
     pub cells: Cells,
     /// What becomes of each position (meaningful in the core). Kept unless a stage says otherwise.
     pub fates: Vec<Fate>,
     /// Where neighbours are found.
     pub around: Around,
+    /// For each position, the selections that one of its records is in, a bit each; empty if no stage
+    /// is limited to some records.
+    pub(crate) selections: Vec<u8>,
+    /// The selections that the stage at work is limited to.
+    pub(crate) limits: u8,
 }
 
 impl Tile {
@@ -93,9 +100,12 @@ impl Tile {
             copies: Vec::with_capacity(capacity),
             core: 0..0,
             normals: Vec::with_capacity(capacity),
+            figures: Vec::new(),
             cells: Cells::default(),
             fates: Vec::with_capacity(capacity),
             around: Around::default(),
+            selections: Vec::new(),
+            limits: 0,
         }
     }
 
@@ -111,9 +121,12 @@ impl Tile {
             copies: vec![1; n],
             core: 0..n,
             normals: vec![[f32::NAN; 3]; n],
+            figures: vec![f64::NAN; n],
             cells: Cells::default(),
             fates: vec![Fate::Kept; n],
             around: Around::default(),
+            selections: Vec::new(),
+            limits: 0,
         }
     }
 
@@ -123,14 +136,28 @@ impl Tile {
         self.positions.clear();
         self.copies.clear();
         self.normals.clear();
+        self.figures.clear();
         self.cells.clear();
         self.fates.clear();
+        self.selections.clear();
+        self.limits = 0;
+    }
+
+    /// True if the stage at work decides about position `i`: one of its records is of the classes and
+    /// flags that the stage is limited to.
+    pub fn is_chosen(&self, i: usize) -> bool {
+        chosen(&self.selections, self.limits, i)
     }
 
     /// True if columns must be right for position `i`.
     pub fn in_zone(&self, i: usize) -> bool {
         self.zone.contains(self.positions[i])
     }
+}
+
+/// See [`Tile::is_chosen`].
+fn chosen(selections: &[u8], limits: u8, i: usize) -> bool {
+    limits == 0 || selections.get(i).is_none_or(|of| of & limits == limits)
 }
 
 /// What becomes of the records of a position.
@@ -140,6 +167,8 @@ pub enum Fate {
     Kept,
     /// The canonical first is kept, the other copies are removed as coincident.
     KeptOnce,
+    /// All are removed, and nothing stands for them.
+    Removed,
     /// All are removed; a kept point stands for them.
     Represented {
         /// Distance to the plane through the point that stands for them, along its normal, in

@@ -8,7 +8,7 @@ use pointmill::ops::{Cells, Median, Side, Split};
 use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
 use pointmill::report::Tally;
 use pointmill::stage::{ScanFacts, TileOp};
-use pointmill::tile::{Cells as Partition, Fate, Levels, Tile, TileKey, morton_cmp};
+use pointmill::tile::{Fate, Levels, Tile, TileKey, morton_cmp};
 use proptest::prelude::*;
 
 pub const NONE: [f32; 3] = [f32::NAN; 3];
@@ -41,17 +41,11 @@ pub fn tile(scan: &[Point], cube: Bounds, side: i64) -> Tile {
     let loaded: Vec<Point> = scan.iter().copied().filter(|p| zone.contains(p.at)).collect();
     let start = loaded.iter().take_while(|p| !cube.contains(p.at)).count();
     let count = loaded.iter().filter(|p| cube.contains(p.at)).count();
-    Tile {
-        cube,
-        zone,
-        positions: loaded.iter().map(|p| p.at).collect(),
-        copies: loaded.iter().map(|p| p.copies).collect(),
-        core: start..start + count,
-        normals: loaded.iter().map(|p| p.normal).collect(),
-        cells: Partition::default(),
-        fates: vec![Fate::Kept; loaded.len()],
-        around: Default::default(),
-    }
+    let mut tile = Tile::of(loaded.iter().map(|p| p.at).collect());
+    (tile.cube, tile.zone, tile.core) = (cube, zone, start..start + count);
+    tile.copies = loaded.iter().map(|p| p.copies).collect();
+    tile.normals = loaded.iter().map(|p| p.normal).collect();
+    tile
 }
 
 pub fn cells(side: f64, max_angle: f64, split: Split) -> Cells {
