@@ -9,7 +9,7 @@ use pointmill::ops::{Cells, Median, Side, Split};
 use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
 use pointmill::report::Tally;
 use pointmill::stage::{ScanFacts, TileOp};
-use pointmill::tile::{Cells as Partition, Fate, Levels, Tile, TileKey, morton_cmp};
+use pointmill::tile::{Fate, Levels, Tile, TileKey, morton_cmp};
 
 /// Positions a side of the plane.
 const SIDE: i64 = 1000;
