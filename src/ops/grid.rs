@@ -19,8 +19,8 @@ const LARGEST_SIDE: i64 = 1 << 62;
 /// Bytes a position: its cube and its index, and coordinates to take a median of.
 const BYTES: usize = size_of::<Entry>() + size_of::<i64>();
 
-/// Keeps one record of every occupied cube of a uniform grid (Martin et al., with which the paper
-/// compares; elsewhere called voxel thinning).
+/// The uniform grid of Martin et al., with which the paper compares; elsewhere called voxel thinning:
+/// of every occupied cube one record stays.
 ///
 /// The cubes are anchored at world 0 and have the side `side`, rounded to whole lattice steps, which
 /// the report names. It looks at nothing but positions, so no stage needs to come before it; after
@@ -48,7 +48,7 @@ pub enum Pick {
     Center,
     /// The nearest to the lower medians of the x, of the y and of the z of the cube's positions.
     Median,
-    /// The first in canonical order, which is that of the octree; the fastest.
+    /// The first in canonical order (Morton order). The fastest.
     First,
 }
 

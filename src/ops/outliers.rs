@@ -19,7 +19,7 @@ pub const MAX_NEIGHBORS: usize = 64;
 const NEIGHBORS: usize = 10;
 const MULTIPLIER: f64 = 2.0;
 
-/// Removes points that are far from all others (what the paper does before its first step).
+/// What the paper does before its first step: "the farther noise point is removed".
 ///
 /// Positions count, not records: copies of a point are no neighbours of each other, weigh as one, and
 /// are removed together.
@@ -28,8 +28,8 @@ const MULTIPLIER: f64 = 2.0;
 /// positions, or to all there are where the scan has fewer. Removed is what exceeds mean + `multiplier`
 /// · σ, both taken over the figures of all positions that the stage decides about (σ of the population).
 /// Figures are rounded to 2^-16 lattice steps and summed exactly, so that the mean and σ of a scan do
-/// not depend on how it is cut into tiles. Report and `plan` name mean, σ and threshold in the scan's
-/// unit. The scan is searched once: a first phase stores the figures, a second reads them.
+/// not depend on how it is cut into tiles. The report names mean, σ and threshold in the scan's unit.
+/// The scan is searched once: a first phase stores the figures, a second reads them.
 ///
 /// With `method = "radius"` removed is what has fewer than `min_neighbors` other positions within
 /// `radius`, those at exactly this distance included. Squared distances are whole numbers of lattice
