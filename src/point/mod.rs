@@ -4,7 +4,9 @@ mod batch;
 mod bounds;
 pub mod names;
 mod schema;
+mod units;
 
 pub use batch::PointBatch;
 pub use bounds::{Bounds, Position, distance2};
 pub use schema::{Bits, Dimension, Endian, Layout, Metadata, Scalar, Schema, Value};
+pub use units::{Horizontal, Mismatch, Units};
