@@ -38,8 +38,8 @@ pub fn epsg_vertical(code: u32) -> Option<f64> {
     match code {
         // EGM2008, ODN, AHD, NAVD88, NAP, EGM96, IGN69, EGM84, Baltic 1977, LN02, DHHN92, CGVD28, EVRF2007,
         // CGVD2013, JGD2011, NZVD2016, DHHN2016, CGVD2013a, EVRF2019
-        3855 | 5701 | 5703 | 5705 | 5709 | 5711 | 5713 | 5720 | 5728 | 5773 | 5783 | 5798 | 5621
-        | 6647 | 6695 | 7837 | 7839 | 9245 | 9389 => Some(1.0),
+        3855 | 5701 | 5703 | 5705 | 5709 | 5711 | 5713 | 5720 | 5728 | 5773 | 5783 | 5798
+        | 5621 | 6647 | 6695 | 7837 | 7839 | 9245 | 9389 => Some(1.0),
         // NGVD29 and NAVD88 in US survey feet.
         5702 | 6360 => Some(SURVEY_FOOT),
         // NAVD88 in feet.
@@ -244,10 +244,8 @@ mod tests {
 
     #[test]
     fn a_foot_of_one_metre_says_nothing() {
-        let text = UTM.replace(
-            "AXIS[\"Easting\",EAST]",
-            "VERTCS[\"NAVD88\",UNIT[\"US survey foot\",1.0]]",
-        );
+        let text = UTM
+            .replace("AXIS[\"Easting\",EAST]", "VERTCS[\"NAVD88\",UNIT[\"US survey foot\",1.0]]");
         assert_eq!(units(&text), of(Some(Horizontal::Metres(1.0)), None));
     }
 
@@ -262,7 +260,9 @@ mod tests {
     fn nonsense_says_nothing() {
         let deep = "A[".repeat(1_000_000);
         let wide = format!("A[{}]", "B[1],".repeat(1_000_000));
-        for text in ["", "PROJCS", "PROJCS[", "]]]]", "PROJCS[\"", "a,b", "UNIT[\"m\",1]", &deep, &wide] {
+        for text in
+            ["", "PROJCS", "PROJCS[", "]]]]", "PROJCS[\"", "a,b", "UNIT[\"m\",1]", &deep, &wide]
+        {
             assert_eq!(units(text), Units::default());
         }
         let negative = UTM.replace("\"metre\",1", "\"metre\",-1");

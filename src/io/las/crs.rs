@@ -208,7 +208,8 @@ mod tests {
         for degrees in [&[1024, 2, 2048, 4326][..], &[2048, 4326], &[1024, 2, 4099, 9001]] {
             assert_eq!(units(degrees).horizontal, Some(Horizontal::Degrees), "{degrees:?}");
         }
-        for unknown in [&[][..], &[3072, 2154], &[1024, 1, 3076, 32767], &[2048, 4326, 3072, 2154]] {
+        for unknown in [&[][..], &[3072, 2154], &[1024, 1, 3076, 32767], &[2048, 4326, 3072, 2154]]
+        {
             assert_eq!(units(unknown), Units::default(), "{unknown:?}");
         }
     }
