@@ -192,7 +192,18 @@ fn the_pipelines_that_users_copy_are_right() {
         names.push(name);
     }
     names.sort();
-    assert_eq!(names, ["convert.toml", "demo.toml", "reduce.toml"]);
+    assert_eq!(
+        names,
+        [
+            "classes.toml",
+            "convert.toml",
+            "demo.toml",
+            "grid.toml",
+            "mark.toml",
+            "outliers.toml",
+            "reduce.toml",
+        ]
+    );
 }
 
 #[test]

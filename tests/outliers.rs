@@ -87,9 +87,9 @@ fn statistical_outliers_are_those_of_brute_force_however_the_scan_is_cut() {
         assert!((1..scan.len() / 2).contains(&count));
 
         let mut decisions = Vec::new();
-        for depth in [0, 1, 3] {
-            let cubes = cubes(&scan, depth);
-            assert!(cubes.len() >= [1, 4, 0, 30][depth as usize], "{}", cubes.len());
+        for (most, fewest) in [(scan.len(), 1), (300, 4), (25, 30)] {
+            let cubes = cubes(&scan, most);
+            assert!(cubes.len() >= fewest, "{}", cubes.len());
             let stage = StatisticalOutliers::new(k, multiplier, None).unwrap();
             let (fates, tally, stage) = statistical(stage, &scan, &cubes, &|_| 1);
             let out: Vec<bool> = fates.iter().map(|f| f.1 == Fate::Removed).collect();
@@ -113,7 +113,7 @@ fn copies_are_no_neighbours_and_go_together() {
     let scan = scene(&[500]);
     let far = |p: Position| p[2] == 500;
     let stage = || StatisticalOutliers::new(10, 2.0, None).unwrap();
-    let cubes = cubes(&scan, 1);
+    let cubes = cubes(&scan, 200);
     let (once, _, of_one) = statistical(stage(), &scan, &cubes, &|_| 1);
     let copies = |p: Position| if far(p) { 20 } else { 1 + (p[0] % 3 == 0) as u32 };
     let (many, tally, of_many) = statistical(stage(), &scan, &cubes, &copies);
@@ -131,7 +131,7 @@ fn positions_that_are_only_seen_are_neighbours_but_have_no_figure() {
     let scan = scene(&[40, 41, 900]);
     let seen = |p: Position| u32::from(p[2] >= 40);
     let stage = StatisticalOutliers::new(3, 1.0, None).unwrap();
-    let (fates, tally, _) = statistical(stage, &scan, &cubes(&scan, 2), &seen);
+    let (fates, tally, _) = statistical(stage, &scan, &cubes(&scan, 60), &seen);
     let out: Vec<Position> = fates.iter().filter(|f| f.1 == Fate::Removed).map(|f| f.0).collect();
     assert_eq!(out, [[24, 150, 900]]);
     assert_eq!(removed(&tally, "outliers", "outlier"), 1);
@@ -142,7 +142,7 @@ fn a_lattice_of_equal_distances_and_single_points_have_no_outlier() {
     let even = sorted((0..512).map(|i| [i % 8 * 3, i / 8 % 8 * 3, i / 64 * 3]));
     for (scan, k) in [(even, 3), (vec![[5, 5, 5]], 10), (sorted([[0, 0, 0], [9, 9, 9]]), 10)] {
         let stage = StatisticalOutliers::new(k, 0.0, None).unwrap();
-        let (fates, tally, stage) = statistical(stage, &scan, &cubes(&scan, 1), &|_| 1);
+        let (fates, tally, stage) = statistical(stage, &scan, &cubes(&scan, 200), &|_| 1);
         assert!(fates.len() == scan.len() && fates.iter().all(|f| f.1 == Fate::Kept));
         assert!(tally.removed.is_empty());
         assert_eq!(stage.decisions()[1], ("sigma".to_owned(), 0.0.into()));
@@ -154,8 +154,8 @@ fn a_mark_is_counted_and_enters_no_ledger() {
     let scan = scene(&[500, -500]);
     let out = |mark| {
         let stage = StatisticalOutliers::new(10, 2.0, mark).unwrap();
-        assert_eq!((stage.needs().mark, stage.needs().removes), (mark, mark.is_none()));
-        statistical(stage, &scan, &cubes(&scan, 1), &|_| 2)
+        assert_eq!((stage.needs().mark, stage.needs().removes), (mark, true));
+        statistical(stage, &scan, &cubes(&scan, 200), &|_| 2)
     };
     let ((removed_fates, ledger, _), (fates, tally, _)) = (out(None), out(Some(Mark::Class(7))));
     assert_eq!(fates, removed_fates);
@@ -165,9 +165,9 @@ fn a_mark_is_counted_and_enters_no_ledger() {
     assert_eq!(tally.counts.get("outliers_marked"), Some(&records));
 }
 
-fn radius(scan: &[Position], depth: u32, stage: &RadiusOutliers) -> Vec<(Position, Fate)> {
+fn radius(scan: &[Position], most: usize, stage: &RadiusOutliers) -> Vec<(Position, Fate)> {
     let mut all = Vec::new();
-    for cube in cubes(scan, depth) {
+    for cube in cubes(scan, most) {
         let mut tile = tile(scan, cube, 0);
         let mut tally = Tally::default();
         stage.run(&mut tile, &mut tally).unwrap();
@@ -197,8 +197,8 @@ proptest! {
                 (*p, if near < least { Fate::Removed } else { Fate::Kept })
             })
             .collect();
-        prop_assert_eq!(radius(&scan, 0, &stage), &expected[..]);
-        prop_assert_eq!(radius(&scan, 2, &stage), &expected[..]);
+        prop_assert_eq!(radius(&scan, scan.len(), &stage), &expected[..]);
+        prop_assert_eq!(radius(&scan, 5, &stage), &expected[..]);
     }
 }
 
@@ -208,7 +208,7 @@ fn who_is_exactly_at_the_radius_counts() {
     for (length, kept) in [(0.299, 0), (0.3, 2), (0.399_999, 2), (0.4, 4)] {
         let mut stage = RadiusOutliers::new(length, 1, None).unwrap();
         settle(&mut stage, &scan, 0.1);
-        let fates = radius(&scan, 0, &stage);
+        let fates = radius(&scan, scan.len(), &stage);
         assert_eq!(fates.iter().filter(|f| f.1 == Fate::Kept).count(), kept, "{length}");
     }
 }

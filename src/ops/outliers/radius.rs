@@ -57,7 +57,7 @@ impl TileOp for RadiusOutliers {
             reads: names::XYZ.map(str::to_owned).to_vec(),
             neighbors: self.min_neighbors,
             bytes_per_point: size_of::<bool>(),
-            removes: self.mark.is_none(),
+            removes: true,
             mark: self.mark,
             ..Needs::default()
         }

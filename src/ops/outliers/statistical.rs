@@ -46,12 +46,7 @@ impl StatisticalOutliers {
 
 impl TileOp for StatisticalOutliers {
     fn needs(&self) -> Needs {
-        Needs {
-            reads: vec!["Figure".into()],
-            removes: self.mark.is_none(),
-            mark: self.mark,
-            ..Needs::default()
-        }
+        Needs { reads: vec!["Figure".into()], removes: true, mark: self.mark, ..Needs::default() }
     }
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
