@@ -12,7 +12,7 @@ use std::time::Duration;
 use fuzz_support::campaign::Campaign;
 use fuzz_support::harness::Harness;
 use fuzz_support::judge::{Judgement, Outcome, refused};
-use fuzz_support::{TARGETS, Target, las, mutate, pipeline, ply, text};
+use fuzz_support::{TARGETS, Target, las, las_seeds, mutate, pipeline, ply, text};
 
 /// Time that one input may take.
 const MOST_TIME: Duration = Duration::from_secs(5);
@@ -49,12 +49,12 @@ fn bounded(target: Target, executions: u64, fewest: usize) {
 
 #[test]
 fn las_files_of_any_bytes_fail_or_read() {
-    bounded(las::TARGET, 3000, 120);
+    bounded(las::TARGET, 2500, 120);
 }
 
 #[test]
 fn ply_files_of_any_bytes_fail_or_read() {
-    bounded(ply::TARGET, 30_000, 200);
+    bounded(ply::TARGET, 20_000, 200);
 }
 
 #[test]
@@ -81,6 +81,39 @@ fn inputs_that_once_broke_a_promise_keep_it() {
         }
     }
     assert!(replayed >= 4, "only {replayed} inputs are committed");
+}
+
+/// A PLY file of one vertex with `lines` in its header, before and behind its coordinates.
+fn one_vertex(before: &str, behind: &str, more: usize) -> Vec<u8> {
+    format!(
+        "ply\nformat ascii 1.0\n{before}element vertex 1\nproperty float x\nproperty float y\n\
+         property float z\n{behind}end_header\n1 2 3{}\n",
+        " 1".repeat(more)
+    )
+    .into_bytes()
+}
+
+#[test]
+fn the_longest_headers_take_no_longer_than_they_are() {
+    let lines = |range: std::ops::Range<usize>, line: fn(usize) -> String| -> String {
+        range.map(line).collect()
+    };
+    let las = Harness::new(las::TARGET, MOST_TIME).judge(&las_seeds::same_names());
+    assert!(las.as_ref().is_ok_and(|o| o.accepted), "{las:?}");
+    let elements = lines(0..60_000, |i| format!("element {i:x} 0\n"));
+    let comments = lines(0..15_000, |i| format!("comment dimension p{i:x}: D{i:x}\n"));
+    let others = lines(15_000..35_000, |i| format!("property float p{i:x}\n"));
+    let own = lines(0..15_000, |i| format!("property float p{i:x}\n"));
+    let harness = Harness::new(ply::TARGET, MOST_TIME);
+    for (what, file) in [
+        ("elements", one_vertex(&elements, "", 0)),
+        ("comments about none of the properties", one_vertex(&comments, &others, 20_000)),
+        ("comments about all of the properties", one_vertex(&comments, &own, 15_000)),
+    ] {
+        assert!(file.len() > 500_000, "{what}");
+        let outcome = harness.judge(&file);
+        assert!(outcome.as_ref().is_ok_and(|o| o.accepted), "{what}: {outcome:?}");
+    }
 }
 
 /// A target that breaks a promise if its input has the byte 0xff at 3 and asks for it.

@@ -44,7 +44,8 @@ fn target(path: &Path, data: &[u8]) -> Judgement {
         None => format!("format {:?} read, {}", schema.layout, read.all),
     });
     if read.all && read.error.is_none() {
-        let compressed = data.len() % 2 == 0;
+        // An encoder of very long records holds more than is worth trying.
+        let compressed = data.len() % 2 == 0 && schema.stride < 4096;
         marks.extend(written(path, &*source, &schema, &read, compressed)?);
     }
     Ok(Outcome { accepted: read.error.is_none(), marks })

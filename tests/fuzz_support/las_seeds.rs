@@ -161,6 +161,28 @@ fn descriptor(name: &str, kind: u8) -> Vec<u8> {
     bytes
 }
 
+/// A descriptor of `size` bytes without a meaning.
+fn unnamed(size: u8) -> Vec<u8> {
+    let mut bytes = vec![0; 192];
+    bytes[3] = size;
+    bytes
+}
+
+/// A file whose records are as long as can be, of descriptors that all want the same names.
+pub fn same_names() -> Vec<u8> {
+    let same = ("LASF_Spec", 4, unnamed(192).repeat(341));
+    Recipe {
+        minor: 4,
+        format: 0,
+        extra: 341 * 192,
+        points: 1,
+        vlrs: vec![same],
+        evlrs: Vec::new(),
+        chunk: None,
+    }
+    .bake()
+}
+
 /// The files to begin with.
 pub fn seeds() -> Vec<Vec<u8>> {
     let none = Recipe {
