@@ -38,6 +38,10 @@ fn fields(object: &Map<String, Value>, indent: usize, lines: &mut Vec<String>) {
     }
 }
 
+/// Columns are padded to no more characters than this: a file may hold longer ones, and a table that
+/// repeats the longest in every row could be larger than any memory.
+const WIDEST: usize = 60;
+
 /// A list of objects as a table, with the keys of all of them as its columns.
 fn rows(list: &[Value], indent: usize, lines: &mut Vec<String>) {
     let mut columns: Vec<&str> = Vec::new();
@@ -49,7 +53,8 @@ fn rows(list: &[Value], indent: usize, lines: &mut Vec<String>) {
     let cell = |row: &Value, column: &str| row.get(column).map(plain).unwrap_or_default();
     let mut table = vec![columns.iter().map(|c| (*c).to_owned()).collect::<Vec<String>>()];
     table.extend(list.iter().map(|row| columns.iter().map(|c| cell(row, c)).collect()));
-    let width = |i: usize| table.iter().map(|row| row[i].chars().count()).max().unwrap_or(0);
+    let width =
+        |i: usize| table.iter().map(|row| row[i].chars().count()).max().unwrap_or(0).min(WIDEST);
     let widths: Vec<usize> = (0..columns.len()).map(width).collect();
     for row in &table {
         let cells: Vec<String> =
@@ -96,5 +101,13 @@ mod tests {
     Red
   text        a [31mb";
         assert_eq!(format!("\n{}", render(&facts, 2)), expected);
+    }
+
+    #[test]
+    fn a_cell_longer_than_any_column_makes_no_other_row_long() {
+        let rows: Vec<Value> = (0..500).map(|i| json!({ "name": "x", "n": i })).collect();
+        let long = json!({ "name": "x".repeat(100_000), "n": 0 });
+        let text = render(&json!({ "elements": [rows, vec![long]].concat() }), 0);
+        assert!(text.contains(&"x".repeat(100_000)) && text.len() < 150_000, "{}", text.len());
     }
 }

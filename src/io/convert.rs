@@ -5,6 +5,8 @@ mod layouts;
 
 pub use layouts::{las_schema, ply_schema};
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use crate::point::names::XYZ;
 use crate::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
 use crate::{Error, ErrorKind, Result};
@@ -50,11 +52,12 @@ impl Projection {
     /// `from` lacks. Coordinates cannot be dropped.
     pub fn new(from: &Schema, to: &Schema, drop: &[String]) -> Result<Projection> {
         check_drop(from, drop)?;
+        let held: BTreeSet<&str> = to.dimensions.iter().map(|d| d.name.as_str()).collect();
         let lost: Vec<&str> = from
             .dimensions
             .iter()
             .map(|d| d.name.as_str())
-            .filter(|name| to.find(name).is_none() && !drop.iter().any(|d| d == name))
+            .filter(|name| !held.contains(name) && !drop.iter().any(|d| d == name))
             .collect();
         if !lost.is_empty() {
             let format = match to.layout {
@@ -64,10 +67,11 @@ impl Projection {
             return Err(Error::pipeline(format!("{format} cannot hold {}", quoted(&lost)))
                 .help(format!("drop = {lost:?} leaves them out")));
         }
+        let sources: BTreeMap<&str, &Dimension> =
+            from.dimensions.iter().map(|d| (d.name.as_str(), d)).collect();
         let mut moves = Vec::new();
-        for target in &to.dimensions {
-            let source = from.find(&target.name).filter(|_| !drop.contains(&target.name));
-            if let Some(source) = source {
+        for target in to.dimensions.iter().filter(|d| !drop.contains(&d.name)) {
+            if let Some(source) = sources.get(target.name.as_str()) {
                 push(&mut moves, step(source, from.endian, target, to.endian));
             }
         }

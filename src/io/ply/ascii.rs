@@ -36,7 +36,8 @@ pub(super) struct AsciiPart<'a> {
 impl<'a> AsciiPart<'a> {
     /// Bytes that reading holds besides the batch.
     pub fn bytes(schema: &Schema) -> u64 {
-        (WINDOW + longest_line(schema)) as u64
+        let fields = schema.dimensions.len() * size_of::<(&str, Scalar, usize)>();
+        (WINDOW + longest_line(schema) + fields) as u64
     }
 
     pub fn new(handle: File, file: &'a PlyFile, schema: &'a Schema, source: u32) -> Self {

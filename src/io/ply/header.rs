@@ -247,6 +247,8 @@ fn parse(bytes: &[u8], whole: bool, path: &Path) -> Result<Option<Header>> {
 struct Partial {
     encoding: Option<Encoding>,
     elements: Vec<Element>,
+    element_names: BTreeSet<String>,
+    /// Names of the last element's properties.
     names: BTreeSet<String>,
     comments: Vec<String>,
     obj_info: Vec<String>,
@@ -306,7 +308,7 @@ impl Partial {
         let count = count
             .parse()
             .map_err(|_| format!("`{}` is no count of element `{}`", shown(count), shown(name)))?;
-        if self.elements.iter().any(|e| e.name == name) {
+        if !self.element_names.insert(name.to_owned()) {
             return Err(format!("a second element `{}`", shown(name)));
         }
         self.elements.push(Element { name: name.to_owned(), count, properties: Vec::new() });

@@ -1,5 +1,6 @@
 //! Writes vertices to a PLY file.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::os::unix::fs::FileExt;
@@ -254,10 +255,9 @@ fn headings(
     rest: Option<&Native>,
 ) -> Headings {
     let dimensions: Vec<&str> = plan.vertex.dimensions.iter().map(|d| d.name.as_str()).collect();
-    let properties = names::properties(&dimensions, |name| {
-        let (_, property) = native?.properties.iter().find(|(d, _)| d == name)?;
-        Some(property.clone())
-    });
+    let kept = native.iter().flat_map(|native| &native.properties);
+    let kept: BTreeMap<&str, &String> = kept.map(|(d, p)| (d.as_str(), p)).collect();
+    let properties = names::properties(&dimensions, |name| kept.get(name).copied().cloned());
     // A line end within a text would begin a line of its own.
     let line =
         |keyword: &str, text: &str| format!("{keyword} {}\n", text.replace(['\n', '\r'], " "));

@@ -1,5 +1,6 @@
 //! Reads the vertices of PLY files.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
@@ -100,6 +101,7 @@ impl Texts {
         let properties: Vec<&str> = file.properties().iter().map(|p| p.name.as_str()).collect();
         let header = &file.header;
         let dimensions = names::dimensions(&properties, &header.comments);
+        let properties: BTreeSet<&str> = properties.into_iter().collect();
         let mut crs: Option<String> = None;
         let mut comments = Vec::new();
         // Only pieces right behind the first belong to it: other comments are free to look alike.
@@ -115,7 +117,7 @@ impl Texts {
                 continue;
             }
             more = false;
-            let of_ours = names::property_told(comment).is_some_and(|p| properties.contains(&p));
+            let of_ours = names::property_told(comment).is_some_and(|p| properties.contains(p));
             if !of_ours && !super::is_padding(comment, file.points) {
                 comments.push(comment.clone());
             }
