@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use docs_support::{Enum, Field, enum_of, item_docs, struct_of};
 use pointmill::ops::normals::Normals;
-use pointmill::ops::{Cells, Median};
+use pointmill::ops::{Cells, Grid, Median, Outliers};
 use pointmill::pipeline::{
     Overrides, Pipeline, Quiet, Read, Registry, RunSettings, StageKind, Synth, Write,
 };
@@ -77,9 +77,11 @@ fn pages() -> Vec<Page> {
             words: &["src/io/synthetic/mod.rs"],
             ..page::<Synth>(KINDS, "scene = 'als'\npoints = 1000")
         },
-        page::<Normals>("src/ops/normals.rs", ""),
+        page::<Outliers>("src/ops/outliers.rs", ""),
+        Page { words: &["src/ops/normals/orient.rs"], ..page::<Normals>("src/ops/normals.rs", "") },
         Page { words: &["src/ops/cells/settings.rs"], ..page::<Cells>("src/ops/cells.rs", "") },
         page::<Median>("src/ops/median.rs", ""),
+        page::<Grid>("src/ops/grid.rs", "side = 1.0"),
         page::<Write>(KINDS, "path = 'out.laz'"),
     ]
 }
@@ -99,6 +101,7 @@ fn sort_of(subject: &str, field: &Field, files: &[String]) -> (String, Option<En
         ("write", "scale", _) => "a number, or three",
         ("run", "z_scale", _) => "a number, or `\"auto\"`",
         ("run", "memory", _) => "a size such as `\"2GiB\"`, or a number of bytes",
+        (_, "mark", _) => "`\"key-point\"`, `\"withheld\"`, 7 or 18",
         (_, _, "usize" | "u64") => "a whole number",
         (_, _, "NonZeroUsize") => "a whole number from 1",
         (_, _, "f64") => "a number",

@@ -107,7 +107,7 @@ pub fn run(stage: &Cells, scan: &[Point], cubes: &[Bounds]) -> Outcome {
         let mut tile = tile(scan, *cube, side);
         let mut tally = Tally::default();
         stage.run(&mut tile, &mut tally).unwrap();
-        Median {}.run(&mut tile, &mut tally).unwrap();
+        Median::default().run(&mut tile, &mut tally).unwrap();
         outcome.tally.merge(&tally);
         outcome.fates.extend(tile.core.clone().map(|i| (tile.positions[i], tile.fates[i])));
         outcome.groups.extend(groups(&tile));
