@@ -5,7 +5,7 @@ mod cells_scene;
 use std::num::NonZeroUsize;
 
 use cells_scene::*;
-use pointmill::ops::{Cells, Split};
+use pointmill::ops::{Cells, Measure, Reference, Split};
 use pointmill::point::{Bounds, Position};
 use pointmill::report::Tally;
 use pointmill::stage::TileOp;
@@ -22,6 +22,25 @@ fn any_split() -> impl Strategy<Value = Split> {
     prop::sample::select(vec![Split::Voronoi, Split::Octant])
 }
 
+fn any_measure() -> impl Strategy<Value = Measure> {
+    prop::sample::select(vec![Measure::Axis, Measure::Cone])
+}
+
+fn any_reference() -> impl Strategy<Value = Reference> {
+    // Their largest components are powers of two: scaled by them they are what the plain version has.
+    let [a, b] = [[0.0, 0.0, 2.0], [1.0, -1.0, 0.5]].map(Reference::Vector);
+    prop::sample::select(vec![Reference::X, Reference::Y, Reference::Z, a, b])
+}
+
+/// A least spacing and a largest side, in this order.
+fn any_lengths() -> impl Strategy<Value = (Option<f64>, Option<f64>)> {
+    let length = || 1i64..30;
+    (any::<bool>(), any::<bool>(), length(), length()).prop_map(|(has_least, has_most, a, b)| {
+        let (least, most) = (a.min(b) as f64, a.max(b) as f64);
+        (has_least.then_some(least), has_most.then_some(most))
+    })
+}
+
 /// A grid of `n` × `n` positions 10 steps apart.
 fn grid(n: i64, normal: impl Fn(i64, i64) -> [f32; 3]) -> Vec<Point> {
     scan((0..n * n).map(|i| ([i % n * 10, i / n * 10, 0], normal(i % n, i / n), 1)))
@@ -32,18 +51,21 @@ proptest! {
     fn groups_and_medians_equal_the_plain_version(
         scan in prop_oneof![any_scan(0, 14, 90), any_scan(1 << 30, 200, 60), any_scan(-1000, 40, 60), any_scan(99, 1 << 39, 60)],
         side in prop_oneof![5 => 1i64..40, 2 => (1i64 << 36) - 3..(1 << 40) + 3, 1 => Just(1 << 38)], delta in prop::sample::select(vec![0.0, 0.05, 0.1, 0.7, 2.0, 3.1]),
-        split in any_split(), min_points in 1usize..6,
+        split in any_split(), min_points in 1usize..6, measure in any_measure(), reference in any_reference(),
+        bounds in prop_oneof![Just((None, None)), any_lengths()],
     ) {
         let mut stage = cells(side as f64, delta, split);
         stage.min_points = NonZeroUsize::new(min_points).unwrap();
+        (stage.measure, stage.reference) = (measure, reference);
+        (stage.min_spacing, stage.max_side) = bounds;
         let plain = plain_groups(&scan, &stage, side);
-        let outcome = run_whole(stage, &scan);
+        let outcome = run_whole(stage.clone(), &scan);
         let positions = |g: &Vec<Point>| g.iter().map(|p| p.at).collect::<Vec<_>>();
         // Equal as lists: members of both are in Morton order.
         prop_assert_eq!(sorted(outcome.groups.clone()), sorted(plain.iter().map(positions).collect()));
         let mut kept = outcome.kept();
         kept.sort_unstable();
-        let mut expected: Vec<Position> = plain.iter().map(|g| plain_median(g)).collect();
+        let mut expected: Vec<Position> = plain.iter().map(|g| plain_median(g, &stage)).collect();
         expected.extend(scan.iter().filter(|p| p.normal[0].is_nan()).map(|p| p.at));
         expected.sort_unstable();
         prop_assert_eq!(kept, expected);

@@ -5,7 +5,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
-use crate::geom::angle::{cosine, is_known};
+use crate::geom::angle::{cosine, dominant_axis, is_known, outer_sum, sine2};
 use crate::point::Position;
 use crate::report::Tally;
 use crate::stage::{Needs, TileOp};
@@ -16,8 +16,8 @@ const BYTES: usize = 16;
 
 /// Keeps one record of every cell (the paper's third step).
 ///
-/// A cell's positions are sorted by their angle θ to the partition's direction; the lower median
-/// stays: of m positions that at index (m − 1) / 2. Among positions of exactly that angle it is the
+/// A cell's positions are sorted by their angle θ to the partition's direction (to the cell's own
+/// dominant axis where `cells` has `measure = "cone"`); the lower median stays: of m positions that at index (m − 1) / 2. Among positions of exactly that angle it is the
 /// one nearest to the centre of mass of the cell's positions, then the first in Morton order. Copies
 /// weigh as one position and are removed as coincident. A position without a normal is in no cell
 /// and keeps one record.
@@ -76,11 +76,18 @@ fn median(tile: &Tile, group: Range<usize>, angles: &mut Vec<(f64, u32)>) -> usi
         return only as usize;
     }
     angles.clear();
-    angles.extend(group.clone().map(|at| {
-        let i = members[at];
-        (cosine(*reference, tile.normals[i as usize], turned[at]), i)
-    }));
-    // Ascending angles are descending cosines.
+    let normal = |i: u32| tile.normals[i as usize];
+    match reference {
+        Some(reference) => angles.extend(group.clone().map(|at| {
+            let i = members[at];
+            (cosine(*reference, normal(i), turned[at]), i)
+        })),
+        None => {
+            let axis = dominant_axis(outer_sum(members[group.clone()].iter().map(|&i| normal(i))));
+            angles.extend(members[group.clone()].iter().map(|&i| (-sine2(axis, normal(i)), i)));
+        }
+    }
+    // Ascending angles are descending cosines, and descending −sin² up to a right angle.
     let middle = (angles.len() - 1) / 2;
     let cosine = angles.select_nth_unstable_by(middle, |a, b| b.0.total_cmp(&a.0)).1.0;
     angles.retain(|angle| angle.0 == cosine);

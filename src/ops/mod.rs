@@ -4,5 +4,5 @@ mod cells;
 mod median;
 pub mod normals;
 
-pub use cells::{Cells, Measure, Side, Split};
+pub use cells::{Cells, Keep, Measure, Reference, Side, Split};
 pub use median::Median;

@@ -38,5 +38,17 @@ tile_op!(
     "normals",
     "Computes a surface normal at every point from its nearest neighbours."
 );
-tile_op!(Cells, "cells", "Divides the scan into cells whose normals agree.");
 tile_op!(Median, "median", "Keeps the median point of every cell.");
+
+impl StageKind for Cells {
+    const KIND: &'static str = "cells";
+    const ABOUT: &'static str = "Divides the scan into cells whose normals agree.";
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.check().map_err(|(key, error)| at.blame(key, error))?;
+        Ok(match self.keep {
+            Some(_) => Role::ScanOp(Box::new(self)),
+            None => Role::TileOp(Box::new(self)),
+        })
+    }
+}

@@ -189,8 +189,9 @@ pub struct Cells {
     pub turned: Vec<bool>,
     /// End of each group in `members`.
     pub ends: Vec<u32>,
-    /// Reference direction N of the partition; θ is the angle to it.
-    pub reference: [f64; 3],
+    /// Reference direction N of the partition, to which θ is the angle; none if each group has its
+    /// own: the dominant axis of its normals.
+    pub reference: Option<[f64; 3]>,
 }
 
 impl Cells {
