@@ -69,6 +69,11 @@ const SORTING_BYTES: usize = 32;
 /// is met exactly, as each division adds one record; a cut in eight adds up to seven, and the first
 /// in that order that would exceed the number ends it. If all divisions leave fewer, all are made. A
 /// division needs angles that differ: of a perfect plane no more can be kept than its initial cells.
+///
+/// Before a run it looks at a sample of the scan: `normal_scatter` of the report is how far, in
+/// radians, normals are off their linear trend where the scan is planar (root of the mean square, the
+/// median of the samples). Where that exceeds `max_angle` noise divides cells that are flat, and the
+/// run says so.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Cells {

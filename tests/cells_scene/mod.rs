@@ -284,3 +284,22 @@ pub fn any_scan(center: i64, width: i64, most: usize) -> impl Strategy<Value = V
     let at = prop::array::uniform3(center - width / 2..center + width / 2);
     prop::collection::vec((at, any_normal(), 1u32..4), most / 2..most).prop_map(scan)
 }
+
+/// Octree nodes below `key`, cut where they hold more than `most` positions.
+fn cut(scan: &[Point], key: TileKey, most: usize, tiles: &mut Vec<Bounds>) {
+    let count = scan.iter().filter(|p| key.cube().contains(p.at)).count();
+    match key.children() {
+        Some(children) if count > most => {
+            children.into_iter().for_each(|child| cut(scan, child, most, tiles));
+        }
+        _ if count > 0 => tiles.push(key.cube()),
+        _ => {}
+    }
+}
+
+/// A cut of the scan into tiles of at most `most` positions.
+pub fn tiles(scan: &[Point], most: usize) -> Vec<Bounds> {
+    let mut tiles = Vec::new();
+    cut(scan, whole(scan), most, &mut tiles);
+    tiles
+}

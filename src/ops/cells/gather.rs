@@ -23,9 +23,9 @@ impl ScanOp for Cells {
         Needs { bytes_per_point: needs.bytes_per_point + BYTES, ..needs }
     }
 
-    fn gather(&self, tile: &mut Tile, found: &mut Vec<[u64; 2]>, tally: &mut Tally) -> Result<()> {
-        let (mut cells, crossing) = self.initial_cells(tile)?;
-        tally.work("crossing_cells", crossing);
+    fn gather(&self, tile: &mut Tile, found: &mut Vec<[u64; 2]>, _: &mut Tally) -> Result<()> {
+        // What crosses a face is counted by the second phase.
+        let (mut cells, _) = self.initial_cells(tile)?;
         let mut division = Division::new(self.rule(ALL)?, tile);
         let without_normal =
             tile.core.clone().filter(|&i| tile.is_chosen(i) && !is_known(tile.normals[i])).count();

@@ -138,3 +138,21 @@ impl Grouping<'_> {
         self.tile.is_chosen(i) && is_known(self.tile.normals[i])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_that_are_not_chosen_are_in_no_cell() {
+        for side in [8, 7] {
+            let mut tile = Tile::of((0..6).map(|x| [x, 0, 0]).collect());
+            tile.normals.fill([0.0, 0.0, 1.0]);
+            tile.normals[5] = [f32::NAN; 3];
+            (tile.selections, tile.limits) = (vec![3, 1, 2, 0, 3, 3], 2);
+            let mut cells = Partition::default();
+            Grouping { tile: &tile, side }.run(&mut cells);
+            assert_eq!((cells.members, cells.ends), (vec![0, 2, 4], vec![3]), "side {side}");
+        }
+    }
+}

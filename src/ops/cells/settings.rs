@@ -262,9 +262,10 @@ mod tests {
     #[test]
     fn an_empty_stage_has_the_documented_defaults() {
         let cells: Cells = toml::from_str("").unwrap();
-        assert_eq!((cells.side, cells.max_angle), (Side::Auto, 0.1));
+        assert_eq!((cells.side, cells.max_angle()), (Side::Auto, 0.1));
+        assert_eq!((cells.keep, cells.max_side, cells.min_spacing), (None, None, None));
         assert_eq!((cells.min_points.get(), cells.split), (1, Split::Voronoi));
-        assert_eq!(cells.measure, Measure::Axis);
+        assert_eq!((cells.measure, cells.reference), (Measure::Axis, Reference::X));
     }
 
     #[test]
@@ -277,7 +278,7 @@ mod tests {
             ("'0.1rad'", 0.1),
         ] {
             let cells: Cells = toml::from_str(&format!("max_angle = {text}")).unwrap();
-            assert_eq!(cells.max_angle, radians, "{text}");
+            assert_eq!(cells.max_angle, Some(radians), "{text}");
         }
         assert!(refusal("max_angle = 6").contains("write \"6deg\""));
         for wrong in ["-0.1", "nan", "inf", "1000", "'6'", "'deg'", "'181deg'", "'-1rad'", "true"] {
@@ -297,8 +298,36 @@ mod tests {
     }
 
     #[test]
+    fn bounds_are_lengths() {
+        let cells: Cells = toml::from_str("max_side = 2\nmin_spacing = 0.25").unwrap();
+        assert_eq!((cells.max_side, cells.min_spacing), (Some(2.0), Some(0.25)));
+        for wrong in ["0", "-1.0", "nan", "inf", "'auto'"] {
+            assert!(refusal(&format!("max_side = {wrong}")).contains("above 0"), "{wrong}");
+            assert!(refusal(&format!("min_spacing = {wrong}")).contains("above 0"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn references_are_axes_or_vectors_of_any_length() {
+        let direction = |text: &str| {
+            let cells: Cells = toml::from_str(&format!("reference = {text}")).unwrap();
+            cells.reference.direction().unwrap()
+        };
+        assert_eq!(direction("'y'"), [0.0, 1.0, 0.0]);
+        assert_eq!(direction("[0, 0, -7]"), [0.0, 0.0, -1.0]);
+        assert_eq!(direction("[3.0, 0, 4]"), [0.6, 0.0, 0.8]);
+        assert_eq!(direction("[1e-310, 0, 0]"), [1.0, 0.0, 0.0]);
+        assert_eq!(direction("[1e308, 1e308, 0]"), direction("[1, 1, 0]"));
+        let wrong =
+            ["'w'", "[0, 0, 0]", "[1, 2]", "[1, 2, 3, 4]", "[nan, 0, 1]", "[inf, 0, 1]", "1"];
+        for wrong in wrong {
+            assert!(refusal(&format!("reference = {wrong}")).contains("[x, y, z]"), "{wrong}");
+        }
+    }
+
+    #[test]
     fn what_cells_do_not_know_is_refused() {
-        assert!(refusal("measure = 'cone'").contains("axis"));
+        assert!(refusal("measure = 'sphere'").contains("cone"));
         assert!(refusal("split = 'kd'").contains("octant"));
         assert!(refusal("min_points = 0").contains("nonzero"));
         assert!(refusal("max_angel = 0.1").contains("max_angle"));
