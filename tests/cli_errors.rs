@@ -79,7 +79,11 @@ fn defaults_in_the_help_are_those_of_the_pipeline() {
         let lines = help.split(flag).nth(1).expect(flag);
         let lines: Vec<&str> = lines.lines().take(2).collect();
         assert!(lines.join(" ").contains(&format!("[default: {default}]")), "{flag}: {lines:?}");
-        let line = file.lines().find(|l| l.starts_with(&format!("{key} = "))).expect(key);
+        let line = file
+            .lines()
+            .map(|line| line.trim_start_matches("# "))
+            .find(|l| l.starts_with(&format!("{key} = ")))
+            .expect(key);
         let value = line.split('=').nth(1).unwrap().split('#').next().unwrap();
         assert_eq!(value.trim().trim_matches('"'), default, "{key}");
     }

@@ -134,6 +134,9 @@ impl Course {
         self.sieve.states = Some(stored.states);
         self.sieve.fates = Some(stored.fates);
         self.sieve.figures = stored.figures;
+        if stored.normals.is_some() {
+            self.sieve.oriented = milled.oriented;
+        }
         self.sieve.normals = stored.normals.or(self.sieve.normals.take());
         (self.alive, self.kept) = (milled.counts.alive, milled.counts.written);
         match pass.gathers() {
