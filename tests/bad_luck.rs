@@ -15,7 +15,9 @@ use pointmill::io::synthetic::Scene;
 use pointmill::point::{
     Dimension, Endian, Layout, Metadata, Position, Scalar, Schema, distance2, names,
 };
-use pointmill::tile::{Folder, Intake, Loader, SpillArea, TileStore, morton_cmp, parallel, seal};
+use pointmill::tile::{
+    Folder, Intake, Loader, Sieve, SpillArea, Tag, TileStore, morton_cmp, parallel, seal,
+};
 use serde_json::Value;
 
 /// A landscape's records, each moved to where `place` says.
@@ -154,11 +156,11 @@ fn neighbors_are_exact(scan: &Scan) -> u64 {
     let budget = Budget::new(1 << 30);
     let folder = Box::new(Scratch(tempfile::tempdir().unwrap()));
     let area = SpillArea::new(budget.clone(), 0, folder);
-    let store = TileStore::new(&area, &budget, scan.schema.stride);
+    let store = TileStore::new(&area, &budget, scan.schema.stride, false);
     parallel(2, |thread| {
         let mut intake = Intake::new(&store, 900);
         for (i, &p) in positions.iter().enumerate().skip(thread).step_by(2) {
-            intake.push(p, scan.record(i))?;
+            intake.push(p, scan.record(i), Tag::default())?;
         }
         intake.flush()
     })
@@ -169,7 +171,7 @@ fn neighbors_are_exact(scan: &Scan) -> u64 {
     all.dedup();
     let keys = tiles.cut(200, 400, 0, 0).unwrap();
     assert!(keys.len() >= 8, "{} tiles", keys.len());
-    let mut loader = Loader::new(&tiles, 1_000);
+    let mut loader = Loader::new(&tiles, &Sieve::default(), 1_000);
     loader.limit_rim(260);
     let (mut seen, mut checked, mut unproven) = (0, 0, 0);
     for key in keys {

@@ -109,19 +109,18 @@ struct Benches<'a> {
     job: &'a Job<'a>,
     tiles: &'a SealedTiles,
     encoders: Vec<Arc<dyn Encode>>,
-    /// The sink by whose records classes are counted as kept: the last of the pipeline.
+    /// The sink by whose records classes are counted as kept: one of what all stages leave.
     counted: Option<usize>,
     chunk_points: usize,
 }
 
 impl<'a> Benches<'a> {
     fn new(job: &'a Job<'a>, tiles: &'a SealedTiles, sinks: &[(usize, Box<dyn Sink>)]) -> Self {
-        let last = job.wants_normals.len().checked_sub(1);
         Benches {
             job,
             tiles,
             encoders: sinks.iter().map(|(_, sink)| sink.encoder()).collect(),
-            counted: sinks.iter().position(|(sink, _)| Some(*sink) == last),
+            counted: sinks.iter().position(|(sink, _)| *sink == job.last_sink),
             chunk_points: sinks.iter().map(|(_, sink)| sink.chunk_points()).max().unwrap_or(0),
         }
     }

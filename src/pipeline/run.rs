@@ -45,6 +45,8 @@ pub(super) struct Job<'a> {
     pub run_records: Option<usize>,
     /// For each sink, whether it writes normals.
     pub wants_normals: Vec<bool>,
+    /// A sink of what all stages leave.
+    pub last_sink: usize,
     pub watch: &'a dyn Watch,
     /// What the user was warned of before the end.
     pub warnings: Mutex<Vec<String>>,
@@ -274,6 +276,7 @@ impl Plan {
             tile_points,
             run_records: tile_points.map(|n| n.saturating_mul(4).min(shares.run_records)),
             wants_normals: self.sinks.iter().map(|sink| sink.wants_normals()).collect(),
+            last_sink: self.last_sink,
             watch,
             warnings: Mutex::default(),
             failed: AtomicBool::new(false),
