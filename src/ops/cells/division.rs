@@ -119,10 +119,7 @@ impl<'a> Division<'a> {
         cells: &mut Partition,
         mut log: impl FnMut(f64, u64),
     ) {
-        if self.spare.len() < end - start {
-            self.spare.reserve_exact(end - start - self.spare.len());
-            self.spare.resize(end - start, 0);
-        }
+        self.make_room(end - start);
         let mine = self.owns(cells, start);
         let deepest = DEEPEST + 2 * (end - start).max(1).ilog2();
         let first = self.tile.positions[cells.members[start] as usize];
@@ -164,6 +161,13 @@ impl<'a> Division<'a> {
         }
         self.counts.initial += u64::from(mine);
         self.counts.cut_deep += u64::from(mine && cut_deep);
+    }
+
+    fn make_room(&mut self, members: usize) {
+        if self.spare.len() < members {
+            self.spare.reserve_exact(members - self.spare.len());
+            self.spare.resize(members, 0);
+        }
     }
 
     /// Decides about a part whose angles, and those of all parts above it, span `narrowest` or more.
