@@ -80,7 +80,7 @@ fn pages() -> Vec<Page> {
         page::<Normals>("src/ops/normals.rs", ""),
         Page { words: &["src/ops/cells/settings.rs"], ..page::<Cells>("src/ops/cells.rs", "") },
         page::<Median>("src/ops/median.rs", ""),
-        page::<Write>(KINDS, "path = 'out.laz'"),
+        page::<Write>(KINDS, ""),
     ]
 }
 

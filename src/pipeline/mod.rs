@@ -13,6 +13,7 @@ mod mill;
 mod mistake;
 mod node;
 mod outlet;
+mod outputs;
 mod plan;
 mod publish;
 mod registry;
