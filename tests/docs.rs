@@ -97,6 +97,7 @@ fn sort_of(subject: &str, field: &Field, files: &[String]) -> (String, Option<En
         ("cells", "side", _) => "a length, or `\"auto\"`",
         ("cells", "max_angle", _) => "a number of radians, or text with a unit",
         ("write", "scale", _) => "a number, or three",
+        ("run", "z_scale", _) => "a number, or `\"auto\"`",
         ("run", "memory", _) => "a size such as `\"2GiB\"`, or a number of bytes",
         (_, _, "usize" | "u64") => "a whole number",
         (_, _, "NonZeroUsize") => "a whole number from 1",

@@ -8,8 +8,9 @@ use std::path::Path;
 
 use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
 use pointmill::report::{
-    Decision, DeviationFigures, DeviationTotals, FileFigures, Ledger, Machine, Outcome, Pair,
-    Phase, PlaneFigures, Report, RunFigures, Tally, TileFigures, Totals, result_bytes,
+    ClassFigures, Decision, DeviationFigures, DeviationTotals, FileFigures, LatticeFigures, Ledger,
+    Machine, Outcome, Pair, Phase, PlaneFigures, Report, RunFigures, Tally, TileFigures, Totals,
+    result_bytes,
 };
 use serde_json::{Value, json};
 
@@ -47,8 +48,7 @@ fn report(tiles: u64) -> Report {
     };
     let result = Outcome {
         pipeline: json!({"stage": [{"kind": "read", "path": ["line\n,\n\"run\": "]}]}),
-        lattice_step: 0.001,
-        lattice_shift: [0.0, 0.0, 0.0005],
+        lattice: Some(LatticeFigures { step: 0.001, shift: [0.0, 0.0, 0.0005] }),
         ledger: Ledger::new(2_000_000, 812_345, &tally),
         decisions: vec![Decision {
             stage: "cells".into(),
@@ -58,6 +58,11 @@ fn report(tiles: u64) -> Report {
         counts: BTreeMap::from([("cells".into(), 812_300), ("coincident".into(), 4)]),
         tile_side: Some(4.096),
         totals: Some(totals),
+        classes: vec![
+            ClassFigures { class: 2, before: 1_500_000, after: 75_000 },
+            ClassFigures { class: 5, before: 499_000, after: 49_900 },
+            ClassFigures { class: 65, before: 1_000, after: 1_000 },
+        ],
     };
     Report { result, run: run_figures() }
 }
@@ -108,8 +113,17 @@ fn a_report_is_json_with_result_before_run_and_tiles_in_order() {
         assert_eq!(tile["plane"]["after"], Value::Null);
     }
     let text = String::from_utf8(text).unwrap();
-    let keys =
-        ["pipeline", "lattice", "ledger", "decisions", "counts", "totals", "tile_side", "tiles"];
+    let keys = [
+        "pipeline",
+        "lattice",
+        "ledger",
+        "decisions",
+        "counts",
+        "totals",
+        "classes",
+        "tile_side",
+        "tiles",
+    ];
     let places: Vec<usize> =
         keys.iter().map(|key| text.find(&format!("\n\"{key}\": ")).unwrap()).collect();
     assert!(places.is_sorted(), "{places:?}");
@@ -146,10 +160,12 @@ fn a_lost_tile_is_an_error() {
 fn a_streamed_run_has_no_tiles_and_no_totals() {
     let mut streamed = report(0);
     streamed.result.totals = None;
+    streamed.result.lattice = None;
     streamed.result.tile_side = None;
     let value: Value = serde_json::from_slice(&written(&streamed, b"")).unwrap();
     assert_eq!(value["result"]["tiles"], json!([]));
     assert_eq!(value["result"]["totals"], Value::Null);
+    assert_eq!(value["result"]["lattice"], Value::Null);
     let table = streamed.table(None).to_string();
     assert!(table.starts_with("points     2,000,000 in, 812,345 out (40.6 %)\n"), "{table}");
     assert!(!table.contains("plane") && !table.contains("report"), "{table}");
@@ -160,6 +176,9 @@ fn the_table_says_in_a_few_lines_what_matters() {
     let table = report(1).table(Some(Path::new("reduced.json"))).to_string();
     let expected = "\
 points     2,000,000 in, 812,345 out (40.6 %)
+classes    2 ground           1,500,000 → 75,000 (5.0 %)
+           5 high vegetation  499,000 → 49,900 (10.0 %)
+           65                 1,000 → 1,000 (100.0 %)
 cells      812,300
 plane RMS  in tiles 0.0123
            whole scan 4.00 → 4.50

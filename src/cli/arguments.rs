@@ -194,7 +194,7 @@ pub(super) struct Info {
 
 #[derive(Debug, Args)]
 pub(super) struct Synth {
-    /// What is scanned: plane, part or als
+    /// What is scanned: plane, part, sphere, squares-random, squares-uniform or als
     #[arg(value_name = "KIND")]
     pub scene: String,
     /// How many points

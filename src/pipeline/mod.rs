@@ -34,6 +34,8 @@ pub use plan::Plan;
 pub use registry::{Registry, StageKind, StagePlace};
 pub use run::Done;
 pub use set::Set;
-pub use settings::{Nonfinite, Overrides, RunSettings, Simd, Spill, parse_bytes};
+pub use settings::{
+    MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill, ZScale, parse_bytes,
+};
 pub use text::{Pipeline, PlacedStage};
 pub use watch::{Quiet, Watch};

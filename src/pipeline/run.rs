@@ -20,7 +20,8 @@ use crate::budget::{Budget, Bytes};
 use crate::geom::lattice::Misplaced;
 use crate::point::PointBatch;
 use crate::report::{
-    Decision, FileFigures, Ledger, Machine, Outcome, Report, RunFigures, Tally, peak_memory,
+    Decision, FileFigures, LatticeFigures, Ledger, Machine, Outcome, Report, RunFigures, Tally,
+    peak_memory,
 };
 use crate::stage::{Input, Part, SinkSummary, Source, TileOp, Transform};
 use crate::tile::{SpillArea, parallel};
@@ -279,13 +280,13 @@ impl Plan {
         let lattice = self.lattice.as_ref();
         let result = Outcome {
             pipeline: self.stages.clone(),
-            lattice_step: lattice.map_or(0.0, |lattice| lattice.step),
-            lattice_shift: lattice.map_or([0.0; 3], |lattice| lattice.shift),
+            lattice: lattice.map(|l| LatticeFigures { step: l.step, shift: l.shift }),
             ledger,
             decisions: finished.decisions,
             counts: finished.tally.counts.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect(),
             tile_side,
             totals,
+            classes: Vec::new(),
         };
         Ok((Report { result, run }, tiles))
     }

@@ -5,8 +5,10 @@ mod bounds;
 pub mod names;
 mod schema;
 mod selection;
+mod units;
 
 pub use batch::PointBatch;
 pub use bounds::{Bounds, Position, distance2};
 pub use schema::{Bits, Dimension, Endian, Layout, Metadata, Scalar, Schema, Value};
 pub use selection::{Edit, Flag, Mark, Selection};
+pub use units::{Horizontal, Mismatch, Units};

@@ -5,7 +5,7 @@ use std::io::{self, BufRead, Write};
 
 use serde::Serialize;
 
-use super::figures::Totals;
+use super::figures::{ClassFigures, Totals};
 use super::ledger::Ledger;
 use super::machine::Machine;
 
@@ -24,10 +24,8 @@ pub struct Report {
 pub struct Outcome {
     /// The pipeline's stages with all their settings, defaults filled in.
     pub pipeline: serde_json::Value,
-    /// World units of one lattice step.
-    pub lattice_step: f64,
-    /// World coordinates of lattice position 0.
-    pub lattice_shift: [f64; 3],
+    /// Where all decisions are made; None if the pipeline streams and asks for no lattice.
+    pub lattice: Option<LatticeFigures>,
     /// read = kept + removed.
     pub ledger: Ledger,
     /// What stages settled by themselves.
@@ -38,6 +36,17 @@ pub struct Outcome {
     pub tile_side: Option<f64>,
     /// Figures of the whole scan; None likewise.
     pub totals: Option<Totals>,
+    /// Records by class, in ascending order; empty if they have none.
+    pub classes: Vec<ClassFigures>,
+}
+
+/// The lattice of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LatticeFigures {
+    /// World units of one step.
+    pub step: f64,
+    /// World coordinates of position 0.
+    pub shift: [f64; 3],
 }
 
 /// Something that a stage settled by itself.
@@ -123,14 +132,14 @@ impl Report {
 impl Outcome {
     /// Writes `result` alone, as in [`Report::write`].
     pub fn write(&self, out: &mut impl Write, tiles: &mut impl BufRead) -> io::Result<()> {
-        let lattice = LatticeFigures { step: self.lattice_step, shift: self.lattice_shift };
         let mut object = Object::open(out)?;
         object.entry("pipeline", &self.pipeline)?;
-        object.entry("lattice", &lattice)?;
+        object.entry("lattice", &self.lattice)?;
         object.entry("ledger", &self.ledger)?;
         object.entry("decisions", &self.decisions)?;
         object.entry("counts", &self.counts)?;
         object.entry("totals", &self.totals)?;
+        object.entry("classes", &self.classes)?;
         object.entry("tile_side", &self.tile_side)?;
         object.key("tiles")?;
         let copied = copy_lines(object.out, tiles)?;
@@ -159,12 +168,6 @@ pub fn result_bytes(report: &[u8]) -> Option<&[u8]> {
     let rest = report.strip_prefix(b"{\n\"result\": ")?;
     let end = rest.windows(RUN.len()).position(|window| window == RUN)?;
     rest.get(..end)
-}
-
-#[derive(Serialize)]
-struct LatticeFigures {
-    step: f64,
-    shift: [f64; 3],
 }
 
 impl RunFigures {

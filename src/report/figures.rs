@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use serde::Serialize;
 
 use crate::geom::lattice::Lattice;
+use crate::point::Position;
 
 /// A figure before and after the reduction.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -93,7 +94,47 @@ pub struct Totals {
     pub deviation: Option<DeviationTotals>,
 }
 
+/// The records of one class.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct ClassFigures {
+    /// The class, as the records have it: LAS 1.4 R15, Tables 9 and 17.
+    pub class: u8,
+    /// Records read.
+    pub before: u64,
+    /// Records kept.
+    pub after: u64,
+}
+
+/// World coordinates of a position of the scan. Where positions are rounded they are the shortest
+/// decimals within half a step, which say all that the position tells.
+pub(super) fn world_point(position: Position, lattice: &Lattice) -> [f64; 3] {
+    let world = lattice.world(position);
+    if lattice.rounds() { world.map(|at| shortest(at, lattice.step / 2.0)) } else { world }
+}
+
+/// The shortest decimal nearer to `at` than `within`.
+fn shortest(at: f64, within: f64) -> f64 {
+    let decimal = |digits: usize| format!("{at:.digits$}").parse::<f64>().ok();
+    let near = |d: &f64| (d - at).abs() < within;
+    (0..=12).filter_map(decimal).find(near).unwrap_or(at)
+}
+
 /// A length in lattice steps as one in world units.
 pub(super) fn world_length(steps: f32, lattice: &Lattice) -> f64 {
     f64::from(steps) * lattice.step
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shortest;
+
+    #[test]
+    fn a_rounded_coordinate_is_the_shortest_decimal_within_half_a_step() {
+        let step = 1.0 / f64::from(1 << 30);
+        for at in [12.346, -31.35136, 5_600_018.349, 1e-9, 0.0, 4e9] {
+            let rounded = (at / step).round_ties_even() * step;
+            assert_eq!(shortest(rounded, step / 2.0), at);
+        }
+        assert_eq!(shortest(0.123_456_789_012_345_6, 0.0), 0.123_456_789_012_345_6);
+    }
 }

@@ -1,5 +1,6 @@
 //! What a run says it did: the ledger, the errors of tiles and scan, and how they are merged.
 
+mod classes;
 mod deviations;
 mod document;
 mod figures;
@@ -11,9 +12,14 @@ mod survey;
 mod table;
 mod tally;
 
+pub use classes::class_name;
 pub use deviations::{Deviations, Histogram};
-pub use document::{Decision, FileFigures, Outcome, Phase, Report, RunFigures, result_bytes};
-pub use figures::{DeviationFigures, DeviationTotals, Pair, PlaneFigures, TileFigures, Totals};
+pub use document::{
+    Decision, FileFigures, LatticeFigures, Outcome, Phase, Report, RunFigures, result_bytes,
+};
+pub use figures::{
+    ClassFigures, DeviationFigures, DeviationTotals, Pair, PlaneFigures, TileFigures, Totals,
+};
 pub use ledger::{Ledger, Removed};
 pub use machine::{Machine, cpu_seconds, peak_memory, resident_now};
 pub use moments::{Moments, Plane};

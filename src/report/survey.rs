@@ -13,6 +13,7 @@
 use super::deviations::{Deviations, Histogram};
 use super::figures::{
     DeviationFigures, DeviationTotals, Pair, PlaneFigures, TileFigures, Totals, world_length,
+    world_point,
 };
 use super::moments::{Moments, Plane};
 use super::sums::Distances;
@@ -338,7 +339,7 @@ fn deviation_figures(deviations: &Deviations, lattice: &Lattice) -> Option<Devia
         points: deviations.count(),
         rms: deviations.rms()? * lattice.step,
         max: world_length(largest, lattice),
-        at: lattice.world(at),
+        at: world_point(at, lattice),
     })
 }
 

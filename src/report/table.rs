@@ -3,8 +3,9 @@
 use std::fmt;
 use std::path::Path;
 
-use super::document::Report;
-use super::figures::{DeviationTotals, Pair, PlaneFigures, Totals};
+use super::classes::class_name;
+use super::document::{Outcome, Report};
+use super::figures::{ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
 use crate::budget::Bytes;
 
 /// A [`Report`] as a few lines for the terminal; lengths in the scan's unit.
@@ -24,15 +25,13 @@ impl fmt::Display for Table<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Report { result, run } = self.report;
         let (read, kept) = (result.ledger.read, result.ledger.kept);
-        write!(f, "points     {} in, {} out", Grouped(read), Grouped(kept))?;
-        if read > 0 {
-            write!(f, " ({:.1} %)", kept as f64 / read as f64 * 100.0)?;
-        }
+        write!(f, "points     {} in, {} out{}", Grouped(read), Grouped(kept), Share(kept, read))?;
+        class_lines(f, &result.classes)?;
         if let Some(&cells) = result.counts.get("cells") {
             write!(f, "\ncells      {}", Grouped(cells))?;
         }
         if let Some(totals) = &result.totals {
-            totals_lines(f, totals)?;
+            totals_lines(f, totals, result)?;
         }
         if let Some(peak) = run.peak_memory_bytes {
             write!(f, "\nmemory     {} at most, budget {}", Bytes(peak), Bytes(run.memory_bytes))?;
@@ -41,6 +40,12 @@ impl fmt::Display for Table<'_> {
         if run.spill_bytes > 0 {
             write!(f, "\nspill      {}", Bytes(run.spill_bytes))?;
         }
+        for output in &run.outputs {
+            write!(f, "\noutput     {}", output.path)?;
+            if let Some(bytes) = output.bytes {
+                write!(f, ", {}", Bytes(bytes))?;
+            }
+        }
         if let Some(path) = self.path {
             write!(f, "\nreport     {}", path.display())?;
         }
@@ -48,7 +53,25 @@ impl fmt::Display for Table<'_> {
     }
 }
 
-fn totals_lines(f: &mut fmt::Formatter<'_>, totals: &Totals) -> fmt::Result {
+/// A line a class, unless none was reduced: then all say the same as the scan's.
+fn class_lines(f: &mut fmt::Formatter<'_>, classes: &[ClassFigures]) -> fmt::Result {
+    if classes.iter().all(|c| c.before == c.after) {
+        return Ok(());
+    }
+    let name = |class: u8| match class_name(class) {
+        Some(name) => format!("{class} {name}"),
+        None => class.to_string(),
+    };
+    let width = classes.iter().map(|c| name(c.class).len()).max().unwrap_or(0);
+    for (i, &ClassFigures { class, before, after }) in classes.iter().enumerate() {
+        let heading = if i == 0 { "classes" } else { "" };
+        write!(f, "\n{heading:9}  {:width$}  ", name(class))?;
+        write!(f, "{} → {}{}", Grouped(before), Grouped(after), Share(after, before))?;
+    }
+    Ok(())
+}
+
+fn totals_lines(f: &mut fmt::Formatter<'_>, totals: &Totals, result: &Outcome) -> fmt::Result {
     let planes = [("in tiles", &totals.tile_plane), ("whole scan", &totals.scan_plane)];
     let mut heading = "plane RMS";
     for (name, plane) in planes {
@@ -60,8 +83,10 @@ fn totals_lines(f: &mut fmt::Formatter<'_>, totals: &Totals) -> fmt::Result {
             heading = "";
         }
     }
-    if let Some(DeviationTotals { rms, p95, max, at: [x, y, z], .. }) = totals.deviation {
+    if let Some(DeviationTotals { rms, p95, max, at, .. }) = totals.deviation {
         write!(f, "\ndeviation  RMS {}, 95 % ≤ {}", Short(rms), Short(p95))?;
+        let step = result.lattice.map_or(0.0, |lattice| lattice.step);
+        let [x, y, z] = at.map(|at| Coordinate { at, step });
         write!(f, ", max {} at ({x}, {y}, {z})", Short(max))?;
     }
     Ok(())
@@ -77,6 +102,35 @@ fn time_line(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result {
         write!(f, "{before}{} {:.1}", phase.name, phase.seconds)?;
     }
     Ok(())
+}
+
+/// How many of all, in brackets; nothing where there are none.
+struct Share(u64, u64);
+
+impl fmt::Display for Share {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.1 {
+            0 => Ok(()),
+            all => write!(f, " ({:.1} %)", self.0 as f64 / all as f64 * 100.0),
+        }
+    }
+}
+
+/// A coordinate in the digits that tell it from its neighbours on the lattice: those of the single
+/// precision number that it is, if it is one.
+struct Coordinate {
+    at: f64,
+    step: f64,
+}
+
+impl fmt::Display for Coordinate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let single = self.at as f32;
+        match (f64::from(single) - self.at).abs() <= self.step / 2.0 {
+            true => write!(f, "{single}"),
+            false => write!(f, "{}", self.at),
+        }
+    }
 }
 
 /// A count with a comma between thousands.
@@ -120,6 +174,17 @@ mod tests {
     fn counts_are_grouped_in_thousands() {
         let text = [0, 999, 1000, 12345, 1234567].map(|n| Grouped(n).to_string());
         assert_eq!(text, ["0", "999", "1,000", "12,345", "1,234,567"]);
+    }
+
+    #[test]
+    fn coordinates_show_the_digits_that_the_lattice_tells_apart() {
+        let shown = |at: f64, step: f64| Coordinate { at, step }.to_string();
+        let binary = 1.0 / f64::from(1 << 30);
+        assert_eq!(shown(f64::from(12.346_f32), binary), "12.346");
+        assert_eq!(shown(12.346, 0.001), "12.346");
+        assert_eq!(shown(5_600_018.349, 0.001), "5600018.349");
+        assert_eq!(shown(12.123456789, binary), "12.123456789");
+        assert_eq!(shown(-0.1, 0.0), "-0.1");
     }
 
     #[test]

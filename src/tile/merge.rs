@@ -3,8 +3,9 @@
 //! The lattice is cut into ranges of Morton order that the threads merge independently, each by
 //! walking all runs at once; nothing is held but a block a run.
 
-use std::cmp::Ordering;
+use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
+use std::collections::binary_heap::PeekMut;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering as Atomic};
 
@@ -143,14 +144,15 @@ fn merge_range(
         .filter_map(|(run, c)| Some(Head { position: c.head(until)?, run }))
         .collect();
     let mut emitter = Emitter::new(out, most);
-    let mut equal = Vec::new();
+    let (mut equal, mut records) = (Vec::new(), BinaryHeap::new());
     while let Some(head) = heap.pop() {
         equal.clear();
         equal.push(head.run);
         while heap.peek().is_some_and(|next| next.position == head.position) {
             equal.extend(heap.pop().map(|next| next.run));
         }
-        emit_equal(&mut cursors, &mut equal.clone(), head.position, &mut emitter, &mut buffer)?;
+        let at = head.position;
+        emit_equal(&mut cursors, &equal, at, &mut emitter, &mut records, &mut buffer)?;
         for &run in &equal {
             if let Some(position) = cursors[run].head(until) {
                 heap.push(Head { position, run });
@@ -160,30 +162,44 @@ fn merge_range(
     emitter.finish()
 }
 
-/// Emits the records of one position from the runs that have it, smallest record first.
+/// Emits the records of one position from the runs that have it, smallest record first; `records`
+/// is an empty heap to work in, with the record at the head of each run.
 fn emit_equal(
     cursors: &mut [Cursor<'_>],
-    runs: &mut Vec<usize>,
+    runs: &[usize],
     position: Position,
     emitter: &mut Emitter<'_>,
+    records: &mut BinaryHeap<Reverse<(Vec<u8>, usize)>>,
     buffer: &mut Vec<u8>,
 ) -> Result<()> {
-    while runs.len() > 1 {
-        let mut smallest = 0;
-        for i in 0..runs.len() {
-            cursors[runs[i]].load_record()?;
-            if cursors[runs[i]].record < cursors[runs[smallest]].record {
-                smallest = i;
+    let mut last = runs.first().copied();
+    if runs.len() > 1 {
+        for &run in runs {
+            let mut record = std::mem::take(&mut cursors[run].spare);
+            cursors[run].read_record(&mut record)?;
+            records.push(Reverse((record, run)));
+        }
+        while records.len() > 1
+            && let Some(mut smallest) = records.peek_mut()
+        {
+            let Reverse((record, run)) = &mut *smallest;
+            let cursor = &mut cursors[*run];
+            emitter.emit(position, cursor.number())?;
+            cursor.advance(buffer)?;
+            if cursor.head(None) == Some(position) {
+                cursor.read_record(record)?;
+            } else {
+                cursor.spare = PeekMut::pop(smallest).0.0;
             }
         }
-        let cursor = &mut cursors[runs[smallest]];
-        emitter.emit(position, cursor.number())?;
-        cursor.advance(buffer)?;
-        if cursor.head(None) != Some(position) {
-            runs.swap_remove(smallest);
-        }
+        // What the last run has left is in order, and nothing is left to compare it to.
+        last = records.pop().map(|Reverse((record, run))| {
+            cursors[run].spare = record;
+            run
+        });
     }
-    let cursor = &mut cursors[runs[0]];
+    let Some(run) = last else { return Ok(()) };
+    let cursor = &mut cursors[run];
     while cursor.head(None) == Some(position) {
         emitter.emit(position, cursor.number())?;
         cursor.advance(buffer)?;
@@ -221,22 +237,13 @@ struct Cursor<'a> {
     block: usize,
     at: usize,
     positions: Vec<Position>,
-    /// The record at the head, once it was needed to order equal positions.
-    record: Vec<u8>,
-    record_of: Option<u64>,
+    /// Memory for the record at the head, for when equal positions must be ordered.
+    spare: Vec<u8>,
 }
 
 impl<'a> Cursor<'a> {
     fn new(store: &'a TileStore, run: &'a Run) -> Self {
-        Cursor {
-            store,
-            run,
-            block: 0,
-            at: 0,
-            positions: Vec::new(),
-            record: Vec::new(),
-            record_of: None,
-        }
+        Cursor { store, run, block: 0, at: 0, positions: Vec::new(), spare: Vec::new() }
     }
 
     /// Goes to the first record at or behind `from`; returns how many records the range until
@@ -300,14 +307,10 @@ impl<'a> Cursor<'a> {
         Ok(())
     }
 
-    fn load_record(&mut self) -> Result<()> {
-        let number = self.number();
-        if self.record_of != Some(number) {
-            self.record.resize(self.store.stride, 0);
-            self.store.records.read(number, &mut self.record)?;
-            self.record_of = Some(number);
-        }
-        Ok(())
+    /// Reads the record it stands at.
+    fn read_record(&self, record: &mut Vec<u8>) -> Result<()> {
+        record.resize(self.store.stride, 0);
+        self.store.records.read(self.number(), record)
     }
 }
 

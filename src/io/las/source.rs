@@ -30,7 +30,7 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
         return Err(Error::pipeline("there is no input file"));
     };
     let first = Input::open(first)?;
-    let (mut schema, crs) = (first.schema(), first.crs()?);
+    let (mut schema, crs, units) = (first.schema(), first.crs()?, first.units()?);
     let mut inputs = vec![first.clone().without_records()];
     let mut merge = Merge::of(first);
     for path in others {
@@ -43,7 +43,7 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
         dimension.origin = native.header.offset()[axis];
     }
     let warnings = inputs.iter().flat_map(|i| i.warnings.clone()).collect();
-    let metadata = Metadata { crs, comments: Vec::new(), native: Some(Arc::new(native)) };
+    let metadata = Metadata { crs, units, comments: Vec::new(), native: Some(Arc::new(native)) };
     let files: Vec<Opened> = inputs.into_iter().zip(shifts).map(Opened::new).collect();
     let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i)).collect();
     Ok(Box::new(LasSource { files, parts, schema: Arc::new(schema), metadata, warnings }))

@@ -1,0 +1,46 @@
+//! The names of classes, for people.
+
+/// What a class means by LAS 1.4 R15; None for those that it leaves to the user or reserves.
+///
+/// Table 17 for all but 8 and 12, which only formats 0 to 5 have (Table 9); it reserves them.
+pub fn class_name(class: u8) -> Option<&'static str> {
+    Some(match class {
+        0 => "never classified",
+        1 => "unclassified",
+        2 => "ground",
+        3 => "low vegetation",
+        4 => "medium vegetation",
+        5 => "high vegetation",
+        6 => "building",
+        7 => "low noise",
+        8 => "model key-point",
+        9 => "water",
+        10 => "rail",
+        11 => "road surface",
+        12 => "overlap",
+        13 => "wire guard",
+        14 => "wire conductor",
+        15 => "transmission tower",
+        16 => "wire connector",
+        17 => "bridge deck",
+        18 => "high noise",
+        19 => "overhead structure",
+        20 => "ignored ground",
+        21 => "snow",
+        22 => "temporal exclusion",
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::class_name;
+
+    #[test]
+    fn classes_of_the_standard_have_names_and_others_none() {
+        let named = (0..=255).filter(|&class| class_name(class).is_some()).count();
+        assert_eq!(named, 23);
+        assert_eq!((class_name(2), class_name(6)), (Some("ground"), Some("building")));
+        assert_eq!(class_name(64), None);
+    }
+}
