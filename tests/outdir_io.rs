@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use las_support::{LAS, LAZ, Random, write};
-use outdir_support::{assert_equal_files, ends, named, write_each};
+use outdir_support::{assert_equal_files, convert_one, ends, named, write_each};
 use pointmill::io::las::{fresh, layout, open};
-use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
+use pointmill::pipeline::{Pipeline, Registry};
 use pointmill::point::Scalar;
 
 /// Records of random bytes whose stored coordinates leave room for a shift.
@@ -151,14 +151,6 @@ fn outputs_of_some_records_hold_them_byte_for_byte_under_their_own_header() {
     }
 }
 
-/// A run that converts one file.
-fn convert_one(input: &Path, output: &Path, keys: &str) {
-    let keys = format!("path = '{}'\n{keys}", output.display());
-    let text = outdir_support::text(&[input.to_owned()], &keys);
-    let pipeline = Pipeline::parse(&text, "one.toml", &Registry::builtin()).unwrap();
-    pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
-}
-
 #[test]
 fn a_conversion_together_gives_the_files_of_conversions_one_by_one() {
     let at = tempfile::tempdir().unwrap();
@@ -174,7 +166,7 @@ fn a_conversion_together_gives_the_files_of_conversions_one_by_one() {
         let outputs = write_each(&inputs, &keys(&folder, more), |_, _| true).unwrap();
         for (input, output) in inputs.iter().zip(&outputs) {
             let one = at.path().join("one").with_extension(extension);
-            convert_one(input, &one, more);
+            convert_one(std::slice::from_ref(input), &one, more);
             assert_equal_files(&one, output);
         }
         fs::remove_dir_all(folder).unwrap();
@@ -274,7 +266,7 @@ fn a_write_stage_takes_a_path_or_a_folder() {
     };
     let told = |keys: &str| parse(keys).unwrap_err().to_string();
     assert!(parse("folder = 'out'").is_ok() && parse("path = 'out.las'").is_ok());
-    assert!(told("").contains("`path`, or `folder`"));
+    assert!(told("").contains("`write` needs `path` or `folder`"));
     let both = told("path = 'out.las'\nfolder = 'out'");
     assert!(both.contains("p.toml:7:") && both.contains("give one of them"), "{both}");
     assert!(told("folder = 'out'\nformat = 'las'\nencoding = 'ascii'").contains("`encoding`"));

@@ -223,7 +223,7 @@ impl StageKind for Write {
                     "`path` makes one file and `folder` one for each input: give one of them";
                 Err(at.blame("folder", Error::pipeline(told)))
             }
-            (None, None) => Err(Error::pipeline("a key is missing: `path`, or `folder`")
+            (None, None) => Err(Error::pipeline("`write` needs `path` or `folder`")
                 .help("`path` is one file, `folder` gets one for each input")),
             (Some(path), None) => {
                 let Some(format) = self.format.or(Format::of(&path)) else {

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use pointmill::Result;
-use pointmill::pipeline::{Pipeline, Registry};
+use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
 use pointmill::point::PointBatch;
 use pointmill::stage::{CreateSink, Role, Source};
 
@@ -89,6 +89,13 @@ fn write_all(
         sink.append(encoder.encode(&batch)?)?;
     }
     Ok(())
+}
+
+/// A run that converts `inputs` into one file.
+pub fn convert_one(inputs: &[PathBuf], output: &Path, keys: &str) {
+    let text = text(inputs, &format!("path = '{}'\n{keys}", output.display()));
+    let pipeline = Pipeline::parse(&text, "one.toml", &Registry::builtin()).unwrap();
+    pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
 }
 
 /// Fails without printing megabytes.
