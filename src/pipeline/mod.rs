@@ -6,15 +6,20 @@ mod clock;
 mod connect;
 mod cut;
 mod draft;
+mod forecast;
+mod grind;
 mod inputs;
 mod keys;
 mod kinds;
+mod limits;
 mod mill;
 mod mistake;
 mod node;
 mod outlet;
 mod outputs;
+mod passes;
 mod plan;
+mod product;
 mod publish;
 mod registry;
 mod rounded;
@@ -23,19 +28,22 @@ mod scratch;
 mod set;
 mod settings;
 mod shares;
+mod shown;
 mod stream;
 mod survey;
+mod tagger;
 mod text;
 mod watch;
 
 pub use inputs::expand;
 pub use kinds::{Encoding, Format, OutputOrder, Read, Synth, Write};
+pub use limits::{LimitKeys, Sees};
 pub use plan::Plan;
 pub use registry::{Registry, StageKind, StagePlace};
 pub use run::Done;
 pub use set::Set;
 pub use settings::{
-    MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill, ZScale, parse_bytes,
+    MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill, Withheld, ZScale, parse_bytes,
 };
 pub use text::{Pipeline, PlacedStage};
 pub use watch::{Quiet, Watch};

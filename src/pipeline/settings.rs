@@ -8,8 +8,9 @@ use serde::{Deserialize, Deserializer, de};
 use crate::point::{Mismatch, Units};
 use crate::{Error, ErrorKind};
 
-/// What a run may use and where it leaves things. No setting but `lattice`, `z_scale` and
-/// `nonfinite` changes what is computed. All are optional; arguments of the same name take their place.
+/// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`
+/// and `withheld` changes what is computed. All are optional; arguments of the same name take their
+/// place.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RunSettings {
@@ -34,6 +35,9 @@ pub struct RunSettings {
     /// What becomes of points whose coordinates are not finite, where stages measure distances. A
     /// pipeline that streams copies them unless they are dropped: a conversion keeps its records.
     pub nonfinite: Nonfinite,
+    /// What becomes of points with the withheld flag, in pipelines that work on tiles; others keep
+    /// every point.
+    pub withheld: Withheld,
     /// Most points a tile's cube holds, for tests; none: as the memory allows.
     pub tile_points: Option<NonZeroUsize>,
     /// Which of the equal code paths runs, for tests.
@@ -71,6 +75,19 @@ pub enum ZScale {
     Auto,
     /// This number, above 0.
     Factor(f64),
+}
+
+/// What becomes of points with the withheld flag.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Withheld {
+    /// They take no part and are removed, entered in the ledger as such.
+    #[default]
+    Drop,
+    /// They are points like all others.
+    Keep,
+    /// They take no part and are written as they are.
+    Ignore,
 }
 
 /// Where decoded points wait for the mill.

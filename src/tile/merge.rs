@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicUsize, Ordering as Atomic};
 use super::block::{BLOCK, Block};
 use super::intake::{Run, TileStore};
 use super::key::morton_cmp;
-use super::sealed::{SealedTiles, Sequence};
+use super::sealed::{SealedTiles, Sequence, ref_bytes};
 use super::spill::{PIECE, Pieces, Spill, lock};
 use super::{Levels, parallel};
 use crate::point::Position;
@@ -28,8 +28,8 @@ const BLOCKS_AT_ONCE: usize = 64;
 
 /// Bytes that a thread holds while it merges `runs` runs of records of `stride` bytes.
 pub fn merge_bytes(runs: usize, stride: usize) -> u64 {
-    let cursor = BLOCK * size_of::<Position>() + stride + 256;
-    let emitter = BLOCKS_AT_ONCE * BLOCK * 28 + PIECE * 8 + 2 * BLOCK * 28;
+    let cursor = BLOCK * (size_of::<Position>() + 4) + stride + 256;
+    let emitter = BLOCKS_AT_ONCE * BLOCK * 28 + PIECE * 12 + 2 * BLOCK * 28;
     (runs * cursor + emitter) as u64
 }
 
@@ -51,7 +51,8 @@ pub fn seal(
     let mut lease = store.budget.lease(blocks as u64 * each, "index of the tiles")?;
     let out = Output {
         positions: Spill::new(&store.area, "positions"),
-        refs: Pieces::new(&store.area, "order", size_of::<u64>()),
+        refs: Pieces::new(&store.area, "order", ref_bytes(store.tagged)),
+        tagged: store.tagged,
     };
     let ranges: Vec<Mutex<Option<Merged>>> =
         (0..=borders.len()).map(|_| Mutex::default()).collect();
@@ -75,7 +76,8 @@ pub fn seal(
     let ranges = ranges.into_iter().filter_map(|slot| slot.into_inner().ok().flatten());
     let sequence = join(ranges, blocks);
     lease.resize(sequence.blocks.len() as u64 * each)?;
-    Ok(SealedTiles::new(sequence, out.positions, out.refs, store.records, lease))
+    let refs = (out.refs, out.tagged);
+    Ok(SealedTiles::new(sequence, out.positions, refs, store.records, lease))
 }
 
 /// Positions at which one range ends and the next begins: every so many blocks' first positions.
@@ -92,6 +94,7 @@ fn borders(runs: &[Run]) -> Vec<Position> {
 struct Output {
     positions: Spill,
     refs: Pieces,
+    tagged: bool,
 }
 
 /// What a range came to.
@@ -112,6 +115,9 @@ fn join(ranges: impl Iterator<Item = Merged>, most_blocks: usize) -> Sequence {
         all.levels.add(last, first);
         all.levels.merge(&range.levels);
         last = Some(end);
+        if let Some(block) = range.blocks.first() {
+            all.stretches.push((all.blocks.len(), block.first_record, all.records));
+        }
         all.records += range.records;
         for mut block in range.blocks {
             block.first_position = all.positions;
@@ -184,7 +190,7 @@ fn emit_equal(
         {
             let Reverse((record, run)) = &mut *smallest;
             let cursor = &mut cursors[*run];
-            emitter.emit(position, cursor.number())?;
+            emitter.emit(position, cursor.number(), cursor.tag())?;
             cursor.advance(buffer)?;
             if cursor.head(None) == Some(position) {
                 cursor.read_record(record)?;
@@ -201,7 +207,7 @@ fn emit_equal(
     let Some(run) = last else { return Ok(()) };
     let cursor = &mut cursors[run];
     while cursor.head(None) == Some(position) {
-        emitter.emit(position, cursor.number())?;
+        emitter.emit(position, cursor.number(), cursor.tag())?;
         cursor.advance(buffer)?;
     }
     Ok(())
@@ -237,13 +243,16 @@ struct Cursor<'a> {
     block: usize,
     at: usize,
     positions: Vec<Position>,
+    /// Tags of the block's records, if they have any.
+    tags: Vec<u32>,
     /// Memory for the record at the head, for when equal positions must be ordered.
     spare: Vec<u8>,
 }
 
 impl<'a> Cursor<'a> {
     fn new(store: &'a TileStore, run: &'a Run) -> Self {
-        Cursor { store, run, block: 0, at: 0, positions: Vec::new(), spare: Vec::new() }
+        let (positions, tags, spare) = (Vec::new(), Vec::new(), Vec::new());
+        Cursor { store, run, block: 0, at: 0, positions, tags, spare }
     }
 
     /// Goes to the first record at or behind `from`; returns how many records the range until
@@ -280,10 +289,11 @@ impl<'a> Cursor<'a> {
     fn load(&mut self, buffer: &mut Vec<u8>) -> Result<()> {
         self.at = 0;
         self.positions.clear();
-        match self.run.blocks.get(self.block) {
-            Some(block) => block.read(&self.store.positions, buffer, &mut self.positions, None),
-            None => Ok(()),
-        }
+        self.tags.clear();
+        let Some(block) = self.run.blocks.get(self.block) else { return Ok(()) };
+        // Records of a run are not gathered: where distinct positions have copies, these have tags.
+        let tags = self.store.tagged.then_some(&mut self.tags);
+        block.read(&self.store.positions, buffer, &mut self.positions, tags)
     }
 
     /// The position it stands at, if that is before `until`.
@@ -298,6 +308,11 @@ impl<'a> Cursor<'a> {
         self.run.first_record + (self.block * BLOCK + self.at) as u64
     }
 
+    /// The tag of the record it stands at.
+    fn tag(&self) -> u32 {
+        self.tags.get(self.at).copied().unwrap_or_default()
+    }
+
     fn advance(&mut self, buffer: &mut Vec<u8>) -> Result<()> {
         self.at += 1;
         if self.at == self.positions.len() {
@@ -310,7 +325,10 @@ impl<'a> Cursor<'a> {
     /// Reads the record it stands at.
     fn read_record(&self, record: &mut Vec<u8>) -> Result<()> {
         record.resize(self.store.stride, 0);
-        self.store.records.read(self.number(), record)
+        self.store.records.read(self.number(), record)?;
+        // Equal records are told apart by their tags: by the input that they come from.
+        record.extend_from_slice(&self.tag().to_be_bytes());
+        Ok(())
     }
 }
 
@@ -342,14 +360,14 @@ impl<'a> Emitter<'a> {
             copies: Vec::with_capacity(BLOCK),
             packed: Vec::with_capacity(BLOCKS_AT_ONCE * BLOCK * 28),
             unplaced: Vec::with_capacity(BLOCKS_AT_ONCE),
-            refs: Vec::with_capacity(PIECE * 8),
+            refs: Vec::with_capacity(PIECE * ref_bytes(out.tagged)),
             first_ref: out.refs.reserve(most_records),
             refs_stored: 0,
             block_first: 0,
         }
     }
 
-    fn emit(&mut self, position: Position, record: u64) -> Result<()> {
+    fn emit(&mut self, position: Position, record: u64, tag: u32) -> Result<()> {
         match (&mut self.merged.ends, self.copies.last_mut()) {
             (Some((_, last)), Some(copies)) if *last == position => {
                 *copies = copies.checked_add(1).ok_or_else(|| {
@@ -373,7 +391,10 @@ impl<'a> Emitter<'a> {
         }
         self.merged.records += 1;
         self.refs.extend_from_slice(&record.to_le_bytes());
-        if self.refs.len() == PIECE * 8 {
+        if self.out.tagged {
+            self.refs.extend_from_slice(&tag.to_le_bytes());
+        }
+        if self.refs.len() == PIECE * ref_bytes(self.out.tagged) {
             self.store_refs()?;
         }
         Ok(())
@@ -382,7 +403,7 @@ impl<'a> Emitter<'a> {
     fn store_refs(&mut self) -> Result<()> {
         if !self.refs.is_empty() {
             self.out.refs.put(self.first_ref + self.refs_stored, &self.refs)?;
-            self.refs_stored += (self.refs.len() / 8) as u64;
+            self.refs_stored += (self.refs.len() / ref_bytes(self.out.tagged)) as u64;
             self.refs.clear();
         }
         Ok(())
