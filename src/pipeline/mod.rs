@@ -16,6 +16,7 @@ mod mill;
 mod mistake;
 mod node;
 mod outlet;
+mod outputs;
 mod passes;
 mod plan;
 mod product;

@@ -22,6 +22,16 @@ fn is_index(user: &str, record: u16) -> bool {
     user == "copc" || (user == "LAStools" && record == 30)
 }
 
+/// True for a record that outputs carry: not one that describes how its file stores its points.
+pub fn is_carried(vlr: &Vlr) -> bool {
+    !vlr.is(LASZIP.0, LASZIP.1) && !is_index(&vlr.user(), vlr.record())
+}
+
+/// True for an extended record that outputs carry.
+pub fn is_carried_extended(evlr: &Evlr) -> bool {
+    !is_index(&evlr.user(), evlr.record())
+}
+
 /// How the points are stored.
 #[derive(Debug, Clone)]
 pub enum Storage {
@@ -121,16 +131,19 @@ impl Input {
         self.extra_record().map_or(Vec::new(), |i| Descriptor::all(self.vlrs[i].payload()))
     }
 
-    /// The records that outputs carry: not those that describe how this file stores its points.
+    /// The records that outputs carry.
     pub fn carried_vlrs(&self) -> Vec<Vlr> {
-        let own = |v: &&Vlr| !v.is(LASZIP.0, LASZIP.1) && !is_index(&v.user(), v.record());
-        self.vlrs.iter().filter(own).cloned().collect()
+        self.vlrs.iter().filter(|v| is_carried(v)).cloned().collect()
     }
 
     /// The extended records that outputs carry.
     pub fn carried_evlrs(&self) -> Vec<Evlr> {
-        let own = |v: &&Evlr| !is_index(&v.user(), v.record());
-        self.evlrs.iter().filter(own).cloned().collect()
+        self.evlrs.iter().filter(|v| is_carried_extended(v)).cloned().collect()
+    }
+
+    /// The same without the records, whose payloads of thousands of files would add up.
+    pub fn without_records(self) -> Self {
+        Input { vlrs: Vec::new(), gap: Vec::new(), evlrs: Vec::new(), ..self }
     }
 
     /// The coordinate reference system as text.

@@ -19,7 +19,7 @@ pub struct Shift(pub [i64; 3]);
 
 impl Shift {
     /// Moves the coordinates of all records; False if one would leave i32.
-    fn apply(self, records: &mut [u8], stride: usize) -> bool {
+    pub fn apply(self, records: &mut [u8], stride: usize) -> bool {
         if self.0 == [0; 3] {
             return true;
         }

@@ -243,6 +243,13 @@ impl Source for PlySource {
         self.files.iter().map(|f| Input { path: f.path.clone(), points: f.points }).collect()
     }
 
+    fn metadata_of(&self, input: usize) -> Result<Metadata> {
+        let Some(file) = self.files.get(input) else {
+            return Err(Error::internal(format!("input {input} of {}", self.files.len())));
+        };
+        Ok(metadata(std::slice::from_ref(file), vec![Texts::of(file)]))
+    }
+
     fn points(&self) -> u64 {
         self.files.iter().fold(0, |sum, f| sum.saturating_add(f.points))
     }
