@@ -78,8 +78,9 @@ impl Pipeline {
         let source = open.open()?;
         check_columns(&sorted.transforms, &sorted.ops, &*sink, source.schema())?;
         let mills = mills(&sorted.ops, &*sink)?;
+        let z_scale = z_scale(&settings, &*source, &sorted.ops)?;
         let lattice = match mills || settings.nonfinite == super::settings::Nonfinite::Drop {
-            true => Some(Lattice::of(source.schema(), settings.lattice)?),
+            true => Some(Lattice::stretched(source.schema(), settings.lattice, z_scale)?),
             false => None,
         };
         let threads = match settings.threads {
@@ -182,6 +183,22 @@ fn check_columns(
             .help("put a `normals` stage before it, or leave `dimensions` out"));
     }
     Ok(())
+}
+
+/// What z is multiplied by where stages measure distances; else 1.
+fn z_scale(
+    settings: &RunSettings,
+    source: &dyn Source,
+    ops: &[(String, Box<dyn TileOp>)],
+) -> Result<f64> {
+    if ops.is_empty() {
+        return Ok(1.0);
+    }
+    let stretch = settings.stretch(source.metadata().units);
+    stretch.map_err(|error| match source.inputs().first() {
+        Some(input) => error.at(&input.path),
+        None => error,
+    })
 }
 
 fn mills(ops: &[(String, Box<dyn TileOp>)], sink: &dyn CreateSink) -> Result<bool> {
