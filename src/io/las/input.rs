@@ -11,8 +11,9 @@ use super::header::Header;
 use super::laz::{Compression, LASZIP};
 use super::vlr::{Evlr, VLR_HEAD, Vlr, read_evlrs, read_vlrs};
 use super::{chunks, crs};
+use crate::Result;
+use crate::io::origin::Origin;
 use crate::point::{Schema, Units};
-use crate::{Error, Result};
 
 /// User and number of the record that names the extra bytes.
 pub const EXTRA_BYTES: (&str, u16) = ("LASF_Spec", 4);
@@ -36,8 +37,8 @@ pub enum Storage {
 pub struct Input {
     /// Its path.
     pub path: PathBuf,
-    /// Its length in bytes.
-    pub len: u64,
+    /// What the file was when it was opened.
+    pub origin: Origin,
     /// Its public header block.
     pub header: Header,
     /// Its variable length records, all of them.
@@ -71,17 +72,13 @@ impl Input {
                 path.display()
             ));
         }
-        let path = path.to_owned();
-        Ok(Input { path, len: file.len(), header, vlrs, gap, evlrs, storage, warnings })
+        let (path, origin) = (path.to_owned(), file.origin().clone());
+        Ok(Input { path, origin, header, vlrs, gap, evlrs, storage, warnings })
     }
 
-    /// Opens the file again to read points.
+    /// Opens the file again to read points; fails if it has changed.
     pub fn reopen(&self) -> Result<InputFile> {
-        let file = InputFile::open(&self.path)?;
-        if file.len() != self.len {
-            return Err(Error::data(&self.path, "the file changed while it was read"));
-        }
-        Ok(file)
+        InputFile::reopen(&self.origin)
     }
 
     /// Points to read.

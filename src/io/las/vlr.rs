@@ -2,11 +2,11 @@
 //! ones stay in their file until they are written: one may hold gigabytes of waveforms.
 
 use std::cmp::Ordering;
-use std::path::PathBuf;
 
 use super::file::InputFile;
 use super::header::{Header, at, encoding};
 use crate::Result;
+use crate::io::origin::Origin;
 
 /// Bytes of a record's head.
 pub const VLR_HEAD: usize = 54;
@@ -101,7 +101,7 @@ impl Vlr {
 #[derive(Debug, Clone)]
 pub struct Evlr {
     head: [u8; EVLR_HEAD],
-    path: PathBuf,
+    origin: Origin,
     start: u64,
 }
 
@@ -140,7 +140,7 @@ impl Evlr {
 
     /// Opened anew for each use: a survey of thousands of files must not hold them all open.
     fn open(&self) -> Result<InputFile> {
-        InputFile::open(&self.path)
+        InputFile::reopen(&self.origin)
     }
 
     /// Where its head stands in its file.
@@ -168,7 +168,7 @@ impl Evlr {
             take(&file.bytes(at, len)?)?;
             at += len as u64;
         }
-        Ok(())
+        self.origin.unchanged()
     }
 
     /// The order of a union of records: user, number, bytes.
@@ -271,7 +271,7 @@ pub fn read_evlrs(file: &InputFile, header: &Header) -> Result<Vec<Evlr>> {
     for i in 0..claimed {
         let mut head = [0; EVLR_HEAD];
         file.read_at(&mut head, at)?;
-        let evlr = Evlr { head, path: file.path().to_owned(), start: at };
+        let evlr = Evlr { head, origin: file.origin().clone(), start: at };
         let room = file.len().saturating_sub(at + EVLR_HEAD as u64);
         if evlr.payload_len() > room {
             return Err(file

@@ -7,6 +7,7 @@ use std::path::Path;
 use super::file::PlyFile;
 use super::header::{shown, type_name};
 use super::text;
+use crate::io::origin::Origin;
 use crate::point::{PointBatch, Scalar, Schema};
 use crate::stage::Part;
 use crate::{Error, Result};
@@ -22,6 +23,7 @@ fn longest_line(schema: &Schema) -> usize {
 /// The vertices of a text file, in one part: where a line begins is known only from the lines before.
 pub(super) struct AsciiPart<'a> {
     path: &'a Path,
+    origin: &'a Origin,
     lines: Lines<'a>,
     /// Names (as the file has them), types and byte offsets in the record.
     fields: Vec<(&'a str, Scalar, usize)>,
@@ -43,6 +45,7 @@ impl<'a> AsciiPart<'a> {
         let properties = file.properties();
         AsciiPart {
             path: &file.path,
+            origin: &file.origin,
             lines: Lines {
                 file: handle,
                 path: &file.path,
@@ -79,7 +82,9 @@ impl<'a> AsciiPart<'a> {
     }
 
     fn short(&self, when: &str) -> Error {
-        Error::data(self.path, format!("the file ends {when}")).at_byte(self.lines.length)
+        Error::data(self.path, format!("the file ends {when}"))
+            .at_byte(self.lines.length)
+            .help("the file is cut short, or its header is wrong")
     }
 
     fn vertex(&mut self, record: &mut [u8]) -> Result<()> {
@@ -129,6 +134,13 @@ fn word<'a>(line: &'a [u8], place: &mut usize) -> Option<&'a [u8]> {
 
 impl Part for AsciiPart<'_> {
     fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
+        let outcome = self.fill(batch);
+        self.origin.vouch(outcome, batch.is_empty())
+    }
+}
+
+impl AsciiPart<'_> {
+    fn fill(&mut self, batch: &mut PointBatch) -> Result<()> {
         batch.source = self.source;
         batch.clear();
         self.skip()?;

@@ -1,15 +1,16 @@
 //! One PLY file: where its vertices are, and whether it is long enough for them.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use super::header::{Element, Encoding, Header, Kind, Property, shown};
 use super::{names, walk};
+use crate::io::origin::Origin;
 use crate::{Error, Result};
 
 /// One file, its header read.
 pub(super) struct PlyFile {
     pub path: PathBuf,
+    pub origin: Origin,
     pub header: Header,
     pub points: u64,
     pub length: u64,
@@ -24,7 +25,8 @@ pub(super) struct PlyFile {
 impl PlyFile {
     /// Reads the header, and what stands before the vertices of a binary file.
     pub fn open(path: &Path) -> Result<PlyFile> {
-        let (file, length) = open(path)?;
+        let (file, origin) = Origin::open(path)?;
+        let length = origin.length();
         let header = Header::read(&file, path, length)?;
         let Some(vertex) = header.vertex() else {
             let elements: Vec<String> =
@@ -44,6 +46,7 @@ impl PlyFile {
         };
         let file = PlyFile {
             path: path.to_owned(),
+            origin,
             points: element.count,
             length,
             body,
@@ -81,16 +84,6 @@ impl PlyFile {
         .at_byte(self.length)
         .help("the file is cut short, or its header is wrong"))
     }
-}
-
-/// Opens a regular file for reading; its length in bytes.
-pub(super) fn open(path: &Path) -> Result<(File, u64)> {
-    let file = File::open(path).map_err(|cause| Error::io(path, "open", cause))?;
-    let facts = file.metadata().map_err(|cause| Error::io(path, "read its length", cause))?;
-    if !facts.is_file() {
-        return Err(Error::data(path, "not a regular file"));
-    }
-    Ok((file, facts.len()))
 }
 
 /// Lines that `elements` take in a text file. One without properties takes none.
