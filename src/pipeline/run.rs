@@ -11,7 +11,7 @@ use super::clock::Clock;
 use super::mill::mill;
 use super::plan::Plan;
 use super::publish::Staged;
-use super::scratch::{Scratch, free_space};
+use super::scratch::{Scratch, free_space, memory_warning};
 use super::settings::{Nonfinite, Spill};
 use super::shares::Demands;
 use super::stream::stream;
@@ -230,7 +230,8 @@ impl Plan {
             }
         };
         drop(job);
-        let run = self.figures(&finished, &budget, area.written());
+        let mut run = self.figures(&finished, &budget, area.written());
+        run.warnings.extend(memory_warning(spill.parent(), area.written()));
         run.warnings.iter().for_each(|warning| watch.warn(warning));
         Ok((finished, run))
     }
@@ -277,12 +278,17 @@ impl Plan {
             None => (None, None, None),
         };
         let lattice = self.lattice.as_ref();
+        let mut decisions = finished.decisions;
+        if let Some(lattice) = lattice.filter(|lattice| lattice.z_scale() != 1.0) {
+            let (stage, name) = ("run".to_owned(), "z_scale".to_owned());
+            decisions.insert(0, Decision { stage, name, value: lattice.z_scale().into() });
+        }
         let result = Outcome {
             pipeline: self.stages.clone(),
             lattice_step: lattice.map_or(0.0, |lattice| lattice.step),
             lattice_shift: lattice.map_or([0.0; 3], |lattice| lattice.shift),
             ledger,
-            decisions: finished.decisions,
+            decisions,
             counts: finished.tally.counts.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect(),
             tile_side,
             totals,

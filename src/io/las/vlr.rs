@@ -12,6 +12,10 @@ use crate::io::origin::Origin;
 pub const VLR_HEAD: usize = 54;
 /// Bytes of an extended record's head.
 pub const EVLR_HEAD: usize = 60;
+/// Bytes of variable length records that are held in memory; no file that means them has as many.
+const VLRS_HELD: u64 = 64 << 20;
+/// Extended records whose heads are held in memory; no file that means them has as many.
+const EVLRS_HELD: u32 = 1 << 18;
 /// Bytes between the records and the points that are carried; more are dropped with a warning.
 const GAP_CARRIED: u64 = 64 << 10;
 
@@ -215,12 +219,19 @@ pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>
     let mut at = start;
     for i in 0..claimed {
         if end - at < VLR_HEAD as u64 {
-            return Err(file.wrong(at, format!("record {i} of {claimed} begins behind the points")));
+            return Err(file
+                .wrong(at, format!("record {i} of {claimed} begins behind the points"))
+                .help("the record count or the start of the points is damaged"));
         }
         let mut head = [0; VLR_HEAD];
         file.read_at(&mut head, at)?;
         let len = u16::from_le_bytes([head[20], head[21]]);
         at += VLR_HEAD as u64;
+        if at - start > VLRS_HELD {
+            return Err(file
+                .wrong(at::VLRS as u64, format!("{claimed} variable length records exceed 64 MiB"))
+                .help("the record count is damaged: no scan needs that many"));
+        }
         if u64::from(len) > end - at {
             return Err(file
                 .wrong(
@@ -266,6 +277,11 @@ pub fn read_evlrs(file: &InputFile, header: &Header) -> Result<Vec<Evlr>> {
                 ),
             )
             .help("the file is cut off, or its header is damaged"));
+    }
+    if claimed > EVLRS_HELD {
+        return Err(file
+            .wrong(field, format!("{claimed} extended records are more than any scan has"))
+            .help("the record count is damaged"));
     }
     let mut evlrs = Vec::new();
     for i in 0..claimed {

@@ -3,11 +3,11 @@
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
+use std::sync::atomic::Ordering;
 
 use super::file::PlyFile;
 use super::header::{shown, type_name};
 use super::text;
-use crate::io::origin::Origin;
 use crate::point::{PointBatch, Scalar, Schema};
 use crate::stage::Part;
 use crate::{Error, Result};
@@ -23,7 +23,7 @@ fn longest_line(schema: &Schema) -> usize {
 /// The vertices of a text file, in one part: where a line begins is known only from the lines before.
 pub(super) struct AsciiPart<'a> {
     path: &'a Path,
-    origin: &'a Origin,
+    file: &'a PlyFile,
     lines: Lines<'a>,
     /// Names (as the file has them), types and byte offsets in the record.
     fields: Vec<(&'a str, Scalar, usize)>,
@@ -45,7 +45,7 @@ impl<'a> AsciiPart<'a> {
         let properties = file.properties();
         AsciiPart {
             path: &file.path,
-            origin: &file.origin,
+            file,
             lines: Lines {
                 file: handle,
                 path: &file.path,
@@ -135,7 +135,7 @@ fn word<'a>(line: &'a [u8], place: &mut usize) -> Option<&'a [u8]> {
 impl Part for AsciiPart<'_> {
     fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
         let outcome = self.fill(batch);
-        self.origin.vouch(outcome, batch.is_empty())
+        self.file.origin.vouch(outcome, batch.is_empty())
     }
 }
 
@@ -149,6 +149,10 @@ impl AsciiPart<'_> {
         for record in batch.refill(points).chunks_exact_mut(stride) {
             self.vertex(record)?;
             self.left -= 1;
+        }
+        // A line behind the last vertex may be too long to be read: it is there all the same.
+        if points == 0 && self.file.ends_with_vertices() && !matches!(self.lines.next(), Ok(None)) {
+            self.file.more_lines.store(true, Ordering::Relaxed);
         }
         Ok(())
     }

@@ -279,7 +279,8 @@ impl Source for PlySource {
     }
 
     fn warnings(&self) -> Vec<String> {
-        self.warnings.clone()
+        let unread = self.files.iter().flat_map(PlyFile::unread);
+        self.warnings.iter().cloned().chain(unread).collect()
     }
 }
 
