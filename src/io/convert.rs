@@ -180,7 +180,7 @@ impl Projection {
             }
             None => format!("point {index} of its batch"),
         };
-        let value = match value {
+        let text = match value {
             Value::Unsigned(v) => v.to_string(),
             Value::Signed(v) => v.to_string(),
             Value::Single(v) => v.to_string(),
@@ -189,9 +189,12 @@ impl Projection {
         let name = &to.name;
         let error = Error::new(
             ErrorKind::Data,
-            format!("{name} = {value} of {place} does not fit {}", room(to)),
+            format!("{name} = {text} of {place} does not fit {}", room(to)),
         );
         if XYZ.contains(&name.as_str()) {
+            if !value.as_f64().is_finite() {
+                return error.help("set nonfinite = \"drop\" under [run] to leave such points out");
+            }
             // Whole thousands near the point: a scan around it fits, and its digits stay readable.
             let near = self.from.coordinates().map(|axes| {
                 axes.map(|axis| (axis.world(record, self.from.endian) / 1000.0).round() * 1000.0)

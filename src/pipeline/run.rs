@@ -12,7 +12,7 @@ use super::mill::mill;
 use super::passes::{Pass, StageOp};
 use super::plan::Plan;
 use super::publish::Staged;
-use super::scratch::{Scratch, free_space};
+use super::scratch::{Scratch, free_space, memory_warning};
 use super::settings::{Nonfinite, Spill};
 use super::shares::{Demands, Shares};
 use super::stream::stream;
@@ -254,6 +254,7 @@ impl Plan {
         let earlier = std::mem::take(&mut *lock(&job.warnings));
         drop(job);
         let mut run = self.figures(&finished, &budget, area.written());
+        run.warnings.extend(memory_warning(spill.parent(), area.written()));
         run.warnings.iter().for_each(|warning| watch.warn(warning));
         run.warnings.splice(0..0, earlier);
         Ok((finished, run))
@@ -329,11 +330,16 @@ impl Plan {
             None => (None, None, None),
         };
         let lattice = self.lattice.as_ref();
+        let mut decisions = finished.decisions;
+        if let Some(lattice) = lattice.filter(|lattice| lattice.z_scale() != 1.0) {
+            let (stage, name) = ("run".to_owned(), "z_scale".to_owned());
+            decisions.insert(0, Decision { stage, name, value: lattice.z_scale().into() });
+        }
         let result = Outcome {
             pipeline: self.stages.clone(),
             lattice: lattice.map(|l| LatticeFigures { step: l.step, shift: l.shift }),
             ledger,
-            decisions: finished.decisions,
+            decisions,
             counts: finished.tally.counts.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect(),
             passes: finished.passes,
             tile_side,

@@ -216,7 +216,8 @@ fn parse(bytes: &[u8], whole: bool, path: &Path) -> Result<Option<Header>> {
     let mut lines = Lines::new(bytes);
     // Asked of a line without an end too: what is no PLY is told as such, whatever its size.
     if lines.next().is_none_or(|(_, line, _)| line.trim_ascii() != b"ply") {
-        return Err(fail(0, "not a PLY file: the first line is not `ply`".into()));
+        return Err(fail(0, "not a PLY file: the first line is not `ply`".into())
+            .help("the file is cut off, or another format under this name"));
     }
     let mut header = Partial { lines: 1, ..Partial::default() };
     while let Some((at, line, ended)) = lines.next() {

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::file::open;
 use super::header::{Encoding, Header, Kind};
 use crate::Result;
+use crate::io::origin::Origin;
 
 /// What the header of a PLY file says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -49,7 +49,8 @@ pub struct PropertyInfo {
 /// Reads the header of the PLY file at `path`. Fails if it cannot be read or is no PLY header; counts
 /// are told as claimed.
 pub fn describe(path: &Path) -> Result<PlyInfo> {
-    let (file, bytes) = open(path)?;
+    let (file, origin) = Origin::open(path)?;
+    let bytes = origin.length();
     let header = Header::read(&file, path, bytes)?;
     let points = header.vertex().map_or(0, |vertex| header.elements[vertex].count);
     let word = |kind: Kind| kind.word();

@@ -7,7 +7,6 @@ use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::file::open;
 use super::header::{Element, Encoding, Kind, Property};
 use super::source::{Native, Rest};
 use super::{CRS, CRS_MORE, PlyOptions, names, padding, text};
@@ -113,19 +112,20 @@ impl PlySink {
     fn carry(&mut self, native: &Native, which: usize) -> Result<()> {
         let Some(rest) = &native.rest else { return Ok(()) };
         let (mut at, end) = (rest.cuts[2 * which], rest.cuts[2 * which + 1]);
-        let (from, _) = open(&rest.path)?;
+        let from = rest.origin.reopen()?;
         let mut buffer = vec![0; CARRY];
         while at < end {
             let piece = &mut buffer[..(end - at).min(CARRY as u64) as usize];
-            from.read_exact_at(piece, at)
-                .map_err(|e| Error::io(&rest.path, "read its other elements", e).at_byte(at))?;
+            from.read_exact_at(piece, at).map_err(|e| {
+                Error::io(rest.origin.path(), "read its other elements", e).at_byte(at)
+            })?;
             self.file
                 .write_all(piece)
                 .map_err(|e| Error::io(&self.path, "write the other elements", e))?;
             at += piece.len() as u64;
             self.bytes += piece.len() as u64;
         }
-        Ok(())
+        rest.origin.unchanged()
     }
 }
 
