@@ -13,6 +13,7 @@ mod mill;
 mod mistake;
 mod node;
 mod outlet;
+mod outline;
 mod plan;
 mod publish;
 mod registry;
@@ -29,6 +30,7 @@ mod watch;
 
 pub use inputs::expand;
 pub use kinds::{Encoding, Format, OutputOrder, Read, Synth, Write};
+pub use outline::Outline;
 pub use plan::Plan;
 pub use registry::{Registry, StageKind, StagePlace};
 pub use run::Done;

@@ -2,11 +2,13 @@
 
 mod batch;
 mod bounds;
+mod count;
 pub mod names;
 mod schema;
 mod selection;
 
 pub use batch::PointBatch;
 pub use bounds::{Bounds, Position, distance2};
+pub use count::parse_count;
 pub use schema::{Bits, Dimension, Endian, Layout, Metadata, Scalar, Schema, Value};
 pub use selection::{Edit, Flag, Mark, Selection};

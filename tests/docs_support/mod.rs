@@ -1,5 +1,7 @@
 //! Reads the doc comments of items, fields and variants from Rust source, formatted by rustfmt.
 
+pub mod keys;
+
 /// A public field: its name, its type as written, its documentation.
 pub struct Field {
     pub name: String,
