@@ -34,6 +34,16 @@ pub trait Source: Send + Sync {
         Vec::new()
     }
 
+    /// What the output of one of the [`inputs`](Source::inputs) alone carries on: its own header and
+    /// records, where [`metadata`](Source::metadata) is what all have in common. Read again from the
+    /// file, so that thousands of headers are not held; a file that changed since is an error.
+    ///
+    /// The records of a batch still are in the source's schema: a sink that is created with this
+    /// brings them to what the input's own header says of them.
+    fn metadata_of(&self, _input: usize) -> Result<Metadata> {
+        Ok(self.metadata().clone())
+    }
+
     /// How many points the headers claim, cut to what the files could hold at most.
     fn points(&self) -> u64;
 
@@ -218,8 +228,19 @@ pub struct ChunkSize {
 
 /// Creates a sink once the source's schema is known.
 pub trait CreateSink: Send + Sync {
-    /// The final path of the output.
+    /// The final path of the output; the folder where there is one output for each input.
     fn path(&self) -> &Path;
+
+    /// The sinks of the `inputs`, in their order, if each input gets an output of its own: this one
+    /// then is not created, and its [`chunk`](CreateSink::chunk) is as large as any of theirs. They
+    /// are created one after the other, each with [`Source::metadata_of`] its input, and an input of
+    /// which no record is kept gets its output too.
+    ///
+    /// Fails if two outputs would have one name, or one would replace an input. Makes nothing: the
+    /// folder is made by the run.
+    fn each_input(&self, _inputs: &[Input]) -> Result<Option<Vec<Box<dyn CreateSink>>>> {
+        Ok(None)
+    }
 
     /// The order in which records are wanted.
     fn order(&self) -> Order;

@@ -161,3 +161,22 @@ fn every_run_ends_with_a_summary() {
     let many = lines(&["convert", "a.laz", "b.laz", "-o", "c/", "--to", "las"]);
     assert_eq!(many, ["files", "points", "memory", "time", "output"]);
 }
+
+#[test]
+fn classes_that_are_named_are_reduced_and_all_others_stay() {
+    let at = tempfile::tempdir().unwrap();
+    done(at.path(), &["synth", "als", "-n", "20k", "-o", "a.laz"]);
+    let arguments = ["reduce", "a.laz", "-o", "o.laz", "--classes", "2", "--progress", "json"];
+    let told = events(at.path(), &arguments, 0);
+    let classes = told[told.len() - 1]["classes"].as_array().unwrap();
+    assert!(classes.len() >= 3, "{classes:?}");
+    for class in classes {
+        let (before, after) = (class["before"].as_u64().unwrap(), class["after"].as_u64().unwrap());
+        match class["class"].as_u64() {
+            Some(2) => assert!(after < before / 2, "{class}"),
+            _ => assert_eq!(after, before, "{class}"),
+        }
+    }
+    let told = done(at.path(), &["reduce", "a.laz", "-o", "o.laz"]);
+    assert!(told.contains("\nclasses    2 ground "), "{told}");
+}

@@ -13,12 +13,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
+use docs_support::formats::{agree, documented};
 use docs_support::keys::{self, Default, Key};
 use docs_support::{Enum, Field, enum_of, item_docs, struct_of};
 use pointmill::ops::normals::Normals;
 use pointmill::ops::{Cells, Median};
 use pointmill::pipeline::{
-    Overrides, Pipeline, Quiet, Read, Registry, RunSettings, StageKind, Synth, Write,
+    LimitKeys, Overrides, Pipeline, Quiet, Read, Registry, RunSettings, StageKind, Synth, Write,
 };
 use serde_json::Value;
 
@@ -98,12 +99,17 @@ fn sort_of(subject: &str, field: &Field, files: &[String]) -> (String, Option<En
         ("cells", "side", _) => "a length, or `\"auto\"`",
         ("cells", "max_angle", _) => "a number of radians, or text with a unit",
         ("write", "scale", _) => "a number, or three",
+        ("run", "z_scale", _) => "a number, or `\"auto\"`",
         ("run", "memory", _) => "a size such as `\"2GiB\"`, or a number of bytes",
         (_, _, "usize" | "u64") => "a whole number",
         (_, _, "NonZeroUsize") => "a whole number from 1",
         (_, _, "f64") => "a number",
         (_, _, "[f64; 3]") => "three numbers",
         (_, _, "PathBuf") => "a path",
+        (_, _, "Vec<u8>") => "a list of whole numbers to 255",
+        ("limits", _, "Vec<Flag>") => {
+            "a list of `\"withheld\"`, `\"overlap\"`, `\"synthetic\"`, `\"key-point\"`"
+        }
         (_, _, "Vec<String>") => "a list of texts",
         (_, _, name) => {
             let words = files.iter().find_map(|text| enum_of(text, name)).unwrap_or_else(|| {
@@ -131,6 +137,17 @@ fn keys_said(
         Key { name: field.name.clone(), value, default, docs: field.docs.clone(), words }
     };
     fields.iter().map(key).collect()
+}
+
+/// The keys that every stage on tiles takes besides its own.
+fn limit_keys() -> Vec<Key> {
+    let text = source("src/pipeline/limits.rs");
+    let (_, fields) = struct_of(&text, "LimitKeys");
+    let names: Vec<&str> = fields.iter().map(|field| field.name.as_str()).collect();
+    assert_eq!(names, LimitKeys::KEYS);
+    let defaults = serde_json::to_value(LimitKeys::default()).unwrap();
+    let default = |field: &Field, _: Option<&Enum>| Default::Is(defaults[&field.name].clone());
+    keys_said("limits", &fields, &[text, source("src/point/selection.rs")], default)
 }
 
 /// A stage's page, and what `pointmill stages` says of it.
@@ -167,6 +184,7 @@ fn stage_page(page: &Page) -> (String, Value) {
         }
     };
     let said = keys_said(page.kind, &fields, &files, default);
+    let on_tiles = !["read", "synth", "write"].contains(&page.kind);
     let mut out = format!("# {}\n\n<!-- {SAYS_SO} -->\n\n{}\n\n{docs}\n", page.kind, page.about);
     out += "\n## Keys\n\n";
     match said.is_empty() {
@@ -176,8 +194,13 @@ fn stage_page(page: &Page) -> (String, Value) {
     if let Some((heading, file, function)) = page.more {
         let _ = write!(out, "\n## {heading}\n\n{}\n", item_docs(&source(file), "fn", function));
     }
+    if on_tiles {
+        out += "\nIt takes [the keys of all stages that work on tiles](README.md#limits) too.\n";
+    }
     out += "\nEvery stage may also have a `name`, by which `--set` and `from` mean it.\n";
-    (out, keys::described(page.kind, page.about, &said))
+    let limits = if on_tiles { limit_keys() } else { Vec::new() };
+    let all: Vec<Key> = said.into_iter().chain(limits).collect();
+    (out, keys::described(page.kind, page.about, &all))
 }
 
 #[test]
@@ -193,6 +216,8 @@ fn every_stage_has_a_page_that_says_what_the_code_does() {
         keep(&format!("docs/stages/{}.md", page.kind), &text);
         let _ = writeln!(index, "| [{0}]({0}.md) | {1} |", page.kind, page.about);
     }
+    let (limits, _) = struct_of(&source("src/pipeline/limits.rs"), "LimitKeys");
+    let _ = write!(index, "\n## Limits\n\n{limits}\n\n{}", keys::markdown(&limit_keys()));
     index += "\nWhat stands above all of them: [the `[run]` table](../run.md).\n";
     keep("docs/stages/README.md", &index);
     let stored = fs::read_dir(root().join("docs/stages")).unwrap().count();
@@ -264,56 +289,6 @@ fn the_command_line_has_a_page_that_says_what_help_says() {
         let _ = write!(out, "\n## {command}\n\n```\n{}\n```\n", help(Some(command)));
     }
     keep("docs/cli.md", &out);
-}
-
-/// The keys of a value, as paths: `ledger.removed[].stage`.
-fn key_paths(value: &Value, path: &str, into: &mut BTreeSet<String>) {
-    match value {
-        Value::Object(object) => {
-            for (key, value) in object {
-                let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
-                into.insert(path.clone());
-                key_paths(value, &path, into);
-            }
-        }
-        Value::Array(list) => {
-            list.iter().for_each(|value| key_paths(value, &format!("{path}[]"), into));
-        }
-        _ => {}
-    }
-}
-
-/// The keys that a section of docs/formats.md names: code at the beginning of a table's rows. True
-/// for those of which it says "not always".
-fn documented(section: &str) -> Vec<(String, bool)> {
-    let text = source("docs/formats.md");
-    let heading = format!("\n## {section}\n");
-    let (_, after) = text.split_once(&heading).unwrap_or_else(|| panic!("no section {section}"));
-    let section = after.split("\n## ").next().unwrap_or(after);
-    let key = |row: &str| {
-        let (key, _) = row.strip_prefix("| `")?.split_once('`')?;
-        Some((key.to_owned(), row.contains("not always")))
-    };
-    section.lines().filter_map(key).collect()
-}
-
-/// Every key of `value` is named in the section, and every key named is one, unless it says that it
-/// is not always there. Below a key `x.*` are keys of free choice.
-fn agree(value: &Value, section: &str) {
-    let mut there = BTreeSet::new();
-    key_paths(value, "", &mut there);
-    let documented = documented(section);
-    let free: Vec<&str> = documented.iter().filter_map(|(key, _)| key.strip_suffix('*')).collect();
-    there.retain(|path| !free.iter().any(|free| path.starts_with(free)));
-    let named: BTreeSet<&str> = documented.iter().map(|(key, _)| key.as_str()).collect();
-    let unnamed: Vec<&String> =
-        there.iter().filter(|path| !named.contains(path.as_str())).collect();
-    assert!(unnamed.is_empty(), "docs/formats.md does not name {unnamed:?} under {section}");
-    let must = documented.iter().filter(|(key, not_always)| !not_always && !key.ends_with('*'));
-    let missing: Vec<&String> =
-        must.map(|(key, _)| key).filter(|key| !there.contains(*key)).collect();
-    assert!(missing.is_empty(), "there are no {missing:?}, which docs/formats.md names");
-    assert!(there.len() >= 8, "{section}: too few keys to prove anything");
 }
 
 /// Reduces a made-up scan to `output` with a report, which is returned.

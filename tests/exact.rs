@@ -14,7 +14,8 @@ use pointmill::budget::Budget;
 use pointmill::ops::normals::{Estimate, Estimator, Method};
 use pointmill::point::{Bounds, Position, distance2, names};
 use pointmill::tile::{
-    Folder, Intake, Loader, SealedTiles, SpillArea, TileStore, morton_cmp, parallel, seal,
+    Folder, Intake, Loader, SealedTiles, Sieve, SpillArea, Tag, TileStore, morton_cmp, parallel,
+    seal,
 };
 
 /// Tiles that both tests cut: small, and cut where the pipeline cuts them.
@@ -41,11 +42,11 @@ fn sealed(scan: &Scan, positions: &[Position]) -> Arc<SealedTiles> {
     let budget = Budget::new(1 << 30);
     let folder = Box::new(Scratch(tempfile::tempdir().unwrap()));
     let area = SpillArea::new(budget.clone(), 0, folder);
-    let store = TileStore::new(&area, &budget, scan.schema.stride);
+    let store = TileStore::new(&area, &budget, scan.schema.stride, false);
     parallel(3, |thread| {
         let mut intake = Intake::new(&store, 1500);
         for (i, &p) in positions.iter().enumerate().skip(thread).step_by(3) {
-            intake.push(p, scan.record(i))?;
+            intake.push(p, scan.record(i), Tag::default())?;
         }
         intake.flush()
     })
@@ -97,7 +98,7 @@ fn neighbors_at_the_faces_of_tiles_of_a_real_scan_are_those_of_all_of_it() {
         let keys = tiles.cut(TILE_POINTS as u64, 5_000, reach, 0).unwrap();
         let levels: BTreeSet<u32> = keys.iter().map(|key| key.level).collect();
         assert!(keys.len() >= 30 && levels.len() >= 2, "{} tiles, {levels:?}", keys.len());
-        let mut loader = Loader::new(&tiles, 6_000);
+        let mut loader = Loader::new(&tiles, &Sieve::default(), 6_000);
         loader.limit_rim(2 * TILE_POINTS);
         let (mut cores, mut checked, mut ties, mut unproven) = (Vec::new(), 0, 0, 0);
         for key in keys {

@@ -5,7 +5,8 @@
 use std::path::Path;
 
 use pointmill::pipeline::{
-    Nonfinite, Overrides, Pipeline, Registry, Set, Simd, StageKind, StagePlace, Synth, Write,
+    MixedUnits, Nonfinite, Overrides, Pipeline, Registry, Set, Simd, StageKind, StagePlace, Synth,
+    Write, ZScale,
 };
 use pointmill::report::Tally;
 use pointmill::stage::{Needs, Role, TileOp};
@@ -120,7 +121,8 @@ fn canonical_keys_have_defaults_but_no_places() {
 #[test]
 fn settings_are_read() {
     let run = "[run]\nmemory = \"1.5GiB\"\nthreads = 3\nscratch = \"s\"\nreport = \"r.json\"\n\
-               lattice = 0.001\nnonfinite = \"drop\"\ntile_points = 5000\nsimd = \"portable\"\n";
+               lattice = 0.001\nnonfinite = \"drop\"\ntile_points = 5000\nsimd = \"portable\"\n\
+               z_scale = 0.5\nunits = \"ignore\"\n";
     let settings = parse(&format!("{run}{GOOD}")).unwrap().settings;
     assert_eq!(settings.memory, Some(1_610_612_736));
     assert_eq!(settings.threads.unwrap().get(), 3);
@@ -130,6 +132,7 @@ fn settings_are_read() {
     assert_eq!(settings.nonfinite, Nonfinite::Drop);
     assert_eq!(settings.tile_points.unwrap().get(), 5000);
     assert_eq!(settings.simd, Simd::Portable);
+    assert_eq!((settings.z_scale, settings.units), (Some(ZScale::Factor(0.5)), MixedUnits::Ignore));
     assert_eq!(
         parse(&format!("[run]\nmemory = 4096\n{GOOD}")).unwrap().settings.memory,
         Some(4096)
@@ -170,7 +173,7 @@ p.toml:2:10: `memory`: `2G` is no size such as 512MiB or 2GiB (units: B, KiB, Mi
 p.toml:3:1: `[run]` has no key `thraeds`
   3 | thraeds = 4
     | ^^^^^^^
-    = did you mean `threads`? keys: lattice, memory, nonfinite, report, scratch, simd, spill, threads, tile_points
+    = did you mean `threads`? keys: lattice, memory, nonfinite, report, scratch, simd, spill, threads, tile_points, units, z_scale
 p.toml:7:9: `scene` cannot be `alps`
   7 | scene = \"alps\"
     |         ^^^^^^

@@ -11,8 +11,8 @@ use pointmill::point::{
     Dimension, Endian, Layout, PointBatch, Position, Scalar, Schema, distance2, names,
 };
 use pointmill::tile::{
-    Fetch, Folder, Intake, Loader, Reader, SealedTiles, SpillArea, TileStore, morton_cmp, parallel,
-    seal,
+    Fetch, Folder, Intake, Loader, Reader, SealedTiles, Sieve, SpillArea, Tag, TileStore,
+    morton_cmp, parallel, seal,
 };
 
 /// A small generator, so that a failing case is the same everywhere.
@@ -90,11 +90,11 @@ fn sealed(
     let budget = Budget::new(1 << 30);
     let folder = Box::new(Scratch(tempfile::tempdir().unwrap()));
     let area = SpillArea::new(budget.clone(), memory, folder);
-    let store = TileStore::new(&area, &budget, schema().stride);
+    let store = TileStore::new(&area, &budget, schema().stride, false);
     parallel(threads, |thread| {
         let mut intake = Intake::new(&store, run);
         for (i, &p) in scan.iter().enumerate().skip(thread).step_by(threads) {
-            intake.push(p, &record(p, (i % 3) as u32))?;
+            intake.push(p, &record(p, (i % 3) as u32), Tag::default())?;
         }
         intake.flush()
     })
@@ -166,7 +166,7 @@ fn tiles_share_the_scan_out_and_their_neighborhoods_are_those_of_the_whole_scan(
         let keys = tiles.cut(capacity, capacity, reach, 3).unwrap();
         let levels: std::collections::BTreeSet<u32> = keys.iter().map(|key| key.level).collect();
         assert!(keys.len() >= 30 && levels.len() >= 2, "{} tiles, levels {levels:?}", keys.len());
-        let mut loader = Loader::new(&tiles, 2 * capacity as usize);
+        let mut loader = Loader::new(&tiles, &Sieve::default(), 2 * capacity as usize);
         let (mut cores, mut checked, mut unproven, mut ties) = (Vec::new(), 0, 0, 0);
         for key in keys {
             let tile = loader.load(key, reach, k).unwrap();

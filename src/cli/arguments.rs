@@ -185,6 +185,14 @@ pub(super) struct Reduce {
     /// How a normal is computed: varady or pca [default: varady]
     #[arg(long, value_name = "HOW")]
     pub method: Option<String>,
+    /// Reduce the points of these classes alone, such as 2,6; all others stay, and are not seen as
+    /// neighbours
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
+    pub classes: Vec<u8>,
+    /// Points with the withheld flag: drop them, keep them as points like all others, or ignore them
+    /// and write them as they are [default: drop]
+    #[arg(long, value_name = "HOW")]
+    pub withheld: Option<String>,
     #[command(flatten)]
     pub written: Written,
     #[command(flatten)]
@@ -248,7 +256,7 @@ pub(super) struct Stages {
 
 #[derive(Debug, Args)]
 pub(super) struct Synth {
-    /// What is scanned: plane, part or als
+    /// What is scanned: plane, part, sphere, squares-random, squares-uniform or als
     #[arg(value_name = "KIND")]
     pub scene: String,
     /// How many points, such as 1500, 10k, 5M or 1e6

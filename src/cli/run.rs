@@ -78,6 +78,7 @@ pub(super) fn parse_sets(sets: &[String], common: &Common) -> Result<Vec<Set>> {
 }
 
 fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
+    let classes = (!arguments.classes.is_empty()).then(|| json!(arguments.classes));
     given([
         ("IN", "read.path", Some(json!(arguments.inputs))),
         ("-o", "write.path", Some(json!(arguments.output))),
@@ -87,6 +88,10 @@ fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
         ("--min-points", "cells.min_points", arguments.min_points.map(Value::from)),
         ("--split", "cells.split", arguments.split.clone().map(Value::from)),
         ("--method", "normals.method", arguments.method.clone().map(Value::from)),
+        ("--classes", "normals.classes", classes.clone()),
+        ("--classes", "cells.classes", classes.clone()),
+        ("--classes", "median.classes", classes),
+        ("--withheld", "run.withheld", arguments.withheld.clone().map(Value::from)),
     ])
 }
 

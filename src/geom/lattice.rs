@@ -11,10 +11,12 @@ const SMALLEST_STEP: f64 = 1e-9;
 /// An isotropic lattice of i64 positions anchored at world 0, fixed by headers alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lattice {
-    /// World units of one step.
+    /// World units of one step, along z after it was stretched.
     pub step: f64,
     /// World coordinate of lattice position 0 (the fraction of a step that all offsets share).
     pub shift: [f64; 3],
+    /// What z was multiplied by, so that its unit is that of x and y.
+    z_scale: f64,
     placement: Placement,
 }
 
@@ -39,6 +41,21 @@ pub enum Misplaced {
 impl Lattice {
     /// The lattice of records of `schema`. `step` overrides the step in world units.
     pub fn of(schema: &Schema, step: Option<f64>) -> Result<Lattice> {
+        Lattice::stretched(schema, step, 1.0)
+    }
+
+    /// The lattice of records of `schema` whose z is multiplied by `z_scale`, for scans whose heights
+    /// have another unit than their x and y. Records stay as they are: only where their points are
+    /// for each other changes, and lengths are in the unit of x and y. It is exact where a decimal
+    /// step of 1e-9 or more divides the stretched scale too; else positions are rounded to 2^-30.
+    ///
+    /// # Errors
+    ///
+    /// A factor or step that is not above 0, and records without coordinates.
+    pub fn stretched(schema: &Schema, step: Option<f64>, z_scale: f64) -> Result<Lattice> {
+        if !(z_scale.is_finite() && z_scale > 0.0) {
+            return Err(Error::pipeline(format!("z_scale must be above 0, not {z_scale}")));
+        }
         let axes = schema
             .coordinates()
             .ok_or_else(|| Error::pipeline("the input has no coordinates X, Y and Z"))?;
@@ -48,13 +65,13 @@ impl Lattice {
                     "the lattice step must be above 0, not {step}"
                 )));
             }
-            return Ok(Lattice::binary(step, 1.0 / step));
+            return Ok(Lattice::binary(step, 1.0 / step, z_scale));
         }
         let stored_whole = matches!(schema.layout, Layout::Las { .. })
             && axes.iter().all(|d| d.scalar == Scalar::I32);
-        let decimal =
-            stored_whole.then(|| decimal(axes.map(|d| d.scale), axes.map(|d| d.origin))).flatten();
-        Ok(decimal.unwrap_or_else(|| Lattice::binary(1.0 / BINARY, BINARY)))
+        let decimal = || decimal(axes.map(|d| d.scale), axes.map(|d| d.origin), z_scale);
+        let decimal = stored_whole.then(decimal).flatten();
+        Ok(decimal.unwrap_or_else(|| Lattice::binary(1.0 / BINARY, BINARY, z_scale)))
     }
 
     /// True if positions are rounded, so that unequal coordinates may share one.
@@ -62,11 +79,16 @@ impl Lattice {
         matches!(self.placement, Placement::Float { .. })
     }
 
-    fn binary(step: f64, per_unit: f64) -> Lattice {
-        Lattice { step, shift: [0.0; 3], placement: Placement::Float { per_unit } }
+    /// What z is multiplied by before it is placed; 1 for most scans.
+    pub fn z_scale(&self) -> f64 {
+        self.z_scale
     }
 
-    /// World coordinates of a position. Where a world unit is a whole number of steps they are
+    fn binary(step: f64, per_unit: f64, z_scale: f64) -> Lattice {
+        Lattice { step, shift: [0.0; 3], z_scale, placement: Placement::Float { per_unit } }
+    }
+
+    /// World coordinates of a position, z as the records have it. Where a world unit is a whole number of steps they are
     /// divided, which rounds to the decimal that one expects: 12.345 and not 12.345000000000001.
     pub fn world(&self, p: Position) -> [f64; 3] {
         let per_unit = (1.0 / self.step).round();
@@ -74,6 +96,7 @@ impl Lattice {
         std::array::from_fn(|axis| {
             let steps = p[axis] as f64;
             let at = if whole { steps / per_unit } else { steps * self.step };
+            let at = if axis == 2 { at / self.z_scale } else { at };
             at + self.shift[axis]
         })
     }
@@ -110,7 +133,8 @@ impl Lattice {
             Placement::Float { per_unit } => {
                 let endian: Endian = schema.endian;
                 for (i, record) in records.chunks_exact(schema.stride).enumerate() {
-                    let world = axes.map(|d| d.world(record, endian));
+                    let mut world = axes.map(|d| d.world(record, endian));
+                    world[2] = stretched(world[2], self.z_scale);
                     match float_position(world, per_unit) {
                         Ok(position) => place(i, position),
                         Err(why) => misplaced(i, why),
@@ -123,6 +147,13 @@ impl Lattice {
 
 /// 2^62: far enough from the ends of i64 that a box around a position can grow.
 const FARTHEST: f64 = (1u64 << 62) as f64;
+
+/// A height times `z_scale`. A finite one that overflows stays finite: it is too far, and not a point
+/// to be dropped as not finite.
+fn stretched(z: f64, z_scale: f64) -> f64 {
+    let scaled = z * z_scale;
+    if z.is_finite() { scaled.clamp(f64::MIN, f64::MAX) } else { z }
+}
 
 fn float_position(world: [f64; 3], per_unit: f64) -> Result<Position, Misplaced> {
     let mut position = [0; 3];
@@ -141,9 +172,11 @@ fn float_position(world: [f64; 3], per_unit: f64) -> Result<Position, Misplaced>
     Ok(position)
 }
 
-/// The decimal lattice of integer coordinates: one step that all scales are whole multiples of, and
-/// offsets that share their fraction of a step. None if there is no such step.
-fn decimal(scale: [f64; 3], origin: [f64; 3]) -> Option<Lattice> {
+/// The decimal lattice of integer coordinates, z stretched: one step that all scales are whole
+/// multiples of, and offsets that share their fraction of a step. None if there is no such step.
+fn decimal(mut scale: [f64; 3], mut origin: [f64; 3], z_scale: f64) -> Option<Lattice> {
+    scale[2] *= z_scale;
+    origin[2] *= z_scale;
     if scale.iter().chain(&origin).any(|v| !v.is_finite()) || scale.iter().any(|&s| s <= 0.0) {
         return None;
     }
@@ -173,7 +206,8 @@ fn decimal(scale: [f64; 3], origin: [f64; 3]) -> Option<Lattice> {
         let fraction = steps - whole;
         shift[axis] = if fraction.abs() < 1e-6 { 0.0 } else { fraction * step };
     }
-    Some(Lattice { step, shift, placement: Placement::Integer { times, plus } })
+    shift[2] /= z_scale;
+    Some(Lattice { step, shift, z_scale, placement: Placement::Integer { times, plus } })
 }
 
 /// How many steps a scale is, if it is a whole number of them within the rounding of decimals.
@@ -187,10 +221,11 @@ fn multiple(scale: f64, step: f64) -> Option<i64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::point::Dimension;
 
     #[test]
     fn scales_of_one_decimal_step_are_whole_multiples() {
-        let lattice = decimal([0.01, 0.01, 0.001], [500_000.0, 4_100_000.0, 0.0]).unwrap();
+        let lattice = decimal([0.01, 0.01, 0.001], [500_000.0, 4_100_000.0, 0.0], 1.0).unwrap();
         assert_eq!(lattice.step, 0.001);
         let Placement::Integer { times, plus } = lattice.placement else { panic!() };
         assert_eq!((times, plus), ([10, 10, 1], [500_000_000, 4_100_000_000, 0]));
@@ -198,25 +233,25 @@ mod tests {
 
     #[test]
     fn equal_scales_need_not_be_decimal() {
-        assert_eq!(decimal([1.0 / 3.0; 3], [0.0; 3]).unwrap().step, 1.0 / 3.0);
-        assert!(decimal([1.0 / 3.0, 0.5, 0.5], [0.0; 3]).is_none());
+        assert_eq!(decimal([1.0 / 3.0; 3], [0.0; 3], 1.0).unwrap().step, 1.0 / 3.0);
+        assert!(decimal([1.0 / 3.0, 0.5, 0.5], [0.0; 3], 1.0).is_none());
     }
 
     #[test]
     fn decimal_positions_are_decimal_in_the_world() {
-        let lattice = decimal([0.001; 3], [0.0; 3]).unwrap();
+        let lattice = decimal([0.001; 3], [0.0; 3], 1.0).unwrap();
         assert_eq!(lattice.world([5_600_037_884, -31_351, 7]), [5_600_037.884, -31.351, 0.007]);
         assert_ne!(5_600_037_884.0 * 0.001, 5_600_037.884, "a product rounds otherwise");
-        let lattice = decimal([1e-5; 3], [0.0; 3]).unwrap();
+        let lattice = decimal([1e-5; 3], [0.0; 3], 1.0).unwrap();
         assert_eq!(lattice.world([-3_135_136, 1, 0]), [-31.35136, 1e-5, 0.0]);
-        let lattice = decimal([2.5; 3], [0.0; 3]).unwrap();
+        let lattice = decimal([2.5; 3], [0.0; 3], 1.0).unwrap();
         assert_eq!(lattice.world([3, -1, 0]), [7.5, -2.5, 0.0]);
     }
 
     #[test]
     fn zero_negative_and_nan_scales_have_no_decimal_lattice() {
         for scale in [0.0, -0.01, f64::NAN, f64::INFINITY, 1e-12] {
-            assert!(decimal([scale; 3], [0.0; 3]).is_none(), "{scale}");
+            assert!(decimal([scale; 3], [0.0; 3], 1.0).is_none(), "{scale}");
         }
     }
 
@@ -238,5 +273,75 @@ mod tests {
             float_position([-4294967295.0, 0.0, 0.0], BINARY).unwrap()[0],
             -0x3fff_ffff_c000_0000
         );
+    }
+
+    fn las(scale: f64, origin: f64) -> Schema {
+        let axis = |name: &str, at| Dimension::new(name, Scalar::I32, at).scaled(scale, origin);
+        Schema {
+            layout: Layout::Las { format: 0 },
+            endian: Endian::Little,
+            stride: 12,
+            dimensions: vec![axis("X", 0), axis("Y", 4), axis("Z", 8)],
+        }
+    }
+
+    fn placed(lattice: &Lattice, schema: &Schema, stored: [i32; 3]) -> Position {
+        let record: Vec<u8> = stored.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let mut position = None;
+        lattice.place(schema, &record, |_, p| position = Some(p), |_, why| panic!("{why:?}"));
+        position.unwrap()
+    }
+
+    #[test]
+    fn feet_over_metres_are_stretched_exactly() {
+        let schema = las(0.01, 100.0);
+        let lattice = Lattice::stretched(&schema, None, 0.3048).unwrap();
+        assert_eq!((lattice.step, lattice.rounds()), (1e-6, false));
+        let p = placed(&lattice, &schema, [1, -1, 10_000]);
+        assert_eq!(p, [100_010_000, 99_990_000, 60_960_000], "200 ft are 60.96 m");
+        let world = lattice.world(p);
+        assert_eq!(world[..2], [100.01, 99.99]);
+        assert!((world[2] - 200.0).abs() < 1e-12, "{world:?}");
+    }
+
+    #[test]
+    fn a_factor_without_a_decimal_step_rounds_half_to_even() {
+        let schema = las(0.01, 0.0);
+        let foot = 1200.0 / 3937.0;
+        let lattice = Lattice::stretched(&schema, None, foot).unwrap();
+        assert!(lattice.rounds());
+        let p = placed(&lattice, &schema, [100, 0, 12_345]);
+        assert_eq!(p[0], 1 << 30);
+        assert_eq!(p[2], (12_345.0 * 0.01 * foot * BINARY).round_ties_even() as i64);
+        assert!((lattice.world(p)[2] - 123.45).abs() < 1e-8);
+    }
+
+    #[test]
+    fn no_factor_changes_nothing() {
+        for schema in [las(0.001, 5.25), las(1.0 / 3.0, 0.1)] {
+            let (plain, one) = (Lattice::of(&schema, None), Lattice::stretched(&schema, None, 1.0));
+            assert_eq!(plain.unwrap(), one.unwrap());
+        }
+        for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(Lattice::stretched(&las(0.01, 0.0), None, wrong).is_err());
+        }
+    }
+
+    #[test]
+    fn a_height_that_overflows_by_the_factor_is_too_far_and_not_infinite() {
+        let far = stretched(1e300, 1e10);
+        assert_eq!(float_position([0.0, 0.0, far], BINARY), Err(Misplaced::TooFar));
+        let none = stretched(f64::INFINITY, 0.5);
+        assert_eq!(float_position([0.0, 0.0, none], BINARY), Err(Misplaced::NotFinite));
+    }
+
+    #[test]
+    fn an_offset_beside_the_steps_comes_back_in_the_unit_of_z() {
+        let schema = las(0.01, 0.005);
+        let lattice = Lattice::stretched(&schema, None, 10.0).unwrap();
+        let world = lattice.world(placed(&lattice, &schema, [3, 4, 5]));
+        for (axis, stored) in [3.0, 4.0, 5.0].into_iter().enumerate() {
+            assert!((world[axis] - (stored * 0.01 + 0.005)).abs() < 1e-12, "{world:?}");
+        }
     }
 }

@@ -6,6 +6,7 @@ pub mod las;
 pub mod ply;
 mod project;
 pub mod synthetic;
+mod wkt;
 
 pub use describe::describe;
 pub use project::Projected;

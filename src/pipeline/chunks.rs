@@ -1,160 +1,294 @@
-//! What tiles leave behind becomes chunks of the output, cut by rank, and stored fates.
+//! What tiles leave behind becomes chunks of the outputs, cut by rank, and stored columns.
 
-use super::survey::{FATE_BYTES, fate_code};
+use std::sync::Arc;
+
+use super::product::{Entry, Product};
 use crate::Result;
-use crate::tile::{Fate, PIECE, Pieces, Tile};
+use crate::tile::{Address, PIECE, Pieces, Spill, SpillArea, State};
 
-/// What a tile leaves behind.
-pub(super) struct Product {
-    /// First record and number of records of each kept position.
-    kept: Vec<(u64, u32)>,
-    /// Normals of the kept positions, if the sink wants them.
-    normals: Option<Vec<[f32; 3]>>,
-    /// Fates of all core positions, as stored.
-    fates: Vec<u8>,
-}
-
-impl Product {
-    /// What `tile` leaves behind, whose core positions have these first records.
-    pub fn of(tile: &Tile, first_records: &[u64], wants_normals: bool) -> Self {
-        let core = tile.core.clone();
-        let mut product = Product {
-            kept: Vec::with_capacity(core.len()),
-            normals: wants_normals.then(|| Vec::with_capacity(core.len())),
-            fates: Vec::with_capacity(core.len() * FATE_BYTES),
-        };
-        for (&first, i) in first_records.iter().zip(core) {
-            let records = match tile.fates[i] {
-                Fate::Kept => tile.copies[i],
-                Fate::KeptOnce => 1,
-                Fate::Removed | Fate::Represented { .. } => 0,
-            };
-            product.fates.extend_from_slice(&fate_code(tile.fates[i]));
-            if records > 0 {
-                product.kept.push((first, records));
-                if let Some(normals) = &mut product.normals {
-                    normals.push(tile.normals[i]);
-                }
-            }
-        }
-        product
-    }
-
-    /// Positions of the tile's core.
-    pub fn positions(&self) -> u64 {
-        (self.fates.len() / FATE_BYTES) as u64
-    }
-}
-
-/// Records that become one chunk of the output, as a product has them: a position with a million
+/// Records that become one chunk of an output, as a product has them: a position with a million
 /// copies is one entry of each chunk that it fills.
 pub(super) struct Chunk {
-    /// First record and number of records of each position.
-    records: Vec<(u64, u32)>,
-    /// Normals of the positions, if the sink wants them.
+    /// Which output.
+    pub sink: usize,
+    /// First record, number of records, and their state.
+    records: Vec<(u64, u32, State)>,
+    /// Normals of the entries, if the sink wants them.
     normals: Option<Vec<[f32; 3]>>,
 }
 
 impl Chunk {
-    fn empty(wants_normals: bool) -> Self {
-        Chunk { records: Vec::new(), normals: wants_normals.then(Vec::new) }
+    fn empty(sink: usize, wants_normals: bool) -> Self {
+        Chunk { sink, records: Vec::new(), normals: wants_normals.then(Vec::new) }
     }
 
     /// Replaces `numbers` by the numbers of its records.
     pub fn number(&self, numbers: &mut Vec<u64>) {
         numbers.clear();
-        numbers.extend(self.records.iter().flat_map(|&(first, n)| first..first + u64::from(n)));
+        numbers.extend(self.records.iter().flat_map(|&(first, n, _)| first..first + u64::from(n)));
     }
 
     /// The normal of each record.
     pub fn spread_normals(&self) -> Option<Vec<[f32; 3]>> {
-        let each = self.records.iter().map(|&(_, n)| n as usize).zip(self.normals.as_ref()?);
+        let each = self.records.iter().map(|&(_, n, _)| n as usize).zip(self.normals.as_ref()?);
         Some(each.flat_map(|(n, &normal)| std::iter::repeat_n(normal, n)).collect())
+    }
+
+    /// The state of each record.
+    pub fn states(&self) -> impl Iterator<Item = State> + '_ {
+        self.records.iter().flat_map(|&(_, n, state)| std::iter::repeat_n(state, n as usize))
     }
 }
 
-/// Cuts kept records into chunks of the sink's size by their rank, and stores fates.
-pub(super) struct Cutter<'a> {
-    fates: &'a Pieces,
-    fate_bytes: Vec<u8>,
-    fates_stored: u64,
-    chunk_points: usize,
-    wants_normals: bool,
-    open: Chunk,
-    /// Records that the open chunk takes until it is full.
-    room: usize,
-    kept: u64,
+/// A stored column while it grows, item after item.
+struct Column {
+    pieces: Arc<Pieces>,
+    item: usize,
+    open: Vec<u8>,
+    stored: u64,
 }
 
-impl<'a> Cutter<'a> {
-    /// A cutter for chunks of `chunk_points` records that stores fates in `fates`.
-    pub fn new(fates: &'a Pieces, chunk_points: usize, wants_normals: bool) -> Self {
+impl Column {
+    fn new(area: &Arc<SpillArea>, name: &'static str, item: usize, items: u64) -> Self {
+        let pieces = Arc::new(Pieces::new(area, name, item));
+        pieces.reserve(items);
+        Column { pieces, item, open: Vec::with_capacity(PIECE * item), stored: 0 }
+    }
+
+    fn add(&mut self, mut bytes: &[u8]) -> Result<()> {
+        while !bytes.is_empty() {
+            let room = PIECE * self.item - self.open.len();
+            let (now, later) = bytes.split_at(room.min(bytes.len()));
+            self.open.extend_from_slice(now);
+            bytes = later;
+            if self.open.len() == PIECE * self.item {
+                self.flush()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds `count` items of one byte.
+    fn repeat(&mut self, byte: u8, mut count: u32) -> Result<()> {
+        while count > 0 {
+            let now = (PIECE - self.open.len()).min(count as usize);
+            self.open.resize(self.open.len() + now, byte);
+            count -= now as u32;
+            if self.open.len() == PIECE {
+                self.flush()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        if !self.open.is_empty() {
+            self.pieces.put(self.stored, &self.open)?;
+            self.stored += (self.open.len() / self.item) as u64;
+            self.open.clear();
+        }
+        Ok(())
+    }
+}
+
+/// What a pass stores.
+pub(super) struct Stored {
+    /// See [`Sieve`](crate::tile::Sieve).
+    pub states: Arc<Pieces>,
+    pub fates: Arc<Pieces>,
+    pub normals: Option<Arc<Pieces>>,
+    pub figures: Option<Arc<Pieces>>,
+    pub found: Found,
+}
+
+/// What a first phase found, in the order of the tiles.
+pub(super) struct Found {
+    spill: Spill,
+    stretches: Vec<(Address, usize)>,
+    open: Vec<u8>,
+}
+
+/// Found entries are handed to the spill in stretches of about this size.
+const FOUND_AT_ONCE: usize = 1 << 18;
+
+impl Found {
+    fn add(&mut self, entries: &[[u64; 2]]) -> Result<()> {
+        for [a, b] in entries {
+            self.open.extend_from_slice(&a.to_le_bytes());
+            self.open.extend_from_slice(&b.to_le_bytes());
+            if self.open.len() >= FOUND_AT_ONCE {
+                self.flush()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        if !self.open.is_empty() {
+            self.stretches.push((self.spill.append(&self.open)?, self.open.len()));
+            self.open.clear();
+        }
+        Ok(())
+    }
+
+    /// Calls `visit` with all entries, stretch after stretch.
+    pub fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()> {
+        let (mut bytes, mut entries) = (Vec::new(), Vec::new());
+        for &(address, length) in &self.stretches {
+            bytes.resize(length, 0);
+            self.spill.read(address, &mut bytes)?;
+            entries.clear();
+            entries.extend(bytes.chunks_exact(16).map(|pair| {
+                let (a, b) = pair.split_at(8);
+                [a, b].map(|half| {
+                    let mut word = [0; 8];
+                    word.copy_from_slice(half);
+                    u64::from_le_bytes(word)
+                })
+            }));
+            visit(&entries)?;
+        }
+        Ok(())
+    }
+}
+
+/// An output while its chunks are cut.
+pub(super) struct Open {
+    /// Records of a full chunk.
+    pub chunk_points: usize,
+    /// True if it writes normals.
+    pub wants_normals: bool,
+    /// True if it takes what was there before the pass.
+    pub before: bool,
+    chunk: Chunk,
+    /// Records that the chunk takes until it is full.
+    room: usize,
+    written: u64,
+}
+
+impl Open {
+    /// Output `sink` without a record.
+    pub fn new(sink: usize, chunk_points: usize, wants_normals: bool, before: bool) -> Self {
+        let chunk = Chunk::empty(sink, wants_normals);
+        Open { chunk_points, wants_normals, before, chunk, room: chunk_points, written: 0 }
+    }
+
+    fn take(&mut self, entry: &Entry, normal: Option<[f32; 3]>, full: &mut Vec<Chunk>) {
+        let state = if self.before { entry.was } else { entry.now };
+        if !state.is_written() {
+            return;
+        }
+        let (mut first, mut left) = (entry.number, entry.count);
+        self.written += u64::from(left);
+        while left > 0 {
+            let now = left.min(u32::try_from(self.room).unwrap_or(u32::MAX));
+            self.chunk.records.push((first, now, state));
+            if let (Some(normals), Some(normal)) = (&mut self.chunk.normals, normal) {
+                normals.push(normal);
+            }
+            (first, left) = (first + u64::from(now), left - now);
+            self.room -= now as usize;
+            if self.room == 0 {
+                full.push(self.close());
+            }
+        }
+    }
+
+    fn close(&mut self) -> Chunk {
+        self.room = self.chunk_points;
+        let empty = Chunk::empty(self.chunk.sink, self.wants_normals);
+        std::mem::replace(&mut self.chunk, empty)
+    }
+}
+
+/// Cuts records into chunks of the outputs by their rank, and stores columns.
+pub(super) struct Cutter {
+    states: Column,
+    fates: Column,
+    normals: Option<Column>,
+    figures: Option<Column>,
+    found: Found,
+    outputs: Vec<Open>,
+    counts: Counts,
+}
+
+/// Records behind a pass.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct Counts {
+    /// Those that later passes look at.
+    pub alive: u64,
+    /// Those that are not removed.
+    pub written: u64,
+    /// Those that each output of the pass was given.
+    pub outputs: Vec<u64>,
+}
+
+impl Cutter {
+    /// A cutter for a scan of so many positions and records, into `outputs`; the last two columns
+    /// are stored if they are wanted.
+    pub fn new(
+        area: &Arc<SpillArea>,
+        (positions, records): (u64, u64),
+        (normals, figures): (bool, bool),
+        outputs: Vec<Open>,
+    ) -> Self {
+        use crate::tile::{FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES};
+        let column = |name, item| Column::new(area, name, item, positions);
         Cutter {
-            fates,
-            fate_bytes: Vec::with_capacity(PIECE * FATE_BYTES),
-            fates_stored: 0,
-            chunk_points,
-            wants_normals,
-            open: Chunk::empty(wants_normals),
-            room: chunk_points,
-            kept: 0,
+            states: Column::new(area, "states", 1, records),
+            fates: column("fates", FATE_BYTES),
+            normals: normals.then(|| column("normals", NORMAL_BYTES)),
+            figures: figures.then(|| column("figures", FIGURE_BYTES)),
+            found: Found {
+                spill: Spill::new(area, "found"),
+                stretches: Vec::new(),
+                open: Vec::new(),
+            },
+            outputs,
+            counts: Counts::default(),
         }
     }
 
     /// The chunks that the next product completes.
-    pub fn cut(&mut self, product: Product) -> Result<Vec<Chunk>> {
-        self.store_fates(&product.fates)?;
+    pub fn cut(&mut self, product: &Product) -> Result<Vec<Chunk>> {
+        self.fates.add(&product.fates)?;
+        if let Some(normals) = &mut self.normals {
+            normals.add(&product.normals)?;
+        }
+        if let Some(figures) = &mut self.figures {
+            figures.add(&product.figures)?;
+        }
+        self.found.add(&product.found)?;
         let mut full = Vec::new();
-        for (n, &(mut first, mut left)) in product.kept.iter().enumerate() {
-            while left > 0 {
-                let now = left.min(u32::try_from(self.room).unwrap_or(u32::MAX));
-                self.open.records.push((first, now));
-                if let (Some(open), Some(normals)) = (&mut self.open.normals, &product.normals) {
-                    open.push(normals[n]);
-                }
-                (first, left) = (first + u64::from(now), left - now);
-                self.room -= now as usize;
-                if self.room == 0 {
-                    full.push(self.close());
-                }
+        for (n, entry) in product.entries.iter().enumerate() {
+            self.states.repeat(entry.now.0, entry.count)?;
+            self.counts.alive += if entry.now.is_alive() { u64::from(entry.count) } else { 0 };
+            self.counts.written += if entry.now.is_written() { u64::from(entry.count) } else { 0 };
+            let normal = product.entry_normals.as_ref().map(|normals| normals[n]);
+            for output in &mut self.outputs {
+                output.take(entry, normal, &mut full);
             }
         }
         Ok(full)
     }
 
-    fn close(&mut self) -> Chunk {
-        self.kept += (self.chunk_points - self.room) as u64;
-        self.room = self.chunk_points;
-        std::mem::replace(&mut self.open, Chunk::empty(self.wants_normals))
-    }
-
-    fn store_fates(&mut self, mut fates: &[u8]) -> Result<()> {
-        while !fates.is_empty() {
-            let room = PIECE * FATE_BYTES - self.fate_bytes.len();
-            let (now, later) = fates.split_at(room.min(fates.len()));
-            self.fate_bytes.extend_from_slice(now);
-            fates = later;
-            if self.fate_bytes.len() == PIECE * FATE_BYTES {
-                self.flush_fates()?;
-            }
-        }
-        Ok(())
-    }
-
-    fn flush_fates(&mut self) -> Result<()> {
-        if !self.fate_bytes.is_empty() {
-            self.fates.put(self.fates_stored, &self.fate_bytes)?;
-            self.fates_stored += (self.fate_bytes.len() / FATE_BYTES) as u64;
-            self.fate_bytes.clear();
-        }
-        Ok(())
-    }
-
-    /// The last chunk, and how many records are kept in all.
-    pub fn finish(&mut self) -> Result<(Vec<Chunk>, u64)> {
-        self.flush_fates()?;
-        let rest = if self.open.records.is_empty() { Vec::new() } else { vec![self.close()] };
-        Ok((rest, self.kept))
+    /// The last chunks, the columns, and what was counted.
+    pub fn finish(mut self) -> Result<(Vec<Chunk>, Stored, Counts)> {
+        let columns = [Some(&mut self.states), Some(&mut self.fates)];
+        let more = [self.normals.as_mut(), self.figures.as_mut()];
+        columns.into_iter().chain(more).flatten().try_for_each(Column::flush)?;
+        self.found.flush()?;
+        let open = self.outputs.iter_mut().filter(|output| output.room < output.chunk_points);
+        let rest = open.map(Open::close).collect();
+        self.counts.outputs = self.outputs.iter().map(|output| output.written).collect();
+        let stored = Stored {
+            states: self.states.pieces,
+            fates: self.fates.pieces,
+            normals: self.normals.map(|column| column.pieces),
+            figures: self.figures.map(|column| column.pieces),
+            found: self.found,
+        };
+        Ok((rest, stored, self.counts))
     }
 }
 
@@ -162,7 +296,7 @@ impl<'a> Cutter<'a> {
 mod tests {
     use super::*;
     use crate::budget::Budget;
-    use crate::tile::{Folder, SpillArea};
+    use crate::tile::{FATE_BYTES, Folder, Tag};
 
     #[derive(Debug)]
     struct Nowhere;
@@ -173,25 +307,39 @@ mod tests {
         }
     }
 
+    fn product(kept: &[(u64, u32)]) -> Product {
+        let entry = |&(number, count): &(u64, u32)| Entry {
+            number,
+            count,
+            tag: Tag::default(),
+            was: State::ALIVE,
+            now: State::ALIVE,
+        };
+        Product {
+            entries: kept.iter().map(entry).collect(),
+            entry_normals: Some(kept.iter().map(|&(first, _)| [first as f32; 3]).collect()),
+            fates: vec![0; kept.len() * FATE_BYTES],
+            ..Product::default()
+        }
+    }
+
     #[test]
     fn chunks_are_cut_by_rank_and_copies_are_one_entry() {
-        let area = SpillArea::new(Budget::new(1 << 20), 1 << 20, Box::new(Nowhere));
-        let fates = Pieces::new(&area, "fates", FATE_BYTES);
-        fates.reserve(8);
-        let mut cutter = Cutter::new(&fates, 1000, true);
-        let product = |kept: &[(u64, u32)]| Product {
-            kept: kept.to_vec(),
-            normals: Some(kept.iter().map(|&(first, _)| [first as f32; 3]).collect()),
-            fates: vec![0; kept.len() * FATE_BYTES],
-        };
+        let area = SpillArea::new(Budget::new(1 << 26), 1 << 26, Box::new(Nowhere));
+        let outputs = vec![Open::new(0, 1000, true, false)];
         let copies = 10_000_000;
-        let mut chunks = cutter.cut(product(&[(0, 1), (1, 2), (7, copies)])).unwrap();
+        let all = 8 + u64::from(copies);
+        let mut cutter = Cutter::new(&area, (8, all), (false, false), outputs);
+        let mut chunks = cutter.cut(&product(&[(0, 1), (1, 2), (7, copies)])).unwrap();
         assert_eq!(chunks.len(), 10_000);
         assert!(chunks.iter().all(|chunk| chunk.records.len() <= 3));
-        chunks.extend(cutter.cut(product(&[(20_000_000, 5)])).unwrap());
-        let (rest, kept) = cutter.finish().unwrap();
+        chunks.extend(cutter.cut(&product(&[(20_000_000, 5)])).unwrap());
+        let (rest, stored, counts) = cutter.finish().unwrap();
         chunks.extend(rest);
-        assert_eq!(kept, 3 + u64::from(copies) + 5);
+        assert_eq!(counts, Counts { alive: all, written: all, outputs: vec![all] });
+        let mut state = [9; 3];
+        stored.states.read(all - 3, &mut state).unwrap();
+        assert_eq!(state, [State::ALIVE.0; 3]);
         let (mut numbers, mut ranks) = (Vec::new(), 0);
         let expected = (0..3).chain(7..7 + u64::from(copies)).chain(20_000_000..20_000_005);
         let mut expected = expected.peekable();
@@ -199,7 +347,7 @@ mod tests {
             chunk.number(&mut numbers);
             assert!(numbers.iter().all(|&number| expected.next() == Some(number)));
             let normals = chunk.spread_normals().unwrap();
-            assert_eq!(normals.len(), numbers.len());
+            assert_eq!((normals.len(), chunk.states().count()), (numbers.len(), numbers.len()));
             assert!(numbers.iter().zip(normals).all(|(&n, normal)| match n {
                 0 => normal[0] == 0.0,
                 1..3 => normal[0] == 1.0,
@@ -210,5 +358,30 @@ mod tests {
             assert!(ranks % 1000 == 0 || expected.peek().is_none());
         }
         assert_eq!(expected.next(), None);
+    }
+
+    #[test]
+    fn outputs_take_what_was_there_before_the_pass_or_what_it_leaves() {
+        let area = SpillArea::new(Budget::new(1 << 20), 1 << 20, Box::new(Nowhere));
+        let outputs = vec![Open::new(3, 2, false, true), Open::new(5, 2, false, false)];
+        let mut cutter = Cutter::new(&area, (3, 3), (false, false), outputs);
+        let mut product = product(&[(0, 1), (1, 1), (2, 1)]);
+        product.entries[1].now = State::REMOVED;
+        product.entries[2].now = State::ASIDE.edited(3);
+        let mut chunks = cutter.cut(&product).unwrap();
+        let (rest, _, counts) = cutter.finish().unwrap();
+        chunks.extend(rest);
+        assert_eq!(counts, Counts { alive: 1, written: 2, outputs: vec![3, 2] });
+        let of = |sink: usize| {
+            let mut all = Vec::new();
+            for chunk in chunks.iter().filter(|chunk| chunk.sink == sink) {
+                let mut numbers = Vec::new();
+                chunk.number(&mut numbers);
+                all.extend(numbers.into_iter().zip(chunk.states().map(State::edit)));
+            }
+            all
+        };
+        assert_eq!(of(3), [(0, 0), (1, 0), (2, 0)]);
+        assert_eq!(of(5), [(0, 0), (2, 3)]);
     }
 }

@@ -1,45 +1,45 @@
 //! Cutting the decoded scan into tiles that fit the memory, wide enough for the stages' cells.
 
+use super::passes::{Pass, StageOp};
 use super::run::Job;
 use super::shares::{Demands, Shares};
 use crate::budget::whole_mebibytes;
 use crate::geom::lattice::Lattice;
-use crate::stage::TileOp;
 use crate::tile::{CutError, SealedTiles, TileKey};
 use crate::{Error, Result};
 
 /// How far beyond its cube a tile's columns must be right: the sides of the cells that its faces
 /// may cut, which add along the chain.
-pub(super) fn reach(ops: &[(String, Box<dyn TileOp>)]) -> i64 {
-    ops.iter()
-        .map(|(_, op)| op.needs())
+pub(super) fn reach(ops: &[StageOp], pass: &Pass) -> i64 {
+    pass.needs(ops)
         .filter(|needs| !needs.cell_aligned)
         .fold(0, |sum, needs| sum.saturating_add(needs.cell_side))
 }
 
-pub(super) fn neighbors(ops: &[(String, Box<dyn TileOp>)]) -> usize {
-    ops.iter().map(|(_, op)| op.needs().neighbors).max().unwrap_or(0)
+pub(super) fn neighbors(ops: &[StageOp], pass: &Pass) -> usize {
+    pass.needs(ops).map(|needs| needs.neighbors).max().unwrap_or(0)
 }
 
 /// Tiles are at least four cells wide, or their zones would be mostly their neighbours'.
 const CELLS_ACROSS: u64 = 4;
 
-/// The tiles of the scan and the positions that an arena for them takes: as planned, or, where a cube
+/// The tiles of a pass and the positions that an arena for them takes: as planned, or, where a cube
 /// that cannot be cut holds more, what the memory left after the decode can give.
 pub(super) fn cut(
     job: &Job<'_>,
+    pass: &Pass,
     lattice: &Lattice,
     shares: &Shares,
     demands: &Demands,
     tiles: &SealedTiles,
 ) -> Result<(Vec<TileKey>, usize)> {
-    let side = job.ops.iter().map(|(_, op)| op.needs().cell_side).max().unwrap_or(0);
+    let side = pass.needs(&job.ops).map(|needs| needs.cell_side).max().unwrap_or(0);
     let lowest = match u64::try_from(side).unwrap_or(0).saturating_mul(CELLS_ACROSS) {
         0 => 0,
         wide => wide.checked_next_power_of_two().map_or(64, u64::ilog2),
     };
     let wanted = job.tile_points.map_or(zone_of(shares.tile_positions), |points| points as u64);
-    let reach = reach(&job.ops);
+    let reach = reach(&job.ops, pass);
     let free = demands.tile_positions(job.budget.free());
     let mut capacity = shares.tile_positions;
     loop {

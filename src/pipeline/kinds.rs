@@ -107,7 +107,8 @@ pub struct Synth {
 
 impl StageKind for Synth {
     const KIND: &'static str = "synth";
-    const ABOUT: &'static str = "Makes a scan of a plane, a machine part or a landscape up.";
+    const ABOUT: &'static str =
+        "Makes a scan up: of a simple surface, a machine part, projected squares or a landscape.";
 
     fn build(self, _at: &StagePlace) -> Result<Role> {
         Ok(Role::Source(connect::synth(&self)))

@@ -1,35 +1,34 @@
-//! The mill: decode into the tile store, then tile after tile through the stages, in canonical
-//! order into the sink.
+//! The mill: decode into the tile store, then pass after pass over the tiles, in canonical order into
+//! the sinks.
 
 use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::chunks::{Chunk, Cutter, Product};
+use super::chunks::Found;
 use super::clock::Clock;
-use super::cut::{cut, neighbors, reach};
-use super::outlet::{Hands, Outlet};
-use super::rounded::Rounded;
-use super::run::{Finished, Job, StopOnDrop};
+use super::cut::cut;
+use super::forecast::forecast;
+use super::grind::{Field, grind};
+use super::passes::{Op, Pass};
+use super::run::{Finished, Job};
 use super::shares::{BATCH, Demands, Shares};
-use super::survey::{FATE_BYTES, survey};
-use crate::Result;
+use super::survey::survey;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::PointBatch;
-use crate::report::{Decision, Tally};
-use crate::stage::{Encoded, ScanFacts, Sink};
-use crate::tile::{
-    Fetch, Intake, Loader, Pieces, SealedTiles, SpillArea, TileKey, TileStore, lock, parallel, seal,
-};
+use crate::report::{Decision, PassFigures, Tally};
+use crate::stage::{Gathered, ScanFacts, Sink, SinkSummary};
+use crate::tile::{Intake, SealedTiles, Sieve, SpillArea, TileStore, lock, seal};
+use crate::{Error, Result};
 
-/// Runs a pipeline with tile stages (or one that only sorts) into `sink`.
+/// Runs a pipeline with tile stages (or one that only sorts) into `sinks`.
 pub(super) fn mill(
     job: &mut Job<'_>,
     lattice: &Lattice,
     shares: &Shares,
     demands: &Demands,
     area: &Arc<SpillArea>,
-    sink: Box<dyn Sink>,
+    sinks: Vec<Box<dyn Sink>>,
     clock: &mut Clock<'_>,
 ) -> Result<Finished> {
     clock.phase("decode", Some(job.source.points()));
@@ -38,26 +37,133 @@ pub(super) fn mill(
     clock.phase("merge", Some(tally.work.get("placed").copied().unwrap_or(0)));
     let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
     tally.count("positions", tiles.positions());
-    let decisions = settle(job, lattice, &tiles)?;
-    let (keys, capacity) = cut(job, lattice, shares, demands, &tiles)?;
-    tally.work("tiles", keys.len() as u64);
-    let levels: std::collections::BTreeSet<u32> = keys.iter().map(|key| key.level).collect();
-    tally.work("tile_levels", levels.len() as u64);
-    clock.phase("mill", Some(tiles.positions()));
-    let working = job.budget.lease(demands.mill_bytes(capacity as u64), "the mill")?;
-    let milled = grind(job, lattice, capacity, area, &tiles, &keys, sink)?;
-    drop(working);
-    tally.merge(&milled.tally);
+    settle(job, lattice, &tiles)?;
+    let field = Field { lattice, area: area.clone(), tiles: tiles.clone() };
+    let mut course = Course {
+        sieve: Sieve::default(),
+        alive: tiles.points(),
+        kept: tiles.points(),
+        passes: Vec::new(),
+        forecasts: vec![Vec::new(); job.ops.len()],
+        written: sinks.iter().map(|_| None).collect(),
+        sinks: sinks.into_iter().map(Some).collect(),
+    };
+    for pass in std::mem::take(&mut job.passes) {
+        course.run(job, &pass, &field, (shares, demands), &mut tally, clock)?;
+    }
     clock.phase("survey", Some(2 * tiles.positions()));
-    let measured = survey(job, lattice, area, &tiles, &milled.fates)?;
+    let measured = survey(job, lattice, area, &tiles, &course.sieve)?;
+    let unwritten = || Error::internal("an output was never written");
     Ok(Finished {
         read: tally.work.remove("read").unwrap_or(0),
-        kept: milled.kept,
-        written: milled.written,
+        kept: course.kept,
+        written: course
+            .written
+            .into_iter()
+            .map(|w| w.ok_or_else(unwritten))
+            .collect::<Result<_>>()?,
+        decisions: decisions(job, course.forecasts),
+        classes: tally.classes.take().map_or(Vec::new(), |classes| classes.figures()),
+        passes: course.passes,
         tally,
-        decisions,
         measured: Some(measured),
     })
+}
+
+/// How far a mill has come.
+struct Course {
+    /// What the passes so far left.
+    sieve: Sieve,
+    /// Records that the next pass finds, and that are written if none follows.
+    alive: u64,
+    kept: u64,
+    passes: Vec<PassFigures>,
+    /// For each stage, what it said is to be expected.
+    forecasts: Vec<Vec<(String, serde_json::Value)>>,
+    sinks: Vec<Option<Box<dyn Sink>>>,
+    /// For each sink, how many records it was given, and what it said in the end.
+    written: Vec<Option<(u64, SinkSummary)>>,
+}
+
+impl Course {
+    fn run(
+        &mut self,
+        job: &mut Job<'_>,
+        pass: &Pass,
+        field: &Field<'_>,
+        (shares, demands): (&Shares, &Demands),
+        tally: &mut Tally,
+        clock: &mut Clock<'_>,
+    ) -> Result<()> {
+        let tiles = &field.tiles;
+        let sieve = pass.sieve(&self.sieve);
+        let (keys, capacity) = cut(job, pass, field.lattice, shares, demands, tiles)?;
+        let working = job.budget.lease(demands.mill_bytes(capacity as u64), "the mill")?;
+        if pass.round == 1 {
+            for (op, foreseen) in forecast(job, pass, field, &sieve, capacity)? {
+                if let Some(warning) = foreseen.warning {
+                    job.warn(warning);
+                }
+                self.forecasts[op].extend(foreseen.decisions);
+            }
+        }
+        clock.phase(
+            if pass.gathers().is_some() { "gather" } else { "mill" },
+            Some(tiles.positions()),
+        );
+        tally.work("tiles", keys.len() as u64);
+        let levels: std::collections::BTreeSet<u32> = keys.iter().map(|key| key.level).collect();
+        tally.work("tile_levels", levels.len() as u64);
+        let mut sinks = Vec::new();
+        for &sink in pass.before.iter().chain(&pass.after) {
+            let open = self.sinks.get_mut(sink).and_then(Option::take);
+            sinks.push((sink, open.ok_or_else(|| Error::internal("an output is written twice"))?));
+        }
+        let which: Vec<usize> = sinks.iter().map(|(sink, _)| *sink).collect();
+        let milled = grind(job, pass, field, &sieve, capacity, &keys, sinks)?;
+        drop(working);
+        tally.merge(&milled.tally);
+        for (sink, outcome) in
+            which.into_iter().zip(milled.counts.outputs.into_iter().zip(milled.written))
+        {
+            self.written[sink] = Some(outcome);
+        }
+        let stages = pass.calls.iter().map(|call| job.ops[call.op].kind.clone()).collect();
+        self.passes.push(PassFigures { stages, before: self.alive, after: milled.counts.alive });
+        let stored = milled.stored;
+        self.sieve.states = Some(stored.states);
+        self.sieve.fates = Some(stored.fates);
+        self.sieve.figures = stored.figures;
+        self.sieve.normals = stored.normals.or(self.sieve.normals.take());
+        (self.alive, self.kept) = (milled.counts.alive, milled.counts.written);
+        match pass.gathers() {
+            Some(op) => conclude(job, op, stored.found, milled.decided),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What a first phase found, for its stage.
+struct Whole {
+    found: Found,
+    records: u64,
+}
+
+impl Gathered for Whole {
+    fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()> {
+        self.found.each(visit)
+    }
+
+    fn records(&self) -> u64 {
+        self.records
+    }
+}
+
+fn conclude(job: &mut Job<'_>, op: usize, found: Found, records: u64) -> Result<()> {
+    match &mut job.ops[op].op {
+        Op::Scan(op) => op.conclude(&Whole { found, records }),
+        Op::Tile(_) => Err(Error::internal("a stage gathered that has one phase")),
+    }
 }
 
 fn decode(
@@ -67,7 +173,8 @@ fn decode(
     area: &Arc<SpillArea>,
 ) -> Result<(TileStore, Tally)> {
     let _working = job.budget.lease(shares.work, "decoding")?;
-    let store = TileStore::new(area, &job.budget, job.source.schema().stride);
+    let tagged = job.tagger.tags();
+    let store = TileStore::new(area, &job.budget, job.source.schema().stride, tagged);
     let total = Mutex::new(Tally::default());
     let next = AtomicUsize::new(0);
     job.parallel(|| {
@@ -102,14 +209,19 @@ fn take(
 ) -> Result<()> {
     let stride = batch.schema().stride;
     let records = batch.records();
-    let (mut outcome, mut misplaced, mut placed) = (Ok(()), Vec::new(), 0);
+    let (mut outcome, mut misplaced, mut placed, mut withheld) = (Ok(()), Vec::new(), 0, 0);
     lattice.place(
         batch.schema(),
         records,
         |i, position| {
-            if outcome.is_ok() {
-                placed += 1;
-                outcome = intake.push(position, &records[i * stride..(i + 1) * stride]);
+            let record = &records[i * stride..(i + 1) * stride];
+            match job.tagger.look(record, batch.source) {
+                None => withheld += 1,
+                Some(tag) if outcome.is_ok() => {
+                    placed += 1;
+                    outcome = intake.push(position, record, tag);
+                }
+                Some(_) => {}
             }
         },
         |i, why| misplaced.push((i, why)),
@@ -122,11 +234,12 @@ fn take(
             return Err(job.misplaced(batch, i, why));
         }
     }
+    tally.remove(&job.source_kind, "withheld", withheld);
     tally.work("placed", placed);
     Ok(())
 }
 
-fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<Vec<Decision>> {
+fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<()> {
     let facts = ScanFacts {
         points: tiles.points(),
         positions: tiles.positions(),
@@ -134,135 +247,14 @@ fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<V
         lattice,
         levels: tiles.levels(),
     };
-    let mut decisions = Vec::new();
-    for (kind, op) in job.ops.iter_mut() {
-        op.settle(&facts)?;
-        decisions.extend(op.decisions().into_iter().map(|(name, value)| Decision {
-            stage: kind.clone(),
-            name,
-            value,
-        }));
-    }
-    Ok(decisions)
+    job.ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().settle(&facts))
 }
 
-struct Milled {
-    tally: Tally,
-    fates: Pieces,
-    kept: u64,
-    written: crate::stage::SinkSummary,
-}
-
-fn grind(
-    job: &Job<'_>,
-    lattice: &Lattice,
-    capacity: usize,
-    area: &Arc<SpillArea>,
-    tiles: &Arc<SealedTiles>,
-    keys: &[TileKey],
-    sink: Box<dyn Sink>,
-) -> Result<Milled> {
-    let (encoder, chunk_points) = (sink.encoder(), sink.chunk_points());
-    let outlet: Outlet<Product, Chunk> = Outlet::new(sink, job.threads);
-    let fates = Pieces::new(area, "fates", FATE_BYTES);
-    fates.reserve(tiles.positions());
-    let cutter = Mutex::new(Cutter::new(&fates, chunk_points, job.wants_normals));
-    let commit = |product: Product| lock(&cutter).cut(product);
-    let encode = |chunk: Chunk, bench: &mut Bench| -> Result<Encoded> {
-        bench.batch.clear();
-        chunk.number(&mut bench.numbers);
-        tiles.fetch(&bench.numbers, &mut bench.fetch, &mut bench.batch)?;
-        bench.batch.normals = chunk.spread_normals();
-        encoder.encode(&bench.batch)
-    };
-    let bench = || Bench {
-        numbers: Vec::with_capacity(chunk_points),
-        fetch: Fetch::default(),
-        batch: PointBatch::new(job.source.schema().clone(), chunk_points),
-    };
-    let total = Mutex::new(Tally::default());
-    let next = AtomicUsize::new(0);
-    parallel(job.threads, |_| {
-        let guard = StopOnDrop::new(|| outlet.stop());
-        let mut bench = bench();
-        let mut encode = |chunk| encode(chunk, &mut bench);
-        let mut hands = Hands { commit: &commit, encode: &mut encode };
-        let mut worker = Worker::new(job, lattice, tiles, capacity);
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(&key) = keys.get(index) else { break };
-            let product = worker.mill(key)?;
-            let positions = product.positions();
-            outlet.deliver((index as u64, 0), product, true, &mut hands)?;
-            job.advance(positions)?;
-        }
-        outlet.drain(&mut hands, |turn| turn.0 >= keys.len() as u64)?;
-        lock(&total).merge(&worker.tally);
-        guard.disarm();
-        Ok(())
-    })?;
-    let (rest, kept) = lock(&cutter).finish()?;
-    let mut bench = bench();
-    let mut encode = |chunk| encode(chunk, &mut bench);
-    let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
-    let tally = std::mem::take(&mut *lock(&total));
-    drop(cutter);
-    Ok(Milled { tally, fates, kept, written })
-}
-
-/// What a thread needs to encode chunks.
-struct Bench {
-    numbers: Vec<u64>,
-    fetch: Fetch,
-    batch: PointBatch,
-}
-
-/// What a thread needs to mill tiles.
-struct Worker<'a> {
-    job: &'a Job<'a>,
-    loader: Loader,
-    reach: i64,
-    neighbors: usize,
-    /// Where positions are rounded, and unequal coordinates that share one are counted.
-    rounded: Option<Rounded<'a>>,
-    tally: Tally,
-}
-
-impl<'a> Worker<'a> {
-    fn new(
-        job: &'a Job<'a>,
-        lattice: &Lattice,
-        tiles: &'a Arc<SealedTiles>,
-        capacity: usize,
-    ) -> Self {
-        let neighbors = neighbors(&job.ops);
-        let mut loader = Loader::new(tiles, capacity);
-        if let Some(points) = job.tile_points {
-            // Half for the zone, half for the rim, as where memory decides.
-            loader.limit_rim(points.saturating_mul(2));
-        }
-        if neighbors > 0 {
-            loader.tile().0.around.reserve(capacity);
-        }
-        let rounded = lattice.rounds().then(|| Rounded::new(tiles, job.source.schema()));
-        let reach = reach(&job.ops);
-        Worker { job, loader, reach, neighbors, rounded, tally: Tally::default() }
-    }
-
-    fn mill(&mut self, key: TileKey) -> Result<Product> {
-        self.loader.load(key, self.reach, self.neighbors)?;
-        let (tile, first_records) = self.loader.tile();
-        for (_, op) in &self.job.ops {
-            op.run(tile, &mut self.tally)?;
-        }
-        if let Some(rounded) = &mut self.rounded {
-            let copies = tile.copies[tile.core.clone()].iter().copied();
-            let unequal = rounded.count(first_records.iter().copied().zip(copies))?;
-            self.tally.count("unequal_coordinates", unequal);
-        }
-        self.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
-        self.tally.work("unproven", tile.around.take_unproven());
-        self.tally.work("tied", tile.around.take_tied());
-        Ok(Product::of(tile, first_records, self.job.wants_normals))
-    }
+/// What the stages settled by themselves and what they expected, in their order.
+fn decisions(job: &Job<'_>, forecasts: Vec<Vec<(String, serde_json::Value)>>) -> Vec<Decision> {
+    let each = job.ops.iter().zip(forecasts).flat_map(|(stage, expected)| {
+        let settled = stage.op.tile().decisions().into_iter().chain(expected);
+        settled.map(|(name, value)| Decision { stage: stage.kind.clone(), name, value })
+    });
+    each.collect()
 }

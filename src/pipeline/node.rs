@@ -35,6 +35,14 @@ pub(super) struct Node {
 }
 
 impl Node {
+    /// The entries of a table; none of what is no table.
+    pub fn entries(&self) -> &[Entry] {
+        match &self.value {
+            Value::Table(entries) => entries,
+            _ => &[],
+        }
+    }
+
     /// Where the value of `key` is written, if this is a table that has it.
     pub fn at(&self, key: &str) -> Option<&Place> {
         let Value::Table(entries) = &self.value else { return None };

@@ -1,4 +1,4 @@
-//! From products that come in any order to a file in one order: what several threads deliver is
+//! From products that come in any order to files in one order: what several threads deliver is
 //! committed in turn, cut into chunks, encoded by whoever has time, and appended in turn again.
 //!
 //! What waits is bounded: products and chunks by the number of threads, and nobody encodes further
@@ -34,9 +34,9 @@ struct State<R, P> {
     committing: bool,
     chunks: VecDeque<(u64, P)>,
     numbered: u64,
-    encoded: BTreeMap<u64, Encoded>,
+    encoded: BTreeMap<u64, (usize, Encoded)>,
     appended: u64,
-    sink: Option<Box<dyn Sink>>,
+    sinks: Option<Vec<Box<dyn Sink>>>,
     stopped: bool,
 }
 
@@ -44,13 +44,13 @@ struct State<R, P> {
 pub struct Hands<'a, R, P> {
     /// Cuts a product, in its turn, into complete chunks; called by one thread at a time.
     pub commit: &'a (dyn Fn(R) -> Result<Vec<P>> + Sync),
-    /// Encodes a chunk.
-    pub encode: &'a mut dyn FnMut(P) -> Result<Encoded>,
+    /// Encodes a chunk and says for which of the sinks.
+    pub encode: &'a mut dyn FnMut(P) -> Result<(usize, Encoded)>,
 }
 
 impl<R, P> Outlet<R, P> {
-    /// An outlet into `sink` for `threads` threads.
-    pub fn new(sink: Box<dyn Sink>, threads: usize) -> Self {
+    /// An outlet into `sinks` for `threads` threads.
+    pub fn new(sinks: Vec<Box<dyn Sink>>, threads: usize) -> Self {
         Outlet {
             state: Mutex::new(State {
                 turn: (0, 0),
@@ -60,7 +60,7 @@ impl<R, P> Outlet<R, P> {
                 numbered: 0,
                 encoded: BTreeMap::new(),
                 appended: 0,
-                sink: Some(sink),
+                sinks: Some(sinks),
                 stopped: false,
             }),
             changed: Condvar::new(),
@@ -114,7 +114,7 @@ impl<R, P> Outlet<R, P> {
     }
 
     /// Adds the chunks that are left when all products are committed.
-    pub fn close(&self, rest: Vec<P>, hands: &mut Hands<'_, R, P>) -> Result<SinkSummary> {
+    pub fn close(&self, rest: Vec<P>, hands: &mut Hands<'_, R, P>) -> Result<Vec<SinkSummary>> {
         let mut state = lock(&self.state);
         state.queue(rest);
         loop {
@@ -124,8 +124,8 @@ impl<R, P> Outlet<R, P> {
                 break;
             }
         }
-        match state.sink.take() {
-            Some(sink) => sink.finish(),
+        match state.sinks.take() {
+            Some(sinks) => sinks.into_iter().map(|sink| sink.finish()).collect(),
             None => Err(Error::internal("an output was closed twice")),
         }
     }
@@ -180,17 +180,20 @@ impl<R, P> Outlet<R, P> {
             Err(error) => return Err(self.fail(state, error)),
         };
         while !state.stopped
-            && let Some(mut sink) = state.sink.take()
+            && let Some(mut sinks) = state.sinks.take()
         {
             let next = state.appended;
-            let Some(encoded) = state.encoded.remove(&next) else {
-                state.sink = Some(sink);
+            let Some((to, encoded)) = state.encoded.remove(&next) else {
+                state.sinks = Some(sinks);
                 break;
             };
             drop(state);
-            let outcome = sink.append(encoded);
+            let outcome = match sinks.get_mut(to) {
+                Some(sink) => sink.append(encoded),
+                None => Err(Error::internal("a chunk is for a sink that is not there")),
+            };
             state = lock(&self.state);
-            state.sink = Some(sink);
+            state.sinks = Some(sinks);
             state.appended += 1;
             if let Err(error) = outcome {
                 return Err(self.fail(state, error));

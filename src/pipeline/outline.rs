@@ -26,7 +26,7 @@ pub struct Outline {
 impl Plan {
     /// What the plan reads, writes and uses.
     pub fn outline(&self) -> Outline {
-        let outputs = vec![self.sink.path().to_owned()];
+        let outputs: Vec<PathBuf> = self.sinks.iter().map(|sink| sink.path().to_owned()).collect();
         let beside = outputs.first().and_then(|output| output.parent());
         let beside = beside.filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
         Outline {

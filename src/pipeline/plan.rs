@@ -1,17 +1,17 @@
-//! A pipeline that fits: its source open, its lattice fixed, its stages in order, its memory divided.
+//! A pipeline that fits: its source open, its lattice fixed, its stages in passes, its memory divided.
 
-use std::collections::BTreeSet;
-use std::fmt;
 use std::path::Path;
 
+use super::passes::{Op, Pass, StageOp, Tap, number_selections, unroll};
 use super::publish::check_place;
-use super::settings::{Overrides, RunSettings};
+use super::settings::{Nonfinite, Overrides, RunSettings, Withheld};
 use super::shares::Demands;
+use super::tagger::Tagger;
 use super::text::{Pipeline, PlacedStage, resolved};
-use crate::budget::{Bytes, default_limit};
+use crate::budget::default_limit;
 use crate::geom::lattice::Lattice;
 use crate::point::Schema;
-use crate::stage::{CreateSink, Needs, Order, Role, Source, TileOp, Transform};
+use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Role, Source, Transform};
 use crate::{Error, ErrorKind, Result};
 
 /// A pipeline ready to run.
@@ -21,8 +21,10 @@ pub struct Plan {
     pub(super) source: Box<dyn Source>,
     pub(super) source_kind: String,
     pub(super) transforms: Vec<(String, Box<dyn Transform>)>,
-    pub(super) ops: Vec<(String, Box<dyn TileOp>)>,
-    pub(super) sink: Box<dyn CreateSink>,
+    pub(super) ops: Vec<StageOp>,
+    pub(super) passes: Vec<Pass>,
+    pub(super) sinks: Vec<Box<dyn CreateSink>>,
+    pub(super) tagger: Tagger,
     /// True if the run needs tiles: for its stages, or to sort.
     pub(super) mills: bool,
     /// Where points are; None for a stream that does not ask.
@@ -35,10 +37,12 @@ pub struct Plan {
 /// The stages of a pipeline by role.
 #[derive(Default)]
 struct Sorted {
-    source: Option<(String, Box<dyn crate::stage::OpenSource>)>,
+    source: Option<(String, Box<dyn OpenSource>)>,
     transforms: Vec<(String, Box<dyn Transform>)>,
-    ops: Vec<(String, Box<dyn TileOp>)>,
-    sink: Option<Box<dyn CreateSink>>,
+    ops: Vec<StageOp>,
+    sinks: Vec<(Box<dyn CreateSink>, Tap)>,
+    /// Names of stages, each with the tile stages down to it.
+    names: Vec<(String, usize)>,
 }
 
 impl Pipeline {
@@ -47,39 +51,36 @@ impl Pipeline {
     /// Fails if the stages do not fit each other, the inputs disagree, an output is an input or
     /// cannot appear where it should, or the memory cannot do.
     pub fn plan(self, overrides: &Overrides) -> Result<Plan> {
+        let origin = self.origin;
         let settings = self.settings.with(overrides);
         let stages = self
             .stages
             .iter()
             .map(|stage| serde_json::json!({ "kind": stage.kind, "keys": stage.keys }))
             .collect();
-        let sorted = sort(self.stages)?;
+        let in_file = |error: Error| match error.path() {
+            None => error.at(&origin),
+            Some(_) => error,
+        };
+        let mut sorted = sort(self.stages).map_err(in_file)?;
         let (source_kind, open) =
             sorted.source.ok_or_else(|| Error::pipeline("the pipeline reads nothing"))?;
-        let sink = sorted.sink.ok_or_else(|| Error::pipeline("the pipeline writes nothing"))?;
-        for input in open.paths() {
-            refuse_overwrite(&input, sink.path())?;
-            if let Some(report) = &settings.report {
-                refuse_overwrite(&input, report)?;
-            }
-        }
-        check_place(sink.path())?;
-        if let Some(report) = &settings.report {
-            check_place(report)?;
-            if resolved(report) == resolved(sink.path()) {
-                return Err(Error::pipeline("the report would replace the output").at(report));
-            }
-        }
-        if let Some(folder) = settings.scratch.as_ref().filter(|folder| !folder.is_dir()) {
-            return Err(Error::new(ErrorKind::Io, "the folder for scratch does not exist")
-                .at(folder)
-                .help("create it first, or name another with --scratch"));
-        }
+        let (sinks, taps): (Vec<_>, Vec<_>) = sorted.sinks.into_iter().unzip();
+        check_places(&*open, &sinks, &settings)?;
         let source = open.open()?;
-        check_columns(&sorted.transforms, &sorted.ops, &*sink, source.schema())?;
-        let mills = mills(&sorted.ops, &*sink)?;
-        let lattice = match mills || settings.nonfinite == super::settings::Nonfinite::Drop {
-            true => Some(Lattice::of(source.schema(), settings.lattice)?),
+        let schema = source.schema();
+        check_transforms(&sorted.transforms, schema).map_err(in_file)?;
+        let selections = number_selections(&mut sorted.ops).map_err(in_file)?;
+        let passes = unroll(&sorted.ops, schema, &taps).map_err(in_file)?;
+        let withheld = match sorted.ops.is_empty() {
+            true => Withheld::Keep,
+            false => settings.withheld,
+        };
+        let tagger = Tagger::new(schema, &selections, withheld, false).map_err(in_file)?;
+        let mills = mills(&sorted.ops, &sinks)?;
+        let z_scale = z_scale(&settings, &*source, &sorted.ops)?;
+        let lattice = match mills || settings.nonfinite == Nonfinite::Drop {
+            true => Some(Lattice::stretched(schema, settings.lattice, z_scale)?),
             false => None,
         };
         let threads = match settings.threads {
@@ -87,9 +88,14 @@ impl Pipeline {
             None => std::thread::available_parallelism().map_or(1, usize::from),
         };
         let limit = settings.memory.unwrap_or_else(default_limit);
-        let chunk = sink.chunk(source.schema(), source.metadata())?;
-        let ops = sorted.ops.iter().map(|(_, op)| op.needs()).collect();
-        let demands = Demands { mills, ops, ..Demands::of(&*source, chunk, limit, threads) };
+        let chunks = chunks(&sinks, &*source)?;
+        let needs = passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect();
+        let demands = Demands {
+            mills,
+            passes: needs,
+            tagged: tagger.tags(),
+            ..Demands::of(&*source, &chunks, limit, threads)
+        };
         demands.divide()?;
         Ok(Plan {
             settings,
@@ -98,7 +104,9 @@ impl Pipeline {
             source_kind,
             transforms: sorted.transforms,
             ops: sorted.ops,
-            sink,
+            passes,
+            sinks,
+            tagger,
             mills,
             lattice,
             stages,
@@ -110,90 +118,120 @@ impl Pipeline {
 fn sort(stages: Vec<PlacedStage>) -> Result<Sorted> {
     let mut sorted = Sorted::default();
     for stage in stages {
-        let PlacedStage { kind, line, role, .. } = stage;
+        let PlacedStage { kind, name, from, line, limits, role, .. } = stage;
         let misplaced = |why: &str| {
             Err(Error::pipeline(format!("line {line}: `{kind}` cannot stand here: {why}")))
         };
+        let tile_op = |op| StageOp { kind: kind.clone(), line, op, limits, selection: 0 };
         match role {
             Role::Source(_) if sorted.source.is_some() => {
                 return misplaced("a pipeline has one source");
             }
             Role::Source(source) => sorted.source = Some((kind, source)),
             _ if sorted.source.is_none() => return misplaced("the first stage is a source"),
-            Role::Sink(_) if sorted.sink.is_some() => {
-                return misplaced("a pipeline has one output");
+            Role::Sink(sink) => {
+                let named = |name: &String| sorted.names.iter().find(|(other, _)| other == name);
+                let ops = from.as_ref().and_then(named).map_or(sorted.ops.len(), |(_, ops)| *ops);
+                let tap = Tap { ops, wants_normals: sink.wants_normals() };
+                sorted.sinks.push((sink, tap));
             }
-            Role::Sink(sink) => sorted.sink = Some(sink),
-            _ if sorted.sink.is_some() => return misplaced("the last stage writes"),
             Role::Transform(_) if !sorted.ops.is_empty() => {
                 return misplaced("stages that stream come before those that work on tiles");
             }
+            Role::Transform(_) if !sorted.sinks.is_empty() => {
+                return misplaced("a stage that streams cannot follow a sink");
+            }
             Role::Transform(transform) => sorted.transforms.push((kind, transform)),
-            Role::TileOp(op) => sorted.ops.push((kind, op)),
-            Role::ScanOp(_) => return misplaced("stages of two phases are not run yet"),
+            Role::TileOp(op) => sorted.ops.push(tile_op(Op::Tile(op))),
+            Role::ScanOp(op) => sorted.ops.push(tile_op(Op::Scan(op))),
         }
+        sorted.names.extend(name.map(|name| (name, sorted.ops.len())));
     }
-    Ok(sorted)
+    match sorted.sinks.is_empty() {
+        true => Err(Error::pipeline("the pipeline writes nothing")),
+        false => Ok(sorted),
+    }
 }
 
-/// Columns that stages compute; everything else that a stage reads is a dimension of the records.
-const COLUMNS: [&str; 2] = ["Normal", "Cell"];
-
-/// Checks that every stage's reads are written before it, and that no neighbourhood follows a
-/// removal (that would be a second pass).
-fn check_columns(
-    transforms: &[(String, Box<dyn Transform>)],
-    ops: &[(String, Box<dyn TileOp>)],
-    sink: &dyn CreateSink,
-    schema: &Schema,
+/// Refuses outputs that would replace an input or each other, or that cannot appear where they
+/// should.
+fn check_places(
+    source: &dyn OpenSource,
+    sinks: &[Box<dyn CreateSink>],
+    settings: &RunSettings,
 ) -> Result<()> {
-    let mut there: BTreeSet<String> = schema.dimensions.iter().map(|d| d.name.clone()).collect();
-    let mut removed_by: Option<&str> = None;
-    // What a transform removes is gone before the tiles are cut: no neighbourhood ever saw it.
-    let needs = transforms
-        .iter()
-        .map(|(kind, t)| (kind, t.needs(), false))
-        .chain(ops.iter().map(|(kind, op)| (kind, op.needs(), true)));
-    for (kind, needs, on_tiles) in needs {
-        let Needs { reads, writes, neighbors, removes, .. } = needs;
-        if let Some(missing) = reads.iter().find(|name| !there.contains(*name)) {
-            let help = match COLUMNS.iter().position(|column| column == missing) {
-                Some(0) => "put a `normals` stage before it",
-                Some(_) => "put a `cells` stage before it",
-                None => "the input has no such dimension",
-            };
-            let told = format!("`{kind}` needs {missing}, which nothing before it gives");
-            return Err(Error::pipeline(told).help(help));
-        }
-        if let (Some(earlier), true) = (removed_by, neighbors > 0) {
-            return Err(Error::pipeline(format!(
-                "`{kind}` looks at neighbours after `{earlier}` removed points: that takes a second \
-                 pass, which one pipeline cannot make yet"
-            ))
-            .help("write the reduced scan and run a second pipeline on it"));
-        }
-        there.extend(writes);
-        if removes && on_tiles {
-            removed_by = Some(kind);
-        }
+    let outputs = || sinks.iter().map(|sink| sink.path()).chain(settings.report.as_deref());
+    for input in source.paths() {
+        outputs().try_for_each(|output| refuse_overwrite(&input, output))?;
     }
-    if sink.wants_normals() && !there.contains("Normal") {
-        return Err(Error::pipeline("the output wants normals, which no stage computes")
-            .at(sink.path())
-            .help("put a `normals` stage before it, or leave `dimensions` out"));
+    outputs().try_for_each(check_place)?;
+    let mut files = Vec::new();
+    for output in outputs() {
+        let file = resolved(output);
+        if files.contains(&file) {
+            let told = match settings.report.as_deref() == Some(output) {
+                true => "the report would replace the output",
+                false => "two outputs have this name",
+            };
+            return Err(Error::pipeline(told).at(output));
+        }
+        files.push(file);
+    }
+    match settings.scratch.as_ref().filter(|folder| !folder.is_dir()) {
+        Some(folder) => Err(Error::new(ErrorKind::Io, "the folder for scratch does not exist")
+            .at(folder)
+            .help("create it first, or name another with --scratch")),
+        None => Ok(()),
+    }
+}
+
+fn check_transforms(transforms: &[(String, Box<dyn Transform>)], schema: &Schema) -> Result<()> {
+    let mut written: Vec<String> = Vec::new();
+    for (kind, transform) in transforms {
+        let needs = transform.needs();
+        let there = |name: &&String| schema.find(name).is_some() || written.contains(name);
+        if let Some(missing) = needs.reads.iter().find(|name| !there(name)) {
+            let told = format!("`{kind}` needs {missing}, which nothing before it gives");
+            return Err(Error::pipeline(told).help("the input has no such dimension"));
+        }
+        written.extend(needs.writes);
     }
     Ok(())
 }
 
-fn mills(ops: &[(String, Box<dyn TileOp>)], sink: &dyn CreateSink) -> Result<bool> {
-    match sink.order() {
-        Order::Input if !ops.is_empty() => Err(Error::pipeline(
-            "order = \"input\" is for pipelines that stream; tiles write the canonical order",
-        )
-        .at(sink.path())
-        .help("leave `order` out")),
-        Order::Canonical => Ok(true),
-        Order::Input | Order::Auto => Ok(!ops.is_empty()),
+/// The chunks of all outputs.
+fn chunks(sinks: &[Box<dyn CreateSink>], source: &dyn Source) -> Result<Vec<ChunkSize>> {
+    sinks.iter().map(|sink| sink.chunk(source.schema(), source.metadata())).collect()
+}
+
+/// What z is multiplied by where stages measure distances; else 1.
+fn z_scale(settings: &RunSettings, source: &dyn Source, ops: &[StageOp]) -> Result<f64> {
+    if ops.is_empty() {
+        return Ok(1.0);
+    }
+    let stretch = settings.stretch(source.metadata().units);
+    stretch.map_err(|error| match source.inputs().first() {
+        Some(input) => error.at(&input.path),
+        None => error,
+    })
+}
+
+/// True if the run needs tiles: for its stages, or because an output is to be in canonical order.
+fn mills(ops: &[StageOp], sinks: &[Box<dyn CreateSink>]) -> Result<bool> {
+    let of = |order: Order| sinks.iter().find(move |sink| sink.order() == order);
+    let (canonical, input) = (of(Order::Canonical), of(Order::Input));
+    let mills = !ops.is_empty() || canonical.is_some();
+    match input.filter(|_| mills) {
+        None => Ok(mills),
+        Some(sink) => {
+            let told = match ops.is_empty() {
+                true => "order = \"input\" is not possible beside an output in canonical order",
+                false => {
+                    "order = \"input\" is for pipelines that stream; tiles write the canonical order"
+                }
+            };
+            Err(Error::pipeline(told).at(sink.path()).help("leave `order` out"))
+        }
     }
 }
 
@@ -210,55 +248,4 @@ fn refuse_overwrite(input: &Path, output: &Path) -> Result<()> {
             .help("write to another file"));
     }
     Ok(())
-}
-
-impl fmt::Display for Plan {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let shares = self.demands.divide().map_err(|_| fmt::Error)?;
-        let inputs = self.source.inputs();
-        writeln!(
-            f,
-            "source   {} ({} files, {} points by their headers)",
-            self.source_kind,
-            inputs.len(),
-            self.source.points()
-        )?;
-        for (kind, _) in &self.transforms {
-            writeln!(f, "streams  {kind}")?;
-        }
-        for (n, (kind, op)) in self.ops.iter().enumerate() {
-            let needs = op.needs();
-            let pass = if n == 0 { "pass 1" } else { "" };
-            write!(f, "{pass:<8} {kind}: reads {}", needs.reads.join(", "))?;
-            if !needs.writes.is_empty() {
-                write!(f, ", writes {}", needs.writes.join(", "))?;
-            }
-            if needs.neighbors > 0 {
-                write!(f, ", {} nearest neighbours", needs.neighbors)?;
-            }
-            writeln!(f)?;
-        }
-        writeln!(f, "sink     {}", self.sink.path().display())?;
-        match &self.lattice {
-            Some(lattice) => writeln!(f, "lattice  step {} world units", lattice.step)?,
-            None => writeln!(f, "lattice  none: records stream by as they are")?,
-        }
-        writeln!(f, "order    {}", if self.mills { "canonical" } else { "of the input" })?;
-        writeln!(f, "threads  {}", self.threads)?;
-        write!(f, "memory   {}", Bytes(self.demands.limit))?;
-        if self.mills {
-            write!(
-                f,
-                ": {} for the program, {} for the index, {} for work, {} to keep points in\n         \
-                 runs of {} records, tiles of {} positions with their rims",
-                Bytes(shares.base),
-                Bytes(shares.index),
-                Bytes(shares.work),
-                Bytes(shares.kept_in_memory),
-                shares.run_records,
-                shares.tile_positions
-            )?;
-        }
-        Ok(())
-    }
 }

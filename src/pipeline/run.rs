@@ -3,28 +3,30 @@
 use std::fs::{self, File};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use super::Watch;
 use super::clock::Clock;
 use super::mill::mill;
+use super::passes::{Pass, StageOp};
 use super::plan::Plan;
 use super::publish::Staged;
 use super::scratch::{Scratch, free_space};
 use super::settings::{Nonfinite, Spill};
-use super::shares::Demands;
+use super::shares::{Demands, Shares};
 use super::stream::stream;
 use super::survey::{Lines, Measured};
+use super::tagger::{ClassOf, Tagger};
 use crate::budget::{Budget, Bytes};
 use crate::geom::lattice::Misplaced;
 use crate::point::PointBatch;
 use crate::report::{
-    Decision, FileFigures, LatticeFigures, Ledger, Machine, Outcome, Report, RunFigures, Tally,
-    peak_memory,
+    ClassFigures, Decision, FileFigures, LatticeFigures, Ledger, Machine, Outcome, PassFigures,
+    Report, RunFigures, Tally, check_written, peak_memory,
 };
-use crate::stage::{Input, Part, SinkSummary, Source, TileOp, Transform};
-use crate::tile::{SpillArea, parallel};
+use crate::stage::{Input, Part, SinkSummary, Source, Transform};
+use crate::tile::{SpillArea, lock, parallel};
 use crate::{Error, ErrorKind, Result};
 
 /// What every phase of a run needs.
@@ -32,14 +34,20 @@ pub(super) struct Job<'a> {
     pub source: &'a dyn Source,
     pub source_kind: String,
     pub transforms: Vec<(String, Box<dyn Transform>)>,
-    pub ops: Vec<(String, Box<dyn TileOp>)>,
+    pub ops: Vec<StageOp>,
+    pub passes: Vec<Pass>,
+    pub tagger: Tagger,
+    pub classes: ClassOf,
     pub budget: Budget,
     pub threads: usize,
     pub drop_nonfinite: bool,
     pub tile_points: Option<usize>,
     pub run_records: Option<usize>,
-    pub wants_normals: bool,
+    /// For each sink, whether it writes normals.
+    pub wants_normals: Vec<bool>,
     pub watch: &'a dyn Watch,
+    /// What the user was warned of before the end.
+    pub warnings: Mutex<Vec<String>>,
     /// Set once a thread has failed.
     pub failed: AtomicBool,
 }
@@ -59,6 +67,7 @@ impl Job<'_> {
             return Ok(false);
         }
         tally.work("read", read);
+        self.classes.read(batch, tally);
         for (kind, transform) in &self.transforms {
             let before = batch.len();
             transform.apply(batch)?;
@@ -69,6 +78,12 @@ impl Job<'_> {
         }
         self.advance(read)?;
         Ok(true)
+    }
+
+    /// Warns of something now, and again in the report.
+    pub fn warn(&self, message: String) {
+        self.watch.warn(&message);
+        lock(&self.warnings).push(message);
     }
 
     /// Tells of progress, and hears whether to go on.
@@ -140,9 +155,12 @@ impl<F: Fn()> Drop for StopOnDrop<F> {
 pub(super) struct Finished {
     pub read: u64,
     pub kept: u64,
-    pub written: SinkSummary,
+    /// For each sink, the records that it was given, and what it says.
+    pub written: Vec<(u64, SinkSummary)>,
     pub tally: Tally,
     pub decisions: Vec<Decision>,
+    pub classes: Vec<ClassFigures>,
+    pub passes: Vec<PassFigures>,
     pub measured: Option<Measured>,
 }
 
@@ -166,25 +184,34 @@ impl Plan {
     /// that `watch` asks for leaves nothing behind.
     pub fn run(mut self, watch: &dyn Watch) -> Result<Done> {
         let mut clock = Clock::new(watch);
-        let output = Staged::beside(self.sink.path())?;
+        let mut outputs: Vec<Staged> = Vec::new();
+        for sink in &self.sinks {
+            let staged = match outputs.first() {
+                Some(first) => first.also(sink.path())?,
+                None => Staged::beside(sink.path())?,
+            };
+            outputs.push(staged);
+        }
+        let first =
+            outputs.first().ok_or_else(|| Error::pipeline("the pipeline writes nothing"))?;
         let staged_report =
-            self.settings.report.as_deref().map(|path| output.also(path)).transpose()?;
-        let (finished, run) =
-            self.work(&output, &mut clock, watch).map_err(|error| output.tell(error))?;
+            self.settings.report.as_deref().map(|path| first.also(path)).transpose()?;
+        let tell = |error| outputs.iter().fold(error, |error, output| output.tell(error));
+        let (finished, run) = self.work(&outputs, &mut clock, watch).map_err(tell)?;
         let (report, tiles) = self.account(finished, run, clock)?;
         if let Some(staged) = &staged_report {
             write_report(staged.file(), &report, &tiles).map_err(|error| staged.tell(error))?;
         }
         drop(tiles);
-        output.publish()?;
+        outputs.into_iter().try_for_each(Staged::publish)?;
         staged_report.map_or(Ok(()), Staged::publish)?;
         Ok(Done { report, report_path: self.settings.report })
     }
 
-    /// Streams or mills into the staged output.
+    /// Streams or mills into the staged outputs.
     fn work(
         &mut self,
-        output: &Staged,
+        outputs: &[Staged],
         clock: &mut Clock<'_>,
         watch: &dyn Watch,
     ) -> Result<(Finished, RunFigures)> {
@@ -192,62 +219,81 @@ impl Plan {
         let whole = !self.mills
             && self.transforms.is_empty()
             && self.settings.nonfinite == Nonfinite::Refuse;
-        let sink = self.sink.create(output.file(), schema, metadata, whole)?;
+        let created = self.sinks.iter().zip(outputs);
+        let sinks = created
+            .map(|(sink, output)| sink.create(output.file(), schema, metadata, whole))
+            .collect::<Result<Vec<_>>>()?;
         let shares = self.demands.divide()?;
         let budget = Budget::new(self.demands.limit);
         let _base = budget.lease(shares.base, "program")?;
-        let spill = match &self.settings.scratch {
-            Some(folder) => Arc::new(Scratch::below(folder)),
-            None => output.scratch().clone(),
+        let spill = match (&self.settings.scratch, outputs) {
+            (None, [first, ..]) => first.scratch().clone(),
+            (Some(folder), _) => Arc::new(Scratch::below(folder)),
+            (None, []) => return Err(Error::pipeline("the pipeline writes nothing")),
         };
         let kept_in_memory = match self.settings.spill {
             Spill::Auto => shares.kept_in_memory,
             Spill::Always => 0,
         };
         let area = SpillArea::new(budget.clone(), kept_in_memory, Box::new(spill.clone()));
+        let transforms = std::mem::take(&mut self.transforms);
+        let (ops, passes) = (std::mem::take(&mut self.ops), std::mem::take(&mut self.passes));
+        let mut job = Job { transforms, ops, passes, ..self.job(&budget, &shares, watch) };
+        let finished = match &self.lattice {
+            Some(lattice) if self.mills => {
+                check_disk(&self.demands, &spill, kept_in_memory)?;
+                mill(&mut job, lattice, &shares, &self.demands, &area, sinks, clock)?
+            }
+            lattice => {
+                clock.phase("convert", Some(self.source.points()));
+                stream(&job, &shares, sinks, lattice.as_ref())?
+            }
+        };
+        let earlier = std::mem::take(&mut *lock(&job.warnings));
+        drop(job);
+        let mut run = self.figures(&finished, &budget, area.written());
+        run.warnings.iter().for_each(|warning| watch.warn(warning));
+        run.warnings.splice(0..0, earlier);
+        Ok((finished, run))
+    }
+
+    /// What every phase needs but the stages.
+    fn job<'a>(&'a self, budget: &Budget, shares: &Shares, watch: &'a dyn Watch) -> Job<'a> {
         let tile_points = self.settings.tile_points.map(usize::from);
-        let mut job = Job {
+        Job {
             source: &*self.source,
             source_kind: self.source_kind.clone(),
-            transforms: std::mem::take(&mut self.transforms),
-            ops: std::mem::take(&mut self.ops),
+            transforms: Vec::new(),
+            ops: Vec::new(),
+            passes: Vec::new(),
+            tagger: self.tagger.clone(),
+            classes: ClassOf::new(self.source.schema()),
             budget: budget.clone(),
             threads: self.threads,
             drop_nonfinite: self.settings.nonfinite == Nonfinite::Drop,
             tile_points,
             run_records: tile_points.map(|n| n.saturating_mul(4).min(shares.run_records)),
-            wants_normals: self.sink.wants_normals(),
+            wants_normals: self.sinks.iter().map(|sink| sink.wants_normals()).collect(),
             watch,
+            warnings: Mutex::default(),
             failed: AtomicBool::new(false),
-        };
-        let finished = match &self.lattice {
-            Some(lattice) if self.mills => {
-                check_disk(&self.demands, &spill, kept_in_memory)?;
-                mill(&mut job, lattice, &shares, &self.demands, &area, sink, clock)?
-            }
-            lattice => {
-                clock.phase("convert", Some(self.source.points()));
-                stream(&job, &shares, sink, lattice.as_ref())?
-            }
-        };
-        drop(job);
-        let run = self.figures(&finished, &budget, area.written());
-        run.warnings.iter().for_each(|warning| watch.warn(warning));
-        Ok((finished, run))
+        }
     }
 
     /// What is known of the run when its output is written.
     fn figures(&self, finished: &Finished, budget: &Budget, spill_bytes: u64) -> RunFigures {
         let mut warnings = self.source.warnings();
-        warnings.extend(finished.written.notes.iter().cloned());
+        warnings.extend(finished.written.iter().flat_map(|(_, sink)| sink.notes.iter().cloned()));
+        let outputs = self.sinks.iter().zip(&finished.written);
+        let outputs = outputs.map(|(sink, (_, summary))| FileFigures {
+            path: sink.path().display().to_string(),
+            points: summary.points,
+            bytes: Some(summary.bytes),
+        });
         RunFigures {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             inputs: input_figures(&*self.source),
-            outputs: vec![FileFigures {
-                path: self.sink.path().display().to_string(),
-                points: finished.written.points,
-                bytes: Some(finished.written.bytes),
-            }],
+            outputs: outputs.collect(),
             machine: Machine::this(),
             threads: self.threads,
             memory_bytes: self.demands.limit,
@@ -267,7 +313,9 @@ impl Plan {
     ) -> Result<(Report, Option<Lines>)> {
         let ledger = Ledger::new(finished.read, finished.kept, &finished.tally);
         ledger.check()?;
-        ledger.check_written(self.sink.path(), finished.written.points)?;
+        for (sink, (given, summary)) in self.sinks.iter().zip(&finished.written) {
+            check_written(sink.path(), *given, summary.points)?;
+        }
         (run.seconds, run.cpu_seconds, run.phases) = clock.finish();
         run.peak_memory_bytes = peak_memory();
         run.work = finished.tally.work.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect();
@@ -284,9 +332,10 @@ impl Plan {
             ledger,
             decisions: finished.decisions,
             counts: finished.tally.counts.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect(),
+            passes: finished.passes,
             tile_side,
             totals,
-            classes: Vec::new(),
+            classes: finished.classes,
         };
         Ok((Report { result, run }, tiles))
     }
@@ -316,8 +365,11 @@ fn input_figures(source: &dyn Source) -> Vec<FileFigures> {
 
 /// Refuses a run whose spill would not fit on the scratch disk.
 fn check_disk(demands: &Demands, spill: &Scratch, kept_in_memory: u64) -> Result<()> {
-    // Records, their order, packed positions twice (runs and merged scan) and fates.
-    let each = demands.stride as u64 + 8 + 2 * 8 + 4;
+    // Records, their order, packed positions twice (runs and merged scan), states and fates twice
+    // (of the pass before and of the pass at work), and columns between passes.
+    let order = if demands.tagged { 12 } else { 8 };
+    let columns = if demands.passes.len() > 1 { 1 + 4 + 12 + 8 } else { 0 };
+    let each = demands.stride as u64 + order + 2 * 8 + 1 + 4 + columns;
     let needed = demands.points.saturating_mul(each).saturating_sub(kept_in_memory);
     match free_space(spill.parent()) {
         Some(free) if free < needed => Err(Error::memory(format!(

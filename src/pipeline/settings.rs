@@ -5,8 +5,12 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Deserializer, de};
 
-/// What a run may use and where it leaves things. No setting but `lattice` and `nonfinite` changes
-/// what is computed. All are optional; arguments of the same name take their place.
+use crate::point::{Mismatch, Units};
+use crate::{Error, ErrorKind};
+
+/// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`
+/// and `withheld` changes what is computed. All are optional; arguments of the same name take their
+/// place.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RunSettings {
@@ -23,8 +27,17 @@ pub struct RunSettings {
     /// Lattice step in world units; none: as the inputs' headers have it.
     #[serde(deserialize_with = "some_step")]
     pub lattice: Option<f64>,
-    /// What becomes of points whose coordinates are not finite.
+    /// What z is multiplied by wherever distances are measured, so that its unit is that of x and y;
+    /// the records keep their z. None: 1, where the units match or nothing is known of them.
+    pub z_scale: Option<ZScale>,
+    /// What becomes of scans whose x, y and z have different units, where stages measure distances.
+    pub units: MixedUnits,
+    /// What becomes of points whose coordinates are not finite, where stages measure distances. A
+    /// pipeline that streams copies them unless they are dropped: a conversion keeps its records.
     pub nonfinite: Nonfinite,
+    /// What becomes of points with the withheld flag, in pipelines that work on tiles; others keep
+    /// every point.
+    pub withheld: Withheld,
     /// Most points a tile's cube holds, for tests; none: as the memory allows.
     pub tile_points: Option<NonZeroUsize>,
     /// Which of the equal code paths runs, for tests.
@@ -42,6 +55,39 @@ pub enum Nonfinite {
     Refuse,
     /// They are removed, entered in the ledger as such.
     Drop,
+}
+
+/// What becomes of scans whose x, y and z have different units.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MixedUnits {
+    /// The run fails and names the units, unless `z_scale` is given.
+    #[default]
+    Refuse,
+    /// All are taken for one unit.
+    Ignore,
+}
+
+/// What z is multiplied by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ZScale {
+    /// What the units in the coordinate reference system ask for.
+    Auto,
+    /// This number, above 0.
+    Factor(f64),
+}
+
+/// What becomes of points with the withheld flag.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Withheld {
+    /// They take no part and are removed, entered in the ledger as such.
+    #[default]
+    Drop,
+    /// They are points like all others.
+    Keep,
+    /// They take no part and are written as they are.
+    Ignore,
 }
 
 /// Where decoded points wait for the mill.
@@ -89,6 +135,38 @@ impl RunSettings {
             scratch: over.scratch.or(self.scratch),
             report: over.report.or(self.report),
             ..self
+        }
+    }
+}
+
+impl RunSettings {
+    /// What z is multiplied by on the lattice of a scan in `units`.
+    ///
+    /// # Errors
+    ///
+    /// Units that do not match and that neither a factor nor an override answers, and `auto` where
+    /// no factor makes them match.
+    pub fn stretch(&self, units: Units) -> crate::Result<f64> {
+        let mismatch = match (self.z_scale, self.units) {
+            (Some(ZScale::Factor(factor)), _) => return Ok(factor),
+            (None, MixedUnits::Ignore) => return Ok(1.0),
+            _ => units.mismatch(),
+        };
+        let auto = self.z_scale == Some(ZScale::Auto);
+        match mismatch {
+            None => Ok(1.0),
+            Some(Mismatch { z_scale: Some(factor), .. }) if auto => Ok(factor),
+            Some(Mismatch { message, z_scale: Some(factor) }) => {
+                Err(Error::new(ErrorKind::Data, message).help(format!(
+                    "set z_scale = \"auto\" under [run], which measures with z times {factor}, or \
+                 z_scale = 1 if the reference system is wrong; records keep their z"
+                )))
+            }
+            Some(Mismatch { message, z_scale: None }) => Err(Error::new(ErrorKind::Data, message)
+                .help(
+                    "project the scan to metres first; or set z_scale under [run] (z_scale = 1 if \
+                     the reference system is wrong)",
+                )),
         }
     }
 }
@@ -169,6 +247,42 @@ fn some_bytes<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u64>, D::Erro
     from.deserialize_any(Size).map(Some)
 }
 
+impl<'de> Deserialize<'de> for ZScale {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct Factor;
+        impl de::Visitor<'_> for Factor {
+            type Value = ZScale;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a number above 0, or \"auto\"")
+            }
+
+            fn visit_f64<E: de::Error>(self, factor: f64) -> Result<ZScale, E> {
+                match factor.is_finite() && factor > 0.0 {
+                    true => Ok(ZScale::Factor(factor)),
+                    false => Err(E::invalid_value(de::Unexpected::Float(factor), &self)),
+                }
+            }
+
+            fn visit_i64<E: de::Error>(self, factor: i64) -> Result<ZScale, E> {
+                self.visit_f64(factor as f64)
+            }
+
+            fn visit_u64<E: de::Error>(self, factor: u64) -> Result<ZScale, E> {
+                self.visit_f64(factor as f64)
+            }
+
+            fn visit_str<E: de::Error>(self, word: &str) -> Result<ZScale, E> {
+                match word {
+                    "auto" => Ok(ZScale::Auto),
+                    _ => Err(E::invalid_value(de::Unexpected::Str(word), &self)),
+                }
+            }
+        }
+        from.deserialize_any(Factor)
+    }
+}
+
 fn some_step<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
     let step = f64::deserialize(from)?;
     if step.is_finite() && step > 0.0 {
@@ -180,6 +294,7 @@ fn some_step<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::point::Horizontal;
 
     #[test]
     fn sizes_have_binary_and_decimal_units() {
@@ -211,5 +326,26 @@ mod tests {
         }
         assert!(parse_bytes("99999999TiB").unwrap_err().ends_with("too large"));
         assert!(parse_bytes("18446744073709551616").is_err());
+    }
+
+    #[test]
+    fn units_that_differ_need_a_factor_or_an_override() {
+        let feet = Units { horizontal: Some(Horizontal::Metres(1.0)), vertical: Some(0.3048) };
+        let degrees = Units { horizontal: Some(Horizontal::Degrees), vertical: None };
+        let with = |z_scale, units| RunSettings { z_scale, units, ..RunSettings::default() };
+        let (refuse, ignore) = (MixedUnits::Refuse, MixedUnits::Ignore);
+        let none = with(None, refuse);
+        assert_eq!(none.stretch(Units::default()).unwrap(), 1.0);
+        let told = none.stretch(feet).unwrap_err();
+        assert!(told.remedy().unwrap().contains("times 0.3048"), "{told:?}");
+        assert!(none.stretch(degrees).unwrap_err().remedy().unwrap().contains("project"));
+        let auto = with(Some(ZScale::Auto), refuse);
+        assert_eq!(auto.stretch(feet).unwrap(), 0.3048);
+        assert_eq!(auto.stretch(Units::default()).unwrap(), 1.0);
+        assert!(auto.stretch(degrees).is_err());
+        for units in [feet, degrees] {
+            assert_eq!(with(None, ignore).stretch(units).unwrap(), 1.0);
+            assert_eq!(with(Some(ZScale::Factor(2.0)), refuse).stretch(units).unwrap(), 2.0);
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! How a run divides its memory: what it can tell before any work, as a pure function.
 
+use super::product::Product;
 use crate::budget::{Bytes, whole_mebibytes};
 use crate::stage::{ChunkSize, Needs, Source};
 use crate::tile::{Fetch, Intake, Loader, Remote, index_bytes, merge_bytes};
@@ -30,12 +31,16 @@ pub struct Demands {
     pub points: u64,
     /// Bytes that reading a part holds.
     pub part_bytes: u64,
-    /// What the sink encodes at once.
+    /// What the largest chunk of a sink is.
     pub chunk: ChunkSize,
+    /// Sinks that are written at once.
+    pub sinks: usize,
     /// True if the run needs tiles; else it streams.
     pub mills: bool,
-    /// What the tile stages need.
-    pub ops: Vec<Needs>,
+    /// True if records have tags.
+    pub tagged: bool,
+    /// What the stages of each pass need.
+    pub passes: Vec<Vec<Needs>>,
 }
 
 /// The division.
@@ -56,8 +61,13 @@ pub struct Shares {
 }
 
 impl Demands {
-    /// The demands of `source` into chunks of `chunk`.
-    pub fn of(source: &dyn Source, chunk: ChunkSize, limit: u64, threads: usize) -> Self {
+    /// The demands of `source` into sinks with these chunks.
+    pub fn of(source: &dyn Source, chunks: &[ChunkSize], limit: u64, threads: usize) -> Self {
+        let largest = |of: fn(&ChunkSize) -> u64| chunks.iter().map(of).max().unwrap_or(0);
+        let chunk = ChunkSize {
+            points: largest(|chunk| chunk.points as u64) as usize,
+            bytes: largest(|chunk| chunk.bytes),
+        };
         Demands {
             limit,
             resident: crate::report::resident_now().unwrap_or(8 << 20),
@@ -66,8 +76,10 @@ impl Demands {
             points: source.points(),
             part_bytes: source.part_bytes(),
             chunk,
+            sinks: chunks.len(),
             mills: false,
-            ops: Vec::new(),
+            tagged: false,
+            passes: Vec::new(),
         }
     }
 
@@ -89,33 +101,45 @@ impl Demands {
     /// Records of a run for which neither the decode, which holds one, nor the merge, which holds a
     /// bit of each, takes more than they must.
     fn fewest_records(&self) -> u64 {
-        let each = Intake::bytes_per_record(self.stride).max(1) as u64;
+        let each = Intake::bytes_per_record(self.stride, self.tagged).max(1) as u64;
         let run = merge_bytes(1, self.stride) - merge_bytes(0, self.stride);
         (self.points.saturating_mul(run) / each).isqrt().max(FEWEST as u64)
     }
 
     /// Bytes that a thread holds in the mill, besides its tile: one chunk that it encodes and one
-    /// that waits (of each position: first record, number of records, normal), and the records of
-    /// the former with their numbers and normals.
+    /// that waits (of each position: first record, number of records, normal), one that is open for
+    /// every other sink, and the records of the first with their numbers and normals.
     fn mill_fixed(&self) -> u64 {
         let ChunkSize { points, bytes } = self.chunk;
         let batch = points as u64 * (self.stride as u64 + 8 + 12);
-        Remote::BYTES + 2 * (bytes + points as u64 * 28) + batch + Fetch::bytes(points, self.stride)
+        let open = self.sinks.saturating_sub(1) as u64 * points as u64 * 28;
+        let chunks = 2 * (bytes + points as u64 * 28);
+        Remote::BYTES + chunks + open + batch + Fetch::bytes(points, self.stride)
     }
 
     /// Bytes that a thread of a stream holds: batches read and waiting for their turn, chunks filled,
     /// waiting, being encoded and encoded.
     fn stream(&self) -> u64 {
         let records = self.chunk.points as u64 * self.stride as u64;
-        self.part_bytes + 3 * (BATCH * self.stride) as u64 + 3 * records + 2 * self.chunk.bytes
+        let open = self.sinks.saturating_sub(1) as u64 * records;
+        self.part_bytes
+            + 3 * (BATCH * self.stride) as u64
+            + 3 * records
+            + open
+            + 2 * self.chunk.bytes
     }
 
     /// Bytes of a tile per position it holds, the product that it leaves behind included.
     pub fn tile_bytes_per_point(&self) -> usize {
-        let search =
-            if self.ops.iter().any(|n| n.neighbors > 0) { Nearest::BYTES_PER_POINT } else { 0 };
-        let columns: usize = self.ops.iter().map(|n| n.bytes_per_point).sum();
-        Loader::BYTES_PER_POINT + search + columns + 2 * PRODUCT_BYTES
+        let of = |pass: &Vec<Needs>| {
+            let looks = pass.iter().any(|n| n.neighbors > 0);
+            let search = if looks { Nearest::BYTES_PER_POINT } else { 0 };
+            search + pass.iter().map(|n| n.bytes_per_point).sum::<usize>()
+        };
+        let stages = self.passes.iter().map(of).max().unwrap_or(0);
+        let sieved = self.tagged || self.passes.len() > 1;
+        let sieve = if sieved { Loader::SIEVE_BYTES_PER_POINT } else { 0 };
+        Loader::BYTES_PER_POINT + sieve + stages + 2 * Product::BYTES_PER_POINT
     }
 
     fn index(&self) -> u64 {
@@ -124,8 +148,8 @@ impl Demands {
     }
 
     fn work(&self, run_records: u64, tile_positions: u64) -> u64 {
-        let decode =
-            self.decode_fixed() + run_records * Intake::bytes_per_record(self.stride) as u64;
+        let decode = self.decode_fixed()
+            + run_records * Intake::bytes_per_record(self.stride, self.tagged) as u64;
         let each = decode.max(self.merge(run_records));
         (self.threads as u64 * each).max(self.mill_bytes(tile_positions))
     }
@@ -185,7 +209,7 @@ impl Demands {
         }
         let work = (least + spare / SPARE.1 * SPARE.0).min(self.most_work(least));
         let share = work / self.threads as u64;
-        let each = Intake::bytes_per_record(self.stride).max(1) as u64;
+        let each = Intake::bytes_per_record(self.stride, self.tagged).max(1) as u64;
         Ok(Shares {
             base,
             work,
@@ -219,10 +243,8 @@ impl Demands {
 /// The part of the memory to spare that goes to work, up to what it makes use of: 3 of 4.
 const SPARE: (u64, u64) = (3, 4);
 /// Bytes that a record kept in memory takes at most besides its own: its place in the order, its
-/// position in a run and in the merged scan, its copies, its fate.
-const KEPT_BYTES: u64 = 8 + 24 + 24 + 4 + 4;
-/// Bytes that a tile leaves behind for each of its positions: what is kept, its normal, its fate.
-const PRODUCT_BYTES: usize = 16 + 12 + 4;
+/// position in a run and in the merged scan, its copies, its state, its fate.
+const KEPT_BYTES: u64 = 8 + 24 + 24 + 4 + 1 + 4;
 
 #[cfg(test)]
 mod tests {
@@ -237,8 +259,10 @@ mod tests {
             points: 10_000_000,
             part_bytes: 1 << 20,
             chunk: ChunkSize { points: 50_000, bytes: 4_500_000 },
+            sinks: 1,
             mills: true,
-            ops: vec![Needs { neighbors: 10, bytes_per_point: 40, ..Needs::default() }],
+            tagged: false,
+            passes: vec![vec![Needs { neighbors: 10, bytes_per_point: 40, ..Needs::default() }]],
         }
     }
 

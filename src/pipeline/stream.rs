@@ -6,37 +6,43 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::outlet::{Hands, Outlet};
 use super::run::{Finished, Job, StopOnDrop};
 use super::shares::{BATCH, Shares};
-use crate::Result;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::PointBatch;
 use crate::report::Tally;
 use crate::stage::{Encoded, Sink};
 use crate::tile::{lock, parallel};
+use crate::{Error, Result};
 
-/// Streams all parts of the source into `sink`. With a lattice, points that have no position on it
+/// Streams all parts of the source into each of `sinks`. With a lattice, points that have no position on it
 /// are removed.
 pub(super) fn stream(
     job: &Job<'_>,
     shares: &Shares,
-    sink: Box<dyn Sink>,
+    sinks: Vec<Box<dyn Sink>>,
     lattice: Option<&Lattice>,
 ) -> Result<Finished> {
     let _working = job.budget.lease(shares.work, "streaming")?;
-    let (encoder, chunk_points) = (sink.encoder(), sink.chunk_points());
-    let outlet: Outlet<PointBatch, PointBatch> = Outlet::new(sink, job.threads);
     let schema = job.source.schema();
-    let open = Mutex::new((PointBatch::new(schema.clone(), chunk_points), 0u64));
-    let commit = |batch: PointBatch| -> Result<Vec<PointBatch>> {
-        let (chunk, kept) = &mut *lock(&open);
+    let encoders: Vec<_> = sinks.iter().map(|sink| sink.encoder()).collect();
+    let empty = |sink: &Box<dyn Sink>| PointBatch::new(schema.clone(), sink.chunk_points());
+    let open = Mutex::new((sinks.iter().map(empty).collect::<Vec<_>>(), 0u64));
+    let outlet: Outlet<PointBatch, (usize, PointBatch)> = Outlet::new(sinks, job.threads);
+    let commit = |batch: PointBatch| -> Result<Vec<(usize, PointBatch)>> {
+        let (chunks, kept) = &mut *lock(&open);
         *kept += batch.len() as u64;
-        Ok(chunked(&batch, chunk))
+        let each = chunks.iter_mut().enumerate();
+        Ok(each.flat_map(|(sink, chunk)| chunked(&batch, sink, chunk)).collect())
+    };
+    let encode = |(sink, chunk): (usize, PointBatch)| -> Result<(usize, Encoded)> {
+        let encoder = encoders.get(sink).ok_or_else(|| Error::internal("no such sink"))?;
+        Ok((sink, encoder.encode(&chunk)?))
     };
     let total = Mutex::new(Tally::default());
     let next = AtomicUsize::new(0);
     let parts = job.source.parts();
     parallel(job.threads, |_| {
         let guard = StopOnDrop::new(|| outlet.stop());
-        let mut encode = |chunk: PointBatch| -> Result<Encoded> { encoder.encode(&chunk) };
+        let mut encode = encode;
         let mut hands = Hands { commit: &commit, encode: &mut encode };
         let mut tally = Tally::default();
         loop {
@@ -51,6 +57,7 @@ pub(super) fn stream(
                 if let Some(lattice) = lattice {
                     drop_nonfinite(job, lattice, &mut batch, &mut tally)?;
                 }
+                job.classes.keep(&batch, &mut tally);
                 outlet.deliver((index as u64, number), batch, !more, &mut hands)?;
                 if !more {
                     break;
@@ -63,25 +70,27 @@ pub(super) fn stream(
         Ok(())
     })?;
     let (rest, kept) = {
-        let (chunk, kept) = &mut *lock(&open);
-        let rest = std::mem::replace(chunk, PointBatch::new(schema.clone(), 0));
-        (if rest.is_empty() { Vec::new() } else { vec![rest] }, *kept)
+        let (chunks, kept) = &mut *lock(&open);
+        let rest = std::mem::take(chunks).into_iter().enumerate();
+        (rest.filter(|(_, chunk)| !chunk.is_empty()).collect(), *kept)
     };
-    let mut encode = |chunk: PointBatch| -> Result<Encoded> { encoder.encode(&chunk) };
+    let mut encode = encode;
     let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
     let mut tally = std::mem::take(&mut *lock(&total));
     Ok(Finished {
         read: tally.work.remove("read").unwrap_or(0),
         kept,
-        written,
+        written: written.into_iter().map(|summary| (kept, summary)).collect(),
+        classes: tally.classes.take().map_or(Vec::new(), |classes| classes.figures()),
         tally,
         decisions: Vec::new(),
+        passes: Vec::new(),
         measured: None,
     })
 }
 
-/// Fills `chunk` from `batch` and returns the chunks that this completed.
-fn chunked(batch: &PointBatch, chunk: &mut PointBatch) -> Vec<PointBatch> {
+/// Fills `chunk` of `sink` from `batch` and returns the chunks that this completed.
+fn chunked(batch: &PointBatch, sink: usize, chunk: &mut PointBatch) -> Vec<(usize, PointBatch)> {
     let stride = batch.schema().stride;
     let mut records = batch.records();
     let mut full = Vec::new();
@@ -92,7 +101,7 @@ fn chunked(batch: &PointBatch, chunk: &mut PointBatch) -> Vec<PointBatch> {
         records = later;
         if chunk.len() == chunk.capacity() {
             let empty = PointBatch::new(batch.schema().clone(), chunk.capacity());
-            full.push(std::mem::replace(chunk, empty));
+            full.push((sink, std::mem::replace(chunk, empty)));
         }
     }
     full

@@ -9,11 +9,12 @@ use super::run::Job;
 use crate::geom::lattice::Lattice;
 use crate::point::Position;
 use crate::report::{Lot, ScanSurvey, TileFigures, Totals, report_tile_level};
-use crate::tile::{Address, Fate, Pieces, Reader, SealedTiles, Spill, SpillArea, TileKey, lock};
+use crate::tile::{
+    Address, FATE_BYTES, Fate, Pieces, Reader, SealedTiles, Sieve, Spill, SpillArea, State,
+    TileKey, lock,
+};
 use crate::{Error, Result};
 
-/// Bytes of a stored fate.
-pub(super) const FATE_BYTES: usize = size_of::<f32>();
 const KEPT: f32 = -1.0;
 const KEPT_ONCE: f32 = -2.0;
 const REMOVED: f32 = -3.0;
@@ -31,12 +32,13 @@ pub(super) fn fate_code(fate: Fate) -> [u8; FATE_BYTES] {
     .to_le_bytes()
 }
 
-fn fate_of(code: [u8; FATE_BYTES]) -> Fate {
+/// How far the removed records of a position are from the surface, by its stored fate: copies of a
+/// kept one are on it; None where nothing stands for them.
+fn deviation_of(code: [u8; FATE_BYTES]) -> Option<f32> {
     match f32::from_le_bytes(code) {
-        KEPT => Fate::Kept,
-        KEPT_ONCE => Fate::KeptOnce,
-        REMOVED => Fate::Removed,
-        deviation => Fate::Represented { deviation },
+        REMOVED => None,
+        KEPT | KEPT_ONCE => Some(0.0),
+        deviation => Some(deviation),
     }
 }
 
@@ -113,16 +115,23 @@ pub(super) struct Measured {
     pub tiles: Lines,
 }
 
-/// Measures the reduction of `tiles` whose positions have the given fates, on all threads.
+/// Measures, on all threads, the reduction of `tiles` whose positions have the stored fates and whose
+/// records have the stored states of `sieve`.
 pub(super) fn survey(
     job: &Job<'_>,
     lattice: &Lattice,
     area: &Arc<SpillArea>,
     tiles: &SealedTiles,
-    fates: &Pieces,
+    sieve: &Sieve,
 ) -> Result<Measured> {
     let level = report_tile_level(tiles.levels());
-    let walk = Walk { tiles, fates, level };
+    let missing = || Error::internal("a scan is surveyed that no pass went over");
+    let walk = Walk {
+        tiles,
+        fates: sieve.fates.as_ref().ok_or_else(missing)?,
+        states: sieve.states.as_ref().ok_or_else(missing)?,
+        level,
+    };
     let ranges = tiles.blocks().div_ceil(BLOCKS);
     let each = 2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64);
     let _working = job.budget.lease(each * job.threads as u64, "survey")?;
@@ -148,9 +157,7 @@ pub(super) fn survey(
         let mut stretch = Stretch::default();
         for block in range * BLOCKS..((range + 1) * BLOCKS).min(tiles.blocks()) {
             stretch.load(&walk, block)?;
-            for (&(p, fate), &copies) in stretch.positions.iter().zip(&stretch.copies) {
-                part.measure(p, Lot::of(copies, fate));
-            }
+            stretch.positions.iter().for_each(|&(p, lot)| part.measure(p, lot));
             positions += stretch.positions.len() as u64;
         }
         lock(&fitted).merge(&part);
@@ -185,17 +192,17 @@ fn each_range(
 struct Walk<'a> {
     tiles: &'a SealedTiles,
     fates: &'a Pieces,
+    states: &'a Pieces,
     level: u32,
 }
 
-/// A block with the fates of its positions.
+/// A block with the lots of its positions.
 #[derive(Default)]
 struct Stretch {
     block: Option<usize>,
     reader: Reader,
     buffer: Vec<u8>,
-    positions: Vec<(Position, Fate)>,
-    copies: Vec<u32>,
+    positions: Vec<(Position, Lot)>,
 }
 
 impl Stretch {
@@ -204,17 +211,30 @@ impl Stretch {
             return Ok(());
         }
         let (positions, copies) = walk.tiles.read(block, &mut self.reader)?;
+        let lot = |copies: u32| Lot { copies, kept: 0, deviation: None };
         self.positions.clear();
-        self.positions.extend(positions.iter().map(|&p| (p, Fate::Kept)));
-        self.copies.clear();
-        self.copies.extend_from_slice(copies);
+        self.positions.extend(positions.iter().zip(copies).map(|(&p, &copies)| (p, lot(copies))));
         let (first, len) = (walk.tiles.block(block).first_position, positions.len() as u64);
         let placed = &mut self.positions;
         walk.fates.each(first, len, &mut self.buffer, |at, bytes| {
             for (n, code) in bytes.chunks_exact(FATE_BYTES).enumerate() {
                 let mut stored = [0; FATE_BYTES];
                 stored.copy_from_slice(code);
-                placed[(at - first) as usize + n].1 = fate_of(stored);
+                placed[(at - first) as usize + n].1.deviation = deviation_of(stored);
+            }
+            Ok(())
+        })?;
+        let records = placed.iter().map(|(_, lot)| u64::from(lot.copies)).sum();
+        let (mut at, mut left) = (0, placed.first().map_or(0, |(_, lot)| lot.copies));
+        let rank = walk.tiles.rank_of_block(block);
+        walk.states.each(rank, records, &mut self.buffer, |_, states| {
+            for &state in states {
+                while left == 0 {
+                    at += 1;
+                    left = placed[at].1.copies;
+                }
+                placed[at].1.kept += u32::from(State(state).is_alive());
+                left -= 1;
             }
             Ok(())
         })?;
@@ -248,14 +268,12 @@ impl Walk<'_> {
             stretch.load(self, at.0)?;
             let key = TileKey::around(stretch.positions[at.1].0, self.level);
             let mut tile = scan.tile(key);
-            let (next, seen) = self.visit(&mut stretch, at, key, |p, copies, fate| {
-                tile.add(p, Lot::of(copies, fate));
-                scan.add(p, Lot::of(copies, fate));
+            let (next, seen) = self.visit(&mut stretch, at, key, |p, lot| {
+                tile.add(p, lot);
+                scan.add(p, lot);
             })?;
             let mut fitted = tile.fit();
-            self.visit(&mut stretch, at, key, |p, copies, fate| {
-                fitted.measure(p, Lot::of(copies, fate));
-            })?;
+            self.visit(&mut stretch, at, key, |p, lot| fitted.measure(p, lot))?;
             lines.add(&fitted.finish(lattice, scan)?)?;
             positions += seen;
             at = next;
@@ -292,17 +310,17 @@ impl Walk<'_> {
         stretch: &mut Stretch,
         mut at: (usize, usize),
         key: TileKey,
-        mut visit: impl FnMut(Position, u32, Fate),
+        mut visit: impl FnMut(Position, Lot),
     ) -> Result<((usize, usize), u64)> {
         let cube = key.cube();
         let mut seen = 0;
         while at.0 < self.tiles.blocks() {
             stretch.load(self, at.0)?;
-            while let Some(&(p, fate)) = stretch.positions.get(at.1) {
+            while let Some(&(p, lot)) = stretch.positions.get(at.1) {
                 if !cube.contains(p) {
                     return Ok((at, seen));
                 }
-                visit(p, stretch.copies[at.1], fate);
+                visit(p, lot);
                 seen += 1;
                 at.1 += 1;
             }

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use super::draft::{self, Draft, StageDraft};
 use super::keys;
+use super::limits::{LimitKeys, Limits};
 use super::mistake::{self, Mistake, SourceText};
-use super::node::{self, Node, Place};
+use super::node::{self, Entry, Node, Place, Value};
 use super::registry::{Registry, StagePlace};
 use super::set::Set;
 use super::settings::RunSettings;
@@ -20,8 +21,8 @@ pub struct Pipeline {
     pub origin: String,
     /// The `[run]` table.
     pub settings: RunSettings,
-    /// The stages from top to bottom: a source, any number of transforms and tile ops, one sink or
-    /// more, which take from the last stage that is no sink.
+    /// The stages from top to bottom: a source, then transforms, tile stages and sinks. A sink takes
+    /// from the last stage above that is no sink, or from the one it names.
     pub stages: Vec<PlacedStage>,
 }
 
@@ -35,6 +36,8 @@ pub struct PlacedStage {
     pub from: Option<String>,
     /// Line of its `kind`, from 1.
     pub line: usize,
+    /// The records that it is limited to.
+    pub(super) limits: Limits,
     /// What it does.
     pub role: Role,
     /// Its keys with all defaults filled in, those that name files left out.
@@ -122,21 +125,50 @@ fn place(
     let (kind, at) = &stage.kind;
     let line = text.as_bytes()[..at.start.min(text.len())].iter().filter(|&&b| b == b'\n').count();
     let place = StagePlace::new(origin, line + 1);
-    let Some(built) = registry.build(kind, &stage.keys, &place) else {
+    let (limits, keys) = split_limits(&stage.keys);
+    let Some(built) = registry.build(kind, &keys, &place) else {
         let kinds = registry.kinds().map(|(kind, _)| kind);
         let told = format!("there is no stage `{kind}`");
         return Err(vec![Mistake::word(at.clone(), told, kind, "stages", kinds)]);
     };
-    let (role, keys) = built?;
+    let given = limits.entries();
+    let read = keys::read::<LimitKeys>(kind, &limits);
+    let (role, mut canonical) = match (built, read.is_ok()) {
+        (Ok(built), true) => built,
+        (built, _) => {
+            return Err(built.err().into_iter().chain(read.err()).flatten().collect());
+        }
+    };
+    let limits = read?;
+    if !matches!(role, Role::TileOp(_) | Role::ScanOp(_)) {
+        let told = |e: &Entry| format!("`{}` is for stages that work on tiles", e.key);
+        let wrong: Vec<_> = given.iter().map(|e| Mistake::new(e.at.clone(), told(e))).collect();
+        if !wrong.is_empty() {
+            return Err(wrong);
+        }
+    }
+    if let (false, Some(keys)) = (given.is_empty(), canonical.as_object_mut()) {
+        let told = serde_json::to_value(&limits).unwrap_or_default();
+        keys.extend(told.as_object().cloned().unwrap_or_default());
+    }
     let text = |part: &Option<(String, Place)>| part.as_ref().map(|(text, _)| text.clone());
     Ok(PlacedStage {
         kind: kind.clone(),
         name: text(&stage.name),
         from: text(&stage.from),
         line: place.line(),
+        limits: limits.limits(),
         role,
-        keys,
+        keys: canonical,
     })
+}
+
+/// The keys that every tile stage takes, and the stage's own.
+fn split_limits(keys: &Node) -> (Node, Node) {
+    let (limits, own) =
+        keys.entries().iter().cloned().partition(|e| LimitKeys::KEYS.contains(&e.key.as_str()));
+    let table = |entries| Node { place: keys.place.clone(), value: Value::Table(entries) };
+    (table(limits), table(own))
 }
 
 /// Names are words of their own: no two alike, none that already means something.
@@ -170,16 +202,18 @@ fn check_chain(drafts: &[StageDraft], stages: &[PlacedStage], mistakes: &mut Vec
             (Role::Source(_), _) => wrong(i, "a second source is not possible yet"),
             (_, 0) => wrong(i, "the first stage must be a source, such as `read`"),
             (Role::Sink(_), _) => sinks += 1,
-            _ if sinks > 0 => wrong(i, "a stage behind a sink is not possible yet"),
             _ => {}
         }
     }
-    match stages.len().checked_sub(1) {
-        Some(last) if sinks == 0 => wrong(last, "nothing takes these points: end with `write`"),
-        _ => {}
+    match stages.last().map(|stage| &stage.role) {
+        None | Some(Role::Sink(_)) if sinks > 0 => {}
+        _ => {
+            let last = stages.len().saturating_sub(1);
+            wrong(last, "nothing takes these points: end with `write`");
+        }
     }
     check_from(drafts, stages, mistakes);
-    let tiles = stages.iter().any(|s| matches!(s.role, Role::TileOp(_)));
+    let tiles = stages.iter().any(|s| matches!(s.role, Role::TileOp(_) | Role::ScanOp(_)));
     for (draft, stage) in drafts.iter().zip(stages) {
         let Role::Sink(sink) = &stage.role else { continue };
         if tiles && sink.order() == Order::Input {
@@ -190,22 +224,25 @@ fn check_chain(drafts: &[StageDraft], stages: &[PlacedStage], mistakes: &mut Vec
     }
 }
 
-/// `from` names an earlier stage; as long as pipelines are chains, the one that is above anyway.
+/// `from` names an earlier stage that is no sink. Only a sink may take from another than the one
+/// above: what works on the points is one chain.
 fn check_from(drafts: &[StageDraft], stages: &[PlacedStage], mistakes: &mut Vec<Mistake>) {
     let mut above: Option<usize> = None;
     for (i, stage) in stages.iter().enumerate() {
+        let is_sink = matches!(stage.role, Role::Sink(_));
         if let Some((from, at)) = &drafts[i].from {
+            let works = |s: &&PlacedStage| !matches!(s.role, Role::Sink(_));
             let name = |s: &PlacedStage| s.name.clone();
-            let earlier: Vec<String> = stages[..i].iter().filter_map(name).collect();
+            let earlier: Vec<String> = stages[..i].iter().filter(works).filter_map(name).collect();
             if !earlier.contains(from) {
-                let told = format!("no earlier stage is named `{from}`");
+                let told = format!("no earlier stage that gives points is named `{from}`");
                 mistakes.push(Mistake::word(at.clone(), told, from, "names", earlier));
-            } else if above.and_then(|a| stages[a].name.as_ref()) != Some(from) {
-                let told = "taking from another stage than the one above is not possible yet";
+            } else if !is_sink && above.and_then(|a| stages[a].name.as_ref()) != Some(from) {
+                let told = "only a sink can take from another stage than the one above";
                 mistakes.push(Mistake::new(at.clone(), told));
             }
         }
-        if !matches!(stage.role, Role::Sink(_)) {
+        if !is_sink {
             above = Some(i);
         }
     }

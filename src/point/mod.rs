@@ -6,9 +6,11 @@ mod count;
 pub mod names;
 mod schema;
 mod selection;
+mod units;
 
 pub use batch::PointBatch;
 pub use bounds::{Bounds, Position, distance2};
 pub use count::parse_count;
 pub use schema::{Bits, Dimension, Endian, Layout, Metadata, Scalar, Schema, Value};
-pub use selection::{Edit, Flag, Mark, Selection};
+pub use selection::{Chooser, Edit, Flag, Mark, Selection};
+pub use units::{Horizontal, Mismatch, Units};

@@ -266,6 +266,8 @@ impl Schema {
 pub struct Metadata {
     /// Coordinate reference system as text (WKT where the file has one).
     pub crs: Option<String>,
+    /// Units of the coordinates, as far as that says them.
+    pub units: super::Units,
     /// Free text lines, such as the comments of a PLY header.
     pub comments: Vec<String>,
     /// The format's own header and records, known to sources and sinks of that format alone.
@@ -276,6 +278,7 @@ impl std::fmt::Debug for Metadata {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Metadata")
             .field("crs", &self.crs)
+            .field("units", &self.units)
             .field("comments", &self.comments)
             .field("native", &self.native.is_some())
             .finish()

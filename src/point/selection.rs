@@ -4,7 +4,7 @@
 use serde::{Deserialize, Deserializer, Serialize, de};
 
 use super::names;
-use super::{Dimension, Schema, Value};
+use super::{Dimension, Endian, Schema, Value};
 
 /// One of the flags that LAS has for every record (LAS 1.4 R15, tables 8 and 16).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -57,19 +57,38 @@ impl Selection {
         class.into_iter().chain(flags).collect()
     }
 
-    /// Whether it holds `record`; a dimension that the records do not have counts as 0.
-    pub fn holds(&self, schema: &Schema, record: &[u8]) -> bool {
-        let value = |name| match schema.find(name).map(|d| d.get(record, schema.endian)) {
-            Some(Value::Unsigned(value)) => value,
-            Some(Value::Signed(value)) => u64::try_from(value).unwrap_or(u64::MAX),
-            Some(other) => other.as_f64() as u64,
-            None => 0,
+    /// The dimensions to look at in records of `schema`. One that they do not have counts as 0.
+    pub fn of(&self, schema: &Schema) -> Chooser {
+        let flag = |is_set| move |flag: &Flag| (schema.find(flag.dimension()).cloned(), is_set);
+        let flags = self.with.iter().map(flag(true)).chain(self.without.iter().map(flag(false)));
+        Chooser {
+            endian: schema.endian,
+            class: schema.find(names::CLASSIFICATION).cloned(),
+            classes: self.classes.clone(),
+            flags: flags.collect(),
+        }
+    }
+}
+
+/// A [`Selection`] among records of one schema.
+#[derive(Debug, Clone)]
+pub struct Chooser {
+    endian: Endian,
+    class: Option<Dimension>,
+    classes: Vec<u8>,
+    /// Fields of flags, and whether they are to be set.
+    flags: Vec<(Option<Dimension>, bool)>,
+}
+
+impl Chooser {
+    /// True if the selection holds `record`.
+    pub fn holds(&self, record: &[u8]) -> bool {
+        let value = |field: &Option<Dimension>| {
+            field.as_ref().map_or(0.0, |field| field.get(record, self.endian).as_f64())
         };
-        let is_set = |flag: &Flag| value(flag.dimension()) != 0;
-        (self.classes.is_empty()
-            || self.classes.iter().any(|&class| value(names::CLASSIFICATION) == u64::from(class)))
-            && self.with.iter().all(is_set)
-            && !self.without.iter().any(is_set)
+        let class = value(&self.class);
+        (self.classes.is_empty() || self.classes.iter().any(|&of| f64::from(of) == class))
+            && self.flags.iter().all(|(field, is_set)| (value(field) != 0.0) == *is_set)
     }
 }
 
@@ -213,16 +232,16 @@ mod tests {
 
     #[test]
     fn a_selection_holds_what_its_classes_and_flags_say() {
+        let holds = |selection: &Selection, record: [u8; 2]| selection.of(&schema()).holds(&record);
         let classes = Selection { classes: vec![2, 6], ..Selection::default() };
-        assert!(classes.holds(&schema(), &[2, 0]) && classes.holds(&schema(), &[6, 255]));
-        assert!(!classes.holds(&schema(), &[5, 0]));
+        assert!(holds(&classes, [2, 0]) && holds(&classes, [6, 255]) && !holds(&classes, [5, 0]));
         let with = Selection { with: vec![Flag::KeyPoint], ..Selection::default() };
-        assert!(with.holds(&schema(), &[0, 2]) && !with.holds(&schema(), &[0, 4]));
+        assert!(holds(&with, [0, 2]) && !holds(&with, [0, 4]));
         let without = Selection { without: vec![Flag::Withheld], ..Selection::default() };
-        assert!(without.holds(&schema(), &[0, 2]) && !without.holds(&schema(), &[0, 4]));
+        assert!(holds(&without, [0, 2]) && !holds(&without, [0, 4]));
         // What the records do not have is not set.
         let overlap = Selection { without: vec![Flag::Overlap], ..Selection::default() };
-        assert!(overlap.holds(&schema(), &[0, 0]));
+        assert!(holds(&overlap, [0, 0]));
         assert!(Selection::default().is_all() && !overlap.is_all());
     }
 

@@ -1,5 +1,7 @@
 //! The names of classes, for people.
 
+use super::figures::{ClassFigures, Pair};
+
 /// What a class means by LAS 1.4 R15; None for those that it leaves to the user or reserves.
 ///
 /// Table 17 for all but 8 and 12, which only formats 0 to 5 have (Table 9); it reserves them.
@@ -42,5 +44,43 @@ mod tests {
         assert_eq!(named, 23);
         assert_eq!((class_name(2), class_name(6)), (Some("ground"), Some("building")));
         assert_eq!(class_name(64), None);
+    }
+}
+
+/// Records by class, before and after.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ClassCounts {
+    counts: Box<[Pair<u64>; 256]>,
+}
+
+impl Default for ClassCounts {
+    fn default() -> Self {
+        ClassCounts { counts: Box::new([Pair::default(); 256]) }
+    }
+}
+
+impl ClassCounts {
+    /// Counts a record read.
+    pub fn read(&mut self, class: u8) {
+        self.counts[usize::from(class)].before += 1;
+    }
+
+    /// Counts a record kept.
+    pub fn keep(&mut self, class: u8) {
+        self.counts[usize::from(class)].after += 1;
+    }
+
+    /// Adds other counts.
+    pub fn merge(&mut self, other: &ClassCounts) {
+        for (sum, n) in self.counts.iter_mut().zip(other.counts.iter()) {
+            sum.before += n.before;
+            sum.after += n.after;
+        }
+    }
+
+    /// The classes that there are, by number.
+    pub fn figures(&self) -> Vec<ClassFigures> {
+        let classes = (0..=u8::MAX).zip(self.counts.iter()).filter(|(_, n)| n.before > 0);
+        classes.map(|(class, n)| ClassFigures { class, before: n.before, after: n.after }).collect()
     }
 }

@@ -5,7 +5,7 @@ use std::io::{self, BufRead, Write};
 
 use serde::Serialize;
 
-use super::figures::{ClassFigures, Totals};
+use super::figures::{ClassFigures, PassFigures, Totals};
 use super::ledger::Ledger;
 use super::machine::Machine;
 
@@ -32,6 +32,8 @@ pub struct Outcome {
     pub decisions: Vec<Decision>,
     /// Counts by name.
     pub counts: BTreeMap<String, u64>,
+    /// The passes over the scan, in order; none if the pipeline streams.
+    pub passes: Vec<PassFigures>,
     /// Side of the report tiles in world units; None if the pipeline streams, which has no tiles.
     pub tile_side: Option<f64>,
     /// Figures of the whole scan; None likewise.
@@ -138,6 +140,7 @@ impl Outcome {
         object.entry("ledger", &self.ledger)?;
         object.entry("decisions", &self.decisions)?;
         object.entry("counts", &self.counts)?;
+        object.entry("passes", &self.passes)?;
         object.entry("totals", &self.totals)?;
         object.entry("classes", &self.classes)?;
         object.entry("tile_side", &self.tile_side)?;

@@ -94,6 +94,17 @@ pub struct Totals {
     pub deviation: Option<DeviationTotals>,
 }
 
+/// What a pass over the scan left.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct PassFigures {
+    /// Kinds of its stages, in order.
+    pub stages: Vec<String>,
+    /// Records that it found.
+    pub before: u64,
+    /// Records that it left for the next: neither removed nor marked as what would be removed.
+    pub after: u64,
+}
+
 /// The records of one class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct ClassFigures {

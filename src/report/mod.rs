@@ -12,15 +12,17 @@ mod survey;
 mod table;
 mod tally;
 
+pub use classes::ClassCounts;
 pub use classes::class_name;
 pub use deviations::{Deviations, Histogram};
 pub use document::{
     Decision, FileFigures, LatticeFigures, Outcome, Phase, Report, RunFigures, result_bytes,
 };
 pub use figures::{
-    ClassFigures, DeviationFigures, DeviationTotals, Pair, PlaneFigures, TileFigures, Totals,
+    ClassFigures, DeviationFigures, DeviationTotals, Pair, PassFigures, PlaneFigures, TileFigures,
+    Totals,
 };
-pub use ledger::{Ledger, Removed};
+pub use ledger::{Ledger, Removed, check_written};
 pub use machine::{Machine, cpu_seconds, peak_memory, resident_now};
 pub use moments::{Moments, Plane};
 pub use sums::{Distances, FixedSum};

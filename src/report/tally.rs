@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use super::ClassCounts;
+
 /// Counts that a tile or a stream reports; merged by addition, so that order does not matter.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Tally {
@@ -11,6 +13,8 @@ pub struct Tally {
     pub work: BTreeMap<&'static str, u64>,
     /// Records removed, by stage kind and reason.
     pub removed: BTreeMap<(String, &'static str), u64>,
+    /// Records by class; None where they have none.
+    pub classes: Option<ClassCounts>,
 }
 
 impl Tally {
@@ -41,6 +45,9 @@ impl Tally {
         }
         for (key, n) in &other.removed {
             *self.removed.entry(key.clone()).or_default() += n;
+        }
+        if let Some(classes) = &other.classes {
+            self.classes.get_or_insert_default().merge(classes);
         }
     }
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::key::morton_cmp;
 use super::remote::Remote;
 use super::sealed::SealedTiles;
+use super::sieve::Sieve;
 use super::{Bounds, Position, Tile, chosen};
 use crate::Result;
 use crate::geom::few::{FEW, places};
@@ -31,13 +32,14 @@ pub struct Around {
 #[derive(Debug)]
 struct Beyond {
     tiles: Arc<SealedTiles>,
+    sieve: Sieve,
     /// The box that is loaded, without limits where the scan has nothing beyond.
     loaded: Bounds,
 }
 
 impl Beyond {
     /// None if the scan has nothing beyond `loaded`.
-    fn new(tiles: &Arc<SealedTiles>, loaded: Bounds) -> Option<Beyond> {
+    fn new(tiles: &Arc<SealedTiles>, sieve: &Sieve, loaded: Bounds) -> Option<Beyond> {
         let scan = tiles.bounds();
         let mut open = loaded;
         for axis in 0..3 {
@@ -48,7 +50,8 @@ impl Beyond {
                 open.hi[axis] = i64::MAX;
             }
         }
-        (!loaded.holds(&scan)).then(|| Beyond { tiles: tiles.clone(), loaded: open })
+        let beyond = || Beyond { tiles: tiles.clone(), sieve: sieve.clone(), loaded: open };
+        (!loaded.holds(&scan)).then(beyond)
     }
 
     /// True if no position that is not loaded can be among the nearest of `p`, of which the farthest
@@ -83,8 +86,8 @@ impl Around {
 }
 
 impl Tile {
-    pub(super) fn surround(&mut self, tiles: &Arc<SealedTiles>, loaded: Bounds) {
-        self.around.beyond = Beyond::new(tiles, loaded);
+    pub(super) fn surround(&mut self, tiles: &Arc<SealedTiles>, sieve: &Sieve, loaded: Bounds) {
+        self.around.beyond = Beyond::new(tiles, sieve, loaded);
     }
 
     /// Calls `visit` for every chosen position of the zone with its index in the tile and the offsets,
@@ -114,7 +117,12 @@ impl Tile {
                     Some(beyond) if !(enough && beyond.proves(p, d2)) => {
                         *unproven += 1;
                         offsets.clear();
-                        match remote.nearest(&beyond.tiles, p, k, enough.then_some(d2)) {
+                        match remote.nearest(
+                            (&beyond.tiles, &beyond.sieve),
+                            p,
+                            k,
+                            enough.then_some(d2),
+                        ) {
                             Ok(found) => offsets.extend(found),
                             Err(error) => return outcome = Err(error),
                         }

@@ -7,6 +7,7 @@ use std::sync::Mutex;
 use super::TileKey;
 use super::block::{BLOCK, Block};
 use super::key::{morton_cmp, morton_prefix};
+use super::sieve::Tag;
 use super::spill::{PIECE, Pieces, Spill, SpillArea, lock};
 use crate::Result;
 use crate::budget::{Budget, Lease};
@@ -30,6 +31,7 @@ pub struct TileStore {
     pub(super) area: Arc<SpillArea>,
     pub(super) budget: Budget,
     pub(super) stride: usize,
+    pub(super) tagged: bool,
     pub(super) positions: Spill,
     pub(super) records: Pieces,
     pub(super) runs: Mutex<Vec<Run>>,
@@ -37,12 +39,13 @@ pub struct TileStore {
 }
 
 impl TileStore {
-    /// An empty store for records of `stride` bytes.
-    pub fn new(area: &Arc<SpillArea>, budget: &Budget, stride: usize) -> Self {
+    /// An empty store for records of `stride` bytes, each with a tag or none.
+    pub fn new(area: &Arc<SpillArea>, budget: &Budget, stride: usize, tagged: bool) -> Self {
         TileStore {
             area: area.clone(),
             budget: budget.clone(),
             stride,
+            tagged,
             positions: Spill::new(area, "runs"),
             records: Pieces::new(area, "records", stride),
             runs: Mutex::default(),
@@ -70,14 +73,16 @@ pub struct Intake<'a> {
     capacity: usize,
     records: Vec<u8>,
     positions: Vec<Position>,
+    tags: Vec<u32>,
     order: Vec<(u64, u32)>,
     packed: Vec<u8>,
 }
 
 impl<'a> Intake<'a> {
     /// Bytes that an intake holds for each record of `stride` bytes.
-    pub fn bytes_per_record(stride: usize) -> usize {
-        stride + size_of::<Position>() + size_of::<(u64, u32)>()
+    pub fn bytes_per_record(stride: usize, tagged: bool) -> usize {
+        let tag = if tagged { size_of::<Tag>() } else { 0 };
+        stride + size_of::<Position>() + size_of::<(u64, u32)>() + tag
     }
 
     /// Bytes that an intake holds whatever its capacity.
@@ -92,18 +97,22 @@ impl<'a> Intake<'a> {
             capacity,
             records: Vec::with_capacity(capacity * store.stride),
             positions: Vec::with_capacity(capacity),
+            tags: Vec::with_capacity(if store.tagged { capacity } else { 0 }),
             order: Vec::with_capacity(capacity),
             packed: Vec::with_capacity(STRETCH + 2 * BLOCK * 28),
         }
     }
 
-    /// Takes one record at its position.
-    pub fn push(&mut self, position: Position, record: &[u8]) -> Result<()> {
+    /// Takes one record at its position; its tag counts if the store has tags.
+    pub fn push(&mut self, position: Position, record: &[u8], tag: Tag) -> Result<()> {
         if self.positions.len() == self.capacity {
             self.flush()?;
         }
         self.positions.push(position);
         self.records.extend_from_slice(record);
+        if self.store.tagged {
+            self.tags.push(tag.0);
+        }
         Ok(())
     }
 
@@ -118,12 +127,18 @@ impl<'a> Intake<'a> {
         let blocks = self.store_positions()?;
         self.records.clear();
         self.positions.clear();
+        self.tags.clear();
         self.store.add(Run { blocks, first_record })
     }
 
     fn record(&self, i: u32) -> &[u8] {
         let stride = self.store.stride;
         &self.records[i as usize * stride..(i as usize + 1) * stride]
+    }
+
+    /// What a run's block holds beside a position, where blocks of distinct positions have copies.
+    fn tag(&self, i: u32) -> u32 {
+        self.tags.get(i as usize).copied().unwrap_or(1)
     }
 
     /// Sorts into canonical order: by the upper 21 levels of the run's octree first, which nearly
@@ -142,7 +157,9 @@ impl<'a> Intake<'a> {
         for equal in order.chunk_by_mut(|a, b| a.0 == b.0).filter(|equal| equal.len() > 1) {
             equal.sort_unstable_by(|a, b| {
                 let (p, q) = (&self.positions[a.1 as usize], &self.positions[b.1 as usize]);
-                morton_cmp(p, q).then_with(|| self.record(a.1).cmp(self.record(b.1)))
+                morton_cmp(p, q)
+                    .then_with(|| self.record(a.1).cmp(self.record(b.1)))
+                    .then_with(|| self.tag(a.1).cmp(&self.tag(b.1)))
             });
         }
         self.order = order;
@@ -161,7 +178,7 @@ impl<'a> Intake<'a> {
     fn store_positions(&mut self) -> Result<Vec<Block>> {
         let mut blocks = Vec::with_capacity(self.order.len().div_ceil(BLOCK));
         let mut sorted = Vec::with_capacity(BLOCK);
-        let ones = [1; BLOCK];
+        let mut tags = Vec::with_capacity(BLOCK);
         for stretch in self.order.chunks(STRETCH / 24 / BLOCK * BLOCK) {
             self.packed.clear();
             let begin = blocks.len();
@@ -169,7 +186,9 @@ impl<'a> Intake<'a> {
             for slots in stretch.chunks(BLOCK) {
                 sorted.clear();
                 sorted.extend(slots.iter().map(|&(_, i)| self.positions[i as usize]));
-                let (block, start) = Block::pack(&sorted, &ones[..sorted.len()], &mut self.packed);
+                tags.clear();
+                tags.extend(slots.iter().map(|&(_, i)| self.tag(i)));
+                let (block, start) = Block::pack(&sorted, &tags, &mut self.packed);
                 blocks.push(block);
                 starts.push(start);
             }

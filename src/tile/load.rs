@@ -3,34 +3,97 @@
 use std::sync::Arc;
 
 use super::sealed::{Reader, SealedTiles};
+use super::sieve::{FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, Run, Runs, Sieve};
+use super::spill::Pieces;
 use super::{Fate, Tile, TileKey};
-use crate::Result;
 use crate::point::Bounds;
+use crate::{Error, Result};
 
 /// Loads tiles into one arena that it reuses; one a thread.
 #[derive(Debug)]
 pub struct Loader {
     tiles: Arc<SealedTiles>,
+    sieve: Sieve,
     reader: Reader,
+    runs: Runs,
+    stored: Vec<u8>,
+    /// Positions that a tile takes.
+    capacity: usize,
     /// Positions up to which a tile gets a rim.
     rim_limit: usize,
     tile: Tile,
-    /// For each position of the core, the number of its first record.
+    core: Core,
+}
+
+/// The records of a tile's core, those that the pass does not see included: what the tile's stages
+/// decide is to be entered for all of them.
+#[derive(Debug, Default)]
+pub struct Core {
+    /// Number of the first of its positions.
+    pub first_position: u64,
+    /// Number of each position's first record: where every record is seen, and this tells all.
     first_records: Vec<u64>,
+    /// The runs of its records, where a sieve may hold some back.
+    runs: Vec<Run>,
+    /// Stored fates of its positions; none before the first pass.
+    fates: Vec<u8>,
+}
+
+impl Core {
+    /// Calls `visit` for every position with its runs, which have its index in the tile, and its
+    /// stored fate. `copies` are the tile's.
+    pub fn each(
+        &self,
+        tile: &Tile,
+        mut visit: impl FnMut(&[Run], Option<[u8; FATE_BYTES]>) -> Result<()>,
+    ) -> Result<()> {
+        let slots = tile.core.start as u32..;
+        for (slot, &number) in slots.zip(&self.first_records) {
+            let count = tile.copies[slot as usize];
+            visit(&[Run { number, count, slot, begins: true, ..Run::default() }], None)?;
+        }
+        let mut stored = self.fates.chunks_exact(FATE_BYTES);
+        let mut rest = &self.runs[..];
+        while let [_, others @ ..] = rest {
+            let count = 1 + others.iter().take_while(|run| !run.begins).count();
+            let (position, later) = rest.split_at(count);
+            let fate = stored.next().map(|fate| {
+                let mut code = [0; FATE_BYTES];
+                code.copy_from_slice(fate);
+                code
+            });
+            visit(position, fate)?;
+            rest = later;
+        }
+        Ok(())
+    }
+
+    fn clear(&mut self) {
+        self.first_position = 0;
+        self.first_records.clear();
+        self.runs.clear();
+        self.fates.clear();
+    }
 }
 
 impl Loader {
     /// Bytes that a loader holds for each position of its capacity, columns included.
     pub const BYTES_PER_POINT: usize = 24 + 4 + 12 + size_of::<Fate>() + 8;
+    /// Bytes more where a sieve may hold records back, or columns are stored.
+    pub const SIEVE_BYTES_PER_POINT: usize = size_of::<Run>() + FATE_BYTES + FIGURE_BYTES + 1;
 
-    /// A loader for tiles of up to `capacity` positions, rim included.
-    pub fn new(tiles: &Arc<SealedTiles>, capacity: usize) -> Self {
+    /// A loader for tiles of up to `capacity` positions, rim included, as `sieve` lets them be seen.
+    pub fn new(tiles: &Arc<SealedTiles>, sieve: &Sieve, capacity: usize) -> Self {
         Loader {
             tiles: tiles.clone(),
+            sieve: sieve.clone(),
             reader: Reader::default(),
+            runs: Runs::default(),
+            stored: Vec::new(),
+            capacity,
             rim_limit: capacity,
             tile: Tile::with_capacity(capacity),
-            first_records: Vec::with_capacity(capacity),
+            core: Core::default(),
         }
     }
 
@@ -46,38 +109,139 @@ impl Loader {
         let cube = key.cube();
         let zone = cube.grown(reach);
         let loaded = self.rim(&zone, neighbors)?;
-        let tile = &mut self.tile;
-        tile.clear(cube, zone);
-        self.first_records.clear();
+        self.tile.clear(cube, zone);
+        self.core.clear();
         let tiles = self.tiles.clone();
-        tiles.blocks_meeting(&loaded, |b| {
-            let block = tiles.block(b);
-            let (positions, copies) = tiles.read(b, &mut self.reader)?;
-            let mut record = block.first_record;
-            for (&p, &n) in positions.iter().zip(copies) {
-                if loaded.contains(p) {
-                    if cube.contains(p) {
-                        self.first_records.push(record);
-                    } else if self.first_records.is_empty() {
-                        tile.core.start = tile.positions.len() + 1;
-                    }
-                    tile.positions.push(p);
-                    tile.copies.push(n);
-                }
-                record += u64::from(n);
-            }
-            Ok(())
+        let is_fine = self.sieve.is_fine(&tiles);
+        tiles.blocks_meeting(&loaded, |b| match is_fine {
+            true => self.sift(b, &loaded),
+            false => self.take(b, &loaded),
         })?;
-        tile.core.end = tile.core.start + self.first_records.len();
-        tile.normals.resize(tile.positions.len(), [f32::NAN; 3]);
-        tile.fates.resize(tile.positions.len(), Fate::Kept);
-        tile.surround(&tiles, loaded);
-        Ok(tile)
+        let Tile { positions, normals, figures, fates, core, .. } = &mut self.tile;
+        if !is_fine {
+            core.end = core.start + self.core.first_records.len();
+        }
+        normals.resize(positions.len(), [f32::NAN; 3]);
+        figures.resize(if self.sieve.figures.is_some() { positions.len() } else { 0 }, f64::NAN);
+        fates.resize(positions.len(), Fate::Kept);
+        self.tile.surround(&tiles, &self.sieve, loaded);
+        Ok(&mut self.tile)
     }
 
-    /// The tile last loaded and the number of the first record of each core position.
-    pub fn tile(&mut self) -> (&mut Tile, &[u64]) {
-        (&mut self.tile, &self.first_records)
+    /// Takes all positions of block `b` that are in `loaded`.
+    fn take(&mut self, b: usize, loaded: &Bounds) -> Result<()> {
+        let block = self.tiles.block(b);
+        let (positions, copies) = self.tiles.read(b, &mut self.reader)?;
+        let (tile, first_records) = (&mut self.tile, &mut self.core.first_records);
+        let mut record = block.first_record;
+        for (j, (&p, &n)) in positions.iter().zip(copies).enumerate() {
+            if loaded.contains(p) {
+                if tile.cube.contains(p) {
+                    if first_records.is_empty() {
+                        self.core.first_position = block.first_position + j as u64;
+                    }
+                    first_records.push(record);
+                } else if first_records.is_empty() {
+                    tile.core.start = tile.positions.len() + 1;
+                }
+                tile.positions.push(p);
+                tile.copies.push(n);
+            }
+            record += u64::from(n);
+        }
+        Ok(())
+    }
+
+    /// Takes those positions of block `b` in `loaded` that the pass sees, and the records of those
+    /// in the core.
+    fn sift(&mut self, b: usize, loaded: &Bounds) -> Result<()> {
+        let first = self.tiles.block(b).first_position;
+        let (positions, copies) = self.tiles.read(b, &mut self.reader)?;
+        self.runs.read(&self.tiles, &self.sieve, b, copies)?;
+        let Sieve { seen, decided, .. } = self.sieve;
+        let (tile, core) = (&mut self.tile, &mut self.core);
+        let mut places = Vec::with_capacity(positions.len());
+        let mut in_core = 0..0;
+        for (j, &p) in positions.iter().enumerate().filter(|(_, p)| loaded.contains(**p)) {
+            let runs = self.runs.of(j);
+            let is_core = tile.cube.contains(p);
+            let is_seen = runs.iter().any(|run| run.is_in(seen));
+            let slot = if is_seen { tile.positions.len() as u32 } else { Run::UNSEEN };
+            if is_core {
+                if core.runs.is_empty() {
+                    core.first_position = first + j as u64;
+                    (tile.core.start, tile.core.end) = (tile.positions.len(), tile.positions.len());
+                }
+                if in_core.is_empty() {
+                    in_core = j as u64..j as u64;
+                }
+                in_core.end = j as u64 + 1;
+                core.runs.extend(runs.iter().map(|run| Run { slot, ..*run }));
+            }
+            if is_seen {
+                let alive = runs.iter().filter(|run| run.is_alive());
+                tile.selections.push(alive.fold(0, |of, run| of | run.tag.selections()));
+                let decided = runs.iter().filter(|run| run.is_in(decided));
+                tile.copies.push(decided.map(|run| run.count).sum());
+                tile.positions.push(p);
+                tile.core.end += usize::from(is_core);
+                places.push(j);
+            }
+        }
+        // Runs are one a position but where copies differ in what stages look at.
+        if core.runs.len() > 4 * self.capacity + (1 << 16) {
+            return Err(Error::memory(
+                "records of one position differ so much in class and flags that they do not fit",
+            )
+            .help("give more --memory"));
+        }
+        self.columns(first, &places, in_core)
+    }
+
+    /// Reads what is stored for the positions just taken, at `places` of the block whose first
+    /// position has the number `first`, and the fates of those `in_core`.
+    fn columns(
+        &mut self,
+        first: u64,
+        places: &[usize],
+        in_core: std::ops::Range<u64>,
+    ) -> Result<()> {
+        let Loader { sieve, tile, core, stored, .. } = self;
+        let begin = tile.positions.len() - places.len();
+        if let Some(fates) = sieve.fates.as_ref().filter(|_| !in_core.is_empty()) {
+            read_column(fates, (first + in_core.start, in_core.end - in_core.start), stored)?;
+            core.fates.extend_from_slice(stored);
+        }
+        let Some((&lowest, &highest)) = places.first().zip(places.last()) else { return Ok(()) };
+        let span = (first + lowest as u64, (highest - lowest + 1) as u64);
+        if let Some(normals) = &sieve.normals {
+            read_column(normals, span, stored)?;
+            tile.normals.resize(begin, [f32::NAN; 3]);
+            tile.normals.extend(places.iter().map(|j| {
+                let at = (j - lowest) * NORMAL_BYTES;
+                std::array::from_fn(|axis| {
+                    let mut bytes = [0; 4];
+                    bytes.copy_from_slice(&stored[at + 4 * axis..at + 4 * axis + 4]);
+                    f32::from_le_bytes(bytes)
+                })
+            }));
+        }
+        if let Some(figures) = &sieve.figures {
+            read_column(figures, span, stored)?;
+            tile.figures.resize(begin, f64::NAN);
+            tile.figures.extend(places.iter().map(|j| {
+                let at = (j - lowest) * FIGURE_BYTES;
+                let mut bytes = [0; FIGURE_BYTES];
+                bytes.copy_from_slice(&stored[at..at + FIGURE_BYTES]);
+                f64::from_le_bytes(bytes)
+            }));
+        }
+        Ok(())
+    }
+
+    /// The tile last loaded and the records of its core.
+    pub fn tile(&mut self) -> (&mut Tile, &Core) {
+        (&mut self.tile, &self.core)
     }
 
     /// The zone grown by a few times the distance at which its positions have their neighbours,
@@ -117,4 +281,14 @@ fn spacing(bounds: &Bounds, positions: usize) -> f64 {
     side.sort_unstable_by(f64::total_cmp);
     let n = positions as f64;
     (side[2] * side[1] / n).sqrt().max(side[2] / n)
+}
+
+/// Replaces `stored` by `count` items of `column` from number `first` on.
+fn read_column(column: &Pieces, (first, count): (u64, u64), stored: &mut Vec<u8>) -> Result<()> {
+    stored.clear();
+    let mut buffer = Vec::new();
+    column.each(first, count, &mut buffer, |_, bytes| {
+        stored.extend_from_slice(bytes);
+        Ok(())
+    })
 }

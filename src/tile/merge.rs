@@ -3,15 +3,16 @@
 //! The lattice is cut into ranges of Morton order that the threads merge independently, each by
 //! walking all runs at once; nothing is held but a block a run.
 
-use std::cmp::Ordering;
+use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
+use std::collections::binary_heap::PeekMut;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering as Atomic};
 
 use super::block::{BLOCK, Block};
 use super::intake::{Run, TileStore};
 use super::key::morton_cmp;
-use super::sealed::{SealedTiles, Sequence};
+use super::sealed::{SealedTiles, Sequence, ref_bytes};
 use super::spill::{PIECE, Pieces, Spill, lock};
 use super::{Levels, parallel};
 use crate::point::Position;
@@ -27,8 +28,8 @@ const BLOCKS_AT_ONCE: usize = 64;
 
 /// Bytes that a thread holds while it merges `runs` runs of records of `stride` bytes.
 pub fn merge_bytes(runs: usize, stride: usize) -> u64 {
-    let cursor = BLOCK * size_of::<Position>() + stride + 256;
-    let emitter = BLOCKS_AT_ONCE * BLOCK * 28 + PIECE * 8 + 2 * BLOCK * 28;
+    let cursor = BLOCK * (size_of::<Position>() + 4) + stride + 256;
+    let emitter = BLOCKS_AT_ONCE * BLOCK * 28 + PIECE * 12 + 2 * BLOCK * 28;
     (runs * cursor + emitter) as u64
 }
 
@@ -50,7 +51,8 @@ pub fn seal(
     let mut lease = store.budget.lease(blocks as u64 * each, "index of the tiles")?;
     let out = Output {
         positions: Spill::new(&store.area, "positions"),
-        refs: Pieces::new(&store.area, "order", size_of::<u64>()),
+        refs: Pieces::new(&store.area, "order", ref_bytes(store.tagged)),
+        tagged: store.tagged,
     };
     let ranges: Vec<Mutex<Option<Merged>>> =
         (0..=borders.len()).map(|_| Mutex::default()).collect();
@@ -74,7 +76,8 @@ pub fn seal(
     let ranges = ranges.into_iter().filter_map(|slot| slot.into_inner().ok().flatten());
     let sequence = join(ranges, blocks);
     lease.resize(sequence.blocks.len() as u64 * each)?;
-    Ok(SealedTiles::new(sequence, out.positions, out.refs, store.records, lease))
+    let refs = (out.refs, out.tagged);
+    Ok(SealedTiles::new(sequence, out.positions, refs, store.records, lease))
 }
 
 /// Positions at which one range ends and the next begins: every so many blocks' first positions.
@@ -91,6 +94,7 @@ fn borders(runs: &[Run]) -> Vec<Position> {
 struct Output {
     positions: Spill,
     refs: Pieces,
+    tagged: bool,
 }
 
 /// What a range came to.
@@ -111,6 +115,9 @@ fn join(ranges: impl Iterator<Item = Merged>, most_blocks: usize) -> Sequence {
         all.levels.add(last, first);
         all.levels.merge(&range.levels);
         last = Some(end);
+        if let Some(block) = range.blocks.first() {
+            all.stretches.push((all.blocks.len(), block.first_record, all.records));
+        }
         all.records += range.records;
         for mut block in range.blocks {
             block.first_position = all.positions;
@@ -143,14 +150,15 @@ fn merge_range(
         .filter_map(|(run, c)| Some(Head { position: c.head(until)?, run }))
         .collect();
     let mut emitter = Emitter::new(out, most);
-    let mut equal = Vec::new();
+    let (mut equal, mut records) = (Vec::new(), BinaryHeap::new());
     while let Some(head) = heap.pop() {
         equal.clear();
         equal.push(head.run);
         while heap.peek().is_some_and(|next| next.position == head.position) {
             equal.extend(heap.pop().map(|next| next.run));
         }
-        emit_equal(&mut cursors, &mut equal.clone(), head.position, &mut emitter, &mut buffer)?;
+        let at = head.position;
+        emit_equal(&mut cursors, &equal, at, &mut emitter, &mut records, &mut buffer)?;
         for &run in &equal {
             if let Some(position) = cursors[run].head(until) {
                 heap.push(Head { position, run });
@@ -160,32 +168,46 @@ fn merge_range(
     emitter.finish()
 }
 
-/// Emits the records of one position from the runs that have it, smallest record first.
+/// Emits the records of one position from the runs that have it, smallest record first; `records`
+/// is an empty heap to work in, with the record at the head of each run.
 fn emit_equal(
     cursors: &mut [Cursor<'_>],
-    runs: &mut Vec<usize>,
+    runs: &[usize],
     position: Position,
     emitter: &mut Emitter<'_>,
+    records: &mut BinaryHeap<Reverse<(Vec<u8>, usize)>>,
     buffer: &mut Vec<u8>,
 ) -> Result<()> {
-    while runs.len() > 1 {
-        let mut smallest = 0;
-        for i in 0..runs.len() {
-            cursors[runs[i]].load_record()?;
-            if cursors[runs[i]].record < cursors[runs[smallest]].record {
-                smallest = i;
+    let mut last = runs.first().copied();
+    if runs.len() > 1 {
+        for &run in runs {
+            let mut record = std::mem::take(&mut cursors[run].spare);
+            cursors[run].read_record(&mut record)?;
+            records.push(Reverse((record, run)));
+        }
+        while records.len() > 1
+            && let Some(mut smallest) = records.peek_mut()
+        {
+            let Reverse((record, run)) = &mut *smallest;
+            let cursor = &mut cursors[*run];
+            emitter.emit(position, cursor.number(), cursor.tag())?;
+            cursor.advance(buffer)?;
+            if cursor.head(None) == Some(position) {
+                cursor.read_record(record)?;
+            } else {
+                cursor.spare = PeekMut::pop(smallest).0.0;
             }
         }
-        let cursor = &mut cursors[runs[smallest]];
-        emitter.emit(position, cursor.number())?;
-        cursor.advance(buffer)?;
-        if cursor.head(None) != Some(position) {
-            runs.swap_remove(smallest);
-        }
+        // What the last run has left is in order, and nothing is left to compare it to.
+        last = records.pop().map(|Reverse((record, run))| {
+            cursors[run].spare = record;
+            run
+        });
     }
-    let cursor = &mut cursors[runs[0]];
+    let Some(run) = last else { return Ok(()) };
+    let cursor = &mut cursors[run];
     while cursor.head(None) == Some(position) {
-        emitter.emit(position, cursor.number())?;
+        emitter.emit(position, cursor.number(), cursor.tag())?;
         cursor.advance(buffer)?;
     }
     Ok(())
@@ -221,22 +243,16 @@ struct Cursor<'a> {
     block: usize,
     at: usize,
     positions: Vec<Position>,
-    /// The record at the head, once it was needed to order equal positions.
-    record: Vec<u8>,
-    record_of: Option<u64>,
+    /// Tags of the block's records, if they have any.
+    tags: Vec<u32>,
+    /// Memory for the record at the head, for when equal positions must be ordered.
+    spare: Vec<u8>,
 }
 
 impl<'a> Cursor<'a> {
     fn new(store: &'a TileStore, run: &'a Run) -> Self {
-        Cursor {
-            store,
-            run,
-            block: 0,
-            at: 0,
-            positions: Vec::new(),
-            record: Vec::new(),
-            record_of: None,
-        }
+        let (positions, tags, spare) = (Vec::new(), Vec::new(), Vec::new());
+        Cursor { store, run, block: 0, at: 0, positions, tags, spare }
     }
 
     /// Goes to the first record at or behind `from`; returns how many records the range until
@@ -273,10 +289,11 @@ impl<'a> Cursor<'a> {
     fn load(&mut self, buffer: &mut Vec<u8>) -> Result<()> {
         self.at = 0;
         self.positions.clear();
-        match self.run.blocks.get(self.block) {
-            Some(block) => block.read(&self.store.positions, buffer, &mut self.positions, None),
-            None => Ok(()),
-        }
+        self.tags.clear();
+        let Some(block) = self.run.blocks.get(self.block) else { return Ok(()) };
+        // Records of a run are not gathered: where distinct positions have copies, these have tags.
+        let tags = self.store.tagged.then_some(&mut self.tags);
+        block.read(&self.store.positions, buffer, &mut self.positions, tags)
     }
 
     /// The position it stands at, if that is before `until`.
@@ -291,6 +308,11 @@ impl<'a> Cursor<'a> {
         self.run.first_record + (self.block * BLOCK + self.at) as u64
     }
 
+    /// The tag of the record it stands at.
+    fn tag(&self) -> u32 {
+        self.tags.get(self.at).copied().unwrap_or_default()
+    }
+
     fn advance(&mut self, buffer: &mut Vec<u8>) -> Result<()> {
         self.at += 1;
         if self.at == self.positions.len() {
@@ -300,13 +322,12 @@ impl<'a> Cursor<'a> {
         Ok(())
     }
 
-    fn load_record(&mut self) -> Result<()> {
-        let number = self.number();
-        if self.record_of != Some(number) {
-            self.record.resize(self.store.stride, 0);
-            self.store.records.read(number, &mut self.record)?;
-            self.record_of = Some(number);
-        }
+    /// Reads the record it stands at.
+    fn read_record(&self, record: &mut Vec<u8>) -> Result<()> {
+        record.resize(self.store.stride, 0);
+        self.store.records.read(self.number(), record)?;
+        // Equal records are told apart by their tags: by the input that they come from.
+        record.extend_from_slice(&self.tag().to_be_bytes());
         Ok(())
     }
 }
@@ -339,14 +360,14 @@ impl<'a> Emitter<'a> {
             copies: Vec::with_capacity(BLOCK),
             packed: Vec::with_capacity(BLOCKS_AT_ONCE * BLOCK * 28),
             unplaced: Vec::with_capacity(BLOCKS_AT_ONCE),
-            refs: Vec::with_capacity(PIECE * 8),
+            refs: Vec::with_capacity(PIECE * ref_bytes(out.tagged)),
             first_ref: out.refs.reserve(most_records),
             refs_stored: 0,
             block_first: 0,
         }
     }
 
-    fn emit(&mut self, position: Position, record: u64) -> Result<()> {
+    fn emit(&mut self, position: Position, record: u64, tag: u32) -> Result<()> {
         match (&mut self.merged.ends, self.copies.last_mut()) {
             (Some((_, last)), Some(copies)) if *last == position => {
                 *copies = copies.checked_add(1).ok_or_else(|| {
@@ -370,7 +391,10 @@ impl<'a> Emitter<'a> {
         }
         self.merged.records += 1;
         self.refs.extend_from_slice(&record.to_le_bytes());
-        if self.refs.len() == PIECE * 8 {
+        if self.out.tagged {
+            self.refs.extend_from_slice(&tag.to_le_bytes());
+        }
+        if self.refs.len() == PIECE * ref_bytes(self.out.tagged) {
             self.store_refs()?;
         }
         Ok(())
@@ -379,7 +403,7 @@ impl<'a> Emitter<'a> {
     fn store_refs(&mut self) -> Result<()> {
         if !self.refs.is_empty() {
             self.out.refs.put(self.first_ref + self.refs_stored, &self.refs)?;
-            self.refs_stored += (self.refs.len() / 8) as u64;
+            self.refs_stored += (self.refs.len() / ref_bytes(self.out.tagged)) as u64;
             self.refs.clear();
         }
         Ok(())

@@ -9,6 +9,7 @@ mod load;
 mod merge;
 mod remote;
 mod sealed;
+mod sieve;
 mod spill;
 
 pub use around::Around;
@@ -16,10 +17,14 @@ pub use block::Block;
 pub use intake::{Intake, TileStore};
 pub use key::{TileKey, morton_cmp};
 pub use levels::Levels;
-pub use load::Loader;
+pub use load::{Core, Loader};
 pub use merge::{merge_bytes, seal};
 pub use remote::Remote;
 pub use sealed::{CutError, Fetch, Reader, SealedTiles, index_bytes};
+pub use sieve::{
+    ASIDE, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, Run, SELECTIONS, Sieve, State, TAGGED_INPUTS,
+    Tag,
+};
 pub use spill::{Address, Folder, PIECE, Pieces, Spill, SpillArea, lock};
 
 use std::ops::Range;

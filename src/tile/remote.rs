@@ -5,6 +5,7 @@ use std::collections::BinaryHeap;
 
 use super::key::morton_cmp;
 use super::sealed::{Reader, SealedTiles};
+use super::sieve::{Runs, Sieve};
 use crate::Result;
 use crate::point::{Position, distance2};
 
@@ -16,6 +17,7 @@ const CACHED: usize = 64;
 pub struct Remote {
     cache: Vec<(usize, Vec<Position>)>,
     reader: Reader,
+    runs: Runs,
     open: BinaryHeap<Reverse<(u128, usize, usize)>>,
     found: Vec<(u128, Position)>,
 }
@@ -25,6 +27,7 @@ impl Default for Remote {
         Remote {
             cache: vec![(usize::MAX, Vec::new()); CACHED],
             reader: Reader::default(),
+            runs: Runs::default(),
             open: BinaryHeap::new(),
             found: Vec::new(),
         }
@@ -37,11 +40,11 @@ impl Remote {
         ((CACHED + 2) * super::block::BLOCK * size_of::<Position>()) as u64 + (64 << 10);
 
     /// The `k` positions nearest to `p` other than itself, by exact squared distance, ties by Morton
-    /// order; fewer if the scan has fewer. `bound` is a squared distance within which `k` others are
+    /// order, of those that `sieve` lets be seen; fewer if there are fewer. `bound` is a squared distance within which `k` others are
     /// known to lie, if one is known.
     pub fn nearest(
         &mut self,
-        tiles: &SealedTiles,
+        (tiles, sieve): (&SealedTiles, &Sieve),
         p: Position,
         k: usize,
         bound: Option<u128>,
@@ -57,7 +60,7 @@ impl Remote {
                 break;
             }
             if height == 0 {
-                self.look_into(tiles, node, p, k, bound)?;
+                self.look_into((tiles, sieve), node, p, k, bound)?;
                 continue;
             }
             for child in tiles.children((height, node)) {
@@ -79,7 +82,7 @@ impl Remote {
 
     fn look_into(
         &mut self,
-        tiles: &SealedTiles,
+        (tiles, sieve): (&SealedTiles, &Sieve),
         block: usize,
         p: Position,
         k: usize,
@@ -87,10 +90,20 @@ impl Remote {
     ) -> Result<()> {
         let slot = block % CACHED;
         if self.cache[slot].0 != block {
-            let (positions, _) = tiles.read(block, &mut self.reader)?;
+            let (positions, copies) = tiles.read(block, &mut self.reader)?;
             let cached = &mut self.cache[slot];
+            cached.0 = usize::MAX;
             cached.1.clear();
             cached.1.extend_from_slice(positions);
+            if sieve.is_fine(tiles) {
+                let runs = &mut self.runs;
+                runs.read(tiles, sieve, block, copies)?;
+                let mut j = 0;
+                cached.1.retain(|_| {
+                    j += 1;
+                    runs.of(j - 1).iter().any(|run| run.is_in(sieve.seen))
+                });
+            }
             cached.0 = block;
         }
         for i in 0..self.cache[slot].1.len() {

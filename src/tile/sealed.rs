@@ -22,6 +22,9 @@ pub(super) struct Sequence {
     pub records: u64,
     pub bounds: Bounds,
     pub levels: Levels,
+    /// For each stretch of record numbers without a gap: its first block, its first number, and how
+    /// many records are before it in canonical order.
+    pub stretches: Vec<(usize, u64, u64)>,
 }
 
 /// The decoded scan, ready for tiles.
@@ -32,8 +35,15 @@ pub struct SealedTiles {
     boxes: Vec<Vec<Bounds>>,
     spill: Spill,
     refs: Pieces,
+    tagged: bool,
     records: Pieces,
     _index: Lease,
+}
+
+/// Bytes of a record's entry in the canonical order: its number in the store and, if records have
+/// them, its tag.
+pub(super) fn ref_bytes(tagged: bool) -> usize {
+    if tagged { 12 } else { 8 }
 }
 
 /// What reading blocks needs and keeps from call to call.
@@ -48,7 +58,7 @@ impl SealedTiles {
     pub(super) fn new(
         sequence: Sequence,
         spill: Spill,
-        refs: Pieces,
+        (refs, tagged): (Pieces, bool),
         records: Pieces,
         index: Lease,
     ) -> Self {
@@ -61,7 +71,7 @@ impl SealedTiles {
                 .collect();
             boxes.push(level.clone());
         }
-        SealedTiles { sequence, boxes, spill, refs, records, _index: index }
+        SealedTiles { sequence, boxes, spill, refs, tagged, records, _index: index }
     }
 
     /// Distinct positions.
@@ -92,6 +102,41 @@ impl SealedTiles {
     /// Block `index`.
     pub fn block(&self, index: usize) -> &Block {
         &self.sequence.blocks[index]
+    }
+
+    /// True if records have tags.
+    pub fn is_tagged(&self) -> bool {
+        self.tagged
+    }
+
+    /// How many records are before block `index` in canonical order. Within a block, numbers of
+    /// records follow one another; from block to block they may not.
+    pub fn rank_of_block(&self, index: usize) -> u64 {
+        let stretches = &self.sequence.stretches;
+        let stretch = stretches.partition_point(|stretch| stretch.0 <= index);
+        let number = self.block(index).first_record;
+        let of = stretch.checked_sub(1).map(|at| stretches[at]);
+        of.map_or(0, |(_, first, before)| before + (number - first))
+    }
+
+    /// Replaces `tags` by those of `count` records from number `first` on, 4 bytes each; by nothing
+    /// if records have none.
+    pub(super) fn tags(
+        &self,
+        first: u64,
+        count: usize,
+        buffer: &mut Vec<u8>,
+        tags: &mut Vec<u8>,
+    ) -> Result<()> {
+        tags.clear();
+        if !self.tagged {
+            return Ok(());
+        }
+        self.refs.each(first, count as u64, buffer, |_, refs| {
+            refs.chunks_exact(ref_bytes(true))
+                .for_each(|entry| tags.extend_from_slice(&entry[8..]));
+            Ok(())
+        })
     }
 
     /// Reads block `index`: its positions and how many records share each.
@@ -257,6 +302,12 @@ impl SealedTiles {
         }
     }
 
+    /// Number of the block that has the position with this number.
+    pub fn block_with(&self, position: u64) -> usize {
+        let blocks = &self.sequence.blocks;
+        blocks.partition_point(|block| block.first_position <= position).saturating_sub(1)
+    }
+
     /// Number of the first block that can hold positions at or behind `p` in Morton order.
     pub fn block_of(&self, p: &Position) -> usize {
         self.sequence
@@ -270,7 +321,7 @@ impl SealedTiles {
     pub fn fetch(&self, numbers: &[u64], fetch: &mut Fetch, batch: &mut PointBatch) -> Result<()> {
         fetch.sources.clear();
         for (slot, &number) in numbers.iter().enumerate() {
-            let source = fetch.ref_of(&self.refs, number)?;
+            let source = fetch.ref_of(&self.refs, self.tagged, number)?;
             fetch.sources.push((source, slot as u32));
         }
         fetch.sources.sort_unstable();
@@ -332,16 +383,17 @@ impl Fetch {
     }
 
     /// Where the record numbered `number` in canonical order is stored.
-    fn ref_of(&mut self, refs: &Pieces, number: u64) -> Result<u64> {
+    fn ref_of(&mut self, refs: &Pieces, tagged: bool, number: u64) -> Result<u64> {
         const WINDOW: u64 = 256;
+        let each = ref_bytes(tagged);
         let window = number / WINDOW;
         if self.refs_piece != Some(window) {
-            self.refs.resize(WINDOW as usize * 8, 0);
+            self.refs.resize(WINDOW as usize * each, 0);
             let stored = refs.stored_in(window * WINDOW)?.min(WINDOW as usize);
-            refs.read(window * WINDOW, &mut self.refs[..stored * 8])?;
+            refs.read(window * WINDOW, &mut self.refs[..stored * each])?;
             self.refs_piece = Some(window);
         }
-        let at = (number % WINDOW) as usize * 8;
+        let at = (number % WINDOW) as usize * each;
         let mut bytes = [0; 8];
         bytes.copy_from_slice(&self.refs[at..at + 8]);
         Ok(u64::from_le_bytes(bytes))

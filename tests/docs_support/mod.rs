@@ -1,5 +1,6 @@
 //! Reads the doc comments of items, fields and variants from Rust source, formatted by rustfmt.
 
+pub mod formats;
 pub mod keys;
 
 /// A public field: its name, its type as written, its documentation.
@@ -45,7 +46,7 @@ pub fn struct_of(text: &str, name: &str) -> (String, Vec<Field>) {
     (docs, fields)
 }
 
-/// The words of an enum whose variants are written in lower case; None if there is no such enum.
+/// The words of an enum whose variants are written in kebab case; None if there is no such enum.
 pub fn enum_of(text: &str, name: &str) -> Option<Enum> {
     let lines = body(text, "enum", name)?;
     let (mut words, mut default) = (Vec::new(), None);
@@ -56,7 +57,7 @@ pub fn enum_of(text: &str, name: &str) -> Option<Enum> {
         if variant.is_empty() || !variant.chars().all(char::is_alphanumeric) {
             continue;
         }
-        let word = variant.to_lowercase();
+        let word = kebab(variant);
         if at > 0 && lines[at - 1].trim() == "#[default]" {
             default = Some(word.clone());
         }
@@ -64,6 +65,18 @@ pub fn enum_of(text: &str, name: &str) -> Option<Enum> {
     }
     assert!(!words.is_empty(), "the enum {name} was not read");
     Some(Enum { words, default })
+}
+
+/// `TwoWords` as `two-words`.
+fn kebab(variant: &str) -> String {
+    let mut word = String::new();
+    for letter in variant.chars() {
+        if letter.is_uppercase() && !word.is_empty() {
+            word.push('-');
+        }
+        word.extend(letter.to_lowercase());
+    }
+    word
 }
 
 /// The lines between the braces of an item.
@@ -116,6 +129,6 @@ fn comments_and_fields_are_read() {
     assert_eq!(fields[0].docs, "A key\nof two lines.");
     let words = enum_of(text, "E").unwrap();
     assert_eq!(words.default.as_deref(), Some("one"));
-    assert_eq!(words.words, [("one".into(), "One.".into()), ("twowords".into(), "Two.".into())]);
+    assert_eq!(words.words, [("one".into(), "One.".into()), ("two-words".into(), "Two.".into())]);
     assert!(enum_of(text, "F").is_none());
 }

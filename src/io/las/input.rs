@@ -11,7 +11,7 @@ use super::header::Header;
 use super::laz::{Compression, LASZIP};
 use super::vlr::{Evlr, VLR_HEAD, Vlr, read_evlrs, read_vlrs};
 use super::{chunks, crs};
-use crate::point::Schema;
+use crate::point::{Schema, Units};
 use crate::{Error, Result};
 
 /// User and number of the record that names the extra bytes.
@@ -136,6 +136,11 @@ impl Input {
     /// The coordinate reference system as text.
     pub fn crs(&self) -> Result<Option<String>> {
         crs::text(&self.vlrs, &self.evlrs)
+    }
+
+    /// The units of the coordinates, as far as that says them.
+    pub fn units(&self) -> Result<Units> {
+        crs::units(&self.vlrs, &self.evlrs)
     }
 }
 

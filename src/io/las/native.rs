@@ -72,6 +72,7 @@ impl Native {
 pub fn fresh(schema: &Schema, crs: Option<&str>) -> Metadata {
     Metadata {
         crs: crs.map(str::to_owned),
+        units: crs.map(crate::io::wkt::units).unwrap_or_default(),
         comments: Vec::new(),
         native: Some(std::sync::Arc::new(Native::fresh(schema, crs))),
     }

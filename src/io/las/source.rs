@@ -32,8 +32,12 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
         dimension.origin = native.header.offset()[axis];
     }
     let warnings = inputs.iter().flat_map(|i| i.warnings.clone()).collect();
-    let metadata =
-        Metadata { crs: inputs[0].crs()?, comments: Vec::new(), native: Some(Arc::new(native)) };
+    let metadata = Metadata {
+        crs: inputs[0].crs()?,
+        units: inputs[0].units()?,
+        comments: Vec::new(),
+        native: Some(Arc::new(native)),
+    };
     let files: Vec<Opened> = inputs.into_iter().zip(shifts).map(Opened::new).collect();
     let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i)).collect();
     Ok(Box::new(LasSource { files, parts, schema: Arc::new(schema), metadata, warnings }))

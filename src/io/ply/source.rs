@@ -182,8 +182,10 @@ fn metadata(files: &[PlyFile], mut texts: Vec<Texts>) -> Metadata {
         obj_info: union(files.iter().map(|f| f.header.obj_info.clone()).collect()),
         rest: rest(files),
     };
+    let crs = texts[0].crs.take();
     Metadata {
-        crs: texts[0].crs.take(),
+        units: crs.as_deref().map(crate::io::wkt::units).unwrap_or_default(),
+        crs,
         comments: union(texts.into_iter().map(|t| t.comments).collect()),
         native: Some(Arc::new(native)),
     }

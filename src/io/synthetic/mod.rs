@@ -8,6 +8,9 @@ mod part;
 mod plane;
 mod random;
 mod record;
+mod relief;
+mod sphere;
+mod squares;
 
 use std::fmt;
 use std::ops::Range;
@@ -30,13 +33,25 @@ const MOST_NOISE: f64 = 1000.0;
 
 /// What is scanned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Scene {
     /// A tilted square plane, 400 points a square unit of its plan, in random order.
     Plane,
     /// A machined part, a box of 120 × 80 × 30 with four through holes and a dome, from all sides:
     /// sharp edges, even by area, in random order. `UserData` is the number of the face.
     Part,
+    /// A sphere of radius 50 around world 0, even by area, in random order. `UserData` is the number of
+    /// the octant: 1, 2 and 4 for negative x, y and z.
+    Sphere,
+    /// The paper's experiment: squares of 60 × 60 pixels at random places of a window of 1200 × 1600,
+    /// projected on the front of an object, a point for each. The object is ours, the paper names
+    /// none: 120 × 160 mm with two planes that meet in an edge, and a dome. `UserData` is the number of
+    /// the face.
+    SquaresRandom,
+    /// The same with the squares on a grid, 60 pixels apart and 520 a run, each run 2 pixels further
+    /// in x; after 30 runs also 2 pixels lower. `PointSourceId` is the number of the run. After
+    /// 468,000 points all places are taken and come again with other noise.
+    SquaresUniform,
     /// An airborne scan in metres: ground (class 2), trees (5) and gabled roofs (6) in overlapping
     /// strips, about 10 points a square metre, in the order of acquisition.
     Als,
@@ -44,33 +59,46 @@ pub enum Scene {
 
 impl Scene {
     /// All scenes.
-    pub const ALL: [Scene; 3] = [Scene::Plane, Scene::Part, Scene::Als];
+    pub const ALL: [Scene; 6] = [
+        Scene::Plane,
+        Scene::Part,
+        Scene::Sphere,
+        Scene::SquaresRandom,
+        Scene::SquaresUniform,
+        Scene::Als,
+    ];
 
     /// The word for it in pipelines and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Scene::Plane => "plane",
             Scene::Part => "part",
+            Scene::Sphere => "sphere",
+            Scene::SquaresRandom => "squares-random",
+            Scene::SquaresUniform => "squares-uniform",
             Scene::Als => "als",
         }
     }
 
     /// Standard deviation of the noise unless told otherwise, in world units: across the surface
-    /// (`plane`), in every direction (`part`) or in height (`als`).
+    /// (`plane`, `sphere`), in every direction (`part`), in depth (squares) or in height (`als`).
     pub fn default_noise(self) -> f64 {
         match self {
             Scene::Plane => 0.005,
-            Scene::Part => 0.02,
+            Scene::Part | Scene::Sphere => 0.02,
+            Scene::SquaresRandom | Scene::SquaresUniform => 0.1,
             Scene::Als => 0.025,
         }
     }
 
-    /// The true surface nearest to the world coordinates `p`, where it has a closed form (`plane`,
-    /// `part`).
+    /// The true surface nearest to the world coordinates `p`, where it has a closed form (all
+    /// but `als`).
     pub fn truth(self, p: [f64; 3]) -> Option<Truth> {
         match self {
             Scene::Plane => Some(plane::truth(p)),
             Scene::Part => part::truth(p),
+            Scene::Sphere => Some(sphere::truth(p)),
+            Scene::SquaresRandom | Scene::SquaresUniform => relief::truth(p),
             Scene::Als => None,
         }
     }
@@ -130,19 +158,7 @@ impl OpenSource for Synthetic {
                 format!("the noise of a synthetic scan is 0 to {MOST_NOISE}, not {noise}");
             return Err(Error::pipeline(message));
         }
-        let (surface, scale, origin) = match self.scene {
-            Scene::Plane => {
-                let plane = plane::Plane::new(self.points, self.seed, noise);
-                (Surface::Plane(plane), plane::SCALE, [0.0; 3])
-            }
-            Scene::Part => {
-                (Surface::Part(part::Part::new(self.seed, noise)), part::SCALE, [0.0; 3])
-            }
-            Scene::Als => {
-                let als = als::Als::new(self.points, self.seed, noise);
-                (Surface::Als(Box::new(als)), als::SCALE, als::ORIGIN)
-            }
-        };
+        let (surface, scale, origin) = Surface::of(self, noise);
         let schema = las::layout(record::FORMAT, &[], [scale; 3], origin);
         Ok(Box::new(Scan {
             metadata: las::fresh(&schema, None),
@@ -165,15 +181,44 @@ struct Scan {
 enum Surface {
     Plane(plane::Plane),
     Part(part::Part),
+    Sphere(sphere::Sphere),
+    Squares(squares::Squares),
     Als(Box<als::Als>),
 }
 
 impl Surface {
+    /// The scene of a scan with this noise, the scale of its coordinates and their origin.
+    fn of(scan: &Synthetic, noise: f64) -> (Surface, f64, [f64; 3]) {
+        let (points, seed) = (scan.points, scan.seed);
+        let squares = |pattern| {
+            let squares = squares::Squares::new(pattern, seed, noise);
+            (Surface::Squares(squares), squares::SCALE, [0.0; 3])
+        };
+        match scan.scene {
+            Scene::Plane => {
+                let plane = plane::Plane::new(points, seed, noise);
+                (Surface::Plane(plane), plane::SCALE, [0.0; 3])
+            }
+            Scene::Part => (Surface::Part(part::Part::new(seed, noise)), part::SCALE, [0.0; 3]),
+            Scene::Sphere => {
+                (Surface::Sphere(sphere::Sphere::new(seed, noise)), sphere::SCALE, [0.0; 3])
+            }
+            Scene::SquaresRandom => squares(squares::Pattern::Random),
+            Scene::SquaresUniform => squares(squares::Pattern::Uniform),
+            Scene::Als => {
+                let als = als::Als::new(points, seed, noise);
+                (Surface::Als(Box::new(als)), als::SCALE, als::ORIGIN)
+            }
+        }
+    }
+
     /// Makes the points from number `first` on, as many as `records` takes.
     fn fill(&self, first: u64, records: &mut [u8]) {
         match self {
             Surface::Plane(plane) => plane.fill(first, records),
             Surface::Part(part) => part.fill(first, records),
+            Surface::Sphere(sphere) => sphere.fill(first, records),
+            Surface::Squares(squares) => squares.fill(first, records),
             Surface::Als(als) => als.fill(first, records),
         }
     }

@@ -66,6 +66,9 @@ fn the_bytes_of_a_scan_are_these_on_every_machine() {
         (Scene::Plane, 0x667c_3176_e004_fa44),
         (Scene::Part, 0xf6bc_252e_92a1_a60a),
         (Scene::Als, 0xa789_88e3_67b1_06a8),
+        (Scene::Sphere, 0x4644_6370_670c_040e),
+        (Scene::SquaresRandom, 0x6ec6_0273_16ac_8130),
+        (Scene::SquaresUniform, 0xecd4_cb90_a473_5cba),
     ];
     for (scene, hash) in expected {
         // FNV-1a
@@ -136,7 +139,10 @@ fn a_scene_is_known_by_its_name() {
         assert_eq!(serde_json::from_str::<Scene>(&quoted).unwrap(), scene);
     }
     let error = "Plane".parse::<Scene>().unwrap_err();
-    assert_eq!(error.remedy(), Some("the scenes are plane, part, als"));
+    assert_eq!(
+        error.remedy(),
+        Some("the scenes are plane, part, sphere, squares-random, squares-uniform, als")
+    );
 }
 
 #[test]
@@ -199,6 +205,98 @@ fn normals_of_the_part_point_out_of_it() {
     assert_eq!(up.normal, [0.0, 0.0, 1.0]);
     let into_hole = Scene::Part.truth([45.0 + 5.9, 25.0, 15.0]).unwrap();
     assert_eq!(into_hole.normal, [-1.0, 0.0, 0.0]);
+}
+
+#[test]
+fn points_of_the_sphere_are_off_it_along_its_normals_alone() {
+    let exact = Synthetic { noise: Some(0.0), ..synthetic(Scene::Sphere, 50_000) };
+    let noisy = Synthetic { noise: Some(0.5), ..exact.clone() };
+    let mut square = 0.0;
+    for (p, q) in positions(&exact).into_iter().zip(positions(&noisy)) {
+        let [on, off] = [p, q].map(|p| Scene::Sphere.truth(p).unwrap());
+        assert!(on.distance < 1e-5, "{p:?}");
+        let apart = (0..3).map(|axis| (on.normal[axis] - off.normal[axis]).abs()).sum::<f64>();
+        assert!(apart < 1e-6, "{p:?} and {q:?} have one normal");
+        square += off.distance * off.distance;
+    }
+    let rms = (square / 50_000.0f64).sqrt();
+    assert!((rms - 0.5).abs() < 0.01, "{rms}");
+    assert_eq!(Scene::Sphere.truth([0.0; 3]).unwrap().distance, 50.0);
+}
+
+#[test]
+fn the_sphere_is_even_by_area() {
+    let scan = synthetic(Scene::Sphere, 80_000);
+    let mut octants = [0u32; 8];
+    values(&scan, names::USER_DATA).iter().for_each(|&octant| octants[octant as usize] += 1);
+    assert!(octants.iter().all(|&n| n.abs_diff(10_000) < 500), "{octants:?}");
+    // Slices of equal height have equal areas, along every axis.
+    for name in names::XYZ {
+        let mut slices = [0u32; 10];
+        for v in values(&scan, name) {
+            slices[((v / 50.0 + 1.0) * 5.0).clamp(0.0, 9.0) as usize] += 1;
+        }
+        assert!(slices.iter().all(|&n| n.abs_diff(8_000) < 450), "{name}: {slices:?}");
+    }
+}
+
+#[test]
+fn points_of_squares_are_off_the_relief_in_depth_alone() {
+    for scene in [Scene::SquaresRandom, Scene::SquaresUniform] {
+        let exact = Synthetic { noise: Some(0.0), ..synthetic(scene, 20_000) };
+        let noisy = Synthetic { noise: Some(0.3), ..exact.clone() };
+        let faces = values(&exact, names::USER_DATA);
+        let (mut square, mut seen) = (0.0, [0u32; 3]);
+        for ((p, q), face) in positions(&exact).into_iter().zip(positions(&noisy)).zip(faces) {
+            assert!(scene.truth(p).unwrap().distance < 1e-4, "{scene} {p:?}");
+            assert_eq!(p[..2], q[..2], "{scene}");
+            square += (p[2] - q[2]) * (p[2] - q[2]);
+            seen[face as usize] += 1;
+            let up = scene.truth(p).unwrap().normal[2];
+            // The normals of the plane, of the slope, and of the dome down to its foot.
+            let least = [1.0, 0.9922, 72.0 / 78.0][face as usize];
+            assert!(up > least - 1e-4, "{scene} {p:?} on face {face}: {up}");
+        }
+        let rms = (square / 20_000.0f64).sqrt();
+        assert!((rms - 0.3).abs() < 0.006, "{scene}: {rms}");
+        // A third behind the edge; the dome's foot is 2827 of 19,200 square millimetres.
+        assert!((6_200..7_200).contains(&seen[1]), "{scene}: {seen:?}");
+        assert!((2_600..3_300).contains(&seen[2]), "{scene}: {seen:?}");
+    }
+}
+
+#[test]
+fn random_squares_cover_the_window() {
+    let scan = synthetic(Scene::SquaresRandom, 5_500);
+    let [x, y] = [names::XYZ[0], names::XYZ[1]].map(|name| values(&scan, name));
+    // Centres of whole squares: 30 pixels, 3 mm, off the window's sides.
+    assert!(x.iter().all(|v| (3.0..=117.0).contains(v)) && range(&x) > 113.5);
+    assert!(y.iter().all(|v| (3.0..=157.0).contains(v)) && range(&y) > 153.5);
+    let mut fields = [0u32; 100];
+    for (x, y) in x.iter().zip(&y) {
+        let [column, row] =
+            [(x - 3.0) / 11.4, (y - 3.0) / 15.4].map(|v| v.clamp(0.0, 9.0) as usize);
+        fields[10 * row + column] += 1;
+    }
+    assert!(fields.iter().all(|&n| (25..90).contains(&n)), "{fields:?}");
+}
+
+#[test]
+fn uniform_squares_are_60_pixels_apart_in_runs_2_pixels_apart() {
+    let scan = synthetic(Scene::SquaresUniform, 2_100);
+    let [x, y] = [names::XYZ[0], names::XYZ[1]].map(|name| values(&scan, name));
+    let pixels = |v: f64| (v * 10.0).round() as i64;
+    for i in 0..2_100 {
+        let (run, square) = (i / 520, i % 520);
+        let column = (pixels(x[i]) - 30 - 2 * (run as i64 + 1)).rem_euclid(1200);
+        assert_eq!(column, 60 * (square as i64 % 20), "point {i}");
+        assert_eq!(1570 - pixels(y[i]), 60 * (square as i64 / 20), "point {i}");
+    }
+    let runs = values(&scan, names::POINT_SOURCE_ID);
+    for run in 1..=5 {
+        let of_run = runs.iter().filter(|&&r| r == f64::from(run)).count();
+        assert_eq!(of_run, if run < 5 { 520 } else { 20 });
+    }
 }
 
 #[test]

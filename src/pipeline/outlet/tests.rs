@@ -93,7 +93,7 @@ fn run(threads: usize, tiles: &[u8], each: usize, trouble: Trouble) -> Outcome {
     let (listed, held) = (Arc::new(Mutex::new(Vec::new())), Arc::new(AtomicUsize::new(0)));
     let most_held = AtomicUsize::new(0);
     let sink = Listing { trouble: trouble.clone(), listed: listed.clone(), held: held.clone() };
-    let outlet: Outlet<u8, u8> = Outlet::new(Box::new(sink), threads);
+    let outlet: Outlet<u8, u8> = Outlet::new(vec![Box::new(sink)], threads);
     let commit = |product: u8| {
         trouble.meet(1, |w| if let Wrong::Commit(n) = w { Some(n) } else { None })?;
         Ok(vec![product; each])
@@ -101,7 +101,7 @@ fn run(threads: usize, tiles: &[u8], each: usize, trouble: Trouble) -> Outcome {
     let encode = |chunk: u8| {
         most_held.fetch_max(held.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
         trouble.meet(2, |w| if let Wrong::Encode(n) = w { Some(n) } else { None })?;
-        Ok(Encoded { bytes: vec![chunk], points: 1, ..Encoded::default() })
+        Ok((0, Encoded { bytes: vec![chunk], points: 1, ..Encoded::default() }))
     };
     let next = AtomicUsize::new(0);
     let result = parallel(threads, |_| {
@@ -125,6 +125,7 @@ fn run(threads: usize, tiles: &[u8], each: usize, trouble: Trouble) -> Outcome {
     let mut hands = Hands { commit: &commit, encode: &mut encode };
     let result = result.and_then(|()| outlet.close(vec![255], &mut hands));
     let listed = lock(&listed).clone();
+    let result = result.map(|mut all| all.pop().unwrap_or_default());
     Outcome { result, listed, most_held: most_held.into_inner() }
 }
 
@@ -225,13 +226,13 @@ fn chunks_do_not_pile_up_behind_a_slow_disk() {
     let held = Arc::new(AtomicUsize::new(0));
     let listed = Arc::default();
     let sink = Slow(Listing { trouble, listed, held: held.clone() });
-    let outlet: Outlet<u8, u8> = Outlet::new(Box::new(sink), 3);
+    let outlet: Outlet<u8, u8> = Outlet::new(vec![Box::new(sink)], 3);
     let most = AtomicUsize::new(0);
     let next = AtomicUsize::new(0);
     parallel(3, |_| {
         let mut encode = |chunk: u8| {
             most.fetch_max(held.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
-            Ok(Encoded { bytes: vec![chunk], points: 1, ..Encoded::default() })
+            Ok((0, Encoded { bytes: vec![chunk], points: 1, ..Encoded::default() }))
         };
         let mut hands = Hands { commit: &|product| Ok(vec![product]), encode: &mut encode };
         loop {

@@ -1,0 +1,69 @@
+//! A look at a sample of the scan before a pass: small cubes, spread evenly over its positions.
+
+use super::grind::{Field, Worker};
+use super::passes::Pass;
+use super::run::Job;
+use crate::Result;
+use crate::stage::Forecast;
+use crate::tile::{Reader, SealedTiles, Sieve, TileKey};
+
+/// Cubes that are looked at.
+const SAMPLES: u64 = 256;
+/// Positions that a cube has on average, at most, however large the cells.
+const MOST_POSITIONS: u64 = 2048;
+/// Positions that are loaded around a cube, about.
+const RIM: usize = 4096;
+
+/// What the stages of `pass` expect, each with its number, from samples that are a function of the
+/// points alone.
+pub(super) fn forecast(
+    job: &mut Job<'_>,
+    pass: &Pass,
+    field: &Field<'_>,
+    sieve: &Sieve,
+    capacity: usize,
+) -> Result<Vec<(usize, Forecast)>> {
+    let mut forecasts = Vec::new();
+    let wants = |op: usize| job.ops[op].op.tile().wants_sample();
+    let ops: Vec<usize> = pass.calls.iter().map(|call| call.op).filter(|&op| wants(op)).collect();
+    for op in ops {
+        let side = job.ops[op].op.tile().needs().cell_side.max(1);
+        let keys = cubes(&field.tiles, side)?;
+        let capacity = capacity.min(8 * RIM);
+        let mut worker = Worker::new(job, pass, field, sieve, capacity, false);
+        worker.limit_rim(RIM);
+        let mut samples = Vec::with_capacity(keys.len());
+        let mut reader = Reader::default();
+        for key in keys {
+            job.advance(0)?;
+            if field.tiles.holds_more(&key.cube(), (capacity / 2) as u64, &mut reader)? {
+                continue;
+            }
+            let (tile, _) = worker.run(key, Some(op))?;
+            tile.limits = job.ops[op].selection;
+            samples.push(job.ops[op].op.tile().sample(tile)?);
+        }
+        drop(worker);
+        forecasts.push((op, job.ops[op].op.tile_mut().forecast(&samples)));
+    }
+    Ok(forecasts)
+}
+
+/// The octree nodes, of the smallest side of `side` steps or more, that hold positions spread evenly
+/// over Morton order.
+fn cubes(tiles: &SealedTiles, side: i64) -> Result<Vec<TileKey>> {
+    let level = (side as u64).next_power_of_two().ilog2();
+    let level = level.min(tiles.levels().smallest_side(MOST_POSITIONS));
+    let mut reader = Reader::default();
+    let mut keys: Vec<TileKey> = Vec::new();
+    let samples = SAMPLES.min(tiles.positions());
+    for n in 0..samples {
+        let rank = (u128::from(tiles.positions()) * (2 * u128::from(n) + 1)
+            / (2 * u128::from(samples))) as u64;
+        let block = tiles.block_with(rank);
+        let (positions, _) = tiles.read(block, &mut reader)?;
+        let within = (rank - tiles.block(block).first_position) as usize;
+        keys.extend(positions.get(within).map(|&p| TileKey::around(p, level)));
+    }
+    Ok(keys)
+}

@@ -1,0 +1,265 @@
+//! One pass: tile after tile through the stages, and what they leave into stored columns and sinks.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+
+use super::chunks::{Chunk, Counts, Cutter, Open, Stored};
+use super::cut::{neighbors, reach};
+use super::outlet::{Hands, Outlet};
+use super::passes::{Op, Pass};
+use super::product::Product;
+use super::rounded::Rounded;
+use super::run::{Job, StopOnDrop};
+use crate::geom::lattice::Lattice;
+use crate::point::{Edit, PointBatch};
+use crate::report::Tally;
+use crate::stage::{Encode, Encoded, Sink, SinkSummary};
+use crate::tile::{
+    Fetch, Loader, Run, SealedTiles, Sieve, SpillArea, State, Tile, TileKey, lock, parallel,
+};
+use crate::{Error, Result};
+
+/// What all passes go over.
+pub(super) struct Field<'a> {
+    pub lattice: &'a Lattice,
+    pub area: Arc<SpillArea>,
+    pub tiles: Arc<SealedTiles>,
+}
+
+/// What a pass came to.
+pub(super) struct Milled {
+    pub tally: Tally,
+    pub stored: Stored,
+    pub counts: Counts,
+    /// For each sink of the pass, what it said.
+    pub written: Vec<SinkSummary>,
+    /// Records that the pass's stages decide about.
+    pub decided: u64,
+}
+
+/// Runs `pass` over the tiles `keys`, into the `sinks` with their numbers.
+pub(super) fn grind(
+    job: &Job<'_>,
+    pass: &Pass,
+    field: &Field<'_>,
+    sieve: &Sieve,
+    capacity: usize,
+    keys: &[TileKey],
+    sinks: Vec<(usize, Box<dyn Sink>)>,
+) -> Result<Milled> {
+    let tiles = &field.tiles;
+    let wants_normals = sinks.iter().any(|(sink, _)| job.wants_normals[*sink]);
+    let outputs = sinks.iter().enumerate().map(|(n, (sink, open))| {
+        let before = pass.before.contains(sink);
+        Open::new(n, open.chunk_points(), job.wants_normals[*sink], before)
+    });
+    let cutter = Cutter::new(
+        &field.area,
+        (tiles.positions(), tiles.points()),
+        (pass.stores_normals, pass.stores_figures),
+        outputs.collect(),
+    );
+    let cutter = Mutex::new(Some(cutter));
+    let commit = |product: Product| match &mut *lock(&cutter) {
+        Some(cutter) => cutter.cut(&product),
+        None => Err(Error::internal("a tile came behind the last")),
+    };
+    let benches = Benches::new(job, tiles, &sinks);
+    let outlet: Outlet<Product, Chunk> =
+        Outlet::new(sinks.into_iter().map(|(_, sink)| sink).collect(), job.threads);
+    let total = Mutex::new((Tally::default(), 0));
+    let next = AtomicUsize::new(0);
+    parallel(job.threads, |_| {
+        let guard = StopOnDrop::new(|| outlet.stop());
+        let mut bench = benches.bench();
+        let mut encode = |chunk| bench.encode(&benches, &chunk);
+        let mut hands = Hands { commit: &commit, encode: &mut encode };
+        let mut worker = Worker::new(job, pass, field, sieve, capacity, wants_normals);
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(&key) = keys.get(index) else { break };
+            let product = worker.mill(key)?;
+            let positions = product.positions();
+            outlet.deliver((index as u64, 0), product, true, &mut hands)?;
+            job.advance(positions)?;
+        }
+        outlet.drain(&mut hands, |turn| turn.0 >= keys.len() as u64)?;
+        let mut total = lock(&total);
+        total.0.merge(&worker.tally);
+        total.0.merge(&bench.tally);
+        total.1 += worker.decided;
+        guard.disarm();
+        Ok(())
+    })?;
+    let unfinished = || Error::internal("a pass was finished twice");
+    let (rest, stored, counts) = lock(&cutter).take().ok_or_else(unfinished)?.finish()?;
+    let mut bench = benches.bench();
+    let mut encode = |chunk| bench.encode(&benches, &chunk);
+    let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
+    let (mut tally, decided) = std::mem::take(&mut *lock(&total));
+    tally.merge(&bench.tally);
+    Ok(Milled { tally, stored, counts, written, decided })
+}
+
+/// What threads need to encode chunks.
+struct Benches<'a> {
+    job: &'a Job<'a>,
+    tiles: &'a SealedTiles,
+    encoders: Vec<Arc<dyn Encode>>,
+    /// The sink by whose records classes are counted as kept: the last of the pipeline.
+    counted: Option<usize>,
+    chunk_points: usize,
+}
+
+impl<'a> Benches<'a> {
+    fn new(job: &'a Job<'a>, tiles: &'a SealedTiles, sinks: &[(usize, Box<dyn Sink>)]) -> Self {
+        let last = job.wants_normals.len().checked_sub(1);
+        Benches {
+            job,
+            tiles,
+            encoders: sinks.iter().map(|(_, sink)| sink.encoder()).collect(),
+            counted: sinks.iter().position(|(sink, _)| Some(*sink) == last),
+            chunk_points: sinks.iter().map(|(_, sink)| sink.chunk_points()).max().unwrap_or(0),
+        }
+    }
+
+    fn bench(&self) -> Bench {
+        Bench {
+            numbers: Vec::with_capacity(self.chunk_points),
+            states: Vec::with_capacity(self.chunk_points),
+            fetch: Fetch::default(),
+            batch: PointBatch::new(self.job.source.schema().clone(), self.chunk_points),
+            tally: Tally::default(),
+        }
+    }
+}
+
+/// What a thread holds to encode chunks.
+struct Bench {
+    numbers: Vec<u64>,
+    states: Vec<State>,
+    fetch: Fetch,
+    batch: PointBatch,
+    tally: Tally,
+}
+
+impl Bench {
+    fn encode(&mut self, all: &Benches<'_>, chunk: &Chunk) -> Result<(usize, Encoded)> {
+        self.batch.clear();
+        chunk.number(&mut self.numbers);
+        self.states.clear();
+        self.states.extend(chunk.states());
+        all.tiles.fetch(&self.numbers, &mut self.fetch, &mut self.batch)?;
+        if all.counted == Some(chunk.sink) {
+            all.job.classes.keep_alive(&self.batch, &self.states, &mut self.tally);
+        }
+        edit(&mut self.batch, &self.states)?;
+        self.batch.normals = chunk.spread_normals();
+        let encoder = all.encoders.get(chunk.sink);
+        let encoder = encoder.ok_or_else(|| Error::internal("a chunk is for no sink"))?;
+        Ok((chunk.sink, encoder.encode(&self.batch)?))
+    }
+}
+
+/// Writes the edits of `states` into the records.
+fn edit(batch: &mut PointBatch, states: &[State]) -> Result<()> {
+    let schema = batch.schema().clone();
+    let edits = states.iter().map(|state| Edit::of(state.edit()));
+    for (record, edit) in batch.records_mut().chunks_exact_mut(schema.stride).zip(edits) {
+        let Some(edit) = edit else { continue };
+        let field = schema.find(edit.dimension());
+        if !field.is_some_and(|field| edit.write(field, &schema, record)) {
+            let name = edit.dimension();
+            return Err(Error::pipeline(format!("the records cannot hold the mark in {name}")));
+        }
+    }
+    Ok(())
+}
+
+/// What a thread needs to mill tiles.
+pub(super) struct Worker<'a> {
+    job: &'a Job<'a>,
+    pass: &'a Pass,
+    loader: Loader,
+    reach: i64,
+    neighbors: usize,
+    wants_normals: bool,
+    /// Where positions are rounded, and unequal coordinates that share one are counted.
+    rounded: Option<Rounded<'a>>,
+    pub tally: Tally,
+    decided: u64,
+}
+
+impl<'a> Worker<'a> {
+    pub fn new(
+        job: &'a Job<'a>,
+        pass: &'a Pass,
+        field: &'a Field<'_>,
+        sieve: &Sieve,
+        capacity: usize,
+        wants_normals: bool,
+    ) -> Self {
+        let neighbors = neighbors(&job.ops, pass);
+        let mut loader = Loader::new(&field.tiles, sieve, capacity);
+        if let Some(points) = job.tile_points {
+            // Half for the zone, half for the rim, as where memory decides.
+            loader.limit_rim(points.saturating_mul(2));
+        }
+        if neighbors > 0 {
+            loader.tile().0.around.reserve(capacity);
+        }
+        // Once, in the first pass.
+        let rounds = field.lattice.rounds() && sieve.states.is_none();
+        let rounded = rounds.then(|| Rounded::new(&field.tiles, job.source.schema()));
+        let reach = reach(&job.ops, pass);
+        let tally = Tally::default();
+        Worker { job, pass, loader, reach, neighbors, wants_normals, rounded, tally, decided: 0 }
+    }
+
+    /// Gives no tile a rim that makes it more than `positions`, for a look at a small cube.
+    pub fn limit_rim(&mut self, positions: usize) {
+        self.loader.limit_rim(positions);
+    }
+
+    /// Loads a tile and runs the stages of the pass on it, those before stage `until` if one is
+    /// given.
+    pub fn run(
+        &mut self,
+        key: TileKey,
+        until: Option<usize>,
+    ) -> Result<(&mut Tile, Vec<[u64; 2]>)> {
+        self.loader.load(key, if until.is_some() { 0 } else { self.reach }, self.neighbors)?;
+        let (tile, _) = self.loader.tile();
+        let mut found = Vec::new();
+        for call in self.pass.calls.iter().take_while(|call| Some(call.op) != until) {
+            let stage = &self.job.ops[call.op];
+            tile.limits = stage.selection;
+            match (&stage.op, call.gathers) {
+                (Op::Scan(op), true) => op.gather(tile, &mut found, &mut self.tally)?,
+                (op, _) => op.tile().run(tile, &mut self.tally)?,
+            }
+        }
+        Ok((tile, found))
+    }
+
+    fn mill(&mut self, key: TileKey) -> Result<Product> {
+        let (_, found) = self.run(key, None)?;
+        let (tile, core) = self.loader.tile();
+        if let Some(rounded) = &mut self.rounded {
+            let mut positions = Vec::new();
+            core.each(tile, |runs, _| {
+                let count = runs.iter().map(|run| run.count).sum::<u32>();
+                positions.extend(runs.first().map(|run: &Run| (run.number, count)));
+                Ok(())
+            })?;
+            self.tally.count("unequal_coordinates", rounded.count(positions.into_iter())?);
+        }
+        self.decided += tile.copies[tile.core.clone()].iter().map(|&n| u64::from(n)).sum::<u64>();
+        self.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
+        self.tally.work("unproven", tile.around.take_unproven());
+        self.tally.work("tied", tile.around.take_tied());
+        let mut product = Product::of(tile, core, self.pass, self.wants_normals)?;
+        product.found = found;
+        Ok(product)
+    }
+}

@@ -1,0 +1,314 @@
+//! The tile stages of a pipeline as passes over the scan: a pass ends where points are removed, or
+//! where a stage must have seen all tiles before it decides.
+
+use super::limits::{Limits, Sees};
+use crate::point::{Mark, Schema};
+use crate::stage::{Needs, ScanOp, TileOp};
+use crate::tile::{SELECTIONS, Sieve};
+use crate::{Error, Result};
+
+/// A tile stage and where it stands.
+pub(super) struct StageOp {
+    pub kind: String,
+    /// Line of its `kind` in the pipeline file.
+    pub line: usize,
+    pub op: Op,
+    pub limits: Limits,
+    /// The bit of the records that it is limited to; 0 for all.
+    pub selection: u8,
+}
+
+/// The role of a tile stage.
+pub(super) enum Op {
+    Tile(Box<dyn TileOp>),
+    Scan(Box<dyn ScanOp>),
+}
+
+impl Op {
+    pub fn tile(&self) -> &dyn TileOp {
+        match self {
+            Op::Tile(op) => &**op,
+            Op::Scan(op) => &**op,
+        }
+    }
+
+    pub fn tile_mut(&mut self) -> &mut dyn TileOp {
+        match self {
+            Op::Tile(op) => &mut **op,
+            Op::Scan(op) => &mut **op,
+        }
+    }
+}
+
+/// One of a pass's stages, in one of its phases.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Call {
+    /// Which of the tile stages.
+    pub op: usize,
+    /// True for the first phase of a scan stage.
+    pub gathers: bool,
+}
+
+/// Stages that run on each tile in turn.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Pass {
+    pub calls: Vec<Call>,
+    /// How often the stages were applied before, where they are repeated.
+    pub round: usize,
+    /// Selections of the records that are seen as neighbours, and of those that are decided about.
+    pub seen: u8,
+    pub decided: u8,
+    pub removes: bool,
+    pub mark: Option<Mark>,
+    /// Columns that an earlier pass stored and this one reads.
+    pub loads_normals: bool,
+    pub loads_figures: bool,
+    /// Columns that this pass stores.
+    pub stores_normals: bool,
+    pub stores_figures: bool,
+    /// Sinks of what is there before the pass removes anything, and of what it leaves.
+    pub before: Vec<usize>,
+    pub after: Vec<usize>,
+    writes_normals: bool,
+    writes_cells: bool,
+    looks: bool,
+}
+
+/// Where a sink takes its points.
+pub(super) struct Tap {
+    /// Tile stages above it.
+    pub ops: usize,
+    /// True if it writes normals.
+    pub wants_normals: bool,
+}
+
+/// What a call needs.
+pub(super) fn needs(ops: &[StageOp], call: Call) -> Needs {
+    match (&ops[call.op].op, call.gathers) {
+        (Op::Scan(op), true) => op.gather_needs(),
+        (op, _) => op.tile().needs(),
+    }
+}
+
+impl Pass {
+    /// What the pass's calls need, in order.
+    pub fn needs<'a>(&'a self, ops: &'a [StageOp]) -> impl Iterator<Item = Needs> + 'a {
+        self.calls.iter().map(|&call| needs(ops, call))
+    }
+
+    /// The stage of this pass that gathers.
+    pub fn gathers(&self) -> Option<usize> {
+        self.calls.iter().find(|call| call.gathers).map(|call| call.op)
+    }
+
+    /// What the pass sees, with what earlier passes stored.
+    pub fn sieve(&self, stored: &Sieve) -> Sieve {
+        let Pass { seen, decided, .. } = *self;
+        let mut sieve = Sieve { seen, decided, ..stored.clone() };
+        if !self.loads_normals {
+            sieve.normals = None;
+        }
+        if !self.loads_figures {
+            sieve.figures = None;
+        }
+        sieve
+    }
+}
+
+/// Gives stages that are limited to some records a bit each, equal limits the same.
+pub(super) fn number_selections(ops: &mut [StageOp]) -> Result<Vec<crate::point::Selection>> {
+    let mut selections = Vec::new();
+    for op in ops.iter_mut().filter(|op| !op.limits.selection.is_all()) {
+        let same = selections.iter().position(|known| *known == op.limits.selection);
+        let number = same.unwrap_or_else(|| {
+            selections.push(op.limits.selection.clone());
+            selections.len() - 1
+        });
+        if number >= SELECTIONS as usize {
+            let told = format!("stages are limited in more than {SELECTIONS} different ways");
+            return Err(blame(op, told).help("let some of them have equal classes and flags"));
+        }
+        op.selection = 1 << number;
+    }
+    Ok(selections)
+}
+
+/// Lays the stages out as passes; `taps` are the sinks.
+///
+/// Fails if a stage reads what nothing before it gives, or what a pass cannot carry.
+pub(super) fn unroll(ops: &[StageOp], schema: &Schema, taps: &[Tap]) -> Result<Vec<Pass>> {
+    let mut layout =
+        Layout { ops, schema, passes: vec![Pass::default()], normals_from: None, open: true };
+    let mut waiting: Vec<(usize, &Tap)> = taps.iter().enumerate().collect();
+    layout.tap(&mut waiting, 0, false)?;
+    for (op, stage) in ops.iter().enumerate() {
+        let rounds = stage.op.tile().needs().passes.max(1);
+        layout.add(op, 1)?;
+        if rounds > 1 {
+            let first = layout.repeated(op)?;
+            for round in 2..=rounds {
+                (first..=op).try_for_each(|op| layout.add(op, round))?;
+            }
+        }
+        layout.tap(&mut waiting, op + 1, stage.op.tile().needs().removes)?;
+    }
+    Ok(layout.passes)
+}
+
+struct Layout<'a> {
+    ops: &'a [StageOp],
+    schema: &'a Schema,
+    passes: Vec<Pass>,
+    /// The pass whose normals are the newest.
+    normals_from: Option<usize>,
+    /// False once the last pass removes or gathers.
+    open: bool,
+}
+
+impl Layout<'_> {
+    fn last(&mut self) -> &mut Pass {
+        let end = self.passes.len() - 1;
+        &mut self.passes[end]
+    }
+
+    /// The first of the stages that are repeated with `op`: the last above that computes normals.
+    fn repeated(&self, op: usize) -> Result<usize> {
+        let writes = |at: &usize| {
+            self.ops[*at].op.tile().needs().writes.iter().any(|column| column == "Normal")
+        };
+        let first = (0..op).rev().find(writes).ok_or_else(|| {
+            blame(&self.ops[op], "`passes` repeats the stages from `normals` on, and there is none")
+        })?;
+        let twice = (first..=op).find(|&at| matches!(self.ops[at].op, Op::Scan(_)));
+        match twice {
+            None => Ok(first),
+            Some(at) => {
+                let kind = &self.ops[at].kind;
+                let told = format!("`{kind}` looks at the whole scan and cannot be repeated");
+                Err(blame(&self.ops[op], told)
+                    .help("leave `passes` out, or run the pipeline twice"))
+            }
+        }
+    }
+
+    fn add(&mut self, op: usize, round: usize) -> Result<()> {
+        if let Op::Scan(_) = &self.ops[op].op {
+            self.call(Call { op, gathers: true }, round)?;
+            self.open = false;
+        }
+        self.call(Call { op, gathers: false }, round)
+    }
+
+    fn call(&mut self, call: Call, round: usize) -> Result<()> {
+        let stage = &self.ops[call.op];
+        let needs = needs(self.ops, call);
+        let reads = |column: &str| needs.reads.iter().any(|name| name == column);
+        let Limits { sees, .. } = stage.limits;
+        let seen = if sees == Sees::Selected { stage.selection } else { 0 };
+        let on_columns = reads("Normal") || reads("Cell");
+        let last = self.last();
+        let other_neighbors = needs.neighbors > 0 && last.looks && last.seen != seen;
+        let other_records = !on_columns && last.decided != stage.selection;
+        let begun = !last.calls.is_empty();
+        if begun && (!self.open || other_neighbors || other_records) {
+            self.passes.push(Pass { round, ..Pass::default() });
+            self.open = true;
+        }
+        let at = self.passes.len() - 1;
+        for name in &needs.reads {
+            self.provide(at, name, stage)?;
+        }
+        let from = self.normals_from;
+        let pass = &mut self.passes[at];
+        pass.round = round;
+        pass.calls.push(call);
+        pass.decided |= stage.selection;
+        if needs.neighbors > 0 {
+            (pass.seen, pass.looks) = (seen, true);
+        }
+        let writes = |column: &str| needs.writes.iter().any(|name| name == column);
+        if writes("Normal") {
+            (pass.writes_normals, pass.loads_normals) = (true, false);
+        }
+        pass.writes_cells |= writes("Cell");
+        pass.stores_figures |= writes("Figure");
+        if needs.removes {
+            (pass.removes, pass.mark) = (true, needs.mark);
+            self.open = false;
+        }
+        self.normals_from = if writes("Normal") { Some(at) } else { from };
+        Ok(())
+    }
+
+    /// Sees to it that `name` is there for a stage of pass `at`.
+    fn provide(&mut self, at: usize, name: &str, stage: &StageOp) -> Result<()> {
+        let kind = &stage.kind;
+        let missing = |help: &str| {
+            let told = format!("`{kind}` needs {name}, which nothing before it gives");
+            Err(blame(stage, told).help(help.to_owned()))
+        };
+        match name {
+            "Normal" => {
+                if !self.bring_normals(at) {
+                    return missing("put a `normals` stage before it");
+                }
+            }
+            "Cell" if self.passes[at].writes_cells => {}
+            "Cell" if self.passes.iter().any(|pass| pass.writes_cells) => {
+                return missing(
+                    "cells last until points are removed: put a `cells` stage right before it",
+                );
+            }
+            "Cell" => return missing("put a `cells` stage before it"),
+            "Figure" => match at.checked_sub(1) {
+                Some(before) if self.passes[before].stores_figures => {
+                    self.passes[at].loads_figures = true;
+                }
+                _ => return missing("only the second phase of a stage reads it"),
+            },
+            _ if self.schema.find(name).is_none() => {
+                return missing("the input has no such dimension");
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Brings the newest normals to pass `at`; false if there are none.
+    fn bring_normals(&mut self, at: usize) -> bool {
+        let Some(from) = self.normals_from else { return false };
+        if from != at {
+            self.passes[from].stores_normals = true;
+            self.passes[at].loads_normals = true;
+        }
+        true
+    }
+
+    /// Attaches the sinks that take what the first `ops` stages leave to the last pass.
+    fn tap(&mut self, waiting: &mut Vec<(usize, &Tap)>, ops: usize, removes: bool) -> Result<()> {
+        let at = self.passes.len() - 1;
+        let mut outcome = Ok(());
+        waiting.retain(|&(sink, tap)| {
+            if tap.ops != ops {
+                return true;
+            }
+            if tap.wants_normals && !self.bring_normals(at) {
+                outcome = Err(Error::pipeline("the output wants normals, which no stage computes")
+                    .help("put a `normals` stage before it, or leave `dimensions` out"));
+            }
+            let pass = &mut self.passes[at];
+            if removes {
+                pass.after.push(sink)
+            } else {
+                pass.before.push(sink)
+            }
+            false
+        });
+        outcome
+    }
+}
+
+/// An error about a stage, which names its line.
+pub(super) fn blame(stage: &StageOp, told: impl std::fmt::Display) -> Error {
+    Error::pipeline(format!("line {}: {told}", stage.line))
+}

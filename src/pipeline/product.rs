@@ -1,0 +1,132 @@
+//! What a tile leaves behind: what becomes of each record of its core, and the columns that later
+//! passes read.
+
+use super::passes::Pass;
+use super::survey::fate_code;
+use crate::Result;
+use crate::point::Mark;
+use crate::tile::{
+    ASIDE, Core, FATE_BYTES, FIGURE_BYTES, Fate, NORMAL_BYTES, Run, State, Tag, Tile,
+};
+
+/// Records of one position that follow one another and share what becomes of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Entry {
+    /// Number of the first.
+    pub number: u64,
+    /// How many.
+    pub count: u32,
+    /// What accompanies them.
+    pub tag: Tag,
+    /// Their state before the pass and behind it.
+    pub was: State,
+    pub now: State,
+}
+
+/// What a tile leaves behind.
+#[derive(Debug, Default)]
+pub(super) struct Product {
+    /// All records of the core, in canonical order.
+    pub entries: Vec<Entry>,
+    /// Normals of the entries, if a sink wants them.
+    pub entry_normals: Option<Vec<[f32; 3]>>,
+    /// Columns of the core's positions, as stored; the last two are empty if nobody reads them.
+    pub fates: Vec<u8>,
+    pub normals: Vec<u8>,
+    pub figures: Vec<u8>,
+    /// What a first phase found.
+    pub found: Vec<[u64; 2]>,
+}
+
+impl Product {
+    /// Bytes of a product for each position of the core, what a first phase finds aside.
+    pub const BYTES_PER_POINT: usize =
+        size_of::<Entry>() + FATE_BYTES + NORMAL_BYTES + size_of::<[f32; 3]>() + FIGURE_BYTES;
+
+    /// What `tile` leaves behind, whose core has the records `core`.
+    pub fn of(tile: &Tile, core: &Core, pass: &Pass, wants_normals: bool) -> Result<Self> {
+        let records = tile.core.len();
+        let mut product = Product {
+            entries: Vec::with_capacity(records),
+            entry_normals: wants_normals.then(|| Vec::with_capacity(records)),
+            fates: Vec::with_capacity(records * FATE_BYTES),
+            ..Product::default()
+        };
+        core.each(tile, |runs, stored| {
+            let slot = runs.first().map_or(Run::UNSEEN, |run| run.slot);
+            let fate = match slot {
+                Run::UNSEEN => Fate::Kept,
+                slot => tile.fates[slot as usize],
+            };
+            match (fate, stored) {
+                (Fate::Kept, Some(code)) => product.fates.extend_from_slice(&code),
+                (fate, _) => product.fates.extend_from_slice(&fate_code(fate)),
+            }
+            let at = (slot != Run::UNSEEN).then_some(slot as usize);
+            let normal = at.map_or([f32::NAN; 3], |i| tile.normals[i]);
+            if pass.stores_normals {
+                normal.iter().for_each(|v| product.normals.extend_from_slice(&v.to_le_bytes()));
+            }
+            if pass.stores_figures {
+                let figure = at.and_then(|i| tile.figures.get(i)).copied().unwrap_or(f64::NAN);
+                product.figures.extend_from_slice(&figure.to_le_bytes());
+            }
+            product.enter(runs, fate, pass);
+            if let Some(normals) = &mut product.entry_normals {
+                normals.resize(product.entries.len(), normal);
+            }
+            Ok(())
+        })?;
+        Ok(product)
+    }
+
+    /// Positions of the tile's core.
+    pub fn positions(&self) -> u64 {
+        (self.fates.len() / FATE_BYTES) as u64
+    }
+
+    /// Enters the records of one position.
+    fn enter(&mut self, runs: &[Run], fate: Fate, pass: &Pass) {
+        // How many of the records that the pass decides about are still to be kept.
+        let mut keep = match fate {
+            Fate::Kept => u32::MAX,
+            Fate::KeptOnce => 1,
+            Fate::Removed | Fate::Represented { .. } => 0,
+        };
+        for run in runs {
+            let was = match run.tag.selections() & ASIDE {
+                0 => run.state,
+                _ if run.state.is_alive() => State::ASIDE,
+                _ => run.state,
+            };
+            let Run { mut number, count, tag, .. } = *run;
+            let mut push = |count: u32, now: State| {
+                if count > 0 {
+                    self.entries.push(Entry { number, count, tag, was, now });
+                    number += u64::from(count);
+                }
+            };
+            if !pass.removes || run.slot == Run::UNSEEN || !run.is_in(pass.decided) {
+                push(count, was);
+                continue;
+            }
+            let kept = count.min(keep);
+            if keep != u32::MAX {
+                keep -= kept;
+            }
+            push(kept, marked(pass.mark, true, was));
+            push(count - kept, marked(pass.mark, false, was));
+        }
+    }
+}
+
+/// The state of a record that was in `state` and is kept, or would be removed.
+fn marked(mark: Option<Mark>, kept: bool, state: State) -> State {
+    let edit = mark.and_then(|mark| mark.edit(kept)).map(|edit| edit as u8);
+    match (mark, kept, edit) {
+        (_, true, None) => state,
+        (_, true, Some(edit)) => state.edited(edit),
+        (None, false, _) => State::REMOVED,
+        (Some(_), false, edit) => State::ASIDE.edited(edit.unwrap_or_default()),
+    }
+}

@@ -1,0 +1,99 @@
+//! A plan as text: what a run would do and what it would use.
+
+use std::fmt;
+
+use super::passes::{Call, Pass, needs};
+use super::plan::Plan;
+use crate::budget::Bytes;
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "source   {} ({} files, {} points by their headers)",
+            self.source_kind,
+            self.source.inputs().len(),
+            self.source.points()
+        )?;
+        for (kind, _) in &self.transforms {
+            writeln!(f, "streams  {kind}")?;
+        }
+        match self.ops.is_empty() {
+            true => self.sinks.iter().try_for_each(|sink| sink_line(f, sink.path()))?,
+            false => self.passes_shown(f)?,
+        }
+        match &self.lattice {
+            Some(lattice) => writeln!(f, "lattice  step {} world units", lattice.step)?,
+            None => writeln!(f, "lattice  none: records stream by as they are")?,
+        }
+        writeln!(f, "order    {}", if self.mills { "canonical" } else { "of the input" })?;
+        writeln!(f, "threads  {}", self.threads)?;
+        self.memory(f)
+    }
+}
+
+fn sink_line(f: &mut fmt::Formatter<'_>, path: &std::path::Path) -> fmt::Result {
+    writeln!(f, "sink     {}", path.display())
+}
+
+impl Plan {
+    fn passes_shown(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (n, pass) in self.passes.iter().enumerate() {
+            let sinks = |f: &mut fmt::Formatter<'_>, which: &[usize]| {
+                which.iter().try_for_each(|&sink| sink_line(f, self.sinks[sink].path()))
+            };
+            let label = format!("pass {}", n + 1);
+            sinks(f, &pass.before)?;
+            for (i, &call) in pass.calls.iter().enumerate() {
+                write!(f, "{:<8} ", if i == 0 { &label } else { "" })?;
+                self.call_shown(f, pass, call)?;
+            }
+            sinks(f, &pass.after)?;
+        }
+        Ok(())
+    }
+
+    fn call_shown(&self, f: &mut fmt::Formatter<'_>, pass: &Pass, call: Call) -> fmt::Result {
+        let (stage, needs) = (&self.ops[call.op], needs(&self.ops, call));
+        write!(f, "{}", stage.kind)?;
+        if pass.round > 1 {
+            write!(f, " (round {})", pass.round)?;
+        }
+        if call.gathers {
+            write!(f, " gathers over the whole scan")?;
+        }
+        write!(f, ": reads {}", needs.reads.join(", "))?;
+        if !needs.writes.is_empty() {
+            write!(f, ", writes {}", needs.writes.join(", "))?;
+        }
+        if needs.neighbors > 0 {
+            write!(f, ", {} nearest neighbours", needs.neighbors)?;
+        }
+        if needs.removes {
+            write!(f, ", {}", if needs.mark.is_some() { "marks" } else { "removes" })?;
+        }
+        if !stage.limits.selection.is_all() {
+            write!(f, ", of some classes or flags only")?;
+        }
+        writeln!(f)
+    }
+
+    fn memory(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let shares = self.demands.divide().map_err(|_| fmt::Error)?;
+        write!(f, "memory   {}", Bytes(self.demands.limit))?;
+        if self.mills {
+            write!(
+                f,
+                ": {} for the program, {} for the index, {} for work, {} to keep points in\n         \
+                 runs of {} records, tiles of {} positions with their rims",
+                Bytes(shares.base),
+                Bytes(shares.index),
+                Bytes(shares.work),
+                Bytes(shares.kept_in_memory),
+                shares.run_records,
+                shares.tile_positions
+            )?;
+        }
+        Ok(())
+    }
+}

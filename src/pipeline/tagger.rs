@@ -1,0 +1,115 @@
+//! Looks at every record once, as it is decoded: the selections that it is in, whether it is
+//! withheld, and its class.
+
+use super::settings::Withheld;
+use crate::point::{Chooser, Dimension, Endian, Flag, PointBatch, Schema, Selection, Value, names};
+use crate::report::{ClassCounts, Tally};
+use crate::tile::{ASIDE, State, Tag};
+use crate::{Error, Result};
+
+/// Tells records apart as stages and settings ask.
+#[derive(Debug, Clone)]
+pub(super) struct Tagger {
+    selections: Vec<Chooser>,
+    withheld: Option<Chooser>,
+    treatment: Withheld,
+    /// True if tags carry the number of the input.
+    inputs: bool,
+}
+
+impl Tagger {
+    /// A tagger for records of `schema`. Fails if a selection asks for what these do not have.
+    pub fn new(
+        schema: &Schema,
+        selections: &[Selection],
+        treatment: Withheld,
+        inputs: bool,
+    ) -> Result<Self> {
+        for selection in selections {
+            let asked = selection.with.iter().map(|flag| flag.dimension());
+            let class = (!selection.classes.is_empty()).then_some(names::CLASSIFICATION);
+            if let Some(missing) = asked.chain(class).find(|name| schema.find(name).is_none()) {
+                let told =
+                    format!("a stage is limited by {missing}, which the input does not have");
+                return Err(Error::pipeline(told).help("leave out `classes` or the flag in `with`"));
+            }
+        }
+        let withheld = Selection { with: vec![Flag::Withheld], ..Selection::default() };
+        let has_flag = schema.find(names::WITHHELD).is_some() && treatment != Withheld::Keep;
+        Ok(Tagger {
+            selections: selections.iter().map(|selection| selection.of(schema)).collect(),
+            withheld: has_flag.then(|| withheld.of(schema)),
+            treatment,
+            inputs,
+        })
+    }
+
+    /// True if records need tags.
+    pub fn tags(&self) -> bool {
+        self.inputs
+            || !self.selections.is_empty()
+            || self.withheld.is_some() && self.treatment == Withheld::Ignore
+    }
+
+    /// The tag of `record` from input `input`; None if it is withheld and to be removed.
+    pub fn look(&self, record: &[u8], input: u32) -> Option<Tag> {
+        let is_withheld = self.withheld.as_ref().is_some_and(|flag| flag.holds(record));
+        if is_withheld && self.treatment == Withheld::Drop {
+            return None;
+        }
+        let in_which =
+            self.selections.iter().enumerate().map(|(n, s)| u8::from(s.holds(record)) << n);
+        let selections = in_which.sum::<u8>() | if is_withheld { ASIDE } else { 0 };
+        Some(Tag::new(selections, if self.inputs { input } else { 0 }))
+    }
+}
+
+/// Where the class of a record is, to count records by it.
+pub(super) struct ClassOf {
+    field: Option<Dimension>,
+    endian: Endian,
+}
+
+impl ClassOf {
+    /// The class of records of `schema`.
+    pub fn new(schema: &Schema) -> Self {
+        ClassOf { field: schema.find(names::CLASSIFICATION).cloned(), endian: schema.endian }
+    }
+
+    /// Counts the records of `batch` as read.
+    pub fn read(&self, batch: &PointBatch, tally: &mut Tally) {
+        self.each(batch, tally, |counts, _, class| counts.read(class));
+    }
+
+    /// Counts the records of `batch` as kept.
+    pub fn keep(&self, batch: &PointBatch, tally: &mut Tally) {
+        self.each(batch, tally, |counts, _, class| counts.keep(class));
+    }
+
+    /// Counts as kept those records of `batch` whose state is alive.
+    pub fn keep_alive(&self, batch: &PointBatch, states: &[State], tally: &mut Tally) {
+        self.each(batch, tally, |counts, i, class| {
+            if states[i].is_alive() {
+                counts.keep(class);
+            }
+        });
+    }
+
+    fn each(
+        &self,
+        batch: &PointBatch,
+        tally: &mut Tally,
+        mut count: impl FnMut(&mut ClassCounts, usize, u8),
+    ) {
+        let Some(field) = &self.field else { return };
+        let counts = tally.classes.get_or_insert_default();
+        for (i, record) in batch.iter().enumerate() {
+            // A PLY property of that name may hold what is no class.
+            let class = match field.get(record, self.endian) {
+                Value::Unsigned(class) => u8::try_from(class).ok(),
+                other => Some(other.as_f64() as u8),
+            };
+            count(counts, i, class.unwrap_or_default());
+        }
+    }
+}

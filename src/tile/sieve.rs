@@ -1,0 +1,220 @@
+//! What a pass sees of the scan: the records that earlier passes left, and those that its stages are
+//! limited to; and the columns that earlier passes computed.
+
+use std::sync::Arc;
+
+use super::sealed::SealedTiles;
+use super::spill::Pieces;
+use crate::Result;
+
+/// Selections that a record can be in, a bit each; the highest bit is [`ASIDE`].
+pub const SELECTIONS: u32 = 7;
+/// Set in the selections of a record that takes no part in any pass and is written as it is.
+pub const ASIDE: u8 = 1 << SELECTIONS;
+
+/// What accompanies a record from the decode on: the selections that it is in, a bit each, and the
+/// number of its input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub struct Tag(pub u32);
+
+/// Inputs that a tag can tell apart.
+pub const TAGGED_INPUTS: u32 = 1 << 24;
+
+impl Tag {
+    /// A tag of selections and the number of an input.
+    pub fn new(selections: u8, input: u32) -> Tag {
+        Tag(u32::from(selections) << 24 | input & (TAGGED_INPUTS - 1))
+    }
+
+    /// The selections, a bit each.
+    pub fn selections(self) -> u8 {
+        (self.0 >> 24) as u8
+    }
+
+    /// The number of the input.
+    pub fn input(self) -> u32 {
+        self.0 & (TAGGED_INPUTS - 1)
+    }
+}
+
+/// The state of a record between passes, as it is stored: a byte.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct State(pub u8);
+
+impl State {
+    /// In the scan.
+    pub const ALIVE: State = State(0);
+    /// Removed.
+    pub const REMOVED: State = State(1);
+    /// Written, but no longer looked at.
+    pub const ASIDE: State = State(2);
+
+    /// The same state with an edit, by its number, of the record.
+    #[must_use]
+    pub fn edited(self, edit: u8) -> State {
+        State(self.0 & 3 | edit << 2)
+    }
+
+    /// True if later passes look at the record.
+    pub fn is_alive(self) -> bool {
+        self.0 & 3 == 0
+    }
+
+    /// True if the record is in the output.
+    pub fn is_written(self) -> bool {
+        self.0 & 3 != 1
+    }
+
+    /// The number of the edit that the record is written with; 0 for none.
+    pub fn edit(self) -> u8 {
+        self.0 >> 2
+    }
+}
+
+/// Bytes of a stored fate; see the survey.
+pub const FATE_BYTES: usize = size_of::<f32>();
+/// Bytes of a stored normal.
+pub const NORMAL_BYTES: usize = size_of::<[f32; 3]>();
+/// Bytes of a stored figure.
+pub const FIGURE_BYTES: usize = size_of::<f64>();
+
+/// What a pass sees of the scan, and what earlier passes stored.
+#[derive(Debug, Clone, Default)]
+pub struct Sieve {
+    /// A [`State`] for every record, by rank; none before the first pass.
+    pub states: Option<Arc<Pieces>>,
+    /// A stored fate for every position; none before the first pass.
+    pub fates: Option<Arc<Pieces>>,
+    /// A normal for every position.
+    pub normals: Option<Arc<Pieces>>,
+    /// A figure for every position.
+    pub figures: Option<Arc<Pieces>>,
+    /// Selections that a record must be in to be seen as a neighbour.
+    pub seen: u8,
+    /// Selections that a record must be in to be decided about.
+    pub decided: u8,
+}
+
+impl Sieve {
+    /// True if it may hold records back.
+    pub fn is_fine(&self, tiles: &SealedTiles) -> bool {
+        self.states.is_some() || tiles.is_tagged()
+    }
+}
+
+/// Records of one position that follow one another and are alike to every stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Run {
+    /// Number of the first.
+    pub number: u64,
+    /// How many.
+    pub count: u32,
+    /// Index of the position in its tile, or [`Run::UNSEEN`].
+    pub slot: u32,
+    /// What accompanies them.
+    pub tag: Tag,
+    /// What earlier passes left them in.
+    pub state: State,
+    /// True for the first of its position.
+    pub begins: bool,
+}
+
+impl Run {
+    /// The slot of a position that a pass does not see.
+    pub const UNSEEN: u32 = u32::MAX;
+
+    /// True if it takes part in passes.
+    pub fn is_alive(&self) -> bool {
+        self.state.is_alive() && self.tag.selections() & ASIDE == 0
+    }
+
+    /// True if it takes part and is in all of `selections`.
+    pub fn is_in(&self, selections: u8) -> bool {
+        self.is_alive() && self.tag.selections() & selections == selections
+    }
+}
+
+/// Reads the runs of blocks; keeps its memory.
+#[derive(Debug, Default)]
+pub(super) struct Runs {
+    buffer: Vec<u8>,
+    states: Vec<u8>,
+    tags: Vec<u8>,
+    runs: Vec<Run>,
+    ends: Vec<usize>,
+}
+
+impl Runs {
+    /// Reads the runs of block `index`, whose positions have `copies` records each.
+    pub(super) fn read(
+        &mut self,
+        tiles: &SealedTiles,
+        sieve: &Sieve,
+        index: usize,
+        copies: &[u32],
+    ) -> Result<()> {
+        /// Records read at once: a position may have millions.
+        const AT_ONCE: u64 = 4096;
+        self.runs.clear();
+        self.ends.clear();
+        let (mut number, mut rank) = (tiles.block(index).first_record, tiles.rank_of_block(index));
+        let end = number + copies.iter().map(|&n| u64::from(n)).sum::<u64>();
+        let mut window = 0..0;
+        for &count in copies {
+            let mut begins = true;
+            for _ in 0..count {
+                if !window.contains(&number) {
+                    window = number..end.min(number + AT_ONCE);
+                    self.fill(tiles, sieve, number, rank, (window.end - number) as usize)?;
+                }
+                let at = (number - window.start) as usize;
+                let state = State(self.states.get(at).copied().unwrap_or_default());
+                let tag = match self.tags.get(4 * at..4 * at + 4) {
+                    Some(&[a, b, c, d]) => Tag(u32::from_le_bytes([a, b, c, d])),
+                    _ => Tag::default(),
+                };
+                self.push(begins, number, state, tag);
+                begins = false;
+                number += 1;
+                rank += 1;
+            }
+            self.ends.push(self.runs.len());
+        }
+        Ok(())
+    }
+
+    fn push(&mut self, begins: bool, number: u64, state: State, tag: Tag) {
+        match self.runs.last_mut() {
+            Some(run) if !begins && run.state == state && run.tag == tag => run.count += 1,
+            _ => {
+                let slot = Run::UNSEEN;
+                self.runs.push(Run { number, count: 1, slot, tag, state, begins });
+            }
+        }
+    }
+
+    fn fill(
+        &mut self,
+        tiles: &SealedTiles,
+        sieve: &Sieve,
+        number: u64,
+        rank: u64,
+        count: usize,
+    ) -> Result<()> {
+        self.states.clear();
+        if let Some(stored) = &sieve.states {
+            let states = &mut self.states;
+            stored.each(rank, count as u64, &mut self.buffer, |_, bytes| {
+                states.extend_from_slice(bytes);
+                Ok(())
+            })?;
+        }
+        tiles.tags(number, count, &mut self.buffer, &mut self.tags)
+    }
+
+    /// The runs of the `j`-th position of the block.
+    pub(super) fn of(&self, j: usize) -> &[Run] {
+        let start = if j == 0 { 0 } else { self.ends[j - 1] };
+        &self.runs[start..self.ends[j]]
+    }
+}
