@@ -22,6 +22,15 @@ fn fields(object: &Map<String, Value>, indent: usize, lines: &mut Vec<String>) {
                 lines.push(label);
                 fields(inner, indent + 2, lines);
             }
+            Value::Array(list) if list.iter().any(holds_lists) => {
+                for entry in list {
+                    lines.push(label.clone());
+                    match entry {
+                        Value::Object(inner) => fields(inner, indent + 2, lines),
+                        other => lines.push(format!("{:1$}{2}", "", indent + 2, plain(other))),
+                    }
+                }
+            }
             Value::Array(list) if list.iter().any(Value::is_object) => {
                 lines.push(label);
                 rows(list, indent + 2, lines);
@@ -41,6 +50,12 @@ fn fields(object: &Map<String, Value>, indent: usize, lines: &mut Vec<String>) {
 /// Columns are padded to no more characters than this: a file may hold longer ones, and a table that
 /// repeats the longest in every row could be larger than any memory.
 const WIDEST: usize = 60;
+
+/// True for what no row of a table can hold: an object with lists of objects in it.
+fn holds_lists(value: &Value) -> bool {
+    let list = |v: &Value| v.as_array().is_some_and(|list| list.iter().any(Value::is_object));
+    value.as_object().is_some_and(|object| object.values().any(list))
+}
 
 /// A list of objects as a table, with the keys of all of them as its columns.
 fn rows(list: &[Value], indent: usize, lines: &mut Vec<String>) {
@@ -110,5 +125,25 @@ mod tests {
         let elements = [rows, vec![long]].concat();
         let text = render(&json!({ "elements": elements }), 0);
         assert!(text.contains(&"x".repeat(100_000)) && text.len() < 150_000, "{}", text.len());
+    }
+
+    #[test]
+    fn lists_within_lists_are_tables_of_their_own() {
+        let property = json!({"name": "x", "type": "float"});
+        let facts = json!({"elements": [
+            {"name": "vertex", "count": 7, "properties": [property]},
+            {"name": "face", "count": 0, "properties": []},
+        ]});
+        let expected = "
+elements
+  name        vertex
+  count       7
+  properties
+    name  type
+    x     float
+elements
+  name        face
+  count       0";
+        assert_eq!(format!("\n{}", render(&facts, 0)), expected);
     }
 }

@@ -11,6 +11,8 @@ use crate::io::origin::Origin;
 /// What the header of a PLY file says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlyInfo {
+    /// "PLY".
+    pub kind: &'static str,
     /// How the values are written.
     pub encoding: Encoding,
     /// Length of the file.
@@ -67,6 +69,16 @@ pub fn describe(path: &Path) -> Result<PlyInfo> {
                 .collect(),
         })
         .collect();
-    let (comments, obj_info) = (header.comments, header.obj_info);
-    Ok(PlyInfo { encoding: header.encoding, bytes, points, elements, comments, obj_info })
+    let is_told = |comment: &String| !super::is_padding(comment, points);
+    let comments = header.comments.into_iter().filter(is_told).collect();
+    let obj_info = header.obj_info;
+    Ok(PlyInfo {
+        kind: "PLY",
+        encoding: header.encoding,
+        bytes,
+        points,
+        elements,
+        comments,
+        obj_info,
+    })
 }
