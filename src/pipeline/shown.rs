@@ -75,7 +75,7 @@ impl Plan {
         if needs.neighbors > 0 {
             write!(f, ", {} nearest neighbours", needs.neighbors)?;
         }
-        if needs.removes {
+        if needs.removes || needs.mark.is_some() {
             write!(f, ", {}", if needs.mark.is_some() { "marks" } else { "removes" })?;
         }
         if !stage.limits.selection.is_all() {
