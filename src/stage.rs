@@ -306,7 +306,7 @@ pub struct Needs {
     pub cell_aligned: bool,
     /// Working memory per position of the tile, rim included.
     pub bytes_per_point: usize,
-    /// True if it removes points, or marks those that it would remove.
+    /// True if it removes points.
     pub removes: bool,
     /// How it marks records instead of removing any, if it does.
     pub mark: Option<Mark>,

@@ -154,7 +154,7 @@ fn a_mark_is_counted_and_enters_no_ledger() {
     let scan = scene(&[500, -500]);
     let out = |mark| {
         let stage = StatisticalOutliers::new(10, 2.0, mark).unwrap();
-        assert_eq!((stage.needs().mark, stage.needs().removes), (mark, true));
+        assert_eq!((stage.needs().mark, stage.needs().removes), (mark, mark.is_none()));
         statistical(stage, &scan, &cubes(&scan, 200), &|_| 2)
     };
     let ((removed_fates, ledger, _), (fates, tally, _)) = (out(None), out(Some(Mark::Class(7))));

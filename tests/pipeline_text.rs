@@ -177,7 +177,7 @@ p.toml:3:1: `[run]` has no key `thraeds`
 p.toml:7:9: `scene` cannot be `alps`
   7 | scene = \"alps\"
     |         ^^^^^^
-    = did you mean `als`? valid: als, part, plane
+    = did you mean `als`? valid: als, part, plane, sphere, squares-random, squares-uniform
 p.toml:8:1: `synth` has no key `pionts`
   8 | pionts = 1_000
     | ^^^^^^

@@ -6,7 +6,7 @@ use serde::de::{Error as _, Unexpected};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 
-use super::removal::{Account, decides, keep_once, remove, represent};
+use super::removal::{Account, keep_once, remove, represent};
 use crate::geom::angle::is_known;
 use crate::point::{Bounds, Position, distance2};
 use crate::report::Tally;
@@ -154,7 +154,7 @@ fn grouped(tile: &Tile, side: i64) -> Vec<Entry> {
             .iter()
             .enumerate()
             .map(|(i, &p)| (cube(p), i as u32))
-            .filter(|(cube, i)| reached.contains(*cube) && decides(tile, *i as usize))
+            .filter(|(cube, i)| reached.contains(*cube) && tile.is_chosen(*i as usize))
     };
     // Counted first: growing would hold more than the stage says it needs.
     let mut grouped = Vec::with_capacity(entries().count());

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::removal::{Account, decides, keep_once, represent};
-use crate::geom::angle::{cosine, is_known};
+use super::removal::{Account, keep_once, represent};
+use crate::geom::angle::{cosine, dominant_axis, is_known, outer_sum, sine2};
 use crate::geom::wide::Wide;
 use crate::point::{Mark, Position};
 use crate::report::Tally;
@@ -20,8 +20,8 @@ pub const MAX_PASSES: usize = 16;
 
 /// Keeps one record of every cell (the paper's third step).
 ///
-/// A cell's positions are sorted by their angle θ to the partition's direction; the lower median
-/// stays: of m positions that at index (m − 1) / 2. Among positions of exactly that angle it is the
+/// A cell's positions are sorted by their angle θ to the partition's direction (to the cell's own
+/// dominant axis where `cells` has `measure = "cone"`); the lower median stays: of m positions that at index (m − 1) / 2. Among positions of exactly that angle it is the
 /// one nearest to the centre of mass of the cell's positions, then the first in Morton order. Copies
 /// weigh as one position and are removed as coincident. A position without a normal is in no cell
 /// and keeps one record.
@@ -50,17 +50,10 @@ impl Default for Median {
 }
 
 impl Median {
-    /// Refuses passes outside 1 to 16, and several of them where nothing is removed; names the key to
-    /// blame.
+    /// Refuses passes outside 1 to 16; names the key to blame.
     pub fn check(&self) -> Result<(), (&'static str, Error)> {
         let wrong = |told: String| ("passes", Error::pipeline(told));
-        check_passes(self.passes as u64).map_err(wrong)?;
-        if self.passes > 1 && self.mark.is_some() {
-            let told = "`passes` above 1 need records removed, and `mark` removes none".to_owned();
-            let (key, error) = wrong(told);
-            return Err((key, error.help("leave one of the two out")));
-        }
-        Ok(())
+        check_passes(self.passes as u64).map_err(wrong)
     }
 }
 
@@ -82,7 +75,7 @@ impl TileOp for Median {
         Needs {
             reads: vec!["Cell".into(), "Normal".into()],
             bytes_per_point: BYTES,
-            removes: true,
+            removes: self.mark.is_none(),
             mark: self.mark,
             passes: self.passes,
             ..Needs::default()
@@ -93,7 +86,7 @@ impl TileOp for Median {
         let core = tile.core.clone();
         let (mut coincident, mut represented) = (0, 0);
         for i in core.clone() {
-            if !is_known(tile.normals[i]) && decides(tile, i) {
+            if !is_known(tile.normals[i]) && tile.is_chosen(i) {
                 coincident += keep_once(tile, i);
             }
         }
@@ -108,7 +101,7 @@ impl TileOp for Median {
             let Some(kept) = median(tile, group.clone(), &mut angles) else { continue };
             for at in group {
                 let i = tile.cells.members[at] as usize;
-                if !core.contains(&i) || !decides(tile, i) {
+                if !core.contains(&i) || !tile.is_chosen(i) {
                     continue;
                 } else if i == kept {
                     coincident += keep_once(tile, i);
@@ -129,21 +122,29 @@ impl TileOp for Median {
 fn median(tile: &Tile, group: Range<usize>, angles: &mut Vec<(f64, u32)>) -> Option<usize> {
     let Partition { members, turned, reference, .. } = &tile.cells;
     angles.clear();
-    angles.extend(group.clone().filter(|&at| decides(tile, members[at] as usize)).map(|at| {
-        let i = members[at];
-        (cosine(*reference, tile.normals[i as usize], turned[at]), i)
-    }));
+    let normal = |i: u32| tile.normals[i as usize];
+    let decided = group.clone().filter(|&at| tile.is_chosen(members[at] as usize));
+    match reference {
+        Some(reference) => angles.extend(decided.map(|at| {
+            let i = members[at];
+            (cosine(*reference, normal(i), turned[at]), i)
+        })),
+        None => {
+            let axis = dominant_axis(outer_sum(members[group.clone()].iter().map(|&i| normal(i))));
+            angles.extend(decided.map(|at| (-sine2(axis, normal(members[at])), members[at])));
+        }
+    }
     if let [] | [_] = angles[..] {
         return angles.first().map(|(_, only)| *only as usize);
     }
-    // Ascending angles are descending cosines.
+    // Ascending angles are descending cosines, and descending −sin² up to a right angle.
     let middle = (angles.len() - 1) / 2;
     let cosine = angles.select_nth_unstable_by(middle, |a, b| b.0.total_cmp(&a.0)).1.0;
     angles.retain(|angle| angle.0 == cosine);
     if let [(_, only)] = angles[..] {
         return Some(only as usize);
     }
-    let voters = members[group].iter().map(|&i| i as usize).filter(|&i| decides(tile, i));
+    let voters = members[group].iter().map(|&i| i as usize).filter(|&i| tile.is_chosen(i));
     let center = Center::of(voters.map(|i| tile.positions[i]));
     // Indices are in Morton order.
     let first =
@@ -209,5 +210,13 @@ mod tests {
             assert_eq!(toml::from_str::<Median>(text).unwrap().check().is_ok(), fits, "{text}");
         }
         assert!(Median { passes: 17, mark: None }.check().is_err());
+    }
+
+    #[test]
+    fn a_mark_removes_nothing() {
+        let needs = Median { passes: 1, mark: Some(Mark::KeyPoint) }.needs();
+        assert!(!needs.removes && needs.mark == Some(Mark::KeyPoint));
+        let needs = Median::default().needs();
+        assert!(needs.removes && needs.mark.is_none());
     }
 }

@@ -7,7 +7,7 @@ pub mod normals;
 pub mod outliers;
 mod removal;
 
-pub use cells::{Cells, Measure, Side, Split};
+pub use cells::{Cells, Keep, Measure, Reference, Side, Split};
 pub use grid::{Grid, Pick};
 pub use median::Median;
 pub use outliers::Outliers;

@@ -136,7 +136,7 @@ impl TileOp for Normals {
         (tile.normals, tile.copies) = (normals, copies);
         tile.oriented = side != Side::Any;
         for i in 0..tile.positions.len() {
-            if tile.oriented && is_known(tile.normals[i]) && tile.is_chosen(i) {
+            if tile.oriented && is_known(tile.normals[i]) {
                 tile.normals[i] = side.settled(tile.normals[i], tile.positions[i]);
             }
         }

@@ -4,12 +4,6 @@ use crate::point::Mark;
 use crate::report::Tally;
 use crate::tile::{Fate, Tile};
 
-/// True if the stage at work decides about position `i`: a position that it is not limited from, with
-/// records of its own. What became of it before is not asked: beyond the core no fate is known.
-pub(super) fn decides(tile: &Tile, i: usize) -> bool {
-    tile.is_chosen(i) && tile.copies[i] > 0
-}
-
 /// Keeps one record of position `i`; returns how many copies that removes.
 pub(super) fn keep_once(tile: &mut Tile, i: usize) -> u64 {
     if tile.fates[i] == Fate::Kept && tile.copies[i] > 1 {

@@ -50,8 +50,12 @@ impl StageKind for Cells {
     const KIND: &'static str = "cells";
     const ABOUT: &'static str = "Divides the scan into cells whose normals agree.";
 
-    fn build(self, _: &StagePlace) -> Result<Role> {
-        Ok(tile_op(self))
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.check().map_err(|(key, error)| at.blame(key, error))?;
+        Ok(match self.keep {
+            Some(_) => Role::ScanOp(Box::new(self)),
+            None => tile_op(self),
+        })
     }
 }
 

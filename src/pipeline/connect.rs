@@ -20,11 +20,6 @@ pub fn synth(synth: &Synth) -> Box<dyn OpenSource> {
     Box::new(synthetic::Synthetic { scene, points, seed, noise })
 }
 
-/// The sink that writes a file of `format`.
-pub fn write(write: Write, format: Format) -> Box<dyn CreateSink> {
-    Box::new(Output { write, format })
-}
-
 struct Files {
     files: Vec<PathBuf>,
     ply: bool,
@@ -40,14 +35,21 @@ impl OpenSource for Files {
     }
 }
 
-struct Output {
-    write: Write,
-    format: Format,
+/// The sink that writes a file of one format.
+pub struct Output {
+    /// The keys.
+    pub write: Write,
+    /// The file.
+    pub path: PathBuf,
+    /// Its format.
+    pub format: Format,
+    /// True for the output of one of several inputs: records take the form that they have there.
+    pub of_one: bool,
 }
 
 impl CreateSink for Output {
     fn path(&self) -> &Path {
-        &self.write.path
+        &self.path
     }
 
     fn order(&self) -> Order {
@@ -69,7 +71,8 @@ impl CreateSink for Output {
                 })
             }),
         };
-        chunk.map_err(|error| error.at(&self.write.path))
+        let chunk = chunk.map_err(|error| error.at(&self.path))?;
+        Ok(if self.of_one { las::Shifted::chunk(chunk, schema) } else { chunk })
     }
 
     fn create(
@@ -79,12 +82,8 @@ impl CreateSink for Output {
         metadata: &Metadata,
         whole: bool,
     ) -> Result<Box<dyn Sink>> {
-        let created = match self.format {
-            Format::Ply => ply::create(staged, &self.ply_options(whole), schema, metadata),
-            Format::Las | Format::Laz => self.las(staged, schema, metadata),
-        };
-        created.map_err(|error| {
-            if error.path() == Some(staged) { error } else { error.at(&self.write.path) }
+        self.open(staged, schema, metadata, whole).map_err(|error| {
+            if error.path() == Some(staged) { error } else { error.at(&self.path) }
         })
     }
 }
@@ -97,6 +96,24 @@ struct Target {
 }
 
 impl Output {
+    fn open(
+        &self,
+        staged: &Path,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+        whole: bool,
+    ) -> Result<Box<dyn Sink>> {
+        let open = |schema: &Arc<Schema>| match self.format {
+            Format::Ply => ply::create(staged, &self.ply_options(whole), schema, metadata),
+            Format::Las | Format::Laz => self.las(staged, schema, metadata),
+        };
+        let own = if self.of_one { las::own_form(schema, metadata)? } else { None };
+        Ok(match own {
+            Some(own) => Box::new(las::Shifted::new(staged, open(&own.0)?, own)),
+            None => open(schema)?,
+        })
+    }
+
     fn ply_options(&self, whole: bool) -> ply::PlyOptions {
         let encoding = self.write.encoding.map(|encoding| match encoding {
             Encoding::Ascii => ply::Encoding::Ascii,
@@ -123,7 +140,7 @@ impl Output {
         let Target { schema, metadata, projection } = self.las_target(schema, metadata)?;
         let sink = las::create(staged, &self.las_options(), &schema, &metadata)?;
         Ok(match projection {
-            Some(projection) => Box::new(Projected::new(sink, projection, schema)),
+            Some(projection) => Box::new(Projected::new(sink, projection, schema, &self.path)),
             None => sink,
         })
     }

@@ -104,14 +104,19 @@ impl Draft {
     }
 
     /// Puts the value of `set`, which is text `source`, in its place.
-    pub fn apply(&mut self, set: &Set, source: usize) {
-        match self.apply_to_table(set, source) {
+    pub fn apply(&mut self, set: &Set, source: usize, registry: &Registry) {
+        match self.apply_to_table(set, source, registry) {
             Ok(()) => {}
             Err(mistakes) => self.mistakes.extend(mistakes),
         }
     }
 
-    fn apply_to_table(&mut self, set: &Set, source: usize) -> Result<(), Vec<Mistake>> {
+    fn apply_to_table(
+        &mut self,
+        set: &Set,
+        source: usize,
+        registry: &Registry,
+    ) -> Result<(), Vec<Mistake>> {
         let Some((stage, key)) = set.address() else {
             let told = Mistake::new(set.place(source, ""), "the value has no address");
             return Err(vec![told.note("write stage.key=value, or run.key=value")]);
@@ -122,24 +127,27 @@ impl Draft {
         }
         let node = set.value(source)?;
         let at = set.place(source, key);
-        let table = match stage {
-            "run" => &mut self.run,
-            _ => self.addressed(stage).map_err(|(told, note)| {
-                vec![Mistake::new(set.place(source, stage), told).note(note)]
-            })?,
+        let (table, kind) = match stage {
+            "run" => (&mut self.run, "run"),
+            _ => {
+                let addressed = self.addressed(stage).map_err(|(told, note)| {
+                    vec![Mistake::new(set.place(source, stage), told).note(note)]
+                })?;
+                (&mut addressed.keys, addressed.kind.0.as_str())
+            }
         };
         let Value::Table(entries) = &mut table.value else { return Ok(()) };
-        entries.retain(|e| e.key != key);
+        entries.retain(|e| e.key != key && registry.others(kind, key).all(|other| e.key != other));
         entries.push(Entry { key: key.to_owned(), at, node });
         Ok(())
     }
 
-    /// The keys of the stage that `address` means: a name, a kind, or `kind.N` counted from 1; else
+    /// The stage that `address` means: a name, a kind, or `kind.N` counted from 1; else
     /// what is wrong, and what is right.
-    fn addressed(&mut self, address: &str) -> Result<&mut Node, (String, String)> {
+    fn addressed(&mut self, address: &str) -> Result<&mut StageDraft, (String, String)> {
         let named = |s: &StageDraft| s.name.as_ref().is_some_and(|(name, _)| name == address);
         if let Some(i) = self.stages.iter().position(named) {
-            return Ok(&mut self.stages[i].keys);
+            return Ok(&mut self.stages[i]);
         }
         let of = |kind: &str| -> Vec<usize> {
             (0..self.stages.len()).filter(|&i| self.stages[i].kind.0 == kind).collect()
@@ -150,7 +158,7 @@ impl Draft {
         });
         let all = of(address);
         match (&all[..], numbered) {
-            (_, Some(one)) | (&[one], None) => Ok(&mut self.stages[one].keys),
+            (_, Some(one)) | (&[one], None) => Ok(&mut self.stages[one]),
             (&[], None) => Err((
                 format!("this pipeline has no stage `{address}`"),
                 advice(address, "stages", self.addresses()),

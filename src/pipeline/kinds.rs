@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, de};
 
+use super::outputs::Outputs;
 use super::registry::{StageKind, StagePlace};
 use super::{connect, inputs};
 use crate::io::synthetic::Scene;
@@ -121,12 +122,21 @@ impl StageKind for Synth {
 /// A record that is kept is the input's, byte for byte, wherever the format can hold it; LAS header
 /// fields that depend on the points are computed again and all others carried. From LAS to PLY or
 /// back every field keeps its name; one that cannot be held is an error unless `drop` names it.
+///
+/// With `path` all inputs become one file. With `folder` each input becomes a file of its own there:
+/// under its name, with its header, its records and its offset, holding those of its points that are
+/// kept, even if that is none. The inputs are one scan all the same: neighbourhoods and cells go on
+/// from file to file, and the outputs together have the points that the one file would have.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Write {
-    /// The file; it appears under this name when it is complete.
-    pub path: PathBuf,
-    /// Its format; none: as the extension says.
+    /// The file; it appears under this name when it is complete. Either this or `folder` is given.
+    #[serde(default)]
+    pub path: Option<PathBuf>,
+    /// The folder that gets a file for each input; it is made if it does not exist.
+    #[serde(default)]
+    pub folder: Option<PathBuf>,
+    /// The format; none: as the extension says, in a folder that of the input.
     #[serde(default)]
     pub format: Option<Format>,
     /// Dimensions that the output need not hold.
@@ -180,37 +190,58 @@ impl Write {
     }
 }
 
-impl StageKind for Write {
-    const KIND: &'static str = "write";
-    const ABOUT: &'static str = "Writes a LAS, LAZ or PLY file.";
-    const PLACES: &'static [&'static str] = &["path"];
-
-    fn build(self, at: &StagePlace) -> Result<Role> {
-        let Some(format) = self.format.or(Format::of(&self.path)) else {
-            return Err(at.blame("path", unknown_extension(&self.path)));
-        };
-        let only = |key: &str, formats: &str| {
+impl Write {
+    /// Refuses keys that an output of `format` does not have; tells which.
+    pub(super) fn check(&self, format: Format) -> Result<(), (&'static str, Error)> {
+        let only = |key: &'static str, formats: &str| {
             let told = format!("`{key}` is for {formats}, the output is {}", format.extension());
-            at.blame(key, Error::pipeline(told))
+            Err((key, Error::pipeline(told)))
         };
         match format {
-            Format::Ply if self.scale.is_some() => return Err(only("scale", "las and laz")),
-            Format::Ply if self.offset.is_some() => return Err(only("offset", "las and laz")),
-            Format::Las | Format::Laz if self.encoding.is_some() => {
-                return Err(only("encoding", "ply"));
-            }
+            Format::Ply if self.scale.is_some() => only("scale", "las and laz"),
+            Format::Ply if self.offset.is_some() => only("offset", "las and laz"),
+            Format::Las | Format::Laz if self.encoding.is_some() => only("encoding", "ply"),
             _ if self.offset.is_some_and(|offset| offset.iter().any(|v| !v.is_finite())) => {
-                return Err(
-                    at.blame("offset", Error::pipeline("an offset is three finite numbers"))
-                );
+                Err(("offset", Error::pipeline("an offset is three finite numbers")))
             }
-            _ => {}
+            _ => Ok(()),
         }
-        Ok(Role::Sink(connect::write(self, format)))
     }
 }
 
-fn unknown_extension(path: &Path) -> Error {
+impl StageKind for Write {
+    const KIND: &'static str = "write";
+    const ABOUT: &'static str = "Writes a LAS, LAZ or PLY file, or one for each input.";
+    const PLACES: &'static [&'static str] = &["path", "folder"];
+    const EITHER: &'static [&'static str] = &["path", "folder"];
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        let check = |format| self.check(format).map_err(|(key, error)| at.blame(key, error));
+        match (self.path.clone(), self.folder.clone()) {
+            (Some(_), Some(_)) => {
+                let told =
+                    "`path` makes one file and `folder` one for each input: give one of them";
+                Err(at.blame("folder", Error::pipeline(told)))
+            }
+            (None, None) => Err(Error::pipeline("`write` needs `path` or `folder`")
+                .help("`path` is one file, `folder` gets one for each input")),
+            (Some(path), None) => {
+                let Some(format) = self.format.or(Format::of(&path)) else {
+                    return Err(at.blame("path", unknown_extension(&path)));
+                };
+                check(format)?;
+                let output = connect::Output { write: self, path, format, of_one: false };
+                Ok(Role::Sink(Box::new(output)))
+            }
+            (None, Some(folder)) => {
+                self.format.map_or(Ok(()), check)?;
+                Ok(Role::Sink(Box::new(Outputs { write: self, folder })))
+            }
+        }
+    }
+}
+
+pub(super) fn unknown_extension(path: &Path) -> Error {
     Error::pipeline(format!("the extension of `{}` names no format", path.display()))
         .help("use .las, .laz or .ply, or add `format`")
 }

@@ -10,7 +10,7 @@ use super::clock::Clock;
 use super::cut::cut;
 use super::forecast::forecast;
 use super::grind::{Field, grind};
-use super::passes::{Op, Pass};
+use super::passes::{Call, Op, Pass};
 use super::run::{Finished, Job};
 use super::shares::{BATCH, Demands, Shares};
 use super::survey::survey;
@@ -44,7 +44,7 @@ pub(super) fn mill(
         alive: tiles.points(),
         kept: tiles.points(),
         passes: Vec::new(),
-        forecasts: vec![Vec::new(); job.ops.len()],
+        forecasts: vec![None; job.ops.len()],
         written: sinks.iter().map(|_| None).collect(),
         sinks: sinks.into_iter().map(Some).collect(),
     };
@@ -79,7 +79,7 @@ struct Course {
     kept: u64,
     passes: Vec<PassFigures>,
     /// For each stage, what it said is to be expected.
-    forecasts: Vec<Vec<(String, serde_json::Value)>>,
+    forecasts: Vec<Option<Vec<(String, serde_json::Value)>>>,
     sinks: Vec<Option<Box<dyn Sink>>>,
     /// For each sink, how many records it was given, and what it said in the end.
     written: Vec<Option<(u64, SinkSummary)>>,
@@ -99,13 +99,13 @@ impl Course {
         let sieve = pass.sieve(&self.sieve);
         let (keys, capacity) = cut(job, pass, field.lattice, shares, demands, tiles)?;
         let working = job.budget.lease(demands.mill_bytes(capacity as u64), "the mill")?;
-        if pass.round == 1 {
-            for (op, foreseen) in forecast(job, pass, field, &sieve, capacity)? {
-                if let Some(warning) = foreseen.warning {
-                    job.warn(warning);
-                }
-                self.forecasts[op].extend(foreseen.decisions);
+        let ahead = |call: &&Call| self.forecasts[call.op].is_none();
+        let ops: Vec<usize> = pass.calls.iter().filter(ahead).map(|call| call.op).collect();
+        for (op, foreseen) in forecast(job, pass, &ops, field, &sieve, capacity)? {
+            if let Some(warning) = foreseen.warning {
+                job.warn(warning);
             }
+            self.forecasts[op] = Some(foreseen.decisions);
         }
         clock.phase(
             if pass.gathers().is_some() { "gather" } else { "mill" },
@@ -134,6 +134,9 @@ impl Course {
         self.sieve.states = Some(stored.states);
         self.sieve.fates = Some(stored.fates);
         self.sieve.figures = stored.figures;
+        if stored.normals.is_some() {
+            self.sieve.oriented = milled.oriented;
+        }
         self.sieve.normals = stored.normals.or(self.sieve.normals.take());
         (self.alive, self.kept) = (milled.counts.alive, milled.counts.written);
         match pass.gathers() {
@@ -251,9 +254,12 @@ fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<(
 }
 
 /// What the stages settled by themselves and what they expected, in their order.
-fn decisions(job: &Job<'_>, forecasts: Vec<Vec<(String, serde_json::Value)>>) -> Vec<Decision> {
+fn decisions(
+    job: &Job<'_>,
+    forecasts: Vec<Option<Vec<(String, serde_json::Value)>>>,
+) -> Vec<Decision> {
     let each = job.ops.iter().zip(forecasts).flat_map(|(stage, expected)| {
-        let settled = stage.op.tile().decisions().into_iter().chain(expected);
+        let settled = stage.op.tile().decisions().into_iter().chain(expected.into_iter().flatten());
         settled.map(|(name, value)| Decision { stage: stage.kind.clone(), name, value })
     });
     each.collect()

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::passes::{Op, Pass, StageOp, Tap, number_selections, unroll};
+use super::passes::{Op, Pass, StageOp, Tap, blame, number_selections, unroll};
 use super::publish::check_place;
 use super::settings::{Nonfinite, Overrides, RunSettings, Withheld};
 use super::shares::Demands;
@@ -24,6 +24,8 @@ pub struct Plan {
     pub(super) ops: Vec<StageOp>,
     pub(super) passes: Vec<Pass>,
     pub(super) sinks: Vec<Box<dyn CreateSink>>,
+    /// A sink of what all stages leave.
+    pub(super) last_sink: usize,
     pub(super) tagger: Tagger,
     /// True if the run needs tiles: for its stages, or to sort.
     pub(super) mills: bool,
@@ -66,6 +68,7 @@ impl Pipeline {
         let (source_kind, open) =
             sorted.source.ok_or_else(|| Error::pipeline("the pipeline reads nothing"))?;
         let (sinks, taps): (Vec<_>, Vec<_>) = sorted.sinks.into_iter().unzip();
+        let last_sink = last_sink(&sorted.ops, &taps).map_err(in_file)?;
         check_places(&*open, &sinks, &settings)?;
         let source = open.open()?;
         let schema = source.schema();
@@ -106,6 +109,7 @@ impl Pipeline {
             ops: sorted.ops,
             passes,
             sinks,
+            last_sink,
             tagger,
             mills,
             lattice,
@@ -151,6 +155,18 @@ fn sort(stages: Vec<PlacedStage>) -> Result<Sorted> {
         true => Err(Error::pipeline("the pipeline writes nothing")),
         false => Ok(sorted),
     }
+}
+
+/// The first sink of what all stages leave; without one, the last stages would work for nothing.
+fn last_sink(ops: &[StageOp], taps: &[Tap]) -> Result<usize> {
+    let last = taps.iter().position(|tap| tap.ops == ops.len());
+    last.ok_or_else(|| match ops.last() {
+        Some(stage) => {
+            let told = format!("no output takes what `{}` leaves", stage.kind);
+            blame(stage, told).help("add a `write` behind it that has no `from`")
+        }
+        None => Error::pipeline("the pipeline writes nothing"),
+    })
 }
 
 /// Refuses outputs that would replace an input or each other, or that cannot appear where they

@@ -27,6 +27,10 @@ pub trait StageKind: DeserializeOwned + Serialize {
     /// `pipeline`, which must not depend on where a scan lies and how it is split into files.
     const PLACES: &'static [&'static str] = &[];
 
+    /// Keys of which a stage takes one: an argument that gives one takes the place of the others,
+    /// where a file gives several the stage tells.
+    const EITHER: &'static [&'static str] = &[];
+
     /// Puts the stage in its role. Called once every key fits its field; an error is told with the
     /// stage's place in the file, or that of a key if it went through [`StagePlace::blame`].
     fn build(self, at: &StagePlace) -> Result<Role>;
@@ -77,6 +81,7 @@ type Read = fn(&Node, &StagePlace) -> Result<(Role, serde_json::Value), Vec<Mist
 #[derive(Clone, Copy)]
 struct Kind {
     about: &'static str,
+    either: &'static [&'static str],
     read: Read,
 }
 
@@ -89,7 +94,7 @@ impl Registry {
     /// The same and `K`, which takes the place of a kind of that name.
     #[must_use]
     pub fn with<K: StageKind>(mut self) -> Self {
-        self.kinds.insert(K::KIND, Kind { about: K::ABOUT, read: read::<K> });
+        self.kinds.insert(K::KIND, Kind { about: K::ABOUT, either: K::EITHER, read: read::<K> });
         self
     }
 
@@ -101,6 +106,13 @@ impl Registry {
     /// True if there is a kind of that name.
     pub fn has(&self, kind: &str) -> bool {
         self.kinds.contains_key(kind)
+    }
+
+    /// Keys that `key` of a stage of that kind takes the place of.
+    pub(super) fn others(&self, kind: &str, key: &str) -> impl Iterator<Item = &'static str> {
+        let either = self.kinds.get(kind).map_or(&[][..], |kind| kind.either);
+        let either = if either.contains(&key) { either } else { &[] };
+        either.iter().copied().filter(move |other| *other != key)
     }
 
     /// Builds a stage from its keys; none if there is no such kind.

@@ -73,7 +73,7 @@ impl Pipeline {
         let entries = node::parse(text, 0).map_err(told)?;
         let mut draft = draft::read(entries, text.len(), registry);
         for (i, set) in sets.iter().enumerate() {
-            draft.apply(set, i + 1);
+            draft.apply(set, i + 1, registry);
         }
         let (pipeline, mistakes) = build(draft, text, origin, registry);
         if mistakes.is_empty() { Ok(pipeline) } else { Err(told(mistakes)) }
@@ -262,7 +262,9 @@ fn check_files(
         match &stage.role {
             Role::Source(source) => inputs.extend(source.paths().iter().map(|p| resolved(p))),
             Role::Sink(sink) => {
-                outputs.push((sink.path(), draft.keys.at("path").unwrap_or(&draft.kind.1)));
+                let key = |key| draft.keys.at(key);
+                let at = key("path").or(key("folder")).unwrap_or(&draft.kind.1);
+                outputs.push((sink.path(), at));
             }
             _ => {}
         }

@@ -156,7 +156,7 @@ impl Tile {
     /// True if the stage at work decides about position `i`: one of its records is of the classes and
     /// flags that the stage is limited to.
     pub fn is_chosen(&self, i: usize) -> bool {
-        chosen(&self.selections, self.limits, i)
+        self.copies[i] > 0 && chosen(&self.selections, self.limits, i)
     }
 
     /// True if columns must be right for position `i`.
@@ -199,8 +199,9 @@ pub struct Cells {
     pub turned: Vec<bool>,
     /// End of each group in `members`.
     pub ends: Vec<u32>,
-    /// Reference direction N of the partition; θ is the angle to it.
-    pub reference: [f64; 3],
+    /// Reference direction N of the partition, to which θ is the angle; none if each group has its
+    /// own: the dominant axis of its normals.
+    pub reference: Option<[f64; 3]>,
 }
 
 impl Cells {

@@ -1,40 +1,53 @@
 //! Several files as one: what they must share, and what becomes of what they do not. Nothing here
 //! depends on the order of the inputs.
 
-use std::cmp::Ordering;
-
 use super::crs;
-use super::extra::Descriptor;
 use super::format::{has_gps_time, has_waveforms};
 use super::header::{Header, at, encoding};
-use super::input::{EXTRA_BYTES, Input};
+use super::input::Input;
 use super::native::Native;
 use super::read::Shift;
-use super::vlr::{Evlr, Vlr};
+use super::union::{Records, described};
+use super::vlr::Evlr;
 use crate::{Error, Result};
 
 /// Offsets whose distance is this close to whole steps differ by whole steps: decimal offsets are
 /// seldom exact in binary.
 const WHOLE: f64 = 1e-6;
 
-/// One header and one list of records for all inputs, and how far each must be shifted.
-pub fn merge(inputs: &[Input]) -> Result<(Native, Vec<Shift>)> {
-    let [first, others @ ..] = inputs else {
-        return Err(Error::pipeline("there is no input file"));
-    };
-    if others.is_empty() {
-        return Ok((Native::of(first), vec![Shift::default()]));
+/// Files that are to be read as one scan, taken in one by one: of each only its header is kept, and
+/// of their records the union.
+pub struct Merge {
+    /// The first, with its records: the others are compared with it.
+    first: Input,
+    records: Records,
+}
+
+impl Merge {
+    /// Begins with one file.
+    pub fn of(first: Input) -> Self {
+        Merge { records: Records::of(&first), first }
     }
-    for other in others {
-        agree(first, other)?;
+
+    /// Adds a file; fails if the two cannot be one.
+    pub fn add(&mut self, other: &Input) -> Result<()> {
+        agree(&self.first, other)?;
+        self.records.add(other)
     }
-    let (offset, shifts) = shifts(inputs)?;
-    let evlrs = union_evlrs(inputs)?;
-    waveforms(inputs, &evlrs)?;
-    let mut header = header(inputs);
-    header.put_floats(at::OFFSET, offset);
-    let gap = if others.iter().all(|i| i.gap == first.gap) { first.gap.clone() } else { vec![] };
-    Ok((Native { header, vlrs: union_vlrs(inputs), gap, evlrs }, shifts))
+
+    /// One header and one list of records for all `inputs`, which are the files taken in, and how
+    /// far each must be shifted.
+    pub fn finish(self, inputs: &[Input]) -> Result<(Native, Vec<Shift>)> {
+        if inputs.len() <= 1 {
+            return Ok((Native::of(&self.first), vec![Shift::default()]));
+        }
+        let (offset, shifts) = shifts(inputs)?;
+        let (vlrs, gap, evlrs) = self.records.finish();
+        waveforms(inputs, &evlrs)?;
+        let mut header = header(inputs);
+        header.put_floats(at::OFFSET, offset);
+        Ok((Native { header, vlrs, gap, evlrs }, shifts))
+    }
 }
 
 /// Refuses two files that cannot be one.
@@ -87,11 +100,6 @@ fn short(text: &str) -> String {
     if tail.is_empty() { head.to_owned() } else { format!("{head}…") }
 }
 
-/// The descriptors without what is a statistic of one file.
-fn described(input: &Input) -> Vec<Descriptor> {
-    input.descriptors().iter().map(Descriptor::without_range).collect()
-}
-
 /// The smallest offset of all inputs per axis, and each input's whole steps to it.
 fn shifts(inputs: &[Input]) -> Result<([f64; 3], Vec<Shift>)> {
     let first = &inputs[0];
@@ -104,14 +112,7 @@ fn shifts(inputs: &[Input]) -> Result<([f64; 3], Vec<Shift>)> {
         let mut shift = [0; 3];
         for axis in 0..3 {
             let offset = input.header.offset()[axis];
-            if offset == smallest[axis] {
-                continue;
-            }
-            let steps = (offset - smallest[axis]) / scale[axis];
-            let whole = steps.round();
-            let rounding = 4.0 * f64::EPSILON * (offset / scale[axis]).abs();
-            // Stored coordinates are i32: a shift of 2^32 steps leaves none of them room.
-            if !((steps - whole).abs() <= WHOLE + rounding && whole.abs() < 2f64.powi(32)) {
+            shift[axis] = whole_steps(smallest[axis], offset, scale[axis]).ok_or_else(|| {
                 let other = inputs.iter().find(|i| i.header.offset()[axis] == smallest[axis]);
                 let why = format!(
                     "their offsets {:?} and {offset:?} on axis {} do not differ by whole steps \
@@ -120,13 +121,25 @@ fn shifts(inputs: &[Input]) -> Result<([f64; 3], Vec<Shift>)> {
                     ["x", "y", "z"][axis],
                     scale[axis]
                 );
-                return Err(refuse(other.unwrap_or(first), input, why));
-            }
-            shift[axis] = whole as i64;
+                refuse(other.unwrap_or(first), input, why)
+            })?;
         }
         shifts.push(Shift(shift));
     }
     Ok((smallest, shifts))
+}
+
+/// The steps of `scale` from one offset to another, if they are whole and stored coordinates, which
+/// are i32, can move by them.
+pub fn whole_steps(from: f64, to: f64, scale: f64) -> Option<i64> {
+    if from == to {
+        return Some(0);
+    }
+    let steps = (to - from) / scale;
+    let whole = steps.round();
+    let rounding = 4.0 * f64::EPSILON * (from.abs().max(to.abs()) / scale).abs();
+    let near = (steps - whole).abs() <= WHOLE + rounding && whole.abs() < 2f64.powi(32);
+    near.then_some(whole as i64)
 }
 
 /// Fields that all inputs share are carried; the others become neutral, the version and the date
@@ -166,61 +179,6 @@ fn header(inputs: &[Input]) -> Header {
         merged.put(at::WAVEFORM_START, &[0; 8]);
     }
     merged
-}
-
-/// Equal lists as they are, else the union in the order of user, number and bytes.
-fn union_vlrs(inputs: &[Input]) -> Vec<Vlr> {
-    let lists: Vec<Vec<Vlr>> = inputs.iter().map(carried_without_ranges(inputs)).collect();
-    if lists.iter().all(|list| *list == lists[0]) {
-        return lists.into_iter().next().unwrap_or_default();
-    }
-    let mut all: Vec<Vlr> = lists.into_iter().flatten().collect();
-    all.sort_by(Vlr::order);
-    all.dedup();
-    all
-}
-
-/// Where the ranges in the descriptors of extra bytes differ, none holds for all points: they are
-/// left out, so that one record remains.
-fn carried_without_ranges(inputs: &[Input]) -> impl Fn(&Input) -> Vec<Vlr> {
-    let first = inputs[0].descriptors();
-    let differ = inputs.iter().any(|i| i.descriptors() != first);
-    move |input| {
-        let plain = described(input).iter().flat_map(|d| *d.bytes()).collect::<Vec<u8>>();
-        let mut vlrs = input.carried_vlrs();
-        if let Some(record) =
-            super::input::extra_record(&vlrs, input.extra_len()).filter(|_| differ)
-        {
-            vlrs[record] = Vlr::new(EXTRA_BYTES.0, EXTRA_BYTES.1, "Extra bytes", plain);
-        }
-        vlrs
-    }
-}
-
-fn union_evlrs(inputs: &[Input]) -> Result<Vec<Evlr>> {
-    let lists: Vec<Vec<Evlr>> = inputs.iter().map(Input::carried_evlrs).collect();
-    let mut equal = true;
-    for list in &lists[1..] {
-        equal &= list.len() == lists[0].len();
-        for (a, b) in list.iter().zip(&lists[0]) {
-            equal = equal && a.order(b)? == Ordering::Equal;
-        }
-    }
-    if equal {
-        return Ok(lists.into_iter().next().unwrap_or_default());
-    }
-    let mut failure = None;
-    let mut order = |a: &Evlr, b: &Evlr| match a.order(b) {
-        Ok(order) => order,
-        Err(error) => {
-            failure.get_or_insert(error);
-            Ordering::Equal
-        }
-    };
-    let mut all: Vec<Evlr> = lists.into_iter().flatten().collect();
-    all.sort_by(&mut order);
-    all.dedup_by(|a, b| order(a, b) == Ordering::Equal);
-    failure.map_or(Ok(all), Err)
 }
 
 /// Records refer to waveforms by their place in one block: two blocks cannot be one.

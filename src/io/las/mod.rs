@@ -17,13 +17,17 @@ mod input;
 mod laz;
 mod merge;
 mod native;
+mod own;
 mod read;
 mod sink;
 mod source;
+mod union;
 mod vlr;
 
 pub use describe::{Description, ExtraBytes, Record, describe};
 pub use format::layout;
 pub use native::fresh;
+pub use own::{Shifted, own_form};
+pub use read::Shift;
 pub use sink::{LasOptions, chunk, create};
 pub use source::open;

@@ -2,10 +2,12 @@
 
 use super::crs;
 use super::extra::Descriptor;
+use super::file::InputFile;
 use super::format::record_size;
 use super::header::{Header, at, encoding};
-use super::input::{EXTRA_BYTES, Input};
-use super::vlr::{Evlr, Vlr};
+use super::input::{EXTRA_BYTES, Input, is_carried, is_carried_extended};
+use super::vlr::{Evlr, Vlr, read_evlrs, read_vlrs};
+use crate::Result;
 use crate::point::{Layout, Metadata, Schema, names};
 
 /// Header and records of the input, without what describes how that file stored its points.
@@ -30,6 +32,21 @@ impl Native {
             gap: input.gap.clone(),
             evlrs: input.carried_evlrs(),
         }
+    }
+
+    /// Of a file that was opened before with `header`, read again.
+    ///
+    /// Fails if the file is another by now.
+    pub fn again(file: &InputFile, header: &Header) -> Result<Self> {
+        let now = Header::read(file)?;
+        if now != *header {
+            return Err(file.wrong(0, "the header changed while the file was read"));
+        }
+        let (mut vlrs, gap, _) = read_vlrs(file, header)?;
+        let mut evlrs = read_evlrs(file, header)?;
+        vlrs.retain(is_carried);
+        evlrs.retain(is_carried_extended);
+        Ok(Native { header: now, vlrs, gap, evlrs })
     }
 
     /// True if it belongs to records of this schema.

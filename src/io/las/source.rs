@@ -6,7 +6,8 @@ use std::sync::Arc;
 use super::chunks::{Chunk, Chunks};
 use super::file::WINDOW_BYTES;
 use super::input::{Input, Storage};
-use super::merge::merge;
+use super::merge::Merge;
+use super::native::Native;
 use super::read::{LazPart, PlainPart, Shift};
 use crate::point::{Metadata, Schema};
 use crate::stage::{self, Part, Source};
@@ -25,19 +26,24 @@ const PART_POINTS: u64 = 50_000;
 /// byte; files that do not agree (point format, record length, extra bytes, scale, GPS time type,
 /// CRS; offsets apart from whole steps) are named both.
 pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
-    let inputs = paths.iter().map(|path| Input::open(path)).collect::<Result<Vec<_>>>()?;
-    let (native, shifts) = merge(&inputs)?;
-    let mut schema = inputs[0].schema();
+    let Some((first, others)) = paths.split_first() else {
+        return Err(Error::pipeline("there is no input file"));
+    };
+    let first = Input::open(first)?;
+    let (mut schema, crs, units) = (first.schema(), first.crs()?, first.units()?);
+    let mut inputs = vec![first.clone().without_records()];
+    let mut merge = Merge::of(first);
+    for path in others {
+        let input = Input::open(path)?;
+        merge.add(&input)?;
+        inputs.push(input.without_records());
+    }
+    let (native, shifts) = merge.finish(&inputs)?;
     for (axis, dimension) in schema.dimensions.iter_mut().take(3).enumerate() {
         dimension.origin = native.header.offset()[axis];
     }
     let warnings = inputs.iter().flat_map(|i| i.warnings.clone()).collect();
-    let metadata = Metadata {
-        crs: inputs[0].crs()?,
-        units: inputs[0].units()?,
-        comments: Vec::new(),
-        native: Some(Arc::new(native)),
-    };
+    let metadata = Metadata { crs, units, comments: Vec::new(), native: Some(Arc::new(native)) };
     let files: Vec<Opened> = inputs.into_iter().zip(shifts).map(Opened::new).collect();
     let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i)).collect();
     Ok(Box::new(LasSource { files, parts, schema: Arc::new(schema), metadata, warnings }))
@@ -146,6 +152,15 @@ impl Source for LasSource {
         let input =
             |f: &Opened| stage::Input { path: f.input.path.clone(), points: f.input.points() };
         self.files.iter().map(input).collect()
+    }
+
+    fn metadata_of(&self, input: usize) -> Result<Metadata> {
+        let Some(Opened { input, .. }) = self.files.get(input) else {
+            return Err(Error::internal(format!("input {input} of {}", self.files.len())));
+        };
+        let native = Native::again(&input.reopen()?, &input.header)?;
+        // The CRS is that of all inputs, or they would have been refused.
+        Ok(Metadata { native: Some(Arc::new(native)), ..self.metadata.clone() })
     }
 
     fn points(&self) -> u64 {

@@ -1,6 +1,6 @@
 //! Outliers with too few neighbours within a radius: a tile at a time.
 
-use super::super::removal::{decides, remove};
+use super::super::removal::remove;
 use super::{account, checked};
 use crate::point::{Mark, distance2, names};
 use crate::report::Tally;
@@ -57,7 +57,7 @@ impl TileOp for RadiusOutliers {
             reads: names::XYZ.map(str::to_owned).to_vec(),
             neighbors: self.min_neighbors,
             bytes_per_point: size_of::<bool>(),
-            removes: true,
+            removes: self.mark.is_none(),
             mark: self.mark,
             ..Needs::default()
         }
@@ -79,7 +79,7 @@ impl TileOp for RadiusOutliers {
         })?;
         let mut records = 0;
         for i in tile.core.clone() {
-            if lonely[i] && decides(tile, i) {
+            if lonely[i] && tile.is_chosen(i) {
                 records += remove(tile, i);
             }
         }

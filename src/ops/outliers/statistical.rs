@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::super::removal::{decides, remove};
+use super::super::removal::remove;
 use super::{account, checked};
 use crate::geom::wide::Wide;
 use crate::point::{Mark, Position, distance2, names};
@@ -46,7 +46,12 @@ impl StatisticalOutliers {
 
 impl TileOp for StatisticalOutliers {
     fn needs(&self) -> Needs {
-        Needs { reads: vec!["Figure".into()], removes: true, mark: self.mark, ..Needs::default() }
+        Needs {
+            reads: vec!["Figure".into()],
+            removes: self.mark.is_none(),
+            mark: self.mark,
+            ..Needs::default()
+        }
     }
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
@@ -63,7 +68,7 @@ impl TileOp for StatisticalOutliers {
         }
         let mut records = 0;
         for i in tile.core.clone() {
-            if decides(tile, i) && units(tile.figures[i]).is_some_and(|u| u > concluded.most) {
+            if tile.is_chosen(i) && units(tile.figures[i]).is_some_and(|u| u > concluded.most) {
                 records += remove(tile, i);
             }
         }
@@ -106,7 +111,7 @@ impl ScanOp for StatisticalOutliers {
         let mut sums = Sums::default();
         for i in tile.core.clone() {
             match units(tile.figures[i]) {
-                Some(units) if decides(tile, i) => sums.add(units),
+                Some(units) if tile.is_chosen(i) => sums.add(units),
                 _ => tile.figures[i] = f64::NAN,
             }
         }
