@@ -120,10 +120,9 @@ mod tests {
 
     #[test]
     fn a_cell_longer_than_any_column_makes_no_other_row_long() {
-        let rows: Vec<Value> = (0..500).map(|i| json!({ "name": "x", "n": i })).collect();
-        let long = json!({ "name": "x".repeat(100_000), "n": 0 });
-        let elements = [rows, vec![long]].concat();
-        let text = render(&json!({ "elements": elements }), 0);
+        let mut rows: Vec<Value> = (0..500).map(|i| json!({ "name": "x", "n": i })).collect();
+        rows.push(json!({ "name": "x".repeat(100_000), "n": 0 }));
+        let text = render(&json!({ "elements": rows }), 0);
         assert!(text.contains(&"x".repeat(100_000)) && text.len() < 150_000, "{}", text.len());
     }
 

@@ -12,6 +12,9 @@ use super::random::Random;
 const LONGEST: usize = 128 << 10;
 /// Inputs that are kept, at most.
 const MOST_KEPT: usize = 4096;
+/// Marks that begin with the same words (up to a colon) and count as new, at most: some hold parts of
+/// the input after all.
+const MOST_ALIKE: usize = 300;
 /// Tries to make a finding smaller.
 const TRIES: usize = 400;
 
@@ -30,6 +33,8 @@ pub struct Campaign {
     corpus: Vec<Vec<u8>>,
     seeds: usize,
     marks: BTreeSet<String>,
+    /// How many marks begin alike.
+    alike: BTreeMap<String, usize>,
     /// Inputs taken, and those of them that were accepted.
     pub executions: u64,
     pub accepted: u64,
@@ -50,6 +55,7 @@ impl Campaign {
             seeds: corpus.len(),
             corpus: Vec::new(),
             marks: BTreeSet::new(),
+            alike: BTreeMap::new(),
             executions: 0,
             accepted: 0,
             findings: BTreeMap::new(),
@@ -126,15 +132,23 @@ impl Campaign {
         }
     }
 
+    /// Enters a mark; true if it is new.
+    fn enter(&mut self, mark: String) -> bool {
+        let begins = mark.split(':').next().unwrap_or_default();
+        if self.marks.contains(&mark) || self.alike.get(begins) >= Some(&MOST_ALIKE) {
+            return false;
+        }
+        *self.alike.entry(begins.to_owned()).or_default() += 1;
+        self.marks.insert(mark)
+    }
+
     /// Takes one input; true if it came to something new.
     fn take(&mut self, input: &[u8]) -> bool {
         self.executions += 1;
         match self.harness.judge(input) {
             Ok(outcome) => {
                 self.accepted += u64::from(outcome.accepted);
-                let before = self.marks.len();
-                self.marks.extend(outcome.marks);
-                self.marks.len() > before
+                outcome.marks.into_iter().fold(false, |new, mark| self.enter(mark) || new)
             }
             Err(promise) => {
                 let key = shape(&promise);

@@ -41,7 +41,8 @@ pub fn proper(stage: &str, error: &Error, allowed: &[ErrorKind]) -> Result<Strin
     Ok(text)
 }
 
-/// A message without what differs from input to input: digits, and words in backticks or quotes.
+/// A message without what differs from input to input: digits, and what stands in backticks, quotes or
+/// brackets.
 pub fn shape(message: &str) -> String {
     let mut shape = String::new();
     let mut quoted = None;
@@ -50,6 +51,7 @@ pub fn shape(message: &str) -> String {
             Some(end) if c == end => quoted = None,
             Some(_) => continue,
             None if c == '`' || c == '"' => quoted = Some(c),
+            None if c == '[' => quoted = Some(']'),
             None if c.is_ascii_digit() => {
                 if !shape.ends_with('#') {
                     shape.push('#');

@@ -1,6 +1,6 @@
 //! Target `las`: header, records, chunk table and points of a LAS or LAZ file.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use pointmill::ErrorKind::{self, Data, Pipeline};
 use pointmill::io::las::{LasOptions, create, describe, open};
@@ -28,12 +28,17 @@ fn target(path: &Path, data: &[u8]) -> Judgement {
         Err(error) => return judge::refused("open", &error, REFUSED),
     };
     let schema = source.schema().clone();
-    let mut marks: Vec<String> = source.warnings().iter().map(|w| shape(w)).collect();
-    marks.push(format!("{:?} of {} dimensions", schema.layout, schema.dimensions.len().min(40)));
+    let mut marks: Vec<String> =
+        source.warnings().iter().map(|w| format!("warning: {}", shape(w))).collect();
+    marks.push(format!(
+        "schema: {:?} of {} dimensions",
+        schema.layout,
+        schema.dimensions.len().min(40)
+    ));
     let crs = source.metadata().crs.as_deref().map(|crs| shape(crs).chars().take(6).collect());
-    marks.push(format!("crs {:?}", crs.unwrap_or_else(String::new)));
+    marks.push(format!("crs: {:?}", crs.unwrap_or_else(String::new)));
     let parts = magnitude(source.parts() as u64);
-    marks.push(format!("2^{} points in 2^{parts} parts", magnitude(source.points())));
+    marks.push(format!("size: 2^{} points in 2^{parts} parts", magnitude(source.points())));
     twice_the_file(path, &*source)?;
     let Some(read) = judge::read_twice(&*source, REFUSED)? else {
         marks.push("a part holds too much".to_owned());
@@ -45,7 +50,7 @@ fn target(path: &Path, data: &[u8]) -> Judgement {
     });
     if read.all && read.error.is_none() {
         // An encoder of very long records holds more than is worth trying.
-        let compressed = data.len() % 2 == 0 && schema.stride < 4096;
+        let compressed = data.len().is_multiple_of(2) && schema.stride < 4096;
         marks.extend(written(path, &*source, &schema, &read, compressed)?);
     }
     Ok(Outcome { accepted: read.error.is_none(), marks })
@@ -88,7 +93,7 @@ fn written(
 }
 
 fn copy_of(
-    copy: &PathBuf,
+    copy: &Path,
     source: &dyn Source,
     schema: &std::sync::Arc<Schema>,
     options: LasOptions,

@@ -1,6 +1,6 @@
 //! Target `ply`: header, other elements and vertices of a PLY file.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use pointmill::ErrorKind::{self, Data, Pipeline};
 use pointmill::io::ply::{PlyOptions, create, describe, open};
@@ -27,17 +27,21 @@ fn target(path: &Path, data: &[u8]) -> Judgement {
         Err(error) => return judge::refused("open", &error, REFUSED),
     };
     let schema = source.schema().clone();
-    let mut marks: Vec<String> = source.warnings().iter().map(|w| shape(w)).collect();
+    let mut marks: Vec<String> =
+        source.warnings().iter().map(|w| format!("warning: {}", shape(w))).collect();
     let dimensions = magnitude(schema.dimensions.len() as u64);
-    marks.push(format!("{:?}, 2^{dimensions} dimensions", schema.endian));
+    marks.push(format!("schema: {:?}, 2^{dimensions} dimensions", schema.endian));
     marks.push(format!(
-        "2^{} points, {} comments, crs {}",
+        "size: 2^{} points, {} comments, crs {}",
         magnitude(source.points()),
         magnitude(source.metadata().comments.len() as u64),
         source.metadata().crs.is_some(),
     ));
-    let known = schema.dimensions.iter().map(|d| shape(&d.name)).filter(|name| name.len() < 12);
-    marks.extend(known.map(|name| format!("dimension {name}")).take(40));
+    // The shared dimensions begin with a capital letter; all other names are the file's own.
+    let known = schema.dimensions.iter().map(|d| &d.name);
+    let known = known.filter(|name| name.len() < 24 && name.starts_with(char::is_uppercase));
+    let known = known.map(|name| shape(name));
+    marks.extend(known.map(|name| format!("dimension: {name}")).take(40));
     twice_the_file(path, &*source)?;
     let Some(read) = judge::read_twice(&*source, REFUSED)? else {
         marks.push("a part holds too much".to_owned());
@@ -47,7 +51,7 @@ fn target(path: &Path, data: &[u8]) -> Judgement {
         marks.push(format!("points: {}", shape(error)));
     }
     if read.all && read.error.is_none() {
-        marks.extend(written(path, &*source, &read, data.len() % 2 == 0)?);
+        marks.extend(written(path, &*source, &read, data.len().is_multiple_of(2))?);
     }
     Ok(Outcome { accepted: read.error.is_none(), marks })
 }
@@ -84,7 +88,7 @@ fn written(
     }
 }
 
-fn copy_of(copy: &PathBuf, source: &dyn Source, carry_rest: bool) -> pointmill::Result<()> {
+fn copy_of(copy: &Path, source: &dyn Source, carry_rest: bool) -> pointmill::Result<()> {
     let schema = source.schema();
     let options = PlyOptions { carry_rest, ..PlyOptions::default() };
     let mut sink = create(copy, &options, schema, source.metadata())?;
