@@ -11,6 +11,8 @@ use crate::tile::{Reader, SealedTiles, Sieve, TileKey};
 const SAMPLES: u64 = 256;
 /// Positions that a cube has on average, at most, however large the cells.
 const MOST_POSITIONS: u64 = 2048;
+/// Positions of a cube beyond which it is left out; as many fit into any plan's tiles.
+const HEAVIEST: u64 = 8192;
 /// Positions that are loaded around a cube, about.
 const RIM: usize = 4096;
 
@@ -38,7 +40,7 @@ pub(super) fn forecast(
         let mut reader = Reader::default();
         for key in keys {
             job.advance(0)?;
-            if field.tiles.holds_more(&key.cube(), (capacity / 2) as u64, &mut reader)? {
+            if field.tiles.holds_more(&key.cube(), HEAVIEST, &mut reader)? {
                 continue;
             }
             let (tile, _) = worker.run(key, Some(op))?;

@@ -33,11 +33,11 @@ pub(super) fn fate_code(fate: Fate) -> [u8; FATE_BYTES] {
 }
 
 /// How far the removed records of a position are from the surface, by its stored fate: copies of a
-/// kept one are on it; None where nothing stands for them.
+/// kept one are on it; None where nothing stands for them, as for those that took no part.
 fn deviation_of(code: [u8; FATE_BYTES]) -> Option<f32> {
     match f32::from_le_bytes(code) {
-        REMOVED => None,
-        KEPT | KEPT_ONCE => Some(0.0),
+        REMOVED | KEPT => None,
+        KEPT_ONCE => Some(0.0),
         deviation => Some(deviation),
     }
 }

@@ -27,6 +27,11 @@ impl fmt::Display for Table<'_> {
         let (read, kept) = (result.ledger.read, result.ledger.kept);
         write!(f, "points     {} in, {} out{}", Grouped(read), Grouped(kept), Share(kept, read))?;
         class_lines(f, &result.classes)?;
+        for (name, &records) in &result.counts {
+            if let Some(stage) = name.strip_suffix("_marked") {
+                write!(f, "\nmarked     {} by {stage}", Grouped(records))?;
+            }
+        }
         if let Some(&cells) = result.counts.get("cells") {
             write!(f, "\ncells      {}", Grouped(cells))?;
         }
