@@ -148,7 +148,11 @@ impl Campaign {
         match self.harness.judge(input) {
             Ok(outcome) => {
                 self.accepted += u64::from(outcome.accepted);
-                outcome.marks.into_iter().fold(false, |new, mark| self.enter(mark) || new)
+                let mut new = false;
+                for mark in outcome.marks {
+                    new |= self.enter(mark);
+                }
+                new
             }
             Err(promise) => {
                 let key = shape(&promise);
