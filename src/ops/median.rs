@@ -198,16 +198,14 @@ mod tests {
     }
 
     #[test]
-    fn passes_are_1_to_16_and_only_where_points_are_removed() {
+    fn passes_are_1_to_16_with_a_mark_and_without() {
         assert_eq!(toml::from_str::<Median>("").unwrap(), Median { passes: 1, mark: None });
         assert_eq!(toml::from_str::<Median>("passes = 16").unwrap().needs().passes, 16);
         for wrong in ["passes = 0", "passes = 17", "passes = -1", "keep = 2", "mark = 6"] {
             assert!(toml::from_str::<Median>(wrong).is_err(), "{wrong}");
         }
-        for (text, fits) in
-            [("passes = 2", true), ("mark = 7", true), ("passes = 2\nmark = 7", false)]
-        {
-            assert_eq!(toml::from_str::<Median>(text).unwrap().check().is_ok(), fits, "{text}");
+        for text in ["passes = 2", "mark = 7", "passes = 2\nmark = 7"] {
+            toml::from_str::<Median>(text).unwrap().check().unwrap();
         }
         assert!(Median { passes: 17, mark: None }.check().is_err());
     }
