@@ -80,8 +80,8 @@ impl PlyFile {
             self.more_lines.load(Ordering::Relaxed).then(|| "lines".to_owned())?
         } else {
             let behind = &self.header.elements[self.vertex..];
-            let sizes = behind.iter().map(|e| e.size()?.checked_mul(e.count));
-            let end = sizes.fold(Some(self.body), |end, size| end?.checked_add(size?))?;
+            let mut sizes = behind.iter().map(|e| e.size()?.checked_mul(e.count));
+            let end = sizes.try_fold(self.body, |end, size| end.checked_add(size?))?;
             // Some writers end a binary file with an empty line.
             let bytes = self.length.checked_sub(end).filter(|&bytes| bytes > 2)?;
             format!("{bytes} bytes")
