@@ -1,4 +1,5 @@
 //! The partition into cells: against the plain version, and what the words of the method promise.
+#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
 
 mod cells_scene;
 
