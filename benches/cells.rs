@@ -88,7 +88,7 @@ fn main() {
                 let start = Instant::now();
                 stage.run(&mut tile, &mut tally).unwrap();
                 let between = Instant::now();
-                Median {}.run(&mut tile, &mut tally).unwrap();
+                Median::default().run(&mut tile, &mut tally).unwrap();
                 let points = tile.positions.len() as f64;
                 best[0] = best[0].min((between - start).as_secs_f64() * 1e9 / points);
                 best[1] = best[1].min(between.elapsed().as_secs_f64() * 1e9 / points);

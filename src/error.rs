@@ -53,8 +53,8 @@ impl Error {
 
     /// A refusal of the operating system at `path`; `doing` completes "cannot …".
     pub fn io(path: impl AsRef<Path>, doing: &str, cause: std::io::Error) -> Self {
-        use std::io::ErrorKind::{QuotaExceeded, StorageFull};
-        let is_full = matches!(cause.kind(), QuotaExceeded | StorageFull);
+        use std::io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+        let is_full = matches!(cause.kind(), FileTooLarge | QuotaExceeded | StorageFull);
         let error = Error::new(ErrorKind::Io, format!("cannot {doing}")).at(path).because(cause);
         if is_full { error.help("free some disk space, or write elsewhere") } else { error }
     }

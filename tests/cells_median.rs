@@ -109,10 +109,10 @@ fn a_second_median_removes_nothing_more() {
     let mut tile = tile(&scan, whole(&scan).cube(), 5);
     let mut first = Tally::default();
     stage.run(&mut tile, &mut first).unwrap();
-    Median {}.run(&mut tile, &mut first).unwrap();
+    Median::default().run(&mut tile, &mut first).unwrap();
     let fates = tile.fates.clone();
     let mut second = Tally::default();
-    Median {}.run(&mut tile, &mut second).unwrap();
+    Median::default().run(&mut tile, &mut second).unwrap();
     assert_eq!(tile.fates, fates);
     assert!(second.removed.is_empty());
     let records: u64 = scan.iter().map(|p| u64::from(p.copies)).sum();

@@ -5,7 +5,7 @@ mod cells_scene;
 use std::num::NonZeroUsize;
 
 use cells_scene::*;
-use pointmill::ops::{Cells, Split};
+use pointmill::ops::{Cells, Measure, Reference, Split};
 use pointmill::point::{Bounds, Position};
 use pointmill::report::Tally;
 use pointmill::stage::TileOp;
@@ -22,6 +22,25 @@ fn any_split() -> impl Strategy<Value = Split> {
     prop::sample::select(vec![Split::Voronoi, Split::Octant])
 }
 
+fn any_measure() -> impl Strategy<Value = Measure> {
+    prop::sample::select(vec![Measure::Axis, Measure::Cone])
+}
+
+fn any_reference() -> impl Strategy<Value = Reference> {
+    // Their largest components are powers of two: scaled by them they are what the plain version has.
+    let [a, b] = [[0.0, 0.0, 2.0], [1.0, -1.0, 0.5]].map(Reference::Vector);
+    prop::sample::select(vec![Reference::X, Reference::Y, Reference::Z, a, b])
+}
+
+/// A least spacing and a largest side, in this order.
+fn any_lengths() -> impl Strategy<Value = (Option<f64>, Option<f64>)> {
+    let length = || 1i64..30;
+    (any::<bool>(), any::<bool>(), length(), length()).prop_map(|(has_least, has_most, a, b)| {
+        let (least, most) = (a.min(b) as f64, a.max(b) as f64);
+        (has_least.then_some(least), has_most.then_some(most))
+    })
+}
+
 /// A grid of `n` × `n` positions 10 steps apart.
 fn grid(n: i64, normal: impl Fn(i64, i64) -> [f32; 3]) -> Vec<Point> {
     scan((0..n * n).map(|i| ([i % n * 10, i / n * 10, 0], normal(i % n, i / n), 1)))
@@ -32,18 +51,21 @@ proptest! {
     fn groups_and_medians_equal_the_plain_version(
         scan in prop_oneof![any_scan(0, 14, 90), any_scan(1 << 30, 200, 60), any_scan(-1000, 40, 60), any_scan(99, 1 << 39, 60)],
         side in prop_oneof![5 => 1i64..40, 2 => (1i64 << 36) - 3..(1 << 40) + 3, 1 => Just(1 << 38)], delta in prop::sample::select(vec![0.0, 0.05, 0.1, 0.7, 2.0, 3.1]),
-        split in any_split(), min_points in 1usize..6,
+        split in any_split(), min_points in 1usize..6, measure in any_measure(), reference in any_reference(),
+        bounds in prop_oneof![Just((None, None)), any_lengths()],
     ) {
         let mut stage = cells(side as f64, delta, split);
         stage.min_points = NonZeroUsize::new(min_points).unwrap();
+        (stage.measure, stage.reference) = (measure, reference);
+        (stage.min_spacing, stage.max_side) = bounds;
         let plain = plain_groups(&scan, &stage, side);
-        let outcome = run_whole(stage, &scan);
+        let outcome = run_whole(stage.clone(), &scan);
         let positions = |g: &Vec<Point>| g.iter().map(|p| p.at).collect::<Vec<_>>();
         // Equal as lists: members of both are in Morton order.
         prop_assert_eq!(sorted(outcome.groups.clone()), sorted(plain.iter().map(positions).collect()));
         let mut kept = outcome.kept();
         kept.sort_unstable();
-        let mut expected: Vec<Position> = plain.iter().map(|g| plain_median(g)).collect();
+        let mut expected: Vec<Position> = plain.iter().map(|g| plain_median(g, &stage)).collect();
         expected.extend(scan.iter().filter(|p| p.normal[0].is_nan()).map(|p| p.at));
         expected.sort_unstable();
         prop_assert_eq!(kept, expected);
@@ -208,4 +230,73 @@ fn no_data_makes_the_division_quadratic() {
     for group in &outcome.groups {
         assert_eq!(group.len(), 1, "neighbours differ by more than the angle");
     }
+}
+
+/// The longest side of each group's tight box.
+fn lengths(outcome: &Outcome) -> Vec<u64> {
+    let length = |group: &Vec<Position>| {
+        Bounds::of(group.iter().copied()).extent().into_iter().max().unwrap()
+    };
+    outcome.groups.iter().map(length).collect()
+}
+
+#[test]
+fn no_cell_longer_than_max_side_is_kept_whole() {
+    let plane = grid(40, |_, _| UP);
+    let mut stage = cells(1e6, 0.1, Split::Voronoi);
+    stage.min_points = NonZeroUsize::new(1000).unwrap();
+    assert_eq!(run_whole(stage.clone(), &plane).groups.len(), 1);
+    stage.max_side = Some(50.0);
+    let outcome = run_whole(stage.clone(), &plane);
+    let groups = outcome.groups.len();
+    assert!(lengths(&outcome).iter().all(|&length| length <= 50));
+    assert!((64..=400).contains(&groups), "{groups} of squares of 25 to 50");
+    // Of a plane every division is one for that reason; each makes two to four parts.
+    let divided = outcome.count("cells_by_max_side");
+    assert!(divided < groups as u64 && groups as u64 <= 3 * divided + 1, "{divided}, {groups}");
+    // A part of two sides of a ridge is divided by its angles, however long.
+    let ridge = grid(2, |x, _| if x == 0 { [0.6, 0.0, 0.8] } else { [-0.6, 0.0, 0.8] });
+    (stage.max_side, stage.min_points) = (Some(9.0), NonZeroUsize::MIN);
+    let outcome = run_whole(stage, &ridge);
+    assert_eq!((outcome.groups.len(), outcome.count("cells_by_max_side")), (4, 0));
+}
+
+#[test]
+fn no_cell_of_min_spacing_is_divided() {
+    let rough = grid(32, |x, y| if (x + y) % 2 == 0 { [0.6, 0.0, 0.8] } else { [-0.6, 0.0, 0.8] });
+    let mut stage = cells(1e6, 0.1, Split::Octant);
+    assert_eq!(run_whole(stage.clone(), &rough).groups.len(), 1024);
+    stage.min_spacing = Some(70.0);
+    let outcome = run_whole(stage.clone(), &rough);
+    assert!(lengths(&outcome).iter().all(|&length| length <= 70));
+    assert_eq!(outcome.count("cells_by_min_spacing"), outcome.groups.len() as u64);
+    assert!(outcome.groups.len() < 150, "{}", outcome.groups.len());
+    // Cells that agree are not kept for that reason.
+    let plane = grid(4, |_, _| UP);
+    assert_eq!(run_whole(stage, &plane).count("cells_by_min_spacing"), 0);
+}
+
+#[test]
+fn cones_see_what_turns_about_the_reference() {
+    // Normals turn about x: their angle to it is the same everywhere.
+    let roll = grid(40, |_, y| {
+        let angle = (y as f64 - 19.5) * 0.02;
+        [0.0, angle.sin() as f32, angle.cos() as f32]
+    });
+    let mut stage = cells(1e6, 0.1, Split::Voronoi);
+    assert_eq!(run_whole(stage.clone(), &roll).groups.len(), 1, "blind");
+    stage.reference = Reference::Y;
+    assert!(run_whole(stage.clone(), &roll).groups.len() >= 8);
+    (stage.measure, stage.reference) = (Measure::Cone, Reference::X);
+    let outcome = run_whole(stage.clone(), &roll);
+    assert!((8..=40).contains(&outcome.groups.len()), "{}", outcome.groups.len());
+    // Rows of one normal are 0.02 rad apart: a cone of 0.1 holds at most 6 of them.
+    assert!(outcome.groups.iter().all(|g| g.iter().all(|p| (p[1] - g[0][1]).abs() <= 50)));
+    // Normals that agree are in one cone even of angle 0, rounded as they are.
+    stage.max_angle = Some(0.0);
+    let tilted = grid(20, |x, _| {
+        let n = [0.267_261_24, 0.534_522_5, 0.801_783_7f32];
+        if x % 2 == 0 { n } else { n.map(|v| -v) }
+    });
+    assert_eq!(run_whole(stage, &tilted).groups.len(), 1);
 }

@@ -3,28 +3,9 @@
 mod cells_scene;
 
 use cells_scene::*;
-use pointmill::ops::{Cells, Split};
-use pointmill::point::Bounds;
-use pointmill::tile::{Fate, TileKey};
+use pointmill::ops::{Cells, Measure, Split};
+use pointmill::tile::Fate;
 use proptest::prelude::*;
-
-/// Octree nodes below `key`, cut where they hold more than `most` positions.
-fn cut(scan: &[Point], key: TileKey, most: usize, tiles: &mut Vec<Bounds>) {
-    let count = scan.iter().filter(|p| key.cube().contains(p.at)).count();
-    match key.children() {
-        Some(children) if count > most => {
-            children.into_iter().for_each(|child| cut(scan, child, most, tiles));
-        }
-        _ if count > 0 => tiles.push(key.cube()),
-        _ => {}
-    }
-}
-
-fn tiles(scan: &[Point], most: usize) -> Vec<Bounds> {
-    let mut tiles = Vec::new();
-    cut(scan, whole(scan), most, &mut tiles);
-    tiles
-}
 
 fn bits(fates: &[(pointmill::point::Position, Fate)]) -> Vec<([i64; 3], Option<u32>, bool)> {
     let deviation = |fate: Fate| match fate {
@@ -56,8 +37,13 @@ proptest! {
         most in 5usize..60,
         split in prop::sample::select(vec![Split::Voronoi, Split::Octant]),
         delta in prop::sample::select(vec![0.0, 0.1, 0.8]),
+        measure in prop::sample::select(vec![Measure::Axis, Measure::Cone]),
+        bounds in prop::sample::select(vec![None, Some((1.0, 3.0)), Some((2.0, 2.0))]),
     ) {
-        let crossing = same_for_every_cut(cells(side as f64, delta, split), &scan, most)?;
+        let mut stage = cells(side as f64, delta, split);
+        stage.measure = measure;
+        (stage.min_spacing, stage.max_side) = bounds.unzip();
+        let crossing = same_for_every_cut(stage, &scan, most)?;
         prop_assume!(crossing > 0);
     }
 

@@ -48,7 +48,7 @@ fn help_names_commands_and_exit_codes() {
     let at = here();
     let help = pointmill(at.path(), &["--help"]);
     assert_eq!((help.code, help.stderr.as_str()), (0, ""));
-    for command in ["run", "reduce", "convert", "info", "plan", "synth"] {
+    for command in ["run", "reduce", "convert", "info", "plan", "check", "stages", "synth"] {
         assert!(help.stdout.contains(&format!("\n  {command} ")), "{command}");
         let own = pointmill(at.path(), &[command, "--help"]);
         assert_eq!(own.code, 0);
@@ -58,7 +58,7 @@ fn help_names_commands_and_exit_codes() {
     {
         assert!(help.stdout.contains(code), "{code}");
     }
-    for later in ["check", "stages", "schema", "compare"] {
+    for later in ["schema", "compare"] {
         assert!(!help.stdout.contains(&format!("\n  {later} ")), "{later}");
     }
 }
@@ -79,7 +79,11 @@ fn defaults_in_the_help_are_those_of_the_pipeline() {
         let lines = help.split(flag).nth(1).expect(flag);
         let lines: Vec<&str> = lines.lines().take(2).collect();
         assert!(lines.join(" ").contains(&format!("[default: {default}]")), "{flag}: {lines:?}");
-        let line = file.lines().find(|l| l.starts_with(&format!("{key} = "))).expect(key);
+        let line = file
+            .lines()
+            .map(|line| line.trim_start_matches("# "))
+            .find(|l| l.starts_with(&format!("{key} = ")))
+            .expect(key);
         let value = line.split('=').nth(1).unwrap().split('#').next().unwrap();
         assert_eq!(value.trim().trim_matches('"'), default, "{key}");
     }
@@ -92,8 +96,12 @@ fn a_wrong_command_line_exits_with_2() {
     refused(at.path(), &["redcue"], &["redcue", "reduce"]);
     refused(at.path(), &["reduce", "a.laz"], &["--output <OUT>"]);
     refused(at.path(), &["run", "p.toml", "--memory", "2G"], &["--memory", "512MiB or 2GiB"]);
-    refused(at.path(), &["run", "p.toml", "--threads", "0"], &["--threads"]);
-    refused(at.path(), &["run", "p.toml", "--progress", "json"], &["auto", "never"]);
+    let threads = ["--threads", "`0` is no number of threads: give 1 or more"];
+    refused(at.path(), &["run", "p.toml", "--threads", "0"], &threads);
+    let progress = ["auto", "json", "never"];
+    refused(at.path(), &["run", "p.toml", "--progress", "jsn"], &progress);
+    refused(at.path(), &["run", "p.toml", "-q", "-v"], &["--quiet", "--verbose"]);
+    refused(at.path(), &["stages", "cels"], &["there is no stage `cels`", "help: stages: "]);
     refused(at.path(), &["run", "p.toml", "--set", "x"], &["--set x: there is no `=`", "help: "]);
 }
 
@@ -102,7 +110,7 @@ fn a_wrong_pipeline_exits_with_2_and_names_file_line_and_words() {
     let at = here();
     let text = "[[stage]]\nkind = \"raed\"\n";
     fs::write(at.path().join("p.toml"), text).unwrap();
-    for command in ["run", "plan"] {
+    for command in ["run", "plan", "check"] {
         let parts = ["error: p.toml:2:8: there is no stage `raed`", "did you mean `read`?"];
         refused(at.path(), &[command, "p.toml"], &parts);
     }
@@ -111,13 +119,38 @@ fn a_wrong_pipeline_exits_with_2_and_names_file_line_and_words() {
 #[test]
 fn what_is_not_there_exits_with_1() {
     let at = here();
-    for arguments in [&["run", "no.toml"][..], &["info", "no.laz"]] {
+    for arguments in [&["run", "no.toml"][..], &["info", "no.laz"], &["check", "no.toml"]] {
         let outcome = pointmill(at.path(), arguments);
         assert_eq!(outcome.code, 1, "{arguments:?}: {}", outcome.stderr);
         assert!(outcome.stderr.starts_with(&format!("error: {}: cannot ", arguments[1])));
         assert!(outcome.stderr.contains("No such file"), "the cause: {}", outcome.stderr);
         assert_eq!(outcome.stdout, "");
     }
+}
+
+#[test]
+fn inputs_that_are_not_there_exit_with_1_however_they_are_named() {
+    let at = here();
+    fs::create_dir(at.path().join("empty")).unwrap();
+    for (input, told) in [
+        ("no.laz", "no.laz: cannot open"),
+        ("*.las", "IN: no file matches `*.las`"),
+        ("empty", "IN: the folder `empty` has no las, laz or ply file"),
+    ] {
+        for command in ["reduce", "convert"] {
+            let outcome = pointmill(at.path(), &[command, input, "-o", "b.laz"]);
+            assert_eq!((outcome.code, outcome.stdout.as_str()), (1, ""), "{command} {input}");
+            assert!(outcome.stderr.contains(told), "{command} {input}: {}", outcome.stderr);
+        }
+    }
+    let read =
+        "[[stage]]\nkind = 'read'\npath = '*.laz'\n[[stage]]\nkind = 'write'\npath = 'o.laz'\n";
+    fs::write(at.path().join("p.toml"), read).unwrap();
+    let outcome = pointmill(at.path(), &["check", "p.toml"]);
+    assert_eq!(outcome.code, 1, "{}", outcome.stderr);
+    assert!(outcome.stderr.starts_with("error: p.toml:3:8: no file matches"), "{}", outcome.stderr);
+    fs::write(at.path().join("p.toml"), read.replace("path = 'o", "pth = 'o")).unwrap();
+    refused(at.path(), &["check", "p.toml"], &["3 mistakes", "p.toml:3:8: no file", "p.toml:6:"]);
 }
 
 #[test]
@@ -130,9 +163,10 @@ fn flags_of_reduce_are_told_as_they_were_typed() {
     };
     reduce(&["--split", "octnt"], &["error: --split: ", "octnt", "did you mean `octant`?"]);
     reduce(&["--method", "vardy"], &["--method: ", "did you mean `varady`?"]);
-    refused(at.path(), &["reduce", "*.las", "-o", "b.laz"], &["IN: no file matches `*.las`"]);
     refused(at.path(), &["reduce", "a.laz", "-o", "b"], &["-o: the extension of `b` names no"]);
     refused(at.path(), &["reduce", "a.laz", "-o", "./a.laz"], &["-o: ./a.laz is an input"]);
+    reduce(&["--withheld", "drp"], &["--withheld: ", "did you mean `drop`?"]);
+    reduce(&["--classes", "2,256"], &["--classes", "256"]);
     reduce(&["--report", "a.laz"], &["--report: a.laz is an input"]);
     reduce(&["--report", "./b.laz"], &["--report: ./b.laz is written twice"]);
 }
@@ -153,6 +187,11 @@ fn conversions_into_a_folder_are_checked_before_the_first() {
     convert(&["a.las", "b.las", "-o", "out/", "--to", "lax"], &["--to: ", "did you mean `las`?"]);
     convert(&["a.las", "b.las", "-o", "."], &["is an input: it cannot be written over"]);
     convert(&["a.las", "-o", "x.laz", "--scale", "-1"], &["--scale: ", "a number above 0"]);
+    convert(
+        &["a.las", "-o", "x.laz", "--scale", "1,2"],
+        &["--scale", "neither a number nor three"],
+    );
+    convert(&["a.las", "-o", "x.laz", "--scale", "1,0,1"], &["--scale: ", "a number above 0"]);
     convert(&["a.las", "-o", "x.ply", "--encoding", "txt"], &["--encoding: ", "ascii, binary"]);
     convert(&["a.las", "-o", "x"], &["-o: the extension of `x` names no format"]);
 }
@@ -167,6 +206,10 @@ fn flags_of_synth_are_told_as_they_were_typed() {
     synth("plain", &[], &["KIND: `scene` cannot be `plain`", "did you mean `plane`?"]);
     synth("part", &["--noise", "-1"], &["--noise: ", "a number from 0"]);
     synth("part", &["--noise", "nan"], &["--noise: "]);
+    for count in ["1.5", "5MB", "1e"] {
+        let arguments = ["synth", "part", "-n", count, "-o", "a.laz"];
+        refused(at.path(), &arguments, &["--points", "is no count such as 1500, 10k, 5M or 1e6"]);
+    }
 }
 
 #[test]

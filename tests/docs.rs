@@ -1,4 +1,4 @@
-//! The pages of docs/ that the code generates are those in the repository, and the keys that
+//! The pages of docs/ and the data of `pointmill stages` that the code generates are those in the repository, and the keys that
 //! docs/formats.md names are those that a real report and real descriptions have.
 //!
 //! `POINTMILL_WRITE_DOCS=1 cargo test --test docs` writes the generated pages again.
@@ -13,11 +13,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
+use docs_support::formats::{agree, documented};
+use docs_support::keys::{self, Default, Key};
 use docs_support::{Enum, Field, enum_of, item_docs, struct_of};
 use pointmill::ops::normals::Normals;
-use pointmill::ops::{Cells, Median};
+use pointmill::ops::{Cells, Grid, Median, Outliers};
 use pointmill::pipeline::{
-    Overrides, Pipeline, Quiet, Read, Registry, RunSettings, StageKind, Synth, Write,
+    LimitKeys, Overrides, Pipeline, Quiet, Read, Registry, RunSettings, StageKind, Synth, Write,
 };
 use serde_json::Value;
 
@@ -31,16 +33,16 @@ fn source(file: &str) -> String {
     fs::read_to_string(root().join(file)).unwrap_or_else(|e| panic!("{file}: {e}"))
 }
 
-/// Compares the page with the one in the repository, or writes it.
+/// Compares the file with the one in the repository, or writes it.
 fn keep(page: &str, text: &str) {
-    let path = root().join("docs").join(page);
+    let path = root().join(page);
     if std::env::var_os("POINTMILL_WRITE_DOCS").is_some() {
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(&path, text).unwrap();
         return;
     }
     let kept = fs::read_to_string(&path).unwrap_or_default();
-    assert!(kept == text, "docs/{page} is not what the code says: it is {SAYS_SO}");
+    assert!(kept == text, "{page} is not what the code says: it is {SAYS_SO}");
 }
 
 /// A stage and where its documentation is.
@@ -77,9 +79,11 @@ fn pages() -> Vec<Page> {
             words: &["src/io/synthetic/mod.rs"],
             ..page::<Synth>(KINDS, "scene = 'als'\npoints = 1000")
         },
-        page::<Normals>("src/ops/normals.rs", ""),
+        page::<Outliers>("src/ops/outliers.rs", ""),
+        Page { words: &["src/ops/normals/orient.rs"], ..page::<Normals>("src/ops/normals.rs", "") },
         Page { words: &["src/ops/cells/settings.rs"], ..page::<Cells>("src/ops/cells.rs", "") },
         page::<Median>("src/ops/median.rs", ""),
+        page::<Grid>("src/ops/grid.rs", "side = 1.0"),
         page::<Write>(KINDS, ""),
     ]
 }
@@ -96,14 +100,22 @@ fn sort_of(subject: &str, field: &Field, files: &[String]) -> (String, Option<En
         ("read", "path", _) => "text, or a list of texts",
         ("cells", "side", _) => "a length, or `\"auto\"`",
         ("cells", "max_angle", _) => "a number of radians, or text with a unit",
+        ("cells", "keep", _) => "a share such as `\"10%\"`, or a number such as `\"250k\"`",
+        ("cells", "max_side" | "min_spacing", _) => "a length",
+        ("cells", "reference", _) => "`\"x\"`, `\"y\"`, `\"z\"`, or three numbers",
         ("write", "scale", _) => "a number, or three",
         ("run", "z_scale", _) => "a number, or `\"auto\"`",
         ("run", "memory", _) => "a size such as `\"2GiB\"`, or a number of bytes",
+        (_, "mark", _) => "`\"key-point\"`, `\"withheld\"`, 7 or 18",
         (_, _, "usize" | "u64") => "a whole number",
         (_, _, "NonZeroUsize") => "a whole number from 1",
         (_, _, "f64") => "a number",
         (_, _, "[f64; 3]") => "three numbers",
         (_, _, "PathBuf") => "a path",
+        (_, _, "Vec<u8>") => "a list of whole numbers to 255",
+        ("limits", _, "Vec<Flag>") => {
+            "a list of `\"withheld\"`, `\"overlap\"`, `\"synthetic\"`, `\"key-point\"`"
+        }
         (_, _, "Vec<String>") => "a list of texts",
         (_, _, name) => {
             let words = files.iter().find_map(|text| enum_of(text, name)).unwrap_or_else(|| {
@@ -117,30 +129,35 @@ fn sort_of(subject: &str, field: &Field, files: &[String]) -> (String, Option<En
     (said.to_owned(), None)
 }
 
-/// The table of keys, and lists of the words that they take.
-fn keys_section(
+/// What is said of every field.
+fn keys_said(
     subject: &str,
     fields: &[Field],
     files: &[String],
-    default: impl Fn(&Field, Option<&Enum>) -> String,
-) -> String {
-    let mut table = "| key | value | default | |\n|---|---|---|---|\n".to_owned();
-    let mut lists = String::new();
-    for field in fields {
-        let (said, words) = sort_of(subject, field, files);
+    default: impl Fn(&Field, Option<&Enum>) -> Default,
+) -> Vec<Key> {
+    let key = |field: &Field| {
+        let (value, words) = sort_of(subject, field, files);
         let default = default(field, words.as_ref());
-        let docs = field.docs.replace('\n', " ").replace('|', "\\|");
-        let _ = writeln!(table, "| `{}` | {said} | {default} | {docs} |", field.name);
-        let Some(words) = words else { continue };
-        let _ = writeln!(lists, "\n`{}`:\n", field.name);
-        for (word, docs) in &words.words {
-            let _ = writeln!(lists, "- `\"{word}\"`: {}", docs.replace('\n', "\n  "));
-        }
-    }
-    table + &lists
+        let words = words.map_or(Vec::new(), |words| words.words);
+        Key { name: field.name.clone(), value, default, docs: field.docs.clone(), words }
+    };
+    fields.iter().map(key).collect()
 }
 
-fn stage_page(page: &Page) -> String {
+/// The keys that every stage on tiles takes besides its own.
+fn limit_keys() -> Vec<Key> {
+    let text = source("src/pipeline/limits.rs");
+    let (_, fields) = struct_of(&text, "LimitKeys");
+    let names: Vec<&str> = fields.iter().map(|field| field.name.as_str()).collect();
+    assert_eq!(names, LimitKeys::KEYS);
+    let defaults = serde_json::to_value(LimitKeys::default()).unwrap();
+    let default = |field: &Field, _: Option<&Enum>| Default::Is(defaults[&field.name].clone());
+    keys_said("limits", &fields, &[text, source("src/point/selection.rs")], default)
+}
+
+/// A stage's page, and what `pointmill stages` says of it.
+fn stage_page(page: &Page) -> (String, Value) {
     let text = source(page.file);
     let (docs, fields) = struct_of(&text, &title(page.kind));
     let files: Vec<String> =
@@ -167,22 +184,29 @@ fn stage_page(page: &Page) -> String {
     let default = |field: &Field, words: Option<&Enum>| {
         takes(field, words);
         match &keys[&field.name] {
-            _ if given.contains_key(&field.name) => "must be given".to_owned(),
-            Value::Null => "none".to_owned(),
-            value => format!("`{value}`"),
+            _ if given.contains_key(&field.name) => Default::MustBeGiven,
+            Value::Null => Default::None,
+            value => Default::Is(value.clone()),
         }
     };
+    let said = keys_said(page.kind, &fields, &files, default);
+    let on_tiles = !["read", "synth", "write"].contains(&page.kind);
     let mut out = format!("# {}\n\n<!-- {SAYS_SO} -->\n\n{}\n\n{docs}\n", page.kind, page.about);
     out += "\n## Keys\n\n";
-    match fields.is_empty() {
+    match said.is_empty() {
         true => out += "It has none.\n",
-        false => out += &keys_section(page.kind, &fields, &files, default),
+        false => out += &keys::markdown(&said),
     }
     if let Some((heading, file, function)) = page.more {
         let _ = write!(out, "\n## {heading}\n\n{}\n", item_docs(&source(file), "fn", function));
     }
+    if on_tiles {
+        out += "\nIt takes [the keys of all stages that work on tiles](README.md#limits) too.\n";
+    }
     out += "\nEvery stage may also have a `name`, by which `--set` and `from` mean it.\n";
-    out
+    let limits = if on_tiles { limit_keys() } else { Vec::new() };
+    let all: Vec<Key> = said.into_iter().chain(limits).collect();
+    (out, keys::described(page.kind, page.about, &all))
 }
 
 #[test]
@@ -193,19 +217,21 @@ fn every_stage_has_a_page_that_says_what_the_code_does() {
     assert_eq!(kinds, registry.kinds().map(|(kind, _)| kind).collect(), "a page for every stage");
     let mut index = format!("# Stages\n\n<!-- {SAYS_SO} -->\n\n| stage | |\n|---|---|\n");
     for page in &pages {
-        let text = stage_page(page);
+        let (text, _) = stage_page(page);
         assert!(text.len() > 400, "{}: {text}", page.kind);
-        keep(&format!("stages/{}.md", page.kind), &text);
+        keep(&format!("docs/stages/{}.md", page.kind), &text);
         let _ = writeln!(index, "| [{0}]({0}.md) | {1} |", page.kind, page.about);
     }
+    let (limits, _) = struct_of(&source("src/pipeline/limits.rs"), "LimitKeys");
+    let _ = write!(index, "\n## Limits\n\n{limits}\n\n{}", keys::markdown(&limit_keys()));
     index += "\nWhat stands above all of them: [the `[run]` table](../run.md).\n";
-    keep("stages/README.md", &index);
+    keep("docs/stages/README.md", &index);
     let stored = fs::read_dir(root().join("docs/stages")).unwrap().count();
     assert_eq!(stored, pages.len() + 1, "docs/stages has pages of no stage");
 }
 
-#[test]
-fn the_run_table_has_a_page_that_says_what_the_code_does() {
+/// The page of the `[run]` table, and what `pointmill stages` says of it.
+fn run_page() -> (String, Value) {
     let text = source("src/pipeline/settings.rs");
     let (docs, fields) = struct_of(&text, "RunSettings");
     assert!(fields.len() >= 8, "fields were not read");
@@ -214,19 +240,34 @@ fn the_run_table_has_a_page_that_says_what_the_code_does() {
             let word = words.default.as_ref().expect("an enum of settings has a default");
             let set: RunSettings = toml::from_str(&format!("{} = '{word}'", field.name)).unwrap();
             assert_eq!(set, RunSettings::default(), "{} = {word}", field.name);
-            format!("`\"{word}\"`")
+            Default::Is(word.as_str().into())
         }
         (None, kind) => {
             assert!(kind.starts_with("Option<"), "{}: what is its default?", field.name);
-            "none".to_owned()
+            Default::None
         }
     };
-    let table = keys_section("run", &fields, std::slice::from_ref(&text), default);
+    let said = keys_said("run", &fields, std::slice::from_ref(&text), default);
     let out = format!(
-        "# The `[run]` table\n\n<!-- {SAYS_SO} -->\n\n{docs}\n\n{table}\n## Sizes\n\n{}\n",
+        "# The `[run]` table\n\n<!-- {SAYS_SO} -->\n\n{docs}\n\n{}\n## Sizes\n\n{}\n",
+        keys::markdown(&said),
         item_docs(&text, "fn", "parse_bytes")
     );
-    keep("run.md", &out);
+    let (first, _) = docs.split_once(". ").unwrap();
+    (out, keys::described("run", &format!("{first}."), &said))
+}
+
+#[test]
+fn the_run_table_has_a_page_that_says_what_the_code_does() {
+    keep("docs/run.md", &run_page().0);
+}
+
+#[test]
+fn the_command_knows_what_the_pages_say() {
+    let mut all = vec![run_page().1];
+    all.extend(pages().iter().map(|page| stage_page(page).1));
+    let text = serde_json::to_string_pretty(&Value::from(all)).unwrap();
+    keep("src/cli/stages.json", &(text + "\n"));
 }
 
 fn help(command: Option<&str>) -> String {
@@ -253,57 +294,7 @@ fn the_command_line_has_a_page_that_says_what_help_says() {
     for command in commands {
         let _ = write!(out, "\n## {command}\n\n```\n{}\n```\n", help(Some(command)));
     }
-    keep("cli.md", &out);
-}
-
-/// The keys of a value, as paths: `ledger.removed[].stage`.
-fn key_paths(value: &Value, path: &str, into: &mut BTreeSet<String>) {
-    match value {
-        Value::Object(object) => {
-            for (key, value) in object {
-                let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
-                into.insert(path.clone());
-                key_paths(value, &path, into);
-            }
-        }
-        Value::Array(list) => {
-            list.iter().for_each(|value| key_paths(value, &format!("{path}[]"), into));
-        }
-        _ => {}
-    }
-}
-
-/// The keys that a section of docs/formats.md names: code at the beginning of a table's rows. True
-/// for those of which it says "not always".
-fn documented(section: &str) -> Vec<(String, bool)> {
-    let text = source("docs/formats.md");
-    let heading = format!("\n## {section}\n");
-    let (_, after) = text.split_once(&heading).unwrap_or_else(|| panic!("no section {section}"));
-    let section = after.split("\n## ").next().unwrap_or(after);
-    let key = |row: &str| {
-        let (key, _) = row.strip_prefix("| `")?.split_once('`')?;
-        Some((key.to_owned(), row.contains("not always")))
-    };
-    section.lines().filter_map(key).collect()
-}
-
-/// Every key of `value` is named in the section, and every key named is one, unless it says that it
-/// is not always there. Below a key `x.*` are keys of free choice.
-fn agree(value: &Value, section: &str) {
-    let mut there = BTreeSet::new();
-    key_paths(value, "", &mut there);
-    let documented = documented(section);
-    let free: Vec<&str> = documented.iter().filter_map(|(key, _)| key.strip_suffix('*')).collect();
-    there.retain(|path| !free.iter().any(|free| path.starts_with(free)));
-    let named: BTreeSet<&str> = documented.iter().map(|(key, _)| key.as_str()).collect();
-    let unnamed: Vec<&String> =
-        there.iter().filter(|path| !named.contains(path.as_str())).collect();
-    assert!(unnamed.is_empty(), "docs/formats.md does not name {unnamed:?} under {section}");
-    let must = documented.iter().filter(|(key, not_always)| !not_always && !key.ends_with('*'));
-    let missing: Vec<&String> =
-        must.map(|(key, _)| key).filter(|key| !there.contains(*key)).collect();
-    assert!(missing.is_empty(), "there are no {missing:?}, which docs/formats.md names");
-    assert!(there.len() >= 8, "{section}: too few keys to prove anything");
+    keep("docs/cli.md", &out);
 }
 
 /// Reduces a made-up scan to `output` with a report, which is returned.

@@ -85,6 +85,17 @@ const REFUSED: [&str; 17] = [
     "trimesh/emptyIO/ply_empty_header.ply",
 ];
 
+/// Files whose x and y are degrees, or metres under heights in feet: stages that measure refuse them
+/// until they are told what to do.
+const MIXED: [&str; 6] = [
+    "laspy/simple.copc.laz",
+    "laspy/simple1_4.las",
+    "laspy/simple_with_page.copc.laz",
+    "pdal/las/epsg_4326.las",
+    "pdal/las/no-points.las",
+    "pdal/las/test_epsg_4047.las",
+];
+
 /// A file of the folder and what its manifest says.
 #[derive(Debug, Clone)]
 struct Scan {
@@ -210,7 +221,10 @@ fn reduces_and_reads_back(scan: &Scan) -> String {
         assert_eq!(points as u64, told.min(MOST as u64), "{}: points of the manifest", scan.name);
     }
     let output = folder.path().join("out").with_extension(scan.path.extension().unwrap());
+    // A crop loses no reference system.
+    let units = if MIXED.contains(&scan.name.as_str()) { "ignore" } else { "refuse" };
     let spilled = Setup::new(&[
+        ("run.units", json!(units)),
         ("run.spill", json!("always")),
         ("run.tile_points", json!(if points <= TWICE { 500 } else { 10_000 })),
     ]);
@@ -223,7 +237,8 @@ fn reduces_and_reads_back(scan: &Scan) -> String {
     assert_contained(&scan.name, &kept, &all, schema.stride);
     if points <= TWICE {
         let bytes = std::fs::read(&output).unwrap();
-        let done = reduce(&input, &output, &Setup::new(&[]).memory(MEMORY)).unwrap();
+        let plain = Setup::new(&[("run.units", json!(units))]).memory(MEMORY);
+        let done = reduce(&input, &output, &plain).unwrap();
         accounted(&scan.name, &done, &output, points as u64);
         let same = std::fs::read(&output).unwrap() == bytes;
         assert!(same, "{}: tiles, threads or spill changed the output", scan.name);
@@ -271,4 +286,33 @@ fn every_broken_scan_is_refused_with_its_path() {
     for_each(broken, is_refused).iter().for_each(|line| println!("{line}"));
     let largest = LARGEST.load(Ordering::Relaxed);
     assert!((largest as u64) < MEMORY, "an allocation of {largest} bytes");
+}
+
+#[test]
+fn every_scan_of_mixed_units_is_refused_until_it_is_told_how_to_measure() {
+    let Some(scans) = scans() else { return };
+    let mixed: Vec<Scan> =
+        scans.into_iter().filter(|scan| MIXED.contains(&scan.name.as_str())).collect();
+    assert_eq!(mixed.len(), MIXED.len());
+    let folder = tempfile::tempdir().unwrap();
+    let mut feet = 0;
+    for scan in mixed {
+        let input = std::slice::from_ref(&scan.path);
+        let output = folder.path().join("out").with_extension(scan.path.extension().unwrap());
+        let run = |sets: &[(&'static str, serde_json::Value)]| {
+            reduce(input, &output, &Setup::new(sets).memory(MEMORY))
+        };
+        let error = run(&[]).expect_err(&scan.name);
+        assert_eq!(error.path(), Some(scan.path.as_path()), "{error:?}");
+        assert!(error.to_string().contains("x and y are in "), "{error:?}");
+        assert!(error.remedy().unwrap().contains("z_scale"), "{error:?}");
+        scans_support::assert_holds(folder.path(), &[]);
+        let auto = run(&[("run.z_scale", json!("auto"))]);
+        assert_eq!(auto.is_ok(), error.to_string().contains("feet"), "{}: {auto:?}", scan.name);
+        feet += usize::from(auto.is_ok());
+        run(&[("run.z_scale", json!(1.0))]).expect(&scan.name);
+        convert(input, &output, &Setup::new(&[]).memory(MEMORY)).expect(&scan.name);
+        std::fs::remove_file(&output).unwrap();
+    }
+    assert_eq!(feet, 2, "metres under feet can be measured");
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::pipeline::{Overrides, Set, parse_bytes};
+use crate::point::parse_count;
 use crate::{Error, Result};
 
 const EXIT_CODES: &str = "\
@@ -37,8 +38,27 @@ pub(super) enum Command {
     Info(Info),
     /// Show how a pipeline would be run, without a run
     Plan(Plan),
+    /// Say whether a pipeline is right, or every mistake: reads its inputs' headers, writes nothing
+    Check(Plan),
+    /// List the stages that a pipeline can have, with their keys
+    Stages(Stages),
     /// Make a scan up
     Synth(Synth),
+}
+
+impl Command {
+    /// What commands that plan or run a pipeline have in common.
+    pub fn common(&self) -> Option<&Common> {
+        match self {
+            Command::Run(Run { common, .. })
+            | Command::Reduce(Reduce { common, .. })
+            | Command::Convert(Convert { common, .. })
+            | Command::Plan(Plan { common, .. })
+            | Command::Check(Plan { common, .. })
+            | Command::Synth(Synth { common, .. }) => Some(common),
+            Command::Info(_) | Command::Stages(_) => None,
+        }
+    }
 }
 
 /// Common to all commands that run a pipeline.
@@ -49,14 +69,20 @@ pub(super) struct Common {
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     pub memory: Option<u64>,
     /// Threads that work at once [default: all processors]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = parse_threads)]
     pub threads: Option<NonZeroUsize>,
     /// Folder for what does not fit in memory [default: beside the output]
     #[arg(long, value_name = "DIR")]
     pub scratch: Option<PathBuf>,
-    /// Draw progress bars: where stderr is a terminal, or never
-    #[arg(long, value_name = "WHEN", default_value = "auto")]
+    /// Progress on stderr: bars where it is a terminal, one JSON event a line, or none
+    #[arg(long, value_name = "HOW", default_value = "auto")]
     pub progress: Progress,
+    /// Say nothing but errors
+    #[arg(short, long, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say what the plan and the stages decided, and how long each phase took
+    #[arg(short, long)]
+    pub verbose: bool,
     /// Write the report to this file
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
@@ -87,7 +113,25 @@ impl Common {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Progress {
     Auto,
+    Json,
     Never,
+}
+
+fn parse_threads(text: &str) -> Result<NonZeroUsize, String> {
+    let refused = |_| format!("`{text}` is no number of threads: give 1 or more, or leave it out");
+    text.parse().map_err(refused)
+}
+
+/// One number for all axes, or three for X, Y and Z.
+#[derive(Debug, Clone)]
+pub(super) struct Axes(pub Vec<f64>);
+
+fn parse_axes(text: &str) -> Result<Axes, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    match numbers {
+        Ok(numbers) if [1, 3].contains(&numbers.len()) => Ok(Axes(numbers)),
+        _ => Err(format!("`{text}` is neither a number nor three with commas between them")),
+    }
 }
 
 #[derive(Debug, Args)]
@@ -148,6 +192,14 @@ pub(super) struct Reduce {
     /// How a normal is computed: varady or pca [default: varady]
     #[arg(long, value_name = "HOW")]
     pub method: Option<String>,
+    /// Reduce the points of these classes alone, such as 2,6; all others stay, and are not seen as
+    /// neighbours
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
+    pub classes: Vec<u8>,
+    /// Points with the withheld flag: drop them, keep them as points like all others, or ignore them
+    /// and write them as they are [default: drop]
+    #[arg(long, value_name = "HOW")]
+    pub withheld: Option<String>,
     #[command(flatten)]
     pub written: Written,
     #[command(flatten)]
@@ -157,9 +209,9 @@ pub(super) struct Reduce {
 /// How the output is written.
 #[derive(Debug, Args)]
 pub(super) struct Written {
-    /// Scale of LAS coordinates [default: the input's; PLY to LAS must say it]
-    #[arg(long, value_name = "SCALE", allow_negative_numbers = true)]
-    pub scale: Option<f64>,
+    /// Scale of LAS coordinates, or three for X, Y and Z [default: the input's; PLY to LAS must say it]
+    #[arg(long, value_name = "SCALE", allow_hyphen_values = true, value_parser = parse_axes)]
+    pub scale: Option<Axes>,
     /// Offset of LAS coordinates on each axis [default: the input's, or 0]
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true)]
     pub offset: Vec<f64>,
@@ -200,12 +252,22 @@ pub(super) struct Info {
 }
 
 #[derive(Debug, Args)]
+pub(super) struct Stages {
+    /// One stage, or `run` for the settings above all stages
+    #[arg(value_name = "KIND")]
+    pub kind: Option<String>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
 pub(super) struct Synth {
     /// What is scanned: plane, part, sphere, squares-random, squares-uniform or als
     #[arg(value_name = "KIND")]
     pub scene: String,
-    /// How many points
-    #[arg(short = 'n', long = "points", value_name = "N")]
+    /// How many points, such as 1500, 10k, 5M or 1e6
+    #[arg(short = 'n', long = "points", value_name = "N", value_parser = parse_count)]
     pub points: u64,
     /// The file: .las, .laz or .ply
     #[arg(short, long, value_name = "OUT")]

@@ -6,21 +6,23 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::arguments::Convert;
-use super::print;
-use super::progress::Bars;
-use super::run::{given, mill, mill_under, written};
-use crate::pipeline::{Format, Pipeline, Registry, Watch, expand};
+use super::console::Console;
+use super::run::{given, mill, written};
+use crate::budget::Bytes;
+use crate::pipeline::{Done, Format, Pipeline, Registry, Watch, expand};
+use crate::report::Grouped;
 use crate::{Error, ErrorKind, Result};
 
 /// The pipeline of `convert`, which users copy.
 const CONVERT: &str = include_str!("../../pipelines/convert.toml");
 
-/// Converts all inputs into one file, or each into a file of its own in a folder.
-pub(super) fn convert(arguments: &Convert, registry: &Registry) -> Result<()> {
+/// Converts all inputs into one file, or each into a file of its own in a folder; prints a closing
+/// table.
+pub(super) fn convert(arguments: &Convert, registry: &Registry, console: &Console) -> Result<()> {
     let folder = Path::new(&arguments.output);
     if !(arguments.output.ends_with('/') || folder.is_dir()) {
         let one = pipeline(arguments, json!(arguments.inputs), json!(arguments.output), registry);
-        return mill(one?, &arguments.common).map(|_report| ());
+        return console.result(mill(one?, &arguments.common, console)?);
     }
     let inputs = expand(&arguments.inputs)?;
     if inputs.len() > 1 && arguments.common.report.is_some() {
@@ -34,32 +36,67 @@ pub(super) fn convert(arguments: &Convert, registry: &Registry) -> Result<()> {
     }
     let is_new = !folder.is_dir();
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create the folder", e))?;
-    let outcome = run_all(runs, arguments);
+    let outcome = run_all(runs, arguments, console);
     if outcome.is_err() && is_new {
         // Left behind if any output is in it, which is as it should be.
         let _ = std::fs::remove_dir(folder);
     }
-    outcome
+    console.result(outcome?.told(&arguments.output))
+}
+
+/// What several conversions came to.
+struct Total {
+    files: usize,
+    points: u64,
+    bytes: u64,
+    peak_bytes: Option<u64>,
+    seconds: f64,
+}
+
+impl Total {
+    fn of(all: &[Done]) -> Total {
+        let outputs = || all.iter().flat_map(|done| &done.report.run.outputs);
+        Total {
+            files: all.len(),
+            points: all.iter().map(|done| done.report.result.ledger.kept).sum(),
+            bytes: outputs().filter_map(|output| output.bytes).sum(),
+            peak_bytes: all.iter().filter_map(|done| done.report.run.peak_memory_bytes).max(),
+            seconds: all.iter().map(|done| done.report.run.seconds).sum(),
+        }
+    }
+
+    fn told(&self, folder: &str) -> String {
+        let Total { files, points, bytes, peak_bytes, seconds } = self;
+        let mut told = format!("files      {files}\npoints     {}\n", Grouped(*points));
+        if let Some(peak) = peak_bytes {
+            told += &format!("memory     {} at most\n", Bytes(*peak));
+        }
+        told + &format!("time       {seconds:.1} s\noutput     {folder}, {}\n", Bytes(*bytes))
+    }
 }
 
 /// Runs one pipeline after the other. One that fails is told at once and does not keep the others
 /// from running; the error in the end is of the first failure's kind.
-fn run_all(runs: Vec<(PathBuf, Pipeline)>, arguments: &Convert) -> Result<()> {
-    let bars = Bars::new(arguments.common.progress);
+fn run_all(
+    runs: Vec<(PathBuf, Pipeline)>,
+    arguments: &Convert,
+    console: &Console,
+) -> Result<Total> {
     let total = runs.len();
+    let mut all = Vec::new();
     let mut failures: Vec<ErrorKind> = Vec::new();
     for (input, pipeline) in runs {
-        if bars.cancelled() {
+        if console.cancelled() {
             return Err(Error::interrupted());
         }
-        match mill_under(pipeline, &arguments.common, &bars) {
-            Ok(_report) => {}
+        match mill(pipeline, &arguments.common, console) {
+            Ok(done) => all.push(done),
             Err(error) if total == 1 || error.kind() == ErrorKind::Interrupted => {
                 return Err(error);
             }
             Err(error) => {
                 failures.push(error.kind());
-                print::error(&error.at(input));
+                console.error(&error.at(input));
             }
         }
     }
@@ -67,7 +104,7 @@ fn run_all(runs: Vec<(PathBuf, Pipeline)>, arguments: &Convert) -> Result<()> {
         Some(kind) => {
             Err(Error::new(*kind, format!("{} of {total} conversions failed", failures.len())))
         }
-        None => Ok(()),
+        None => Ok(Total::of(&all)),
     }
 }
 

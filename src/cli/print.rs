@@ -21,6 +21,16 @@ pub(super) fn warning(message: &str) {
     line(&format!("warning: {message}"));
 }
 
+/// Prints a line or several on stderr.
+pub(super) fn message(text: impl Display) {
+    line(text.to_string().trim_end());
+}
+
+/// Prints an event as one line on stderr.
+pub(super) fn event(event: &serde_json::Value) {
+    line(&event.to_string());
+}
+
 /// Prints an error on stderr: place and message, the causes beneath it, what the user can do.
 pub(super) fn error(error: &Error) {
     line(&rendered(error));
@@ -42,7 +52,8 @@ fn rendered(error: &Error) -> String {
 }
 
 fn line(text: &str) {
-    let _ = writeln!(io::stderr(), "{text}"); // nobody is left to tell that stderr is gone
+    // In one piece, whatever other threads print; nobody is left to tell that stderr is gone.
+    let _ = io::stderr().lock().write_all(format!("{text}\n").as_bytes());
 }
 
 #[cfg(test)]

@@ -1,32 +1,25 @@
-//! Progress bars on a terminal's stderr; warnings above them.
+//! Progress bars on a terminal's stderr.
 
 use std::io::IsTerminal;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
-
-use super::arguments::Progress;
-use super::{interrupt, print};
-use crate::pipeline::Watch;
 
 const KNOWN: &str =
     "{prefix:<10} {wide_bar} {pos_points} of {len_points} points, {rate}, {eta} left";
 const UNKNOWN: &str = "{prefix:<10} {spinner} {pos_points} points, {rate}, {elapsed}";
 
-/// Draws one bar, of the phase that a run is in, and hears Ctrl-C.
+/// Draws one bar, of the phase that a run is in.
 pub(super) struct Bars {
     drawn: bool,
     bar: Mutex<Option<ProgressBar>>,
-    cancelled: Arc<AtomicBool>,
 }
 
 impl Bars {
-    /// Bars that are drawn if `progress` allows and stderr is a terminal. Takes Ctrl-C over.
-    pub fn new(progress: Progress) -> Self {
-        let drawn = progress == Progress::Auto && std::io::stderr().is_terminal();
-        Bars { drawn, bar: Mutex::new(None), cancelled: interrupt::flag() }
+    /// Bars that are drawn if they are `wanted` and stderr is a terminal.
+    pub fn new(wanted: bool) -> Self {
+        Bars { drawn: wanted && std::io::stderr().is_terminal(), bar: Mutex::new(None) }
     }
 
     /// Removes the bar, so that what is printed next stands alone.
@@ -36,13 +29,8 @@ impl Bars {
         }
     }
 
-    fn bar(&self) -> std::sync::MutexGuard<'_, Option<ProgressBar>> {
-        self.bar.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Watch for Bars {
-    fn phase(&self, name: &'static str, total: Option<u64>) {
+    /// A phase begins, with `total` points to do.
+    pub fn phase(&self, name: &'static str, total: Option<u64>) {
         self.clear();
         if !self.drawn {
             return;
@@ -54,21 +42,23 @@ impl Watch for Bars {
         *self.bar() = Some(bar);
     }
 
-    fn advance(&self, points: u64) {
+    /// `points` more are done.
+    pub fn advance(&self, points: u64) {
         if let Some(bar) = &*self.bar() {
             bar.inc(points);
         }
     }
 
-    fn warn(&self, message: &str) {
+    /// Calls `print` while no bar is in its way.
+    pub fn beside(&self, print: impl FnOnce()) {
         match &*self.bar() {
-            Some(bar) => bar.suspend(|| print::warning(message)),
-            None => print::warning(message),
+            Some(bar) => bar.suspend(print),
+            None => print(),
         }
     }
 
-    fn cancelled(&self) -> bool {
-        self.cancelled.load(Ordering::Relaxed)
+    fn bar(&self) -> MutexGuard<'_, Option<ProgressBar>> {
+        self.bar.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -99,7 +89,7 @@ mod tests {
 
     #[test]
     fn a_bar_that_is_drawn_nowhere_counts() {
-        let bars = Bars { drawn: true, bar: Mutex::new(None), cancelled: Arc::default() };
+        let bars = Bars { drawn: true, bar: Mutex::new(None) };
         bars.phase("decode", Some(10));
         bars.bar().as_ref().unwrap().set_draw_target(ProgressDrawTarget::hidden());
         bars.advance(4);
@@ -107,6 +97,5 @@ mod tests {
         assert_eq!(bars.bar().as_ref().unwrap().position(), 7);
         bars.clear();
         assert!(bars.bar().is_none());
-        assert!(!bars.cancelled());
     }
 }

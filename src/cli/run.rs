@@ -1,12 +1,11 @@
-//! `run`, `reduce`, `synth` and `plan`: arguments to a pipeline, and the pipeline's run.
+//! `run`, `reduce` and `synth`: arguments to a pipeline, and the pipeline's run.
 
 use serde_json::{Value, json};
 
-use super::arguments::{Common, Plan, Reduce, Run, Synth, Written};
-use super::print;
-use super::progress::Bars;
+use super::arguments::{Axes, Common, Reduce, Run, Synth, Written};
+use super::console::Console;
 use crate::Result;
-use crate::pipeline::{Pipeline, Registry, Set};
+use crate::pipeline::{Done, Pipeline, Registry, Set};
 
 /// The pipeline of `reduce`, which users copy.
 const REDUCE: &str = include_str!("../../pipelines/reduce.toml");
@@ -21,22 +20,22 @@ kind = \"write\"
 ";
 
 /// Runs a pipeline file and prints its closing table.
-pub(super) fn run(arguments: &Run, registry: &Registry) -> Result<()> {
+pub(super) fn run(arguments: &Run, registry: &Registry, console: &Console) -> Result<()> {
     let sets = parse_sets(&arguments.sets, &arguments.common)?;
     let pipeline = Pipeline::read(&arguments.pipeline, registry, &sets)?;
-    print::result(mill(pipeline, &arguments.common)?)
+    console.result(mill(pipeline, &arguments.common, console)?)
 }
 
 /// Runs `pipelines/reduce.toml` on other files and prints the closing table.
-pub(super) fn reduce(arguments: &Reduce, registry: &Registry) -> Result<()> {
+pub(super) fn reduce(arguments: &Reduce, registry: &Registry, console: &Console) -> Result<()> {
     let written = written(&arguments.written);
     let sets = [reduce_sets(arguments), written, arguments.common.sets()?].concat();
     let pipeline = Pipeline::parse_with(REDUCE, "pipelines/reduce.toml", registry, &sets)?;
-    print::result(mill(pipeline, &arguments.common)?)
+    console.result(mill(pipeline, &arguments.common, console)?)
 }
 
-/// Writes a made-up scan.
-pub(super) fn synth(arguments: &Synth, registry: &Registry) -> Result<()> {
+/// Writes a made-up scan and prints the closing table.
+pub(super) fn synth(arguments: &Synth, registry: &Registry, console: &Console) -> Result<()> {
     let stages = given([
         ("KIND", "synth.scene", Some(json!(arguments.scene))),
         ("-n", "synth.points", Some(json!(arguments.points))),
@@ -46,31 +45,17 @@ pub(super) fn synth(arguments: &Synth, registry: &Registry) -> Result<()> {
     ]);
     let sets = [stages, arguments.common.sets()?].concat();
     let pipeline = Pipeline::parse_with(SYNTH, "synth", registry, &sets)?;
-    mill(pipeline, &arguments.common).map(|_report| ())
+    console.result(mill(pipeline, &arguments.common, console)?)
 }
 
-/// Prints how a pipeline would be run.
-pub(super) fn plan(arguments: &Plan, registry: &Registry) -> Result<()> {
-    let sets = parse_sets(&arguments.sets, &arguments.common)?;
-    let pipeline = Pipeline::read(&arguments.pipeline, registry, &sets)?;
-    print::result(pipeline.plan(&arguments.common.overrides())?)
-}
-
-/// Plans and runs a pipeline under progress bars; gives its report.
-pub(super) fn mill(pipeline: Pipeline, common: &Common) -> Result<impl std::fmt::Display> {
-    mill_under(pipeline, common, &Bars::new(common.progress))
-}
-
-/// The same under bars that several runs share.
-pub(super) fn mill_under(
-    pipeline: Pipeline,
-    common: &Common,
-    bars: &Bars,
-) -> Result<impl std::fmt::Display + use<>> {
+/// Plans and runs a pipeline; Ctrl-C asks it to stop.
+pub(super) fn mill(pipeline: Pipeline, common: &Common, console: &Console) -> Result<Done> {
+    console.hear_interrupts();
     let plan = pipeline.plan(&common.overrides())?;
-    let report = plan.run(bars);
-    bars.clear();
-    report
+    console.planned(&plan);
+    let done = plan.run(console);
+    console.end();
+    done.inspect(|done| console.done(done))
 }
 
 /// Those of `(argument, address, value)` that are given.
@@ -86,12 +71,14 @@ pub(super) fn number(value: f64) -> Value {
     serde_json::Number::from_f64(value).map_or_else(|| json!(value.to_string()), Value::from)
 }
 
-fn parse_sets(sets: &[String], common: &Common) -> Result<Vec<Set>> {
+/// The values of `--set`, and those of other arguments.
+pub(super) fn parse_sets(sets: &[String], common: &Common) -> Result<Vec<Set>> {
     let sets = sets.iter().map(|set| Set::parse(set)).collect::<Result<Vec<Set>>>()?;
     Ok([sets, common.sets()?].concat())
 }
 
 fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
+    let classes = (!arguments.classes.is_empty()).then(|| json!(arguments.classes));
     given([
         ("IN", "read.path", Some(json!(arguments.inputs))),
         ("-o", "write.path", arguments.output.clone().map(Value::from)),
@@ -103,6 +90,10 @@ fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
         ("--min-points", "cells.min_points", arguments.min_points.map(Value::from)),
         ("--split", "cells.split", arguments.split.clone().map(Value::from)),
         ("--method", "normals.method", arguments.method.clone().map(Value::from)),
+        ("--classes", "normals.classes", classes.clone()),
+        ("--classes", "cells.classes", classes.clone()),
+        ("--classes", "median.classes", classes),
+        ("--withheld", "run.withheld", arguments.withheld.clone().map(Value::from)),
     ])
 }
 
@@ -110,11 +101,19 @@ fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
 pub(super) fn written(arguments: &Written) -> Vec<Set> {
     let list = |given: bool, value: Value| given.then_some(value);
     given([
-        ("--scale", "write.scale", arguments.scale.map(number)),
+        ("--scale", "write.scale", arguments.scale.as_ref().map(axes)),
         ("--offset", "write.offset", list(!arguments.offset.is_empty(), json!(arguments.offset))),
         ("--drop", "write.drop", list(!arguments.drop.is_empty(), json!(arguments.drop))),
         ("--encoding", "write.encoding", arguments.encoding.as_deref().map(Value::from)),
     ])
+}
+
+/// One number, or a list of them.
+fn axes(Axes(numbers): &Axes) -> Value {
+    match numbers[..] {
+        [one] => number(one),
+        _ => numbers.iter().map(|&axis| number(axis)).collect(),
+    }
 }
 
 /// A number where the text is one, else the text (`6deg`, `auto`).

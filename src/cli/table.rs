@@ -22,6 +22,15 @@ fn fields(object: &Map<String, Value>, indent: usize, lines: &mut Vec<String>) {
                 lines.push(label);
                 fields(inner, indent + 2, lines);
             }
+            Value::Array(list) if list.iter().any(holds_lists) => {
+                for entry in list {
+                    lines.push(label.clone());
+                    match entry {
+                        Value::Object(inner) => fields(inner, indent + 2, lines),
+                        other => lines.push(format!("{:1$}{2}", "", indent + 2, plain(other))),
+                    }
+                }
+            }
             Value::Array(list) if list.iter().any(Value::is_object) => {
                 lines.push(label);
                 rows(list, indent + 2, lines);
@@ -38,6 +47,16 @@ fn fields(object: &Map<String, Value>, indent: usize, lines: &mut Vec<String>) {
     }
 }
 
+/// Columns are padded to no more characters than this: a file may hold longer ones, and a table that
+/// repeats the longest in every row could be larger than any memory.
+const WIDEST: usize = 60;
+
+/// True for what no row of a table can hold: an object with lists of objects in it.
+fn holds_lists(value: &Value) -> bool {
+    let list = |v: &Value| v.as_array().is_some_and(|list| list.iter().any(Value::is_object));
+    value.as_object().is_some_and(|object| object.values().any(list))
+}
+
 /// A list of objects as a table, with the keys of all of them as its columns.
 fn rows(list: &[Value], indent: usize, lines: &mut Vec<String>) {
     let mut columns: Vec<&str> = Vec::new();
@@ -49,7 +68,8 @@ fn rows(list: &[Value], indent: usize, lines: &mut Vec<String>) {
     let cell = |row: &Value, column: &str| row.get(column).map(plain).unwrap_or_default();
     let mut table = vec![columns.iter().map(|c| (*c).to_owned()).collect::<Vec<String>>()];
     table.extend(list.iter().map(|row| columns.iter().map(|c| cell(row, c)).collect()));
-    let width = |i: usize| table.iter().map(|row| row[i].chars().count()).max().unwrap_or(0);
+    let width =
+        |i: usize| table.iter().map(|row| row[i].chars().count()).max().unwrap_or(0).min(WIDEST);
     let widths: Vec<usize> = (0..columns.len()).map(width).collect();
     for row in &table {
         let cells: Vec<String> =
@@ -96,5 +116,34 @@ mod tests {
     Red
   text        a [31mb";
         assert_eq!(format!("\n{}", render(&facts, 2)), expected);
+    }
+
+    #[test]
+    fn a_cell_longer_than_any_column_makes_no_other_row_long() {
+        let rows: Vec<Value> = (0..500).map(|i| json!({ "name": "x", "n": i })).collect();
+        let long = json!({ "name": "x".repeat(100_000), "n": 0 });
+        let elements = [rows, vec![long]].concat();
+        let text = render(&json!({ "elements": elements }), 0);
+        assert!(text.contains(&"x".repeat(100_000)) && text.len() < 150_000, "{}", text.len());
+    }
+
+    #[test]
+    fn lists_within_lists_are_tables_of_their_own() {
+        let property = json!({"name": "x", "type": "float"});
+        let facts = json!({"elements": [
+            {"name": "vertex", "count": 7, "properties": [property]},
+            {"name": "face", "count": 0, "properties": []},
+        ]});
+        let expected = "
+elements
+  name        vertex
+  count       7
+  properties
+    name  type
+    x     float
+elements
+  name        face
+  count       0";
+        assert_eq!(format!("\n{}", render(&facts, 0)), expected);
     }
 }

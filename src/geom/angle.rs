@@ -15,6 +15,46 @@ pub fn cosine(reference: [f64; 3], normal: [f32; 3], turned: bool) -> f64 {
     (if turned { -dot } else { dot }) + 0.0
 }
 
+/// cos(θ_max − θ_min), given cos θ_min ≥ cos θ_max, as
+/// cos θ_max · cos θ_min + sin θ_max · sin θ_min; infinite where both are equal. Smaller values are
+/// wider ranges; ranges below about 1e-8 rad cannot be told from none.
+pub fn range(cos_theta_min: f64, cos_theta_max: f64) -> f64 {
+    if cos_theta_min > cos_theta_max {
+        cos_theta_min * cos_theta_max + sine(cos_theta_min) * sine(cos_theta_max)
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// sin² θ of the angle θ between the line along `axis` (of any length) and `normal`, in [0, 1]:
+/// exact to a few roundings for small θ too, where the cosine of a normal that was rounded tells
+/// little. Signs do not matter.
+pub fn sine2(axis: [f64; 3], normal: [f32; 3]) -> f64 {
+    let [x, y, z] = normal.map(f64::from);
+    let [ax, ay, az] = axis;
+    let squared = |x: f64, y: f64, z: f64| x * x + y * y + z * z;
+    let lengths2 = squared(ax, ay, az) * squared(x, y, z);
+    if lengths2 > 0.0 {
+        (squared(ay * z - az * y, az * x - ax * z, ax * y - ay * x) / lengths2).min(1.0)
+    } else {
+        0.0
+    }
+}
+
+/// cos 2θ of a θ in [0, π/2] from sin² θ: what [`range`] is for a cone of half angle θ.
+pub fn cone(sine2: f64) -> f64 {
+    1.0 - 2.0 * sine2
+}
+
+/// `v` at length 1; none if it is 0 or not finite. Whatever the size of its components.
+pub fn direction(v: [f64; 3]) -> Option<[f64; 3]> {
+    let size = v[largest(v)].abs();
+    let scaled = v.map(|c| c / size);
+    let length = scaled.iter().map(|c| c * c).sum::<f64>().sqrt();
+    // NaN where a component is NaN or infinite, or all are 0. Adding 0 makes −0 a 0.
+    length.is_finite().then(|| scaled.map(|c| c / length + 0.0))
+}
+
 /// The widest range of angles that counts as agreement, prepared for comparing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MaxAngle {
@@ -22,17 +62,45 @@ pub struct MaxAngle {
 }
 
 impl MaxAngle {
+    /// The range 0: everything that can be told from it exceeds it.
+    pub const NONE: MaxAngle = MaxAngle { cosine: 1.0 };
+
     /// The range `radians`, in [0, π].
     pub fn new(radians: f64) -> Self {
         MaxAngle { cosine: libm::cos(radians) }
     }
 
-    /// True if θ_max − θ_min is larger, given cos θ_min ≥ cos θ_max: by
-    /// cos(θ_max − θ_min) = cos θ_max · cos θ_min + sin θ_max · sin θ_min. Ranges below about
-    /// 1e-8 rad cannot be told from none.
+    /// The range whose cosine is `cosine`.
+    pub fn of_cosine(cosine: f64) -> Self {
+        MaxAngle { cosine }
+    }
+
+    /// Its cosine.
+    pub fn cosine(self) -> f64 {
+        self.cosine
+    }
+
+    /// It in radians, for [`new`](MaxAngle::new): rounded up, so that it exceeds no less than this.
+    pub fn radians(self) -> f64 {
+        let mut radians = libm::acos(self.cosine.clamp(-1.0, 1.0));
+        // An arc cosine errs by a rounding or two.
+        for _ in 0..8 {
+            if libm::cos(radians) <= self.cosine {
+                break;
+            }
+            radians = radians.next_up();
+        }
+        radians
+    }
+
+    /// True if `range`, as [`range`] and [`cone`] give it, is larger.
+    pub fn is_exceeded_by(self, range: f64) -> bool {
+        range < self.cosine
+    }
+
+    /// True if θ_max − θ_min is larger, given cos θ_min ≥ cos θ_max.
     pub fn is_exceeded(self, cos_theta_min: f64, cos_theta_max: f64) -> bool {
-        let difference = cos_theta_min * cos_theta_max + sine(cos_theta_min) * sine(cos_theta_max);
-        cos_theta_min > cos_theta_max && difference < self.cosine
+        self.is_exceeded_by(range(cos_theta_min, cos_theta_max))
     }
 }
 

@@ -7,3 +7,4 @@ pub mod lattice;
 pub mod nearest;
 pub mod plane;
 pub mod star;
+pub mod wide;

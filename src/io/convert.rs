@@ -5,6 +5,8 @@ mod layouts;
 
 pub use layouts::{las_schema, ply_schema};
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use crate::point::names::XYZ;
 use crate::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
 use crate::{Error, ErrorKind, Result};
@@ -50,11 +52,12 @@ impl Projection {
     /// `from` lacks. Coordinates cannot be dropped.
     pub fn new(from: &Schema, to: &Schema, drop: &[String]) -> Result<Projection> {
         check_drop(from, drop)?;
+        let held: BTreeSet<&str> = to.dimensions.iter().map(|d| d.name.as_str()).collect();
         let lost: Vec<&str> = from
             .dimensions
             .iter()
             .map(|d| d.name.as_str())
-            .filter(|name| to.find(name).is_none() && !drop.iter().any(|d| d == name))
+            .filter(|name| !held.contains(name) && !drop.iter().any(|d| d == name))
             .collect();
         if !lost.is_empty() {
             let format = match to.layout {
@@ -64,10 +67,11 @@ impl Projection {
             return Err(Error::pipeline(format!("{format} cannot hold {}", quoted(&lost)))
                 .help(format!("drop = {lost:?} leaves them out")));
         }
+        let sources: BTreeMap<&str, &Dimension> =
+            from.dimensions.iter().map(|d| (d.name.as_str(), d)).collect();
         let mut moves = Vec::new();
-        for target in &to.dimensions {
-            let source = from.find(&target.name).filter(|_| !drop.contains(&target.name));
-            if let Some(source) = source {
+        for target in to.dimensions.iter().filter(|d| !drop.contains(&d.name)) {
+            if let Some(source) = sources.get(target.name.as_str()) {
                 push(&mut moves, step(source, from.endian, target, to.endian));
             }
         }
@@ -176,7 +180,7 @@ impl Projection {
             }
             None => format!("point {index} of its batch"),
         };
-        let value = match value {
+        let text = match value {
             Value::Unsigned(v) => v.to_string(),
             Value::Signed(v) => v.to_string(),
             Value::Single(v) => v.to_string(),
@@ -185,9 +189,12 @@ impl Projection {
         let name = &to.name;
         let error = Error::new(
             ErrorKind::Data,
-            format!("{name} = {value} of {place} does not fit {}", room(to)),
+            format!("{name} = {text} of {place} does not fit {}", room(to)),
         );
         if XYZ.contains(&name.as_str()) {
+            if !value.as_f64().is_finite() {
+                return error.help("set nonfinite = \"drop\" under [run] to leave such points out");
+            }
             // Whole thousands near the point: a scan around it fits, and its digits stay readable.
             let near = self.from.coordinates().map(|axes| {
                 axes.map(|axis| (axis.world(record, self.from.endian) / 1000.0).round() * 1000.0)

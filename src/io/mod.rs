@@ -3,6 +3,7 @@
 pub mod convert;
 mod describe;
 pub mod las;
+mod origin;
 pub mod ply;
 mod project;
 pub mod synthetic;

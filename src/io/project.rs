@@ -1,5 +1,6 @@
 //! A sink of one record layout behind records of another.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::convert::Projection;
@@ -15,6 +16,7 @@ pub struct Projected {
 }
 
 struct ProjectingEncoder {
+    path: PathBuf,
     projection: Projection,
     to: Arc<Schema>,
     inner: Arc<dyn Encode>,
@@ -22,8 +24,10 @@ struct ProjectingEncoder {
 
 impl Projected {
     /// Records go through `projection` and, as records of `to`, into `inner`.
-    pub fn new(inner: Box<dyn Sink>, projection: Projection, to: Arc<Schema>) -> Self {
-        let encoder = ProjectingEncoder { projection, to, inner: inner.encoder() };
+    /// `path` is the output's, to be named where a value does not fit.
+    pub fn new(inner: Box<dyn Sink>, projection: Projection, to: Arc<Schema>, path: &Path) -> Self {
+        let path = path.to_owned();
+        let encoder = ProjectingEncoder { path, projection, to, inner: inner.encoder() };
         Projected { inner, encoder: Arc::new(encoder), rounded: (0, 0.0) }
     }
 
@@ -37,7 +41,8 @@ impl Projected {
 impl Encode for ProjectingEncoder {
     fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
         let mut records = Vec::with_capacity(batch.len() * self.to.stride);
-        let rounding = self.projection.project(batch.records(), &mut records)?;
+        let rounding = self.projection.project(batch.records(), &mut records);
+        let rounding = rounding.map_err(|error| error.at(&self.path))?;
         let mut projected = PointBatch::new(self.to.clone(), batch.len());
         projected.extend(&records);
         projected.normals = batch.normals.clone();

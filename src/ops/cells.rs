@@ -1,26 +1,36 @@
 //! The stage `cells`: cubes of points, divided until the normals of each part agree.
 
 mod division;
+mod entry;
+mod gather;
 mod grouping;
+mod limit;
+mod noise;
 mod settings;
+mod target;
+mod threshold;
 
 use std::num::NonZeroUsize;
 
-use serde::{Deserialize, Serialize};
+use serde::ser::SerializeStruct;
+use serde::{Deserialize, Serialize, Serializer};
 use serde_json::Value;
 
-use crate::point::Position;
+use crate::geom::angle::MaxAngle;
 use crate::report::Tally;
-use crate::stage::{Needs, ScanFacts, TileOp};
-use crate::tile::{Cells as Partition, Tile};
+use crate::stage::{Forecast, Needs, ScanFacts, TileOp};
+use crate::tile::{Cells as Partition, Levels, Tile};
 use crate::{Error, Result};
 
-use division::{Division, Rule};
+use division::{Counts, Division, Rule};
 use grouping::Grouping;
-pub use settings::{Measure, Side, Split};
+use limit::Limit;
+pub use settings::{Measure, Reference, Side, Split};
+pub use target::Keep;
+use threshold::Threshold;
 
-/// Direction N that angles are measured from.
-const REFERENCE: [f64; 3] = [1.0, 0.0, 0.0];
+/// Largest range of angles where nothing is said, in radians.
+const MAX_ANGLE: f64 = 0.1;
 /// Positions that an occupied cube holds on average, at least, where the side is chosen by itself.
 const POSITIONS_PER_CUBE: u64 = 32;
 /// Cubes of this side, anchored at world 0, are the octants of the lattice: no larger side differs.
@@ -45,33 +55,69 @@ const SORTING_BYTES: usize = 32;
 /// separates only a few their cost is quadratic. No surface does that; to bound the time of data
 /// that does, parts more than 64 + 2 log₂ m divisions deep are cut in eight instead
 /// (`cells_cut_deep` of the report counts the initial cells with such parts).
-#[derive(Debug, Clone, Serialize, Deserialize)]
+///
+/// Two lengths bound the density. A part whose tight box is longer than `max_side` is cut in eight
+/// whatever its angles and however few its positions, so that flat regions stay covered; one no
+/// longer than `min_spacing` is not divided. `cells_by_max_side` of the report counts the parts that
+/// were divided for that reason alone, `cells_by_min_spacing` those that were not.
+///
+/// With `keep` the largest angle is found instead of given. Where a cell is divided does not depend
+/// on that angle, so all divisions are made once, those of the widest ranges count first, and of
+/// those of exactly the last range the first in canonical order (initial cells by their Morton-first
+/// position; each part before its own parts): as many as leave the number of records asked for. A
+/// position without a normal keeps a record and is among them. With `split = "voronoi"` the number
+/// is met exactly, as each division adds one record; a cut in eight adds up to seven, and the first
+/// in that order that would exceed the number ends it. If all divisions leave fewer, all are made. A
+/// division needs angles that differ: of a perfect plane no more can be kept than its initial cells.
+///
+/// Before a run it looks at a sample of the scan: `normal_scatter` of the report is how far, in
+/// radians, normals are off their linear trend where the scan is planar (root of the mean square, the
+/// median of the samples). Where that exceeds `max_angle` noise divides cells that are flat, and the
+/// run says so.
+#[derive(Debug, Clone, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Cells {
     /// Side of the initial cells: a length in world units, rounded to whole lattice steps, or "auto":
-    /// the smallest 2^j steps for which occupied cubes hold 32 positions on average.
+    /// the smallest 2^j steps for which occupied cubes hold 32 positions on average; with `keep` also
+    /// large enough that there are at most half as many cubes as records are to stay.
     pub side: Side,
     /// Largest θ_max − θ_min of a cell (the paper's α) in radians, 0 to π. In a pipeline file also
-    /// "6deg" or "0.1rad".
+    /// "6deg" or "0.1rad". Not together with `keep`.
     #[serde(deserialize_with = "settings::angle")]
-    pub max_angle: f64,
+    pub max_angle: Option<f64>,
+    /// How many records are to stay, instead of `max_angle`: a share of those that the stage decides
+    /// about ("10%", to six decimals, rounded to whole records), or a number (500000, "250k", "5M").
+    pub keep: Option<Keep>,
     /// Cells of so many positions or fewer are not divided (the paper's β).
     pub min_points: NonZeroUsize,
+    /// Length in world units beyond which no cell is kept whole.
+    #[serde(deserialize_with = "settings::length")]
+    pub max_side: Option<f64>,
+    /// Length in world units up to which no cell is divided.
+    #[serde(deserialize_with = "settings::length")]
+    pub min_spacing: Option<f64>,
     /// How a cell is divided.
     pub split: Split,
     /// What the range of angles of a cell is.
     pub measure: Measure,
+    /// Direction N that `measure = "axis"` takes angles to: an axis, or a vector of any length.
+    pub reference: Reference,
     #[serde(skip)]
     settled: Option<Settled>,
+    #[serde(skip)]
+    threshold: Option<Threshold>,
 }
 
-/// The side once the scan is known.
+/// What is fixed once the scan is known.
 #[derive(Debug, Clone, Copy)]
 struct Settled {
-    /// Lattice steps.
+    /// Side of the initial cells in lattice steps.
     steps: i64,
-    /// World units.
+    /// The same in world units.
     length: f64,
+    /// `max_side` and `min_spacing` in lattice steps; the largest number and 0 where not given.
+    max_side: u64,
+    min_spacing: u64,
 }
 
 impl Settled {
@@ -84,12 +130,35 @@ impl Default for Cells {
     fn default() -> Self {
         Cells {
             side: Side::Auto,
-            max_angle: 0.1,
+            max_angle: None,
+            keep: None,
             min_points: NonZeroUsize::MIN,
+            max_side: None,
+            min_spacing: None,
             split: Split::Voronoi,
             measure: Measure::Axis,
+            reference: Reference::X,
             settled: None,
+            threshold: None,
         }
+    }
+}
+
+/// The keys; `max_angle` as what it is where it was not given.
+impl Serialize for Cells {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let max_angle = self.keep.is_none().then(|| self.max_angle());
+        let mut keys = serializer.serialize_struct("Cells", 9)?;
+        keys.serialize_field("side", &self.side)?;
+        keys.serialize_field("max_angle", &self.max_angle.or(max_angle))?;
+        keys.serialize_field("keep", &self.keep)?;
+        keys.serialize_field("min_points", &self.min_points)?;
+        keys.serialize_field("max_side", &self.max_side)?;
+        keys.serialize_field("min_spacing", &self.min_spacing)?;
+        keys.serialize_field("split", &self.split)?;
+        keys.serialize_field("measure", &self.measure)?;
+        keys.serialize_field("reference", &self.reference)?;
+        keys.end()
     }
 }
 
@@ -110,78 +179,159 @@ impl TileOp for Cells {
     }
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
+        self.check().map_err(|(_, error)| error)?;
         let steps = match self.side {
-            Side::Auto => 1 << scan.levels.smallest_side(POSITIONS_PER_CUBE),
+            Side::Auto => 1 << self.auto_level(scan.levels, scan.points),
             Side::Length(length) => scan.lattice.steps(length).min(LARGEST_SIDE),
         };
-        self.settled = Some(Settled { steps, length: steps as f64 * scan.lattice.step });
+        let bound = |length: f64| scan.lattice.steps(length).unsigned_abs();
+        self.settled = Some(Settled {
+            steps,
+            length: steps as f64 * scan.lattice.step,
+            max_side: self.max_side.map_or(u64::MAX, bound),
+            min_spacing: self.min_spacing.map_or(0, bound),
+        });
         Ok(())
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
-        let settled = self
-            .settled
-            .ok_or_else(|| Error::internal("the stage cells ran before its side was settled"))?;
-        if u32::try_from(tile.positions.len()).is_err() {
-            return Err(Error::internal("a tile has more than 2^32 positions"));
+        let limit = self.limit()?;
+        let (mut cells, crossing) = self.initial_cells(tile)?;
+        let mut division = Division::new(self.rule(limit)?, tile);
+        let initial = std::mem::take(&mut cells.ends);
+        cells.ends.reserve_exact(cells.members.len());
+        let mut start = 0;
+        for end in initial {
+            division.run(start..end as usize, &mut cells, |_, _| {});
+            start = end as usize;
         }
-        let Tile { positions, normals, core, cells, .. } = tile;
-        cells.clear();
-        cells.reference = REFERENCE;
-        let grouping = Grouping { positions, normals, core: core.clone(), side: settled.steps };
-        let crossing = grouping.run(cells);
         tally.work("crossing_cells", crossing);
-        let rule = Rule::new(self, REFERENCE, settled.steps);
-        self.divide(Division::new(rule, positions, normals), cells, &|i| core.contains(&i), tally);
+        self.count(division.counts(), tally);
+        tile.cells = cells;
         Ok(())
     }
 
     fn decisions(&self) -> Vec<(String, Value)> {
-        self.settled.map_or(Vec::new(), |settled| {
-            vec![
-                ("side".into(), settled.length.into()),
-                ("side_steps".into(), settled.steps.into()),
-            ]
-        })
+        let settled = self.settled.iter().flat_map(|settled| {
+            [("side".into(), settled.length.into()), ("side_steps".into(), settled.steps.into())]
+        });
+        settled.chain(self.threshold.iter().flat_map(Threshold::decisions)).collect()
+    }
+
+    fn wants_sample(&self) -> bool {
+        true
+    }
+
+    fn sample(&self, tile: &mut Tile) -> Result<Vec<f64>> {
+        noise::sample(self, tile)
+    }
+
+    fn forecast(&mut self, samples: &[Vec<f64>]) -> Forecast {
+        noise::forecast(self, samples)
     }
 }
 
 impl Cells {
-    /// Divides the initial cells in place. What crosses a tile's face is counted by the tile whose
-    /// core has its Morton-first member, so that every cut into tiles counts alike.
-    fn divide(
-        &self,
-        mut division: Division,
-        cells: &mut Partition,
-        is_core: &dyn Fn(usize) -> bool,
-        tally: &mut Tally,
-    ) {
-        let initial = std::mem::take(&mut cells.ends);
-        cells.turned.resize(cells.members.len(), false);
-        cells.ends.reserve_exact(cells.members.len());
-        let owned = |cells: &Partition, start: usize| is_core(cells.members[start] as usize);
-        let (mut cells_initial, mut cells_divided, mut cut_deep) = (0, 0, 0);
-        let mut start = 0;
-        for end in initial {
-            let mine = u64::from(owned(cells, start));
-            let groups = cells.ends.len();
-            let deep = division.run(start, end as usize, cells);
-            cells_initial += mine;
-            cut_deep += mine * u64::from(deep);
-            for group in groups..cells.ends.len() {
-                cells_divided += u64::from(owned(cells, start));
-                start = cells.ends[group] as usize;
-            }
+    /// Refuses keys that do not go together, naming one of them.
+    pub(crate) fn check(&self) -> Result<(), (&'static str, Error)> {
+        if self.keep.is_some() && self.max_angle.is_some() {
+            let error = Error::pipeline("`keep` finds the largest angle, and `max_angle` gives it");
+            return Err(("keep", error.help("give one of them")));
         }
-        tally.count("cells_initial", cells_initial);
-        tally.count("cells", cells_divided);
-        if cut_deep > 0 {
-            tally.count("cells_cut_deep", cut_deep);
+        match (self.max_side, self.min_spacing) {
+            (Some(most), Some(least)) if most < least => {
+                let told = format!(
+                    "`max_side` is {most}, less than `min_spacing`, {least}: cells between the two \
+                     would have to be divided and must not be"
+                );
+                Err(("max_side", Error::pipeline(told)))
+            }
+            _ if self.reference.direction().is_none() => {
+                Err(("reference", Error::pipeline("`reference` has no direction")))
+            }
+            _ => Ok(()),
         }
     }
-}
 
-/// Corner of the cell of side `side`, anchored at world 0, that holds `p`.
-fn corner(p: Position, side: i64) -> Position {
-    p.map(|v| v.div_euclid(side) * side)
+    /// The largest range of angles in radians, where none is to be found.
+    fn max_angle(&self) -> f64 {
+        self.max_angle.unwrap_or(MAX_ANGLE)
+    }
+
+    /// Binary logarithm of the side that is chosen by itself.
+    fn auto_level(&self, levels: &Levels, records: u64) -> u32 {
+        let fewest = levels.occupied(62);
+        let most = self.keep.map_or(u64::MAX, |keep| keep.of(records) / 2);
+        let level = levels.smallest_side(POSITIONS_PER_CUBE);
+        (level..62)
+            .find(|&level| [fewest, most].iter().any(|&n| levels.occupied(level) <= n))
+            .unwrap_or(62)
+    }
+
+    fn settled(&self) -> Result<Settled> {
+        self.settled
+            .ok_or_else(|| Error::internal("the stage cells ran before its side was settled"))
+    }
+
+    /// Which divisions a run makes.
+    fn limit(&self) -> Result<Limit> {
+        match (self.keep, &self.threshold) {
+            (None, _) => Ok(Limit { max_angle: MaxAngle::new(self.max_angle()), ties: None }),
+            (Some(_), Some(threshold)) => Ok(threshold.limit()),
+            (Some(_), None) => {
+                Err(Error::internal("the stage cells ran before its largest angle was found"))
+            }
+        }
+    }
+
+    fn rule(&self, limit: Limit) -> Result<Rule> {
+        let Settled { steps: side, max_side, min_spacing, .. } = self.settled()?;
+        let reference = match self.measure {
+            Measure::Axis => self.reference.direction(),
+            Measure::Cone => None,
+        };
+        let (min_points, split) = (self.min_points.get(), self.split);
+        Ok(Rule {
+            reference,
+            limit,
+            min_points,
+            max_side,
+            min_spacing,
+            split,
+            side,
+            origin: [0; 3],
+        })
+    }
+
+    /// The initial cells that have a position in the tile's core, in the memory of the tile's own,
+    /// and how many of them cross its faces.
+    fn initial_cells(&self, tile: &mut Tile) -> Result<(Partition, u64)> {
+        let side = self.settled()?.steps;
+        if u32::try_from(tile.positions.len()).is_err() {
+            return Err(Error::internal("a tile has more than 2^32 positions"));
+        }
+        let mut cells = std::mem::take(&mut tile.cells);
+        cells.clear();
+        cells.reference = match self.measure {
+            Measure::Axis => self.reference.direction(),
+            Measure::Cone => None,
+        };
+        let crossing = Grouping { tile, side }.run(&mut cells);
+        cells.turned.resize(cells.members.len(), false);
+        Ok((cells, crossing))
+    }
+
+    fn count(&self, counts: Counts, tally: &mut Tally) {
+        tally.count("cells_initial", counts.initial);
+        tally.count("cells", counts.cells);
+        if counts.cut_deep > 0 {
+            tally.count("cells_cut_deep", counts.cut_deep);
+        }
+        if self.max_side.is_some() {
+            tally.count("cells_by_max_side", counts.by_max_side);
+        }
+        if self.min_spacing.is_some() {
+            tally.count("cells_by_min_spacing", counts.by_min_spacing);
+        }
+    }
 }

@@ -2,35 +2,82 @@
 
 use std::ops::Range;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::Result;
-use crate::geom::angle::{cosine, is_known};
-use crate::point::Position;
+use super::removal::{Account, keep_once, represent};
+use crate::geom::angle::{cosine, dominant_axis, is_known, outer_sum, sine2};
+use crate::geom::wide::Wide;
+use crate::point::{Mark, Position};
 use crate::report::Tally;
 use crate::stage::{Needs, TileOp};
-use crate::tile::{Cells as Partition, Fate, Tile};
+use crate::tile::{Cells as Partition, Tile};
+use crate::{Error, Result};
 
 /// Bytes a position: an angle and an index.
 const BYTES: usize = 16;
+/// Most passes that the stage takes.
+pub const MAX_PASSES: usize = 16;
 
 /// Keeps one record of every cell (the paper's third step).
 ///
-/// A cell's positions are sorted by their angle θ to the partition's direction; the lower median
-/// stays: of m positions that at index (m − 1) / 2. Among positions of exactly that angle it is the
+/// A cell's positions are sorted by their angle θ to the partition's direction (to the cell's own
+/// dominant axis where `cells` has `measure = "cone"`); the lower median stays: of m positions that at index (m − 1) / 2. Among positions of exactly that angle it is the
 /// one nearest to the centre of mass of the cell's positions, then the first in Morton order. Copies
 /// weigh as one position and are removed as coincident. A position without a normal is in no cell
 /// and keeps one record.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Median {}
+///
+/// With `passes` above 1, what one pass leaves is the scan of the next: normals, cells and selection
+/// again, with the same keys. A cell's side, once chosen, stays.
+///
+/// With `mark`, every record is written and the decision is in the records: `"key-point"` sets the
+/// key-point flag of those that stay and clears it of the others, `"withheld"` sets the withheld flag
+/// of the others, 7 and 18 make that their class. The report counts them as `median_marked`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Median {
+    /// How often the stages from the last `normals` to this one are applied (the paper's degree of
+    /// reduction), 1 to 16.
+    #[serde(deserialize_with = "checked_passes")]
+    pub passes: usize,
+    /// How records are marked, instead of removing any.
+    pub mark: Option<Mark>,
+}
+
+impl Default for Median {
+    fn default() -> Self {
+        Median { passes: 1, mark: None }
+    }
+}
+
+impl Median {
+    /// Refuses passes outside 1 to 16; names the key to blame.
+    pub fn check(&self) -> Result<(), (&'static str, Error)> {
+        let wrong = |told: String| ("passes", Error::pipeline(told));
+        check_passes(self.passes as u64).map_err(wrong)
+    }
+}
+
+fn check_passes(passes: u64) -> Result<(), String> {
+    if (1..=MAX_PASSES as u64).contains(&passes) {
+        return Ok(());
+    }
+    Err(format!("passes must be 1 to {MAX_PASSES}, not {passes}"))
+}
+
+fn checked_passes<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
+    let passes = u64::deserialize(from)?;
+    check_passes(passes).map_err(serde::de::Error::custom)?;
+    Ok(passes as usize)
+}
 
 impl TileOp for Median {
     fn needs(&self) -> Needs {
         Needs {
             reads: vec!["Cell".into(), "Normal".into()],
             bytes_per_point: BYTES,
-            removes: true,
+            removes: self.mark.is_none(),
+            mark: self.mark,
+            passes: self.passes,
             ..Needs::default()
         }
     }
@@ -39,7 +86,7 @@ impl TileOp for Median {
         let core = tile.core.clone();
         let (mut coincident, mut represented) = (0, 0);
         for i in core.clone() {
-            if !is_known(tile.normals[i]) {
+            if !is_known(tile.normals[i]) && tile.is_chosen(i) {
                 coincident += keep_once(tile, i);
             }
         }
@@ -51,10 +98,10 @@ impl TileOp for Median {
             if !tile.cells.members[group.clone()].iter().any(|&i| core.contains(&(i as usize))) {
                 continue;
             }
-            let kept = median(tile, group.clone(), &mut angles);
+            let Some(kept) = median(tile, group.clone(), &mut angles) else { continue };
             for at in group {
                 let i = tile.cells.members[at] as usize;
-                if !core.contains(&i) {
+                if !core.contains(&i) || !tile.is_chosen(i) {
                     continue;
                 } else if i == kept {
                     coincident += keep_once(tile, i);
@@ -63,59 +110,46 @@ impl TileOp for Median {
                 }
             }
         }
-        tally.remove("median", "coincident", coincident);
-        tally.remove("median", "represented", represented);
+        let account = Account { stage: "median", marked: "median_marked", mark: self.mark };
+        account.enter(tally, "coincident", coincident);
+        account.enter(tally, "represented", represented);
         Ok(())
     }
 }
 
-/// The position of `group` with the lower median angle. `angles` is memory to work in.
-fn median(tile: &Tile, group: Range<usize>, angles: &mut Vec<(f64, u32)>) -> usize {
+/// The position of `group` with the lower median angle among those that the stage decides about; none
+/// if there are none. `angles` is memory to work in.
+fn median(tile: &Tile, group: Range<usize>, angles: &mut Vec<(f64, u32)>) -> Option<usize> {
     let Partition { members, turned, reference, .. } = &tile.cells;
-    if let [only] = members[group.clone()] {
-        return only as usize;
-    }
     angles.clear();
-    angles.extend(group.clone().map(|at| {
-        let i = members[at];
-        (cosine(*reference, tile.normals[i as usize], turned[at]), i)
-    }));
-    // Ascending angles are descending cosines.
+    let normal = |i: u32| tile.normals[i as usize];
+    let decided = group.clone().filter(|&at| tile.is_chosen(members[at] as usize));
+    match reference {
+        Some(reference) => angles.extend(decided.map(|at| {
+            let i = members[at];
+            (cosine(*reference, normal(i), turned[at]), i)
+        })),
+        None => {
+            let axis = dominant_axis(outer_sum(members[group.clone()].iter().map(|&i| normal(i))));
+            angles.extend(decided.map(|at| (-sine2(axis, normal(members[at])), members[at])));
+        }
+    }
+    if let [] | [_] = angles[..] {
+        return angles.first().map(|(_, only)| *only as usize);
+    }
+    // Ascending angles are descending cosines, and descending −sin² up to a right angle.
     let middle = (angles.len() - 1) / 2;
     let cosine = angles.select_nth_unstable_by(middle, |a, b| b.0.total_cmp(&a.0)).1.0;
     angles.retain(|angle| angle.0 == cosine);
     if let [(_, only)] = angles[..] {
-        return only as usize;
+        return Some(only as usize);
     }
-    let center = Center::of(members[group].iter().map(|&i| tile.positions[i as usize]));
+    let voters = members[group].iter().map(|&i| i as usize).filter(|&i| tile.is_chosen(i));
+    let center = Center::of(voters.map(|i| tile.positions[i]));
     // Indices are in Morton order.
     let first =
         angles.iter().min_by_key(|(_, i)| (center.distance2(tile.positions[*i as usize]), *i));
-    first.map_or(0, |(_, i)| *i as usize)
-}
-
-/// Keeps one record of position `i`; returns how many copies that removes.
-fn keep_once(tile: &mut Tile, i: usize) -> u64 {
-    if tile.fates[i] == Fate::Kept && tile.copies[i] > 1 {
-        tile.fates[i] = Fate::KeptOnce;
-        return u64::from(tile.copies[i] - 1);
-    }
-    0
-}
-
-/// Lets `kept` stand for position `i`; returns how many records that removes.
-fn represent(tile: &mut Tile, i: usize, kept: usize) -> u64 {
-    let records = match tile.fates[i] {
-        Fate::Kept => u64::from(tile.copies[i]),
-        Fate::KeptOnce => 1,
-        Fate::Removed | Fate::Represented { .. } => return 0,
-    };
-    let normal = tile.normals[kept].map(f64::from);
-    let (p, q) = (tile.positions[i], tile.positions[kept]);
-    let [x, y, z]: [f64; 3] =
-        std::array::from_fn(|axis| p[axis].saturating_sub(q[axis]) as f64 * normal[axis]);
-    tile.fates[i] = Fate::Represented { deviation: (x + y + z).abs() as f32 };
-    records
+    first.map(|(_, i)| *i as usize)
 }
 
 /// The centre of mass of a group, in whole numbers: n·x − Σx instead of x − Σx / n.
@@ -136,60 +170,21 @@ impl Center {
         center
     }
 
-    /// Exact squared distance of `p`, times n²: the upper and the lower 128 bits.
-    fn distance2(&self, p: Position) -> (u128, u128) {
-        let mut total = (0, 0);
+    /// Exact squared distance of `p`, times n².
+    fn distance2(&self, p: Position) -> Wide {
+        let mut total = Wide::ZERO;
         for (sum, v) in self.sum.iter().zip(p) {
             // Below 2^32 positions of 63 bits: an offset has less than 97.
             let offset = (self.count * i128::from(v) - sum).unsigned_abs();
-            total = add(total, square(offset));
+            total = total.plus(Wide::square(offset));
         }
         total
     }
 }
 
-/// v² for v < 2^127: the upper and the lower 128 bits.
-fn square(v: u128) -> (u128, u128) {
-    let (high, low) = (v >> 64, v & u128::from(u64::MAX));
-    if high == 0 {
-        return (0, low * low);
-    }
-    let cross = 2 * high * low;
-    add((high * high + (cross >> 64), cross << 64), (0, low * low))
-}
-
-/// The sum of two numbers of 256 bits.
-fn add(a: (u128, u128), b: (u128, u128)) -> (u128, u128) {
-    let (low, carry) = a.1.overflowing_add(b.1);
-    (a.0 + b.0 + u128::from(carry), low)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    proptest::proptest! {
-        #[test]
-        fn squares_of_256_bits_are_exact(a in 0u64.., b in 0u32..) {
-            // (a + b·2^64)² in pieces of 32 bits, by hand.
-            let v = u128::from(a) + (u128::from(b) << 64);
-            let digits: Vec<u128> = (0..4).map(|i| v >> (32 * i) & 0xffff_ffff).collect();
-            let mut pieces = [0u128; 9];
-            for i in 0..4 {
-                for j in 0..4 {
-                    pieces[i + j] += digits[i] * digits[j];
-                }
-            }
-            for i in 0..8 {
-                pieces[i + 1] += pieces[i] >> 32;
-                pieces[i] &= 0xffff_ffff;
-            }
-            let number = |range: Range<usize>| {
-                pieces[range].iter().rev().fold(0u128, |number, piece| number << 32 | piece)
-            };
-            proptest::prop_assert_eq!(square(v), (number(4..8), number(0..4)));
-        }
-    }
 
     #[test]
     fn the_center_of_far_positions_is_exact() {
@@ -199,12 +194,29 @@ mod tests {
         let [a, _, c, d] = positions.map(|p| center.distance2(p));
         assert!(c < a, "one step nearer at 2^62");
         assert!(d < c);
-        assert!(a.0 > 0, "beyond 128 bits");
+        assert!(a > Wide::from(u128::MAX));
     }
 
     #[test]
-    fn the_stage_has_no_keys() {
-        assert!(toml::from_str::<Median>("").is_ok());
-        assert!(toml::from_str::<Median>("keep = 2").is_err());
+    fn passes_are_1_to_16_and_only_where_points_are_removed() {
+        assert_eq!(toml::from_str::<Median>("").unwrap(), Median { passes: 1, mark: None });
+        assert_eq!(toml::from_str::<Median>("passes = 16").unwrap().needs().passes, 16);
+        for wrong in ["passes = 0", "passes = 17", "passes = -1", "keep = 2", "mark = 6"] {
+            assert!(toml::from_str::<Median>(wrong).is_err(), "{wrong}");
+        }
+        for (text, fits) in
+            [("passes = 2", true), ("mark = 7", true), ("passes = 2\nmark = 7", false)]
+        {
+            assert_eq!(toml::from_str::<Median>(text).unwrap().check().is_ok(), fits, "{text}");
+        }
+        assert!(Median { passes: 17, mark: None }.check().is_err());
+    }
+
+    #[test]
+    fn a_mark_removes_nothing() {
+        let needs = Median { passes: 1, mark: Some(Mark::KeyPoint) }.needs();
+        assert!(!needs.removes && needs.mark == Some(Mark::KeyPoint));
+        let needs = Median::default().needs();
+        assert!(needs.removes && needs.mark.is_none());
     }
 }

@@ -1,8 +1,13 @@
 //! The built-in stages that compute: one file each.
 
 mod cells;
+mod grid;
 mod median;
 pub mod normals;
+pub mod outliers;
+mod removal;
 
-pub use cells::{Cells, Measure, Side, Split};
+pub use cells::{Cells, Keep, Measure, Reference, Side, Split};
+pub use grid::{Grid, Pick};
 pub use median::Median;
+pub use outliers::Outliers;

@@ -4,8 +4,8 @@ use super::kinds::{Read, Synth, Write};
 use super::registry::{Registry, StageKind, StagePlace};
 use crate::Result;
 use crate::ops::normals::Normals;
-use crate::ops::{Cells, Median};
-use crate::stage::Role;
+use crate::ops::{Cells, Grid, Median, Outliers};
+use crate::stage::{Role, TileOp};
 
 impl Registry {
     /// The stage kinds that pointmill has.
@@ -14,29 +14,66 @@ impl Registry {
             .with::<Read>()
             .with::<Synth>()
             .with::<Write>()
+            .with::<Outliers>()
             .with::<Normals>()
             .with::<Cells>()
             .with::<Median>()
+            .with::<Grid>()
     }
 }
 
-macro_rules! tile_op {
-    ($stage:ty, $kind:literal, $about:literal) => {
-        impl StageKind for $stage {
-            const KIND: &'static str = $kind;
-            const ABOUT: &'static str = $about;
-
-            fn build(self, _: &StagePlace) -> Result<Role> {
-                Ok(Role::TileOp(Box::new(self)))
-            }
-        }
-    };
+fn tile_op(stage: impl TileOp + 'static) -> Role {
+    Role::TileOp(Box::new(stage))
 }
 
-tile_op!(
-    Normals,
-    "normals",
-    "Computes a surface normal at every point from its nearest neighbours."
-);
-tile_op!(Cells, "cells", "Divides the scan into cells whose normals agree.");
-tile_op!(Median, "median", "Keeps the median point of every cell.");
+impl StageKind for Outliers {
+    const KIND: &'static str = "outliers";
+    const ABOUT: &'static str = "Removes points that are far from all others.";
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.role().map_err(|(key, error)| at.blame(key, error))
+    }
+}
+
+impl StageKind for Normals {
+    const KIND: &'static str = "normals";
+    const ABOUT: &'static str =
+        "Computes a surface normal at every point from its nearest neighbours.";
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.check().map_err(|(key, error)| at.blame(key, error))?;
+        Ok(tile_op(self))
+    }
+}
+
+impl StageKind for Cells {
+    const KIND: &'static str = "cells";
+    const ABOUT: &'static str = "Divides the scan into cells whose normals agree.";
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.check().map_err(|(key, error)| at.blame(key, error))?;
+        Ok(match self.keep {
+            Some(_) => Role::ScanOp(Box::new(self)),
+            None => tile_op(self),
+        })
+    }
+}
+
+impl StageKind for Median {
+    const KIND: &'static str = "median";
+    const ABOUT: &'static str = "Keeps the median point of every cell.";
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.check().map_err(|(key, error)| at.blame(key, error))?;
+        Ok(tile_op(self))
+    }
+}
+
+impl StageKind for Grid {
+    const KIND: &'static str = "grid";
+    const ABOUT: &'static str = "Keeps one point of every cube of a uniform grid.";
+
+    fn build(self, _: &StagePlace) -> Result<Role> {
+        Ok(tile_op(self))
+    }
+}

@@ -140,7 +140,7 @@ impl Output {
         let Target { schema, metadata, projection } = self.las_target(schema, metadata)?;
         let sink = las::create(staged, &self.las_options(), &schema, &metadata)?;
         Ok(match projection {
-            Some(projection) => Box::new(Projected::new(sink, projection, schema)),
+            Some(projection) => Box::new(Projected::new(sink, projection, schema, &self.path)),
             None => sink,
         })
     }

@@ -14,19 +14,21 @@ const MOST_POSITIONS: u64 = 2048;
 /// Positions that are loaded around a cube, about.
 const RIM: usize = 4096;
 
-/// What the stages of `pass` expect, each with its number, from samples that are a function of the
+/// What those of the stages `ops` of `pass` expect that look at samples, each with its number, from samples that are a function of the
 /// points alone.
 pub(super) fn forecast(
     job: &mut Job<'_>,
     pass: &Pass,
+    ops: &[usize],
     field: &Field<'_>,
     sieve: &Sieve,
     capacity: usize,
 ) -> Result<Vec<(usize, Forecast)>> {
     let mut forecasts = Vec::new();
-    let wants = |op: usize| job.ops[op].op.tile().wants_sample();
-    let ops: Vec<usize> = pass.calls.iter().map(|call| call.op).filter(|&op| wants(op)).collect();
-    for op in ops {
+    for &op in ops {
+        if !job.ops[op].op.tile().wants_sample() {
+            continue;
+        }
         let side = job.ops[op].op.tile().needs().cell_side.max(1);
         let keys = cubes(&field.tiles, side)?;
         let capacity = capacity.min(8 * RIM);

@@ -38,6 +38,8 @@ pub(super) struct Milled {
     pub by_input: Vec<ByInput>,
     /// Records that the pass's stages decide about.
     pub decided: u64,
+    /// True if the pass oriented normals.
+    pub oriented: bool,
 }
 
 /// Runs `pass` over the tiles `keys`, into the `sinks` with their numbers and into lists by input.
@@ -71,7 +73,7 @@ pub(super) fn grind(
     let benches = Benches::new(job, tiles, &sinks);
     let outlet: Outlet<Product, Chunk> =
         Outlet::new(sinks.into_iter().map(|(_, sink)| sink).collect(), job.threads);
-    let total = Mutex::new((Tally::default(), 0));
+    let total = Mutex::new((Tally::default(), 0, false));
     let next = AtomicUsize::new(0);
     parallel(job.threads, |_| {
         let guard = StopOnDrop::new(|| outlet.stop());
@@ -92,6 +94,7 @@ pub(super) fn grind(
         total.0.merge(&worker.tally);
         total.0.merge(&bench.tally);
         total.1 += worker.decided;
+        total.2 |= worker.oriented;
         guard.disarm();
         Ok(())
     })?;
@@ -100,9 +103,9 @@ pub(super) fn grind(
     let mut bench = benches.bench();
     let mut encode = |chunk| bench.encode(&benches, &chunk);
     let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
-    let (mut tally, decided) = std::mem::take(&mut *lock(&total));
+    let (mut tally, decided, oriented) = std::mem::take(&mut *lock(&total));
     tally.merge(&bench.tally);
-    Ok(Milled { tally, stored, counts, written, by_input, decided })
+    Ok(Milled { tally, stored, counts, written, by_input, decided, oriented })
 }
 
 /// What threads need to encode chunks.
@@ -110,19 +113,18 @@ pub(super) struct Benches<'a> {
     job: &'a Job<'a>,
     tiles: &'a SealedTiles,
     encoders: Vec<Arc<dyn Encode>>,
-    /// The sink by whose records classes are counted as kept: the last of the pipeline.
+    /// The sink by whose records classes are counted as kept: one of what all stages leave.
     counted: Option<usize>,
     chunk_points: usize,
 }
 
 impl<'a> Benches<'a> {
     fn new(job: &'a Job<'a>, tiles: &'a SealedTiles, sinks: &[(usize, Box<dyn Sink>)]) -> Self {
-        let last = job.wants_normals.len().checked_sub(1);
         Benches {
             job,
             tiles,
             encoders: sinks.iter().map(|(_, sink)| sink.encoder()).collect(),
-            counted: sinks.iter().position(|(sink, _)| Some(*sink) == last),
+            counted: sinks.iter().position(|(sink, _)| *sink == job.last_sink),
             chunk_points: sinks.iter().map(|(_, sink)| sink.chunk_points()).max().unwrap_or(0),
         }
     }
@@ -210,6 +212,7 @@ pub(super) struct Worker<'a> {
     rounded: Option<Rounded<'a>>,
     pub tally: Tally,
     decided: u64,
+    oriented: bool,
 }
 
 impl<'a> Worker<'a> {
@@ -235,7 +238,19 @@ impl<'a> Worker<'a> {
         let rounded = rounds.then(|| Rounded::new(&field.tiles, job.source.schema()));
         let reach = reach(&job.ops, pass);
         let tally = Tally::default();
-        Worker { job, pass, loader, reach, neighbors, wants_normals, rounded, tally, decided: 0 }
+        let (decided, oriented) = (0, false);
+        Worker {
+            job,
+            pass,
+            loader,
+            reach,
+            neighbors,
+            wants_normals,
+            rounded,
+            tally,
+            decided,
+            oriented,
+        }
     }
 
     /// Gives no tile a rim that makes it more than `positions`, for a look at a small cube.
@@ -277,6 +292,7 @@ impl<'a> Worker<'a> {
             self.tally.count("unequal_coordinates", rounded.count(positions.into_iter())?);
         }
         self.decided += tile.copies[tile.core.clone()].iter().map(|&n| u64::from(n)).sum::<u64>();
+        self.oriented |= tile.oriented;
         self.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
         self.tally.work("unproven", tile.around.take_unproven());
         self.tally.work("tied", tile.around.take_tied());

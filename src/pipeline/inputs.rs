@@ -7,7 +7,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 use super::kinds::Format;
-use crate::{Error, Result};
+use crate::{Error, ErrorKind, Result};
 
 /// The files that `paths` mean, in their order. For each path:
 ///
@@ -15,7 +15,7 @@ use crate::{Error, Result};
 /// - a folder means every LAS, LAZ and PLY file in it, sorted by the bytes of their names, hidden
 ///   ones left out;
 /// - else `*`, `?`, `[…]` and `**` make it a pattern: the files that match, sorted by the bytes of
-///   their paths; one that matches none is an error;
+///   their paths; one that matches none is an error, like a file that is not there;
 /// - else it is a file that does not exist (yet): opening it will tell.
 ///
 /// Upper and lower case differ, and `*` and `?` do not match a dot at the beginning of a name, as in
@@ -59,7 +59,7 @@ fn one(path: &str) -> Result<Vec<PathBuf>> {
         walk(start, &steps, &mut files)?;
     }
     if files.is_empty() {
-        return Err(Error::pipeline(format!("no file matches `{path}`")));
+        return Err(Error::new(ErrorKind::Io, format!("no file matches `{path}`")));
     }
     sort(&mut files);
     files.dedup();
@@ -153,7 +153,8 @@ fn folder(path: &Path) -> Result<Vec<PathBuf>> {
     }
     if files.is_empty() {
         let path = path.display();
-        return Err(Error::pipeline(format!("the folder `{path}` has no las, laz or ply file")));
+        let told = format!("the folder `{path}` has no las, laz or ply file");
+        return Err(Error::new(ErrorKind::Io, told));
     }
     sort(&mut files);
     Ok(files)

@@ -11,7 +11,7 @@ use super::cut::cut;
 use super::each::ByInput;
 use super::forecast::forecast;
 use super::grind::{Field, grind};
-use super::passes::{Op, Pass};
+use super::passes::{Call, Op, Pass};
 use super::run::{Finished, Job};
 use super::shares::{BATCH, Demands, Shares};
 use super::survey::survey;
@@ -46,7 +46,7 @@ pub(super) fn mill(
         alive: tiles.points(),
         kept: tiles.points(),
         passes: Vec::new(),
-        forecasts: vec![Vec::new(); job.ops.len()],
+        forecasts: vec![None; job.ops.len()],
         written: sinks.iter().map(|_| None).collect(),
         sinks,
     };
@@ -81,7 +81,7 @@ struct Course {
     kept: u64,
     passes: Vec<PassFigures>,
     /// For each stage, what it said is to be expected.
-    forecasts: Vec<Vec<(String, serde_json::Value)>>,
+    forecasts: Vec<Option<Vec<(String, serde_json::Value)>>>,
     sinks: Vec<Option<Box<dyn Sink>>>,
     /// For each file of each sink, how many records it was given, and what it said in the end.
     written: Vec<Option<Vec<(u64, SinkSummary)>>>,
@@ -101,13 +101,13 @@ impl Course {
         let sieve = pass.sieve(&self.sieve);
         let (keys, capacity) = cut(job, pass, field.lattice, shares, demands, tiles)?;
         let working = job.budget.lease(demands.mill_bytes(capacity as u64), "the mill")?;
-        if pass.round == 1 {
-            for (op, foreseen) in forecast(job, pass, field, &sieve, capacity)? {
-                if let Some(warning) = foreseen.warning {
-                    job.warn(warning);
-                }
-                self.forecasts[op].extend(foreseen.decisions);
+        let ahead = |call: &&Call| self.forecasts[call.op].is_none();
+        let ops: Vec<usize> = pass.calls.iter().filter(ahead).map(|call| call.op).collect();
+        for (op, foreseen) in forecast(job, pass, &ops, field, &sieve, capacity)? {
+            if let Some(warning) = foreseen.warning {
+                job.warn(warning);
             }
+            self.forecasts[op] = Some(foreseen.decisions);
         }
         clock.phase(
             if pass.gathers().is_some() { "gather" } else { "mill" },
@@ -134,7 +134,7 @@ impl Course {
             clock.phase("write", Some(lists.records()));
             let unknown = || Error::internal("an output has no inputs");
             let each = job.each[lists.sink].as_ref().ok_or_else(unknown)?;
-            let last = lists.sink + 1 == job.each.len();
+            let last = lists.sink == job.last_sink;
             let (written, counted) = each.write(job, tiles, lists, last)?;
             tally.merge(&counted);
             self.written[lists.sink] = Some(written);
@@ -151,6 +151,9 @@ impl Course {
         self.sieve.states = Some(stored.states);
         self.sieve.fates = Some(stored.fates);
         self.sieve.figures = stored.figures;
+        if stored.normals.is_some() {
+            self.sieve.oriented = milled.oriented;
+        }
         self.sieve.normals = stored.normals.or(self.sieve.normals.take());
         (self.alive, self.kept) = (milled.counts.alive, milled.counts.written);
         match pass.gathers() {
@@ -268,9 +271,12 @@ fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<(
 }
 
 /// What the stages settled by themselves and what they expected, in their order.
-fn decisions(job: &Job<'_>, forecasts: Vec<Vec<(String, serde_json::Value)>>) -> Vec<Decision> {
+fn decisions(
+    job: &Job<'_>,
+    forecasts: Vec<Option<Vec<(String, serde_json::Value)>>>,
+) -> Vec<Decision> {
     let each = job.ops.iter().zip(forecasts).flat_map(|(stage, expected)| {
-        let settled = stage.op.tile().decisions().into_iter().chain(expected);
+        let settled = stage.op.tile().decisions().into_iter().chain(expected.into_iter().flatten());
         settled.map(|(name, value)| Decision { stage: stage.kind.clone(), name, value })
     });
     each.collect()

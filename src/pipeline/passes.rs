@@ -115,6 +115,11 @@ impl Pass {
     }
 }
 
+/// True if a stage that needs this takes records away from the passes behind it.
+fn decides(needs: &Needs) -> bool {
+    needs.removes || needs.mark.is_some()
+}
+
 /// Gives stages that are limited to some records a bit each, equal limits the same.
 pub(super) fn number_selections(ops: &mut [StageOp]) -> Result<Vec<crate::point::Selection>> {
     let mut selections = Vec::new();
@@ -150,7 +155,7 @@ pub(super) fn unroll(ops: &[StageOp], schema: &Schema, taps: &[Tap]) -> Result<V
                 (first..=op).try_for_each(|op| layout.add(op, round))?;
             }
         }
-        layout.tap(&mut waiting, op + 1, stage.op.tile().needs().removes)?;
+        layout.tap(&mut waiting, op + 1, decides(&stage.op.tile().needs()))?;
     }
     Ok(layout.passes)
 }
@@ -232,7 +237,7 @@ impl Layout<'_> {
         }
         pass.writes_cells |= writes("Cell");
         pass.stores_figures |= writes("Figure");
-        if needs.removes {
+        if decides(&needs) {
             (pass.removes, pass.mark) = (true, needs.mark);
             self.open = false;
         }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::each::{lists_bytes, paths, ranks};
-use super::passes::{Op, Pass, StageOp, Tap, number_selections, unroll};
+use super::passes::{Op, Pass, StageOp, Tap, blame, number_selections, unroll};
 use super::publish::check_place;
 use super::settings::{Nonfinite, Overrides, RunSettings, Withheld};
 use super::shares::Demands;
@@ -31,6 +31,8 @@ pub struct Plan {
     pub(super) each: Vec<Vec<Box<dyn CreateSink>>>,
     /// See [`ranks`].
     pub(super) ranks: Vec<u32>,
+    /// A sink of what all stages leave.
+    pub(super) last_sink: usize,
     pub(super) tagger: Tagger,
     /// True if the run needs tiles: for its stages, or to sort.
     pub(super) mills: bool,
@@ -73,6 +75,7 @@ impl Pipeline {
         let (source_kind, open) =
             sorted.source.ok_or_else(|| Error::pipeline("the pipeline reads nothing"))?;
         let (sinks, taps): (Vec<_>, Vec<_>) = sorted.sinks.into_iter().unzip();
+        let last_sink = last_sink(&sorted.ops, &taps).map_err(in_file)?;
         check_places(&*open, &sinks, &settings)?;
         let source = open.open()?;
         let (each, ranks) = each_input(&*source, &sinks, &settings)?;
@@ -118,6 +121,7 @@ impl Pipeline {
             sinks,
             each,
             ranks,
+            last_sink,
             tagger,
             mills,
             lattice,
@@ -163,6 +167,18 @@ fn sort(stages: Vec<PlacedStage>) -> Result<Sorted> {
         true => Err(Error::pipeline("the pipeline writes nothing")),
         false => Ok(sorted),
     }
+}
+
+/// The first sink of what all stages leave; without one, the last stages would work for nothing.
+fn last_sink(ops: &[StageOp], taps: &[Tap]) -> Result<usize> {
+    let last = taps.iter().position(|tap| tap.ops == ops.len());
+    last.ok_or_else(|| match ops.last() {
+        Some(stage) => {
+            let told = format!("no output takes what `{}` leaves", stage.kind);
+            blame(stage, told).help("add a `write` behind it that has no `from`")
+        }
+        None => Error::pipeline("the pipeline writes nothing"),
+    })
 }
 
 /// Refuses outputs that would replace an input or each other, or that cannot appear where they

@@ -22,7 +22,11 @@ impl Staged {
     pub fn beside(path: &Path) -> Result<Self> {
         check_place(path)?;
         let scratch = Arc::new(Scratch::below(&folder_of(path)));
-        let file = scratch.path("output")?;
+        let file = scratch.path("output").map_err(|error| {
+            error.help(
+                "make the folder writable, or write to another: a file grows beside its place",
+            )
+        })?;
         Ok(Staged { path: path.to_owned(), file, scratch })
     }
 
@@ -87,6 +91,11 @@ pub fn check_place(path: &Path) -> Result<()> {
     let folder = folder_of(path);
     if folder.is_dir() {
         return Ok(());
+    }
+    if let Some(file) = folder.ancestors().find(|above| above.is_file()) {
+        return Err(Error::new(ErrorKind::Io, "this is a file: nothing can be written below it")
+            .at(file)
+            .help("write into a folder"));
     }
     Err(Error::new(ErrorKind::Io, "the folder does not exist").at(folder).help("create it first"))
 }

@@ -13,7 +13,7 @@ use super::mill::mill;
 use super::passes::{Pass, StageOp};
 use super::plan::Plan;
 use super::publish::{Staged, make_folder};
-use super::scratch::{Scratch, free_space};
+use super::scratch::{Scratch, free_space, memory_warning};
 use super::settings::{Nonfinite, Spill};
 use super::shares::{Demands, Shares};
 use super::stream::stream;
@@ -48,6 +48,8 @@ pub(super) struct Job<'a> {
     pub run_records: Option<usize>,
     /// For each sink, whether it writes normals.
     pub wants_normals: Vec<bool>,
+    /// A sink of what all stages leave.
+    pub last_sink: usize,
     pub watch: &'a dyn Watch,
     /// What the user was warned of before the end.
     pub warnings: Mutex<Vec<String>>,
@@ -279,6 +281,7 @@ impl Plan {
         let earlier = std::mem::take(&mut *lock(&job.warnings));
         drop(job);
         let mut run = self.figures(&finished, &budget, area.written());
+        run.warnings.extend(memory_warning(spill.parent(), area.written()));
         run.warnings.iter().for_each(|warning| watch.warn(warning));
         run.warnings.splice(0..0, earlier);
         Ok((finished, run))
@@ -314,6 +317,7 @@ impl Plan {
             tile_points,
             run_records: tile_points.map(|n| n.saturating_mul(4).min(shares.run_records)),
             wants_normals: self.sinks.iter().map(|sink| sink.wants_normals()).collect(),
+            last_sink: self.last_sink,
             watch,
             warnings: Mutex::default(),
             failed: AtomicBool::new(false),
@@ -375,11 +379,16 @@ impl Plan {
             None => (None, None, None),
         };
         let lattice = self.lattice.as_ref();
+        let mut decisions = finished.decisions;
+        if let Some(lattice) = lattice.filter(|lattice| lattice.z_scale() != 1.0) {
+            let (stage, name) = ("run".to_owned(), "z_scale".to_owned());
+            decisions.insert(0, Decision { stage, name, value: lattice.z_scale().into() });
+        }
         let result = Outcome {
             pipeline: self.stages.clone(),
             lattice: lattice.map(|l| LatticeFigures { step: l.step, shift: l.shift }),
             ledger,
-            decisions: finished.decisions,
+            decisions,
             counts: finished.tally.counts.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect(),
             passes: finished.passes,
             tile_side,

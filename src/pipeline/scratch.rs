@@ -10,6 +10,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
+use crate::budget::Bytes;
 use crate::tile::{Folder, lock};
 use crate::{Error, Result};
 
@@ -171,6 +172,21 @@ fn remove(folder: &Path) -> io::Result<()> {
 pub fn free_space(folder: &Path) -> Option<u64> {
     let figures = rustix::fs::statvfs(folder).ok()?;
     figures.f_bavail.checked_mul(figures.f_frsize)
+}
+
+/// A warning if `folder` is on a file system that is memory itself: what spills there is not counted
+/// in the run's budget, and frees nothing. `spilled` is how much did.
+pub fn memory_warning(folder: &Path, spilled: u64) -> Option<String> {
+    // linux/magic.h
+    const MEMORY: [(u32, &str); 2] = [(0x0102_1994, "tmpfs"), (0x8584_58f6, "ramfs")];
+    let kind = rustix::fs::statfs(folder).ok()?.f_type as u32;
+    let (_, name) = MEMORY.into_iter().find(|(magic, _)| *magic == kind).filter(|_| spilled > 0)?;
+    Some(format!(
+        "{}: {} were spilled to a file system in memory ({name}), beyond the budget of the run: name a \
+         folder on a disk with --scratch",
+        folder.display(),
+        Bytes(spilled)
+    ))
 }
 
 #[cfg(test)]

@@ -23,7 +23,13 @@ impl fmt::Display for Plan {
             false => self.passes_shown(f)?,
         }
         match &self.lattice {
-            Some(lattice) => writeln!(f, "lattice  step {} world units", lattice.step)?,
+            Some(lattice) => {
+                write!(f, "lattice  step {} world units", lattice.step)?;
+                if lattice.z_scale() != 1.0 {
+                    write!(f, ", z times {}", lattice.z_scale())?;
+                }
+                writeln!(f)?;
+            }
             None => writeln!(f, "lattice  none: records stream by as they are")?,
         }
         writeln!(f, "order    {}", if self.mills { "canonical" } else { "of the input" })?;
@@ -69,7 +75,7 @@ impl Plan {
         if needs.neighbors > 0 {
             write!(f, ", {} nearest neighbours", needs.neighbors)?;
         }
-        if needs.removes {
+        if needs.removes || needs.mark.is_some() {
             write!(f, ", {}", if needs.mark.is_some() { "marks" } else { "removes" })?;
         }
         if !stage.limits.selection.is_all() {

@@ -2,6 +2,7 @@
 
 mod batch;
 mod bounds;
+mod count;
 pub mod names;
 mod schema;
 mod selection;
@@ -9,6 +10,7 @@ mod units;
 
 pub use batch::PointBatch;
 pub use bounds::{Bounds, Position, distance2};
+pub use count::parse_count;
 pub use schema::{Bits, Dimension, Endian, Layout, Metadata, Scalar, Schema, Value};
 pub use selection::{Chooser, Edit, Flag, Mark, Selection};
 pub use units::{Horizontal, Mismatch, Units};

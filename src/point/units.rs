@@ -45,8 +45,9 @@ impl Units {
     pub fn mismatch(&self) -> Option<Mismatch> {
         match (self.horizontal?, self.vertical) {
             (Horizontal::Degrees, vertical) => {
-                let z = vertical.map_or_else(|| "a length".to_owned(), name);
-                let message = format!("x and y are in degrees and z in {z}: a distance mixes them");
+                let z = vertical
+                    .map_or_else(|| "is a length".to_owned(), |z| "in ".to_owned() + &name(z));
+                let message = format!("x and y are in degrees and z {z}: a distance mixes them");
                 Some(Mismatch { message, z_scale: None })
             }
             (Horizontal::Metres(across), Some(up)) => {

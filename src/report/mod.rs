@@ -29,5 +29,5 @@ pub use sums::{Distances, FixedSum};
 pub use survey::{
     FittedScan, FittedTile, Lot, PlaneDistances, ScanSurvey, TileSurvey, report_tile_level,
 };
-pub use table::Table;
+pub use table::{Grouped, Table};
 pub use tally::Tally;

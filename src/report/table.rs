@@ -134,7 +134,7 @@ impl fmt::Display for Coordinate {
 }
 
 /// A count with a comma between thousands.
-struct Grouped(u64);
+pub struct Grouped(pub u64);
 
 impl fmt::Display for Grouped {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -111,6 +111,7 @@ impl Loader {
         let loaded = self.rim(&zone, neighbors)?;
         self.tile.clear(cube, zone);
         self.core.clear();
+        self.tile.oriented = self.sieve.normals.is_some() && self.sieve.oriented;
         let tiles = self.tiles.clone();
         let is_fine = self.sieve.is_fine(&tiles);
         tiles.blocks_meeting(&loaded, |b| match is_fine {

@@ -80,6 +80,8 @@ pub struct Tile {
     pub core: Range<usize>,
     /// Unit normals; NaN where there is none or it was not asked for.
     pub normals: Vec<[f32; 3]>,
+    /// True if the signs of normals mean something: a stage turned them to a side.
+    pub oriented: bool,
     /// What a first phase found for each position of the core; NaN where it found nothing.
     pub figures: Vec<f64>,
     /// The partition into cells, once a stage made one.
@@ -105,6 +107,7 @@ impl Tile {
             copies: Vec::with_capacity(capacity),
             core: 0..0,
             normals: Vec::with_capacity(capacity),
+            oriented: false,
             figures: Vec::new(),
             cells: Cells::default(),
             fates: Vec::with_capacity(capacity),
@@ -126,6 +129,7 @@ impl Tile {
             copies: vec![1; n],
             core: 0..n,
             normals: vec![[f32::NAN; 3]; n],
+            oriented: false,
             figures: vec![f64::NAN; n],
             cells: Cells::default(),
             fates: vec![Fate::Kept; n],
@@ -141,6 +145,7 @@ impl Tile {
         self.positions.clear();
         self.copies.clear();
         self.normals.clear();
+        self.oriented = false;
         self.figures.clear();
         self.cells.clear();
         self.fates.clear();
@@ -151,7 +156,7 @@ impl Tile {
     /// True if the stage at work decides about position `i`: one of its records is of the classes and
     /// flags that the stage is limited to.
     pub fn is_chosen(&self, i: usize) -> bool {
-        chosen(&self.selections, self.limits, i)
+        self.copies[i] > 0 && chosen(&self.selections, self.limits, i)
     }
 
     /// True if columns must be right for position `i`.
@@ -194,8 +199,9 @@ pub struct Cells {
     pub turned: Vec<bool>,
     /// End of each group in `members`.
     pub ends: Vec<u32>,
-    /// Reference direction N of the partition; θ is the angle to it.
-    pub reference: [f64; 3],
+    /// Reference direction N of the partition, to which θ is the angle; none if each group has its
+    /// own: the dominant axis of its normals.
+    pub reference: Option<[f64; 3]>,
 }
 
 impl Cells {

@@ -87,6 +87,8 @@ pub struct Sieve {
     pub fates: Option<Arc<Pieces>>,
     /// A normal for every position.
     pub normals: Option<Arc<Pieces>>,
+    /// True if the signs of these normals mean something.
+    pub oriented: bool,
     /// A figure for every position.
     pub figures: Option<Arc<Pieces>>,
     /// Selections that a record must be in to be seen as a neighbour.

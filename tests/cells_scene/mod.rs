@@ -2,9 +2,11 @@
 //! be: recursive, on cloned lists, over the whole scan at once.
 #![allow(dead_code, clippy::unwrap_used, reason = "each test uses its part; tests may panic")]
 
-use pointmill::geom::angle::{MaxAngle, cosine, dominant_axis, is_turned, outer_sum};
+use pointmill::geom::angle::{
+    MaxAngle, cosine, direction, dominant_axis, is_turned, outer_sum, sine2,
+};
 use pointmill::geom::lattice::Lattice;
-use pointmill::ops::{Cells, Median, Side, Split};
+use pointmill::ops::{Cells, Measure, Median, Reference, Side, Split};
 use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
 use pointmill::report::Tally;
 use pointmill::stage::{ScanFacts, TileOp};
@@ -50,7 +52,7 @@ pub fn tile(scan: &[Point], cube: Bounds, side: i64) -> Tile {
 
 pub fn cells(side: f64, max_angle: f64, split: Split) -> Cells {
     let mut stage = Cells::default();
-    (stage.side, stage.max_angle, stage.split) = (Side::Length(side), max_angle, split);
+    (stage.side, stage.max_angle, stage.split) = (Side::Length(side), Some(max_angle), split);
     stage
 }
 
@@ -107,7 +109,7 @@ pub fn run(stage: &Cells, scan: &[Point], cubes: &[Bounds]) -> Outcome {
         let mut tile = tile(scan, *cube, side);
         let mut tally = Tally::default();
         stage.run(&mut tile, &mut tally).unwrap();
-        Median {}.run(&mut tile, &mut tally).unwrap();
+        Median::default().run(&mut tile, &mut tally).unwrap();
         outcome.tally.merge(&tally);
         outcome.fates.extend(tile.core.clone().map(|i| (tile.positions[i], tile.fates[i])));
         outcome.groups.extend(groups(&tile));
@@ -145,9 +147,49 @@ pub fn plain_groups(scan: &[Point], stage: &Cells, side: i64) -> Vec<Vec<Point>>
     groups
 }
 
-fn plain_cosines(cell: &[Point]) -> Vec<f64> {
+/// Of each member a number that falls as its angle grows, and whether its normal is turned.
+fn plain_angles(cell: &[Point], stage: &Cells) -> Vec<(f64, bool)> {
     let axis = dominant_axis(outer_sum(cell.iter().map(|p| p.normal)));
-    cell.iter().map(|p| cosine(X, p.normal, is_turned(axis, p.normal))).collect()
+    let n = match stage.reference {
+        Reference::X => X,
+        Reference::Y => [0.0, 1.0, 0.0],
+        Reference::Z => [0.0, 0.0, 1.0],
+        Reference::Vector(v) => {
+            let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
+            v.map(|c| c / length)
+        }
+    };
+    let of = |p: &Point| {
+        let turned = is_turned(axis, p.normal);
+        match stage.measure {
+            Measure::Axis => (cosine(n, p.normal, turned), turned),
+            Measure::Cone => (-sine2(axis, p.normal), turned),
+        }
+    };
+    cell.iter().map(of).collect()
+}
+
+/// The first of the largest values.
+fn first_largest(values: &[f64]) -> usize {
+    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    values.iter().position(|&v| v == most).unwrap()
+}
+
+fn plain_sites(cell: &[Point], angles: &[(f64, bool)], stage: &Cells) -> (Point, Point) {
+    let falling: Vec<f64> = angles.iter().map(|a| a.0).collect();
+    let far = first_largest(&falling.iter().map(|v| -v).collect::<Vec<_>>());
+    let near = match stage.measure {
+        Measure::Axis => first_largest(&falling),
+        Measure::Cone => {
+            let unit = |i: usize| {
+                let n = direction(cell[i].normal.map(f64::from)).unwrap();
+                if angles[i].1 { n.map(|v| -v) } else { n }
+            };
+            let chord2 = |i| (0..3).map(|a| (unit(i)[a] - unit(far)[a]).powi(2)).sum::<f64>();
+            first_largest(&(0..cell.len()).map(chord2).collect::<Vec<_>>())
+        }
+    };
+    (cell[near], cell[far])
 }
 
 fn plain_divide(
@@ -156,19 +198,26 @@ fn plain_divide(
     stage: &Cells,
     groups: &mut Vec<Vec<Point>>,
 ) {
-    let cosines = plain_cosines(&cell);
-    let most = cosines.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let least = cosines.iter().copied().fold(f64::INFINITY, f64::min);
-    if cell.len() <= stage.min_points.get()
-        || !MaxAngle::new(stage.max_angle).is_exceeded(most, least)
-    {
+    let angles = plain_angles(&cell, stage);
+    let most = angles.iter().map(|a| a.0).fold(f64::NEG_INFINITY, f64::max);
+    let least = angles.iter().map(|a| a.0).fold(f64::INFINITY, f64::min);
+    let max_angle = MaxAngle::new(stage.max_angle.unwrap_or(0.1));
+    let is_wide = match stage.measure {
+        Measure::Axis => max_angle.is_exceeded(most, least),
+        Measure::Cone => max_angle.is_exceeded_by(1.0 + 2.0 * least),
+    };
+    let tight = Bounds::of(cell.iter().map(|p| p.at));
+    let length = tight.extent().into_iter().max().unwrap() as f64;
+    let is_long = stage.max_side.is_some_and(|side| length > side);
+    let is_short = stage.min_spacing.is_some_and(|spacing| length <= spacing);
+    if !is_long && (cell.len() <= stage.min_points.get() || !is_wide || is_short) {
         groups.push(cell);
         return;
     }
-    match stage.split {
+    let split = if is_long { Split::Octant } else { stage.split };
+    match split {
         Split::Voronoi => {
-            let site = |c: f64| cell[cosines.iter().position(|&v| v == c).unwrap()];
-            let (a, b) = (site(most), site(least));
+            let (a, b) = plain_sites(&cell, &angles, stage);
             let far = |p: &Point, q: &Point| -> i128 {
                 (0..3).map(|i| (i128::from(p.at[i]) - i128::from(q.at[i])).pow(2)).sum()
             };
@@ -197,8 +246,8 @@ fn plain_divide(
 }
 
 /// The position that stays of a group, written plainly. Coordinates below 2^40 only.
-pub fn plain_median(group: &[Point]) -> Position {
-    let cosines = plain_cosines(group);
+pub fn plain_median(group: &[Point], stage: &Cells) -> Position {
+    let cosines: Vec<f64> = plain_angles(group, stage).iter().map(|a| a.0).collect();
     let mut sorted = cosines.clone();
     sorted.sort_by(|a, b| b.total_cmp(a));
     let median = sorted[(group.len() - 1) / 2];
@@ -234,4 +283,23 @@ pub fn any_normal() -> impl Strategy<Value = [f32; 3]> {
 pub fn any_scan(center: i64, width: i64, most: usize) -> impl Strategy<Value = Vec<Point>> {
     let at = prop::array::uniform3(center - width / 2..center + width / 2);
     prop::collection::vec((at, any_normal(), 1u32..4), most / 2..most).prop_map(scan)
+}
+
+/// Octree nodes below `key`, cut where they hold more than `most` positions.
+fn cut(scan: &[Point], key: TileKey, most: usize, tiles: &mut Vec<Bounds>) {
+    let count = scan.iter().filter(|p| key.cube().contains(p.at)).count();
+    match key.children() {
+        Some(children) if count > most => {
+            children.into_iter().for_each(|child| cut(scan, child, most, tiles));
+        }
+        _ if count > 0 => tiles.push(key.cube()),
+        _ => {}
+    }
+}
+
+/// A cut of the scan into tiles of at most `most` positions.
+pub fn tiles(scan: &[Point], most: usize) -> Vec<Bounds> {
+    let mut tiles = Vec::new();
+    cut(scan, whole(scan), most, &mut tiles);
+    tiles
 }

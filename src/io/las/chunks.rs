@@ -114,6 +114,24 @@ fn plausible(file: &InputFile, all: Chunk) -> Result<()> {
         .help("the file is cut off, or its header's count is damaged"))
 }
 
+/// Bytes of compressed points where the header counts none; None if there are none, or it counts some.
+pub fn uncounted(
+    file: &InputFile,
+    header: &Header,
+    evlrs_start: Option<u64>,
+    compression: &Compression,
+) -> Option<u64> {
+    let start = u64::from(header.points_start());
+    let first = start + TABLE_OFFSET_BYTES;
+    if header.points() > 0 || first > file.len() {
+        return None;
+    }
+    let table = table_start(file, start);
+    let end = table.or(evlrs_start.filter(|&at| at >= first)).unwrap_or(file.len());
+    // Less than one stored point are an empty chunk table, or what a writer pads with.
+    Some(end - first).filter(|&bytes| bytes > compression.stride as u64)
+}
+
 /// The chunks as the chunk table says, or why it cannot be used.
 fn table(
     file: &InputFile,
@@ -270,7 +288,9 @@ pub fn layered_head(
     let mut words = head.as_chunks().0.iter().map(|b| u64::from(u32::from_le_bytes(*b)));
     let points = words.next().unwrap_or(0);
     if points == 0 {
-        return Err(file.wrong(at, "a chunk says that it is empty and has a point"));
+        return Err(file
+            .wrong(at, "a chunk says that it is empty and has a point")
+            .help("the file is damaged; ask for it again"));
     }
     let bytes = at + len as u64 - start + words.sum::<u64>();
     if start + bytes > end.min(file.len()) {

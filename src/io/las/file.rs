@@ -2,39 +2,44 @@
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
+use crate::io::origin::Origin;
 use crate::{Error, Result};
 
-/// A file open for reading, its length and its name for errors.
+/// A file open for reading, and what it was when it was first opened.
 #[derive(Debug, Clone)]
 pub struct InputFile {
     file: Arc<File>,
-    path: Arc<PathBuf>,
-    len: u64,
+    origin: Origin,
 }
 
 impl InputFile {
     /// Opens `path`, which must be a plain file.
     pub fn open(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|e| Error::io(path, "open it", e))?;
-        let about = file.metadata().map_err(|e| Error::io(path, "read its length", e))?;
-        if !about.is_file() {
-            return Err(Error::data(path, "this is not a plain file")
-                .help("LAS is read at positions: pipes and folders cannot be"));
-        }
-        Ok(InputFile { file: Arc::new(file), path: Arc::new(path.to_owned()), len: about.len() })
+        let (file, origin) = Origin::open(path)?;
+        Ok(InputFile { file: Arc::new(file), origin })
+    }
+
+    /// Opens a file again; fails if it is not what it was.
+    pub fn reopen(origin: &Origin) -> Result<Self> {
+        Ok(InputFile { file: Arc::new(origin.reopen()?), origin: origin.clone() })
+    }
+
+    /// What it was when it was first opened.
+    pub fn origin(&self) -> &Origin {
+        &self.origin
     }
 
     /// Its path.
     pub fn path(&self) -> &Path {
-        &self.path
+        self.origin.path()
     }
 
     /// Its length in bytes when it was opened.
     pub fn len(&self) -> u64 {
-        self.len
+        self.origin.length()
     }
 
     /// Fills `bytes` from position `at`; an end of file before that is an error.
@@ -58,7 +63,7 @@ impl InputFile {
     /// `len` bytes from `at`. The caller has bounded `len`; this checks it against the file's
     /// length before it allocates.
     pub fn bytes(&self, at: u64, len: usize) -> Result<Vec<u8>> {
-        if at.checked_add(len as u64).is_none_or(|end| end > self.len) {
+        if at.checked_add(len as u64).is_none_or(|end| end > self.len()) {
             return Err(self.wrong(at, format!("{len} bytes from here exceed the file")));
         }
         let mut bytes = vec![0; len];

@@ -1,6 +1,6 @@
 //! The point data record formats 0 to 10 (LAS 1.4 R15, section 2.6) as schemas.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::extra::Descriptor;
 use crate::point::{Dimension, Endian, Layout, Scalar, Schema, names};
@@ -42,14 +42,19 @@ pub fn schema(
     let mut dimensions = standard(format, scale, offset);
     let base = usize::from(record_size(format).unwrap_or(0));
     let mut taken: BTreeSet<String> = dimensions.iter().map(|d| d.name.clone()).collect();
+    // Hundreds of descriptors may want one name: numbers that were taken are not tried again.
+    let mut copies: BTreeMap<String, u32> = BTreeMap::new();
     let mut add = |mut dimension: Dimension, dimensions: &mut Vec<Dimension>| {
         let wanted = std::mem::take(&mut dimension.name);
         let mut name = wanted.clone();
-        let mut copy = 2;
-        while !taken.insert(name.clone()) {
-            name = format!("{wanted}_{copy}");
-            copy += 1;
+        if taken.contains(&name) {
+            let copy = copies.entry(wanted.clone()).or_insert(1);
+            while taken.contains(&name) {
+                *copy += 1;
+                name = format!("{wanted}_{copy}");
+            }
         }
+        taken.insert(name.clone());
         dimension.name = name;
         dimensions.push(dimension);
     };

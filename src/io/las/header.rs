@@ -43,6 +43,9 @@ pub mod encoding {
     pub const WKT: u16 = 16;
 }
 
+/// What is to be done about a header that cannot be.
+const DAMAGED: &str = "the file is cut off, or its header is damaged: get another copy";
+
 /// The bit of the format byte that says LAZ.
 pub const COMPRESSED: u8 = 0x80;
 
@@ -97,14 +100,16 @@ impl Header {
         let size = u16::from_le_bytes([bytes[at::HEADER_SIZE], bytes[at::HEADER_SIZE + 1]]);
         let needed = Self::size_of(minor);
         if usize::from(size) < needed || u64::from(size) > file.len() {
-            return Err(file.wrong(
-                at::HEADER_SIZE as u64,
-                format!(
-                    "a header of {size} bytes cannot be: LAS 1.{minor} has {needed} and the file \
-                     {} bytes",
-                    file.len()
-                ),
-            ));
+            return Err(file
+                .wrong(
+                    at::HEADER_SIZE as u64,
+                    format!(
+                        "a header of {size} bytes cannot be: LAS 1.{minor} has {needed} and the \
+                         file {} bytes",
+                        file.len()
+                    ),
+                )
+                .help(DAMAGED));
         }
         let header = Header { bytes: file.bytes(0, usize::from(size))? };
         header.check(file).map(|()| header)
@@ -121,7 +126,8 @@ impl Header {
                     self.bytes.len(),
                     file.len()
                 ),
-            ));
+            )
+            .help(DAMAGED));
         }
         let Some(least) = format::record_size(self.format()) else {
             return Err(file
@@ -129,23 +135,52 @@ impl Header {
                 .help("point formats 0 to 10 are read"));
         };
         if self.record_length() < least {
-            return Err(file.wrong(
-                at::RECORD_LENGTH as u64,
-                format!(
-                    "records of {} bytes cannot hold point format {}, which needs {least}",
-                    self.record_length(),
-                    self.format()
-                ),
-            ));
+            return Err(file
+                .wrong(
+                    at::RECORD_LENGTH as u64,
+                    format!(
+                        "records of {} bytes cannot hold point format {}, which needs {least}",
+                        self.record_length(),
+                        self.format()
+                    ),
+                )
+                .help(DAMAGED));
         }
-        let whole = self.scale().iter().chain(&self.offset()).all(|v| v.is_finite());
-        if self.points() > 0 && (!whole || self.scale().contains(&0.0)) {
-            return Err(file.wrong(
-                at::SCALE as u64,
-                format!("scale {:?} with offset {:?} places no point", self.scale(), self.offset()),
-            ));
+        if self.points() > 0 && !self.places() {
+            return Err(file
+                .wrong(
+                    at::SCALE as u64,
+                    format!(
+                        "scale {:?} with offset {:?} places no point",
+                        self.scale(),
+                        self.offset()
+                    ),
+                )
+                .help("the header is damaged: its scales are above 0, 0.01 or 0.001 mostly"));
         }
         Ok(())
+    }
+
+    /// True if every stored coordinate is a finite one in the world.
+    fn places(&self) -> bool {
+        let axes = self.scale().into_iter().zip(self.offset());
+        let farthest = |scale: f64, offset: f64| scale.abs() * 2f64.powi(31) + offset.abs();
+        axes.into_iter().all(|(scale, offset)| scale != 0.0 && farthest(scale, offset).is_finite())
+    }
+
+    /// What is odd about scales that can be read all the same.
+    pub fn odd_scales(&self) -> Option<String> {
+        let scale = self.scale();
+        let why = if self.points() == 0 {
+            return None;
+        } else if scale.iter().any(|s| *s < 0.0) {
+            "negative: the scan is mirrored, or its header damaged"
+        } else if scale.iter().any(|s| *s < 1e-9) {
+            "below 1e-9: points so near to each other share a position"
+        } else {
+            return None;
+        };
+        Some(format!("the scale {scale:?} is {why}"))
     }
 
     /// All bytes, those a writer added behind the standard fields included.
@@ -212,12 +247,16 @@ impl Header {
         u32::from_le_bytes(self.get(at::VLRS))
     }
 
-    /// Points claimed: the 64-bit count where the version has one.
+    /// Points claimed: the 64-bit count where the version has one. Some writers of LAS 1.4 set the
+    /// legacy one alone.
     pub fn points(&self) -> u64 {
-        if self.minor() >= 4 {
-            u64::from_le_bytes(self.get(at::POINTS))
-        } else {
-            u64::from(u32::from_le_bytes(self.get(at::LEGACY_POINTS)))
+        let legacy = u64::from(u32::from_le_bytes(self.get(at::LEGACY_POINTS)));
+        if self.minor() < 4 {
+            return legacy;
+        }
+        match u64::from_le_bytes(self.get(at::POINTS)) {
+            0 => legacy,
+            points => points,
         }
     }
 

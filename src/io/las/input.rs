@@ -11,6 +11,7 @@ use super::header::Header;
 use super::laz::{Compression, LASZIP};
 use super::vlr::{Evlr, VLR_HEAD, Vlr, read_evlrs, read_vlrs};
 use super::{chunks, crs};
+use crate::io::origin::Origin;
 use crate::point::{Schema, Units};
 use crate::{Error, Result};
 
@@ -46,8 +47,8 @@ pub enum Storage {
 pub struct Input {
     /// Its path.
     pub path: PathBuf,
-    /// Its length in bytes.
-    pub len: u64,
+    /// What the file was when it was opened.
+    pub origin: Origin,
     /// Its public header block.
     pub header: Header,
     /// Its variable length records, all of them.
@@ -56,6 +57,8 @@ pub struct Input {
     pub gap: Vec<u8>,
     /// Its extended records, all of them.
     pub evlrs: Vec<Evlr>,
+    /// The descriptors of the extra bytes where an extended record holds them.
+    extended_descriptors: Vec<Descriptor>,
     /// How the points are stored.
     pub storage: Storage,
     /// What the user should know.
@@ -70,7 +73,10 @@ impl Input {
         let (vlrs, gap, warning) = read_vlrs(&file, &header)?;
         let mut warnings: Vec<String> = warning.into_iter().collect();
         let evlrs = read_evlrs(&file, &header)?;
-        let storage = storage(&file, &header, &vlrs, &mut warnings)?;
+        let behind = evlrs.iter().map(Evlr::position).min();
+        let storage = storage(&file, &header, &vlrs, behind, &mut warnings)?;
+        let path_said = |odd: String| format!("{}: {odd}", path.display());
+        warnings.extend(header.odd_scales().map(path_said));
         let named = vlrs.iter().map(|v| (v.user(), v.record()));
         let named = named.chain(evlrs.iter().map(|v| (v.user(), v.record())));
         let indexes: BTreeSet<String> =
@@ -81,17 +87,24 @@ impl Input {
                 path.display()
             ));
         }
-        let path = path.to_owned();
-        Ok(Input { path, len: file.len(), header, vlrs, gap, evlrs, storage, warnings })
+        let (path, origin) = (path.to_owned(), file.origin().clone());
+        let extended_descriptors = extended_descriptors(&evlrs)?;
+        Ok(Input {
+            path,
+            origin,
+            header,
+            vlrs,
+            gap,
+            evlrs,
+            extended_descriptors,
+            storage,
+            warnings,
+        })
     }
 
-    /// Opens the file again to read points.
+    /// Opens the file again to read points; fails if it has changed.
     pub fn reopen(&self) -> Result<InputFile> {
-        let file = InputFile::open(&self.path)?;
-        if file.len() != self.len {
-            return Err(Error::data(&self.path, "the file changed while it was read"));
-        }
-        Ok(file)
+        InputFile::reopen(&self.origin)
     }
 
     /// Points to read.
@@ -128,7 +141,10 @@ impl Input {
 
     /// The descriptors of the extra bytes.
     pub fn descriptors(&self) -> Vec<Descriptor> {
-        self.extra_record().map_or(Vec::new(), |i| Descriptor::all(self.vlrs[i].payload()))
+        match self.extra_record() {
+            Some(i) => Descriptor::all(self.vlrs[i].payload()),
+            None => self.extended_descriptors.clone(),
+        }
     }
 
     /// The records that outputs carry.
@@ -157,6 +173,14 @@ impl Input {
     }
 }
 
+/// The descriptors of extra bytes in an extended record. There can be as many as a record has bytes.
+pub fn extended_descriptors(evlrs: &[Evlr]) -> Result<Vec<Descriptor>> {
+    let most = DESCRIPTOR_BYTES * usize::from(u16::MAX);
+    let record = evlrs.iter().find(|v| v.is(EXTRA_BYTES.0, EXTRA_BYTES.1));
+    let payload = record.map(|evlr| evlr.payload(most)).transpose()?.flatten();
+    Ok(payload.map_or(Vec::new(), |payload| Descriptor::all(&payload)))
+}
+
 /// See [`Input::extra_record`].
 pub fn extra_record(vlrs: &[Vlr], extra: usize) -> Option<usize> {
     let described = |v: &Vlr| -> usize {
@@ -171,11 +195,13 @@ fn storage(
     file: &InputFile,
     header: &Header,
     vlrs: &[Vlr],
+    evlrs_start: Option<u64>,
     warnings: &mut Vec<String>,
 ) -> Result<Storage> {
     let record = vlrs.iter().position(|v| v.is(LASZIP.0, LASZIP.1));
     if !header.compressed() {
-        return plain(file, header).map(|()| Storage::Plain);
+        warnings.extend(plain(file, header, evlrs_start)?);
+        return Ok(Storage::Plain);
     }
     let Some(record) = record else {
         return Err(file
@@ -189,29 +215,52 @@ fn storage(
     let at = (header.bytes().len() + before + VLR_HEAD) as u64;
     let (format, stride) = (header.format(), header.record_length());
     let compression = Compression::read(file, &vlrs[record], at, format, stride)?;
+    if let Some(bytes) = chunks::uncounted(file, header, evlrs_start, &compression) {
+        return Err(uncounted(file, bytes));
+    }
     let (mut chunks, warning) = Chunks::read(file, header, &compression)?;
     warnings.extend(warning);
     check_last(file, &compression, &mut chunks, warnings)?;
     Ok(Storage::Laz(compression, chunks))
 }
 
-/// The bytes of plain points must be there.
-fn plain(file: &InputFile, header: &Header) -> Result<()> {
+/// The bytes of plain points must be there; a warning if there are more.
+fn plain(file: &InputFile, header: &Header, evlrs_start: Option<u64>) -> Result<Option<String>> {
     let start = u64::from(header.points_start());
     let (points, each) = (header.points(), u64::from(header.record_length()));
     let held = (file.len() - start) / each;
-    if points <= held {
-        return Ok(());
+    if points > held {
+        return Err(file
+            .wrong(
+                file.len(),
+                format!(
+                    "the file ends after {held} of the {points} points that its header claims, \
+                     {each} bytes each from byte {start}"
+                ),
+            )
+            .help("the copy or download is incomplete, or the header's count is damaged"));
     }
-    Err(file
-        .wrong(
-            file.len(),
-            format!(
-                "the file ends after {held} of the {points} points that its header claims, \
-                 {each} bytes each from byte {start}"
-            ),
+    let end = start + points * each;
+    // Waveform packets that are not listed as a record stand behind the points too.
+    let waveforms = Some(header.waveform_start()).filter(|&at| at > 0);
+    let next = evlrs_start.into_iter().chain(waveforms).filter(|&at| at >= end).min();
+    let behind = next.unwrap_or(file.len()).min(file.len()).saturating_sub(end);
+    if points == 0 && behind >= each {
+        return Err(uncounted(file, behind));
+    }
+    Ok((behind >= each).then(|| {
+        format!(
+            "{}: {behind} bytes behind the {points} points that the header counts are not read",
+            file.path().display()
         )
-        .help("the copy or download is incomplete, or the header's count is damaged"))
+    }))
+}
+
+/// A writer that did not come to its end leaves a count of 0 in front of the points.
+fn uncounted(file: &InputFile, bytes: u64) -> Error {
+    let field = super::header::at::LEGACY_POINTS as u64;
+    file.wrong(field, format!("the header counts no points and {bytes} bytes of points follow it"))
+        .help("what wrote the file did not finish it; repair the counts of its header first")
 }
 
 /// The table of fixed layered chunks does not say how many points the last one has; the chunk does.

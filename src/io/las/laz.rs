@@ -5,7 +5,7 @@ use laz::record::{
     LayeredPointRecordCompressor, LayeredPointRecordDecompressor, RecordCompressor,
     RecordDecompressor, SequentialPointRecordCompressor, SequentialPointRecordDecompressor,
 };
-use laz::{LazItem, LazVlr};
+use laz::{LazItem, LazItemType, LazVlr};
 
 use super::file::{InputFile, Window};
 use super::format::record_size;
@@ -147,9 +147,12 @@ impl Compression {
         .unwrap_or_else(|| Err(failed()))
     }
 
-    /// Upper estimate of what a decoder or an encoder holds besides bytes: models and contexts.
+    /// Upper estimate of what a decoder or an encoder holds besides bytes: models and contexts. Each
+    /// extra byte has models of its own.
     pub fn state_bytes(&self) -> u64 {
-        (3 << 20) + 24 * 1024 * self.layers as u64
+        let extra = |item: &&LazItem| matches!(item.item_type(), LazItemType::Byte(_));
+        let extra: u64 = self.items.iter().filter(extra).map(|item| u64::from(item.size())).sum();
+        (3 << 20) + 24 * 1024 * self.layers as u64 + 3 * 1024 * extra
     }
 }
 

@@ -63,6 +63,13 @@ pub struct PlainPart {
 
 impl Part for PlainPart {
     fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
+        let outcome = self.fill(batch);
+        self.file.origin().vouch(outcome, batch.is_empty())
+    }
+}
+
+impl PlainPart {
+    fn fill(&mut self, batch: &mut PointBatch) -> Result<()> {
         let n = self.left.min(batch.capacity() as u64) as usize;
         batch.source = self.source;
         let stride = batch.schema().stride;
@@ -176,6 +183,13 @@ impl LazPart {
 
 impl Part for LazPart {
     fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
+        let outcome = self.fill(batch);
+        self.file.origin().vouch(outcome, batch.is_empty())
+    }
+}
+
+impl LazPart {
+    fn fill(&mut self, batch: &mut PointBatch) -> Result<()> {
         let stride = batch.schema().stride;
         let capacity = batch.capacity();
         batch.source = self.source;

@@ -14,7 +14,7 @@ use super::encode::{LasEncoder, Normals};
 use super::extra::{Descriptor, with_normals};
 use super::format::record_size;
 use super::header::{COMPRESSED, Header, at, encoding};
-use super::input::{EXTRA_BYTES, extra_record};
+use super::input::{EXTRA_BYTES, extended_descriptors, extra_record};
 use super::laz::{CHUNK_POINTS, Compression};
 use super::native::Native;
 use super::vlr::Vlr;
@@ -116,7 +116,10 @@ fn too_long(what: &str, format: u8) -> Error {
 fn describe_normals(native: &mut Native, format: u8, schema: &Schema) -> Result<()> {
     let extra = schema.stride - usize::from(record_size(format).unwrap_or(0));
     let record = extra_record(&native.vlrs, extra);
-    let known = record.map_or(Vec::new(), |i| Descriptor::all(native.vlrs[i].payload()));
+    let known = match record {
+        Some(i) => Descriptor::all(native.vlrs[i].payload()),
+        None => extended_descriptors(&native.evlrs)?,
+    };
     let payload: Vec<u8> = with_normals(&known, extra).iter().flat_map(|d| *d.bytes()).collect();
     if u16::try_from(payload.len()).is_err() {
         return Err(too_long("the extra bytes' descriptors of point format ", format));

@@ -2,16 +2,20 @@
 //! ones stay in their file until they are written: one may hold gigabytes of waveforms.
 
 use std::cmp::Ordering;
-use std::path::PathBuf;
 
 use super::file::InputFile;
 use super::header::{Header, at, encoding};
 use crate::Result;
+use crate::io::origin::Origin;
 
 /// Bytes of a record's head.
 pub const VLR_HEAD: usize = 54;
 /// Bytes of an extended record's head.
 pub const EVLR_HEAD: usize = 60;
+/// Bytes of variable length records that are held in memory; no file that means them has as many.
+const VLRS_HELD: u64 = 64 << 20;
+/// Extended records whose heads are held in memory; no file that means them has as many.
+const EVLRS_HELD: u32 = 1 << 18;
 /// Bytes between the records and the points that are carried; more are dropped with a warning.
 const GAP_CARRIED: u64 = 64 << 10;
 
@@ -101,7 +105,7 @@ impl Vlr {
 #[derive(Debug, Clone)]
 pub struct Evlr {
     head: [u8; EVLR_HEAD],
-    path: PathBuf,
+    origin: Origin,
     start: u64,
 }
 
@@ -140,7 +144,7 @@ impl Evlr {
 
     /// Opened anew for each use: a survey of thousands of files must not hold them all open.
     fn open(&self) -> Result<InputFile> {
-        InputFile::open(&self.path)
+        InputFile::reopen(&self.origin)
     }
 
     /// Where its head stands in its file.
@@ -168,7 +172,7 @@ impl Evlr {
             take(&file.bytes(at, len)?)?;
             at += len as u64;
         }
-        Ok(())
+        self.origin.unchanged()
     }
 
     /// The order of a union of records: user, number, bytes.
@@ -215,12 +219,19 @@ pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>
     let mut at = start;
     for i in 0..claimed {
         if end - at < VLR_HEAD as u64 {
-            return Err(file.wrong(at, format!("record {i} of {claimed} begins behind the points")));
+            return Err(file
+                .wrong(at, format!("record {i} of {claimed} begins behind the points"))
+                .help("the record count or the start of the points is damaged"));
         }
         let mut head = [0; VLR_HEAD];
         file.read_at(&mut head, at)?;
         let len = u16::from_le_bytes([head[20], head[21]]);
         at += VLR_HEAD as u64;
+        if at - start > VLRS_HELD {
+            return Err(file
+                .wrong(at::VLRS as u64, format!("{claimed} variable length records exceed 64 MiB"))
+                .help("the record count is damaged: no scan needs that many"));
+        }
         if u64::from(len) > end - at {
             return Err(file
                 .wrong(
@@ -267,11 +278,16 @@ pub fn read_evlrs(file: &InputFile, header: &Header) -> Result<Vec<Evlr>> {
             )
             .help("the file is cut off, or its header is damaged"));
     }
+    if claimed > EVLRS_HELD {
+        return Err(file
+            .wrong(field, format!("{claimed} extended records are more than any scan has"))
+            .help("the record count is damaged"));
+    }
     let mut evlrs = Vec::new();
     for i in 0..claimed {
         let mut head = [0; EVLR_HEAD];
         file.read_at(&mut head, at)?;
-        let evlr = Evlr { head, path: file.path().to_owned(), start: at };
+        let evlr = Evlr { head, origin: file.origin().clone(), start: at };
         let room = file.len().saturating_sub(at + EVLR_HEAD as u64);
         if evlr.payload_len() > room {
             return Err(file

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
+use std::sync::atomic::Ordering;
 
 use super::file::PlyFile;
 use super::header::{shown, type_name};
@@ -22,6 +23,7 @@ fn longest_line(schema: &Schema) -> usize {
 /// The vertices of a text file, in one part: where a line begins is known only from the lines before.
 pub(super) struct AsciiPart<'a> {
     path: &'a Path,
+    file: &'a PlyFile,
     lines: Lines<'a>,
     /// Names (as the file has them), types and byte offsets in the record.
     fields: Vec<(&'a str, Scalar, usize)>,
@@ -36,13 +38,15 @@ pub(super) struct AsciiPart<'a> {
 impl<'a> AsciiPart<'a> {
     /// Bytes that reading holds besides the batch.
     pub fn bytes(schema: &Schema) -> u64 {
-        (WINDOW + longest_line(schema)) as u64
+        let fields = schema.dimensions.len() * size_of::<(&str, Scalar, usize)>();
+        (WINDOW + longest_line(schema) + fields) as u64
     }
 
     pub fn new(handle: File, file: &'a PlyFile, schema: &'a Schema, source: u32) -> Self {
         let properties = file.properties();
         AsciiPart {
             path: &file.path,
+            file,
             lines: Lines {
                 file: handle,
                 path: &file.path,
@@ -79,7 +83,9 @@ impl<'a> AsciiPart<'a> {
     }
 
     fn short(&self, when: &str) -> Error {
-        Error::data(self.path, format!("the file ends {when}")).at_byte(self.lines.length)
+        Error::data(self.path, format!("the file ends {when}"))
+            .at_byte(self.lines.length)
+            .help("the file is cut short, or its header is wrong")
     }
 
     fn vertex(&mut self, record: &mut [u8]) -> Result<()> {
@@ -129,6 +135,13 @@ fn word<'a>(line: &'a [u8], place: &mut usize) -> Option<&'a [u8]> {
 
 impl Part for AsciiPart<'_> {
     fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
+        let outcome = self.fill(batch);
+        self.file.origin.vouch(outcome, batch.is_empty())
+    }
+}
+
+impl AsciiPart<'_> {
+    fn fill(&mut self, batch: &mut PointBatch) -> Result<()> {
         batch.source = self.source;
         batch.clear();
         self.skip()?;
@@ -137,6 +150,10 @@ impl Part for AsciiPart<'_> {
         for record in batch.refill(points).chunks_exact_mut(stride) {
             self.vertex(record)?;
             self.left -= 1;
+        }
+        // A line behind the last vertex may be too long to be read: it is there all the same.
+        if points == 0 && self.file.ends_with_vertices() && !matches!(self.lines.next(), Ok(None)) {
+            self.file.more_lines.store(true, Ordering::Relaxed);
         }
         Ok(())
     }

@@ -1,15 +1,17 @@
 //! One PLY file: where its vertices are, and whether it is long enough for them.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::header::{Element, Encoding, Header, Kind, Property, shown};
 use super::{names, walk};
+use crate::io::origin::Origin;
 use crate::{Error, Result};
 
 /// One file, its header read.
 pub(super) struct PlyFile {
     pub path: PathBuf,
+    pub origin: Origin,
     pub header: Header,
     pub points: u64,
     pub length: u64,
@@ -19,12 +21,15 @@ pub(super) struct PlyFile {
     pub skipped_lines: u64,
     /// Place of `vertex` among the elements.
     pub vertex: usize,
+    /// Set when a text file turns out to have more lines than its header counts.
+    pub more_lines: AtomicBool,
 }
 
 impl PlyFile {
     /// Reads the header, and what stands before the vertices of a binary file.
     pub fn open(path: &Path) -> Result<PlyFile> {
-        let (file, length) = open(path)?;
+        let (file, origin) = Origin::open(path)?;
+        let length = origin.length();
         let header = Header::read(&file, path, length)?;
         let Some(vertex) = header.vertex() else {
             let elements: Vec<String> =
@@ -44,11 +49,13 @@ impl PlyFile {
         };
         let file = PlyFile {
             path: path.to_owned(),
+            origin,
             points: element.count,
             length,
             body,
             skipped_lines,
             vertex,
+            more_lines: AtomicBool::new(false),
             header,
         };
         file.bound()?;
@@ -58,6 +65,32 @@ impl PlyFile {
     /// The properties of its vertices.
     pub fn properties(&self) -> &[Property] {
         &self.header.elements[self.vertex].properties
+    }
+
+    /// True if nothing that the header names stands behind the vertices.
+    pub fn ends_with_vertices(&self) -> bool {
+        let behind = &self.header.elements[self.vertex + 1..];
+        behind.iter().all(|e| e.count == 0 || e.properties.is_empty())
+    }
+
+    /// A warning for what is behind the last element that the header names. Of a text file it is
+    /// known once all is read; of elements with lists never.
+    pub fn unread(&self) -> Option<String> {
+        let what = if self.header.encoding == Encoding::Ascii {
+            self.more_lines.load(Ordering::Relaxed).then(|| "lines".to_owned())?
+        } else {
+            let behind = &self.header.elements[self.vertex..];
+            let sizes = behind.iter().map(|e| e.size()?.checked_mul(e.count));
+            let end = sizes.fold(Some(self.body), |end, size| end?.checked_add(size?))?;
+            // Some writers end a binary file with an empty line.
+            let bytes = self.length.checked_sub(end).filter(|&bytes| bytes > 2)?;
+            format!("{bytes} bytes")
+        };
+        Some(format!(
+            "{}: {what} behind the {} vertices that the header counts are not read",
+            self.path.display(),
+            self.points
+        ))
     }
 
     /// Refuses a count of vertices that the file is too short for.
@@ -81,16 +114,6 @@ impl PlyFile {
         .at_byte(self.length)
         .help("the file is cut short, or its header is wrong"))
     }
-}
-
-/// Opens a regular file for reading; its length in bytes.
-pub(super) fn open(path: &Path) -> Result<(File, u64)> {
-    let file = File::open(path).map_err(|cause| Error::io(path, "open", cause))?;
-    let facts = file.metadata().map_err(|cause| Error::io(path, "read its length", cause))?;
-    if !facts.is_file() {
-        return Err(Error::data(path, "not a regular file"));
-    }
-    Ok((file, facts.len()))
 }
 
 /// Lines that `elements` take in a text file. One without properties takes none.

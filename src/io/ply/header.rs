@@ -216,7 +216,8 @@ fn parse(bytes: &[u8], whole: bool, path: &Path) -> Result<Option<Header>> {
     let mut lines = Lines::new(bytes);
     // Asked of a line without an end too: what is no PLY is told as such, whatever its size.
     if lines.next().is_none_or(|(_, line, _)| line.trim_ascii() != b"ply") {
-        return Err(fail(0, "not a PLY file: the first line is not `ply`".into()));
+        return Err(fail(0, "not a PLY file: the first line is not `ply`".into())
+            .help("the file is cut off, or another format under this name"));
     }
     let mut header = Partial { lines: 1, ..Partial::default() };
     while let Some((at, line, ended)) = lines.next() {
@@ -247,6 +248,8 @@ fn parse(bytes: &[u8], whole: bool, path: &Path) -> Result<Option<Header>> {
 struct Partial {
     encoding: Option<Encoding>,
     elements: Vec<Element>,
+    element_names: BTreeSet<String>,
+    /// Names of the last element's properties.
     names: BTreeSet<String>,
     comments: Vec<String>,
     obj_info: Vec<String>,
@@ -306,7 +309,7 @@ impl Partial {
         let count = count
             .parse()
             .map_err(|_| format!("`{}` is no count of element `{}`", shown(count), shown(name)))?;
-        if self.elements.iter().any(|e| e.name == name) {
+        if !self.element_names.insert(name.to_owned()) {
             return Err(format!("a second element `{}`", shown(name)));
         }
         self.elements.push(Element { name: name.to_owned(), count, properties: Vec::new() });

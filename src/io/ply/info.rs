@@ -4,13 +4,15 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::file::open;
 use super::header::{Encoding, Header, Kind};
 use crate::Result;
+use crate::io::origin::Origin;
 
 /// What the header of a PLY file says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlyInfo {
+    /// "PLY".
+    pub kind: &'static str,
     /// How the values are written.
     pub encoding: Encoding,
     /// Length of the file.
@@ -49,7 +51,8 @@ pub struct PropertyInfo {
 /// Reads the header of the PLY file at `path`. Fails if it cannot be read or is no PLY header; counts
 /// are told as claimed.
 pub fn describe(path: &Path) -> Result<PlyInfo> {
-    let (file, bytes) = open(path)?;
+    let (file, origin) = Origin::open(path)?;
+    let bytes = origin.length();
     let header = Header::read(&file, path, bytes)?;
     let points = header.vertex().map_or(0, |vertex| header.elements[vertex].count);
     let word = |kind: Kind| kind.word();
@@ -66,6 +69,16 @@ pub fn describe(path: &Path) -> Result<PlyInfo> {
                 .collect(),
         })
         .collect();
-    let (comments, obj_info) = (header.comments, header.obj_info);
-    Ok(PlyInfo { encoding: header.encoding, bytes, points, elements, comments, obj_info })
+    let is_told = |comment: &String| !super::is_padding(comment, points);
+    let comments = header.comments.into_iter().filter(is_told).collect();
+    let obj_info = header.obj_info;
+    Ok(PlyInfo {
+        kind: "PLY",
+        encoding: header.encoding,
+        bytes,
+        points,
+        elements,
+        comments,
+        obj_info,
+    })
 }

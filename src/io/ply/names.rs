@@ -1,6 +1,6 @@
 //! Names of vertex properties and of the dimensions they stand for.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::point::names as n;
 
@@ -62,12 +62,15 @@ pub(super) fn dimension_of(property: &str) -> &str {
 /// says, else the shared dimension, else the property's own name. Where two properties claim one
 /// name the first has it.
 pub(super) fn dimensions(properties: &[&str], comments: &[String]) -> Vec<String> {
-    let told: Vec<(&str, &str)> = comments.iter().filter_map(|c| read_comment(c)).collect();
+    let mut told: BTreeMap<&str, &str> = BTreeMap::new();
+    for (property, name) in comments.iter().filter_map(|c| read_comment(c)) {
+        told.entry(property).or_insert(name); // the first comment counts
+    }
     let mut taken = BTreeSet::new();
     let mut names: Vec<Option<String>> = properties
         .iter()
         .map(|property| {
-            let name = told.iter().find(|(told, _)| told == property)?.1;
+            let name = *told.get(property)?;
             taken.insert(name.to_owned()).then(|| name.to_owned())
         })
         .collect();

@@ -1,12 +1,12 @@
 //! Writes vertices to a PLY file.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::file::open;
 use super::header::{Element, Encoding, Kind, Property};
 use super::source::{Native, Rest};
 use super::{CRS, CRS_MORE, PlyOptions, names, padding, text};
@@ -112,19 +112,20 @@ impl PlySink {
     fn carry(&mut self, native: &Native, which: usize) -> Result<()> {
         let Some(rest) = &native.rest else { return Ok(()) };
         let (mut at, end) = (rest.cuts[2 * which], rest.cuts[2 * which + 1]);
-        let (from, _) = open(&rest.path)?;
+        let from = rest.origin.reopen()?;
         let mut buffer = vec![0; CARRY];
         while at < end {
             let piece = &mut buffer[..(end - at).min(CARRY as u64) as usize];
-            from.read_exact_at(piece, at)
-                .map_err(|e| Error::io(&rest.path, "read its other elements", e).at_byte(at))?;
+            from.read_exact_at(piece, at).map_err(|e| {
+                Error::io(rest.origin.path(), "read its other elements", e).at_byte(at)
+            })?;
             self.file
                 .write_all(piece)
                 .map_err(|e| Error::io(&self.path, "write the other elements", e))?;
             at += piece.len() as u64;
             self.bytes += piece.len() as u64;
         }
-        Ok(())
+        rest.origin.unchanged()
     }
 }
 
@@ -254,10 +255,9 @@ fn headings(
     rest: Option<&Native>,
 ) -> Headings {
     let dimensions: Vec<&str> = plan.vertex.dimensions.iter().map(|d| d.name.as_str()).collect();
-    let properties = names::properties(&dimensions, |name| {
-        let (_, property) = native?.properties.iter().find(|(d, _)| d == name)?;
-        Some(property.clone())
-    });
+    let kept = native.iter().flat_map(|native| &native.properties);
+    let kept: BTreeMap<&str, &String> = kept.map(|(d, p)| (d.as_str(), p)).collect();
+    let properties = names::properties(&dimensions, |name| kept.get(name).copied().cloned());
     // A line end within a text would begin a line of its own.
     let line =
         |keyword: &str, text: &str| format!("{keyword} {}\n", text.replace(['\n', '\r'], " "));

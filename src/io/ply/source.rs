@@ -1,14 +1,16 @@
 //! Reads the vertices of PLY files.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::ascii::AsciiPart;
-use super::file::{PlyFile, open};
+use super::file::PlyFile;
 use super::header::{Element, Encoding, Kind, shown};
 use super::names;
+use crate::io::origin::Origin;
 use crate::point::{Dimension, Layout, Metadata, PointBatch, Schema};
 use crate::stage::{Input, Part, Source};
 use crate::{Error, Result};
@@ -30,7 +32,7 @@ pub(super) struct Native {
 /// The elements of a binary file other than its vertices.
 #[derive(Debug)]
 pub(super) struct Rest {
-    pub path: PathBuf,
+    pub origin: Origin,
     pub before: Vec<Element>,
     pub after: Vec<Element>,
     /// Byte of the first element, of the first vertex, behind the last vertex, and of the file's end.
@@ -100,6 +102,7 @@ impl Texts {
         let properties: Vec<&str> = file.properties().iter().map(|p| p.name.as_str()).collect();
         let header = &file.header;
         let dimensions = names::dimensions(&properties, &header.comments);
+        let properties: BTreeSet<&str> = properties.into_iter().collect();
         let mut crs: Option<String> = None;
         let mut comments = Vec::new();
         // Only pieces right behind the first belong to it: other comments are free to look alike.
@@ -115,7 +118,7 @@ impl Texts {
                 continue;
             }
             more = false;
-            let of_ours = names::property_told(comment).is_some_and(|p| properties.contains(&p));
+            let of_ours = names::property_told(comment).is_some_and(|p| properties.contains(p));
             if !of_ours && !super::is_padding(comment, file.points) {
                 comments.push(comment.clone());
             }
@@ -201,7 +204,7 @@ fn rest(files: &[PlyFile]) -> Option<Rest> {
     }
     let end = file.body + file.points * size; // within the file: bounded on opening
     Some(Rest {
-        path: file.path.clone(),
+        origin: file.origin.clone(),
         before: before.to_vec(),
         after: after.to_vec(),
         cuts: [file.header.body, file.body, end, file.length],
@@ -269,10 +272,7 @@ impl Source for PlySource {
             return Err(Error::internal(format!("part {index} of {}", self.parts())));
         };
         let within = index - number.checked_sub(1).map_or(0, |before| self.ends[before]);
-        let (handle, length) = open(&file.path)?;
-        if length != file.length {
-            return Err(Error::data(&file.path, "the file changed its length while it was read"));
-        }
+        let handle = file.origin.reopen()?;
         let source = number as u32;
         if file.header.encoding == Encoding::Ascii {
             return Ok(Box::new(AsciiPart::new(handle, file, &self.schema, source)));
@@ -280,7 +280,7 @@ impl Source for PlySource {
         let start = within as u64 * PART_POINTS;
         Ok(Box::new(BinaryPart {
             file: handle,
-            path: &file.path,
+            origin: &file.origin,
             at: file.body + start * self.schema.stride as u64,
             left: PART_POINTS.min(file.points - start),
             source,
@@ -288,14 +288,15 @@ impl Source for PlySource {
     }
 
     fn warnings(&self) -> Vec<String> {
-        self.warnings.clone()
+        let unread = self.files.iter().flat_map(PlyFile::unread);
+        self.warnings.iter().cloned().chain(unread).collect()
     }
 }
 
 /// A range of the vertices of a binary file, read straight into the batch.
 struct BinaryPart<'a> {
     file: File,
-    path: &'a Path,
+    origin: &'a Origin,
     at: u64,
     left: u64,
     source: u32,
@@ -303,12 +304,19 @@ struct BinaryPart<'a> {
 
 impl Part for BinaryPart<'_> {
     fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
+        let outcome = self.fill(batch);
+        self.origin.vouch(outcome, batch.is_empty())
+    }
+}
+
+impl BinaryPart<'_> {
+    fn fill(&mut self, batch: &mut PointBatch) -> Result<()> {
         let points = self.left.min(batch.capacity() as u64);
         batch.source = self.source;
         let bytes = batch.refill(points as usize);
-        self.file
-            .read_exact_at(bytes, self.at)
-            .map_err(|cause| Error::io(self.path, "read vertices", cause).at_byte(self.at))?;
+        self.file.read_exact_at(bytes, self.at).map_err(|cause| {
+            Error::io(self.origin.path(), "read vertices", cause).at_byte(self.at)
+        })?;
         self.at += bytes.len() as u64;
         self.left -= points;
         Ok(())

@@ -1,113 +1,215 @@
 //! The division of a cell into parts whose normals agree.
 
-use super::{Cells, Split, corner};
-use crate::geom::angle::{MaxAngle, cosine, dominant_axis, is_turned, outer_sum};
-use crate::point::{Bounds, Position, distance2};
-use crate::tile::Cells as Partition;
+use std::ops::Range;
 
-/// Divisions that a part may be deep, besides two for every doubling of the cell's positions,
-/// before it is cut in eight.
+use super::Split;
+use super::limit::Limit;
+use crate::geom::angle::{
+    cone, cosine, direction, dominant_axis, is_turned, outer_sum, range, sine2,
+};
+use crate::point::{Bounds, Position, distance2};
+use crate::tile::{Cells as Partition, Tile};
+
+/// Divisions by angle that a part may be deep, besides two for every doubling of the cell's
+/// positions, before it is cut in eight.
 const DEEPEST: u32 = 64;
 /// Sides up to which squared distances within a cell fit in an i64.
 const SHORT_SIDE: i64 = 1 << 30;
 
 /// When and how a cell is divided.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Rule {
-    reference: [f64; 3],
-    max_angle: MaxAngle,
-    min_points: usize,
-    split: Split,
-    side: i64,
+    /// Direction N of the angles; none: each part's own dominant axis.
+    pub(super) reference: Option<[f64; 3]>,
+    pub(super) limit: Limit,
+    pub(super) min_points: usize,
+    /// A part longer than so many steps is divided whatever its angles.
+    pub(super) max_side: u64,
+    /// A part of so many steps or fewer is not divided; 0 for no such bound.
+    pub(super) min_spacing: u64,
+    pub(super) split: Split,
+    /// Side of the initial cells in steps, and a corner of one of them.
+    pub(super) side: i64,
+    pub(super) origin: Position,
 }
 
-impl Rule {
-    pub(super) fn new(cells: &Cells, reference: [f64; 3], side: i64) -> Self {
-        Rule {
-            reference,
-            max_angle: MaxAngle::new(cells.max_angle),
-            min_points: cells.min_points.get(),
-            split: cells.split,
-            side,
-        }
-    }
-}
-
-/// Members `start..end` of a cell, cut off by `depth` divisions.
+/// Members `start..end` of a cell, cut off by `depth` divisions by angle, the narrowest of which
+/// was of the range `narrowest` (see [`range`]).
 struct Part {
     start: usize,
     end: usize,
     depth: u32,
+    narrowest: f64,
 }
 
-/// The positions with the smallest and the largest angle of a part.
-struct Extremes {
-    nearest: Position,
-    farthest: Position,
+impl Part {
+    /// The part of its members `range`.
+    fn child(&self, range: Range<usize>, narrowest: f64, levels: u32) -> Part {
+        let (start, end) = (self.start + range.start, self.start + range.end);
+        Part { start, end, depth: self.depth + levels, narrowest }
+    }
+}
+
+/// The range of a part's angles, and the members with the smallest and the largest, of equal ones
+/// the first.
+struct Survey {
+    range: f64,
+    nearest: u32,
+    farthest: u32,
+}
+
+/// What is to become of a part.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Verdict {
+    Kept,
+    /// Divided as its angles demand.
+    ByAngle,
+    /// Divided because it is too long.
+    ByLength,
+}
+
+/// What divisions were made; cells by whose core has their Morton-first member.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Counts {
+    /// Initial cells.
+    pub(super) initial: u64,
+    /// Parts not divided further.
+    pub(super) cells: u64,
+    /// Initial cells that had a part so deep that it was cut in eight.
+    pub(super) cut_deep: u64,
+    /// Parts divided that `max_side` alone demanded to divide.
+    pub(super) by_max_side: u64,
+    /// Parts not divided that only `min_spacing` forbade to divide.
+    pub(super) by_min_spacing: u64,
 }
 
 /// Divides cells of one tile, one after the other, in memory that it keeps.
 pub(super) struct Division<'a> {
     rule: Rule,
-    positions: &'a [Position],
-    normals: &'a [[f32; 3]],
+    tile: &'a Tile,
+    counts: Counts,
     stack: Vec<Part>,
     spare: Vec<u32>,
 }
 
 impl<'a> Division<'a> {
-    pub(super) fn new(rule: Rule, positions: &'a [Position], normals: &'a [[f32; 3]]) -> Self {
-        Division { rule, positions, normals, stack: Vec::new(), spare: Vec::new() }
+    /// Of a tile whose groups were taken out of it.
+    pub(super) fn new(rule: Rule, tile: &'a Tile) -> Self {
+        let counts = Counts::default();
+        Division { rule, tile, counts, stack: Vec::new(), spare: Vec::new() }
+    }
+
+    /// What was done so far.
+    pub(super) fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// True if the tile's core has the Morton-first of the members from `start` on: each cell counts
+    /// there, so that every cut into tiles counts alike.
+    pub(super) fn owns(&self, cells: &Partition, start: usize) -> bool {
+        self.tile.core.contains(&(cells.members[start] as usize))
     }
 
     /// Divides the initial cell `members[start..end]` of `cells`: reorders the members part by part,
     /// each in Morton order, says which of their normals are turned, and adds the end of each part.
-    /// Returns true if a part was so deep that it was cut in eight.
-    pub(super) fn run(&mut self, start: usize, end: usize, cells: &mut Partition) -> bool {
-        let Partition { members, turned, ends, .. } = cells;
-        if self.spare.len() < end - start {
-            self.spare.reserve_exact(end - start - self.spare.len());
-            self.spare.resize(end - start, 0);
-        }
+    /// Tells `log` of every division by angle: of which range, and how many parts more it makes.
+    pub(super) fn run(
+        &mut self,
+        Range { start, end }: Range<usize>,
+        cells: &mut Partition,
+        mut log: impl FnMut(f64, u64),
+    ) {
+        self.make_room(end - start);
+        let mine = self.owns(cells, start);
         let deepest = DEEPEST + 2 * (end - start).max(1).ilog2();
+        let first = self.tile.positions[cells.members[start] as usize];
+        let mut ties = self.rule.limit.ties(first);
         let mut cut_deep = false;
-        self.stack.push(Part { start, end, depth: 0 });
-        while let Some(Part { start, end, depth }) = self.stack.pop() {
-            let part = &mut members[start..end];
-            let Some(extremes) = self.survey(part, &mut turned[start..end]) else {
-                ends.push(end as u32);
-                continue;
-            };
+        self.stack.push(Part { start, end, depth: 0, narrowest: f64::NEG_INFINITY });
+        while let Some(part) = self.stack.pop() {
+            let whole = part.start..part.end;
+            let (members, turned) = (&mut cells.members[whole.clone()], &mut cells.turned[whole]);
+            let survey = self.survey(members, turned);
+            let narrowest = part.narrowest.max(survey.range);
             let pushed = self.stack.len();
-            if self.rule.split == Split::Voronoi && depth < deepest {
-                self.bisect(start, part, depth, &extremes);
-            } else {
-                cut_deep |= self.rule.split == Split::Voronoi;
-                self.cut_in_eight(start, part, depth);
+            match self.verdict(members, narrowest, ties) {
+                Verdict::Kept => {}
+                Verdict::ByLength => {
+                    self.cut_in_eight(members, |range| part.child(range, part.narrowest, 0))
+                }
+                Verdict::ByAngle => {
+                    let child = |range| part.child(range, narrowest, 1);
+                    if self.rule.split == Split::Voronoi && part.depth < deepest {
+                        self.bisect(members, turned, &survey, child);
+                    } else {
+                        cut_deep |= self.rule.split == Split::Voronoi;
+                        self.cut_in_eight(members, child);
+                    }
+                    let parts = self.stack.len() - pushed;
+                    if parts > 1 {
+                        log(narrowest, parts as u64 - 1);
+                        ties -= u64::from(self.rule.limit.is_tie(narrowest));
+                    }
+                }
             }
             if self.stack.len() - pushed < 2 {
                 // Only positions that are not distinct cannot be told apart.
                 self.stack.truncate(pushed);
-                ends.push(end as u32);
+                self.counts.cells += u64::from(self.owns(cells, part.start));
+                cells.ends.push(part.end as u32);
             }
         }
-        cut_deep
+        self.counts.initial += u64::from(mine);
+        self.counts.cut_deep += u64::from(mine && cut_deep);
     }
 
-    /// Turns the normals of a part to its own dominant axis; returns the extremes of their angles,
-    /// of equal ones the first, if the part is to be divided.
-    fn survey(&self, part: &[u32], turned: &mut [bool]) -> Option<Extremes> {
-        let normal = |i: u32| self.normals[i as usize];
+    fn make_room(&mut self, members: usize) {
+        if self.spare.len() < members {
+            self.spare.reserve_exact(members - self.spare.len());
+            self.spare.resize(members, 0);
+        }
+    }
+
+    /// Decides about a part whose angles, and those of all parts above it, span `narrowest` or more.
+    fn verdict(&mut self, part: &[u32], narrowest: f64, ties: u64) -> Verdict {
+        let Rule { limit, min_points, max_side, min_spacing, .. } = self.rule;
+        let is_wide = part.len() > min_points && limit.allows(narrowest, ties);
+        let by_angle = if is_wide { Verdict::ByAngle } else { Verdict::Kept };
+        if part.len() < 2 || max_side == u64::MAX && (min_spacing == 0 || !is_wide) {
+            return by_angle;
+        }
+        let positions = part.iter().map(|&i| self.tile.positions[i as usize]);
+        let [x, y, z] = Bounds::of(positions).extent();
+        let length = x.max(y).max(z);
+        let mine = u64::from(self.tile.core.contains(&(part[0] as usize)));
+        if length > max_side {
+            self.counts.by_max_side += mine * u64::from(!is_wide);
+            Verdict::ByLength
+        } else if is_wide && length <= min_spacing {
+            self.counts.by_min_spacing += mine;
+            Verdict::Kept
+        } else {
+            by_angle
+        }
+    }
+
+    /// Turns the normals of a part to its own dominant axis and finds what their angles span.
+    fn survey(&self, part: &[u32], turned: &mut [bool]) -> Survey {
+        let normal = |i: u32| self.tile.normals[i as usize];
         if let ([only], [turned]) = (part, &mut *turned) {
             // Half of all parts where cells are divided to the last; its own normal is the axis.
             *turned = is_turned([0.0; 3], normal(*only));
-            return None;
+            return Survey { range: f64::INFINITY, nearest: *only, farthest: *only };
         }
         let axis = dominant_axis(outer_sum(part.iter().map(|&i| normal(i))));
+        let Some(reference) = self.rule.reference else {
+            return self.survey_cone(axis, part, turned);
+        };
         let mut smallest = (f64::NEG_INFINITY, 0);
         let mut largest = (f64::INFINITY, 0);
         for (&i, turned) in part.iter().zip(turned) {
             *turned = is_turned(axis, normal(i));
-            let cosine = cosine(self.rule.reference, normal(i), *turned);
+            let cosine = cosine(reference, normal(i), *turned);
             if cosine > smallest.0 {
                 smallest = (cosine, i);
             }
@@ -115,19 +217,57 @@ impl<'a> Division<'a> {
                 largest = (cosine, i);
             }
         }
-        let divide = part.len() > self.rule.min_points
-            && self.rule.max_angle.is_exceeded(smallest.0, largest.0);
-        divide.then(|| Extremes {
-            nearest: self.positions[smallest.1 as usize],
-            farthest: self.positions[largest.1 as usize],
-        })
+        Survey { range: range(smallest.0, largest.0), nearest: smallest.1, farthest: largest.1 }
     }
 
-    /// Parts the members by the bisector of the two extremes; equally far ones go to the smallest
-    /// angle's.
-    fn bisect(&mut self, start: usize, part: &mut [u32], depth: u32, extremes: &Extremes) {
-        let &Extremes { nearest, farthest } = extremes;
-        let positions = self.positions;
+    /// The same where angles are those to the part's own axis.
+    fn survey_cone(&self, axis: [f64; 3], part: &[u32], turned: &mut [bool]) -> Survey {
+        let mut largest = (f64::NEG_INFINITY, 0);
+        for (&i, turned) in part.iter().zip(turned) {
+            let normal = self.tile.normals[i as usize];
+            *turned = is_turned(axis, normal);
+            let sine2 = sine2(axis, normal);
+            if sine2 > largest.0 {
+                largest = (sine2, i);
+            }
+        }
+        Survey { range: cone(largest.0), nearest: largest.1, farthest: largest.1 }
+    }
+
+    /// The member whose normal is farthest in angle from that of `from`, both turned; of equal ones
+    /// the first. Chords of unit normals compare as their angles do.
+    fn opposite(&self, from: u32, part: &[u32], turned: &[bool]) -> u32 {
+        let unit = |i: u32| direction(self.tile.normals[i as usize].map(f64::from));
+        let sign_of = |turned: bool| if turned { -1.0 } else { 1.0 };
+        let is_turned = part.iter().zip(turned).any(|(&i, &turned)| i == from && turned);
+        let (a, sign) = (unit(from).unwrap_or_default(), sign_of(is_turned));
+        let mut largest = (f64::NEG_INFINITY, from);
+        for (&i, &turned) in part.iter().zip(turned) {
+            let (b, sign) = (unit(i).unwrap_or_default(), sign * sign_of(turned));
+            let [x, y, z]: [f64; 3] = std::array::from_fn(|axis| a[axis] - sign * b[axis]);
+            let chord2 = x * x + y * y + z * z;
+            if chord2 > largest.0 {
+                largest = (chord2, i);
+            }
+        }
+        largest.1
+    }
+
+    /// Parts the members by the bisector of the two sites; equally far ones go to the smallest
+    /// angle's, or, where angles are those to the part's own axis, to that of the second site.
+    fn bisect(
+        &mut self,
+        part: &mut [u32],
+        turned: &[bool],
+        survey: &Survey,
+        child: impl Fn(Range<usize>) -> Part,
+    ) {
+        let positions = &self.tile.positions[..];
+        let nearest = match self.rule.reference {
+            Some(_) => survey.nearest,
+            None => self.opposite(survey.farthest, part, turned),
+        };
+        let [nearest, farthest] = [nearest, survey.farthest].map(|i| positions[i as usize]);
         let cut = if self.rule.side <= SHORT_SIDE {
             // |x − a|² ≤ |x − b|² as 2 (x − a)·(b − a) ≤ |b − a|², exact as every term is below 2^61.
             let apart: [i64; 3] = std::array::from_fn(|axis| farthest[axis] - nearest[axis]);
@@ -143,10 +283,9 @@ impl<'a> Division<'a> {
                 distance2(p, nearest) <= distance2(p, farthest)
             })
         };
-        let end = start + part.len();
-        for range in [start + cut..end, start..start + cut] {
+        for range in [cut..part.len(), 0..cut] {
             if !range.is_empty() {
-                self.stack.push(Part { start: range.start, end: range.end, depth: depth + 1 });
+                self.stack.push(child(range));
             }
         }
     }
@@ -169,10 +308,10 @@ impl<'a> Division<'a> {
     }
 
     /// Parts the members by the octants of the smallest octant of the initial cell that holds them.
-    fn cut_in_eight(&mut self, start: usize, part: &mut [u32], depth: u32) {
-        let positions = self.positions;
+    fn cut_in_eight(&mut self, part: &mut [u32], child: impl Fn(Range<usize>) -> Part) {
+        let positions = &self.tile.positions[..];
         let tight = Bounds::of(part.iter().map(|&i| positions[i as usize]));
-        let Some(middle) = middle(&tight, self.rule.side) else { return };
+        let Some(middle) = middle(&tight, self.rule.origin, self.rule.side) else { return };
         let octant = |i: u32| {
             let p = positions[i as usize];
             (0..3).fold(0, |octant, axis| octant | usize::from(p[axis] >= middle[axis]) << axis)
@@ -191,16 +330,17 @@ impl<'a> Division<'a> {
             next[octant] += 1;
         }
         for octant in bounds.windows(2).rev().filter(|octant| octant[0] < octant[1]) {
-            let (start, end) = (start + octant[0], start + octant[1]);
-            self.stack.push(Part { start, end, depth: depth + 1 });
+            self.stack.push(child(octant[0]..octant[1]));
         }
     }
 }
 
 /// Smallest corner of the last octant of the smallest octant of a cell that holds `bounds`; the
 /// lower half of an odd side is the longer one. None if `bounds` is a single position.
-fn middle(bounds: &Bounds, side: i64) -> Option<Position> {
-    let mut corner = corner(bounds.lo, side);
+fn middle(bounds: &Bounds, origin: Position, side: i64) -> Option<Position> {
+    let corner =
+        |axis: usize| origin[axis] + (bounds.lo[axis] - origin[axis]).div_euclid(side) * side;
+    let mut corner: Position = std::array::from_fn(corner);
     let mut sides = [side; 3];
     while sides != [1; 3] {
         let middle = std::array::from_fn(|axis| corner[axis] + (sides[axis] - sides[axis] / 2));
@@ -227,11 +367,11 @@ mod tests {
     #[test]
     fn the_middle_is_that_of_the_smallest_octant() {
         let bounds = |lo, hi| Bounds { lo, hi };
-        assert_eq!(middle(&bounds([0; 3], [7; 3]), 8), Some([4; 3]));
-        assert_eq!(middle(&bounds([4; 3], [5, 4, 4]), 8), Some([5; 3]));
-        assert_eq!(middle(&bounds([-7; 3], [-1; 3]), 7), Some([-3; 3]));
-        assert_eq!(middle(&bounds([3; 3], [3; 3]), 7), None);
+        assert_eq!(middle(&bounds([0; 3], [7; 3]), [0; 3], 8), Some([4; 3]));
+        assert_eq!(middle(&bounds([4; 3], [5, 4, 4]), [0; 3], 8), Some([5; 3]));
+        assert_eq!(middle(&bounds([-7; 3], [-1; 3]), [-14, 0, 7], 7), Some([-3; 3]));
+        assert_eq!(middle(&bounds([3; 3], [3; 3]), [-14, 0, 7], 7), None);
         // A side of 3 is halved into 2 and 1: octants need not be cubes.
-        assert_eq!(middle(&bounds([0, 2, 0], [1, 2, 0]), 3), Some([1, 3, 1]));
+        assert_eq!(middle(&bounds([0, 2, 0], [1, 2, 0]), [0; 3], 3), Some([1, 3, 1]));
     }
 }

@@ -4,30 +4,28 @@ use std::ops::Range;
 
 use crate::geom::angle::is_known;
 use crate::point::{Bounds, Position};
-use crate::tile::Cells as Partition;
+use crate::tile::{Cells as Partition, Tile};
 
 /// Cells along an axis that a packed key can tell apart.
 const PACKED_CELLS: i64 = 1 << 21;
 
 /// A tile's positions, to be grouped by the cube of side `side` that they are in.
 pub(super) struct Grouping<'a> {
-    pub(super) positions: &'a [Position],
-    pub(super) normals: &'a [[f32; 3]],
-    pub(super) core: Range<usize>,
+    pub(super) tile: &'a Tile,
     pub(super) side: i64,
 }
 
 impl Grouping<'_> {
-    /// Makes each cell with a core position a group of `cells`: its positions that have a normal, in
-    /// Morton order. Returns how many groups have positions on both sides of a face of the tile.
+    /// Makes each cell with a core position a group of `cells`: the chosen positions of it that have a
+    /// normal, in Morton order. Returns how many groups have positions on both sides of a face of the tile.
     pub(super) fn run(&self, cells: &mut Partition) -> u64 {
-        if self.core.is_empty() {
+        if self.tile.core.is_empty() {
             return 0;
         }
         if self.side.count_ones() == 1 {
             return self.nodes(cells);
         }
-        let core = Bounds::of(self.positions[self.core.clone()].iter().copied());
+        let core = Bounds::of(self.tile.positions[self.tile.core.clone()].iter().copied());
         let (lo, hi) = (self.cell(core.lo), self.cell(core.hi));
         if (0..3).all(|axis| hi[axis] - lo[axis] < PACKED_CELLS) {
             let packed = |key, (v, lo)| key * PACKED_CELLS + (v - lo);
@@ -46,15 +44,15 @@ impl Grouping<'_> {
     fn nodes(&self, cells: &mut Partition) -> u64 {
         let level = self.side.trailing_zeros();
         let same = |i: usize, j: usize| {
-            let (a, b) = (self.positions[i], self.positions[j]);
+            let (a, b) = (self.tile.positions[i], self.tile.positions[j]);
             (0..3).all(|axis| (a[axis] ^ b[axis]) >> level == 0)
         };
         // A core smaller than a cell: the rest of the cell is before or behind it.
-        let Range { start: mut first, end: mut last } = self.core;
-        while first > 0 && same(first - 1, self.core.start) {
+        let Range { start: mut first, end: mut last } = self.tile.core.clone();
+        while first > 0 && same(first - 1, self.tile.core.start) {
             first -= 1;
         }
-        while last < self.positions.len() && same(last, self.core.end - 1) {
+        while last < self.tile.positions.len() && same(last, self.tile.core.end - 1) {
             last += 1;
         }
         cells.members.reserve_exact(last - first);
@@ -64,7 +62,7 @@ impl Grouping<'_> {
             if i > first && !same(i - 1, i) {
                 crossing += self.close(cells);
             }
-            if self.has_normal(i) {
+            if self.belongs(i) {
                 cells.members.push(i as u32);
             }
         }
@@ -99,7 +97,7 @@ impl Grouping<'_> {
             if i > 0 && runs[i - 1].0 != *cell {
                 crossing += self.close(cells);
             }
-            cells.members.extend((*start..*end).filter(|&i| self.has_normal(i as usize)));
+            cells.members.extend((*start..*end).filter(|&i| self.belongs(i as usize)));
         }
         crossing + self.close(cells)
     }
@@ -107,14 +105,14 @@ impl Grouping<'_> {
     /// Calls `each` for every run of positions that are in one cell.
     fn runs(&self, mut each: impl FnMut([i64; 3], Range<usize>)) {
         let mut start = 0;
-        while start < self.positions.len() {
-            let cell = self.cell(self.positions[start]);
+        while start < self.tile.positions.len() {
+            let cell = self.cell(self.tile.positions[start]);
             let corner = cell.map(|v| v * self.side);
             let same = |p: &Position| {
                 (0..3).all(|axis| (p[axis].wrapping_sub(corner[axis]) as u64) < self.side as u64)
             };
             let end =
-                start + 1 + self.positions[start + 1..].iter().take_while(|p| same(p)).count();
+                start + 1 + self.tile.positions[start + 1..].iter().take_while(|p| same(p)).count();
             each(cell, start..end);
             start = end;
         }
@@ -125,8 +123,8 @@ impl Grouping<'_> {
     fn close(&self, cells: &mut Partition) -> u64 {
         let start = cells.ends.last().map_or(0, |&end| end as usize);
         let group = &cells.members[start..];
-        let before = group.partition_point(|&i| (i as usize) < self.core.start);
-        let core = group[before..].partition_point(|&i| (i as usize) < self.core.end);
+        let before = group.partition_point(|&i| (i as usize) < self.tile.core.start);
+        let core = group[before..].partition_point(|&i| (i as usize) < self.tile.core.end);
         let crossing = core < group.len();
         if core == 0 {
             cells.members.truncate(start);
@@ -136,7 +134,25 @@ impl Grouping<'_> {
         u64::from(crossing)
     }
 
-    fn has_normal(&self, i: usize) -> bool {
-        is_known(self.normals[i])
+    fn belongs(&self, i: usize) -> bool {
+        self.tile.is_chosen(i) && is_known(self.tile.normals[i])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_that_are_not_chosen_are_in_no_cell() {
+        for side in [8, 7] {
+            let mut tile = Tile::of((0..6).map(|x| [x, 0, 0]).collect());
+            tile.normals.fill([0.0, 0.0, 1.0]);
+            tile.normals[5] = [f32::NAN; 3];
+            (tile.selections, tile.limits) = (vec![3, 1, 2, 0, 3, 3], 2);
+            let mut cells = Partition::default();
+            Grouping { tile: &tile, side }.run(&mut cells);
+            assert_eq!((cells.members, cells.ends), (vec![0, 2, 4], vec![3]), "side {side}");
+        }
     }
 }

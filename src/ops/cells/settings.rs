@@ -3,8 +3,10 @@
 use std::f64::consts::PI;
 use std::fmt;
 
-use serde::de::{Deserializer, Error, Unexpected, Visitor};
+use serde::de::{Deserializer, Error, SeqAccess, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
+
+use crate::geom::angle::direction;
 
 /// Side of the initial cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,8 +33,92 @@ pub enum Split {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Measure {
-    /// θ_max − θ_min of the angles to N (the paper's; blind to rotations about N).
+    /// θ_max − θ_min of the angles to N (the paper's; blind to rotations about N). The sites of
+    /// `split = "voronoi"` are the positions with θ_min and with θ_max.
     Axis,
+    /// Twice the largest angle θ to the cell's own dominant axis. The sites are the position with
+    /// the largest θ, and the one whose normal is farthest in angle from that position's (of equal
+    /// ones the first in Morton order); an equally far position goes with the latter.
+    Cone,
+}
+
+/// Direction N that angles are measured from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reference {
+    /// (1, 0, 0).
+    X,
+    /// (0, 1, 0).
+    Y,
+    /// (0, 0, 1).
+    Z,
+    /// Any other, of any length above 0.
+    Vector([f64; 3]),
+}
+
+impl Reference {
+    /// The direction at length 1; none if there is none.
+    pub(super) fn direction(self) -> Option<[f64; 3]> {
+        match self {
+            Reference::X => Some([1.0, 0.0, 0.0]),
+            Reference::Y => Some([0.0, 1.0, 0.0]),
+            Reference::Z => Some([0.0, 0.0, 1.0]),
+            Reference::Vector(v) => direction(v),
+        }
+    }
+}
+
+impl Serialize for Reference {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Reference::X => serializer.serialize_str("x"),
+            Reference::Y => serializer.serialize_str("y"),
+            Reference::Z => serializer.serialize_str("z"),
+            Reference::Vector(v) => v.serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Reference {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(ReferenceVisitor)
+    }
+}
+
+struct ReferenceVisitor;
+
+impl<'de> Visitor<'de> for ReferenceVisitor {
+    type Value = Reference;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("\"x\", \"y\", \"z\", or a vector [x, y, z] that is not 0")
+    }
+
+    fn visit_str<E: Error>(self, word: &str) -> Result<Reference, E> {
+        match word {
+            "x" => Ok(Reference::X),
+            "y" => Ok(Reference::Y),
+            "z" => Ok(Reference::Z),
+            _ => Err(E::invalid_value(Unexpected::Str(word), &self)),
+        }
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut numbers: A) -> Result<Reference, A::Error> {
+        let mut vector = [0.0; 3];
+        let mut count = 0;
+        while let Some(number) = numbers.next_element::<f64>()? {
+            if let Some(component) = vector.get_mut(count) {
+                *component = number;
+            }
+            count += 1;
+        }
+        if count != 3 {
+            return Err(A::Error::invalid_length(count, &self));
+        }
+        match direction(vector) {
+            Some(_) => Ok(Reference::Vector(vector)),
+            None => Err(A::Error::invalid_value(Unexpected::Other("no direction"), &self)),
+        }
+    }
 }
 
 impl Serialize for Side {
@@ -83,9 +169,40 @@ impl Visitor<'_> for SideVisitor {
     }
 }
 
+/// A length in world units, above 0.
+pub(super) fn length<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    deserializer.deserialize_any(LengthVisitor).map(Some)
+}
+
+struct LengthVisitor;
+
+impl Visitor<'_> for LengthVisitor {
+    type Value = f64;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("a length above 0 in the scan's unit")
+    }
+
+    fn visit_f64<E: Error>(self, length: f64) -> Result<f64, E> {
+        if length.is_finite() && length > 0.0 {
+            Ok(length)
+        } else {
+            Err(E::invalid_value(Unexpected::Float(length), &self))
+        }
+    }
+
+    fn visit_i64<E: Error>(self, length: i64) -> Result<f64, E> {
+        self.visit_f64(length as f64)
+    }
+
+    fn visit_u64<E: Error>(self, length: u64) -> Result<f64, E> {
+        self.visit_f64(length as f64)
+    }
+}
+
 /// An angle from 0 to π: a number of radians, or text with a unit.
-pub(super) fn angle<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    deserializer.deserialize_any(AngleVisitor)
+pub(super) fn angle<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    deserializer.deserialize_any(AngleVisitor).map(Some)
 }
 
 struct AngleVisitor;
@@ -145,9 +262,10 @@ mod tests {
     #[test]
     fn an_empty_stage_has_the_documented_defaults() {
         let cells: Cells = toml::from_str("").unwrap();
-        assert_eq!((cells.side, cells.max_angle), (Side::Auto, 0.1));
+        assert_eq!((cells.side, cells.max_angle()), (Side::Auto, 0.1));
+        assert_eq!((cells.keep, cells.max_side, cells.min_spacing), (None, None, None));
         assert_eq!((cells.min_points.get(), cells.split), (1, Split::Voronoi));
-        assert_eq!(cells.measure, Measure::Axis);
+        assert_eq!((cells.measure, cells.reference), (Measure::Axis, Reference::X));
     }
 
     #[test]
@@ -160,7 +278,7 @@ mod tests {
             ("'0.1rad'", 0.1),
         ] {
             let cells: Cells = toml::from_str(&format!("max_angle = {text}")).unwrap();
-            assert_eq!(cells.max_angle, radians, "{text}");
+            assert_eq!(cells.max_angle, Some(radians), "{text}");
         }
         assert!(refusal("max_angle = 6").contains("write \"6deg\""));
         for wrong in ["-0.1", "nan", "inf", "1000", "'6'", "'deg'", "'181deg'", "'-1rad'", "true"] {
@@ -180,8 +298,36 @@ mod tests {
     }
 
     #[test]
+    fn bounds_are_lengths() {
+        let cells: Cells = toml::from_str("max_side = 2\nmin_spacing = 0.25").unwrap();
+        assert_eq!((cells.max_side, cells.min_spacing), (Some(2.0), Some(0.25)));
+        for wrong in ["0", "-1.0", "nan", "inf", "'auto'"] {
+            assert!(refusal(&format!("max_side = {wrong}")).contains("above 0"), "{wrong}");
+            assert!(refusal(&format!("min_spacing = {wrong}")).contains("above 0"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn references_are_axes_or_vectors_of_any_length() {
+        let direction = |text: &str| {
+            let cells: Cells = toml::from_str(&format!("reference = {text}")).unwrap();
+            cells.reference.direction().unwrap()
+        };
+        assert_eq!(direction("'y'"), [0.0, 1.0, 0.0]);
+        assert_eq!(direction("[0, 0, -7]"), [0.0, 0.0, -1.0]);
+        assert_eq!(direction("[3.0, 0, 4]"), [0.6, 0.0, 0.8]);
+        assert_eq!(direction("[1e-310, 0, 0]"), [1.0, 0.0, 0.0]);
+        assert_eq!(direction("[1e308, 1e308, 0]"), direction("[1, 1, 0]"));
+        let wrong =
+            ["'w'", "[0, 0, 0]", "[1, 2]", "[1, 2, 3, 4]", "[nan, 0, 1]", "[inf, 0, 1]", "1"];
+        for wrong in wrong {
+            assert!(refusal(&format!("reference = {wrong}")).contains("[x, y, z]"), "{wrong}");
+        }
+    }
+
+    #[test]
     fn what_cells_do_not_know_is_refused() {
-        assert!(refusal("measure = 'cone'").contains("axis"));
+        assert!(refusal("measure = 'sphere'").contains("cone"));
         assert!(refusal("split = 'kd'").contains("octant"));
         assert!(refusal("min_points = 0").contains("nonzero"));
         assert!(refusal("max_angel = 0.1").contains("max_angle"));

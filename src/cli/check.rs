@@ -1,0 +1,61 @@
+//! `plan` and `check`: what a pipeline would do, and whether it can.
+
+use std::path::PathBuf;
+
+use super::arguments::Plan;
+use super::console::Console;
+use super::print;
+use super::run::parse_sets;
+use crate::pipeline::{Outline, Pipeline, Registry};
+use crate::report::Grouped;
+use crate::stage::Role;
+use crate::{Result, io};
+
+/// Prints how a pipeline would be run.
+pub(super) fn plan(arguments: &Plan, registry: &Registry) -> Result<()> {
+    print::result(read(arguments, registry)?.plan(&arguments.common.overrides())?)
+}
+
+/// Prints that a pipeline can be run, or fails as its run would before it reads a point; then the
+/// inputs that cannot be read are all told, and not the first alone.
+pub(super) fn check(arguments: &Plan, registry: &Registry, console: &Console) -> Result<()> {
+    let pipeline = read(arguments, registry)?;
+    let inputs = inputs(&pipeline);
+    let name = pipeline.origin.clone();
+    match pipeline.plan(&arguments.common.overrides()) {
+        Ok(plan) => {
+            console.planned(&plan);
+            console.result(format_args!("{name} is right: {}", said(&plan.outline())))
+        }
+        Err(error) => {
+            let others = inputs.iter().filter(|input| error.path() != Some(input));
+            for other in others.filter_map(|input| io::describe(input).err().map(|e| e.at(input))) {
+                console.error(&other);
+            }
+            Err(error)
+        }
+    }
+}
+
+fn read(arguments: &Plan, registry: &Registry) -> Result<Pipeline> {
+    let sets = parse_sets(&arguments.sets, &arguments.common)?;
+    Pipeline::read(&arguments.pipeline, registry, &sets)
+}
+
+fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
+    let paths = |role: &Role| match role {
+        Role::Source(source) => source.paths(),
+        _ => Vec::new(),
+    };
+    pipeline.stages.iter().flat_map(|stage| paths(&stage.role)).collect()
+}
+
+fn said(outline: &Outline) -> String {
+    let Outline { inputs, points, .. } = outline;
+    let outputs: Vec<String> =
+        outline.outputs.iter().map(|output| output.display().to_string()).collect();
+    let files = if *inputs == 1 { "file" } else { "files" };
+    let from = if *inputs == 0 { String::new() } else { format!(" from {inputs} {files}") };
+    let points = Grouped(*points);
+    format!("{points} points{from} would become {}", outputs.join(", "))
+}

@@ -1,0 +1,144 @@
+//! What a command says while it works: bars, text or events on stderr, as loud as the user wants.
+
+use std::fmt::Display;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::time::Instant;
+
+use super::arguments::{Common, Progress};
+use super::events::Events;
+use super::progress::Bars;
+use super::{interrupt, print};
+use crate::pipeline::{Done, Plan, Watch};
+use crate::{Error, Result};
+
+/// Where all that a command says goes through; called from several threads.
+pub(super) struct Console {
+    voice: Voice,
+    quiet: bool,
+    verbose: bool,
+    /// The phase of which `verbose` tells the time when it ends.
+    phase: Mutex<Option<(&'static str, Instant)>>,
+    /// Set by Ctrl-C, once a run listens to it.
+    interrupted: OnceLock<Arc<AtomicBool>>,
+}
+
+enum Voice {
+    Text(Bars),
+    Json(Events),
+}
+
+impl Console {
+    /// As the arguments of a command ask for; one that has none of these speaks plainly.
+    pub fn new(common: Option<&Common>) -> Self {
+        let progress = common.map_or(Progress::Never, |common| common.progress);
+        let quiet = common.is_some_and(|common| common.quiet);
+        Console {
+            voice: match progress {
+                Progress::Json => Voice::Json(Events::new()),
+                Progress::Auto | Progress::Never => {
+                    Voice::Text(Bars::new(progress == Progress::Auto && !quiet))
+                }
+            },
+            quiet,
+            verbose: common.is_some_and(|common| common.verbose),
+            phase: Mutex::new(None),
+            interrupted: OnceLock::new(),
+        }
+    }
+
+    /// From now on Ctrl-C asks the run to stop, rather than ending the process.
+    pub fn hear_interrupts(&self) {
+        self.interrupted.get_or_init(interrupt::flag);
+    }
+
+    /// Prints a result on stdout, unless nothing is wanted there.
+    pub fn result(&self, text: impl Display) -> Result<()> {
+        if self.quiet { Ok(()) } else { print::result(text) }
+    }
+
+    /// Tells what a plan decided.
+    pub fn planned(&self, plan: &Plan) {
+        let outline = plan.outline();
+        match &self.voice {
+            Voice::Json(events) if !self.quiet => events.planned(&outline, &plan.to_string()),
+            Voice::Text(_) if self.verbose => {
+                print::message(plan);
+                print::message(format_args!("scratch  {}", outline.scratch.display()));
+            }
+            _ => {}
+        }
+    }
+
+    /// A run is done.
+    pub fn done(&self, done: &Done) {
+        self.end();
+        match &self.voice {
+            Voice::Json(events) if !self.quiet => events.done(done),
+            Voice::Text(_) if self.verbose => {
+                for decision in &done.report.result.decisions {
+                    let (stage, name, value) = (&decision.stage, &decision.name, &decision.value);
+                    print::message(format_args!("decided  {stage}: {name} = {value}"));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Tells an error, whatever is wanted.
+    pub fn error(&self, error: &Error) {
+        self.end();
+        match &self.voice {
+            Voice::Json(events) => events.error(error),
+            Voice::Text(_) => print::error(error),
+        }
+    }
+
+    /// No bar is left, and the time of the last phase is told.
+    pub fn end(&self) {
+        if let Voice::Text(bars) = &self.voice {
+            bars.clear();
+        }
+        let ended = self.phase.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some((name, since)) = ended {
+            print::message(format_args!("{name:8} {:.1} s", since.elapsed().as_secs_f64()));
+        }
+    }
+}
+
+impl Watch for Console {
+    fn phase(&self, name: &'static str, total: Option<u64>) {
+        self.end();
+        match &self.voice {
+            Voice::Json(events) if !self.quiet => events.phase(name, total),
+            Voice::Json(_) => {}
+            Voice::Text(bars) => {
+                if self.verbose {
+                    let mut phase = self.phase.lock().unwrap_or_else(PoisonError::into_inner);
+                    *phase = Some((name, Instant::now()));
+                }
+                bars.phase(name, total);
+            }
+        }
+    }
+
+    fn advance(&self, points: u64) {
+        match &self.voice {
+            Voice::Json(events) if !self.quiet => events.advance(points),
+            Voice::Json(_) => {}
+            Voice::Text(bars) => bars.advance(points),
+        }
+    }
+
+    fn warn(&self, message: &str) {
+        match &self.voice {
+            _ if self.quiet => {}
+            Voice::Json(events) => events.warn(message),
+            Voice::Text(bars) => bars.beside(|| print::warning(message)),
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        self.interrupted.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
+}

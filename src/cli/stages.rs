@@ -1,0 +1,154 @@
+//! `stages`: the kinds of stages with their keys, as text or JSON.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::arguments::Stages;
+use super::print;
+use crate::pipeline::Registry;
+use crate::{Error, Result};
+
+/// The `[run]` table, then every built-in kind: written from the documentation of their keys by the
+/// test that writes the pages of docs/stages.
+const DESCRIBED: &str = include_str!("stages.json");
+
+/// Columns of a terminal that text is wrapped to.
+const COLUMNS: usize = 96;
+
+/// A kind of stage, or the `[run]` table.
+#[derive(Deserialize, Serialize)]
+struct Described {
+    kind: String,
+    about: String,
+    /// None for a kind that an embedding program brings: its keys are not known here.
+    keys: Option<Vec<Key>>,
+}
+
+#[derive(Deserialize, Serialize)]
+struct Key {
+    key: String,
+    value: String,
+    required: bool,
+    default: Value,
+    about: String,
+    words: Vec<Word>,
+}
+
+#[derive(Deserialize, Serialize)]
+struct Word {
+    word: String,
+    about: String,
+}
+
+/// Prints the `[run]` table and all kinds of stages, or one of them.
+pub(super) fn stages(arguments: &Stages, registry: &Registry) -> Result<()> {
+    let all = described(registry)?;
+    let shown: Vec<&Described> = match &arguments.kind {
+        None => all.iter().collect(),
+        Some(kind) => vec![all.iter().find(|d| d.kind == *kind).ok_or_else(|| {
+            let kinds: Vec<&str> = all.iter().map(|d| d.kind.as_str()).collect();
+            let told = format!("there is no stage `{kind}`");
+            Error::pipeline(told).help(format!("stages: {}", kinds.join(", ")))
+        })?],
+    };
+    if arguments.json {
+        let json = match (&arguments.kind, &shown[..]) {
+            (Some(_), [one]) => serde_json::to_string_pretty(one),
+            _ => serde_json::to_string_pretty(&shown),
+        };
+        let failed = |e| Error::internal("the stages could not be written as JSON").because(e);
+        return print::result(json.map_err(failed)?);
+    }
+    let text: Vec<String> = shown.into_iter().map(text).collect();
+    print::result(text.join("\n"))
+}
+
+/// The `[run]` table, then the kinds of the registry in their order.
+fn described(registry: &Registry) -> Result<Vec<Described>> {
+    let mut known: Vec<Described> = serde_json::from_str(DESCRIBED)
+        .map_err(|e| Error::internal("the built-in description of stages is wrong").because(e))?;
+    let mut all: Vec<Described> = known.extract_if(.., |d| d.kind == "run").collect();
+    for (kind, about) in registry.kinds() {
+        // A program's own kind may have the name of a built-in one.
+        let built_in = known.iter().position(|d| d.kind == kind && d.about == about);
+        all.push(match built_in {
+            Some(at) => known.swap_remove(at),
+            None => Described { kind: kind.to_owned(), about: about.to_owned(), keys: None },
+        });
+    }
+    Ok(all)
+}
+
+fn text(described: &Described) -> String {
+    let heading = match described.kind.as_str() {
+        "run" => "[run]",
+        kind => kind,
+    };
+    let mut out = format!("{heading}\n{}", wrapped(&described.about, 2));
+    match &described.keys {
+        None => out += &wrapped("Its keys are not described here.", 2),
+        Some(keys) if keys.is_empty() => out += &wrapped("It has no keys.", 2),
+        Some(keys) => keys.iter().for_each(|key| out += &key_text(key)),
+    }
+    out
+}
+
+fn key_text(key: &Key) -> String {
+    let default = match &key.default {
+        _ if key.required => "must be given".to_owned(),
+        Value::Null => "default: none".to_owned(),
+        value => format!("default: {value}"),
+    };
+    let mut out = format!("\n  {} = {} [{default}]\n", key.key, key.value);
+    out += &wrapped(&key.about, 6);
+    for Word { word, about } in &key.words {
+        out += &wrapped(&format!("\"{word}\": {about}"), 8);
+    }
+    out
+}
+
+/// Lines of words, indented.
+fn wrapped(text: &str, indent: usize) -> String {
+    let mut out = String::new();
+    let mut line = String::new();
+    for word in text.split_whitespace() {
+        let length = indent + line.chars().count() + 1 + word.chars().count();
+        if !line.is_empty() && length > COLUMNS {
+            out += &format!("{:indent$}{line}\n", "");
+            line.clear();
+        }
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        line += word;
+    }
+    if !line.is_empty() {
+        out += &format!("{:indent$}{line}\n", "");
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_built_in_kind_is_described() {
+        let registry = Registry::builtin();
+        let all = described(&registry).unwrap();
+        let kinds: Vec<&str> = all.iter().skip(1).map(|d| d.kind.as_str()).collect();
+        assert_eq!(kinds, registry.kinds().map(|(kind, _)| kind).collect::<Vec<&str>>());
+        assert!(all.iter().all(|d| d.keys.is_some()));
+        assert!(all[0].kind == "run" && all[0].keys.as_ref().unwrap().len() >= 8);
+    }
+
+    #[test]
+    fn lines_are_wrapped_between_words() {
+        let text = wrapped(&"word ".repeat(100), 4);
+        assert!(text.lines().count() > 4);
+        for line in text.lines() {
+            assert!(line.starts_with("    word") && line.len() <= COLUMNS, "{line}");
+        }
+        assert_eq!(wrapped("", 2), "");
+    }
+}

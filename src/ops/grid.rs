@@ -1,0 +1,231 @@
+//! The stage `grid`: of every cube of one size, one point stays.
+
+use std::ops::Range;
+
+use serde::de::{Error as _, Unexpected};
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::Value;
+
+use super::removal::{Account, keep_once, remove, represent};
+use crate::geom::angle::is_known;
+use crate::point::{Bounds, Position, distance2};
+use crate::report::Tally;
+use crate::stage::{Needs, ScanFacts, TileOp};
+use crate::tile::Tile;
+use crate::{Error, Result};
+
+/// Cubes of this side, anchored at world 0, are the octants of the lattice: no larger side differs.
+const LARGEST_SIDE: i64 = 1 << 62;
+/// Bytes a position: its cube and its index, and coordinates to take a median of.
+const BYTES: usize = size_of::<Entry>() + size_of::<i64>();
+
+/// The uniform grid of Martin et al., with which the paper compares; elsewhere called voxel thinning:
+/// of every occupied cube one record stays.
+///
+/// The cubes are anchored at world 0 and have the side `side`, rounded to whole lattice steps, which
+/// the report names. It looks at nothing but positions, so no stage needs to come before it; after
+/// `normals`, the report also says how far what was removed lies from the plane of the point that stays.
+/// Copies weigh as one position and are removed as coincident.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// Side of the cubes, a length above 0 in the scan's unit; rounded to whole lattice steps.
+    #[serde(deserialize_with = "checked_side")]
+    pub side: f64,
+    /// Which position of a cube stays; of equally good ones the first in Morton order.
+    #[serde(default)]
+    pub pick: Pick,
+    #[serde(skip)]
+    settled: Option<Settled>,
+}
+
+/// Which position of a cube stays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Pick {
+    /// The nearest to the cube's centre.
+    #[default]
+    Center,
+    /// The nearest to the lower medians of the x, of the y and of the z of the cube's positions.
+    Median,
+    /// The first in canonical order (Morton order). The fastest.
+    First,
+}
+
+/// The side once the lattice is known.
+#[derive(Debug, Clone, Copy)]
+struct Settled {
+    /// Lattice steps.
+    steps: i64,
+    /// World units.
+    length: f64,
+}
+
+/// Which cube along each axis, from world 0, and the index of a position in it.
+type Entry = ([i64; 3], u32);
+
+impl Grid {
+    /// A grid of cubes of `side` world units.
+    pub fn new(side: f64, pick: Pick) -> Self {
+        Grid { side, pick, settled: None }
+    }
+}
+
+fn checked_side<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    let side = f64::deserialize(from)?;
+    if side.is_finite() && side > 0.0 {
+        return Ok(side);
+    }
+    Err(D::Error::invalid_value(Unexpected::Float(side), &"a length above 0 in the scan's unit"))
+}
+
+impl TileOp for Grid {
+    fn needs(&self) -> Needs {
+        Needs {
+            reads: crate::point::names::XYZ.map(str::to_owned).to_vec(),
+            cell_side: self.settled.map_or(0, |settled| settled.steps),
+            cell_aligned: self.settled.is_some_and(|settled| settled.steps.count_ones() == 1),
+            bytes_per_point: BYTES,
+            removes: true,
+            ..Needs::default()
+        }
+    }
+
+    fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
+        let steps = scan.lattice.steps(self.side).min(LARGEST_SIDE);
+        self.settled = Some(Settled { steps, length: steps as f64 * scan.lattice.step });
+        Ok(())
+    }
+
+    fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
+        let side = self
+            .settled
+            .ok_or_else(|| Error::internal("the stage grid ran before its side was settled"))?
+            .steps;
+        if u32::try_from(tile.positions.len()).is_err() {
+            return Err(Error::internal("a tile has more than 2^32 positions"));
+        }
+        let core = tile.core.clone();
+        let (mut cubes, mut coincident, mut represented) = (0, 0, 0);
+        let mut axis = Vec::new();
+        for group in grouped(tile, side).chunk_by(|a, b| a.0 == b.0) {
+            let members = || group.iter().map(|(_, i)| *i as usize);
+            let Some(kept) = self.pick.of(tile, group, side, &mut axis) else { continue };
+            cubes += u64::from(members().next().is_some_and(|first| core.contains(&first)));
+            for i in members().filter(|i| core.contains(i)) {
+                if i == kept {
+                    coincident += keep_once(tile, i);
+                } else if is_known(tile.normals[kept]) {
+                    represented += represent(tile, i, kept);
+                } else {
+                    represented += remove(tile, i);
+                }
+            }
+        }
+        let account = Account { stage: "grid", marked: "grid_marked", mark: None };
+        account.enter(tally, "coincident", coincident);
+        account.enter(tally, "represented", represented);
+        tally.count("grid_cubes", cubes);
+        Ok(())
+    }
+
+    fn decisions(&self) -> Vec<(String, Value)> {
+        self.settled.map_or(Vec::new(), |settled| {
+            vec![
+                ("side".into(), settled.length.into()),
+                ("side_steps".into(), settled.steps.into()),
+            ]
+        })
+    }
+}
+
+/// The positions that the stage decides about, cube after cube, in Morton order within each; cubes
+/// that no position of the core is in may be missing.
+fn grouped(tile: &Tile, side: i64) -> Vec<Entry> {
+    let cube = |p: Position| p.map(|v| v.div_euclid(side));
+    let Range { start, end } = tile.core;
+    let core = Bounds::of(tile.positions[start..end].iter().copied());
+    if core.is_empty() {
+        return Vec::new();
+    }
+    let reached = Bounds { lo: cube(core.lo), hi: cube(core.hi) };
+    let entries = || {
+        tile.positions
+            .iter()
+            .enumerate()
+            .map(|(i, &p)| (cube(p), i as u32))
+            .filter(|(cube, i)| reached.contains(*cube) && tile.is_chosen(*i as usize))
+    };
+    // Counted first: growing would hold more than the stage says it needs.
+    let mut grouped = Vec::with_capacity(entries().count());
+    grouped.extend(entries());
+    // Octree nodes follow one another in Morton order.
+    if side.count_ones() > 1 {
+        grouped.sort_unstable();
+    }
+    grouped
+}
+
+impl Pick {
+    /// The position of a cube that stays. `axis` is memory to work in.
+    fn of(self, tile: &Tile, group: &[Entry], side: i64, axis: &mut Vec<i64>) -> Option<usize> {
+        let at = |entry: &Entry| tile.positions[entry.1 as usize];
+        let (cube, first) = group.first()?;
+        let nearest = |distance2: &dyn Fn(Position) -> u128| {
+            let nearest = group.iter().min_by_key(|entry| (distance2(at(entry)), entry.1));
+            nearest.map(|entry| entry.1 as usize)
+        };
+        match self {
+            Pick::First => Some(*first as usize),
+            // In half steps from the cube's corner: the centre of an odd side is between two steps.
+            Pick::Center => nearest(&|p| {
+                let halves = std::array::from_fn(|axis| 2 * (p[axis] - cube[axis] * side));
+                distance2(halves, [side; 3])
+            }),
+            Pick::Median => {
+                let mut median = [0; 3];
+                for (i, median) in median.iter_mut().enumerate() {
+                    axis.clear();
+                    axis.extend(group.iter().map(|entry| at(entry)[i]));
+                    let middle = (axis.len() - 1) / 2;
+                    *median = *axis.select_nth_unstable(middle).1;
+                }
+                nearest(&|p| distance2(p, median))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_side_must_be_given_and_above_0() {
+        let grid: Grid = toml::from_str("side = 2").unwrap();
+        assert_eq!((grid.side, grid.pick), (2.0, Pick::Center));
+        let grid: Grid = toml::from_str("side = 0.5\npick = 'median'").unwrap();
+        assert_eq!((grid.side, grid.pick), (0.5, Pick::Median));
+        for wrong in ["", "side = 0", "side = -1", "side = nan", "side = inf", "side = 'auto'"] {
+            assert!(toml::from_str::<Grid>(wrong).is_err(), "{wrong}");
+        }
+        let told = toml::from_str::<Grid>("side = 0.0").unwrap_err().to_string();
+        assert!(told.contains("a length above 0"), "{told}");
+        assert!(toml::from_str::<Grid>("side = 1\npick = 'last'").is_err());
+    }
+
+    #[test]
+    fn cubes_at_the_end_of_the_lattice_do_not_overflow() {
+        let far = (1 << 62) - 1;
+        for side in [1, 3, far, LARGEST_SIDE] {
+            for pick in [Pick::Center, Pick::Median, Pick::First] {
+                let mut tile = Tile::of(vec![[-far; 3], [far; 3]]);
+                let length = 1.0;
+                let grid =
+                    Grid { settled: Some(Settled { steps: side, length }), ..Grid::new(1.0, pick) };
+                grid.run(&mut tile, &mut Tally::default()).unwrap();
+                assert!(tile.fates.iter().all(|fate| *fate == crate::tile::Fate::Kept));
+            }
+        }
+    }
+}

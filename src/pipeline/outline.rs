@@ -1,0 +1,42 @@
+//! What a plan says of itself before it is run, for programs.
+
+use std::path::{Path, PathBuf};
+
+use super::plan::Plan;
+
+/// What a plan reads, writes and uses.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Outline {
+    /// Files that are read.
+    pub inputs: usize,
+    /// Records in them by their headers.
+    pub points: u64,
+    /// Files that are written.
+    pub outputs: Vec<PathBuf>,
+    /// Where the report is written, if one is wanted.
+    pub report: Option<PathBuf>,
+    /// Threads that work at once.
+    pub threads: usize,
+    /// Bound of the peak memory.
+    pub memory_bytes: u64,
+    /// Folder for what does not fit in memory.
+    pub scratch: PathBuf,
+}
+
+impl Plan {
+    /// What the plan reads, writes and uses.
+    pub fn outline(&self) -> Outline {
+        let outputs: Vec<PathBuf> = self.sinks.iter().map(|sink| sink.path().to_owned()).collect();
+        let beside = outputs.first().and_then(|output| output.parent());
+        let beside = beside.filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+        Outline {
+            inputs: self.source.inputs().len(),
+            points: self.source.points(),
+            report: self.settings.report.clone(),
+            threads: self.threads,
+            memory_bytes: self.demands.limit,
+            scratch: self.settings.scratch.clone().unwrap_or_else(|| beside.to_owned()),
+            outputs,
+        }
+    }
+}
