@@ -231,6 +231,11 @@ pub trait CreateSink: Send + Sync {
     /// The final path of the output; the folder where there is one output for each input.
     fn path(&self) -> &Path;
 
+    /// True if each input gets an output of its own, in the folder [`path`](CreateSink::path).
+    fn is_folder(&self) -> bool {
+        false
+    }
+
     /// The sinks of the `inputs`, in their order, if each input gets an output of its own: this one
     /// then is not created, and its [`chunk`](CreateSink::chunk) is as large as any of theirs. They
     /// are created one after the other, each with [`Source::metadata_of`] its input, and an input of

@@ -165,8 +165,15 @@ pub(super) struct Reduce {
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
     /// The reduced file: .las, .laz or .ply
-    #[arg(short, long, value_name = "OUT")]
-    pub output: String,
+    #[arg(short, long, value_name = "OUT", required_unless_present = "outdir")]
+    pub output: Option<String>,
+    /// One reduced file for each input instead, in this folder, under the input's name and header;
+    /// neighbours are found across the inputs
+    #[arg(long, value_name = "DIR", conflicts_with = "output")]
+    pub outdir: Option<String>,
+    /// Format of the files in that folder: las, laz or ply [default: that of each input]
+    #[arg(long, value_name = "FORMAT", requires = "outdir")]
+    pub to: Option<String>,
     /// Largest range of normal angles in a cell, in radians or as 6deg [default: 0.1]
     #[arg(long, value_name = "ANGLE")]
     pub max_angle: Option<String>,

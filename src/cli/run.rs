@@ -81,7 +81,9 @@ fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
     let classes = (!arguments.classes.is_empty()).then(|| json!(arguments.classes));
     given([
         ("IN", "read.path", Some(json!(arguments.inputs))),
-        ("-o", "write.path", Some(json!(arguments.output))),
+        ("-o", "write.path", arguments.output.clone().map(Value::from)),
+        ("--outdir", "write.folder", arguments.outdir.clone().map(Value::from)),
+        ("--to", "write.format", arguments.to.clone().map(Value::from)),
         ("--max-angle", "cells.max_angle", arguments.max_angle.as_deref().map(number_or_text)),
         ("--neighbors", "normals.neighbors", arguments.neighbors.map(Value::from)),
         ("--side", "cells.side", arguments.side.as_deref().map(number_or_text)),

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::each::ByInput;
 use super::product::{Entry, Product};
 use crate::Result;
 use crate::tile::{Address, PIECE, Pieces, Spill, SpillArea, State};
@@ -173,7 +174,8 @@ impl Open {
         Open { chunk_points, wants_normals, before, chunk, room: chunk_points, written: 0 }
     }
 
-    fn take(&mut self, entry: &Entry, normal: Option<[f32; 3]>, full: &mut Vec<Chunk>) {
+    /// Takes what becomes of an entry; chunks that this completes go to `full`.
+    pub fn take(&mut self, entry: &Entry, normal: Option<[f32; 3]>, full: &mut Vec<Chunk>) {
         let state = if self.before { entry.was } else { entry.now };
         if !state.is_written() {
             return;
@@ -194,6 +196,11 @@ impl Open {
         }
     }
 
+    /// The last chunk, if there is one.
+    pub fn rest(&mut self) -> Option<Chunk> {
+        (self.room < self.chunk_points).then(|| self.close())
+    }
+
     fn close(&mut self) -> Chunk {
         self.room = self.chunk_points;
         let empty = Chunk::empty(self.chunk.sink, self.wants_normals);
@@ -209,6 +216,7 @@ pub(super) struct Cutter {
     figures: Option<Column>,
     found: Found,
     outputs: Vec<Open>,
+    by_input: Vec<ByInput>,
     counts: Counts,
 }
 
@@ -224,13 +232,13 @@ pub(super) struct Counts {
 }
 
 impl Cutter {
-    /// A cutter for a scan of so many positions and records, into `outputs`; the last two columns
-    /// are stored if they are wanted.
+    /// A cutter for a scan of so many positions and records, into `outputs` and, where each input has
+    /// its own, `by_input`; the last two columns are stored if they are wanted.
     pub fn new(
         area: &Arc<SpillArea>,
         (positions, records): (u64, u64),
         (normals, figures): (bool, bool),
-        outputs: Vec<Open>,
+        (outputs, by_input): (Vec<Open>, Vec<ByInput>),
     ) -> Self {
         use crate::tile::{FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES};
         let column = |name, item| Column::new(area, name, item, positions);
@@ -245,6 +253,7 @@ impl Cutter {
                 open: Vec::new(),
             },
             outputs,
+            by_input,
             counts: Counts::default(),
         }
     }
@@ -268,18 +277,18 @@ impl Cutter {
             for output in &mut self.outputs {
                 output.take(entry, normal, &mut full);
             }
+            self.by_input.iter_mut().try_for_each(|lists| lists.take(entry, normal))?;
         }
         Ok(full)
     }
 
-    /// The last chunks, the columns, and what was counted.
-    pub fn finish(mut self) -> Result<(Vec<Chunk>, Stored, Counts)> {
+    /// The last chunks, the columns, the lists by input, and what was counted.
+    pub fn finish(mut self) -> Result<(Vec<Chunk>, Stored, Vec<ByInput>, Counts)> {
         let columns = [Some(&mut self.states), Some(&mut self.fates)];
         let more = [self.normals.as_mut(), self.figures.as_mut()];
         columns.into_iter().chain(more).flatten().try_for_each(Column::flush)?;
         self.found.flush()?;
-        let open = self.outputs.iter_mut().filter(|output| output.room < output.chunk_points);
-        let rest = open.map(Open::close).collect();
+        let rest = self.outputs.iter_mut().filter_map(Open::rest).collect();
         self.counts.outputs = self.outputs.iter().map(|output| output.written).collect();
         let stored = Stored {
             states: self.states.pieces,
@@ -288,7 +297,7 @@ impl Cutter {
             figures: self.figures.map(|column| column.pieces),
             found: self.found,
         };
-        Ok((rest, stored, self.counts))
+        Ok((rest, stored, self.by_input, self.counts))
     }
 }
 
@@ -329,12 +338,12 @@ mod tests {
         let outputs = vec![Open::new(0, 1000, true, false)];
         let copies = 10_000_000;
         let all = 8 + u64::from(copies);
-        let mut cutter = Cutter::new(&area, (8, all), (false, false), outputs);
+        let mut cutter = Cutter::new(&area, (8, all), (false, false), (outputs, Vec::new()));
         let mut chunks = cutter.cut(&product(&[(0, 1), (1, 2), (7, copies)])).unwrap();
         assert_eq!(chunks.len(), 10_000);
         assert!(chunks.iter().all(|chunk| chunk.records.len() <= 3));
         chunks.extend(cutter.cut(&product(&[(20_000_000, 5)])).unwrap());
-        let (rest, stored, counts) = cutter.finish().unwrap();
+        let (rest, stored, _, counts) = cutter.finish().unwrap();
         chunks.extend(rest);
         assert_eq!(counts, Counts { alive: all, written: all, outputs: vec![all] });
         let mut state = [9; 3];
@@ -364,12 +373,12 @@ mod tests {
     fn outputs_take_what_was_there_before_the_pass_or_what_it_leaves() {
         let area = SpillArea::new(Budget::new(1 << 20), 1 << 20, Box::new(Nowhere));
         let outputs = vec![Open::new(3, 2, false, true), Open::new(5, 2, false, false)];
-        let mut cutter = Cutter::new(&area, (3, 3), (false, false), outputs);
+        let mut cutter = Cutter::new(&area, (3, 3), (false, false), (outputs, Vec::new()));
         let mut product = product(&[(0, 1), (1, 1), (2, 1)]);
         product.entries[1].now = State::REMOVED;
         product.entries[2].now = State::ASIDE.edited(3);
         let mut chunks = cutter.cut(&product).unwrap();
-        let (rest, _, counts) = cutter.finish().unwrap();
+        let (rest, _, _, counts) = cutter.finish().unwrap();
         chunks.extend(rest);
         assert_eq!(counts, Counts { alive: 1, written: 2, outputs: vec![3, 2] });
         let of = |sink: usize| {

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use super::chunks::{Chunk, Counts, Cutter, Open, Stored};
 use super::cut::{neighbors, reach};
+use super::each::ByInput;
 use super::outlet::{Hands, Outlet};
 use super::passes::{Op, Pass};
 use super::product::Product;
@@ -33,13 +34,15 @@ pub(super) struct Milled {
     pub counts: Counts,
     /// For each sink of the pass, what it said.
     pub written: Vec<SinkSummary>,
+    /// What goes to outputs that are one for each input.
+    pub by_input: Vec<ByInput>,
     /// Records that the pass's stages decide about.
     pub decided: u64,
     /// True if the pass oriented normals.
     pub oriented: bool,
 }
 
-/// Runs `pass` over the tiles `keys`, into the `sinks` with their numbers.
+/// Runs `pass` over the tiles `keys`, into the `sinks` with their numbers and into lists by input.
 pub(super) fn grind(
     job: &Job<'_>,
     pass: &Pass,
@@ -47,10 +50,11 @@ pub(super) fn grind(
     sieve: &Sieve,
     capacity: usize,
     keys: &[TileKey],
-    sinks: Vec<(usize, Box<dyn Sink>)>,
+    (sinks, by_input): (Vec<(usize, Box<dyn Sink>)>, Vec<ByInput>),
 ) -> Result<Milled> {
     let tiles = &field.tiles;
-    let wants_normals = sinks.iter().any(|(sink, _)| job.wants_normals[*sink]);
+    let numbers = sinks.iter().map(|(sink, _)| *sink).chain(by_input.iter().map(|by| by.sink));
+    let wants_normals = numbers.into_iter().any(|sink| job.wants_normals[sink]);
     let outputs = sinks.iter().enumerate().map(|(n, (sink, open))| {
         let before = pass.before.contains(sink);
         Open::new(n, open.chunk_points(), job.wants_normals[*sink], before)
@@ -59,7 +63,7 @@ pub(super) fn grind(
         &field.area,
         (tiles.positions(), tiles.points()),
         (pass.stores_normals, pass.stores_figures),
-        outputs.collect(),
+        (outputs.collect(), by_input),
     );
     let cutter = Mutex::new(Some(cutter));
     let commit = |product: Product| match &mut *lock(&cutter) {
@@ -95,17 +99,17 @@ pub(super) fn grind(
         Ok(())
     })?;
     let unfinished = || Error::internal("a pass was finished twice");
-    let (rest, stored, counts) = lock(&cutter).take().ok_or_else(unfinished)?.finish()?;
+    let (rest, stored, by_input, counts) = lock(&cutter).take().ok_or_else(unfinished)?.finish()?;
     let mut bench = benches.bench();
     let mut encode = |chunk| bench.encode(&benches, &chunk);
     let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
     let (mut tally, decided, oriented) = std::mem::take(&mut *lock(&total));
     tally.merge(&bench.tally);
-    Ok(Milled { tally, stored, counts, written, decided, oriented })
+    Ok(Milled { tally, stored, counts, written, by_input, decided, oriented })
 }
 
 /// What threads need to encode chunks.
-struct Benches<'a> {
+pub(super) struct Benches<'a> {
     job: &'a Job<'a>,
     tiles: &'a SealedTiles,
     encoders: Vec<Arc<dyn Encode>>,
@@ -125,28 +129,46 @@ impl<'a> Benches<'a> {
         }
     }
 
+    /// For chunks of one output, by whose records classes are counted or not.
+    pub fn of_one(
+        job: &'a Job<'a>,
+        tiles: &'a SealedTiles,
+        encoder: Arc<dyn Encode>,
+        counted: bool,
+        chunk_points: usize,
+    ) -> Self {
+        let counted = counted.then_some(0);
+        Benches { job, tiles, encoders: vec![encoder], counted, chunk_points }
+    }
+
     fn bench(&self) -> Bench {
-        Bench {
-            numbers: Vec::with_capacity(self.chunk_points),
-            states: Vec::with_capacity(self.chunk_points),
-            fetch: Fetch::default(),
-            batch: PointBatch::new(self.job.source.schema().clone(), self.chunk_points),
-            tally: Tally::default(),
-        }
+        Bench::new(self.job, self.chunk_points)
     }
 }
 
 /// What a thread holds to encode chunks.
-struct Bench {
+pub(super) struct Bench {
     numbers: Vec<u64>,
     states: Vec<State>,
     fetch: Fetch,
     batch: PointBatch,
-    tally: Tally,
+    pub tally: Tally,
 }
 
 impl Bench {
-    fn encode(&mut self, all: &Benches<'_>, chunk: &Chunk) -> Result<(usize, Encoded)> {
+    /// For chunks of up to `chunk_points` records.
+    pub fn new(job: &Job<'_>, chunk_points: usize) -> Self {
+        Bench {
+            numbers: Vec::with_capacity(chunk_points),
+            states: Vec::with_capacity(chunk_points),
+            fetch: Fetch::default(),
+            batch: PointBatch::new(job.source.schema().clone(), chunk_points),
+            tally: Tally::default(),
+        }
+    }
+
+    /// The chunk's records, encoded, and for which of the sinks.
+    pub fn encode(&mut self, all: &Benches<'_>, chunk: &Chunk) -> Result<(usize, Encoded)> {
         self.batch.clear();
         chunk.number(&mut self.numbers);
         self.states.clear();

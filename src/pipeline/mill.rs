@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::chunks::Found;
 use super::clock::Clock;
 use super::cut::cut;
+use super::each::ByInput;
 use super::forecast::forecast;
 use super::grind::{Field, grind};
 use super::passes::{Call, Op, Pass};
@@ -21,14 +22,15 @@ use crate::stage::{Gathered, ScanFacts, Sink, SinkSummary};
 use crate::tile::{Intake, SealedTiles, Sieve, SpillArea, TileStore, lock, seal};
 use crate::{Error, Result};
 
-/// Runs a pipeline with tile stages (or one that only sorts) into `sinks`.
+/// Runs a pipeline with tile stages (or one that only sorts) into `sinks`; none where each input has
+/// an output of its own.
 pub(super) fn mill(
     job: &mut Job<'_>,
     lattice: &Lattice,
     shares: &Shares,
     demands: &Demands,
     area: &Arc<SpillArea>,
-    sinks: Vec<Box<dyn Sink>>,
+    sinks: Vec<Option<Box<dyn Sink>>>,
     clock: &mut Clock<'_>,
 ) -> Result<Finished> {
     clock.phase("decode", Some(job.source.points()));
@@ -46,7 +48,7 @@ pub(super) fn mill(
         passes: Vec::new(),
         forecasts: vec![None; job.ops.len()],
         written: sinks.iter().map(|_| None).collect(),
-        sinks: sinks.into_iter().map(Some).collect(),
+        sinks,
     };
     for pass in std::mem::take(&mut job.passes) {
         course.run(job, &pass, &field, (shares, demands), &mut tally, clock)?;
@@ -81,8 +83,8 @@ struct Course {
     /// For each stage, what it said is to be expected.
     forecasts: Vec<Option<Vec<(String, serde_json::Value)>>>,
     sinks: Vec<Option<Box<dyn Sink>>>,
-    /// For each sink, how many records it was given, and what it said in the end.
-    written: Vec<Option<(u64, SinkSummary)>>,
+    /// For each file of each sink, how many records it was given, and what it said in the end.
+    written: Vec<Option<Vec<(u64, SinkSummary)>>>,
 }
 
 impl Course {
@@ -114,19 +116,34 @@ impl Course {
         tally.work("tiles", keys.len() as u64);
         let levels: std::collections::BTreeSet<u32> = keys.iter().map(|key| key.level).collect();
         tally.work("tile_levels", levels.len() as u64);
-        let mut sinks = Vec::new();
+        let (mut sinks, mut by_input) = (Vec::new(), Vec::new());
         for &sink in pass.before.iter().chain(&pass.after) {
+            if let Some(Some(each)) = job.each.get(sink) {
+                let (inputs, before) = (each.sinks.len(), pass.before.contains(&sink));
+                let normals = job.wants_normals[sink];
+                by_input.push(ByInput::new(&field.area, sink, inputs, normals, before));
+                continue;
+            }
             let open = self.sinks.get_mut(sink).and_then(Option::take);
             sinks.push((sink, open.ok_or_else(|| Error::internal("an output is written twice"))?));
         }
         let which: Vec<usize> = sinks.iter().map(|(sink, _)| *sink).collect();
-        let milled = grind(job, pass, field, &sieve, capacity, &keys, sinks)?;
-        drop(working);
+        let milled = grind(job, pass, field, &sieve, capacity, &keys, (sinks, by_input))?;
         tally.merge(&milled.tally);
+        for lists in &milled.by_input {
+            clock.phase("write", Some(lists.records()));
+            let unknown = || Error::internal("an output has no inputs");
+            let each = job.each[lists.sink].as_ref().ok_or_else(unknown)?;
+            let last = lists.sink == job.last_sink;
+            let (written, counted) = each.write(job, tiles, lists, last)?;
+            tally.merge(&counted);
+            self.written[lists.sink] = Some(written);
+        }
+        drop(working);
         for (sink, outcome) in
             which.into_iter().zip(milled.counts.outputs.into_iter().zip(milled.written))
         {
-            self.written[sink] = Some(outcome);
+            self.written[sink] = Some(vec![outcome]);
         }
         let stages = pass.calls.iter().map(|call| job.ops[call.op].kind.clone()).collect();
         self.passes.push(PassFigures { stages, before: self.alive, after: milled.counts.alive });

@@ -6,6 +6,7 @@ mod clock;
 mod connect;
 mod cut;
 mod draft;
+mod each;
 mod forecast;
 mod grind;
 mod inputs;

@@ -67,6 +67,10 @@ impl CreateSink for Outputs {
         &self.folder
     }
 
+    fn is_folder(&self) -> bool {
+        true
+    }
+
     fn each_input(&self, inputs: &[Input]) -> Result<Option<Vec<Box<dyn CreateSink>>>> {
         self.check_folder()?;
         if inputs.is_empty() {

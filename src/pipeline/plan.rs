@@ -1,7 +1,9 @@
 //! A pipeline that fits: its source open, its lattice fixed, its stages in passes, its memory divided.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
+use super::each::{lists_bytes, paths, ranks};
 use super::passes::{Op, Pass, StageOp, Tap, blame, number_selections, unroll};
 use super::publish::check_place;
 use super::settings::{Nonfinite, Overrides, RunSettings, Withheld};
@@ -12,6 +14,7 @@ use crate::budget::default_limit;
 use crate::geom::lattice::Lattice;
 use crate::point::Schema;
 use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Role, Source, Transform};
+use crate::tile::TAGGED_INPUTS;
 use crate::{Error, ErrorKind, Result};
 
 /// A pipeline ready to run.
@@ -24,6 +27,10 @@ pub struct Plan {
     pub(super) ops: Vec<StageOp>,
     pub(super) passes: Vec<Pass>,
     pub(super) sinks: Vec<Box<dyn CreateSink>>,
+    /// For each sink, those of the inputs if it is a folder; else none.
+    pub(super) each: Vec<Vec<Box<dyn CreateSink>>>,
+    /// See [`ranks`].
+    pub(super) ranks: Vec<u32>,
     /// A sink of what all stages leave.
     pub(super) last_sink: usize,
     pub(super) tagger: Tagger,
@@ -71,6 +78,7 @@ impl Pipeline {
         let last_sink = last_sink(&sorted.ops, &taps).map_err(in_file)?;
         check_places(&*open, &sinks, &settings)?;
         let source = open.open()?;
+        let (each, ranks) = each_input(&*source, &sinks, &settings)?;
         let schema = source.schema();
         check_transforms(&sorted.transforms, schema).map_err(in_file)?;
         let selections = number_selections(&mut sorted.ops).map_err(in_file)?;
@@ -79,7 +87,7 @@ impl Pipeline {
             true => Withheld::Keep,
             false => settings.withheld,
         };
-        let tagger = Tagger::new(schema, &selections, withheld, false).map_err(in_file)?;
+        let tagger = Tagger::new(schema, &selections, withheld, ranks.clone()).map_err(in_file)?;
         let mills = mills(&sorted.ops, &sinks)?;
         let z_scale = z_scale(&settings, &*source, &sorted.ops)?;
         let lattice = match mills || settings.nonfinite == Nonfinite::Drop {
@@ -93,7 +101,9 @@ impl Pipeline {
         let limit = settings.memory.unwrap_or_else(default_limit);
         let chunks = chunks(&sinks, &*source)?;
         let needs = passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect();
+        let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
         let demands = Demands {
+            lists: folders.saturating_mul(lists_bytes(ranks.len())),
             mills,
             passes: needs,
             tagged: tagger.tags(),
@@ -109,6 +119,8 @@ impl Pipeline {
             ops: sorted.ops,
             passes,
             sinks,
+            each,
+            ranks,
             last_sink,
             tagger,
             mills,
@@ -180,7 +192,8 @@ fn check_places(
     for input in source.paths() {
         outputs().try_for_each(|output| refuse_overwrite(&input, output))?;
     }
-    outputs().try_for_each(check_place)?;
+    let files = sinks.iter().filter(|sink| !sink.is_folder()).map(|sink| sink.path());
+    files.chain(settings.report.as_deref()).try_for_each(check_place)?;
     let mut files = Vec::new();
     for output in outputs() {
         let file = resolved(output);
@@ -199,6 +212,41 @@ fn check_places(
             .help("create it first, or name another with --scratch")),
         None => Ok(()),
     }
+}
+
+/// Sinks of the inputs for each output that is a folder, and the ranks of the inputs if one is.
+type EachInput = (Vec<Vec<Box<dyn CreateSink>>>, Vec<u32>);
+
+/// Names the outputs of folders; refuses those that cannot appear there, or that would replace
+/// another output.
+fn each_input(
+    source: &dyn Source,
+    sinks: &[Box<dyn CreateSink>],
+    settings: &RunSettings,
+) -> Result<EachInput> {
+    let inputs = source.inputs();
+    if inputs.len() > TAGGED_INPUTS as usize && sinks.iter().any(|sink| sink.is_folder()) {
+        let told = format!("more than {TAGGED_INPUTS} inputs cannot have an output each");
+        return Err(Error::pipeline(told).help("run them in several parts"));
+    }
+    let mut each = Vec::new();
+    let files = sinks.iter().filter(|sink| !sink.is_folder()).map(|sink| sink.path());
+    let mut taken: BTreeSet<PathBuf> =
+        files.chain(settings.report.as_deref()).map(resolved).collect();
+    for sink in sinks {
+        let own = sink.each_input(&inputs)?.unwrap_or_default();
+        for path in paths(&own) {
+            if !taken.insert(resolved(&path)) {
+                return Err(Error::pipeline("two outputs have this name").at(path));
+            }
+            if sink.path().is_dir() {
+                check_place(&path)?;
+            }
+        }
+        each.push(own);
+    }
+    let folders = each.iter().any(|own| !own.is_empty());
+    Ok((each, if folders { ranks(&inputs) } else { Vec::new() }))
 }
 
 fn check_transforms(transforms: &[(String, Box<dyn Transform>)], schema: &Schema) -> Result<()> {
@@ -236,12 +284,15 @@ fn z_scale(settings: &RunSettings, source: &dyn Source, ops: &[StageOp]) -> Resu
 fn mills(ops: &[StageOp], sinks: &[Box<dyn CreateSink>]) -> Result<bool> {
     let of = |order: Order| sinks.iter().find(move |sink| sink.order() == order);
     let (canonical, input) = (of(Order::Canonical), of(Order::Input));
-    let mills = !ops.is_empty() || canonical.is_some();
+    let folder = sinks.iter().any(|sink| sink.is_folder());
+    let mills = !ops.is_empty() || canonical.is_some() || folder;
     match input.filter(|_| mills) {
         None => Ok(mills),
         Some(sink) => {
             let told = match ops.is_empty() {
-                true => "order = \"input\" is not possible beside an output in canonical order",
+                true => {
+                    "order = \"input\" is not possible in or beside an output in canonical order"
+                }
                 false => {
                     "order = \"input\" is for pipelines that stream; tiles write the canonical order"
                 }

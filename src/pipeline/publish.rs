@@ -66,6 +66,14 @@ impl Staged {
     }
 }
 
+/// Makes the folder for outputs if it does not exist; that it is in must.
+pub fn make_folder(folder: &Path) -> Result<()> {
+    match fs::create_dir(folder) {
+        Err(_) if folder.is_dir() => Ok(()),
+        made => made.map_err(|e| Error::io(folder, "make the folder", e)),
+    }
+}
+
 /// Refuses `path` if no file can appear there: its folder is missing, or something is there that is
 /// no file and would be replaced by one.
 pub fn check_place(path: &Path) -> Result<()> {

@@ -8,10 +8,11 @@ use std::sync::{Arc, Mutex};
 
 use super::Watch;
 use super::clock::Clock;
+use super::each::Each;
 use super::mill::mill;
 use super::passes::{Pass, StageOp};
 use super::plan::Plan;
-use super::publish::Staged;
+use super::publish::{Staged, make_folder};
 use super::scratch::{Scratch, free_space, memory_warning};
 use super::settings::{Nonfinite, Spill};
 use super::shares::{Demands, Shares};
@@ -25,7 +26,7 @@ use crate::report::{
     ClassFigures, Decision, FileFigures, LatticeFigures, Ledger, Machine, Outcome, PassFigures,
     Report, RunFigures, Tally, check_written, peak_memory,
 };
-use crate::stage::{Input, Part, SinkSummary, Source, Transform};
+use crate::stage::{CreateSink, Input, Part, SinkSummary, Source, Transform};
 use crate::tile::{SpillArea, lock, parallel};
 use crate::{Error, ErrorKind, Result};
 
@@ -36,6 +37,8 @@ pub(super) struct Job<'a> {
     pub transforms: Vec<(String, Box<dyn Transform>)>,
     pub ops: Vec<StageOp>,
     pub passes: Vec<Pass>,
+    /// For each sink, where the outputs of the inputs go if each has its own.
+    pub each: Vec<Option<Each<'a>>>,
     pub tagger: Tagger,
     pub classes: ClassOf,
     pub budget: Budget,
@@ -157,8 +160,8 @@ impl<F: Fn()> Drop for StopOnDrop<F> {
 pub(super) struct Finished {
     pub read: u64,
     pub kept: u64,
-    /// For each sink, the records that it was given, and what it says.
-    pub written: Vec<(u64, SinkSummary)>,
+    /// For each file of each sink, the records that it was given, and what it says.
+    pub written: Vec<Vec<(u64, SinkSummary)>>,
     pub tally: Tally,
     pub decisions: Vec<Decision>,
     pub classes: Vec<ClassFigures>,
@@ -186,34 +189,55 @@ impl Plan {
     /// that `watch` asks for leaves nothing behind.
     pub fn run(mut self, watch: &dyn Watch) -> Result<Done> {
         let mut clock = Clock::new(watch);
-        let mut outputs: Vec<Staged> = Vec::new();
-        for sink in &self.sinks {
-            let staged = match outputs.first() {
-                Some(first) => first.also(sink.path())?,
-                None => Staged::beside(sink.path())?,
-            };
-            outputs.push(staged);
-        }
-        let first =
-            outputs.first().ok_or_else(|| Error::pipeline("the pipeline writes nothing"))?;
+        let outputs = self.stage()?;
+        let nothing = || Error::pipeline("the pipeline writes nothing");
+        let first = outputs.iter().flatten().next().ok_or_else(nothing)?;
         let staged_report =
             self.settings.report.as_deref().map(|path| first.also(path)).transpose()?;
-        let tell = |error| outputs.iter().fold(error, |error, output| output.tell(error));
+        let tell = |error| outputs.iter().flatten().fold(error, |error, output| output.tell(error));
         let (finished, run) = self.work(&outputs, &mut clock, watch).map_err(tell)?;
         let (report, tiles) = self.account(finished, run, clock)?;
         if let Some(staged) = &staged_report {
             write_report(staged.file(), &report, &tiles).map_err(|error| staged.tell(error))?;
         }
         drop(tiles);
-        outputs.into_iter().try_for_each(Staged::publish)?;
+        outputs.into_iter().flatten().try_for_each(Staged::publish)?;
         staged_report.map_or(Ok(()), Staged::publish)?;
         Ok(Done { report, report_path: self.settings.report })
+    }
+
+    /// The files of a sink, one for each input where it is a folder.
+    fn files(&self, sink: usize) -> &[Box<dyn CreateSink>] {
+        match self.each.get(sink) {
+            Some(each) if !each.is_empty() => each,
+            _ => &self.sinks[sink..=sink],
+        }
+    }
+
+    /// Makes places for the files of all sinks.
+    fn stage(&self) -> Result<Vec<Vec<Staged>>> {
+        let mut outputs: Vec<Vec<Staged>> = Vec::new();
+        for (n, sink) in self.sinks.iter().enumerate() {
+            if sink.is_folder() {
+                make_folder(sink.path())?;
+            }
+            let mut staged: Vec<Staged> = Vec::new();
+            for file in self.files(n) {
+                let one = match staged.first().or(outputs.iter().flatten().next()) {
+                    Some(first) => first.also(file.path())?,
+                    None => Staged::beside(file.path())?,
+                };
+                staged.push(one);
+            }
+            outputs.push(staged);
+        }
+        Ok(outputs)
     }
 
     /// Streams or mills into the staged outputs.
     fn work(
         &mut self,
-        outputs: &[Staged],
+        outputs: &[Vec<Staged>],
         clock: &mut Clock<'_>,
         watch: &dyn Watch,
     ) -> Result<(Finished, RunFigures)> {
@@ -221,17 +245,20 @@ impl Plan {
         let whole = !self.mills
             && self.transforms.is_empty()
             && self.settings.nonfinite == Nonfinite::Refuse;
-        let created = self.sinks.iter().zip(outputs);
-        let sinks = created
-            .map(|(sink, output)| sink.create(output.file(), schema, metadata, whole))
-            .collect::<Result<Vec<_>>>()?;
+        let mut sinks = Vec::new();
+        for (sink, staged) in self.sinks.iter().zip(outputs) {
+            // The outputs of the inputs are created one by one, when their records are known.
+            let file = staged.first().filter(|_| !sink.is_folder());
+            let open = file.map(|file| sink.create(file.file(), schema, metadata, whole));
+            sinks.push(open.transpose()?);
+        }
         let shares = self.demands.divide()?;
         let budget = Budget::new(self.demands.limit);
         let _base = budget.lease(shares.base, "program")?;
-        let spill = match (&self.settings.scratch, outputs) {
-            (None, [first, ..]) => first.scratch().clone(),
+        let spill = match (&self.settings.scratch, outputs.iter().flatten().next()) {
+            (None, Some(first)) => first.scratch().clone(),
             (Some(folder), _) => Arc::new(Scratch::below(folder)),
-            (None, []) => return Err(Error::pipeline("the pipeline writes nothing")),
+            (None, None) => return Err(Error::pipeline("the pipeline writes nothing")),
         };
         let kept_in_memory = match self.settings.spill {
             Spill::Auto => shares.kept_in_memory,
@@ -240,7 +267,7 @@ impl Plan {
         let area = SpillArea::new(budget.clone(), kept_in_memory, Box::new(spill.clone()));
         let transforms = std::mem::take(&mut self.transforms);
         let (ops, passes) = (std::mem::take(&mut self.ops), std::mem::take(&mut self.passes));
-        let mut job = Job { transforms, ops, passes, ..self.job(&budget, &shares, watch) };
+        let mut job = Job { transforms, ops, passes, ..self.job(outputs, &budget, &shares, watch) };
         let finished = match &self.lattice {
             Some(lattice) if self.mills => {
                 check_disk(&self.demands, &spill, kept_in_memory)?;
@@ -248,7 +275,7 @@ impl Plan {
             }
             lattice => {
                 clock.phase("convert", Some(self.source.points()));
-                stream(&job, &shares, sinks, lattice.as_ref())?
+                stream(&job, &shares, sinks.into_iter().flatten().collect(), lattice.as_ref())?
             }
         };
         let earlier = std::mem::take(&mut *lock(&job.warnings));
@@ -261,7 +288,19 @@ impl Plan {
     }
 
     /// What every phase needs but the stages.
-    fn job<'a>(&'a self, budget: &Budget, shares: &Shares, watch: &'a dyn Watch) -> Job<'a> {
+    fn job<'a>(
+        &'a self,
+        outputs: &'a [Vec<Staged>],
+        budget: &Budget,
+        shares: &Shares,
+        watch: &'a dyn Watch,
+    ) -> Job<'a> {
+        let each = self.each.iter().zip(&self.sinks).zip(outputs).map(|((each, sink), staged)| {
+            let chunk = sink.chunk(self.source.schema(), self.source.metadata());
+            let chunk_points = chunk.map_or(self.demands.chunk.points, |chunk| chunk.points);
+            let ranks = &self.ranks;
+            (!each.is_empty()).then_some(Each { sinks: each, staged, ranks, chunk_points })
+        });
         let tile_points = self.settings.tile_points.map(usize::from);
         Job {
             source: &*self.source,
@@ -269,6 +308,7 @@ impl Plan {
             transforms: Vec::new(),
             ops: Vec::new(),
             passes: Vec::new(),
+            each: each.collect(),
             tagger: self.tagger.clone(),
             classes: ClassOf::new(self.source.schema()),
             budget: budget.clone(),
@@ -284,12 +324,21 @@ impl Plan {
         }
     }
 
+    /// The files of all sinks, each with the records that it was given and what it said.
+    fn written<'a>(
+        &'a self,
+        finished: &'a Finished,
+    ) -> impl Iterator<Item = (&'a dyn CreateSink, &'a (u64, SinkSummary))> {
+        let files = (0..self.sinks.len()).flat_map(|sink| self.files(sink)).map(|file| &**file);
+        files.zip(finished.written.iter().flatten())
+    }
+
     /// What is known of the run when its output is written.
     fn figures(&self, finished: &Finished, budget: &Budget, spill_bytes: u64) -> RunFigures {
         let mut warnings = self.source.warnings();
-        warnings.extend(finished.written.iter().flat_map(|(_, sink)| sink.notes.iter().cloned()));
-        let outputs = self.sinks.iter().zip(&finished.written);
-        let outputs = outputs.map(|(sink, (_, summary))| FileFigures {
+        let all = finished.written.iter().flatten();
+        warnings.extend(all.flat_map(|(_, sink)| sink.notes.iter().cloned()));
+        let outputs = self.written(finished).map(|(sink, (_, summary))| FileFigures {
             path: sink.path().display().to_string(),
             points: summary.points,
             bytes: Some(summary.bytes),
@@ -317,7 +366,7 @@ impl Plan {
     ) -> Result<(Report, Option<Lines>)> {
         let ledger = Ledger::new(finished.read, finished.kept, &finished.tally);
         ledger.check()?;
-        for (sink, (given, summary)) in self.sinks.iter().zip(&finished.written) {
+        for (sink, (given, summary)) in self.written(&finished) {
             check_written(sink.path(), *given, summary.points)?;
         }
         (run.seconds, run.cpu_seconds, run.phases) = clock.finish();

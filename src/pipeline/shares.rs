@@ -35,6 +35,8 @@ pub struct Demands {
     pub chunk: ChunkSize,
     /// Sinks that are written at once.
     pub sinks: usize,
+    /// Bytes of the lists of records by input, where each input has an output of its own.
+    pub lists: u64,
     /// True if the run needs tiles; else it streams.
     pub mills: bool,
     /// True if records have tags.
@@ -77,6 +79,7 @@ impl Demands {
             part_bytes: source.part_bytes(),
             chunk,
             sinks: chunks.len(),
+            lists: 0,
             mills: false,
             tagged: false,
             passes: Vec::new(),
@@ -84,7 +87,7 @@ impl Demands {
     }
 
     fn base(&self) -> u64 {
-        self.resident + PROCESS_OVERHEAD + self.threads as u64 * THREAD_OVERHEAD
+        self.resident + self.lists + PROCESS_OVERHEAD + self.threads as u64 * THREAD_OVERHEAD
     }
 
     /// Bytes that a thread holds while it decodes, besides its run.
@@ -260,6 +263,7 @@ mod tests {
             part_bytes: 1 << 20,
             chunk: ChunkSize { points: 50_000, bytes: 4_500_000 },
             sinks: 1,
+            lists: 0,
             mills: true,
             tagged: false,
             passes: vec![vec![Needs { neighbors: 10, bytes_per_point: 40, ..Needs::default() }]],

@@ -80,7 +80,7 @@ pub(super) fn stream(
     Ok(Finished {
         read: tally.work.remove("read").unwrap_or(0),
         kept,
-        written: written.into_iter().map(|summary| (kept, summary)).collect(),
+        written: written.into_iter().map(|summary| vec![(kept, summary)]).collect(),
         classes: tally.classes.take().map_or(Vec::new(), |classes| classes.figures()),
         tally,
         decisions: Vec::new(),

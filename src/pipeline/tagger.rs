@@ -13,17 +13,18 @@ pub(super) struct Tagger {
     selections: Vec<Chooser>,
     withheld: Option<Chooser>,
     treatment: Withheld,
-    /// True if tags carry the number of the input.
-    inputs: bool,
+    /// For each input the number that tags carry; empty if they carry none.
+    inputs: Vec<u32>,
 }
 
 impl Tagger {
-    /// A tagger for records of `schema`. Fails if a selection asks for what these do not have.
+    /// A tagger for records of `schema`; `inputs` are the numbers that tags carry for the inputs, if
+    /// they are to. Fails if a selection asks for what these do not have.
     pub fn new(
         schema: &Schema,
         selections: &[Selection],
         treatment: Withheld,
-        inputs: bool,
+        inputs: Vec<u32>,
     ) -> Result<Self> {
         for selection in selections {
             let asked = selection.with.iter().map(|flag| flag.dimension());
@@ -46,7 +47,7 @@ impl Tagger {
 
     /// True if records need tags.
     pub fn tags(&self) -> bool {
-        self.inputs
+        !self.inputs.is_empty()
             || !self.selections.is_empty()
             || self.withheld.is_some() && self.treatment == Withheld::Ignore
     }
@@ -60,7 +61,7 @@ impl Tagger {
         let in_which =
             self.selections.iter().enumerate().map(|(n, s)| u8::from(s.holds(record)) << n);
         let selections = in_which.sum::<u8>() | if is_withheld { ASIDE } else { 0 };
-        Some(Tag::new(selections, if self.inputs { input } else { 0 }))
+        Some(Tag::new(selections, self.inputs.get(input as usize).copied().unwrap_or(0)))
     }
 }
 
