@@ -180,3 +180,29 @@ fn classes_that_are_named_are_reduced_and_all_others_stay() {
     let told = done(at.path(), &["reduce", "a.laz", "-o", "o.laz"]);
     assert!(told.contains("\nclasses    2 ground "), "{told}");
 }
+
+#[test]
+fn outliers_passes_marks_and_targets_are_flags_of_reduce() {
+    let at = tempfile::tempdir().unwrap();
+    done(at.path(), &["synth", "als", "-n", "20k", "-o", "a.laz"]);
+    let kept = |flags: &[&str]| {
+        let arguments = [&["reduce", "a.laz", "-o", "o.laz", "--progress", "json"], flags].concat();
+        let told = events(at.path(), &arguments, 0);
+        told[told.len() - 1]["ledger"].clone()
+    };
+    let once = kept(&[]);
+    let twice = kept(&["--passes", "2"]);
+    assert!(twice["kept"].as_u64() < once["kept"].as_u64(), "{once} {twice}");
+    let marked = kept(&["--mark", "key-point"]);
+    assert_eq!(marked["kept"], 20_000, "{marked}");
+    let marked = kept(&["--mark", "7"]);
+    assert_eq!(marked["kept"], 20_000, "{marked}");
+    assert_eq!(kept(&["--keep", "10%"])["kept"], 2_000);
+    assert_eq!(kept(&["--keep", "1k"])["kept"], 1_000);
+    let covered = kept(&["--max-side", "2"]);
+    assert!(covered["kept"].as_u64() > once["kept"].as_u64(), "{once} {covered}");
+    let spaced = kept(&["--min-spacing", "2"]);
+    assert!(spaced["kept"].as_u64() < once["kept"].as_u64(), "{once} {spaced}");
+    let outliers = kept(&["--outliers", "--classes", "2,5,6"]);
+    assert_eq!(outliers["removed"][1]["stage"], "outliers", "{outliers}");
+}

@@ -177,6 +177,9 @@ pub(super) struct Reduce {
     /// Largest range of normal angles in a cell, in radians or as 6deg [default: 0.1]
     #[arg(long, value_name = "ANGLE")]
     pub max_angle: Option<String>,
+    /// Instead of an angle: how many points are to stay, such as 10% or 5M
+    #[arg(long, value_name = "TARGET", conflicts_with = "max_angle")]
+    pub keep: Option<String>,
     /// Nearest other positions that a normal is computed from [default: 10]
     #[arg(long, value_name = "K")]
     pub neighbors: Option<u64>,
@@ -186,12 +189,27 @@ pub(super) struct Reduce {
     /// A cell with this many points or fewer is not split [default: 1]
     #[arg(long, value_name = "N")]
     pub min_points: Option<u64>,
+    /// Largest side of a cell that is kept whole, in the scan's unit [default: none]
+    #[arg(long, value_name = "LENGTH")]
+    pub max_side: Option<f64>,
+    /// No cell of this length or less is split, in the scan's unit [default: none]
+    #[arg(long, value_name = "LENGTH")]
+    pub min_spacing: Option<f64>,
     /// How a cell is split: voronoi or octant [default: voronoi]
     #[arg(long, value_name = "HOW")]
     pub split: Option<String>,
     /// How a normal is computed: varady or pca [default: varady]
     #[arg(long, value_name = "HOW")]
     pub method: Option<String>,
+    /// Remove points that are far from all others before anything else, as a stage `outliers` does
+    #[arg(long)]
+    pub outliers: bool,
+    /// Reduce what is left again, until it was reduced this often [default: 1]
+    #[arg(long, value_name = "N")]
+    pub passes: Option<u64>,
+    /// Mark the decision in the records and write them all: key-point, withheld, or class 7 or 18
+    #[arg(long, value_name = "HOW")]
+    pub mark: Option<String>,
     /// Reduce the points of these classes alone, such as 2,6; all others stay, and are not seen as
     /// neighbours
     #[arg(long, value_name = "CLASSES", value_delimiter = ',')]

@@ -30,7 +30,8 @@ pub(super) fn run(arguments: &Run, registry: &Registry, console: &Console) -> Re
 pub(super) fn reduce(arguments: &Reduce, registry: &Registry, console: &Console) -> Result<()> {
     let written = written(&arguments.written);
     let sets = [reduce_sets(arguments), written, arguments.common.sets()?].concat();
-    let pipeline = Pipeline::parse_with(REDUCE, "pipelines/reduce.toml", registry, &sets)?;
+    let text = if arguments.outliers { with_outliers() } else { REDUCE.to_owned() };
+    let pipeline = Pipeline::parse_with(&text, "pipelines/reduce.toml", registry, &sets)?;
     console.result(mill(pipeline, &arguments.common, console)?)
 }
 
@@ -77,6 +78,13 @@ pub(super) fn parse_sets(sets: &[String], common: &Common) -> Result<Vec<Set>> {
     Ok([sets, common.sets()?].concat())
 }
 
+/// The pipeline of `reduce` with a stage `outliers` behind the first, which reads.
+fn with_outliers() -> String {
+    let stage = "[[stage]]\n";
+    let at = REDUCE.match_indices(stage).nth(1).map_or(REDUCE.len(), |(at, _)| at);
+    format!("{}{stage}kind = \"outliers\"\n\n{}", &REDUCE[..at], &REDUCE[at..])
+}
+
 fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
     let classes = (!arguments.classes.is_empty()).then(|| json!(arguments.classes));
     given([
@@ -85,11 +93,17 @@ fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
         ("--outdir", "write.folder", arguments.outdir.clone().map(Value::from)),
         ("--to", "write.format", arguments.to.clone().map(Value::from)),
         ("--max-angle", "cells.max_angle", arguments.max_angle.as_deref().map(number_or_text)),
+        ("--keep", "cells.keep", arguments.keep.as_deref().map(whole_or_text)),
+        ("--max-side", "cells.max_side", arguments.max_side.map(number)),
+        ("--min-spacing", "cells.min_spacing", arguments.min_spacing.map(number)),
         ("--neighbors", "normals.neighbors", arguments.neighbors.map(Value::from)),
         ("--side", "cells.side", arguments.side.as_deref().map(number_or_text)),
         ("--min-points", "cells.min_points", arguments.min_points.map(Value::from)),
         ("--split", "cells.split", arguments.split.clone().map(Value::from)),
         ("--method", "normals.method", arguments.method.clone().map(Value::from)),
+        ("--passes", "median.passes", arguments.passes.map(Value::from)),
+        ("--mark", "median.mark", arguments.mark.as_deref().map(whole_or_text)),
+        ("--classes", "outliers.classes", classes.clone().filter(|_| arguments.outliers)),
         ("--classes", "normals.classes", classes.clone()),
         ("--classes", "cells.classes", classes.clone()),
         ("--classes", "median.classes", classes),
@@ -116,7 +130,26 @@ fn axes(Axes(numbers): &Axes) -> Value {
     }
 }
 
+/// A whole number where the text is one, else the text.
+fn whole_or_text(text: &str) -> Value {
+    text.parse::<u64>().map_or_else(|_| json!(text), Value::from)
+}
+
 /// A number where the text is one, else the text (`6deg`, `auto`).
 fn number_or_text(text: &str) -> Value {
     text.parse().map_or_else(|_| json!(text), number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outliers_go_before_all_other_stages() {
+        let kinds: Vec<String> = with_outliers()
+            .lines()
+            .filter_map(|line| line.strip_prefix("kind = \"")?.split('"').next().map(str::to_owned))
+            .collect();
+        assert_eq!(kinds, ["read", "outliers", "normals", "cells", "median", "write"]);
+    }
 }
