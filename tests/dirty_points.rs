@@ -162,7 +162,7 @@ fn heights_in_feet_over_metres_are_measured_in_metres_once_asked_for() {
     assert_holds(folder.path(), &["in.las"]);
     let normals = ("write.dimensions", json!(["NormalX", "NormalY", "NormalZ"]));
     let slopes = |sets: &[(&'static str, serde_json::Value)]| -> f64 {
-        let sets = [sets, &[normals.clone()]].concat();
+        let sets = [sets, std::slice::from_ref(&normals)].concat();
         let done = run(&sets).unwrap();
         assert!(done.report.run.warnings.is_empty());
         let (schema, records) = read(&output);

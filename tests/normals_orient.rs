@@ -101,8 +101,8 @@ fn a_viewpoint_sees_the_side_of_every_surface_that_faces_it() {
         assert!((0..scan.len()).all(|i| !outwards(&tile, i)), "from within, {center:?}");
         let above = [world[0], world[1], world[2] + 1e6 * STEP];
         let tile = run(towards(above), &scan);
-        for i in 0..scan.len() {
-            let height = scan[i][2] - center[2];
+        for (i, p) in scan.iter().enumerate() {
+            let height = p[2] - center[2];
             if height.abs() > 100 {
                 assert_eq!(outwards(&tile, i), height > 0, "{center:?}");
             }

@@ -227,7 +227,8 @@ fn outliers_that_are_marked_have_the_flag_or_the_class() {
     let stage = "[[stage]]\nkind = 'outliers'\nmultiplier = 1.0\n";
     las(folder.path(), stage, "in.las", "kept.las");
     let kept = records(&folder.path().join("kept.las"));
-    let is_marked: [(&str, fn(&[u8]) -> bool); 3] = [
+    type IsMarked = fn(&[u8]) -> bool;
+    let is_marked: [(&str, IsMarked); 3] = [
         ("'withheld'", |r| r[FLAGS] & WITHHELD != 0),
         ("7", |r| r[CLASS] == 7),
         ("18", |r| r[CLASS] == 18),

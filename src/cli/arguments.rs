@@ -31,7 +31,7 @@ pub(super) enum Command {
     /// Run a pipeline file
     Run(Run),
     /// Reduce scans to the points that matter: a run of pipelines/reduce.toml
-    Reduce(Reduce),
+    Reduce(Box<Reduce>),
     /// Convert between LAS, LAZ and PLY: a run of pipelines/convert.toml
     Convert(Convert),
     /// Say what the headers of files say
@@ -218,6 +218,14 @@ pub(super) struct Reduce {
     /// and write them as they are [default: drop]
     #[arg(long, value_name = "HOW")]
     pub withheld: Option<String>,
+    /// Points whose coordinates are not finite: refuse the scan, or drop them [default: refuse]
+    #[arg(long, value_name = "HOW")]
+    pub nonfinite: Option<String>,
+    /// What z is multiplied by where distances are measured, or auto: by what the units of the
+    /// reference system say; the records keep their z [default: 1, and scans of mixed units are
+    /// refused]
+    #[arg(long, value_name = "FACTOR")]
+    pub z_scale: Option<String>,
     #[command(flatten)]
     pub written: Written,
     #[command(flatten)]

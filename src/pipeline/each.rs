@@ -112,7 +112,7 @@ impl ByInput {
     fn each(
         &self,
         rank: usize,
-        visit: &mut dyn FnMut(&Entry, Option<[f32; 3]>) -> Result<()>,
+        mut visit: impl FnMut(&Entry, Option<[f32; 3]>) -> Result<()>,
     ) -> Result<()> {
         let Some(list) = self.lists.get(rank) else { return Ok(()) };
         let mut bytes = Vec::new();

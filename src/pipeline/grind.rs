@@ -42,6 +42,9 @@ pub(super) struct Milled {
     pub oriented: bool,
 }
 
+/// A sink with its number.
+pub(super) type Numbered = (usize, Box<dyn Sink>);
+
 /// Runs `pass` over the tiles `keys`, into the `sinks` with their numbers and into lists by input.
 pub(super) fn grind(
     job: &Job<'_>,
@@ -50,7 +53,7 @@ pub(super) fn grind(
     sieve: &Sieve,
     capacity: usize,
     keys: &[TileKey],
-    (sinks, by_input): (Vec<(usize, Box<dyn Sink>)>, Vec<ByInput>),
+    (sinks, by_input): (Vec<Numbered>, Vec<ByInput>),
 ) -> Result<Milled> {
     let tiles = &field.tiles;
     let numbers = sinks.iter().map(|(sink, _)| *sink).chain(by_input.iter().map(|by| by.sink));

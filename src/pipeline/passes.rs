@@ -253,11 +253,10 @@ impl Layout<'_> {
             Err(blame(stage, told).help(help.to_owned()))
         };
         match name {
-            "Normal" => {
-                if !self.bring_normals(at) {
-                    return missing("put a `normals` stage before it");
-                }
-            }
+            "Normal" => match self.bring_normals(at) {
+                true => {}
+                false => return missing("put a `normals` stage before it"),
+            },
             "Cell" if self.passes[at].writes_cells => {}
             "Cell" if self.passes.iter().any(|pass| pass.writes_cells) => {
                 return missing(

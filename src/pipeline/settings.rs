@@ -158,13 +158,13 @@ impl RunSettings {
             Some(Mismatch { z_scale: Some(factor), .. }) if auto => Ok(factor),
             Some(Mismatch { message, z_scale: Some(factor) }) => {
                 Err(Error::new(ErrorKind::Data, message).help(format!(
-                    "set z_scale = \"auto\" under [run], which measures with z times {factor}, or \
+                    "set z_scale = \"auto\" under [run] (or --z-scale auto), which measures with z times {factor}, or \
                  z_scale = 1 if the reference system is wrong; records keep their z"
                 )))
             }
             Some(Mismatch { message, z_scale: None }) => Err(Error::new(ErrorKind::Data, message)
                 .help(
-                    "project the scan to metres first; or set z_scale under [run] (z_scale = 1 if \
+                    "project the scan to metres first; or set z_scale under [run], or --z-scale (1 if \
                      the reference system is wrong)",
                 )),
         }

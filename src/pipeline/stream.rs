@@ -24,8 +24,8 @@ pub(super) fn stream(
     let _working = job.budget.lease(shares.work, "streaming")?;
     let schema = job.source.schema();
     let encoders: Vec<_> = sinks.iter().map(|sink| sink.encoder()).collect();
-    let empty = |sink: &Box<dyn Sink>| PointBatch::new(schema.clone(), sink.chunk_points());
-    let open = Mutex::new((sinks.iter().map(empty).collect::<Vec<_>>(), 0u64));
+    let empty = sinks.iter().map(|sink| PointBatch::new(schema.clone(), sink.chunk_points()));
+    let open = Mutex::new((empty.collect::<Vec<_>>(), 0u64));
     let outlet: Outlet<PointBatch, (usize, PointBatch)> = Outlet::new(sinks, job.threads);
     let commit = |batch: PointBatch| -> Result<Vec<(usize, PointBatch)>> {
         let (chunks, kept) = &mut *lock(&open);
