@@ -203,22 +203,25 @@ const WITHHELD: u8 = 4;
 #[test]
 fn a_median_that_marks_sets_the_key_point_flag_of_what_it_would_keep() {
     let folder = tempfile::tempdir().unwrap();
-    let stages = REDUCE.replace("kind = 'cells'", "kind = 'cells'\nside = 1.0");
-    las(folder.path(), &stages, "in.las", "reduced.las");
-    let report = las(folder.path(), &format!("{stages}mark = 'key-point'\n"), "in.las", "out.las");
-    let (input, reduced) =
-        (records(&folder.path().join("in.las")), records(&folder.path().join("reduced.las")));
-    let marked = records(&folder.path().join("out.las"));
-    let mut plain = marked.clone();
-    plain.iter_mut().for_each(|r| r[FLAGS] &= !KEY_POINT);
-    assert_eq!(plain, input, "every record is there, in canonical order");
-    let key_points = marked.iter().zip(&plain).filter(|(r, _)| r[FLAGS] & KEY_POINT != 0);
-    let key_points: Vec<&Vec<u8>> = key_points.map(|(_, plain)| plain).collect();
-    assert_eq!(key_points, reduced.iter().collect::<Vec<_>>());
-    assert!(!reduced.is_empty() && reduced.len() < input.len());
-    assert_many_tiles(&report);
-    assert_eq!(report["result"]["ledger"]["kept"], input.len());
-    assert_eq!(report["result"]["counts"]["median_marked"], input.len() - reduced.len());
+    for passes in [1, 2] {
+        let stages = REDUCE.replace("kind = 'cells'", "kind = 'cells'\nside = 1.0");
+        let stages = format!("{stages}passes = {passes}\n");
+        las(folder.path(), &stages, "in.las", "reduced.las");
+        let stages = format!("{stages}mark = 'key-point'\n");
+        let report = las(folder.path(), &stages, "in.las", "out.las");
+        let read = |name: &str| records(&folder.path().join(name));
+        let (input, reduced, marked) = (read("in.las"), read("reduced.las"), read("out.las"));
+        let mut plain = marked.clone();
+        plain.iter_mut().for_each(|r| r[FLAGS] &= !KEY_POINT);
+        assert_eq!(plain, input, "every record is there, in canonical order");
+        let key_points = marked.iter().zip(&plain).filter(|(r, _)| r[FLAGS] & KEY_POINT != 0);
+        let key_points: Vec<&Vec<u8>> = key_points.map(|(_, plain)| plain).collect();
+        assert_eq!(key_points, reduced.iter().collect::<Vec<_>>(), "{passes}");
+        assert!(!reduced.is_empty() && reduced.len() < input.len());
+        assert_many_tiles(&report);
+        assert_eq!(report["result"]["ledger"]["kept"], input.len());
+        assert_eq!(report["result"]["counts"]["median_marked"], input.len() - reduced.len());
+    }
 }
 
 #[test]
