@@ -50,8 +50,8 @@ impl Command {
     /// What commands that plan or run a pipeline have in common.
     pub fn common(&self) -> Option<&Common> {
         match self {
+            Command::Reduce(reduce) => Some(&reduce.common),
             Command::Run(Run { common, .. })
-            | Command::Reduce(Reduce { common, .. })
             | Command::Convert(Convert { common, .. })
             | Command::Plan(Plan { common, .. })
             | Command::Check(Plan { common, .. })

@@ -215,7 +215,7 @@ impl Each<'_> {
             sink.append(encoded)?;
             job.advance(0)
         };
-        records.each(rank, &mut |entry, normal| {
+        records.each(rank, |entry: &Entry, normal| {
             given += u64::from(entry.count);
             open.take(entry, normal, &mut full);
             full.drain(..).try_for_each(&mut append)

@@ -103,9 +103,9 @@ fn scatter(tile: &Tile) -> Option<f64> {
 /// Σ of the squared differences between component `of` of the tilts and its best linear function of
 /// the place.
 fn residual(placed: &[([f64; 2], [f64; 2])], of: usize) -> f64 {
-    type Value = dyn Fn(&([f64; 2], [f64; 2])) -> f64;
+    type Value<'a> = dyn Fn(&([f64; 2], [f64; 2])) -> f64 + 'a;
     let count = placed.len() as f64;
-    let mean = |value: &Value| placed.iter().map(value).sum::<f64>() / count;
+    let mean = |value: &Value<'_>| placed.iter().map(value).sum::<f64>() / count;
     let (x, y, t) = (mean(&|p| p.0[0]), mean(&|p| p.0[1]), mean(&|p| p.1[of]));
     let sum = |product: &dyn Fn(f64, f64, f64) -> f64| {
         placed.iter().map(|p| product(p.0[0] - x, p.0[1] - y, p.1[of] - t)).sum::<f64>()
