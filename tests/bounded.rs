@@ -104,6 +104,60 @@ fn memory_of_256_mib_bounds_the_reduction_of_a_scan_three_times_larger() {
     }
 }
 
+/// Outliers of the scan, then a target for the ground and a grid for the rest, with an output
+/// between them.
+const BY_CLASS: &str = r#"
+[[stage]]
+kind = "read"
+path = "scan.las"
+
+[[stage]]
+kind = "outliers"
+multiplier = 3.0
+name = "clean"
+
+[[stage]]
+kind = "normals"
+classes = [2, 6]
+
+[[stage]]
+kind = "cells"
+classes = [2, 6]
+keep = "10%"
+
+[[stage]]
+kind = "median"
+classes = [2, 6]
+
+[[stage]]
+kind = "write"
+path = "marked.laz"
+
+[[stage]]
+kind = "grid"
+side = 1.1
+classes = [5]
+
+[[stage]]
+kind = "write"
+path = "reduced.laz"
+"#;
+
+#[test]
+fn memory_of_128_mib_bounds_stages_of_two_phases_selections_and_two_outputs() {
+    if !optimised() {
+        return;
+    }
+    let points = 3_200_000;
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    synth(at, points);
+    std::fs::write(at.join("p.toml"), BY_CLASS).unwrap();
+    let run = bounded(at, "run p.toml --threads 2", 128);
+    assert!(run["spill_bytes"].as_u64().unwrap() > points * 8, "{run}");
+    assert!(run["work"]["tiles"].as_u64().unwrap() >= 30, "{run}");
+}
+
 #[test]
 fn a_budget_too_small_is_refused_before_any_work_with_the_number_that_does() {
     let folder = tempfile::tempdir().unwrap();

@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use pointmill::pipeline::{Overrides, Quiet, Registry, StageKind, StagePlace, Watch};
 use pointmill::point::PointBatch;
 use pointmill::report::Tally;
-use pointmill::stage::{Needs, Role, TileOp, Transform};
+use pointmill::stage::{Gathered, Needs, Role, ScanOp, TileOp, Transform};
 use pointmill::tile::Tile;
 use pointmill::{Error, ErrorKind, Result};
 use serde::{Deserialize, Serialize};
@@ -119,6 +119,101 @@ fn trouble_in_a_stage_ends_the_run_and_leaves_nothing_behind() {
     assert_eq!(fs::read(case.path("out.ply")).unwrap(), b"old");
 }
 
+/// A stage of two phases that fails or panics in one of them.
+#[derive(Debug, Serialize, Deserialize)]
+struct ScanTrouble {
+    phase: String,
+    panics: bool,
+    #[serde(skip)]
+    calls: Arc<AtomicU64>,
+}
+
+impl ScanTrouble {
+    /// Fails in the third tile of its phase, or at once where there are none.
+    fn meet(&self, phase: &str) -> Result<()> {
+        if self.phase != phase {
+            return Ok(());
+        }
+        let calls = self.calls.fetch_add(1, Ordering::Relaxed);
+        match calls == 2 || phase == "conclude" {
+            true if self.panics => std::panic::resume_unwind(Box::new("trouble")),
+            true => Err(Error::new(ErrorKind::Data, "trouble")),
+            false => Ok(()),
+        }
+    }
+}
+
+impl StageKind for ScanTrouble {
+    const KIND: &'static str = "scan-trouble";
+    const ABOUT: &'static str = "Fails in one of two phases.";
+
+    fn build(self, _at: &StagePlace) -> Result<Role> {
+        Ok(Role::ScanOp(Box::new(self)))
+    }
+}
+
+impl TileOp for ScanTrouble {
+    fn needs(&self) -> Needs {
+        Needs { reads: vec!["Figure".into()], ..Needs::default() }
+    }
+    fn run(&self, _tile: &mut Tile, _tally: &mut Tally) -> Result<()> {
+        self.meet("run")
+    }
+}
+
+impl ScanOp for ScanTrouble {
+    fn gather_needs(&self) -> Needs {
+        Needs { writes: vec!["Figure".into()], ..Needs::default() }
+    }
+    fn gather(&self, tile: &mut Tile, found: &mut Vec<[u64; 2]>, _tally: &mut Tally) -> Result<()> {
+        tile.figures = vec![0.0; tile.positions.len()];
+        found.push([tile.core.len() as u64; 2]);
+        self.meet("gather")
+    }
+    fn conclude(&mut self, found: &dyn Gathered) -> Result<()> {
+        found.each(&mut |rows| match rows.is_empty() {
+            true => Err(Error::internal("an empty stretch")),
+            false => self.meet("conclude"),
+        })
+    }
+}
+
+#[test]
+fn trouble_in_either_phase_of_a_stage_ends_the_run_and_leaves_nothing_behind() {
+    let case = Case::new();
+    let points: Vec<_> =
+        (0..20_000u32).map(|i| ([f64::from(i % 200), f64::from(i / 200), 0.0], i)).collect();
+    case.ply(&points);
+    fs::write(case.path("out.ply"), "old").unwrap();
+    let text = |phase: &str, panics: bool, threads: usize| {
+        let stage =
+            format!("[[stage]]\nkind = 'scan-trouble'\nphase = '{phase}'\npanics = {panics}\n");
+        // An output above it is complete by then, and goes away all the same.
+        let early = case.path("early.ply");
+        let early = format!("[[stage]]\nkind = 'write'\npath = '{}'\n", early.display());
+        let normals = "[[stage]]\nkind = 'normals'\n";
+        let run = format!("threads = {threads}\ntile_points = 1500\nspill = 'always'");
+        case.text(&run, &format!("{normals}{early}{stage}"), "")
+    };
+    let registry = Registry::builtin().with::<ScanTrouble>();
+    let go = |text: &str| execute_with(&registry, text, &Overrides::default(), &Quiet);
+    for threads in [1, 3] {
+        for phase in ["gather", "conclude", "run"] {
+            for (panics, kind) in [(false, ErrorKind::Data), (true, ErrorKind::Internal)] {
+                if panics && phase == "conclude" {
+                    continue; // on the caller's own thread
+                }
+                let error = go(&text(phase, panics, threads)).unwrap_err();
+                assert_eq!(error.kind(), kind, "{threads} {phase}: {error}");
+                assert_eq!(case.left(), ["in.ply", "out.ply"], "{threads} {phase}");
+            }
+        }
+    }
+    assert_eq!(fs::read(case.path("out.ply")).unwrap(), b"old");
+    go(&text("none", false, 2)).unwrap();
+    assert_eq!(case.left(), ["early.ply", "in.ply", "out.ply", "report.json"]);
+}
+
 /// Asks to stop after so many reports of progress.
 struct Impatient(AtomicU64);
 
@@ -141,7 +236,9 @@ fn a_run_stops_in_every_phase_when_it_is_asked_to() {
         .collect();
     case.ply(&points);
     let run = "threads = 2\ntile_points = 2000\nspill = 'always'";
-    let text = case.text(run, REDUCE, "");
+    let stages = "[[stage]]\nkind = 'outliers'\n[[stage]]\nkind = 'normals'\n[[stage]]\nkind = \
+                  'cells'\nkeep = '30%'\n[[stage]]\nkind = 'median'\n";
+    let text = case.text(run, stages, "");
     let mut stops = 0;
     for patience in (1..).step_by(3) {
         let watch = Impatient(AtomicU64::new(patience));

@@ -35,6 +35,11 @@ impl fmt::Display for Table<'_> {
         if let Some(&cells) = result.counts.get("cells") {
             write!(f, "\ncells      {}", Grouped(cells))?;
         }
+        for found in result.decisions.iter().filter(|d| d.stage == "cells" && d.name == "max_angle")
+        {
+            let angle = found.value.as_f64().unwrap_or_default();
+            write!(f, "\nangle      {angle:.4} rad, found for the number of points to keep")?;
+        }
         if let Some(totals) = &result.totals {
             totals_lines(f, totals, result)?;
         }

@@ -13,7 +13,7 @@ use pointmill::io::ply::{self, PlyOptions};
 use pointmill::io::synthetic::{Scene, Synthetic};
 use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
 use pointmill::point::{Layout, Metadata, PointBatch, Position, Schema, Value};
-use pointmill::report::result_bytes;
+use pointmill::report::{Report, result_bytes};
 use pointmill::stage::{OpenSource, Sink, Source};
 use pointmill::{Error, ErrorKind, Result};
 
@@ -150,9 +150,9 @@ impl Scan {
         scan
     }
 
-    /// The same with copies: whole records, records that share no more than their position, one
-    /// position a thousand times, and one point far from all others.
-    pub fn with_copies_and_an_outlier(&self, seed: u64) -> Scan {
+    /// The same with copies: whole records, records that share no more than their position, and one
+    /// position a thousand times.
+    pub fn with_copies(&self, seed: u64) -> Scan {
         let mut random = Random(seed);
         let mut scan = self.clone();
         let (points, stride) = (self.points(), self.schema.stride);
@@ -167,6 +167,12 @@ impl Scan {
             }
             assert_eq!(scan.records.len(), at + stride);
         }
+        scan
+    }
+
+    /// The same with copies, and one point far from all others.
+    pub fn with_copies_and_an_outlier(&self, seed: u64) -> Scan {
+        let mut scan = self.with_copies(seed);
         let at = scan.records.len();
         scan.records.extend_from_slice(self.record(0));
         let schema = self.schema.clone();
@@ -177,6 +183,26 @@ impl Scan {
                 Value::Signed(2_000_000_011)
             };
             assert!(axis.put(&mut scan.records[at..], schema.endian, far));
+        }
+        scan
+    }
+
+    /// The same (of point format 6 to 10) with classes and flags at random, so that copies of one
+    /// record differ in them: every seventh record has another class, and each flag is set on about
+    /// one record of twenty.
+    pub fn with_classes_and_flags(&self, seed: u64) -> Scan {
+        /// Where the flags and the class of a record are (LAS 1.4 R15, table 16).
+        const FLAGS: usize = 15;
+        const CLASS: usize = 16;
+        let mut random = Random(seed);
+        let mut scan = self.clone();
+        for record in scan.records.chunks_exact_mut(self.schema.stride) {
+            let flag = |set: bool, bit: u8| if set { 1 << bit } else { 0 };
+            let flags = (0..4).fold(0, |all, bit| all | flag(random.below(20) == 0, bit));
+            record[FLAGS] = record[FLAGS] & 0xf0 | flags;
+            if random.below(7) == 0 {
+                record[CLASS] = random.one_of(&[1, 2, 5, 6]);
+            }
         }
         scan
     }
@@ -268,6 +294,8 @@ pub struct Ran {
     /// Counts of how the work was cut up.
     pub work: BTreeMap<String, u64>,
     pub spilled: u64,
+    /// The whole report, but for its tiles.
+    pub report: Report,
 }
 
 impl Ran {
@@ -289,12 +317,25 @@ pub fn run(
     write: &str,
     settings: Settings,
 ) -> Result<Ran> {
+    run_with(folder, inputs, stages, write, settings, "")
+}
+
+/// The same with more keys under `[run]`; `{folder}` in `stages` becomes the folder.
+pub fn run_with(
+    folder: &Path,
+    inputs: &[PathBuf],
+    stages: &str,
+    write: &str,
+    settings: Settings,
+    keys_of_run: &str,
+) -> Result<Ran> {
+    let stages = stages.replace("{folder}", folder.to_str().unwrap());
     let (extension, keys) = write.split_once('\n').unwrap_or((write, ""));
     let output = folder.join(format!("out.{extension}"));
     let report = folder.join("report.json");
     let text = |memory| {
         format!(
-            "{}\n[[stage]]\nkind = \"read\"\npath = {inputs:?}\n{stages}\n\
+            "{}\n{keys_of_run}\n[[stage]]\nkind = \"read\"\npath = {inputs:?}\n{stages}\n\
              [[stage]]\nkind = \"write\"\npath = {output:?}\n{keys}\n",
             settings.text(memory, &report)
         )
@@ -323,8 +364,9 @@ pub fn run(
     Ok(Ran {
         output,
         result: result_bytes(&report).unwrap().to_vec(),
-        work: done.report.run.work,
+        work: done.report.run.work.clone(),
         spilled: done.report.run.spill_bytes,
+        report: done.report,
     })
 }
 

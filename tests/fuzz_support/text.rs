@@ -45,7 +45,8 @@ fn target(_: &Path, data: &[u8]) -> Judgement {
         Err(told) if told.is_empty() => return Err("a size is refused without a word".to_owned()),
         Err(told) => format!("no size: {}", shape(&told)),
     }];
-    let wrong = &[pointmill::ErrorKind::Pipeline];
+    // A text may name a file that is not there.
+    let wrong = &[pointmill::ErrorKind::Pipeline, pointmill::ErrorKind::Io];
     let set = match Set::parse(&text) {
         Ok(set) => set,
         Err(error) => {
