@@ -27,7 +27,6 @@ pub(super) struct Arguments {
 }
 
 #[derive(Debug, Subcommand)]
-#[expect(clippy::large_enum_variant, reason = "there is one in a process")]
 pub(super) enum Command {
     /// Run a pipeline file
     Run(Run),

@@ -305,6 +305,7 @@ impl Cutter {
 mod tests {
     use super::*;
     use crate::budget::Budget;
+    use crate::point::Edit;
     use crate::tile::{FATE_BYTES, Folder, Tag};
 
     #[derive(Debug)]
@@ -376,7 +377,7 @@ mod tests {
         let mut cutter = Cutter::new(&area, (3, 3), (false, false), (outputs, Vec::new()));
         let mut product = product(&[(0, 1), (1, 1), (2, 1)]);
         product.entries[1].now = State::REMOVED;
-        product.entries[2].now = State::ASIDE.edited(3);
+        product.entries[2].now = State::ASIDE.edited(Edit::SetWithheld);
         let mut chunks = cutter.cut(&product).unwrap();
         let (rest, _, _, counts) = cutter.finish().unwrap();
         chunks.extend(rest);
@@ -386,11 +387,11 @@ mod tests {
             for chunk in chunks.iter().filter(|chunk| chunk.sink == sink) {
                 let mut numbers = Vec::new();
                 chunk.number(&mut numbers);
-                all.extend(numbers.into_iter().zip(chunk.states().map(State::edit)));
+                all.extend(numbers.into_iter().zip(chunk.states().map(State::edits)));
             }
             all
         };
         assert_eq!(of(3), [(0, 0), (1, 0), (2, 0)]);
-        assert_eq!(of(5), [(0, 0), (2, 3)]);
+        assert_eq!(of(5), [(0, 0), (2, Edit::SetWithheld as u8)]);
     }
 }

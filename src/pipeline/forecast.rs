@@ -9,6 +9,8 @@ use crate::tile::{Reader, SealedTiles, Sieve, TileKey};
 
 /// Cubes that are looked at.
 const SAMPLES: u64 = 256;
+/// Cells that a cube is wide, about: of one cell too little is seen to tell noise from shape.
+const CELLS_ACROSS: u64 = 4;
 /// Positions that a cube has on average, at most, however large the cells.
 const MOST_POSITIONS: u64 = 2048;
 /// Positions of a cube beyond which it is left out; as many fit into any plan's tiles.
@@ -53,10 +55,11 @@ pub(super) fn forecast(
     Ok(forecasts)
 }
 
-/// The octree nodes, of the smallest side of `side` steps or more, that hold positions spread evenly
+/// The octree nodes, a few times `side` steps wide, that hold positions spread evenly
 /// over Morton order.
 fn cubes(tiles: &SealedTiles, side: i64) -> Result<Vec<TileKey>> {
-    let level = (side as u64).next_power_of_two().ilog2();
+    let wide = (side as u64).saturating_mul(CELLS_ACROSS).checked_next_power_of_two();
+    let level = wide.map_or(63, u64::ilog2);
     let level = level.min(tiles.levels().smallest_side(MOST_POSITIONS));
     let mut reader = Reader::default();
     let mut keys: Vec<TileKey> = Vec::new();

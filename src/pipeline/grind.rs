@@ -178,7 +178,7 @@ impl Bench {
         self.states.extend(chunk.states());
         all.tiles.fetch(&self.numbers, &mut self.fetch, &mut self.batch)?;
         if all.counted == Some(chunk.sink) {
-            all.job.classes.keep_alive(&self.batch, &self.states, &mut self.tally);
+            all.job.classes.keep_by_state(&self.batch, &self.states, &mut self.tally);
         }
         edit(&mut self.batch, &self.states)?;
         self.batch.normals = chunk.spread_normals();
@@ -191,13 +191,13 @@ impl Bench {
 /// Writes the edits of `states` into the records.
 fn edit(batch: &mut PointBatch, states: &[State]) -> Result<()> {
     let schema = batch.schema().clone();
-    let edits = states.iter().map(|state| Edit::of(state.edit()));
-    for (record, edit) in batch.records_mut().chunks_exact_mut(schema.stride).zip(edits) {
-        let Some(edit) = edit else { continue };
-        let field = schema.find(edit.dimension());
-        if !field.is_some_and(|field| edit.write(field, &schema, record)) {
-            let name = edit.dimension();
-            return Err(Error::pipeline(format!("the records cannot hold the mark in {name}")));
+    for (record, state) in batch.records_mut().chunks_exact_mut(schema.stride).zip(states) {
+        for edit in Edit::of(state.edits()) {
+            let field = schema.find(edit.dimension());
+            if !field.is_some_and(|field| edit.write(field, &schema, record)) {
+                let name = edit.dimension();
+                return Err(Error::pipeline(format!("the records cannot hold the mark in {name}")));
+            }
         }
     }
     Ok(())

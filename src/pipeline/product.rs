@@ -122,11 +122,7 @@ impl Product {
 
 /// The state of a record that was in `state` and is kept, or would be removed.
 fn marked(mark: Option<Mark>, kept: bool, state: State) -> State {
-    let edit = mark.and_then(|mark| mark.edit(kept)).map(|edit| edit as u8);
-    match (mark, kept, edit) {
-        (_, true, None) => state,
-        (_, true, Some(edit)) => state.edited(edit),
-        (None, false, _) => State::REMOVED,
-        (Some(_), false, edit) => State::ASIDE.edited(edit.unwrap_or_default()),
-    }
+    let Some(mark) = mark else { return if kept { state } else { State::REMOVED } };
+    let state = if kept { state } else { state.aside() };
+    mark.edit(kept).map_or(state, |edit| state.edited(edit))
 }

@@ -87,10 +87,10 @@ impl ClassOf {
         self.each(batch, tally, |counts, _, class| counts.keep(class));
     }
 
-    /// Counts as kept those records of `batch` whose state is alive.
-    pub fn keep_alive(&self, batch: &PointBatch, states: &[State], tally: &mut Tally) {
+    /// Counts as kept those records of `batch` whose state is so.
+    pub fn keep_by_state(&self, batch: &PointBatch, states: &[State], tally: &mut Tally) {
         self.each(batch, tally, |counts, i, class| {
-            if states[i].is_alive() {
+            if states[i].is_kept() {
                 counts.keep(class);
             }
         });

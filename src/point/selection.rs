@@ -173,25 +173,38 @@ impl<'de> Deserialize<'de> for Mark {
     }
 }
 
-/// A change of one field of a record.
+/// A change of one field of a record; a bit each in a set of edits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 #[allow(missing_docs, reason = "the names say what they change")]
 pub enum Edit {
     SetKeyPoint = 1,
     ClearKeyPoint = 2,
-    SetWithheld = 3,
-    LowNoise = 4,
-    HighNoise = 5,
+    SetWithheld = 4,
+    LowNoise = 8,
+    HighNoise = 16,
 }
 
 impl Edit {
-    /// The edit with this number; None for 0, which changes nothing, and numbers that are none.
-    pub fn of(code: u8) -> Option<Edit> {
-        use Edit::*;
-        [SetKeyPoint, ClearKeyPoint, SetWithheld, LowNoise, HighNoise]
-            .into_iter()
-            .find(|edit| *edit as u8 == code)
+    const ALL: [Edit; 5] = [
+        Edit::SetKeyPoint,
+        Edit::ClearKeyPoint,
+        Edit::SetWithheld,
+        Edit::LowNoise,
+        Edit::HighNoise,
+    ];
+
+    /// The set `edits` and this one, which takes the place of another of the same field.
+    #[must_use]
+    pub fn added_to(self, edits: u8) -> u8 {
+        let same_field = |other: &&Edit| other.dimension() == self.dimension();
+        let replaced = Edit::ALL.iter().filter(same_field).fold(0, |all, edit| all | *edit as u8);
+        edits & !replaced | self as u8
+    }
+
+    /// The edits of a set.
+    pub fn of(edits: u8) -> impl Iterator<Item = Edit> {
+        Edit::ALL.into_iter().filter(move |edit| edits & *edit as u8 != 0)
     }
 
     /// The dimension that it writes.
@@ -258,11 +271,15 @@ mod tests {
         assert_eq!(edited(Edit::SetWithheld, [2, 0b0010]), [2, 0b0110]);
         assert_eq!(edited(Edit::LowNoise, [2, 1]), [7, 1]);
         assert_eq!(edited(Edit::HighNoise, [2, 1]), [18, 1]);
-        for code in 0..=255 {
-            assert_eq!(
-                Edit::of(code).map_or(0, |edit| edit as u8),
-                if code < 6 { code } else { 0 }
-            );
-        }
+    }
+
+    #[test]
+    fn an_edit_takes_the_place_of_another_of_its_field_alone() {
+        let all = |edits: &[Edit]| edits.iter().fold(0, |set, edit| edit.added_to(set));
+        let set = all(&[Edit::SetKeyPoint, Edit::LowNoise, Edit::SetWithheld, Edit::HighNoise]);
+        let edits: Vec<Edit> = Edit::of(set).collect();
+        assert_eq!(edits, [Edit::SetKeyPoint, Edit::SetWithheld, Edit::HighNoise]);
+        assert!(Edit::of(all(&[Edit::SetKeyPoint, Edit::ClearKeyPoint])).eq([Edit::ClearKeyPoint]));
+        assert_eq!(Edit::of(0).count(), 0);
     }
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::sealed::SealedTiles;
 use super::spill::Pieces;
 use crate::Result;
+use crate::point::Edit;
 
 /// Selections that a record can be in, a bit each; the highest bit is [`ASIDE`].
 pub const SELECTIONS: u32 = 7;
@@ -49,10 +50,16 @@ impl State {
     /// Written, but no longer looked at.
     pub const ASIDE: State = State(2);
 
-    /// The same state with an edit, by its number, of the record.
+    /// The same state with an edit of the record more.
     #[must_use]
-    pub fn edited(self, edit: u8) -> State {
-        State(self.0 & 3 | edit << 2)
+    pub fn edited(self, edit: Edit) -> State {
+        State(self.0 & 3 | edit.added_to(self.edits()) << 2)
+    }
+
+    /// Set aside, with the edits that it has.
+    #[must_use]
+    pub fn aside(self) -> State {
+        State(self.0 & !3 | State::ASIDE.0)
     }
 
     /// True if later passes look at the record.
@@ -65,8 +72,13 @@ impl State {
         self.0 & 3 != 1
     }
 
-    /// The number of the edit that the record is written with; 0 for none.
-    pub fn edit(self) -> u8 {
+    /// True if the record is in the output and no mark says that it would be removed.
+    pub fn is_kept(self) -> bool {
+        self.is_alive() || self == State::ASIDE
+    }
+
+    /// The set of edits that the record is written with: see [`Edit::of`].
+    pub fn edits(self) -> u8 {
         self.0 >> 2
     }
 }

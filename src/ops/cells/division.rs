@@ -86,7 +86,9 @@ pub(super) struct Counts {
 /// Divides cells of one tile, one after the other, in memory that it keeps.
 pub(super) struct Division<'a> {
     rule: Rule,
-    tile: &'a Tile,
+    positions: &'a [Position],
+    normals: &'a [[f32; 3]],
+    core: Range<usize>,
     counts: Counts,
     stack: Vec<Part>,
     spare: Vec<u32>,
@@ -95,8 +97,15 @@ pub(super) struct Division<'a> {
 impl<'a> Division<'a> {
     /// Of a tile whose groups were taken out of it.
     pub(super) fn new(rule: Rule, tile: &'a Tile) -> Self {
-        let counts = Counts::default();
-        Division { rule, tile, counts, stack: Vec::new(), spare: Vec::new() }
+        Division {
+            rule,
+            positions: &tile.positions,
+            normals: &tile.normals,
+            core: tile.core.clone(),
+            counts: Counts::default(),
+            stack: Vec::new(),
+            spare: Vec::new(),
+        }
     }
 
     /// What was done so far.
@@ -107,7 +116,7 @@ impl<'a> Division<'a> {
     /// True if the tile's core has the Morton-first of the members from `start` on: each cell counts
     /// there, so that every cut into tiles counts alike.
     pub(super) fn owns(&self, cells: &Partition, start: usize) -> bool {
-        self.tile.core.contains(&(cells.members[start] as usize))
+        self.core.contains(&(cells.members[start] as usize))
     }
 
     /// Divides the initial cell `members[start..end]` of `cells`: reorders the members part by part,
@@ -122,13 +131,18 @@ impl<'a> Division<'a> {
         self.make_room(end - start);
         let mine = self.owns(cells, start);
         let deepest = DEEPEST + 2 * (end - start).max(1).ilog2();
-        let first = self.tile.positions[cells.members[start] as usize];
-        let mut ties = self.rule.limit.ties(first);
+        let mut ties = self.rule.limit.ties(self.positions[cells.members[start] as usize]);
         let mut cut_deep = false;
         self.stack.push(Part { start, end, depth: 0, narrowest: f64::NEG_INFINITY });
         while let Some(part) = self.stack.pop() {
             let whole = part.start..part.end;
             let (members, turned) = (&mut cells.members[whole.clone()], &mut cells.turned[whole]);
+            if let &mut [only] = members {
+                // Half of all parts where cells are divided to the last; its own normal is the axis.
+                turned[0] = is_turned([0.0; 3], self.normals[only as usize]);
+                self.close(cells, &part);
+                continue;
+            }
             let survey = self.survey(members, turned);
             let narrowest = part.narrowest.max(survey.range);
             let pushed = self.stack.len();
@@ -139,11 +153,11 @@ impl<'a> Division<'a> {
                 }
                 Verdict::ByAngle => {
                     let child = |range| part.child(range, narrowest, 1);
-                    if self.rule.split == Split::Voronoi && part.depth < deepest {
-                        self.bisect(members, turned, &survey, child);
-                    } else {
-                        cut_deep |= self.rule.split == Split::Voronoi;
-                        self.cut_in_eight(members, child);
+                    let is_deep = part.depth >= deepest && self.rule.split == Split::Voronoi;
+                    cut_deep |= is_deep;
+                    match self.rule.split {
+                        Split::Voronoi if !is_deep => self.bisect(members, turned, &survey, child),
+                        _ => self.cut_in_eight(members, child),
                     }
                     let parts = self.stack.len() - pushed;
                     if parts > 1 {
@@ -155,12 +169,17 @@ impl<'a> Division<'a> {
             if self.stack.len() - pushed < 2 {
                 // Only positions that are not distinct cannot be told apart.
                 self.stack.truncate(pushed);
-                self.counts.cells += u64::from(self.owns(cells, part.start));
-                cells.ends.push(part.end as u32);
+                self.close(cells, &part);
             }
         }
         self.counts.initial += u64::from(mine);
         self.counts.cut_deep += u64::from(mine && cut_deep);
+    }
+
+    /// Ends a part that is not divided further.
+    fn close(&mut self, cells: &mut Partition, part: &Part) {
+        self.counts.cells += u64::from(self.owns(cells, part.start));
+        cells.ends.push(part.end as u32);
     }
 
     fn make_room(&mut self, members: usize) {
@@ -175,13 +194,13 @@ impl<'a> Division<'a> {
         let Rule { limit, min_points, max_side, min_spacing, .. } = self.rule;
         let is_wide = part.len() > min_points && limit.allows(narrowest, ties);
         let by_angle = if is_wide { Verdict::ByAngle } else { Verdict::Kept };
-        if part.len() < 2 || max_side == u64::MAX && (min_spacing == 0 || !is_wide) {
+        if max_side == u64::MAX && (min_spacing == 0 || !is_wide) {
             return by_angle;
         }
-        let positions = part.iter().map(|&i| self.tile.positions[i as usize]);
+        let positions = part.iter().map(|&i| self.positions[i as usize]);
         let [x, y, z] = Bounds::of(positions).extent();
         let length = x.max(y).max(z);
-        let mine = u64::from(self.tile.core.contains(&(part[0] as usize)));
+        let mine = u64::from(self.core.contains(&(part[0] as usize)));
         if length > max_side {
             self.counts.by_max_side += mine * u64::from(!is_wide);
             Verdict::ByLength
@@ -195,12 +214,8 @@ impl<'a> Division<'a> {
 
     /// Turns the normals of a part to its own dominant axis and finds what their angles span.
     fn survey(&self, part: &[u32], turned: &mut [bool]) -> Survey {
-        let normal = |i: u32| self.tile.normals[i as usize];
-        if let ([only], [turned]) = (part, &mut *turned) {
-            // Half of all parts where cells are divided to the last; its own normal is the axis.
-            *turned = is_turned([0.0; 3], normal(*only));
-            return Survey { range: f64::INFINITY, nearest: *only, farthest: *only };
-        }
+        let normals = self.normals;
+        let normal = |i: u32| normals[i as usize];
         let axis = dominant_axis(outer_sum(part.iter().map(|&i| normal(i))));
         let Some(reference) = self.rule.reference else {
             return self.survey_cone(axis, part, turned);
@@ -224,7 +239,7 @@ impl<'a> Division<'a> {
     fn survey_cone(&self, axis: [f64; 3], part: &[u32], turned: &mut [bool]) -> Survey {
         let mut largest = (f64::NEG_INFINITY, 0);
         for (&i, turned) in part.iter().zip(turned) {
-            let normal = self.tile.normals[i as usize];
+            let normal = self.normals[i as usize];
             *turned = is_turned(axis, normal);
             let sine2 = sine2(axis, normal);
             if sine2 > largest.0 {
@@ -237,7 +252,7 @@ impl<'a> Division<'a> {
     /// The member whose normal is farthest in angle from that of `from`, both turned; of equal ones
     /// the first. Chords of unit normals compare as their angles do.
     fn opposite(&self, from: u32, part: &[u32], turned: &[bool]) -> u32 {
-        let unit = |i: u32| direction(self.tile.normals[i as usize].map(f64::from));
+        let unit = |i: u32| direction(self.normals[i as usize].map(f64::from));
         let sign_of = |turned: bool| if turned { -1.0 } else { 1.0 };
         let is_turned = part.iter().zip(turned).any(|(&i, &turned)| i == from && turned);
         let (a, sign) = (unit(from).unwrap_or_default(), sign_of(is_turned));
@@ -262,7 +277,7 @@ impl<'a> Division<'a> {
         survey: &Survey,
         child: impl Fn(Range<usize>) -> Part,
     ) {
-        let positions = &self.tile.positions[..];
+        let positions = self.positions;
         let nearest = match self.rule.reference {
             Some(_) => survey.nearest,
             None => self.opposite(survey.farthest, part, turned),
@@ -309,7 +324,7 @@ impl<'a> Division<'a> {
 
     /// Parts the members by the octants of the smallest octant of the initial cell that holds them.
     fn cut_in_eight(&mut self, part: &mut [u32], child: impl Fn(Range<usize>) -> Part) {
-        let positions = &self.tile.positions[..];
+        let positions = self.positions;
         let tight = Bounds::of(part.iter().map(|&i| positions[i as usize]));
         let Some(middle) = middle(&tight, self.rule.origin, self.rule.side) else { return };
         let octant = |i: u32| {
