@@ -549,6 +549,9 @@ fn a_neighbourhood_after_any_removal_is_a_second_pass() {
         assert_eq!(passes(&["normals", "cells", "median"]), 1);
         assert_eq!(passes(&[removal, "normals", "cells", "median"]), 2);
         assert_eq!(passes(&["normals", "cells", "median", removal]), 2);
+        assert_eq!(passes(&["normals", "cells", "median", "normals", "cells", "median"]), 2);
+        let unread = plan(&["normals", removal, "normals", "cells", "median"]).err().unwrap();
+        assert!(unread.to_string().contains("that nothing has read"), "{unread}");
     }
     assert!(plan(&["normals", "cells", "median"]).is_ok());
 }

@@ -142,8 +142,14 @@ pub(super) fn number_selections(ops: &mut [StageOp]) -> Result<Vec<crate::point:
 ///
 /// Fails if a stage reads what nothing before it gives, or what a pass cannot carry.
 pub(super) fn unroll(ops: &[StageOp], schema: &Schema, taps: &[Tap]) -> Result<Vec<Pass>> {
-    let mut layout =
-        Layout { ops, schema, passes: vec![Pass::default()], normals_from: None, open: true };
+    let mut layout = Layout {
+        ops,
+        schema,
+        passes: vec![Pass::default()],
+        normals_from: None,
+        normals_read: false,
+        open: true,
+    };
     let mut waiting: Vec<(usize, &Tap)> = taps.iter().enumerate().collect();
     layout.tap(&mut waiting, 0, false)?;
     for (op, stage) in ops.iter().enumerate() {
@@ -166,6 +172,8 @@ struct Layout<'a> {
     passes: Vec<Pass>,
     /// The pass whose normals are the newest.
     normals_from: Option<usize>,
+    /// True once a stage or a sink has read them.
+    normals_read: bool,
     /// False once the last pass removes or gathers.
     open: bool,
 }
@@ -211,11 +219,17 @@ impl Layout<'_> {
         let Limits { sees, .. } = stage.limits;
         let seen = if sees == Sees::Selected { stage.selection } else { 0 };
         let on_columns = reads("Normal") || reads("Cell");
+        let writes = |column: &str| needs.writes.iter().any(|name| name == column);
+        if writes("Normal") && self.normals_from.is_some() && !self.normals_read {
+            let told = "this `normals` would replace normals that nothing has read";
+            return Err(blame(stage, told).help("leave one of the two out"));
+        }
         let last = self.last();
+        let rewrites = writes("Normal") && last.writes_normals;
         let other_neighbors = needs.neighbors > 0 && last.looks && last.seen != seen;
         let other_records = !on_columns && last.decided != stage.selection;
         let begun = !last.calls.is_empty();
-        if begun && (!self.open || other_neighbors || other_records) {
+        if begun && (!self.open || rewrites || other_neighbors || other_records) {
             self.passes.push(Pass { round, ..Pass::default() });
             self.open = true;
         }
@@ -231,7 +245,6 @@ impl Layout<'_> {
         if needs.neighbors > 0 {
             (pass.seen, pass.looks) = (seen, true);
         }
-        let writes = |column: &str| needs.writes.iter().any(|name| name == column);
         if writes("Normal") {
             (pass.writes_normals, pass.loads_normals) = (true, false);
         }
@@ -240,6 +253,9 @@ impl Layout<'_> {
         if decides(&needs) {
             (pass.removes, pass.mark) = (true, needs.mark);
             self.open = false;
+        }
+        if writes("Normal") {
+            self.normals_read = false;
         }
         self.normals_from = if writes("Normal") { Some(at) } else { from };
         Ok(())
@@ -281,6 +297,7 @@ impl Layout<'_> {
     /// Brings the newest normals to pass `at`; false if there are none.
     fn bring_normals(&mut self, at: usize) -> bool {
         let Some(from) = self.normals_from else { return false };
+        self.normals_read = true;
         if from != at {
             self.passes[from].stores_normals = true;
             self.passes[at].loads_normals = true;
