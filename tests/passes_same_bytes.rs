@@ -201,7 +201,7 @@ fn cells_with_a_target_are_the_same_bytes() {
         ("orient = \"up\"", "keep = \"25%\"\nmeasure = \"cone\"\nside = 2.9"),
         ("orient = \"viewpoint\"\nviewpoint = [10.0, 20.0, 500.0]", "keep = \"12%\""),
         ("neighbors = 12", "keep = 4000\nreference = [0.3, 0.2, 1.0]\nmin_points = 3\nside = 2.3"),
-        ("", "keep = \"15%\"\nmax_side = 1.1\nmin_spacing = 0.45\nside = 1.9"),
+        ("", "keep = \"60%\"\nmax_side = 1.1\nmin_spacing = 0.45\nside = 1.9"),
     ];
     for (seed, (normals, cells)) in cells.into_iter().enumerate() {
         let stages = stages(&[("normals", normals), ("cells", cells), ("median", "")]);
@@ -238,9 +238,9 @@ fn a_lattice_whose_angles_tie_meets_its_target_with_the_same_bytes() {
 fn bounds_and_measures_of_cells_are_the_same_bytes() {
     let scan = landscape();
     for (seed, cells) in [
-        "measure = \"cone\"\nmax_angle = 0.3\nside = 1.9",
-        "reference = \"z\"\nmax_side = 1.1\nmin_spacing = 0.3\nside = 2.1\nsplit = \"octant\"",
-        "reference = [1, 2, 3]\nmax_side = 1.2\nside = 1.7",
+        "measure = \"cone\"\nmax_angle = 0.3\nside = 0.9",
+        "reference = \"z\"\nmax_side = 0.5\nmin_spacing = 0.15\nside = 0.9\nsplit = \"octant\"",
+        "reference = [1, 2, 3]\nmax_side = 0.6\nside = 0.8",
     ]
     .into_iter()
     .enumerate()
