@@ -1,7 +1,7 @@
 //! Cutting the decoded scan into tiles that fit the memory, wide enough for the stages' cells.
 
+use super::job::Job;
 use super::passes::{Pass, StageOp};
-use super::run::Job;
 use super::shares::{Demands, Shares};
 use crate::budget::whole_mebibytes;
 use crate::geom::lattice::Lattice;

@@ -8,9 +8,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::chunks::{Chunk, Open};
 use super::grind::{Bench, Benches};
+use super::job::Job;
 use super::product::Entry;
 use super::publish::Staged;
-use super::run::Job;
 use crate::point::Metadata;
 use crate::report::Tally;
 use crate::stage::{CreateSink, Input, SinkSummary};

@@ -1,8 +1,8 @@
 //! A look at a sample of the scan before a pass: small cubes, spread evenly over its positions.
 
 use super::grind::{Field, Worker};
+use super::job::Job;
 use super::passes::Pass;
-use super::run::Job;
 use crate::Result;
 use crate::stage::Forecast;
 use crate::tile::{Reader, SealedTiles, Sieve, TileKey};

@@ -10,6 +10,7 @@ mod each;
 mod forecast;
 mod grind;
 mod inputs;
+mod job;
 mod keys;
 mod kinds;
 mod limits;

@@ -3,14 +3,14 @@
 use std::fs::{self, File};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
 use super::clock::Clock;
 use super::each::Each;
+use super::job::Job;
 use super::mill::mill;
-use super::passes::{Pass, StageOp};
 use super::plan::Plan;
 use super::publish::{Staged, make_folder};
 use super::scratch::{Scratch, free_space, memory_warning};
@@ -18,143 +18,15 @@ use super::settings::{Nonfinite, Spill};
 use super::shares::{Demands, Shares};
 use super::stream::stream;
 use super::survey::{Lines, Measured};
-use super::tagger::{ClassOf, Tagger};
+use super::tagger::ClassOf;
 use crate::budget::{Budget, Bytes};
-use crate::geom::lattice::Misplaced;
-use crate::point::PointBatch;
 use crate::report::{
     ClassFigures, Decision, FileFigures, LatticeFigures, Ledger, Machine, Outcome, PassFigures,
     Report, RunFigures, Tally, check_written, peak_memory,
 };
-use crate::stage::{CreateSink, Input, Part, SinkSummary, Source, Transform};
-use crate::tile::{SpillArea, lock, parallel};
-use crate::{Error, ErrorKind, Result};
-
-/// What every phase of a run needs.
-pub(super) struct Job<'a> {
-    pub source: &'a dyn Source,
-    pub source_kind: String,
-    pub transforms: Vec<(String, Box<dyn Transform>)>,
-    pub ops: Vec<StageOp>,
-    pub passes: Vec<Pass>,
-    /// For each sink, where the outputs of the inputs go if each has its own.
-    pub each: Vec<Option<Each<'a>>>,
-    pub tagger: Tagger,
-    pub classes: ClassOf,
-    pub budget: Budget,
-    pub threads: usize,
-    pub drop_nonfinite: bool,
-    pub tile_points: Option<usize>,
-    pub run_records: Option<usize>,
-    /// For each sink, whether it writes normals.
-    pub wants_normals: Vec<bool>,
-    /// A sink of what all stages leave.
-    pub last_sink: usize,
-    pub watch: &'a dyn Watch,
-    /// What the user was warned of before the end.
-    pub warnings: Mutex<Vec<String>>,
-    /// Set once a thread has failed.
-    pub failed: AtomicBool,
-}
-
-impl Job<'_> {
-    /// Reads the next batch of a part through the transforms; false at its end.
-    pub fn read(
-        &self,
-        part: &mut dyn Part,
-        batch: &mut PointBatch,
-        tally: &mut Tally,
-    ) -> Result<bool> {
-        batch.clear();
-        part.read(batch)?;
-        let read = batch.len() as u64;
-        if read == 0 {
-            return Ok(false);
-        }
-        tally.work("read", read);
-        self.classes.read(batch, tally);
-        for (kind, transform) in &self.transforms {
-            let before = batch.len();
-            transform.apply(batch)?;
-            let removed = before
-                .checked_sub(batch.len())
-                .ok_or_else(|| Error::internal(format!("the stage {kind} made points up")))?;
-            tally.remove(kind, "removed", removed as u64);
-        }
-        self.advance(read)?;
-        Ok(true)
-    }
-
-    /// Warns of something now, and again in the report.
-    pub fn warn(&self, message: String) {
-        self.watch.warn(&message);
-        lock(&self.warnings).push(message);
-    }
-
-    /// Tells of progress, and hears whether to go on.
-    pub fn advance(&self, points: u64) -> Result<()> {
-        self.watch.advance(points);
-        let stop = self.watch.cancelled() || self.failed.load(Ordering::Relaxed);
-        if stop { Err(Error::interrupted()) } else { Ok(()) }
-    }
-
-    /// Runs `work` on all threads; once one has failed, [`advance`](Job::advance) stops the others.
-    pub fn parallel(&self, work: impl Fn() -> Result<()> + Sync) -> Result<()> {
-        parallel(self.threads, |_| {
-            let guard = StopOnDrop::new(|| self.failed.store(true, Ordering::Relaxed));
-            work()?;
-            guard.disarm();
-            Ok(())
-        })
-    }
-
-    /// The error of a record that has no place on the lattice.
-    pub fn misplaced(&self, batch: &PointBatch, index: usize, why: Misplaced) -> Error {
-        let schema = batch.schema();
-        let record = &batch.records()[index * schema.stride..(index + 1) * schema.stride];
-        let point = schema.coordinates().map(|axes| axes.map(|d| d.world(record, schema.endian)));
-        let (what, help) = match why {
-            Misplaced::NotFinite => {
-                ("is not finite", "set nonfinite = \"drop\" under [run] to leave such points out")
-            }
-            Misplaced::TooFar => (
-                "lies beyond the lattice",
-                "set a larger `lattice` step under [run], or move the scan nearer to its origin",
-            ),
-        };
-        let error = Error::new(
-            ErrorKind::Data,
-            format!("the point {:?} {what}", point.unwrap_or_default()),
-        )
-        .help(help);
-        match self.source.inputs().get(batch.source as usize) {
-            Some(input) => error.at(&input.path),
-            None => error,
-        }
-    }
-}
-
-/// Calls its function when dropped, unless disarmed: what a thread does that leaves by an error or
-/// a panic.
-pub(super) struct StopOnDrop<F: Fn()>(Option<F>);
-
-impl<F: Fn()> StopOnDrop<F> {
-    pub fn new(stop: F) -> Self {
-        StopOnDrop(Some(stop))
-    }
-
-    pub fn disarm(mut self) {
-        self.0 = None;
-    }
-}
-
-impl<F: Fn()> Drop for StopOnDrop<F> {
-    fn drop(&mut self) {
-        if let Some(stop) = &self.0 {
-            stop();
-        }
-    }
-}
+use crate::stage::{CreateSink, Input, SinkSummary, Source};
+use crate::tile::{SpillArea, lock};
+use crate::{Error, Result};
 
 /// What a stream or a mill came to.
 pub(super) struct Finished {

@@ -3,8 +3,9 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use super::job::{Job, StopOnDrop};
 use super::outlet::{Hands, Outlet};
-use super::run::{Finished, Job, StopOnDrop};
+use super::run::Finished;
 use super::shares::{BATCH, Shares};
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::PointBatch;

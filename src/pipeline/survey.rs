@@ -5,7 +5,7 @@ use std::io::{self, BufReader, Read};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use super::run::Job;
+use super::job::Job;
 use crate::geom::lattice::Lattice;
 use crate::point::Position;
 use crate::report::{Lot, ScanSurvey, TileFigures, Totals, report_tile_level};

@@ -10,27 +10,24 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering as Atomic};
 
 use super::block::{BLOCK, Block};
+use super::emit::{Emitter, Merged, Output};
 use super::intake::{Run, TileStore};
 use super::key::morton_cmp;
+use super::parallel;
 use super::sealed::{SealedTiles, Sequence, ref_bytes};
-use super::spill::{PIECE, Pieces, Spill, lock};
-use super::{Levels, parallel};
+use super::spill::{Pieces, Spill, lock};
+use crate::Result;
 use crate::point::Position;
-use crate::{Error, Result};
 
 /// Blocks of all runs that one range has, about, at least.
 const RANGE_BLOCKS: usize = 256;
 /// Blocks of one run that a range has, about, at least: where it begins and ends, blocks of every
 /// run are read for a part of them.
 const RANGE_BLOCKS_EACH: usize = 4;
-/// Blocks packed before they are handed to the spill.
-const BLOCKS_AT_ONCE: usize = 64;
-
 /// Bytes that a thread holds while it merges `runs` runs of records of `stride` bytes.
 pub fn merge_bytes(runs: usize, stride: usize) -> u64 {
     let cursor = BLOCK * (size_of::<Position>() + 4) + stride + 256;
-    let emitter = BLOCKS_AT_ONCE * BLOCK * 28 + PIECE * 12 + 2 * BLOCK * 28;
-    (runs * cursor + emitter) as u64
+    (runs * cursor + Emitter::BYTES) as u64
 }
 
 /// Merges the runs of `store` on `threads` threads; `advance` is told of records merged and says
@@ -89,20 +86,6 @@ fn borders(runs: &[Run]) -> Vec<Position> {
     let mut borders: Vec<Position> = firsts.into_iter().skip(each).step_by(each).collect();
     borders.dedup();
     borders
-}
-
-struct Output {
-    positions: Spill,
-    refs: Pieces,
-    tagged: bool,
-}
-
-/// What a range came to.
-struct Merged {
-    blocks: Vec<Block>,
-    records: u64,
-    levels: Levels,
-    ends: Option<(Position, Position)>,
 }
 
 fn join(ranges: impl Iterator<Item = Merged>, most_blocks: usize) -> Sequence {
@@ -329,117 +312,5 @@ impl<'a> Cursor<'a> {
         // Equal records are told apart by their tags: by the input that they come from.
         record.extend_from_slice(&self.tag().to_be_bytes());
         Ok(())
-    }
-}
-
-/// Packs what comes out of the merge into blocks and pieces.
-struct Emitter<'a> {
-    out: &'a Output,
-    merged: Merged,
-    positions: Vec<Position>,
-    copies: Vec<u32>,
-    packed: Vec<u8>,
-    unplaced: Vec<usize>,
-    refs: Vec<u8>,
-    first_ref: u64,
-    refs_stored: u64,
-    block_first: u64,
-}
-
-impl<'a> Emitter<'a> {
-    fn new(out: &'a Output, most_records: u64) -> Self {
-        Emitter {
-            out,
-            merged: Merged {
-                blocks: Vec::new(),
-                records: 0,
-                levels: Levels::default(),
-                ends: None,
-            },
-            positions: Vec::with_capacity(BLOCK),
-            copies: Vec::with_capacity(BLOCK),
-            packed: Vec::with_capacity(BLOCKS_AT_ONCE * BLOCK * 28),
-            unplaced: Vec::with_capacity(BLOCKS_AT_ONCE),
-            refs: Vec::with_capacity(PIECE * ref_bytes(out.tagged)),
-            first_ref: out.refs.reserve(most_records),
-            refs_stored: 0,
-            block_first: 0,
-        }
-    }
-
-    fn emit(&mut self, position: Position, record: u64, tag: u32) -> Result<()> {
-        match (&mut self.merged.ends, self.copies.last_mut()) {
-            (Some((_, last)), Some(copies)) if *last == position => {
-                *copies = copies.checked_add(1).ok_or_else(|| {
-                    Error::new(crate::ErrorKind::Data, "more than 2^32 records share one position")
-                })?;
-            }
-            (ends, _) => {
-                match ends {
-                    None => *ends = Some((position, position)),
-                    Some((_, last)) => {
-                        self.merged.levels.add(Some(*last), position);
-                        *last = position;
-                    }
-                }
-                if self.positions.len() == BLOCK {
-                    self.close_block()?;
-                }
-                self.positions.push(position);
-                self.copies.push(1);
-            }
-        }
-        self.merged.records += 1;
-        self.refs.extend_from_slice(&record.to_le_bytes());
-        if self.out.tagged {
-            self.refs.extend_from_slice(&tag.to_le_bytes());
-        }
-        if self.refs.len() == PIECE * ref_bytes(self.out.tagged) {
-            self.store_refs()?;
-        }
-        Ok(())
-    }
-
-    fn store_refs(&mut self) -> Result<()> {
-        if !self.refs.is_empty() {
-            self.out.refs.put(self.first_ref + self.refs_stored, &self.refs)?;
-            self.refs_stored += (self.refs.len() / ref_bytes(self.out.tagged)) as u64;
-            self.refs.clear();
-        }
-        Ok(())
-    }
-
-    fn close_block(&mut self) -> Result<()> {
-        if self.positions.is_empty() {
-            return Ok(());
-        }
-        let (mut block, start) = Block::pack(&self.positions, &self.copies, &mut self.packed);
-        block.first_record = self.first_ref + self.block_first;
-        self.block_first += self.copies.iter().map(|&n| u64::from(n)).sum::<u64>();
-        self.merged.blocks.push(block);
-        self.unplaced.push(start);
-        self.positions.clear();
-        self.copies.clear();
-        if self.unplaced.len() == BLOCKS_AT_ONCE { self.place() } else { Ok(()) }
-    }
-
-    fn place(&mut self) -> Result<()> {
-        if self.packed.is_empty() {
-            return Ok(());
-        }
-        let address = self.out.positions.append(&self.packed)?;
-        let begin = self.merged.blocks.len() - self.unplaced.len();
-        for (block, start) in self.merged.blocks[begin..].iter_mut().zip(self.unplaced.drain(..)) {
-            block.placed(address, start);
-        }
-        self.packed.clear();
-        Ok(())
-    }
-
-    fn finish(mut self) -> Result<Merged> {
-        self.close_block()?;
-        self.place()?;
-        self.store_refs()?;
-        Ok(self.merged)
     }
 }

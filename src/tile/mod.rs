@@ -2,6 +2,8 @@
 
 mod around;
 mod block;
+mod cutting;
+mod emit;
 mod intake;
 mod key;
 mod levels;
@@ -14,13 +16,14 @@ mod spill;
 
 pub use around::Around;
 pub use block::Block;
+pub use cutting::CutError;
 pub use intake::{Intake, TileStore};
 pub use key::{TileKey, morton_cmp};
 pub use levels::Levels;
 pub use load::{Core, Loader};
 pub use merge::{merge_bytes, seal};
 pub use remote::Remote;
-pub use sealed::{CutError, Fetch, Reader, SealedTiles, index_bytes};
+pub use sealed::{Fetch, Reader, SealedTiles, index_bytes};
 pub use sieve::{
     ASIDE, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, Run, SELECTIONS, Sieve, State, TAGGED_INPUTS,
     Tag,

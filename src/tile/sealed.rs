@@ -3,10 +3,10 @@
 
 use std::cmp::Ordering;
 
+use super::Levels;
 use super::block::{BLOCK, Block};
 use super::key::morton_cmp;
 use super::spill::{PIECE, Pieces, Spill};
-use super::{Levels, TileKey};
 use crate::budget::Lease;
 use crate::point::{Bounds, PointBatch, Position};
 use crate::{Error, Result};
@@ -256,52 +256,6 @@ impl SealedTiles {
         Ok(count)
     }
 
-    /// Cuts the scan into octree nodes, in Morton order, none without a position: nodes whose cube
-    /// grown by `reach` has at most `wanted` positions, or that have the smallest side allowed,
-    /// 2^`lowest`, and at most `most`.
-    ///
-    /// If nodes of that side have more, the error names the one that has most and its count.
-    pub fn cut(
-        &self,
-        wanted: u64,
-        most: u64,
-        reach: i64,
-        lowest: u32,
-    ) -> Result<Vec<TileKey>, CutError> {
-        let mut tiles = Vec::new();
-        if self.positions() == 0 {
-            return Ok(tiles);
-        }
-        let mut reader = Reader::default();
-        let mut heaviest: Option<(u64, TileKey)> = None;
-        let mut open = vec![TileKey::holding(&self.bounds())];
-        while let Some(key) = open.pop() {
-            if !self.holds_more(&key.cube(), 0, &mut reader)? {
-                continue;
-            }
-            let zone = key.cube().grown(reach);
-            let smallest = key.level <= lowest || key.level == 0;
-            let limit = if smallest { most } else { wanted.min(most) };
-            if !self.holds_more(&zone, limit, &mut reader)? {
-                tiles.push(key);
-                continue;
-            }
-            match key.children().filter(|_| !smallest) {
-                Some(children) => open.extend(children.iter().rev()),
-                None => {
-                    let positions = self.count(&zone, &mut reader)?;
-                    if heaviest.is_none_or(|(most, _)| positions > most) {
-                        heaviest = Some((positions, key));
-                    }
-                }
-            }
-        }
-        match heaviest {
-            Some((positions, key)) => Err(CutError::TooHeavy { key, positions }),
-            None => Ok(tiles),
-        }
-    }
-
     /// Number of the block that has the position with this number.
     pub fn block_with(&self, position: u64) -> usize {
         let blocks = &self.sequence.blocks;
@@ -344,26 +298,6 @@ impl SealedTiles {
             }
         }
         Ok(())
-    }
-}
-
-/// Why a scan could not be cut.
-#[derive(Debug)]
-pub enum CutError {
-    /// A cube of the smallest side holds more positions than fit.
-    TooHeavy {
-        /// The cube.
-        key: TileKey,
-        /// Positions in it and what is around it that its cells need.
-        positions: u64,
-    },
-    /// The spill could not be read.
-    Read(Error),
-}
-
-impl From<Error> for CutError {
-    fn from(error: Error) -> Self {
-        CutError::Read(error)
     }
 }
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::*;
 use crate::ErrorKind;
-use crate::pipeline::run::StopOnDrop;
+use crate::pipeline::job::StopOnDrop;
 use crate::stage::Encode;
 use crate::tile::parallel;
 
