@@ -6,10 +6,12 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use pointmill::ops::normals::{Estimator, Method};
+use pointmill::tile::Neighborhood;
 
 const NEIGHBORHOODS: usize = 4096;
 const CHUNK: usize = 128;
 const ROUNDS: usize = 100;
+const RANKS: [u32; 10] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9];
 
 fn main() {
     let mut state = 1u64;
@@ -34,21 +36,41 @@ fn main() {
             let nanoseconds = time(&neighborhoods, |offsets| {
                 black_box(estimator.estimate(offsets));
             });
-            println!("{method:?}, steps of {lattice}: {nanoseconds:.0} ns a normal");
+            let together = time_together(method, &neighborhoods);
+            println!(
+                "{method:?}, steps of {lattice}: {nanoseconds:.0} ns a normal alone, {together:.0} \
+                 among others"
+            );
         }
     }
 }
 
+/// Nanoseconds a normal where neighbourhoods are estimated side by side.
+fn time_together(method: Method, neighborhoods: &[Vec<[i64; 3]>]) -> f64 {
+    let mut estimator = Estimator::new(method);
+    let chunks: Vec<&[Vec<[i64; 3]>]> = neighborhoods.chunks(CHUNK).collect();
+    let each = time(&chunks, |chunk| {
+        let mut settle = |owner, outcome| {
+            black_box((owner, outcome));
+        };
+        for (i, offsets) in chunk.iter().enumerate() {
+            estimator.take(i, &Neighborhood::of_offsets(offsets, &RANKS), &mut settle);
+        }
+        estimator.finish(&mut settle);
+    });
+    each / CHUNK as f64
+}
+
 /// Nanoseconds a call: each chunk's best of all rounds, so that other work on the machine does not
 /// count.
-fn time(neighborhoods: &[Vec<[i64; 3]>], mut call: impl FnMut(&[[i64; 3]])) -> f64 {
-    let mut best = vec![f64::INFINITY; neighborhoods.len().div_ceil(CHUNK)];
+fn time<T>(work: &[T], mut call: impl FnMut(&T)) -> f64 {
+    let mut best = vec![f64::INFINITY; work.len().div_ceil(CHUNK)];
     for _ in 0..ROUNDS {
-        for (chunk, best) in neighborhoods.chunks(CHUNK).zip(&mut best) {
+        for (chunk, best) in work.chunks(CHUNK).zip(&mut best) {
             let start = Instant::now();
-            chunk.iter().for_each(|offsets| call(black_box(offsets)));
+            chunk.iter().for_each(|item| call(black_box(item)));
             *best = best.min(start.elapsed().as_secs_f64());
         }
     }
-    best.iter().sum::<f64>() / neighborhoods.len() as f64 * 1e9
+    best.iter().sum::<f64>() / work.len() as f64 * 1e9
 }

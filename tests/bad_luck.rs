@@ -177,7 +177,7 @@ fn neighbors_are_exact(scan: &Scan) -> u64 {
     for key in keys {
         let tile = loader.load(key, 0, K).unwrap();
         let (positions, core) = (tile.positions.clone(), tile.core.clone());
-        tile.each_neighborhood(K, |i, offsets| {
+        tile.each_neighborhood(K, |i, neighbors| {
             seen += 1;
             // The first and the last of a tile lie at its faces.
             if i != core.start && i + 1 != core.end && i % 37 != 0 {
@@ -192,8 +192,11 @@ fn neighbors_are_exact(scan: &Scan) -> u64 {
             others.sort_unstable();
             let mut ranks: Vec<usize> = others.iter().take(K).map(|other| other.1).collect();
             ranks.sort_unstable();
-            let found: Vec<Position> =
-                offsets.iter().map(|o| std::array::from_fn(|axis| p[axis] + o[axis])).collect();
+            let mut found: Vec<Position> = neighbors
+                .offsets()
+                .map(|o| std::array::from_fn(|axis| p[axis] + o[axis]))
+                .collect();
+            found.sort_unstable_by(morton_cmp);
             let expected: Vec<Position> = ranks.into_iter().map(|rank| all[rank]).collect();
             assert_eq!(found, expected, "of {p:?}");
         })

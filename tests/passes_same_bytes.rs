@@ -9,7 +9,7 @@ mod common;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use common::{Memory, Ran, Random, Scan, Settings, assert_same, run_with};
+use common::{Memory, Ran, Random, Scan, Settings, assert_same, instruction_sets, run_with};
 use pointmill::io::synthetic::Scene;
 
 /// A pipeline to run the scan through in many configurations.
@@ -74,7 +74,7 @@ impl Family<'_> {
                 memory: random.one_of(&[Memory::Least(0), Memory::Least(6), Memory::Ample]),
                 threads: 1 + number % 3,
                 spill: if number % 3 == 2 { "auto" } else { "always" },
-                simd: random.one_of(&["auto", "portable"]),
+                simd: random.one_of(&instruction_sets()),
             };
             let files = 1 + random.below(4);
             let ran = one(self, scan, files, settings, random.number());

@@ -464,7 +464,7 @@ fn mistakes_of_an_argument_point_into_it() {
         ("thin.0.angle=1", "no stage `thin.0`"),
         ("thin.2.angle=1", "no stage `thin.2`"),
         ("run.memory=-3", "takes a size such as \"2GiB\", or bytes, not -3"),
-        ("run.simd=avx", "valid: auto, portable"),
+        ("run.simd=avx", "valid: auto, avx2, avx512, portable"),
         ("thin.angle=nan", "not finite"),
         ("thin.angle=4", "an angle is at most π"),
         ("thin.neighbors", "there is no `=`"),

@@ -5,7 +5,10 @@
 
 mod common;
 
-use common::{Memory, Ran, Random, Scan, Settings, assert_not_empty, assert_same, run, scans};
+use common::{
+    Memory, Ran, Random, Scan, Settings, assert_not_empty, assert_same, instruction_sets, run,
+    scans,
+};
 use pointmill::io::synthetic::Scene;
 use pointmill::tile::morton_cmp;
 
@@ -42,7 +45,7 @@ impl Configuration {
             memory: if demanding { memory } else { random.one_of(&[memory, Memory::Ample]) },
             threads: 1 + random.below(4),
             spill: if demanding { "always" } else { random.one_of(&["auto", "always"]) },
-            simd: random.one_of(&["auto", "portable"]),
+            simd: random.one_of(&instruction_sets()),
         };
         Configuration { settings, files: 1 + random.below(4), seed: random.number() }
     }

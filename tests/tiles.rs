@@ -175,7 +175,7 @@ fn tiles_share_the_scan_out_and_their_neighborhoods_are_those_of_the_whole_scan(
             let positions = tile.positions.clone();
             let zone = tile.zone;
             let mut seen = 0;
-            tile.each_neighborhood(k, |i, offsets| {
+            tile.each_neighborhood(k, |i, neighbors| {
                 seen += 1;
                 let p = positions[i];
                 let at_face = (0..3)
@@ -184,8 +184,9 @@ fn tiles_share_the_scan_out_and_their_neighborhoods_are_those_of_the_whole_scan(
                     return;
                 }
                 checked += 1;
-                let found: Vec<Position> =
-                    offsets.iter().map(|o| std::array::from_fn(|a| p[a] + o[a])).collect();
+                let mut found: Vec<Position> =
+                    neighbors.offsets().map(|o| std::array::from_fn(|a| p[a] + o[a])).collect();
+                found.sort_unstable_by(morton_cmp);
                 assert_eq!(found, nearest_by_brute_force(&all, p, k), "of {p:?}");
                 let mut distances: Vec<u128> = found.iter().map(|&q| distance2(p, q)).collect();
                 distances.sort_unstable();

@@ -2,9 +2,10 @@
 //! Knows no tiles, no files.
 
 pub mod angle;
-pub mod few;
 pub mod lattice;
 pub mod nearest;
 pub mod plane;
+pub mod rows;
+pub mod simd;
 pub mod star;
 pub mod wide;

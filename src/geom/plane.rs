@@ -6,6 +6,8 @@
 
 use std::ops::{Mul, Sub};
 
+use super::simd::Real;
+
 /// A symmetric 3 × 3 matrix, its upper triangle row by row: xx, xy, xz, yy, yz, zz.
 pub type Symmetric = [f64; 6];
 
@@ -216,13 +218,13 @@ pub fn smallest(matrix: Symmetric) -> (f64, [f64; 3]) {
 }
 
 /// The eigenvector of [`smallest`], or NaN where it is a matter of choice, of a matrix that is
-/// finite and not 0. Without a branch: loops over matrices become vector instructions.
+/// finite and not 0. Without a branch: for several matrices at once.
 #[inline(always)]
-pub fn smallest_vector(matrix: Symmetric) -> [f64; 3] {
+pub fn smallest_vector<T: Real>(matrix: [T; 6]) -> [T; 3] {
     let Traceless { matrix, .. } = Traceless::of(matrix);
     let (root, far) = isolated(&matrix);
     let (_, vector) = smallest_across(&matrix, far);
-    select3(root < 0.0, far, vector)
+    choose(root.below(root.of(0.0)), far, vector)
 }
 
 /// The eigenvector of the largest eigenvalue, as [`smallest`] in every other respect.
@@ -232,91 +234,98 @@ pub fn largest_eigenvector(matrix: Symmetric) -> [f64; 3] {
 
 /// A symmetric matrix as (mean·I + radius·M)·unit, with M of trace 0 and squared norm 6: its
 /// eigenvalues are the roots of t³ − 3t − det M.
-struct Traceless {
-    mean: f64,
-    radius: f64,
-    unit: f64,
-    matrix: Symmetric,
+struct Traceless<T> {
+    mean: T,
+    radius: T,
+    unit: T,
+    matrix: [T; 6],
 }
 
-impl Traceless {
+impl<T: Real> Traceless<T> {
     #[inline(always)]
-    fn of(matrix: Symmetric) -> Traceless {
-        let size = matrix.iter().fold(0.0, |size, v| select(v.abs() > size, v.abs(), size));
-        // Scaling by a power of two is exact: the exponent field of `size` alone.
-        let unit = f64::from_bits(size.to_bits() & 0x7ff0_0000_0000_0000);
-        let scale = 1.0 / unit;
-        let [xx, xy, xz, yy, yz, zz] = matrix.map(|v| v * scale);
-        let mean = (xx + yy + zz) / 3.0;
+    fn of(matrix: [T; 6]) -> Traceless<T> {
+        let mut size = matrix[0].of(0.0);
+        for v in matrix {
+            size = T::choose(size.below(v.size()), v.size(), size);
+        }
+        // Scaling by a power of two is exact.
+        let unit = size.power();
+        let [xx, xy, xz, yy, yz, zz] = scaled(matrix, unit.of(1.0) / unit);
+        let mean = (xx + yy + zz) / xx.of(3.0);
         let (dx, dy, dz) = (xx - mean, yy - mean, zz - mean);
-        let squares = dx * dx + dy * dy + dz * dz + 2.0 * (xy * xy + xz * xz + yz * yz);
-        let radius = (squares / 6.0).sqrt();
-        let scale = 1.0 / radius;
-        let matrix = [dx * scale, xy * scale, xz * scale, dy * scale, yz * scale, dz * scale];
+        let squares = dx * dx + dy * dy + dz * dz + xy.of(2.0) * (xy * xy + xz * xz + yz * yz);
+        let radius = (squares / xx.of(6.0)).root();
+        let matrix = scaled([dx, xy, xz, dy, yz, dz], radius.of(1.0) / radius);
         Traceless { mean, radius, unit, matrix }
     }
+}
+
+#[inline(always)]
+fn scaled<T: Real>([xx, xy, xz, yy, yz, zz]: [T; 6], by: T) -> [T; 6] {
+    [xx * by, xy * by, xz * by, yy * by, yz * by, zz * by]
 }
 
 fn is_nan(v: [f64; 3]) -> bool {
     v[0].is_nan()
 }
 
-/// One of two finished values: no branch.
+/// One of two finished vectors: no branch.
 #[inline(always)]
-pub fn select(condition: bool, a: f64, b: f64) -> f64 {
-    if condition { a } else { b }
-}
-
-#[inline(always)]
-fn select3(condition: bool, [ax, ay, az]: [f64; 3], [bx, by, bz]: [f64; 3]) -> [f64; 3] {
-    [select(condition, ax, bx), select(condition, ay, by), select(condition, az, bz)]
+pub fn choose<T: Real>(mask: T::Mask, a: [T; 3], b: [T; 3]) -> [T; 3] {
+    [T::choose(mask, a[0], b[0]), T::choose(mask, a[1], b[1]), T::choose(mask, a[2], b[2])]
 }
 
 /// The eigenvalue farthest from the two others, and its unit eigenvector (NaN if rounding leaves
 /// none), of a matrix with trace 0 and squared norm 6.
 #[inline(always)]
-fn isolated(m: &Symmetric) -> (f64, [f64; 3]) {
+fn isolated<T: Real>(m: &[T; 6]) -> (T, [T; 3]) {
     let [xx, xy, xz, yy, yz, zz] = *m;
+    let number = |v: f64| xx.of(v);
     let determinant =
         xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-    let d = select(determinant.abs() < 2.0, determinant.abs(), 2.0);
-    let r = 0.5 * d;
-    let mut t = ROOT_START[0] + r * (ROOT_START[1] + r * (ROOT_START[2] + r * ROOT_START[3]));
+    let d = determinant.size();
+    let d = T::choose(d.below(number(2.0)), d, number(2.0));
+    let r = number(0.5) * d;
+    let [c0, c1, c2, c3] = ROOT_START;
+    let mut t = number(c0) + r * (number(c1) + r * (number(c2) + r * number(c3)));
     for _ in 0..ROOT_STEPS {
         let square = t * t;
-        t -= (t * (square - 3.0) - d) / (3.0 * square - 3.0);
+        t = t - (t * (square - number(3.0)) - d) / (number(3.0) * square - number(3.0));
     }
     // Adding 0 makes −0 a 0.
-    let root = t.copysign(determinant + 0.0);
+    let root = t.signed(determinant + number(0.0));
     let (xx, yy, zz) = (xx - root, yy - root, zz - root);
     // Columns of the adjugate are multiples of the eigenvector; the longest has the largest
     // diagonal entry.
     let (ax, ay, az) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
     let (axy, axz, ayz) = (xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz);
-    let column = select3(ay >= az, [axy, ay, ayz], [axz, ayz, az]);
-    let column = select3(ax >= select(ay >= az, ay, az), [ax, axy, axz], column);
-    (root, unit_or_nan(column))
+    let z_leads = ay.below(az);
+    let column = choose(z_leads, [axz, ayz, az], [axy, ay, ayz]);
+    let x_leads = !ax.below(T::choose(z_leads, az, ay));
+    (root, unit_or_nan(choose(x_leads, [ax, axy, axz], column)))
 }
 
 /// The smallest eigenvalue, and its unit eigenvector (NaN if both are equal), of `m` in the plane
 /// across `axis`.
 #[inline(always)]
-fn smallest_across(m: &Symmetric, axis: [f64; 3]) -> (f64, [f64; 3]) {
+fn smallest_across<T: Real>(m: &[T; 6], axis: [T; 3]) -> (T, [T; 3]) {
     let (u, v) = across(axis);
     let (mu, mv) = (product(m, u), product(m, v));
     let (a, b, d) = (dot(u, mu), dot(u, mv), dot(v, mv));
-    let half = 0.5 * (a - d);
-    let radius = (half * half + b * b).sqrt();
-    let x = select(half >= 0.0, -b, radius - half);
-    let y = select(half >= 0.0, half + radius, -b);
+    let (zero, half) = (a.of(0.0), a.of(0.5));
+    let apart = half * (a - d);
+    let radius = (apart * apart + b * b).root();
+    let negative = apart.below(zero);
+    let x = T::choose(negative, radius - apart, zero - b);
+    let y = T::choose(negative, zero - b, apart + radius);
     let vector = [x * u[0] + y * v[0], x * u[1] + y * v[1], x * u[2] + y * v[2]];
-    (0.5 * (a + d) - radius, unit_or_nan(vector))
+    (half * (a + d) - radius, unit_or_nan(vector))
 }
 
 /// The vector at length 1; NaN if it is 0.
 #[inline(always)]
-fn unit_or_nan(v: [f64; 3]) -> [f64; 3] {
-    let length = dot(v, v).sqrt();
+pub fn unit_or_nan<T: Real>(v: [T; 3]) -> [T; 3] {
+    let length = dot(v, v).root();
     [v[0] / length, v[1] / length, v[2] / length]
 }
 
@@ -324,16 +333,17 @@ fn unit_or_nan(v: [f64; 3]) -> [f64; 3] {
 /// case but the sign of z (Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6, 2017). Axes
 /// of the coordinate system give axes.
 #[inline(always)]
-pub fn across([x, y, z]: [f64; 3]) -> ([f64; 3], [f64; 3]) {
-    let sign = 1.0f64.copysign(z);
-    let a = -1.0 / (sign + z);
+pub fn across<T: Real>([x, y, z]: [T; 3]) -> ([T; 3], [T; 3]) {
+    let (zero, one) = (z.of(0.0), z.of(1.0));
+    let sign = one.signed(z);
+    let a = z.of(-1.0) / (sign + z);
     let b = x * y * a;
-    ([1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y])
+    ([one + sign * x * x * a, sign * b, zero - sign * x], [b, sign + y * y * a, zero - y])
 }
 
 /// `matrix` times `v`.
 #[inline(always)]
-pub fn product(matrix: &Symmetric, v: [f64; 3]) -> [f64; 3] {
+pub fn product<T: Real>(matrix: &[T; 6], v: [T; 3]) -> [T; 3] {
     let [xx, xy, xz, yy, yz, zz] = *matrix;
     [
         xx * v[0] + xy * v[1] + xz * v[2],
@@ -344,7 +354,7 @@ pub fn product(matrix: &Symmetric, v: [f64; 3]) -> [f64; 3] {
 
 /// The scalar product.
 #[inline(always)]
-pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub fn dot<T: Real>(a: [T; 3], b: [T; 3]) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 

@@ -1,14 +1,15 @@
 //! The star of a point: the Delaunay triangles incident to it in the plane of its neighbourhood,
 //! found as a convex hull. Knows no tiles, no stages.
 
-use super::plane::{across, dot, select, to_f64, unit};
+use super::plane::{across, dot, to_f64, unit};
+use super::simd::Real;
 
 /// Relative size below which a computed quantity counts as 0.
 ///
 /// Projections to the plane are rounded, so exact coincidences (cocircular grid points, neighbours
 /// straight above each other, scan edges that are straight lines) come out as a few 2^-53. They are
 /// taken for what they are up to 2^-40; nothing measured lies between.
-const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
+pub const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
 /// The bits of a key that hold a neighbour's place; those above hold its direction, to 2^-46 of a
 /// turn: nearer ones count as equal.
 const PLACE: u64 = (1 << 18) - 1;
@@ -31,34 +32,35 @@ pub struct Star {
     vertices: Vec<Inverted>,
 }
 
-/// A neighbour in the plane, relative to p.
+/// A neighbour in the plane, relative to p; or several side by side.
 #[derive(Debug, Clone, Copy)]
-pub struct Projected {
+pub struct Projected<T> {
     /// The inverted projection; NaN if the neighbour is straight above or below p.
-    pub x: f64,
+    pub x: T,
     /// Likewise.
-    pub y: f64,
+    pub y: T,
     /// Square of the distance to p in the plane, before the inversion.
-    pub square: f64,
-    /// Grows with the direction, counter-clockwise: 4 to 8, so that its exponent is the same for
-    /// all. No neighbour is at 8 itself, which is the direction of 4.
-    pub direction: f64,
+    pub square: T,
 }
 
-impl Projected {
-    /// Projects a neighbour at `offset` to the plane of the unit vectors `u` and `v`, without a
-    /// branch: loops over neighbours become vector instructions.
+impl<T: Real> Projected<T> {
+    /// Projects a neighbour at `offset` to the plane of the unit vectors `u` and `v`.
     #[inline(always)]
-    pub fn of(offset: [f64; 3], u: [f64; 3], v: [f64; 3]) -> Projected {
+    pub fn of(offset: [T; 3], u: [T; 3], v: [T; 3]) -> Projected<T> {
         let (x, y) = (dot(offset, u), dot(offset, v));
         let square = x * x + y * y;
-        let slope = y / (x.abs() + y.abs());
-        let direction = select(x >= 0.0, 5.0 + slope, 7.0 - slope);
-        let direction = select(direction == 8.0, 4.0, direction);
-        let upright = square <= ROUNDING * ROUNDING * dot(offset, offset);
-        let inverse = select(upright, f64::NAN, 1.0 / square);
-        Projected { x: x * inverse, y: y * inverse, square, direction }
+        let clear = (x.of(ROUNDING * ROUNDING) * dot(offset, offset)).below(square);
+        let inverse = T::choose(clear, x.of(1.0) / square, x.of(f64::NAN));
+        Projected { x: x * inverse, y: y * inverse, square }
     }
+}
+
+/// What grows with the direction of (x, y), counter-clockwise: 4 to 8, so that its exponent is the
+/// same for all. Nothing is at 8 itself, which is the direction of 4.
+fn turn(x: f64, y: f64) -> f64 {
+    let slope = y / (x.abs() + y.abs());
+    let turn = if x >= 0.0 { 5.0 + slope } else { 7.0 - slope };
+    if turn == 8.0 { 4.0 } else { turn }
 }
 
 /// A neighbour, projected and inverted.
@@ -100,29 +102,6 @@ impl Star {
         self.mean_normal(normal, closed, |rank| offsets[rank as usize], exact_cross)
     }
 
-    /// Takes neighbours that have been projected with [`Projected::of`] and sorted by direction, for
-    /// [`normal_inside`](Self::normal_inside).
-    pub fn place(&mut self, sorted: impl ExactSizeIterator<Item = Inverted>) {
-        self.points.clear();
-        self.points.extend(sorted);
-    }
-
-    /// What [`normal`](Self::normal) returns for the neighbours last placed, if p is inside of their
-    /// polygon and no two are in one direction, else None. `nearest` is the place of the nearest one,
-    /// if known. `offset` gives offsets by rank; none is larger than 2^26.
-    pub fn normal_inside(
-        &mut self,
-        nearest: Option<usize>,
-        normal: [f64; 3],
-        offset: impl Fn(u32) -> [f64; 3],
-    ) -> Option<Option<[f64; 3]>> {
-        if !self.turns_left_throughout() {
-            return None;
-        }
-        self.hull(Some(nearest.unwrap_or_else(|| self.nearest())));
-        Some(self.mean_normal(normal, true, offset, cross))
-    }
-
     /// Projects and inverts all neighbours that are not straight above or below p.
     fn project(&mut self, offsets: &[[i64; 3]], normal: [f64; 3]) {
         let (u, v) = across(normal);
@@ -132,7 +111,7 @@ impl Star {
             let at = Projected::of(offset.map(|c| c as f64), u, v);
             if !at.x.is_nan() {
                 let place = self.projected.len() as u64;
-                self.keys.push(at.direction.to_bits() << 12 & !PLACE | place);
+                self.keys.push(turn(at.x, at.y).to_bits() << 12 & !PLACE | place);
                 self.projected.push(Inverted::new(at.x, at.y, rank));
             }
         }
@@ -265,9 +244,8 @@ fn left_turn(a: &Inverted, b: &Inverted, c: &Inverted) -> bool {
 
 /// The vector product.
 #[inline(always)]
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    let minor = |i: usize, j: usize| a[i] * b[j] - a[j] * b[i];
-    [minor(1, 2), minor(2, 0), minor(0, 1)]
+pub fn cross<T: Real>(a: [T; 3], b: [T; 3]) -> [T; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// The vector product of two offsets, each component rounded once.

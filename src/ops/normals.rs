@@ -1,20 +1,22 @@
 //! Surface normals from the nearest neighbours of every position: the first step of the reduction.
 
 mod bundle;
+mod fan;
 mod orient;
 
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::geom::angle::is_known;
 use crate::geom::plane::{self, Covariance};
+use crate::geom::simd::Simd;
 use crate::geom::star::Star;
-use crate::point::names;
+use crate::point::{Position, names};
 use crate::report::Tally;
 use crate::stage::{Needs, ScanFacts, TileOp};
-use crate::tile::Tile;
+use crate::tile::{Neighborhood, Tile};
 use crate::{Error, Result};
 
-use bundle::Bundle;
+use bundle::{Bundle, in_morton_order, rounded, shift};
 pub use orient::Orient;
 use orient::Side;
 
@@ -112,7 +114,7 @@ impl TileOp for Normals {
                 return Err(Error::internal("normals ran before their viewpoint was settled"));
             }
         };
-        let mut estimator = Estimator::new(self.method);
+        let mut estimator = Estimator::with(self.method, tile.simd());
         let mut normals = std::mem::take(&mut tile.normals);
         let copies = std::mem::take(&mut tile.copies);
         let core = tile.core.clone();
@@ -129,8 +131,8 @@ impl TileOp for Normals {
                 None => {}
             }
         };
-        let outcome = tile.each_neighborhood(self.neighbors, |i, offsets| {
-            estimator.take(i, offsets, &mut settle);
+        let outcome = tile.each_neighborhood(self.neighbors, |i, neighborhood| {
+            estimator.take(i, neighborhood, &mut settle);
         });
         estimator.finish(&mut settle);
         (tile.normals, tile.copies) = (normals, copies);
@@ -197,14 +199,21 @@ pub type Outcome = (Estimate, Option<Fallback>);
 #[derive(Debug, Default)]
 pub struct Estimator {
     method: Method,
+    simd: Simd,
     star: Star,
     bundle: Bundle,
+    rounded: Vec<[i64; 3]>,
 }
 
 impl Estimator {
-    /// An estimator by `method`.
+    /// An estimator by `method`, computing by the best instruction set of the processor.
     pub fn new(method: Method) -> Self {
         Estimator { method, ..Estimator::default() }
+    }
+
+    /// The same by the given instruction set; all give the same normals.
+    pub fn with(method: Method, simd: Simd) -> Self {
+        Estimator { method, simd, ..Estimator::default() }
     }
 
     /// The normal at a position whose neighbours are at `offsets` from it, in lattice steps: none of
@@ -212,7 +221,14 @@ impl Estimator {
     ///
     /// The result is a function of `offsets` alone, the same bits on every platform.
     pub fn estimate(&mut self, offsets: &[[i64; 3]]) -> Outcome {
-        alone(self.method, &mut self.star, offsets)
+        match shift(offsets) {
+            None | Some(0) => alone(self.method, &mut self.star, offsets),
+            Some(shift) => {
+                self.rounded.clear();
+                self.rounded.extend(offsets.iter().map(|&offset| rounded(offset, shift)));
+                alone(self.method, &mut self.star, &self.rounded)
+            }
+        }
     }
 
     /// Takes the neighbourhood of `owner` to [`estimate`](Self::estimate) it with others, which is
@@ -220,11 +236,13 @@ impl Estimator {
     pub fn take(
         &mut self,
         owner: usize,
-        offsets: &[[i64; 3]],
+        neighborhood: &Neighborhood<'_>,
         settle: &mut impl FnMut(usize, Outcome),
     ) {
-        if !self.bundle.take(owner, offsets) {
-            settle(owner, self.estimate(offsets));
+        if !self.bundle.take(owner, neighborhood) {
+            let offsets: Vec<Position> = neighborhood.offsets().collect();
+            let offsets = in_morton_order(&offsets, neighborhood.ranks());
+            settle(owner, self.estimate(&offsets));
         } else if self.bundle.is_full() {
             self.finish(settle);
         }
@@ -232,7 +250,7 @@ impl Estimator {
 
     /// Calls `settle` for what was taken and is not settled yet.
     pub fn finish(&mut self, settle: &mut impl FnMut(usize, Outcome)) {
-        self.bundle.estimate(self.method, &mut self.star, settle);
+        self.bundle.estimate(self.method, self.simd, &mut self.star, settle);
     }
 }
 
@@ -269,9 +287,17 @@ mod tests {
 
     /// Noisy surfaces, grids full of ties and cocircular points, lines, walls, far points; most with
     /// equally many neighbours.
-    fn neighborhoods() -> impl Strategy<Value = Vec<Vec<[i64; 3]>>> {
+    ///
+    /// Each is in Morton order, with the places of its neighbours in another order.
+    fn neighborhoods() -> impl Strategy<Value = Vec<(Vec<[i64; 3]>, Vec<u32>)>> {
         let count = prop::sample::select(vec![1usize, 2, 3, 8, 10, 10, 10, 16, 64, 66]);
-        count.prop_flat_map(|count| prop::collection::vec(neighborhood(count), 1..40))
+        let shuffled = |count| {
+            neighborhood(count).prop_flat_map(|offsets| {
+                let ranks: Vec<u32> = (0..offsets.len() as u32).collect();
+                (Just(offsets), Just(ranks).prop_shuffle())
+            })
+        };
+        count.prop_flat_map(move |count| prop::collection::vec(shuffled(count), 1..40))
     }
 
     fn neighborhood(count: usize) -> impl Strategy<Value = Vec<[i64; 3]>> {
@@ -296,15 +322,21 @@ mod tests {
             neighborhoods in neighborhoods(), pca: bool,
         ) {
             let method = if pca { Method::Pca } else { Method::Varady };
-            let mut estimator = Estimator::new(method);
-            let mut together = vec![None; neighborhoods.len()];
-            let mut settle = |i: usize, outcome| together[i] = Some(outcome);
-            for (i, offsets) in neighborhoods.iter().enumerate() {
-                estimator.take(i, offsets, &mut settle);
-            }
-            estimator.finish(&mut settle);
-            for (offsets, together) in neighborhoods.iter().zip(together) {
-                prop_assert_eq!(Some(estimator.estimate(offsets)), together, "{:?}", offsets);
+            for simd in Simd::all() {
+                let mut estimator = Estimator::with(method, simd);
+                let mut together = vec![None; neighborhoods.len()];
+                let mut settle = |i: usize, outcome| together[i] = Some(outcome);
+                for (i, (offsets, ranks)) in neighborhoods.iter().enumerate() {
+                    let shuffled: Vec<Position> =
+                        ranks.iter().map(|&rank| offsets[rank as usize]).collect();
+                    let neighborhood = Neighborhood::of_offsets(&shuffled, ranks);
+                    estimator.take(i, &neighborhood, &mut settle);
+                }
+                estimator.finish(&mut settle);
+                for ((offsets, _), together) in neighborhoods.iter().zip(together) {
+                    let alone = estimator.estimate(offsets);
+                    prop_assert_eq!(Some(alone), together, "{:?} by {:?}", offsets, simd);
+                }
             }
         }
     }

@@ -233,8 +233,10 @@ impl<'a> Worker<'a> {
             // Half for the zone, half for the rim, as where memory decides.
             loader.limit_rim(points.saturating_mul(2));
         }
+        let tile = loader.tile().0;
+        tile.compute_by(job.simd);
         if neighbors > 0 {
-            loader.tile().0.around.reserve(capacity);
+            tile.around.reserve(capacity);
         }
         // Once, in the first pass.
         let rounds = field.lattice.rounds() && sieve.states.is_none();

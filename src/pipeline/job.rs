@@ -9,6 +9,7 @@ use super::passes::{Pass, StageOp};
 use super::tagger::{ClassOf, Tagger};
 use crate::budget::Budget;
 use crate::geom::lattice::Misplaced;
+use crate::geom::simd::Simd;
 use crate::point::PointBatch;
 use crate::report::Tally;
 use crate::stage::{Part, Source, Transform};
@@ -28,6 +29,7 @@ pub(super) struct Job<'a> {
     pub classes: ClassOf,
     pub budget: Budget,
     pub threads: usize,
+    pub simd: Simd,
     pub drop_nonfinite: bool,
     pub tile_points: Option<usize>,
     pub run_records: Option<usize>,

@@ -12,6 +12,7 @@ use super::tagger::Tagger;
 use super::text::{Pipeline, PlacedStage, resolved};
 use crate::budget::default_limit;
 use crate::geom::lattice::Lattice;
+use crate::geom::simd::Simd;
 use crate::point::Schema;
 use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Role, Source, Transform};
 use crate::tile::TAGGED_INPUTS;
@@ -21,6 +22,7 @@ use crate::{Error, ErrorKind, Result};
 pub struct Plan {
     pub(super) settings: RunSettings,
     pub(super) threads: usize,
+    pub(super) simd: Simd,
     pub(super) source: Box<dyn Source>,
     pub(super) source_kind: String,
     pub(super) transforms: Vec<(String, Box<dyn Transform>)>,
@@ -94,6 +96,7 @@ impl Pipeline {
             true => Some(Lattice::stretched(schema, settings.lattice, z_scale)?),
             false => None,
         };
+        let simd = settings.simd.resolve().map_err(in_file)?;
         let threads = match settings.threads {
             Some(threads) => threads.get(),
             None => std::thread::available_parallelism().map_or(1, usize::from),
@@ -112,6 +115,7 @@ impl Pipeline {
         demands.divide()?;
         Ok(Plan {
             settings,
+            simd,
             threads,
             source,
             source_kind,

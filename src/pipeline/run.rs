@@ -185,6 +185,7 @@ impl Plan {
             classes: ClassOf::new(self.source.schema()),
             budget: budget.clone(),
             threads: self.threads,
+            simd: self.simd,
             drop_nonfinite: self.settings.nonfinite == Nonfinite::Drop,
             tile_points,
             run_records: tile_points.map(|n| n.saturating_mul(4).min(shares.run_records)),

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Deserializer, de};
 
+use crate::geom::simd::{self, Level};
 use crate::point::{Mismatch, Units};
-use crate::{Error, ErrorKind};
+use crate::{Error, ErrorKind, Result};
 
 /// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`
 /// and `withheld` changes what is computed. All are optional; arguments of the same name take their
@@ -108,8 +109,32 @@ pub enum Simd {
     /// The fastest that the processor has.
     #[default]
     Auto,
+    /// 256-bit vectors of x86-64; the run is refused where the processor has none.
+    Avx2,
+    /// 512-bit vectors of x86-64, likewise.
+    Avx512,
     /// The one that every processor has.
     Portable,
+}
+
+impl Simd {
+    /// What kernels are to run by.
+    ///
+    /// # Errors
+    ///
+    /// If this processor does not have it.
+    pub(super) fn resolve(self) -> Result<simd::Simd> {
+        let level = match self {
+            Simd::Auto => return Ok(simd::Simd::best()),
+            Simd::Avx2 => Level::Avx2,
+            Simd::Avx512 => Level::Avx512,
+            Simd::Portable => Level::Portable,
+        };
+        simd::Simd::of(level).ok_or_else(|| {
+            Error::pipeline(format!("this processor has no {}", level.name()))
+                .help("leave `simd` under [run] out: the fastest that is there is taken")
+        })
+    }
 }
 
 /// What a command line or a program puts in the place of `[run]` settings.

@@ -9,8 +9,8 @@ use super::sealed::SealedTiles;
 use super::sieve::Sieve;
 use super::{Bounds, Position, Tile, chosen};
 use crate::Result;
-use crate::geom::few::{FEW, places};
 use crate::geom::nearest::Nearest;
+use crate::geom::simd::Simd;
 use crate::point::distance2;
 
 /// The search of a tile, and how to look beyond it.
@@ -20,8 +20,9 @@ pub struct Around {
     remote: Remote,
     /// None if the tile is all there is.
     beyond: Option<Beyond>,
+    /// What was found beyond, and the ranks in Morton order.
+    far: Vec<Position>,
     ranks: Vec<u32>,
-    offsets: Vec<Position>,
     /// Neighbourhoods that what was loaded could not prove, since the last [`Around::take_unproven`].
     unproven: u64,
     /// Neighbourhoods whose two farthest are equally far, likewise.
@@ -86,21 +87,31 @@ impl Around {
 }
 
 impl Tile {
+    /// Sets the instruction set that the tile's neighbours are searched by, and that its stages are
+    /// to compute by: that of the processor's best if nothing else is set. Drops what was reserved.
+    pub fn compute_by(&mut self, simd: Simd) {
+        self.around.search = Nearest::with(simd);
+    }
+
+    /// The instruction set that stages are to compute by.
+    pub fn simd(&self) -> Simd {
+        self.around.search.simd()
+    }
+
     pub(super) fn surround(&mut self, tiles: &Arc<SealedTiles>, sieve: &Sieve, loaded: Bounds) {
         self.around.beyond = Beyond::new(tiles, sieve, loaded);
     }
 
-    /// Calls `visit` for every chosen position of the zone with its index in the tile and the offsets,
-    /// in Morton order of the positions they lead to, of the `k` nearest *other* positions of the
-    /// whole scan: nearest by exact squared distance, ties by Morton order. Fewer only if the scan
-    /// has fewer.
+    /// Calls `visit` for every chosen position of the zone with its index in the tile and the `k`
+    /// nearest *other* positions of the whole scan: nearest by exact squared distance, ties by Morton
+    /// order. Fewer only if the scan has fewer.
     pub fn each_neighborhood(
         &mut self,
         k: usize,
-        mut visit: impl FnMut(usize, &[Position]),
+        mut visit: impl FnMut(usize, &Neighborhood<'_>),
     ) -> Result<()> {
         let Tile { positions, zone, around, selections, limits, .. } = self;
-        let Around { search, remote, beyond, ranks, offsets, unproven, tied } = around;
+        let Around { search, remote, beyond, far, ranks, unproven, tied } = around;
         let mut outcome = Ok(());
         search.build(positions);
         search.search(
@@ -113,58 +124,77 @@ impl Tile {
                 }
                 let p = positions[i];
                 let enough = neighbors.len() == k;
-                match beyond {
-                    Some(beyond) if !(enough && beyond.proves(p, d2)) => {
-                        *unproven += 1;
-                        offsets.clear();
-                        match remote.nearest(
-                            (&beyond.tiles, &beyond.sieve),
-                            p,
-                            k,
-                            enough.then_some(d2),
-                        ) {
-                            Ok(found) => offsets.extend(found),
-                            Err(error) => return outcome = Err(error),
-                        }
-                        offsets.sort_unstable_by(morton_cmp);
-                        offsets.iter_mut().for_each(|q| *q = offset(p, *q));
+                if let Some(beyond) = beyond
+                    && !(enough && beyond.proves(p, d2))
+                {
+                    *unproven += 1;
+                    far.clear();
+                    let scan = (&*beyond.tiles, &beyond.sieve);
+                    match remote.nearest(scan, p, k, enough.then_some(d2)) {
+                        Ok(found) => far.extend(found),
+                        Err(error) => return outcome = Err(error),
                     }
-                    _ => {
-                        if let [.., before, _] = *neighbors {
-                            *tied += u64::from(distance2(p, positions[before as usize]) == d2);
-                        }
-                        in_morton_order(p, neighbors, positions, ranks, offsets);
-                    }
+                    rank(far, ranks);
+                    return visit(i, &Neighborhood { p, positions: Positions::Each(far), ranks });
                 }
-                visit(i, offsets);
+                if let [.., before, _] = *neighbors {
+                    *tied += u64::from(distance2(p, positions[before as usize]) == d2);
+                }
+                let positions = Positions::OfTile(positions);
+                visit(i, &Neighborhood { p, positions, ranks: neighbors });
             },
         );
         outcome
     }
 }
 
-/// The offsets from `p` of neighbours given by rank. `ranks` is memory to work in.
-fn in_morton_order(
+/// The nearest other positions of a position, nearest first, of equally near ones the Morton-first.
+#[derive(Debug, Clone, Copy)]
+pub struct Neighborhood<'a> {
     p: Position,
-    neighbors: &[u32],
-    positions: &[Position],
-    ranks: &mut Vec<u32>,
-    offsets: &mut Vec<Position>,
-) {
-    if neighbors.len() <= FEW {
-        offsets.resize(neighbors.len(), p);
-        for (&rank, place) in neighbors.iter().zip(places(neighbors)) {
-            offsets[place as usize] = offset(p, positions[rank as usize]);
-        }
-        return;
-    }
-    ranks.clear();
-    ranks.extend_from_slice(neighbors);
-    ranks.sort_unstable();
-    offsets.clear();
-    offsets.extend(ranks.iter().map(|&rank| offset(p, positions[rank as usize])));
+    positions: Positions<'a>,
+    /// For each neighbour a number that grows in Morton order.
+    ranks: &'a [u32],
 }
 
-fn offset(p: Position, q: Position) -> Position {
-    std::array::from_fn(|axis| q[axis] - p[axis])
+/// Where the neighbours' positions are.
+#[derive(Debug, Clone, Copy)]
+enum Positions<'a> {
+    /// Among those of a tile, at their ranks.
+    OfTile(&'a [Position]),
+    /// Here, in the neighbours' order.
+    Each(&'a [Position]),
+}
+
+impl<'a> Neighborhood<'a> {
+    /// The neighbourhood of a position whose neighbours are at `offsets`, smaller than 2^62, in
+    /// order; `ranks` grow in Morton order.
+    pub fn of_offsets(offsets: &'a [Position], ranks: &'a [u32]) -> Self {
+        Neighborhood { p: [0; 3], positions: Positions::Each(offsets), ranks }
+    }
+
+    /// For each neighbour a number that grows in Morton order.
+    pub fn ranks(&self) -> &'a [u32] {
+        self.ranks
+    }
+
+    /// The offsets of the neighbours from the position, in lattice steps.
+    #[inline(always)]
+    pub fn offsets(&self) -> impl ExactSizeIterator<Item = Position> + '_ {
+        self.ranks.iter().enumerate().map(|(i, &rank)| {
+            let q = match self.positions {
+                Positions::OfTile(positions) => positions[rank as usize],
+                Positions::Each(positions) => positions[i],
+            };
+            [q[0] - self.p[0], q[1] - self.p[1], q[2] - self.p[2]]
+        })
+    }
+}
+
+/// The numbers of the positions in Morton order.
+fn rank(positions: &[Position], ranks: &mut Vec<u32>) {
+    let before =
+        |p: &Position| positions.iter().filter(|q| morton_cmp(q, p).is_lt()).count() as u32;
+    ranks.clear();
+    ranks.extend(positions.iter().map(before));
 }

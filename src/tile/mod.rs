@@ -14,7 +14,7 @@ mod sealed;
 mod sieve;
 mod spill;
 
-pub use around::Around;
+pub use around::{Around, Neighborhood};
 pub use block::Block;
 pub use cutting::CutError;
 pub use intake::{Intake, TileStore};

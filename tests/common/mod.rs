@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pointmill::geom::lattice::Lattice;
+use pointmill::geom::simd::Simd;
 use pointmill::io::las::{self, LasOptions};
 use pointmill::io::ply::{self, PlyOptions};
 use pointmill::io::synthetic::{Scene, Synthetic};
@@ -263,6 +264,11 @@ pub struct Settings {
     pub threads: usize,
     pub spill: &'static str,
     pub simd: &'static str,
+}
+
+/// What `simd` under `[run]` can be on this processor.
+pub fn instruction_sets() -> Vec<&'static str> {
+    Simd::all().map(|simd| simd.level().name()).collect()
 }
 
 impl Settings {

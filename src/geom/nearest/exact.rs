@@ -1,8 +1,9 @@
 //! The search of one point in integers alone: slower, and right whatever floats could not tell.
 
-use super::kernel::{at_most, box_distances};
+use super::kernel::{Boxes, at_most};
 use super::tree::{Tree, above, below};
 use super::walk::{WIDENED, Work, lanes, nearest};
+use crate::geom::simd::Simd;
 use crate::point::{Position, distance2};
 
 /// A neighbour by exact squared distance, then rank: ordered like that.
@@ -10,6 +11,7 @@ pub(super) type Neighbor = (u128, u32);
 
 /// One point on its way through the tree, from the root.
 pub(super) struct ExactWalk<'a> {
+    simd: Simd,
     tree: &'a Tree,
     positions: &'a [Position],
     work: &'a mut Work,
@@ -29,6 +31,7 @@ impl<'a> ExactWalk<'a> {
     /// The search of `query` for `k` neighbours, of which none is beyond the last of `candidates`;
     /// the answer takes their place.
     pub fn new(
+        simd: Simd,
         tree: &'a Tree,
         positions: &'a [Position],
         work: &'a mut Work,
@@ -39,7 +42,7 @@ impl<'a> ExactWalk<'a> {
         let k = candidates.len();
         candidates.clear();
         let reach = reach(limit.0);
-        ExactWalk { tree, positions, work, query, k, limit, reach, found: candidates }
+        ExactWalk { simd, tree, positions, work, query, k, limit, reach, found: candidates }
     }
 
     /// Finds the `k` nearest others.
@@ -57,7 +60,7 @@ impl<'a> ExactWalk<'a> {
         let from = |i: usize| at[i].wrapping_sub(node.origin[i]);
         let lo = std::array::from_fn(|i| below(from(i).saturating_sub(node.error)));
         let hi = std::array::from_fn(|i| above(from(i).saturating_add(node.error)));
-        let distances = box_distances(&node.lo, &node.hi, lo, hi);
+        let distances = self.simd.run(Boxes { node, lo, hi });
         let mut left = lanes(node.children, None) & at_most(&distances, self.reach);
         while let Some(child) = nearest(&distances, left, self.reach) {
             left &= !(1 << child);

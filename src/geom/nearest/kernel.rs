@@ -1,14 +1,11 @@
-//! The arithmetic of the search, 16 lanes at a time, in plain loops that compilers turn into vector
-//! instructions. A kernel for another instruction set replaces [`box_distances`], [`meet`] and the
-//! inserts over the same layout; with the same operations in the same order (no fused multiply-add)
-//! it finds the same keys.
+//! The arithmetic of the search, 16 lanes at a time.
 //!
 //! Squared distances are ((dx·dx) + dy·dy) + dz·dz everywhere, boxes included: rounding is
 //! monotonic, so no point of a box gets a smaller float than its box does.
 
-#![allow(clippy::needless_range_loop, reason = "one index walks several arrays of lanes")]
-
-use super::tree::{LANES, Leaf};
+use super::tree::{LANES, Leaf, Node};
+use crate::geom::rows::{self, Row};
+use crate::geom::simd::{Kernel, Lanes, joined, smaller};
 
 /// What is farther than any point: no candidate yet.
 pub(super) const NONE: f64 = f64::from_bits((f32::MAX.to_bits() as u64) << 32 | u32::MAX as u64);
@@ -16,46 +13,25 @@ pub(super) const NONE: f64 = f64::from_bits((f32::MAX.to_bits() as u64) << 32 | 
 /// 16 points that search together.
 #[derive(Debug)]
 pub(super) struct Batch {
-    /// The points in the frame of the node being visited.
-    pub at: [[f32; LANES]; 3],
     /// Squared distance of each point's last kept candidate: what is farther is of no use. −1 in
     /// lanes that do not search.
     pub bound: [f32; LANES],
     /// Rank of that candidate: of what is equally far, only smaller ranks are of use.
     pub bound_rank: [u32; LANES],
+    /// The largest bound.
+    pub farthest: f32,
     /// The best keys of each point in ascending order, `width` a point.
-    pub best: Vec<f64>,
-    pub width: usize,
+    best: Vec<f64>,
+    width: usize,
     /// How many candidates are kept, at most `width`.
     pub kept: usize,
-    insert: Insert,
 }
 
-/// Merges the candidates of the lanes in a mask into an ascending list.
-type Insert = fn(best: &mut [f64], distances: &[f32; LANES], ranks: &[u32; LANES], hits: u32);
-
-/// The width of lists of `most` candidates, and how to insert there.
-fn shape(most: usize) -> (usize, Insert) {
-    match most {
-        0..=4 => (4, insert::<4>),
-        5..=8 => (8, insert::<8>),
-        9..=12 => (12, insert::<12>),
-        13..=16 => (16, insert::<16>),
-        17..=20 => (20, insert::<20>),
-        21..=24 => (24, insert::<24>),
-        25..=32 => (32, insert::<32>),
-        33..=48 => (48, insert::<48>),
-        49..=72 => (72, insert::<72>),
-        _ => (most, insert_any),
-    }
-}
-
-/// A candidate as a number that sorts by distance, then rank: the float's bits above the rank's.
-/// Positive floats sort like their bits, so the 64 bits can be compared as an f64, for which vector
-/// minimum and maximum exist everywhere.
-#[inline(always)]
-fn key(distance: f32, rank: u32) -> f64 {
-    f64::from_bits(u64::from(distance.to_bits()) << 32 | u64::from(rank))
+/// The width of lists of `most` candidates: one of those that [`insert`] is made for, if there is
+/// one.
+fn width(most: usize) -> usize {
+    let widths = [4, 8, 12, 16, 20, 24, 32, 48, 72];
+    widths.into_iter().find(|&width| most <= width).unwrap_or(most)
 }
 
 /// Squared distance of a key.
@@ -70,32 +46,21 @@ pub(super) fn rank_of(key: f64) -> u32 {
     key.to_bits() as u32
 }
 
-#[inline(always)]
-fn larger<T: PartialOrd>(a: T, b: T) -> T {
-    if a > b { a } else { b }
-}
-
-#[inline(always)]
-fn smaller<T: PartialOrd>(a: T, b: T) -> T {
-    if a < b { a } else { b }
-}
-
 impl Batch {
     pub fn new() -> Batch {
         Batch {
-            at: [[0.0; LANES]; 3],
             bound: [-1.0; LANES],
             bound_rank: [0; LANES],
+            farthest: -1.0,
             best: Vec::new(),
             width: 0,
             kept: 0,
-            insert: insert_any,
         }
     }
 
     /// Makes room for `most` candidates a point.
     pub fn fit(&mut self, most: usize) {
-        (self.width, self.insert) = shape(most);
+        self.width = width(most);
         self.best.clear();
         self.best.reserve_exact(self.width * LANES);
         self.best.resize(self.width * LANES, NONE);
@@ -103,30 +68,7 @@ impl Batch {
 
     /// Bytes of the lists for `most` candidates a point.
     pub fn bytes(most: usize) -> usize {
-        shape(most).0 * LANES * size_of::<f64>()
-    }
-
-    /// Forgets all candidates; the lanes of `wanted` search for `kept`.
-    pub fn start(&mut self, wanted: u32, kept: usize) {
-        self.best.fill(NONE);
-        self.kept = kept;
-        for lane in 0..LANES {
-            self.bound[lane] = if wanted >> lane & 1 == 1 { f32::MAX } else { -1.0 };
-            self.bound_rank[lane] = u32::MAX;
-        }
-    }
-
-    /// The largest bound of the batch.
-    #[inline(always)]
-    pub fn farthest(&self) -> f32 {
-        // Halves against halves: a plain fold would wait for every comparison.
-        let mut all = self.bound;
-        for half in [8, 4, 2, 1] {
-            for i in 0..half {
-                all[i] = larger(all[i], all[i + half]);
-            }
-        }
-        all[0]
+        width(most) * LANES * size_of::<f64>()
     }
 
     /// The best keys of a lane.
@@ -135,143 +77,272 @@ impl Batch {
         &self.best[lane * self.width..(lane + 1) * self.width]
     }
 
+    /// Notes what the last kept candidate of a lane is.
     #[inline(always)]
-    fn offer(&mut self, lane: usize, distances: &[f32; LANES], ranks: &[u32; LANES], hits: u32) {
-        let list = &mut self.best[lane * self.width..(lane + 1) * self.width];
-        (self.insert)(list, distances, ranks, hits);
-        let last = list[self.kept - 1];
+    fn bind(&mut self, lane: usize) {
+        let last = self.best[lane * self.width + self.kept - 1];
         self.bound[lane] = distance_of(last);
         self.bound_rank[lane] = rank_of(last);
     }
+}
 
-    /// The points' own leaf: everyone but oneself is a candidate.
-    pub fn meet_home(&mut self, leaf: &Leaf) {
+/// The points of a leaf meet each other: a new search begins with the nearest of them.
+pub(super) struct Home<'a> {
+    pub batch: &'a mut Batch,
+    pub leaf: &'a Leaf,
+    /// The lanes that search.
+    pub wanted: u32,
+    /// How many candidates they keep.
+    pub kept: usize,
+}
+
+impl Kernel for Home<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let Home { batch, leaf, wanted, kept } = self;
+        batch.kept = kept;
+        let mut rows = [[NONE; LANES]; LANES];
+        let at = load(lanes, &leaf.at);
+        for (other, row) in rows.iter_mut().enumerate() {
+            let distances = lanes.store(squared(lanes, at, leaf.point(other)));
+            *row = keys(&distances, leaf.rank[other]);
+            row[other] = NONE;
+        }
+        rows::sort(&mut rows);
+        let width = batch.width;
+        for (lane, list) in batch.best.chunks_exact_mut(width).enumerate() {
+            let (near, rest) = list.split_at_mut(width.min(LANES));
+            near.iter_mut().zip(&rows).for_each(|(key, row)| *key = row[lane]);
+            rest.fill(NONE);
+        }
         for lane in 0..LANES {
-            if self.bound[lane] < 0.0 {
-                continue;
-            }
-            let distances = distances(leaf, self.point(lane));
-            let hits = at_most(&distances, f32::MAX) & !(1 << lane);
-            self.offer(lane, &distances, &leaf.rank, hits);
-        }
-    }
-
-    /// Another leaf in the same frame, its box and its smallest rank. True if a bound has sunk.
-    pub fn meet(&mut self, leaf: &Leaf, lo: [f32; 3], hi: [f32; 3], first: u32) -> bool {
-        let mut near = self.lanes_near(lo, hi, first);
-        let mut found = false;
-        while near != 0 {
-            let lane = near.trailing_zeros() as usize & (LANES - 1);
-            near &= near - 1;
-            let distances = distances(leaf, self.point(lane));
-            let hits = at_most(&distances, self.bound[lane]);
-            if hits != 0 {
-                self.offer(lane, &distances, &leaf.rank, hits);
-                found = true;
+            batch.bind(lane);
+            if wanted >> lane & 1 == 0 {
+                batch.bound[lane] = -1.0;
             }
         }
-        found
-    }
-
-    #[inline(always)]
-    fn point(&self, lane: usize) -> [f32; 3] {
-        [self.at[0][lane], self.at[1][lane], self.at[2][lane]]
-    }
-
-    /// The lanes for which a box can hold a better candidate.
-    #[inline(always)]
-    fn lanes_near(&self, lo: [f32; 3], hi: [f32; 3], first: u32) -> u32 {
-        let mut sum = [0.0; LANES];
-        for axis in 0..3 {
-            for i in 0..LANES {
-                let q = self.at[axis][i];
-                let gap = larger(larger(lo[axis] - q, q - hi[axis]), 0.0);
-                sum[i] += gap * gap;
-            }
-        }
-        let mut mask = 0;
-        for i in 0..LANES {
-            let nearer = sum[i] < self.bound[i];
-            let tied = sum[i] == self.bound[i] && first < self.bound_rank[i];
-            mask |= u32::from(nearer | tied) << i;
-        }
-        mask
+        batch.farthest = lanes.largest(lanes.load(&batch.bound));
     }
 }
 
-/// Squared distances of the points of a leaf to `q`.
+/// The keys of one point as a candidate of others; whoever is infinitely far is none.
 #[inline(always)]
-fn distances(leaf: &Leaf, q: [f32; 3]) -> [f32; LANES] {
-    let mut sum = [0.0; LANES];
-    for axis in 0..3 {
-        for i in 0..LANES {
-            let d = leaf.at[axis][i] - q[axis];
-            sum[i] += d * d;
+fn keys(distances: &[f32; LANES], rank: u32) -> Row {
+    let mut keys = [0.0; LANES];
+    for (key, &distance) in keys.iter_mut().zip(distances) {
+        *key = smaller(joined(distance, rank), NONE);
+    }
+    keys
+}
+
+/// The points of a leaf meet the leaves of a run, nearest first.
+pub(super) struct Visit<'a> {
+    pub batch: &'a mut Batch,
+    pub node: &'a Node,
+    /// The children of the node.
+    pub leaves: &'a [Leaf],
+    /// Those to be met, a bit each.
+    pub left: u32,
+    /// The points, and a box around them, in the frame of their own node.
+    pub points: &'a [[f32; LANES]; 3],
+    pub lo: [f32; 3],
+    pub hi: [f32; 3],
+    /// From that frame to the node's.
+    pub shift: [f32; 3],
+}
+
+impl Kernel for Visit<'_> {
+    /// How many leaves were met.
+    type Output = u64;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> u64 {
+        let Visit { batch, node, leaves, mut left, points, lo, hi, shift } = self;
+        // The same sums as the points' own, and monotonic: a box around the points as stored.
+        let boxes = box_distances(lanes, node, moved(lo, shift), moved(hi, shift));
+        left &= lanes.at_most(boxes, lanes.splat(batch.farthest));
+        if left == 0 {
+            return 0;
+        }
+        let queries = load(lanes, points);
+        let queries = [
+            lanes.add(queries[0], lanes.splat(shift[0])),
+            lanes.add(queries[1], lanes.splat(shift[1])),
+            lanes.add(queries[2], lanes.splat(shift[2])),
+        ];
+        let at = [lanes.store(queries[0]), lanes.store(queries[1]), lanes.store(queries[2])];
+        let order = order(&lanes.store(boxes));
+        let mut met = 0;
+        while left != 0 {
+            let child = lanes.first(&order, left);
+            left &= !(1 << child);
+            met += 1;
+            if meet(
+                lanes,
+                batch,
+                &leaves[child],
+                lanes_near(lanes, batch, queries, node, child),
+                &at,
+            ) {
+                batch.farthest = lanes.largest(lanes.load(&batch.bound));
+                left &= lanes.at_most(boxes, lanes.splat(batch.farthest));
+            }
+        }
+        met
+    }
+}
+
+/// Numbers that sort like distances, to 20 bits of them, and tell their lanes.
+#[inline(always)]
+fn order(distances: &[f32; LANES]) -> [u32; LANES] {
+    let mut keys = [0; LANES];
+    for lane in 0..LANES {
+        keys[lane] = distances[lane].to_bits() & !(LANES as u32 - 1) | lane as u32;
+    }
+    keys
+}
+
+/// The lanes for which a leaf can hold a better candidate.
+#[inline(always)]
+fn lanes_near<L: Lanes>(
+    lanes: L,
+    batch: &Batch,
+    at: [L::F32; 3],
+    node: &Node,
+    child: usize,
+) -> u32 {
+    let x =
+        gap(lanes, lanes.splat(node.lo[0][child]), lanes.splat(node.hi[0][child]), at[0], at[0]);
+    let y =
+        gap(lanes, lanes.splat(node.lo[1][child]), lanes.splat(node.hi[1][child]), at[1], at[1]);
+    let z =
+        gap(lanes, lanes.splat(node.lo[2][child]), lanes.splat(node.hi[2][child]), at[2], at[2]);
+    let distances = norm(lanes, x, y, z);
+    lanes.before(distances, lanes.load(&batch.bound), node.first[child], &batch.bound_rank)
+}
+
+/// The points of the lanes in `near` meet a leaf. True if a bound may have sunk.
+#[inline(always)]
+fn meet<L: Lanes>(
+    lanes: L,
+    batch: &mut Batch,
+    leaf: &Leaf,
+    mut near: u32,
+    at: &[[f32; LANES]; 3],
+) -> bool {
+    let mut found = false;
+    let others = load(lanes, &leaf.at);
+    while near != 0 {
+        let lane = near.trailing_zeros() as usize & (LANES - 1);
+        near &= near - 1;
+        let distances = squared(lanes, others, [at[0][lane], at[1][lane], at[2][lane]]);
+        let hits = lanes.at_most(distances, lanes.splat(batch.bound[lane]));
+        if hits != 0 {
+            let list = &mut batch.best[lane * batch.width..(lane + 1) * batch.width];
+            insert(lanes, list, &lanes.store(distances), &leaf.rank, hits);
+            batch.bind(lane);
+            found = true;
         }
     }
-    sum
+    found
+}
+
+/// Three axes.
+#[inline(always)]
+fn load<L: Lanes>(lanes: L, at: &[[f32; LANES]; 3]) -> [L::F32; 3] {
+    [lanes.load(&at[0]), lanes.load(&at[1]), lanes.load(&at[2])]
+}
+
+#[inline(always)]
+fn moved(v: [f32; 3], shift: [f32; 3]) -> [f32; 3] {
+    [v[0] + shift[0], v[1] + shift[1], v[2] + shift[2]]
+}
+
+/// Squared distances of points to `q`.
+#[inline(always)]
+fn squared<L: Lanes>(lanes: L, at: [L::F32; 3], q: [f32; 3]) -> L::F32 {
+    let x = lanes.sub(at[0], lanes.splat(q[0]));
+    let y = lanes.sub(at[1], lanes.splat(q[1]));
+    let z = lanes.sub(at[2], lanes.splat(q[2]));
+    norm(lanes, x, y, z)
+}
+
+#[inline(always)]
+fn norm<L: Lanes>(lanes: L, x: L::F32, y: L::F32, z: L::F32) -> L::F32 {
+    lanes.add(lanes.add(lanes.mul(x, x), lanes.mul(y, y)), lanes.mul(z, z))
+}
+
+/// How far the intervals `lo..hi` and `from..to` are apart.
+#[inline(always)]
+fn gap<L: Lanes>(lanes: L, lo: L::F32, hi: L::F32, from: L::F32, to: L::F32) -> L::F32 {
+    let gap = lanes.larger(lanes.sub(lo, to), lanes.sub(from, hi));
+    lanes.larger(gap, lanes.splat(0.0))
+}
+
+/// Squared distances between the 16 boxes of a node and the box `lo..hi`.
+#[inline(always)]
+fn box_distances<L: Lanes>(lanes: L, node: &Node, lo: [f32; 3], hi: [f32; 3]) -> L::F32 {
+    let (los, his) = (load(lanes, &node.lo), load(lanes, &node.hi));
+    let x = gap(lanes, los[0], his[0], lanes.splat(lo[0]), lanes.splat(hi[0]));
+    let y = gap(lanes, los[1], his[1], lanes.splat(lo[1]), lanes.splat(hi[1]));
+    let z = gap(lanes, los[2], his[2], lanes.splat(lo[2]), lanes.splat(hi[2]));
+    norm(lanes, x, y, z)
+}
+
+/// Squared distances between the boxes of a node and the box `lo..hi`.
+pub(super) struct Boxes<'a> {
+    pub node: &'a Node,
+    pub lo: [f32; 3],
+    pub hi: [f32; 3],
+}
+
+impl Kernel for Boxes<'_> {
+    type Output = [f32; LANES];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> [f32; LANES] {
+        lanes.store(box_distances(lanes, self.node, self.lo, self.hi))
+    }
 }
 
 /// The lanes not above `bound`.
 #[inline(always)]
 pub(super) fn at_most(distances: &[f32; LANES], bound: f32) -> u32 {
-    let mut mask = 0;
-    for i in 0..LANES {
-        mask |= u32::from(distances[i] <= bound) << i;
-    }
-    mask
+    (0..LANES).fold(0, |mask, i| mask | u32::from(distances[i] <= bound) << i)
 }
 
-/// Squared distances between 16 boxes and the box `lo..hi`.
+/// Merges candidates into a list of one of the widths that lists have.
 #[inline(always)]
-pub(super) fn box_distances(
-    boxes_lo: &[[f32; LANES]; 3],
-    boxes_hi: &[[f32; LANES]; 3],
-    lo: [f32; 3],
-    hi: [f32; 3],
-) -> [f32; LANES] {
-    let mut sum = [0.0; LANES];
-    for axis in 0..3 {
-        for i in 0..LANES {
-            let gap = larger(boxes_lo[axis][i] - hi[axis], lo[axis] - boxes_hi[axis][i]);
-            let gap = larger(gap, 0.0);
-            sum[i] += gap * gap;
-        }
-    }
-    sum
-}
-
-/// [`Insert`] for lists of `WIDTH`: the list stays in registers, and no branch depends on where a
-/// candidate belongs.
-fn insert<const WIDTH: usize>(
-    best: &mut [f64],
+fn insert<L: Lanes>(
+    lanes: L,
+    list: &mut [f64],
     distances: &[f32; LANES],
     ranks: &[u32; LANES],
-    mut hits: u32,
+    hits: u32,
 ) {
-    let Some(list) = best.first_chunk_mut::<WIDTH>() else {
-        return insert_any(best, distances, ranks, hits);
-    };
-    let mut sorted = *list;
-    while hits != 0 {
-        let lane = hits.trailing_zeros() as usize & (LANES - 1);
-        hits &= hits - 1;
-        let candidate = key(distances[lane], ranks[lane]);
-        let before = sorted;
-        sorted[0] = smaller(before[0], candidate);
-        for i in 1..WIDTH {
-            sorted[i] = smaller(before[i], larger(before[i - 1], candidate));
-        }
+    macro_rules! of_width {
+        ($($width:literal)*) => {
+            match list.len() {
+                $($width => {
+                    if let Some(list) = list.first_chunk_mut::<$width>() {
+                        lanes.insert(list, distances, ranks, hits);
+                    }
+                })*
+                _ => insert_any(list, distances, ranks, hits),
+            }
+        };
     }
-    *list = sorted;
+    of_width!(12 4 8 16 20 24 32 48 72)
 }
 
-/// [`Insert`] for lists of any length.
+/// [`Lanes::insert`] for lists of any length.
 fn insert_any(best: &mut [f64], distances: &[f32; LANES], ranks: &[u32; LANES], mut hits: u32) {
     while hits != 0 {
         let lane = hits.trailing_zeros() as usize & (LANES - 1);
         hits &= hits - 1;
-        let candidate = key(distances[lane], ranks[lane]);
+        let candidate = joined(distances[lane], ranks[lane]);
         let place = best.partition_point(|&kept| kept < candidate);
         if place < best.len() {
             best.copy_within(place..best.len() - 1, place + 1);

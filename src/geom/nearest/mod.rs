@@ -31,6 +31,7 @@ use tree::{EXACT, LANES, Node, Tree};
 use walk::Walk;
 pub use walk::Work;
 
+use crate::geom::simd::Simd;
 use crate::point::{Position, distance2};
 
 /// The relative error of the root of a float distance, 2.5 · 2^-24, rounded up.
@@ -52,6 +53,7 @@ const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
 /// ```
 #[derive(Debug)]
 pub struct Nearest {
+    simd: Simd,
     tree: Tree,
     points: usize,
     batch: Batch,
@@ -78,9 +80,15 @@ impl Nearest {
         Tree::bytes(points) + Batch::bytes(k + 1) + k * (size_of::<Neighbor>() + size_of::<u32>())
     }
 
-    /// A search that holds no set yet.
+    /// A search that holds no set yet, by the best instruction set of the processor.
     pub fn new() -> Self {
+        Nearest::with(Simd::best())
+    }
+
+    /// The same by the given one; all give the same answers.
+    pub fn with(simd: Simd) -> Self {
         Nearest {
+            simd,
             tree: Tree::default(),
             points: 0,
             batch: Batch::new(),
@@ -88,6 +96,11 @@ impl Nearest {
             neighbors: Vec::new(),
             work: Work::default(),
         }
+    }
+
+    /// What it searches by.
+    pub fn simd(&self) -> Simd {
+        self.simd
     }
 
     /// Allocates for sets of up to `points`, so that building them allocates nothing more.
@@ -156,8 +169,9 @@ impl Nearest {
             return;
         }
         let one_more = (k + 1).min(positions.len() - 1);
-        self.batch.start(active, if likely_exact(node, child, k) { k } else { one_more });
-        let error = Walk::new(&self.tree, &mut self.batch, &mut self.work, run, child).run();
+        let kept = if likely_exact(node, child, k) { k } else { one_more };
+        let Nearest { simd, tree, batch, work, .. } = self;
+        let error = Walk::new(*simd, tree, batch, work, run, child).run(active, kept);
         for (lane, &rank) in ranks.iter().enumerate().filter(|(lane, _)| active >> lane & 1 == 1) {
             let distance2 = self.settle(positions, k, rank, lane, error);
             visit(rank as usize, &self.neighbors, distance2);
@@ -202,7 +216,15 @@ impl Nearest {
         self.found.sort_unstable();
         if !proven {
             self.work.redone += 1;
-            ExactWalk::new(&self.tree, positions, &mut self.work, query, &mut self.found).run();
+            ExactWalk::new(
+                self.simd,
+                &self.tree,
+                positions,
+                &mut self.work,
+                query,
+                &mut self.found,
+            )
+            .run();
         }
         self.neighbors.clear();
         self.neighbors.extend(self.found.iter().map(|&(_, rank)| rank));

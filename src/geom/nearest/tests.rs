@@ -3,6 +3,7 @@ use std::cmp::Ordering;
 use proptest::prelude::*;
 
 use super::*;
+use crate::geom::simd::Simd;
 
 /// A sequence of pseudo-random numbers (splitmix64).
 struct Random(u64);
@@ -45,7 +46,7 @@ fn brute_force(positions: &[Position], query: usize) -> Vec<Neighbor> {
 }
 
 /// What a comparison with brute force met on its way.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq)]
 struct Met {
     compared: usize,
     /// Points whose k-th and next neighbour are equally far.
@@ -54,9 +55,17 @@ struct Met {
     work: Work,
 }
 
-/// Searches all of `positions` and compares about `sample` of them with brute force.
+/// Searches all of `positions` by every instruction set and compares about `sample` of them with
+/// brute force; all do the same.
 fn compare(positions: &[Position], k: usize, sample: usize) -> Met {
-    let mut nearest = Nearest::new();
+    let mut all = Simd::all().map(|simd| compare_by(simd, positions, k, sample));
+    let portable = all.next().unwrap();
+    all.for_each(|met| assert_eq!(met, portable));
+    portable
+}
+
+fn compare_by(simd: Simd, positions: &[Position], k: usize, sample: usize) -> Met {
+    let mut nearest = Nearest::with(simd);
     nearest.build(positions);
     let every = positions.len().div_ceil(sample).max(1);
     let mut met = Met::default();

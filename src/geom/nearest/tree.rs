@@ -8,7 +8,7 @@ use super::refine::{RUN, Run};
 use crate::point::{Bounds, Position};
 
 /// Points in a leaf, boxes in a node.
-pub(super) const LANES: usize = 16;
+pub(super) const LANES: usize = crate::geom::simd::LANES;
 /// Integers up to here are exact in f32.
 pub(super) const EXACT: i64 = 1 << 24;
 /// Levels of a tree of 2^32 points at most.
@@ -22,6 +22,14 @@ pub(super) struct Leaf {
     pub at: [[f32; LANES]; 3],
     /// Index of each point in the positions.
     pub rank: [u32; LANES],
+}
+
+impl Leaf {
+    /// One of the points.
+    #[inline(always)]
+    pub fn point(&self, lane: usize) -> [f32; 3] {
+        [self.at[0][lane], self.at[1][lane], self.at[2][lane]]
+    }
 }
 
 /// Up to 16 boxes in the node's frame. The children of level 0 are leaves.

@@ -1,8 +1,9 @@
 //! The walk of one leaf's points through the tree: from their own leaf upward, and from every
 //! ancestor down into whatever is near enough to matter.
 
-use super::kernel::{Batch, at_most, box_distances};
+use super::kernel::{Batch, Boxes, Home, Visit, at_most};
 use super::tree::{EXACT, LANES, Tree, above, below};
+use crate::geom::simd::Simd;
 use crate::point::Position;
 
 /// Above level 0, boxes are measured against bounds this much larger. Their distances are those of
@@ -25,6 +26,7 @@ pub struct Work {
 
 /// One leaf's points on their way.
 pub(super) struct Walk<'a> {
+    simd: Simd,
     tree: &'a Tree,
     batch: &'a mut Batch,
     work: &'a mut Work,
@@ -43,8 +45,9 @@ pub(super) struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    /// The points of leaf `child` of the level-0 node `home`; the batch has been started.
+    /// The points of leaf `child` of the level-0 node `home`.
     pub fn new(
+        simd: Simd,
         tree: &'a Tree,
         batch: &'a mut Batch,
         work: &'a mut Work,
@@ -61,15 +64,15 @@ impl<'a> Walk<'a> {
             let stored = node.origin[axis].saturating_add(node.hi[axis][child] as i64);
             stored.saturating_add(node.error)
         });
-        Walk { tree, batch, work, home, child, points, lo, hi, error: 0.0 }
+        Walk { simd, tree, batch, work, home, child, points, lo, hi, error: 0.0 }
     }
 
-    /// Fills the batch with the nearest by float distance, and returns the largest error of a
-    /// coordinate difference, in lattice steps: see [`super`].
-    pub fn run(mut self) -> f64 {
+    /// Fills the batch with the `kept` nearest by float distance of the lanes in `wanted`, and
+    /// returns the largest error of a coordinate difference, in lattice steps: see [`super`].
+    pub fn run(mut self, wanted: u32, kept: usize) -> f64 {
         let first = self.tree.node(0, self.home).first_child as usize;
-        self.batch.at = *self.points;
-        self.batch.meet_home(&self.tree.leaves[first + self.child]);
+        let leaf = &self.tree.leaves[first + self.child];
+        self.simd.run(Home { batch: self.batch, leaf, wanted, kept });
         self.visit_run(self.home, Some(self.child));
         let mut child = self.home;
         for level in 1..self.tree.levels {
@@ -86,7 +89,7 @@ impl<'a> Walk<'a> {
         let node = self.tree.node(level, index);
         let lo = std::array::from_fn(|i| below(self.lo[i].saturating_sub(node.origin[i])));
         let hi = std::array::from_fn(|i| above(self.hi[i].saturating_sub(node.origin[i])));
-        let distances = box_distances(&node.lo, &node.hi, lo, hi);
+        let distances = self.simd.run(Boxes { node, lo, hi });
         let mut left = lanes(node.children, skip) & at_most(&distances, self.reach());
         while let Some(child) = nearest(&distances, left, self.reach()) {
             left &= !(1 << child);
@@ -102,26 +105,22 @@ impl<'a> Walk<'a> {
     /// Visits the leaves of a level-0 node, nearest first, except `skip`.
     fn visit_run(&mut self, index: usize, skip: Option<usize>) {
         self.work.nodes += 1;
-        self.enter(index);
+        self.note_error(index);
         let node = self.tree.node(0, index);
         let own = self.tree.node(0, self.home);
+        let first = node.first_child as usize;
         let shift = self.shift(index);
-        // The same sums as the points' own, and monotonic: a box around the points as stored.
-        let lo = std::array::from_fn(|axis| own.lo[axis][self.child] + shift[axis]);
-        let hi = std::array::from_fn(|axis| own.hi[axis][self.child] + shift[axis]);
-        let distances = box_distances(&node.lo, &node.hi, lo, hi);
-        let mut farthest = self.batch.farthest();
-        let mut left = lanes(node.children, skip) & at_most(&distances, farthest);
-        while let Some(child) = nearest(&distances, left, farthest) {
-            left &= !(1 << child);
-            self.work.leaves += 1;
-            let leaf = &self.tree.leaves[node.first_child as usize + child];
-            let lo = std::array::from_fn(|axis| node.lo[axis][child]);
-            let hi = std::array::from_fn(|axis| node.hi[axis][child]);
-            if self.batch.meet(leaf, lo, hi, node.first[child]) {
-                farthest = self.batch.farthest();
-            }
-        }
+        let visit = Visit {
+            batch: self.batch,
+            node,
+            leaves: &self.tree.leaves[first..first + node.children as usize],
+            left: lanes(node.children, skip),
+            points: self.points,
+            lo: own.lo.map(|axis| axis[self.child]),
+            hi: own.hi.map(|axis| axis[self.child]),
+            shift,
+        };
+        self.work.leaves += self.simd.run(visit);
     }
 
     /// From the frame of the home node to that of another.
@@ -130,14 +129,9 @@ impl<'a> Walk<'a> {
         std::array::from_fn(|axis| home.origin[axis].wrapping_sub(other.origin[axis]) as f32)
     }
 
-    /// Moves the points into the frame of a level-0 node and notes what that costs in precision.
-    fn enter(&mut self, index: usize) {
+    /// Notes what moving the points into the frame of a level-0 node costs in precision.
+    fn note_error(&mut self, index: usize) {
         let shift = self.shift(index);
-        let mut at = *self.points;
-        for (lanes, shift) in at.iter_mut().zip(shift) {
-            lanes.iter_mut().for_each(|v| *v += shift);
-        }
-        self.batch.at = at;
         let (home, other) = (self.tree.node(0, self.home), self.tree.node(0, index));
         let far = shift.iter().fold(0.0, |far: f64, s| far.max(f64::from(s.abs())));
         let reach = far + home.reach as f64;
@@ -152,7 +146,7 @@ impl<'a> Walk<'a> {
 
     /// How far boxes above level 0 matter.
     fn reach(&self) -> f32 {
-        (self.batch.farthest() * WIDENED).min(f32::MAX)
+        (self.batch.farthest * WIDENED).min(f32::MAX)
     }
 }
 

@@ -1,264 +1,276 @@
-//! Neighbourhoods estimated side by side, in plain loops over lanes that compilers turn into vector
-//! instructions: every lane does what [`Estimator::estimate`](super::Estimator::estimate) does, to
+//! Neighbourhoods estimated side by side: every lane does what [`Estimator::estimate`](super::Estimator::estimate) does, to
 //! the last bit.
 
-#![allow(clippy::needless_range_loop, reason = "one index walks several arrays of lanes")]
-
-use super::{Estimate, Method, Outcome, alone, settled, varady};
+use super::fan::Fan;
+use super::{Estimate, Fallback, Method, Outcome, alone, settled};
 use crate::geom::plane::{self, Covariance};
-use crate::geom::star::{Inverted, Projected, Star};
+use crate::geom::simd::{EIGHT, Kernel, Lanes, Mask, Real, Simd};
+use crate::geom::star::Star;
+use crate::tile::Neighborhood;
 
-/// Neighbourhoods side by side.
-const LANES: usize = 16;
-/// The bits of a sorting key that hold a neighbour's rank; those above hold its direction.
-const RANK: u64 = 63;
-/// Positions times offset up to which all sums of products are exact in f64: their squares.
-const EXACT: f64 = (1 << 26) as f64;
+/// Most neighbours of a neighbourhood that is not estimated alone.
+const MOST: usize = 64;
+/// Binary logarithm of positions times offset up to which all sums of products are exact in f64:
+/// their squares.
+const EXACT_BITS: u32 = 26;
+/// Bits that the nearest neighbour keeps at least where offsets are rounded.
+const NEAREST_BITS: u32 = 14;
 
-type Row = [f64; LANES];
+/// By how many bits offsets are rounded so that their moments are exact in f64: 0 where they are
+/// integers of a few million, as on decimal lattices; where they have the 30 binary places of a
+/// scan of floats, what goes is a few millionths of the farthest offset. None where that would
+/// leave too little of the nearest.
+pub(super) fn shift(offsets: &[[i64; 3]]) -> Option<u32> {
+    let (mut widest, mut nearest) = (0, u64::MAX);
+    for o in offsets {
+        let size = o[0].unsigned_abs() | o[1].unsigned_abs() | o[2].unsigned_abs();
+        widest |= size;
+        nearest = nearest.min(size);
+    }
+    let bits = |v: u64| u64::BITS - v.leading_zeros();
+    // One more, as rounding may carry.
+    let excess = bits(widest) + bits(offsets.len() as u64 + 1);
+    match excess.checked_sub(EXACT_BITS) {
+        None | Some(0) => Some(0),
+        Some(shift) if bits(nearest) > shift + NEAREST_BITS => Some(shift + 1),
+        Some(_) => None,
+    }
+}
 
-/// Up to 16 neighbourhoods of equally many neighbours.
+/// An offset without its last `shift` bits, rounded to nearest, halves upwards.
+pub(super) fn rounded(offset: [i64; 3], shift: u32) -> [i64; 3] {
+    match shift {
+        0 => offset,
+        _ => offset.map(|v| ((v >> (shift - 1)) + 1) >> 1),
+    }
+}
+
+/// One number of each neighbourhood.
+pub(super) type Row = [f64; EIGHT];
+
+/// Up to eight neighbourhoods of equally many neighbours, nearest first.
 #[derive(Debug, Default)]
 pub(super) struct Bundle {
     /// What each neighbourhood belongs to.
     owners: Vec<usize>,
     neighbors: usize,
-    /// Neighbourhood after neighbourhood.
+    /// Neighbourhood after neighbourhood; and for each neighbour what grows in Morton order.
     offsets: Vec<[i64; 3]>,
-    /// The same, a row for each neighbour and axis.
+    ranks: Vec<u32>,
+    /// The offsets once more, a row for each neighbour and axis.
     at: Vec<[Row; 3]>,
-    /// The inverted projections.
-    inverted: Vec<[Row; 2]>,
-    /// Distances in the plane, squared.
-    squares: Vec<Row>,
-    /// Directions, with ranks as their last bits; sorted.
-    keys: Vec<Row>,
+    fan: Fan,
 }
 
 impl Bundle {
-    /// Takes the neighbourhood of `owner`, unless it has too few or too many neighbours or not as
-    /// many as the others.
-    pub fn take(&mut self, owner: usize, offsets: &[[i64; 3]]) -> bool {
+    /// Takes the neighbourhood of `owner`, unless it has too few or too many neighbours, not as many
+    /// as the others, or needs more than f64 for exact moments.
+    pub fn take(&mut self, owner: usize, neighborhood: &Neighborhood<'_>) -> bool {
+        let count = neighborhood.ranks().len();
         if self.owners.is_empty() {
-            self.neighbors = offsets.len();
+            self.neighbors = count;
+            self.at.resize(count, [[0.0; EIGHT]; 3]);
         }
-        if offsets.len() != self.neighbors || !(3..=RANK as usize + 1).contains(&offsets.len()) {
+        if count != self.neighbors || !(3..=MOST).contains(&count) {
             return false;
         }
+        let start = self.offsets.len();
+        self.offsets.extend(neighborhood.offsets());
+        let offsets = &mut self.offsets[start..];
+        match shift(offsets) {
+            Some(0) => {}
+            Some(shift) => offsets.iter_mut().for_each(|offset| *offset = rounded(*offset, shift)),
+            None => {
+                self.offsets.truncate(start);
+                return false;
+            }
+        }
+        let lane = self.owners.len() & (EIGHT - 1);
+        for (at, offset) in self.at.iter_mut().zip(offsets) {
+            for axis in 0..3 {
+                at[axis][lane] = offset[axis] as f64;
+            }
+        }
+        self.ranks.extend_from_slice(neighborhood.ranks());
         self.owners.push(owner);
-        self.offsets.extend_from_slice(offsets);
         true
     }
 
     /// True if there is no room for another one.
     pub fn is_full(&self) -> bool {
-        self.owners.len() == LANES
+        self.owners.len() == EIGHT
     }
 
-    /// Estimates all normals, calls `settle` with their owners, and is empty again. Where exact
-    /// arithmetic needs more than f64, and where p is not inside of its neighbours' polygon, a
-    /// neighbourhood is estimated alone.
+    /// Estimates all normals, calls `settle` with their owners, and is empty again. Where p is
+    /// not clearly inside of its neighbours' polygon, a neighbourhood is estimated alone.
     pub fn estimate(
         &mut self,
         method: Method,
+        simd: Simd,
         star: &mut Star,
         settle: &mut impl FnMut(usize, Outcome),
     ) {
-        if self.neighbors < 2 {
-            // A scan of one or two positions has no surface.
-            self.owners.drain(..).for_each(|owner| settle(owner, (Estimate::None, None)));
-            self.offsets.clear();
+        if self.owners.is_empty() {
             return;
         }
-        let exact = self.spread();
-        let scatter = self.scatter();
-        let flat = flat(&scatter, self.neighbors + 1);
-        let nearest = (method == Method::Varady).then(|| {
-            self.project(&flat);
-            self.sort();
-            self.nearest()
-        });
-        for (lane, &owner) in self.owners.iter().enumerate() {
-            let offsets = &self.offsets[lane * self.neighbors..][..self.neighbors];
-            let flat = [flat[0][lane], flat[1][lane], flat[2][lane]];
-            let scatter = std::array::from_fn(|entry| scatter[entry][lane] as i64);
-            let covariance = Covariance::of_scatter(scatter, self.neighbors + 1);
-            let outcome = if !exact[lane] || flat[0].is_nan() {
-                alone(method, star, offsets)
-            } else if covariance.is_of_a_line() {
-                (Estimate::None, None)
-            } else if let Some(nearest) = &nearest {
-                match self.first_estimate(lane, nearest[lane], flat, star) {
-                    Some(first) => varady(&covariance, flat, first),
-                    None => alone(method, star, offsets),
-                }
-            } else {
-                (settled(flat), None)
-            };
+        let Bundle { at, fan, owners, offsets, ranks, neighbors } = self;
+        let normals = simd.run(Together { at, ranks, fan, method });
+        for (lane, owner) in owners.drain(..).enumerate() {
+            let outcome = normals.outcome(lane).unwrap_or_else(|| {
+                let own = lane * *neighbors..(lane + 1) * *neighbors;
+                alone(method, star, &in_morton_order(&offsets[own.clone()], &ranks[own]))
+            });
             settle(owner, outcome);
         }
-        self.owners.clear();
-        self.offsets.clear();
+        offsets.clear();
+        ranks.clear();
     }
+}
 
-    /// Writes the offsets into rows; says which lanes are exact.
-    fn spread(&mut self) -> [bool; LANES] {
-        self.at.resize(self.neighbors, [[0.0; LANES]; 3]);
-        for (lane, offsets) in self.offsets.chunks_exact(self.neighbors).enumerate() {
-            for (at, offset) in self.at.iter_mut().zip(offsets) {
-                for axis in 0..3 {
-                    at[axis][lane] = offset[axis] as f64;
-                }
-            }
-        }
-        let mut widest = [0.0; LANES];
-        for at in &self.at {
-            for row in at {
-                for i in 0..LANES {
-                    let size = row[i].abs();
-                    widest[i] = if size > widest[i] { size } else { widest[i] };
-                }
-            }
-        }
-        widest.map(|widest| widest * (self.neighbors + 1) as f64 <= EXACT)
-    }
+/// Offsets whose ranks grow in Morton order.
+pub(super) fn in_morton_order(offsets: &[[i64; 3]], ranks: &[u32]) -> Vec<[i64; 3]> {
+    let mut sorted: Vec<(u32, [i64; 3])> =
+        ranks.iter().copied().zip(offsets.iter().copied()).collect();
+    sorted.sort_unstable_by_key(|neighbor| neighbor.0);
+    sorted.into_iter().map(|neighbor| neighbor.1).collect()
+}
 
-    /// n·Σxy − Σx·Σy as in [`Covariance`].
-    fn scatter(&self) -> [Row; 6] {
-        let mut sum = [[0.0; LANES]; 3];
-        let mut product = [[0.0; LANES]; 6];
-        for at in &self.at {
-            for i in 0..LANES {
-                let o = [at[0][i], at[1][i], at[2][i]];
-                let products = plane::products(o);
-                for axis in 0..3 {
-                    sum[axis][i] += o[axis];
-                }
-                for entry in 0..6 {
-                    product[entry][i] += products[entry];
-                }
-            }
-        }
-        let count = (self.neighbors + 1) as f64;
-        for i in 0..LANES {
-            let means = plane::products([sum[0][i], sum[1][i], sum[2][i]]);
-            for entry in 0..6 {
-                product[entry][i] = count * product[entry][i] - means[entry];
-            }
-        }
-        product
-    }
+/// The estimate of each lane.
+struct Estimates {
+    normal: [Row; 3],
+    /// The lanes to be estimated alone.
+    alone: u32,
+    /// The lanes whose positions all lie on one line.
+    lines: u32,
+    /// The lanes whose first estimate lies in the plane that it should be normal to: they have the
+    /// normal of the plane of regression.
+    perpendicular: u32,
+}
 
-    /// Projects all neighbours to the planes with the given normals.
-    fn project(&mut self, normals: &[Row; 3]) {
-        let Bundle { at, inverted, squares, keys, neighbors, .. } = self;
-        inverted.resize(*neighbors, [[0.0; LANES]; 2]);
-        squares.resize(*neighbors, [0.0; LANES]);
-        keys.resize(*neighbors, [0.0; LANES]);
-        let mut frame = [[0.0; LANES]; 6];
-        for i in 0..LANES {
-            let (u, v) = plane::across([normals[0][i], normals[1][i], normals[2][i]]);
-            for axis in 0..3 {
-                (frame[axis][i], frame[3 + axis][i]) = (u[axis], v[axis]);
-            }
+impl Estimates {
+    /// None if the lane is to be estimated alone.
+    fn outcome(&self, lane: usize) -> Option<Outcome> {
+        let is_in = |mask: u32| mask >> lane & 1 == 1;
+        if is_in(self.alone) {
+            return None;
         }
-        for (rank, at) in at.iter().enumerate() {
-            let ([x, y], square, key) = (&mut inverted[rank], &mut squares[rank], &mut keys[rank]);
-            for i in 0..LANES {
-                let u = [frame[0][i], frame[1][i], frame[2][i]];
-                let v = [frame[3][i], frame[4][i], frame[5][i]];
-                let p = Projected::of([at[0][i], at[1][i], at[2][i]], u, v);
-                (x[i], y[i], square[i]) = (p.x, p.y, p.square);
-                key[i] = f64::from_bits(p.direction.to_bits() & !RANK | rank as u64);
-            }
+        if is_in(self.lines) {
+            return Some((Estimate::None, None));
         }
+        let normal = settled([self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]]);
+        Some((normal, is_in(self.perpendicular).then_some(Fallback::Perpendicular)))
     }
+}
 
-    /// Sorts the keys of every lane: Batcher's merge exchange, as in Knuth's Algorithm 5.2.2 M. A
-    /// direction that is not a number spoils its lane, which then does not turn left.
-    fn sort(&mut self) {
-        let count = self.keys.len();
-        let top = count.next_power_of_two() / 2;
-        let mut p = top;
-        while p > 0 {
-            let (mut q, mut r, mut d) = (top, 0, p);
-            loop {
-                for i in (0..count - d).filter(|i| i & p == r) {
-                    let (low, high) = self.keys.split_at_mut(i + d);
-                    exchange(&mut low[i], &mut high[0]);
-                }
-                if q == p {
-                    break;
-                }
-                (d, q, r) = (q - p, q / 2, p);
-            }
-            p /= 2;
-        }
-    }
+/// All lanes of a bundle; those that no neighbourhood is in have a result that nobody reads.
+struct Together<'a> {
+    at: &'a [[Row; 3]],
+    /// Neighbourhood after neighbourhood.
+    ranks: &'a [u32],
+    fan: &'a mut Fan,
+    method: Method,
+}
 
-    /// The rank of each lane's nearest neighbour in the plane; None if rounding cannot tell.
-    fn nearest(&self) -> [Option<u32>; LANES] {
-        const RIVAL: f64 = 1.0 + 1.0 / (1u64 << 36) as f64;
-        let (mut least, mut rank, mut rivals) = ([f64::MAX; LANES], [0.0; LANES], [0.0; LANES]);
-        for (row, this) in self.squares.iter().zip(0u32..) {
-            for i in 0..LANES {
-                let less = row[i] < least[i];
-                least[i] = plane::select(less, row[i], least[i]);
-                rank[i] = plane::select(less, f64::from(this), rank[i]);
-            }
-        }
-        for row in &self.squares {
-            for i in 0..LANES {
-                rivals[i] += plane::select(row[i] <= least[i] * RIVAL, 1.0, 0.0);
-            }
-        }
-        std::array::from_fn(|i| (rivals[i] == 1.0).then_some(rank[i] as u32))
-    }
+impl Kernel for Together<'_> {
+    type Output = Estimates;
 
-    /// The mean normal of the Delaunay triangles around a lane's p, if p is inside of them.
-    fn first_estimate(
-        &self,
-        lane: usize,
-        nearest: Option<u32>,
-        flat: [f64; 3],
-        star: &mut Star,
-    ) -> Option<Option<[f64; 3]>> {
-        let mut start = None;
-        let sorted = self.keys.iter().enumerate().map(|(place, key)| {
-            let rank = (key[lane].to_bits() & RANK) as u32;
-            start = if nearest == Some(rank) { Some(place) } else { start };
-            let [x, y] = &self.inverted[rank as usize];
-            Inverted::new(x[lane], y[lane], rank)
-        });
-        star.place(sorted);
-        star.normal_inside(start, flat, |rank| {
-            let at = &self.at[rank as usize];
-            [at[0][lane], at[1][lane], at[2][lane]]
-        })
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> Estimates {
+        let Together { at, ranks, fan, method } = self;
+        let scatter = scatter(lanes, at);
+        let flat = flat(lanes, &scatter, at.len() + 1);
+        let (adjugate, lines) = adjugate(&scatter, at.len() + 1);
+        let mut alone = !flat[0].equals(flat[0]).bits();
+        let (mut normal, mut perpendicular) = (flat, 0);
+        if method == Method::Varady {
+            let (first, clear) = fan.mean_normals(lanes, at, ranks, flat);
+            alone |= !(clear & first[0].equals(first[0]).bits());
+            let fitted = fitted(lanes, &adjugate, first);
+            let is_fitted = fitted[0].equals(fitted[0]);
+            normal = plane::choose(is_fitted, fitted, flat);
+            perpendicular = !is_fitted.bits();
+        }
+        let normal = [
+            lanes.store_eight(normal[0]),
+            lanes.store_eight(normal[1]),
+            lanes.store_eight(normal[2]),
+        ];
+        Estimates { normal, alone, lines, perpendicular }
     }
+}
+
+/// Three rows.
+#[inline(always)]
+pub(super) fn load<L: Lanes>(lanes: L, rows: &[Row; 3]) -> [L::F64; 3] {
+    [lanes.load_eight(&rows[0]), lanes.load_eight(&rows[1]), lanes.load_eight(&rows[2])]
+}
+
+/// n·Σxy − Σx·Σy as in [`Covariance`].
+#[inline(always)]
+fn scatter<L: Lanes>(lanes: L, at: &[[Row; 3]]) -> [Row; 6] {
+    let zero = lanes.load_eight(&[0.0; EIGHT]);
+    let (mut sum, mut product) = ([zero; 3], [zero; 6]);
+    for at in at {
+        let [x, y, z] = load(lanes, at);
+        sum = [sum[0] + x, sum[1] + y, sum[2] + z];
+        let products = plane::products([x, y, z]);
+        for entry in 0..6 {
+            product[entry] = product[entry] + products[entry];
+        }
+    }
+    let count = zero.of((at.len() + 1) as f64);
+    let means = plane::products(sum);
+    let mut scatter = [[0.0; EIGHT]; 6];
+    for entry in 0..6 {
+        scatter[entry] = lanes.store_eight(count * product[entry] - means[entry]);
+    }
+    scatter
 }
 
 /// The normals of the planes of regression of `count` positions each; NaN where there is no single
 /// one.
-fn flat(scatter: &[Row; 6], count: usize) -> [Row; 3] {
+#[inline(always)]
+fn flat<L: Lanes>(lanes: L, scatter: &[Row; 6], count: usize) -> [L::F64; 3] {
     let unit = 1.0 / (count * count) as f64;
-    let mut flat = [[0.0; LANES]; 3];
-    for i in 0..LANES {
-        let matrix = std::array::from_fn(|entry| scatter[entry][i] * unit);
-        let normal = plane::smallest_vector(matrix);
-        for axis in 0..3 {
-            flat[axis][i] = normal[axis];
-        }
+    let mut matrix = [lanes.load_eight(&[0.0; EIGHT]); 6];
+    for entry in 0..6 {
+        let scatter = lanes.load_eight(&scatter[entry]);
+        matrix[entry] = scatter * scatter.of(unit);
     }
-    flat
+    plane::smallest_vector(matrix)
 }
 
-/// Puts the smaller of two keys first, in every lane.
-fn exchange(low: &mut Row, high: &mut Row) {
-    for i in 0..LANES {
-        // In this form compilers know minimum and maximum.
-        let (a, b) = (low[i], high[i]);
-        low[i] = if a < b { a } else { b };
-        high[i] = if a > b { a } else { b };
+/// The adjugates of the covariances of `count` positions each, and the lanes where all are on one
+/// line.
+#[inline(always)]
+fn adjugate(scatter: &[Row; 6], count: usize) -> ([Row; 6], u32) {
+    let (mut adjugate, mut lines) = ([[0.0; EIGHT]; 6], 0);
+    for lane in 0..EIGHT {
+        let mut entries = [0; 6];
+        for entry in 0..6 {
+            entries[entry] = scatter[entry][lane] as i64;
+        }
+        let of_lane = Covariance::of_scatter(entries, count).adjugate();
+        for entry in 0..6 {
+            adjugate[entry][lane] = of_lane[entry];
+        }
+        let is_line = (of_lane[0] == 0.0) & (of_lane[3] == 0.0) & (of_lane[5] == 0.0);
+        lines |= u32::from(is_line) << lane;
     }
+    (adjugate, lines)
+}
+
+/// The height function's normal where the first estimates are `first`, at length 1; NaN if it is 0.
+#[inline(always)]
+fn fitted<L: Lanes>(lanes: L, adjugate: &[Row; 6], first: [L::F64; 3]) -> [L::F64; 3] {
+    let mut matrix = [first[0]; 6];
+    for entry in 0..6 {
+        matrix[entry] = lanes.load_eight(&adjugate[entry]);
+    }
+    let normal = plane::product(&matrix, first);
+    let length = plane::dot(normal, normal).root();
+    let zero = length.of(0.0);
+    let usable = zero.below(length) & length.below(zero.of(f64::INFINITY));
+    let length = L::F64::choose(usable, length, zero.of(f64::NAN));
+    [normal[0] / length, normal[1] / length, normal[2] / length]
 }

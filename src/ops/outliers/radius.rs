@@ -73,8 +73,8 @@ impl TileOp for RadiusOutliers {
             Error::internal("the stage outliers ran before its radius was settled")
         })?;
         let mut lonely = vec![false; tile.positions.len()];
-        tile.each_neighborhood(self.min_neighbors, |i, offsets| {
-            let near = offsets.iter().filter(|o| distance2([0; 3], **o) <= within).count();
+        tile.each_neighborhood(self.min_neighbors, |i, neighbors| {
+            let near = neighbors.offsets().filter(|o| distance2([0; 3], *o) <= within).count();
             lonely[i] = near < self.min_neighbors;
         })?;
         let mut records = 0;

@@ -1,0 +1,266 @@
+//! Vectors of 512 bits.
+
+use std::arch::x86_64::*;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
+
+use super::avx2::insert_by_four;
+use crate::geom::simd::lanes::{LANES, Lanes, joined};
+use crate::geom::simd::real::{EIGHT, EXPONENT, Mask, Real};
+
+// SAFETY, of every block here: a value of a type of this module comes from `witness` alone, which is
+// called only in code that is compiled for the instructions and run where the processor has them;
+// and arrays that are read or written have the numbers that the instruction touches.
+
+/// One vector of 512 bits.
+#[derive(Clone, Copy)]
+pub struct Avx512(());
+
+impl Avx512 {
+    /// For code that is compiled for these instructions.
+    pub(super) fn witness() -> Avx512 {
+        Avx512(())
+    }
+}
+
+impl Lanes for Avx512 {
+    type F32 = __m512;
+    type F64 = Eight;
+
+    #[inline(always)]
+    fn load(self, from: &[f32; LANES]) -> Self::F32 {
+        unsafe { _mm512_loadu_ps(from.as_ptr()) }
+    }
+
+    #[inline(always)]
+    fn store(self, v: Self::F32) -> [f32; LANES] {
+        let mut to = [0.0; LANES];
+        unsafe { _mm512_storeu_ps(to.as_mut_ptr(), v) };
+        to
+    }
+
+    #[inline(always)]
+    fn splat(self, v: f32) -> Self::F32 {
+        unsafe { _mm512_set1_ps(v) }
+    }
+
+    #[inline(always)]
+    fn add(self, a: Self::F32, b: Self::F32) -> Self::F32 {
+        unsafe { _mm512_add_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn sub(self, a: Self::F32, b: Self::F32) -> Self::F32 {
+        unsafe { _mm512_sub_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn mul(self, a: Self::F32, b: Self::F32) -> Self::F32 {
+        unsafe { _mm512_mul_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn larger(self, a: Self::F32, b: Self::F32) -> Self::F32 {
+        unsafe { _mm512_max_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn at_most(self, a: Self::F32, b: Self::F32) -> u32 {
+        unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b)) }
+    }
+
+    #[inline(always)]
+    fn before(self, a: Self::F32, b: Self::F32, rank: u32, ranks: &[u32; LANES]) -> u32 {
+        unsafe {
+            let less = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b);
+            let equal = _mm512_cmp_ps_mask::<_CMP_EQ_OQ>(a, b);
+            let ranks = _mm512_loadu_si512(ranks.as_ptr().cast());
+            let ahead = _mm512_cmplt_epu32_mask(_mm512_set1_epi32(rank as i32), ranks);
+            u32::from(less | (equal & ahead))
+        }
+    }
+
+    #[inline(always)]
+    fn largest(self, v: Self::F32) -> f32 {
+        unsafe { _mm512_reduce_max_ps(v) }
+    }
+
+    #[inline(always)]
+    fn first(self, keys: &[u32; LANES], mask: u32) -> usize {
+        unsafe {
+            let keys = _mm512_loadu_si512(keys.as_ptr().cast());
+            let rest = _mm512_set1_epi32(-1);
+            let least = _mm512_mask_mov_epi32(rest, mask as u16, keys);
+            _mm512_reduce_min_epu32(least) as usize & (LANES - 1)
+        }
+    }
+
+    #[inline(always)]
+    fn load_eight(self, from: &[f64; EIGHT]) -> Eight {
+        unsafe { Eight(_mm512_loadu_pd(from.as_ptr())) }
+    }
+
+    #[inline(always)]
+    fn store_eight(self, v: Eight) -> [f64; EIGHT] {
+        let mut to = [0.0; EIGHT];
+        unsafe { _mm512_storeu_pd(to.as_mut_ptr(), v.0) };
+        to
+    }
+
+    #[inline(always)]
+    fn insert<const WIDTH: usize>(
+        self,
+        list: &mut [f64; WIDTH],
+        high: &[f32; LANES],
+        low: &[u32; LANES],
+        hits: u32,
+    ) {
+        const { assert!(WIDTH % 4 == 0) };
+        if WIDTH % 8 == 0 {
+            unsafe { insert_by_eight(list, high, low, hits) }
+        } else {
+            unsafe { insert_by_four(list, high, low, hits) }
+        }
+    }
+}
+
+/// As [`insert_by_four`], for lists of whole vectors of eight.
+#[inline(always)]
+unsafe fn insert_by_eight<const WIDTH: usize>(
+    list: &mut [f64; WIDTH],
+    high: &[f32; LANES],
+    low: &[u32; LANES],
+    mut hits: u32,
+) {
+    let mut sorted = [unsafe { _mm512_setzero_pd() }; 9];
+    let vectors = WIDTH / 8;
+    for i in 0..vectors {
+        sorted[i] = unsafe { _mm512_loadu_pd(list.as_ptr().add(8 * i)) };
+    }
+    while hits != 0 {
+        let lane = hits.trailing_zeros() as usize & (LANES - 1);
+        hits &= hits - 1;
+        unsafe {
+            let new = _mm512_set1_pd(joined(high[lane], low[lane]));
+            let mut before = _mm512_setzero_si512();
+            for vector in &mut sorted[..vectors] {
+                let this = _mm512_castpd_si512(*vector);
+                // The last of the vector before, then all but the last of this one.
+                let moved = _mm512_castsi512_pd(_mm512_alignr_epi64::<7>(this, before));
+                before = this;
+                *vector = _mm512_min_pd(*vector, _mm512_max_pd(moved, new));
+            }
+        }
+    }
+    for i in 0..vectors {
+        unsafe { _mm512_storeu_pd(list.as_mut_ptr().add(8 * i), sorted[i]) };
+    }
+}
+
+/// Eight f64.
+#[derive(Clone, Copy)]
+pub struct Eight(__m512d);
+
+/// Where a condition holds.
+#[derive(Clone, Copy)]
+pub struct Where(__mmask8);
+
+macro_rules! by_vector {
+    ($($operator:ident $method:ident $intrinsic:ident)*) => {
+        $(impl $operator for Eight {
+            type Output = Eight;
+
+            #[inline(always)]
+            fn $method(self, other: Eight) -> Eight {
+                unsafe { Eight($intrinsic(self.0, other.0)) }
+            }
+        })*
+    };
+}
+
+by_vector!(
+    Add add _mm512_add_pd
+    Sub sub _mm512_sub_pd
+    Mul mul _mm512_mul_pd
+    Div div _mm512_div_pd
+);
+
+impl BitAnd for Where {
+    type Output = Where;
+
+    #[inline(always)]
+    fn bitand(self, other: Where) -> Where {
+        Where(self.0 & other.0)
+    }
+}
+
+impl BitOr for Where {
+    type Output = Where;
+
+    #[inline(always)]
+    fn bitor(self, other: Where) -> Where {
+        Where(self.0 | other.0)
+    }
+}
+
+impl Not for Where {
+    type Output = Where;
+
+    #[inline(always)]
+    fn not(self) -> Where {
+        Where(!self.0)
+    }
+}
+
+impl Mask for Where {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        u32::from(self.0)
+    }
+}
+
+impl Real for Eight {
+    type Mask = Where;
+
+    #[inline(always)]
+    fn of(self, v: f64) -> Eight {
+        unsafe { Eight(_mm512_set1_pd(v)) }
+    }
+
+    #[inline(always)]
+    fn root(self) -> Eight {
+        unsafe { Eight(_mm512_sqrt_pd(self.0)) }
+    }
+
+    #[inline(always)]
+    fn size(self) -> Eight {
+        unsafe { Eight(_mm512_abs_pd(self.0)) }
+    }
+
+    #[inline(always)]
+    fn signed(self, sign: Eight) -> Eight {
+        unsafe {
+            let bit = _mm512_and_pd(_mm512_set1_pd(-0.0), sign.0);
+            Eight(_mm512_or_pd(_mm512_abs_pd(self.0), bit))
+        }
+    }
+
+    #[inline(always)]
+    fn power(self) -> Eight {
+        unsafe { Eight(_mm512_and_pd(_mm512_set1_pd(f64::from_bits(EXPONENT)), self.0)) }
+    }
+
+    #[inline(always)]
+    fn below(self, other: Eight) -> Where {
+        unsafe { Where(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0)) }
+    }
+
+    #[inline(always)]
+    fn equals(self, other: Eight) -> Where {
+        unsafe { Where(_mm512_cmp_pd_mask::<_CMP_EQ_OQ>(self.0, other.0)) }
+    }
+
+    #[inline(always)]
+    fn choose(mask: Where, a: Eight, b: Eight) -> Eight {
+        unsafe { Eight(_mm512_mask_blend_pd(mask.0, b.0, a.0)) }
+    }
+}
