@@ -6,6 +6,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use pointmill::ops::normals::{Estimator, Method};
+use pointmill::point::distance2;
 use pointmill::tile::Neighborhood;
 
 const NEIGHBORHOODS: usize = 4096;
@@ -23,12 +24,14 @@ fn main() {
     for (lattice, step) in [("1 mm", 1), ("2^-30 m", 1 << 20)] {
         let neighborhoods: Vec<Vec<[i64; 3]>> = (0..NEIGHBORHOODS)
             .map(|_| {
-                (0..10)
+                let mut offsets: Vec<[i64; 3]> = (0..10)
                     .map(|_| {
                         let (x, y) = (random(400) - 200, random(400) - 200);
                         [x, y, x / 3 + random(20) + 1].map(|v| v * step)
                     })
-                    .collect()
+                    .collect();
+                offsets.sort_by_key(|o| distance2([0; 3], *o));
+                offsets
             })
             .collect();
         for method in [Method::Varady, Method::Pca] {

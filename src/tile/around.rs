@@ -135,13 +135,15 @@ impl Tile {
                         Err(error) => return outcome = Err(error),
                     }
                     rank(far, ranks);
-                    return visit(i, &Neighborhood { p, positions: Positions::Each(far), ranks });
+                    let farthest2 = far.last().map_or(0, |&q| distance2(p, q));
+                    let positions = Positions::Each(far);
+                    return visit(i, &Neighborhood { p, positions, ranks, farthest2 });
                 }
                 if let [.., before, _] = *neighbors {
                     *tied += u64::from(distance2(p, positions[before as usize]) == d2);
                 }
                 let positions = Positions::OfTile(positions);
-                visit(i, &Neighborhood { p, positions, ranks: neighbors });
+                visit(i, &Neighborhood { p, positions, ranks: neighbors, farthest2: d2 });
             },
         );
         outcome
@@ -155,6 +157,8 @@ pub struct Neighborhood<'a> {
     positions: Positions<'a>,
     /// For each neighbour a number that grows in Morton order.
     ranks: &'a [u32],
+    /// Squared distance of the last.
+    farthest2: u128,
 }
 
 /// Where the neighbours' positions are.
@@ -170,7 +174,13 @@ impl<'a> Neighborhood<'a> {
     /// The neighbourhood of a position whose neighbours are at `offsets`, smaller than 2^62, in
     /// order; `ranks` grow in Morton order.
     pub fn of_offsets(offsets: &'a [Position], ranks: &'a [u32]) -> Self {
-        Neighborhood { p: [0; 3], positions: Positions::Each(offsets), ranks }
+        let farthest2 = offsets.iter().map(|&o| distance2([0; 3], o)).max().unwrap_or(0);
+        Neighborhood { p: [0; 3], positions: Positions::Each(offsets), ranks, farthest2 }
+    }
+
+    /// Squared distance of the farthest neighbour in lattice steps; 0 if there is none.
+    pub fn farthest2(&self) -> u128 {
+        self.farthest2
     }
 
     /// For each neighbour a number that grows in Morton order.

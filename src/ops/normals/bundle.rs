@@ -6,6 +6,7 @@ use super::{Estimate, Fallback, Method, Outcome, alone, settled};
 use crate::geom::plane::{self, Covariance};
 use crate::geom::simd::{EIGHT, Kernel, Lanes, Mask, Real, Simd};
 use crate::geom::star::Star;
+use crate::point::distance2;
 use crate::tile::Neighborhood;
 
 /// Most neighbours of a neighbourhood that is not estimated alone.
@@ -16,24 +17,21 @@ const EXACT_BITS: u32 = 26;
 /// Bits that the nearest neighbour keeps at least where offsets are rounded.
 const NEAREST_BITS: u32 = 14;
 
-/// By how many bits offsets are rounded so that their moments are exact in f64: 0 where they are
-/// integers of a few million, as on decimal lattices; where they have the 30 binary places of a
-/// scan of floats, what goes is a few millionths of the farthest offset. None where that would
-/// leave too little of the nearest.
-pub(super) fn shift(offsets: &[[i64; 3]]) -> Option<u32> {
-    let (mut widest, mut nearest) = (0, u64::MAX);
-    for o in offsets {
-        let size = o[0].unsigned_abs() | o[1].unsigned_abs() | o[2].unsigned_abs();
-        widest |= size;
-        nearest = nearest.min(size);
-    }
-    let bits = |v: u64| u64::BITS - v.leading_zeros();
-    // One more, as rounding may carry.
-    let excess = bits(widest) + bits(offsets.len() as u64 + 1);
+/// By how many bits offsets are rounded so that their moments are exact in f64, given how many there
+/// are and the squared lengths of the shortest and the longest: 0 where they are integers of a few
+/// million, as on decimal lattices; where they have the 30 binary places of a scan of floats, what
+/// goes is a few millionths of the farthest offset. None where that would leave too little of the
+/// nearest.
+pub(super) fn shift(count: usize, nearest2: impl Fn() -> u128, farthest2: u128) -> Option<u32> {
+    let bits = |v: u128| u128::BITS - v.leading_zeros();
+    let excess = bits(farthest2).div_ceil(2) + bits(count as u128 + 1);
     match excess.checked_sub(EXACT_BITS) {
         None | Some(0) => Some(0),
-        Some(shift) if bits(nearest) > shift + NEAREST_BITS => Some(shift + 1),
-        Some(_) => None,
+        // One more, as rounding may carry.
+        Some(shift) => {
+            let left = bits(nearest2()) / 2;
+            (left > shift + 1 + NEAREST_BITS).then_some(shift + 1)
+        }
     }
 }
 
@@ -54,11 +52,10 @@ pub(super) struct Bundle {
     /// What each neighbourhood belongs to.
     owners: Vec<usize>,
     neighbors: usize,
-    /// Neighbourhood after neighbourhood; and for each neighbour what grows in Morton order.
-    offsets: Vec<[i64; 3]>,
-    ranks: Vec<u32>,
-    /// The offsets once more, a row for each neighbour and axis.
+    /// The offsets, a row for each neighbour and axis.
     at: Vec<[Row; 3]>,
+    /// For each neighbour what grows in Morton order, neighbourhood after neighbourhood.
+    ranks: Vec<u32>,
     fan: Fan,
 }
 
@@ -74,19 +71,11 @@ impl Bundle {
         if count != self.neighbors || !(3..=MOST).contains(&count) {
             return false;
         }
-        let start = self.offsets.len();
-        self.offsets.extend(neighborhood.offsets());
-        let offsets = &mut self.offsets[start..];
-        match shift(offsets) {
-            Some(0) => {}
-            Some(shift) => offsets.iter_mut().for_each(|offset| *offset = rounded(*offset, shift)),
-            None => {
-                self.offsets.truncate(start);
-                return false;
-            }
-        }
+        let nearest2 = || neighborhood.offsets().next().map_or(0, |o| distance2([0; 3], o));
+        let Some(shift) = shift(count, nearest2, neighborhood.farthest2()) else { return false };
         let lane = self.owners.len() & (EIGHT - 1);
-        for (at, offset) in self.at.iter_mut().zip(offsets) {
+        for (at, offset) in self.at.iter_mut().zip(neighborhood.offsets()) {
+            let offset = rounded(offset, shift);
             for axis in 0..3 {
                 at[axis][lane] = offset[axis] as f64;
             }
@@ -113,24 +102,27 @@ impl Bundle {
         if self.owners.is_empty() {
             return;
         }
-        let Bundle { at, fan, owners, offsets, ranks, neighbors } = self;
+        let Bundle { at, fan, owners, ranks, neighbors } = self;
         let normals = simd.run(Together { at, ranks, fan, method });
         for (lane, owner) in owners.drain(..).enumerate() {
             let outcome = normals.outcome(lane).unwrap_or_else(|| {
-                let own = lane * *neighbors..(lane + 1) * *neighbors;
-                alone(method, star, &in_morton_order(&offsets[own.clone()], &ranks[own]))
+                let offsets = at.iter().map(|at| [at[0][lane], at[1][lane], at[2][lane]]);
+                let offsets = offsets.map(|offset| offset.map(|v| v as i64));
+                let ranks = &ranks[lane * *neighbors..][..*neighbors];
+                alone(method, star, &in_morton_order(offsets, ranks))
             });
             settle(owner, outcome);
         }
-        offsets.clear();
         ranks.clear();
     }
 }
 
-/// Offsets whose ranks grow in Morton order.
-pub(super) fn in_morton_order(offsets: &[[i64; 3]], ranks: &[u32]) -> Vec<[i64; 3]> {
-    let mut sorted: Vec<(u32, [i64; 3])> =
-        ranks.iter().copied().zip(offsets.iter().copied()).collect();
+/// Offsets sorted by their ranks.
+pub(super) fn in_morton_order(
+    offsets: impl Iterator<Item = [i64; 3]>,
+    ranks: &[u32],
+) -> Vec<[i64; 3]> {
+    let mut sorted: Vec<(u32, [i64; 3])> = ranks.iter().copied().zip(offsets).collect();
     sorted.sort_unstable_by_key(|neighbor| neighbor.0);
     sorted.into_iter().map(|neighbor| neighbor.1).collect()
 }
