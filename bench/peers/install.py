@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 HERE = Path(__file__).parent
-PACKAGES = ["g++", "libpcl-dev", "libcgal-dev", "libnanoflann-dev", "libeigen3-dev"]
+PACKAGES = ["g++", "libpcl-dev", "libnanoflann-dev", "libeigen3-dev"]
 
 
 def python_peers(cache: Path) -> str | None:
@@ -48,3 +48,14 @@ def driver(cache: Path, name: str, flags: list[str]) -> str | None:
     with open(cache / f"{name}.log", "wb") as sink:
         code = subprocess.run(command + flags, stdout=sink, stderr=sink).returncode
     return None if code == 0 else f"not built: see {name}.log"
+
+
+def versions() -> str:
+    """The system packages that are there, with their versions."""
+    query = ["dpkg-query", "-W", "-f", "${db:Status-Abbrev} ${Package} ${Version}\n", *PACKAGES]
+    try:
+        lines = subprocess.run(query, capture_output=True, text=True).stdout.splitlines()
+    except OSError:
+        return "no system packages"
+    found = [line.removeprefix("ii ").strip() for line in lines if line.startswith("ii ")]
+    return ", ".join(found) or "no system packages"
