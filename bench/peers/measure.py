@@ -41,7 +41,8 @@ def run(command: list[str], environment: dict[str, str], log: str) -> Figures:
     with open(log, encoding="utf-8", errors="replace") as source:
         output = source.read()
     if process.returncode != 0:
-        last = (output.strip().splitlines() or [""])[-1][:120]
+        lines = output.strip().splitlines() or [""]
+        last = next((line for line in lines if line.startswith("error")), lines[-1])[:120]
         raise Failure(f"failed ({process.returncode}): {last}")
     own = told(output)
     return Figures(
