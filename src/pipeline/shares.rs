@@ -2,8 +2,9 @@
 
 use super::product::Product;
 use crate::budget::{Bytes, whole_mebibytes};
+use crate::point::Position;
 use crate::stage::{ChunkSize, Needs, Source};
-use crate::tile::{Fetch, Intake, Loader, Remote, index_bytes, merge_bytes};
+use crate::tile::{Fetch, Intake, Loader, Remote, Tag, index_bytes, merge_bytes};
 use crate::{Error, Result, geom::nearest::Nearest};
 
 /// Records that a batch of the decode takes.
@@ -92,7 +93,9 @@ impl Demands {
 
     /// Bytes that a thread holds while it decodes, besides its run.
     fn decode_fixed(&self) -> u64 {
-        self.part_bytes + (BATCH * self.stride + Intake::fixed_bytes(self.stride)) as u64
+        let placed = BATCH * (size_of::<Position>() + size_of::<Tag>() + size_of::<usize>());
+        let batch = BATCH * self.stride + placed;
+        self.part_bytes + (batch + Intake::fixed_bytes(self.stride)) as u64
     }
 
     /// Bytes that a thread holds while it merges runs of `run_records`.
