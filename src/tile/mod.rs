@@ -17,7 +17,7 @@ mod sieve;
 mod spill;
 
 pub use around::Around;
-pub use block::Block;
+pub use block::{BLOCK, Block};
 pub use cutting::CutError;
 pub use intake::{Intake, TileStore};
 pub use key::{TileKey, morton_cmp};
