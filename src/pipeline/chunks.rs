@@ -26,7 +26,7 @@ impl Chunk {
     /// Replaces `numbers` by the numbers of its records.
     pub fn number(&self, numbers: &mut Vec<u64>) {
         numbers.clear();
-        numbers.extend(self.records.iter().flat_map(|&(first, n, _)| first..first + u64::from(n)));
+        self.records.iter().for_each(|&(first, n, _)| numbers.extend(first..first + u64::from(n)));
     }
 
     /// The normal of each record.
@@ -35,9 +35,12 @@ impl Chunk {
         Some(each.flat_map(|(n, &normal)| std::iter::repeat_n(normal, n)).collect())
     }
 
-    /// The state of each record.
-    pub fn states(&self) -> impl Iterator<Item = State> + '_ {
-        self.records.iter().flat_map(|&(_, n, state)| std::iter::repeat_n(state, n as usize))
+    /// Replaces `states` by the state of each record.
+    pub fn states(&self, states: &mut Vec<State>) {
+        states.clear();
+        for &(_, n, state) in &self.records {
+            states.resize(states.len() + n as usize, state);
+        }
     }
 }
 
@@ -71,6 +74,10 @@ impl Column {
 
     /// Adds `count` items of one byte.
     fn repeat(&mut self, byte: u8, mut count: u32) -> Result<()> {
+        if count == 1 && self.open.len() + 1 < PIECE {
+            self.open.push(byte);
+            return Ok(());
+        }
         while count > 0 {
             let now = (PIECE - self.open.len()).min(count as usize);
             self.open.resize(self.open.len() + now, byte);
@@ -350,14 +357,15 @@ mod tests {
         let mut state = [9; 3];
         stored.states.read(all - 3, &mut state).unwrap();
         assert_eq!(state, [State::ALIVE.0; 3]);
-        let (mut numbers, mut ranks) = (Vec::new(), 0);
+        let (mut numbers, mut states, mut ranks) = (Vec::new(), Vec::new(), 0);
         let expected = (0..3).chain(7..7 + u64::from(copies)).chain(20_000_000..20_000_005);
         let mut expected = expected.peekable();
         for chunk in &chunks {
             chunk.number(&mut numbers);
             assert!(numbers.iter().all(|&number| expected.next() == Some(number)));
             let normals = chunk.spread_normals().unwrap();
-            assert_eq!((normals.len(), chunk.states().count()), (numbers.len(), numbers.len()));
+            chunk.states(&mut states);
+            assert_eq!((normals.len(), states.len()), (numbers.len(), numbers.len()));
             assert!(numbers.iter().zip(normals).all(|(&n, normal)| match n {
                 0 => normal[0] == 0.0,
                 1..3 => normal[0] == 1.0,
@@ -385,9 +393,10 @@ mod tests {
         let of = |sink: usize| {
             let mut all = Vec::new();
             for chunk in chunks.iter().filter(|chunk| chunk.sink == sink) {
-                let mut numbers = Vec::new();
+                let (mut numbers, mut states) = (Vec::new(), Vec::new());
                 chunk.number(&mut numbers);
-                all.extend(numbers.into_iter().zip(chunk.states().map(State::edits)));
+                chunk.states(&mut states);
+                all.extend(numbers.into_iter().zip(states.into_iter().map(State::edits)));
             }
             all
         };

@@ -1,11 +1,15 @@
 //! A look at a sample of the scan before a pass: small cubes, spread evenly over its positions.
 
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use super::grind::{Field, Worker};
 use super::job::Job;
 use super::passes::Pass;
 use crate::Result;
 use crate::stage::Forecast;
-use crate::tile::{Reader, SealedTiles, Sieve, TileKey};
+use crate::tile::{Reader, SealedTiles, Sieve, TileKey, lock};
 
 /// Cubes that are looked at.
 const SAMPLES: u64 = 256;
@@ -15,8 +19,10 @@ const CELLS_ACROSS: u64 = 4;
 const MOST_POSITIONS: u64 = 2048;
 /// Positions of a cube beyond which it is left out; as many fit into any plan's tiles.
 const HEAVIEST: u64 = 8192;
-/// Positions that are loaded around a cube, about.
-const RIM: usize = 4096;
+/// Positions that are loaded around a cube and in it, at most.
+const RIM: usize = 16_384;
+/// Positions that a tile of a look takes.
+const CAPACITY: usize = 32_768;
 
 /// What those of the stages `ops` of `pass` expect that look at samples, each with its number, from samples that are a function of the
 /// points alone.
@@ -35,24 +41,43 @@ pub(super) fn forecast(
         }
         let side = job.ops[op].op.tile().needs().cell_side.max(1);
         let keys = cubes(&field.tiles, side)?;
-        let capacity = capacity.min(8 * RIM);
+        let samples = samples(job, pass, op, field, sieve, capacity.min(CAPACITY), &keys)?;
+        forecasts.push((op, job.ops[op].op.tile_mut().forecast(&samples)));
+    }
+    Ok(forecasts)
+}
+
+/// What stage `op` says of the cubes `keys`, in their order, those left out that are too heavy.
+fn samples(
+    job: &Job<'_>,
+    pass: &Pass,
+    op: usize,
+    field: &Field<'_>,
+    sieve: &Sieve,
+    capacity: usize,
+    keys: &[TileKey],
+) -> Result<Vec<Vec<f64>>> {
+    let samples = Mutex::new(BTreeMap::new());
+    let next = AtomicUsize::new(0);
+    job.parallel(|| {
         let mut worker = Worker::new(job, pass, field, sieve, capacity, false);
         worker.limit_rim(RIM);
-        let mut samples = Vec::with_capacity(keys.len());
         let mut reader = Reader::default();
-        for key in keys {
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(&key) = keys.get(index) else { return Ok(()) };
             job.advance(0)?;
             if field.tiles.holds_more(&key.cube(), HEAVIEST, &mut reader)? {
                 continue;
             }
             let (tile, _) = worker.run(key, Some(op))?;
             tile.limits = job.ops[op].selection;
-            samples.push(job.ops[op].op.tile().sample(tile)?);
+            let sample = job.ops[op].op.tile().sample(tile)?;
+            lock(&samples).insert(index, sample);
         }
-        drop(worker);
-        forecasts.push((op, job.ops[op].op.tile_mut().forecast(&samples)));
-    }
-    Ok(forecasts)
+    })?;
+    let samples = std::mem::take(&mut *lock(&samples));
+    Ok(samples.into_values().collect())
 }
 
 /// The octree nodes, a few times `side` steps wide, that hold positions spread evenly

@@ -174,8 +174,7 @@ impl Bench {
     pub fn encode(&mut self, all: &Benches<'_>, chunk: &Chunk) -> Result<(usize, Encoded)> {
         self.batch.clear();
         chunk.number(&mut self.numbers);
-        self.states.clear();
-        self.states.extend(chunk.states());
+        chunk.states(&mut self.states);
         all.tiles.fetch(&self.numbers, &mut self.fetch, &mut self.batch)?;
         if all.counted == Some(chunk.sink) {
             all.job.classes.keep_by_state(&self.batch, &self.states, &mut self.tally);

@@ -17,10 +17,10 @@ use super::run::Finished;
 use super::shares::{BATCH, Demands, Shares};
 use super::survey::survey;
 use crate::geom::lattice::{Lattice, Misplaced};
-use crate::point::PointBatch;
+use crate::point::{PointBatch, Position};
 use crate::report::{Decision, PassFigures, Tally};
 use crate::stage::{Gathered, ScanFacts, Sink, SinkSummary};
-use crate::tile::{Intake, SealedTiles, Sieve, SpillArea, TileStore, lock, seal};
+use crate::tile::{Intake, SealedTiles, Sieve, SpillArea, Tag, TileStore, lock, seal};
 use crate::{Error, Result};
 
 /// Runs a pipeline with tile stages (or one that only sorts) into `sinks`; none where each input has
@@ -202,6 +202,7 @@ fn decode(
         let mut tally = Tally::default();
         let mut intake = Intake::new(&store, job.run_records.unwrap_or(shares.run_records));
         let mut batch = PointBatch::new(job.source.schema().clone(), BATCH);
+        let mut placed = Placed::default();
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
             if index >= job.source.parts() {
@@ -209,7 +210,7 @@ fn decode(
             }
             let mut part = job.source.part(index)?;
             while job.read(&mut *part, &mut batch, &mut tally)? {
-                take(job, lattice, &batch, &mut intake, &mut tally)?;
+                take(job, lattice, &batch, &mut placed, &mut intake, &mut tally)?;
             }
         }
         intake.flush()?;
@@ -220,43 +221,65 @@ fn decode(
     Ok((store, tally))
 }
 
+/// What of a batch goes to the intake; keeps its memory.
+#[derive(Default)]
+struct Placed {
+    positions: Vec<Position>,
+    tags: Vec<Tag>,
+    /// Indices of records that do not go there.
+    left_out: Vec<usize>,
+}
+
 /// Places a batch's records on the lattice and hands them to the intake.
 fn take(
     job: &Job<'_>,
     lattice: &Lattice,
     batch: &PointBatch,
+    placed: &mut Placed,
     intake: &mut Intake<'_>,
     tally: &mut Tally,
 ) -> Result<()> {
     let stride = batch.schema().stride;
     let records = batch.records();
-    let (mut outcome, mut misplaced, mut placed, mut withheld) = (Ok(()), Vec::new(), 0, 0);
+    let Placed { positions, tags, left_out } = placed;
+    positions.clear();
+    tags.clear();
+    left_out.clear();
+    let (mut misplaced, mut withheld) = (Vec::new(), 0);
+    let tagger = &job.tagger;
     lattice.place(
         batch.schema(),
         records,
-        |i, position| {
-            let record = &records[i * stride..(i + 1) * stride];
-            match job.tagger.look(record, batch.source) {
-                None => withheld += 1,
-                Some(tag) if outcome.is_ok() => {
-                    placed += 1;
-                    outcome = intake.push(position, record, tag);
-                }
-                Some(_) => {}
+        |i, position| match tagger.look(&records[i * stride..(i + 1) * stride], batch.source) {
+            None => {
+                withheld += 1;
+                left_out.push(i);
+            }
+            Some(tag) => {
+                positions.push(position);
+                tags.push(tag);
             }
         },
         |i, why| misplaced.push((i, why)),
     );
-    outcome?;
     for (i, why) in misplaced {
         if why == Misplaced::NotFinite && job.drop_nonfinite {
             tally.remove(&job.source_kind, "not finite", 1);
+            left_out.push(i);
         } else {
             return Err(job.misplaced(batch, i, why));
         }
     }
     tally.remove(&job.source_kind, "withheld", withheld);
-    tally.work("placed", placed);
+    tally.work("placed", positions.len() as u64);
+    left_out.sort_unstable();
+    let (mut begin, mut at) = (0, 0);
+    for end in left_out.iter().copied().chain([batch.len()]) {
+        let count = end - begin;
+        let (these, of_these) = (&positions[at..at + count], &tags[at..at + count]);
+        intake.take(these, &records[begin * stride..end * stride], of_these)?;
+        (begin, at) = (end + 1, at + count);
+    }
     Ok(())
 }
 

@@ -52,6 +52,13 @@ impl Product {
             fates: Vec::with_capacity(records * FATE_BYTES),
             ..Product::default()
         };
+        let columns = pass.stores_normals || pass.stores_figures || wants_normals;
+        if let Some(first_records) = core.first_records()
+            && !(columns || pass.decided != 0 || pass.mark.is_some())
+        {
+            product.enter_all(tile, first_records, pass.removes);
+            return Ok(product);
+        }
         core.each(tile, |runs, stored| {
             let slot = runs.first().map_or(Run::UNSEEN, |run| run.slot);
             let fate = match slot {
@@ -83,6 +90,36 @@ impl Product {
     /// Positions of the tile's core.
     pub fn positions(&self) -> u64 {
         (self.fates.len() / FATE_BYTES) as u64
+    }
+
+    /// Enters the records of all positions of the core, which are alike to every stage and follow
+    /// their first.
+    fn enter_all(&mut self, tile: &Tile, first_records: &[u64], removes: bool) {
+        let core = tile.core.clone();
+        let each = first_records.iter().zip(&tile.copies[core.clone()]).zip(&tile.fates[core]);
+        for ((&number, &count), &fate) in each {
+            self.fates.extend_from_slice(&fate_code(fate));
+            let kept = match fate {
+                _ if !removes => count,
+                Fate::Kept => count,
+                Fate::KeptOnce => count.min(1),
+                Fate::Removed | Fate::Represented { .. } => 0,
+            };
+            let entry = Entry {
+                number,
+                count: kept,
+                tag: Tag::default(),
+                was: State::ALIVE,
+                now: State::ALIVE,
+            };
+            if kept > 0 {
+                self.entries.push(entry);
+            }
+            if count > kept {
+                let (number, count) = (number + u64::from(kept), count - kept);
+                self.entries.push(Entry { number, count, now: State::REMOVED, ..entry });
+            }
+        }
     }
 
     /// Enters the records of one position.

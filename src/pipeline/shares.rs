@@ -2,8 +2,9 @@
 
 use super::product::Product;
 use crate::budget::{Bytes, whole_mebibytes};
+use crate::point::Position;
 use crate::stage::{ChunkSize, Needs, Source};
-use crate::tile::{Fetch, Intake, Loader, Remote, index_bytes, merge_bytes};
+use crate::tile::{Fetch, Intake, Loader, Remote, Tag, index_bytes, merge_bytes};
 use crate::{Error, Result, geom::nearest::Nearest};
 
 /// Records that a batch of the decode takes.
@@ -12,6 +13,9 @@ pub const BATCH: usize = 8192;
 const FEWEST: usize = 16_384;
 /// Working memory that a thread makes use of; more goes to keeping the scan in memory.
 const THREAD_MOST: u64 = 192 << 20;
+/// Records that a run has at most, unless the scan then has more runs than a merge likes.
+const RUN_MOST: u64 = 1 << 19;
+const RUNS: u64 = 64;
 /// Stacks, allocator slack and decoder tables of a thread, and the same for the process.
 const THREAD_OVERHEAD: u64 = 3 << 20;
 const PROCESS_OVERHEAD: u64 = 6 << 20;
@@ -92,7 +96,9 @@ impl Demands {
 
     /// Bytes that a thread holds while it decodes, besides its run.
     fn decode_fixed(&self) -> u64 {
-        self.part_bytes + (BATCH * self.stride + Intake::fixed_bytes(self.stride)) as u64
+        let placed = BATCH * (size_of::<Position>() + size_of::<Tag>() + size_of::<usize>());
+        let batch = BATCH * self.stride + placed;
+        self.part_bytes + (batch + Intake::fixed_bytes(self.stride)) as u64
     }
 
     /// Bytes that a thread holds while it merges runs of `run_records`.
@@ -107,6 +113,12 @@ impl Demands {
         let each = Intake::bytes_per_record(self.stride, self.tagged).max(1) as u64;
         let run = merge_bytes(1, self.stride) - merge_bytes(0, self.stride);
         (self.points.saturating_mul(run) / each).isqrt().max(FEWEST as u64)
+    }
+
+    /// Records of a run beyond which a larger one gains nothing: it is sorted and gathered outside of
+    /// the caches, and its memory is written to for the first time.
+    fn most_records(&self) -> u64 {
+        RUN_MOST.max(self.points / RUNS)
     }
 
     /// Bytes that a thread holds in the mill, besides its tile: one chunk that it encodes and one
@@ -218,7 +230,8 @@ impl Demands {
             work,
             index,
             kept_in_memory: least + spare - work,
-            run_records: (share.saturating_sub(self.decode_fixed()) / each) as usize,
+            run_records: (share.saturating_sub(self.decode_fixed()) / each).min(self.most_records())
+                as usize,
             tile_positions: self.tile_positions(work),
         })
     }

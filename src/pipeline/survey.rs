@@ -10,8 +10,8 @@ use crate::geom::lattice::Lattice;
 use crate::point::Position;
 use crate::report::{Lot, ScanSurvey, TileFigures, Totals, report_tile_level};
 use crate::tile::{
-    Address, FATE_BYTES, Fate, Pieces, Reader, SealedTiles, Sieve, Spill, SpillArea, State,
-    TileKey, lock,
+    Address, BLOCK, FATE_BYTES, Fate, PIECE, Pieces, Reader, SealedTiles, Sieve, Spill, SpillArea,
+    State, TileKey, lock,
 };
 use crate::{Error, Result};
 
@@ -133,7 +133,7 @@ pub(super) fn survey(
         level,
     };
     let ranges = tiles.blocks().div_ceil(BLOCKS);
-    let each = 2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64);
+    let each = 2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64) + Stretches::BYTES;
     let _working = job.budget.lease(each * job.threads as u64, "survey")?;
     let spill = Spill::new(area, "report");
     let all = Mutex::new((ScanSurvey::new(&tiles.bounds()), BTreeMap::new()));
@@ -154,11 +154,11 @@ pub(super) fn survey(
     each_range(job, ranges, |range| {
         let mut part = empty.clone();
         let mut positions = 0;
-        let mut stretch = Stretch::default();
+        let mut stretches = Stretches::new(1);
         for block in range * BLOCKS..((range + 1) * BLOCKS).min(tiles.blocks()) {
-            stretch.load(&walk, block)?;
-            stretch.positions.iter().for_each(|&(p, lot)| part.measure(p, lot));
-            positions += stretch.positions.len() as u64;
+            let (these, lots) = stretches.of(&walk, block)?;
+            part.measure_all(these, lots);
+            positions += these.len() as u64;
         }
         lock(&fitted).merge(&part);
         Ok(positions)
@@ -201,45 +201,85 @@ struct Walk<'a> {
 struct Stretch {
     block: Option<usize>,
     reader: Reader,
-    buffer: Vec<u8>,
-    positions: Vec<(Position, Lot)>,
+    lots: Vec<Lot>,
 }
 
 impl Stretch {
-    fn load(&mut self, walk: &Walk<'_>, block: usize) -> Result<()> {
-        if self.block == Some(block) {
-            return Ok(());
-        }
+    fn load(&mut self, walk: &Walk<'_>, block: usize, columns: &mut Columns) -> Result<()> {
+        self.block = None;
         let (positions, copies) = walk.tiles.read(block, &mut self.reader)?;
-        let lot = |copies: u32| Lot { copies, kept: 0, deviation: None };
-        self.positions.clear();
-        self.positions.extend(positions.iter().zip(copies).map(|(&p, &copies)| (p, lot(copies))));
-        let (first, len) = (walk.tiles.block(block).first_position, positions.len() as u64);
-        let placed = &mut self.positions;
-        walk.fates.each(first, len, &mut self.buffer, |at, bytes| {
-            for (n, code) in bytes.chunks_exact(FATE_BYTES).enumerate() {
-                let mut stored = [0; FATE_BYTES];
-                stored.copy_from_slice(code);
-                placed[(at - first) as usize + n].1.deviation = deviation_of(stored);
-            }
-            Ok(())
-        })?;
-        let records = placed.iter().map(|(_, lot)| u64::from(lot.copies)).sum();
-        let (mut at, mut left) = (0, placed.first().map_or(0, |(_, lot)| lot.copies));
+        let records = copies.iter().map(|&n| u64::from(n)).sum::<u64>();
+        let Columns { fates, states } = columns;
+        fates.resize(positions.len() * FATE_BYTES, 0);
+        walk.fates.fill(walk.tiles.block(block).first_position, fates)?;
+        let fates = fates.as_chunks().0.iter().copied().map(deviation_of);
         let rank = walk.tiles.rank_of_block(block);
-        walk.states.each(rank, records, &mut self.buffer, |_, states| {
-            for &state in states {
-                while left == 0 {
-                    at += 1;
-                    left = placed[at].1.copies;
+        self.lots.clear();
+        if records == positions.len() as u64 {
+            states.resize(positions.len(), 0);
+            walk.states.fill(rank, states)?;
+            self.lots.extend(fates.zip(&*states).map(|(deviation, &state)| {
+                let kept = State(state).is_alive().into();
+                Lot { copies: 1, kept, deviation }
+            }));
+        } else {
+            let unkept = |(&copies, deviation)| Lot { copies, kept: 0, deviation };
+            self.lots.extend(copies.iter().zip(fates).map(unkept));
+            let (mut lots, mut left) = (self.lots.iter_mut(), 0);
+            let mut lot = lots.next();
+            walk.states.each(rank, records, states, |_, states| {
+                for &state in states {
+                    if lot.as_ref().is_some_and(|lot| lot.copies == left) {
+                        (lot, left) = (lots.next(), 0);
+                    }
+                    left += 1;
+                    if let Some(lot) = &mut lot {
+                        lot.kept += u32::from(State(state).is_alive());
+                    }
                 }
-                placed[at].1.kept += u32::from(State(state).is_alive());
-                left -= 1;
-            }
-            Ok(())
-        })?;
+                Ok(())
+            })?;
+        }
         self.block = Some(block);
         Ok(())
+    }
+}
+
+/// Memory for what is stored of a block.
+#[derive(Default)]
+struct Columns {
+    fates: Vec<u8>,
+    states: Vec<u8>,
+}
+
+/// Blocks that a walk keeps: a tile is walked twice.
+const KEPT_BLOCKS: usize = 64;
+
+/// The blocks last seen.
+struct Stretches {
+    kept: Vec<Stretch>,
+    columns: Columns,
+}
+
+impl Stretches {
+    /// Bytes that they hold.
+    const BYTES: u64 = (KEPT_BLOCKS * BLOCK * (2 * size_of::<Position>() + size_of::<Lot>() + 4)
+        + PIECE
+        + BLOCK * FATE_BYTES) as u64;
+
+    fn new(blocks: usize) -> Self {
+        let kept = (0..blocks).map(|_| Stretch::default()).collect();
+        Stretches { kept, columns: Columns::default() }
+    }
+
+    /// The positions of a block and their lots.
+    fn of(&mut self, walk: &Walk<'_>, block: usize) -> Result<(&[Position], &[Lot])> {
+        let slot = block % self.kept.len();
+        let stretch = &mut self.kept[slot];
+        if stretch.block != Some(block) {
+            stretch.load(walk, block, &mut self.columns)?;
+        }
+        Ok((stretch.reader.positions(), &stretch.lots))
     }
 }
 
@@ -254,26 +294,26 @@ impl Walk<'_> {
         lines: &mut RangeLines<'_>,
     ) -> Result<u64> {
         let end = ((range + 1) * BLOCKS).min(self.tiles.blocks());
-        let mut stretch = Stretch::default();
+        let mut stretches = Stretches::new(KEPT_BLOCKS);
         let mut at = (range * BLOCKS, 0);
-        if let Some(before) = at.0.checked_sub(1) {
-            stretch.load(self, before)?;
-            if let Some(&(last, _)) = stretch.positions.last() {
-                // The tile that reaches into this range belongs to the one before.
-                at = self.end_of(TileKey::around(last, self.level), at.0, &mut stretch)?;
-            }
+        if let Some(before) = at.0.checked_sub(1)
+            && let Some(&last) = stretches.of(self, before)?.0.last()
+        {
+            // The tile that reaches into this range belongs to the one before.
+            at = self.end_of(TileKey::around(last, self.level), at.0, &mut stretches)?;
         }
         let mut positions = 0;
         while at.0 < end {
-            stretch.load(self, at.0)?;
-            let key = TileKey::around(stretch.positions[at.1].0, self.level);
+            let key = TileKey::around(stretches.of(self, at.0)?.0[at.1], self.level);
             let mut tile = scan.tile(key);
-            let (next, seen) = self.visit(&mut stretch, at, key, |p, lot| {
-                tile.add(p, lot);
-                scan.add(p, lot);
+            let (next, seen) = self.visit(&mut stretches, at, key, |positions, lots| {
+                tile.add_all(positions, lots);
+                scan.add_all(positions, lots);
             })?;
             let mut fitted = tile.fit();
-            self.visit(&mut stretch, at, key, |p, lot| fitted.measure(p, lot))?;
+            self.visit(&mut stretches, at, key, |positions, lots| {
+                fitted.measure_all(positions, lots);
+            })?;
             lines.add(&fitted.finish(lattice, scan)?)?;
             positions += seen;
             at = next;
@@ -283,7 +323,12 @@ impl Walk<'_> {
 
     /// The first position behind the cube of `key`, which reaches to the beginning of block `from` or
     /// into it.
-    fn end_of(&self, key: TileKey, from: usize, stretch: &mut Stretch) -> Result<(usize, usize)> {
+    fn end_of(
+        &self,
+        key: TileKey,
+        from: usize,
+        stretches: &mut Stretches,
+    ) -> Result<(usize, usize)> {
         let cube = key.cube();
         let (mut inside, mut behind) = (from, self.tiles.blocks());
         while inside < behind {
@@ -297,32 +342,34 @@ impl Walk<'_> {
             return Ok((from, 0));
         }
         // The last block that begins in the cube may end behind it.
-        stretch.load(self, inside - 1)?;
-        let end = stretch.positions.partition_point(|(p, _)| cube.contains(*p));
-        let whole = end == stretch.positions.len();
+        let (positions, _) = stretches.of(self, inside - 1)?;
+        let end = positions.partition_point(|p| cube.contains(*p));
+        let whole = end == positions.len();
         Ok(if whole { (inside, 0) } else { (inside - 1, end) })
     }
 
-    /// Visits the positions of the cube of `key` from block and index `at` on; returns where they
-    /// end and how many there were.
+    /// Visits the positions of the cube of `key` from block and index `at` on, block by block; returns
+    /// where they end and how many there were.
     fn visit(
         &self,
-        stretch: &mut Stretch,
+        stretches: &mut Stretches,
         mut at: (usize, usize),
         key: TileKey,
-        mut visit: impl FnMut(Position, Lot),
+        mut visit: impl FnMut(&[Position], &[Lot]),
     ) -> Result<((usize, usize), u64)> {
         let cube = key.cube();
         let mut seen = 0;
         while at.0 < self.tiles.blocks() {
-            stretch.load(self, at.0)?;
-            while let Some(&(p, lot)) = stretch.positions.get(at.1) {
-                if !cube.contains(p) {
-                    return Ok((at, seen));
-                }
-                visit(p, lot);
-                seen += 1;
-                at.1 += 1;
+            let (positions, lots) = stretches.of(self, at.0)?;
+            let rest = &positions[at.1..];
+            let count = match rest.last() {
+                Some(&last) if cube.contains(last) => rest.len(),
+                _ => rest.partition_point(|p| cube.contains(*p)),
+            };
+            visit(&rest[..count], &lots[at.1..at.1 + count]);
+            seen += count as u64;
+            if count < rest.len() {
+                return Ok(((at.0, at.1 + count), seen));
             }
             at = (at.0 + 1, 0);
         }

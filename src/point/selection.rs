@@ -86,8 +86,11 @@ impl Chooser {
         let value = |field: &Option<Dimension>| {
             field.as_ref().map_or(0.0, |field| field.get(record, self.endian).as_f64())
         };
-        let class = value(&self.class);
-        (self.classes.is_empty() || self.classes.iter().any(|&of| f64::from(of) == class))
+        let of_class = || {
+            let class = value(&self.class);
+            self.classes.iter().any(|&of| f64::from(of) == class)
+        };
+        (self.classes.is_empty() || of_class())
             && self.flags.iter().all(|(field, is_set)| (value(field) != 0.0) == *is_set)
     }
 }

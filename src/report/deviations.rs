@@ -2,7 +2,8 @@
 
 use std::cmp::Ordering;
 
-use super::sums::FixedSum;
+use super::sums::{FixedSum, OpenSum};
+use super::survey::Lot;
 use crate::point::Position;
 use crate::tile::morton_cmp;
 
@@ -31,6 +32,23 @@ impl Deviations {
         let wide = f64::from(deviation);
         self.squares.add(wide * wide, copies);
         self.reach(deviation, position);
+    }
+
+    /// Adds the deviations of removed records at `positions`, as their lots tell.
+    pub(super) fn add_all(&mut self, positions: &[Position], lots: &[Lot]) {
+        let mut squares = OpenSum::default();
+        for (&position, lot) in positions.iter().zip(lots) {
+            let Some(deviation) = lot.deviation else { continue };
+            if lot.removed() != 1 || !deviation.is_finite() {
+                self.add(deviation, position, lot.removed());
+                continue;
+            }
+            self.count += 1;
+            let wide = f64::from(deviation);
+            squares.add(wide * wide, &mut self.squares);
+            self.reach(deviation.abs(), position);
+        }
+        squares.close(&mut self.squares);
     }
 
     /// Of equal deviations the first in Morton order is named.

@@ -51,6 +51,19 @@ impl Moments {
         }
     }
 
+    /// Adds `copies` records, those of its index, at each position.
+    ///
+    /// What lies close together and is exact is summed about its first position, in words.
+    pub fn add_all(&mut self, positions: &[Position], copies: impl Fn(usize) -> u32) {
+        for (n, near) in positions.chunks(NEAR).enumerate() {
+            let copies = |i: usize| copies(n * NEAR + i);
+            match near_moments(near, copies).filter(|_| self.is_exact()) {
+                Some(part) => self.absorb(&part),
+                None => near.iter().enumerate().for_each(|(i, &p)| self.add(p, copies(i))),
+            }
+        }
+    }
+
     /// Adds the first and second moments of `at`, each as `weighed`.
     #[inline(always)]
     fn plus(&mut self, weighed: impl Fn(i128) -> i128, at: [i64; 3]) {
@@ -158,6 +171,42 @@ impl Moments {
         }
         scatter
     }
+}
+
+/// Positions that are summed together.
+const NEAR: usize = 256;
+/// Bits of their distances from the first, and of their number with copies, with which no sum of
+/// products overflows.
+const NEAR_BITS: u32 = 22;
+const NEAR_RECORDS: u64 = 1 << (62 - 2 * NEAR_BITS);
+
+/// Moments of positions about the first of them; None if they might overflow.
+fn near_moments(positions: &[Position], copies: impl Fn(usize) -> u32) -> Option<Moments> {
+    let origin = *positions.first()?;
+    let (mut count, mut span, mut sum, mut products) = (0, 0, [0i64; 3], [0i64; 6]);
+    for (i, position) in positions.iter().enumerate() {
+        let copies = copies(i);
+        if copies == 0 {
+            continue;
+        }
+        count += u64::from(copies);
+        let [x, y, z]: [i64; 3] = std::array::from_fn(|a| position[a].wrapping_sub(origin[a]));
+        span |= (x ^ x >> 63) | (y ^ y >> 63) | (z ^ z >> 63);
+        let weighed = [x, y, z].map(|v| v.wrapping_mul(i64::from(copies)));
+        for (sum, term) in sum.iter_mut().zip(weighed) {
+            *sum = sum.wrapping_add(term);
+        }
+        for (product, (a, b)) in products.iter_mut().zip(PAIRS) {
+            *product = product.wrapping_add(weighed[a].wrapping_mul([x, y, z][b]));
+        }
+    }
+    (span >> NEAR_BITS == 0 && count <= NEAR_RECORDS).then(|| Moments {
+        origin,
+        shift: 0,
+        count,
+        sum: sum.map(i128::from),
+        products: products.map(i128::from),
+    })
 }
 
 /// A plane in lattice space.

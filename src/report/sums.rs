@@ -39,6 +39,16 @@ impl FixedSum {
         }
     }
 
+    /// A figure in units of the last bit; None if that takes more than 96 bits.
+    fn units(figure: f64) -> Option<u128> {
+        let bits = figure.to_bits();
+        let field = (bits >> 52 & 0x7ff) as i32;
+        let hidden = u64::from(field > 0) << 52;
+        let shift = field.max(1) - LAST_BIT + FRACTION;
+        let mantissa = rounded(bits & ((1 << 52) - 1) | hidden, shift);
+        (shift <= 43).then(|| u128::from(mantissa) << shift.max(0))
+    }
+
     /// Adds another sum.
     pub fn merge(&mut self, other: &FixedSum) {
         self.plus(other.high, other.low);
@@ -76,6 +86,25 @@ fn rounded(mantissa: u64, shift: i32) -> u64 {
     }
 }
 
+/// Figures for a [`FixedSum`] on the way there: up to 2^32 of them, added in fewer words.
+#[derive(Debug, Default)]
+pub(super) struct OpenSum(u128);
+
+impl OpenSum {
+    /// Adds `figure` once, to itself or, where it is too large, to `sum`.
+    pub fn add(&mut self, figure: f64, sum: &mut FixedSum) {
+        match FixedSum::units(figure) {
+            Some(units) => self.0 += units,
+            None => sum.add(figure, 1),
+        }
+    }
+
+    /// Adds what it holds to `sum`.
+    pub fn close(self, sum: &mut FixedSum) {
+        sum.plus(0, self.0);
+    }
+}
+
 /// Distances of records to a plane: their number, their sum and that of their squares. Each distance
 /// is rounded to 2^-32 of a step first, so that positions on the plane have none.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -98,6 +127,24 @@ impl Distances {
             self.sum.add(distance, copies);
             self.squares.add(distance * distance, copies);
         }
+    }
+
+    /// Adds up to 2^24 distances, each with its copies.
+    pub fn add_all(&mut self, distances: impl Iterator<Item = (f64, u32)>) {
+        let (mut sum, mut squares) = (0, 0);
+        for (distance, copies) in distances {
+            if copies != 1 || distance.abs() >= NEAR {
+                self.add(distance, copies);
+                continue;
+            }
+            let steps = u128::from(fine_steps(distance.abs()));
+            self.count += 1;
+            // Below 2^51 and 2^102.
+            sum += steps;
+            squares += steps * steps;
+        }
+        self.sum.plus(0, sum << 32);
+        self.squares.plus(0, squares);
     }
 
     /// Adds other distances.
@@ -193,6 +240,25 @@ mod tests {
     }
 
     proptest::proptest! {
+        #[test]
+        fn sums_of_many_are_those_of_each(
+            figures in proptest::collection::vec((0f64..1.0, -90i32..70, 1u32..3), 0..50),
+        ) {
+            let figures = figures.iter().map(|&(f, e, n)| (f * 2f64.powi(e), n));
+            let (mut each, mut all) = (Distances::default(), Distances::default());
+            let (mut one_by_one, mut open, mut sum) =
+                (FixedSum::default(), OpenSum::default(), FixedSum::default());
+            for (figure, copies) in figures.clone() {
+                each.add(-figure, copies);
+                one_by_one.add(figure, 1);
+                open.add(figure, &mut sum);
+            }
+            all.add_all(figures.map(|(figure, copies)| (-figure, copies)));
+            open.close(&mut sum);
+            proptest::prop_assert_eq!(each, all);
+            proptest::prop_assert_eq!(one_by_one, sum);
+        }
+
         #[test]
         fn one_add_is_the_rounded_figure(
             mantissa in 1f64..2.0, exponent in -11i32..127, times in 1u32..,

@@ -25,6 +25,9 @@ use crate::{Error, Result};
 /// Positions that an occupied report tile holds on average, at least.
 const POSITIONS_PER_TILE: u64 = 4096;
 
+/// Positions whose distances are summed together.
+const AT_ONCE: usize = 4096;
+
 /// Binary logarithm of the side of report tiles in lattice steps: the smallest for which an occupied
 /// one holds 4,096 positions on average. Where none does, the smallest for which they are fewest.
 pub fn report_tile_level(levels: &Levels) -> u32 {
@@ -57,7 +60,7 @@ impl Lot {
         Lot { copies, kept, deviation }
     }
 
-    fn removed(self) -> u32 {
+    pub(super) fn removed(self) -> u32 {
         self.copies.saturating_sub(self.kept)
     }
 }
@@ -65,6 +68,11 @@ impl Lot {
 fn no_moments(bounds: &Bounds) -> Pair<Moments> {
     let moments = Moments::for_bounds(bounds);
     Pair { before: moments.clone(), after: moments }
+}
+
+fn add_moments(moments: &mut Pair<Moments>, positions: &[Position], lots: &[Lot]) {
+    moments.before.add_all(positions, |i| lots[i].copies);
+    moments.after.add_all(positions, |i| lots[i].kept);
 }
 
 /// The first walk over a report tile: moments of its records before and after the reduction.
@@ -82,11 +90,13 @@ impl TileSurvey {
 
     /// Adds the records at `position`, which is in the cube.
     pub fn add(&mut self, position: Position, lot: Lot) {
-        self.moments.before.add(position, lot.copies);
-        self.moments.after.add(position, lot.kept);
-        if let Some(deviation) = lot.deviation {
-            self.deviations.add(deviation, position, lot.removed());
-        }
+        self.add_all(&[position], &[lot]);
+    }
+
+    /// Adds the records at `positions`, which are in the cube, each with its lot.
+    pub fn add_all(&mut self, positions: &[Position], lots: &[Lot]) {
+        add_moments(&mut self.moments, positions, lots);
+        self.deviations.add_all(positions, lots);
     }
 
     /// Adds what another walk over other records of the same tile saw.
@@ -119,7 +129,12 @@ pub struct FittedTile {
 impl FittedTile {
     /// Adds the records at `position`, as in the first walk.
     pub fn measure(&mut self, position: Position, lot: Lot) {
-        self.distances.measure(position, lot);
+        self.measure_all(&[position], &[lot]);
+    }
+
+    /// Adds the records at `positions`, as in the first walk.
+    pub fn measure_all(&mut self, positions: &[Position], lots: &[Lot]) {
+        self.distances.measure_all(positions, lots);
     }
 
     /// The tile's figures in world units; its sums go into the totals of `scan`.
@@ -130,6 +145,7 @@ impl FittedTile {
         let points = counts(&self.moments);
         check_walks(points, &self.distances.sums)?;
         scan.tiles += 1;
+        scan.deviations.merge(&self.deviations);
         if scan.takes_moments_from_tiles() {
             scan.moments.before.absorb(&self.moments.before);
             scan.moments.after.absorb(&self.moments.after);
@@ -151,7 +167,9 @@ impl FittedTile {
 pub struct ScanSurvey {
     bounds: Bounds,
     moments: Pair<Moments>,
+    /// Those of the tiles.
     deviations: Deviations,
+    /// The same deviations, as the walk over the scan saw them.
     histogram: Histogram,
     /// Removed records that nothing stands for.
     unrepresented: u64,
@@ -188,16 +206,19 @@ impl ScanSurvey {
 
     /// Adds the records at `position`, which is in the bounds and also added to its tile.
     pub fn add(&mut self, position: Position, lot: Lot) {
+        self.add_all(&[position], &[lot]);
+    }
+
+    /// Adds the records at `positions`, which are in the bounds and also added to their tile.
+    pub fn add_all(&mut self, positions: &[Position], lots: &[Lot]) {
         if !self.takes_moments_from_tiles() {
-            self.moments.before.add(position, lot.copies);
-            self.moments.after.add(position, lot.kept);
+            add_moments(&mut self.moments, positions, lots);
         }
-        match (lot.removed(), lot.deviation) {
-            (0, _) => {}
-            (removed, None) => self.unrepresented += u64::from(removed),
-            (removed, Some(deviation)) => {
-                self.deviations.add(deviation, position, removed);
-                self.histogram.add(deviation, removed);
+        for lot in lots {
+            match (lot.removed(), lot.deviation) {
+                (0, _) => {}
+                (removed, None) => self.unrepresented += u64::from(removed),
+                (removed, Some(deviation)) => self.histogram.add(deviation, removed),
             }
         }
     }
@@ -256,7 +277,7 @@ impl FittedScan {
         let points = counts(&survey.moments);
         check_walks(points, &distances.sums)?;
         check_walks(points, &survey.tile_distances)?;
-        check_removed(points, &survey.deviations, survey.unrepresented)?;
+        check_removed(points, &survey)?;
         Ok(Totals {
             tiles: survey.tiles,
             points,
@@ -283,11 +304,21 @@ impl PlaneDistances {
 
     /// Adds the records at `position`, as in the first walk.
     pub fn measure(&mut self, position: Position, lot: Lot) {
-        if let Some(plane) = &self.planes.before {
-            self.sums.before.add(plane.distance(position), lot.copies);
-        }
-        if let Some(plane) = self.planes.after.as_ref().filter(|_| lot.kept > 0) {
-            self.sums.after.add(plane.distance(position), lot.kept);
+        self.measure_all(&[position], &[lot]);
+    }
+
+    /// Adds the records at `positions`, as in the first walk.
+    pub fn measure_all(&mut self, positions: &[Position], lots: &[Lot]) {
+        for (positions, lots) in positions.chunks(AT_ONCE).zip(lots.chunks(AT_ONCE)) {
+            let each = || positions.iter().zip(lots);
+            if let Some(plane) = &self.planes.before {
+                let before = each().map(|(&p, lot)| (plane.distance(p), lot.copies));
+                self.sums.before.add_all(before);
+            }
+            if let Some(plane) = &self.planes.after {
+                let kept = each().filter(|(_, lot)| lot.kept > 0);
+                self.sums.after.add_all(kept.map(|(&p, lot)| (plane.distance(p), lot.kept)));
+            }
         }
     }
 }
@@ -308,14 +339,14 @@ fn check_walks(points: Pair<u64>, measured: &Pair<Distances>) -> Result<()> {
     )))
 }
 
-fn check_removed(points: Pair<u64>, deviations: &Deviations, unrepresented: u64) -> Result<()> {
-    let undefined = deviations.undefined();
+fn check_removed(points: Pair<u64>, survey: &ScanSurvey) -> Result<()> {
+    let undefined = survey.deviations.undefined();
     if undefined > 0 {
         return Err(Error::internal(format!(
             "{undefined} removed records have a deviation that is no number"
         )));
     }
-    let removed = deviations.count() + unrepresented;
+    let removed = survey.histogram.count() + survey.unrepresented;
     if points.after.checked_add(removed) == Some(points.before) {
         return Ok(());
     }

@@ -35,8 +35,8 @@ impl Block {
         self.len() * (3 * usize::from(self.width) + if self.has_copies { 4 } else { 0 })
     }
 
-    /// Packs positions in Morton order onto `out`. The address is that of the stretch which `out`
-    /// will become, once [`placed`](Block::placed).
+    /// Packs positions in Morton order onto `out`, each with its copies; no `copies` are one each. The
+    /// address is that of the stretch which `out` will become, once [`placed`](Block::placed).
     pub fn pack(positions: &[Position], copies: &[u32], out: &mut Vec<u8>) -> (Block, usize) {
         let bounds = Bounds::of(positions.iter().copied());
         let extent = bounds.extent().into_iter().max().unwrap_or(0);
@@ -47,10 +47,11 @@ impl Block {
             _ => 8,
         };
         let start = out.len();
-        for p in positions {
-            for (v, lo) in p.iter().zip(bounds.lo) {
-                out.extend_from_slice(&v.abs_diff(lo).to_le_bytes()[..width]);
-            }
+        match width {
+            1 => pack_as::<1>(positions, bounds.lo, out),
+            2 => pack_as::<2>(positions, bounds.lo, out),
+            4 => pack_as::<4>(positions, bounds.lo, out),
+            _ => pack_as::<8>(positions, bounds.lo, out),
         }
         let has_copies = copies.iter().any(|&n| n != 1);
         if has_copies {
@@ -113,5 +114,17 @@ impl Block {
                 lo[axis].wrapping_add(u64::from_le_bytes(offset) as i64)
             })
         }));
+    }
+}
+
+/// Packs the offsets of `positions` from `lo`, `W` bytes an axis.
+fn pack_as<const W: usize>(positions: &[Position], lo: Position, out: &mut Vec<u8>) {
+    let start = out.len();
+    out.resize(start + positions.len() * 3 * W, 0);
+    for (p, packed) in positions.iter().zip(out[start..].chunks_exact_mut(3 * W)) {
+        for axis in 0..3 {
+            let offset = p[axis].wrapping_sub(lo[axis]).to_le_bytes();
+            packed[axis * W..(axis + 1) * W].copy_from_slice(&offset[..W]);
+        }
     }
 }

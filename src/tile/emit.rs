@@ -2,6 +2,7 @@
 
 use super::Levels;
 use super::block::{BLOCK, Block};
+use super::key::split_level;
 use super::sealed::ref_bytes;
 use super::spill::{PIECE, Pieces, Spill};
 use crate::point::Position;
@@ -63,36 +64,80 @@ impl<'a> Emitter<'a> {
         }
     }
 
-    /// Takes the next record: its position, its number among all of the store, and its tag.
-    pub fn emit(&mut self, position: Position, record: u64, tag: u32) -> Result<()> {
-        match (&mut self.merged.ends, self.copies.last_mut()) {
-            (Some((_, last)), Some(copies)) if *last == position => {
-                *copies = copies.checked_add(1).ok_or_else(|| {
-                    Error::new(crate::ErrorKind::Data, "more than 2^32 records share one position")
-                })?;
+    /// Takes the next records, numbered from `first_record` on among all of the store: their positions,
+    /// and their tags if they have any.
+    pub fn take(&mut self, positions: &[Position], first_record: u64, tags: &[u32]) -> Result<()> {
+        let Some(&end) = positions.last() else { return Ok(()) };
+        let mut new = positions;
+        let mut last = match self.merged.ends {
+            Some((_, last)) => last,
+            None => {
+                self.merged.ends = Some((positions[0], positions[0]));
+                self.open(positions[0])?;
+                new = &positions[1..];
+                positions[0]
             }
-            (ends, _) => {
-                match ends {
-                    None => *ends = Some((position, position)),
-                    Some((_, last)) => {
-                        self.merged.levels.add(Some(*last), position);
-                        *last = position;
-                    }
+        };
+        for &position in new {
+            match split_level(last, position) {
+                Some(level) => {
+                    self.merged.levels.split(level);
+                    self.open(position)?;
+                    last = position;
                 }
-                if self.positions.len() == BLOCK {
-                    self.close_block()?;
-                }
-                self.positions.push(position);
-                self.copies.push(1);
+                None => self.copy()?,
             }
         }
-        self.merged.records += 1;
-        self.refs.extend_from_slice(&record.to_le_bytes());
-        if self.out.tagged {
-            self.refs.extend_from_slice(&tag.to_le_bytes());
+        self.merged.ends = self.merged.ends.map(|(first, _)| (first, end));
+        self.merged.records += positions.len() as u64;
+        self.refer(first_record, positions.len(), tags)
+    }
+
+    /// Begins a position.
+    fn open(&mut self, position: Position) -> Result<()> {
+        if self.positions.len() == BLOCK {
+            self.close_block()?;
         }
-        if self.refs.len() == PIECE * ref_bytes(self.out.tagged) {
-            self.store_refs()?;
+        self.positions.push(position);
+        self.copies.push(1);
+        Ok(())
+    }
+
+    /// Counts another record of the last position.
+    fn copy(&mut self) -> Result<()> {
+        let copies = self.copies.last_mut().and_then(|n| Some((n.checked_add(1)?, n)));
+        let Some((more, copies)) = copies else {
+            return Err(Error::new(
+                crate::ErrorKind::Data,
+                "more than 2^32 records share one position",
+            ));
+        };
+        *copies = more;
+        Ok(())
+    }
+
+    /// Enters `count` records, numbered from `first` on, into the canonical order.
+    fn refer(&mut self, mut first: u64, mut count: usize, mut tags: &[u32]) -> Result<()> {
+        let each = ref_bytes(self.out.tagged);
+        while count > 0 {
+            let start = self.refs.len();
+            let now = count.min(PIECE - start / each);
+            self.refs.resize(start + now * each, 0);
+            let refs = self.refs[start..].chunks_exact_mut(each).zip(first..);
+            if self.out.tagged {
+                let (head, rest) = tags.split_at(now);
+                for ((entry, number), tag) in refs.zip(head) {
+                    entry[..8].copy_from_slice(&number.to_le_bytes());
+                    entry[8..].copy_from_slice(&tag.to_le_bytes());
+                }
+                tags = rest;
+            } else {
+                refs.for_each(|(entry, number)| entry.copy_from_slice(&number.to_le_bytes()));
+            }
+            (first, count) = (first + now as u64, count - now);
+            if self.refs.len() == PIECE * each {
+                self.store_refs()?;
+            }
         }
         Ok(())
     }

@@ -4,14 +4,14 @@
 use std::sync::Arc;
 use std::sync::Mutex;
 
-use super::TileKey;
 use super::block::{BLOCK, Block};
-use super::key::{morton_cmp, morton_prefix};
+use super::gather::gather;
+use super::order::{Order, Sorted};
 use super::sieve::Tag;
 use super::spill::{PIECE, Pieces, Spill, SpillArea, lock};
 use crate::Result;
 use crate::budget::{Budget, Lease};
-use crate::point::{Bounds, Position};
+use crate::point::Position;
 
 /// Bytes of index that a run keeps in memory for each of its blocks.
 const INDEX_BYTES: u64 = size_of::<Block>() as u64;
@@ -74,7 +74,7 @@ pub struct Intake<'a> {
     records: Vec<u8>,
     positions: Vec<Position>,
     tags: Vec<u32>,
-    order: Vec<(u64, u32)>,
+    order: Order,
     packed: Vec<u8>,
 }
 
@@ -82,7 +82,7 @@ impl<'a> Intake<'a> {
     /// Bytes that an intake holds for each record of `stride` bytes.
     pub fn bytes_per_record(stride: usize, tagged: bool) -> usize {
         let tag = if tagged { size_of::<Tag>() } else { 0 };
-        stride + size_of::<Position>() + size_of::<(u64, u32)>() + tag
+        stride + size_of::<Position>() + Order::BYTES + tag
     }
 
     /// Bytes that an intake holds whatever its capacity.
@@ -98,20 +98,39 @@ impl<'a> Intake<'a> {
             records: Vec::with_capacity(capacity * store.stride),
             positions: Vec::with_capacity(capacity),
             tags: Vec::with_capacity(if store.tagged { capacity } else { 0 }),
-            order: Vec::with_capacity(capacity),
+            order: Order::with_capacity(capacity),
             packed: Vec::with_capacity(STRETCH + 2 * BLOCK * 28),
         }
     }
 
     /// Takes one record at its position; its tag counts if the store has tags.
     pub fn push(&mut self, position: Position, record: &[u8], tag: Tag) -> Result<()> {
-        if self.positions.len() == self.capacity {
-            self.flush()?;
-        }
-        self.positions.push(position);
-        self.records.extend_from_slice(record);
-        if self.store.tagged {
-            self.tags.push(tag.0);
+        self.take(&[position], record, &[tag])
+    }
+
+    /// Takes records, one after the other, at their positions; their tags count if the store has tags.
+    pub fn take(
+        &mut self,
+        mut positions: &[Position],
+        mut records: &[u8],
+        mut tags: &[Tag],
+    ) -> Result<()> {
+        while !positions.is_empty() {
+            if self.positions.len() == self.capacity {
+                self.flush()?;
+            }
+            let now = positions.len().min(self.capacity - self.positions.len());
+            let (head, rest) = positions.split_at(now);
+            self.positions.extend_from_slice(head);
+            positions = rest;
+            let (head, rest) = records.split_at(now * self.store.stride);
+            self.records.extend_from_slice(head);
+            records = rest;
+            if self.store.tagged {
+                let (head, rest) = tags.split_at(now);
+                self.tags.extend(head.iter().map(|tag| tag.0));
+                tags = rest;
+            }
         }
         Ok(())
     }
@@ -121,82 +140,64 @@ impl<'a> Intake<'a> {
         if self.positions.is_empty() {
             return Ok(());
         }
-        self.sort();
-        let first_record = self.store.records.reserve(self.positions.len() as u64);
-        self.store_records(first_record)?;
-        let blocks = self.store_positions()?;
+        let (store, records, tags) = (self.store, &self.records, &self.tags);
+        let equal = |a: usize, b: usize| {
+            let record = |i: usize| &records[i * store.stride..(i + 1) * store.stride];
+            record(a).cmp(record(b)).then_with(|| tags.get(a).cmp(&tags.get(b)))
+        };
+        let order = self.order.sort(&self.positions, &equal);
+        let first_record = store.records.reserve(order.len() as u64);
+        store_records(store, order, records, first_record)?;
+        let blocks = store_positions(store, order, &self.positions, tags, &mut self.packed)?;
         self.records.clear();
         self.positions.clear();
         self.tags.clear();
-        self.store.add(Run { blocks, first_record })
+        store.add(Run { blocks, first_record })
     }
+}
 
-    fn record(&self, i: u32) -> &[u8] {
-        let stride = self.store.stride;
-        &self.records[i as usize * stride..(i as usize + 1) * stride]
+/// Stores `records` in `order`, numbered from `first` on.
+fn store_records(store: &TileStore, order: Sorted<'_>, records: &[u8], first: u64) -> Result<()> {
+    let mut piece = Vec::with_capacity(PIECE * store.stride);
+    let numbers = (first..).step_by(PIECE);
+    for (number, slots) in numbers.zip(order.chunks(PIECE)) {
+        piece.clear();
+        gather(records, store.stride, slots.indices(), &mut piece);
+        store.records.put(number, &piece)?;
     }
+    Ok(())
+}
 
-    /// What a run's block holds beside a position, where blocks of distinct positions have copies.
-    fn tag(&self, i: u32) -> u32 {
-        self.tags.get(i as usize).copied().unwrap_or(1)
-    }
-
-    /// Sorts into canonical order: by the upper 21 levels of the run's octree first, which nearly
-    /// always decide, then what shares them exactly.
-    fn sort(&mut self) {
-        let root = TileKey::holding(&Bounds::of(self.positions.iter().copied()));
-        let mut order = std::mem::take(&mut self.order);
-        order.clear();
-        order.extend(
-            self.positions
-                .iter()
-                .enumerate()
-                .map(|(i, p)| (morton_prefix(*p, root.level), i as u32)),
-        );
-        order.sort_unstable();
-        for equal in order.chunk_by_mut(|a, b| a.0 == b.0).filter(|equal| equal.len() > 1) {
-            equal.sort_unstable_by(|a, b| {
-                let (p, q) = (&self.positions[a.1 as usize], &self.positions[b.1 as usize]);
-                morton_cmp(p, q)
-                    .then_with(|| self.record(a.1).cmp(self.record(b.1)))
-                    .then_with(|| self.tag(a.1).cmp(&self.tag(b.1)))
-            });
-        }
-        self.order = order;
-    }
-
-    fn store_records(&self, first: u64) -> Result<()> {
-        let mut piece = Vec::with_capacity(PIECE * self.store.stride);
-        for (n, slots) in self.order.chunks(PIECE).enumerate() {
-            piece.clear();
-            slots.iter().for_each(|&(_, i)| piece.extend_from_slice(self.record(i)));
-            self.store.records.put(first + (n * PIECE) as u64, &piece)?;
-        }
-        Ok(())
-    }
-
-    fn store_positions(&mut self) -> Result<Vec<Block>> {
-        let mut blocks = Vec::with_capacity(self.order.len().div_ceil(BLOCK));
-        let mut sorted = Vec::with_capacity(BLOCK);
-        let mut tags = Vec::with_capacity(BLOCK);
-        for stretch in self.order.chunks(STRETCH / 24 / BLOCK * BLOCK) {
-            self.packed.clear();
-            let begin = blocks.len();
-            let mut starts = Vec::new();
-            for slots in stretch.chunks(BLOCK) {
-                sorted.clear();
-                sorted.extend(slots.iter().map(|&(_, i)| self.positions[i as usize]));
-                tags.clear();
-                tags.extend(slots.iter().map(|&(_, i)| self.tag(i)));
-                let (block, start) = Block::pack(&sorted, &tags, &mut self.packed);
-                blocks.push(block);
-                starts.push(start);
+/// Stores `positions` in `order` as blocks; `packed` is memory to work in. Where blocks of distinct
+/// positions have copies, those of a run have tags.
+fn store_positions(
+    store: &TileStore,
+    order: Sorted<'_>,
+    positions: &[Position],
+    tags: &[u32],
+    packed: &mut Vec<u8>,
+) -> Result<Vec<Block>> {
+    let mut blocks = Vec::with_capacity(order.len().div_ceil(BLOCK));
+    let (mut of_block, mut tags_of_block) = (Vec::with_capacity(BLOCK), Vec::with_capacity(BLOCK));
+    for stretch in order.chunks(STRETCH / 24 / BLOCK * BLOCK) {
+        packed.clear();
+        let begin = blocks.len();
+        let mut starts = Vec::new();
+        for slots in stretch.chunks(BLOCK) {
+            of_block.clear();
+            of_block.extend(slots.indices().map(|i| positions[i]));
+            tags_of_block.clear();
+            if store.tagged {
+                tags_of_block.extend(slots.indices().map(|i| tags[i]));
             }
-            let address = self.store.positions.append(&self.packed)?;
-            for (block, start) in blocks[begin..].iter_mut().zip(starts) {
-                block.placed(address, start);
-            }
+            let (block, start) = Block::pack(&of_block, &tags_of_block, packed);
+            blocks.push(block);
+            starts.push(start);
         }
-        Ok(blocks)
+        let address = store.positions.append(packed)?;
+        for (block, start) in blocks[begin..].iter_mut().zip(starts) {
+            block.placed(address, start);
+        }
     }
+    Ok(blocks)
 }

@@ -45,6 +45,11 @@ pub fn morton_prefix(p: Position, level: u32) -> u64 {
     x | y << 1 | z << 2
 }
 
+/// The path of `p` as in [`morton_prefix`], or its upper `bits` bits if it has more.
+pub fn morton_path(p: Position, level: u32, bits: u32) -> u64 {
+    morton_prefix(p, level) >> (3 * level.min(PREFIX_LEVELS)).saturating_sub(bits)
+}
+
 /// Bit i of a 21-bit number goes to bit 3i.
 fn spread(v: u64) -> u64 {
     let v = (v | v << 32) & 0x001f_0000_0000_ffff;

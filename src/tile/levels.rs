@@ -24,11 +24,19 @@ impl Levels {
     /// Counts the distinct position `p` that follows `before` (None for the very first) in Morton
     /// order.
     pub fn add(&mut self, before: Option<Position>, p: Position) {
-        self.positions += 1;
         match before.and_then(|b| split_level(b, p)) {
-            Some(level) => self.splits[level as usize] += 1,
-            None => self.first = true,
+            Some(level) => self.split(level),
+            None => {
+                self.positions += 1;
+                self.first = true;
+            }
         }
+    }
+
+    /// Counts a position that first differs from the one before in bit `level`.
+    pub(super) fn split(&mut self, level: u32) {
+        self.positions += 1;
+        self.splits[level as usize] += 1;
     }
 
     /// Adds what another walk counted; exactly one of all walks began with `None`.

@@ -68,6 +68,11 @@ impl Core {
         Ok(())
     }
 
+    /// Number of each position's first record, if every record is seen, and alike to every stage.
+    pub fn first_records(&self) -> Option<&[u64]> {
+        self.runs.is_empty().then_some(&self.first_records)
+    }
+
     fn clear(&mut self) {
         self.first_position = 0;
         self.first_records.clear();
@@ -135,6 +140,24 @@ impl Loader {
         let (positions, copies) = self.tiles.read(b, &mut self.reader)?;
         let (tile, first_records) = (&mut self.tile, &mut self.core.first_records);
         let mut record = block.first_record;
+        let is_core = tile.cube.holds(&block.bounds);
+        if loaded.holds(&block.bounds) && (is_core || !tile.cube.meets(&block.bounds)) {
+            // Nearly all blocks: no position has to be looked at.
+            if is_core && first_records.is_empty() {
+                self.core.first_position = block.first_position;
+            } else if first_records.is_empty() {
+                tile.core.start = tile.positions.len() + positions.len();
+            }
+            if is_core {
+                first_records.extend(copies.iter().map(|&n| {
+                    record += u64::from(n);
+                    record - u64::from(n)
+                }));
+            }
+            tile.positions.extend_from_slice(positions);
+            tile.copies.extend_from_slice(copies);
+            return Ok(());
+        }
         for (j, (&p, &n)) in positions.iter().zip(copies).enumerate() {
             if loaded.contains(p) {
                 if tile.cube.contains(p) {

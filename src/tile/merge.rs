@@ -135,6 +135,15 @@ fn merge_range(
     let mut emitter = Emitter::new(out, most);
     let (mut equal, mut records) = (Vec::new(), BinaryHeap::new());
     while let Some(head) = heap.pop() {
+        let next = heap.peek().map(|next| next.position);
+        if next != Some(head.position) {
+            // Up to where another run goes on, or the range ends, nothing is to be compared.
+            let cursor = &mut cursors[head.run];
+            cursor.emit_until(next.or(until), &mut emitter, &mut buffer)?;
+            let position = cursor.head(until);
+            heap.extend(position.map(|position| Head { position, run: head.run }));
+            continue;
+        }
         equal.clear();
         equal.push(head.run);
         while heap.peek().is_some_and(|next| next.position == head.position) {
@@ -173,8 +182,8 @@ fn emit_equal(
         {
             let Reverse((record, run)) = &mut *smallest;
             let cursor = &mut cursors[*run];
-            emitter.emit(position, cursor.number(), cursor.tag())?;
-            cursor.advance(buffer)?;
+            emitter.take(&[position], cursor.number(), &[cursor.tag()])?;
+            cursor.advance(1, buffer)?;
             if cursor.head(None) == Some(position) {
                 cursor.read_record(record)?;
             } else {
@@ -190,8 +199,8 @@ fn emit_equal(
     let Some(run) = last else { return Ok(()) };
     let cursor = &mut cursors[run];
     while cursor.head(None) == Some(position) {
-        emitter.emit(position, cursor.number(), cursor.tag())?;
-        cursor.advance(buffer)?;
+        emitter.take(&[position], cursor.number(), &[cursor.tag()])?;
+        cursor.advance(1, buffer)?;
     }
     Ok(())
 }
@@ -218,6 +227,22 @@ impl PartialEq for Head {
     }
 }
 impl Eq for Head {}
+
+/// How many of `positions`, which are in order, are before `end`: the search is quick where few are,
+/// and where all are.
+fn before(positions: &[Position], end: &Position) -> usize {
+    let is_before = |p: &Position| morton_cmp(p, end) == Ordering::Less;
+    if positions.last().is_none_or(is_before) {
+        return positions.len();
+    }
+    let mut wide = 1;
+    while positions.get(wide).is_some_and(is_before) {
+        wide *= 2;
+    }
+    let from = wide / 2;
+    let to = wide.min(positions.len());
+    from + positions[from..to].partition_point(is_before)
+}
 
 /// A walk along a run.
 struct Cursor<'a> {
@@ -296,8 +321,28 @@ impl<'a> Cursor<'a> {
         self.tags.get(self.at).copied().unwrap_or_default()
     }
 
-    fn advance(&mut self, buffer: &mut Vec<u8>) -> Result<()> {
-        self.at += 1;
+    /// Emits its records before `until`, all that are left if that is nowhere.
+    fn emit_until(
+        &mut self,
+        until: Option<Position>,
+        emitter: &mut Emitter<'_>,
+        buffer: &mut Vec<u8>,
+    ) -> Result<()> {
+        loop {
+            let rest = &self.positions[self.at..];
+            let count = until.map_or(rest.len(), |end| before(rest, &end));
+            if count == 0 {
+                return Ok(());
+            }
+            let range = self.at..self.at + count;
+            let tags = self.tags.get(range.clone()).unwrap_or_default();
+            emitter.take(&self.positions[range], self.number(), tags)?;
+            self.advance(count, buffer)?;
+        }
+    }
+
+    fn advance(&mut self, records: usize, buffer: &mut Vec<u8>) -> Result<()> {
+        self.at += records;
         if self.at == self.positions.len() {
             self.block += 1;
             self.load(buffer)?;

@@ -54,6 +54,13 @@ pub struct Reader {
     copies: Vec<u32>,
 }
 
+impl Reader {
+    /// The positions last read.
+    pub fn positions(&self) -> &[Position] {
+        &self.positions
+    }
+}
+
 impl SealedTiles {
     pub(super) fn new(
         sequence: Sequence,

@@ -220,6 +220,18 @@ impl Pieces {
         self.spill.read(address.plus(first % PIECE as u64 * self.stride as u64), into)
     }
 
+    /// Fills `into` with the items from number `first` on, of one stretch of numbers.
+    pub fn fill(&self, mut first: u64, mut into: &mut [u8]) -> Result<()> {
+        while !into.is_empty() {
+            let in_piece = (PIECE - (first % PIECE as u64) as usize) * self.stride;
+            let (now, later) = into.split_at_mut(in_piece.min(into.len()));
+            self.read(first, now)?;
+            first += (now.len() / self.stride) as u64;
+            into = later;
+        }
+        Ok(())
+    }
+
     /// How many items are stored from number `first` to the end of its piece.
     pub fn stored_in(&self, first: u64) -> Result<usize> {
         let (_, items) = self.piece(first)?;
