@@ -2,7 +2,9 @@
 //! withheld, and its class.
 
 use super::settings::Withheld;
-use crate::point::{Chooser, Dimension, Endian, Flag, PointBatch, Schema, Selection, Value, names};
+use crate::point::{
+    Chooser, Dimension, Endian, Flag, PointBatch, Scalar, Schema, Selection, Value, names,
+};
 use crate::report::{ClassCounts, Tally};
 use crate::tile::{ASIDE, State, Tag};
 use crate::{Error, Result};
@@ -104,6 +106,14 @@ impl ClassOf {
     ) {
         let Some(field) = &self.field else { return };
         let counts = tally.classes.get_or_insert_default();
+        if field.scalar == Scalar::U8 {
+            let (shift, width) = field.bits.map_or((0, 8), |bits| (bits.shift, bits.width));
+            let mask = ((1u16 << width) - 1) as u8;
+            for (i, record) in batch.iter().enumerate() {
+                count(counts, i, record[field.offset] >> shift & mask);
+            }
+            return;
+        }
         for (i, record) in batch.iter().enumerate() {
             // A PLY property of that name may hold what is no class.
             let class = match field.get(record, self.endian) {
