@@ -1,11 +1,14 @@
 //! Records of one format as records of another: every dimension goes where its name is, and what the
 //! target cannot hold is told, never changed. Knows no files.
 
+mod columns;
 mod layouts;
 
 pub use layouts::{las_schema, ply_schema};
 
 use std::collections::{BTreeMap, BTreeSet};
+
+use columns::{BLOCK, Column, Records, Targets};
 
 use crate::point::names::XYZ;
 use crate::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
@@ -27,6 +30,8 @@ pub struct Projection {
     to_endian: Endian,
     to_stride: usize,
     moves: Vec<Move>,
+    /// The same steps over columns, for those that have such a form.
+    columns: Vec<Option<Column>>,
 }
 
 /// One step of a projection.
@@ -75,7 +80,10 @@ impl Projection {
                 push(&mut moves, step(source, from.endian, target, to.endian));
             }
         }
-        Ok(Projection { from: from.clone(), to_endian: to.endian, to_stride: to.stride, moves })
+        let over_columns = moves.iter().map(|step| Column::of(step, from.endian, to.endian));
+        let columns = over_columns.collect();
+        let (to_endian, to_stride) = (to.endian, to.stride);
+        Ok(Projection { from: from.clone(), to_endian, to_stride, moves, columns })
     }
 
     /// Leaves room behind each record: records become `stride` bytes long, the new ones 0.
@@ -91,28 +99,77 @@ impl Projection {
         whole && self.to_stride == all
     }
 
+    /// Bytes of a projected record.
+    pub fn stride(&self) -> usize {
+        self.to_stride
+    }
+
     /// Appends the projections of `records` to `out`. Fails on the first point with a value that its
     /// target cannot hold, naming dimension, value and point.
     pub fn project(&self, records: &[u8], out: &mut Vec<u8>) -> Result<Rounding> {
         let start = out.len();
         let points = records.len() / self.from.stride.max(1);
         out.resize(start + points * self.to_stride, 0);
+        self.project_into(records, &mut out[start..])
+    }
+
+    /// Replaces `out`, which has room for exactly as many, by the projections of `records`; fails as
+    /// [`project`](Self::project) does.
+    pub fn project_into(&self, records: &[u8], out: &mut [u8]) -> Result<Rounding> {
+        let (from, to) = (self.from.stride.max(1), self.to_stride.max(1));
         let mut rounding = Rounding::default();
-        let targets = out[start..].chunks_exact_mut(self.to_stride.max(1));
-        for (index, (record, target)) in
-            records.chunks_exact(self.from.stride.max(1)).zip(targets).enumerate()
-        {
-            let mut largest = 0f64;
-            for step in &self.moves {
-                match self.apply(step, record, target) {
-                    Ok(rounded) => largest = largest.max(rounded),
-                    Err(unfit) => return Err(self.refuse(unfit, index, record)),
-                }
+        let blocks = records.chunks(BLOCK * from).zip(out.chunks_mut(BLOCK * to));
+        for (block, (records, targets)) in blocks.enumerate() {
+            let mut rounded = [0.0; BLOCK];
+            let rounded = &mut rounded[..records.len() / from];
+            if !self.block(records, targets, rounded) {
+                self.one_by_one(block * BLOCK, records, targets, rounded)?;
             }
-            rounding.points += u64::from(largest > 0.0);
-            rounding.largest = rounding.largest.max(largest);
+            rounding.points += rounded.iter().map(|&by| u64::from(by > 0.0)).sum::<u64>();
+            rounding.largest = rounded.iter().fold(rounding.largest, |all, &by| all.max(by));
         }
         Ok(rounding)
+    }
+
+    /// Projects up to [`BLOCK`] records field by field; False if a value may not fit.
+    fn block(&self, records: &[u8], targets: &mut [u8], rounded: &mut [f64]) -> bool {
+        targets.fill(0);
+        let from = Records { bytes: records, stride: self.from.stride.max(1) };
+        let mut to = Targets { bytes: targets, stride: self.to_stride.max(1) };
+        self.moves.iter().zip(&self.columns).all(|(step, column)| match column {
+            Some(column) => column.apply(from, &mut to, rounded),
+            None => {
+                let records = from.bytes.chunks_exact(from.stride);
+                let targets = to.bytes.chunks_exact_mut(to.stride);
+                records.zip(targets).zip(&mut *rounded).all(|((record, target), rounded)| {
+                    let by = self.apply(step, record, target);
+                    by.map(|by| *rounded = rounded.max(by)).is_ok()
+                })
+            }
+        })
+    }
+
+    /// Projects the records from number `first` on one by one.
+    fn one_by_one(
+        &self,
+        first: usize,
+        records: &[u8],
+        targets: &mut [u8],
+        rounded: &mut [f64],
+    ) -> Result<()> {
+        targets.fill(0);
+        let records = records.chunks_exact(self.from.stride.max(1));
+        let targets = targets.chunks_exact_mut(self.to_stride.max(1));
+        for (index, ((record, target), rounded)) in records.zip(targets).zip(rounded).enumerate() {
+            *rounded = 0.0;
+            for step in &self.moves {
+                match self.apply(step, record, target) {
+                    Ok(by) => *rounded = rounded.max(by),
+                    Err(unfit) => return Err(self.refuse(unfit, first + index, record)),
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Applies one step; returns by how much it rounded.
@@ -329,3 +386,6 @@ fn push(moves: &mut Vec<Move>, step: Move) {
     }
     moves.push(step);
 }
+
+#[cfg(test)]
+mod tests;

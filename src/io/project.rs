@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::convert::Projection;
-use crate::point::{PointBatch, Schema};
+use crate::point::{PointBatch, Schema, Spare};
 use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -20,6 +20,7 @@ struct ProjectingEncoder {
     projection: Projection,
     to: Arc<Schema>,
     inner: Arc<dyn Encode>,
+    spare: Spare<PointBatch>,
 }
 
 impl Projected {
@@ -27,27 +28,32 @@ impl Projected {
     /// `path` is the output's, to be named where a value does not fit.
     pub fn new(inner: Box<dyn Sink>, projection: Projection, to: Arc<Schema>, path: &Path) -> Self {
         let path = path.to_owned();
-        let encoder = ProjectingEncoder { path, projection, to, inner: inner.encoder() };
+        let (spare, inner_encoder) = (Spare::default(), inner.encoder());
+        let encoder = ProjectingEncoder { path, projection, to, inner: inner_encoder, spare };
         Projected { inner, encoder: Arc::new(encoder), rounded: (0, 0.0) }
     }
 
     /// The chunks of such a sink around one of the chunks `inner`, which takes records of `to`.
     pub fn chunk(inner: ChunkSize, to: &Schema) -> ChunkSize {
-        // The projected records, twice: as made and in their batch.
+        // The projected records, and those that are spare.
         ChunkSize { bytes: inner.bytes + 2 * (inner.points * to.stride) as u64, ..inner }
     }
 }
 
 impl Encode for ProjectingEncoder {
     fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
-        let mut records = Vec::with_capacity(batch.len() * self.to.stride);
-        let rounding = self.projection.project(batch.records(), &mut records);
+        let make = || PointBatch::new(self.to.clone(), batch.len());
+        let mut projected = self.spare.take(make);
+        if projected.capacity() < batch.len() {
+            projected = make();
+        }
+        let records = projected.refill(batch.len());
+        let rounding = self.projection.project_into(batch.records(), records);
         let rounding = rounding.map_err(|error| error.at(&self.path))?;
-        let mut projected = PointBatch::new(self.to.clone(), batch.len());
-        projected.extend(&records);
         projected.normals = batch.normals.clone();
         let mut encoded = self.inner.encode(&projected)?;
         encoded.rounded = Some((rounding.points, rounding.largest));
+        self.spare.put(projected);
         Ok(encoded)
     }
 }

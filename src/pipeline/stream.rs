@@ -8,7 +8,7 @@ use super::outlet::{Hands, Outlet};
 use super::run::Finished;
 use super::shares::{BATCH, Shares};
 use crate::geom::lattice::{Lattice, Misplaced};
-use crate::point::PointBatch;
+use crate::point::{PointBatch, Spare};
 use crate::report::Tally;
 use crate::stage::{Encoded, Sink};
 use crate::tile::{lock, parallel};
@@ -26,17 +26,25 @@ pub(super) fn stream(
     let schema = job.source.schema();
     let encoders: Vec<_> = sinks.iter().map(|sink| sink.encoder()).collect();
     let empty = sinks.iter().map(|sink| PointBatch::new(schema.clone(), sink.chunk_points()));
+    let spare_batches: Spare<PointBatch> = Spare::default();
+    let spare_chunks: Vec<Spare<PointBatch>> = sinks.iter().map(|_| Spare::default()).collect();
     let open = Mutex::new((empty.collect::<Vec<_>>(), 0u64));
     let outlet: Outlet<PointBatch, (usize, PointBatch)> = Outlet::new(sinks, job.threads);
     let commit = |batch: PointBatch| -> Result<Vec<(usize, PointBatch)>> {
         let (chunks, kept) = &mut *lock(&open);
         *kept += batch.len() as u64;
-        let each = chunks.iter_mut().enumerate();
-        Ok(each.flat_map(|(sink, chunk)| chunked(&batch, sink, chunk)).collect())
+        let mut full = Vec::new();
+        for (sink, chunk) in chunks.iter_mut().enumerate() {
+            chunked(&batch, chunk, &spare_chunks[sink], |chunk| full.push((sink, chunk)));
+        }
+        spare_batches.put(batch);
+        Ok(full)
     };
     let encode = |(sink, chunk): (usize, PointBatch)| -> Result<(usize, Encoded)> {
         let encoder = encoders.get(sink).ok_or_else(|| Error::internal("no such sink"))?;
-        Ok((sink, encoder.encode(&chunk)?))
+        let encoded = encoder.encode(&chunk)?;
+        spare_chunks[sink].put(chunk);
+        Ok((sink, encoded))
     };
     let total = Mutex::new(Tally::default());
     let next = AtomicUsize::new(0);
@@ -53,7 +61,7 @@ pub(super) fn stream(
             }
             let mut part = job.source.part(index)?;
             for number in 0.. {
-                let mut batch = PointBatch::new(schema.clone(), BATCH);
+                let mut batch = spare_batches.take(|| PointBatch::new(schema.clone(), BATCH));
                 let more = job.read(&mut *part, &mut batch, &mut tally)?;
                 if let Some(lattice) = lattice {
                     drop_nonfinite(job, lattice, &mut batch, &mut tally)?;
@@ -90,22 +98,27 @@ pub(super) fn stream(
     })
 }
 
-/// Fills `chunk` of `sink` from `batch` and returns the chunks that this completed.
-fn chunked(batch: &PointBatch, sink: usize, chunk: &mut PointBatch) -> Vec<(usize, PointBatch)> {
+/// Fills `chunk` from `batch` and calls `full` with the chunks that this completed.
+fn chunked(
+    batch: &PointBatch,
+    chunk: &mut PointBatch,
+    spare: &Spare<PointBatch>,
+    mut full: impl FnMut(PointBatch),
+) {
     let stride = batch.schema().stride;
     let mut records = batch.records();
-    let mut full = Vec::new();
     while !records.is_empty() {
         let room = (chunk.capacity() - chunk.len()) * stride;
         let (now, later) = records.split_at(room.min(records.len()));
         chunk.extend(now);
         records = later;
         if chunk.len() == chunk.capacity() {
-            let empty = PointBatch::new(batch.schema().clone(), chunk.capacity());
-            full.push((sink, std::mem::replace(chunk, empty)));
+            let capacity = chunk.capacity();
+            let mut empty = spare.take(|| PointBatch::new(batch.schema().clone(), capacity));
+            empty.clear();
+            full(std::mem::replace(chunk, empty));
         }
     }
-    full
 }
 
 fn drop_nonfinite(

@@ -106,9 +106,13 @@ impl ClassOf {
     ) {
         let Some(field) = &self.field else { return };
         let counts = tally.classes.get_or_insert_default();
-        if field.scalar == Scalar::U8 && field.bits.is_none() {
-            let classes = batch.iter().map(|record| record[field.offset]);
-            return classes.enumerate().for_each(|(i, class)| count(counts, i, class));
+        if field.scalar == Scalar::U8 {
+            let (shift, width) = field.bits.map_or((0, 8), |bits| (bits.shift, bits.width));
+            let mask = ((1u16 << width) - 1) as u8;
+            for (i, record) in batch.iter().enumerate() {
+                count(counts, i, record[field.offset] >> shift & mask);
+            }
+            return;
         }
         for (i, record) in batch.iter().enumerate() {
             // A PLY property of that name may hold what is no class.

@@ -6,6 +6,7 @@ mod count;
 pub mod names;
 mod schema;
 mod selection;
+mod spare;
 mod units;
 
 pub use batch::PointBatch;
@@ -13,4 +14,5 @@ pub use bounds::{Bounds, Position, distance2};
 pub use count::parse_count;
 pub use schema::{Bits, Dimension, Endian, Layout, Metadata, Scalar, Schema, Value};
 pub use selection::{Chooser, Edit, Flag, Mark, Selection};
+pub use spare::Spare;
 pub use units::{Horizontal, Mismatch, Units};

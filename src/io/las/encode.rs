@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::laz::{CHUNK_POINTS, Compression};
 use super::native::normals_of;
-use crate::point::{Dimension, Endian, PointBatch, Schema, Value};
+use crate::point::{Dimension, Endian, PointBatch, Schema, Spare, Value};
 use crate::stage::{Encode, Encoded};
 use crate::{Error, Result};
 
@@ -48,6 +48,8 @@ pub struct LasEncoder {
     pub normals: Normals,
     /// How records are compressed, if they are.
     pub compression: Option<Compression>,
+    /// For the bytes of chunks; whoever has written one puts them back.
+    pub spare: Spare<Vec<u8>>,
 }
 
 impl LasEncoder {
@@ -59,7 +61,8 @@ impl LasEncoder {
         compression: Option<Compression>,
     ) -> Self {
         let return_bits = if format < 6 { 0b111 } else { 0b1111 };
-        LasEncoder { stride: schema.stride, return_bits, normals, compression }
+        let (stride, spare) = (schema.stride, Spare::default());
+        LasEncoder { stride, return_bits, normals, compression, spare }
     }
 
     /// Upper estimate of what encoding one chunk holds: records with normals, the compressor's
@@ -143,11 +146,19 @@ impl Encode for LasEncoder {
         }
         if encoded.points > 0 {
             (encoded.lo, encoded.hi) = (lo.map(i64::from), hi.map(i64::from));
-            encoded.bytes = match &self.compression {
-                Some(compression) => {
-                    compression.encode(&records, Vec::with_capacity(records.len() / 4))?
+            encoded.bytes = match (&self.compression, records) {
+                (None, Cow::Owned(records)) => records,
+                (None, Cow::Borrowed(records)) => {
+                    let mut bytes = self.spare.take(|| Vec::with_capacity(records.len()));
+                    bytes.clear();
+                    bytes.extend_from_slice(records);
+                    bytes
                 }
-                None => records.into_owned(),
+                (Some(compression), records) => {
+                    let mut bytes = self.spare.take(|| Vec::with_capacity(records.len() / 4));
+                    bytes.clear();
+                    compression.encode(&records, bytes)?
+                }
             };
         }
         Ok(encoded)

@@ -301,7 +301,9 @@ impl Sink for LasSink {
             self.lo[axis] = self.lo[axis].min(chunk.lo[axis]);
             self.hi[axis] = self.hi[axis].max(chunk.hi[axis]);
         }
-        self.write(&chunk.bytes)
+        self.write(&chunk.bytes)?;
+        self.encoder.spare.put(chunk.bytes);
+        Ok(())
     }
 
     fn finish(mut self: Box<Self>) -> Result<SinkSummary> {

@@ -12,7 +12,7 @@ use super::source::{Native, Rest};
 use super::{CRS, CRS_MORE, PlyOptions, names, padding, text};
 use crate::io::convert::{Projection, ply_schema};
 use crate::point::names::NORMAL;
-use crate::point::{Dimension, Layout, Metadata, PointBatch, Scalar, Schema, Value};
+use crate::point::{Dimension, Layout, Metadata, PointBatch, Scalar, Schema, Spare, Value};
 use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -44,6 +44,8 @@ struct Plan {
     projection: Option<Projection>,
     /// The normals' fields, if they are written.
     normals: Option<[Dimension; 3]>,
+    /// For the vertices of chunks; whoever has written them puts them back.
+    spare: Spare<Vec<u8>>,
 }
 
 /// The header, but for the count of vertices.
@@ -186,7 +188,7 @@ impl Plan {
             normals = Some(added);
         }
         let projection = (!projection.is_copy()).then_some(projection);
-        Ok(Plan { encoding, vertex, projection, normals })
+        Ok(Plan { encoding, vertex, projection, normals, spare: Spare::default() })
     }
 
     fn chunk(&self) -> ChunkSize {
@@ -305,11 +307,13 @@ fn pieces(text: &str) -> Vec<String> {
 impl Encode for Plan {
     fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
         let mut rounded = None;
-        let mut vertices = Vec::new();
+        let mut vertices = self.spare.take(Vec::new);
         if let Some(projection) = &self.projection {
-            let rounding = projection.project(batch.records(), &mut vertices)?;
+            vertices.resize(batch.len() * self.vertex.stride, 0);
+            let rounding = projection.project_into(batch.records(), &mut vertices)?;
             rounded = (rounding.points > 0).then_some((rounding.points, rounding.largest));
-        } else if self.normals.is_some() || self.encoding != Encoding::Ascii {
+        } else {
+            vertices.clear();
             vertices.extend_from_slice(batch.records());
         }
         if self.normals.is_some() {
@@ -320,8 +324,11 @@ impl Encode for Plan {
             self.put_normals(normals, &mut vertices)?;
         }
         let bytes = match self.encoding {
-            Encoding::Ascii if vertices.is_empty() => self.print(batch.records()),
-            Encoding::Ascii => self.print(&vertices),
+            Encoding::Ascii => {
+                let text = self.print(&vertices);
+                self.spare.put(vertices);
+                text
+            }
             _ => vertices,
         };
         Ok(Encoded { bytes, points: batch.len() as u64, rounded, ..Encoded::default() })
@@ -347,6 +354,9 @@ impl Sink for PlySink {
             .map_err(|e| Error::io(&self.path, "write vertices", e))?;
         self.points += chunk.points;
         self.bytes += chunk.bytes.len() as u64;
+        if self.plan.encoding != Encoding::Ascii {
+            self.plan.spare.put(chunk.bytes);
+        }
         Ok(())
     }
 
