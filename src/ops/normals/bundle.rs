@@ -10,7 +10,7 @@ use crate::point::distance2;
 use crate::tile::Neighborhood;
 
 /// Most neighbours of a neighbourhood that is not estimated alone.
-const MOST: usize = 64;
+pub(super) const MOST: usize = 64;
 /// Binary logarithm of positions times offset up to which all sums of products are exact in f64:
 /// their squares.
 const EXACT_BITS: u32 = 26;
