@@ -194,6 +194,7 @@ fn neighbors_are_exact(scan: &Scan) -> u64 {
             ranks.sort_unstable();
             let mut found: Vec<Position> = neighbors
                 .offsets()
+                .iter()
                 .map(|o| std::array::from_fn(|axis| p[axis] + o[axis]))
                 .collect();
             found.sort_unstable_by(morton_cmp);

@@ -117,8 +117,11 @@ fn neighbors_at_the_faces_of_tiles_of_a_real_scan_are_those_of_all_of_it() {
                     return;
                 }
                 checked += 1;
-                let mut found: Vec<Position> =
-                    neighbors.offsets().map(|o| std::array::from_fn(|a| p[a] + o[a])).collect();
+                let mut found: Vec<Position> = neighbors
+                    .offsets()
+                    .iter()
+                    .map(|o| std::array::from_fn(|a| p[a] + o[a]))
+                    .collect();
                 found.sort_unstable_by(morton_cmp);
                 let (expected, tied) = nearest(&all, p, k);
                 assert_eq!(found, expected, "neighbours of {p:?}");

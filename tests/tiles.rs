@@ -184,8 +184,11 @@ fn tiles_share_the_scan_out_and_their_neighborhoods_are_those_of_the_whole_scan(
                     return;
                 }
                 checked += 1;
-                let mut found: Vec<Position> =
-                    neighbors.offsets().map(|o| std::array::from_fn(|a| p[a] + o[a])).collect();
+                let mut found: Vec<Position> = neighbors
+                    .offsets()
+                    .iter()
+                    .map(|o| std::array::from_fn(|a| p[a] + o[a]))
+                    .collect();
                 found.sort_unstable_by(morton_cmp);
                 assert_eq!(found, nearest_by_brute_force(&all, p, k), "of {p:?}");
                 let mut distances: Vec<u128> = found.iter().map(|&q| distance2(p, q)).collect();

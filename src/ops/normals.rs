@@ -242,7 +242,8 @@ impl Estimator {
         settle: &mut impl FnMut(usize, Outcome),
     ) {
         if !self.bundle.take(owner, neighborhood) {
-            let offsets = in_morton_order(neighborhood.offsets(), neighborhood.ranks());
+            let offsets =
+                in_morton_order(neighborhood.offsets().iter().copied(), neighborhood.ranks());
             settle(owner, self.estimate(&offsets));
         } else if self.bundle.is_full() {
             self.finish(settle);

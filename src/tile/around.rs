@@ -20,8 +20,8 @@ pub struct Around {
     remote: Remote,
     /// None if the tile is all there is.
     beyond: Option<Beyond>,
-    /// What was found beyond, and the ranks in Morton order.
-    far: Vec<Position>,
+    /// The offsets of a position's neighbours, and the ranks of what was found beyond the tile.
+    offsets: Vec<Position>,
     ranks: Vec<u32>,
     /// Neighbourhoods that what was loaded could not prove, since the last [`Around::take_unproven`].
     unproven: u64,
@@ -111,7 +111,7 @@ impl Tile {
         mut visit: impl FnMut(usize, &Neighborhood<'_>),
     ) -> Result<()> {
         let Tile { positions, zone, around, selections, limits, .. } = self;
-        let Around { search, remote, beyond, far, ranks, unproven, tied } = around;
+        let Around { search, remote, beyond, offsets, ranks, unproven, tied } = around;
         let mut outcome = Ok(());
         search.build(positions);
         search.search(
@@ -124,63 +124,55 @@ impl Tile {
                 }
                 let p = positions[i];
                 let enough = neighbors.len() == k;
+                offsets.clear();
                 if let Some(beyond) = beyond
                     && !(enough && beyond.proves(p, d2))
                 {
                     *unproven += 1;
-                    far.clear();
                     let scan = (&*beyond.tiles, &beyond.sieve);
                     match remote.nearest(scan, p, k, enough.then_some(d2)) {
-                        Ok(found) => far.extend(found),
+                        Ok(found) => offsets.extend(found),
                         Err(error) => return outcome = Err(error),
                     }
-                    rank(far, ranks);
-                    let farthest2 = far.last().map_or(0, |&q| distance2(p, q));
-                    let positions = Positions::Each(far);
-                    return visit(i, &Neighborhood { p, positions, ranks, farthest2 });
+                    rank(offsets, ranks);
+                    offsets.iter_mut().for_each(|q| *q = offset(p, *q));
+                    return visit(i, &Neighborhood::of_offsets(offsets, ranks));
                 }
                 if let [.., before, _] = *neighbors {
                     *tied += u64::from(distance2(p, positions[before as usize]) == d2);
                 }
-                let positions = Positions::OfTile(positions);
-                visit(i, &Neighborhood { p, positions, ranks: neighbors, farthest2: d2 });
+                offsets.extend(neighbors.iter().map(|&rank| offset(p, positions[rank as usize])));
+                visit(i, &Neighborhood { offsets, ranks: neighbors, farthest2: d2 });
             },
         );
         outcome
     }
 }
 
+#[inline(always)]
+fn offset(p: Position, q: Position) -> Position {
+    [q[0] - p[0], q[1] - p[1], q[2] - p[2]]
+}
+
 /// The nearest other positions of a position, nearest first, of equally near ones the Morton-first.
 #[derive(Debug, Clone, Copy)]
 pub struct Neighborhood<'a> {
-    p: Position,
-    positions: Positions<'a>,
-    /// For each neighbour a number that grows in Morton order.
+    offsets: &'a [Position],
     ranks: &'a [u32],
-    /// Squared distance of the last.
     farthest2: u128,
 }
 
-/// Where the neighbours' positions are.
-#[derive(Debug, Clone, Copy)]
-enum Positions<'a> {
-    /// Among those of a tile, at their ranks.
-    OfTile(&'a [Position]),
-    /// Here, in the neighbours' order.
-    Each(&'a [Position]),
-}
-
 impl<'a> Neighborhood<'a> {
-    /// The neighbourhood of a position whose neighbours are at `offsets`, smaller than 2^62, in
-    /// order; `ranks` grow in Morton order.
+    /// The neighbourhood of a position whose neighbours are at `offsets`, in order; `ranks` grow in
+    /// Morton order of where they lead to.
     pub fn of_offsets(offsets: &'a [Position], ranks: &'a [u32]) -> Self {
-        let farthest2 = offsets.iter().map(|&o| distance2([0; 3], o)).max().unwrap_or(0);
-        Neighborhood { p: [0; 3], positions: Positions::Each(offsets), ranks, farthest2 }
+        let farthest2 = offsets.last().map_or(0, |&o| distance2([0; 3], o));
+        Neighborhood { offsets, ranks, farthest2 }
     }
 
-    /// Squared distance of the farthest neighbour in lattice steps; 0 if there is none.
-    pub fn farthest2(&self) -> u128 {
-        self.farthest2
+    /// The offsets of the neighbours from the position, in lattice steps.
+    pub fn offsets(&self) -> &'a [Position] {
+        self.offsets
     }
 
     /// For each neighbour a number that grows in Morton order.
@@ -188,16 +180,9 @@ impl<'a> Neighborhood<'a> {
         self.ranks
     }
 
-    /// The offsets of the neighbours from the position, in lattice steps.
-    #[inline(always)]
-    pub fn offsets(&self) -> impl ExactSizeIterator<Item = Position> + '_ {
-        self.ranks.iter().enumerate().map(|(i, &rank)| {
-            let q = match self.positions {
-                Positions::OfTile(positions) => positions[rank as usize],
-                Positions::Each(positions) => positions[i],
-            };
-            [q[0] - self.p[0], q[1] - self.p[1], q[2] - self.p[2]]
-        })
+    /// Squared distance of the farthest neighbour in lattice steps; 0 if there is none.
+    pub fn farthest2(&self) -> u128 {
+        self.farthest2
     }
 }
 

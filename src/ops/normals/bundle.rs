@@ -35,12 +35,10 @@ pub(super) fn shift(count: usize, nearest2: impl Fn() -> u128, farthest2: u128) 
     }
 }
 
-/// An offset without its last `shift` bits, rounded to nearest, halves upwards.
+/// An offset without its last `shift` bits, of which there is one at least, rounded to nearest,
+/// halves upwards.
 pub(super) fn rounded(offset: [i64; 3], shift: u32) -> [i64; 3] {
-    match shift {
-        0 => offset,
-        _ => offset.map(|v| ((v >> (shift - 1)) + 1) >> 1),
-    }
+    offset.map(|v| ((v >> (shift - 1)) + 1) >> 1)
 }
 
 /// One number of each neighbourhood.
@@ -71,11 +69,12 @@ impl Bundle {
         if count != self.neighbors || !(3..=MOST).contains(&count) {
             return false;
         }
-        let nearest2 = || neighborhood.offsets().next().map_or(0, |o| distance2([0; 3], o));
+        let offsets = neighborhood.offsets();
+        let nearest2 = || offsets.first().map_or(0, |&o| distance2([0; 3], o));
         let Some(shift) = shift(count, nearest2, neighborhood.farthest2()) else { return false };
         let lane = self.owners.len() & (EIGHT - 1);
-        for (at, offset) in self.at.iter_mut().zip(neighborhood.offsets()) {
-            let offset = rounded(offset, shift);
+        for (at, &offset) in self.at.iter_mut().zip(offsets) {
+            let offset = if shift == 0 { offset } else { rounded(offset, shift) };
             for axis in 0..3 {
                 at[axis][lane] = offset[axis] as f64;
             }

@@ -74,7 +74,8 @@ impl TileOp for RadiusOutliers {
         })?;
         let mut lonely = vec![false; tile.positions.len()];
         tile.each_neighborhood(self.min_neighbors, |i, neighbors| {
-            let near = neighbors.offsets().filter(|o| distance2([0; 3], *o) <= within).count();
+            let near =
+                neighbors.offsets().iter().filter(|o| distance2([0; 3], **o) <= within).count();
             lonely[i] = near < self.min_neighbors;
         })?;
         let mut records = 0;

@@ -142,10 +142,9 @@ impl ScanOp for StatisticalOutliers {
 }
 
 /// Mean length of `offsets` in steps, rounded half to even to whole [`UNITS`]; NaN if there are none.
-fn figure(offsets: impl ExactSizeIterator<Item = Position>) -> f64 {
-    let count = offsets.len() as f64;
-    let sum = offsets.fold(0.0, |sum, o| sum + (distance2([0; 3], o) as f64).sqrt());
-    (sum / count * UNITS).round_ties_even() / UNITS
+fn figure(offsets: &[Position]) -> f64 {
+    let sum = offsets.iter().fold(0.0, |sum, &o| sum + (distance2([0; 3], o) as f64).sqrt());
+    (sum / offsets.len() as f64 * UNITS).round_ties_even() / UNITS
 }
 
 /// A figure in whole [`UNITS`]; none if it is NaN.
@@ -253,13 +252,13 @@ mod tests {
 
     #[test]
     fn a_figure_is_the_mean_distance_in_small_whole_units() {
-        assert_eq!(figure([[3, 4, 0], [0, 0, 2]].into_iter()), 3.5);
-        let third = figure([[1, 0, 0], [1, 0, 0], [2, 0, 0]].into_iter());
+        assert_eq!(figure(&[[3, 4, 0], [0, 0, 2]]), 3.5);
+        let third = figure(&[[1, 0, 0], [1, 0, 0], [2, 0, 0]]);
         assert_eq!(third, 87381.0 / 65536.0);
         assert_eq!(units(third), Some(87381));
-        assert!(figure([].into_iter()).is_nan());
+        assert!(figure(&[]).is_nan());
         assert_eq!(units(f64::NAN), None);
-        assert_eq!(units(figure([[i64::MAX, 0, 0]].into_iter())), Some(1 << 79));
+        assert_eq!(units(figure(&[[i64::MAX, 0, 0]])), Some(1 << 79));
     }
 
     proptest::proptest! {
