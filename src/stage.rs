@@ -57,6 +57,12 @@ pub trait Source: Send + Sync {
     /// Opens part `index < parts()`.
     fn part(&self, index: usize) -> Result<Box<dyn Part + '_>>;
 
+    /// Opens a part of which nobody will look at the dimensions `unread`: their fields may hold
+    /// anything, so that a source need not decode them. Coordinates are never among them.
+    fn part_without(&self, index: usize, _unread: &[String]) -> Result<Box<dyn Part + '_>> {
+        self.part(index)
+    }
+
     /// Warnings for the user that opening or reading gave rise to (dropped faces, odd headers).
     fn warnings(&self) -> Vec<String> {
         Vec::new()
@@ -252,6 +258,11 @@ pub trait CreateSink: Send + Sync {
 
     /// True if it writes the normals that a stage computed.
     fn wants_normals(&self) -> bool;
+
+    /// The dimensions of its records that it does not look at.
+    fn unread(&self) -> &[String] {
+        &[]
+    }
 
     /// The chunks of the output that [`create`](CreateSink::create) would open, for a plan of the
     /// memory. Fails where `create` would refuse the schema.

@@ -60,6 +60,10 @@ impl CreateSink for Output {
         !self.write.dimensions.is_empty()
     }
 
+    fn unread(&self) -> &[String] {
+        if self.format == Format::Ply { &self.write.drop } else { &[] }
+    }
+
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize> {
         let chunk = match self.format {
             Format::Ply => ply::chunk(&self.ply_options(false), schema, metadata),

@@ -20,6 +20,7 @@ use super::stream::stream;
 use super::survey::{Lines, Measured};
 use super::tagger::ClassOf;
 use crate::budget::{Budget, Bytes};
+use crate::point::names;
 use crate::report::{
     ClassFigures, Decision, FileFigures, LatticeFigures, Ledger, Machine, Outcome, PassFigures,
     Report, RunFigures, Tally, check_written, peak_memory,
@@ -147,7 +148,8 @@ impl Plan {
             }
             lattice => {
                 clock.phase("convert", Some(self.source.points()));
-                stream(&job, &shares, sinks.into_iter().flatten().collect(), lattice.as_ref())?
+                let sinks = sinks.into_iter().flatten().collect();
+                stream(&job, &shares, sinks, lattice.as_ref(), &self.unread(&job))?
             }
         };
         let earlier = std::mem::take(&mut *lock(&job.warnings));
@@ -157,6 +159,16 @@ impl Plan {
         run.warnings.iter().for_each(|warning| watch.warn(warning));
         run.warnings.splice(0..0, earlier);
         Ok((finished, run))
+    }
+
+    /// The dimensions that nobody looks at while points stream: no sink, and neither the counts of
+    /// classes. What a transform looks at is not known for sure.
+    fn unread(&self, job: &Job<'_>) -> Vec<String> {
+        let Some((first, others)) = self.sinks.split_first() else { return Vec::new() };
+        let by_all = |name: &&String| others.iter().all(|sink| sink.unread().contains(*name));
+        let mut unread: Vec<String> = first.unread().iter().filter(by_all).cloned().collect();
+        unread.retain(|name| name != names::CLASSIFICATION && job.transforms.is_empty());
+        unread
     }
 
     /// What every phase needs but the stages.

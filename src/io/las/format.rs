@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use laz::DecompressionSelection;
+
 use super::extra::Descriptor;
 use crate::point::{Dimension, Endian, Layout, Scalar, Schema, names};
 
@@ -79,6 +81,42 @@ pub fn schema(
         stride: base + extra,
         dimensions,
     }
+}
+
+/// The layers of compressed records of `schema` that are to be decoded if nobody looks at the
+/// dimensions `unread`: a layer is left out if it holds no others.
+pub fn selection(schema: &Schema, unread: &[String]) -> DecompressionSelection {
+    use DecompressionSelection as Layer;
+    const FLAGS: [&str; 6] = [
+        names::SYNTHETIC,
+        names::KEY_POINT,
+        names::WITHHELD,
+        names::OVERLAP,
+        names::SCAN_DIRECTION_FLAG,
+        names::EDGE_OF_FLIGHT_LINE,
+    ];
+    let Layout::Las { format } = schema.layout else { return Layer::all() };
+    if unread.is_empty() {
+        return Layer::all();
+    }
+    let base = usize::from(record_size(format).unwrap_or(0));
+    let layer = |dimension: &Dimension| match dimension.name.as_str() {
+        _ if dimension.offset >= base => Layer::ALL_EXTRA_BYTES,
+        names::CLASSIFICATION => Layer::CLASSIFICATION,
+        names::INTENSITY => Layer::INTENSITY,
+        names::SCAN_ANGLE => Layer::SCAN_ANGLE,
+        names::USER_DATA => Layer::USER_DATA,
+        names::POINT_SOURCE_ID => Layer::POINT_SOURCE_ID,
+        names::GPS_TIME => Layer::GPS_TIME,
+        names::RED | names::GREEN | names::BLUE => Layer::RGB,
+        names::NIR => Layer::NIR,
+        name if FLAGS.contains(&name) => Layer::FLAGS,
+        name if name.starts_with("Wave") => Layer::WAVEPACKET,
+        // Coordinates and what is coded with them.
+        _ => Layer::Z,
+    };
+    let read = schema.dimensions.iter().filter(|d| !unread.contains(&d.name));
+    Layer(read.fold(Layer::Z, |all, dimension| all | layer(dimension)))
 }
 
 /// The fields that the specification gives a format.

@@ -3,6 +3,7 @@
 use std::io;
 use std::sync::Arc;
 
+use laz::DecompressionSelection;
 use laz::record::RecordDecompressor;
 
 use super::chunks::{Chunk, layered_head};
@@ -90,6 +91,7 @@ pub struct LazPart {
     source: u32,
     shift: Shift,
     compression: Arc<Compression>,
+    selection: DecompressionSelection,
     decoder: Box<dyn RecordDecompressor<Window> + Send>,
     chunks: std::vec::IntoIter<Chunk>,
     /// The chunk being read and how many of its points are left.
@@ -111,7 +113,14 @@ impl LazPart {
     ) -> Self {
         let decoder = compression.decoder(Window::new(file.clone(), 0, 0));
         let chunks = chunks.into_iter();
-        LazPart { file, source, shift, compression, decoder, chunks, now: None, in_a_row }
+        let selection = DecompressionSelection::all();
+        let now = None;
+        LazPart { file, source, shift, compression, selection, decoder, chunks, now, in_a_row }
+    }
+
+    /// Decodes these layers alone, where there are layers.
+    pub fn select(self, selection: DecompressionSelection) -> Self {
+        LazPart { selection, ..self }
     }
 
     /// The chunk to read from and how many points to take from it at most; None at the end.
@@ -148,6 +157,7 @@ impl LazPart {
         }
         self.decoder.get_mut().move_to(chunk.start, chunk.end);
         self.compression.reset(&mut *self.decoder)?;
+        self.decoder.set_selection(self.selection);
         let left = self.in_a_row.map_or(chunk.points, |each| each.min(chunk.points));
         self.now = Some((chunk, left));
         Ok((chunk, left))

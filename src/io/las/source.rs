@@ -3,8 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use laz::DecompressionSelection;
+
 use super::chunks::{Chunk, Chunks};
 use super::file::WINDOW_BYTES;
+use super::format::selection;
 use super::input::{Input, Storage};
 use super::merge::Merge;
 use super::native::Native;
@@ -115,7 +118,7 @@ impl Opened {
         held + WINDOW_BYTES as u64 + compression.state_bytes()
     }
 
-    fn open(&self, place: &PartPlace) -> Result<Box<dyn Part>> {
+    fn open(&self, place: &PartPlace, selection: DecompressionSelection) -> Result<Box<dyn Part>> {
         let file = self.input.reopen()?;
         let (shift, source) = (self.shift, place.file as u32);
         let (first, count) = (place.first as usize, place.count as usize);
@@ -135,7 +138,8 @@ impl Opened {
             .compression
             .clone()
             .ok_or_else(|| Error::internal("a LAZ file without its compression"))?;
-        Ok(Box::new(LazPart::new(file, source, shift, compression, chunks, in_a_row)))
+        let part = LazPart::new(file, source, shift, compression, chunks, in_a_row);
+        Ok(Box::new(part.select(selection)))
     }
 }
 
@@ -176,8 +180,12 @@ impl Source for LasSource {
     }
 
     fn part(&self, index: usize) -> Result<Box<dyn Part + '_>> {
+        self.part_without(index, &[])
+    }
+
+    fn part_without(&self, index: usize, unread: &[String]) -> Result<Box<dyn Part + '_>> {
         let place = &self.parts[index];
-        self.files[place.file].open(place)
+        self.files[place.file].open(place, selection(&self.schema, unread))
     }
 
     fn warnings(&self) -> Vec<String> {
