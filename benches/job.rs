@@ -1,5 +1,5 @@
-//! The whole job, LAZ → LAZ, as a user runs it: CPU seconds, wall seconds and peak memory in several
-//! configurations, whose outputs must be the same bytes.
+//! The whole job, LAZ → LAZ and LAS → LAS, as a user runs it: CPU seconds, wall seconds and peak
+//! memory in several configurations. Those of one format and method must give the same bytes.
 //!
 //! `cargo bench --bench job` makes an airborne scan of 10 million points first;
 //! `cargo bench --bench job -- SCAN.laz` takes a scan of yours;
@@ -7,6 +7,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints and may fail")]
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -30,23 +31,51 @@ struct Figures {
     kept: u64,
 }
 
-fn run(scan: &str, configuration: &[&str], folder: &Path) -> (Figures, Vec<u8>) {
-    let (output, report) = (folder.join("reduced.laz"), folder.join("reduced.json"));
-    let (to, told) = (output.to_str().unwrap(), report.to_str().unwrap());
-    let mut arguments = vec!["reduce", scan, "-o", to, "--report", told, "--progress", "never"];
-    arguments.extend(configuration);
-    pointmill(&arguments);
-    let json: serde_json::Value = serde_json::from_slice(&std::fs::read(report).unwrap()).unwrap();
-    let figure = |name: &str| json["run"][name].as_f64().unwrap_or(f64::NAN);
-    let mib = |name: &str| figure(name) / f64::from(1 << 20);
-    let figures = Figures {
-        cpu: figure("cpu_seconds"),
-        wall: figure("seconds"),
-        peak_mib: mib("peak_memory_bytes"),
-        spill_mib: mib("spill_bytes"),
-        kept: json["result"]["ledger"]["kept"].as_u64().unwrap(),
-    };
-    (figures, std::fs::read(output).unwrap())
+/// One way to run the job.
+struct Configuration {
+    format: &'static str,
+    method: &'static str,
+    options: Vec<String>,
+    runs: Vec<Figures>,
+}
+
+impl Configuration {
+    fn new(format: &'static str, method: &'static str, options: &str) -> Configuration {
+        let options = options.split_whitespace().map(str::to_owned).collect();
+        Configuration { format, method, options, runs: Vec::new() }
+    }
+
+    fn name(&self) -> String {
+        format!("{} {} {}", self.format, self.method, self.options.join(" "))
+    }
+
+    /// Runs it once on the scan of its format in `folder`, and returns the output.
+    fn run(&mut self, scan: &str, folder: &Path) -> Vec<u8> {
+        let at = |name: &str| folder.join(name).to_str().unwrap().to_owned();
+        let (output, report) = (at(&format!("reduced.{}", self.format)), at("reduced.json"));
+        let pipeline = concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines/reduce.toml");
+        let set = [
+            format!("read.path={scan}"),
+            format!("write.path={output}"),
+            format!("normals.method={}", self.method),
+        ];
+        let mut arguments = vec!["run", pipeline, "--progress", "never", "--report", &report];
+        set.iter().for_each(|set| arguments.extend(["--set", set]));
+        arguments.extend(self.options.iter().map(String::as_str));
+        pointmill(&arguments);
+        let json: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(&report).unwrap()).unwrap();
+        let figure = |name: &str| json["run"][name].as_f64().unwrap_or(f64::NAN);
+        let mib = |name: &str| figure(name) / f64::from(1 << 20);
+        self.runs.push(Figures {
+            cpu: figure("cpu_seconds"),
+            wall: figure("seconds"),
+            peak_mib: mib("peak_memory_bytes"),
+            spill_mib: mib("spill_bytes"),
+            kept: json["result"]["ledger"]["kept"].as_u64().unwrap(),
+        });
+        std::fs::read(output).unwrap()
+    }
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -63,30 +92,37 @@ fn main() {
     if arguments.is_empty() {
         pointmill(&["synth", "als", "-n", "10000000", "-o", scan]);
     }
+    let las = folder.path().join("scan.las");
+    let las = las.to_str().unwrap();
+    pointmill(&["convert", scan, "-o", las]);
     let mut configurations = vec![
-        vec!["--threads", "1"],
-        vec!["--threads", "2"],
-        vec!["--threads", "2", "--memory", "256MiB"],
+        Configuration::new("laz", "varady", "--threads 1"),
+        Configuration::new("laz", "varady", "--threads 2"),
+        Configuration::new("laz", "varady", "--threads 2 --memory 256MiB"),
+        Configuration::new("laz", "pca", "--threads 2"),
+        Configuration::new("las", "varady", "--threads 2"),
+        Configuration::new("las", "pca", "--threads 2"),
     ];
     if let Some(memory) = arguments.get(1) {
-        configurations.push(vec!["--memory", memory]);
+        configurations.push(Configuration::new("laz", "varady", &format!("--memory {memory}")));
     }
-    let mut figures: Vec<Vec<Figures>> = configurations.iter().map(|_| Vec::new()).collect();
-    let mut first: Option<Vec<u8>> = None;
+    let mut first: BTreeMap<[&str; 2], Vec<u8>> = BTreeMap::new();
     // In turn, so that a machine that slows down slows all of them.
     for _ in 0..ROUNDS {
-        for (configuration, figures) in configurations.iter().zip(&mut figures) {
-            let (run, output) = run(scan, configuration, folder.path());
-            let first = first.get_or_insert_with(|| output.clone());
-            assert!(*first == output, "{configuration:?} gave other bytes");
-            figures.push(run);
+        for configuration in &mut configurations {
+            let of_format = if configuration.format == "las" { las } else { scan };
+            let output = configuration.run(of_format, folder.path());
+            let kind = [configuration.format, configuration.method];
+            let first = first.entry(kind).or_insert_with(|| output.clone());
+            assert!(*first == output, "{} gave other bytes", configuration.name());
         }
     }
-    println!("{scan}: medians of {ROUNDS} runs in turn, all of the same bytes");
-    for (configuration, runs) in configurations.iter().zip(&figures) {
+    println!("{scan}: medians of {ROUNDS} runs in turn");
+    for configuration in &configurations {
+        let runs = &configuration.runs;
         println!(
-            "{:<32} {:>6.1} CPU s {:>6.1} s {:>6.0} MiB peak {:>6.0} MiB spilled, {} kept",
-            configuration.join(" "),
+            "{:<40} {:>6.1} CPU s {:>6.1} s {:>6.0} MiB peak {:>6.0} MiB spilled, {} kept",
+            configuration.name(),
             median(runs.iter().map(|r| r.cpu).collect()),
             median(runs.iter().map(|r| r.wall).collect()),
             runs.iter().map(|r| r.peak_mib).fold(0.0, f64::max),
