@@ -9,6 +9,12 @@ HERE = Path(__file__).parent
 PACKAGES = ["g++", "libpcl-dev", "libnanoflann-dev", "libeigen3-dev"]
 
 
+def launcher(cache: Path) -> str:
+    """Builds what starts the contenders; where Rust links, there is a C compiler."""
+    subprocess.run(["cc", "-O2", str(HERE / "launch.c"), "-o", str(cache / "launch")], check=True)
+    return str(cache / "launch")
+
+
 def python_peers(cache: Path) -> str | None:
     """Why the Python peers are not there, or None."""
     venv = cache / "venv"
