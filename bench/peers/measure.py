@@ -44,7 +44,7 @@ def run(launch: str, command: list[str], environment: dict[str, str], work: Path
     output = tail(log)
     if code != 0:
         lines = output.strip().splitlines() or [""]
-        last = next((line for line in lines if line.startswith("error")), lines[-1])[:120]
+        last = next((line for line in lines if line.startswith("error")), lines[-1])
         raise Failure(f"failed ({code}): {last}")
     whole = told(figures.read_text(encoding="utf-8"))
     own = told(output)
