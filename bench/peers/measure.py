@@ -3,8 +3,8 @@
 import json
 import os
 import subprocess
-import time
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass
@@ -19,35 +19,38 @@ class Failure(Exception):
     """A command that did not do its job, and why."""
 
 
-def told(output: str) -> dict:
-    """The line of JSON that a command ends with, if it does."""
-    lines = output.strip().splitlines()
+def told(text: str) -> dict:
+    """The line of JSON that a text ends with, if it does."""
+    lines = text.strip().splitlines()
     if lines and lines[-1].startswith("{"):
         return json.loads(lines[-1])
     return {}
 
 
-def run(command: list[str], environment: dict[str, str], log: str) -> Figures:
+def tail(log: Path) -> str:
+    """The end of a log, however long it is: this process stays small."""
+    with open(log, "rb") as source:
+        source.seek(max(0, log.stat().st_size - 16384))
+        return source.read().decode("utf-8", "replace")
+
+
+def run(launch: str, command: list[str], environment: dict[str, str], work: Path) -> Figures:
     """Figures of the whole process, or those that it tells of itself; raises Failure."""
-    before = time.monotonic()
+    log, figures = work / "log", work / "figures"
+    figures.unlink(missing_ok=True)
     with open(log, "wb") as sink:
-        try:
-            process = subprocess.Popen(command, stdout=sink, stderr=sink, env=os.environ | environment)
-        except OSError as error:
-            raise Failure(f"does not start: {error.strerror}") from error
-        _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    wall = time.monotonic() - before
-    with open(log, encoding="utf-8", errors="replace") as source:
-        output = source.read()
-    if process.returncode != 0:
+        code = subprocess.run([launch, figures, *command], stdin=subprocess.DEVNULL, stdout=sink, stderr=sink,
+                              env=os.environ | environment).returncode
+    output = tail(log)
+    if code != 0:
         lines = output.strip().splitlines() or [""]
-        last = next((line for line in lines if line.startswith("error")), lines[-1])[:120]
-        raise Failure(f"failed ({process.returncode}): {last}")
+        last = next((line for line in lines if line.startswith("error")), lines[-1])
+        raise Failure(f"failed ({code}): {last}")
+    whole = told(figures.read_text(encoding="utf-8"))
     own = told(output)
     return Figures(
-        cpu_seconds=own.get("cpu_seconds", usage.ru_utime + usage.ru_stime),
-        wall_seconds=own.get("wall_seconds", wall),
-        peak_mib=usage.ru_maxrss / 1024,
+        cpu_seconds=own.get("cpu_seconds", whole["cpu_seconds"]),
+        wall_seconds=own.get("wall_seconds", whole["wall_seconds"]),
+        peak_mib=whole["peak_kib"] / 1024,
         kept=own.get("kept"),
     )

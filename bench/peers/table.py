@@ -6,21 +6,22 @@ from statistics import median
 from measure import Figures
 
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
-HEAD = "| contender | CPU s | wall s | peak MiB | points per CPU s | CPU, times pointmill's | kept |\n|---|---|---|---|---|---|---|"
+HEAD = "| contender | CPU s | wall s | peak MiB | points per CPU s | CPU, times the first row's | kept |\n|---|---|---|---|---|---|---|"
 
 
 def row(name: str, runs: list[Figures], points: int, reference: float | None) -> str:
     cpu = median(run.cpu_seconds for run in runs)
+    rate = f"{points / cpu:,.0f}" if cpu else "–"  # a clock may be too coarse for a small scan
     ratio = f"{cpu / reference:.2f}" if reference else "–"
     kept = next((f"{run.kept:,}" for run in runs if run.kept is not None), "–")
     return (f"| {name} | {cpu:.2f} | {median(r.wall_seconds for r in runs):.2f} | "
-            f"{max(r.peak_mib for r in runs):.0f} | {points / cpu:,.0f} | {ratio} | {kept} |")
+            f"{max(r.peak_mib for r in runs):.0f} | {rate} | {ratio} | {kept} |")
 
 
 def section(job: str, results: dict[str, list[Figures] | str], points: int) -> str:
     """A job's rows; a contender without figures says why."""
-    own = results.get("pointmill")
-    reference = median(r.cpu_seconds for r in own) if isinstance(own, list) else None
+    first = next(iter(results.values()))
+    reference = median(r.cpu_seconds for r in first) if isinstance(first, list) else None
     rows = [f"| {name} | {runs} | | | | | |" if isinstance(runs, str) else row(name, runs, points, reference)
             for name, runs in results.items()]
     return "\n".join([f"### {job}", "", HEAD, *rows])
