@@ -10,13 +10,13 @@ use crate::geom::angle::is_known;
 use crate::geom::plane::{self, Covariance};
 use crate::geom::simd::Simd;
 use crate::geom::star::Star;
-use crate::point::{distance2, names};
+use crate::point::names;
 use crate::report::Tally;
 use crate::stage::{Needs, ScanFacts, TileOp};
 use crate::tile::{Neighborhood, Tile};
 use crate::{Error, Result};
 
-use bundle::{Bundle, in_morton_order, rounded, shift};
+use bundle::{Bundle, in_morton_order};
 pub use orient::Orient;
 use orient::Side;
 
@@ -202,7 +202,6 @@ pub struct Estimator {
     simd: Simd,
     star: Star,
     bundle: Bundle,
-    rounded: Vec<[i64; 3]>,
 }
 
 impl Estimator {
@@ -221,16 +220,7 @@ impl Estimator {
     ///
     /// The result is a function of `offsets` alone, the same bits on every platform.
     pub fn estimate(&mut self, offsets: &[[i64; 3]]) -> Outcome {
-        let lengths2 = || offsets.iter().map(|&offset| distance2([0; 3], offset));
-        let nearest2 = || lengths2().min().unwrap_or(0);
-        match shift(offsets.len(), nearest2, lengths2().max().unwrap_or(0)) {
-            None | Some(0) => alone(self.method, &mut self.star, offsets),
-            Some(shift) => {
-                self.rounded.clear();
-                self.rounded.extend(offsets.iter().map(|&offset| rounded(offset, shift)));
-                alone(self.method, &mut self.star, &self.rounded)
-            }
-        }
+        alone(self.method, &mut self.star, offsets)
     }
 
     /// Takes the neighbourhood of `owner` to [`estimate`](Self::estimate) it with others, which is
@@ -285,6 +275,7 @@ fn settled(normal: [f64; 3]) -> Estimate {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::point::distance2;
     use proptest::prelude::*;
 
     /// Noisy surfaces, grids full of ties and cocircular points, lines, walls, far points; most with
@@ -297,7 +288,8 @@ mod tests {
     fn neighborhood(count: usize) -> impl Strategy<Value = Vec<[i64; 3]>> {
         let width = prop::sample::select(vec![2i64, 4, 40, 1000, 1 << 21, 1 << 23, 1 << 40]);
         let height = prop::sample::select(vec![0i64, 1, 30]);
-        (width, height, 0usize..3).prop_flat_map(move |(width, height, up)| {
+        let step = prop::sample::select(vec![1i64, 1, 12, 1 << 13]);
+        (width, height, 0usize..3, step).prop_flat_map(move |(width, height, up, step)| {
             let one = (-width..=width, -width..=width, -height..=height);
             prop::collection::vec(one, count).prop_map(move |offsets| {
                 let mut offsets: Vec<_> = offsets.into_iter().map(|(x, y, z)| [x, y, z]).collect();
@@ -305,6 +297,7 @@ mod tests {
                 offsets.dedup();
                 offsets.retain(|o| *o != [0; 3]);
                 offsets.iter_mut().for_each(|o| o.swap(2, up));
+                offsets.iter_mut().for_each(|o| *o = o.map(|v| v * step));
                 offsets
             })
         })

@@ -11,8 +11,10 @@ use crate::Result;
 use crate::stage::Forecast;
 use crate::tile::{Reader, SealedTiles, Sieve, TileKey, lock};
 
-/// Cubes that are looked at.
-const SAMPLES: u64 = 256;
+/// Cubes that are looked at, at most and at least.
+const SAMPLES: (u64, u64) = (256, 32);
+/// Between the two, one cube of so many: a look costs a small part of the pass.
+const ONE_OF: u64 = 8;
 /// Cells that a cube is wide, about: of one cell too little is seen to tell noise from shape.
 const CELLS_ACROSS: u64 = 4;
 /// Positions that a cube has on average, at most, however large the cells.
@@ -88,7 +90,8 @@ fn cubes(tiles: &SealedTiles, side: i64) -> Result<Vec<TileKey>> {
     let level = level.min(tiles.levels().smallest_side(MOST_POSITIONS));
     let mut reader = Reader::default();
     let mut keys: Vec<TileKey> = Vec::new();
-    let samples = SAMPLES.min(tiles.positions());
+    let samples = tiles.levels().occupied(level) / ONE_OF;
+    let samples = samples.clamp(SAMPLES.1, SAMPLES.0).min(tiles.positions());
     for n in 0..samples {
         let rank = (u128::from(tiles.positions()) * (2 * u128::from(n) + 1)
             / (2 * u128::from(samples))) as u64;

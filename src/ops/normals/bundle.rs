@@ -1,4 +1,5 @@
-//! Neighbourhoods estimated side by side: every lane does what [`Estimator::estimate`](super::Estimator::estimate) does, to
+//! Neighbourhoods estimated side by side: every lane does what
+//! [`Estimator::estimate`](super::Estimator::estimate) does, to
 //! the last bit.
 
 use super::fan::Fan;
@@ -6,7 +7,6 @@ use super::{Estimate, Fallback, Method, Outcome, alone, settled};
 use crate::geom::plane::{self, Covariance};
 use crate::geom::simd::{EIGHT, Kernel, Lanes, Mask, Real, Simd};
 use crate::geom::star::Star;
-use crate::point::distance2;
 use crate::tile::Neighborhood;
 
 /// Most neighbours of a neighbourhood that is not estimated alone.
@@ -14,31 +14,19 @@ pub(super) const MOST: usize = 64;
 /// Binary logarithm of positions times offset up to which all sums of products are exact in f64:
 /// their squares.
 const EXACT_BITS: u32 = 26;
-/// Bits that the nearest neighbour keeps at least where offsets are rounded.
-const NEAREST_BITS: u32 = 14;
 
-/// By how many bits offsets are rounded so that their moments are exact in f64, given how many there
-/// are and the squared lengths of the shortest and the longest: 0 where they are integers of a few
-/// million, as on decimal lattices; where they have the 30 binary places of a scan of floats, what
-/// goes is a few millionths of the farthest offset. None where that would leave too little of the
-/// nearest.
-pub(super) fn shift(count: usize, nearest2: impl Fn() -> u128, farthest2: u128) -> Option<u32> {
+/// How many zeros at the end all offsets share, if their moments are exact in f64 without them, or
+/// with them already, which is 0; none if they are not. `farthest2` is the largest of their squared
+/// lengths.
+///
+/// On decimal lattices offsets are short; differences of neighbouring f32 on a lattice with 30
+/// binary places end in zeros. A power of two changes no normal.
+pub(super) fn shift(offsets: &[[i64; 3]], farthest2: u128) -> Option<u32> {
     let bits = |v: u128| u128::BITS - v.leading_zeros();
-    let excess = bits(farthest2).div_ceil(2) + bits(count as u128 + 1);
-    match excess.checked_sub(EXACT_BITS) {
-        None | Some(0) => Some(0),
-        // One more, as rounding may carry.
-        Some(shift) => {
-            let left = bits(nearest2()) / 2;
-            (left > shift + 1 + NEAREST_BITS).then_some(shift + 1)
-        }
-    }
-}
-
-/// An offset without its last `shift` bits, of which there is one at least, rounded to nearest,
-/// halves upwards.
-pub(super) fn rounded(offset: [i64; 3], shift: u32) -> [i64; 3] {
-    offset.map(|v| ((v >> (shift - 1)) + 1) >> 1)
+    let needed = bits(farthest2).div_ceil(2) + bits(offsets.len() as u128 + 1);
+    let Some(excess @ 1..) = needed.checked_sub(EXACT_BITS) else { return Some(0) };
+    let shared = offsets.iter().fold(0, |all, o| all | o[0] | o[1] | o[2]).trailing_zeros();
+    (shared >= excess).then_some(shared)
 }
 
 /// One number of each neighbourhood.
@@ -70,13 +58,11 @@ impl Bundle {
             return false;
         }
         let offsets = neighborhood.offsets();
-        let nearest2 = || offsets.first().map_or(0, |&o| distance2([0; 3], o));
-        let Some(shift) = shift(count, nearest2, neighborhood.farthest2()) else { return false };
+        let Some(shift) = shift(offsets, neighborhood.farthest2()) else { return false };
         let lane = self.owners.len() & (EIGHT - 1);
         for (at, &offset) in self.at.iter_mut().zip(offsets) {
-            let offset = if shift == 0 { offset } else { rounded(offset, shift) };
             for axis in 0..3 {
-                at[axis][lane] = offset[axis] as f64;
+                at[axis][lane] = (offset[axis] >> shift) as f64;
             }
         }
         self.ranks.extend_from_slice(neighborhood.ranks());
