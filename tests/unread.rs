@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use las_support::{LAS, LAZ, Random, read, write};
 use pointmill::io::las::{fresh, layout, open};
-use pointmill::point::{PointBatch, Scalar, Schema};
+use pointmill::point::{PointBatch, Scalar, Schema, names};
 
 const POINTS: usize = 60_000;
 
@@ -24,6 +24,10 @@ fn scan(folder: &Path, format: u8) -> Schema {
         // Returns and channels as they come, the rest of the record noise.
         record[14] = 0x11 + (record[14] & 3);
         record[15] &= 0xdf;
+        // A place in a file of waveforms: PLY holds it as a double, if it is not beyond 2^53.
+        if let Some(place) = schema.find(names::WAVE_OFFSET) {
+            record[place.offset + 4..place.offset + 8].fill(0);
+        }
     }
     let metadata = fresh(&schema, None);
     for (name, options) in [("scan.las", LAS), ("scan.laz", LAZ)] {
@@ -49,8 +53,7 @@ fn what_is_dropped_need_not_be_decoded() {
         let names: Vec<String> =
             schema.dimensions.iter().filter(own).map(|d| d.name.clone()).collect();
         let mut choices = vec![names.join(",")];
-        choices.extend(names.iter().cloned());
-        choices.extend(names.windows(3).map(|some| some.join(",")));
+        choices.extend(names.chunks(3).map(|some| some.join(",")));
         for drop in choices {
             let one = converted(folder.path(), "scan.las", "one.ply", &drop);
             let two = converted(folder.path(), "scan.laz", "two.ply", &drop);
