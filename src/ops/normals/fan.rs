@@ -2,6 +2,8 @@
 //! [`Star`](crate::geom::star::Star) finds for one point, where that point is clearly inside of its
 //! neighbours' polygon and no four points are nearly on one circle.
 
+#![allow(clippy::needless_range_loop, reason = "one index walks several arrays of lanes")]
+
 use super::bundle::{MOST, Row, load};
 use crate::geom::plane::{across, choose, dot, unit_or_nan};
 use crate::geom::simd::{EIGHT, Lanes, Mask, Real};

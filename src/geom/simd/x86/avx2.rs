@@ -1,5 +1,7 @@
 //! Vectors of 256 bits.
 
+#![allow(clippy::needless_range_loop, reason = "one index walks several arrays of lanes")]
+
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
@@ -126,7 +128,7 @@ impl Lanes for Avx2 {
         low: &[u32; LANES],
         hits: u32,
     ) {
-        const { assert!(WIDTH % 4 == 0) };
+        const { assert!(WIDTH.is_multiple_of(4)) };
         unsafe { insert_by_four(list, high, low, hits) }
     }
 }

@@ -1,5 +1,7 @@
 //! Vectors of 512 bits.
 
+#![allow(clippy::needless_range_loop, reason = "one index walks several arrays of lanes")]
+
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
@@ -114,8 +116,8 @@ impl Lanes for Avx512 {
         low: &[u32; LANES],
         hits: u32,
     ) {
-        const { assert!(WIDTH % 4 == 0) };
-        if WIDTH % 8 == 0 {
+        const { assert!(WIDTH.is_multiple_of(4)) };
+        if WIDTH.is_multiple_of(8) {
             unsafe { insert_by_eight(list, high, low, hits) }
         } else {
             unsafe { insert_by_four(list, high, low, hits) }
