@@ -26,7 +26,9 @@ use pointmill::tile::{
     Folder, Intake, Loader, SealedTiles, Sieve, SpillArea, Tag, TileStore, seal,
 };
 
-/// Positions of a tile's cube, and of a tile with its rim, as a plan of ample memory has them.
+/// Records of a run, positions of a tile's cube, and of a tile with its rim, as a plan of ample memory
+/// has them.
+const RUN: usize = 1 << 19;
 const TILE: u64 = 400_000;
 const CAPACITY: usize = 800_000;
 
@@ -132,7 +134,7 @@ fn sealed(positions: &[Position]) -> Arc<SealedTiles> {
     let budget = Budget::new(1 << 40);
     let area = SpillArea::new(budget.clone(), 1 << 36, Box::new(InMemory));
     let store = TileStore::new(&area, &budget, 4, false);
-    let mut intake = Intake::new(&store, 4 << 20);
+    let mut intake = Intake::new(&store, RUN);
     for &p in positions {
         intake.push(p, &[0; 4], Tag::default()).unwrap();
     }

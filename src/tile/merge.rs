@@ -12,12 +12,13 @@ use std::sync::atomic::{AtomicUsize, Ordering as Atomic};
 use super::block::{BLOCK, Block};
 use super::emit::{Emitter, Merged, Output};
 use super::intake::{Run, TileStore};
-use super::key::morton_cmp;
+use super::key::{morton_cmp, morton_prefix, split_level};
 use super::parallel;
 use super::sealed::{SealedTiles, Sequence, ref_bytes};
 use super::spill::{Pieces, Spill, lock};
+use super::tournament::Tournament;
 use crate::Result;
-use crate::point::Position;
+use crate::point::{Bounds, Position};
 
 /// Blocks of all runs that one range has, about, at least.
 const RANGE_BLOCKS: usize = 256;
@@ -41,9 +42,9 @@ pub fn seal(
     let _working = store
         .budget
         .lease(merge_bytes(runs.len(), store.stride) * threads as u64, "merging of sorted runs")?;
-    let borders = borders(&runs);
+    let ranges = ranges(&runs);
     // The merge leaves no more blocks than the runs have, but for one that is not full in each range.
-    let blocks = runs.iter().map(|run| run.blocks.len()).sum::<usize>() + borders.len() + 1;
+    let blocks = runs.iter().map(|run| run.blocks.len()).sum::<usize>() + ranges.len();
     let each = size_of::<Block>() as u64 + 8;
     let mut lease = store.budget.lease(blocks as u64 * each, "index of the tiles")?;
     let out = Output {
@@ -51,41 +52,61 @@ pub fn seal(
         refs: Pieces::new(&store.area, "order", ref_bytes(store.tagged)),
         tagged: store.tagged,
     };
-    let ranges: Vec<Mutex<Option<Merged>>> =
-        (0..=borders.len()).map(|_| Mutex::default()).collect();
+    let merged: Vec<Mutex<Option<Merged>>> = ranges.iter().map(|_| Mutex::default()).collect();
     let next = AtomicUsize::new(0);
-    let merge = |range: usize, slot: &Mutex<Option<Merged>>| -> Result<()> {
-        let from = range.checked_sub(1).map(|b| borders[b]);
-        let merged = merge_range(&store, &runs, from, borders.get(range).copied(), &out)?;
+    let merge = |range: &Range, slot: &Mutex<Option<Merged>>| -> Result<()> {
+        let merged = merge_range(&store, &runs, range, &out)?;
         advance(merged.records)?;
         *lock(slot) = Some(merged);
         Ok(())
     };
     parallel(threads, |_| {
         loop {
-            let range = next.fetch_add(1, Atomic::Relaxed);
-            let Some(slot) = ranges.get(range) else { return Ok(()) };
+            let number = next.fetch_add(1, Atomic::Relaxed);
+            let Some(range) = ranges.get(number) else { return Ok(()) };
             // Whoever fails leaves the others no range.
-            merge(range, slot).inspect_err(|_| next.store(ranges.len(), Atomic::Relaxed))?;
+            merge(range, &merged[number])
+                .inspect_err(|_| next.store(ranges.len(), Atomic::Relaxed))?;
         }
     })?;
     drop(runs);
-    let ranges = ranges.into_iter().filter_map(|slot| slot.into_inner().ok().flatten());
+    let ranges = merged.into_iter().filter_map(|slot| slot.into_inner().ok().flatten());
     let sequence = join(ranges, blocks);
     lease.resize(sequence.blocks.len() as u64 * each)?;
     let refs = (out.refs, out.tagged);
     Ok(SealedTiles::new(sequence, out.positions, refs, store.records, lease))
 }
 
-/// Positions at which one range ends and the next begins: every so many blocks' first positions.
-fn borders(runs: &[Run]) -> Vec<Position> {
-    let mut firsts: Vec<Position> =
-        runs.iter().flat_map(|run| run.blocks.iter().map(|block| block.first)).collect();
+/// A range of Morton order.
+struct Range {
+    /// Where it begins; None where the scan does.
+    from: Option<Position>,
+    /// Where the next one begins; None behind the last.
+    until: Option<Position>,
+    /// A cube of side 2^level holds all of its positions.
+    level: u32,
+}
+
+/// The scan in ranges, which end at every so many blocks' first positions.
+fn ranges(runs: &[Run]) -> Vec<Range> {
+    let blocks = || runs.iter().flat_map(|run| &run.blocks);
+    let mut firsts: Vec<Position> = blocks().map(|block| block.first).collect();
     firsts.sort_unstable_by(morton_cmp);
     let each = RANGE_BLOCKS.max(RANGE_BLOCKS_EACH * runs.len());
     let mut borders: Vec<Position> = firsts.into_iter().skip(each).step_by(each).collect();
     borders.dedup();
-    borders
+    let bounds = blocks().fold(Bounds::EMPTY, |all, block| all.union(&block.bounds));
+    let begins = std::iter::once(None).chain(borders.iter().copied().map(Some));
+    let ends = borders.iter().copied().map(Some).chain([None]);
+    begins
+        .zip(ends)
+        .map(|(from, until)| {
+            // No corner of the box comes before its lowest, and none after its highest.
+            let (first, last) = (from.unwrap_or(bounds.lo), until.unwrap_or(bounds.hi));
+            let level = split_level(first, last).map_or(0, |bit| bit + 1);
+            Range { from, until, level }
+        })
+        .collect()
 }
 
 fn join(ranges: impl Iterator<Item = Merged>, most_blocks: usize) -> Sequence {
@@ -112,52 +133,70 @@ fn join(ranges: impl Iterator<Item = Merged>, most_blocks: usize) -> Sequence {
     all
 }
 
-fn merge_range(
-    store: &TileStore,
-    runs: &[Run],
-    from: Option<Position>,
-    until: Option<Position>,
-    out: &Output,
-) -> Result<Merged> {
+fn merge_range(store: &TileStore, runs: &[Run], range: &Range, out: &Output) -> Result<Merged> {
     let mut cursors = Vec::with_capacity(runs.len());
+    let mut tournament = Tournament::new(runs.len());
     let mut buffer = Vec::new();
     let mut most = 0;
-    for run in runs {
-        let mut cursor = Cursor::new(store, run);
-        most += cursor.seek(from, until, &mut buffer)?;
+    for (number, run) in runs.iter().enumerate() {
+        let mut cursor = Cursor::new(store, run, range);
+        most += cursor.seek(&mut buffer)?;
+        tournament.set(number, cursor.key());
         cursors.push(cursor);
     }
-    let mut heap: BinaryHeap<Head> = cursors
-        .iter()
-        .enumerate()
-        .filter_map(|(run, c)| Some(Head { position: c.head(until)?, run }))
-        .collect();
     let mut emitter = Emitter::new(out, most);
-    let (mut equal, mut records) = (Vec::new(), BinaryHeap::new());
-    while let Some(head) = heap.pop() {
-        let next = heap.peek().map(|next| next.position);
-        if next != Some(head.position) {
-            // Up to where another run goes on, or the range ends, nothing is to be compared.
-            let cursor = &mut cursors[head.run];
-            cursor.emit_until(next.or(until), &mut emitter, &mut buffer)?;
-            let position = cursor.head(until);
-            heap.extend(position.map(|position| Head { position, run: head.run }));
+    let mut equals = Equals::default();
+    while let Some(first) = tournament.first() {
+        let second = tournament.second();
+        if second.is_some_and(|second| second.key == first.key) {
+            equals.emit(first.key, &mut tournament, &mut cursors, &mut emitter, &mut buffer)?;
             continue;
         }
-        equal.clear();
-        equal.push(head.run);
-        while heap.peek().is_some_and(|next| next.position == head.position) {
-            equal.extend(heap.pop().map(|next| next.run));
-        }
-        let at = head.position;
-        emit_equal(&mut cursors, &equal, at, &mut emitter, &mut records, &mut buffer)?;
-        for &run in &equal {
-            if let Some(position) = cursors[run].head(until) {
-                heap.push(Head { position, run });
-            }
-        }
+        // Up to where another run goes on, nothing is to be compared.
+        let until = second.and_then(|second| cursors[second.run].head());
+        let cursor = &mut cursors[first.run];
+        cursor.emit_until(until, &mut emitter, &mut buffer)?;
+        tournament.set(first.run, cursor.key());
     }
     emitter.finish()
+}
+
+/// Orders what keys leave open: runs of which the heads have the same key, be the positions equal or
+/// not. Holds memory to work in.
+#[derive(Default)]
+struct Equals {
+    runs: Vec<usize>,
+    records: BinaryHeap<Reverse<(Vec<u8>, usize)>>,
+}
+
+impl Equals {
+    /// Emits all positions of that key.
+    fn emit(
+        &mut self,
+        key: u64,
+        tournament: &mut Tournament,
+        cursors: &mut [Cursor<'_>],
+        emitter: &mut Emitter<'_>,
+        buffer: &mut Vec<u8>,
+    ) -> Result<()> {
+        let mut open = Vec::new();
+        while let Some(head) = tournament.first().filter(|head| head.key == key) {
+            open.push(head.run);
+            tournament.set(head.run, None);
+        }
+        loop {
+            let heads = open.iter().filter(|run| cursors[**run].key() == Some(key));
+            let Some(first) = heads.filter_map(|run| cursors[*run].head()).min_by(morton_cmp)
+            else {
+                break;
+            };
+            self.runs.clear();
+            self.runs.extend(open.iter().filter(|run| cursors[**run].head() == Some(first)));
+            emit_equal(cursors, &self.runs, first, emitter, &mut self.records, buffer)?;
+        }
+        open.iter().for_each(|&run| tournament.set(run, cursors[run].key()));
+        Ok(())
+    }
 }
 
 /// Emits the records of one position from the runs that have it, smallest record first; `records`
@@ -184,7 +223,7 @@ fn emit_equal(
             let cursor = &mut cursors[*run];
             emitter.take(&[position], cursor.number(), &[cursor.tag()])?;
             cursor.advance(1, buffer)?;
-            if cursor.head(None) == Some(position) {
+            if cursor.head() == Some(position) {
                 cursor.read_record(record)?;
             } else {
                 cursor.spare = PeekMut::pop(smallest).0.0;
@@ -198,58 +237,21 @@ fn emit_equal(
     }
     let Some(run) = last else { return Ok(()) };
     let cursor = &mut cursors[run];
-    while cursor.head(None) == Some(position) {
+    while cursor.head() == Some(position) {
         emitter.take(&[position], cursor.number(), &[cursor.tag()])?;
         cursor.advance(1, buffer)?;
     }
     Ok(())
 }
 
-/// The next position of a run; the smallest is the greatest in a [`BinaryHeap`].
-struct Head {
-    position: Position,
-    run: usize,
-}
-
-impl Ord for Head {
-    fn cmp(&self, other: &Self) -> Ordering {
-        morton_cmp(&other.position, &self.position).then(other.run.cmp(&self.run))
-    }
-}
-impl PartialOrd for Head {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl PartialEq for Head {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Head {}
-
-/// How many of `positions`, which are in order, are before `end`: the search is quick where few are,
-/// and where all are.
-fn before(positions: &[Position], end: &Position) -> usize {
-    let is_before = |p: &Position| morton_cmp(p, end) == Ordering::Less;
-    if positions.last().is_none_or(is_before) {
-        return positions.len();
-    }
-    let mut wide = 1;
-    while positions.get(wide).is_some_and(is_before) {
-        wide *= 2;
-    }
-    let from = wide / 2;
-    let to = wide.min(positions.len());
-    from + positions[from..to].partition_point(is_before)
-}
-
-/// A walk along a run.
+/// A walk along a range of a run.
 struct Cursor<'a> {
     store: &'a TileStore,
     run: &'a Run,
+    range: &'a Range,
     block: usize,
     at: usize,
+    /// Positions of the block that it is at, up to the end of the range.
     positions: Vec<Position>,
     /// Tags of the block's records, if they have any.
     tags: Vec<u32>,
@@ -258,57 +260,62 @@ struct Cursor<'a> {
 }
 
 impl<'a> Cursor<'a> {
-    fn new(store: &'a TileStore, run: &'a Run) -> Self {
+    fn new(store: &'a TileStore, run: &'a Run, range: &'a Range) -> Self {
         let (positions, tags, spare) = (Vec::new(), Vec::new(), Vec::new());
-        Cursor { store, run, block: 0, at: 0, positions, tags, spare }
+        Cursor { store, run, range, block: 0, at: 0, positions, tags, spare }
     }
 
-    /// Goes to the first record at or behind `from`; returns how many records the range until
-    /// `until` has at most.
-    fn seek(
-        &mut self,
-        from: Option<Position>,
-        until: Option<Position>,
-        buffer: &mut Vec<u8>,
-    ) -> Result<u64> {
+    /// Goes to the first record of the range; returns how many it has at most.
+    fn seek(&mut self, buffer: &mut Vec<u8>) -> Result<u64> {
         let blocks = &self.run.blocks;
         let before = |p: &Position| {
             blocks.partition_point(|block| morton_cmp(&block.first, p) == Ordering::Less)
         };
-        let end = until.as_ref().map_or(blocks.len(), before);
+        let end = self.range.until.as_ref().map_or(blocks.len(), before);
         // Records equal to `from` may begin in the block before the first that begins at or behind it.
-        self.block = from.as_ref().map_or(0, |p| before(p).saturating_sub(1));
+        self.block = self.range.from.as_ref().map_or(0, |p| before(p).saturating_sub(1));
+        let most = (end.saturating_sub(self.block) * BLOCK) as u64;
         self.load(buffer)?;
-        if let Some(from) = from {
+        if let Some(from) = &self.range.from {
             loop {
-                self.at =
-                    self.positions.partition_point(|p| morton_cmp(p, &from) == Ordering::Less);
-                if self.at < self.positions.len() || self.block >= blocks.len() {
+                self.at = self.positions.partition_point(|p| morton_cmp(p, from) == Ordering::Less);
+                if self.at < self.positions.len() || self.positions.is_empty() {
                     break;
                 }
                 self.block += 1;
                 self.load(buffer)?;
             }
         }
-        Ok((end.saturating_sub(self.block) * BLOCK) as u64)
+        Ok(most)
     }
 
-    /// Reads the block that it is at; `buffer` is memory to work in, which all cursors share.
+    /// Reads the block that it is at, none if that begins behind the range; `buffer` is memory to work
+    /// in, which all cursors share.
     fn load(&mut self, buffer: &mut Vec<u8>) -> Result<()> {
         self.at = 0;
         self.positions.clear();
         self.tags.clear();
-        let Some(block) = self.run.blocks.get(self.block) else { return Ok(()) };
+        let until = &self.range.until;
+        let inside = |p: &Position| until.is_none_or(|end| morton_cmp(p, &end) == Ordering::Less);
+        let Some(block) = self.run.blocks.get(self.block).filter(|block| inside(&block.first))
+        else {
+            return Ok(());
+        };
         // Records of a run are not gathered: where distinct positions have copies, these have tags.
         let tags = self.store.tagged.then_some(&mut self.tags);
-        block.read(&self.store.positions, buffer, &mut self.positions, tags)
+        block.read(&self.store.positions, buffer, &mut self.positions, tags)?;
+        self.positions.truncate(self.positions.partition_point(inside));
+        Ok(())
     }
 
-    /// The position it stands at, if that is before `until`.
-    fn head(&self, until: Option<Position>) -> Option<Position> {
-        let head = *self.positions.get(self.at)?;
-        let inside = until.is_none_or(|end| morton_cmp(&head, &end) == Ordering::Less);
-        inside.then_some(head)
+    /// The position it stands at; None at the end of the range.
+    fn head(&self) -> Option<Position> {
+        self.positions.get(self.at).copied()
+    }
+
+    /// The key of [`head`](Cursor::head).
+    fn key(&self) -> Option<u64> {
+        self.positions.get(self.at).map(|p| morton_prefix(*p, self.range.level))
     }
 
     /// Number of the record it stands at, among all of the store.
@@ -321,7 +328,7 @@ impl<'a> Cursor<'a> {
         self.tags.get(self.at).copied().unwrap_or_default()
     }
 
-    /// Emits its records before `until`, all that are left if that is nowhere.
+    /// Emits its records before `until`, all of the range if that is nowhere.
     fn emit_until(
         &mut self,
         until: Option<Position>,
@@ -330,13 +337,13 @@ impl<'a> Cursor<'a> {
     ) -> Result<()> {
         loop {
             let rest = &self.positions[self.at..];
-            let count = until.map_or(rest.len(), |end| before(rest, &end));
+            let count = until.map_or(rest.len(), |end| count_before(rest, &end));
             if count == 0 {
                 return Ok(());
             }
-            let range = self.at..self.at + count;
-            let tags = self.tags.get(range.clone()).unwrap_or_default();
-            emitter.take(&self.positions[range], self.number(), tags)?;
+            let taken = self.at..self.at + count;
+            let tags = self.tags.get(taken.clone()).unwrap_or_default();
+            emitter.take(&self.positions[taken], self.number(), tags)?;
             self.advance(count, buffer)?;
         }
     }
@@ -358,4 +365,20 @@ impl<'a> Cursor<'a> {
         record.extend_from_slice(&self.tag().to_be_bytes());
         Ok(())
     }
+}
+
+/// How many of `positions`, which are in order, are before `end`: the search is quick where few are,
+/// and where all are.
+fn count_before(positions: &[Position], end: &Position) -> usize {
+    let is_before = |p: &Position| morton_cmp(p, end) == Ordering::Less;
+    if positions.last().is_none_or(is_before) {
+        return positions.len();
+    }
+    let mut wide = 1;
+    while positions.get(wide).is_some_and(is_before) {
+        wide *= 2;
+    }
+    let from = wide / 2;
+    let to = wide.min(positions.len());
+    from + positions[from..to].partition_point(is_before)
 }

@@ -15,6 +15,7 @@ mod remote;
 mod sealed;
 mod sieve;
 mod spill;
+mod tournament;
 
 pub use around::{Around, Neighborhood};
 pub use block::{BLOCK, Block};
