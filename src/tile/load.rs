@@ -268,9 +268,9 @@ impl Loader {
         (&mut self.tile, &self.core)
     }
 
-    /// The zone grown by a few times the distance at which its positions have their neighbours,
-    /// less where that would not fit. What the rim does not prove is searched for elsewhere, so
-    /// its width decides speed alone.
+    /// The zone grown by about twice the distance at which its positions have their neighbours (k
+    /// of them on a plane lie within √(k/π) spacings), less where that would not fit. What the rim
+    /// does not prove is searched for elsewhere, so its width decides speed alone.
     fn rim(&mut self, zone: &Bounds, neighbors: usize) -> Result<Bounds> {
         if neighbors == 0 {
             return Ok(*zone);
@@ -286,7 +286,7 @@ impl Loader {
             0 => 0.0,
             _ => *spacings.select_nth_unstable_by(typical, f64::total_cmp).1,
         };
-        let mut width = (1.5 * (neighbors as f64).sqrt() * spacing).min(4e18) as i64 + 1;
+        let mut width = ((neighbors as f64).sqrt() * spacing).min(4e18) as i64 + 1;
         let limit = self.rim_limit as u64;
         loop {
             let region = zone.grown(width);

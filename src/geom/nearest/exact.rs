@@ -1,6 +1,6 @@
 //! The search of one point in integers alone: slower, and right whatever floats could not tell.
 
-use super::kernel::{Boxes, at_most};
+use super::kernel::Boxes;
 use super::tree::{Tree, above, below};
 use super::walk::{WIDENED, Work, lanes, nearest};
 use crate::geom::simd::Simd;
@@ -60,8 +60,8 @@ impl<'a> ExactWalk<'a> {
         let from = |i: usize| at[i].wrapping_sub(node.origin[i]);
         let lo = std::array::from_fn(|i| below(from(i).saturating_sub(node.error)));
         let hi = std::array::from_fn(|i| above(from(i).saturating_add(node.error)));
-        let distances = self.simd.run(Boxes { node, lo, hi });
-        let mut left = lanes(node.children, None) & at_most(&distances, self.reach);
+        let (distances, near) = self.simd.run(Boxes { node, lo, hi, bound: self.reach });
+        let mut left = near & lanes(node.children, None);
         while let Some(child) = nearest(&distances, left, self.reach) {
             left &= !(1 << child);
             let child = node.first_child as usize + child;

@@ -4,8 +4,8 @@
 //! monotonic, so no point of a box gets a smaller float than its box does.
 
 use super::tree::{LANES, Leaf, Node};
-use crate::geom::rows::{self, Row};
-use crate::geom::simd::{Kernel, Lanes, joined, smaller};
+use crate::geom::rows::Row;
+use crate::geom::simd::{COLUMNS, Kernel, Lanes, joined, smaller};
 
 /// What is farther than any point: no candidate yet.
 pub(super) const NONE: f64 = f64::from_bits((f32::MAX.to_bits() as u64) << 32 | u32::MAX as u64);
@@ -20,18 +20,38 @@ pub(super) struct Batch {
     pub bound_rank: [u32; LANES],
     /// The largest bound.
     pub farthest: f32,
-    /// The best keys of each point in ascending order, `width` a point.
+    /// The best keys of each point in ascending order, `shape.width()` a point.
     best: Vec<f64>,
-    width: usize,
-    /// How many candidates are kept, at most `width`.
+    shape: Shape,
+    /// How many candidates are kept, at most as many as there is room for.
     pub kept: usize,
 }
 
-/// The width of lists of `most` candidates: one of those that [`insert`] is made for, if there is
-/// one.
-fn width(most: usize) -> usize {
-    let widths = [4, 8, 12, 16, 20, 24, 32, 48, 72];
-    widths.into_iter().find(|&width| most <= width).unwrap_or(most)
+/// How the list of a point is stored: down the first column, then the second, and so on.
+#[derive(Debug, Clone, Copy)]
+struct Shape {
+    rows: usize,
+    columns: usize,
+}
+
+impl Shape {
+    /// For lists of `most` candidates: one of those that [`insert`] is made for, if there is one.
+    fn of(most: usize) -> Shape {
+        let rows = [1, 2, 3, 4, 5, 6, 8, 12, 18];
+        match rows.into_iter().find(|rows| most <= rows * COLUMNS) {
+            Some(rows) => Shape { rows, columns: COLUMNS },
+            None => Shape { rows: most, columns: 1 },
+        }
+    }
+
+    fn width(self) -> usize {
+        self.rows * self.columns
+    }
+
+    /// Where the number `i` of a list is.
+    fn place(self, i: usize) -> usize {
+        i % self.rows * self.columns + i / self.rows
+    }
 }
 
 /// Squared distance of a key.
@@ -53,34 +73,47 @@ impl Batch {
             bound_rank: [0; LANES],
             farthest: -1.0,
             best: Vec::new(),
-            width: 0,
+            shape: Shape::of(0),
             kept: 0,
         }
     }
 
     /// Makes room for `most` candidates a point.
     pub fn fit(&mut self, most: usize) {
-        self.width = width(most);
+        self.shape = Shape::of(most);
+        let numbers = self.shape.width() * LANES;
         self.best.clear();
-        self.best.reserve_exact(self.width * LANES);
-        self.best.resize(self.width * LANES, NONE);
+        self.best.reserve_exact(numbers);
+        self.best.resize(numbers, NONE);
     }
 
     /// Bytes of the lists for `most` candidates a point.
     pub fn bytes(most: usize) -> usize {
-        width(most) * LANES * size_of::<f64>()
+        Shape::of(most).width() * LANES * size_of::<f64>()
     }
 
-    /// The best keys of a lane.
+    /// Fills `ranks` with those of a lane's first candidates, in ascending order of keys.
     #[inline(always)]
-    pub fn list(&self, lane: usize) -> &[f64] {
-        &self.best[lane * self.width..(lane + 1) * self.width]
+    pub fn ranks(&self, lane: usize, ranks: &mut [u32]) {
+        let Shape { rows, columns } = self.shape;
+        let list = &self.best[lane * rows * columns..(lane + 1) * rows * columns];
+        for (column, ranks) in ranks.chunks_mut(rows).enumerate() {
+            for (row, rank) in ranks.iter_mut().enumerate() {
+                *rank = rank_of(list[row * columns + column]);
+            }
+        }
+    }
+
+    /// Number `i` of a lane's list.
+    #[inline(always)]
+    pub fn key(&self, lane: usize, i: usize) -> f64 {
+        self.best[lane * self.shape.width() + self.shape.place(i)]
     }
 
     /// Notes what the last kept candidate of a lane is.
     #[inline(always)]
-    fn bind(&mut self, lane: usize) {
-        let last = self.best[lane * self.width + self.kept - 1];
+    fn bind(&mut self, lane: usize, last: usize) {
+        let last = self.best[lane * self.shape.width() + last];
         self.bound[lane] = distance_of(last);
         self.bound_rank[lane] = rank_of(last);
     }
@@ -110,15 +143,16 @@ impl Kernel for Home<'_> {
             *row = keys(&distances, leaf.rank[other]);
             row[other] = NONE;
         }
-        rows::sort(&mut rows);
-        let width = batch.width;
-        for (lane, list) in batch.best.chunks_exact_mut(width).enumerate() {
-            let (near, rest) = list.split_at_mut(width.min(LANES));
-            near.iter_mut().zip(&rows).for_each(|(key, row)| *key = row[lane]);
-            rest.fill(NONE);
+        lanes.sort(&mut rows);
+        let shape = batch.shape;
+        batch.best.fill(NONE);
+        for (i, row) in rows.iter().enumerate().take(shape.width()) {
+            let places = batch.best[shape.place(i)..].iter_mut().step_by(shape.width());
+            places.zip(row).for_each(|(place, key)| *place = *key);
         }
+        let last = shape.place(kept - 1);
         for lane in 0..LANES {
-            batch.bind(lane);
+            batch.bind(lane, last);
             if wanted >> lane & 1 == 0 {
                 batch.bound[lane] = -1.0;
             }
@@ -233,6 +267,7 @@ fn meet<L: Lanes>(
     at: &[[f32; LANES]; 3],
 ) -> bool {
     let mut found = false;
+    let (width, last) = (batch.shape.width(), batch.shape.place(batch.kept - 1));
     let others = load(lanes, &leaf.at);
     while near != 0 {
         let lane = near.trailing_zeros() as usize & (LANES - 1);
@@ -240,9 +275,9 @@ fn meet<L: Lanes>(
         let distances = squared(lanes, others, [at[0][lane], at[1][lane], at[2][lane]]);
         let hits = lanes.at_most(distances, lanes.splat(batch.bound[lane]));
         if hits != 0 {
-            let list = &mut batch.best[lane * batch.width..(lane + 1) * batch.width];
+            let list = &mut batch.best[lane * width..(lane + 1) * width];
             insert(lanes, list, &lanes.store(distances), &leaf.rank, hits);
-            batch.bind(lane);
+            batch.bind(lane, last);
             found = true;
         }
     }
@@ -291,29 +326,26 @@ fn box_distances<L: Lanes>(lanes: L, node: &Node, lo: [f32; 3], hi: [f32; 3]) ->
     norm(lanes, x, y, z)
 }
 
-/// Squared distances between the boxes of a node and the box `lo..hi`.
+/// Squared distances between the boxes of a node and the box `lo..hi`, and a bit for each that is not
+/// above `bound`.
 pub(super) struct Boxes<'a> {
     pub node: &'a Node,
     pub lo: [f32; 3],
     pub hi: [f32; 3],
+    pub bound: f32,
 }
 
 impl Kernel for Boxes<'_> {
-    type Output = [f32; LANES];
+    type Output = ([f32; LANES], u32);
 
     #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) -> [f32; LANES] {
-        lanes.store(box_distances(lanes, self.node, self.lo, self.hi))
+    fn run<L: Lanes>(self, lanes: L) -> ([f32; LANES], u32) {
+        let distances = box_distances(lanes, self.node, self.lo, self.hi);
+        (lanes.store(distances), lanes.at_most(distances, lanes.splat(self.bound)))
     }
 }
 
-/// The lanes not above `bound`.
-#[inline(always)]
-pub(super) fn at_most(distances: &[f32; LANES], bound: f32) -> u32 {
-    (0..LANES).fold(0, |mask, i| mask | u32::from(distances[i] <= bound) << i)
-}
-
-/// Merges candidates into a list of one of the widths that lists have.
+/// Merges candidates into a list of one of the shapes that lists have.
 #[inline(always)]
 fn insert<L: Lanes>(
     lanes: L,
@@ -322,22 +354,22 @@ fn insert<L: Lanes>(
     ranks: &[u32; LANES],
     hits: u32,
 ) {
-    macro_rules! of_width {
-        ($($width:literal)*) => {
-            match list.len() {
-                $($width => {
-                    if let Some(list) = list.first_chunk_mut::<$width>() {
-                        lanes.insert(list, distances, ranks, hits);
+    macro_rules! of_rows {
+        ($($rows:literal)*) => {
+            match list.as_chunks_mut().0 {
+                $(rows if rows.len() == $rows => {
+                    if let Some(rows) = rows.first_chunk_mut::<$rows>() {
+                        lanes.insert(rows, distances, ranks, hits);
                     }
                 })*
                 _ => insert_any(list, distances, ranks, hits),
             }
         };
     }
-    of_width!(12 4 8 16 20 24 32 48 72)
+    of_rows!(3 1 2 4 5 6 8 12 18)
 }
 
-/// [`Lanes::insert`] for lists of any length.
+/// [`Lanes::insert`] for lists of one column.
 fn insert_any(best: &mut [f64], distances: &[f32; LANES], ranks: &[u32; LANES], mut hits: u32) {
     while hits != 0 {
         let lane = hits.trailing_zeros() as usize & (LANES - 1);

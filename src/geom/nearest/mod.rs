@@ -26,7 +26,7 @@ mod tree;
 mod walk;
 
 use exact::{ExactWalk, Neighbor};
-use kernel::{Batch, distance_of, rank_of};
+use kernel::{Batch, distance_of};
 use tree::{EXACT, LANES, Node, Tree};
 use walk::Walk;
 pub use walk::Work;
@@ -199,15 +199,15 @@ impl Nearest {
         error: f64,
     ) -> u128 {
         self.work.queries += 1;
-        let list = self.batch.list(lane);
-        let last = distance_of(list[k - 1]);
-        self.neighbors.clear();
-        self.neighbors.extend(list[..k].iter().map(|&key| rank_of(key)));
+        let bound = self.batch.bound[lane];
+        let one_more = self.batch.kept > k;
+        let last = if one_more { distance_of(self.batch.key(lane, k - 1)) } else { bound };
+        self.neighbors.resize(k, 0);
+        self.batch.ranks(lane, &mut self.neighbors);
         if error == 0.0 && last < EXACT as f32 {
             return last as u128;
         }
-        let proven = k == positions.len() - 1
-            || (self.batch.kept > k && gap(last, distance_of(list[k]), error));
+        let proven = k == positions.len() - 1 || one_more && gap(last, bound, error);
         let at = positions[query as usize];
         self.found.clear();
         self.found.extend(

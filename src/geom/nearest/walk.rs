@@ -1,7 +1,7 @@
 //! The walk of one leaf's points through the tree: from their own leaf upward, and from every
 //! ancestor down into whatever is near enough to matter.
 
-use super::kernel::{Batch, Boxes, Home, Visit, at_most};
+use super::kernel::{Batch, Boxes, Home, Visit};
 use super::tree::{EXACT, LANES, Tree, above, below};
 use crate::geom::simd::Simd;
 use crate::point::Position;
@@ -89,8 +89,8 @@ impl<'a> Walk<'a> {
         let node = self.tree.node(level, index);
         let lo = std::array::from_fn(|i| below(self.lo[i].saturating_sub(node.origin[i])));
         let hi = std::array::from_fn(|i| above(self.hi[i].saturating_sub(node.origin[i])));
-        let distances = self.simd.run(Boxes { node, lo, hi });
-        let mut left = lanes(node.children, skip) & at_most(&distances, self.reach());
+        let (distances, near) = self.simd.run(Boxes { node, lo, hi, bound: self.reach() });
+        let mut left = near & lanes(node.children, skip);
         while let Some(child) = nearest(&distances, left, self.reach()) {
             left &= !(1 << child);
             let child = node.first_child as usize + child;

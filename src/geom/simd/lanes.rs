@@ -2,9 +2,12 @@
 //! find in loops.
 
 use super::real::{EIGHT, Eight, Real};
+use crate::geom::rows::{self, Row};
 
 /// Numbers side by side.
 pub const LANES: usize = 16;
+/// Columns of a list that [`Lanes::insert`] inserts into.
+pub const COLUMNS: usize = 4;
 
 /// Operations on 16 f32 at once, a value of an implementing type being the witness that the
 /// processor has them. Every implementation gives the bits of [`Portable`].
@@ -41,11 +44,15 @@ pub trait Lanes: Copy {
     fn load_eight(self, from: &[f64; EIGHT]) -> Self::F64;
     /// Eight numbers as an array.
     fn store_eight(self, v: Self::F64) -> [f64; EIGHT];
+    /// Sorts lists side by side, row i being the i-th numbers of all: smallest first, none NaN.
+    fn sort(self, rows: &mut [Row; LANES]);
     /// Merges numbers into an ascending list, of which the smallest stay: for each lane in `hits`
-    /// the one with the bits of `high` above those of `low`. All are positive and finite.
-    fn insert<const WIDTH: usize>(
+    /// the one with the bits of `high` above those of `low`. All are positive and finite. The list goes
+    /// down the first column, then the second, and so on: the number before each is in the row above,
+    /// but for the first row.
+    fn insert<const ROWS: usize>(
         self,
-        list: &mut [f64; WIDTH],
+        list: &mut [[f64; COLUMNS]; ROWS],
         high: &[f32; LANES],
         low: &[u32; LANES],
         hits: u32,
@@ -142,25 +149,38 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn insert<const WIDTH: usize>(
+    fn sort(self, rows: &mut [Row; LANES]) {
+        for first in (0..LANES).step_by(2) {
+            let mut lists = rows.map(|row| [row[first], row[first + 1]]);
+            rows::sort(&mut lists);
+            for (row, list) in rows.iter_mut().zip(lists) {
+                [row[first], row[first + 1]] = list;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn insert<const ROWS: usize>(
         self,
-        list: &mut [f64; WIDTH],
+        list: &mut [[f64; COLUMNS]; ROWS],
         high: &[f32; LANES],
         low: &[u32; LANES],
         mut hits: u32,
     ) {
-        let mut sorted = *list;
         while hits != 0 {
             let lane = hits.trailing_zeros() as usize & (LANES - 1);
             hits &= hits - 1;
             let new = joined(high[lane], low[lane]);
-            let old = sorted;
-            sorted[0] = smaller(old[0], new);
-            for i in 1..WIDTH {
-                sorted[i] = smaller(old[i], larger(old[i - 1], new));
+            let last = list[ROWS - 1];
+            let mut before = [0.0, last[0], last[1], last[2]];
+            for row in list.iter_mut() {
+                let old = *row;
+                for i in 0..COLUMNS {
+                    row[i] = smaller(old[i], larger(before[i], new));
+                }
+                before = old;
             }
         }
-        *list = sorted;
     }
 }
 

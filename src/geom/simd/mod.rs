@@ -9,7 +9,7 @@ mod real;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub use lanes::{LANES, Lanes, Portable, joined, smaller};
+pub use lanes::{COLUMNS, LANES, Lanes, Portable, joined, smaller};
 pub use real::{EIGHT, Eight, Mask, Real};
 #[cfg(target_arch = "x86_64")]
 use x86::{has_avx2, has_avx512};

@@ -5,7 +5,8 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
-use crate::geom::simd::lanes::{LANES, Lanes, joined};
+use crate::geom::rows::{self, Ordered, Row};
+use crate::geom::simd::lanes::{COLUMNS, LANES, Lanes, joined};
 use crate::geom::simd::real::{EIGHT, EXPONENT, Mask, Real};
 
 // SAFETY, of every block here: a value of a type of this module comes from `witness` alone, which is
@@ -121,15 +122,29 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn insert<const WIDTH: usize>(
+    fn sort(self, rows: &mut [Row; LANES]) {
+        // Four lists at a time: their numbers are as many vectors as there are registers.
+        for first in (0..LANES).step_by(4) {
+            let mut lists = [Four(unsafe { _mm256_setzero_pd() }); LANES];
+            for i in 0..LANES {
+                lists[i] = Four(unsafe { _mm256_loadu_pd(rows[i].as_ptr().add(first)) });
+            }
+            rows::sort(&mut lists);
+            for i in 0..LANES {
+                unsafe { _mm256_storeu_pd(rows[i].as_mut_ptr().add(first), lists[i].0) };
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn insert<const ROWS: usize>(
         self,
-        list: &mut [f64; WIDTH],
+        list: &mut [[f64; COLUMNS]; ROWS],
         high: &[f32; LANES],
         low: &[u32; LANES],
         hits: u32,
     ) {
-        const { assert!(WIDTH.is_multiple_of(4)) };
-        unsafe { insert_by_four(list, high, low, hits) }
+        unsafe { insert(list, high, low, hits) }
     }
 }
 
@@ -163,37 +178,46 @@ unsafe fn least(keys: *const u32, mask: u32) -> __m256i {
     }
 }
 
-/// Inserts into a list of whole vectors of four: each number is compared with a vector and with the
-/// same moved up by one place.
+/// [`Lanes::insert`]: one vector a row, of which the last alone is to be turned.
 #[inline(always)]
-pub(super) unsafe fn insert_by_four<const WIDTH: usize>(
-    list: &mut [f64; WIDTH],
+pub(super) unsafe fn insert<const ROWS: usize>(
+    list: &mut [[f64; COLUMNS]; ROWS],
     high: &[f32; LANES],
     low: &[u32; LANES],
     mut hits: u32,
 ) {
-    // Arrays of WIDTH / 4 cannot be named; what is beyond it is never touched and costs nothing.
-    let mut sorted = [unsafe { _mm256_setzero_pd() }; 18];
-    let vectors = WIDTH / 4;
-    for i in 0..vectors {
-        sorted[i] = unsafe { _mm256_loadu_pd(list.as_ptr().add(4 * i)) };
+    let mut sorted = [unsafe { _mm256_setzero_pd() }; ROWS];
+    for i in 0..ROWS {
+        sorted[i] = unsafe { _mm256_loadu_pd(list[i].as_ptr()) };
     }
     while hits != 0 {
         let lane = hits.trailing_zeros() as usize & (LANES - 1);
         hits &= hits - 1;
         unsafe {
             let new = _mm256_set1_pd(joined(high[lane], low[lane]));
-            let mut before = _mm256_setzero_pd();
-            for vector in &mut sorted[..vectors] {
-                let turned = _mm256_permute4x64_pd::<0b10_01_00_11>(*vector);
-                let moved = _mm256_blend_pd::<1>(turned, before);
-                before = turned;
-                *vector = _mm256_min_pd(*vector, _mm256_max_pd(moved, new));
+            let turned = _mm256_permute4x64_pd::<0b10_01_00_11>(sorted[ROWS - 1]);
+            let mut before = _mm256_blend_pd::<1>(turned, _mm256_setzero_pd());
+            for row in &mut sorted {
+                let old = *row;
+                *row = _mm256_min_pd(old, _mm256_max_pd(before, new));
+                before = old;
             }
         }
     }
-    for i in 0..vectors {
-        unsafe { _mm256_storeu_pd(list.as_mut_ptr().add(4 * i), sorted[i]) };
+    for i in 0..ROWS {
+        unsafe { _mm256_storeu_pd(list[i].as_mut_ptr(), sorted[i]) };
+    }
+}
+
+/// One number of each of four lists.
+#[derive(Clone, Copy)]
+struct Four(__m256d);
+
+impl Ordered for Four {
+    #[inline(always)]
+    fn ordered(self, other: Four) -> (Four, Four) {
+        let (a, b) = (self.0, other.0);
+        unsafe { (Four(_mm256_min_pd(a, b)), Four(_mm256_max_pd(a, b))) }
     }
 }
 

@@ -5,8 +5,9 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
-use super::avx2::insert_by_four;
-use crate::geom::simd::lanes::{LANES, Lanes, joined};
+use super::avx2::insert;
+use crate::geom::rows::{self, Ordered, Row};
+use crate::geom::simd::lanes::{COLUMNS, LANES, Lanes};
 use crate::geom::simd::real::{EIGHT, EXPONENT, Mask, Real};
 
 // SAFETY, of every block here: a value of a type of this module comes from `witness` alone, which is
@@ -109,58 +110,42 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    fn insert<const WIDTH: usize>(
+    fn sort(self, rows: &mut [Row; LANES]) {
+        for first in (0..LANES).step_by(8) {
+            let mut lists = [Eight(unsafe { _mm512_setzero_pd() }); LANES];
+            for i in 0..LANES {
+                lists[i] = Eight(unsafe { _mm512_loadu_pd(rows[i].as_ptr().add(first)) });
+            }
+            rows::sort(&mut lists);
+            for i in 0..LANES {
+                unsafe { _mm512_storeu_pd(rows[i].as_mut_ptr().add(first), lists[i].0) };
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn insert<const ROWS: usize>(
         self,
-        list: &mut [f64; WIDTH],
+        list: &mut [[f64; COLUMNS]; ROWS],
         high: &[f32; LANES],
         low: &[u32; LANES],
         hits: u32,
     ) {
-        const { assert!(WIDTH.is_multiple_of(4)) };
-        if WIDTH.is_multiple_of(8) {
-            unsafe { insert_by_eight(list, high, low, hits) }
-        } else {
-            unsafe { insert_by_four(list, high, low, hits) }
-        }
-    }
-}
-
-/// As [`insert_by_four`], for lists of whole vectors of eight.
-#[inline(always)]
-unsafe fn insert_by_eight<const WIDTH: usize>(
-    list: &mut [f64; WIDTH],
-    high: &[f32; LANES],
-    low: &[u32; LANES],
-    mut hits: u32,
-) {
-    let mut sorted = [unsafe { _mm512_setzero_pd() }; 9];
-    let vectors = WIDTH / 8;
-    for i in 0..vectors {
-        sorted[i] = unsafe { _mm512_loadu_pd(list.as_ptr().add(8 * i)) };
-    }
-    while hits != 0 {
-        let lane = hits.trailing_zeros() as usize & (LANES - 1);
-        hits &= hits - 1;
-        unsafe {
-            let new = _mm512_set1_pd(joined(high[lane], low[lane]));
-            let mut before = _mm512_setzero_si512();
-            for vector in &mut sorted[..vectors] {
-                let this = _mm512_castpd_si512(*vector);
-                // The last of the vector before, then all but the last of this one.
-                let moved = _mm512_castsi512_pd(_mm512_alignr_epi64::<7>(this, before));
-                before = this;
-                *vector = _mm512_min_pd(*vector, _mm512_max_pd(moved, new));
-            }
-        }
-    }
-    for i in 0..vectors {
-        unsafe { _mm512_storeu_pd(list.as_mut_ptr().add(8 * i), sorted[i]) };
+        unsafe { insert(list, high, low, hits) }
     }
 }
 
 /// Eight f64.
 #[derive(Clone, Copy)]
 pub struct Eight(__m512d);
+
+impl Ordered for Eight {
+    #[inline(always)]
+    fn ordered(self, other: Eight) -> (Eight, Eight) {
+        let (a, b) = (self.0, other.0);
+        unsafe { (Eight(_mm512_min_pd(a, b)), Eight(_mm512_max_pd(a, b))) }
+    }
+}
 
 /// Where a condition holds.
 #[derive(Clone, Copy)]
