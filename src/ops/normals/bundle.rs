@@ -156,10 +156,15 @@ impl Kernel for Together<'_> {
         let Together { at, ranks, fan, method } = self;
         let scatter = scatter(lanes, at);
         let flat = flat(lanes, &scatter, at.len() + 1);
-        let (adjugate, lines) = adjugate(&scatter, at.len() + 1);
         let mut alone = !flat[0].equals(flat[0]).bits();
-        let (mut normal, mut perpendicular) = (flat, 0);
-        if method == Method::Varady {
+        let (mut normal, mut perpendicular, mut lines) = (flat, 0, 0);
+        if method == Method::Pca {
+            if spread(lanes, &scatter) != (1 << EIGHT) - 1 {
+                lines = adjugate(&scatter, at.len() + 1).1;
+            }
+        } else {
+            let (adjugate, of_lines) = adjugate(&scatter, at.len() + 1);
+            lines = of_lines;
             let (first, clear) = fan.mean_normals(lanes, at, ranks, flat);
             alone |= !(clear & first[0].equals(first[0]).bits());
             let fitted = fitted(lanes, &adjugate, first);
@@ -215,6 +220,24 @@ fn flat<L: Lanes>(lanes: L, scatter: &[Row; 6], count: usize) -> [L::F64; 3] {
         matrix[entry] = scatter * scatter.of(unit);
     }
     plane::smallest_vector(matrix)
+}
+
+/// The lanes where the positions are certainly not on one line: two of the axes have variances whose
+/// product exceeds the square of their covariance, whatever rounding did.
+#[inline(always)]
+fn spread<L: Lanes>(lanes: L, scatter: &[Row; 6]) -> u32 {
+    // Two products are rounded, each by a factor within 1 ± 2^-53.
+    const CERTAIN: f64 = 1.0 - 4.0 * f64::EPSILON;
+    let mut entries = [lanes.load_eight(&scatter[0]); 6];
+    for entry in 1..6 {
+        entries[entry] = lanes.load_eight(&scatter[entry]);
+    }
+    let [xx, xy, xz, yy, yz, zz] = entries;
+    let certain = xx.of(CERTAIN);
+    let over = (xy * xy).below(xx * yy * certain)
+        | (xz * xz).below(xx * zz * certain)
+        | (yz * yz).below(yy * zz * certain);
+    over.bits()
 }
 
 /// The adjugates of the covariances of `count` positions each, and the lanes where all are on one
