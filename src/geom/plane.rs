@@ -371,14 +371,15 @@ pub fn canonical<T>(v: [T; 3]) -> [T; 3]
 where
     T: Copy + PartialOrd + std::ops::Neg<Output = T> + Default + std::ops::Add<Output = T>,
 {
+    use std::hint::select_unpredictable;
+
     let zero = T::default();
-    let size = v.map(|c| if c < zero { -c } else { c });
-    let mut largest = 0;
+    let size = |c: T| select_unpredictable(c < zero, -c, c);
+    let mut largest = v[0];
     for axis in 1..3 {
-        if size[axis] > size[largest] {
-            largest = axis;
-        }
+        largest = select_unpredictable(size(v[axis]) > size(largest), v[axis], largest);
     }
+    let turned = largest < zero;
     // −0 + 0 = 0
-    v.map(|c| if v[largest] < zero { -c } else { c } + zero)
+    v.map(|c| select_unpredictable(turned, -c, c) + zero)
 }
