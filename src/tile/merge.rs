@@ -328,24 +328,20 @@ impl<'a> Cursor<'a> {
         self.tags.get(self.at).copied().unwrap_or_default()
     }
 
-    /// Emits its records before `until`, all of the range if that is nowhere.
+    /// Emits its records from the head, which is before `until`, up to there or to the end of the
+    /// block.
     fn emit_until(
         &mut self,
         until: Option<Position>,
         emitter: &mut Emitter<'_>,
         buffer: &mut Vec<u8>,
     ) -> Result<()> {
-        loop {
-            let rest = &self.positions[self.at..];
-            let count = until.map_or(rest.len(), |end| count_before(rest, &end));
-            if count == 0 {
-                return Ok(());
-            }
-            let taken = self.at..self.at + count;
-            let tags = self.tags.get(taken.clone()).unwrap_or_default();
-            emitter.take(&self.positions[taken], self.number(), tags)?;
-            self.advance(count, buffer)?;
-        }
+        let rest = &self.positions[self.at..];
+        let count = until.map_or(rest.len(), |end| count_before(rest, &end));
+        let taken = self.at..self.at + count;
+        let tags = self.tags.get(taken.clone()).unwrap_or_default();
+        emitter.take(&self.positions[taken], self.number(), tags)?;
+        self.advance(count, buffer)
     }
 
     fn advance(&mut self, records: usize, buffer: &mut Vec<u8>) -> Result<()> {
@@ -367,14 +363,17 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// How many of `positions`, which are in order, are before `end`: the search is quick where few are,
-/// and where all are.
+/// How many of `positions`, which are in order and the first of which is, are before `end`: the
+/// search is quick where few are, and where all are.
 fn count_before(positions: &[Position], end: &Position) -> usize {
     let is_before = |p: &Position| morton_cmp(p, end) == Ordering::Less;
+    if !positions.get(1).is_some_and(is_before) {
+        return positions.len().min(1);
+    }
     if positions.last().is_none_or(is_before) {
         return positions.len();
     }
-    let mut wide = 1;
+    let mut wide = 2;
     while positions.get(wide).is_some_and(is_before) {
         wide *= 2;
     }
