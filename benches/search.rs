@@ -135,8 +135,9 @@ fn sealed(positions: &[Position]) -> Arc<SealedTiles> {
     let area = SpillArea::new(budget.clone(), 1 << 36, Box::new(InMemory));
     let store = TileStore::new(&area, &budget, 4, false);
     let mut intake = Intake::new(&store, RUN);
-    for &p in positions {
-        intake.push(p, &[0; 4], Tag::default()).unwrap();
+    for positions in positions.chunks(8192) {
+        let (records, tags) = (vec![0; positions.len() * 4], vec![Tag::default(); positions.len()]);
+        intake.take(positions, &records, &tags).unwrap();
     }
     intake.flush().unwrap();
     drop(intake);

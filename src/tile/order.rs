@@ -12,6 +12,8 @@ const FEW: usize = 64;
 /// Bits that one pass of the radix sort sorts by.
 const DIGIT: u32 = 8;
 const BUCKETS: usize = 1 << DIGIT;
+/// Passes of the radix sort: 32 bits are ten levels of the octree and more.
+const DIGITS: usize = 4;
 
 /// The order of up to 2^32 positions. Entries are a path through the octree, as many of its upper
 /// levels as there is room for, above the index of a position.
@@ -126,38 +128,47 @@ impl<E: Fn(usize, usize) -> Ordering> Sorter<'_, E> {
     }
 }
 
-/// Sorts by the bits from `lowest` on, least significant digit first; `spare` is as long.
+/// Sorts by the bits from `lowest` on; `spare` is as long. The upper [`DIGITS`] digits are sorted by,
+/// least significant first; what these leave equal, mostly one or two positions of a surface, is
+/// compared.
 fn radix_sort(entries: &mut [u64], spare: &mut [u64], lowest: u32) {
     if entries.len() <= BUCKETS * 8 {
         return entries.sort_unstable();
     }
     let (any, all) = entries.iter().fold((0, u64::MAX), |(any, all), &e| (any | e, all & e));
-    let varies = any & !all;
-    let (mut from, mut to) = (entries, spare);
+    let varying = u64::BITS - (any & !all).leading_zeros();
+    let from = varying.saturating_sub(DIGITS as u32 * DIGIT).max(lowest);
+    let digit =
+        |entry: u64, d: usize| (entry >> from >> (d as u32 * DIGIT)) as usize & (BUCKETS - 1);
+    let mut counts = [[0usize; BUCKETS]; DIGITS];
+    for &entry in entries.iter() {
+        (0..DIGITS).for_each(|d| counts[d][digit(entry, d)] += 1);
+    }
+    let count = entries.len();
+    let (mut source, mut target) = (&mut *entries, &mut *spare);
     let mut moved = false;
-    let mut counts = [0usize; BUCKETS];
-    for shift in (lowest..u64::BITS).step_by(DIGIT as usize) {
-        // Bits that all entries share sort nothing.
-        if varies >> shift & (BUCKETS as u64 - 1) == 0 {
+    for (d, places) in counts.iter_mut().enumerate() {
+        // A digit that all entries share sorts nothing.
+        if places[digit(source[0], d)] == count {
             continue;
         }
-        let digit = |entry: u64| (entry >> shift) as usize & (BUCKETS - 1);
-        counts.fill(0);
-        from.iter().for_each(|&entry| counts[digit(entry)] += 1);
         let mut begin = 0;
-        for count in &mut counts {
-            begin += std::mem::replace(count, begin);
+        for place in places.iter_mut() {
+            begin += std::mem::replace(place, begin);
         }
-        for &entry in from.iter() {
-            let place = &mut counts[digit(entry)];
-            to[*place] = entry;
+        for &entry in source.iter() {
+            let place = &mut places[digit(entry, d)];
+            target[*place] = entry;
             *place += 1;
         }
-        std::mem::swap(&mut from, &mut to);
+        std::mem::swap(&mut source, &mut target);
         moved = !moved;
     }
     if moved {
-        to.copy_from_slice(from);
+        target.copy_from_slice(source);
+    }
+    if from > lowest {
+        entries.chunk_by_mut(|a, b| a >> from == b >> from).for_each(|group| group.sort_unstable());
     }
 }
 
