@@ -116,8 +116,8 @@ impl<'a> Walk<'a> {
             leaves: &self.tree.leaves[first..first + node.children as usize],
             left: lanes(node.children, skip),
             points: self.points,
-            lo: own.lo.map(|axis| axis[self.child]),
-            hi: own.hi.map(|axis| axis[self.child]),
+            lo: [own.lo[0][self.child], own.lo[1][self.child], own.lo[2][self.child]],
+            hi: [own.hi[0][self.child], own.hi[1][self.child], own.hi[2][self.child]],
             shift,
         };
         self.work.leaves += self.simd.run(visit);
