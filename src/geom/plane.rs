@@ -376,8 +376,8 @@ where
     let zero = T::default();
     let size = |c: T| select_unpredictable(c < zero, -c, c);
     let mut largest = v[0];
-    for axis in 1..3 {
-        largest = select_unpredictable(size(v[axis]) > size(largest), v[axis], largest);
+    for &c in &v[1..] {
+        largest = select_unpredictable(size(c) > size(largest), c, largest);
     }
     let turned = largest < zero;
     // −0 + 0 = 0
