@@ -7,6 +7,7 @@ mod scans_support;
 
 use std::path::{Path, PathBuf};
 
+use laz::{LasZipCompressor, LazVlr};
 use pointmill::ErrorKind;
 use scans_support::{Beside, LasFile, STRIDES, Setup, assert_holds, convert, read, reduce};
 
@@ -50,6 +51,30 @@ fn laz(format: u8) -> Vec<u8> {
     std::fs::write(&from, las(format)).unwrap();
     convert(&[from], &to, &Setup::new(&[])).unwrap();
     std::fs::read(to).unwrap()
+}
+
+/// The same points as LAZ in chunks of 100, 7, 100, 7, … points, as the chunk table alone tells.
+fn laz_of_varying_chunks(format: u8) -> Vec<u8> {
+    let whole = laz(format);
+    let start = word(&whole, 96);
+    let payload = 52 + whole.windows(14).position(|w| w == b"laszip encoded").unwrap();
+    // This chunk size means "as the table says".
+    let mut file = std::io::Cursor::new(put(&whole[..start], payload + 12, &[0xff; 4]));
+    file.set_position(start as u64);
+    let laszip = LazVlr::read_from(&file.get_ref()[payload..]).unwrap();
+    assert!(laszip.uses_variable_size_chunks());
+    let mut encoder = LasZipCompressor::new(file, laszip).unwrap();
+    let stride = STRIDES[usize::from(format)];
+    for (i, record) in records(stride).chunks(stride).enumerate() {
+        encoder.compress_one(record).unwrap();
+        if [99, 106].contains(&(i % 107)) {
+            encoder.finish_current_chunk().unwrap();
+        }
+    }
+    encoder.done().unwrap();
+    let file = encoder.into_inner().into_inner();
+    // No records behind the points, where those of the file with fixed chunks were.
+    put(&file, 235, &[0; 12])
 }
 
 fn put(bytes: &[u8], at: usize, what: &[u8]) -> Vec<u8> {
@@ -293,6 +318,42 @@ fn chunk_tables_that_lie_or_lack_cost_speed_and_no_point() {
         let good = put(&whole, 243, &[0; 4]);
         reads_as("no table", "in.laz", &bare[..table], &good, "chunk table");
         reads_as("half a table", "in.laz", &bare[..end - 6], &good, "chunk table");
+    }
+}
+
+#[test]
+fn a_chunk_table_told_at_the_end_of_the_file_is_found() {
+    for format in [1, 6] {
+        for whole in [laz(format), laz_of_varying_chunks(format)] {
+            let start = word(&whole, 96);
+            let place = long(&whole, start);
+            // Writers to a pipe leave −1 in front and append the place behind everything else.
+            let mut piped = put(&whole, start, &(-1i64).to_le_bytes());
+            piped.extend(place.to_le_bytes());
+            reads_as("a table told at the end", "in.laz", &piped, &whole, "");
+        }
+    }
+}
+
+#[test]
+fn chunks_of_varying_size_are_read_and_found_without_their_table_where_they_tell_their_length() {
+    for format in [1, 6] {
+        let varying = laz_of_varying_chunks(format);
+        let fixed = put(&laz(format), 243, &[0; 4]);
+        let outputs = [&varying, &fixed].map(|bytes| {
+            let (folder, path) = input("in.laz", bytes);
+            let output = folder.path().join("out.las");
+            convert(&[path], &output, &Setup::new(&[])).unwrap();
+            read(&output).1
+        });
+        assert!(outputs[0] == outputs[1], "format {format}: other points");
+        let start = word(&varying, 96);
+        let bare = &varying[..long(&varying, start)];
+        if format >= 6 {
+            reads_as("no table", "in.laz", bare, &varying, "chunk table");
+        } else {
+            refused("no table", "in.laz", bare, Some(start), "chunks of varying size need one");
+        }
     }
 }
 
