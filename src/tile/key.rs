@@ -48,6 +48,13 @@ pub fn morton_prefix(p: Position, level: u32) -> u64 {
     x | y << 1 | z << 2
 }
 
+/// The Morton-first of all positions that have the [`morton_prefix`] of `p` below a cube of that
+/// `level`.
+pub fn first_of_prefix(p: Position, level: u32) -> Position {
+    let below = level.saturating_sub(PREFIX_LEVELS);
+    p.map(|v| v >> below << below)
+}
+
 /// The path of `p` as in [`morton_prefix`], or its upper `bits` bits if it has more.
 pub fn morton_path(p: Position, level: u32, bits: u32) -> u64 {
     morton_prefix(p, level) >> (3 * level.min(PREFIX_LEVELS)).saturating_sub(bits)
@@ -151,6 +158,11 @@ mod tests {
             proptest::prop_assert!(keys == Ordering::Equal || keys == morton_cmp(&p, &q));
             if level <= PREFIX_LEVELS {
                 proptest::prop_assert_eq!(keys, morton_cmp(&p, &q));
+            }
+            let first = first_of_prefix(p, level);
+            proptest::prop_assert_eq!(morton_prefix(first, level), morton_prefix(p, level));
+            if keys == Ordering::Equal {
+                proptest::prop_assert_ne!(morton_cmp(&first, &q), Ordering::Greater);
             }
         }
 

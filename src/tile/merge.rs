@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicUsize, Ordering as Atomic};
 use super::block::{BLOCK, Block};
 use super::emit::{Emitter, Merged, Output};
 use super::intake::{Run, TileStore};
-use super::key::{morton_cmp, morton_prefix, split_level};
+use super::key::{first_of_prefix, morton_cmp, morton_prefix, split_level};
 use super::parallel;
 use super::sealed::{SealedTiles, Sequence, ref_bytes};
 use super::spill::{Pieces, Spill, lock};
@@ -152,8 +152,9 @@ fn merge_range(store: &TileStore, runs: &[Run], range: &Range, out: &Output) -> 
             equals.emit(first.key, &mut tournament, &mut cursors, &mut emitter, &mut buffer)?;
             continue;
         }
-        // Up to where another run goes on, nothing is to be compared.
-        let until = second.and_then(|second| cursors[second.run].head());
+        // Up to the key with which another run goes on, nothing is to be compared. Several may go on
+        // with it: their first position is known when they are all asked.
+        let until = second.and_then(|second| cursors[second.run].first_of_key());
         let cursor = &mut cursors[first.run];
         cursor.emit_until(until, &mut emitter, &mut buffer)?;
         tournament.set(first.run, cursor.key());
@@ -316,6 +317,11 @@ impl<'a> Cursor<'a> {
     /// The key of [`head`](Cursor::head).
     fn key(&self) -> Option<u64> {
         self.positions.get(self.at).map(|p| morton_prefix(*p, self.range.level))
+    }
+
+    /// The first of all positions that have the key of [`head`](Cursor::head), be they there or not.
+    fn first_of_key(&self) -> Option<Position> {
+        self.head().map(|p| first_of_prefix(p, self.range.level))
     }
 
     /// Number of the record it stands at, among all of the store.
