@@ -1,7 +1,7 @@
 //! Reach for this when you want to see what a reduction keeps: draws a scan and its reduction side
 //! by side, from one oblique view, coloured by height, as an SVG of dots.
 //!
-//! `cargo run --release --example 02_picture -- picture.svg scan.laz reduced.laz`
+//! `cargo run --example 02_picture -- picture.svg scan.laz reduced.laz`
 //!
 //! Without files, the picture is of a computed scan and every sixth point of it.
 
