@@ -191,29 +191,30 @@ impl Job {
     }
 }
 
-/// The conversions: input, output, and what is asked for beside them.
-const CONVERSIONS: [(&str, &str, &[&str]); 6] = [
-    ("laz", "laz", &[]),
-    ("laz", "las", &[]),
-    ("las", "laz", &[]),
-    ("las", "ply", &[]),
-    ("ply", "las", &["--scale"]),
-    ("las", "las", &[]),
+/// The conversions: input, output.
+const CONVERSIONS: [(&str, &str); 6] = [
+    ("laz", "laz"),
+    ("laz", "las"),
+    ("las", "laz"),
+    ("las", "ply"),
+    ("ply", "las"),
+    ("las", "las"),
 ];
 
-fn convert(program: &Path, from: &Path, to: &Path, more: &[&str]) -> Command {
+fn convert(program: &Path, from: &Path, to: &Path, more: &[String]) -> Command {
     let mut command = Command::new(program);
     command.args(["convert", "--threads", "1", "--quiet", "--progress", "never"]);
     command.arg(from).arg("-o").arg(to).args(more);
     command
 }
 
-/// The scale of the file's coordinates, as an argument.
-fn scale(las: &Path) -> String {
-    let mut head = [0; 155];
+/// The scale and the offset of the file's coordinates, as arguments: those that PLY does not hold.
+fn steps(las: &Path) -> [String; 2] {
+    let mut head = [0; 179];
     File::open(las).unwrap().read_exact(&mut head).unwrap();
     let axis = |at: usize| f64::from_le_bytes(head[at..at + 8].try_into().unwrap());
-    format!("--scale={},{},{}", axis(131), axis(139), axis(147))
+    [("scale", 131), ("offset", 155)]
+        .map(|(name, at)| format!("--{name}={},{},{}", axis(at), axis(at + 8), axis(at + 16)))
 }
 
 /// All jobs on the files `scan.*` of `folder`.
@@ -223,12 +224,12 @@ fn jobs(folder: &Path, scan: &Path, programs: &[PathBuf]) -> Vec<Job> {
         "laz" => scan.to_owned(),
         kind => folder.join(format!("scan.{kind}")),
     };
-    let (las, scale) = (input("las"), scale(scan));
+    let (las, steps) = (input("las"), steps(scan));
     let mut jobs = vec![
         Job::new("bare decode".into(), &own, &[&"--bare", &"decode", &scan]),
         Job::new("bare encode".into(), &own, &[&"--bare", &"encode", &las, &scan]),
     ];
-    for (from, to, more) in CONVERSIONS {
+    for (from, to) in CONVERSIONS {
         let (from_path, name) = (input(from), format!("{from} → {to}"));
         let copied = folder.join("copied");
         let arguments: [&dyn AsRef<std::ffi::OsStr>; 5] =
@@ -238,10 +239,10 @@ fn jobs(folder: &Path, scan: &Path, programs: &[PathBuf]) -> Vec<Job> {
         let system = jobs.len() - 1;
         for (number, program) in programs.iter().enumerate() {
             let outcome = |number: usize| folder.join(format!("{from}-{number}.{to}"));
-            let more: Vec<&str> = more.iter().map(|_| scale.as_str()).collect();
+            let more: &[String] = if from == "ply" { &steps } else { &[] };
             let label = if number == 0 { name.clone() } else { format!("{name} (other)") };
             jobs.push(Job {
-                command: convert(program, &from_path, &outcome(number), &more),
+                command: convert(program, &from_path, &outcome(number), more),
                 output: Some(outcome(number)),
                 same: (number > 0).then(|| outcome(0)),
                 bounds: match (from, to) {
