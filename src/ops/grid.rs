@@ -16,8 +16,9 @@ use crate::{Error, Result};
 
 /// Cubes of this side, anchored at world 0, are the octants of the lattice: no larger side differs.
 const LARGEST_SIDE: i64 = 1 << 62;
-/// Bytes a position: its cube and its index, and coordinates to take a median of.
-const BYTES: usize = size_of::<Entry>() + size_of::<i64>();
+/// Bytes a position: its key, its cube and its index, and coordinates to take a median of. All
+/// positions may share one key.
+const BYTES: usize = size_of::<u64>() + size_of::<Entry>() + size_of::<i64>();
 
 /// The uniform grid of Martin et al., with which the paper compares; elsewhere called voxel thinning:
 /// of every occupied cube one record stays.
@@ -105,27 +106,27 @@ impl TileOp for Grid {
         if u32::try_from(tile.positions.len()).is_err() {
             return Err(Error::internal("a tile has more than 2^32 positions"));
         }
-        let core = tile.core.clone();
-        let (mut cubes, mut coincident, mut represented) = (0, 0, 0);
-        let mut axis = Vec::new();
-        for group in grouped(tile, side).chunk_by(|a, b| a.0 == b.0) {
-            let members = || group.iter().map(|(_, i)| *i as usize);
-            let Some(kept) = self.pick.of(tile, group, side, &mut axis) else { continue };
-            cubes += u64::from(members().next().is_some_and(|first| core.contains(&first)));
-            for i in members().filter(|i| core.contains(i)) {
-                if i == kept {
-                    coincident += keep_once(tile, i);
-                } else if is_known(tile.normals[kept]) {
-                    represented += represent(tile, i, kept);
-                } else {
-                    represented += remove(tile, i);
+        let mut counts = Counts::default();
+        let (mut entries, mut axis) = (Vec::new(), Vec::new());
+        for bucket in keyed(tile, side).chunk_by(|a, b| a >> u32::BITS == b >> u32::BITS) {
+            entries.clear();
+            entries.extend(bucket.iter().map(|&key| {
+                let i = key as u32;
+                (cube(tile.positions[i as usize], side), i)
+            }));
+            if entries.iter().any(|entry| entry.0 != entries[0].0) {
+                entries.sort_unstable();
+            }
+            for group in entries.chunk_by(|a, b| a.0 == b.0) {
+                if let Some(kept) = self.pick.of(tile, group, side, &mut axis) {
+                    counts.decide(tile, group, kept);
                 }
             }
         }
         let account = Account { stage: "grid", marked: "grid_marked", mark: None };
-        account.enter(tally, "coincident", coincident);
-        account.enter(tally, "represented", represented);
-        tally.count("grid_cubes", cubes);
+        account.enter(tally, "coincident", counts.coincident);
+        account.enter(tally, "represented", counts.represented);
+        tally.count("grid_cubes", counts.cubes);
         Ok(())
     }
 
@@ -139,31 +140,61 @@ impl TileOp for Grid {
     }
 }
 
-/// The positions that the stage decides about, cube after cube, in Morton order within each; cubes
-/// that no position of the core is in may be missing.
-fn grouped(tile: &Tile, side: i64) -> Vec<Entry> {
-    let cube = |p: Position| p.map(|v| v.div_euclid(side));
+/// What became of the positions of a tile's core.
+#[derive(Default)]
+struct Counts {
+    /// Cubes whose first position is in the core.
+    cubes: u64,
+    coincident: u64,
+    represented: u64,
+}
+
+impl Counts {
+    /// Removes all positions of a cube but the one that is `kept`.
+    fn decide(&mut self, tile: &mut Tile, group: &[Entry], kept: usize) {
+        let core = tile.core.clone();
+        let members = || group.iter().map(|(_, i)| *i as usize);
+        self.cubes += u64::from(members().next().is_some_and(|first| core.contains(&first)));
+        for i in members().filter(|i| core.contains(i)) {
+            if i == kept {
+                self.coincident += keep_once(tile, i);
+            } else if is_known(tile.normals[kept]) {
+                self.represented += represent(tile, i, kept);
+            } else {
+                self.represented += remove(tile, i);
+            }
+        }
+    }
+}
+
+/// Which cube along each axis, from world 0.
+fn cube(p: Position, side: i64) -> [i64; 3] {
+    p.map(|v| v.div_euclid(side))
+}
+
+/// The positions that the stage decides about, as the lowest bits of their cubes above their indices:
+/// those of a cube one after the other, in Morton order, with those of cubes far away whose lowest
+/// bits are the same. Cubes that no position of the core is in may be missing.
+fn keyed(tile: &Tile, side: i64) -> Vec<u64> {
     let Range { start, end } = tile.core;
     let core = Bounds::of(tile.positions[start..end].iter().copied());
     if core.is_empty() {
         return Vec::new();
     }
-    let reached = Bounds { lo: cube(core.lo), hi: cube(core.hi) };
-    let entries = || {
-        tile.positions
-            .iter()
-            .enumerate()
-            .map(|(i, &p)| (cube(p), i as u32))
-            .filter(|(cube, i)| reached.contains(*cube) && tile.is_chosen(*i as usize))
-    };
-    // Counted first: growing would hold more than the stage says it needs.
-    let mut grouped = Vec::with_capacity(entries().count());
-    grouped.extend(entries());
+    let reached = Bounds { lo: cube(core.lo, side), hi: cube(core.hi, side) };
+    let lowest = |v: i64, bits: u32| v as u64 & ((1 << bits) - 1);
+    let mut keys = Vec::with_capacity(tile.positions.len());
+    keys.extend(tile.positions.iter().enumerate().filter_map(|(i, &p)| {
+        let cube @ [x, y, z] = cube(p, side);
+        let cube_bits = lowest(z, 10) << 22 | lowest(y, 11) << 11 | lowest(x, 11);
+        let is_in = reached.contains(cube) && tile.is_chosen(i);
+        is_in.then_some(cube_bits << u32::BITS | i as u64)
+    }));
     // Octree nodes follow one another in Morton order.
     if side.count_ones() > 1 {
-        grouped.sort_unstable();
+        keys.sort_unstable();
     }
-    grouped
+    keys
 }
 
 impl Pick {
@@ -212,6 +243,25 @@ mod tests {
         let told = toml::from_str::<Grid>("side = 0.0").unwrap_err().to_string();
         assert!(told.contains("a length above 0"), "{told}");
         assert!(toml::from_str::<Grid>("side = 1\npick = 'last'").is_err());
+    }
+
+    #[test]
+    fn cubes_of_which_the_lowest_bits_are_the_same_are_apart() {
+        use crate::tile::Fate;
+
+        let far = 3 << 11;
+        for pick in [Pick::Center, Pick::Median, Pick::First] {
+            let mut tile =
+                Tile::of(vec![[0, 0, 0], [1, 0, 0], [far, 0, 0], [far + 1, 0, 0], [0, far, 0]]);
+            let settled = Some(Settled { steps: 3, length: 3.0 });
+            let keys = keyed(&tile, 3);
+            assert!(keys.iter().all(|key| key >> 32 == keys[0] >> 32), "{keys:x?}");
+            let mut tally = Tally::default();
+            Grid { settled, ..Grid::new(3.0, pick) }.run(&mut tile, &mut tally).unwrap();
+            let kept: Vec<bool> = tile.fates.iter().map(|fate| *fate == Fate::Kept).collect();
+            let first = pick != Pick::Center;
+            assert_eq!(kept, [first, !first, first, !first, true], "{pick:?}");
+        }
     }
 
     #[test]
