@@ -3,8 +3,9 @@
 use super::Levels;
 use super::block::{BLOCK, Block};
 use super::key::split_level;
+use super::pieces::{PIECE, Pieces};
 use super::sealed::ref_bytes;
-use super::spill::{PIECE, Pieces, Spill};
+use super::spill::Spill;
 use crate::point::Position;
 use crate::{Error, Result};
 

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use super::pieces::Pieces;
 use super::sealed::{Reader, SealedTiles};
 use super::sieve::{FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, Run, Runs, Sieve};
-use super::spill::Pieces;
 use super::{Fate, Tile, TileKey};
 use crate::point::Bounds;
 use crate::{Error, Result};

@@ -11,6 +11,7 @@ mod levels;
 mod load;
 mod merge;
 mod order;
+mod pieces;
 mod remote;
 mod sealed;
 mod sieve;
@@ -25,13 +26,14 @@ pub use key::{TileKey, morton_cmp};
 pub use levels::Levels;
 pub use load::{Core, Loader};
 pub use merge::{merge_bytes, seal};
+pub use pieces::{PIECE, Pieces};
 pub use remote::Remote;
 pub use sealed::{Fetch, Reader, SealedTiles, index_bytes};
 pub use sieve::{
     ASIDE, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, Run, SELECTIONS, Sieve, State, TAGGED_INPUTS,
     Tag,
 };
-pub use spill::{Address, Folder, PIECE, Pieces, Spill, SpillArea, lock};
+pub use spill::{Address, Folder, Spill, SpillArea, lock};
 
 use std::ops::Range;
 

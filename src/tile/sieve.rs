@@ -3,8 +3,8 @@
 
 use std::sync::Arc;
 
+use super::pieces::Pieces;
 use super::sealed::SealedTiles;
-use super::spill::Pieces;
 use crate::Result;
 use crate::point::Edit;
 

@@ -4,8 +4,8 @@
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard};
 
 use crate::budget::{Budget, Lease};
 use crate::{Error, Result};
@@ -63,9 +63,14 @@ pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Address(u64);
 
-/// Set in addresses that lie in the scratch file; others are a segment's number and a byte in it.
+/// Set in addresses that lie in a scratch file. Below it are the number of the segment or the file
+/// and a byte in it.
 const IN_FILE: u64 = 1 << 63;
 const SEGMENT_BITS: u32 = 32;
+const FILE_BITS: u32 = 55;
+
+/// Scratch files of a spill at most: more threads than these write to them in turn.
+const FILES: usize = 8;
 
 impl Address {
     /// The address `bytes` further in the same stretch.
@@ -74,28 +79,29 @@ impl Address {
     }
 }
 
-/// Appended stretches of bytes of one sort. Dropping it frees its memory and removes its file.
+/// Appended stretches of bytes of one sort. Dropping it frees its memory and removes its files.
 #[derive(Debug)]
 pub struct Spill {
     area: Arc<SpillArea>,
     name: &'static str,
     segments: RwLock<Vec<(Box<[u8]>, Lease)>>,
-    file: Mutex<Option<Arc<File>>>,
-    path: Mutex<Option<PathBuf>>,
+    files: RwLock<Vec<Arc<Scratch>>>,
+}
+
+/// One scratch file. Threads that write at the same time write to different ones, for the system
+/// lets only one at a time write to a file.
+#[derive(Debug)]
+struct Scratch {
+    file: File,
+    path: PathBuf,
     end: AtomicU64,
+    writers: AtomicUsize,
 }
 
 impl Spill {
-    /// An empty spill; `name` is that of its scratch file, should it need one.
+    /// An empty spill; `name` is that of its scratch files, should it need any.
     pub fn new(area: &Arc<SpillArea>, name: &'static str) -> Self {
-        Spill {
-            area: area.clone(),
-            name,
-            segments: RwLock::default(),
-            file: Mutex::default(),
-            path: Mutex::default(),
-            end: AtomicU64::new(0),
-        }
+        Spill { area: area.clone(), name, segments: RwLock::default(), files: RwLock::default() }
     }
 
     /// Stores a stretch of less than 4 GiB; from several threads at once.
@@ -105,49 +111,80 @@ impl Spill {
             segments.push((bytes.into(), lease));
             return Ok(Address((segments.len() as u64 - 1) << SEGMENT_BITS));
         }
-        let file = self.file()?;
-        let at = self.end.fetch_add(bytes.len() as u64, Ordering::Relaxed);
-        file.write_all_at(bytes, at).map_err(|e| self.fail("write scratch data", e))?;
+        let (number, scratch) = self.file_to_write()?;
+        let at = scratch.end.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        let outcome = scratch.file.write_all_at(bytes, at);
+        scratch.writers.fetch_sub(1, Ordering::Relaxed);
+        outcome.map_err(|e| scratch.fail("write scratch data", e))?;
         self.area.written.fetch_add(bytes.len() as u64, Ordering::Relaxed);
-        Ok(Address(at | IN_FILE))
+        Ok(Address(IN_FILE | (number as u64) << FILE_BITS | at))
     }
 
     /// Fills `into` with what was stored from `at` on, within one stretch.
     pub fn read(&self, at: Address, into: &mut [u8]) -> Result<()> {
+        let lost = || Error::internal(format!("{}: read beyond a stretch", self.name));
         if at.0 & IN_FILE == 0 {
             let segments = self.segments.read().unwrap_or_else(PoisonError::into_inner);
             let from = at.0 as u32 as usize;
             let stored = segments
                 .get((at.0 >> SEGMENT_BITS) as usize)
                 .and_then(|(bytes, _)| bytes.get(from..from + into.len()))
-                .ok_or_else(|| Error::internal(format!("{}: read beyond a stretch", self.name)))?;
+                .ok_or_else(lost)?;
             into.copy_from_slice(stored);
             return Ok(());
         }
-        let file = self.file()?;
-        file.read_exact_at(into, at.0 & !IN_FILE).map_err(|e| self.fail("read scratch data", e))
+        let number = (at.0 & !IN_FILE) >> FILE_BITS;
+        let scratch = self.files().get(number as usize).cloned().ok_or_else(lost)?;
+        let byte = at.0 & ((1 << FILE_BITS) - 1);
+        scratch.file.read_exact_at(into, byte).map_err(|e| scratch.fail("read scratch data", e))
     }
 
-    fn file(&self) -> Result<Arc<File>> {
-        let mut slot = lock(&self.file);
-        if let Some(file) = slot.as_ref() {
-            return Ok(file.clone());
+    fn files(&self) -> RwLockReadGuard<'_, Vec<Arc<Scratch>>> {
+        self.files.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A file and its number, for one write: one that nobody writes to, a new one, or if there are
+    /// [`FILES`], the one with the fewest writers. The caller is counted among these.
+    fn file_to_write(&self) -> Result<(usize, Arc<Scratch>)> {
+        if let Some(found) = take_idle(&self.files()) {
+            return Ok(found);
         }
-        let path = self.area.folder.file(self.name)?;
+        let mut files = self.files.write().unwrap_or_else(PoisonError::into_inner);
+        if let Some(found) = take_idle(&files) {
+            return Ok(found);
+        }
+        if files.len() < FILES {
+            let path = self.area.folder.file(&format!("{}-{}", self.name, files.len()))?;
+            files.push(Arc::new(Scratch::create(path)?));
+        }
+        let least = (0..files.len()).min_by_key(|&n| files[n].writers.load(Ordering::Relaxed));
+        let number = least.ok_or_else(|| Error::internal("a spill without a file"))?;
+        files[number].writers.fetch_add(1, Ordering::Relaxed);
+        Ok((number, files[number].clone()))
+    }
+}
+
+fn take_idle(files: &[Arc<Scratch>]) -> Option<(usize, Arc<Scratch>)> {
+    let number = files.iter().position(|scratch| {
+        scratch.writers.compare_exchange(0, 1, Ordering::Relaxed, Ordering::Relaxed).is_ok()
+    })?;
+    Some((number, files[number].clone()))
+}
+
+impl Scratch {
+    fn create(path: PathBuf) -> Result<Self> {
         let file = File::options()
             .read(true)
             .write(true)
             .create_new(true)
             .open(&path)
             .map_err(|e| Error::io(&path, "create a scratch file", e))?;
-        *lock(&self.path) = Some(path);
-        Ok(slot.insert(Arc::new(file)).clone())
+        Ok(Scratch { file, path, end: AtomicU64::new(0), writers: AtomicUsize::new(0) })
     }
 
     fn fail(&self, doing: &str, cause: std::io::Error) -> Error {
-        let path = lock(&self.path).clone().unwrap_or_else(|| PathBuf::from(self.name));
         let full = cause.kind() == std::io::ErrorKind::StorageFull;
-        let error = Error::io(path, doing, cause);
+        let error = Error::io(&self.path, doing, cause);
         if full {
             return error.help("free some disk space, or name another folder with --scratch");
         }
@@ -159,108 +196,9 @@ impl Drop for Spill {
     fn drop(&mut self) {
         let segments = self.segments.get_mut().unwrap_or_else(PoisonError::into_inner);
         self.area.give_back(segments.iter().map(|(bytes, _)| bytes.len() as u64).sum());
-        if let Some(path) = lock(&self.path).take() {
+        for scratch in self.files().iter() {
             // The scratch folder is removed as a whole at the end; this only frees the disk early.
-            let _ = std::fs::remove_file(path);
+            let _ = std::fs::remove_file(&scratch.path);
         }
-    }
-}
-
-/// Items of one size, stored in pieces and found by number.
-///
-/// Writers reserve a stretch of numbers, which begins a new piece, and store its pieces in any
-/// order; numbers between two stretches name nothing.
-#[derive(Debug)]
-pub struct Pieces {
-    spill: Spill,
-    stride: usize,
-    table: RwLock<Vec<Option<(Address, u32)>>>,
-}
-
-/// Items in a piece.
-pub const PIECE: usize = 4096;
-
-impl Pieces {
-    /// No items yet, each `stride` bytes.
-    pub fn new(area: &Arc<SpillArea>, name: &'static str, stride: usize) -> Self {
-        Pieces { spill: Spill::new(area, name), stride, table: RwLock::default() }
-    }
-
-    /// Reserves `items` numbers and returns the first.
-    pub fn reserve(&self, items: u64) -> u64 {
-        let mut table = self.table.write().unwrap_or_else(PoisonError::into_inner);
-        let first = table.len() as u64;
-        let pieces = items.div_ceil(PIECE as u64) as usize;
-        table.resize(first as usize + pieces, None);
-        first * PIECE as u64
-    }
-
-    /// How many numbers are reserved so far.
-    pub fn reserved(&self) -> u64 {
-        let table = self.table.read().unwrap_or_else(PoisonError::into_inner);
-        table.len() as u64 * PIECE as u64
-    }
-
-    /// Stores the items from number `first` on, a multiple of [`PIECE`]: one piece, full or the
-    /// last of its stretch.
-    pub fn put(&self, first: u64, bytes: &[u8]) -> Result<()> {
-        let address = self.spill.append(bytes)?;
-        let mut table = self.table.write().unwrap_or_else(PoisonError::into_inner);
-        let piece = (first / PIECE as u64) as usize;
-        let slot = table
-            .get_mut(piece)
-            .ok_or_else(|| Error::internal("a piece was stored that nobody reserved"))?;
-        *slot = Some((address, (bytes.len() / self.stride) as u32));
-        Ok(())
-    }
-
-    /// Fills `into` with the items from number `first` on, all of one piece.
-    pub fn read(&self, first: u64, into: &mut [u8]) -> Result<()> {
-        let (address, _) = self.piece(first)?;
-        self.spill.read(address.plus(first % PIECE as u64 * self.stride as u64), into)
-    }
-
-    /// Fills `into` with the items from number `first` on, of one stretch of numbers.
-    pub fn fill(&self, mut first: u64, mut into: &mut [u8]) -> Result<()> {
-        while !into.is_empty() {
-            let in_piece = (PIECE - (first % PIECE as u64) as usize) * self.stride;
-            let (now, later) = into.split_at_mut(in_piece.min(into.len()));
-            self.read(first, now)?;
-            first += (now.len() / self.stride) as u64;
-            into = later;
-        }
-        Ok(())
-    }
-
-    /// How many items are stored from number `first` to the end of its piece.
-    pub fn stored_in(&self, first: u64) -> Result<usize> {
-        let (_, items) = self.piece(first)?;
-        Ok((items as usize).saturating_sub((first % PIECE as u64) as usize))
-    }
-
-    fn piece(&self, item: u64) -> Result<(Address, u32)> {
-        let table = self.table.read().unwrap_or_else(PoisonError::into_inner);
-        let piece = table.get((item / PIECE as u64) as usize).copied().flatten();
-        piece.ok_or_else(|| Error::internal("read of a piece that was never stored"))
-    }
-
-    /// Calls `visit` for the items numbered `first..first + count`, piece by piece: the number of
-    /// the first of each stretch and its bytes.
-    pub fn each(
-        &self,
-        first: u64,
-        count: u64,
-        buffer: &mut Vec<u8>,
-        mut visit: impl FnMut(u64, &[u8]) -> Result<()>,
-    ) -> Result<()> {
-        let mut at = first;
-        while at < first + count {
-            let in_piece = (PIECE as u64 - at % PIECE as u64).min(first + count - at);
-            buffer.resize(in_piece as usize * self.stride, 0);
-            self.read(at, buffer)?;
-            visit(at, buffer)?;
-            at += in_piece;
-        }
-        Ok(())
     }
 }
