@@ -278,8 +278,8 @@ mod tests {
     use crate::point::distance2;
     use proptest::prelude::*;
 
-    /// Noisy surfaces, grids full of ties and cocircular points, lines, walls, far points; most with
-    /// equally many neighbours.
+    /// Noisy surfaces, grids full of ties and cocircular points, lines, scan lines, edges, walls, far
+    /// points; most with equally many neighbours.
     fn neighborhoods() -> impl Strategy<Value = Vec<Vec<[i64; 3]>>> {
         let count = prop::sample::select(vec![1usize, 2, 3, 8, 10, 10, 10, 16, 64, 66]);
         count.prop_flat_map(|count| prop::collection::vec(neighborhood(count), 1..40))
@@ -289,8 +289,13 @@ mod tests {
         let width = prop::sample::select(vec![2i64, 4, 40, 1000, 1 << 21, 1 << 23, 1 << 40]);
         let height = prop::sample::select(vec![0i64, 1, 30]);
         let step = prop::sample::select(vec![1i64, 1, 12, 1 << 13]);
-        (width, height, 0usize..3, step).prop_flat_map(move |(width, height, up, step)| {
-            let one = (-width..=width, -width..=width, -height..=height);
+        // How far neighbours are to one side and to the other.
+        let sides = prop::sample::select(vec![(-1i64, 1i64), (-1, 1), (0, 1), (-1, 0)]);
+        let thinner = prop::sample::select(vec![1i64, 1, 10, 100]);
+        let shape = (width, height, 0usize..3, step, sides, thinner);
+        shape.prop_flat_map(move |(width, height, up, step, (low, high), thinner)| {
+            let across = width / thinner;
+            let one = (-width..=width, low * across..=high * across, -height..=height);
             prop::collection::vec(one, count).prop_map(move |offsets| {
                 let mut offsets: Vec<_> = offsets.into_iter().map(|(x, y, z)| [x, y, z]).collect();
                 offsets.sort_unstable();

@@ -1,6 +1,6 @@
-//! The closed fans of Delaunay triangles around eight points side by side: what
+//! The fans of Delaunay triangles around eight points side by side: what
 //! [`Star`](crate::geom::star::Star) finds for one point, where that point is clearly inside of its
-//! neighbours' polygon and no four points are nearly on one circle.
+//! neighbours' polygon or clearly at its edge, and no four points are nearly on one circle.
 
 #![allow(clippy::needless_range_loop, reason = "one index walks several arrays of lanes")]
 
@@ -30,6 +30,8 @@ pub(super) struct Fan {
 struct Hulls {
     places: [[u8; MOST]; EIGHT],
     counts: [usize; EIGHT],
+    /// The corner behind which the point itself is one: no triangle joins it and the next.
+    gaps: [Option<usize>; EIGHT],
 }
 
 impl Fan {
@@ -48,8 +50,8 @@ impl Fan {
         self.project(lanes, at, normals);
         let (start, clear) = self.nearest(lanes);
         let (hulls, clear) = self.walk(lanes, start, clear);
-        self.gather(at, ranks, &hulls);
-        (self.mean(lanes, normals, &hulls.counts), clear)
+        let gaps = self.gather(at, ranks, &hulls);
+        (self.mean(lanes, normals, &hulls.counts, &gaps), clear)
     }
 
     /// Projects all neighbours to the planes with the given normals, and inverts them.
@@ -91,77 +93,107 @@ impl Fan {
     /// `start` until it is back; and tells the lanes where no corner was in doubt.
     #[inline(always)]
     fn walk<L: Lanes>(&self, lanes: L, start: L::F64, clear: u32) -> (Hulls, u32) {
-        let mut hulls = Hulls { places: [[0; MOST]; EIGHT], counts: [0; EIGHT] };
+        let mut hulls =
+            Hulls { places: [[0; MOST]; EIGHT], counts: [1; EIGHT], gaps: [None; EIGHT] };
         let mut place = lanes.store_eight(start);
         let mut corner = [[0.0; EIGHT]; 2];
         for lane in 0..EIGHT {
             let at = &self.inverted[place[lane] as usize];
             (corner[0][lane], corner[1][lane]) = (at[0][lane], at[1][lane]);
+            hulls.places[lane][0] = place[lane] as u8;
         }
-        let mut x = lanes.load_eight(&corner[0]);
-        let mut y = lanes.load_eight(&corner[1]);
+        let mut at = Corner::<L> {
+            x: lanes.load_eight(&corner[0]),
+            y: lanes.load_eight(&corner[1]),
+            place: start,
+            is_left: start.below(start),
+        };
         // The nearest neighbour is the farthest when inverted.
-        let doubt = x.of(CLEAR) * (x * x + y * y);
+        let doubt = at.x.of(CLEAR) * (at.x * at.x + at.y * at.y);
         let (mut walking, mut done) = (clear, 0);
-        for step in 0..self.inverted.len() {
-            for lane in 0..EIGHT {
-                hulls.places[lane][step] = place[lane] as u8;
-            }
-            let next = self.next(lanes, [x, y], lanes.load_eight(&place), doubt);
-            walking &= next.clear;
-            let back = next.place.equals(start).bits() & walking;
+        // Every neighbour may be a corner, and the point itself.
+        for _ in 0..=self.inverted.len() {
+            let (next, clear) = self.next(lanes, at, doubt);
+            walking &= clear;
+            let left = next.is_left.bits();
+            let back = next.place.equals(start).bits() & walking & !left;
             done |= back;
             walking &= !back;
-            for lane in 0..EIGHT {
-                let is_back = back >> lane & 1 == 1;
-                hulls.counts[lane] = if is_back { step + 1 } else { hulls.counts[lane] };
-            }
             if walking == 0 {
                 break;
             }
-            (x, y, place) = (next.x, next.y, lanes.store_eight(next.place));
+            place = lanes.store_eight(next.place);
+            for lane in 0..EIGHT {
+                let count = hulls.counts[lane];
+                if walking & !left & 1 << lane != 0 && count < MOST {
+                    hulls.places[lane][count] = place[lane] as u8;
+                    hulls.counts[lane] = count + 1;
+                } else if walking & left & 1 << lane != 0 {
+                    hulls.gaps[lane] = Some(count - 1);
+                }
+            }
+            at = next;
         }
         (hulls, done)
     }
 
-    /// The next corner of each lane's hull, counter-clockwise: no neighbour is to the right of the
-    /// way there, and the point itself is to the left.
+    /// What follows corner `a` of each lane's hull, counter-clockwise: no neighbour is to the right
+    /// of the way there, and the point itself is not either. Where that is the point itself, the
+    /// corner is the same once more, but left. Also the lanes where it is in no doubt.
     ///
-    /// Who is to the right of the way from corner `a` to the point comes first, and whoever is to
-    /// the right of the way to the one before takes its place. Turns up to `doubt` do not count.
+    /// Who is to the right of the way from `a` to the point comes first, and whoever is to the right
+    /// of the way to the one before takes its place; from the point on, who is to the right of
+    /// the way to the corner that was left. Turns up to `doubt` do not count.
     #[inline(always)]
-    fn next<L: Lanes>(&self, lanes: L, a: [L::F64; 2], place: L::F64, doubt: L::F64) -> Next<L> {
+    fn next<L: Lanes>(&self, lanes: L, a: Corner<L>, doubt: L::F64) -> (Corner<L>, u32) {
         let zero = doubt.of(0.0);
         let right = zero - doubt;
-        let (mut x, mut y) = (zero - a[0], zero - a[1]);
+        let from = [L::F64::choose(a.is_left, zero, a.x), L::F64::choose(a.is_left, zero, a.y)];
+        let mut x = L::F64::choose(a.is_left, a.x, zero - a.x);
+        let mut y = L::F64::choose(a.is_left, a.y, zero - a.y);
         let mut best = zero.of(-1.0);
         let mut clear = zero.equals(zero);
         for (row, this) in self.inverted.iter().zip(0u32..) {
             let this = zero.of(f64::from(this));
-            let to_x = lanes.load_eight(&row[0]) - a[0];
-            let to_y = lanes.load_eight(&row[1]) - a[1];
+            let to_x = lanes.load_eight(&row[0]) - from[0];
+            let to_y = lanes.load_eight(&row[1]) - from[1];
             let turn = x * to_y - y * to_x;
-            clear = clear & (this.equals(place) | doubt.below(turn.size()));
+            clear = clear & (this.equals(a.place) | doubt.below(turn.size()));
             let taken = turn.below(right);
             x = L::F64::choose(taken, to_x, x);
             y = L::F64::choose(taken, to_y, y);
             best = L::F64::choose(taken, this, best);
         }
         let found = zero.of(-0.5).below(best);
-        // Up to a rounding the inverted projection: far less than what is in doubt.
-        Next { x: a[0] + x, y: a[1] + y, place: best, clear: (clear & found).bits() }
+        // From the point itself there is a way on.
+        let clear = clear & (found | !a.is_left);
+        let next = Corner {
+            // Up to a rounding the inverted projection: far less than what is in doubt.
+            x: L::F64::choose(found, from[0] + x, a.x),
+            y: L::F64::choose(found, from[1] + y, a.y),
+            place: L::F64::choose(found, best, a.place),
+            is_left: !found,
+        };
+        (next, clear.bits())
     }
 
-    /// Lays out the offsets of the corners, from the Morton-first on.
+    /// Lays out the offsets of the corners, from the Morton-first on, and tells where the gaps are
+    /// then: the number of the triangle that is none, counted from 1.
     #[inline(always)]
-    fn gather(&mut self, at: &[[Row; 3]], ranks: &[u32], hulls: &Hulls) {
+    fn gather(&mut self, at: &[[Row; 3]], ranks: &[u32], hulls: &Hulls) -> Row {
+        let mut gaps = [0.0; EIGHT];
         for (lane, ranks) in ranks.chunks_exact(at.len()).enumerate().take(EIGHT) {
-            let places = &hulls.places[lane][..hulls.counts[lane]];
+            let count = hulls.counts[lane];
+            let places = &hulls.places[lane][..count];
             let (mut first, mut least) = (0, u32::MAX);
             for (step, &place) in places.iter().enumerate() {
                 let rank = ranks[place as usize];
                 first = if rank < least { step } else { first };
                 least = if rank < least { rank } else { least };
+            }
+            if let Some(gap) = hulls.gaps[lane] {
+                let steps = if gap < first { gap + count - first } else { gap - first };
+                gaps[lane] = (steps + 1) as f64;
             }
             let (before, behind) = places.split_at(first);
             let around = behind.iter().chain(before).chain(behind.first());
@@ -172,17 +204,20 @@ impl Fan {
                 }
             }
         }
+        gaps
     }
 
-    /// Sums the unit normals of the triangles in the order of their corners.
+    /// Sums the unit normals of the triangles in the order of their corners, but for those at gaps.
     #[inline(always)]
     fn mean<L: Lanes>(
         &self,
         lanes: L,
         normals: [L::F64; 3],
         counts: &[usize; EIGHT],
+        gaps: &Row,
     ) -> [L::F64; 3] {
         let zero = normals[0].of(0.0);
+        let gaps = lanes.load_eight(gaps);
         let (mut left, mut most) = ([0.0; EIGHT], 0);
         for lane in 0..EIGHT {
             left[lane] = counts[lane] as f64;
@@ -196,7 +231,8 @@ impl Fan {
             let area = cross(a, b);
             let length = dot(area, area).root();
             let counts = (zero.of(ROUNDING) * length).below(dot(area, normals))
-                & !left.below(zero.of(f64::from(step)));
+                & !left.below(zero.of(f64::from(step)))
+                & !gaps.equals(zero.of(f64::from(step)));
             let unit = [area[0] / length, area[1] / length, area[2] / length];
             let unit = choose(counts, unit, [zero; 3]);
             sum = [sum[0] + unit[0], sum[1] + unit[1], sum[2] + unit[2]];
@@ -206,11 +242,12 @@ impl Fan {
     }
 }
 
-/// A corner of each lane's hull.
-struct Next<L: Lanes> {
+/// A corner of each lane's hull, and where the walk around it has come to.
+#[derive(Clone, Copy)]
+struct Corner<L: Lanes> {
     x: L::F64,
     y: L::F64,
     place: L::F64,
-    /// The lanes where it is in no doubt.
-    clear: u32,
+    /// Where the way went on from the corner to the point itself.
+    is_left: <L::F64 as Real>::Mask,
 }
