@@ -91,6 +91,20 @@ impl Star {
     /// from the vertex of smallest rank. Points cocircular with a triangle are left out, as are
     /// triangles that the projection turns into lines.
     pub fn normal(&mut self, offsets: &[[i64; 3]], normal: [f64; 3]) -> Option<[f64; 3]> {
+        let rounded = offsets.iter().map(|offset| offset.map(|c| c as f64));
+        let closed = self.around(rounded, normal);
+        self.mean_normal(normal, closed, |rank| offsets[rank as usize], exact_cross)
+    }
+
+    /// The same of offsets that are whole numbers below 2^26, whose products f64 holds exactly.
+    pub fn normal_of_short(&mut self, offsets: &[[f64; 3]], normal: [f64; 3]) -> Option<[f64; 3]> {
+        let closed = self.around(offsets.iter().copied(), normal);
+        self.mean_normal(normal, closed, |rank| offsets[rank as usize], cross)
+    }
+
+    /// Finds the vertices around p in the plane normal to `normal`, and whether p is inside.
+    #[inline(always)]
+    fn around(&mut self, offsets: impl Iterator<Item = [f64; 3]>, normal: [f64; 3]) -> bool {
         self.project(offsets, normal);
         self.keys.sort_unstable();
         let Star { projected, keys, points, .. } = self;
@@ -99,16 +113,17 @@ impl Star {
         self.keep_nearest_per_direction();
         let closed = self.turns_left_throughout();
         self.hull(closed.then(|| self.nearest()));
-        self.mean_normal(normal, closed, |rank| offsets[rank as usize], exact_cross)
+        closed
     }
 
     /// Projects and inverts all neighbours that are not straight above or below p.
-    fn project(&mut self, offsets: &[[i64; 3]], normal: [f64; 3]) {
+    #[inline(always)]
+    fn project(&mut self, offsets: impl Iterator<Item = [f64; 3]>, normal: [f64; 3]) {
         let (u, v) = across(normal);
         self.projected.clear();
         self.keys.clear();
         for (rank, offset) in (0..=PLACE as u32).zip(offsets) {
-            let at = Projected::of(offset.map(|c| c as f64), u, v);
+            let at = Projected::of(offset, u, v);
             if !at.x.is_nan() {
                 let place = self.projected.len() as u64;
                 self.keys.push(turn(at.x, at.y).to_bits() << 12 & !PLACE | place);

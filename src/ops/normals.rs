@@ -254,15 +254,15 @@ fn alone(method: Method, star: &mut Star, offsets: &[[i64; 3]]) -> Outcome {
     let (_, flat) = plane::smallest(covariance.matrix());
     match method {
         Method::Pca => (settled(flat), None),
-        Method::Varady => varady(&covariance, flat, star.normal(offsets, flat)),
+        Method::Varady => varady(&covariance.adjugate(), flat, star.normal(offsets, flat)),
     }
 }
 
 /// adj(C)·n_f, which is (−a, −b, 1) of the height function over the first estimate n_f, turned back
 /// from its frame; `flat`, the normal of the plane of regression, where that fails.
-fn varady(covariance: &Covariance, flat: [f64; 3], first: Option<[f64; 3]>) -> Outcome {
+fn varady(adjugate: &[f64; 6], flat: [f64; 3], first: Option<[f64; 3]>) -> Outcome {
     let Some(first) = first else { return (settled(flat), Some(Fallback::NoTriangle)) };
-    match plane::unit(plane::product(&covariance.adjugate(), first)) {
+    match plane::unit(plane::product(adjugate, first)) {
         Some(normal) => (settled(normal), None),
         None => (settled(flat), Some(Fallback::Perpendicular)),
     }

@@ -3,7 +3,7 @@
 //! the last bit.
 
 use super::fan::Fan;
-use super::{Estimate, Fallback, Method, Outcome, alone, settled};
+use super::{Estimate, Fallback, Method, Outcome, alone, settled, varady};
 use crate::geom::plane::{self, Covariance};
 use crate::geom::simd::{EIGHT, Kernel, Lanes, Mask, Real, Simd};
 use crate::geom::star::Star;
@@ -75,8 +75,8 @@ impl Bundle {
         self.owners.len() == EIGHT
     }
 
-    /// Estimates all normals, calls `settle` with their owners, and is empty again. Where p is
-    /// not clearly inside of its neighbours' polygon, a neighbourhood is estimated alone.
+    /// Estimates all normals, calls `settle` with their owners, and is empty again. Where the fan of
+    /// triangles is in doubt, its normal is that of `star`.
     pub fn estimate(
         &mut self,
         method: Method,
@@ -88,14 +88,22 @@ impl Bundle {
             return;
         }
         let Bundle { at, fan, owners, ranks, neighbors } = self;
-        let normals = simd.run(Together { at, ranks, fan, method });
+        let estimates = simd.run(Together { at, ranks, fan, method });
         for (lane, owner) in owners.drain(..).enumerate() {
-            let outcome = normals.outcome(lane).unwrap_or_else(|| {
+            let offsets = || {
                 let offsets = at.iter().map(|at| [at[0][lane], at[1][lane], at[2][lane]]);
-                let offsets = offsets.map(|offset| offset.map(|v| v as i64));
-                let ranks = &ranks[lane * *neighbors..][..*neighbors];
-                alone(method, star, &in_morton_order(offsets, ranks))
-            });
+                in_morton_order(offsets, &ranks[lane * *neighbors..][..*neighbors])
+            };
+            let outcome = match estimates.of(lane) {
+                Found::Outcome(outcome) => outcome,
+                Found::NoFan { flat, adjugate } => {
+                    varady(&adjugate, flat, star.normal_of_short(&offsets(), flat))
+                }
+                Found::Nothing => {
+                    let whole = |offset: [f64; 3]| offset.map(|v| v as i64);
+                    alone(method, star, &offsets().into_iter().map(whole).collect::<Vec<_>>())
+                }
+            };
             settle(owner, outcome);
         }
         ranks.clear();
@@ -103,11 +111,11 @@ impl Bundle {
 }
 
 /// Offsets sorted by their ranks.
-pub(super) fn in_morton_order(
-    offsets: impl Iterator<Item = [i64; 3]>,
+pub(super) fn in_morton_order<T>(
+    offsets: impl Iterator<Item = [T; 3]>,
     ranks: &[u32],
-) -> Vec<[i64; 3]> {
-    let mut sorted: Vec<(u32, [i64; 3])> = ranks.iter().copied().zip(offsets).collect();
+) -> Vec<[T; 3]> {
+    let mut sorted: Vec<(u32, [T; 3])> = ranks.iter().copied().zip(offsets).collect();
     sorted.sort_unstable_by_key(|neighbor| neighbor.0);
     sorted.into_iter().map(|neighbor| neighbor.1).collect()
 }
@@ -115,8 +123,13 @@ pub(super) fn in_morton_order(
 /// The estimate of each lane.
 struct Estimates {
     normal: [Row; 3],
-    /// The lanes to be estimated alone.
+    /// The normals of the planes of regression.
+    flat: [Row; 3],
+    adjugate: [Row; 6],
+    /// The lanes to be estimated alone: they have no single plane of regression.
     alone: u32,
+    /// The lanes where the fan of triangles is in doubt.
+    doubtful: u32,
     /// The lanes whose positions all lie on one line.
     lines: u32,
     /// The lanes whose first estimate lies in the plane that it should be normal to: they have the
@@ -124,18 +137,32 @@ struct Estimates {
     perpendicular: u32,
 }
 
+/// What came of a lane.
+enum Found {
+    Outcome(Outcome),
+    /// All but the fan of triangles.
+    NoFan {
+        flat: [f64; 3],
+        adjugate: [f64; 6],
+    },
+    Nothing,
+}
+
 impl Estimates {
-    /// None if the lane is to be estimated alone.
-    fn outcome(&self, lane: usize) -> Option<Outcome> {
+    fn of(&self, lane: usize) -> Found {
         let is_in = |mask: u32| mask >> lane & 1 == 1;
         if is_in(self.alone) {
-            return None;
+            return Found::Nothing;
         }
         if is_in(self.lines) {
-            return Some((Estimate::None, None));
+            return Found::Outcome((Estimate::None, None));
         }
-        let normal = settled([self.normal[0][lane], self.normal[1][lane], self.normal[2][lane]]);
-        Some((normal, is_in(self.perpendicular).then_some(Fallback::Perpendicular)))
+        if is_in(self.doubtful) {
+            let (flat, adjugate) = (self.flat.map(|v| v[lane]), self.adjugate.map(|v| v[lane]));
+            return Found::NoFan { flat, adjugate };
+        }
+        let normal = settled(self.normal.map(|v| v[lane]));
+        Found::Outcome((normal, is_in(self.perpendicular).then_some(Fallback::Perpendicular)))
     }
 }
 
@@ -156,29 +183,37 @@ impl Kernel for Together<'_> {
         let Together { at, ranks, fan, method } = self;
         let scatter = scatter(lanes, at);
         let flat = flat(lanes, &scatter, at.len() + 1);
-        let mut alone = !flat[0].equals(flat[0]).bits();
-        let (mut normal, mut perpendicular, mut lines) = (flat, 0, 0);
+        let alone = !flat[0].equals(flat[0]).bits();
+        let (mut normal, mut perpendicular, mut lines, mut doubtful) = (flat, 0, 0, 0);
+        let mut adjugates = [[0.0; EIGHT]; 6];
         if method == Method::Pca {
             if spread(lanes, &scatter) != (1 << EIGHT) - 1 {
                 lines = adjugate(&scatter, at.len() + 1).1;
             }
         } else {
-            let (adjugate, of_lines) = adjugate(&scatter, at.len() + 1);
-            lines = of_lines;
+            (adjugates, lines) = adjugate(&scatter, at.len() + 1);
             let (first, clear) = fan.mean_normals(lanes, at, ranks, flat);
-            alone |= !(clear & first[0].equals(first[0]).bits());
-            let fitted = fitted(lanes, &adjugate, first);
+            doubtful = !(clear & first[0].equals(first[0]).bits());
+            let fitted = fitted(lanes, &adjugates, first);
             let is_fitted = fitted[0].equals(fitted[0]);
             normal = plane::choose(is_fitted, fitted, flat);
             perpendicular = !is_fitted.bits();
         }
-        let normal = [
-            lanes.store_eight(normal[0]),
-            lanes.store_eight(normal[1]),
-            lanes.store_eight(normal[2]),
-        ];
-        Estimates { normal, alone, lines, perpendicular }
+        Estimates {
+            normal: store(lanes, normal),
+            flat: store(lanes, flat),
+            adjugate: adjugates,
+            alone,
+            doubtful,
+            lines,
+            perpendicular,
+        }
     }
+}
+
+#[inline(always)]
+fn store<L: Lanes>(lanes: L, rows: [L::F64; 3]) -> [Row; 3] {
+    [lanes.store_eight(rows[0]), lanes.store_eight(rows[1]), lanes.store_eight(rows[2])]
 }
 
 /// Three rows.
