@@ -322,6 +322,29 @@ fn chunk_tables_that_lie_or_lack_cost_speed_and_no_point() {
 }
 
 #[test]
+fn no_flipped_bit_of_a_chunk_table_costs_a_point() {
+    for format in [1, 6] {
+        let whole = laz(format);
+        let table = long(&whole, word(&whole, 96));
+        let points = |bytes: &[u8]| {
+            let (folder, path) = input("in.laz", bytes);
+            let output = folder.path().join("out.las");
+            convert(&[path], &output, &Setup::new(&[])).map(|_| read(&output).1)
+        };
+        let good = points(&whole).unwrap();
+        // The table ends where the record behind the points begins.
+        for bit in 0..8 * (long(&whole, 235) - table) {
+            let mut lie = whole.clone();
+            lie[table + bit / 8] ^= 1 << (bit % 8);
+            let read = points(&lie).unwrap_or_else(|e| panic!("format {format}, {bit}: {e:?}"));
+            assert!(read == good, "format {format}: other points by bit {bit}");
+        }
+        let zeros = vec![0; long(&whole, 235) - table - 8];
+        reads_as("zeros", "in.laz", &put(&whole, table + 8, &zeros), &whole, "chunk table");
+    }
+}
+
+#[test]
 fn a_chunk_table_told_at_the_end_of_the_file_is_found() {
     for format in [1, 6] {
         for whole in [laz(format), laz_of_varying_chunks(format)] {

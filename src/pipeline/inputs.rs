@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use super::kinds::Format;
 use crate::{Error, ErrorKind, Result};
 
-/// The files that `paths` mean, in their order. For each path:
+/// The files that the paths mean, in their order. For each path:
 ///
 /// - a file that exists means itself, whatever characters its name has;
 /// - a folder means every LAS, LAZ and PLY file in it, sorted by the bytes of their names, hidden

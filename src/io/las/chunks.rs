@@ -139,18 +139,20 @@ fn table(
     points: u64,
     compression: &Compression,
 ) -> Result<(Chunks, Option<String>), String> {
-    let at = table_start(file, start).ok_or("the file has no chunk table")?;
+    let at = table_start(file, start).ok_or("the file has no chunk table where it says")?;
     let mut window = Window::new(file.clone(), at, file.len());
     let variable = compression.chunk_points.is_none();
-    let entries =
-        unpanicked(|| entries(&mut window, at - start - TABLE_OFFSET_BYTES, points, compression))
-            .ok_or("the chunk table is damaged")??;
+    let entries = unpanicked(|| entries(&mut window, at - start - TABLE_OFFSET_BYTES, compression))
+        .ok_or("the chunk table is damaged")??;
     let mut chunks = Vec::new();
     let (mut byte, mut left, mut unread) = (start + TABLE_OFFSET_BYTES, points, 0u64);
     for (bytes, held) in entries {
         if left == 0 {
             unread += if variable { held } else { 1 };
         } else if held > 0 {
+            if bytes < compression.stride as u64 {
+                return Err("the chunk table's sizes cannot be".to_owned());
+            }
             // The table of fixed chunks does not say how many points the last one has.
             let whole = if variable { held <= left } else { true };
             let points = held.min(left);
@@ -197,7 +199,6 @@ fn table_start(file: &InputFile, start: u64) -> Option<u64> {
 fn entries(
     window: &mut Window,
     room: u64,
-    points: u64,
     compression: &Compression,
 ) -> Result<Vec<(u64, u64)>, String> {
     use std::io::Read;
@@ -230,10 +231,16 @@ fn entries(
         last_bytes = integers.decompress(&mut decoder, last_bytes, 1).map_err(cut)?;
         let bytes = u64::from(last_bytes as u32);
         used += bytes;
-        if used > room || (held > 0 && held <= points && bytes < smallest && bytes > 0) {
-            return Err("the chunk table's sizes cannot be".to_owned());
+        if used > room {
+            return Err("the chunk table's sizes exceed the bytes of the chunks".to_owned());
         }
         all.push((bytes, held));
+    }
+    // Points of chunks of varying size cannot be found without the table: then it is taken as it is.
+    let is_needed =
+        compression.compressor != Compressor::Layered && compression.chunk_points.is_none();
+    if used != room && !is_needed {
+        return Err("the chunk table's sizes do not add up to the bytes of the chunks".to_owned());
     }
     Ok(all)
 }
