@@ -69,7 +69,7 @@ const IN_FILE: u64 = 1 << 63;
 const SEGMENT_BITS: u32 = 32;
 const FILE_BITS: u32 = 55;
 
-/// Scratch files of a spill at most: more threads than these write to them in turn.
+/// ScratchFile files of a spill at most: more threads than these write to them in turn.
 const FILES: usize = 8;
 
 impl Address {
@@ -85,13 +85,13 @@ pub struct Spill {
     area: Arc<SpillArea>,
     name: &'static str,
     segments: RwLock<Vec<(Box<[u8]>, Lease)>>,
-    files: RwLock<Vec<Arc<Scratch>>>,
+    files: RwLock<Vec<Arc<ScratchFile>>>,
 }
 
 /// One scratch file. Threads that write at the same time write to different ones, for the system
 /// lets only one at a time write to a file.
 #[derive(Debug)]
-struct Scratch {
+struct ScratchFile {
     file: File,
     path: PathBuf,
     end: AtomicU64,
@@ -139,39 +139,30 @@ impl Spill {
         scratch.file.read_exact_at(into, byte).map_err(|e| scratch.fail("read scratch data", e))
     }
 
-    fn files(&self) -> RwLockReadGuard<'_, Vec<Arc<Scratch>>> {
+    fn files(&self) -> RwLockReadGuard<'_, Vec<Arc<ScratchFile>>> {
         self.files.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A file and its number, for one write: one that nobody writes to, a new one, or if there are
-    /// [`FILES`], the one with the fewest writers. The caller is counted among these.
-    fn file_to_write(&self) -> Result<(usize, Arc<Scratch>)> {
-        if let Some(found) = take_idle(&self.files()) {
-            return Ok(found);
-        }
+    /// A file and its number, for one write: the one with the fewest writers, a new one where each
+    /// has some and there are fewer than [`FILES`]. The caller is counted among them.
+    fn file_to_write(&self) -> Result<(usize, Arc<ScratchFile>)> {
         let mut files = self.files.write().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = take_idle(&files) {
-            return Ok(found);
-        }
-        if files.len() < FILES {
-            let path = self.area.folder.file(&format!("{}-{}", self.name, files.len()))?;
-            files.push(Arc::new(Scratch::create(path)?));
-        }
-        let least = (0..files.len()).min_by_key(|&n| files[n].writers.load(Ordering::Relaxed));
-        let number = least.ok_or_else(|| Error::internal("a spill without a file"))?;
+        let writers = |n: &usize| files[*n].writers.load(Ordering::Relaxed);
+        let least = (0..files.len()).min_by_key(writers);
+        let number = match least.filter(|n| files.len() == FILES || writers(n) == 0) {
+            Some(number) => number,
+            None => {
+                let path = self.area.folder.file(&format!("{}-{}", self.name, files.len()))?;
+                files.push(Arc::new(ScratchFile::create(path)?));
+                files.len() - 1
+            }
+        };
         files[number].writers.fetch_add(1, Ordering::Relaxed);
         Ok((number, files[number].clone()))
     }
 }
 
-fn take_idle(files: &[Arc<Scratch>]) -> Option<(usize, Arc<Scratch>)> {
-    let number = files.iter().position(|scratch| {
-        scratch.writers.compare_exchange(0, 1, Ordering::Relaxed, Ordering::Relaxed).is_ok()
-    })?;
-    Some((number, files[number].clone()))
-}
-
-impl Scratch {
+impl ScratchFile {
     fn create(path: PathBuf) -> Result<Self> {
         let file = File::options()
             .read(true)
@@ -179,7 +170,7 @@ impl Scratch {
             .create_new(true)
             .open(&path)
             .map_err(|e| Error::io(&path, "create a scratch file", e))?;
-        Ok(Scratch { file, path, end: AtomicU64::new(0), writers: AtomicUsize::new(0) })
+        Ok(ScratchFile { file, path, end: AtomicU64::new(0), writers: AtomicUsize::new(0) })
     }
 
     fn fail(&self, doing: &str, cause: std::io::Error) -> Error {
@@ -196,7 +187,7 @@ impl Drop for Spill {
     fn drop(&mut self) {
         let segments = self.segments.get_mut().unwrap_or_else(PoisonError::into_inner);
         self.area.give_back(segments.iter().map(|(bytes, _)| bytes.len() as u64).sum());
-        for scratch in self.files().iter() {
+        for scratch in self.files.get_mut().unwrap_or_else(PoisonError::into_inner) {
             // The scratch folder is removed as a whole at the end; this only frees the disk early.
             let _ = std::fs::remove_file(&scratch.path);
         }
