@@ -7,6 +7,7 @@
 mod ascii;
 mod file;
 mod header;
+mod headings;
 mod info;
 mod names;
 mod sink;

@@ -1,15 +1,15 @@
 //! Writes vertices to a PLY file.
 
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::header::{Element, Encoding, Kind, Property};
-use super::source::{Native, Rest};
-use super::{CRS, CRS_MORE, PlyOptions, names, padding, text};
+use super::header::Encoding;
+use super::headings::Headings;
+use super::source::Native;
+use super::{PlyOptions, text};
 use crate::io::convert::{Projection, ply_schema};
 use crate::point::names::NORMAL;
 use crate::point::{Dimension, Layout, Metadata, PointBatch, Scalar, Schema, Spare, Value};
@@ -18,8 +18,6 @@ use crate::{Error, Result};
 
 /// Records of one encoded chunk.
 const CHUNK_POINTS: usize = 65_536;
-/// Bytes of one piece of a long text: some readers refuse header lines of 1,024 bytes.
-const PIECE: usize = 900;
 /// Bytes carried at once.
 const CARRY: usize = 1 << 18;
 
@@ -48,27 +46,6 @@ struct Plan {
     spare: Spare<Vec<u8>>,
 }
 
-/// The header, but for the count of vertices.
-struct Headings {
-    /// To the end of the coordinate reference system, which the padding ends.
-    start: String,
-    comments: String,
-    /// Elements before the vertices.
-    before: String,
-    vertex: Element,
-    after: String,
-}
-
-impl Headings {
-    /// Always of one length: the padding takes what the count leaves.
-    fn text(&self, points: u64) -> String {
-        let vertex = Element { count: points, ..self.vertex.clone() };
-        let Headings { start, comments, before, after, .. } = self;
-        let (padding, vertex) = (padding(points), vertex.lines());
-        format!("{start}comment {padding}\n{comments}{before}{vertex}{after}end_header\n")
-    }
-}
-
 impl PlySink {
     pub fn create(
         staged: &Path,
@@ -79,7 +56,8 @@ impl PlySink {
         let native = native_of(schema, metadata);
         let plan = Plan::new(options, schema, native.as_deref())?;
         let (rest, notes) = carried(options, &plan, native.as_ref());
-        let header = headings(&plan, metadata, native.as_deref(), rest.as_deref());
+        let header =
+            Headings::of(&plan.vertex, plan.encoding, metadata, native.as_deref(), rest.as_deref());
         let mut file = File::create(staged).map_err(|e| Error::io(staged, "create", e))?;
         let text = header.text(0);
         let failed = |e| Error::io(staged, "write the header", e);
@@ -250,60 +228,6 @@ fn add_normals(vertex: &mut Schema) -> Result<[Dimension; 3]> {
     Ok([field(NORMAL[0])?, field(NORMAL[1])?, field(NORMAL[2])?])
 }
 
-fn headings(
-    plan: &Plan,
-    metadata: &Metadata,
-    native: Option<&Native>,
-    rest: Option<&Native>,
-) -> Headings {
-    let dimensions: Vec<&str> = plan.vertex.dimensions.iter().map(|d| d.name.as_str()).collect();
-    let kept = native.iter().flat_map(|native| &native.properties);
-    let kept: BTreeMap<&str, &String> = kept.map(|(d, p)| (d.as_str(), p)).collect();
-    let properties = names::properties(&dimensions, |name| kept.get(name).copied().cloned());
-    // A line end within a text would begin a line of its own.
-    let line =
-        |keyword: &str, text: &str| format!("{keyword} {}\n", text.replace(['\n', '\r'], " "));
-    let mut start = format!("ply\nformat {} 1.0\n", plan.encoding.word());
-    for (n, piece) in metadata.crs.iter().flat_map(|crs| pieces(crs)).enumerate() {
-        start += &line("comment", &format!("{}{piece}", if n == 0 { CRS } else { CRS_MORE }));
-    }
-    let mut comments: String = properties
-        .iter()
-        .zip(&dimensions)
-        .filter_map(|(property, dimension)| names::comment(property, dimension))
-        .map(|comment| line("comment", &comment))
-        .collect();
-    comments.extend(metadata.comments.iter().map(|comment| line("comment", comment)));
-    comments.extend(native.iter().flat_map(|n| &n.obj_info).map(|info| line("obj_info", info)));
-    let lines = |elements: &[Element]| elements.iter().map(Element::lines).collect::<String>();
-    let rest: Option<&Rest> = rest.and_then(|native| native.rest.as_ref());
-    let properties = properties
-        .into_iter()
-        .zip(&plan.vertex.dimensions)
-        .map(|(name, d)| Property { name, kind: Kind::Scalar(d.scalar) })
-        .collect();
-    Headings {
-        before: rest.map(|r| lines(&r.before)).unwrap_or_default(),
-        after: rest.map(|r| lines(&r.after)).unwrap_or_default(),
-        vertex: Element { name: "vertex".into(), count: 0, properties },
-        start,
-        comments,
-    }
-}
-
-/// A text in pieces that fit a header line. Line ends become blanks, and no piece ends in a blank,
-/// which readers may take off.
-fn pieces(text: &str) -> Vec<String> {
-    let mut pieces = vec![String::new()];
-    for word in text.replace(['\n', '\r'], " ").split_inclusive(|c: char| !c.is_whitespace()) {
-        match pieces.last_mut() {
-            Some(last) if last.len() + word.len() <= PIECE || last.is_empty() => *last += word,
-            _ => pieces.push(word.to_owned()),
-        }
-    }
-    pieces
-}
-
 impl Encode for Plan {
     fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
         let mut rounded = None;
@@ -376,34 +300,5 @@ impl Sink for PlySink {
         self.file.write_all(self.header.text(self.points).as_bytes()).map_err(failed)?;
         self.file.sync_all().map_err(|e| Error::io(&self.path, "flush", e))?;
         Ok(SinkSummary { points: self.points, bytes: self.bytes, notes: self.notes })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_header_has_one_length_for_every_count() {
-        let vertex = Element { name: "vertex".into(), count: 0, properties: Vec::new() };
-        let header = Headings {
-            start: "ply\n".into(),
-            comments: String::new(),
-            before: String::new(),
-            vertex,
-            after: String::new(),
-        };
-        let length = header.text(0).len();
-        assert!([1, 9, 10, 12_345, u64::MAX].iter().all(|&n| header.text(n).len() == length));
-        assert!(header.text(u64::MAX).contains("comment .\n"));
-    }
-
-    #[test]
-    fn a_long_text_is_cut_where_no_blank_is_lost() {
-        let text = format!("A {}{} Ω end", "word ".repeat(400), " ".repeat(30));
-        let cut = pieces(&text);
-        assert!(cut.len() >= 3 && cut.iter().all(|p| p.len() <= PIECE), "{}", cut.len());
-        assert!(cut.iter().all(|p| p.trim_end() == p));
-        assert_eq!(cut.concat(), text);
     }
 }

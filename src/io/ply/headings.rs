@@ -1,0 +1,118 @@
+//! The header that a PLY file is written with, and that is of one length whatever the count of vertices.
+
+use std::collections::BTreeMap;
+
+use super::header::{Element, Encoding, Kind, Property};
+use super::source::{Native, Rest};
+use super::{CRS, CRS_MORE, names, padding};
+use crate::point::{Metadata, Schema};
+
+/// Bytes of one piece of a long text: some readers refuse header lines of 1,024 bytes.
+const PIECE: usize = 900;
+
+/// The header, but for the count of vertices.
+pub(super) struct Headings {
+    /// To the end of the coordinate reference system, which the padding ends.
+    start: String,
+    comments: String,
+    /// Elements before the vertices.
+    before: String,
+    vertex: Element,
+    after: String,
+}
+
+impl Headings {
+    /// The header of `vertex` records: with what `native` has beside them and the elements of
+    /// `rest` around them.
+    pub fn of(
+        vertex: &Schema,
+        encoding: Encoding,
+        metadata: &Metadata,
+        native: Option<&Native>,
+        rest: Option<&Native>,
+    ) -> Headings {
+        let dimensions: Vec<&str> = vertex.dimensions.iter().map(|d| d.name.as_str()).collect();
+        let kept = native.iter().flat_map(|native| &native.properties);
+        let kept: BTreeMap<&str, &String> = kept.map(|(d, p)| (d.as_str(), p)).collect();
+        let properties = names::properties(&dimensions, |name| kept.get(name).copied().cloned());
+        // A line end within a text would begin a line of its own.
+        let line =
+            |keyword: &str, text: &str| format!("{keyword} {}\n", text.replace(['\n', '\r'], " "));
+        let mut start = format!("ply\nformat {} 1.0\n", encoding.word());
+        for (n, piece) in metadata.crs.iter().flat_map(|crs| pieces(crs)).enumerate() {
+            start += &line("comment", &format!("{}{piece}", if n == 0 { CRS } else { CRS_MORE }));
+        }
+        let mut comments: String = properties
+            .iter()
+            .zip(&dimensions)
+            .filter_map(|(property, dimension)| names::comment(property, dimension))
+            .map(|comment| line("comment", &comment))
+            .collect();
+        comments.extend(metadata.comments.iter().map(|comment| line("comment", comment)));
+        comments.extend(native.iter().flat_map(|n| &n.obj_info).map(|info| line("obj_info", info)));
+        let lines = |elements: &[Element]| elements.iter().map(Element::lines).collect::<String>();
+        let rest: Option<&Rest> = rest.and_then(|native| native.rest.as_ref());
+        let properties = properties
+            .into_iter()
+            .zip(&vertex.dimensions)
+            .map(|(name, d)| Property { name, kind: Kind::Scalar(d.scalar) })
+            .collect();
+        Headings {
+            before: rest.map(|r| lines(&r.before)).unwrap_or_default(),
+            after: rest.map(|r| lines(&r.after)).unwrap_or_default(),
+            vertex: Element { name: "vertex".into(), count: 0, properties },
+            start,
+            comments,
+        }
+    }
+
+    /// Always of one length: the padding takes what the count leaves.
+    pub fn text(&self, points: u64) -> String {
+        let vertex = Element { count: points, ..self.vertex.clone() };
+        let Headings { start, comments, before, after, .. } = self;
+        let (padding, vertex) = (padding(points), vertex.lines());
+        format!("{start}comment {padding}\n{comments}{before}{vertex}{after}end_header\n")
+    }
+}
+
+/// A text in pieces that fit a header line. Line ends become blanks, and no piece ends in a blank,
+/// which readers may take off.
+fn pieces(text: &str) -> Vec<String> {
+    let mut pieces = vec![String::new()];
+    for word in text.replace(['\n', '\r'], " ").split_inclusive(|c: char| !c.is_whitespace()) {
+        match pieces.last_mut() {
+            Some(last) if last.len() + word.len() <= PIECE || last.is_empty() => *last += word,
+            _ => pieces.push(word.to_owned()),
+        }
+    }
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_header_has_one_length_for_every_count() {
+        let vertex = Element { name: "vertex".into(), count: 0, properties: Vec::new() };
+        let header = Headings {
+            start: "ply\n".into(),
+            comments: String::new(),
+            before: String::new(),
+            vertex,
+            after: String::new(),
+        };
+        let length = header.text(0).len();
+        assert!([1, 9, 10, 12_345, u64::MAX].iter().all(|&n| header.text(n).len() == length));
+        assert!(header.text(u64::MAX).contains("comment .\n"));
+    }
+
+    #[test]
+    fn a_long_text_is_cut_where_no_blank_is_lost() {
+        let text = format!("A {}{} Ω end", "word ".repeat(400), " ".repeat(30));
+        let cut = pieces(&text);
+        assert!(cut.len() >= 3 && cut.iter().all(|p| p.len() <= PIECE), "{}", cut.len());
+        assert!(cut.iter().all(|p| p.trim_end() == p));
+        assert_eq!(cut.concat(), text);
+    }
+}
