@@ -1,7 +1,7 @@
 //! The names of the dimensions that formats share. A dimension of one format is the same dimension
 //! of another when its name is the same; every other name is an extra dimension.
 
-#![allow(missing_docs, reason = "each name says what it is")]
+#![expect(missing_docs, reason = "each name says what it is")]
 
 /// Coordinates, in world units once scale and origin are applied.
 pub const XYZ: [&str; 3] = ["X", "Y", "Z"];

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 /// Type of a stored number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[allow(missing_docs, reason = "the names are the types")]
+#[expect(missing_docs, reason = "the names are the types")]
 pub enum Scalar {
     U8,
     I8,
@@ -38,7 +38,7 @@ impl Scalar {
 
 /// Byte order of the numbers in a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[allow(missing_docs, reason = "the names say it")]
+#[expect(missing_docs, reason = "the names say it")]
 pub enum Endian {
     Little,
     Big,
@@ -46,7 +46,7 @@ pub enum Endian {
 
 /// A number as stored: before scale and origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(missing_docs, reason = "the names say it")]
+#[expect(missing_docs, reason = "the names say it")]
 pub enum Value {
     Unsigned(u64),
     Signed(i64),

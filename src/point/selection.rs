@@ -179,7 +179,7 @@ impl<'de> Deserialize<'de> for Mark {
 /// A change of one field of a record; a bit each in a set of edits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
-#[allow(missing_docs, reason = "the names say what they change")]
+#[expect(missing_docs, reason = "the names say what they change")]
 pub enum Edit {
     SetKeyPoint = 1,
     ClearKeyPoint = 2,

@@ -26,7 +26,7 @@ pub struct Block {
 
 impl Block {
     /// How many positions it has: at least one.
-    #[allow(clippy::len_without_is_empty, reason = "no block is empty")]
+    #[expect(clippy::len_without_is_empty, reason = "no block is empty")]
     pub fn len(&self) -> usize {
         usize::from(self.len)
     }

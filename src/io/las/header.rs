@@ -7,7 +7,6 @@ use crate::{Error, Result};
 
 /// Byte offsets of the fields.
 pub mod at {
-    #![allow(missing_docs, reason = "the names are the specification's")]
     pub const SOURCE_ID: usize = 4;
     pub const GLOBAL_ENCODING: usize = 6;
     pub const GUID: usize = 8;

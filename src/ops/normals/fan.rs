@@ -2,7 +2,7 @@
 //! [`Star`](crate::geom::star::Star) finds for one point, where that point is clearly inside of its
 //! neighbours' polygon or clearly at its edge, and no four points are nearly on one circle.
 
-#![allow(clippy::needless_range_loop, reason = "one index walks several arrays of lanes")]
+#![expect(clippy::needless_range_loop, reason = "one index walks several arrays of lanes")]
 
 use super::bundle::{MOST, Row, load};
 use crate::geom::plane::{across, choose, dot, unit_or_nan};
@@ -95,7 +95,7 @@ impl Fan {
     fn walk<L: Lanes>(&self, lanes: L, start: L::F64, clear: u32) -> (Hulls, u32) {
         let mut hulls =
             Hulls { places: [[0; MOST]; EIGHT], counts: [1; EIGHT], gaps: [None; EIGHT] };
-        let mut place = lanes.store_eight(start);
+        let place = lanes.store_eight(start);
         let mut corner = [[0.0; EIGHT]; 2];
         for lane in 0..EIGHT {
             let at = &self.inverted[place[lane] as usize];
@@ -122,13 +122,14 @@ impl Fan {
             if walking == 0 {
                 break;
             }
-            place = lanes.store_eight(next.place);
+            let place = lanes.store_eight(next.place);
             for lane in 0..EIGHT {
+                let is_in = |mask: u32| walking & mask & 1 << lane != 0;
                 let count = hulls.counts[lane];
-                if walking & !left & 1 << lane != 0 && count < MOST {
+                if is_in(!left) && count < MOST {
                     hulls.places[lane][count] = place[lane] as u8;
                     hulls.counts[lane] = count + 1;
-                } else if walking & left & 1 << lane != 0 {
+                } else if is_in(left) {
                     hulls.gaps[lane] = Some(count - 1);
                 }
             }
@@ -192,8 +193,7 @@ impl Fan {
                 least = if rank < least { rank } else { least };
             }
             if let Some(gap) = hulls.gaps[lane] {
-                let steps = if gap < first { gap + count - first } else { gap - first };
-                gaps[lane] = (steps + 1) as f64;
+                gaps[lane] = ((gap + count - first) % count + 1) as f64;
             }
             let (before, behind) = places.split_at(first);
             let around = behind.iter().chain(before).chain(behind.first());

@@ -1,7 +1,5 @@
 //! Vectors of 256 bits.
 
-#![allow(clippy::needless_range_loop, reason = "one index walks several arrays of lanes")]
-
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
