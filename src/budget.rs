@@ -97,7 +97,7 @@ impl Budget {
             Bytes(self.0.limit.saturating_sub(used)),
             Bytes(self.0.limit)
         ))
-        .help(format!("set memory to at least {}", whole_mebibytes(enough)))
+        .help(format!("give `run.memory = \"{}\"` or more", whole_mebibytes(enough)))
     }
 }
 
@@ -262,7 +262,7 @@ mod tests {
             error.to_string(),
             "the tile needs 40.0 MiB of memory, but 28 MiB of the budget of 128 MiB is free"
         );
-        assert_eq!(error.remedy(), Some("set memory to at least 141MiB"));
+        assert_eq!(error.remedy(), Some("give `run.memory = \"141MiB\"` or more"));
         assert_eq!(budget.used(), 100 * MIB);
     }
 
@@ -270,7 +270,7 @@ mod tests {
     fn the_budget_that_a_refusal_names_would_do() {
         let budget = Budget::new(10);
         let error = budget.lease(3 * MIB, "tile").unwrap_err();
-        assert_eq!(error.remedy(), Some("set memory to at least 3MiB"));
+        assert_eq!(error.remedy(), Some("give `run.memory = \"3MiB\"` or more"));
         assert!(Budget::new(3 * MIB).lease(3 * MIB, "tile").is_ok());
     }
 

@@ -161,11 +161,11 @@ fn flags_of_reduce_are_told_as_they_were_typed() {
         let arguments = [&["reduce", "a.laz", "-o", "b.laz"], flags].concat();
         refused(at.path(), &arguments, parts);
     };
-    reduce(&["--split", "octnt"], &["error: --split: ", "octnt", "did you mean `octant`?"]);
+    reduce(&["--split", "octnt"], &["error: --split: cannot be `octnt`", "did you mean `octant`?"]);
     reduce(&["--method", "vardy"], &["--method: ", "did you mean `varady`?"]);
     refused(at.path(), &["reduce", "a.laz", "-o", "b"], &["-o: the extension of `b` names no"]);
     refused(at.path(), &["reduce", "a.laz", "-o", "./a.laz"], &["-o: ./a.laz is an input"]);
-    reduce(&["--passes", "0"], &["--passes: "]);
+    reduce(&["--passes", "0"], &["--passes: takes a whole number from 1, not 0"]);
     reduce(&["--mark", "keypoint"], &["--mark: ", "keypoint"]);
     reduce(&["--keep", "110%"], &["--keep: "]);
     reduce(&["--keep", "10%", "--max-angle", "0.2"], &["--keep <TARGET>", "--max-angle"]);
@@ -207,7 +207,7 @@ fn flags_of_synth_are_told_as_they_were_typed() {
         let arguments = [&["synth", kind, "-n", "100", "-o", "a.laz"], flags].concat();
         refused(at.path(), &arguments, parts);
     };
-    synth("plain", &[], &["KIND: `scene` cannot be `plain`", "did you mean `plane`?"]);
+    synth("plain", &[], &["error: KIND: cannot be `plain`", "did you mean `plane`?"]);
     synth("part", &["--noise", "-1"], &["--noise: ", "a number from 0"]);
     synth("part", &["--noise", "nan"], &["--noise: "]);
     for count in ["1.5", "5MB", "1e"] {

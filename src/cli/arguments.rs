@@ -5,9 +5,12 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::pipeline::{Overrides, Set, parse_bytes};
+use serde_json::Value;
+
+use super::words::{Flag, flags};
+use crate::Result;
+use crate::pipeline::parse_bytes;
 use crate::point::parse_count;
-use crate::{Error, Result};
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -73,7 +76,7 @@ pub(super) struct Common {
     pub threads: Option<NonZeroUsize>,
     /// Folder for what does not fit in memory [default: beside the output]
     #[arg(long, value_name = "DIR")]
-    pub scratch: Option<PathBuf>,
+    pub scratch: Option<String>,
     /// Progress on stderr: bars where it is a terminal, one JSON event a line, or none
     #[arg(long, value_name = "HOW", default_value = "auto")]
     pub progress: Progress,
@@ -85,28 +88,18 @@ pub(super) struct Common {
     pub verbose: bool,
     /// Write the report to this file
     #[arg(long, value_name = "FILE")]
-    pub report: Option<PathBuf>,
+    pub report: Option<String>,
 }
 
 impl Common {
-    /// What takes the place of the pipeline's `[run]` settings. The report is not among it: see
-    /// [`sets`](Common::sets).
-    pub fn overrides(&self) -> Overrides {
-        Overrides {
-            memory: self.memory,
-            threads: self.threads,
-            scratch: self.scratch.clone(),
-            report: None,
-        }
-    }
-
-    /// Values put in the place of the pipeline's: `--report`, so that it is compared with the
-    /// inputs and outputs.
-    pub fn sets(&self) -> Result<Vec<Set>> {
-        let Some(path) = &self.report else { return Ok(Vec::new()) };
-        let told = || Error::pipeline("the name is not UTF-8 text").at(path);
-        let text = path.to_str().ok_or_else(told)?;
-        Ok(vec![Set::argument("--report", "run.report", text.into())])
+    /// The flags that stand for `[run]` settings.
+    pub fn flags(&self) -> Vec<Flag> {
+        flags([
+            ("--memory", "run.memory", self.memory.map(Value::from)),
+            ("--threads", "run.threads", self.threads.map(|n| n.get().into())),
+            ("--scratch", "run.scratch", self.scratch.clone().map(Value::from)),
+            ("--report", "run.report", self.report.clone().map(Value::from)),
+        ])
     }
 }
 

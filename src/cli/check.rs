@@ -6,14 +6,14 @@ use super::arguments::Plan;
 use super::console::Console;
 use super::print;
 use super::run::parse_sets;
-use crate::pipeline::{Outline, Pipeline, Registry};
+use crate::pipeline::{Outline, Overrides, Pipeline, Registry};
 use crate::report::Grouped;
 use crate::stage::Role;
 use crate::{Result, io};
 
 /// Prints how a pipeline would be run.
 pub(super) fn plan(arguments: &Plan, registry: &Registry) -> Result<()> {
-    print::result(read(arguments, registry)?.plan(&arguments.common.overrides())?)
+    print::result(read(arguments, registry)?.plan(&Overrides::default())?)
 }
 
 /// Prints that a pipeline can be run, or fails as its run would before it reads a point; then the
@@ -22,7 +22,7 @@ pub(super) fn check(arguments: &Plan, registry: &Registry, console: &Console) ->
     let pipeline = read(arguments, registry)?;
     let inputs = inputs(&pipeline);
     let name = pipeline.origin.clone();
-    match pipeline.plan(&arguments.common.overrides()) {
+    match pipeline.plan(&Overrides::default()) {
         Ok(plan) => {
             console.planned(&plan);
             console.result(format_args!("{name} is right: {}", said(&plan.outline())))

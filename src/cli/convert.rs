@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use super::arguments::Convert;
 use super::console::Console;
 use super::run::{given, mill, written};
+use super::words::{self, Flag};
 use crate::budget::Bytes;
 use crate::pipeline::{Done, Format, Pipeline, Registry, Watch, expand};
 use crate::report::Grouped;
@@ -22,7 +23,7 @@ pub(super) fn convert(arguments: &Convert, registry: &Registry, console: &Consol
     let folder = Path::new(&arguments.output);
     if !(arguments.output.ends_with('/') || folder.is_dir()) {
         let one = pipeline(arguments, json!(arguments.inputs), json!(arguments.output), registry);
-        return console.result(mill(one?, &arguments.common, console)?);
+        return console.result(mill(one?, console)?);
     }
     let inputs = expand(&arguments.inputs)?;
     if inputs.len() > 1 && arguments.common.report.is_some() {
@@ -36,7 +37,7 @@ pub(super) fn convert(arguments: &Convert, registry: &Registry, console: &Consol
     }
     let is_new = !folder.is_dir();
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create the folder", e))?;
-    let outcome = run_all(runs, arguments, console);
+    let outcome = run_all(runs, console);
     if outcome.is_err() && is_new {
         // Left behind if any output is in it, which is as it should be.
         let _ = std::fs::remove_dir(folder);
@@ -77,11 +78,7 @@ impl Total {
 
 /// Runs one pipeline after the other. One that fails is told at once and does not keep the others
 /// from running; the error in the end is of the first failure's kind.
-fn run_all(
-    runs: Vec<(PathBuf, Pipeline)>,
-    arguments: &Convert,
-    console: &Console,
-) -> Result<Total> {
+fn run_all(runs: Vec<(PathBuf, Pipeline)>, console: &Console) -> Result<Total> {
     let total = runs.len();
     let mut all = Vec::new();
     let mut failures: Vec<ErrorKind> = Vec::new();
@@ -89,7 +86,7 @@ fn run_all(
         if console.cancelled() {
             return Err(Error::interrupted());
         }
-        match mill(pipeline, &arguments.common, console) {
+        match mill(pipeline, console) {
             Ok(done) => all.push(done),
             Err(error) if total == 1 || error.kind() == ErrorKind::Interrupted => {
                 return Err(error);
@@ -108,18 +105,28 @@ fn run_all(
     }
 }
 
+/// The flags of `convert`, for a run that reads and writes these.
+pub(super) fn flags(
+    arguments: &Convert,
+    inputs: Option<Value>,
+    output: Option<Value>,
+) -> Vec<Flag> {
+    let mut all = words::flags([
+        ("IN", "read.path", inputs),
+        ("-o", "write.path", output),
+        ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
+    ]);
+    all.extend(written(&arguments.written));
+    all
+}
+
 fn pipeline(
     arguments: &Convert,
     inputs: Value,
     output: Value,
     registry: &Registry,
 ) -> Result<Pipeline> {
-    let stages = given([
-        ("IN", "read.path", Some(inputs)),
-        ("-o", "write.path", Some(output)),
-        ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
-    ]);
-    let sets = [stages, written(&arguments.written), arguments.common.sets()?].concat();
+    let sets = given([flags(arguments, Some(inputs), Some(output)), arguments.common.flags()]);
     Pipeline::parse_with(CONVERT, "pipelines/convert.toml", registry, &sets)
 }
 

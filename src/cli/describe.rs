@@ -3,12 +3,13 @@
 use serde_json::Value;
 
 use super::arguments::Info;
+use super::console::Console;
 use super::{print, table};
 use crate::pipeline::expand;
 use crate::{Error, Result, io};
 
 /// Prints what the headers of files say. A file that cannot be read is told, the others are shown.
-pub(super) fn info(arguments: &Info) -> Result<()> {
+pub(super) fn info(arguments: &Info, console: &Console) -> Result<()> {
     let files = expand(&arguments.files)?;
     let total = files.len();
     let mut shown = Vec::new();
@@ -36,7 +37,7 @@ pub(super) fn info(arguments: &Info) -> Result<()> {
         (1, Some(only)) => Err(only),
         (n, Some(last)) => {
             let kind = last.kind();
-            failures.iter().chain([&last]).for_each(print::error);
+            failures.iter().chain([&last]).for_each(|error| console.error(error));
             Err(Error::new(kind, format!("{n} of {total} files cannot be described")))
         }
     }

@@ -15,6 +15,7 @@ mod progress;
 mod run;
 mod stages;
 mod table;
+mod words;
 
 use std::process::ExitCode;
 
@@ -34,7 +35,7 @@ pub fn main(registry: &Registry) -> ExitCode {
             return ExitCode::from(if told.use_stderr() { 2 } else { 0 });
         }
     };
-    let console = Console::new(arguments.command.common());
+    let console = Console::new(&arguments.command);
     match execute(&arguments.command, registry, &console) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -53,7 +54,7 @@ fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<
         Command::Plan(arguments) => check::plan(arguments, registry),
         Command::Check(arguments) => check::check(arguments, registry, console),
         Command::Stages(arguments) => stages::stages(arguments, registry),
-        Command::Info(arguments) => describe::info(arguments),
+        Command::Info(arguments) => describe::info(arguments, console),
     }
 }
 

@@ -3,6 +3,7 @@
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
 
+use super::console::Told;
 use crate::{Error, Result};
 
 /// Prints a result and one line's end on stdout. A reader who has gone (`| head`) wants no more: that
@@ -32,20 +33,16 @@ pub(super) fn event(event: &serde_json::Value) {
 }
 
 /// Prints an error on stderr: place and message, the causes beneath it, what the user can do.
-pub(super) fn error(error: &Error) {
-    line(&rendered(error));
+pub(super) fn error(told: &Told<'_>) {
+    line(&rendered(told));
 }
 
-fn rendered(error: &Error) -> String {
-    let mut text = format!("error: {error}");
-    let mut cause = std::error::Error::source(error);
-    let mut indent = 2;
-    while let Some(inner) = cause {
-        text += &format!("\n{:indent$}{inner}", "");
-        cause = inner.source();
-        indent += 2;
+fn rendered(told: &Told<'_>) -> String {
+    let mut text = format!("error: {}", told.message);
+    for (i, cause) in told.causes.iter().enumerate() {
+        text += &format!("\n{:indent$}{cause}", "", indent = 2 * (i + 1));
     }
-    if let Some(help) = error.remedy() {
+    if let Some(help) = &told.help {
         text += &format!("\nhelp: {help}");
     }
     text
@@ -63,7 +60,13 @@ mod tests {
     #[test]
     fn an_error_says_place_cause_and_remedy() {
         let cause = io::Error::new(ErrorKind::NotFound, "no such file");
-        let told = Error::io("a.laz", "open", cause).help("look in b");
+        let error = Error::io("a.laz", "open", cause).help("look in b");
+        let told = Told {
+            error: &error,
+            message: error.to_string(),
+            causes: vec!["no such file".to_owned()],
+            help: error.remedy().map(str::to_owned),
+        };
         assert_eq!(rendered(&told), "error: a.laz: cannot open\n  no such file\nhelp: look in b");
     }
 }

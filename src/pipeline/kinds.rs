@@ -194,7 +194,8 @@ impl Write {
     /// Refuses keys that an output of `format` does not have; tells which.
     pub(super) fn check(&self, format: Format) -> Result<(), (&'static str, Error)> {
         let only = |key: &'static str, formats: &str| {
-            let told = format!("`{key}` is for {formats}, the output is {}", format.extension());
+            let told =
+                format!("`write.{key}` is for {formats}, the output is {}", format.extension());
             Err((key, Error::pipeline(told)))
         };
         match format {
@@ -220,11 +221,11 @@ impl StageKind for Write {
         match (self.path.clone(), self.folder.clone()) {
             (Some(_), Some(_)) => {
                 let told =
-                    "`path` makes one file and `folder` one for each input: give one of them";
+                    "`write.path` makes one file and `write.folder` one for each input: give one";
                 Err(at.blame("folder", Error::pipeline(told)))
             }
-            (None, None) => Err(Error::pipeline("`write` needs `path` or `folder`")
-                .help("`path` is one file, `folder` gets one for each input")),
+            (None, None) => Err(Error::pipeline("a `write` needs `write.path` or `write.folder`")
+                .help("`write.path` is one file, `write.folder` gets one for each input")),
             (Some(path), None) => {
                 let Some(format) = self.format.or(Format::of(&path)) else {
                     return Err(at.blame("path", unknown_extension(&path)));

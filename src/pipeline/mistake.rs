@@ -18,6 +18,22 @@ pub(super) struct SourceText {
     pub origin: String,
     /// What it says.
     pub text: String,
+    /// The setting that the argument stands for, where its name says it (`--keep`): messages at this
+    /// place need not name it again.
+    pub setting: Option<String>,
+}
+
+impl SourceText {
+    /// `message` as it is told behind the name of this text.
+    fn shortened<'a>(&self, message: &'a str) -> &'a str {
+        let Some(setting) = &self.setting else { return message };
+        let key = setting.rsplit('.').next().unwrap_or(setting);
+        let told = |name: &str| message.strip_prefix(&format!("`{name}`"));
+        match told(setting).or_else(|| told(key)) {
+            Some(rest) => rest.trim_start_matches(':').trim_start(),
+            None => message,
+        }
+    }
 }
 
 /// Something wrong at a place.
@@ -88,7 +104,7 @@ impl Mistake {
         let shown: String = line.chars().take(WIDEST).collect();
         let pad: String = before.chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
         let carets = text[start..end].chars().count().max(1);
-        let mut out = format!("{place}: {}", self.message);
+        let mut out = format!("{place}: {}", source.shortened(&self.message));
         let blank = " ".repeat(gutter.len());
         if pad.chars().count() + carets <= WIDEST {
             let carets = "^".repeat(carets);
@@ -202,7 +218,8 @@ mod tests {
 
     #[test]
     fn a_place_at_the_end_of_the_text_or_inside_a_letter_is_rendered() {
-        let sources = [SourceText { origin: "p.toml".into(), text: "a = 'ö'\r\nb".into() }];
+        let sources =
+            [SourceText { origin: "p.toml".into(), text: "a = 'ö'\r\nb".into(), setting: None }];
         let at = |span| Mistake::new(Place::new(0, span), "wrong").render(&sources);
         assert_eq!(at(10..10), "p.toml:2:1: wrong\n  2 | b\n    | ^");
         assert_eq!(at(99..120), "p.toml:2:2: wrong\n  2 | b\n    |  ^");

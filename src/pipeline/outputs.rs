@@ -76,7 +76,7 @@ impl CreateSink for Outputs {
         if inputs.is_empty() {
             return Err(Error::pipeline("the points come from no file that an output could be of")
                 .at(&self.folder)
-                .help("write one file: give `path` instead of `folder`"));
+                .help("write one file: give `write.path` instead of `write.folder`"));
         }
         let there: BTreeMap<_, _> =
             inputs.iter().filter_map(|i| Some((identity(&i.path)?, &i.path))).collect();

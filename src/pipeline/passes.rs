@@ -190,7 +190,10 @@ impl Layout<'_> {
             self.ops[*at].op.tile().needs().writes.iter().any(|column| column == "Normal")
         };
         let first = (0..op).rev().find(writes).ok_or_else(|| {
-            blame(&self.ops[op], "`passes` repeats the stages from `normals` on, and there is none")
+            blame(
+                &self.ops[op],
+                "`median.passes` repeats the stages from `normals` on, and there is none",
+            )
         })?;
         let twice = (first..=op).find(|&at| matches!(self.ops[at].op, Op::Scan(_)));
         match twice {
@@ -199,7 +202,7 @@ impl Layout<'_> {
                 let kind = &self.ops[at].kind;
                 let told = format!("`{kind}` looks at the whole scan and cannot be repeated");
                 Err(blame(&self.ops[op], told)
-                    .help("leave `passes` out, or run the pipeline twice"))
+                    .help("leave `median.passes` out, or run the pipeline twice"))
             }
         }
     }
@@ -315,7 +318,7 @@ impl Layout<'_> {
             }
             if tap.wants_normals && !self.bring_normals(at) {
                 outcome = Err(Error::pipeline("the output wants normals, which no stage computes")
-                    .help("put a `normals` stage before it, or leave `dimensions` out"));
+                    .help("put a `normals` stage before it, or leave `write.dimensions` out"));
             }
             let pass = &mut self.passes[at];
             if removes {

@@ -213,7 +213,7 @@ fn check_places(
     match settings.scratch.as_ref().filter(|folder| !folder.is_dir()) {
         Some(folder) => Err(Error::new(ErrorKind::Io, "the folder for scratch does not exist")
             .at(folder)
-            .help("create it first, or name another with --scratch")),
+            .help("create it first, or name another with `run.scratch`")),
         None => Ok(()),
     }
 }
@@ -295,13 +295,13 @@ fn mills(ops: &[StageOp], sinks: &[Box<dyn CreateSink>]) -> Result<bool> {
         Some(sink) => {
             let told = match ops.is_empty() {
                 true => {
-                    "order = \"input\" is not possible in or beside an output in canonical order"
+                    "`write.order = \"input\"` is not possible in or beside an output in canonical order"
                 }
                 false => {
-                    "order = \"input\" is for pipelines that stream; tiles write the canonical order"
+                    "`write.order = \"input\"` is for pipelines that stream; tiles write the canonical order"
                 }
             };
-            Err(Error::pipeline(told).at(sink.path()).help("leave `order` out"))
+            Err(Error::pipeline(told).at(sink.path()).help("leave `write.order` out"))
         }
     }
 }

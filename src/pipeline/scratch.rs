@@ -81,7 +81,7 @@ fn make(parent: &Path) -> Result<Made> {
             Err(e) if e.kind() == io::ErrorKind::AlreadyExists && attempt < ATTEMPTS => continue,
             Err(e) => {
                 return Err(Error::io(parent, "create a scratch folder here", e)
-                    .help("make the folder writable, or name another with --scratch"));
+                    .help("make the folder writable, or name another with `run.scratch`"));
             }
         }
         match mark(&folder) {
@@ -183,7 +183,7 @@ pub fn memory_warning(folder: &Path, spilled: u64) -> Option<String> {
     let (_, name) = MEMORY.into_iter().find(|(magic, _)| *magic == kind).filter(|_| spilled > 0)?;
     Some(format!(
         "{}: {} were spilled to a file system in memory ({name}), beyond the budget of the run: name a \
-         folder on a disk with --scratch",
+         folder on a disk with `run.scratch`",
         folder.display(),
         Bytes(spilled)
     ))

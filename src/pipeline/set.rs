@@ -57,7 +57,8 @@ impl Set {
 
     /// The text that errors show.
     pub(super) fn source(&self) -> SourceText {
-        SourceText { origin: self.argument.clone(), text: self.text.clone() }
+        let setting = matches!(self.value, Given::Json(_)).then(|| self.address.clone());
+        SourceText { origin: self.argument.clone(), text: self.text.clone(), setting }
     }
 
     /// The stage part and the key part of the address.

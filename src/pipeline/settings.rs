@@ -132,7 +132,7 @@ impl Simd {
         };
         simd::Simd::of(level).ok_or_else(|| {
             Error::pipeline(format!("this processor has no {}", level.name()))
-                .help("leave `simd` under [run] out: the fastest that is there is taken")
+                .help("leave `run.simd` out: the fastest that is there is taken")
         })
     }
 }
@@ -183,14 +183,14 @@ impl RunSettings {
             Some(Mismatch { z_scale: Some(factor), .. }) if auto => Ok(factor),
             Some(Mismatch { message, z_scale: Some(factor) }) => {
                 Err(Error::new(ErrorKind::Data, message).help(format!(
-                    "set z_scale = \"auto\" under [run] (or --z-scale auto), which measures with z times {factor}, or \
-                 z_scale = 1 if the reference system is wrong; records keep their z"
+                    "give `run.z_scale = \"auto\"`, which measures with z times {factor}, or \
+                     `run.z_scale = 1` if the reference system is wrong; records keep their z"
                 )))
             }
             Some(Mismatch { message, z_scale: None }) => Err(Error::new(ErrorKind::Data, message)
                 .help(
-                    "project the scan to metres first; or set z_scale under [run], or --z-scale (1 if \
-                     the reference system is wrong)",
+                    "project the scan to metres first, or give `run.z_scale` (1 if the reference \
+                     system is wrong)",
                 )),
         }
     }

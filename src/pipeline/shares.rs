@@ -249,9 +249,9 @@ impl Demands {
             Bytes(needed)
         ))
         .help(format!(
-            "give --memory {} or more{}",
+            "give `run.memory = \"{}\"` or more{}",
             whole_mebibytes(needed),
-            if self.threads > 1 { ", or fewer --threads" } else { "" }
+            if self.threads > 1 { ", or fewer `run.threads`" } else { "" }
         ))
     }
 }
@@ -320,8 +320,15 @@ mod tests {
     fn a_refusal_names_a_limit_that_does() {
         let error = demands(32 << 20).divide().unwrap_err();
         let help = error.remedy().unwrap().to_owned();
-        let mebibytes: u64 =
-            help.split_once("--memory ").unwrap().1.split_once("MiB").unwrap().0.parse().unwrap();
+        let mebibytes: u64 = help
+            .split_once("run.memory = \"")
+            .unwrap()
+            .1
+            .split_once("MiB")
+            .unwrap()
+            .0
+            .parse()
+            .unwrap();
         assert!(demands(mebibytes << 20).divide().is_ok(), "{help}");
         assert!(demands((mebibytes - 2) << 20).divide().is_err(), "{help}");
     }

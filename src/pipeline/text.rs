@@ -66,7 +66,7 @@ impl Pipeline {
         registry: &Registry,
         sets: &[Set],
     ) -> Result<Pipeline> {
-        let file = SourceText { origin: origin.to_owned(), text: text.to_owned() };
+        let file = SourceText { origin: origin.to_owned(), text: text.to_owned(), setting: None };
         let sources: Vec<SourceText> =
             std::iter::once(file).chain(sets.iter().map(Set::source)).collect();
         let told = |mistakes| mistake::tell(mistakes, &sources);
@@ -218,7 +218,7 @@ fn check_chain(drafts: &[StageDraft], stages: &[PlacedStage], mistakes: &mut Vec
         let Role::Sink(sink) = &stage.role else { continue };
         if tiles && sink.order() == Order::Input {
             let told = "the input's order is kept only where no stage works on tiles";
-            let note = "leave `order` out: the order is canonical";
+            let note = "leave `write.order` out: the order is canonical";
             mistakes.push(Mistake::new(draft.kind.1.clone(), told).note(note));
         }
     }

@@ -177,7 +177,7 @@ impl ScratchFile {
         let full = cause.kind() == std::io::ErrorKind::StorageFull;
         let error = Error::io(&self.path, doing, cause);
         if full {
-            return error.help("free some disk space, or name another folder with --scratch");
+            return error.help("free some disk space, or name another folder with `run.scratch`");
         }
         error
     }
