@@ -326,7 +326,7 @@ fn an_input_is_never_written_over() {
     );
     let registry = registry().with::<pointmill::pipeline::Read>();
     let told = Pipeline::parse(&text, "p.toml", &registry).unwrap_err().to_string();
-    assert!(told.starts_with("p.toml:6:8: ") && told.contains("is an input"), "{told}");
+    assert!(told.starts_with("p.toml:6:8: ") && told.contains("/scan.laz is the input "), "{told}");
 }
 
 #[test]

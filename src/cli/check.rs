@@ -6,6 +6,7 @@ use super::arguments::Plan;
 use super::console::Console;
 use super::print;
 use super::run::parse_sets;
+use crate::error::shown;
 use crate::pipeline::{Outline, Overrides, Pipeline, Registry};
 use crate::report::Grouped;
 use crate::stage::Role;
@@ -53,7 +54,7 @@ fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
 fn said(outline: &Outline) -> String {
     let Outline { inputs, points, .. } = outline;
     let outputs: Vec<String> =
-        outline.outputs.iter().map(|output| output.display().to_string()).collect();
+        outline.outputs.iter().map(|output| shown(output).to_string()).collect();
     let files = if *inputs == 1 { "file" } else { "files" };
     let from = if *inputs == 0 { String::new() } else { format!(" from {inputs} {files}") };
     let points = Grouped(*points);

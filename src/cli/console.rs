@@ -10,6 +10,7 @@ use super::events::Events;
 use super::progress::Bars;
 use super::words::Words;
 use super::{interrupt, print};
+use crate::error::shown;
 use crate::pipeline::{Done, Plan, Watch};
 use crate::{Error, Result};
 
@@ -94,7 +95,7 @@ impl Console {
             Voice::Json(events) if !self.quiet => events.planned(&outline, &plan.to_string()),
             Voice::Text(_) if self.verbose => {
                 print::message(plan);
-                print::message(format_args!("scratch  {}", outline.scratch.display()));
+                print::message(format_args!("scratch  {}", shown(&outline.scratch)));
             }
             _ => {}
         }

@@ -7,9 +7,10 @@ use serde_json::{Value, json};
 
 use super::arguments::Convert;
 use super::console::Console;
-use super::run::{given, mill, written};
+use super::run::{HIDDEN, given, mill, written};
 use super::words::{self, Flag};
 use crate::budget::Bytes;
+use crate::error::shown;
 use crate::pipeline::{Done, Format, Pipeline, Registry, Watch, expand};
 use crate::report::Grouped;
 use crate::{Error, ErrorKind, Result};
@@ -27,7 +28,8 @@ pub(super) fn convert(arguments: &Convert, registry: &Registry, console: &Consol
     }
     let inputs = expand(&arguments.inputs)?;
     if inputs.len() > 1 && arguments.common.report.is_some() {
-        return Err(Error::pipeline("--report is for one output; this makes several"));
+        return Err(Error::pipeline("--report is for one output, and this makes several")
+            .help("leave --report out, or convert the files one by one"));
     }
     // Every pipeline is checked before the first is run.
     let mut runs = Vec::new();
@@ -127,7 +129,7 @@ fn pipeline(
     registry: &Registry,
 ) -> Result<Pipeline> {
     let sets = given([flags(arguments, Some(inputs), Some(output)), arguments.common.flags()]);
-    Pipeline::parse_with(CONVERT, "pipelines/convert.toml", registry, &sets)
+    Pipeline::parse_with(CONVERT, HIDDEN, registry, &sets)
 }
 
 /// The output in `folder` of every input: its name, with the extension of the format that is asked
@@ -139,12 +141,12 @@ fn outputs(inputs: &[PathBuf], folder: &Path, to: Option<&str>) -> Result<Vec<(P
         let own = || Format::of(input).map(Format::extension);
         let name = input.file_name().map(Path::new);
         let (Some(name), Some(extension)) = (name, to.or_else(own)) else {
-            let told = format!("{}: its name says no format", input.display());
-            return Err(Error::pipeline(told).help("say --to las, laz or ply"));
+            let told = format!("{}: its name says no format", shown(input));
+            return Err(Error::pipeline(told).help("add --to las, laz or ply"));
         };
         let output = folder.join(name.with_extension(extension));
         if let Some(other) = taken.insert(output.clone(), input) {
-            let (a, b, output) = (other.display(), input.display(), output.display());
+            let (a, b, output) = (shown(other), shown(input), shown(&output));
             return Err(Error::pipeline(format!("{a} and {b} would both become {output}")));
         }
         all.push((input.clone(), output));
@@ -153,7 +155,11 @@ fn outputs(inputs: &[PathBuf], folder: &Path, to: Option<&str>) -> Result<Vec<(P
 }
 
 fn text(path: &Path) -> Result<Value> {
-    let told = || Error::pipeline("the name is not UTF-8 text").at(path);
+    let told = || {
+        Error::pipeline("the name is not UTF-8 text")
+            .at(path)
+            .help("rename it, or convert the folder that it is in to one file")
+    };
     Ok(json!(path.to_str().ok_or_else(told)?))
 }
 

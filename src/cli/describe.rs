@@ -5,6 +5,7 @@ use serde_json::Value;
 use super::arguments::Info;
 use super::console::Console;
 use super::{print, table};
+use crate::error::shown;
 use crate::pipeline::expand;
 use crate::{Error, Result, io};
 
@@ -12,22 +13,22 @@ use crate::{Error, Result, io};
 pub(super) fn info(arguments: &Info, console: &Console) -> Result<()> {
     let files = expand(&arguments.files)?;
     let total = files.len();
-    let mut shown = Vec::new();
+    let mut described = Vec::new();
     let mut failures = Vec::new();
     for file in files {
         match io::describe(&file) {
-            Ok(facts) => shown.push((file, facts)),
+            Ok(facts) => described.push((file, facts)),
             Err(error) => failures.push(error.at(file)),
         }
     }
     if arguments.json {
-        let all = Value::Array(shown.into_iter().map(|(_, facts)| facts).collect());
-        print::result(format_args!("{all:#}"))?;
+        let all = Value::Array(described.into_iter().map(|(_, facts)| facts).collect());
+        print::json(&format!("{all:#}"))?;
     } else {
         let text = |(file, facts): (std::path::PathBuf, Value)| {
-            format!("{}\n{}", file.display(), table::render(&facts, 2))
+            format!("{}\n{}", shown(&file), table::render(&facts, 2))
         };
-        let all: Vec<String> = shown.into_iter().map(text).collect();
+        let all: Vec<String> = described.into_iter().map(text).collect();
         if !all.is_empty() {
             print::result(all.join("\n\n"))?;
         }

@@ -11,6 +11,9 @@ use crate::pipeline::{Done, Overrides, Pipeline, Registry, Set};
 /// The pipeline of `reduce`, which users copy.
 const REDUCE: &str = include_str!("../../pipelines/reduce.toml");
 
+/// The origin of the pipelines of commands: users know the flags, not these texts.
+pub(super) const HIDDEN: &str = "";
+
 /// The pipeline of `synth`.
 const SYNTH: &str = "\
 [[stage]]
@@ -31,14 +34,14 @@ pub(super) fn run(arguments: &Run, registry: &Registry, console: &Console) -> Re
 pub(super) fn reduce(arguments: &Reduce, registry: &Registry, console: &Console) -> Result<()> {
     let sets = given([reduce_flags(arguments), arguments.common.flags()]);
     let text = if arguments.outliers { with_outliers() } else { REDUCE.to_owned() };
-    let pipeline = Pipeline::parse_with(&text, "pipelines/reduce.toml", registry, &sets)?;
+    let pipeline = Pipeline::parse_with(&text, HIDDEN, registry, &sets)?;
     console.result(mill(pipeline, console)?)
 }
 
 /// Writes a made-up scan and prints the closing table.
 pub(super) fn synth(arguments: &Synth, registry: &Registry, console: &Console) -> Result<()> {
     let sets = given([synth_flags(arguments), arguments.common.flags()]);
-    let pipeline = Pipeline::parse_with(SYNTH, "synth", registry, &sets)?;
+    let pipeline = Pipeline::parse_with(SYNTH, HIDDEN, registry, &sets)?;
     console.result(mill(pipeline, console)?)
 }
 

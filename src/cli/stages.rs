@@ -59,7 +59,7 @@ pub(super) fn stages(arguments: &Stages, registry: &Registry) -> Result<()> {
             _ => serde_json::to_string_pretty(&shown),
         };
         let failed = |e| Error::internal("the stages could not be written as JSON").because(e);
-        return print::result(json.map_err(failed)?);
+        return print::json(&json.map_err(failed)?);
     }
     let text: Vec<String> = shown.into_iter().map(text).collect();
     print::result(text.join("\n"))

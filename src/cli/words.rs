@@ -50,6 +50,7 @@ impl Words {
             Command::Convert(convert) => convert::flags(convert, None, None),
             Command::Synth(synth) => run::synth_flags(synth),
             Command::Info(_) | Command::Stages(_) => Vec::new(),
+            Command::Completions(_) | Command::Man(_) => Vec::new(),
         };
         let common = command.common().map(|common| common.flags()).unwrap_or_default();
         let flags = flags.into_iter().chain(common).map(|flag| (flag.address, flag.name));

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::node::Place;
+use crate::error::is_control;
 use crate::{Error, ErrorKind};
 
 /// Mistakes that are told in full; a file with more of them is not a pipeline.
@@ -14,7 +15,7 @@ const WIDEST: usize = 160;
 /// One of the texts that make up a pipeline.
 #[derive(Debug, Clone)]
 pub(super) struct SourceText {
-    /// The file's name, or the argument's (`--set`).
+    /// The file's name, or the argument's (`--set`); empty for a text that the user does not know.
     pub origin: String,
     /// What it says.
     pub text: String,
@@ -30,7 +31,10 @@ impl SourceText {
         let key = setting.rsplit('.').next().unwrap_or(setting);
         let told = |name: &str| message.strip_prefix(&format!("`{name}`"));
         match told(setting).or_else(|| told(key)) {
-            Some(rest) => rest.trim_start_matches(':').trim_start(),
+            Some(rest) => {
+                let rest = rest.trim_start_matches(':').trim_start();
+                rest.strip_prefix(key).and_then(|rest| rest.strip_prefix(' ')).unwrap_or(rest)
+            }
             None => message,
         }
     }
@@ -101,10 +105,19 @@ impl Mistake {
         } else {
             (source.origin.clone(), String::new())
         };
-        let shown: String = line.chars().take(WIDEST).collect();
+        // One character each, so that the carets stay below what they mean.
+        let plain = |c: char| if c != '\t' && is_control(c) { '\u{fffd}' } else { c };
+        let shown: String = line.chars().take(WIDEST).map(plain).collect();
         let pad: String = before.chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
         let carets = text[start..end].chars().count().max(1);
-        let mut out = format!("{place}: {}", source.shortened(&self.message));
+        let message = source.shortened(&self.message);
+        if source.origin.is_empty() {
+            // The user knows no such text: its places would say nothing.
+            let note =
+                if self.note.is_empty() { String::new() } else { format!("\n  = {}", self.note) };
+            return format!("{message}{note}");
+        }
+        let mut out = format!("{place}: {message}");
         let blank = " ".repeat(gutter.len());
         if pad.chars().count() + carets <= WIDEST {
             let carets = "^".repeat(carets);
@@ -158,7 +171,7 @@ pub(super) fn advice<S: AsRef<str>>(
 
 /// The valid word that a misspelt one was meant to be, if one is near: two letters in five wrong
 /// at most, the first in the list among equals.
-fn nearest<'a>(word: &str, valid: &'a [String]) -> Option<&'a String> {
+pub(crate) fn nearest<'a>(word: &str, valid: &'a [String]) -> Option<&'a String> {
     let near = valid.iter().map(|v| (distance(word, v), v)).min_by_key(|(d, _)| *d)?;
     let letters = word.chars().count().max(near.1.chars().count());
     (near.0 <= (2 * letters / 5).max(1) && near.0 < letters).then_some(near.1)

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use crate::budget::Bytes;
+use crate::error::shown;
 use crate::tile::{Folder, lock};
 use crate::{Error, Result};
 
@@ -184,7 +185,7 @@ pub fn memory_warning(folder: &Path, spilled: u64) -> Option<String> {
     Some(format!(
         "{}: {} were spilled to a file system in memory ({name}), beyond the budget of the run: name a \
          folder on a disk with `run.scratch`",
-        folder.display(),
+        shown(&folder),
         Bytes(spilled)
     ))
 }
