@@ -212,8 +212,15 @@ pub(super) struct Reduce {
     pub mark: Option<String>,
     /// Reduce the points of these classes alone, such as 2,6; all others stay, and are not seen as
     /// neighbours
-    #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_class)]
     pub classes: Vec<u8>,
+    /// Points of classes 7 and 18, which are noise: drop them, keep them as points like all others, or
+    /// ignore them and write them as they are [default: drop; ignore with --mark; keep where --classes
+    /// or --keep-classes names one of them]
+    #[arg(long, value_name = "HOW")]
+    pub noise: Option<String>,
+    #[command(flatten)]
+    pub filter: Filtered,
     /// Points with the withheld flag: drop them, keep them as points like all others, or ignore them
     /// and write them as they are [default: drop]
     #[arg(long, value_name = "HOW")]
@@ -230,6 +237,22 @@ pub(super) struct Reduce {
     pub written: Written,
     #[command(flatten)]
     pub common: Common,
+}
+
+/// Which points are left out as they are read.
+#[derive(Debug, Args)]
+pub(super) struct Filtered {
+    /// Keep the points of these classes alone, such as 2,6
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_class)]
+    pub keep_classes: Vec<u8>,
+    /// Leave the points of these classes out, such as 7,18
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_class)]
+    pub drop_classes: Vec<u8>,
+}
+
+fn parse_class(text: &str) -> Result<u8, String> {
+    let told = |_| format!("`{text}` is no class: classes are numbers from 0 to 255, such as 2,6");
+    text.trim().parse().map_err(told)
 }
 
 /// How the output is written.
@@ -261,6 +284,8 @@ pub(super) struct Convert {
     /// Format: las, laz or ply [default: by extension; in a folder, the input's]
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
+    #[command(flatten)]
+    pub filter: Filtered,
     #[command(flatten)]
     pub written: Written,
     #[command(flatten)]

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::arguments::Convert;
 use super::console::Console;
-use super::run::{given, mill, written};
+use super::run::{filtered, given, mill, with_stages, written};
 use crate::budget::Bytes;
 use crate::pipeline::{Done, Format, Pipeline, Registry, Watch, expand};
 use crate::report::Grouped;
@@ -119,8 +119,15 @@ fn pipeline(
         ("-o", "write.path", Some(output)),
         ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
     ]);
-    let sets = [stages, written(&arguments.written), arguments.common.sets()?].concat();
-    Pipeline::parse_with(CONVERT, "pipelines/convert.toml", registry, &sets)
+    let (filtered, written) = (filtered(&arguments.filter), written(&arguments.written));
+    let sets = [stages, filtered, written, arguments.common.sets()?].concat();
+    let filter = arguments.filter.is_given().then_some("filter");
+    Pipeline::parse_with(
+        &with_stages(CONVERT, filter.into_iter()),
+        "pipelines/convert.toml",
+        registry,
+        &sets,
+    )
 }
 
 /// The output in `folder` of every input: its name, with the extension of the format that is asked

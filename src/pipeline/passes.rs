@@ -2,7 +2,7 @@
 //! where a stage must have seen all tiles before it decides.
 
 use super::limits::{Limits, Sees};
-use crate::point::{Mark, Schema};
+use crate::point::{Mark, Schema, names};
 use crate::stage::{Needs, ScanOp, TileOp};
 use crate::tile::{SELECTIONS, Sieve};
 use crate::{Error, Result};
@@ -55,6 +55,8 @@ pub(super) struct Pass {
     pub calls: Vec<Call>,
     /// How often the stages were applied before, where they are repeated.
     pub round: usize,
+    /// True if a stage reads the class of positions.
+    pub reads_classes: bool,
     /// Selections of the records that are seen as neighbours, and of those that are decided about.
     pub seen: u8,
     pub decided: u8,
@@ -104,7 +106,8 @@ impl Pass {
     /// What the pass sees, with what earlier passes stored.
     pub fn sieve(&self, stored: &Sieve) -> Sieve {
         let Pass { seen, decided, .. } = *self;
-        let mut sieve = Sieve { seen, decided, ..stored.clone() };
+        let classes = self.reads_classes;
+        let mut sieve = Sieve { classes, seen, decided, ..stored.clone() };
         if !self.loads_normals {
             sieve.normals = None;
         }
@@ -289,6 +292,7 @@ impl Layout<'_> {
             _ if self.schema.find(name).is_none() => {
                 return missing("the input has no such dimension");
             }
+            names::CLASSIFICATION => self.passes[at].reads_classes = true,
             _ => {}
         }
         Ok(())
