@@ -90,6 +90,11 @@ pub trait Transform: Send + Sync {
     /// What it reads and writes.
     fn needs(&self) -> Needs;
 
+    /// Refuses records of a schema that it cannot work on; called once, before any of them is read.
+    fn check(&self, _schema: &Schema) -> Result<()> {
+        Ok(())
+    }
+
     /// Called for every batch, from several threads at once. Points that it removes are entered in
     /// the ledger by the caller.
     fn apply(&self, batch: &mut PointBatch) -> Result<()>;

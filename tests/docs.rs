@@ -17,7 +17,7 @@ use docs_support::formats::{agree, documented};
 use docs_support::keys::{self, Default, Key};
 use docs_support::{Enum, Field, enum_of, item_docs, struct_of};
 use pointmill::ops::normals::Normals;
-use pointmill::ops::{Cells, Grid, Median, Outliers};
+use pointmill::ops::{Cells, Filter, Grid, Median, Outliers};
 use pointmill::pipeline::{
     LimitKeys, Overrides, Pipeline, Quiet, Read, Registry, RunSettings, StageKind, Synth, Write,
 };
@@ -79,6 +79,10 @@ fn pages() -> Vec<Page> {
             words: &["src/io/synthetic/mod.rs"],
             ..page::<Synth>(KINDS, "scene = 'als'\npoints = 1000")
         },
+        Page {
+            words: &["src/point/selection.rs"],
+            ..page::<Filter>("src/ops/filter.rs", "")
+        },
         page::<Outliers>("src/ops/outliers.rs", ""),
         Page { words: &["src/ops/normals/orient.rs"], ..page::<Normals>("src/ops/normals.rs", "") },
         Page { words: &["src/ops/cells/settings.rs"], ..page::<Cells>("src/ops/cells.rs", "") },
@@ -113,7 +117,8 @@ fn sort_of(subject: &str, field: &Field, files: &[String]) -> (String, Option<En
         (_, _, "[f64; 3]") => "three numbers",
         (_, _, "PathBuf") => "a path",
         (_, _, "Vec<u8>") => "a list of whole numbers to 255",
-        ("limits", _, "Vec<Flag>") => {
+        ("cells", "by", _) => "a list, empty or of `\"Classification\"`",
+        ("limits" | "filter", _, "Vec<Flag>") => {
             "a list of `\"withheld\"`, `\"overlap\"`, `\"synthetic\"`, `\"key-point\"`"
         }
         (_, _, "Vec<String>") => "a list of texts",
@@ -190,7 +195,7 @@ fn stage_page(page: &Page) -> (String, Value) {
         }
     };
     let said = keys_said(page.kind, &fields, &files, default);
-    let on_tiles = !["read", "synth", "write"].contains(&page.kind);
+    let on_tiles = !["read", "synth", "filter", "write"].contains(&page.kind);
     let mut out = format!("# {}\n\n<!-- {SAYS_SO} -->\n\n{}\n\n{docs}\n", page.kind, page.about);
     out += "\n## Keys\n\n";
     match said.is_empty() {
@@ -236,13 +241,18 @@ fn run_page() -> (String, Value) {
     let (docs, fields) = struct_of(&text, "RunSettings");
     assert!(fields.len() >= 8, "fields were not read");
     let default = |field: &Field, words: Option<&Enum>| match (words, &field.kind) {
-        (Some(words), _) => {
+        (Some(words), kind) if !kind.starts_with("Option<") => {
             let word = words.default.as_ref().expect("an enum of settings has a default");
             let set: RunSettings = toml::from_str(&format!("{} = '{word}'", field.name)).unwrap();
             assert_eq!(set, RunSettings::default(), "{} = {word}", field.name);
             Default::Is(word.as_str().into())
         }
-        (None, kind) => {
+        (words, kind) => {
+            for (word, _) in words.iter().flat_map(|words| &words.words) {
+                let set: Result<RunSettings, _> =
+                    toml::from_str(&format!("{} = '{word}'", field.name));
+                assert!(set.is_ok_and(|set| set != RunSettings::default()), "{word} does nothing");
+            }
             assert!(kind.starts_with("Option<"), "{}: what is its default?", field.name);
             Default::None
         }

@@ -244,6 +244,13 @@ pub(super) struct Reduce {
     /// neighbours
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_class)]
     pub classes: Vec<u8>,
+    /// Points of classes 7 and 18, which are noise: drop them, keep them as points like all others, or
+    /// ignore them and write them as they are [default: drop; ignore with --mark; keep where --classes
+    /// or --keep-classes names one of them]
+    #[arg(long, value_name = "HOW")]
+    pub noise: Option<String>,
+    #[command(flatten)]
+    pub filter: Filtered,
     /// Points with the withheld flag: drop them, keep them as points like all others, or ignore them
     /// and write them as they are [default: drop]
     #[arg(long, value_name = "HOW")]
@@ -260,6 +267,17 @@ pub(super) struct Reduce {
     pub written: Written,
     #[command(flatten)]
     pub common: Common,
+}
+
+/// Which points are left out as they are read.
+#[derive(Debug, Args)]
+pub(super) struct Filtered {
+    /// Keep the points of these classes alone, such as 2,6
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_class)]
+    pub keep_classes: Vec<u8>,
+    /// Leave the points of these classes out, such as 7,18
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_class)]
+    pub drop_classes: Vec<u8>,
 }
 
 /// How the output is written.
@@ -297,6 +315,8 @@ pub(super) struct Convert {
     /// Format: las, laz or ply [default: by extension; in a folder, the input's]
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
+    #[command(flatten)]
+    pub filter: Filtered,
     #[command(flatten)]
     pub written: Written,
     #[command(flatten)]

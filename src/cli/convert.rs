@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::arguments::Convert;
 use super::console::Console;
-use super::run::{HIDDEN, given, mill, written};
+use super::run::{HIDDEN, filtered, given, mill, with_stages, written};
 use super::words::{self, Flag};
 use crate::budget::Bytes;
 use crate::error::shown;
@@ -118,6 +118,7 @@ pub(super) fn flags(
         ("-o", "write.path", output),
         ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
     ]);
+    all.extend(filtered(&arguments.filter));
     all.extend(written(&arguments.written));
     all
 }
@@ -129,7 +130,8 @@ fn pipeline(
     registry: &Registry,
 ) -> Result<Pipeline> {
     let sets = given([flags(arguments, Some(inputs), Some(output)), arguments.common.flags()]);
-    Pipeline::parse_with(CONVERT, HIDDEN, registry, &sets)
+    let filter = arguments.filter.is_given().then_some("filter");
+    Pipeline::parse_with(&with_stages(CONVERT, filter.into_iter()), HIDDEN, registry, &sets)
 }
 
 /// The output in `folder` of every input: its name, with the extension of the format that is asked

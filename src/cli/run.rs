@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::arguments::{Axes, Common, Reduce, Run, Synth, Written};
+use super::arguments::{Axes, Common, Filtered, Reduce, Run, Synth, Written};
 use super::console::Console;
 use super::words::{self, Flag, flags};
 use crate::Result;
@@ -33,7 +33,9 @@ pub(super) fn run(arguments: &Run, registry: &Registry, console: &Console) -> Re
 /// Runs `pipelines/reduce.toml` on other files and prints the closing table.
 pub(super) fn reduce(arguments: &Reduce, registry: &Registry, console: &Console) -> Result<()> {
     let sets = given([reduce_flags(arguments), arguments.common.flags()]);
-    let text = if arguments.outliers { with_outliers() } else { REDUCE.to_owned() };
+    let outliers = arguments.outliers.then_some("outliers");
+    let filter = arguments.filter.is_given().then_some("filter");
+    let text = with_stages(REDUCE, filter.into_iter().chain(outliers));
     let pipeline = Pipeline::parse_with(&text, HIDDEN, registry, &sets)?;
     console.result(mill(pipeline, console)?)
 }
@@ -71,11 +73,39 @@ pub(super) fn parse_sets(sets: &[String], common: &Common) -> Result<Vec<Set>> {
     Ok([sets, given([common.flags()])].concat())
 }
 
-/// The pipeline of `reduce` with a stage `outliers` behind the first, which reads.
-fn with_outliers() -> String {
+/// The pipeline `text` with stages of these kinds behind the first, which reads.
+pub(super) fn with_stages<'a>(text: &str, kinds: impl Iterator<Item = &'a str>) -> String {
     let stage = "[[stage]]\n";
-    let at = REDUCE.match_indices(stage).nth(1).map_or(REDUCE.len(), |(at, _)| at);
-    format!("{}{stage}kind = \"outliers\"\n\n{}", &REDUCE[..at], &REDUCE[at..])
+    let at = text.match_indices(stage).nth(1).map_or(text.len(), |(at, _)| at);
+    let stages: String = kinds.map(|kind| format!("{stage}kind = \"{kind}\"\n\n")).collect();
+    format!("{}{stages}{}", &text[..at], &text[at..])
+}
+
+impl Filtered {
+    /// True if any points are to be left out.
+    pub fn is_given(&self) -> bool {
+        !self.keep_classes.is_empty() || !self.drop_classes.is_empty()
+    }
+}
+
+/// Which points are left out, as the keys of `filter`.
+pub(super) fn filtered(arguments: &Filtered) -> Vec<Flag> {
+    let list = |classes: &[u8]| (!classes.is_empty()).then(|| json!(classes));
+    flags([
+        ("--keep-classes", "filter.keep_classes", list(&arguments.keep_classes)),
+        ("--drop-classes", "filter.drop_classes", list(&arguments.drop_classes)),
+    ])
+}
+
+/// What becomes of noise: left out, unless all points are to be written, or noise is asked for.
+fn noise(arguments: &Reduce) -> &str {
+    let asked = arguments.classes.iter().chain(&arguments.filter.keep_classes);
+    match &arguments.noise {
+        Some(noise) => noise,
+        None if asked.into_iter().any(|class| [7, 18].contains(class)) => "keep",
+        None if arguments.mark.is_some() => "ignore",
+        None => "drop",
+    }
 }
 
 /// The flags of `reduce`.
@@ -102,9 +132,11 @@ pub(super) fn reduce_flags(arguments: &Reduce) -> Vec<Flag> {
         ("--classes", "cells.classes", classes.clone()),
         ("--classes", "median.classes", classes),
         ("--withheld", "run.withheld", arguments.withheld.clone().map(Value::from)),
+        ("--noise", "run.noise", Some(json!(noise(arguments)))),
         ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(Value::from)),
         ("--z-scale", "run.z_scale", arguments.z_scale.as_deref().map(number_or_text)),
     ]);
+    all.extend(filtered(&arguments.filter));
     all.extend(written(&arguments.written));
     all
 }
@@ -154,11 +186,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn outliers_go_before_all_other_stages() {
-        let kinds: Vec<String> = with_outliers()
+    fn stages_of_arguments_go_before_all_other_stages() {
+        let kinds: Vec<String> = with_stages(REDUCE, ["filter", "outliers"].into_iter())
             .lines()
             .filter_map(|line| line.strip_prefix("kind = \"")?.split('"').next().map(str::to_owned))
             .collect();
-        assert_eq!(kinds, ["read", "outliers", "normals", "cells", "median", "write"]);
+        assert_eq!(kinds, ["read", "filter", "outliers", "normals", "cells", "median", "write"]);
     }
 }

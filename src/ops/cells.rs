@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use serde_json::Value;
 
 use crate::geom::angle::MaxAngle;
+use crate::point::names;
 use crate::report::Tally;
 use crate::stage::{Forecast, Needs, ScanFacts, TileOp};
 use crate::tile::{Cells as Partition, Levels, Tile};
@@ -25,7 +26,7 @@ use crate::{Error, Result};
 use division::{Counts, Division, Rule};
 use grouping::Grouping;
 use limit::Limit;
-pub use settings::{Measure, Reference, Side, Split};
+pub use settings::{By, Measure, Reference, Side, Split};
 pub use target::Keep;
 use threshold::Threshold;
 
@@ -96,6 +97,9 @@ pub struct Cells {
     /// Length in world units up to which no cell is divided.
     #[serde(deserialize_with = "settings::length")]
     pub min_spacing: Option<f64>,
+    /// What all positions of a cell have in common besides its cube: nothing, or ["Classification"]. A
+    /// position has the class of its first record in canonical order.
+    pub by: Vec<By>,
     /// How a cell is divided.
     pub split: Split,
     /// What the range of angles of a cell is.
@@ -135,6 +139,7 @@ impl Default for Cells {
             min_points: NonZeroUsize::MIN,
             max_side: None,
             min_spacing: None,
+            by: Vec::new(),
             split: Split::Voronoi,
             measure: Measure::Axis,
             reference: Reference::X,
@@ -148,13 +153,14 @@ impl Default for Cells {
 impl Serialize for Cells {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let max_angle = self.keep.is_none().then(|| self.max_angle());
-        let mut keys = serializer.serialize_struct("Cells", 9)?;
+        let mut keys = serializer.serialize_struct("Cells", 10)?;
         keys.serialize_field("side", &self.side)?;
         keys.serialize_field("max_angle", &self.max_angle.or(max_angle))?;
         keys.serialize_field("keep", &self.keep)?;
         keys.serialize_field("min_points", &self.min_points)?;
         keys.serialize_field("max_side", &self.max_side)?;
         keys.serialize_field("min_spacing", &self.min_spacing)?;
+        keys.serialize_field("by", &self.by)?;
         keys.serialize_field("split", &self.split)?;
         keys.serialize_field("measure", &self.measure)?;
         keys.serialize_field("reference", &self.reference)?;
@@ -168,8 +174,9 @@ impl TileOp for Cells {
             Some(settled) => settled.is_aligned(),
             None => self.side == Side::Auto,
         };
+        let class = self.by.contains(&By::Classification).then_some(names::CLASSIFICATION);
         Needs {
-            reads: vec!["Normal".into()],
+            reads: std::iter::once("Normal").chain(class).map(str::to_owned).collect(),
             writes: vec!["Cell".into()],
             cell_side: self.settled.map_or(0, |settled| settled.steps),
             cell_aligned: aligned,
@@ -318,7 +325,7 @@ impl Cells {
             Measure::Axis => self.reference.direction(),
             Measure::Cone => None,
         };
-        let crossing = Grouping { tile, side }.run(&mut cells);
+        let crossing = Grouping { tile, side, by_class: !self.by.is_empty() }.run(&mut cells);
         cells.turned.resize(cells.members.len(), false);
         Ok((cells, crossing))
     }

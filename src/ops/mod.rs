@@ -1,13 +1,15 @@
 //! The built-in stages that compute: one file each.
 
 mod cells;
+mod filter;
 mod grid;
 mod median;
 pub mod normals;
 pub mod outliers;
 mod removal;
 
-pub use cells::{Cells, Keep, Measure, Reference, Side, Split};
+pub use cells::{By, Cells, Keep, Measure, Reference, Side, Split};
+pub use filter::Filter;
 pub use grid::{Grid, Pick};
 pub use median::Median;
 pub use outliers::Outliers;

@@ -4,7 +4,7 @@ use super::kinds::{Read, Synth, Write};
 use super::registry::{Registry, StageKind, StagePlace};
 use crate::Result;
 use crate::ops::normals::Normals;
-use crate::ops::{Cells, Grid, Median, Outliers};
+use crate::ops::{Cells, Filter, Grid, Median, Outliers};
 use crate::stage::{Role, TileOp};
 
 impl Registry {
@@ -14,6 +14,7 @@ impl Registry {
             .with::<Read>()
             .with::<Synth>()
             .with::<Write>()
+            .with::<Filter>()
             .with::<Outliers>()
             .with::<Normals>()
             .with::<Cells>()
@@ -24,6 +25,16 @@ impl Registry {
 
 fn tile_op(stage: impl TileOp + 'static) -> Role {
     Role::TileOp(Box::new(stage))
+}
+
+impl StageKind for Filter {
+    const KIND: &'static str = "filter";
+    const ABOUT: &'static str = "Removes records by class and flags.";
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.check().map_err(|(key, error)| at.blame(key, error))?;
+        Ok(Role::Transform(Box::new(self)))
+    }
 }
 
 impl StageKind for Outliers {

@@ -88,7 +88,7 @@ impl ByInput {
         if !state.is_written() {
             return Ok(());
         }
-        let rank = entry.tag.input() as usize;
+        let rank = entry.tag.input(self.lists.len()) as usize;
         let list = self.lists.get_mut(rank).ok_or_else(|| {
             Error::internal(format!("a record of input {rank} came, which there is not"))
         })?;

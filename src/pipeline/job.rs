@@ -6,12 +6,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::Watch;
 use super::each::Each;
 use super::passes::{Pass, StageOp};
-use super::tagger::{ClassOf, Tagger};
+use super::tagger::{ClassOf, LEFT_OUT, Tagger};
 use crate::budget::Budget;
 use crate::geom::lattice::Misplaced;
 use crate::geom::simd::Simd;
 use crate::point::PointBatch;
-use crate::report::Tally;
+use crate::report::{Grouped, Tally};
 use crate::stage::{Part, Source, Transform};
 use crate::tile::{lock, parallel};
 use crate::{Error, ErrorKind, Result};
@@ -76,6 +76,23 @@ impl Job<'_> {
     pub fn warn(&self, message: String) {
         self.watch.warn(&message);
         lock(&self.warnings).push(message);
+    }
+
+    /// Says what the decode left out without being asked, and which stages have nothing to do.
+    pub fn tell_left_out(&self, tally: &Tally) {
+        for (reason, setting, which) in LEFT_OUT {
+            let key = (self.source_kind.clone(), reason);
+            if let Some(&points) = tally.removed.get(&key) {
+                let points = Grouped(points);
+                self.warn(format!(
+                    "points {which} are left out, {points} of them; `{setting} = \"keep\"` keeps \
+                     them, `{setting} = \"ignore\"` writes them as they are"
+                ));
+            }
+        }
+        if tally.work.get("placed").is_some_and(|&placed| placed > 0) {
+            self.tagger.warnings(tally.selections).into_iter().for_each(|told| self.warn(told));
+        }
     }
 
     /// Tells of progress, and hears whether to go on.

@@ -41,7 +41,8 @@ impl LimitKeys {
         classes.sort_unstable();
         with.sort_unstable();
         without.sort_unstable();
-        Limits { selection: Selection { classes, with, without }, sees }
+        let selection = Selection { classes, with, without, ..Selection::default() };
+        Limits { selection, sees }
     }
 }
 

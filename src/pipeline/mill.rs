@@ -1,6 +1,7 @@
 //! The mill: decode into the tile store, then pass after pass over the tiles, in canonical order into
 //! the sinks.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -36,6 +37,7 @@ pub(super) fn mill(
 ) -> Result<Finished> {
     clock.phase("decode", Some(job.source.points()));
     let (store, mut tally) = decode(job, lattice, shares, area)?;
+    job.tell_left_out(&tally);
     tally.work("runs", store.runs() as u64);
     clock.phase("merge", Some(tally.work.get("placed").copied().unwrap_or(0)));
     let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
@@ -228,6 +230,8 @@ struct Placed {
     tags: Vec<Tag>,
     /// Indices of records that do not go there.
     left_out: Vec<usize>,
+    /// How many of them the scan itself says are of no use, by reason.
+    useless: BTreeMap<&'static str, u64>,
 }
 
 /// Places a batch's records on the lattice and hands them to the intake.
@@ -241,21 +245,23 @@ fn take(
 ) -> Result<()> {
     let stride = batch.schema().stride;
     let records = batch.records();
-    let Placed { positions, tags, left_out } = placed;
+    let Placed { positions, tags, left_out, useless } = placed;
     positions.clear();
     tags.clear();
     left_out.clear();
-    let (mut misplaced, mut withheld) = (Vec::new(), 0);
+    useless.clear();
+    let mut misplaced = Vec::new();
     let tagger = &job.tagger;
     lattice.place(
         batch.schema(),
         records,
         |i, position| match tagger.look(&records[i * stride..(i + 1) * stride], batch.source) {
-            None => {
-                withheld += 1;
+            Err(reason) => {
+                *useless.entry(reason).or_default() += 1;
                 left_out.push(i);
             }
-            Some(tag) => {
+            Ok(tag) => {
+                tally.selections |= tag.selections();
                 positions.push(position);
                 tags.push(tag);
             }
@@ -270,7 +276,7 @@ fn take(
             return Err(job.misplaced(batch, i, why));
         }
     }
-    tally.remove(&job.source_kind, "withheld", withheld);
+    useless.iter().for_each(|(reason, &count)| tally.remove(&job.source_kind, reason, count));
     tally.work("placed", positions.len() as u64);
     left_out.sort_unstable();
     let (mut begin, mut at) = (0, 0);

@@ -56,6 +56,8 @@ pub(super) struct Pass {
     pub calls: Vec<Call>,
     /// How often the stages were applied before, where they are repeated.
     pub round: usize,
+    /// True if a stage reads the class of positions.
+    pub reads_classes: bool,
     /// Selections of the records that are seen as neighbours, and of those that are decided about.
     pub seen: u8,
     pub decided: u8,
@@ -105,7 +107,8 @@ impl Pass {
     /// What the pass sees, with what earlier passes stored.
     pub fn sieve(&self, stored: &Sieve) -> Sieve {
         let Pass { seen, decided, .. } = *self;
-        let mut sieve = Sieve { seen, decided, ..stored.clone() };
+        let classes = self.reads_classes;
+        let mut sieve = Sieve { classes, seen, decided, ..stored.clone() };
         if !self.loads_normals {
             sieve.normals = None;
         }
@@ -124,11 +127,8 @@ fn decides(needs: &Needs) -> bool {
 /// Refuses stages that are limited by a class or a flag that records of `schema` do not have.
 pub(super) fn check_limits(ops: &[StageOp], schema: &Schema) -> Result<()> {
     for StageOp { kind, written, limits, .. } in ops {
-        let flags = limits.selection.with.iter().map(|flag| ("with", flag.dimension()));
-        let class =
-            (!limits.selection.classes.is_empty()).then_some(("classes", names::CLASSIFICATION));
-        let missing = flags.chain(class).find(|(_, name)| schema.find(name).is_none());
-        if let Some((key, name)) = missing {
+        if let Some(name) = limits.selection.missing(schema) {
+            let key = if name == names::CLASSIFICATION { "classes" } else { "with" };
             let told =
                 format!("`{kind}.{key}` selects points by {name}, which the input does not have");
             return Err(written.wrong_key(key, told).help(format!("leave `{kind}.{key}` out")));
@@ -313,6 +313,7 @@ impl Layout<'_> {
             _ if self.schema.find(name).is_none() => {
                 return missing("the input has no such dimension");
             }
+            names::CLASSIFICATION => self.passes[at].reads_classes = true,
             _ => {}
         }
         Ok(())

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::each::{lists_bytes, paths, ranks};
 use super::passes::{Op, Pass, StageOp, Tap, check_limits, number_selections, unroll};
 use super::publish::check_place;
-use super::settings::{Nonfinite, Overrides, RunSettings, Withheld};
+use super::settings::{Nonfinite, Overrides, RunSettings};
 use super::shares::Demands;
 use super::tagger::Tagger;
 use super::text::{Pipeline, PlacedStage, resolved};
@@ -15,7 +15,7 @@ use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
 use crate::point::Schema;
 use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Role, Source, Transform};
-use crate::tile::TAGGED_INPUTS;
+use crate::tile::{CLASSED_INPUTS, TAGGED_INPUTS};
 use crate::{Error, ErrorKind, Result};
 
 /// A pipeline ready to run.
@@ -83,11 +83,17 @@ impl Pipeline {
         check_limits(&sorted.ops, schema)?;
         let selections = number_selections(&mut sorted.ops)?;
         let passes = unroll(&sorted.ops, schema, &taps)?;
-        let withheld = match sorted.ops.is_empty() {
-            true => Withheld::Keep,
-            false => settings.withheld,
-        };
-        let tagger = Tagger::new(schema, &selections, withheld, ranks.clone());
+        let classed = passes.iter().any(|pass| pass.reads_classes);
+        if classed && ranks.len() > CLASSED_INPUTS as usize {
+            let told = format!(
+                "more than {CLASSED_INPUTS} inputs cannot have an output each where a stage looks at classes"
+            );
+            return Err(Error::pipeline(told).help("run them in several parts"));
+        }
+        let mut tagger = Tagger::new(schema, &selections, classed, ranks.clone());
+        if !sorted.ops.is_empty() {
+            tagger.treat(schema, &settings);
+        }
         let mills = mills(&sorted.ops, &sinks)?;
         let z_scale = z_scale(&settings, &*source, &sorted.ops)?;
         let lattice = match mills || settings.nonfinite == Nonfinite::Drop {
@@ -260,6 +266,7 @@ fn check_transforms(transforms: &[(String, Box<dyn Transform>)], schema: &Schema
             let told = format!("`{kind}` needs {missing}, which nothing before it gives");
             return Err(Error::pipeline(told).help("the input has no such dimension"));
         }
+        transform.check(schema)?;
         written.extend(needs.writes);
     }
     Ok(())

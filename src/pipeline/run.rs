@@ -22,8 +22,8 @@ use super::tagger::ClassOf;
 use crate::budget::{Budget, Bytes};
 use crate::point::names;
 use crate::report::{
-    ClassFigures, Decision, FileFigures, LatticeFigures, Ledger, Machine, Outcome, PassFigures,
-    Report, RunFigures, Tally, check_written, peak_memory,
+    ClassFigures, Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome,
+    PassFigures, Removed, Report, RunFigures, Tally, check_written, peak_memory,
 };
 use crate::stage::{CreateSink, Input, SinkSummary, Source};
 use crate::tile::{SpillArea, lock};
@@ -155,6 +155,7 @@ impl Plan {
         let earlier = std::mem::take(&mut *lock(&job.warnings));
         drop(job);
         let mut run = self.figures(&finished, &budget, area.written());
+        run.warnings.extend(nothing_left(&finished));
         run.warnings.extend(memory_warning(spill.parent(), area.written()));
         run.warnings.iter().for_each(|warning| watch.warn(warning));
         run.warnings.splice(0..0, earlier);
@@ -282,6 +283,17 @@ impl Plan {
         };
         Ok((Report { result, run }, tiles))
     }
+}
+
+/// Says that an output is empty though its input was not, and what removed the points.
+fn nothing_left(finished: &Finished) -> Option<String> {
+    let ledger = Ledger::new(finished.read, finished.kept, &finished.tally);
+    if ledger.kept > 0 || ledger.read == 0 {
+        return None;
+    }
+    let by = |r: &Removed| format!("{} {} ({})", Grouped(r.records), r.reason, r.stage);
+    let by: Vec<String> = ledger.removed.iter().map(by).collect();
+    Some(format!("no point is left of {}: {}", Grouped(ledger.read), by.join(", ")))
 }
 
 /// Writes the report to `staged` and brings it to disk.

@@ -9,8 +9,8 @@ use crate::geom::simd::{self, Level};
 use crate::point::{Mismatch, Units};
 use crate::{Error, ErrorKind, Result};
 
-/// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`
-/// and `withheld` changes what is computed. All are optional; arguments of the same name take their
+/// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`,
+/// `withheld` and `noise` changes what is computed. All are optional; arguments of the same name take their
 /// place.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -38,7 +38,10 @@ pub struct RunSettings {
     pub nonfinite: Nonfinite,
     /// What becomes of points with the withheld flag, in pipelines that work on tiles; others keep
     /// every point.
-    pub withheld: Withheld,
+    pub withheld: Treatment,
+    /// What becomes of points of the classes 7 and 18, low and high noise, in pipelines that work on
+    /// tiles; none: they are points like all others. The command `reduce` leaves them out.
+    pub noise: Option<Treatment>,
     /// Most points a tile's cube holds, for tests; none: as the memory allows.
     pub tile_points: Option<NonZeroUsize>,
     /// Which of the equal code paths runs, for tests.
@@ -78,10 +81,10 @@ pub enum ZScale {
     Factor(f64),
 }
 
-/// What becomes of points with the withheld flag.
+/// What becomes of points that the scan itself says are of no use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Withheld {
+pub enum Treatment {
     /// They take no part and are removed, entered in the ledger as such.
     #[default]
     Drop,

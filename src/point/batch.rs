@@ -104,9 +104,11 @@ impl PointBatch {
         let mut kept = 0;
         for i in 0..self.len() {
             if keep(i, &self.records[i * stride..(i + 1) * stride]) {
-                self.records.copy_within(i * stride..(i + 1) * stride, kept * stride);
-                if let Some(normals) = &mut self.normals {
-                    normals[kept] = normals[i];
+                if kept < i {
+                    self.records.copy_within(i * stride..(i + 1) * stride, kept * stride);
+                    if let Some(normals) = &mut self.normals {
+                        normals[kept] = normals[i];
+                    }
                 }
                 kept += 1;
             }

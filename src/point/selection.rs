@@ -1,10 +1,15 @@
 //! Which records a stage is limited to, by class and flags, and what a stage writes into a record
 //! instead of removing it.
 
+use std::fmt;
+
 use serde::{Deserialize, Deserializer, Serialize, de};
 
 use super::names;
-use super::{Dimension, Endian, Schema, Value};
+use super::{Dimension, Endian, Layout, Schema, Value};
+
+/// The class of overlap points in point formats 0 to 5.
+const OVERLAP_CLASS: u8 = 12;
 
 /// One of the flags that LAS has for every record (LAS 1.4 R15, tables 8 and 16).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -30,6 +35,28 @@ impl Flag {
             Flag::KeyPoint => names::KEY_POINT,
         }
     }
+
+    /// The word that files and arguments have for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Flag::Withheld => "withheld",
+            Flag::Overlap => "overlap",
+            Flag::Synthetic => "synthetic",
+            Flag::KeyPoint => "key-point",
+        }
+    }
+
+    /// Where records of `schema` have it: in LAS point formats 0 to 5 overlap is the class 12 (LAS
+    /// 1.4 R15, table 9).
+    fn place(self, schema: &Schema) -> Option<FlagPlace> {
+        let field = schema.find(self.dimension()).cloned().map(FlagPlace::Field);
+        let as_class = || {
+            let is_old_las = self == Flag::Overlap && matches!(schema.layout, Layout::Las { .. });
+            let class = schema.find(names::CLASSIFICATION).filter(|_| is_old_las)?;
+            Some(FlagPlace::Class(class.clone(), OVERLAP_CLASS))
+        };
+        field.or_else(as_class)
+    }
 }
 
 /// Records by class and flags; by default all of them.
@@ -38,6 +65,8 @@ impl Flag {
 pub struct Selection {
     /// Classes of the records; none: whatever their class.
     pub classes: Vec<u8>,
+    /// Classes that records must not have.
+    pub not_classes: Vec<u8>,
     /// Flags that must be set.
     pub with: Vec<Flag>,
     /// Flags that must not be set.
@@ -47,26 +76,54 @@ pub struct Selection {
 impl Selection {
     /// True if it leaves no record out.
     pub fn is_all(&self) -> bool {
-        self.classes.is_empty() && self.with.is_empty() && self.without.is_empty()
+        *self == Selection::default()
     }
 
-    /// Dimensions that it reads.
-    pub fn reads(&self) -> Vec<&'static str> {
-        let flags = self.with.iter().chain(&self.without).map(|flag| flag.dimension());
+    /// What it asks for and records of `schema` do not have, so that it would hold none of them.
+    pub fn missing(&self, schema: &Schema) -> Option<&'static str> {
         let class = (!self.classes.is_empty()).then_some(names::CLASSIFICATION);
-        class.into_iter().chain(flags).collect()
+        let flags = self.with.iter().filter(|flag| flag.place(schema).is_none());
+        let class = class.filter(|name| schema.find(name).is_none());
+        class.into_iter().chain(flags.map(|flag| flag.dimension())).next()
+    }
+
+    /// Flags that must not be set and that records of `schema` do not have: they leave none out.
+    pub fn idle(&self, schema: &Schema) -> Vec<Flag> {
+        self.without.iter().copied().filter(|flag| flag.place(schema).is_none()).collect()
     }
 
     /// The dimensions to look at in records of `schema`. One that they do not have counts as 0.
     pub fn of(&self, schema: &Schema) -> Chooser {
-        let flag = |is_set| move |flag: &Flag| (schema.find(flag.dimension()).cloned(), is_set);
+        let flag = |is_set| move |flag: &Flag| (flag.place(schema), is_set);
         let flags = self.with.iter().map(flag(true)).chain(self.without.iter().map(flag(false)));
+        let by_class = !(self.classes.is_empty() && self.not_classes.is_empty());
+        let mut classes = [self.classes.is_empty(); 256];
+        self.classes.iter().for_each(|&class| classes[usize::from(class)] = true);
+        self.not_classes.iter().for_each(|&class| classes[usize::from(class)] = false);
         Chooser {
             endian: schema.endian,
-            class: schema.find(names::CLASSIFICATION).cloned(),
-            classes: self.classes.clone(),
+            class: schema.find(names::CLASSIFICATION).filter(|_| by_class).cloned(),
+            any_class: self.classes.is_empty(),
+            classes: Box::new(classes),
             flags: flags.collect(),
         }
+    }
+}
+
+/// In words that complete "points": `of class 2 or 6, with the flag overlap`.
+impl fmt::Display for Selection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let numbers = |classes: &[u8]| classes.iter().map(u8::to_string).collect::<Vec<_>>();
+        let flags = |flags: &[Flag]| flags.iter().map(|flag| flag.name()).collect::<Vec<_>>();
+        let parts = [
+            ("of class", numbers(&self.classes).join(" or ")),
+            ("not of class", numbers(&self.not_classes).join(" or ")),
+            ("with the flag", flags(&self.with).join(" and ")),
+            ("without the flag", flags(&self.without).join(" or ")),
+        ];
+        let said = parts.iter().filter(|(_, list)| !list.is_empty());
+        let said: Vec<String> = said.map(|(what, list)| format!("{what} {list}")).collect();
+        f.write_str(&said.join(", "))
     }
 }
 
@@ -75,23 +132,54 @@ impl Selection {
 pub struct Chooser {
     endian: Endian,
     class: Option<Dimension>,
-    classes: Vec<u8>,
-    /// Fields of flags, and whether they are to be set.
-    flags: Vec<(Option<Dimension>, bool)>,
+    /// True if a class that is no whole number up to 255 will do.
+    any_class: bool,
+    /// For each class whether it will do.
+    classes: Box<[bool; 256]>,
+    /// Places of flags, and whether they are to be set.
+    flags: Vec<(Option<FlagPlace>, bool)>,
 }
 
 impl Chooser {
     /// True if the selection holds `record`.
     pub fn holds(&self, record: &[u8]) -> bool {
-        let value = |field: &Option<Dimension>| {
-            field.as_ref().map_or(0.0, |field| field.get(record, self.endian).as_f64())
-        };
-        let of_class = || {
-            let class = value(&self.class);
-            self.classes.iter().any(|&of| f64::from(of) == class)
-        };
-        (self.classes.is_empty() || of_class())
-            && self.flags.iter().all(|(field, is_set)| (value(field) != 0.0) == *is_set)
+        self.is_of_class(record)
+            && self.flags.iter().all(|(place, is_set)| {
+                place.as_ref().is_some_and(|place| place.is_set(record, self.endian)) == *is_set
+            })
+    }
+
+    fn is_of_class(&self, record: &[u8]) -> bool {
+        match self.class.as_ref().map(|field| field.get(record, self.endian)) {
+            None => self.classes[0],
+            Some(Value::Unsigned(class)) if class < 256 => self.classes[class as usize],
+            // A PLY property of that name may hold what is no class.
+            Some(other) => {
+                let class = other.as_f64();
+                let whole = (0.0..256.0).contains(&class) && class.fract() == 0.0;
+                if whole { self.classes[class as usize] } else { self.any_class }
+            }
+        }
+    }
+}
+
+/// Where a flag of a record is.
+#[derive(Debug, Clone)]
+enum FlagPlace {
+    /// A field of its own.
+    Field(Dimension),
+    /// Point formats 0 to 5 have no overlap flag, but a class for it.
+    Class(Dimension, u8),
+}
+
+impl FlagPlace {
+    fn is_set(&self, record: &[u8], endian: Endian) -> bool {
+        match self {
+            FlagPlace::Field(field) => field.get(record, endian).as_f64() != 0.0,
+            FlagPlace::Class(field, class) => {
+                field.get(record, endian).as_f64() == f64::from(*class)
+            }
+        }
     }
 }
 

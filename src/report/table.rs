@@ -6,6 +6,7 @@ use std::path::Path;
 use super::classes::class_name;
 use super::document::{Outcome, Report};
 use super::figures::{ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
+use super::ledger::{Ledger, Removed};
 use crate::budget::Bytes;
 use crate::error::shown;
 
@@ -27,6 +28,7 @@ impl fmt::Display for Table<'_> {
         let Report { result, run } = self.report;
         let (read, kept) = (result.ledger.read, result.ledger.kept);
         write!(f, "points     {} in, {} out{}", Grouped(read), Grouped(kept), Share(kept, read))?;
+        removed_line(f, &result.ledger)?;
         class_lines(f, &result.classes)?;
         for (name, &records) in &result.counts {
             if let Some(stage) = name.strip_suffix("_marked") {
@@ -62,6 +64,17 @@ impl fmt::Display for Table<'_> {
         }
         writeln!(f)
     }
+}
+
+/// What was removed for other reasons than that another point stands for it.
+fn removed_line(f: &mut fmt::Formatter<'_>, ledger: &Ledger) -> fmt::Result {
+    let others = |r: &&Removed| !["represented", "coincident"].contains(&r.reason.as_str());
+    for (i, Removed { stage, reason, records }) in ledger.removed.iter().filter(others).enumerate()
+    {
+        let before = if i == 0 { "\nleft out   " } else { ", " };
+        write!(f, "{before}{} {reason} ({stage})", Grouped(*records))?;
+    }
+    Ok(())
 }
 
 /// A line a class, unless none was reduced: then all say the same as the scan's.

@@ -13,6 +13,8 @@ pub struct Tally {
     pub work: BTreeMap<&'static str, u64>,
     /// Records removed, by stage kind and reason.
     pub removed: BTreeMap<(String, &'static str), u64>,
+    /// Selections that a record is in, a bit each.
+    pub selections: u8,
     /// Records by class; None where they have none.
     pub classes: Option<ClassCounts>,
 }
@@ -46,6 +48,7 @@ impl Tally {
         for (key, n) in &other.removed {
             *self.removed.entry(key.clone()).or_default() += n;
         }
+        self.selections |= other.selections;
         if let Some(classes) = &other.classes {
             self.classes.get_or_insert_default().merge(classes);
         }

@@ -85,7 +85,7 @@ impl Loader {
     /// Bytes that a loader holds for each position of its capacity, columns included.
     pub const BYTES_PER_POINT: usize = 24 + 4 + 12 + size_of::<Fate>() + 8;
     /// Bytes more where a sieve may hold records back, or columns are stored.
-    pub const SIEVE_BYTES_PER_POINT: usize = size_of::<Run>() + FATE_BYTES + FIGURE_BYTES + 1;
+    pub const SIEVE_BYTES_PER_POINT: usize = size_of::<Run>() + FATE_BYTES + FIGURE_BYTES + 2;
 
     /// A loader for tiles of up to `capacity` positions, rim included, as `sieve` lets them be seen.
     pub fn new(tiles: &Arc<SealedTiles>, sieve: &Sieve, capacity: usize) -> Self {
@@ -182,7 +182,7 @@ impl Loader {
         let first = self.tiles.block(b).first_position;
         let (positions, copies) = self.tiles.read(b, &mut self.reader)?;
         self.runs.read(&self.tiles, &self.sieve, b, copies)?;
-        let Sieve { seen, decided, .. } = self.sieve;
+        let Sieve { seen, decided, classes, .. } = self.sieve;
         let (tile, core) = (&mut self.tile, &mut self.core);
         let mut places = Vec::with_capacity(positions.len());
         let mut in_core = 0..0;
@@ -205,8 +205,13 @@ impl Loader {
             if is_seen {
                 let alive = runs.iter().filter(|run| run.is_alive());
                 tile.selections.push(alive.fold(0, |of, run| of | run.tag.selections()));
-                let decided = runs.iter().filter(|run| run.is_in(decided));
-                tile.copies.push(decided.map(|run| run.count).sum());
+                let decided = || runs.iter().filter(|run| run.is_in(decided));
+                tile.copies.push(decided().map(|run| run.count).sum());
+                if classes {
+                    let seen = runs.iter().filter(|run| run.is_in(seen));
+                    let first = decided().chain(seen).next();
+                    tile.classes.push(first.map_or(0, |run| run.tag.class()));
+                }
                 tile.positions.push(p);
                 tile.core.end += usize::from(is_core);
                 places.push(j);

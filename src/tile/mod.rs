@@ -30,8 +30,8 @@ pub use pieces::{PIECE, Pieces};
 pub use remote::Remote;
 pub use sealed::{Fetch, Reader, SealedTiles, index_bytes};
 pub use sieve::{
-    ASIDE, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, Run, SELECTIONS, Sieve, State, TAGGED_INPUTS,
-    Tag,
+    ASIDE, CLASSED_INPUTS, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, Run, SELECTIONS, Sieve, State,
+    TAGGED_INPUTS, Tag,
 };
 pub use spill::{Address, Folder, Spill, SpillArea, lock};
 
@@ -92,6 +92,10 @@ pub struct Tile {
     pub normals: Vec<[f32; 3]>,
     /// True if the signs of normals mean something: a stage turned them to a side.
     pub oriented: bool,
+    /// For each position the class of the first of its records that are decided about, in canonical
+    /// order (of those that are seen, where none is decided about); empty unless a stage of the pass
+    /// reads "Classification".
+    pub classes: Vec<u8>,
     /// What a first phase found for each position of the core; NaN where it found nothing.
     pub figures: Vec<f64>,
     /// The partition into cells, once a stage made one.
@@ -118,6 +122,7 @@ impl Tile {
             core: 0..0,
             normals: Vec::with_capacity(capacity),
             oriented: false,
+            classes: Vec::new(),
             figures: Vec::new(),
             cells: Cells::default(),
             fates: Vec::with_capacity(capacity),
@@ -140,6 +145,7 @@ impl Tile {
             core: 0..n,
             normals: vec![[f32::NAN; 3]; n],
             oriented: false,
+            classes: Vec::new(),
             figures: vec![f64::NAN; n],
             cells: Cells::default(),
             fates: vec![Fate::Kept; n],
@@ -156,6 +162,7 @@ impl Tile {
         self.copies.clear();
         self.normals.clear();
         self.oriented = false;
+        self.classes.clear();
         self.figures.clear();
         self.cells.clear();
         self.fates.clear();

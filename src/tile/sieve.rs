@@ -13,13 +13,18 @@ pub const SELECTIONS: u32 = 7;
 /// Set in the selections of a record that takes no part in any pass and is written as it is.
 pub const ASIDE: u8 = 1 << SELECTIONS;
 
-/// What accompanies a record from the decode on: the selections that it is in, a bit each, and the
-/// number of its input.
+/// What accompanies a record from the decode on: the selections that it is in, a bit each, its class
+/// where a stage reads it, and the number of its input.
+///
+/// From the lowest bit: 16 bits of the input's number, 8 bits of the class or, in runs that need no
+/// classes, more of the input's number, and 8 bits of selections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct Tag(pub u32);
 
 /// Inputs that a tag can tell apart.
 pub const TAGGED_INPUTS: u32 = 1 << 24;
+/// Inputs that a tag can tell apart if it holds a class too.
+pub const CLASSED_INPUTS: u32 = 1 << 16;
 
 impl Tag {
     /// A tag of selections and the number of an input.
@@ -32,9 +37,22 @@ impl Tag {
         (self.0 >> 24) as u8
     }
 
-    /// The number of the input.
-    pub fn input(self) -> u32 {
-        self.0 & (TAGGED_INPUTS - 1)
+    /// The same tag with the class of the record; the number of its input is below
+    /// [`CLASSED_INPUTS`].
+    #[must_use]
+    pub fn of_class(self, class: u8) -> Tag {
+        Tag(self.0 & !(0xff << 16) | u32::from(class) << 16)
+    }
+
+    /// The class of the record, in runs that need classes.
+    pub fn class(self) -> u8 {
+        (self.0 >> 16) as u8
+    }
+
+    /// The number of the input, one of so many.
+    pub fn input(self, inputs: usize) -> u32 {
+        let short = inputs <= CLASSED_INPUTS as usize;
+        self.0 & (if short { CLASSED_INPUTS } else { TAGGED_INPUTS } - 1)
     }
 }
 
@@ -103,6 +121,8 @@ pub struct Sieve {
     pub oriented: bool,
     /// A figure for every position.
     pub figures: Option<Arc<Pieces>>,
+    /// True if stages look at the class of positions.
+    pub classes: bool,
     /// Selections that a record must be in to be seen as a neighbour.
     pub seen: u8,
     /// Selections that a record must be in to be decided about.

@@ -13,6 +13,8 @@ const PACKED_CELLS: i64 = 1 << 21;
 pub(super) struct Grouping<'a> {
     pub(super) tile: &'a Tile,
     pub(super) side: i64,
+    /// True if positions of different classes are in different cells.
+    pub(super) by_class: bool,
 }
 
 impl Grouping<'_> {
@@ -118,10 +120,27 @@ impl Grouping<'_> {
         }
     }
 
-    /// Ends the group of the members since the last one, or drops them if none is in the core.
-    /// Returns 1 if only some are.
+    /// Ends the group of the members since the last one, or a group of each of their classes where
+    /// classes are told apart. Returns how many have positions on both sides of a face of the tile.
     fn close(&self, cells: &mut Partition) -> u64 {
         let start = cells.ends.last().map_or(0, |&end| end as usize);
+        if !self.by_class {
+            return self.close_one(cells, start);
+        }
+        let class = |&i: &u32| self.tile.classes.get(i as usize).copied().unwrap_or_default();
+        cells.members[start..].sort_by_key(class);
+        let mixed = cells.members.split_off(start);
+        let one = |group: &[u32]| {
+            let start = cells.members.len();
+            cells.members.extend_from_slice(group);
+            self.close_one(cells, start)
+        };
+        mixed.chunk_by(|a, b| class(a) == class(b)).map(one).sum()
+    }
+
+    /// Ends the group of the members from `start` on, or drops them if none is in the core. Returns 1
+    /// if only some are.
+    fn close_one(&self, cells: &mut Partition, start: usize) -> u64 {
         let group = &cells.members[start..];
         let before = group.partition_point(|&i| (i as usize) < self.tile.core.start);
         let core = group[before..].partition_point(|&i| (i as usize) < self.tile.core.end);
@@ -151,7 +170,7 @@ mod tests {
             tile.normals[5] = [f32::NAN; 3];
             (tile.selections, tile.limits) = (vec![3, 1, 2, 0, 3, 3], 2);
             let mut cells = Partition::default();
-            Grouping { tile: &tile, side }.run(&mut cells);
+            Grouping { tile: &tile, side, by_class: false }.run(&mut cells);
             assert_eq!((cells.members, cells.ends), (vec![0, 2, 4], vec![3]), "side {side}");
         }
     }

@@ -29,6 +29,13 @@ pub enum Split {
     Octant,
 }
 
+/// What the positions of a cell have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum By {
+    /// Their class: no cell has positions of two, so that a reduction leaves points of each.
+    Classification,
+}
+
 /// What the range of angles of a cell is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

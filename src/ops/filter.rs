@@ -1,0 +1,96 @@
+//! The stage `filter`: records of some classes or flags stay, all others go. Knows no neighbours.
+
+use serde::{Deserialize, Serialize};
+
+use crate::point::{Flag, PointBatch, Schema, Selection};
+use crate::stage::{Needs, Transform};
+use crate::{Error, Result};
+
+/// Keeps the records of some classes and flags, and removes all others as they are decoded.
+///
+/// A record stays if its class is among `keep_classes` (where any are given) and not among
+/// `drop_classes`, and if it has all of `keep_flags` and none of `drop_flags`. A scan without classes
+/// has nothing of a class to drop; to keep some of its classes is an error. Point formats 0 to 5 have no
+/// overlap flag: there the flag `overlap` is class 12.
+///
+/// It stands between the source and the stages that work on tiles, so they neither see nor count what
+/// it removes. To limit one stage to some records and let the others pass, give that stage `classes`,
+/// `with` or `without` instead.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Filter {
+    /// Classes that stay, as their number (2 is ground); none: all.
+    pub keep_classes: Vec<u8>,
+    /// Classes that go, such as 7 and 18, which are noise.
+    pub drop_classes: Vec<u8>,
+    /// Flags that a record must have to stay.
+    pub keep_flags: Vec<Flag>,
+    /// Flags that a record must not have to stay.
+    pub drop_flags: Vec<Flag>,
+}
+
+impl Filter {
+    /// Refuses a filter that says nothing, or of one class or flag both; names the key.
+    pub(crate) fn check(&self) -> Result<(), (&'static str, Error)> {
+        let Filter { keep_classes, drop_classes, keep_flags, drop_flags } = self;
+        if let Some(class) = drop_classes.iter().find(|class| keep_classes.contains(class)) {
+            let told = format!("class {class} is both kept and dropped");
+            return Err(("drop_classes", Error::pipeline(told)));
+        }
+        if let Some(flag) = drop_flags.iter().find(|flag| keep_flags.contains(flag)) {
+            let told = format!("records with the flag {} are both kept and dropped", flag.name());
+            return Err(("drop_flags", Error::pipeline(told)));
+        }
+        Ok(())
+    }
+
+    /// The records that stay.
+    fn selection(&self) -> Selection {
+        Selection {
+            classes: self.keep_classes.clone(),
+            not_classes: self.drop_classes.clone(),
+            with: self.keep_flags.clone(),
+            without: self.drop_flags.clone(),
+        }
+    }
+}
+
+impl Transform for Filter {
+    fn needs(&self) -> Needs {
+        Needs { removes: true, ..Needs::default() }
+    }
+
+    fn check(&self, schema: &Schema) -> Result<()> {
+        let Some(missing) = self.selection().missing(schema) else { return Ok(()) };
+        Err(Error::pipeline(format!("`filter` keeps by {missing}, which the input does not have"))
+            .help("leave out `filter.keep_classes`, and the flag in `filter.keep_flags`"))
+    }
+
+    fn apply(&self, batch: &mut PointBatch) -> Result<()> {
+        let selection = self.selection();
+        if !selection.is_all() {
+            let chooser = selection.of(batch.schema());
+            batch.retain(|_, record| chooser.holds(record));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_class_or_flag_that_is_both_kept_and_dropped_is_refused() {
+        let filter = |text: &str| toml::from_str::<Filter>(text).unwrap();
+        let told = filter("keep_classes = [2, 6]\ndrop_classes = [7, 6]").check().unwrap_err();
+        assert_eq!(
+            (told.0, told.1.to_string().as_str()),
+            ("drop_classes", "class 6 is both kept and dropped")
+        );
+        let told =
+            filter("keep_flags = ['overlap']\ndrop_flags = ['overlap']").check().unwrap_err();
+        assert_eq!(told.0, "drop_flags");
+        assert!(filter("keep_classes = [2]\ndrop_flags = ['withheld']").check().is_ok());
+    }
+}
