@@ -294,7 +294,11 @@ fn write_report(staged: &Path, report: &Report, tiles: &Option<Lines>) -> Result
         }
         out.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()
     };
-    write().map_err(|e| Error::io(staged, "write the report", e))
+    // Lines that the spill cannot give back are its error, about its file.
+    write().map_err(|e| match e.downcast::<Error>() {
+        Ok(error) => error,
+        Err(e) => Error::io(staged, "write the report", e),
+    })
 }
 
 fn input_figures(source: &dyn Source) -> Vec<FileFigures> {
