@@ -7,7 +7,7 @@ mod run_support;
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::os::unix::fs::FileExt;
+use std::os::unix::fs::{FileExt, PermissionsExt};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -61,6 +61,9 @@ impl<'a> Flipper<'a> {
     }
 
     fn flip(&self, path: &Path) {
+        for (path, mode) in [(path, 0o600), (path.parent().unwrap(), 0o700)] {
+            assert_eq!(fs::metadata(path).unwrap().permissions().mode() & 0o777, mode);
+        }
         let file = File::options().read(true).write(true).open(path).unwrap();
         let mut byte = [0];
         for at in (0..file.metadata().unwrap().len()).step_by(100) {

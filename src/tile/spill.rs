@@ -3,7 +3,7 @@
 //! checksum of what was written, so that a disk that damages data fails a run and changes no output.
 
 use std::fs::File;
-use std::os::unix::fs::FileExt;
+use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard};
@@ -254,6 +254,7 @@ impl ScratchFile {
             .read(true)
             .write(true)
             .create_new(true)
+            .mode(0o600)
             .open(&path)
             .map_err(|e| Error::io(&path, "create a scratch file", e))?;
         Ok(ScratchFile { file, path, end: AtomicU64::new(0), writers: AtomicUsize::new(0) })
