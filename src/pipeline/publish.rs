@@ -26,10 +26,12 @@ impl Staged {
     pub fn beside(path: &Path, existing: Existing, trouble: &Trouble) -> Result<Self> {
         check_place(path, existing)?;
         let scratch = Arc::new(Scratch::below(&folder_of(path), trouble));
-        let file = scratch.path("output").map_err(|error| {
-            error.help(
+        let file = scratch.path("output").map_err(|error| match error.path() {
+            // The folder itself refuses; other failures have their own remedies.
+            Some(refusing) if refusing == scratch.parent() => error.help(
                 "make the folder writable, or write to another: a file grows beside its place",
-            )
+            ),
+            _ => error,
         })?;
         Ok(Staged { path: path.to_owned(), file, scratch, existing })
     }

@@ -20,10 +20,7 @@ use rustix::io::Errno;
 use crate::budget::Bytes;
 use crate::tile::{Folder, lock};
 use crate::{Error, Result};
-use stale::{Host, is_at, open_folder, remove, remove_stale};
-
-const PREFIX: &str = ".pointmill-";
-const MARKER: &str = "pointmill-scratch.json";
+use stale::{Host, MARKER, is_at, open_folder, remove, remove_stale};
 
 /// What went wrong with scratch and fails no run: told when the run is over.
 pub type Trouble = Arc<Mutex<Vec<String>>>;
@@ -175,6 +172,7 @@ pub fn memory_warning(folder: &Path, spilled: u64) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::stale::PREFIX;
     use super::*;
 
     fn scratch_folders(parent: &Path) -> usize {

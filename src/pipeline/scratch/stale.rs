@@ -12,7 +12,10 @@ use rustix::fs::{AtFlags, CWD, Dir, FileType, Mode, OFlags, fstat, openat, stata
 use rustix::io::Errno;
 use rustix::path::Arg;
 
-use super::{MARKER, PREFIX};
+/// How the names of scratch folders begin.
+pub(super) const PREFIX: &str = ".pointmill-";
+/// The file that tells such a folder from others.
+pub(super) const MARKER: &str = "pointmill-scratch.json";
 
 /// The machine, as far as it tells whether a lock of another run would be seen here.
 #[derive(Debug)]
