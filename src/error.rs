@@ -95,9 +95,14 @@ impl Error {
         use std::io::ErrorKind::{FileTooLarge, NotFound, QuotaExceeded, StorageFull};
         let path = path.as_ref();
         let help = match cause.kind() {
-            FileTooLarge | QuotaExceeded | StorageFull => {
+            QuotaExceeded | StorageFull => {
                 Some("free some disk space, or write elsewhere".to_owned())
             }
+            FileTooLarge => Some(
+                "the file would be larger than the file system or a limit of the shell (`ulimit -f`) \
+                 allows: raise the limit, or write elsewhere"
+                    .to_owned(),
+            ),
             NotFound => whereabouts(path),
             _ => None,
         };

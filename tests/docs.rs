@@ -79,10 +79,7 @@ fn pages() -> Vec<Page> {
             words: &["src/io/synthetic/mod.rs"],
             ..page::<Synth>(KINDS, "scene = 'als'\npoints = 1000")
         },
-        Page {
-            words: &["src/point/selection.rs"],
-            ..page::<Filter>("src/ops/filter.rs", "")
-        },
+        Page { words: &["src/point/selection.rs"], ..page::<Filter>("src/ops/filter.rs", "") },
         page::<Outliers>("src/ops/outliers.rs", ""),
         Page { words: &["src/ops/normals/orient.rs"], ..page::<Normals>("src/ops/normals.rs", "") },
         Page { words: &["src/ops/cells/settings.rs"], ..page::<Cells>("src/ops/cells.rs", "") },

@@ -1,6 +1,6 @@
 //! Runs that are killed or asked to stop: no output under its name, and no scratch that stays.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
+#![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
 
 mod scans_support;
 

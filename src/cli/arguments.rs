@@ -95,16 +95,21 @@ pub(super) struct Common {
     /// Write the report to this file
     #[arg(long, value_name = "FILE")]
     pub report: Option<String>,
+    /// Replace no file: refuse the run, with exit code 1, if an output or the report exists
+    #[arg(long)]
+    pub no_clobber: bool,
 }
 
 impl Common {
     /// The flags that stand for `[run]` settings.
     pub fn flags(&self) -> Vec<Flag> {
+        let existing = self.no_clobber.then(|| Value::from("refuse"));
         flags([
             ("--memory", "run.memory", self.memory.map(Value::from)),
             ("--threads", "run.threads", self.threads.map(|n| n.get().into())),
             ("--scratch", "run.scratch", self.scratch.clone().map(Value::from)),
             ("--report", "run.report", self.report.clone().map(Value::from)),
+            ("--no-clobber", "run.existing", existing),
         ])
     }
 }

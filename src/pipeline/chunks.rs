@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::each::ByInput;
 use super::product::{Entry, Product};
 use crate::Result;
-use crate::tile::{Address, PIECE, Pieces, Spill, SpillArea, State};
+use crate::tile::{PIECE, Pieces, Spill, SpillArea, State, Stretch};
 
 /// Records that become one chunk of an output, as a product has them: a position with a million
 /// copies is one entry of each chunk that it fills.
@@ -53,10 +53,10 @@ struct Column {
 }
 
 impl Column {
-    fn new(area: &Arc<SpillArea>, name: &'static str, item: usize, items: u64) -> Self {
+    fn new(area: &Arc<SpillArea>, name: &'static str, item: usize, items: u64) -> Result<Self> {
         let pieces = Arc::new(Pieces::new(area, name, item));
-        pieces.reserve(items);
-        Column { pieces, item, open: Vec::with_capacity(PIECE * item), stored: 0 }
+        pieces.reserve(items)?;
+        Ok(Column { pieces, item, open: Vec::with_capacity(PIECE * item), stored: 0 })
     }
 
     fn add(&mut self, mut bytes: &[u8]) -> Result<()> {
@@ -112,7 +112,7 @@ pub(super) struct Stored {
 /// What a first phase found, in the order of the tiles.
 pub(super) struct Found {
     spill: Spill,
-    stretches: Vec<(Address, usize)>,
+    stretches: Vec<Stretch>,
     open: Vec<u8>,
 }
 
@@ -133,7 +133,7 @@ impl Found {
 
     fn flush(&mut self) -> Result<()> {
         if !self.open.is_empty() {
-            self.stretches.push((self.spill.append(&self.open)?, self.open.len()));
+            self.stretches.push(self.spill.store(&self.open)?);
             self.open.clear();
         }
         Ok(())
@@ -142,9 +142,8 @@ impl Found {
     /// Calls `visit` with all entries, stretch after stretch.
     pub fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()> {
         let (mut bytes, mut entries) = (Vec::new(), Vec::new());
-        for &(address, length) in &self.stretches {
-            bytes.resize(length, 0);
-            self.spill.read(address, &mut bytes)?;
+        for stretch in &self.stretches {
+            self.spill.load(stretch, &mut bytes)?;
             entries.clear();
             entries.extend(bytes.chunks_exact(16).map(|pair| {
                 let (a, b) = pair.split_at(8);
@@ -246,14 +245,14 @@ impl Cutter {
         (positions, records): (u64, u64),
         (normals, figures): (bool, bool),
         (outputs, by_input): (Vec<Open>, Vec<ByInput>),
-    ) -> Self {
+    ) -> Result<Self> {
         use crate::tile::{FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES};
         let column = |name, item| Column::new(area, name, item, positions);
-        Cutter {
-            states: Column::new(area, "states", 1, records),
-            fates: column("fates", FATE_BYTES),
-            normals: normals.then(|| column("normals", NORMAL_BYTES)),
-            figures: figures.then(|| column("figures", FIGURE_BYTES)),
+        Ok(Cutter {
+            states: Column::new(area, "states", 1, records)?,
+            fates: column("fates", FATE_BYTES)?,
+            normals: normals.then(|| column("normals", NORMAL_BYTES)).transpose()?,
+            figures: figures.then(|| column("figures", FIGURE_BYTES)).transpose()?,
             found: Found {
                 spill: Spill::new(area, "found"),
                 stretches: Vec::new(),
@@ -262,7 +261,7 @@ impl Cutter {
             outputs,
             by_input,
             counts: Counts::default(),
-        }
+        })
     }
 
     /// The chunks that the next product completes.

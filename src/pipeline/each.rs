@@ -14,7 +14,7 @@ use super::publish::Staged;
 use crate::point::Metadata;
 use crate::report::Tally;
 use crate::stage::{CreateSink, Input, SinkSummary};
-use crate::tile::{Address, SealedTiles, Spill, SpillArea, State, Tag, lock};
+use crate::tile::{SealedTiles, Spill, SpillArea, State, Stretch, Tag, lock};
 use crate::{Error, Result};
 use std::sync::Arc;
 
@@ -51,7 +51,7 @@ fn list_bytes(inputs: usize) -> usize {
 #[derive(Debug, Default)]
 struct List {
     open: Vec<u8>,
-    stretches: Vec<(Address, u32)>,
+    stretches: Vec<Stretch>,
     records: u64,
 }
 
@@ -101,8 +101,7 @@ impl ByInput {
         }
         list.records += u64::from(entry.count);
         if list.open.len() + ENTRY + NORMAL > self.list_bytes {
-            let address = self.spill.append(&list.open)?;
-            list.stretches.push((address, list.open.len() as u32));
+            list.stretches.push(self.spill.store(&list.open)?);
             list.open.clear();
         }
         Ok(())
@@ -123,9 +122,8 @@ impl ByInput {
                 visit(&entry, normal)
             })
         };
-        for &(address, length) in &list.stretches {
-            bytes.resize(length as usize, 0);
-            self.spill.read(address, &mut bytes)?;
+        for stretch in &list.stretches {
+            self.spill.load(stretch, &mut bytes)?;
             visit_all(&bytes)?;
         }
         visit_all(&list.open)

@@ -67,7 +67,7 @@ pub(super) fn grind(
         (tiles.positions(), tiles.points()),
         (pass.stores_normals, pass.stores_figures),
         (outputs.collect(), by_input),
-    );
+    )?;
     let cutter = Mutex::new(Some(cutter));
     let commit = |product: Product| match &mut *lock(&cutter) {
         Some(cutter) => cutter.cut(&product),

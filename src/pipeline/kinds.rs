@@ -1,6 +1,7 @@
 //! The stage kinds at both ends of a pipeline, `read`, `synth` and `write`: their keys.
 
 use std::fmt;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, de};
@@ -226,6 +227,15 @@ impl StageKind for Write {
             }
             (None, None) => Err(Error::pipeline("a `write` needs `write.path` or `write.folder`")
                 .help("`write.path` is one file, `write.folder` gets one for each input")),
+            (Some(path), None) if path.as_os_str().as_bytes().ends_with(b"/") || path.is_dir() => {
+                let told = format!("`{}` is a folder, not a file to write", shown(&path));
+                let help = format!(
+                    "name a file in it, such as `{}`, or give the folder as `write.folder`, which gets \
+                     a file for each input",
+                    shown(&path.join("out.laz"))
+                );
+                Err(at.blame("path", Error::pipeline(told).help(help)))
+            }
             (Some(path), None) => {
                 let Some(format) = self.format.or(Format::of(&path)) else {
                     return Err(at.blame("path", unknown_extension(&path, "write.format")));

@@ -4,7 +4,10 @@ use super::product::Product;
 use crate::budget::{Bytes, whole_mebibytes};
 use crate::point::Position;
 use crate::stage::{ChunkSize, Needs, Source};
-use crate::tile::{Fetch, Intake, Loader, Remote, Tag, index_bytes, merge_bytes};
+use crate::tile::{
+    FATE_BYTES, FIGURE_BYTES, Fetch, Intake, Loader, NORMAL_BYTES, Pieces, Remote, Tag,
+    index_bytes, merge_bytes,
+};
 use crate::{Error, Result, geom::nearest::Nearest};
 
 /// Records that a batch of the decode takes.
@@ -159,7 +162,16 @@ impl Demands {
 
     fn index(&self) -> u64 {
         // That of the runs and that of the merged scan exist side by side for a moment.
-        if self.mills { 2 * index_bytes(self.points) } else { 0 }
+        if self.mills { 2 * index_bytes(self.points) + self.tables() } else { 0 }
+    }
+
+    /// Bytes of the tables of all that is stored by number; that of the order has gaps.
+    fn tables(&self) -> u64 {
+        let order = if self.tagged { 12 } else { 8 };
+        let states_and_fates = [1, 1, FATE_BYTES, FATE_BYTES];
+        let stores = [self.stride, order, order, NORMAL_BYTES, FIGURE_BYTES];
+        let all = stores.into_iter().chain(states_and_fates);
+        all.map(|stride| Pieces::table_bytes(self.points, stride)).fold(0, u64::saturating_add)
     }
 
     fn work(&self, run_records: u64, tile_positions: u64) -> u64 {

@@ -1,7 +1,7 @@
 //! The last walk over the decoded scan: what the reduction did to each report tile and to all.
 
 use std::collections::BTreeMap;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufRead, Read};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -10,8 +10,8 @@ use crate::geom::lattice::Lattice;
 use crate::point::Position;
 use crate::report::{Lot, ScanSurvey, TileFigures, Totals, report_tile_level};
 use crate::tile::{
-    Address, BLOCK, FATE_BYTES, Fate, PIECE, Pieces, Reader, SealedTiles, Sieve, Spill, SpillArea,
-    State, TileKey, lock,
+    BLOCK, FATE_BYTES, Fate, PIECE, Pieces, Reader, SealedTiles, Sieve, Spill, SpillArea, State,
+    Stretch, TileKey, lock,
 };
 use crate::{Error, Result};
 
@@ -45,36 +45,46 @@ fn deviation_of(code: [u8; FATE_BYTES]) -> Option<f32> {
 /// Lines of the report's tiles, in order, wherever points are kept: there may be millions.
 pub(super) struct Lines {
     spill: Spill,
-    stretches: Vec<(Address, usize)>,
+    stretches: Vec<Stretch>,
 }
 
 impl Lines {
     /// Reads the lines one stretch after the other.
-    pub fn reader(&self) -> BufReader<LineReader<'_>> {
-        BufReader::with_capacity(LINES_AT_ONCE, LineReader { lines: self, stretch: 0, at: 0 })
+    pub fn reader(&self) -> LineReader<'_> {
+        LineReader { spill: &self.spill, left: self.stretches.iter(), open: Vec::new(), at: 0 }
     }
 }
 
-/// See [`Lines::reader`].
+/// See [`Lines::reader`]. Its errors hold the [`Error`] of the spill.
 pub(super) struct LineReader<'a> {
-    lines: &'a Lines,
-    stretch: usize,
+    spill: &'a Spill,
+    left: std::slice::Iter<'a, Stretch>,
+    open: Vec<u8>,
     at: usize,
+}
+
+impl BufRead for LineReader<'_> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        if self.at == self.open.len() {
+            self.open.clear();
+            self.at = 0;
+            if let Some(stretch) = self.left.next() {
+                self.spill.load(stretch, &mut self.open).map_err(io::Error::other)?;
+            }
+        }
+        Ok(&self.open[self.at..])
+    }
+
+    fn consume(&mut self, bytes: usize) {
+        self.at += bytes;
+    }
 }
 
 impl Read for LineReader<'_> {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        let Some(&(address, length)) = self.lines.stretches.get(self.stretch) else {
-            return Ok(0);
-        };
-        let now = (length - self.at).min(into.len());
-        let read = self.lines.spill.read(address.plus(self.at as u64), &mut into[..now]);
-        read.map_err(io::Error::other)?;
-        self.at += now;
-        if self.at == length {
-            (self.stretch, self.at) = (self.stretch + 1, 0);
-        }
-        Ok(now)
+        let read = self.fill_buf()?.read(into)?;
+        self.consume(read);
+        Ok(read)
     }
 }
 
@@ -85,7 +95,7 @@ const LINES_AT_ONCE: usize = 1 << 18;
 struct RangeLines<'a> {
     spill: &'a Spill,
     open: Vec<u8>,
-    stretches: Vec<(Address, usize)>,
+    stretches: Vec<Stretch>,
 }
 
 impl RangeLines<'_> {
@@ -98,7 +108,7 @@ impl RangeLines<'_> {
 
     fn store(&mut self) -> Result<()> {
         if !self.open.is_empty() {
-            self.stretches.push((self.spill.append(&self.open)?, self.open.len()));
+            self.stretches.push(self.spill.store(&self.open)?);
             self.open.clear();
         }
         Ok(())
@@ -198,26 +208,25 @@ struct Walk<'a> {
 
 /// A block with the lots of its positions.
 #[derive(Default)]
-struct Stretch {
+struct Seen {
     block: Option<usize>,
     reader: Reader,
     lots: Vec<Lot>,
 }
 
-impl Stretch {
+impl Seen {
     fn load(&mut self, walk: &Walk<'_>, block: usize, columns: &mut Columns) -> Result<()> {
         self.block = None;
         let (positions, copies) = walk.tiles.read(block, &mut self.reader)?;
         let records = copies.iter().map(|&n| u64::from(n)).sum::<u64>();
-        let Columns { fates, states } = columns;
-        fates.resize(positions.len() * FATE_BYTES, 0);
-        walk.fates.fill(walk.tiles.block(block).first_position, fates)?;
+        let Columns { fates, states, buffer } = columns;
+        let first = walk.tiles.block(block).first_position;
+        walk.fates.collect(first, positions.len() as u64, buffer, fates)?;
         let fates = fates.as_chunks().0.iter().copied().map(deviation_of);
         let rank = walk.tiles.rank_of_block(block);
         self.lots.clear();
         if records == positions.len() as u64 {
-            states.resize(positions.len(), 0);
-            walk.states.fill(rank, states)?;
+            walk.states.collect(rank, records, buffer, states)?;
             self.lots.extend(fates.zip(&*states).map(|(deviation, &state)| {
                 let kept = State(state).is_alive().into();
                 Lot { copies: 1, kept, deviation }
@@ -250,6 +259,7 @@ impl Stretch {
 struct Columns {
     fates: Vec<u8>,
     states: Vec<u8>,
+    buffer: Vec<u8>,
 }
 
 /// Blocks that a walk keeps: a tile is walked twice.
@@ -257,18 +267,18 @@ const KEPT_BLOCKS: usize = 64;
 
 /// The blocks last seen.
 struct Stretches {
-    kept: Vec<Stretch>,
+    kept: Vec<Seen>,
     columns: Columns,
 }
 
 impl Stretches {
     /// Bytes that they hold.
     const BYTES: u64 = (KEPT_BLOCKS * BLOCK * (2 * size_of::<Position>() + size_of::<Lot>() + 4)
-        + PIECE
+        + 3 * PIECE
         + BLOCK * FATE_BYTES) as u64;
 
     fn new(blocks: usize) -> Self {
-        let kept = (0..blocks).map(|_| Stretch::default()).collect();
+        let kept = (0..blocks).map(|_| Seen::default()).collect();
         Stretches { kept, columns: Columns::default() }
     }
 

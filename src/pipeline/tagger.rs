@@ -43,12 +43,7 @@ impl Tagger {
     /// A tagger for records of `schema`; `inputs` are the numbers that tags carry for the inputs, if
     /// they are to, and `classes` says if they carry the class. A selection by what these do not have
     /// selects nothing.
-    pub fn new(
-        schema: &Schema,
-        selections: &[Selection],
-        classes: bool,
-        inputs: Vec<u32>,
-    ) -> Self {
+    pub fn new(schema: &Schema, selections: &[Selection], classes: bool, inputs: Vec<u32>) -> Self {
         let mut idle: Vec<Flag> = selections.iter().flat_map(|s| s.idle(schema)).collect();
         idle.sort_unstable();
         idle.dedup();

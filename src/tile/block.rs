@@ -1,6 +1,6 @@
 //! Blocks: up to 256 positions that follow each other in Morton order, packed relative to their box.
 
-use super::spill::{Address, Spill};
+use super::spill::{Address, Checksum, Spill};
 use crate::Result;
 use crate::point::{Bounds, Position};
 
@@ -19,6 +19,7 @@ pub struct Block {
     /// Number of the first position's first record among all (see [`SealedTiles`](super::SealedTiles)).
     pub first_record: u64,
     address: Address,
+    checksum: Checksum,
     len: u16,
     width: u8,
     has_copies: bool,
@@ -63,6 +64,7 @@ impl Block {
             first_position: 0,
             first_record: 0,
             address: Address::default(),
+            checksum: Checksum::default(),
             len: positions.len() as u16,
             width: width as u8,
             has_copies,
@@ -70,9 +72,11 @@ impl Block {
         (block, start)
     }
 
-    /// Gives a packed block its address: `start` bytes into the stretch at `stretch`.
-    pub fn placed(&mut self, stretch: Address, start: usize) {
+    /// Gives a packed block its address: `start` bytes into the stretch at `stretch`, which is
+    /// `packed`.
+    pub fn placed(&mut self, stretch: Address, start: usize, packed: &[u8]) {
         self.address = stretch.plus(start as u64);
+        self.checksum = self.address.checksum(&packed[start..start + self.bytes()]);
     }
 
     /// Appends the positions to `positions` and, if asked, how many records share each.
@@ -84,7 +88,7 @@ impl Block {
         copies: Option<&mut Vec<u32>>,
     ) -> Result<()> {
         buffer.resize(self.bytes(), 0);
-        spill.read(self.address, buffer)?;
+        spill.read(self.address, self.checksum, buffer)?;
         let width = usize::from(self.width);
         let (packed, counts) = buffer.split_at(self.len() * 3 * width);
         match width {

@@ -45,8 +45,9 @@ impl<'a> Emitter<'a> {
     pub const BYTES: usize = BLOCKS_AT_ONCE * BLOCK * 28 + PIECE * 12 + 2 * BLOCK * 28;
 
     /// An emitter of at most `most_records` records.
-    pub fn new(out: &'a Output, most_records: u64) -> Self {
-        Emitter {
+    pub fn new(out: &'a Output, most_records: u64) -> Result<Self> {
+        let first_ref = out.refs.reserve(most_records)?;
+        Ok(Emitter {
             out,
             merged: Merged {
                 blocks: Vec::new(),
@@ -59,10 +60,10 @@ impl<'a> Emitter<'a> {
             packed: Vec::with_capacity(BLOCKS_AT_ONCE * BLOCK * 28),
             unplaced: Vec::with_capacity(BLOCKS_AT_ONCE),
             refs: Vec::with_capacity(PIECE * ref_bytes(out.tagged)),
-            first_ref: out.refs.reserve(most_records),
+            first_ref,
             refs_stored: 0,
             block_first: 0,
-        }
+        })
     }
 
     /// Takes the next records, numbered from `first_record` on among all of the store: their positions,
@@ -173,7 +174,7 @@ impl<'a> Emitter<'a> {
         let address = self.out.positions.append(&self.packed)?;
         let begin = self.merged.blocks.len() - self.unplaced.len();
         for (block, start) in self.merged.blocks[begin..].iter_mut().zip(self.unplaced.drain(..)) {
-            block.placed(address, start);
+            block.placed(address, start, &self.packed);
         }
         self.packed.clear();
         Ok(())

@@ -147,7 +147,7 @@ impl<'a> Intake<'a> {
             record(a).cmp(record(b)).then_with(|| tags.get(a).cmp(&tags.get(b)))
         };
         let order = self.order.sort(&self.positions, &equal);
-        let first_record = store.records.reserve(order.len() as u64);
+        let first_record = store.records.reserve(order.len() as u64)?;
         store_records(store, order, records, first_record)?;
         let blocks = store_positions(store, order, &self.positions, tags, &mut self.packed)?;
         self.records.clear();
@@ -197,7 +197,7 @@ fn store_positions(
         }
         let address = store.positions.append(packed)?;
         for (block, start) in blocks[begin..].iter_mut().zip(starts) {
-            block.placed(address, start);
+            block.placed(address, start, packed);
         }
     }
     Ok(blocks)

@@ -314,10 +314,5 @@ fn spacing(bounds: &Bounds, positions: usize) -> f64 {
 
 /// Replaces `stored` by `count` items of `column` from number `first` on.
 fn read_column(column: &Pieces, (first, count): (u64, u64), stored: &mut Vec<u8>) -> Result<()> {
-    stored.clear();
-    let mut buffer = Vec::new();
-    column.each(first, count, &mut buffer, |_, bytes| {
-        stored.extend_from_slice(bytes);
-        Ok(())
-    })
+    column.collect(first, count, &mut Vec::new(), stored)
 }

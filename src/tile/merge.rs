@@ -145,7 +145,7 @@ fn merge_range(store: &TileStore, runs: &[Run], range: &Range, out: &Output) -> 
         tournament.set(number, cursor.key());
         cursors.push(cursor);
     }
-    let mut emitter = Emitter::new(out, most);
+    let mut emitter = Emitter::new(out, most)?;
     let mut equals = Equals::default();
     while let Some(first) = tournament.first() {
         let second = tournament.second();
@@ -215,7 +215,7 @@ fn emit_equal(
     if runs.len() > 1 {
         for &run in runs {
             let mut record = std::mem::take(&mut cursors[run].spare);
-            cursors[run].read_record(&mut record)?;
+            cursors[run].read_record(&mut record, buffer)?;
             records.push(Reverse((record, run)));
         }
         while records.len() > 1
@@ -226,7 +226,7 @@ fn emit_equal(
             emitter.take(&[position], cursor.number(), &[cursor.tag()])?;
             cursor.advance(1, buffer)?;
             if cursor.head() == Some(position) {
-                cursor.read_record(record)?;
+                cursor.read_record(record, buffer)?;
             } else {
                 cursor.spare = PeekMut::pop(smallest).0.0;
             }
@@ -361,9 +361,9 @@ impl<'a> Cursor<'a> {
     }
 
     /// Reads the record it stands at.
-    fn read_record(&self, record: &mut Vec<u8>) -> Result<()> {
-        record.resize(self.store.stride, 0);
-        self.store.records.read(self.number(), record)?;
+    fn read_record(&self, record: &mut Vec<u8>, buffer: &mut Vec<u8>) -> Result<()> {
+        record.clear();
+        record.extend_from_slice(self.store.records.get(self.number(), 1, buffer)?);
         // Equal records are told apart by their tags: by the input that they come from.
         record.extend_from_slice(&self.tag().to_be_bytes());
         Ok(())

@@ -33,7 +33,7 @@ pub use sieve::{
     ASIDE, CLASSED_INPUTS, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, Run, SELECTIONS, Sieve, State,
     TAGGED_INPUTS, Tag,
 };
-pub use spill::{Address, Folder, Spill, SpillArea, lock};
+pub use spill::{Address, Checksum, Folder, Spill, SpillArea, Stretch, lock};
 
 use std::ops::Range;
 

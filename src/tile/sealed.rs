@@ -298,11 +298,11 @@ impl SealedTiles {
             let (Some(&(first, _)), Some(&(last, _))) = (group.first(), group.last()) else {
                 continue;
             };
-            fetch.records.resize((last - first + 1) as usize * stride, 0);
-            self.records.read(first, &mut fetch.records)?;
+            let stored =
+                self.records.get(first, (last - first + 1) as usize, &mut fetch.records)?;
             for &(source, slot) in group {
                 let at = (source - first) as usize * stride;
-                records[slot as usize].copy_from_slice(&fetch.records[at..at + stride]);
+                records[slot as usize].copy_from_slice(&stored[at..at + stride]);
             }
         }
         Ok(())
@@ -330,9 +330,9 @@ impl Fetch {
         let each = ref_bytes(tagged);
         let window = number / WINDOW;
         if self.refs_piece != Some(window) {
-            self.refs.resize(WINDOW as usize * each, 0);
-            let stored = refs.stored_in(window * WINDOW)?.min(WINDOW as usize);
-            refs.read(window * WINDOW, &mut self.refs[..stored * each])?;
+            let first = window * WINDOW;
+            let stored = refs.stored_in(first)?.min(WINDOW as usize) as u64;
+            refs.collect(first, stored, &mut self.records, &mut self.refs)?;
             self.refs_piece = Some(window);
         }
         let at = (number % WINDOW) as usize * each;

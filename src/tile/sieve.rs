@@ -237,11 +237,7 @@ impl Runs {
     ) -> Result<()> {
         self.states.clear();
         if let Some(stored) = &sieve.states {
-            let states = &mut self.states;
-            stored.each(rank, count as u64, &mut self.buffer, |_, bytes| {
-                states.extend_from_slice(bytes);
-                Ok(())
-            })?;
+            stored.collect(rank, count as u64, &mut self.buffer, &mut self.states)?;
         }
         tiles.tags(number, count, &mut self.buffer, &mut self.tags)
     }

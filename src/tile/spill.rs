@@ -1,14 +1,16 @@
 //! What a run sets down between its phases (points, their order, states, columns): in memory while the
-//! budget allows, in scratch files beyond. Reading is the same call for both.
+//! budget allows, in scratch files beyond. Reading is the same call for both; what comes from a file is
+//! compared with the checksum of what was written, so that a disk that damages data fails a run and
+//! changes no output.
 
 use std::fs::File;
-use std::os::unix::fs::FileExt;
+use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard};
 
 use crate::budget::{Budget, Lease};
-use crate::{Error, Result};
+use crate::{Error, ErrorKind, Result};
 
 /// What all spills of a run share: how much may stay in memory, and the folder for the rest.
 #[derive(Debug)]
@@ -34,6 +36,11 @@ impl SpillArea {
             folder,
             written: AtomicU64::new(0),
         })
+    }
+
+    /// What stays in memory is leased from this.
+    pub(super) fn budget(&self) -> &Budget {
+        &self.budget
     }
 
     /// Bytes written to scratch files so far.
@@ -77,6 +84,47 @@ impl Address {
     pub fn plus(self, bytes: u64) -> Address {
         Address(self.0 + bytes)
     }
+
+    /// The checksum of `bytes`, which are stored from here on.
+    ///
+    /// It depends on the address, so that a part that comes from another place is noticed too. What
+    /// stays in memory is not verified and costs nothing.
+    pub fn checksum(self, bytes: &[u8]) -> Checksum {
+        match self.is_in_file() {
+            true => Checksum(self.sum(bytes)),
+            false => Checksum::default(),
+        }
+    }
+
+    /// True if it lies in a scratch file.
+    pub fn is_in_file(self) -> bool {
+        self.0 & IN_FILE != 0
+    }
+
+    fn sum(self, bytes: &[u8]) -> u32 {
+        // Addresses of one file differ in their low bits, those of two files in the highest.
+        let mut sum = crc32fast::Hasher::new_with_initial(self.0 as u32 ^ (self.0 >> 32) as u32);
+        sum.update(bytes);
+        sum.finalize()
+    }
+
+    fn file_and_byte(self) -> (usize, u64) {
+        let within = self.0 & !IN_FILE;
+        ((within >> FILE_BITS) as usize, within & ((1 << FILE_BITS) - 1))
+    }
+}
+
+/// What was stored from an address on, as a number that a read compares with what comes: see
+/// [`Address::checksum`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Checksum(u32);
+
+/// An appended stretch that is always read whole.
+#[derive(Debug, Clone, Copy)]
+pub struct Stretch {
+    address: Address,
+    length: u32,
+    checksum: Checksum,
 }
 
 /// Appended stretches of bytes of one sort. Dropping it frees its memory and removes its files.
@@ -120,10 +168,50 @@ impl Spill {
         Ok(Address(IN_FILE | (number as u64) << FILE_BITS | at))
     }
 
-    /// Fills `into` with what was stored from `at` on, within one stretch.
-    pub fn read(&self, at: Address, into: &mut [u8]) -> Result<()> {
+    /// Stores a stretch of less than 4 GiB that [`load`](Spill::load) reads again.
+    pub fn store(&self, bytes: &[u8]) -> Result<Stretch> {
+        let address = self.append(bytes)?;
+        let checksum = address.checksum(bytes);
+        Ok(Stretch { address, length: bytes.len() as u32, checksum })
+    }
+
+    /// Replaces what is in `into` by a stored stretch.
+    pub fn load(&self, stretch: &Stretch, into: &mut Vec<u8>) -> Result<()> {
+        into.resize(stretch.length as usize, 0);
+        self.read(stretch.address, stretch.checksum, into)
+    }
+
+    /// Fills `into` with what was stored from `at` on, within one stretch, and has this `checksum`.
+    ///
+    /// # Errors
+    ///
+    /// Of kind [`ErrorKind::Io`], with the scratch file and the byte, if something else comes back.
+    pub fn read(&self, at: Address, checksum: Checksum, into: &mut [u8]) -> Result<()> {
+        self.read_unverified(at, into)?;
+        self.verify(at, checksum, into)
+    }
+
+    /// Compares `bytes`, read from `at` on, with the checksum of what was written there.
+    pub(super) fn verify(&self, at: Address, checksum: Checksum, bytes: &[u8]) -> Result<()> {
+        if !at.is_in_file() || at.sum(bytes) == checksum.0 {
+            return Ok(());
+        }
+        let (number, byte) = at.file_and_byte();
+        let told = "what was read of this scratch file is not what was written to it";
+        let error = Error::new(ErrorKind::Io, told).at_byte(byte).help(
+            "the disk or the memory damages data: check them, or name a folder on another disk as \
+             `run.scratch`",
+        );
+        Err(match self.files().get(number) {
+            Some(scratch) => error.at(&scratch.path),
+            None => error,
+        })
+    }
+
+    /// As [`read`](Spill::read), for whoever verifies what comes part by part.
+    pub(super) fn read_unverified(&self, at: Address, into: &mut [u8]) -> Result<()> {
         let lost = || Error::internal(format!("{}: read beyond a stretch", self.name));
-        if at.0 & IN_FILE == 0 {
+        if !at.is_in_file() {
             let segments = self.segments.read().unwrap_or_else(PoisonError::into_inner);
             let from = at.0 as u32 as usize;
             let stored = segments
@@ -133,9 +221,8 @@ impl Spill {
             into.copy_from_slice(stored);
             return Ok(());
         }
-        let number = (at.0 & !IN_FILE) >> FILE_BITS;
-        let scratch = self.files().get(number as usize).cloned().ok_or_else(lost)?;
-        let byte = at.0 & ((1 << FILE_BITS) - 1);
+        let (number, byte) = at.file_and_byte();
+        let scratch = self.files().get(number).cloned().ok_or_else(lost)?;
         scratch.file.read_exact_at(into, byte).map_err(|e| scratch.fail("read scratch data", e))
     }
 
@@ -168,6 +255,7 @@ impl ScratchFile {
             .read(true)
             .write(true)
             .create_new(true)
+            .mode(0o600)
             .open(&path)
             .map_err(|e| Error::io(&path, "create a scratch file", e))?;
         Ok(ScratchFile { file, path, end: AtomicU64::new(0), writers: AtomicUsize::new(0) })
