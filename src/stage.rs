@@ -210,6 +210,8 @@ pub struct Encoded {
     pub returns: [u64; 15],
     /// Points that a conversion rounded, and by how much at most, in world units.
     pub rounded: Option<(u64, f64)>,
+    /// In which of its forms a format wrote the chunk; 0 where it has one.
+    pub form: u8,
 }
 
 /// What a sink says when it is done.

@@ -118,6 +118,7 @@ fn pipeline(
         ("IN", "read.path", Some(inputs)),
         ("-o", "write.path", Some(output)),
         ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
+        ("--nonfinite", "run.nonfinite", arguments.nonfinite.as_deref().map(Value::from)),
     ]);
     let sets = [stages, written(&arguments.written), arguments.common.sets()?].concat();
     Pipeline::parse_with(CONVERT, "pipelines/convert.toml", registry, &sets)

@@ -109,6 +109,7 @@ fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
         ("--classes", "median.classes", classes),
         ("--withheld", "run.withheld", arguments.withheld.clone().map(Value::from)),
         ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(Value::from)),
+        ("--lattice", "run.lattice", arguments.lattice.map(number)),
         ("--z-scale", "run.z_scale", arguments.z_scale.as_deref().map(number_or_text)),
     ])
 }
@@ -121,6 +122,7 @@ pub(super) fn written(arguments: &Written) -> Vec<Set> {
         ("--offset", "write.offset", list(!arguments.offset.is_empty(), json!(arguments.offset))),
         ("--drop", "write.drop", list(!arguments.drop.is_empty(), json!(arguments.drop))),
         ("--encoding", "write.encoding", arguments.encoding.as_deref().map(Value::from)),
+        ("--colors", "write.colors", arguments.colors.as_deref().map(Value::from)),
     ])
 }
 

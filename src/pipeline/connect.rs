@@ -127,6 +127,7 @@ impl Output {
             encoding,
             normals: self.wants_normals(),
             drop: self.write.drop.clone(),
+            colors: self.write.colors,
             carry_rest: whole,
         }
     }
@@ -181,13 +182,35 @@ impl Output {
     fn las_of_ply(&self, schema: &Schema, metadata: &Metadata) -> Result<Target> {
         let scale = self.write.scale.ok_or_else(|| {
             Error::pipeline("a PLY scan written as LAS needs a `scale` for its coordinates")
-                .help("give scale = 0.001 (or --scale 0.001), or what the scan's precision is, in its own unit")
+                .help("give `write.scale = 0.001`, or what the scan's precision is, in its own unit")
         })?;
         let (format, extra) = convert::las_schema(schema, &self.write.drop)?;
         let offset = self.write.offset.unwrap_or([0.0; 3]);
         let layout = Arc::new(las::layout(format, &extra, scale, offset));
-        let projection = Some(convert::Projection::new(schema, &layout, &self.write.drop)?);
+        let mut projection = convert::Projection::new(schema, &layout, &self.write.drop)?;
+        number_returns(schema, &layout, &self.write.drop, &mut projection)?;
+        let projection = Some(projection);
         let metadata = las::fresh(&layout, metadata.crs.as_deref());
         Ok(Target { schema: layout, metadata, projection })
     }
+}
+
+/// Points of which nothing is known of returns are the first and only one of their pulse: LAS has no
+/// return 0 of 0.
+fn number_returns(
+    from: &Schema,
+    to: &Schema,
+    drop: &[String],
+    projection: &mut convert::Projection,
+) -> Result<()> {
+    let both = [names::RETURN_NUMBER, names::NUMBER_OF_RETURNS];
+    if both.iter().any(|name| from.find(name).is_some() && !drop.iter().any(|d| d == name)) {
+        return Ok(());
+    }
+    for field in both.iter().filter_map(|name| to.find(name)) {
+        if !projection.preset(field, 1) {
+            return Err(Error::internal("a number of returns does not hold 1"));
+        }
+    }
+    Ok(())
 }

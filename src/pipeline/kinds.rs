@@ -8,6 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, de};
 use super::outputs::Outputs;
 use super::registry::{StageKind, StagePlace};
 use super::{connect, inputs};
+use crate::io::ply::Colors;
 use crate::io::synthetic::Scene;
 use crate::stage::{Order, Role};
 use crate::{Error, Result, point::names};
@@ -157,6 +158,9 @@ pub struct Write {
     /// Encoding of a PLY file; none: the input's.
     #[serde(default)]
     pub encoding: Option<Encoding>,
+    /// Bits of a colour in a PLY file of LAS points; none: `"auto"`.
+    #[serde(default)]
+    pub colors: Option<Colors>,
 }
 
 /// Order of the records of an output, as a file names it.
@@ -201,6 +205,7 @@ impl Write {
             Format::Ply if self.scale.is_some() => only("scale", "las and laz"),
             Format::Ply if self.offset.is_some() => only("offset", "las and laz"),
             Format::Las | Format::Laz if self.encoding.is_some() => only("encoding", "ply"),
+            Format::Las | Format::Laz if self.colors.is_some() => only("colors", "ply"),
             _ if self.offset.is_some_and(|offset| offset.iter().any(|v| !v.is_finite())) => {
                 Err(("offset", Error::pipeline("an offset is three finite numbers")))
             }

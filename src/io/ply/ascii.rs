@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use super::file::PlyFile;
-use super::header::{shown, type_name};
+use super::header::shown;
 use super::text;
 use crate::point::{PointBatch, Scalar, Schema};
 use crate::stage::Part;
@@ -107,9 +107,12 @@ impl<'a> AsciiPart<'a> {
             let at = start + place - token.len();
             if !text::parse(token, *scalar, &mut record[*offset..]) {
                 let shown = shown(&String::from_utf8_lossy(token));
-                let message =
-                    format!("`{shown}` is no {} for property `{name}`", type_name(*scalar));
+                let kind = self.file.properties()[n].kind.word();
+                let message = format!("`{shown}` is no {kind} for property `{name}`");
                 return Err(fail(at, message));
+            }
+            if *scalar == Scalar::F32 && text::loses_digits(token) {
+                self.file.rounded.fetch_add(1, Ordering::Relaxed);
             }
         }
         match word(line, &mut place) {

@@ -11,7 +11,8 @@ use super::file::PlyFile;
 use super::header::{Element, Encoding, Kind, shown};
 use super::names;
 use crate::io::origin::Origin;
-use crate::point::{Dimension, Layout, Metadata, PointBatch, Schema};
+use crate::point::names::{GPS_TIME, XYZ};
+use crate::point::{Dimension, Layout, Metadata, PointBatch, Scalar, Schema};
 use crate::stage::{Input, Part, Source};
 use crate::{Error, Result};
 
@@ -58,15 +59,7 @@ impl PlySource {
         };
         let texts: Vec<Texts> = files.iter().map(Texts::of).collect();
         for (file, text) in files.iter().zip(&texts).skip(1) {
-            agree(first, file)?;
-            if text.crs != texts[0].crs || text.dimensions != texts[0].dimensions {
-                let what = if text.crs == texts[0].crs {
-                    "dimension names"
-                } else {
-                    "coordinate reference system"
-                };
-                return Err(disagree(first, file, what));
-            }
+            agree((first, &texts[0]), (file, text))?;
         }
         let schema = Arc::new(schema(first, &texts[0].dimensions));
         if schema.coordinates().is_none() {
@@ -85,7 +78,8 @@ impl PlySource {
                 parts
             })
             .collect();
-        let warnings = files.iter().flat_map(dropped).collect();
+        let warnings = files.iter().flat_map(|file| dropped(file).into_iter().chain(cut(file)));
+        let warnings = warnings.collect();
         Ok(PlySource { schema, metadata, files, ends, warnings })
     }
 }
@@ -119,7 +113,7 @@ impl Texts {
             }
             more = false;
             let of_ours = names::property_told(comment).is_some_and(|p| properties.contains(p));
-            if !of_ours && !super::is_padding(comment, file.points) {
+            if !of_ours && !super::is_made(comment, file.points) {
                 comments.push(comment.clone());
             }
         }
@@ -127,20 +121,39 @@ impl Texts {
     }
 }
 
-/// Refuses two files whose vertices differ in kind.
-fn agree(first: &PlyFile, other: &PlyFile) -> Result<()> {
-    if first.header.encoding != other.header.encoding {
-        return Err(disagree(first, other, "encoding"));
-    }
-    if first.properties() != other.properties() {
-        return Err(disagree(first, other, "vertex properties"));
-    }
-    Ok(())
+/// Refuses two files whose vertices differ in kind. Texts whose numbers are held in one type are of
+/// one kind, whatever their headers call it.
+fn agree((first, texts): (&PlyFile, &Texts), (other, of_other): (&PlyFile, &Texts)) -> Result<()> {
+    let names = |file: &PlyFile| -> Vec<String> {
+        file.properties().iter().map(|p| p.name.clone()).collect()
+    };
+    let differ = if first.header.encoding != other.header.encoding {
+        "encoding is"
+    } else if names(first) != names(other) {
+        "vertex properties are"
+    } else if texts.crs != of_other.crs {
+        "coordinate reference system is"
+    } else if texts.dimensions != of_other.dimensions {
+        "dimension names are"
+    } else if schema(first, &texts.dimensions) != schema(other, &texts.dimensions) {
+        "types of vertex properties are"
+    } else {
+        return Ok(());
+    };
+    let told = format!("its {differ} not the same as in {}", first.path.display());
+    Err(Error::data(&other.path, told)
+        .help("files that are read together agree in encoding, vertex properties and coordinate reference system; convert one of them first"))
 }
 
-fn disagree(first: &PlyFile, other: &PlyFile, what: &str) -> Error {
-    Error::data(&other.path, format!("its {what} is not that of {}", first.path.display()))
-        .help("files that are read together agree in encoding, vertex properties and coordinate reference system; convert one of them first")
+/// The type in which values of a property are held. Coordinates and times in a text are, whatever
+/// its header calls them: many programs print them with all digits and call them `float`, which has
+/// room for seven of them.
+fn held(scalar: Scalar, encoding: Encoding, dimension: &str) -> Scalar {
+    let long = XYZ.contains(&dimension) || dimension == GPS_TIME;
+    match (scalar, encoding) {
+        (Scalar::F32, Encoding::Ascii) if long => Scalar::F64,
+        _ => scalar,
+    }
 }
 
 fn schema(file: &PlyFile, dimensions: &[String]) -> Schema {
@@ -151,6 +164,7 @@ fn schema(file: &PlyFile, dimensions: &[String]) -> Schema {
         .zip(dimensions)
         .filter_map(|(property, name)| {
             let Kind::Scalar(scalar) = property.kind else { return None };
+            let scalar = held(scalar, file.header.encoding, name);
             let dimension = Dimension::new(name, scalar, stride);
             stride += scalar.size();
             Some(dimension)
@@ -231,6 +245,16 @@ fn dropped(file: &PlyFile) -> Option<String> {
     })
 }
 
+/// A warning for a text that ends within a line.
+fn cut(file: &PlyFile) -> Option<String> {
+    file.ends_in_a_number.then(|| {
+        format!(
+            "{}: the file ends without the end of a line: its last number may be cut short",
+            file.path.display()
+        )
+    })
+}
+
 impl Source for PlySource {
     fn schema(&self) -> &Arc<Schema> {
         &self.schema
@@ -288,8 +312,8 @@ impl Source for PlySource {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let unread = self.files.iter().flat_map(PlyFile::unread);
-        self.warnings.iter().cloned().chain(unread).collect()
+        let found = |file: &PlyFile| file.unread().into_iter().chain(file.rounded());
+        self.warnings.iter().cloned().chain(self.files.iter().flat_map(found)).collect()
     }
 }
 
