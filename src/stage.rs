@@ -106,6 +106,12 @@ pub trait TileOp: Send + Sync {
         Ok(())
     }
 
+    /// What the user should know of a stage that is settled: lengths that the lattice rounds. Keys are
+    /// named with their stage, as in `` `grid.side = 0.15` ``.
+    fn warnings(&self, _lattice: &Lattice) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Called for every tile, from several threads at once.
     ///
     /// It decides for the positions that [`Tile::is_chosen`] holds; keys that every stage takes may
@@ -269,6 +275,21 @@ pub trait CreateSink: Send + Sync {
     /// The chunks of the output that [`create`](CreateSink::create) would open, for a plan of the
     /// memory. Fails where `create` would refuse the schema.
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize>;
+
+    /// What the output will not hold though the input has it, and nobody was asked; for a plan.
+    fn warnings(&self, _schema: &Schema, _metadata: &Metadata) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Fails on a record that the output cannot hold, for a plan that looks at some before it begins.
+    fn check(&self, _metadata: &Metadata, _records: &PointBatch) -> Result<()> {
+        Ok(())
+    }
+
+    /// True if [`check`](CreateSink::check) may fail for records of `schema`.
+    fn checks(&self, _schema: &Schema) -> bool {
+        false
+    }
 
     /// Checks that the format holds every dimension (or that the user dropped it) and opens the
     /// output at `staged`, a path beside the final one. With `whole`, every record of the source

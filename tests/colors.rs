@@ -63,12 +63,13 @@ fn eight_bits_of_ply_are_257_times_as_much_in_las_and_come_back() {
 #[test]
 fn colors_that_eight_bits_hold_are_eight_bits_in_ply() {
     let folder = tempfile::tempdir().unwrap();
-    let cases: [(&[u16], Scalar, &[u64], &str); 6] = [
+    let cases: [(&[u16], Scalar, &[u64], &str); 7] = [
         (&[0, 257, 65_535], Scalar::U8, &[0, 1, 255], ""),
         (&[0, 256, 65_280], Scalar::U8, &[0, 1, 255], ""),
         (&[0, 1, 255], Scalar::U8, &[0, 1, 255], "did not scale"),
         (&[0, 0, 0], Scalar::U8, &[0, 0, 0], ""),
-        (&[0, 257, 256], Scalar::U16, &[0, 257, 256], "have 16 bits"),
+        (&[0, 257, 65_280], Scalar::U8, &[0, 1, 255], "both are taken for 8 bits"),
+        (&[0, 257, 256, 3], Scalar::U16, &[0, 257, 256, 3], "have 16 bits"),
         (&[0, 1000, 65_535], Scalar::U16, &[0, 1000, 65_535], "have 16 bits"),
     ];
     for (colors, scalar, values, told) in cases {
@@ -111,6 +112,25 @@ fn a_color_of_sixteen_bits_late_in_the_scan_widens_what_is_written_already() {
             assert!(read(&first, &keys) == read(&first, &all), "{factor} {encoding}");
             assert!(String::from_utf8_lossy(&bytes[..400]).contains("property ushort red"));
         }
+    }
+}
+
+#[test]
+fn multiples_of_256_and_of_257_in_different_chunks_are_eight_bits_all_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("in.las");
+    let colors: Vec<u16> =
+        (0..200_000).map(|i| (i % 256) as u16 * if i < 100_000 { 257 } else { 256 }).collect();
+    colored(&colors).write(&input);
+    for encoding in ["binary", "ascii"] {
+        let write = format!("ply\nencoding = {encoding:?}");
+        let (output, _) = converted(folder.path(), &input, &write);
+        let (scalar, values) = red(&output);
+        assert_eq!(scalar, Scalar::U8);
+        assert!(values.iter().zip(0..).all(|(&red, i)| red == i % 256));
+        let eight = std::fs::read(&output).unwrap();
+        let (output, _) = converted(folder.path(), &input, &format!("{write}\ncolors = '8bit'"));
+        assert!(eight == std::fs::read(output).unwrap(), "{encoding}");
     }
 }
 

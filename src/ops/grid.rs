@@ -6,8 +6,10 @@ use serde::de::{Error as _, Unexpected};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 
+use super::lengths::rounded;
 use super::removal::{Account, keep_once, remove, represent};
 use crate::geom::angle::is_known;
+use crate::geom::lattice::Lattice;
 use crate::point::{Bounds, Position, distance2};
 use crate::report::Tally;
 use crate::stage::{Needs, ScanFacts, TileOp};
@@ -96,6 +98,10 @@ impl TileOp for Grid {
         let steps = scan.lattice.steps(self.side).min(LARGEST_SIDE);
         self.settled = Some(Settled { steps, length: steps as f64 * scan.lattice.step });
         Ok(())
+    }
+
+    fn warnings(&self, lattice: &Lattice) -> Vec<String> {
+        rounded(lattice, "grid.side", self.side).into_iter().collect()
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {

@@ -5,6 +5,7 @@ mod grid;
 mod median;
 pub mod normals;
 pub mod outliers;
+mod lengths;
 mod removal;
 
 pub use cells::{Cells, Keep, Measure, Reference, Side, Split};

@@ -144,6 +144,24 @@ impl Part for AsciiPart<'_> {
 }
 
 impl AsciiPart<'_> {
+    /// True if a number of one of the properties `columns` has more digits than a `float` holds. What is
+    /// wrong with a line is left to whoever reads it.
+    pub fn outgrows_float(mut self, columns: &[usize]) -> Result<bool> {
+        self.skip()?;
+        for _ in 0..self.points {
+            let Some((start, end)) = self.lines.next()? else { return Ok(false) };
+            let line = &self.lines.window[start..end];
+            let mut place = 0;
+            for n in 0..=columns.last().copied().unwrap_or(0) {
+                let Some(token) = word(line, &mut place) else { break };
+                if columns.contains(&n) && text::loses_digits(token) {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
+
     fn fill(&mut self, batch: &mut PointBatch) -> Result<()> {
         batch.source = self.source;
         batch.clear();

@@ -1,10 +1,11 @@
 //! Colours of LAS records, which have 16 bits, as the 8 bits that readers of PLY expect.
 //!
-//! Nothing is lost by 8 bits where 16 of them hold no more: where all colours are multiples of 257, of
-//! 256, or below 256, as three kinds of writers leave them. Whether they are only all points together
-//! say, long after the first are written; so vertices are written with 8 bits until a colour needs
-//! more, and what is written until then is widened once. The type in a finished file depends on the
-//! colours alone.
+//! Nothing is lost by 8 bits where 16 of them hold no more: where each colour is a multiple of 257 or
+//! of 256, or all are below 256, as three kinds of writers leave them. Whether they are only all points
+//! together say, long after the first are written; so vertices are written with 8 bits until a colour
+//! needs more, and the file is written anew when one does. Where it was needed for no more than telling
+//! multiples of 257 from those of 256, it is written with 8 bits again in the end. So the type in a
+//! finished file depends on the colours alone.
 
 use serde::{Deserialize, Serialize};
 
@@ -39,33 +40,65 @@ pub(super) enum Depth {
     Times257,
     /// 8 bits times 256.
     Times256,
+    /// Some of the one and some of the other.
+    Mixed,
     /// 8 bits as they are: their writer did not scale them.
     Unscaled,
     /// 16 bits.
     Full,
 }
 
+/// What a chunk is written with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Written {
+    pub depth: Depth,
+    /// True if its colours have 16 bits.
+    pub wide: bool,
+}
+
+impl Written {
+    const WIDE: u8 = 8;
+
+    /// As a number that an encoded chunk carries, and back.
+    pub fn code(self) -> u8 {
+        self.depth as u8 | if self.wide { Self::WIDE } else { 0 }
+    }
+
+    pub fn from_code(code: u8) -> Written {
+        let depth = Depth::ALL.get(usize::from(code & !Self::WIDE)).copied();
+        Written { depth: depth.unwrap_or(Depth::Full), wide: code & Self::WIDE != 0 }
+    }
+}
+
 impl Depth {
-    const ALL: [Depth; 5] =
-        [Depth::Black, Depth::Times257, Depth::Times256, Depth::Unscaled, Depth::Full];
+    const ALL: [Depth; 6] = [
+        Depth::Black,
+        Depth::Times257,
+        Depth::Times256,
+        Depth::Mixed,
+        Depth::Unscaled,
+        Depth::Full,
+    ];
 
     /// That of the colours at the byte offsets `fields` of little-endian records.
     pub fn of(records: &[u8], stride: usize, fields: &[usize]) -> Depth {
-        // Bits that would be 0 if all were multiples of 257, multiples of 256, below 256.
-        let [mut uneven, mut low, mut high] = [0; 3];
+        // 0 if all are multiples of 257, all multiples of 256, all one or the other, all below 256.
+        let ([mut uneven, mut low, mut high], mut neither) = ([0; 3], 0);
         for record in records.chunks_exact(stride.max(1)) {
             for &field in fields {
                 if let Some(&[lower, upper]) = record.get(field..).and_then(<[u8]>::first_chunk) {
                     uneven |= lower ^ upper;
                     low |= lower;
                     high |= upper;
+                    neither |= u16::from(lower) * u16::from(lower ^ upper);
                 }
             }
         }
-        match (uneven, low, high) {
-            (0, 0, 0) => Depth::Black,
+        match (uneven, low, neither, high) {
+            (0, 0, ..) => Depth::Black,
             (0, ..) => Depth::Times257,
-            (_, 0, _) => Depth::Times256,
+            (_, 0, ..) => Depth::Times256,
+            (_, _, 0, _) => Depth::Mixed,
             (.., 0) => Depth::Unscaled,
             _ => Depth::Full,
         }
@@ -73,20 +106,18 @@ impl Depth {
 
     /// That of the points of both.
     pub fn join(self, other: Depth) -> Depth {
+        let scaled = |depth| matches!(depth, Depth::Times257 | Depth::Times256 | Depth::Mixed);
         match (self, other) {
             (Depth::Black, depth) | (depth, Depth::Black) => depth,
             (one, two) if one == two => one,
+            (one, two) if scaled(one) && scaled(two) => Depth::Mixed,
             _ => Depth::Full,
         }
     }
 
-    /// As a number that an encoded chunk carries, and back.
-    pub fn code(self) -> u8 {
-        self as u8
-    }
-
-    pub fn from_code(code: u8) -> Depth {
-        Depth::ALL.get(usize::from(code)).copied().unwrap_or(Depth::Full)
+    /// True if 8 bits are enough to know the 16.
+    pub fn is_narrow(self) -> bool {
+        !matches!(self, Depth::Mixed | Depth::Full)
     }
 
     /// What 8 bits stand for.
@@ -94,7 +125,7 @@ impl Depth {
         match self {
             Depth::Times256 => u16::from(bits) * 256,
             Depth::Unscaled => u16::from(bits),
-            Depth::Black | Depth::Times257 | Depth::Full => u16::from(bits) * 257,
+            _ => u16::from(bits) * 257,
         }
     }
 }
@@ -122,15 +153,15 @@ pub(super) fn bytes_of(schema: &Schema, place: usize) -> Schema {
     narrow
 }
 
-/// Makes vertices with colours of 16 bits of those with 8.
-pub(super) struct Widening<'a> {
+/// Makes vertices with colours of 16 bits of those with 8, or the other way round.
+pub(super) struct Recoloring<'a> {
     pub encoding: Encoding,
     pub from: &'a Schema,
     pub to: &'a Schema,
     pub depth: Depth,
 }
 
-impl Widening<'_> {
+impl Recoloring<'_> {
     /// Appends to `out` what the whole vertices that `written` begins with become; returns how many
     /// bytes of it they are.
     pub fn append(&self, written: &[u8], out: &mut Vec<u8>) -> Result<usize> {
@@ -146,14 +177,16 @@ impl Widening<'_> {
         for vertex in vertices {
             for (from, to) in self.from.dimensions.iter().zip(&self.to.dimensions) {
                 let field = &vertex[from.offset..from.offset + from.scalar.size()];
-                match (field, from.scalar == to.scalar) {
-                    (&[bits], false) => {
-                        let wide = self.depth.widened(bits);
-                        out.extend(match self.encoding.endian() {
-                            Endian::Little => wide.to_le_bytes(),
-                            Endian::Big => wide.to_be_bytes(),
-                        });
+                let endian = self.encoding.endian();
+                match (field, from.scalar == to.scalar, endian) {
+                    (&[bits], false, Endian::Little) => {
+                        out.extend(self.depth.widened(bits).to_le_bytes());
                     }
+                    (&[bits], false, Endian::Big) => {
+                        out.extend(self.depth.widened(bits).to_be_bytes());
+                    }
+                    (&[_, upper], false, Endian::Little) => out.push(upper),
+                    (&[upper, _], false, Endian::Big) => out.push(upper),
                     _ => out.extend_from_slice(field),
                 }
             }
@@ -170,11 +203,15 @@ impl Widening<'_> {
                 if from.scalar == to.scalar {
                     out.extend_from_slice(word);
                 } else {
-                    let mut bits = [0];
+                    let mut bits = [0; 2];
                     if !text::parse(word, from.scalar, &mut bits) {
                         return Err(own());
                     }
-                    text::print(Value::Unsigned(self.depth.widened(bits[0]).into()), out);
+                    let color = match from.scalar {
+                        Scalar::U8 => u64::from(self.depth.widened(bits[0])),
+                        _ => u64::from(bits[1]),
+                    };
+                    text::print(Value::Unsigned(color), out);
                 }
                 out.push(b' ');
             }
@@ -185,12 +222,15 @@ impl Widening<'_> {
     }
 }
 
-/// What to tell of colours in a finished file; `full` if they have 16 bits there.
-pub(super) fn note(asked: Colors, depth: Depth, full: bool) -> Option<String> {
+/// What to tell of colours in a finished file.
+pub(super) fn note(asked: Colors, depth: Depth) -> Option<String> {
     let told = match (asked, depth) {
-        (Colors::Auto, Depth::Full) if full => {
+        (Colors::Auto, Depth::Full) => {
             "colours have 16 bits here, which many viewers of PLY do not read: \
              `write.colors = \"8bit\"` writes their upper 8"
+        }
+        (Colors::Auto, Depth::Mixed) => {
+            "some colours are multiples of 256 and others of 257: both are taken for 8 bits"
         }
         (Colors::Auto, Depth::Unscaled) => {
             "colours are 0 to 255 in the input, though LAS means 0 to 65535: they are taken for 8 \
@@ -222,8 +262,9 @@ mod tests {
         assert_eq!(depth(&[0, 257, 65_535]), Depth::Times257);
         assert_eq!(depth(&[0, 256, 65_280]), Depth::Times256);
         assert_eq!(depth(&[0, 1, 255]), Depth::Unscaled);
-        for mixed in [&[257, 256][..], &[255, 256], &[255, 257], &[258], &[40_000]] {
-            assert_eq!(depth(mixed), Depth::Full, "{mixed:?}");
+        assert_eq!(depth(&[257, 0, 256]), Depth::Mixed);
+        for full in [&[255, 256][..], &[255, 257], &[258], &[40_000], &[257, 256, 1]] {
+            assert_eq!(depth(full), Depth::Full, "{full:?}");
         }
     }
 
@@ -235,14 +276,17 @@ mod tests {
                 assert_eq!(depth(&[one]).join(depth(&[two])), depth(&[one, two]), "{one} {two}");
             }
         }
-        assert!(Depth::ALL.iter().all(|&d| Depth::from_code(d.code()) == d));
+        for (depth, wide) in Depth::ALL.into_iter().flat_map(|d| [(d, false), (d, true)]) {
+            let written = Written { depth, wide };
+            assert_eq!(Written::from_code(written.code()), written);
+        }
     }
 
     #[test]
     fn eight_bits_widen_to_what_they_were() {
         for color in 0..=65_535u16 {
             let depth = depth(&[color]);
-            if depth != Depth::Full {
+            if depth.is_narrow() {
                 let bits = if depth == Depth::Unscaled { color as u8 } else { (color >> 8) as u8 };
                 assert_eq!(depth.widened(bits), color);
             }

@@ -1,8 +1,8 @@
 //! How records become vertices, decided once and done on all threads.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU8, Ordering};
 
-use super::colors::{self, Colors, Depth, Widening};
+use super::colors::{self, Colors, Depth, Recoloring, Written};
 use super::header::Encoding;
 use super::source::Native;
 use super::{PlyOptions, text};
@@ -15,6 +15,9 @@ use crate::{Error, Result};
 /// Records of one encoded chunk.
 pub(super) const CHUNK_POINTS: usize = 65_536;
 
+pub(super) const WIDE: u8 = 1;
+pub(super) const FULL: u8 = 2;
+
 /// How a record becomes a vertex; shared by all threads.
 pub(super) struct Plan {
     pub encoding: Encoding,
@@ -22,8 +25,9 @@ pub(super) struct Plan {
     pub full: Form,
     /// With colours of 8 bits, where the records are LAS and have colours.
     pub narrow: Option<Narrow>,
-    /// Set once the file has colours of 16 bits: no chunk needs to have 8 any more.
-    pub widened: AtomicBool,
+    /// [`WIDE`] once the file has colours of 16 bits, so that no chunk needs to have 8, and [`FULL`]
+    /// once they are known to need them, so that nobody needs to look.
+    pub widened: AtomicU8,
     /// For the vertices of chunks; whoever has written them puts them back.
     pub spare: Spare<Vec<u8>>,
 }
@@ -62,7 +66,7 @@ impl Narrow {
     fn form(&self, depth: Depth) -> Option<&Form> {
         let [lower, upper] = &self.forms;
         match (self.asked, depth) {
-            (Colors::Auto, Depth::Full) => None,
+            (Colors::Auto, Depth::Full | Depth::Mixed) => None,
             (Colors::Auto, Depth::Unscaled) => Some(lower),
             _ => Some(upper),
         }
@@ -144,7 +148,7 @@ impl Plan {
             encoding,
             full: Form::new(options, schema, encoding)?,
             narrow: Narrow::of(options, schema, encoding)?,
-            widened: AtomicBool::new(false),
+            widened: AtomicU8::new(0),
             spare: Spare::default(),
         })
     }
@@ -173,20 +177,32 @@ impl Plan {
         }
     }
 
-    /// From vertices with colours of 8 bits to those with 16.
-    pub fn widening(&self, depth: Depth) -> Option<Widening<'_>> {
+    /// From vertices with colours of 8 bits, of this depth, to those with 16.
+    pub fn widening(&self, depth: Depth) -> Option<Recoloring<'_>> {
         let from = self.narrow.as_ref()?.vertex();
-        Some(Widening { encoding: self.encoding, from, to: &self.full.vertex, depth })
+        Some(Recoloring { encoding: self.encoding, from, to: &self.full.vertex, depth })
+    }
+
+    /// From vertices with colours of 16 bits to those with the upper 8.
+    pub fn narrowing(&self) -> Option<Recoloring<'_>> {
+        let to = self.narrow.as_ref()?.vertex();
+        let (encoding, from, depth) = (self.encoding, &self.full.vertex, Depth::Mixed);
+        Some(Recoloring { encoding, from, to, depth })
     }
 
     /// The form in which a chunk is written, and what its colours are; full where nobody asked.
-    fn form(&self, batch: &PointBatch) -> (&Form, Depth) {
-        let Some(narrow) = &self.narrow else { return (&self.full, Depth::Full) };
-        if self.widened.load(Ordering::Relaxed) {
-            return (&self.full, Depth::Full);
+    fn form(&self, batch: &PointBatch) -> (&Form, Written) {
+        let full = |depth| (&self.full, Written { depth, wide: true });
+        let Some(narrow) = &self.narrow else { return full(Depth::Full) };
+        let widened = self.widened.load(Ordering::Relaxed);
+        if widened == FULL {
+            return full(Depth::Full);
         }
         let depth = Depth::of(batch.records(), batch.schema().stride, &narrow.fields);
-        (narrow.form(depth).unwrap_or(&self.full), depth)
+        match narrow.form(depth).filter(|_| widened != WIDE) {
+            Some(form) => (form, Written { depth, wide: false }),
+            None => full(depth),
+        }
     }
 }
 
@@ -213,7 +229,7 @@ impl Encode for Plan {
     fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
         let mut rounded = None;
         let mut vertices = self.spare.take(Vec::new);
-        let (form, depth) = self.form(batch);
+        let (form, written) = self.form(batch);
         if let Some(projection) = &form.projection {
             vertices.resize(batch.len() * form.vertex.stride, 0);
             let rounding = projection.project_into(batch.records(), &mut vertices)?;
@@ -238,6 +254,6 @@ impl Encode for Plan {
             _ => vertices,
         };
         let points = batch.len() as u64;
-        Ok(Encoded { bytes, points, rounded, form: depth.code(), ..Encoded::default() })
+        Ok(Encoded { bytes, points, rounded, form: written.code(), ..Encoded::default() })
     }
 }

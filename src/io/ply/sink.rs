@@ -8,8 +8,8 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::PlyOptions;
-use super::colors::{Colors, Depth, note};
-use super::encode::{CHUNK_POINTS, Plan};
+use super::colors::{Colors, Depth, Recoloring, Written, note};
+use super::encode::{CHUNK_POINTS, FULL, Plan, WIDE};
 use super::header::Encoding;
 use super::headings::Headings;
 use super::source::Native;
@@ -26,8 +26,10 @@ pub(super) struct PlySink {
     path: PathBuf,
     plan: Arc<Plan>,
     header: Headings,
-    /// With colours of 16 bits, as long as those that were appended have 8.
-    wider: Option<Headings>,
+    /// The header with colours of as many bits as the file does not have, where they can have 8 or 16.
+    other: Option<Headings>,
+    /// True if the file has colours of 16 bits.
+    wide: bool,
     /// What the appended colours are.
     depth: Depth,
     rest: Option<Arc<Native>>,
@@ -50,7 +52,7 @@ impl PlySink {
             Headings::of(vertex, plan.encoding, metadata, native.as_deref(), rest.as_deref())
         };
         let full = headings(&plan.full.vertex);
-        let (header, wider) = match &plan.narrow {
+        let (header, other) = match &plan.narrow {
             Some(narrow) => (headings(narrow.vertex()), Some(full)),
             None => (full, None),
         };
@@ -63,7 +65,8 @@ impl PlySink {
             path: staged.to_owned(),
             plan: Arc::new(plan),
             header,
-            wider,
+            wide: other.is_none(),
+            other,
             depth: Depth::default(),
             rest,
             notes,
@@ -82,56 +85,60 @@ impl PlySink {
         Ok(Plan::new(options, schema, native.as_deref())?.chunk())
     }
 
-    /// Makes the colours of a chunk and those of the file so far be of one depth.
+    /// Makes the colours of a chunk and those of the file so far have as many bits.
     fn fit_colors(&mut self, chunk: &mut Encoded) -> Result<()> {
         let plan = self.plan.clone();
         let Some(narrow) = &plan.narrow else { return Ok(()) };
-        let of_chunk = Depth::from_code(chunk.form);
+        let Written { depth, wide } = Written::from_code(chunk.form);
         let before = self.depth;
-        self.depth = before.join(of_chunk);
+        self.depth = before.join(depth);
         if narrow.asked == Colors::Eight {
             return Ok(());
         }
-        if self.depth == Depth::Full && self.wider.is_some() {
-            self.widen(before)?;
+        if !self.depth.is_narrow() {
+            let known = if self.depth == Depth::Full { FULL } else { WIDE };
+            plan.widened.store(known, Ordering::Relaxed);
+            if !self.wide {
+                self.rewrite(plan.widening(before))?;
+            }
         }
-        if self.wider.is_none() && of_chunk != Depth::Full
-            && let Some(widening) = plan.widening(of_chunk)
+        if self.wide && !wide
+            && let Some(widening) = plan.widening(depth)
         {
-            let mut wide = Vec::new();
-            widening.append(&chunk.bytes, &mut wide)?;
-            chunk.bytes = wide;
+            let mut widened = Vec::new();
+            widening.append(&chunk.bytes, &mut widened)?;
+            chunk.bytes = widened;
         }
         Ok(())
     }
 
-    /// Writes the file anew with colours of 16 bits; until now they have 8, of this depth.
-    fn widen(&mut self, depth: Depth) -> Result<()> {
-        let (Some(header), Some(widening)) = (self.wider.take(), self.plan.widening(depth)) else {
+    /// Writes the file anew with colours of as many bits as it does not have now.
+    fn rewrite(&mut self, recoloring: Option<Recoloring<'_>>) -> Result<()> {
+        let (Some(other), Some(recoloring)) = (&mut self.other, recoloring) else {
             return Ok(());
         };
-        let path = self.path.with_extension("wide");
-        let failed = |e| Error::io(&self.path, "write colours of 16 bits", e);
+        let path = self.path.with_extension("colors");
+        let failed = |e| Error::io(&self.path, "write its colours anew", e);
         let mut file = File::create(&path).map_err(failed)?;
-        file.write_all(header.text(0).as_bytes()).map_err(failed)?;
+        file.write_all(other.text(0).as_bytes()).map_err(failed)?;
         let written = File::open(&self.path).map_err(failed)?;
         let (mut at, end) = (self.header.text(0).len() as u64, self.bytes);
-        let mut bytes = header.text(0).len() as u64;
-        let (mut buffer, mut wide) = (vec![0; CARRY.max(self.plan.vertex_bytes())], Vec::new());
+        let mut bytes = other.text(0).len() as u64;
+        let (mut buffer, mut anew) = (vec![0; CARRY.max(self.plan.vertex_bytes())], Vec::new());
         while at < end {
             let piece = (end - at).min(buffer.len() as u64) as usize;
             written.read_exact_at(&mut buffer[..piece], at).map_err(failed)?;
-            wide.clear();
-            match widening.append(&buffer[..piece], &mut wide)? {
+            anew.clear();
+            match recoloring.append(&buffer[..piece], &mut anew)? {
                 0 => return Err(Error::internal("a vertex is longer than it can be")),
                 taken => at += taken as u64,
             }
-            file.write_all(&wide).map_err(failed)?;
-            bytes += wide.len() as u64;
+            file.write_all(&anew).map_err(failed)?;
+            bytes += anew.len() as u64;
         }
         std::fs::rename(&path, &self.path).map_err(failed)?;
-        (self.file, self.header, self.bytes) = (file, header, bytes);
-        self.plan.widened.store(true, Ordering::Relaxed);
+        std::mem::swap(&mut self.header, other);
+        (self.file, self.bytes, self.wide) = (file, bytes, !self.wide);
         Ok(())
     }
 
@@ -219,6 +226,10 @@ impl Sink for PlySink {
     }
 
     fn finish(mut self: Box<Self>) -> Result<SinkSummary> {
+        if self.wide && self.depth == Depth::Mixed {
+            let plan = self.plan.clone();
+            self.rewrite(plan.narrowing())?;
+        }
         if let Some(native) = self.carries() {
             let expected = native.rest.as_ref().map_or(0, |rest| rest.points);
             if expected != self.points {
@@ -234,7 +245,7 @@ impl Sink for PlySink {
         self.file.write_all(self.header.text(self.points).as_bytes()).map_err(failed)?;
         self.file.sync_all().map_err(|e| Error::io(&self.path, "flush", e))?;
         if let Some(narrow) = &self.plan.narrow {
-            self.notes.extend(note(narrow.asked, self.depth, self.wider.is_none()));
+            self.notes.extend(note(narrow.asked, self.depth));
         }
         Ok(SinkSummary { points: self.points, bytes: self.bytes, notes: self.notes })
     }

@@ -61,7 +61,13 @@ impl PlySource {
         for (file, text) in files.iter().zip(&texts).skip(1) {
             agree((first, &texts[0]), (file, text))?;
         }
-        let schema = Arc::new(schema(first, &texts[0].dimensions));
+        let wide = first.header.encoding == Encoding::Ascii && needs_double(&files, &texts[0])?;
+        let all: Vec<Schema> =
+            files.iter().map(|file| schema(file, &texts[0].dimensions, wide)).collect();
+        if let Some(other) = all.iter().position(|schema| *schema != all[0]) {
+            return Err(disagree(first, &files[other], "types of vertex properties are"));
+        }
+        let schema = Arc::new(schema(first, &texts[0].dimensions, wide));
         if schema.coordinates().is_none() {
             return Err(Error::data(&first.path, "a comment gives x, y or z another dimension"));
         }
@@ -121,8 +127,7 @@ impl Texts {
     }
 }
 
-/// Refuses two files whose vertices differ in kind. Texts whose numbers are held in one type are of
-/// one kind, whatever their headers call it.
+/// Refuses two files whose vertices differ but for the types of properties.
 fn agree((first, texts): (&PlyFile, &Texts), (other, of_other): (&PlyFile, &Texts)) -> Result<()> {
     let names = |file: &PlyFile| -> Vec<String> {
         file.properties().iter().map(|p| p.name.clone()).collect()
@@ -135,28 +140,48 @@ fn agree((first, texts): (&PlyFile, &Texts), (other, of_other): (&PlyFile, &Text
         "coordinate reference system is"
     } else if texts.dimensions != of_other.dimensions {
         "dimension names are"
-    } else if schema(first, &texts.dimensions) != schema(other, &texts.dimensions) {
-        "types of vertex properties are"
     } else {
         return Ok(());
     };
-    let told = format!("its {differ} not the same as in {}", first.path.display());
-    Err(Error::data(&other.path, told)
-        .help("files that are read together agree in encoding, vertex properties and coordinate reference system; convert one of them first"))
+    Err(disagree(first, other, differ))
 }
 
-/// The type in which values of a property are held. Coordinates and times in a text are, whatever
-/// its header calls them: many programs print them with all digits and call them `float`, which has
-/// room for seven of them.
-fn held(scalar: Scalar, encoding: Encoding, dimension: &str) -> Scalar {
-    let long = XYZ.contains(&dimension) || dimension == GPS_TIME;
-    match (scalar, encoding) {
-        (Scalar::F32, Encoding::Ascii) if long => Scalar::F64,
-        _ => scalar,
+fn disagree(first: &PlyFile, other: &PlyFile, what: &str) -> Error {
+    let told = format!("its {what} not the same as in {}", first.path.display());
+    Error::data(&other.path, told)
+        .help("files that are read together agree in encoding, vertex properties and coordinate reference system; convert one of them first")
+}
+
+/// True for dimensions that many programs print with all digits into texts whose headers call them
+/// `float`, which has room for seven.
+fn is_long(dimension: &str) -> bool {
+    XYZ.contains(&dimension) || dimension == GPS_TIME
+}
+
+/// True if coordinates and times of these texts are to be held as `double`, so that none loses a
+/// digit: where one has more than a `float` holds, or where another file calls them `double`.
+fn needs_double(files: &[PlyFile], texts: &Texts) -> Result<bool> {
+    let kind = |file: &PlyFile, n: usize| file.properties()[n].kind;
+    let long: Vec<usize> = (0..texts.dimensions.len())
+        .filter(|&n| is_long(&texts.dimensions[n]))
+        .filter(|&n| files.iter().any(|file| kind(file, n) == Kind::Scalar(Scalar::F32)))
+        .collect();
+    let double = |file: &PlyFile| long.iter().any(|&n| kind(file, n) == Kind::Scalar(Scalar::F64));
+    if long.is_empty() || files.iter().any(double) {
+        return Ok(!long.is_empty());
     }
+    for file in files {
+        let narrow = schema(file, &texts.dimensions, false);
+        let part = AsciiPart::new(file.origin.reopen()?, file, &narrow, 0);
+        if part.outgrows_float(&long)? {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
-fn schema(file: &PlyFile, dimensions: &[String]) -> Schema {
+/// Coordinates and times that a file calls `float` are `double` if they are to be `wide`.
+fn schema(file: &PlyFile, dimensions: &[String], wide: bool) -> Schema {
     let mut stride = 0;
     let dimensions = file
         .properties()
@@ -164,7 +189,8 @@ fn schema(file: &PlyFile, dimensions: &[String]) -> Schema {
         .zip(dimensions)
         .filter_map(|(property, name)| {
             let Kind::Scalar(scalar) = property.kind else { return None };
-            let scalar = held(scalar, file.header.encoding, name);
+            let widens = wide && scalar == Scalar::F32 && is_long(name);
+            let scalar = if widens { Scalar::F64 } else { scalar };
             let dimension = Dimension::new(name, scalar, stride);
             stride += scalar.size();
             Some(dimension)

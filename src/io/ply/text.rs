@@ -54,7 +54,8 @@ pub(super) fn parse(token: &[u8], scalar: Scalar, record: &mut [u8]) -> bool {
     }
 }
 
-/// True for a number that a `float` moves by more than half a unit of the text's last digit.
+/// True for a number that a `float` moves by more than half a unit of the text's last digit that is
+/// not 0.
 pub(super) fn loses_digits(token: &[u8]) -> bool {
     // So many digits a float keeps always.
     if token.len() <= SURE_DIGITS {
@@ -64,9 +65,11 @@ pub(super) fn loses_digits(token: &[u8]) -> bool {
     let Some(value) = text.parse::<f64>().ok().filter(|v| v.is_finite()) else { return false };
     let (digits, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let decimals = digits.split_once('.').map_or(0, |(_, decimals)| decimals.len());
-    let exponent = exponent.parse::<i32>().unwrap_or(0);
-    let power = exponent.saturating_sub(i32::try_from(decimals).unwrap_or(i32::MAX));
-    (f64::from(value as f32) - value).abs() > 10f64.powi(power) / 2.0
+    let zeros = digits.bytes().rev().filter(|b| *b != b'.').take_while(|b| *b == b'0').count();
+    let place = zeros as i64 - decimals as i64 + exponent.parse::<i64>().unwrap_or(0);
+    let unit = 10f64.powi(place.clamp(-400, 400) as i32);
+    // The text itself is off by what a double rounds.
+    (f64::from(value as f32) - value).abs() > unit / 2.0 + 2.0 * f64::EPSILON * value.abs()
 }
 
 /// Decimal digits of which a float keeps every one.
@@ -141,8 +144,11 @@ mod tests {
             assert!(loses_digits(lost.as_bytes()), "{lost}");
         }
         // What programs print of floats: six decimals, or nine digits.
-        for v in [12.3456f32, 0.1, -7.25e-9, 5_600_000.5, 1.0 / 3.0] {
-            for text in [format!("{v}"), format!("{v:.6}"), format!("{v:.8e}")] {
+        for v in [12.3456f32, 0.1, -7.25e-9, 5_600_000.5, 1.0 / 3.0, 9.800_000_5e9, 3e38, 1e-45] {
+            let mut own = Vec::new();
+            print(Value::Single(v), &mut own);
+            let own = String::from_utf8(own).unwrap();
+            for text in [own, format!("{v:.6}"), format!("{v:.8e}")] {
                 assert!(!loses_digits(text.as_bytes()), "{text}");
             }
         }
