@@ -240,8 +240,7 @@ fn few_points_that_the_lattice_merges_are_counted_without_a_warning() {
     }
     text_of_file += "1e-12 0 0\n";
     fs::write(&input, text_of_file).unwrap();
-    let (done, told) =
-        go(&text("", std::slice::from_ref(&input), REDUCE, &output, "")).unwrap();
+    let (done, told) = go(&text("", std::slice::from_ref(&input), REDUCE, &output, "")).unwrap();
     assert_eq!(done.report.result.counts["unequal_coordinates"], 1);
     assert!(told.iter().all(|w| !w.contains("unequal")), "{told:?}");
 }
@@ -271,8 +270,10 @@ fn lengths_that_the_lattice_rounds_are_told() {
     assert!(warning.contains("`grid.side = 0.15`"), "{warning}");
     assert!(grid("0.2").is_empty());
     let cells = |keys: &str| {
-        told(&format!("[[stage]]\nkind = 'normals'\n[[stage]]\nkind = 'cells'\n{keys}\n\
-                       [[stage]]\nkind = 'median'\npasses = 2\n"))
+        told(&format!(
+            "[[stage]]\nkind = 'normals'\n[[stage]]\nkind = 'cells'\n{keys}\n\
+                       [[stage]]\nkind = 'median'\npasses = 2\n"
+        ))
     };
     assert_eq!(cells("side = 1.23\nmax_side = 2.34\nmin_spacing = 0.12").len(), 3);
     assert!(cells("side = 1.2\nmax_side = 2.3\nmin_spacing = 0.1").is_empty());

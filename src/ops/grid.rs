@@ -26,7 +26,7 @@ const BYTES: usize = size_of::<u64>() + size_of::<Entry>() + size_of::<i64>();
 /// of every occupied cube one record stays.
 ///
 /// The cubes are anchored at world 0 and have the side `side`, rounded to whole lattice steps, which
-/// the report names. It looks at nothing but positions, so no stage needs to come before it; after
+/// the report names; a warning says if that is more than a thousandth off. It looks at nothing but positions, so no stage needs to come before it; after
 /// `normals`, the report also says how far what was removed lies from the plane of the point that stays.
 /// Copies weigh as one position and are removed as coincident.
 #[derive(Debug, Clone, Serialize, Deserialize)]

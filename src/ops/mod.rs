@@ -2,10 +2,10 @@
 
 mod cells;
 mod grid;
+mod lengths;
 mod median;
 pub mod normals;
 pub mod outliers;
-mod lengths;
 mod removal;
 
 pub use cells::{Cells, Keep, Measure, Reference, Side, Split};

@@ -215,8 +215,9 @@ impl Output {
 
     fn las_of_ply(&self, schema: &Schema, metadata: &Metadata) -> Result<Target> {
         let scale = self.write.scale.ok_or_else(|| {
-            Error::pipeline("a PLY scan written as LAS needs a `scale` for its coordinates")
-                .help("give `write.scale = 0.001`, or what the scan's precision is, in its own unit")
+            Error::pipeline("a PLY scan written as LAS needs a `scale` for its coordinates").help(
+                "give `write.scale = 0.001`, or what the scan's precision is, in its own unit",
+            )
         })?;
         let (format, extra) = convert::las_schema(schema, &self.write.drop)?;
         let offset = self.write.offset.unwrap_or([0.0; 3]);

@@ -106,9 +106,10 @@ impl Job<'_> {
                 ("is not finite", help)
             }
             Misplaced::TooFar => {
-                let farthest = point.unwrap_or_default().into_iter().fold(0.0, |far: f64, v| {
-                    f64::max(far, v.abs())
-                });
+                let farthest = point
+                    .unwrap_or_default()
+                    .into_iter()
+                    .fold(0.0, |far: f64, v| f64::max(far, v.abs()));
                 let step = Lattice::reaching(farthest);
                 let help = format!(
                     "`run.lattice = {step:e}` reaches it; or move the scan nearer to its origin"

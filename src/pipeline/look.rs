@@ -7,8 +7,9 @@ use crate::{Error, Result};
 
 /// Parts that are looked at, spread evenly over the source.
 const PARTS: usize = 8;
-/// Records of each, from its beginning.
+/// Records of each, from its beginning, and the most bytes that they take.
 const RECORDS: usize = 1024;
+const BYTES: usize = 1 << 20;
 
 /// Looks at some records for all `sinks`. Returns the first error that writing one of them would be;
 /// reading fails as a run would.
@@ -22,7 +23,8 @@ pub(super) fn look(
     if looking.is_empty() {
         return Ok(None);
     }
-    let mut batch = PointBatch::new(schema.clone(), RECORDS);
+    let records = RECORDS.min(BYTES / schema.stride.max(1)).max(1);
+    let mut batch = PointBatch::new(schema.clone(), records);
     let parts = source.parts();
     let step = parts.div_ceil(PARTS).max(1);
     for index in (0..parts).step_by(step) {
@@ -32,11 +34,7 @@ pub(super) fn look(
         }
         for sink in &looking {
             if let Err(error) = sink.check(source.metadata(), &batch) {
-                let input = source.inputs().into_iter().nth(batch.source as usize);
-                return Ok(Some(match input {
-                    Some(input) => error.at(input.path),
-                    None => error.at(sink.path()),
-                }));
+                return Ok(Some(error.at(sink.path())));
             }
         }
     }

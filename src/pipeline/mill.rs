@@ -304,12 +304,7 @@ fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<(
 }
 
 /// What the lattice rounded, as a decision of the report; a warning where it rounded much.
-fn rounding(
-    job: &Job<'_>,
-    lattice: &Lattice,
-    bounds: &Bounds,
-    tally: &Tally,
-) -> Option<Decision> {
+fn rounding(job: &Job<'_>, lattice: &Lattice, bounds: &Bounds, tally: &Tally) -> Option<Decision> {
     let apart = tally.apart?;
     let count = |name| tally.counts.get(name).copied().unwrap_or(0);
     let (unequal, positions) = (count("unequal_coordinates"), count("positions"));

@@ -17,13 +17,13 @@ pub(super) struct Rounded<'a> {
     tiles: &'a SealedTiles,
     fetch: Fetch,
     batch: PointBatch,
-    z_scale: f64,
+    lattice: &'a Lattice,
 }
 
 impl<'a> Rounded<'a> {
-    pub fn new(tiles: &'a SealedTiles, lattice: &Lattice, schema: &Arc<Schema>) -> Self {
+    pub fn new(tiles: &'a SealedTiles, lattice: &'a Lattice, schema: &Arc<Schema>) -> Self {
         let batch = PointBatch::new(schema.clone(), AT_ONCE);
-        Rounded { tiles, fetch: Fetch::default(), batch, z_scale: lattice.z_scale() }
+        Rounded { tiles, fetch: Fetch::default(), batch, lattice }
     }
 
     /// Enters how far records of unequal coordinates are from each other into `fates`, which are those
@@ -41,7 +41,7 @@ impl<'a> Rounded<'a> {
             let apart = if records > 1 { self.apart(first, records)? } else { None };
             if let Some(apart) = apart {
                 unequal += 1;
-                *fate = apart_code(*fate, apart.farthest);
+                *fate = apart_code(*fate, apart.farthest / self.lattice.step);
                 tally.apart = Some(tally.apart.map_or(apart, |all| all.with(apart)));
             }
         }
@@ -63,7 +63,7 @@ impl<'a> Rounded<'a> {
             self.tiles.fetch(&numbers, &mut self.fetch, &mut self.batch)?;
             for record in self.batch.iter() {
                 let mut at = axes.map(|d| d.world(record, schema.endian));
-                at[2] *= self.z_scale;
+                at[2] *= self.lattice.z_scale();
                 let from = *of_first.get_or_insert(at);
                 let mut off = 0.0;
                 for axis in 0..3 {

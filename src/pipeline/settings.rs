@@ -25,7 +25,9 @@ pub struct RunSettings {
     pub scratch: Option<PathBuf>,
     /// Where the report is written; none: nowhere.
     pub report: Option<PathBuf>,
-    /// Lattice step in world units; none: as the inputs' headers have it.
+    /// Lattice step in world units; none: as the inputs' headers have it, or 2^-30 where coordinates
+    /// are floats. A run warns where that merges more than one position in a thousand whose points
+    /// have unequal coordinates, and says what step does not.
     #[serde(deserialize_with = "some_step")]
     pub lattice: Option<f64>,
     /// What z is multiplied by wherever distances are measured, so that its unit is that of x and y;

@@ -32,9 +32,9 @@ pub(super) fn fate_code(fate: Fate) -> [u8; FATE_BYTES] {
     .to_le_bytes()
 }
 
-/// The stored fate of a position whose records are up to `apart` from each other, because the lattice
-/// rounds: where one of them is kept, that is how far the others deviate. Stored as the negative of it,
-/// which is never one of the codes above.
+/// The stored fate of a position whose records are up to `apart` steps from each other, because the
+/// lattice rounds: where one of them is kept, that is how far the others deviate. Stored as the negative
+/// of it, which is never one of the codes above.
 pub(super) fn apart_code(code: [u8; FATE_BYTES], apart: f64) -> [u8; FATE_BYTES] {
     if f32::from_le_bytes(code) != KEPT_ONCE {
         return code;

@@ -33,6 +33,8 @@ pub(super) struct AsciiPart<'a> {
     points: u64,
     left: u64,
     source: u32,
+    /// Numbers that have more digits than the `float` that holds them.
+    rounded: u64,
 }
 
 impl<'a> AsciiPart<'a> {
@@ -69,6 +71,7 @@ impl<'a> AsciiPart<'a> {
             points: file.points,
             left: file.points,
             source,
+            rounded: 0,
         }
     }
 
@@ -112,7 +115,7 @@ impl<'a> AsciiPart<'a> {
                 return Err(fail(at, message));
             }
             if *scalar == Scalar::F32 && text::loses_digits(token) {
-                self.file.rounded.fetch_add(1, Ordering::Relaxed);
+                self.rounded += 1;
             }
         }
         match word(line, &mut place) {
@@ -172,6 +175,8 @@ impl AsciiPart<'_> {
             self.vertex(record)?;
             self.left -= 1;
         }
+        // The file may be looked at before it is read.
+        self.file.rounded.fetch_max(self.rounded, Ordering::Relaxed);
         // A line behind the last vertex may be too long to be read: it is there all the same.
         if points == 0 && self.file.ends_with_vertices() && !matches!(self.lines.next(), Ok(None)) {
             self.file.more_lines.store(true, Ordering::Relaxed);

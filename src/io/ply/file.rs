@@ -165,7 +165,8 @@ fn check(path: &Path, vertex: &Element) -> Result<()> {
                 "element `vertex` has a list, `{}`: vertices of varying size are not read",
                 shown(&list.name)
             ),
-        ));
+        )
+        .help("write the file without that list; elements beside `vertex` may have lists"));
     }
     let missing: Vec<&str> = ["x", "y", "z"]
         .into_iter()

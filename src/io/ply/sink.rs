@@ -102,7 +102,8 @@ impl PlySink {
                 self.rewrite(plan.widening(before))?;
             }
         }
-        if self.wide && !wide
+        if self.wide
+            && !wide
             && let Some(widening) = plan.widening(depth)
         {
             let mut widened = Vec::new();
