@@ -111,6 +111,12 @@ pub trait TileOp: Send + Sync {
         Ok(())
     }
 
+    /// What the user should know of a stage that is settled: lengths that the lattice rounds. Keys are
+    /// named with their stage, as in `` `grid.side = 0.15` ``.
+    fn warnings(&self, _lattice: &Lattice) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Called for every tile, from several threads at once.
     ///
     /// It decides for the positions that [`Tile::is_chosen`] holds; keys that every stage takes may
@@ -215,6 +221,8 @@ pub struct Encoded {
     pub returns: [u64; 15],
     /// Points that a conversion rounded, and by how much at most, in world units.
     pub rounded: Option<(u64, f64)>,
+    /// In which of its forms a format wrote the chunk; 0 where it has one.
+    pub form: u8,
 }
 
 /// What a sink says when it is done.
@@ -272,6 +280,21 @@ pub trait CreateSink: Send + Sync {
     /// The chunks of the output that [`create`](CreateSink::create) would open, for a plan of the
     /// memory. Fails where `create` would refuse the schema.
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize>;
+
+    /// What the output will not hold though the input has it, and nobody was asked; for a plan.
+    fn warnings(&self, _schema: &Schema, _metadata: &Metadata) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Fails on a record that the output cannot hold, for a plan that looks at some before it begins.
+    fn check(&self, _metadata: &Metadata, _records: &PointBatch) -> Result<()> {
+        Ok(())
+    }
+
+    /// True if [`check`](CreateSink::check) may fail for records of `schema`.
+    fn checks(&self, _schema: &Schema) -> bool {
+        false
+    }
 
     /// Checks that the format holds every dimension (or that the user dropped it) and opens the
     /// output at `staged`, a path beside the final one. With `whole`, every record of the source

@@ -85,7 +85,7 @@ fn pages() -> Vec<Page> {
         Page { words: &["src/ops/cells/settings.rs"], ..page::<Cells>("src/ops/cells.rs", "") },
         page::<Median>("src/ops/median.rs", ""),
         page::<Grid>("src/ops/grid.rs", "side = 1.0"),
-        page::<Write>(KINDS, ""),
+        Page { words: &["src/io/ply/colors.rs"], ..page::<Write>(KINDS, "") },
     ]
 }
 

@@ -133,7 +133,7 @@ fn several_files_agree_or_both_are_named() {
     };
     file(folder.path(), "a.ply", text("comment one\n", "float", "1 2 3\n"));
     file(folder.path(), "b.ply", text("comment two\n", "float32", "4 5 6\n"));
-    file(folder.path(), "double.ply", text("", "double", "1 2 3\n"));
+    file(folder.path(), "int.ply", text("", "int", "1 2 3\n"));
     file(folder.path(), "crs.ply", text("comment crs: EPSG:2056\n", "float", "1 2 3\n"));
 
     let both = open(&["b.ply", "a.ply"]).unwrap();
@@ -144,7 +144,7 @@ fn several_files_agree_or_both_are_named() {
         both.part(index).unwrap().read(&mut batch).unwrap();
         assert_eq!((batch.source, &batch.records()[..4]), (index as u32, &x.to_le_bytes()[..]));
     }
-    for other in ["double.ply", "crs.ply"] {
+    for other in ["int.ply", "crs.ply"] {
         let error = open(&["a.ply", other]).err().expect("they disagree");
         let told = error.to_string();
         assert!(told.contains("a.ply") && told.contains(other), "{told}");

@@ -263,6 +263,10 @@ pub(super) struct Reduce {
     /// Points whose coordinates are not finite: refuse the scan, or drop them [default: refuse]
     #[arg(long, value_name = "HOW")]
     pub nonfinite: Option<String>,
+    /// Length of a step of the lattice on which points are compared, for scans far from their origin
+    /// or finer than it [default: what the coordinates are stored in, for floats 2^-30]
+    #[arg(long, value_name = "LENGTH")]
+    pub lattice: Option<f64>,
     /// What z is multiplied by where distances are measured, or auto: by what the units of the
     /// reference system say; the records keep their z [default: 1, and scans of mixed units are
     /// refused]
@@ -306,6 +310,10 @@ pub(super) struct Written {
     /// Encoding of PLY: ascii or binary [default: the input's]
     #[arg(long, value_name = "HOW")]
     pub encoding: Option<String>,
+    /// Bits of a colour where LAS becomes PLY: 8bit, 16bit, or auto: 8 where that loses nothing
+    /// [default: auto]
+    #[arg(long, value_name = "BITS")]
+    pub colors: Option<String>,
 }
 
 #[derive(Debug, Args)]
@@ -320,6 +328,10 @@ pub(super) struct Convert {
     /// Format: las, laz or ply [default: by extension; in a folder, the input's]
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
+    /// Points whose coordinates are not finite: drop them, or refuse to write them where the output
+    /// cannot hold them; PLY can [default: refuse]
+    #[arg(long, value_name = "HOW")]
+    pub nonfinite: Option<String>,
     #[command(flatten)]
     pub filter: Filtered,
     #[command(flatten)]

@@ -7,14 +7,16 @@ use super::console::Console;
 use super::print;
 use super::run::parse_sets;
 use crate::error::shown;
-use crate::pipeline::{Outline, Overrides, Pipeline, Registry};
+use crate::pipeline::{Outline, Overrides, Pipeline, Registry, Watch};
 use crate::report::Grouped;
 use crate::stage::Role;
 use crate::{Result, io};
 
 /// Prints how a pipeline would be run.
-pub(super) fn plan(arguments: &Plan, registry: &Registry) -> Result<()> {
-    print::result(read(arguments, registry)?.plan(&Overrides::default())?)
+pub(super) fn plan(arguments: &Plan, registry: &Registry, console: &Console) -> Result<()> {
+    let plan = read(arguments, registry)?.plan(&Overrides::default())?;
+    plan.warnings().iter().for_each(|warning| console.warn(warning));
+    print::result(plan)
 }
 
 /// Prints that a pipeline can be run, or fails as its run would before it reads a point; then the
@@ -26,6 +28,7 @@ pub(super) fn check(arguments: &Plan, registry: &Registry, console: &Console) ->
     match pipeline.plan(&Overrides::default()) {
         Ok(plan) => {
             console.planned(&plan);
+            plan.warnings().iter().for_each(|warning| console.warn(warning));
             console.result(format_args!("{name} is right: {}", said(&plan.outline())))
         }
         Err(error) => {

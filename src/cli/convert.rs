@@ -141,6 +141,7 @@ pub(super) fn flags(
         ("IN", "read.path", inputs),
         ("-o", "write.path", output),
         ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
+        ("--nonfinite", "run.nonfinite", arguments.nonfinite.as_deref().map(Value::from)),
     ]);
     all.extend(filtered(&arguments.filter));
     all.extend(written(&arguments.written));

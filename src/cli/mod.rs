@@ -63,7 +63,7 @@ fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<
         Command::Reduce(arguments) => run::reduce(arguments, registry, console),
         Command::Convert(arguments) => convert::convert(arguments, registry, console),
         Command::Synth(arguments) => run::synth(arguments, registry, console),
-        Command::Plan(arguments) => check::plan(arguments, registry),
+        Command::Plan(arguments) => check::plan(arguments, registry, console),
         Command::Check(arguments) => check::check(arguments, registry, console),
         Command::Stages(arguments) => stages::stages(arguments, registry),
         Command::Info(arguments) => describe::info(arguments, console),

@@ -134,6 +134,7 @@ pub(super) fn reduce_flags(arguments: &Reduce) -> Vec<Flag> {
         ("--withheld", "run.withheld", arguments.withheld.clone().map(Value::from)),
         ("--noise", "run.noise", Some(json!(noise(arguments)))),
         ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(Value::from)),
+        ("--lattice", "run.lattice", arguments.lattice.map(number)),
         ("--z-scale", "run.z_scale", arguments.z_scale.as_deref().map(number_or_text)),
     ]);
     all.extend(filtered(&arguments.filter));
@@ -160,6 +161,7 @@ pub(super) fn written(arguments: &Written) -> Vec<Flag> {
         ("--offset", "write.offset", list(!arguments.offset.is_empty(), json!(arguments.offset))),
         ("--drop", "write.drop", list(!arguments.drop.is_empty(), json!(arguments.drop))),
         ("--encoding", "write.encoding", arguments.encoding.as_deref().map(Value::from)),
+        ("--colors", "write.colors", arguments.colors.as_deref().map(Value::from)),
     ])
 }
 

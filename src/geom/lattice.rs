@@ -1,6 +1,6 @@
 //! The lattice: where points are, as integers, so that every decision is exact.
 
-use crate::point::{Endian, Layout, Position, Scalar, Schema};
+use crate::point::{Bounds, Endian, Layout, Position, Scalar, Schema};
 use crate::{Error, Result};
 
 /// Steps of the binary lattice per world unit where nothing decimal fits: 2^30.
@@ -104,6 +104,29 @@ impl Lattice {
         ((length / self.step).round() as i64).max(1)
     }
 
+    /// What a length in world units is on the lattice, if that is more than a thousandth beside it.
+    pub fn rounded(&self, length: f64) -> Option<f64> {
+        let held = self.steps(length) as f64 * self.step;
+        ((held - length).abs() > 1e-3 * length).then_some(held)
+    }
+
+    /// A decimal step that tells points apart which are `apart` in one coordinate, and still reaches
+    /// the ends of `bounds`; None where that is no finer than the step of this lattice.
+    pub fn finer(&self, bounds: &Bounds, apart: f64) -> Option<f64> {
+        let ends = bounds.lo.iter().chain(&bounds.hi);
+        let farthest = ends.map(|end| end.unsigned_abs()).max()? as f64 * self.step;
+        let least = decimal_step(farthest / FARTHEST) * 10.0;
+        let step = decimal_step(apart / 2.0);
+        let step = if step < least { decimal_step(least * 1.5) } else { step };
+        (step < self.step).then_some(step)
+    }
+
+    /// A decimal step of a lattice that reaches a coordinate and is no coarser than the numbers
+    /// around it are from one another.
+    pub fn reaching(coordinate: f64) -> f64 {
+        decimal_step(coordinate.abs() * f64::EPSILON)
+    }
+
     /// Positions of `records` (of the schema the lattice was made for), one after the other;
     /// `misplaced` is told the index of each record that has none, which is left out.
     pub fn place(
@@ -141,6 +164,14 @@ impl Lattice {
             }
         }
     }
+}
+
+/// The largest power of ten that is at most `length`, which is above 0; 1e-300 at least.
+fn decimal_step(length: f64) -> f64 {
+    let power = |exponent: i32| format!("1e{exponent}").parse::<f64>().unwrap_or(f64::MAX);
+    // The logarithm may be off by a little, so the first of the larger ones that fits is taken.
+    let above = if length > 1e-300 { libm::ceil(libm::log10(length)) as i32 } else { -300 };
+    (0..3).map(|less| power(above - less)).find(|&step| step <= length).unwrap_or(1e-300)
 }
 
 /// 2^62: far enough from the ends of i64 that a box around a position can grow.
@@ -227,6 +258,29 @@ mod tests {
         assert_eq!(lattice.step, 0.001);
         let Placement::Integer { times, plus } = lattice.placement else { panic!() };
         assert_eq!((times, plus), ([10, 10, 1], [500_000_000, 4_100_000_000, 0]));
+    }
+
+    #[test]
+    fn steps_that_are_proposed_are_decimal_and_do() {
+        for (length, step) in
+            [(1.0, 1.0), (0.99, 0.1), (1e-12, 1e-12), (9.9e-12, 1e-12), (1e22, 1e22), (0.0, 1e-300)]
+        {
+            assert_eq!(decimal_step(length), step, "{length}");
+        }
+        for far in [6.3e9, 4.2e12, 1e300] {
+            let step = Lattice::reaching(far);
+            assert!(float_position([far, 0.0, 0.0], 1.0 / step).is_ok(), "{far} {step}");
+        }
+        let lattice = Lattice::binary(1.0 / BINARY, BINARY, 1.0);
+        let bounds = |far: i64| Bounds { lo: [-far; 3], hi: [0; 3] };
+        assert_eq!(lattice.finer(&bounds(5), 1e-11), Some(1e-12));
+        let far = 1 << 55;
+        let step = lattice.finer(&bounds(far), 1e-30).unwrap();
+        assert!(step < lattice.step && far as f64 * lattice.step / step < FARTHEST, "{step}");
+        assert_eq!(lattice.finer(&bounds(1 << 61), 1e-30), None);
+        assert_eq!(lattice.rounded(0.15), None);
+        let coarse = Lattice::binary(0.1, 10.0, 1.0);
+        assert_eq!((coarse.rounded(0.15), coarse.rounded(0.3)), (Some(0.2), None));
     }
 
     #[test]

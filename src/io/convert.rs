@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use columns::{BLOCK, Column, Records, Targets};
 
-use crate::point::names::XYZ;
+use crate::point::names::{BLUE, GREEN, NIR, RED, XYZ};
 use crate::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
 use crate::{Error, ErrorKind, Result};
 
@@ -30,6 +30,8 @@ pub struct Projection {
     to_endian: Endian,
     to_stride: usize,
     moves: Vec<Move>,
+    /// What a record holds before the steps: 0, and the numbers that [`Projection::preset`] set.
+    blank: Vec<u8>,
     /// The same steps over columns, for those that have such a form.
     columns: Vec<Option<Column>>,
 }
@@ -77,18 +79,44 @@ impl Projection {
         let mut moves = Vec::new();
         for target in to.dimensions.iter().filter(|d| !drop.contains(&d.name)) {
             if let Some(source) = sources.get(target.name.as_str()) {
-                push(&mut moves, step(source, from.endian, target, to.endian));
+                if widens(from, source, to, target) {
+                    // 257 times a byte is the byte twice.
+                    for to in [target.offset, target.offset + 1] {
+                        push(&mut moves, Move::Copy { from: source.offset, to, length: 1 });
+                    }
+                } else {
+                    push(&mut moves, step(source, from.endian, target, to.endian));
+                }
             }
         }
         let over_columns = moves.iter().map(|step| Column::of(step, from.endian, to.endian));
         let columns = over_columns.collect();
         let (to_endian, to_stride) = (to.endian, to.stride);
-        Ok(Projection { from: from.clone(), to_endian, to_stride, moves, columns })
+        let blank = vec![0; to_stride];
+        Ok(Projection { from: from.clone(), to_endian, to_stride, moves, blank, columns })
     }
 
     /// Leaves room behind each record: records become `stride` bytes long, the new ones 0.
     pub fn widen(&mut self, stride: usize) {
         self.to_stride = self.to_stride.max(stride);
+        self.blank.resize(self.to_stride, 0);
+    }
+
+    /// Gives the dimension `to` of the target, which the source lacks, this number instead of 0.
+    /// False if it cannot hold it.
+    #[must_use]
+    pub fn preset(&mut self, to: &Dimension, number: u64) -> bool {
+        to.put(&mut self.blank, self.to_endian, Value::Unsigned(number))
+    }
+
+    fn clear(&self, targets: &mut [u8]) {
+        match self.blank.iter().all(|&byte| byte == 0) {
+            true => targets.fill(0),
+            false => {
+                let each = targets.chunks_exact_mut(self.to_stride.max(1));
+                each.for_each(|target| target.copy_from_slice(&self.blank));
+            }
+        }
     }
 
     /// True if every record stays as it is, byte for byte.
@@ -133,7 +161,7 @@ impl Projection {
 
     /// Projects up to [`BLOCK`] records field by field; False if a value may not fit.
     fn block(&self, records: &[u8], targets: &mut [u8], rounded: &mut [f64]) -> bool {
-        targets.fill(0);
+        self.clear(targets);
         let from = Records { bytes: records, stride: self.from.stride.max(1) };
         let mut to = Targets { bytes: targets, stride: self.to_stride.max(1) };
         self.moves.iter().zip(&self.columns).all(|(step, column)| match column {
@@ -157,7 +185,7 @@ impl Projection {
         targets: &mut [u8],
         rounded: &mut [f64],
     ) -> Result<()> {
-        targets.fill(0);
+        self.clear(targets);
         let records = records.chunks_exact(self.from.stride.max(1));
         let targets = targets.chunks_exact_mut(self.to_stride.max(1));
         for (index, ((record, target), rounded)) in records.zip(targets).zip(rounded).enumerate() {
@@ -332,17 +360,27 @@ fn quoted(names: &[&str]) -> String {
 fn check_drop(from: &Schema, drop: &[String]) -> Result<()> {
     for name in drop {
         if XYZ.contains(&name.as_str()) {
-            return Err(Error::pipeline(format!("drop names `{name}`: coordinates stay")));
+            let told = format!("`write.drop` names `{name}`: coordinates stay");
+            return Err(Error::pipeline(told));
         }
         if from.find(name).is_none() {
             let all: Vec<&str> = from.dimensions.iter().map(|d| d.name.as_str()).collect();
             return Err(Error::pipeline(format!(
-                "drop names `{name}`, which the input does not have; it has {}",
+                "`write.drop` names `{name}`, which the input does not have; it has {}",
                 quoted(&all)
             )));
         }
     }
     Ok(())
+}
+
+/// True if `target` holds 257 times the `source`: colours, of which 255 is the most in a vertex with 8
+/// bits and 65535 in LAS (LAS 1.4 R15, table 9).
+fn widens(from: &Schema, source: &Dimension, to: &Schema, target: &Dimension) -> bool {
+    from.layout == Layout::Ply
+        && matches!(to.layout, Layout::Las { .. })
+        && [RED, GREEN, BLUE, NIR].contains(&target.name.as_str())
+        && (source.scalar, target.scalar) == (Scalar::U8, Scalar::U16)
 }
 
 fn step(from: &Dimension, from_endian: Endian, to: &Dimension, to_endian: Endian) -> Move {

@@ -16,7 +16,9 @@ use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
 use serde_json::Value;
 
+use super::lengths::rounded;
 use crate::geom::angle::MaxAngle;
+use crate::geom::lattice::Lattice;
 use crate::point::names;
 use crate::report::Tally;
 use crate::stage::{Forecast, Needs, ScanFacts, TileOp};
@@ -199,6 +201,20 @@ impl TileOp for Cells {
             min_spacing: self.min_spacing.map_or(0, bound),
         });
         Ok(())
+    }
+
+    fn warnings(&self, lattice: &Lattice) -> Vec<String> {
+        let side = match self.side {
+            Side::Length(length) => Some(length),
+            Side::Auto => None,
+        };
+        let lengths = [
+            ("cells.side", side),
+            ("cells.max_side", self.max_side),
+            ("cells.min_spacing", self.min_spacing),
+        ];
+        let each = lengths.into_iter();
+        each.filter_map(|(address, length)| rounded(lattice, address, length?)).collect()
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {

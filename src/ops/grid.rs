@@ -6,8 +6,10 @@ use serde::de::{Error as _, Unexpected};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 
+use super::lengths::rounded;
 use super::removal::{Account, keep_once, remove, represent};
 use crate::geom::angle::is_known;
+use crate::geom::lattice::Lattice;
 use crate::point::{Bounds, Position, distance2};
 use crate::report::Tally;
 use crate::stage::{Needs, ScanFacts, TileOp};
@@ -24,7 +26,7 @@ const BYTES: usize = size_of::<u64>() + size_of::<Entry>() + size_of::<i64>();
 /// of every occupied cube one record stays.
 ///
 /// The cubes are anchored at world 0 and have the side `side`, rounded to whole lattice steps, which
-/// the report names. It looks at nothing but positions, so no stage needs to come before it; after
+/// the report names; a warning says if that is more than a thousandth off. It looks at nothing but positions, so no stage needs to come before it; after
 /// `normals`, the report also says how far what was removed lies from the plane of the point that stays.
 /// Copies weigh as one position and are removed as coincident.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -96,6 +98,10 @@ impl TileOp for Grid {
         let steps = scan.lattice.steps(self.side).min(LARGEST_SIDE);
         self.settled = Some(Settled { steps, length: steps as f64 * scan.lattice.step });
         Ok(())
+    }
+
+    fn warnings(&self, lattice: &Lattice) -> Vec<String> {
+        rounded(lattice, "grid.side", self.side).into_iter().collect()
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {

@@ -3,6 +3,7 @@
 mod cells;
 mod filter;
 mod grid;
+mod lengths;
 mod median;
 pub mod normals;
 pub mod outliers;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::kinds::{Encoding, Format, Synth, Write};
 use crate::io::{Projected, convert, las, ply, synthetic};
-use crate::point::{Layout, Metadata, Schema, names};
+use crate::point::{Layout, Metadata, PointBatch, Schema, names};
 use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Sink, Source};
 use crate::{Error, Result};
 
@@ -34,6 +34,9 @@ impl OpenSource for Files {
         self.files.clone()
     }
 }
+
+/// So many lost records are named in a warning.
+const NAMED: usize = 8;
 
 /// The sink that writes a file of one format.
 pub struct Output {
@@ -77,6 +80,37 @@ impl CreateSink for Output {
         };
         let chunk = chunk.map_err(|error| error.at(&self.path))?;
         Ok(if self.of_one { las::Shifted::chunk(chunk, schema) } else { chunk })
+    }
+
+    fn warnings(&self, schema: &Schema, metadata: &Metadata) -> Vec<String> {
+        if self.format != Format::Ply || schema.layout == Layout::Ply {
+            return Vec::new();
+        }
+        let lost = las::records_beside(metadata);
+        let named = match &lost[..] {
+            [] => return Vec::new(),
+            [first @ .., _] if first.len() >= NAMED => {
+                format!("{} and {} more", lost[..NAMED].join(", "), lost.len() - NAMED)
+            }
+            all => all.join(", "),
+        };
+        vec![format!(
+            "{}: PLY does not hold variable length records of LAS; these are lost: {named}",
+            self.path.display()
+        )]
+    }
+
+    fn checks(&self, schema: &Schema) -> bool {
+        let Write { scale, offset, .. } = &self.write;
+        let converts = schema.layout == Layout::Ply || scale.is_some() || offset.is_some();
+        self.format != Format::Ply && converts
+    }
+
+    fn check(&self, metadata: &Metadata, records: &PointBatch) -> Result<()> {
+        if let Some(projection) = self.las_target(records.schema(), metadata)?.projection {
+            projection.project(records.records(), &mut Vec::new())?;
+        }
+        Ok(())
     }
 
     fn create(
@@ -127,6 +161,7 @@ impl Output {
             encoding,
             normals: self.wants_normals(),
             drop: self.write.drop.clone(),
+            colors: self.write.colors,
             carry_rest: whole,
         }
     }
@@ -189,8 +224,30 @@ impl Output {
         let (format, extra) = convert::las_schema(schema, &self.write.drop)?;
         let offset = self.write.offset.unwrap_or([0.0; 3]);
         let layout = Arc::new(las::layout(format, &extra, scale, offset));
-        let projection = Some(convert::Projection::new(schema, &layout, &self.write.drop)?);
+        let mut projection = convert::Projection::new(schema, &layout, &self.write.drop)?;
+        number_returns(schema, &layout, &self.write.drop, &mut projection)?;
+        let projection = Some(projection);
         let metadata = las::fresh(&layout, metadata.crs.as_deref());
         Ok(Target { schema: layout, metadata, projection })
     }
+}
+
+/// Points of which nothing is known of returns are the first and only one of their pulse: LAS has no
+/// return 0 of 0.
+fn number_returns(
+    from: &Schema,
+    to: &Schema,
+    drop: &[String],
+    projection: &mut convert::Projection,
+) -> Result<()> {
+    let both = [names::RETURN_NUMBER, names::NUMBER_OF_RETURNS];
+    if both.iter().any(|name| from.find(name).is_some() && !drop.iter().any(|d| d == name)) {
+        return Ok(());
+    }
+    for field in both.iter().filter_map(|name| to.find(name)) {
+        if !projection.preset(field, 1) {
+            return Err(Error::internal("a number of returns does not hold 1"));
+        }
+    }
+    Ok(())
 }

@@ -212,6 +212,7 @@ pub(super) struct Worker<'a> {
     wants_normals: bool,
     /// Where positions are rounded, and unequal coordinates that share one are counted.
     rounded: Option<Rounded<'a>>,
+    first: bool,
     pub tally: Tally,
     decided: u64,
     oriented: bool,
@@ -237,9 +238,11 @@ impl<'a> Worker<'a> {
         if neighbors > 0 {
             tile.around.reserve(capacity);
         }
-        // Once, in the first pass.
-        let rounds = field.lattice.rounds() && sieve.states.is_none();
-        let rounded = rounds.then(|| Rounded::new(&field.tiles, job.source.schema()));
+        // Counted once, in the first pass; fates are stored by every pass that removes.
+        let first = sieve.states.is_none();
+        let rounds = field.lattice.rounds() && (first || pass.removes);
+        let rounded =
+            rounds.then(|| Rounded::new(&field.tiles, field.lattice, job.source.schema()));
         let reach = reach(&job.ops, pass);
         let tally = Tally::default();
         let (decided, oriented) = (0, false);
@@ -251,6 +254,7 @@ impl<'a> Worker<'a> {
             neighbors,
             wants_normals,
             rounded,
+            first,
             tally,
             decided,
             oriented,
@@ -286,15 +290,6 @@ impl<'a> Worker<'a> {
     fn mill(&mut self, key: TileKey) -> Result<Product> {
         let (_, found) = self.run(key, None)?;
         let (tile, core) = self.loader.tile();
-        if let Some(rounded) = &mut self.rounded {
-            let mut positions = Vec::new();
-            core.each(tile, |runs, _| {
-                let count = runs.iter().map(|run| run.count).sum::<u32>();
-                positions.extend(runs.first().map(|run: &Run| (run.number, count)));
-                Ok(())
-            })?;
-            self.tally.count("unequal_coordinates", rounded.count(positions.into_iter())?);
-        }
         self.decided += tile.copies[tile.core.clone()].iter().map(|&n| u64::from(n)).sum::<u64>();
         self.oriented |= tile.oriented;
         self.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
@@ -302,6 +297,19 @@ impl<'a> Worker<'a> {
         self.tally.work("tied", tile.around.take_tied());
         let mut product = Product::of(tile, core, self.pass, self.wants_normals)?;
         product.found = found;
+        if let Some(rounded) = &mut self.rounded {
+            let mut positions = Vec::new();
+            core.each(tile, |runs, _| {
+                let count = runs.iter().map(|run| run.count).sum::<u32>();
+                positions.extend(runs.first().map(|run: &Run| (run.number, count)));
+                Ok(())
+            })?;
+            let mut counted = Tally::default();
+            rounded.enter(&positions, &mut product.fates, &mut counted)?;
+            if self.first {
+                self.tally.merge(&counted);
+            }
+        }
         Ok(product)
     }
 }

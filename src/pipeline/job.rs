@@ -8,7 +8,7 @@ use super::each::Each;
 use super::passes::{Pass, StageOp};
 use super::tagger::{ClassOf, LEFT_OUT, Tagger};
 use crate::budget::Budget;
-use crate::geom::lattice::Misplaced;
+use crate::geom::lattice::{Lattice, Misplaced};
 use crate::geom::simd::Simd;
 use crate::point::PointBatch;
 use crate::report::{Grouped, Tally};
@@ -119,12 +119,20 @@ impl Job<'_> {
         let point = schema.coordinates().map(|axes| axes.map(|d| d.world(record, schema.endian)));
         let (what, help) = match why {
             Misplaced::NotFinite => {
-                ("is not finite", "`run.nonfinite = \"drop\"` leaves such points out")
+                let help = "`run.nonfinite = \"drop\"` leaves such points out".to_owned();
+                ("is not finite", help)
             }
-            Misplaced::TooFar => (
-                "lies beyond the lattice",
-                "give a larger `run.lattice`, or move the scan nearer to its origin",
-            ),
+            Misplaced::TooFar => {
+                let farthest = point
+                    .unwrap_or_default()
+                    .into_iter()
+                    .fold(0.0, |far: f64, v| f64::max(far, v.abs()));
+                let step = Lattice::reaching(farthest);
+                let help = format!(
+                    "`run.lattice = {step:e}` reaches it; or move the scan nearer to its origin"
+                );
+                ("lies beyond the lattice", help)
+            }
         };
         let error = Error::new(
             ErrorKind::Data,

@@ -10,6 +10,7 @@ use super::outputs::Outputs;
 use super::registry::{StageKind, StagePlace};
 use super::{connect, inputs};
 use crate::error::shown;
+use crate::io::ply::Colors;
 use crate::io::synthetic::Scene;
 use crate::stage::{Order, Role};
 use crate::{Error, Result, point::names};
@@ -55,6 +56,12 @@ impl Format {
 /// bytes, scales, GPS time type and coordinate reference system, PLY inputs in encoding, vertex
 /// properties and coordinate reference system. LAS offsets may differ by whole steps; the output has
 /// the smallest.
+///
+/// A number of a PLY text is held in the type that its header says, but coordinates and GPS times are
+/// held as `double` where one of them has more digits than the `float` of its header has room for: a
+/// text is looked through for such before it is read. `scalar_Intensity` and other scalar fields, as
+/// CloudCompare writes them, are the dimensions that they are named after. A text that ends within a
+/// line is told, since its last number may be cut short.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Read {
@@ -122,7 +129,15 @@ impl StageKind for Synth {
 ///
 /// A record that is kept is the input's, byte for byte, wherever the format can hold it; LAS header
 /// fields that depend on the points are computed again and all others carried. From LAS to PLY or
-/// back every field keeps its name; one that cannot be held is an error unless `drop` names it.
+/// back every field keeps its name; one that cannot be held is an error unless `drop` names it. A
+/// point of which a PLY file tells no returns is return 1 of 1 in LAS. Variable length records that
+/// PLY does not hold are named in a warning.
+///
+/// Colours keep their meaning: 255 of 8 bits in PLY is 65535 in LAS. From LAS to PLY they become
+/// `uchar` where that loses nothing: where each is a multiple of 257 or of 256, or all are below 256,
+/// as writers leave them that do not scale. Else they stay `ushort`, which many viewers do not read;
+/// a warning says so, and `colors` can ask for either. The type depends on all colours of the output,
+/// and on nothing else. From LAS to LAS and from PLY to PLY colours are not touched.
 ///
 /// With `path` all inputs become one file. With `folder` each input becomes a file of its own there:
 /// under its name, with its header, its records and its offset, holding those of its points that are
@@ -158,6 +173,9 @@ pub struct Write {
     /// Encoding of a PLY file; none: the input's.
     #[serde(default)]
     pub encoding: Option<Encoding>,
+    /// Bits of a colour in a PLY file of LAS points; none: `"auto"`.
+    #[serde(default)]
+    pub colors: Option<Colors>,
 }
 
 /// Order of the records of an output, as a file names it.
@@ -203,6 +221,7 @@ impl Write {
             Format::Ply if self.scale.is_some() => only("scale", "las and laz"),
             Format::Ply if self.offset.is_some() => only("offset", "las and laz"),
             Format::Las | Format::Laz if self.encoding.is_some() => only("encoding", "ply"),
+            Format::Las | Format::Laz if self.colors.is_some() => only("colors", "ply"),
             _ if self.offset.is_some_and(|offset| offset.iter().any(|v| !v.is_finite())) => {
                 Err(("offset", Error::pipeline("an offset is three finite numbers")))
             }

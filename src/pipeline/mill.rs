@@ -18,8 +18,8 @@ use super::run::Finished;
 use super::shares::{BATCH, Demands, Shares};
 use super::survey::survey;
 use crate::geom::lattice::{Lattice, Misplaced};
-use crate::point::{PointBatch, Position};
-use crate::report::{Decision, PassFigures, Tally};
+use crate::point::{Bounds, PointBatch, Position};
+use crate::report::{Decision, Grouped, PassFigures, Tally};
 use crate::stage::{Gathered, ScanFacts, Sink, SinkSummary};
 use crate::tile::{Intake, SealedTiles, Sieve, SpillArea, Tag, TileStore, lock, seal};
 use crate::{Error, Result};
@@ -43,6 +43,7 @@ pub(super) fn mill(
     let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
     tally.count("positions", tiles.positions());
     settle(job, lattice, &tiles)?;
+    let bounds = tiles.bounds();
     let field = Field { lattice, area: area.clone(), tiles: tiles.clone() };
     let mut course = Course {
         sieve: Sieve::default(),
@@ -67,7 +68,10 @@ pub(super) fn mill(
             .into_iter()
             .map(|w| w.ok_or_else(unwritten))
             .collect::<Result<_>>()?,
-        decisions: decisions(job, course.forecasts),
+        decisions: rounding(job, lattice, &bounds, &tally)
+            .into_iter()
+            .chain(decisions(job, course.forecasts))
+            .collect(),
         classes: tally.classes.take().map_or(Vec::new(), |classes| classes.figures()),
         passes: course.passes,
         tally,
@@ -297,7 +301,35 @@ fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<(
         lattice,
         levels: tiles.levels(),
     };
-    job.ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().settle(&facts))
+    job.ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().settle(&facts))?;
+    let warnings = job.ops.iter().flat_map(|stage| stage.op.tile().warnings(lattice));
+    // Stages that are applied several times say it once.
+    let warnings: std::collections::BTreeSet<String> = warnings.collect();
+    warnings.into_iter().for_each(|warning| job.warn(warning));
+    Ok(())
+}
+
+/// What the lattice rounded, as a decision of the report; a warning where it rounded much.
+fn rounding(job: &Job<'_>, lattice: &Lattice, bounds: &Bounds, tally: &Tally) -> Option<Decision> {
+    let apart = tally.apart?;
+    let count = |name| tally.counts.get(name).copied().unwrap_or(0);
+    let (unequal, positions) = (count("unequal_coordinates"), count("positions"));
+    if unequal > positions / 1000 {
+        let finer = match lattice.finer(bounds, apart.nearest) {
+            Some(step) => format!("`run.lattice = {step:e}` tells them apart"),
+            None => "no step that is finer reaches the scan from its origin".to_owned(),
+        };
+        job.warn(format!(
+            "{} of {} positions hold points of unequal coordinates, up to {:.2e} from each other: \
+             the lattice has steps of {:.2e}; {finer}",
+            Grouped(unequal),
+            Grouped(positions),
+            apart.farthest,
+            lattice.step
+        ));
+    }
+    let (stage, name) = ("run".to_owned(), "unequal_coordinates_apart".to_owned());
+    Some(Decision { stage, name, value: apart.farthest.into() })
 }
 
 /// What the stages settled by themselves and what they expected, in their order.

@@ -16,6 +16,7 @@ mod job;
 mod keys;
 mod kinds;
 mod limits;
+mod look;
 mod mill;
 mod mistake;
 mod node;

@@ -24,6 +24,11 @@ pub struct Outline {
 }
 
 impl Plan {
+    /// What the user should know before the plan is run. A run tells it too.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
     /// What the plan reads, writes and uses.
     pub fn outline(&self) -> Outline {
         let outputs: Vec<PathBuf> = self.sinks.iter().map(|sink| sink.path().to_owned()).collect();

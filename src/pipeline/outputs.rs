@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::connect::Output;
 use super::kinds::{Format, Write, unknown_extension};
 use crate::error::shown;
-use crate::point::{Layout, Metadata, Schema};
+use crate::point::{Layout, Metadata, PointBatch, Schema};
 use crate::stage::{ChunkSize, CreateSink, Input, Order, Sink};
 use crate::{Error, ErrorKind, Result};
 
@@ -36,6 +36,17 @@ impl Outputs {
         let told =
             Error::new(ErrorKind::Io, "the folder does not exist, and the next is to be in it");
         Err(told.at(parent).help("create it first"))
+    }
+
+    /// One of the outputs, for what all have in common.
+    fn any(&self, schema: &Schema) -> Output {
+        // Compressing takes most: where inputs say their formats, some may be LAZ.
+        let format = self.write.format.unwrap_or(match schema.layout {
+            Layout::Ply => Format::Ply,
+            Layout::Las { .. } => Format::Laz,
+        });
+        let (write, path) = (self.write.clone(), self.folder.clone());
+        Output { write, path, format, of_one: true }
     }
 
     /// The output of the input at `path`: its name, with the extension of the format that is asked
@@ -101,13 +112,19 @@ impl CreateSink for Outputs {
     }
 
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize> {
-        // Compressing takes most: where inputs say their formats, some may be LAZ.
-        let format = self.write.format.unwrap_or(match schema.layout {
-            Layout::Ply => Format::Ply,
-            Layout::Las { .. } => Format::Laz,
-        });
-        let (write, path) = (self.write.clone(), self.folder.clone());
-        Output { write, path, format, of_one: true }.chunk(schema, metadata)
+        self.any(schema).chunk(schema, metadata)
+    }
+
+    fn warnings(&self, schema: &Schema, metadata: &Metadata) -> Vec<String> {
+        self.any(schema).warnings(schema, metadata)
+    }
+
+    fn checks(&self, schema: &Schema) -> bool {
+        self.any(schema).checks(schema)
+    }
+
+    fn check(&self, metadata: &Metadata, records: &PointBatch) -> Result<()> {
+        self.any(records.schema()).check(metadata, records)
     }
 
     fn create(

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::each::{lists_bytes, paths, ranks};
 use super::files::{Clash, Files, Use};
+use super::look::look;
 use super::passes::{Op, Pass, StageOp, Tap, check_limits, number_selections, unroll};
 use super::publish::check_place;
 use super::settings::{Nonfinite, Overrides, RunSettings};
@@ -43,6 +44,8 @@ pub struct Plan {
     /// The stages as the report names them.
     pub(super) stages: serde_json::Value,
     pub(super) demands: Demands,
+    /// What the user should know before the run.
+    pub(super) warnings: Vec<String>,
 }
 
 /// The stages of a pipeline by role.
@@ -109,6 +112,7 @@ impl Pipeline {
         let chunks = chunks(&sinks, &*source)?;
         let needs = passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect();
         let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
+        let removes = !(sorted.transforms.is_empty() && sorted.ops.is_empty());
         let demands = Demands {
             lists: folders.saturating_mul(lists_bytes(ranks.len())),
             mills,
@@ -117,7 +121,9 @@ impl Pipeline {
             ..Demands::of(&*source, &chunks, limit, threads)
         };
         demands.divide()?;
+        let warnings = warnings(&*source, &sinks, removes, &settings)?;
         Ok(Plan {
+            warnings,
             settings,
             simd,
             threads,
@@ -263,6 +269,27 @@ fn check_transforms(transforms: &[(String, Box<dyn Transform>)], schema: &Schema
         written.extend(needs.writes);
     }
     Ok(())
+}
+
+/// What outputs will not hold. Records that they cannot hold are an error where all are written, and
+/// a warning where a stage may remove them first (`removes`).
+fn warnings(
+    source: &dyn Source,
+    sinks: &[Box<dyn CreateSink>],
+    removes: bool,
+    settings: &RunSettings,
+) -> Result<Vec<String>> {
+    let lost = sinks.iter().flat_map(|sink| sink.warnings(source.schema(), source.metadata()));
+    let mut warnings: Vec<String> = lost.collect();
+    let Some(error) = look(source, sinks, settings.nonfinite == Nonfinite::Drop)? else {
+        return Ok(warnings);
+    };
+    if !removes {
+        return Err(error);
+    }
+    let help = error.remedy().map_or(String::new(), |help| format!("; {help}"));
+    warnings.push(format!("{error}: the run fails if such a point is kept{help}"));
+    Ok(warnings)
 }
 
 /// The chunks of all outputs.

@@ -27,7 +27,9 @@ pub struct RunSettings {
     pub report: Option<PathBuf>,
     /// What becomes of files that are already where an output or the report is to be.
     pub existing: Existing,
-    /// Lattice step in world units; none: as the inputs' headers have it.
+    /// Lattice step in world units; none: as the inputs' headers have it, or 2^-30 where coordinates
+    /// are floats. A run warns where that merges more than one position in a thousand whose points
+    /// have unequal coordinates, and says what step does not.
     #[serde(deserialize_with = "some_step")]
     pub lattice: Option<f64>,
     /// What z is multiplied by wherever distances are measured, so that its unit is that of x and y;

@@ -32,12 +32,26 @@ pub(super) fn fate_code(fate: Fate) -> [u8; FATE_BYTES] {
     .to_le_bytes()
 }
 
+/// The stored fate of a position whose records are up to `apart` steps from each other, because the
+/// lattice rounds: where one of them is kept, that is how far the others deviate. Stored as the negative
+/// of it, which is never one of the codes above.
+pub(super) fn apart_code(code: [u8; FATE_BYTES], apart: f64) -> [u8; FATE_BYTES] {
+    if f32::from_le_bytes(code) != KEPT_ONCE {
+        return code;
+    }
+    let apart = (apart as f32).max(f32::MIN_POSITIVE);
+    let taken = [KEPT, KEPT_ONCE, REMOVED].contains(&-apart);
+    (if taken { -apart.next_up() } else { -apart }).to_le_bytes()
+}
+
 /// How far the removed records of a position are from the surface, by its stored fate: copies of a
-/// kept one are on it; None where nothing stands for them, as for those that took no part.
+/// kept one are on it, unless the lattice rounds; None where nothing stands for them, as for those
+/// that took no part.
 fn deviation_of(code: [u8; FATE_BYTES]) -> Option<f32> {
     match f32::from_le_bytes(code) {
         REMOVED | KEPT => None,
         KEPT_ONCE => Some(0.0),
+        apart if apart < 0.0 => Some(-apart),
         deviation => Some(deviation),
     }
 }

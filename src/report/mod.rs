@@ -30,4 +30,4 @@ pub use survey::{
     FittedScan, FittedTile, Lot, PlaneDistances, ScanSurvey, TileSurvey, report_tile_level,
 };
 pub use table::{Grouped, Table};
-pub use tally::Tally;
+pub use tally::{Apart, Tally};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::ClassCounts;
 
 /// Counts that a tile or a stream reports; merged by addition, so that order does not matter.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Tally {
     /// Counts that are the same for every configuration, by name; they go into `result`.
     pub counts: BTreeMap<&'static str, u64>,
@@ -17,6 +17,28 @@ pub struct Tally {
     pub selections: u8,
     /// Records by class; None where they have none.
     pub classes: Option<ClassCounts>,
+    /// How far apart unequal coordinates are that share a position; None where there are none.
+    pub apart: Option<Apart>,
+}
+
+/// How far apart points of unequal coordinates are that share a position of the lattice, in world
+/// units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Apart {
+    /// The least difference in one coordinate that was met.
+    pub nearest: f64,
+    /// The largest distance that there may be.
+    pub farthest: f64,
+}
+
+impl Apart {
+    /// That of the points of both.
+    pub fn with(self, other: Apart) -> Apart {
+        Apart {
+            nearest: self.nearest.min(other.nearest),
+            farthest: self.farthest.max(other.farthest),
+        }
+    }
 }
 
 impl Tally {
@@ -49,6 +71,8 @@ impl Tally {
             *self.removed.entry(key.clone()).or_default() += n;
         }
         self.selections |= other.selections;
+        let apart = [self.apart, other.apart].into_iter().flatten();
+        self.apart = apart.reduce(Apart::with);
         if let Some(classes) = &other.classes {
             self.classes.get_or_insert_default().merge(classes);
         }

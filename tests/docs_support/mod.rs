@@ -46,7 +46,7 @@ pub fn struct_of(text: &str, name: &str) -> (String, Vec<Field>) {
     (docs, fields)
 }
 
-/// The words of an enum whose variants are written in kebab case; None if there is no such enum.
+/// The words of an enum whose variants are written in kebab case, or as `serde` renames them; None if there is no such enum.
 pub fn enum_of(text: &str, name: &str) -> Option<Enum> {
     let lines = body(text, "enum", name)?;
     let (mut words, mut default) = (Vec::new(), None);
@@ -57,8 +57,12 @@ pub fn enum_of(text: &str, name: &str) -> Option<Enum> {
         if variant.is_empty() || !variant.chars().all(char::is_alphanumeric) {
             continue;
         }
-        let word = kebab(variant);
-        if at > 0 && lines[at - 1].trim() == "#[default]" {
+        let above = lines[..at].iter().rev().map(|line| line.trim());
+        let attributes: Vec<&str> = above.take_while(|line| line.starts_with("#[")).collect();
+        let renamed = attributes.iter().find_map(|a| a.strip_prefix("#[serde(rename = \""));
+        let renamed = renamed.and_then(|rest| rest.strip_suffix("\")]"));
+        let word = renamed.map_or_else(|| kebab(variant), str::to_owned);
+        if attributes.contains(&"#[default]") {
             default = Some(word.clone());
         }
         words.push((word, docs_above(&lines[..at])));
@@ -121,7 +125,8 @@ fn without_links(text: &str) -> String {
 fn comments_and_fields_are_read() {
     let text = "/// A stage, see [`X::y`](x) and [`z`].\n///\n/// More.\n#[derive(Debug)]\npub struct S {\n    \
                 /// A key\n    /// of two lines.\n    #[serde(default)]\n    pub key: Option<f64>,\n    hidden: u8,\n}\n\n\
-                /// Words.\npub enum E {\n    /// One.\n    #[default]\n    One,\n    /// Two.\n    TwoWords,\n}\n";
+                /// Words.\npub enum E {\n    /// One.\n    #[default]\n    One,\n    /// Two.\n    TwoWords,\n    \
+                /// Three.\n    #[serde(rename = \"3\")]\n    Three,\n}\n";
     let (docs, fields) = struct_of(text, "S");
     assert_eq!(docs, "A stage, see `X::y` and `z`.\n\nMore.");
     assert_eq!(fields.len(), 1);
@@ -129,6 +134,7 @@ fn comments_and_fields_are_read() {
     assert_eq!(fields[0].docs, "A key\nof two lines.");
     let words = enum_of(text, "E").unwrap();
     assert_eq!(words.default.as_deref(), Some("one"));
-    assert_eq!(words.words, [("one".into(), "One.".into()), ("two-words".into(), "Two.".into())]);
+    let expected = [("one", "One."), ("two-words", "Two."), ("3", "Three.")];
+    assert_eq!(words.words, expected.map(|(word, docs)| (word.to_owned(), docs.to_owned())));
     assert!(enum_of(text, "F").is_none());
 }

@@ -148,7 +148,7 @@ const WORDS: &[&[u8]] = &[
     b"dimension x: NormalX",
     b"comment crs: EPSG:4326",
     b"comment crs+ more",
-    b"comment ....................",
+    b"comment made by pointmill                   ",
     b"nan",
     b"-inf",
     b"1e400",

@@ -26,7 +26,7 @@ mod vlr;
 
 pub use describe::{Description, ExtraBytes, Record, describe};
 pub use format::layout;
-pub use native::fresh;
+pub use native::{fresh, records_beside};
 pub use own::{Shifted, own_form};
 pub use read::Shift;
 pub use sink::{LasOptions, chunk, create};

@@ -95,6 +95,21 @@ pub fn fresh(schema: &Schema, crs: Option<&str>) -> Metadata {
     }
 }
 
+/// Names of the variable length records of LAS inputs that say more than dimensions and the coordinate
+/// reference system: what an output of another format does not hold.
+pub fn records_beside(metadata: &Metadata) -> Vec<String> {
+    let native = metadata.native.clone().and_then(|native| native.downcast::<Native>().ok());
+    let Some(native) = native else { return Vec::new() };
+    let name = |user: String, record: u16| {
+        let crs = user == "LASF_Projection" && metadata.crs.is_some();
+        let described = (user.as_str(), record) == EXTRA_BYTES;
+        (!crs && !described).then(|| format!("{user} {record}"))
+    };
+    let vlrs = native.vlrs.iter().filter_map(|vlr| name(vlr.user(), vlr.record()));
+    let evlrs = native.evlrs.iter().filter_map(|evlr| name(evlr.user(), evlr.record()));
+    vlrs.chain(evlrs).collect()
+}
+
 /// The three dimensions that hold a normal already, if all are there.
 pub fn normals_of(schema: &Schema) -> Option<[&crate::point::Dimension; 3]> {
     let [x, y, z] = names::NORMAL.map(|name| schema.find(name));

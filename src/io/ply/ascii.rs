@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use super::file::PlyFile;
-use super::header::{shown, type_name};
+use super::header::shown;
 use super::text;
 use crate::point::{PointBatch, Scalar, Schema};
 use crate::stage::Part;
@@ -33,6 +33,8 @@ pub(super) struct AsciiPart<'a> {
     points: u64,
     left: u64,
     source: u32,
+    /// Numbers that have more digits than the `float` that holds them.
+    rounded: u64,
 }
 
 impl<'a> AsciiPart<'a> {
@@ -69,6 +71,7 @@ impl<'a> AsciiPart<'a> {
             points: file.points,
             left: file.points,
             source,
+            rounded: 0,
         }
     }
 
@@ -107,9 +110,12 @@ impl<'a> AsciiPart<'a> {
             let at = start + place - token.len();
             if !text::parse(token, *scalar, &mut record[*offset..]) {
                 let shown = shown(&String::from_utf8_lossy(token));
-                let message =
-                    format!("`{shown}` is no {} for property `{name}`", type_name(*scalar));
+                let kind = self.file.properties()[n].kind.word();
+                let message = format!("`{shown}` is no {kind} for property `{name}`");
                 return Err(fail(at, message));
+            }
+            if *scalar == Scalar::F32 && text::loses_digits(token) {
+                self.rounded += 1;
             }
         }
         match word(line, &mut place) {
@@ -141,6 +147,24 @@ impl Part for AsciiPart<'_> {
 }
 
 impl AsciiPart<'_> {
+    /// True if a number of one of the properties `columns` has more digits than a `float` holds. What is
+    /// wrong with a line is left to whoever reads it.
+    pub fn outgrows_float(mut self, columns: &[usize]) -> Result<bool> {
+        self.skip()?;
+        for _ in 0..self.points {
+            let Some((start, end)) = self.lines.next()? else { return Ok(false) };
+            let line = &self.lines.window[start..end];
+            let mut place = 0;
+            for n in 0..=columns.last().copied().unwrap_or(0) {
+                let Some(token) = word(line, &mut place) else { break };
+                if columns.contains(&n) && text::loses_digits(token) {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
+
     fn fill(&mut self, batch: &mut PointBatch) -> Result<()> {
         batch.source = self.source;
         batch.clear();
@@ -151,6 +175,8 @@ impl AsciiPart<'_> {
             self.vertex(record)?;
             self.left -= 1;
         }
+        // The file may be looked at before it is read.
+        self.file.rounded.fetch_max(self.rounded, Ordering::Relaxed);
         // A line behind the last vertex may be too long to be read: it is there all the same.
         if points == 0 && self.file.ends_with_vertices() && !matches!(self.lines.next(), Ok(None)) {
             self.file.more_lines.store(true, Ordering::Relaxed);

@@ -1,7 +1,9 @@
 //! One PLY file: where its vertices are, and whether it is long enough for them.
 
+use std::fs::File;
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use super::header::{Element, Encoding, Header, Kind, Property, shown};
 use super::{names, walk};
@@ -23,6 +25,11 @@ pub(super) struct PlyFile {
     pub vertex: usize,
     /// Set when a text file turns out to have more lines than its header counts.
     pub more_lines: AtomicBool,
+    /// Numbers of a text read so far that have more digits than the `float` that holds them.
+    pub rounded: AtomicU64,
+    /// True for a text whose last vertex ends where the file does: nobody knows whether its last
+    /// number has all its digits.
+    pub ends_in_a_number: bool,
 }
 
 impl PlyFile {
@@ -47,7 +54,8 @@ impl PlyFile {
             Encoding::Ascii => (header.body, text_lines(before)),
             encoding => (walk::past(&file, path, before, header.body, length, encoding)?, 0),
         };
-        let file = PlyFile {
+        let ends_open = header.encoding == Encoding::Ascii && ends_open(&file, path, length)?;
+        let mut file = PlyFile {
             path: path.to_owned(),
             origin,
             points: element.count,
@@ -56,8 +64,11 @@ impl PlyFile {
             skipped_lines,
             vertex,
             more_lines: AtomicBool::new(false),
+            rounded: AtomicU64::new(0),
+            ends_in_a_number: false,
             header,
         };
+        file.ends_in_a_number = ends_open && file.points > 0 && file.ends_with_vertices();
         file.bound()?;
         Ok(file)
     }
@@ -93,6 +104,18 @@ impl PlyFile {
         ))
     }
 
+    /// A warning for numbers that lost digits, known once all is read.
+    pub fn rounded(&self) -> Option<String> {
+        let numbers = self.rounded.load(Ordering::Relaxed);
+        (numbers > 0).then(|| {
+            format!(
+                "{}: {numbers} numbers of `float` properties have more digits than a `float` holds \
+                 and were rounded to it; `double` in its header keeps them",
+                self.path.display()
+            )
+        })
+    }
+
     /// Refuses a count of vertices that the file is too short for.
     fn bound(&self) -> Result<()> {
         let room = self.length.saturating_sub(self.body);
@@ -116,6 +139,15 @@ impl PlyFile {
     }
 }
 
+/// True if the last byte of a file is no blank and no end of a line.
+fn ends_open(file: &File, path: &Path, length: u64) -> Result<bool> {
+    let Some(at) = length.checked_sub(1) else { return Ok(false) };
+    let mut last = [0];
+    let read = file.read_exact_at(&mut last, at);
+    read.map_err(|cause| Error::io(path, "read its end", cause).at_byte(at))?;
+    Ok(!last[0].is_ascii_whitespace())
+}
+
 /// Lines that `elements` take in a text file. One without properties takes none.
 fn text_lines(elements: &[Element]) -> u64 {
     elements
@@ -133,7 +165,8 @@ fn check(path: &Path, vertex: &Element) -> Result<()> {
                 "element `vertex` has a list, `{}`: vertices of varying size are not read",
                 shown(&list.name)
             ),
-        ));
+        )
+        .help("write the file without that list; elements beside `vertex` may have lists"));
     }
     let missing: Vec<&str> = ["x", "y", "z"]
         .into_iter()

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::header::{Element, Encoding, Kind, Property};
 use super::source::{Native, Rest};
-use super::{CRS, CRS_MORE, names, padding};
+use super::{CRS, CRS_MORE, made, names};
 use crate::point::{Metadata, Schema};
 
 /// Bytes of one piece of a long text: some readers refuse header lines of 1,024 bytes.
@@ -12,7 +12,7 @@ const PIECE: usize = 900;
 
 /// The header, but for the count of vertices.
 pub(super) struct Headings {
-    /// To the end of the coordinate reference system, which the padding ends.
+    /// To the end of the coordinate reference system, which the comment of [`made`] ends.
     start: String,
     comments: String,
     /// Elements before the vertices.
@@ -66,12 +66,12 @@ impl Headings {
         }
     }
 
-    /// Always of one length: the padding takes what the count leaves.
+    /// Always of one length: blanks behind a comment take what the count leaves.
     pub fn text(&self, points: u64) -> String {
         let vertex = Element { count: points, ..self.vertex.clone() };
         let Headings { start, comments, before, after, .. } = self;
-        let (padding, vertex) = (padding(points), vertex.lines());
-        format!("{start}comment {padding}\n{comments}{before}{vertex}{after}end_header\n")
+        let (made, vertex) = (made(points), vertex.lines());
+        format!("{start}comment {made}\n{comments}{before}{vertex}{after}end_header\n")
     }
 }
 
@@ -104,7 +104,8 @@ mod tests {
         };
         let length = header.text(0).len();
         assert!([1, 9, 10, 12_345, u64::MAX].iter().all(|&n| header.text(n).len() == length));
-        assert!(header.text(u64::MAX).contains("comment .\n"));
+        assert!(header.text(u64::MAX).contains("comment made by pointmill\n"));
+        assert!(!header.text(7).contains('.'));
     }
 
     #[test]

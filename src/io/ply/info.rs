@@ -69,8 +69,11 @@ pub fn describe(path: &Path) -> Result<PlyInfo> {
                 .collect(),
         })
         .collect();
-    let is_told = |comment: &String| !super::is_padding(comment, points);
-    let comments = header.comments.into_iter().filter(is_told).collect();
+    let told = |comment: String| match super::is_made(&comment, points) {
+        true => comment.contains(super::MADE).then(|| super::MADE.to_owned()),
+        false => Some(comment),
+    };
+    let comments = header.comments.into_iter().filter_map(told).collect();
     let obj_info = header.obj_info;
     Ok(PlyInfo {
         kind: "PLY",

@@ -5,6 +5,8 @@
 //! formats do not share is kept as it is. Format: Greg Turk, "The PLY Polygon File Format", 1994.
 
 mod ascii;
+mod colors;
+mod encode;
 mod file;
 mod header;
 mod headings;
@@ -17,6 +19,7 @@ mod walk;
 
 use std::path::{Path, PathBuf};
 
+pub use colors::Colors;
 pub use header::Encoding;
 pub use info::{ElementInfo, PlyInfo, PropertyInfo, describe};
 pub(crate) use names::rank;
@@ -39,6 +42,9 @@ pub struct PlyOptions {
     pub normals: bool,
     /// Dimensions that are left out.
     pub drop: Vec<String>,
+    /// How many bits the colours of LAS records have; as for [`Colors::Auto`] when not said. From PLY
+    /// to PLY they stay as they are, and saying it is an error.
+    pub colors: Option<Colors>,
     /// Carries the other elements (faces) of a single binary input whose encoding is kept. To be set
     /// only where no vertex is removed, added or moved: it fails on a count that differs.
     pub carry_rest: bool,
@@ -69,11 +75,16 @@ pub fn chunk(options: &PlyOptions, schema: &Schema, metadata: &Metadata) -> Resu
     sink::PlySink::chunk(options, schema, metadata)
 }
 
-/// The comment that brings every header of one file to one length, whatever its count of vertices.
-fn padding(points: u64) -> String {
-    ".".repeat(21 - points.to_string().len())
+/// What says who wrote a file, and with blanks behind it brings every header of one file to one length,
+/// whatever its count of vertices.
+const MADE: &str = "made by pointmill";
+
+fn made(points: u64) -> String {
+    format!("{MADE}{}", " ".repeat(20 - points.to_string().len()))
 }
 
-fn is_padding(comment: &str, points: u64) -> bool {
-    comment == padding(points)
+/// True for a comment of [`made`], or for what earlier versions had in its place.
+fn is_made(comment: &str, points: u64) -> bool {
+    let dots = || comment.len() == 21 - points.to_string().len();
+    comment.trim_end() == MADE || (comment.bytes().all(|b| b == b'.') && dots())
 }

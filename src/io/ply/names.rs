@@ -55,7 +55,23 @@ pub(super) fn dimension_of(property: &str) -> &str {
     TABLE
         .iter()
         .find(|row| row.1 == property || row.2.contains(&property))
-        .map_or(property, |row| row.0)
+        .map(|row| row.0)
+        .or_else(|| field_of(property))
+        .unwrap_or(property)
+}
+
+/// The dimension that CloudCompare means by a scalar field: `scalar_Return_Number`, or
+/// `scalar_ReturnNumber`. It writes coordinates, normals and colours otherwise.
+fn field_of(property: &str) -> Option<&'static str> {
+    let field = property.strip_prefix("scalar_")?;
+    let plain = |name: &str| name.replace('_', "").to_ascii_lowercase();
+    let field = plain(field);
+    let otherwise = [&n::XYZ[..], &n::NORMAL, &[n::RED, n::GREEN, n::BLUE]].concat();
+    let fields = TABLE.iter().filter(|row| !otherwise.contains(&row.0));
+    let mut named = fields.filter(|row| {
+        plain(row.0) == field || plain(row.1) == field || row.2.iter().any(|s| plain(s) == field)
+    });
+    named.next().map(|row| row.0)
 }
 
 /// Names of the dimensions of `properties` (distinct names), in their order: what a comment of ours
@@ -105,8 +121,8 @@ pub(super) fn properties(
             let word: String =
                 dimension.chars().map(|c| if c.is_ascii_graphic() { c } else { '_' }).collect();
             let word = if word.is_empty() { "_".to_owned() } else { word };
-            let mistaken = |name: &str| taken.contains(name) || dimension_of(name) != name;
-            let free = if mistaken(&word) { numbered(&word, mistaken) } else { word };
+            // A name that stands for another dimension will do: a comment tells which it is.
+            let free = numbered(&word, |name| taken.contains(name));
             taken.insert(free.clone());
             *name = Some(free);
         }
@@ -164,6 +180,40 @@ mod tests {
     fn two_spellings_of_one_dimension_stay_two() {
         let names = dimensions(&["x", "red", "r", "Red", "diffuse_red"], &[]);
         assert_eq!(names, ["X", "Red", "r", "Red_2", "diffuse_red"]);
+    }
+
+    #[test]
+    fn scalar_fields_are_the_dimensions_that_they_are_named_after() {
+        let fields = [
+            ("scalar_Intensity", "Intensity"),
+            ("scalar_Classification", "Classification"),
+            ("scalar_GpsTime", "GpsTime"),
+            ("scalar_Gps_Time", "GpsTime"),
+            ("scalar_Return_Number", "ReturnNumber"),
+            ("scalar_Number_Of_Returns", "NumberOfReturns"),
+            ("scalar_Scan_Angle_Rank", "ScanAngle"),
+            ("scalar_Point_Source_ID", "PointSourceId"),
+            ("scalar_X", "scalar_X"),
+            ("scalar_Nx", "scalar_Nx"),
+            ("scalar_R", "scalar_R"),
+            ("scalar_Reflectance", "scalar_Reflectance"),
+        ];
+        for (property, dimension) in fields {
+            assert_eq!(dimension_of(property), dimension);
+        }
+        let both = dimensions(&["intensity", "scalar_Intensity"], &[]);
+        assert_eq!(both, ["Intensity", "scalar_Intensity"]);
+    }
+
+    #[test]
+    fn a_name_gets_a_number_only_where_another_has_it() {
+        let asked = ["X", "NormalX", "normal x", "normal_x", "scalar_Intensity"];
+        let written = properties(&asked, |_| None);
+        assert_eq!(written, ["x", "nx", "normal_x", "normal_x_2", "scalar_Intensity"]);
+        let words: Vec<&str> = written.iter().map(String::as_str).collect();
+        let comments: Vec<String> =
+            words.iter().zip(asked).filter_map(|(w, a)| comment(w, a)).collect();
+        assert_eq!(dimensions(&words, &comments), asked);
     }
 
     #[test]

@@ -5,19 +5,18 @@ use std::io::{Seek, SeekFrom, Write};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
+use super::PlyOptions;
+use super::colors::{Colors, Depth, Recoloring, Written, note};
+use super::encode::{CHUNK_POINTS, FULL, Plan, WIDE};
 use super::header::Encoding;
 use super::headings::Headings;
 use super::source::Native;
-use super::{PlyOptions, text};
-use crate::io::convert::{Projection, ply_schema};
-use crate::point::names::NORMAL;
-use crate::point::{Dimension, Layout, Metadata, PointBatch, Scalar, Schema, Spare, Value};
+use crate::point::{Layout, Metadata, Schema};
 use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
-/// Records of one encoded chunk.
-const CHUNK_POINTS: usize = 65_536;
 /// Bytes carried at once.
 const CARRY: usize = 1 << 18;
 
@@ -27,23 +26,16 @@ pub(super) struct PlySink {
     path: PathBuf,
     plan: Arc<Plan>,
     header: Headings,
+    /// The header with colours of as many bits as the file does not have, where they can have 8 or 16.
+    other: Option<Headings>,
+    /// True if the file has colours of 16 bits.
+    wide: bool,
+    /// What the appended colours are.
+    depth: Depth,
     rest: Option<Arc<Native>>,
     notes: Vec<String>,
     points: u64,
     bytes: u64,
-}
-
-/// How a record becomes a vertex; shared by all threads.
-struct Plan {
-    encoding: Encoding,
-    /// What a vertex holds; text is printed from its little-endian form.
-    vertex: Schema,
-    /// From the records to the vertices, where they differ.
-    projection: Option<Projection>,
-    /// The normals' fields, if they are written.
-    normals: Option<[Dimension; 3]>,
-    /// For the vertices of chunks; whoever has written them puts them back.
-    spare: Spare<Vec<u8>>,
 }
 
 impl PlySink {
@@ -56,8 +48,14 @@ impl PlySink {
         let native = native_of(schema, metadata);
         let plan = Plan::new(options, schema, native.as_deref())?;
         let (rest, notes) = carried(options, &plan, native.as_ref());
-        let header =
-            Headings::of(&plan.vertex, plan.encoding, metadata, native.as_deref(), rest.as_deref());
+        let headings = |vertex: &Schema| {
+            Headings::of(vertex, plan.encoding, metadata, native.as_deref(), rest.as_deref())
+        };
+        let full = headings(&plan.full.vertex);
+        let (header, other) = match &plan.narrow {
+            Some(narrow) => (headings(narrow.vertex()), Some(full)),
+            None => (full, None),
+        };
         let mut file = File::create(staged).map_err(|e| Error::io(staged, "create", e))?;
         let text = header.text(0);
         let failed = |e| Error::io(staged, "write the header", e);
@@ -67,6 +65,9 @@ impl PlySink {
             path: staged.to_owned(),
             plan: Arc::new(plan),
             header,
+            wide: other.is_none(),
+            other,
+            depth: Depth::default(),
             rest,
             notes,
             points: 0,
@@ -82,6 +83,64 @@ impl PlySink {
     pub fn chunk(options: &PlyOptions, schema: &Schema, metadata: &Metadata) -> Result<ChunkSize> {
         let native = native_of(schema, metadata);
         Ok(Plan::new(options, schema, native.as_deref())?.chunk())
+    }
+
+    /// Makes the colours of a chunk and those of the file so far have as many bits.
+    fn fit_colors(&mut self, chunk: &mut Encoded) -> Result<()> {
+        let plan = self.plan.clone();
+        let Some(narrow) = &plan.narrow else { return Ok(()) };
+        let Written { depth, wide } = Written::from_code(chunk.form);
+        let before = self.depth;
+        self.depth = before.join(depth);
+        if narrow.asked == Colors::Eight {
+            return Ok(());
+        }
+        if !self.depth.is_narrow() {
+            let known = if self.depth == Depth::Full { FULL } else { WIDE };
+            plan.widened.store(known, Ordering::Relaxed);
+            if !self.wide {
+                self.rewrite(plan.widening(before))?;
+            }
+        }
+        if self.wide
+            && !wide
+            && let Some(widening) = plan.widening(depth)
+        {
+            let mut widened = Vec::new();
+            widening.append(&chunk.bytes, &mut widened)?;
+            chunk.bytes = widened;
+        }
+        Ok(())
+    }
+
+    /// Writes the file anew with colours of as many bits as it does not have now.
+    fn rewrite(&mut self, recoloring: Option<Recoloring<'_>>) -> Result<()> {
+        let (Some(other), Some(recoloring)) = (&mut self.other, recoloring) else {
+            return Ok(());
+        };
+        let path = self.path.with_extension("colors");
+        let failed = |e| Error::io(&self.path, "write its colours anew", e);
+        let mut file = File::create(&path).map_err(failed)?;
+        file.write_all(other.text(0).as_bytes()).map_err(failed)?;
+        let written = File::open(&self.path).map_err(failed)?;
+        let (mut at, end) = (self.header.text(0).len() as u64, self.bytes);
+        let mut bytes = other.text(0).len() as u64;
+        let (mut buffer, mut anew) = (vec![0; CARRY.max(self.plan.vertex_bytes())], Vec::new());
+        while at < end {
+            let piece = (end - at).min(buffer.len() as u64) as usize;
+            written.read_exact_at(&mut buffer[..piece], at).map_err(failed)?;
+            anew.clear();
+            match recoloring.append(&buffer[..piece], &mut anew)? {
+                0 => return Err(Error::internal("a vertex is longer than it can be")),
+                taken => at += taken as u64,
+            }
+            file.write_all(&anew).map_err(failed)?;
+            bytes += anew.len() as u64;
+        }
+        std::fs::rename(&path, &self.path).map_err(failed)?;
+        std::mem::swap(&mut self.header, other);
+        (self.file, self.bytes, self.wide) = (file, bytes, !self.wide);
+        Ok(())
     }
 
     fn carries(&self) -> Option<Arc<Native>> {
@@ -141,126 +200,6 @@ fn carried(
     }
 }
 
-impl Plan {
-    fn new(options: &PlyOptions, schema: &Schema, native: Option<&Native>) -> Result<Plan> {
-        let encoding = options.encoding.or(native.map(|n| n.encoding)).unwrap_or({
-            match (schema.layout, schema.endian) {
-                (Layout::Ply, crate::point::Endian::Big) => Encoding::BinaryBigEndian,
-                _ => Encoding::BinaryLittleEndian,
-            }
-        });
-        let mut vertex = ply_schema(schema);
-        vertex.endian = encoding.endian();
-        vertex.dimensions.retain(|d| !options.drop.contains(&d.name));
-        vertex.stride = 0;
-        for dimension in &mut vertex.dimensions {
-            dimension.offset = vertex.stride;
-            vertex.stride += dimension.scalar.size();
-        }
-        // Made before the normals are added: the records need not have them.
-        let mut projection = Projection::new(schema, &vertex, &options.drop)?;
-        let mut normals = None;
-        if options.normals {
-            let added = add_normals(&mut vertex)?;
-            projection.widen(vertex.stride);
-            normals = Some(added);
-        }
-        let projection = (!projection.is_copy()).then_some(projection);
-        Ok(Plan { encoding, vertex, projection, normals, spare: Spare::default() })
-    }
-
-    fn chunk(&self) -> ChunkSize {
-        let bytes = (CHUNK_POINTS as u64).saturating_mul(self.bytes_per_point() as u64);
-        ChunkSize { points: CHUNK_POINTS, bytes }
-    }
-
-    /// Bytes that encoding one record holds at most.
-    fn bytes_per_point(&self) -> usize {
-        let text: usize = match self.encoding {
-            Encoding::Ascii => self.vertex.dimensions.iter().map(|d| text::longest(d.scalar)).sum(),
-            _ => 0,
-        };
-        self.vertex.stride + text
-    }
-
-    fn put_normals(&self, normals: &[[f32; 3]], vertices: &mut [u8]) -> Result<()> {
-        let Some(fields) = &self.normals else { return Ok(()) };
-        for (vertex, normal) in vertices.chunks_exact_mut(self.vertex.stride).zip(normals) {
-            for (field, value) in fields.iter().zip(normal) {
-                if !field.put(vertex, self.vertex.endian, Value::Single(*value)) {
-                    return Err(Error::internal("a floating-point field refused a normal"));
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn print(&self, vertices: &[u8]) -> Vec<u8> {
-        let points = vertices.len() / self.vertex.stride;
-        let mut text = Vec::with_capacity(points * (self.bytes_per_point() - self.vertex.stride));
-        for vertex in vertices.chunks_exact(self.vertex.stride) {
-            for dimension in &self.vertex.dimensions {
-                text::print(dimension.get(vertex, self.vertex.endian), &mut text);
-                text.push(b' ');
-            }
-            text.pop();
-            text.push(b'\n');
-        }
-        text
-    }
-}
-
-/// Adds the normals' fields that are not there; fails on those that hold whole numbers.
-fn add_normals(vertex: &mut Schema) -> Result<[Dimension; 3]> {
-    let mut field = |name: &str| -> Result<Dimension> {
-        if let Some(found) = vertex.find(name) {
-            if found.scalar.is_float() {
-                return Ok(found.clone());
-            }
-            let message = format!("the input's {name} holds whole numbers: no normal fits");
-            return Err(
-                Error::pipeline(message).help(format!("`write.drop = [{name:?}]` leaves it out"))
-            );
-        }
-        let added = Dimension::new(name, Scalar::F32, vertex.stride);
-        vertex.stride += added.scalar.size();
-        vertex.dimensions.push(added.clone());
-        Ok(added)
-    };
-    Ok([field(NORMAL[0])?, field(NORMAL[1])?, field(NORMAL[2])?])
-}
-
-impl Encode for Plan {
-    fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
-        let mut rounded = None;
-        let mut vertices = self.spare.take(Vec::new);
-        if let Some(projection) = &self.projection {
-            vertices.resize(batch.len() * self.vertex.stride, 0);
-            let rounding = projection.project_into(batch.records(), &mut vertices)?;
-            rounded = (rounding.points > 0).then_some((rounding.points, rounding.largest));
-        } else {
-            vertices.clear();
-            vertices.extend_from_slice(batch.records());
-        }
-        if self.normals.is_some() {
-            let normals =
-                batch.normals.as_ref().filter(|normals| normals.len() == batch.len()).ok_or_else(
-                    || Error::internal("normals are to be written, none were computed"),
-                )?;
-            self.put_normals(normals, &mut vertices)?;
-        }
-        let bytes = match self.encoding {
-            Encoding::Ascii => {
-                let text = self.print(&vertices);
-                self.spare.put(vertices);
-                text
-            }
-            _ => vertices,
-        };
-        Ok(Encoded { bytes, points: batch.len() as u64, rounded, ..Encoded::default() })
-    }
-}
-
 impl Sink for PlySink {
     fn chunk_points(&self) -> usize {
         CHUNK_POINTS
@@ -274,7 +213,8 @@ impl Sink for PlySink {
         self.plan.clone()
     }
 
-    fn append(&mut self, chunk: Encoded) -> Result<()> {
+    fn append(&mut self, mut chunk: Encoded) -> Result<()> {
+        self.fit_colors(&mut chunk)?;
         self.file
             .write_all(&chunk.bytes)
             .map_err(|e| Error::io(&self.path, "write vertices", e))?;
@@ -287,6 +227,10 @@ impl Sink for PlySink {
     }
 
     fn finish(mut self: Box<Self>) -> Result<SinkSummary> {
+        if self.wide && self.depth == Depth::Mixed {
+            let plan = self.plan.clone();
+            self.rewrite(plan.narrowing())?;
+        }
         if let Some(native) = self.carries() {
             let expected = native.rest.as_ref().map_or(0, |rest| rest.points);
             if expected != self.points {
@@ -301,6 +245,9 @@ impl Sink for PlySink {
         self.file.seek(SeekFrom::Start(0)).map_err(failed)?;
         self.file.write_all(self.header.text(self.points).as_bytes()).map_err(failed)?;
         self.file.sync_all().map_err(|e| Error::io(&self.path, "flush", e))?;
+        if let Some(narrow) = &self.plan.narrow {
+            self.notes.extend(note(narrow.asked, self.depth));
+        }
         Ok(SinkSummary { points: self.points, bytes: self.bytes, notes: self.notes })
     }
 }

@@ -11,7 +11,8 @@ use super::file::PlyFile;
 use super::header::{Element, Encoding, Kind, shown};
 use super::names;
 use crate::io::origin::Origin;
-use crate::point::{Dimension, Layout, Metadata, PointBatch, Schema};
+use crate::point::names::{GPS_TIME, XYZ};
+use crate::point::{Dimension, Layout, Metadata, PointBatch, Scalar, Schema};
 use crate::stage::{Input, Part, Source};
 use crate::{Error, Result};
 
@@ -58,17 +59,15 @@ impl PlySource {
         };
         let texts: Vec<Texts> = files.iter().map(Texts::of).collect();
         for (file, text) in files.iter().zip(&texts).skip(1) {
-            agree(first, file)?;
-            if text.crs != texts[0].crs || text.dimensions != texts[0].dimensions {
-                let what = if text.crs == texts[0].crs {
-                    "dimension names"
-                } else {
-                    "coordinate reference system"
-                };
-                return Err(disagree(first, file, what));
-            }
+            agree((first, &texts[0]), (file, text))?;
         }
-        let schema = Arc::new(schema(first, &texts[0].dimensions));
+        let wide = first.header.encoding == Encoding::Ascii && needs_double(&files, &texts[0])?;
+        let all: Vec<Schema> =
+            files.iter().map(|file| schema(file, &texts[0].dimensions, wide)).collect();
+        if let Some(other) = all.iter().position(|schema| *schema != all[0]) {
+            return Err(disagree(first, &files[other], "types of vertex properties are"));
+        }
+        let schema = Arc::new(schema(first, &texts[0].dimensions, wide));
         if schema.coordinates().is_none() {
             return Err(Error::data(&first.path, "a comment gives x, y or z another dimension"));
         }
@@ -85,7 +84,8 @@ impl PlySource {
                 parts
             })
             .collect();
-        let warnings = files.iter().flat_map(dropped).collect();
+        let warnings = files.iter().flat_map(|file| dropped(file).into_iter().chain(cut(file)));
+        let warnings = warnings.collect();
         Ok(PlySource { schema, metadata, files, ends, warnings })
     }
 }
@@ -119,7 +119,7 @@ impl Texts {
             }
             more = false;
             let of_ours = names::property_told(comment).is_some_and(|p| properties.contains(p));
-            if !of_ours && !super::is_padding(comment, file.points) {
+            if !of_ours && !super::is_made(comment, file.points) {
                 comments.push(comment.clone());
             }
         }
@@ -127,23 +127,61 @@ impl Texts {
     }
 }
 
-/// Refuses two files whose vertices differ in kind.
-fn agree(first: &PlyFile, other: &PlyFile) -> Result<()> {
-    if first.header.encoding != other.header.encoding {
-        return Err(disagree(first, other, "encoding"));
-    }
-    if first.properties() != other.properties() {
-        return Err(disagree(first, other, "vertex properties"));
-    }
-    Ok(())
+/// Refuses two files whose vertices differ but for the types of properties.
+fn agree((first, texts): (&PlyFile, &Texts), (other, of_other): (&PlyFile, &Texts)) -> Result<()> {
+    let names = |file: &PlyFile| -> Vec<String> {
+        file.properties().iter().map(|p| p.name.clone()).collect()
+    };
+    let differ = if first.header.encoding != other.header.encoding {
+        "encoding is"
+    } else if names(first) != names(other) {
+        "vertex properties are"
+    } else if texts.crs != of_other.crs {
+        "coordinate reference system is"
+    } else if texts.dimensions != of_other.dimensions {
+        "dimension names are"
+    } else {
+        return Ok(());
+    };
+    Err(disagree(first, other, differ))
 }
 
 fn disagree(first: &PlyFile, other: &PlyFile, what: &str) -> Error {
-    Error::data(&other.path, format!("its {what} is not that of {}", crate::error::shown(&first.path)))
+    let told = format!("its {what} not the same as in {}", crate::error::shown(&first.path));
+    Error::data(&other.path, told)
         .help("files that are read together agree in encoding, vertex properties and coordinate reference system; convert one of them first")
 }
 
-fn schema(file: &PlyFile, dimensions: &[String]) -> Schema {
+/// True for dimensions that many programs print with all digits into texts whose headers call them
+/// `float`, which has room for seven.
+fn is_long(dimension: &str) -> bool {
+    XYZ.contains(&dimension) || dimension == GPS_TIME
+}
+
+/// True if coordinates and times of these texts are to be held as `double`, so that none loses a
+/// digit: where one has more than a `float` holds, or where another file calls them `double`.
+fn needs_double(files: &[PlyFile], texts: &Texts) -> Result<bool> {
+    let kind = |file: &PlyFile, n: usize| file.properties()[n].kind;
+    let long: Vec<usize> = (0..texts.dimensions.len())
+        .filter(|&n| is_long(&texts.dimensions[n]))
+        .filter(|&n| files.iter().any(|file| kind(file, n) == Kind::Scalar(Scalar::F32)))
+        .collect();
+    let double = |file: &PlyFile| long.iter().any(|&n| kind(file, n) == Kind::Scalar(Scalar::F64));
+    if long.is_empty() || files.iter().any(double) {
+        return Ok(!long.is_empty());
+    }
+    for file in files {
+        let narrow = schema(file, &texts.dimensions, false);
+        let part = AsciiPart::new(file.origin.reopen()?, file, &narrow, 0);
+        if part.outgrows_float(&long)? {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// Coordinates and times that a file calls `float` are `double` if they are to be `wide`.
+fn schema(file: &PlyFile, dimensions: &[String], wide: bool) -> Schema {
     let mut stride = 0;
     let dimensions = file
         .properties()
@@ -151,6 +189,8 @@ fn schema(file: &PlyFile, dimensions: &[String]) -> Schema {
         .zip(dimensions)
         .filter_map(|(property, name)| {
             let Kind::Scalar(scalar) = property.kind else { return None };
+            let widens = wide && scalar == Scalar::F32 && is_long(name);
+            let scalar = if widens { Scalar::F64 } else { scalar };
             let dimension = Dimension::new(name, scalar, stride);
             stride += scalar.size();
             Some(dimension)
@@ -231,6 +271,16 @@ fn dropped(file: &PlyFile) -> Option<String> {
     })
 }
 
+/// A warning for a text that ends within a line.
+fn cut(file: &PlyFile) -> Option<String> {
+    file.ends_in_a_number.then(|| {
+        format!(
+            "{}: the file ends without the end of a line: its last number may be cut short",
+            file.path.display()
+        )
+    })
+}
+
 impl Source for PlySource {
     fn schema(&self) -> &Arc<Schema> {
         &self.schema
@@ -288,8 +338,8 @@ impl Source for PlySource {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let unread = self.files.iter().flat_map(PlyFile::unread);
-        self.warnings.iter().cloned().chain(unread).collect()
+        let found = |file: &PlyFile| file.unread().into_iter().chain(file.rounded());
+        self.warnings.iter().cloned().chain(self.files.iter().flat_map(found)).collect()
     }
 }
 

@@ -54,6 +54,27 @@ pub(super) fn parse(token: &[u8], scalar: Scalar, record: &mut [u8]) -> bool {
     }
 }
 
+/// True for a number that a `float` moves by more than half a unit of the text's last digit that is
+/// not 0.
+pub(super) fn loses_digits(token: &[u8]) -> bool {
+    // So many digits a float keeps always.
+    if token.len() <= SURE_DIGITS {
+        return false;
+    }
+    let Some(text) = std::str::from_utf8(token).ok() else { return false };
+    let Some(value) = text.parse::<f64>().ok().filter(|v| v.is_finite()) else { return false };
+    let (digits, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
+    let decimals = digits.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    let zeros = digits.bytes().rev().filter(|b| *b != b'.').take_while(|b| *b == b'0').count();
+    let place = zeros as i64 - decimals as i64 + exponent.parse::<i64>().unwrap_or(0);
+    let unit = 10f64.powi(place.clamp(-400, 400) as i32);
+    // The text itself is off by what a double rounds.
+    (f64::from(value as f32) - value).abs() > unit / 2.0 + 2.0 * f64::EPSILON * value.abs()
+}
+
+/// Decimal digits of which a float keeps every one.
+const SURE_DIGITS: usize = 6;
+
 /// Beyond it a decimal text may stand for an integer that f64 rounds.
 const EXACT: f64 = (1u64 << 53) as f64;
 
@@ -115,6 +136,23 @@ mod tests {
         let text = "1.00000005960464477540";
         assert_eq!(read(text, Scalar::F32), Some(Value::Single(1.0 + f32::EPSILON)));
         assert_eq!(text.parse::<f64>().unwrap() as f32, 1.0);
+    }
+
+    #[test]
+    fn digits_that_a_float_rounds_are_told() {
+        for lost in ["5600000.37", "16777217", "0.123456789", "1.23456789e-5", "1.00000001"] {
+            assert!(loses_digits(lost.as_bytes()), "{lost}");
+        }
+        // What programs print of floats: six decimals, or nine digits.
+        for v in [12.3456f32, 0.1, -7.25e-9, 5_600_000.5, 1.0 / 3.0, 9.800_000_5e9, 3e38, 1e-45] {
+            let mut own = Vec::new();
+            print(Value::Single(v), &mut own);
+            let own = String::from_utf8(own).unwrap();
+            for text in [own, format!("{v:.6}"), format!("{v:.8e}")] {
+                assert!(!loses_digits(text.as_bytes()), "{text}");
+            }
+        }
+        assert!(["nan", "-infinity", "1e9999", ""].iter().all(|t| !loses_digits(t.as_bytes())));
     }
 
     #[test]

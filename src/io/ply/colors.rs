@@ -1,0 +1,295 @@
+//! Colours of LAS records, which have 16 bits, as the 8 bits that readers of PLY expect.
+//!
+//! Nothing is lost by 8 bits where 16 of them hold no more: where each colour is a multiple of 257 or
+//! of 256, or all are below 256, as three kinds of writers leave them. Whether they are only all points
+//! together say, long after the first are written; so vertices are written with 8 bits until a colour
+//! needs more, and the file is written anew when one does. Where it was needed for no more than telling
+//! multiples of 257 from those of 256, it is written with 8 bits again in the end. So the type in a
+//! finished file depends on the colours alone.
+
+use serde::{Deserialize, Serialize};
+
+use super::header::Encoding;
+use super::text;
+use crate::point::names::{BLUE, GREEN, RED};
+use crate::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
+use crate::{Error, Result};
+
+/// How many bits the colours of LAS records have in a PLY file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Colors {
+    /// 8 where that loses nothing, else 16.
+    #[default]
+    #[serde(rename = "auto")]
+    Auto,
+    /// The upper 8 bits, as `uchar`.
+    #[serde(rename = "8bit")]
+    Eight,
+    /// All 16 bits, as `ushort`.
+    #[serde(rename = "16bit")]
+    Sixteen,
+}
+
+/// What the 16-bit colours of some points are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Depth {
+    /// Nothing but 0, which all the others have too.
+    #[default]
+    Black,
+    /// 8 bits times 257, so that 255 is 65535, as the specification wants it (LAS 1.4 R15, table 9).
+    Times257,
+    /// 8 bits times 256.
+    Times256,
+    /// Some of the one and some of the other.
+    Mixed,
+    /// 8 bits as they are: their writer did not scale them.
+    Unscaled,
+    /// 16 bits.
+    Full,
+}
+
+/// What a chunk is written with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Written {
+    pub depth: Depth,
+    /// True if its colours have 16 bits.
+    pub wide: bool,
+}
+
+impl Written {
+    const WIDE: u8 = 8;
+
+    /// As a number that an encoded chunk carries, and back.
+    pub fn code(self) -> u8 {
+        self.depth as u8 | if self.wide { Self::WIDE } else { 0 }
+    }
+
+    pub fn from_code(code: u8) -> Written {
+        let depth = Depth::ALL.get(usize::from(code & !Self::WIDE)).copied();
+        Written { depth: depth.unwrap_or(Depth::Full), wide: code & Self::WIDE != 0 }
+    }
+}
+
+impl Depth {
+    const ALL: [Depth; 6] = [
+        Depth::Black,
+        Depth::Times257,
+        Depth::Times256,
+        Depth::Mixed,
+        Depth::Unscaled,
+        Depth::Full,
+    ];
+
+    /// That of the colours at the byte offsets `fields` of little-endian records.
+    pub fn of(records: &[u8], stride: usize, fields: &[usize]) -> Depth {
+        // 0 if all are multiples of 257, all multiples of 256, all one or the other, all below 256.
+        let ([mut uneven, mut low, mut high], mut neither) = ([0; 3], 0);
+        for record in records.chunks_exact(stride.max(1)) {
+            for &field in fields {
+                if let Some(&[lower, upper]) = record.get(field..).and_then(<[u8]>::first_chunk) {
+                    uneven |= lower ^ upper;
+                    low |= lower;
+                    high |= upper;
+                    neither |= u16::from(lower) * u16::from(lower ^ upper);
+                }
+            }
+        }
+        match (uneven, low, neither, high) {
+            (0, 0, ..) => Depth::Black,
+            (0, ..) => Depth::Times257,
+            (_, 0, ..) => Depth::Times256,
+            (_, _, 0, _) => Depth::Mixed,
+            (.., 0) => Depth::Unscaled,
+            _ => Depth::Full,
+        }
+    }
+
+    /// That of the points of both.
+    pub fn join(self, other: Depth) -> Depth {
+        let scaled = |depth| matches!(depth, Depth::Times257 | Depth::Times256 | Depth::Mixed);
+        match (self, other) {
+            (Depth::Black, depth) | (depth, Depth::Black) => depth,
+            (one, two) if one == two => one,
+            (one, two) if scaled(one) && scaled(two) => Depth::Mixed,
+            _ => Depth::Full,
+        }
+    }
+
+    /// True if 8 bits are enough to know the 16.
+    pub fn is_narrow(self) -> bool {
+        !matches!(self, Depth::Mixed | Depth::Full)
+    }
+
+    /// What 8 bits stand for.
+    fn widened(self, bits: u8) -> u16 {
+        match self {
+            Depth::Times256 => u16::from(bits) * 256,
+            Depth::Unscaled => u16::from(bits),
+            _ => u16::from(bits) * 257,
+        }
+    }
+}
+
+/// True for a dimension that has 16 bits in LAS records and may have 8 in a vertex.
+fn is_color(dimension: &Dimension) -> bool {
+    [RED, GREEN, BLUE].contains(&dimension.name.as_str()) && dimension.scalar == Scalar::U16
+}
+
+/// Byte offsets of the colours of LAS records of `schema`, but for those of `drop`; none in others.
+pub(super) fn fields(schema: &Schema, drop: &[String]) -> Vec<usize> {
+    let las = matches!(schema.layout, Layout::Las { .. }) && schema.endian == Endian::Little;
+    let held = schema.dimensions.iter().filter(|d| las && is_color(d) && !drop.contains(&d.name));
+    held.map(|d| d.offset).collect()
+}
+
+/// The same records, their colours being the byte at `place` of each: 0 for the lower, 1 for the upper
+/// one.
+pub(super) fn bytes_of(schema: &Schema, place: usize) -> Schema {
+    let mut narrow = schema.clone();
+    for dimension in narrow.dimensions.iter_mut().filter(|d| is_color(d)) {
+        dimension.scalar = Scalar::U8;
+        dimension.offset += place;
+    }
+    narrow
+}
+
+/// Makes vertices with colours of 16 bits of those with 8, or the other way round.
+pub(super) struct Recoloring<'a> {
+    pub encoding: Encoding,
+    pub from: &'a Schema,
+    pub to: &'a Schema,
+    pub depth: Depth,
+}
+
+impl Recoloring<'_> {
+    /// Appends to `out` what the whole vertices that `written` begins with become; returns how many
+    /// bytes of it they are.
+    pub fn append(&self, written: &[u8], out: &mut Vec<u8>) -> Result<usize> {
+        match self.encoding {
+            Encoding::Ascii => self.append_lines(written, out),
+            _ => Ok(self.append_binary(written, out)),
+        }
+    }
+
+    fn append_binary(&self, written: &[u8], out: &mut Vec<u8>) -> usize {
+        let vertices = written.chunks_exact(self.from.stride.max(1));
+        let taken = written.len() - vertices.remainder().len();
+        for vertex in vertices {
+            for (from, to) in self.from.dimensions.iter().zip(&self.to.dimensions) {
+                let field = &vertex[from.offset..from.offset + from.scalar.size()];
+                let endian = self.encoding.endian();
+                match (field, from.scalar == to.scalar, endian) {
+                    (&[bits], false, Endian::Little) => {
+                        out.extend(self.depth.widened(bits).to_le_bytes());
+                    }
+                    (&[bits], false, Endian::Big) => {
+                        out.extend(self.depth.widened(bits).to_be_bytes());
+                    }
+                    (&[_, upper], false, Endian::Little) => out.push(upper),
+                    (&[upper, _], false, Endian::Big) => out.push(upper),
+                    _ => out.extend_from_slice(field),
+                }
+            }
+        }
+        taken
+    }
+
+    fn append_lines(&self, written: &[u8], out: &mut Vec<u8>) -> Result<usize> {
+        let own = || Error::internal("a text that was just written does not read back");
+        let taken = written.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1);
+        for line in written[..taken].split_inclusive(|&b| b == b'\n') {
+            let words = line.trim_ascii_end().split(|&b| b == b' ');
+            for ((word, from), to) in words.zip(&self.from.dimensions).zip(&self.to.dimensions) {
+                if from.scalar == to.scalar {
+                    out.extend_from_slice(word);
+                } else {
+                    let mut bits = [0; 2];
+                    if !text::parse(word, from.scalar, &mut bits) {
+                        return Err(own());
+                    }
+                    let color = match from.scalar {
+                        Scalar::U8 => u64::from(self.depth.widened(bits[0])),
+                        _ => u64::from(bits[1]),
+                    };
+                    text::print(Value::Unsigned(color), out);
+                }
+                out.push(b' ');
+            }
+            out.pop();
+            out.push(b'\n');
+        }
+        Ok(taken)
+    }
+}
+
+/// What to tell of colours in a finished file.
+pub(super) fn note(asked: Colors, depth: Depth) -> Option<String> {
+    let told = match (asked, depth) {
+        (Colors::Auto, Depth::Full) => {
+            "colours have 16 bits here, which many viewers of PLY do not read: \
+             `write.colors = \"8bit\"` writes their upper 8"
+        }
+        (Colors::Auto, Depth::Mixed) => {
+            "some colours are multiples of 256 and others of 257: both are taken for 8 bits"
+        }
+        (Colors::Auto, Depth::Unscaled) => {
+            "colours are 0 to 255 in the input, though LAS means 0 to 65535: they are taken for 8 \
+             bits that its writer did not scale"
+        }
+        (Colors::Eight, Depth::Full) => "colours are cut to their upper 8 bits of 16",
+        (Colors::Eight, Depth::Unscaled) => {
+            "no colour is above 255, so the upper 8 bits of 16 are 0: without \
+             `write.colors = \"8bit\"` they are taken for 8 bits"
+        }
+        _ => return None,
+    };
+    Some(told.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn depth(colors: &[u16]) -> Depth {
+        let records: Vec<u8> = colors.iter().flat_map(|c| c.to_le_bytes()).collect();
+        Depth::of(&records, 2, &[0])
+    }
+
+    #[test]
+    fn what_8_bits_hold_is_told_from_what_they_do_not() {
+        assert_eq!(depth(&[]), Depth::Black);
+        assert_eq!(depth(&[0, 0]), Depth::Black);
+        assert_eq!(depth(&[0, 257, 65_535]), Depth::Times257);
+        assert_eq!(depth(&[0, 256, 65_280]), Depth::Times256);
+        assert_eq!(depth(&[0, 1, 255]), Depth::Unscaled);
+        assert_eq!(depth(&[257, 0, 256]), Depth::Mixed);
+        for full in [&[255, 256][..], &[255, 257], &[258], &[40_000], &[257, 256, 1]] {
+            assert_eq!(depth(full), Depth::Full, "{full:?}");
+        }
+    }
+
+    #[test]
+    fn the_depth_of_all_is_that_of_any_parts() {
+        let colors = [0, 1, 255, 256, 257, 514, 768, 65_535, 65_280, 1000];
+        for one in colors {
+            for two in colors {
+                assert_eq!(depth(&[one]).join(depth(&[two])), depth(&[one, two]), "{one} {two}");
+            }
+        }
+        for (depth, wide) in Depth::ALL.into_iter().flat_map(|d| [(d, false), (d, true)]) {
+            let written = Written { depth, wide };
+            assert_eq!(Written::from_code(written.code()), written);
+        }
+    }
+
+    #[test]
+    fn eight_bits_widen_to_what_they_were() {
+        for color in 0..=65_535u16 {
+            let depth = depth(&[color]);
+            if depth.is_narrow() {
+                let bits = if depth == Depth::Unscaled { color as u8 } else { (color >> 8) as u8 };
+                assert_eq!(depth.widened(bits), color);
+            }
+        }
+    }
+}

@@ -1,0 +1,260 @@
+//! How records become vertices, decided once and done on all threads.
+
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use super::colors::{self, Colors, Depth, Recoloring, Written};
+use super::header::Encoding;
+use super::source::Native;
+use super::{PlyOptions, text};
+use crate::io::convert::{Projection, ply_schema};
+use crate::point::names::NORMAL;
+use crate::point::{Dimension, Layout, PointBatch, Scalar, Schema, Spare, Value};
+use crate::stage::{ChunkSize, Encode, Encoded};
+use crate::{Error, Result};
+
+/// Records of one encoded chunk.
+pub(super) const CHUNK_POINTS: usize = 65_536;
+
+pub(super) const WIDE: u8 = 1;
+pub(super) const FULL: u8 = 2;
+
+/// How a record becomes a vertex; shared by all threads.
+pub(super) struct Plan {
+    pub encoding: Encoding,
+    /// With colours as the records have them.
+    pub full: Form,
+    /// With colours of 8 bits, where the records are LAS and have colours.
+    pub narrow: Option<Narrow>,
+    /// [`WIDE`] once the file has colours of 16 bits, so that no chunk needs to have 8, and [`FULL`]
+    /// once they are known to need them, so that nobody needs to look.
+    pub widened: AtomicU8,
+    /// For the vertices of chunks; whoever has written them puts them back.
+    pub spare: Spare<Vec<u8>>,
+}
+
+/// One form of vertices.
+pub(super) struct Form {
+    /// What a vertex holds; text is printed from its little-endian form.
+    pub vertex: Schema,
+    /// From the records to the vertices, where they differ.
+    projection: Option<Projection>,
+    /// The normals' fields, if they are written.
+    normals: Option<[Dimension; 3]>,
+}
+
+/// Vertices with colours of 8 bits.
+pub(super) struct Narrow {
+    pub asked: Colors,
+    /// Of the lower and of the upper byte of the records' colours; the vertices are alike.
+    pub forms: [Form; 2],
+    /// Byte offsets of the colours in a record.
+    fields: Vec<usize>,
+}
+
+impl Narrow {
+    fn of(options: &PlyOptions, schema: &Schema, encoding: Encoding) -> Result<Option<Narrow>> {
+        let fields = colors::fields(schema, &options.drop);
+        if fields.is_empty() || options.colors == Some(Colors::Sixteen) {
+            return Ok(None);
+        }
+        let form = |place| Form::new(options, &colors::bytes_of(schema, place), encoding);
+        let asked = options.colors.unwrap_or_default();
+        Ok(Some(Narrow { asked, forms: [form(0)?, form(1)?], fields }))
+    }
+
+    /// The form of 8-bit vertices that loses nothing, or that was asked for.
+    fn form(&self, depth: Depth) -> Option<&Form> {
+        let [lower, upper] = &self.forms;
+        match (self.asked, depth) {
+            (Colors::Auto, Depth::Full | Depth::Mixed) => None,
+            (Colors::Auto, Depth::Unscaled) => Some(lower),
+            _ => Some(upper),
+        }
+    }
+
+    /// The vertex with colours of 8 bits.
+    pub fn vertex(&self) -> &Schema {
+        &self.forms[0].vertex
+    }
+}
+
+impl Form {
+    fn new(options: &PlyOptions, schema: &Schema, encoding: Encoding) -> Result<Form> {
+        let mut vertex = ply_schema(schema);
+        vertex.endian = encoding.endian();
+        vertex.dimensions.retain(|d| !options.drop.contains(&d.name));
+        vertex.stride = 0;
+        for dimension in &mut vertex.dimensions {
+            dimension.offset = vertex.stride;
+            vertex.stride += dimension.scalar.size();
+        }
+        // Made before the normals are added: the records need not have them.
+        let mut projection = Projection::new(schema, &vertex, &options.drop)?;
+        let mut normals = None;
+        if options.normals {
+            let added = add_normals(&mut vertex)?;
+            projection.widen(vertex.stride);
+            normals = Some(added);
+        }
+        let projection = (!projection.is_copy()).then_some(projection);
+        Ok(Form { vertex, projection, normals })
+    }
+
+    fn put_normals(&self, normals: &[[f32; 3]], vertices: &mut [u8]) -> Result<()> {
+        let Some(fields) = &self.normals else { return Ok(()) };
+        for (vertex, normal) in vertices.chunks_exact_mut(self.vertex.stride).zip(normals) {
+            for (field, value) in fields.iter().zip(normal) {
+                if !field.put(vertex, self.vertex.endian, Value::Single(*value)) {
+                    return Err(Error::internal("a floating-point field refused a normal"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Bytes of the longest text of a vertex.
+    fn text_bytes(&self) -> usize {
+        self.vertex.dimensions.iter().map(|d| text::longest(d.scalar)).sum()
+    }
+
+    fn print(&self, vertices: &[u8]) -> Vec<u8> {
+        let points = vertices.len() / self.vertex.stride;
+        let mut text = Vec::with_capacity(points * self.text_bytes());
+        for vertex in vertices.chunks_exact(self.vertex.stride) {
+            for dimension in &self.vertex.dimensions {
+                text::print(dimension.get(vertex, self.vertex.endian), &mut text);
+                text.push(b' ');
+            }
+            text.pop();
+            text.push(b'\n');
+        }
+        text
+    }
+}
+
+impl Plan {
+    pub fn new(options: &PlyOptions, schema: &Schema, native: Option<&Native>) -> Result<Plan> {
+        let encoding = options.encoding.or(native.map(|n| n.encoding)).unwrap_or({
+            match (schema.layout, schema.endian) {
+                (Layout::Ply, crate::point::Endian::Big) => Encoding::BinaryBigEndian,
+                _ => Encoding::BinaryLittleEndian,
+            }
+        });
+        if options.colors.is_some() && schema.layout == Layout::Ply {
+            let told = "`write.colors` is for LAS inputs: from PLY to PLY colours stay as they are";
+            return Err(Error::pipeline(told).help("leave it out"));
+        }
+        Ok(Plan {
+            encoding,
+            full: Form::new(options, schema, encoding)?,
+            narrow: Narrow::of(options, schema, encoding)?,
+            widened: AtomicU8::new(0),
+            spare: Spare::default(),
+        })
+    }
+
+    pub fn chunk(&self) -> ChunkSize {
+        let bytes = (CHUNK_POINTS as u64).saturating_mul(self.bytes_per_point() as u64);
+        ChunkSize { points: CHUNK_POINTS, bytes }
+    }
+
+    /// Bytes that encoding one record holds at most, those that an appended chunk is widened to included.
+    fn bytes_per_point(&self) -> usize {
+        let text = if self.encoding == Encoding::Ascii { self.full.text_bytes() } else { 0 };
+        let widened = match (&self.narrow, self.encoding) {
+            (None, _) => 0,
+            (_, Encoding::Ascii) => text,
+            _ => self.full.vertex.stride,
+        };
+        self.full.vertex.stride + text + widened
+    }
+
+    /// The most bytes that one vertex takes in the file.
+    pub fn vertex_bytes(&self) -> usize {
+        match self.encoding {
+            Encoding::Ascii => self.full.text_bytes(),
+            _ => self.full.vertex.stride,
+        }
+    }
+
+    /// From vertices with colours of 8 bits, of this depth, to those with 16.
+    pub fn widening(&self, depth: Depth) -> Option<Recoloring<'_>> {
+        let from = self.narrow.as_ref()?.vertex();
+        Some(Recoloring { encoding: self.encoding, from, to: &self.full.vertex, depth })
+    }
+
+    /// From vertices with colours of 16 bits to those with the upper 8.
+    pub fn narrowing(&self) -> Option<Recoloring<'_>> {
+        let to = self.narrow.as_ref()?.vertex();
+        let (encoding, from, depth) = (self.encoding, &self.full.vertex, Depth::Mixed);
+        Some(Recoloring { encoding, from, to, depth })
+    }
+
+    /// The form in which a chunk is written, and what its colours are; full where nobody asked.
+    fn form(&self, batch: &PointBatch) -> (&Form, Written) {
+        let full = |depth| (&self.full, Written { depth, wide: true });
+        let Some(narrow) = &self.narrow else { return full(Depth::Full) };
+        let widened = self.widened.load(Ordering::Relaxed);
+        if widened == FULL {
+            return full(Depth::Full);
+        }
+        let depth = Depth::of(batch.records(), batch.schema().stride, &narrow.fields);
+        match narrow.form(depth).filter(|_| widened != WIDE) {
+            Some(form) => (form, Written { depth, wide: false }),
+            None => full(depth),
+        }
+    }
+}
+
+/// Adds the normals' fields that are not there; fails on those that hold whole numbers.
+fn add_normals(vertex: &mut Schema) -> Result<[Dimension; 3]> {
+    let mut field = |name: &str| -> Result<Dimension> {
+        if let Some(found) = vertex.find(name) {
+            if found.scalar.is_float() {
+                return Ok(found.clone());
+            }
+            let message = format!("the input's {name} holds whole numbers: no normal fits");
+            return Err(
+                Error::pipeline(message).help(format!("`write.drop = [\"{name}\"]` leaves it out"))
+            );
+        }
+        let added = Dimension::new(name, Scalar::F32, vertex.stride);
+        vertex.stride += added.scalar.size();
+        vertex.dimensions.push(added.clone());
+        Ok(added)
+    };
+    Ok([field(NORMAL[0])?, field(NORMAL[1])?, field(NORMAL[2])?])
+}
+
+impl Encode for Plan {
+    fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
+        let mut rounded = None;
+        let mut vertices = self.spare.take(Vec::new);
+        let (form, written) = self.form(batch);
+        if let Some(projection) = &form.projection {
+            vertices.resize(batch.len() * form.vertex.stride, 0);
+            let rounding = projection.project_into(batch.records(), &mut vertices)?;
+            rounded = (rounding.points > 0).then_some((rounding.points, rounding.largest));
+        } else {
+            vertices.clear();
+            vertices.extend_from_slice(batch.records());
+        }
+        if form.normals.is_some() {
+            let normals =
+                batch.normals.as_ref().filter(|normals| normals.len() == batch.len()).ok_or_else(
+                    || Error::internal("normals are to be written, none were computed"),
+                )?;
+            form.put_normals(normals, &mut vertices)?;
+        }
+        let bytes = match self.encoding {
+            Encoding::Ascii => {
+                let text = form.print(&vertices);
+                self.spare.put(vertices);
+                text
+            }
+            _ => vertices,
+        };
+        let points = batch.len() as u64;
+        Ok(Encoded { bytes, points, rounded, form: written.code(), ..Encoded::default() })
+    }
+}

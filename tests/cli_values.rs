@@ -1,0 +1,56 @@
+//! Flags that say what becomes of values that a format or the lattice cannot hold.
+#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+
+fn case(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name)
+}
+
+fn pointmill(arguments: &[&str], input: &str, output: &Path) -> assert_cmd::assert::Assert {
+    let mut command = Command::cargo_bin("pointmill").unwrap();
+    let [first, others @ ..] = arguments else { panic!("no command") };
+    command.arg(first).arg(case(input)).arg("-o").arg(output).args(others).assert()
+}
+
+#[test]
+fn convert_drops_points_that_are_not_finite_if_asked() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.las");
+    let convert = ["convert", "--scale", "0.001"];
+    let refused = pointmill(&convert, "37d-nan-inf.ply", &output).failure();
+    let told = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+    assert!(told.contains("nonfinite") && !output.exists(), "{told}");
+    let drop = [&convert[..], &["--nonfinite", "drop"]].concat();
+    let done = pointmill(&drop, "37d-nan-inf.ply", &output).success();
+    let told = String::from_utf8(done.get_output().stdout.clone()).unwrap();
+    assert!(told.contains("4 in, 1 out"), "{told}");
+}
+
+#[test]
+fn reduce_takes_a_lattice() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.ply");
+    let refused = pointmill(&["reduce"], "94-ecef-mm.ply", &output).failure();
+    let told = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+    assert!(told.contains("lattice"), "{told}");
+    pointmill(&["reduce", "--lattice", "1e-6"], "94-ecef-mm.ply", &output).success();
+    let done = pointmill(&["reduce"], "93-nano.ply", &output).success();
+    let told = String::from_utf8(done.get_output().stderr.clone()).unwrap();
+    assert!(told.contains("points of unequal coordinates"), "{told}");
+}
+
+#[test]
+fn colors_have_as_many_bits_as_are_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.ply");
+    for (bits, kind) in [("auto", "uchar"), ("8bit", "uchar"), ("16bit", "ushort")] {
+        let convert = ["convert", "--encoding", "ascii", "--colors", bits];
+        pointmill(&convert, "50e-las-rgb16.las", &output).success();
+        let text = std::fs::read_to_string(&output).unwrap();
+        assert!(text.contains(&format!("property {kind} red")), "{bits}: {text}");
+    }
+    pointmill(&["convert", "--colors", "9bit"], "50e-las-rgb16.las", &output).failure();
+}
