@@ -6,7 +6,7 @@ use super::arguments::Plan;
 use super::console::Console;
 use super::print;
 use super::run::parse_sets;
-use crate::pipeline::{Outline, Pipeline, Registry};
+use crate::pipeline::{Outline, Pipeline, Registry, Watch};
 use crate::report::Grouped;
 use crate::stage::Role;
 use crate::{Result, io};
@@ -25,6 +25,7 @@ pub(super) fn check(arguments: &Plan, registry: &Registry, console: &Console) ->
     match pipeline.plan(&arguments.common.overrides()) {
         Ok(plan) => {
             console.planned(&plan);
+            plan.warnings().iter().for_each(|warning| console.warn(warning));
             console.result(format_args!("{name} is right: {}", said(&plan.outline())))
         }
         Err(error) => {

@@ -39,4 +39,8 @@ impl Plan {
             outputs,
         }
     }
+    /// What a run would warn of that is known before it.
+    pub fn warnings(&self) -> Vec<String> {
+        self.source.warnings().into_iter().chain(self.doubt.clone()).collect()
+    }
 }

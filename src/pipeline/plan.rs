@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::each::{lists_bytes, paths, ranks};
 use super::passes::{Op, Pass, StageOp, Tap, blame, number_selections, unroll};
 use super::publish::check_place;
-use super::settings::{Nonfinite, Overrides, RunSettings, Withheld};
+use super::settings::{Nonfinite, Overrides, RunSettings, Stretch, Withheld};
 use super::shares::Demands;
 use super::tagger::Tagger;
 use super::text::{Pipeline, PlacedStage, resolved};
@@ -40,6 +40,8 @@ pub struct Plan {
     pub(super) mills: bool,
     /// Where points are; None for a stream that does not ask.
     pub(super) lattice: Option<Lattice>,
+    /// Why the units of the scan may not be one, if stages measure distances.
+    pub(super) doubt: Option<String>,
     /// The stages as the report names them.
     pub(super) stages: serde_json::Value,
     pub(super) demands: Demands,
@@ -91,7 +93,7 @@ impl Pipeline {
         };
         let tagger = Tagger::new(schema, &selections, withheld, ranks.clone()).map_err(in_file)?;
         let mills = mills(&sorted.ops, &sinks)?;
-        let z_scale = z_scale(&settings, &*source, &sorted.ops)?;
+        let Stretch { factor: z_scale, doubt } = stretch(&settings, &*source, &sorted.ops)?;
         let lattice = match mills || settings.nonfinite == Nonfinite::Drop {
             true => Some(Lattice::stretched(schema, settings.lattice, z_scale)?),
             false => None,
@@ -129,6 +131,7 @@ impl Pipeline {
             tagger,
             mills,
             lattice,
+            doubt,
             stages,
             demands,
         })
@@ -273,15 +276,19 @@ fn chunks(sinks: &[Box<dyn CreateSink>], source: &dyn Source) -> Result<Vec<Chun
 }
 
 /// What z is multiplied by where stages measure distances; else 1.
-fn z_scale(settings: &RunSettings, source: &dyn Source, ops: &[StageOp]) -> Result<f64> {
+fn stretch(settings: &RunSettings, source: &dyn Source, ops: &[StageOp]) -> Result<Stretch> {
     if ops.is_empty() {
-        return Ok(1.0);
+        return Ok(Stretch { factor: 1.0, doubt: None });
     }
-    let stretch = settings.stretch(source.metadata().units);
-    stretch.map_err(|error| match source.inputs().first() {
-        Some(input) => error.at(&input.path),
-        None => error,
-    })
+    let first = source.inputs().into_iter().next();
+    match (settings.stretch(source.metadata().units), first) {
+        (Err(error), Some(input)) => Err(error.at(&input.path)),
+        (Ok(Stretch { factor, doubt }), Some(input)) => {
+            let doubt = doubt.map(|doubt| format!("{}: {doubt}", input.path.display()));
+            Ok(Stretch { factor, doubt })
+        }
+        (stretch, None) => stretch,
+    }
 }
 
 /// True if the run needs tiles: for its stages, or because an output is to be in canonical order.

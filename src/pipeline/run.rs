@@ -141,6 +141,7 @@ impl Plan {
         let transforms = std::mem::take(&mut self.transforms);
         let (ops, passes) = (std::mem::take(&mut self.ops), std::mem::take(&mut self.passes));
         let mut job = Job { transforms, ops, passes, ..self.job(outputs, &budget, &shares, watch) };
+        self.doubt.iter().for_each(|doubt| job.warn(doubt.clone()));
         let finished = match &self.lattice {
             Some(lattice) if self.mills => {
                 check_disk(&self.demands, &spill, kept_in_memory)?;

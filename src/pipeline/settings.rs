@@ -29,7 +29,9 @@ pub struct RunSettings {
     #[serde(deserialize_with = "some_step")]
     pub lattice: Option<f64>,
     /// What z is multiplied by wherever distances are measured, so that its unit is that of x and y;
-    /// the records keep their z. None: 1, where the units match or nothing is known of them.
+    /// the records keep their z. None: 1, where the units match or are not known; of units that give
+    /// reason for doubt (feet below heights of no unit, a reference system of no known unit) a run
+    /// warns, and of a scan without a reference system, or in metres without one for z, it does not.
     pub z_scale: Option<ZScale>,
     /// What becomes of scans whose x, y and z have different units, where stages measure distances.
     pub units: MixedUnits,
@@ -72,7 +74,7 @@ pub enum MixedUnits {
 /// What z is multiplied by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ZScale {
-    /// What the units in the coordinate reference system ask for.
+    /// What the units in the coordinate reference system ask for; refused where it does not tell both.
     Auto,
     /// This number, above 0.
     Factor(f64),
@@ -164,36 +166,67 @@ impl RunSettings {
     }
 }
 
+/// What z is multiplied by on a scan's lattice, and why that may be wrong.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stretch {
+    /// The factor.
+    pub factor: f64,
+    /// What the user is to be warned of.
+    pub doubt: Option<String>,
+}
+
 impl RunSettings {
     /// What z is multiplied by on the lattice of a scan in `units`.
     ///
     /// # Errors
     ///
     /// Units that do not match and that neither a factor nor an override answers, and `auto` where
-    /// no factor makes them match.
-    pub fn stretch(&self, units: Units) -> crate::Result<f64> {
+    /// no factor makes them match or not both units are known.
+    pub fn stretch(&self, units: Units) -> crate::Result<Stretch> {
+        let certain = |factor| Ok(Stretch { factor, doubt: None });
         let mismatch = match (self.z_scale, self.units) {
-            (Some(ZScale::Factor(factor)), _) => return Ok(factor),
-            (None, MixedUnits::Ignore) => return Ok(1.0),
+            (Some(ZScale::Factor(factor)), _) => return certain(factor),
+            (None, MixedUnits::Ignore) => return certain(1.0),
             _ => units.mismatch(),
         };
         let auto = self.z_scale == Some(ZScale::Auto);
         match mismatch {
-            None => Ok(1.0),
-            Some(Mismatch { z_scale: Some(factor), .. }) if auto => Ok(factor),
+            None if auto => known(units).and_then(|()| certain(1.0)),
+            None => {
+                let doubt = units.doubt().map(|doubt| {
+                    format!(
+                        "{doubt}; z is measured in the unit of x and y: set `run.z_scale = 1` if that \
+                         is right, or the factor that brings z there"
+                    )
+                });
+                Ok(Stretch { factor: 1.0, doubt })
+            }
+            Some(Mismatch { z_scale: Some(factor), .. }) if auto => certain(factor),
             Some(Mismatch { message, z_scale: Some(factor) }) => {
                 Err(Error::new(ErrorKind::Data, message).help(format!(
-                    "set z_scale = \"auto\" under [run] (or --z-scale auto), which measures with z times {factor}, or \
-                 z_scale = 1 if the reference system is wrong; records keep their z"
+                    "set `run.z_scale = \"auto\"`, which measures with z times {factor}, or \
+                     `run.z_scale = 1` if the reference system is wrong; records keep their z"
                 )))
             }
             Some(Mismatch { message, z_scale: None }) => Err(Error::new(ErrorKind::Data, message)
                 .help(
-                    "project the scan to metres first; or set z_scale under [run], or --z-scale (1 if \
-                     the reference system is wrong)",
+                    "project the scan to metres first, or set `run.z_scale` to a factor (1 if the \
+                     reference system is wrong)",
                 )),
         }
     }
+}
+
+/// Refuses to find a factor by units that are not both known.
+fn known(units: Units) -> Result<()> {
+    if units.horizontal.is_some() && units.vertical.is_some() {
+        return Ok(());
+    }
+    let told = format!("`run.z_scale = \"auto\"` needs to know the units, and the scan has {}", units.words());
+    Err(Error::new(ErrorKind::Data, told).help(
+        "set `run.z_scale = 1` if z is in the unit of x and y, else the factor that brings it there, \
+         such as 0.3048 for feet above metres",
+    ))
 }
 
 /// Bytes in a unit; the first of each is the one that messages use.
@@ -355,22 +388,40 @@ mod tests {
 
     #[test]
     fn units_that_differ_need_a_factor_or_an_override() {
-        let feet = Units { horizontal: Some(Horizontal::Metres(1.0)), vertical: Some(0.3048) };
-        let degrees = Units { horizontal: Some(Horizontal::Degrees), vertical: None };
+        let metres = Some(Horizontal::Metres(1.0));
+        let feet = Units { horizontal: metres, vertical: Some(0.3048), ..Units::default() };
+        let degrees = Units { horizontal: Some(Horizontal::Degrees), ..Units::default() };
         let with = |z_scale, units| RunSettings { z_scale, units, ..RunSettings::default() };
+        let factor = |settings: RunSettings, units| settings.stretch(units).unwrap().factor;
         let (refuse, ignore) = (MixedUnits::Refuse, MixedUnits::Ignore);
         let none = with(None, refuse);
-        assert_eq!(none.stretch(Units::default()).unwrap(), 1.0);
         let told = none.stretch(feet).unwrap_err();
         assert!(told.remedy().unwrap().contains("times 0.3048"), "{told:?}");
         assert!(none.stretch(degrees).unwrap_err().remedy().unwrap().contains("project"));
         let auto = with(Some(ZScale::Auto), refuse);
-        assert_eq!(auto.stretch(feet).unwrap(), 0.3048);
-        assert_eq!(auto.stretch(Units::default()).unwrap(), 1.0);
+        assert_eq!(factor(auto.clone(), feet), 0.3048);
         assert!(auto.stretch(degrees).is_err());
         for units in [feet, degrees] {
-            assert_eq!(with(None, ignore).stretch(units).unwrap(), 1.0);
-            assert_eq!(with(Some(ZScale::Factor(2.0)), refuse).stretch(units).unwrap(), 2.0);
+            assert_eq!(factor(with(None, ignore), units), 1.0);
+            assert_eq!(factor(with(Some(ZScale::Factor(2.0)), refuse), units), 2.0);
         }
+    }
+
+    #[test]
+    fn units_that_are_not_known_are_doubted_and_auto_refuses_them() {
+        let of = |horizontal| Units { horizontal, ..Units::default() };
+        let foot = of(Some(Horizontal::Metres(0.3048)));
+        let metre = of(Some(Horizontal::Metres(1.0)));
+        let with = |z_scale| RunSettings { z_scale, ..RunSettings::default() };
+        for (units, doubted) in [(Units::default(), false), (metre, false), (foot, true)] {
+            let Stretch { factor, doubt } = with(None).stretch(units).unwrap();
+            assert_eq!((factor, doubt.is_some()), (1.0, doubted), "{doubt:?}");
+            let told = with(Some(ZScale::Auto)).stretch(units).unwrap_err();
+            assert!(told.to_string().contains("z in a unit that is not known"), "{told}");
+            let given = with(Some(ZScale::Factor(1.0))).stretch(units).unwrap();
+            assert_eq!(given, Stretch { factor: 1.0, doubt: None });
+        }
+        let both = Units { vertical: Some(1.0), ..metre };
+        assert_eq!(with(Some(ZScale::Auto)).stretch(both).unwrap().factor, 1.0);
     }
 }

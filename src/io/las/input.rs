@@ -10,9 +10,10 @@ use super::format;
 use super::header::Header;
 use super::laz::{Compression, LASZIP};
 use super::vlr::{Evlr, VLR_HEAD, Vlr, read_evlrs, read_vlrs};
-use super::{chunks, crs};
+use super::chunks;
+use super::crs::CrsRecords;
 use crate::io::origin::Origin;
-use crate::point::{Schema, Units};
+use crate::point::Schema;
 use crate::{Error, Result};
 
 /// User and number of the record that names the extra bytes.
@@ -162,14 +163,9 @@ impl Input {
         Input { vlrs: Vec::new(), gap: Vec::new(), evlrs: Vec::new(), ..self }
     }
 
-    /// The coordinate reference system as text.
-    pub fn crs(&self) -> Result<Option<String>> {
-        crs::text(&self.vlrs, &self.evlrs)
-    }
-
-    /// The units of the coordinates, as far as that says them.
-    pub fn units(&self) -> Result<Units> {
-        crs::units(&self.vlrs, &self.evlrs)
+    /// The records that say in which coordinate reference system the points are.
+    pub fn crs_records(&self) -> Result<CrsRecords> {
+        CrsRecords::of(&self.vlrs, &self.evlrs)
     }
 }
 

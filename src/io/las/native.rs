@@ -8,6 +8,7 @@ use super::header::{Header, at, encoding};
 use super::input::{EXTRA_BYTES, Input, is_carried, is_carried_extended};
 use super::vlr::{Evlr, Vlr, read_evlrs, read_vlrs};
 use crate::Result;
+use crate::io::wkt;
 use crate::point::{Layout, Metadata, Schema, names};
 
 /// Header and records of the input, without what describes how that file stored its points.
@@ -69,8 +70,8 @@ impl Native {
             header.put_floats(at::SCALE, axes.map(|d| d.scale));
             header.put_floats(at::OFFSET, axes.map(|d| d.origin));
         }
-        let wkt = crs.filter(|text| crs::is_wkt(text)).and_then(crs::wkt_record);
-        if wkt.is_some() || format >= 6 {
+        let record = crs.filter(|text| wkt::is_wkt(text)).and_then(crs::wkt_record);
+        if record.is_some() || format >= 6 {
             // Section 2.4: formats 6 to 10 always say WKT.
             header.put(at::GLOBAL_ENCODING, &encoding::WKT.to_le_bytes());
         }
@@ -80,7 +81,7 @@ impl Native {
         let describe = !payload.is_empty() && u16::try_from(payload.len()).is_ok();
         let described =
             describe.then(|| Vlr::new(EXTRA_BYTES.0, EXTRA_BYTES.1, "Extra bytes", payload));
-        let vlrs = wkt.into_iter().chain(described).collect();
+        let vlrs = record.into_iter().chain(described).collect();
         Native { header, vlrs, gap: Vec::new(), evlrs: Vec::new() }
     }
 }
@@ -89,7 +90,7 @@ impl Native {
 pub fn fresh(schema: &Schema, crs: Option<&str>) -> Metadata {
     Metadata {
         crs: crs.map(str::to_owned),
-        units: crs.map(crate::io::wkt::units).unwrap_or_default(),
+        units: crs.map(wkt::units).unwrap_or_default(),
         comments: Vec::new(),
         native: Some(std::sync::Arc::new(Native::fresh(schema, crs))),
     }

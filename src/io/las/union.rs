@@ -3,6 +3,7 @@
 
 use std::cmp::Ordering;
 
+use super::crs::{self, CrsRecords};
 use super::extra::Descriptor;
 use super::input::{EXTRA_BYTES, Input, extra_record};
 use super::vlr::{Evlr, Vlr};
@@ -18,25 +19,35 @@ pub struct Records {
     /// are left out, so that one record remains.
     without_ranges: Union<Vlr>,
     extended: Union<Evlr>,
+    /// Of records that name one system in different words, those that are carried.
+    crs: CrsRecords,
+    crs_differ: bool,
     /// The bytes between records and points, if all files have the same.
     gap: Option<Vec<u8>>,
 }
 
 impl Records {
     /// Those of one file.
-    pub fn of(first: &Input) -> Self {
+    pub fn of(first: &Input) -> Result<Self> {
         let vlrs = first.carried_vlrs();
-        Records {
+        Ok(Records {
+            crs: first.crs_records()?,
+            crs_differ: false,
             descriptors: first.descriptors(),
             without_ranges: Union::of(without_ranges(first, vlrs.clone())),
             as_they_are: Some(Union::of(vlrs)),
             extended: Union::of(first.carried_evlrs()),
             gap: Some(first.gap.clone()),
-        }
+        })
     }
 
     /// Adds those of another file, which agrees with the first.
     pub fn add(&mut self, other: &Input) -> Result<()> {
+        let crs = other.crs_records()?;
+        self.crs_differ |= !crs.equal(&self.crs);
+        if crs.order(&self.crs) == Ordering::Less {
+            self.crs = crs;
+        }
         if other.descriptors() != self.descriptors {
             self.as_they_are = None;
         }
@@ -48,9 +59,15 @@ impl Records {
     }
 
     /// The records, the bytes behind them, the extended records.
-    pub fn finish(self) -> (Vec<Vlr>, Vec<u8>, Vec<Evlr>) {
-        let vlrs = self.as_they_are.unwrap_or(self.without_ranges).finish();
-        (vlrs, self.gap.unwrap_or_default(), self.extended.finish())
+    pub fn finish(self) -> Result<(Vec<Vlr>, Vec<u8>, Vec<Evlr>)> {
+        let mut vlrs = self.as_they_are.unwrap_or(self.without_ranges);
+        let mut evlrs = self.extended;
+        if self.crs_differ {
+            let is_crs = |user: String, record| crs::is_record(&user, record);
+            vlrs = vlrs.replaced(|v| is_crs(v.user(), v.record()), self.crs.vlrs)?;
+            evlrs = evlrs.replaced(|v| is_crs(v.user(), v.record()), self.crs.evlrs)?;
+        }
+        Ok((vlrs.finish(), self.gap.unwrap_or_default(), evlrs.finish()))
     }
 }
 
@@ -130,6 +147,14 @@ impl<T: Item> Union<T> {
         }
         self.all.insert(low, item);
         Ok(())
+    }
+
+    /// The list with `those` for all items of a kind.
+    fn replaced(self, is_kind: impl Fn(&T) -> bool, those: Vec<T>) -> Result<Self> {
+        let mut replaced = Union::of(Vec::new());
+        let others = self.finish().into_iter().filter(|item| !is_kind(item));
+        others.chain(those).try_for_each(|item| replaced.insert(item))?;
+        Ok(replaced)
     }
 
     fn finish(self) -> Vec<T> {
