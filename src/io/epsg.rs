@@ -75,7 +75,8 @@ fn find(code: u32, wanted: impl Fn(&str) -> bool) -> Option<(&'static str, Optio
 fn holds(codes: &str, code: u32) -> bool {
     let (first, last) = codes.split_once('-').unwrap_or((codes, codes));
     let number = |text: &str| text.parse::<u32>().ok();
-    number(first).is_some_and(|first| first <= code) && number(last).is_some_and(|last| code <= last)
+    number(first).is_some_and(|first| first <= code)
+        && number(last).is_some_and(|last| code <= last)
 }
 
 #[cfg(test)]

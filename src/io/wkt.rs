@@ -102,7 +102,9 @@ impl Node {
 
     /// Its own EPSG code.
     fn epsg(&self) -> Option<u32> {
-        let [authority, code, ..] = &self.find(&["AUTHORITY", "ID"])?.values[..] else { return None };
+        let [authority, code, ..] = &self.find(&["AUTHORITY", "ID"])?.values[..] else {
+            return None;
+        };
         if authority.eq_ignore_ascii_case("EPSG") { code.parse().ok() } else { None }
     }
 
@@ -308,7 +310,8 @@ mod tests {
     #[test]
     fn a_vertical_system_behind_the_projected_one_counts() {
         for between in [",", "", "\n, "] {
-            let text = format!("{UTM}{between}VERTCS[\"NAVD_1988\",UNIT[\"Foot_US\",0.3048006096]]");
+            let text =
+                format!("{UTM}{between}VERTCS[\"NAVD_1988\",UNIT[\"Foot_US\",0.3048006096]]");
             assert_eq!(units(&text), of(Some(Horizontal::Metres(1.0)), Some(0.3048006096)));
         }
         assert_eq!(units(&format!("{UTM},VERTCS[")), unknown(), "cut short");
@@ -333,7 +336,10 @@ mod tests {
         let height = Units { vertical_unknown: true, ..of(metres, None) };
         assert_eq!((units("EPSG:25832+5103"), units("EPSG:25832+x")), (height, height));
         assert_eq!(units("EPSG:none"), unknown());
-        assert_eq!((codes("EPSG:1+2"), codes("EPSG:x"), codes(UTM)), (Some((1, Some(2))), None, None));
+        assert_eq!(
+            (codes("EPSG:1+2"), codes("EPSG:x"), codes(UTM)),
+            (Some((1, Some(2))), None, None)
+        );
     }
 
     #[test]

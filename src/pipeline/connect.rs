@@ -187,7 +187,11 @@ impl Output {
         let offset = self.write.offset.unwrap_or([0.0; 3]);
         let layout = Arc::new(las::layout(format, &extra, scale, offset));
         let projection = Some(convert::Projection::new(schema, &layout, &self.write.drop)?);
-        let metadata = las::fresh(&layout, metadata.crs.as_deref());
+        let metadata = Metadata {
+            gps_time: metadata.gps_time,
+            pipeline: metadata.pipeline.clone(),
+            ..las::fresh(&layout, metadata.crs.as_deref())
+        };
         Ok(Target { schema: layout, metadata, projection })
     }
 }

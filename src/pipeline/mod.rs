@@ -1,5 +1,6 @@
 //! From a pipeline file to a finished run: parse, plan, run.
 
+mod beside;
 mod builtin;
 mod chunks;
 mod clock;
@@ -33,6 +34,7 @@ mod settings;
 mod shares;
 mod shown;
 mod stream;
+mod stretch;
 mod survey;
 mod tagger;
 mod text;
@@ -49,5 +51,6 @@ pub use set::Set;
 pub use settings::{
     MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill, Withheld, ZScale, parse_bytes,
 };
+pub use stretch::Stretch;
 pub use text::{Pipeline, PlacedStage};
 pub use watch::{Quiet, Watch};

@@ -50,7 +50,9 @@ impl Plan {
         let units = self.source.metadata().units;
         write!(f, "units    {}", units.words())?;
         match units.vertical {
-            None if units.mismatch().is_none() => writeln!(f, ": z is taken to be in that of x and y"),
+            None if units.mismatch().is_none() => {
+                writeln!(f, ": z is taken to be in that of x and y")
+            }
             _ => writeln!(f),
         }
     }

@@ -88,9 +88,10 @@ impl Units {
                 let z = name(up);
                 Some(format!("z is in {z} and the unit of x and y is not known"))
             }
-            (None, None) if self.horizontal_unknown || self.vertical_unknown => {
-                Some("the reference system that the scan names is none whose units are known here".to_owned())
-            }
+            (None, None) if self.horizontal_unknown || self.vertical_unknown => Some(
+                "the reference system that the scan names is none whose units are known here"
+                    .to_owned(),
+            ),
             (None, _) => None,
         }
     }
@@ -200,7 +201,10 @@ mod tests {
             (above(SURVEY_FOOT), "the unit of z is not known: nothing names it"),
             (unknown(above(1.0)), "x and y are in metres and the unit of z is not known"),
             (heights(FOOT), "z is in feet and the unit of x and y is not known"),
-            (Units { horizontal_unknown: true, ..heights(1.0) }, "the unit of x and y is not known"),
+            (
+                Units { horizontal_unknown: true, ..heights(1.0) },
+                "the unit of x and y is not known",
+            ),
             (unknown(none), "none whose units are known"),
             (Units { horizontal_unknown: true, ..none }, "none whose units are known"),
         ];

@@ -1,24 +1,27 @@
-//! The coordinate reference system of a file: WKT where it has one, else what its GeoTIFF keys name;
-//! and whether two files have one system.
+//! The coordinate reference system of a file: WKT where it has one, else what its GeoTIFF keys name.
 
-use std::cmp::Ordering;
-
+use super::header::Header;
 use super::vlr::{Evlr, Vlr};
 use crate::io::epsg;
 use crate::point::{Horizontal, Units};
 use crate::{Result, io};
 
-const USER: &str = "LASF_Projection";
-const WKT: u16 = 2112;
+/// Who defined the records of systems.
+pub const USER: &str = "LASF_Projection";
+/// Their numbers: WKT 1.
+pub const WKT: u16 = 2112;
 /// WKT 2 in LAS 1.4, as some writers have it beside or in place of WKT 1.
 const WKT2: u16 = 4224;
 /// Where libLAS put its WKT before the specification had a place for it.
 const LIBLAS: (&str, u16) = ("liblas", 2112);
-const GEO_KEYS: u16 = 34735;
-const GEO_DOUBLES: u16 = 34736;
-const GEO_ASCII: u16 = 34737;
+/// The directory of GeoTIFF keys, their floats, their texts.
+pub const GEO_KEYS: u16 = 34735;
+/// See [`GEO_KEYS`].
+pub const GEO_DOUBLES: u16 = 34736;
+/// See [`GEO_KEYS`].
+pub const GEO_ASCII: u16 = 34737;
 /// No WKT is longer; a record that claims to be is not read for it.
-const WKT_LIMIT: usize = 1 << 20;
+pub const WKT_LIMIT: usize = 1 << 20;
 
 /// GeoTIFF keys that name a system, most specific first (GeoTIFF 1.1, section 7).
 const PROJECTED: u16 = 3072;
@@ -35,12 +38,47 @@ const VERTICAL_UNITS: u16 = 4099;
 /// Key values above this are "user-defined" or private.
 const USER_DEFINED: u16 = 32767;
 
-/// A new record that holds `wkt`; None if it is too long for one.
-pub fn wkt_record(wkt: &str) -> Option<Vlr> {
-    let mut payload = wkt.as_bytes().to_vec();
+/// A new record that names the system `text`, and why there is none.
+pub fn record(text: &str) -> std::result::Result<Vlr, String> {
+    if !io::wkt::is_wkt(text) {
+        return keys_record(text);
+    }
+    let mut payload = text.as_bytes().to_vec();
     payload.push(0);
-    (payload.len() <= usize::from(u16::MAX))
-        .then(|| Vlr::new(USER, WKT, "OGC coordinate system WKT", payload))
+    match u16::try_from(payload.len()) {
+        Ok(_) => Ok(Vlr::new(USER, WKT, "OGC coordinate system WKT", payload)),
+        Err(_) => Err("WKT of 64 KiB or more fits no record".to_owned()),
+    }
+}
+
+/// GeoTIFF keys for `EPSG:code` or `EPSG:code+code`.
+fn keys_record(text: &str) -> std::result::Result<Vlr, String> {
+    let Some((across, up)) = text.starts_with("EPSG:").then(|| io::wkt::codes(text)).flatten()
+    else {
+        return Err("LAS names a system by WKT or EPSG codes, and this is neither".to_owned());
+    };
+    let kind = match epsg::horizontal(across) {
+        units if units.horizontal_unknown => {
+            return Err(format!("what EPSG:{across} is is not known here"));
+        }
+        Units { horizontal: Some(Horizontal::Degrees), .. } => GEOGRAPHIC,
+        Units { vertical: Some(_), .. } => GEOCENTRIC,
+        _ => 1,
+    };
+    let word = |code: u32| match u16::try_from(code) {
+        Ok(code) if code > 0 && code < USER_DEFINED => Ok(code),
+        _ => Err(format!("a GeoTIFF key cannot hold EPSG:{code}")),
+    };
+    let system = if kind == 1 { PROJECTED } else { GEODETIC };
+    let mut keys = vec![(MODEL_TYPE, kind), (system, word(across)?)];
+    if let Some(up) = up {
+        keys.push((VERTICAL, word(up)?));
+    }
+    // The directory's head: versions of the directory and of the keys, and how many there are.
+    let head = [1, 1, 0, keys.len() as u16];
+    let entries = keys.into_iter().flat_map(|(key, value)| [key, 0, 1, value]);
+    let payload = head.into_iter().chain(entries).flat_map(u16::to_le_bytes).collect();
+    Ok(Vlr::new(USER, GEO_KEYS, "GeoTIFF keys", payload))
 }
 
 /// True for the records that say in which system the points are.
@@ -54,9 +92,13 @@ pub fn has_wkt(vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<bool> {
     Ok(wkt(vlrs, evlrs)?.is_some())
 }
 
-/// True if there are GeoTIFF keys.
-pub fn has_keys(vlrs: &[Vlr]) -> bool {
-    vlrs.iter().any(|v| v.is(USER, GEO_KEYS))
+/// True if the header of an output is to say that its system is WKT (LAS 1.4 R15, section 2.4): where
+/// it is, unless there are GeoTIFF keys too and a point format that may have them; and always in
+/// point formats 6 to 10, unless there are GeoTIFF keys alone, which it would belie.
+pub fn wants_bit(header: &Header, vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<bool> {
+    let keys = vlrs.iter().any(|v| v.is(USER, GEO_KEYS));
+    let wkt = has_wkt(vlrs, evlrs)?;
+    Ok(header.minor() >= 4 && if header.format() >= 6 { wkt || !keys } else { wkt && !keys })
 }
 
 /// The system as text, if the file names one.
@@ -98,67 +140,6 @@ fn first_text(vlrs: &[Vlr], evlrs: &[Evlr], user: &str, record: u16) -> Result<O
     Ok(None)
 }
 
-/// The records that say in which system a file's points are.
-#[derive(Clone)]
-pub struct CrsRecords {
-    /// 0 with WKT, which is to be preferred, else 1.
-    rank: u8,
-    /// Their payloads by number, whether extended or not.
-    payloads: Vec<(u16, Vec<u8>)>,
-    /// Those that are plain.
-    pub vlrs: Vec<Vlr>,
-    /// Those that are extended.
-    pub evlrs: Vec<Evlr>,
-}
-
-impl CrsRecords {
-    /// Those among the records of a file.
-    pub fn of(vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<Self> {
-        let vlrs: Vec<Vlr> =
-            vlrs.iter().filter(|v| is_record(&v.user(), v.record())).cloned().collect();
-        let evlrs: Vec<Evlr> =
-            evlrs.iter().filter(|v| is_record(&v.user(), v.record())).cloned().collect();
-        let mut payloads: Vec<(u16, Vec<u8>)> =
-            vlrs.iter().map(|v| (v.record(), v.payload().to_vec())).collect();
-        for evlr in &evlrs {
-            payloads.extend(evlr.payload(WKT_LIMIT)?.map(|payload| (evlr.record(), payload)));
-        }
-        payloads.sort();
-        payloads.dedup();
-        Ok(CrsRecords { rank: u8::from(!has_wkt(&vlrs, &evlrs)?), payloads, vlrs, evlrs })
-    }
-
-    /// True if both files have them byte for byte, at one place.
-    pub fn equal(&self, other: &Self) -> bool {
-        self.vlrs == other.vlrs && self.payloads == other.payloads
-    }
-
-    /// True if both say the same: the same bytes, WKT of one wording, or the same EPSG codes; in the
-    /// latter cases with the same units.
-    pub fn same_system(&self, other: &Self) -> Result<bool> {
-        if self.payloads == other.payloads {
-            return Ok(true);
-        }
-        let (Some(one), Some(two)) = (self.text()?, other.text()?) else { return Ok(false) };
-        let codes = io::wkt::codes(&one);
-        let same = io::wkt::alike(&one, &two) || (codes.is_some() && codes == io::wkt::codes(&two));
-        Ok(same && units(&self.vlrs, &self.evlrs)? == units(&other.vlrs, &other.evlrs)?)
-    }
-
-    /// See [`text`].
-    pub fn text(&self) -> Result<Option<String>> {
-        text(&self.vlrs, &self.evlrs)
-    }
-
-    /// Of several that say the same, outputs carry the least: those with WKT first, then by bytes.
-    pub fn order(&self, other: &Self) -> Ordering {
-        let bytes = |records: &Self| records.vlrs.iter().flat_map(Vlr::bytes).collect::<Vec<u8>>();
-        (self.rank, &self.payloads)
-            .cmp(&(other.rank, &other.payloads))
-            .then_with(|| bytes(self).cmp(&bytes(other)))
-    }
-}
-
 /// The directory of GeoTIFF keys: number, place, count and value of each.
 struct GeoKeys(Vec<[u16; 4]>);
 
@@ -191,7 +172,8 @@ impl GeoKeys {
         let by_system = || epsg::vertical(self.code(VERTICAL)?.into());
         let vertical = self.value(VERTICAL_UNITS).and_then(epsg::unit).or_else(by_system);
         let named = self.has(VERTICAL) || self.has(VERTICAL_UNITS);
-        let up = Units { vertical, vertical_unknown: named && vertical.is_none(), ..Units::default() };
+        let up =
+            Units { vertical, vertical_unknown: named && vertical.is_none(), ..Units::default() };
         up.or(self.across(vlrs))
     }
 
@@ -283,12 +265,17 @@ mod tests {
         let metres = |m| Some(Horizontal::Metres(m));
         let feet = units(&[1024, 1, 3072, 2264, 3076, 9003, 4099, 9001]);
         assert_eq!((feet.horizontal, feet.vertical), (metres(1200.0 / 3937.0), Some(1.0)));
-        for by_code in [&[1024, 1, 3076, 9001, 4096, 6360][..], &[1024, 1, 3072, 2277, 4096, 5703]] {
+        for by_code in [&[1024, 1, 3076, 9001, 4096, 6360][..], &[1024, 1, 3072, 2277, 4096, 5703]]
+        {
             assert!(units(by_code).mismatch().is_some(), "{by_code:?}");
         }
         let geocentric = units(&[1024, 3, 2048, 4978]);
         assert_eq!((geocentric.horizontal, geocentric.vertical), (metres(1.0), Some(1.0)));
-        assert_eq!(units(&[1024, 2, 2048, 4979]).vertical, Some(1.0), "a height above the ellipsoid");
+        assert_eq!(
+            units(&[1024, 2, 2048, 4979]).vertical,
+            Some(1.0),
+            "a height above the ellipsoid"
+        );
         for degrees in [&[1024, 2, 2048, 4326][..], &[2048, 4326], &[1024, 2, 4099, 9001]] {
             assert_eq!(units(degrees).horizontal, Some(Horizontal::Degrees), "{degrees:?}");
         }
@@ -300,41 +287,36 @@ mod tests {
             assert_eq!(units(unknown), nothing, "{unknown:?}");
         }
         for height in [&[3072, 2154, 4096, 5103][..], &[3072, 2154, 4099, 32767]] {
-            assert!(units(height).vertical_unknown && units(height).doubt().is_some(), "{height:?}");
+            assert!(
+                units(height).vertical_unknown && units(height).doubt().is_some(),
+                "{height:?}"
+            );
         }
     }
 
     #[test]
-    fn one_system_in_other_words_is_one() {
-        let of = |vlrs: &[Vlr]| CrsRecords::of(vlrs, &[]).unwrap();
-        let wkt = |text: &str| Vlr::new(USER, WKT, "", text.as_bytes().to_vec());
-        let utm = |code: u16| keys(&[1, 1, 0, 1, 3072, 0, 1, code]);
-        let text = "PROJCS[\"a\",UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"25832\"]]";
-        let spaced = "PROJCS [ \"a\", UNIT[\"metre\",1.0],\n AUTHORITY[\"EPSG\",\"25832\"]]\0\0";
-        let feet = text.replace("metre\",1", "foot\",0.3048");
-        let plain = [wkt(text)];
-        for same in [wkt(spaced), utm(25832)] {
-            let other = of(&[same]);
-            assert!(of(&plain).same_system(&other).unwrap() && !of(&plain).equal(&other));
-            assert_eq!(of(&plain).order(&other), Ordering::Less, "WKT, and without zeros");
+    fn epsg_codes_become_keys_and_come_back() {
+        for code in ["EPSG:25832", "EPSG:25832+7837", "EPSG:4326", "EPSG:4979", "EPSG:4978"] {
+            let record = [keys_record(code).unwrap()];
+            assert_eq!(geotiff(&record).as_deref(), Some(code));
+            let read = units(&record, &[]).unwrap();
+            assert_eq!(read, io::wkt::units(code), "{code}");
         }
-        for other in [wkt(&feet), utm(25833), wkt("PROJCS[\"b\",UNIT[\"metre\",1]]")] {
-            assert!(!of(&plain).same_system(&of(&[other])).unwrap());
+        for (text, why) in [
+            ("EPSG:1", "not known"),
+            ("EPSG:900913", "cannot hold"),
+            ("EPSG:x", "neither"),
+            ("here", "neither"),
+            (&format!("PROJCS[\"{}\"]", "a".repeat(70_000)), "64 KiB"),
+        ] {
+            assert!(super::record(text).unwrap_err().contains(why), "{text}");
         }
-        assert!(!of(&plain).same_system(&of(&[])).unwrap());
-        // What no code says may differ behind equal citations.
-        let here = |doubles: u8| {
-            let ascii = Vlr::new(USER, GEO_ASCII, "", b"Here|".to_vec());
-            of(&[ascii, Vlr::new(USER, GEO_DOUBLES, "", vec![doubles; 8])])
-        };
-        assert!(!here(1).same_system(&here(2)).unwrap());
     }
 
     #[test]
     fn wkt_of_other_records_is_found() {
-        let record = |user: &str, number, text: &str| {
-            Vlr::new(user, number, "", text.as_bytes().to_vec())
-        };
+        let record =
+            |user: &str, number, text: &str| Vlr::new(user, number, "", text.as_bytes().to_vec());
         let (two, liblas) = (record(USER, WKT2, "PROJCRS[2]"), record("liblas", 2112, "PROJCS[1]"));
         let found = |vlrs: &[Vlr]| text(vlrs, &[]).unwrap();
         assert_eq!(found(&[liblas.clone(), two]).as_deref(), Some("PROJCRS[2]"));

@@ -43,9 +43,11 @@ impl Merge {
         let (offset, shifts) = shifts(inputs)?;
         let (vlrs, gap, evlrs) = self.records.finish()?;
         waveforms(inputs, &evlrs)?;
+        external(inputs)?;
         let mut header = header(inputs);
         header.put_floats(at::OFFSET, offset);
-        Ok((Native { header, vlrs, gap, evlrs }, shifts))
+        let native = Native { header, vlrs, gap, evlrs, waveforms: None, made: false };
+        Ok((native, shifts))
     }
 }
 
@@ -77,7 +79,10 @@ fn agree(a: &Input, b: &Input) -> Result<()> {
 /// from shortly before they differ.
 fn told_apart(one: Option<String>, two: Option<String>) -> (String, String) {
     let (Some(one), Some(two)) = (&one, &two) else {
-        return (one.map_or("none".into(), |text| short(&text)), two.map_or("none".into(), |text| short(&text)));
+        return (
+            one.map_or("none".into(), |text| short(&text)),
+            two.map_or("none".into(), |text| short(&text)),
+        );
     };
     if one == two {
         let shown = format!("{}, with other parameters", short(one));
@@ -198,6 +203,13 @@ fn header(inputs: &[Input]) -> Header {
     merged
 }
 
+/// Records refer to waveforms in the one file that has the name of theirs: two files cannot be one.
+fn external(inputs: &[Input]) -> Result<()> {
+    let Some(one) = inputs.iter().find(|input| input.waveforms.is_some()) else { return Ok(()) };
+    let other = inputs.iter().find(|input| input.path != one.path).unwrap_or(one);
+    Err(refuse(one, other, "their waveforms are in files of their own".to_owned()))
+}
+
 /// Records refer to waveforms by their place in one block: two blocks cannot be one.
 fn waveforms(inputs: &[Input], evlrs: &[Evlr]) -> Result<()> {
     let inside = |i: &&Input| {
@@ -221,7 +233,10 @@ mod tests {
     fn two_texts_are_shown_where_they_differ() {
         let long = |end: &str| Some(format!("PROJCS[\"{}\",{end}]", "name ".repeat(30)));
         let (one, two) = told_apart(long("UNIT[1]"), long("UNIT[2]"));
-        assert!(one.starts_with('…') && one.contains("UNIT[1]") && two.contains("UNIT[2]"), "{one}");
+        assert!(
+            one.starts_with('…') && one.contains("UNIT[1]") && two.contains("UNIT[2]"),
+            "{one}"
+        );
         assert_eq!(told_apart(None, Some("a".into())), ("none".into(), "a".into()));
         let (one, two) = told_apart(Some("Here".into()), Some("Here".into()));
         assert_ne!(one, two);

@@ -8,7 +8,7 @@ use laz::DecompressionSelection;
 use super::chunks::{Chunk, Chunks};
 use super::crs;
 use super::file::WINDOW_BYTES;
-use super::format::selection;
+use super::format::{has_gps_time, selection};
 use super::input::{Input, Storage};
 use super::merge::Merge;
 use super::native::Native;
@@ -47,11 +47,11 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
         dimension.origin = native.header.offset()[axis];
     }
     let warnings = inputs.iter().flat_map(|i| i.warnings.clone()).collect();
-    let (crs, units) = (
-        crs::text(&native.vlrs, &native.evlrs)?,
-        crs::units(&native.vlrs, &native.evlrs)?,
-    );
-    let metadata = Metadata { crs, units, comments: Vec::new(), native: Some(Arc::new(native)) };
+    let (crs, units) =
+        (crs::text(&native.vlrs, &native.evlrs)?, crs::units(&native.vlrs, &native.evlrs)?);
+    let gps_time = has_gps_time(native.header.format()).then(|| native.header.gps_time());
+    let native = Some(Arc::new(native) as Arc<_>);
+    let metadata = Metadata { crs, units, gps_time, native, ..Metadata::default() };
     let files: Vec<Opened> = inputs.into_iter().zip(shifts).map(Opened::new).collect();
     let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i)).collect();
     Ok(Box::new(LasSource { files, parts, schema: Arc::new(schema), metadata, warnings }))

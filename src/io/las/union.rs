@@ -3,9 +3,11 @@
 
 use std::cmp::Ordering;
 
-use super::crs::{self, CrsRecords};
+use super::crs;
+use super::described::{EXTRA_BYTES, record};
 use super::extra::Descriptor;
-use super::input::{EXTRA_BYTES, Input, extra_record};
+use super::input::Input;
+use super::system::CrsRecords;
 use super::vlr::{Evlr, Vlr};
 use crate::Result;
 
@@ -29,14 +31,14 @@ pub struct Records {
 impl Records {
     /// Those of one file.
     pub fn of(first: &Input) -> Result<Self> {
-        let vlrs = first.carried_vlrs();
+        let (vlrs, evlrs) = first.carried();
         Ok(Records {
             crs: first.crs_records()?,
             crs_differ: false,
-            descriptors: first.descriptors(),
-            without_ranges: Union::of(without_ranges(first, vlrs.clone())),
+            descriptors: first.descriptors().to_vec(),
+            without_ranges: Union::of(without_ranges(vlrs.clone())),
             as_they_are: Some(Union::of(vlrs)),
-            extended: Union::of(first.carried_evlrs()),
+            extended: Union::of(evlrs),
             gap: Some(first.gap.clone()),
         })
     }
@@ -52,10 +54,10 @@ impl Records {
             self.as_they_are = None;
         }
         self.gap.take_if(|gap| *gap != other.gap);
-        let vlrs = other.carried_vlrs();
-        self.without_ranges.add(without_ranges(other, vlrs.clone()))?;
+        let (vlrs, evlrs) = other.carried();
+        self.without_ranges.add(without_ranges(vlrs.clone()))?;
         self.as_they_are.as_mut().map_or(Ok(()), |all| all.add(vlrs))?;
-        self.extended.add(other.carried_evlrs())
+        self.extended.add(evlrs)
     }
 
     /// The records, the bytes behind them, the extended records.
@@ -76,10 +78,10 @@ pub fn described(input: &Input) -> Vec<Descriptor> {
     input.descriptors().iter().map(Descriptor::without_range).collect()
 }
 
-fn without_ranges(input: &Input, mut vlrs: Vec<Vlr>) -> Vec<Vlr> {
-    if let Some(record) = extra_record(&vlrs, input.extra_len()) {
-        let payload = described(input).iter().flat_map(|d| *d.bytes()).collect();
-        vlrs[record] = Vlr::new(EXTRA_BYTES.0, EXTRA_BYTES.1, "Extra bytes", payload);
+fn without_ranges(mut vlrs: Vec<Vlr>) -> Vec<Vlr> {
+    for vlr in vlrs.iter_mut().filter(|v| v.is(EXTRA_BYTES.0, EXTRA_BYTES.1)) {
+        let all = Descriptor::all(vlr.payload());
+        *vlr = record(&all.iter().map(Descriptor::without_range).collect::<Vec<_>>());
     }
     vlrs
 }

@@ -299,6 +299,7 @@ impl Sink for PlySink {
         self.file.seek(SeekFrom::Start(0)).map_err(failed)?;
         self.file.write_all(self.header.text(self.points).as_bytes()).map_err(failed)?;
         self.file.sync_all().map_err(|e| Error::io(&self.path, "flush", e))?;
-        Ok(SinkSummary { points: self.points, bytes: self.bytes, notes: self.notes })
+        let (points, bytes, notes) = (self.points, self.bytes, self.notes);
+        Ok(SinkSummary { points, bytes, notes, beside: None })
     }
 }

@@ -11,7 +11,7 @@ use super::file::PlyFile;
 use super::header::{Element, Encoding, Kind, shown};
 use super::names;
 use crate::io::origin::Origin;
-use crate::point::{Dimension, Layout, Metadata, PointBatch, Schema};
+use crate::point::{Dimension, GpsTime, Layout, Metadata, PointBatch, Schema};
 use crate::stage::{Input, Part, Source};
 use crate::{Error, Result};
 
@@ -59,6 +59,9 @@ impl PlySource {
         let texts: Vec<Texts> = files.iter().map(Texts::of).collect();
         for (file, text) in files.iter().zip(&texts).skip(1) {
             agree(first, file)?;
+            if text.gps_time != texts[0].gps_time {
+                return Err(disagree(first, file, "GPS time type"));
+            }
             if text.crs != texts[0].crs || text.dimensions != texts[0].dimensions {
                 let what = if text.crs == texts[0].crs {
                     "dimension names"
@@ -93,6 +96,7 @@ impl PlySource {
 /// What the comments of a file say to us, and the others.
 struct Texts {
     crs: Option<String>,
+    gps_time: Option<GpsTime>,
     dimensions: Vec<String>,
     comments: Vec<String>,
 }
@@ -104,6 +108,7 @@ impl Texts {
         let dimensions = names::dimensions(&properties, &header.comments);
         let properties: BTreeSet<&str> = properties.into_iter().collect();
         let mut crs: Option<String> = None;
+        let mut gps_time = None;
         let mut comments = Vec::new();
         // Only pieces right behind the first belong to it: other comments are free to look alike.
         let mut more = false;
@@ -118,13 +123,23 @@ impl Texts {
                 continue;
             }
             more = false;
+            if let (Some(kind), None) = (gps_time_told(comment), gps_time) {
+                gps_time = Some(kind);
+                continue;
+            }
             let of_ours = names::property_told(comment).is_some_and(|p| properties.contains(p));
             if !of_ours && !super::is_padding(comment, file.points) {
                 comments.push(comment.clone());
             }
         }
-        Texts { crs, dimensions, comments }
+        Texts { crs, gps_time, dimensions, comments }
     }
+}
+
+/// What GPS times count, if `comment` is the one that says it.
+fn gps_time_told(comment: &str) -> Option<GpsTime> {
+    let text = comment.strip_prefix(super::GPS_TIME)?;
+    super::GPS_TIMES.iter().find(|(_, told)| *told == text).map(|(kind, _)| *kind)
 }
 
 /// Refuses two files whose vertices differ in kind.
@@ -189,6 +204,8 @@ fn metadata(files: &[PlyFile], mut texts: Vec<Texts>) -> Metadata {
     Metadata {
         units: crs.as_deref().map(crate::io::wkt::units).unwrap_or_default(),
         crs,
+        gps_time: texts[0].gps_time,
+        pipeline: None,
         comments: union(texts.into_iter().map(|t| t.comments).collect()),
         native: Some(Arc::new(native)),
     }
