@@ -121,7 +121,7 @@ impl Node {
 }
 
 /// The outermost nodes of `text`, mostly one: some writers put the system of z behind that of x and
-/// y. None if its brackets do not match, or there is something outside of them.
+/// y. None if a bracket is left open, or there is something outside of them.
 fn parse(text: &str) -> Option<Vec<Node>> {
     let (mut trees, mut open) = (Vec::new(), Vec::<Node>::new());
     let mut word = String::new();
@@ -137,7 +137,8 @@ fn parse(text: &str) -> Option<Vec<Node>> {
                 let word = std::mem::take(&mut word);
                 open.push(Node { word: word.trim().to_owned(), ..Node::default() });
             }
-            ',' if open.is_empty() && word.trim().is_empty() => word.clear(),
+            // Some writers close a compound before its second part, and once more behind it.
+            ',' | ']' | ')' if open.is_empty() && word.trim().is_empty() => word.clear(),
             ']' | ')' | ',' => {
                 let node = open.last_mut()?;
                 let value = std::mem::take(&mut word);
@@ -193,7 +194,10 @@ fn of_system(node: &Node) -> Units {
         return of_parts(parts(source));
     }
     if node.is(&VERTICAL) {
-        return of_vertical(metres(node).or_else(|| epsg::vertical(node.epsg()?)));
+        return of_vertical(match unit(node) {
+            Some(unit) => factor(unit),
+            None => node.epsg().and_then(epsg::vertical),
+        });
     }
     let system = of_horizontal(node);
     // Some writers put the vertical system inside the projected one.
@@ -202,27 +206,34 @@ fn of_system(node: &Node) -> Units {
     inside.or(third).or(system)
 }
 
-/// The units of a system of x and y as it says them, else as its code does.
+/// The units of a system of x and y as it says them; where it says none, as its code does.
 fn of_horizontal(node: &Node) -> Units {
+    let unknown = Units { horizontal_unknown: true, ..Units::default() };
     let of = |horizontal| Units { horizontal: Some(horizontal), ..Units::default() };
-    let by_code = || epsg::horizontal(node.epsg().unwrap_or(0));
-    let geocentric = node
-        .find(&["CS"])
-        .and_then(|cs| cs.values.first())
-        .is_some_and(|kind| kind.eq_ignore_ascii_case("Cartesian"));
-    if node.is(&GEODETIC) && !geocentric {
-        of(Horizontal::Degrees)
-    } else if node.is(&PROJECTED) || node.is(&GEODETIC) || node.is(&LOCAL) {
-        metres(node).map_or_else(by_code, |metres| of(Horizontal::Metres(metres)))
-    } else {
-        Units { horizontal_unknown: true, ..Units::default() }
+    let cartesian = node.find(&["CS"]).and_then(|cs| cs.values.first());
+    let cartesian = cartesian.is_some_and(|kind| kind.eq_ignore_ascii_case("Cartesian"));
+    if node.is(&GEODETIC) && !cartesian {
+        return of(Horizontal::Degrees);
+    }
+    if ![&PROJECTED[..], &GEODETIC, &LOCAL].iter().any(|words| node.is(words)) {
+        return unknown;
+    }
+    let across = match unit(node) {
+        Some(unit) => factor(unit).map_or(unknown, |metres| of(Horizontal::Metres(metres))),
+        None => epsg::horizontal(node.epsg().unwrap_or(0)),
+    };
+    match across.horizontal {
+        // Three axes in one unit.
+        Some(Horizontal::Metres(metres)) if node.is(&GEODETIC) || node.is(&["GEOCCS"]) => {
+            Units { vertical: Some(metres), ..across }
+        }
+        _ => across,
     }
 }
 
-/// Metres in the unit of length of `node`, or of its first axis.
-fn metres(node: &Node) -> Option<f64> {
-    let unit = node.find(&LENGTH).or_else(|| node.find(&["AXIS"]).and_then(|a| a.find(&LENGTH)))?;
-    factor(unit)
+/// The unit of length of `node`, or of its first axis.
+fn unit(node: &Node) -> Option<&Node> {
+    node.find(&LENGTH).or_else(|| node.find(&["AXIS"]).and_then(|axis| axis.find(&LENGTH)))
 }
 
 /// Metres in the unit of the third of three axes, where each has its own.
@@ -293,7 +304,7 @@ mod tests {
             "GEOCCS[\"x\",UNIT[\"metre\",1]]",
             "GEODCRS[\"x\",CS[Cartesian,3],AXIS[\"X\",geocentricX],LENGTHUNIT[\"metre\",1]]",
         ] {
-            assert_eq!(units(text), of(Some(Horizontal::Metres(1.0)), None), "{text}");
+            assert_eq!(units(text), of(Some(Horizontal::Metres(1.0)), Some(1.0)), "{text}");
         }
         let bound = format!("BOUNDCRS[SOURCECRS[{UTM}],TARGETCRS[GEOGCRS[\"x\"]]]");
         assert_eq!(units(&bound), of(Some(Horizontal::Metres(1.0)), None));
@@ -315,6 +326,8 @@ mod tests {
             assert_eq!(units(&text), of(Some(Horizontal::Metres(1.0)), Some(0.3048006096)));
         }
         assert_eq!(units(&format!("{UTM},VERTCS[")), unknown(), "cut short");
+        let early = format!("COMPD_CS[\"x\",{UTM}],VERT_CS[\"NAVD88\",UNIT[\"metres\",1.0]]]");
+        assert_eq!(units(&early), of(Some(Horizontal::Metres(1.0)), Some(1.0)));
     }
 
     #[test]
@@ -325,6 +338,8 @@ mod tests {
         assert_eq!(codes(text), Some((2277, Some(5703))));
         let other = text.replace("5703", "5103");
         assert!(units(&other).vertical_unknown);
+        let nonsense = text.replace("NAVD88\",", "NAVD88\",UNIT[\"US survey foot\",1.0],");
+        assert!(units(&nonsense).vertical_unknown, "which of the two is wrong, nobody knows");
     }
 
     #[test]
