@@ -301,7 +301,8 @@ fn what_gps_times_count_survives_ply() {
     let at = text.windows(line.len()).position(|w| w == line).unwrap();
     let silent = bench.path("silent.ply");
     fs::write(&silent, [&text[..at], &text[at + line.len()..]].concat()).unwrap();
-    let report = bench.run(&[silent.clone()], "", "", "back.las\nscale = 0.01").unwrap();
+    let report =
+        bench.run(std::slice::from_ref(&silent), "", "", "back.las\nscale = 0.01").unwrap();
     assert!(told(&report.run.warnings, "written as seconds of the GPS week"));
     let error = bench.run(&[bench.path("out.ply"), silent], "", "", "two.ply").unwrap_err();
     assert!(error.to_string().contains("GPS time type"), "{error}");

@@ -151,7 +151,7 @@ mod tests {
         let described = Described::of(&[short.clone(), all.clone()], &[], 4).unwrap();
         assert_eq!(names(&described), ["A", "B"]);
         assert!(described.warning.clone().unwrap().contains("2 records"));
-        assert_eq!(carried(&described, vec![short, all.clone()]), [all.clone()]);
+        assert_eq!(carried(&described, vec![short, all.clone()]), vec![all.clone()]);
         let twice = Described::of(&[all.clone(), all.clone()], &[], 4).unwrap();
         assert_eq!(
             (&twice.warning, carried(&twice, vec![all.clone(), all.clone()])),
