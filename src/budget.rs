@@ -16,13 +16,12 @@ const ASSUMED_MEMORY: u64 = 4 << 30;
 /// A number of bytes that is shared by everything in a run that grows with its settings or its scan.
 /// Clones are the same budget.
 ///
-/// What is leased: spill buffers, tiles and their rims, indices, stage arenas, encoder and decoder
-/// buffers, caches, mapped windows of files. What is not counted, and has to be left room for by
-/// whoever sets the limit: the program's own code and statics, stacks of threads, the allocator's
-/// slack, headers and VLRs, and small values of fixed size.
+/// What is leased: the work of the threads in the decode, the merge, the mill, the survey and a
+/// stream, each with its buffers; the indices of the runs and of the merged scan; points and columns
+/// that stay in memory; and, as one sum, what the program holds anyway: its code and statics, stacks
+/// of threads, the allocator's slack, headers and VLRs, and small values of fixed size.
 ///
-/// A lease never waits. Threads that wait for memory must take leases in tile order, or they can wait
-/// for each other; that order is the caller's job.
+/// A lease never waits: one that does not fit is refused.
 #[derive(Debug, Clone)]
 pub struct Budget(Arc<Account>);
 
@@ -97,7 +96,7 @@ impl Budget {
             Bytes(self.0.limit.saturating_sub(used)),
             Bytes(self.0.limit)
         ))
-        .help(format!("set memory to at least {}", whole_mebibytes(enough)))
+        .help(format!("give `run.memory = \"{}\"` or more", whole_mebibytes(enough)))
     }
 }
 
@@ -262,7 +261,7 @@ mod tests {
             error.to_string(),
             "the tile needs 40.0 MiB of memory, but 28 MiB of the budget of 128 MiB is free"
         );
-        assert_eq!(error.remedy(), Some("set memory to at least 141MiB"));
+        assert_eq!(error.remedy(), Some("give `run.memory = \"141MiB\"` or more"));
         assert_eq!(budget.used(), 100 * MIB);
     }
 
@@ -270,7 +269,7 @@ mod tests {
     fn the_budget_that_a_refusal_names_would_do() {
         let budget = Budget::new(10);
         let error = budget.lease(3 * MIB, "tile").unwrap_err();
-        assert_eq!(error.remedy(), Some("set memory to at least 3MiB"));
+        assert_eq!(error.remedy(), Some("give `run.memory = \"3MiB\"` or more"));
         assert!(Budget::new(3 * MIB).lease(3 * MIB, "tile").is_ok());
     }
 

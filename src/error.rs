@@ -6,6 +6,45 @@ use std::path::{Path, PathBuf};
 /// The result of anything in this crate that can fail.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
+/// True for characters that a terminal obeys rather than shows: control characters, those that end
+/// a line, and those that turn the direction of a text.
+pub(crate) fn is_control(c: char) -> bool {
+    let turns = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}');
+    c.is_control() || turns || matches!(c, '\u{2028}' | '\u{2029}' | '\u{2066}'..='\u{2069}')
+}
+
+/// A path as messages show it: what a terminal would obey and what is no text is escaped.
+pub(crate) fn shown(path: &Path) -> impl fmt::Display + '_ {
+    struct Shown<'a>(&'a [u8]);
+    impl fmt::Display for Shown<'_> {
+        fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            for chunk in self.0.utf8_chunks() {
+                for c in chunk.valid().chars() {
+                    match is_control(c) {
+                        true => write!(f, "{}", c.escape_default())?,
+                        false => write!(f, "{c}")?,
+                    }
+                }
+                chunk.invalid().iter().try_for_each(|byte| write!(f, "\\x{byte:02x}"))?;
+            }
+            Ok(())
+        }
+    }
+    use std::os::unix::ffi::OsStrExt;
+    Shown(path.as_os_str().as_bytes())
+}
+
+/// What helps where `path` does not exist: what it is relative to.
+pub(crate) fn whereabouts(path: &Path) -> Option<String> {
+    if path.starts_with("~") {
+        return Some(
+            "`~` means your home folder in a shell alone: write its whole name".to_owned(),
+        );
+    }
+    let folder = std::env::current_dir().ok().filter(|_| path.is_relative())?;
+    Some(format!("the path is relative to the folder you are in, {}", shown(&folder)))
+}
+
 /// What kind of failure an [`Error`] is; the command line's exit code follows from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorKind {
@@ -53,10 +92,20 @@ impl Error {
 
     /// A refusal of the operating system at `path`; `doing` completes "cannot …".
     pub fn io(path: impl AsRef<Path>, doing: &str, cause: std::io::Error) -> Self {
-        use std::io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
-        let is_full = matches!(cause.kind(), FileTooLarge | QuotaExceeded | StorageFull);
+        use std::io::ErrorKind::{FileTooLarge, NotFound, QuotaExceeded, StorageFull};
+        let path = path.as_ref();
+        let help = match cause.kind() {
+            FileTooLarge | QuotaExceeded | StorageFull => {
+                Some("free some disk space, or write elsewhere".to_owned())
+            }
+            NotFound => whereabouts(path),
+            _ => None,
+        };
         let error = Error::new(ErrorKind::Io, format!("cannot {doing}")).at(path).because(cause);
-        if is_full { error.help("free some disk space, or write elsewhere") } else { error }
+        match help {
+            Some(help) => error.help(help),
+            None => error,
+        }
     }
 
     /// Content of `path` that its format does not allow.
@@ -140,8 +189,8 @@ impl Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (&self.0.path, self.0.offset) {
-            (Some(path), Some(byte)) => write!(f, "{}: at byte {byte}: ", path.display())?,
-            (Some(path), None) => write!(f, "{}: ", path.display())?,
+            (Some(path), Some(byte)) => write!(f, "{}: at byte {byte}: ", shown(path))?,
+            (Some(path), None) => write!(f, "{}: ", shown(path))?,
             _ => {}
         }
         f.write_str(&self.0.message)

@@ -1,7 +1,7 @@
 //! pointmill reduces laser scans that do not fit in memory to the points that matter, and proves what
 //! it did.
 //!
-//! A run is a pipeline: a source, stages that compute, a sink. It is written as a text, planned (do
+//! A run is a pipeline: a source, stages that work on its points, sinks. It is written as a text, planned (do
 //! the stages fit each other, the inputs and the memory?) and run; what comes back is a report.
 //!
 //! ```
@@ -76,7 +76,7 @@
 //! - [`report`]: what a run counts and measures, merged so that no order and no cut changes a byte.
 //! - [`stage`]: the roles that a stage can play and what it tells the plan. Implement one to add a
 //!   stage of your own.
-//! - [`ops`]: the stages that compute: `normals`, `cells`, `median`.
+//! - [`ops`]: the stages that work on tiles: `outliers`, `normals`, `cells`, `median` and `grid`.
 //! - [`io`]: LAS, LAZ and PLY, conversion between their records, and [synthetic](io::synthetic) scans.
 //! - [`pipeline`]: from a text to a finished run: [`Pipeline`](pipeline::Pipeline),
 //!   [`Plan`](pipeline::Plan), and the [`Registry`](pipeline::Registry) of kinds that a text may name.

@@ -62,14 +62,6 @@ fn entries(folder: &Path) -> Vec<std::ffi::OsString> {
     names
 }
 
-/// Tests of scans of several hundred megabytes are for optimised code.
-fn optimised() -> bool {
-    if cfg!(debug_assertions) {
-        println!("this takes --release: nothing was tested");
-    }
-    !cfg!(debug_assertions)
-}
-
 /// Runs commands on a scan at least three times as large as the budget, into outputs of their own.
 fn three_times_larger(points: u64, mebibytes: u64, commands: &[&str]) {
     assert!(points * RECORD >= 3 * mebibytes * MIB);
@@ -88,25 +80,22 @@ fn three_times_larger(points: u64, mebibytes: u64, commands: &[&str]) {
 }
 
 #[test]
+#[ignore = "takes minutes"]
 fn memory_of_128_mib_bounds_the_reduction_of_a_scan_three_times_larger() {
-    if optimised() {
-        let commands = [
-            "reduce scan.las -o reduced.laz --threads 1",
-            "reduce scan.las -o reduced.ply --threads 2",
-            "convert scan.las -o scan.laz --threads 2",
-            "convert scan.laz -o scan.ply --threads 2",
-            "reduce scan.laz -o again.laz --threads 2 --method pca",
-        ];
-        three_times_larger(14_000_000, 128, &commands);
-    }
+    let commands = [
+        "reduce scan.las -o reduced.laz --threads 1",
+        "reduce scan.las -o reduced.ply --threads 2",
+        "convert scan.las -o scan.laz --threads 2",
+        "convert scan.laz -o scan.ply --threads 2",
+        "reduce scan.laz -o again.laz --threads 2 --method pca",
+    ];
+    three_times_larger(14_000_000, 128, &commands);
 }
 
 #[test]
+#[ignore = "takes minutes"]
 fn memory_of_256_mib_bounds_the_reduction_of_a_scan_three_times_larger() {
-    if optimised() {
-        let commands = ["reduce scan.las -o reduced.laz --threads 2"];
-        three_times_larger(27_000_000, 256, &commands);
-    }
+    three_times_larger(27_000_000, 256, &["reduce scan.las -o reduced.laz --threads 2"]);
 }
 
 /// Outliers of the scan, then a target for the ground and a grid for the rest, with an output
@@ -149,10 +138,8 @@ path = "reduced.laz"
 "#;
 
 #[test]
+#[ignore = "takes minutes"]
 fn memory_of_128_mib_bounds_stages_of_two_phases_selections_and_two_outputs() {
-    if !optimised() {
-        return;
-    }
     let points = 3_200_000;
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

@@ -191,14 +191,11 @@ fn truncate(path: &Path, by: i64) {
 }
 
 #[test]
+#[ignore = "needs a file system in memory at /dev/shm"]
 fn scratch_in_memory_is_warned_of_if_anything_spilled_there() {
-    let shm = Path::new("/dev/shm");
-    let is_memory = fs::read_to_string("/proc/mounts")
-        .is_ok_and(|mounts| mounts.lines().any(|l| l.contains(" /dev/shm tmpfs ")));
-    let Some(scratch) = is_memory.then(|| tempfile::tempdir_in(shm).ok()).flatten() else {
-        println!("there is no file system in memory here: nothing was tested");
-        return;
-    };
+    let mounts = fs::read_to_string("/proc/mounts").unwrap();
+    assert!(mounts.lines().any(|line| line.contains(" /dev/shm tmpfs ")), "{mounts}");
+    let scratch = tempfile::tempdir_in("/dev/shm").unwrap();
     let case = Case::new();
     case.ply(
         &(0..3000u32).map(|i| ([f64::from(i % 60), f64::from(i / 60), 0.0], i)).collect::<Vec<_>>(),

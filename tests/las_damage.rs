@@ -133,14 +133,15 @@ fn every_byte_of_headers_and_chunk_tables_can_be_wrong() {
 }
 
 #[test]
+#[ignore = "needs the real scans: POINTMILL_SCANS"]
 fn damaged_real_scans_fail_or_read() {
-    let Some(scans) = scans() else { return };
+    let scans = scans();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan");
     let mut random = Random(23);
     let (mut tested, mut failed) = (0, 0);
     for scan in manifest(&scans) {
-        let small = std::fs::metadata(&scan.path).is_ok_and(|m| m.len() < 100_000);
+        let small = std::fs::metadata(&scan.path).unwrap().len() < 100_000;
         if !small {
             continue;
         }

@@ -326,7 +326,7 @@ fn an_input_is_never_written_over() {
     );
     let registry = registry().with::<pointmill::pipeline::Read>();
     let told = Pipeline::parse(&text, "p.toml", &registry).unwrap_err().to_string();
-    assert!(told.starts_with("p.toml:6:8: ") && told.contains("is an input"), "{told}");
+    assert!(told.starts_with("p.toml:6:8: ") && told.contains("/scan.laz is the input "), "{told}");
 }
 
 #[test]
@@ -367,14 +367,14 @@ fn keys_of_write_fit_its_format() {
     let told_of = |keys: &str| told(&GOOD.replace("path = \"out.laz\"", keys));
     for (keys, expected) in [
         ("path = \"out.xyz\"", "p.toml:12:8: the extension of `out.xyz` names no format"),
-        ("path = \"a.ply\"\nscale = 1", "p.toml:13:9: `scale` is for las and laz"),
-        ("path = \"a.laz\"\nencoding = \"ascii\"", "p.toml:13:12: `encoding` is for ply"),
+        ("path = \"a.ply\"\nscale = 1", "p.toml:13:9: `write.scale` is for las and laz"),
+        ("path = \"a.laz\"\nencoding = \"ascii\"", "p.toml:13:12: `write.encoding` is for ply"),
         ("path = \"a.laz\"\nscale = [1, 2]", "p.toml:13:9: `scale`: takes a number above 0, or"),
         ("path = \"a.laz\"\nscale = [1, 2, 3, 4]", "`scale`: has 1 values too many"),
         ("path = \"a.laz\"\nscale = [1, 0, 1]", "p.toml:13:13: `scale`: takes a number above 0"),
         ("path = \"a.laz\"\ndimensions = [\"NormalX\"]", "p.toml:13:14: `dimensions`: takes [] or"),
         ("path = \"a.laz\"\norder = \"random\"", "valid: canonical, input"),
-        ("format = \"las\"", "p.toml:11:8: `write` needs `path`"),
+        ("format = \"las\"", "p.toml:11:8: a `write` needs `write.path`"),
     ] {
         let told = told_of(keys);
         assert!(told.contains(expected), "{keys}: {told}");

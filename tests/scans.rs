@@ -3,6 +3,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
 
+#[path = "common/real.rs"]
+mod real;
 mod scans_support;
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -58,7 +60,7 @@ static WATCHED: Watched = Watched;
 /// counts in it.
 const MEMORY: u64 = 512 << 20;
 /// Scans above are cut to their first points.
-const MOST: usize = if cfg!(debug_assertions) { 50_000 } else { 300_000 };
+const MOST: usize = 300_000;
 /// Scans up to this are reduced in two ways that must agree.
 const TWICE: usize = 20_000;
 /// No scan takes longer, by far.
@@ -105,12 +107,9 @@ struct Scan {
     points: Option<u64>,
 }
 
-/// The LAS, LAZ and PLY files in the folder that the environment names; None if it names none.
-fn scans() -> Option<Vec<Scan>> {
-    let Some(folder) = std::env::var_os("POINTMILL_SCANS").map(PathBuf::from) else {
-        println!("POINTMILL_SCANS names no folder of scans: nothing was tested");
-        return None;
-    };
+/// The LAS, LAZ and PLY files in the folder of real scans.
+fn scans() -> Vec<Scan> {
+    let folder = real::scans();
     let manifest = std::fs::read_to_string(folder.join("MANIFEST.tsv")).expect("a manifest");
     let mut rows = manifest.lines().map(|line| line.split('\t').collect::<Vec<_>>());
     let head = rows.next().unwrap();
@@ -130,7 +129,7 @@ fn scans() -> Option<Vec<Scan>> {
     let scans: Vec<Scan> = files.into_iter().map(scan).collect();
     let known = scans.iter().filter(|scan| scan.points.is_some()).count();
     assert!(known > 140, "the manifest tells the points of {known} scans");
-    Some(scans)
+    scans
 }
 
 fn walk(folder: &Path, files: &mut Vec<PathBuf>) {
@@ -250,8 +249,9 @@ fn reduces_and_reads_back(scan: &Scan) -> String {
 }
 
 #[test]
+#[ignore = "needs the real scans: POINTMILL_SCANS"]
 fn every_readable_scan_is_reduced_to_records_of_its_own() {
-    let Some(scans) = scans() else { return };
+    let scans = scans();
     let readable: Vec<Scan> =
         scans.into_iter().filter(|scan| !REFUSED.contains(&scan.name.as_str())).collect();
     assert!(readable.len() > 150, "only {} scans", readable.len());
@@ -278,8 +278,9 @@ fn is_refused(scan: &Scan) -> String {
 }
 
 #[test]
+#[ignore = "needs the real scans: POINTMILL_SCANS"]
 fn every_broken_scan_is_refused_with_its_path() {
-    let Some(scans) = scans() else { return };
+    let scans = scans();
     let broken: Vec<Scan> =
         scans.into_iter().filter(|scan| REFUSED.contains(&scan.name.as_str())).collect();
     assert_eq!(broken.len(), REFUSED.len());
@@ -289,8 +290,9 @@ fn every_broken_scan_is_refused_with_its_path() {
 }
 
 #[test]
+#[ignore = "needs the real scans: POINTMILL_SCANS"]
 fn every_scan_of_mixed_units_is_refused_until_it_is_told_how_to_measure() {
-    let Some(scans) = scans() else { return };
+    let scans = scans();
     let mixed: Vec<Scan> =
         scans.into_iter().filter(|scan| MIXED.contains(&scan.name.as_str())).collect();
     assert_eq!(mixed.len(), MIXED.len());

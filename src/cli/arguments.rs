@@ -4,10 +4,14 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 
-use crate::pipeline::{Overrides, Set, parse_bytes};
+use serde_json::Value;
+
+use super::words::{Flag, flags};
+use crate::Result;
+use crate::pipeline::{nearest, parse_bytes};
 use crate::point::parse_count;
-use crate::{Error, Result};
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -30,20 +34,24 @@ pub(super) struct Arguments {
 pub(super) enum Command {
     /// Run a pipeline file
     Run(Run),
-    /// Reduce scans to the points that matter: a run of pipelines/reduce.toml
+    /// Reduce scans to the points that matter
     Reduce(Box<Reduce>),
-    /// Convert between LAS, LAZ and PLY: a run of pipelines/convert.toml
+    /// Convert between LAS, LAZ and PLY
     Convert(Convert),
-    /// Say what the headers of files say
+    /// Show what files contain, from their headers
     Info(Info),
-    /// Show how a pipeline would be run, without a run
+    /// Show how a pipeline would be run, without running it
     Plan(Plan),
-    /// Say whether a pipeline is right, or every mistake: reads its inputs' headers, writes nothing
+    /// Check a pipeline and tell every mistake; reads its inputs' headers, writes nothing
     Check(Plan),
     /// List the stages that a pipeline can have, with their keys
     Stages(Stages),
-    /// Make a scan up
+    /// Make a synthetic scan
     Synth(Synth),
+    /// Print what a shell needs to complete commands and flags
+    Completions(Completions),
+    /// Print the manual page, or write those of all commands into a folder
+    Man(Man),
 }
 
 impl Command {
@@ -57,6 +65,7 @@ impl Command {
             | Command::Check(Plan { common, .. })
             | Command::Synth(Synth { common, .. }) => Some(common),
             Command::Info(_) | Command::Stages(_) => None,
+            Command::Completions(_) | Command::Man(_) => None,
         }
     }
 }
@@ -73,40 +82,30 @@ pub(super) struct Common {
     pub threads: Option<NonZeroUsize>,
     /// Folder for what does not fit in memory [default: beside the output]
     #[arg(long, value_name = "DIR")]
-    pub scratch: Option<PathBuf>,
+    pub scratch: Option<String>,
     /// Progress on stderr: bars where it is a terminal, one JSON event a line, or none
     #[arg(long, value_name = "HOW", default_value = "auto")]
     pub progress: Progress,
-    /// Say nothing but errors
+    /// Print errors only
     #[arg(short, long, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Say what the plan and the stages decided, and how long each phase took
+    /// Print what the plan and the stages decided, and how long each phase took
     #[arg(short, long)]
     pub verbose: bool,
     /// Write the report to this file
     #[arg(long, value_name = "FILE")]
-    pub report: Option<PathBuf>,
+    pub report: Option<String>,
 }
 
 impl Common {
-    /// What takes the place of the pipeline's `[run]` settings. The report is not among it: see
-    /// [`sets`](Common::sets).
-    pub fn overrides(&self) -> Overrides {
-        Overrides {
-            memory: self.memory,
-            threads: self.threads,
-            scratch: self.scratch.clone(),
-            report: None,
-        }
-    }
-
-    /// Values put in the place of the pipeline's: `--report`, so that it is compared with the
-    /// inputs and outputs.
-    pub fn sets(&self) -> Result<Vec<Set>> {
-        let Some(path) = &self.report else { return Ok(Vec::new()) };
-        let told = || Error::pipeline("the name is not UTF-8 text").at(path);
-        let text = path.to_str().ok_or_else(told)?;
-        Ok(vec![Set::argument("--report", "run.report", text.into())])
+    /// The flags that stand for `[run]` settings.
+    pub fn flags(&self) -> Vec<Flag> {
+        flags([
+            ("--memory", "run.memory", self.memory.map(Value::from)),
+            ("--threads", "run.threads", self.threads.map(|n| n.get().into())),
+            ("--scratch", "run.scratch", self.scratch.clone().map(Value::from)),
+            ("--report", "run.report", self.report.clone().map(Value::from)),
+        ])
     }
 }
 
@@ -120,6 +119,37 @@ pub(super) enum Progress {
 fn parse_threads(text: &str) -> Result<NonZeroUsize, String> {
     let refused = |_| format!("`{text}` is no number of threads: give 1 or more, or leave it out");
     text.parse().map_err(refused)
+}
+
+fn parse_whole(text: &str) -> Result<u64, String> {
+    parse_count(text).map_err(|_| format!("`{text}` is no whole number such as 10, 10k or 1e6"))
+}
+
+fn parse_number(text: &str) -> Result<f64, String> {
+    text.trim().parse().map_err(|_| format!("`{text}` is no number such as 0.5 or 1e-3"))
+}
+
+/// Classes that have a name in the LAS specification (1.4 R15, table 17).
+const CLASSES: [(&str, u8); 10] = [
+    ("unclassified", 1),
+    ("ground", 2),
+    ("low-vegetation", 3),
+    ("medium-vegetation", 4),
+    ("high-vegetation", 5),
+    ("building", 6),
+    ("noise", 7),
+    ("water", 9),
+    ("rail", 10),
+    ("road", 11),
+];
+
+fn parse_class(text: &str) -> Result<u8, String> {
+    text.trim().parse().map_err(|_| {
+        let names = CLASSES.map(|(name, _)| name.to_owned());
+        let near = nearest(text, &names).and_then(|near| CLASSES.iter().find(|(n, _)| n == near));
+        let meant = near.map_or(String::new(), |(name, class)| format!("; {name} is {class}"));
+        format!("classes are numbers from 0 to 255{meant}")
+    })
 }
 
 /// One number for all axes, or three for X, Y and Z.
@@ -171,8 +201,8 @@ pub(super) struct Reduce {
     /// neighbours are found across the inputs
     #[arg(long, value_name = "DIR", conflicts_with = "output")]
     pub outdir: Option<String>,
-    /// Format of the files in that folder: las, laz or ply [default: that of each input]
-    #[arg(long, value_name = "FORMAT", requires = "outdir")]
+    /// Format: las, laz or ply [default: by extension; in a folder, that of each input]
+    #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
     /// Largest range of normal angles in a cell, in radians or as 6deg [default: 0.1]
     #[arg(long, value_name = "ANGLE")]
@@ -181,19 +211,19 @@ pub(super) struct Reduce {
     #[arg(long, value_name = "TARGET", conflicts_with = "max_angle")]
     pub keep: Option<String>,
     /// Nearest other positions that a normal is computed from [default: 10]
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = parse_whole)]
     pub neighbors: Option<u64>,
     /// Side of the cells before any split, in the scan's unit [default: auto]
     #[arg(long, value_name = "SIDE")]
     pub side: Option<String>,
     /// A cell with this many points or fewer is not split [default: 1]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = parse_whole)]
     pub min_points: Option<u64>,
     /// Largest side of a cell that is kept whole, in the scan's unit [default: none]
-    #[arg(long, value_name = "LENGTH")]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_number)]
     pub max_side: Option<f64>,
     /// No cell of this length or less is split, in the scan's unit [default: none]
-    #[arg(long, value_name = "LENGTH")]
+    #[arg(long, value_name = "LENGTH", value_parser = parse_number)]
     pub min_spacing: Option<f64>,
     /// How a cell is split: voronoi or octant [default: voronoi]
     #[arg(long, value_name = "HOW")]
@@ -205,14 +235,14 @@ pub(super) struct Reduce {
     #[arg(long)]
     pub outliers: bool,
     /// Reduce what is left again, until it was reduced this often [default: 1]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = parse_whole)]
     pub passes: Option<u64>,
     /// Mark the decision in the records and write them all: key-point, withheld, or class 7 or 18
     #[arg(long, value_name = "HOW")]
     pub mark: Option<String>,
     /// Reduce the points of these classes alone, such as 2,6; all others stay, and are not seen as
     /// neighbours
-    #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_class)]
     pub classes: Vec<u8>,
     /// Points with the withheld flag: drop them, keep them as points like all others, or ignore them
     /// and write them as they are [default: drop]
@@ -239,7 +269,13 @@ pub(super) struct Written {
     #[arg(long, value_name = "SCALE", allow_hyphen_values = true, value_parser = parse_axes)]
     pub scale: Option<Axes>,
     /// Offset of LAS coordinates on each axis [default: the input's, or 0]
-    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        value_parser = parse_number
+    )]
     pub offset: Vec<f64>,
     /// Dimensions that may get lost, such as GpsTime,UserData
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
@@ -288,6 +324,20 @@ pub(super) struct Stages {
 }
 
 #[derive(Debug, Args)]
+pub(super) struct Completions {
+    /// The shell
+    #[arg(value_name = "SHELL")]
+    pub shell: Shell,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Man {
+    /// The folder; it is made if it does not exist
+    #[arg(value_name = "DIR")]
+    pub folder: Option<String>,
+}
+
+#[derive(Debug, Args)]
 pub(super) struct Synth {
     /// What is scanned: plane, part, sphere, squares-random, squares-uniform or als
     #[arg(value_name = "KIND")]
@@ -299,10 +349,10 @@ pub(super) struct Synth {
     #[arg(short, long, value_name = "OUT")]
     pub output: String,
     /// Equal seeds give equal scans [default: 0]
-    #[arg(long, value_name = "SEED")]
+    #[arg(long, value_name = "SEED", value_parser = parse_whole)]
     pub seed: Option<u64>,
     /// Standard deviation of the noise in world units [default: the scene's own]
-    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
+    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true, value_parser = parse_number)]
     pub noise: Option<f64>,
     #[command(flatten)]
     pub common: Common,

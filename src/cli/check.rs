@@ -6,14 +6,15 @@ use super::arguments::Plan;
 use super::console::Console;
 use super::print;
 use super::run::parse_sets;
-use crate::pipeline::{Outline, Pipeline, Registry, Watch};
+use crate::error::shown;
+use crate::pipeline::{Outline, Overrides, Pipeline, Registry, Watch};
 use crate::report::Grouped;
 use crate::stage::Role;
 use crate::{Result, io};
 
 /// Prints how a pipeline would be run.
 pub(super) fn plan(arguments: &Plan, registry: &Registry) -> Result<()> {
-    print::result(read(arguments, registry)?.plan(&arguments.common.overrides())?)
+    print::result(read(arguments, registry)?.plan(&Overrides::default())?)
 }
 
 /// Prints that a pipeline can be run, or fails as its run would before it reads a point; then the
@@ -22,7 +23,7 @@ pub(super) fn check(arguments: &Plan, registry: &Registry, console: &Console) ->
     let pipeline = read(arguments, registry)?;
     let inputs = inputs(&pipeline);
     let name = pipeline.origin.clone();
-    match pipeline.plan(&arguments.common.overrides()) {
+    match pipeline.plan(&Overrides::default()) {
         Ok(plan) => {
             console.planned(&plan);
             plan.warnings().iter().for_each(|warning| console.warn(warning));
@@ -54,7 +55,7 @@ fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
 fn said(outline: &Outline) -> String {
     let Outline { inputs, points, .. } = outline;
     let outputs: Vec<String> =
-        outline.outputs.iter().map(|output| output.display().to_string()).collect();
+        outline.outputs.iter().map(|output| shown(output).to_string()).collect();
     let files = if *inputs == 1 { "file" } else { "files" };
     let from = if *inputs == 0 { String::new() } else { format!(" from {inputs} {files}") };
     let points = Grouped(*points);

@@ -5,16 +5,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
-use super::arguments::{Common, Progress};
+use super::arguments::{Command, Progress};
 use super::events::Events;
 use super::progress::Bars;
+use super::words::Words;
 use super::{interrupt, print};
+use crate::error::shown;
 use crate::pipeline::{Done, Plan, Watch};
 use crate::{Error, Result};
 
 /// Where all that a command says goes through; called from several threads.
 pub(super) struct Console {
     voice: Voice,
+    words: Words,
     quiet: bool,
     verbose: bool,
     /// The phase of which `verbose` tells the time when it ends.
@@ -23,14 +26,41 @@ pub(super) struct Console {
     interrupted: OnceLock<Arc<AtomicBool>>,
 }
 
+/// An error in the words of a command.
+pub(super) struct Told<'a> {
+    /// Its kind, file and byte.
+    pub error: &'a Error,
+    /// Place and message.
+    pub message: String,
+    /// The causes beneath, from the first to the deepest.
+    pub causes: Vec<String>,
+    /// What the user can do.
+    pub help: Option<String>,
+}
+
+impl<'a> Told<'a> {
+    /// `error` in these words.
+    pub fn of(error: &'a Error, words: &Words) -> Self {
+        let first = std::error::Error::source(error);
+        let causes = std::iter::successors(first, |cause| cause.source());
+        Told {
+            error,
+            message: words.told(&error.to_string()),
+            causes: causes.map(|cause| words.told(&cause.to_string())).collect(),
+            help: error.remedy().map(|help| words.told(help)),
+        }
+    }
+}
+
 enum Voice {
     Text(Bars),
     Json(Events),
 }
 
 impl Console {
-    /// As the arguments of a command ask for; one that has none of these speaks plainly.
-    pub fn new(common: Option<&Common>) -> Self {
+    /// As the arguments of a command ask for, in its words; one that has none of these speaks plainly.
+    pub fn new(command: &Command) -> Self {
+        let common = command.common();
         let progress = common.map_or(Progress::Never, |common| common.progress);
         let quiet = common.is_some_and(|common| common.quiet);
         Console {
@@ -40,6 +70,7 @@ impl Console {
                     Voice::Text(Bars::new(progress == Progress::Auto && !quiet))
                 }
             },
+            words: Words::of(command),
             quiet,
             verbose: common.is_some_and(|common| common.verbose),
             phase: Mutex::new(None),
@@ -64,7 +95,7 @@ impl Console {
             Voice::Json(events) if !self.quiet => events.planned(&outline, &plan.to_string()),
             Voice::Text(_) if self.verbose => {
                 print::message(plan);
-                print::message(format_args!("scratch  {}", outline.scratch.display()));
+                print::message(format_args!("scratch  {}", shown(&outline.scratch)));
             }
             _ => {}
         }
@@ -88,9 +119,10 @@ impl Console {
     /// Tells an error, whatever is wanted.
     pub fn error(&self, error: &Error) {
         self.end();
+        let told = Told::of(error, &self.words);
         match &self.voice {
-            Voice::Json(events) => events.error(error),
-            Voice::Text(_) => print::error(error),
+            Voice::Json(events) => events.error(&told),
+            Voice::Text(_) => print::error(&told),
         }
     }
 
@@ -131,6 +163,7 @@ impl Watch for Console {
     }
 
     fn warn(&self, message: &str) {
+        let message = &self.words.told(message);
         match &self.voice {
             _ if self.quiet => {}
             Voice::Json(events) => events.warn(message),

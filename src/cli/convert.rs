@@ -7,8 +7,10 @@ use serde_json::{Value, json};
 
 use super::arguments::Convert;
 use super::console::Console;
-use super::run::{given, mill, written};
+use super::run::{HIDDEN, given, mill, written};
+use super::words::{self, Flag};
 use crate::budget::Bytes;
+use crate::error::shown;
 use crate::pipeline::{Done, Format, Pipeline, Registry, Watch, expand};
 use crate::report::Grouped;
 use crate::{Error, ErrorKind, Result};
@@ -22,11 +24,12 @@ pub(super) fn convert(arguments: &Convert, registry: &Registry, console: &Consol
     let folder = Path::new(&arguments.output);
     if !(arguments.output.ends_with('/') || folder.is_dir()) {
         let one = pipeline(arguments, json!(arguments.inputs), json!(arguments.output), registry);
-        return console.result(mill(one?, &arguments.common, console)?);
+        return console.result(mill(one?, console)?);
     }
     let inputs = expand(&arguments.inputs)?;
     if inputs.len() > 1 && arguments.common.report.is_some() {
-        return Err(Error::pipeline("--report is for one output; this makes several"));
+        return Err(Error::pipeline("--report is for one output, and this makes several")
+            .help("leave --report out, or convert the files one by one"));
     }
     // Every pipeline is checked before the first is run.
     let mut runs = Vec::new();
@@ -36,7 +39,7 @@ pub(super) fn convert(arguments: &Convert, registry: &Registry, console: &Consol
     }
     let is_new = !folder.is_dir();
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create the folder", e))?;
-    let outcome = run_all(runs, arguments, console);
+    let outcome = run_all(runs, console);
     if outcome.is_err() && is_new {
         // Left behind if any output is in it, which is as it should be.
         let _ = std::fs::remove_dir(folder);
@@ -77,11 +80,7 @@ impl Total {
 
 /// Runs one pipeline after the other. One that fails is told at once and does not keep the others
 /// from running; the error in the end is of the first failure's kind.
-fn run_all(
-    runs: Vec<(PathBuf, Pipeline)>,
-    arguments: &Convert,
-    console: &Console,
-) -> Result<Total> {
+fn run_all(runs: Vec<(PathBuf, Pipeline)>, console: &Console) -> Result<Total> {
     let total = runs.len();
     let mut all = Vec::new();
     let mut failures: Vec<ErrorKind> = Vec::new();
@@ -89,7 +88,7 @@ fn run_all(
         if console.cancelled() {
             return Err(Error::interrupted());
         }
-        match mill(pipeline, &arguments.common, console) {
+        match mill(pipeline, console) {
             Ok(done) => all.push(done),
             Err(error) if total == 1 || error.kind() == ErrorKind::Interrupted => {
                 return Err(error);
@@ -108,19 +107,29 @@ fn run_all(
     }
 }
 
+/// The flags of `convert`, for a run that reads and writes these.
+pub(super) fn flags(
+    arguments: &Convert,
+    inputs: Option<Value>,
+    output: Option<Value>,
+) -> Vec<Flag> {
+    let mut all = words::flags([
+        ("IN", "read.path", inputs),
+        ("-o", "write.path", output),
+        ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
+    ]);
+    all.extend(written(&arguments.written));
+    all
+}
+
 fn pipeline(
     arguments: &Convert,
     inputs: Value,
     output: Value,
     registry: &Registry,
 ) -> Result<Pipeline> {
-    let stages = given([
-        ("IN", "read.path", Some(inputs)),
-        ("-o", "write.path", Some(output)),
-        ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
-    ]);
-    let sets = [stages, written(&arguments.written), arguments.common.sets()?].concat();
-    Pipeline::parse_with(CONVERT, "pipelines/convert.toml", registry, &sets)
+    let sets = given([flags(arguments, Some(inputs), Some(output)), arguments.common.flags()]);
+    Pipeline::parse_with(CONVERT, HIDDEN, registry, &sets)
 }
 
 /// The output in `folder` of every input: its name, with the extension of the format that is asked
@@ -132,12 +141,12 @@ fn outputs(inputs: &[PathBuf], folder: &Path, to: Option<&str>) -> Result<Vec<(P
         let own = || Format::of(input).map(Format::extension);
         let name = input.file_name().map(Path::new);
         let (Some(name), Some(extension)) = (name, to.or_else(own)) else {
-            let told = format!("{}: its name says no format", input.display());
-            return Err(Error::pipeline(told).help("say --to las, laz or ply"));
+            let told = format!("{}: its name says no format", shown(input));
+            return Err(Error::pipeline(told).help("add --to las, laz or ply"));
         };
         let output = folder.join(name.with_extension(extension));
         if let Some(other) = taken.insert(output.clone(), input) {
-            let (a, b, output) = (other.display(), input.display(), output.display());
+            let (a, b, output) = (shown(other), shown(input), shown(&output));
             return Err(Error::pipeline(format!("{a} and {b} would both become {output}")));
         }
         all.push((input.clone(), output));
@@ -146,7 +155,11 @@ fn outputs(inputs: &[PathBuf], folder: &Path, to: Option<&str>) -> Result<Vec<(P
 }
 
 fn text(path: &Path) -> Result<Value> {
-    let told = || Error::pipeline("the name is not UTF-8 text").at(path);
+    let told = || {
+        Error::pipeline("the name is not UTF-8 text")
+            .at(path)
+            .help("rename it, or convert the folder that it is in to one file")
+    };
     Ok(json!(path.to_str().ok_or_else(told)?))
 }
 

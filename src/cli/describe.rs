@@ -3,30 +3,32 @@
 use serde_json::Value;
 
 use super::arguments::Info;
+use super::console::Console;
 use super::{print, table};
+use crate::error::shown;
 use crate::pipeline::expand;
 use crate::{Error, Result, io};
 
 /// Prints what the headers of files say. A file that cannot be read is told, the others are shown.
-pub(super) fn info(arguments: &Info) -> Result<()> {
+pub(super) fn info(arguments: &Info, console: &Console) -> Result<()> {
     let files = expand(&arguments.files)?;
     let total = files.len();
-    let mut shown = Vec::new();
+    let mut described = Vec::new();
     let mut failures = Vec::new();
     for file in files {
         match io::describe(&file) {
-            Ok(facts) => shown.push((file, facts)),
+            Ok(facts) => described.push((file, facts)),
             Err(error) => failures.push(error.at(file)),
         }
     }
     if arguments.json {
-        let all = Value::Array(shown.into_iter().map(|(_, facts)| facts).collect());
-        print::result(format_args!("{all:#}"))?;
+        let all = Value::Array(described.into_iter().map(|(_, facts)| facts).collect());
+        print::json(&format!("{all:#}"))?;
     } else {
         let text = |(file, facts): (std::path::PathBuf, Value)| {
-            format!("{}\n{}", file.display(), table::render(&facts, 2))
+            format!("{}\n{}", shown(&file), table::render(&facts, 2))
         };
-        let all: Vec<String> = shown.into_iter().map(text).collect();
+        let all: Vec<String> = described.into_iter().map(text).collect();
         if !all.is_empty() {
             print::result(all.join("\n\n"))?;
         }
@@ -36,7 +38,7 @@ pub(super) fn info(arguments: &Info) -> Result<()> {
         (1, Some(only)) => Err(only),
         (n, Some(last)) => {
             let kind = last.kind();
-            failures.iter().chain([&last]).for_each(print::error);
+            failures.iter().chain([&last]).for_each(|error| console.error(error));
             Err(Error::new(kind, format!("{n} of {total} files cannot be described")))
         }
     }

@@ -7,9 +7,10 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
+use super::console::Told;
 use super::{exit_number, print};
+use crate::ErrorKind;
 use crate::pipeline::{Done, Outline};
-use crate::{Error, ErrorKind};
 
 /// Least time between two events of progress.
 const EVERY: Duration = Duration::from_millis(250);
@@ -100,13 +101,8 @@ impl Events {
     }
 
     /// A failure, with the exit code that it leads to.
-    pub fn error(&self, error: &Error) {
-        let mut causes = Vec::new();
-        let mut cause = std::error::Error::source(error);
-        while let Some(inner) = cause {
-            causes.push(inner.to_string());
-            cause = inner.source();
-        }
+    pub fn error(&self, told: &Told<'_>) {
+        let error = told.error;
         let kind = match error.kind() {
             ErrorKind::Io => "io",
             ErrorKind::Data => "data",
@@ -119,11 +115,11 @@ impl Events {
             "error",
             json!({
                 "kind": kind,
-                "message": error.to_string(),
-                "causes": causes,
+                "message": told.message,
+                "causes": told.causes,
                 "file": error.path().map(|path| path.display().to_string()),
                 "byte": error.byte(),
-                "help": error.remedy(),
+                "help": told.help,
                 "exit_code": exit_number(error),
             }),
         );

@@ -9,32 +9,45 @@ mod console;
 mod convert;
 mod describe;
 mod events;
+mod help;
 mod interrupt;
 mod print;
 mod progress;
 mod run;
 mod stages;
 mod table;
+mod words;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::FromArgMatches;
 
+use crate::error::shown;
 use crate::pipeline::Registry;
 use crate::{Error, ErrorKind, Result};
 use arguments::{Arguments, Command};
 use console::Console;
 
+/// What helps where an argument is no text.
+const UNREADABLE: &str = "\
+    help: rename the file, or name its folder or a pattern: the files that these mean may have any name";
+
 /// Runs the command that the process was started with; pipelines may name the kinds of `registry`.
 pub fn main(registry: &Registry) -> ExitCode {
-    let arguments = match Arguments::try_parse() {
+    if let Some(odd) = std::env::args_os().skip(1).find(|argument| argument.to_str().is_none()) {
+        let odd = shown(odd.as_ref());
+        print::message(format_args!("error: the argument `{odd}` is not UTF-8 text\n{UNREADABLE}"));
+        return ExitCode::from(2);
+    }
+    let typed = help::command().try_get_matches();
+    let arguments = match typed.and_then(|typed| Arguments::from_arg_matches(&typed)) {
         Ok(arguments) => arguments,
         Err(told) => {
-            let _ = told.print(); // nobody is left to tell that a terminal is gone
+            print::usage(&told);
             return ExitCode::from(if told.use_stderr() { 2 } else { 0 });
         }
     };
-    let console = Console::new(arguments.command.common());
+    let console = Console::new(&arguments.command);
     match execute(&arguments.command, registry, &console) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -53,7 +66,9 @@ fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<
         Command::Plan(arguments) => check::plan(arguments, registry),
         Command::Check(arguments) => check::check(arguments, registry, console),
         Command::Stages(arguments) => stages::stages(arguments, registry),
-        Command::Info(arguments) => describe::info(arguments),
+        Command::Info(arguments) => describe::info(arguments, console),
+        Command::Completions(arguments) => help::completions(arguments),
+        Command::Man(arguments) => help::man(arguments),
     }
 }
 

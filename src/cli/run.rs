@@ -4,11 +4,15 @@ use serde_json::{Value, json};
 
 use super::arguments::{Axes, Common, Reduce, Run, Synth, Written};
 use super::console::Console;
+use super::words::{self, Flag, flags};
 use crate::Result;
-use crate::pipeline::{Done, Pipeline, Registry, Set};
+use crate::pipeline::{Done, Overrides, Pipeline, Registry, Set};
 
 /// The pipeline of `reduce`, which users copy.
 const REDUCE: &str = include_str!("../../pipelines/reduce.toml");
+
+/// The origin of the pipelines of commands: users know the flags, not these texts.
+pub(super) const HIDDEN: &str = "";
 
 /// The pipeline of `synth`.
 const SYNTH: &str = "\
@@ -23,48 +27,37 @@ kind = \"write\"
 pub(super) fn run(arguments: &Run, registry: &Registry, console: &Console) -> Result<()> {
     let sets = parse_sets(&arguments.sets, &arguments.common)?;
     let pipeline = Pipeline::read(&arguments.pipeline, registry, &sets)?;
-    console.result(mill(pipeline, &arguments.common, console)?)
+    console.result(mill(pipeline, console)?)
 }
 
 /// Runs `pipelines/reduce.toml` on other files and prints the closing table.
 pub(super) fn reduce(arguments: &Reduce, registry: &Registry, console: &Console) -> Result<()> {
-    let written = written(&arguments.written);
-    let sets = [reduce_sets(arguments), written, arguments.common.sets()?].concat();
+    let sets = given([reduce_flags(arguments), arguments.common.flags()]);
     let text = if arguments.outliers { with_outliers() } else { REDUCE.to_owned() };
-    let pipeline = Pipeline::parse_with(&text, "pipelines/reduce.toml", registry, &sets)?;
-    console.result(mill(pipeline, &arguments.common, console)?)
+    let pipeline = Pipeline::parse_with(&text, HIDDEN, registry, &sets)?;
+    console.result(mill(pipeline, console)?)
 }
 
 /// Writes a made-up scan and prints the closing table.
 pub(super) fn synth(arguments: &Synth, registry: &Registry, console: &Console) -> Result<()> {
-    let stages = given([
-        ("KIND", "synth.scene", Some(json!(arguments.scene))),
-        ("-n", "synth.points", Some(json!(arguments.points))),
-        ("-o", "write.path", Some(json!(arguments.output))),
-        ("--seed", "synth.seed", arguments.seed.map(Value::from)),
-        ("--noise", "synth.noise", arguments.noise.map(number)),
-    ]);
-    let sets = [stages, arguments.common.sets()?].concat();
-    let pipeline = Pipeline::parse_with(SYNTH, "synth", registry, &sets)?;
-    console.result(mill(pipeline, &arguments.common, console)?)
+    let sets = given([synth_flags(arguments), arguments.common.flags()]);
+    let pipeline = Pipeline::parse_with(SYNTH, HIDDEN, registry, &sets)?;
+    console.result(mill(pipeline, console)?)
 }
 
 /// Plans and runs a pipeline; Ctrl-C asks it to stop.
-pub(super) fn mill(pipeline: Pipeline, common: &Common, console: &Console) -> Result<Done> {
+pub(super) fn mill(pipeline: Pipeline, console: &Console) -> Result<Done> {
     console.hear_interrupts();
-    let plan = pipeline.plan(&common.overrides())?;
+    let plan = pipeline.plan(&Overrides::default())?;
     console.planned(&plan);
     let done = plan.run(console);
     console.end();
     done.inspect(|done| console.done(done))
 }
 
-/// Those of `(argument, address, value)` that are given.
-pub(super) fn given<const N: usize>(arguments: [(&str, &str, Option<Value>); N]) -> Vec<Set> {
-    let set = |(argument, address, value): (&str, &str, Option<Value>)| {
-        value.map(|value| Set::argument(argument, address, value))
-    };
-    arguments.into_iter().filter_map(set).collect()
+/// The values of several tables of flags.
+pub(super) fn given<const N: usize>(tables: [Vec<Flag>; N]) -> Vec<Set> {
+    words::sets(tables.into_iter().flatten().collect())
 }
 
 /// A number as a pipeline's value; one that JSON cannot hold is left for the stage to refuse.
@@ -75,7 +68,7 @@ pub(super) fn number(value: f64) -> Value {
 /// The values of `--set`, and those of other arguments.
 pub(super) fn parse_sets(sets: &[String], common: &Common) -> Result<Vec<Set>> {
     let sets = sets.iter().map(|set| Set::parse(set)).collect::<Result<Vec<Set>>>()?;
-    Ok([sets, common.sets()?].concat())
+    Ok([sets, given([common.flags()])].concat())
 }
 
 /// The pipeline of `reduce` with a stage `outliers` behind the first, which reads.
@@ -85,9 +78,10 @@ fn with_outliers() -> String {
     format!("{}{stage}kind = \"outliers\"\n\n{}", &REDUCE[..at], &REDUCE[at..])
 }
 
-fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
+/// The flags of `reduce`.
+pub(super) fn reduce_flags(arguments: &Reduce) -> Vec<Flag> {
     let classes = (!arguments.classes.is_empty()).then(|| json!(arguments.classes));
-    given([
+    let mut all = flags([
         ("IN", "read.path", Some(json!(arguments.inputs))),
         ("-o", "write.path", arguments.output.clone().map(Value::from)),
         ("--outdir", "write.folder", arguments.outdir.clone().map(Value::from)),
@@ -110,13 +104,26 @@ fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
         ("--withheld", "run.withheld", arguments.withheld.clone().map(Value::from)),
         ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(Value::from)),
         ("--z-scale", "run.z_scale", arguments.z_scale.as_deref().map(number_or_text)),
+    ]);
+    all.extend(written(&arguments.written));
+    all
+}
+
+/// The flags of `synth`.
+pub(super) fn synth_flags(arguments: &Synth) -> Vec<Flag> {
+    flags([
+        ("KIND", "synth.scene", Some(json!(arguments.scene))),
+        ("-n", "synth.points", Some(json!(arguments.points))),
+        ("-o", "write.path", Some(json!(arguments.output))),
+        ("--seed", "synth.seed", arguments.seed.map(Value::from)),
+        ("--noise", "synth.noise", arguments.noise.map(number)),
     ])
 }
 
 /// How the output is written, as the keys of `write`.
-pub(super) fn written(arguments: &Written) -> Vec<Set> {
+pub(super) fn written(arguments: &Written) -> Vec<Flag> {
     let list = |given: bool, value: Value| given.then_some(value);
-    given([
+    flags([
         ("--scale", "write.scale", arguments.scale.as_ref().map(axes)),
         ("--offset", "write.offset", list(!arguments.offset.is_empty(), json!(arguments.offset))),
         ("--drop", "write.drop", list(!arguments.drop.is_empty(), json!(arguments.drop))),

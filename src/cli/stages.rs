@@ -1,5 +1,7 @@
 //! `stages`: the kinds of stages with their keys, as text or JSON.
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -57,10 +59,20 @@ pub(super) fn stages(arguments: &Stages, registry: &Registry) -> Result<()> {
             _ => serde_json::to_string_pretty(&shown),
         };
         let failed = |e| Error::internal("the stages could not be written as JSON").because(e);
-        return print::result(json.map_err(failed)?);
+        return print::json(&json.map_err(failed)?);
     }
     let text: Vec<String> = shown.into_iter().map(text).collect();
     print::result(text.join("\n"))
+}
+
+/// The addresses of all settings that are described, as `--set` takes them.
+pub(super) fn settings() -> BTreeSet<String> {
+    // The description is the program's own; a test reads it.
+    let known: Vec<Described> = serde_json::from_str(DESCRIBED).unwrap_or_default();
+    let keys = |d: Described| -> Vec<String> {
+        d.keys.iter().flatten().map(|key| format!("{}.{}", d.kind, key.key)).collect()
+    };
+    known.into_iter().flat_map(keys).collect()
 }
 
 /// The `[run]` table, then the kinds of the registry in their order.

@@ -54,16 +54,14 @@ impl Lattice {
     /// A factor or step that is not above 0, and records without coordinates.
     pub fn stretched(schema: &Schema, step: Option<f64>, z_scale: f64) -> Result<Lattice> {
         if !(z_scale.is_finite() && z_scale > 0.0) {
-            return Err(Error::pipeline(format!("z_scale must be above 0, not {z_scale}")));
+            return Err(Error::pipeline(format!("`run.z_scale` must be above 0, not {z_scale}")));
         }
         let axes = schema
             .coordinates()
             .ok_or_else(|| Error::pipeline("the input has no coordinates X, Y and Z"))?;
         if let Some(step) = step {
             if !(step.is_finite() && step > 0.0) {
-                return Err(Error::pipeline(format!(
-                    "the lattice step must be above 0, not {step}"
-                )));
+                return Err(Error::pipeline(format!("`run.lattice` must be above 0, not {step}")));
             }
             return Ok(Lattice::binary(step, 1.0 / step, z_scale));
         }

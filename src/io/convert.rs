@@ -70,7 +70,7 @@ impl Projection {
                 Layout::Ply => "this PLY output".to_owned(),
             };
             return Err(Error::pipeline(format!("{format} cannot hold {}", quoted(&lost)))
-                .help(format!("drop = {lost:?} leaves them out")));
+                .help(format!("`write.drop = {lost:?}` leaves them out")));
         }
         let sources: BTreeMap<&str, &Dimension> =
             from.dimensions.iter().map(|d| (d.name.as_str(), d)).collect();
@@ -250,7 +250,7 @@ impl Projection {
         );
         if XYZ.contains(&name.as_str()) {
             if !value.as_f64().is_finite() {
-                return error.help("set nonfinite = \"drop\" under [run] to leave such points out");
+                return error.help("`run.nonfinite = \"drop\"` leaves such points out");
             }
             // Whole thousands near the point: a scan around it fits, and its digits stay readable.
             let near = self.from.coordinates().map(|axes| {
@@ -258,12 +258,12 @@ impl Projection {
             });
             return error.help(match near {
                 Some([x, y, z]) if [x, y, z].iter().all(|v| v.is_finite()) => {
-                    format!("give an offset near the points (offset = [{x:?}, {y:?}, {z:?}]), or a larger scale")
+                    format!("give an offset near the points, `write.offset = [{x:?}, {y:?}, {z:?}]`, or a larger `write.scale`")
                 }
-                _ => "give a larger scale, or an offset nearer to the points".to_owned(),
+                _ => "give a larger `write.scale`, or a `write.offset` nearer to the points".to_owned(),
             });
         }
-        error.help(format!("drop = [\"{name}\"] leaves the dimension out"))
+        error.help(format!("`write.drop = [{name:?}]` leaves the dimension out"))
     }
 }
 

@@ -235,19 +235,21 @@ impl Cells {
     /// Refuses keys that do not go together, naming one of them.
     pub(crate) fn check(&self) -> Result<(), (&'static str, Error)> {
         if self.keep.is_some() && self.max_angle.is_some() {
-            let error = Error::pipeline("`keep` finds the largest angle, and `max_angle` gives it");
+            let error = Error::pipeline(
+                "`cells.keep` finds the largest angle, and `cells.max_angle` gives it",
+            );
             return Err(("keep", error.help("give one of them")));
         }
         match (self.max_side, self.min_spacing) {
             (Some(most), Some(least)) if most < least => {
                 let told = format!(
-                    "`max_side` is {most}, less than `min_spacing`, {least}: cells between the two \
+                    "`cells.max_side` is {most}, less than `cells.min_spacing`, {least}: cells between the two \
                      would have to be divided and must not be"
                 );
                 Err(("max_side", Error::pipeline(told)))
             }
             _ if self.reference.direction().is_none() => {
-                Err(("reference", Error::pipeline("`reference` has no direction")))
+                Err(("reference", Error::pipeline("`cells.reference` has no direction")))
             }
             _ => Ok(()),
         }

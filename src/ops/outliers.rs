@@ -73,7 +73,7 @@ impl Outliers {
     pub fn role(self) -> Result<Role, (&'static str, Error)> {
         match self.method {
             Method::Statistical => {
-                let told = "belongs to method = \"radius\"";
+                let told = "belongs to `outliers.method = \"radius\"`";
                 absent("radius", self.radius.is_some(), told)?;
                 absent("min_neighbors", self.min_neighbors.is_some(), told)?;
                 let neighbors = self.neighbors.unwrap_or(NEIGHBORS);
@@ -82,7 +82,7 @@ impl Outliers {
                 Ok(Role::ScanOp(Box::new(stage)))
             }
             Method::Radius => {
-                let told = "belongs to method = \"statistical\"";
+                let told = "belongs to `outliers.method = \"statistical\"`";
                 absent("neighbors", self.neighbors.is_some(), told)?;
                 absent("multiplier", self.multiplier.is_some(), told)?;
                 let radius = given("radius", self.radius)?;
@@ -99,13 +99,15 @@ fn absent(key: &'static str, is_there: bool, told: &str) -> Result<(), (&'static
     if !is_there {
         return Ok(());
     }
-    Err((key, Error::pipeline(format!("`{key}` {told}")).help(format!("leave `{key}` out"))))
+    let help = format!("leave `outliers.{key}` out");
+    Err((key, Error::pipeline(format!("`outliers.{key}` {told}")).help(help)))
 }
 
 fn given<T>(key: &'static str, value: Option<T>) -> Result<T, (&'static str, Error)> {
     value.ok_or_else(|| {
-        let error = Error::pipeline(format!("method = \"radius\" needs `{key}`"))
-            .help("for example radius = 1.0 and min_neighbors = 4");
+        let error =
+            Error::pipeline(format!("`outliers.method = \"radius\"` needs `outliers.{key}`"))
+                .help("for example `outliers.radius = 1.0` and `outliers.min_neighbors = 4`");
         ("method", error)
     })
 }

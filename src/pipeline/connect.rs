@@ -159,8 +159,10 @@ impl Output {
     /// LAS records stay as they are, unless another scale is asked for.
     fn las_of_las(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<Target> {
         if !self.write.drop.is_empty() {
-            return Err(Error::pipeline("`drop` is for conversions between LAS and PLY")
-                .help("a LAS output holds every dimension of a LAS input: leave `drop` out"));
+            return Err(Error::pipeline("`write.drop` is for conversions between LAS and PLY")
+                .help(
+                    "a LAS output holds every dimension of a LAS input: leave `write.drop` out",
+                ));
         }
         let mut scaled = (**schema).clone();
         for (axis, name) in names::XYZ.into_iter().enumerate() {
@@ -180,8 +182,9 @@ impl Output {
 
     fn las_of_ply(&self, schema: &Schema, metadata: &Metadata) -> Result<Target> {
         let scale = self.write.scale.ok_or_else(|| {
-            Error::pipeline("a PLY scan written as LAS needs a `scale` for its coordinates")
-                .help("give scale = 0.001 (or --scale 0.001), or what the scan's precision is, in its own unit")
+            Error::pipeline("a PLY scan written as LAS needs a scale for its coordinates").help(
+                "give `write.scale = 0.001`, or what the scan's precision is, in its own unit",
+            )
         })?;
         let (format, extra) = convert::las_schema(schema, &self.write.drop)?;
         let offset = self.write.offset.unwrap_or([0.0; 3]);

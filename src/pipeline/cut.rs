@@ -72,5 +72,7 @@ fn too_heavy(lattice: &Lattice, key: TileKey, (positions, most): (u64, u64), lim
         "the cube from {lo:?} to {hi:?} and the cells around it hold {positions} positions, more \
          than the {most} that a tile may have"
     ))
-    .help(format!("give --memory {limit} or more, fewer --threads, or a smaller cell side"))
+    .help(format!(
+        "give `run.memory = \"{limit}\"` or more, fewer `run.threads`, or a smaller cell side"
+    ))
 }

@@ -51,6 +51,14 @@ pub(super) fn read(entries: Vec<Entry>, len: usize, registry: &Registry) -> Draf
                 let told = "a stage is one of several tables: write [[stage]]";
                 draft.mistakes.push(Mistake::new(at, told));
             }
+            ("stages", Value::List(list)) => {
+                any = true;
+                let told = "a pipeline file has no `stages`: write [[stage]]";
+                draft.mistakes.push(Mistake::new(at, told));
+                for node in list {
+                    draft.stage(node, registry);
+                }
+            }
             (word, _) => draft.mistakes.push(Mistake::word(
                 at,
                 format!("a pipeline file has no `{word}`"),
@@ -66,6 +74,26 @@ pub(super) fn read(entries: Vec<Entry>, len: usize, registry: &Registry) -> Draf
         draft.mistakes.push(told);
     }
     draft
+}
+
+/// What a stage without a kind is told: the key that was meant to be it, if there is one.
+fn without_kind(
+    place: Place,
+    entries: &[Entry],
+    name: Option<(String, Place)>,
+    registry: &Registry,
+) -> Mistake {
+    if let Some((name, at)) = name.filter(|(name, _)| registry.has(name)) {
+        return Mistake::new(at, format!("a stage needs `kind`: write kind = \"{name}\""))
+            .note("`name` is a word of your own, for the `from` of other stages");
+    }
+    let kinds = || registry.kinds().map(|(kind, _)| kind);
+    if let Some(Entry { at, node, .. }) = entries.iter().find(|e| e.key == "type") {
+        let word = if let Value::Text(word) = &node.value { word.as_str() } else { "" };
+        let told = "a stage has no `type`: write `kind`";
+        return Mistake::word(at.clone(), told, word, "kinds", kinds());
+    }
+    Mistake::new(place, "a stage needs `kind`").note(advice("", "kinds", kinds()))
 }
 
 impl Draft {
@@ -85,8 +113,8 @@ impl Draft {
             }
             Some(None) => {}
             None => {
-                let note = advice("", "kinds", registry.kinds().map(|(kind, _)| kind));
-                self.mistakes.push(Mistake::new(node.place, "a stage needs `kind`").note(note));
+                let mistake = without_kind(node.place, &entries, name.flatten(), registry);
+                self.mistakes.push(mistake);
             }
         }
     }

@@ -7,6 +7,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 use super::kinds::Format;
+use crate::error::{shown, whereabouts};
 use crate::{Error, ErrorKind, Result};
 
 /// The files that the paths mean, in their order. For each path:
@@ -26,7 +27,8 @@ pub fn expand<P: AsRef<str>>(paths: &[P]) -> Result<Vec<PathBuf>> {
     for path in paths.iter().map(AsRef::as_ref) {
         for file in one(path)? {
             if !named.insert(file.canonicalize().unwrap_or_else(|_| file.clone())) {
-                let twice = file.display();
+                let twice = shown(&file);
+                let path = shown(Path::new(path));
                 let told = format!("`{path}` means {twice}, which is named before");
                 return Err(Error::pipeline(told));
             }
@@ -59,7 +61,11 @@ fn one(path: &str) -> Result<Vec<PathBuf>> {
         walk(start, &steps, &mut files)?;
     }
     if files.is_empty() {
-        return Err(Error::new(ErrorKind::Io, format!("no file matches `{path}`")));
+        let error = Error::new(ErrorKind::Io, format!("no file matches `{}`", shown(literal)));
+        return Err(match whereabouts(literal) {
+            Some(help) => error.help(help),
+            None => error,
+        });
     }
     sort(&mut files);
     files.dedup();
@@ -83,10 +89,10 @@ fn steps(path: &str) -> Result<Vec<Step<'_>>> {
             "**" if matches!(steps.last(), Some(Step::Below)) => continue,
             "**" => Step::Below,
             _ if !part.contains(['*', '?', '[']) => Step::Name(part),
-            _ => Step::Matching(
-                glob::Pattern::new(part)
-                    .map_err(|e| Error::pipeline(format!("`{path}` is no pattern: {}", e.msg)))?,
-            ),
+            _ => Step::Matching(glob::Pattern::new(part).map_err(|e| {
+                let path = shown(Path::new(path));
+                Error::pipeline(format!("`{path}` is no pattern: {}", e.msg))
+            })?),
         });
     }
     Ok(steps)
@@ -152,7 +158,7 @@ fn folder(path: &Path) -> Result<Vec<PathBuf>> {
         }
     }
     if files.is_empty() {
-        let path = path.display();
+        let path = shown(path);
         let told = format!("the folder `{path}` has no las, laz or ply file");
         return Err(Error::new(ErrorKind::Io, told));
     }

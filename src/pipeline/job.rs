@@ -104,11 +104,11 @@ impl Job<'_> {
         let point = schema.coordinates().map(|axes| axes.map(|d| d.world(record, schema.endian)));
         let (what, help) = match why {
             Misplaced::NotFinite => {
-                ("is not finite", "set nonfinite = \"drop\" under [run] to leave such points out")
+                ("is not finite", "`run.nonfinite = \"drop\"` leaves such points out")
             }
             Misplaced::TooFar => (
                 "lies beyond the lattice",
-                "set a larger `lattice` step under [run], or move the scan nearer to its origin",
+                "give a larger `run.lattice`, or move the scan nearer to its origin",
             ),
         };
         let error = Error::new(

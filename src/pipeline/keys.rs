@@ -152,7 +152,10 @@ fn plain(expected: &dyn Expected) -> String {
         "a string" | "path string" => "a text in quotes",
         "a boolean" => "true or false",
         "a sequence" => "a list",
-        _ => &name,
+        _ => match name.strip_prefix("an array of length ") {
+            Some(length) => return format!("a list of {length} values"),
+            None => &name,
+        },
     }
     .to_owned()
 }

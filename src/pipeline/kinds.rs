@@ -8,6 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, de};
 use super::outputs::Outputs;
 use super::registry::{StageKind, StagePlace};
 use super::{connect, inputs};
+use crate::error::shown;
 use crate::io::synthetic::Scene;
 use crate::stage::{Order, Role};
 use crate::{Error, Result, point::names};
@@ -77,11 +78,11 @@ impl StageKind for Read {
         for file in &files {
             formats.push(match self.format.or(Format::of(file)) {
                 Some(format) => format,
-                None => return Err(blame(unknown_extension(file))),
+                None => return Err(blame(unknown_extension(file, "read.format"))),
             });
         }
         if let Some(i) = formats.iter().position(|f| !f.same_records(formats[0])) {
-            let (a, b) = (files[0].display(), files[i].display());
+            let (a, b) = (shown(&files[0]), shown(&files[i]));
             let help = "read one of the two formats, or convert first";
             let told = format!("{a} and {b} cannot be read together: LAS and PLY records differ");
             return Err(blame(Error::pipeline(told).help(help)));
@@ -109,8 +110,7 @@ pub struct Synth {
 
 impl StageKind for Synth {
     const KIND: &'static str = "synth";
-    const ABOUT: &'static str =
-        "Makes a scan up: of a simple surface, a machine part, projected squares or a landscape.";
+    const ABOUT: &'static str = "Makes a synthetic scan: of a simple surface, a machine part, projected squares or a landscape.";
 
     fn build(self, _at: &StagePlace) -> Result<Role> {
         Ok(Role::Source(connect::synth(&self)))
@@ -204,7 +204,8 @@ impl Write {
     /// Refuses keys that an output of `format` does not have; tells which.
     pub(super) fn check(&self, format: Format) -> Result<(), (&'static str, Error)> {
         let only = |key: &'static str, formats: &str| {
-            let told = format!("`{key}` is for {formats}, the output is {}", format.extension());
+            let told =
+                format!("`write.{key}` is for {formats}, the output is {}", format.extension());
             Err((key, Error::pipeline(told)))
         };
         match format {
@@ -230,14 +231,14 @@ impl StageKind for Write {
         match (self.path.clone(), self.folder.clone()) {
             (Some(_), Some(_)) => {
                 let told =
-                    "`path` makes one file and `folder` one for each input: give one of them";
+                    "`write.path` makes one file and `write.folder` one for each input: give one";
                 Err(at.blame("folder", Error::pipeline(told)))
             }
-            (None, None) => Err(Error::pipeline("`write` needs `path` or `folder`")
-                .help("`path` is one file, `folder` gets one for each input")),
+            (None, None) => Err(Error::pipeline("a `write` needs `write.path` or `write.folder`")
+                .help("`write.path` is one file, `write.folder` gets one for each input")),
             (Some(path), None) => {
                 let Some(format) = self.format.or(Format::of(&path)) else {
-                    return Err(at.blame("path", unknown_extension(&path)));
+                    return Err(at.blame("path", unknown_extension(&path, "write.format")));
                 };
                 check(format)?;
                 let output = connect::Output { write: self, path, format, of_one: false };
@@ -251,9 +252,9 @@ impl StageKind for Write {
     }
 }
 
-pub(super) fn unknown_extension(path: &Path) -> Error {
-    Error::pipeline(format!("the extension of `{}` names no format", path.display()))
-        .help("use .las, .laz or .ply, or add `format`")
+pub(super) fn unknown_extension(path: &Path, setting: &str) -> Error {
+    Error::pipeline(format!("the extension of `{}` names no format", shown(&path)))
+        .help(format!("use .las, .laz or .ply, or give `{setting}`"))
 }
 
 fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {

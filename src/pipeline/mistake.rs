@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::node::Place;
+use crate::error::is_control;
 use crate::{Error, ErrorKind};
 
 /// Mistakes that are told in full; a file with more of them is not a pipeline.
@@ -14,10 +15,29 @@ const WIDEST: usize = 160;
 /// One of the texts that make up a pipeline.
 #[derive(Debug, Clone)]
 pub(super) struct SourceText {
-    /// The file's name, or the argument's (`--set`).
+    /// The file's name, or the argument's (`--set`); empty for a text that the user does not know.
     pub origin: String,
     /// What it says.
     pub text: String,
+    /// The setting that the argument stands for, where its name says it (`--keep`): messages at this
+    /// place need not name it again.
+    pub setting: Option<String>,
+}
+
+impl SourceText {
+    /// `message` as it is told behind the name of this text.
+    fn shortened<'a>(&self, message: &'a str) -> &'a str {
+        let Some(setting) = &self.setting else { return message };
+        let key = setting.rsplit('.').next().unwrap_or(setting);
+        let told = |name: &str| message.strip_prefix(&format!("`{name}`"));
+        match told(setting).or_else(|| told(key)) {
+            Some(rest) => {
+                let rest = rest.trim_start_matches(':').trim_start();
+                rest.strip_prefix(key).and_then(|rest| rest.strip_prefix(' ')).unwrap_or(rest)
+            }
+            None => message,
+        }
+    }
 }
 
 /// Something wrong at a place.
@@ -85,10 +105,19 @@ impl Mistake {
         } else {
             (source.origin.clone(), String::new())
         };
-        let shown: String = line.chars().take(WIDEST).collect();
+        // One character each, so that the carets stay below what they mean.
+        let plain = |c: char| if c != '\t' && is_control(c) { '\u{fffd}' } else { c };
+        let shown: String = line.chars().take(WIDEST).map(plain).collect();
         let pad: String = before.chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
         let carets = text[start..end].chars().count().max(1);
-        let mut out = format!("{place}: {}", self.message);
+        let message = source.shortened(&self.message);
+        if source.origin.is_empty() {
+            // The user knows no such text: its places would say nothing.
+            let note =
+                if self.note.is_empty() { String::new() } else { format!("\n  = {}", self.note) };
+            return format!("{message}{note}");
+        }
+        let mut out = format!("{place}: {message}");
         let blank = " ".repeat(gutter.len());
         if pad.chars().count() + carets <= WIDEST {
             let carets = "^".repeat(carets);
@@ -142,7 +171,7 @@ pub(super) fn advice<S: AsRef<str>>(
 
 /// The valid word that a misspelt one was meant to be, if one is near: two letters in five wrong
 /// at most, the first in the list among equals.
-fn nearest<'a>(word: &str, valid: &'a [String]) -> Option<&'a String> {
+pub(crate) fn nearest<'a>(word: &str, valid: &'a [String]) -> Option<&'a String> {
     let near = valid.iter().map(|v| (distance(word, v), v)).min_by_key(|(d, _)| *d)?;
     let letters = word.chars().count().max(near.1.chars().count());
     (near.0 <= (2 * letters / 5).max(1) && near.0 < letters).then_some(near.1)
@@ -202,7 +231,8 @@ mod tests {
 
     #[test]
     fn a_place_at_the_end_of_the_text_or_inside_a_letter_is_rendered() {
-        let sources = [SourceText { origin: "p.toml".into(), text: "a = 'ö'\r\nb".into() }];
+        let sources =
+            [SourceText { origin: "p.toml".into(), text: "a = 'ö'\r\nb".into(), setting: None }];
         let at = |span| Mistake::new(Place::new(0, span), "wrong").render(&sources);
         assert_eq!(at(10..10), "p.toml:2:1: wrong\n  2 | b\n    | ^");
         assert_eq!(at(99..120), "p.toml:2:2: wrong\n  2 | b\n    |  ^");

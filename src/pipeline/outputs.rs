@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use super::connect::Output;
 use super::kinds::{Format, Write, unknown_extension};
+use crate::error::shown;
 use crate::point::{Layout, Metadata, Schema};
 use crate::stage::{ChunkSize, CreateSink, Input, Order, Sink};
 use crate::{Error, ErrorKind, Result};
@@ -44,7 +45,8 @@ impl Outputs {
     /// for unless it says that already.
     fn of(&self, path: &Path) -> Result<Output> {
         let told = Format::of(path);
-        let format = self.write.format.or(told).ok_or_else(|| unknown_extension(path))?;
+        let format =
+            self.write.format.or(told).ok_or_else(|| unknown_extension(path, "write.format"))?;
         let Some(name) = path.file_name() else {
             return Err(Error::pipeline("the input has no name for its output").at(path));
         };
@@ -76,7 +78,7 @@ impl CreateSink for Outputs {
         if inputs.is_empty() {
             return Err(Error::pipeline("the points come from no file that an output could be of")
                 .at(&self.folder)
-                .help("write one file: give `path` instead of `folder`"));
+                .help("write one file: give `write.path` instead of `write.folder`"));
         }
         let there: BTreeMap<_, _> =
             inputs.iter().filter_map(|i| Some((identity(&i.path)?, &i.path))).collect();
@@ -85,15 +87,13 @@ impl CreateSink for Outputs {
         for Input { path, .. } in inputs {
             let output = self.of(path)?;
             if let Some(other) = taken.insert(output.path.clone(), path) {
-                let told =
-                    format!("{} and {} would both become this", other.display(), path.display());
+                let told = format!("{} and {} would both become this", shown(&other), shown(&path));
                 return Err(Error::pipeline(told)
                     .at(&output.path)
                     .help("rename one of them, or run them one by one"));
             }
             if let Some(input) = identity(&output.path).and_then(|file| there.get(&file)) {
-                let told =
-                    format!("this is the input {} and would be overwritten", input.display());
+                let told = format!("this is the input {} and would be overwritten", shown(&input));
                 return Err(Error::pipeline(told).at(&output.path).help("write to another folder"));
             }
             all.push(Box::new(output));

@@ -2,7 +2,8 @@
 //! where a stage must have seen all tiles before it decides.
 
 use super::limits::{Limits, Sees};
-use crate::point::{Mark, Schema};
+use super::written::Written;
+use crate::point::{Mark, Schema, names};
 use crate::stage::{Needs, ScanOp, TileOp};
 use crate::tile::{SELECTIONS, Sieve};
 use crate::{Error, Result};
@@ -10,8 +11,8 @@ use crate::{Error, Result};
 /// A tile stage and where it stands.
 pub(super) struct StageOp {
     pub kind: String,
-    /// Line of its `kind` in the pipeline file.
-    pub line: usize,
+    /// How it is written in its pipeline.
+    pub written: Written,
     pub op: Op,
     pub limits: Limits,
     /// The bit of the records that it is limited to; 0 for all.
@@ -120,6 +121,22 @@ fn decides(needs: &Needs) -> bool {
     needs.removes || needs.mark.is_some()
 }
 
+/// Refuses stages that are limited by a class or a flag that records of `schema` do not have.
+pub(super) fn check_limits(ops: &[StageOp], schema: &Schema) -> Result<()> {
+    for StageOp { kind, written, limits, .. } in ops {
+        let flags = limits.selection.with.iter().map(|flag| ("with", flag.dimension()));
+        let class =
+            (!limits.selection.classes.is_empty()).then_some(("classes", names::CLASSIFICATION));
+        let missing = flags.chain(class).find(|(_, name)| schema.find(name).is_none());
+        if let Some((key, name)) = missing {
+            let told =
+                format!("`{kind}.{key}` selects points by {name}, which the input does not have");
+            return Err(written.wrong_key(key, told).help(format!("leave `{kind}.{key}` out")));
+        }
+    }
+    Ok(())
+}
+
 /// Gives stages that are limited to some records a bit each, equal limits the same.
 pub(super) fn number_selections(ops: &mut [StageOp]) -> Result<Vec<crate::point::Selection>> {
     let mut selections = Vec::new();
@@ -131,7 +148,10 @@ pub(super) fn number_selections(ops: &mut [StageOp]) -> Result<Vec<crate::point:
         });
         if number >= SELECTIONS as usize {
             let told = format!("stages are limited in more than {SELECTIONS} different ways");
-            return Err(blame(op, told).help("let some of them have equal classes and flags"));
+            return Err(op
+                .written
+                .wrong(told)
+                .help("let some of them have equal classes and flags"));
         }
         op.selection = 1 << number;
     }
@@ -190,7 +210,9 @@ impl Layout<'_> {
             self.ops[*at].op.tile().needs().writes.iter().any(|column| column == "Normal")
         };
         let first = (0..op).rev().find(writes).ok_or_else(|| {
-            blame(&self.ops[op], "`passes` repeats the stages from `normals` on, and there is none")
+            self.ops[op]
+                .written
+                .wrong("`median.passes` repeats the stages from `normals` on, and there is none")
         })?;
         let twice = (first..=op).find(|&at| matches!(self.ops[at].op, Op::Scan(_)));
         match twice {
@@ -198,8 +220,10 @@ impl Layout<'_> {
             Some(at) => {
                 let kind = &self.ops[at].kind;
                 let told = format!("`{kind}` looks at the whole scan and cannot be repeated");
-                Err(blame(&self.ops[op], told)
-                    .help("leave `passes` out, or run the pipeline twice"))
+                Err(self.ops[op]
+                    .written
+                    .wrong(told)
+                    .help("leave `median.passes` out, or run the pipeline twice"))
             }
         }
     }
@@ -222,7 +246,7 @@ impl Layout<'_> {
         let writes = |column: &str| needs.writes.iter().any(|name| name == column);
         if writes("Normal") && self.normals_from.is_some() && !self.normals_read {
             let told = "this `normals` would replace normals that nothing has read";
-            return Err(blame(stage, told).help("leave one of the two out"));
+            return Err(stage.written.wrong(told).help("leave one of the two out"));
         }
         let last = self.last();
         let rewrites = writes("Normal") && last.writes_normals;
@@ -266,7 +290,7 @@ impl Layout<'_> {
         let kind = &stage.kind;
         let missing = |help: &str| {
             let told = format!("`{kind}` needs {name}, which nothing before it gives");
-            Err(blame(stage, told).help(help.to_owned()))
+            Err(stage.written.wrong(told).help(help.to_owned()))
         };
         match name {
             "Normal" => match self.bring_normals(at) {
@@ -315,7 +339,7 @@ impl Layout<'_> {
             }
             if tap.wants_normals && !self.bring_normals(at) {
                 outcome = Err(Error::pipeline("the output wants normals, which no stage computes")
-                    .help("put a `normals` stage before it, or leave `dimensions` out"));
+                    .help("put a `normals` stage before it, or leave `write.dimensions` out"));
             }
             let pass = &mut self.passes[at];
             if removes {
@@ -327,9 +351,4 @@ impl Layout<'_> {
         });
         outcome
     }
-}
-
-/// An error about a stage, which names its line.
-pub(super) fn blame(stage: &StageOp, told: impl std::fmt::Display) -> Error {
-    Error::pipeline(format!("line {}: {told}", stage.line))
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::each::{lists_bytes, paths, ranks};
-use super::passes::{Op, Pass, StageOp, Tap, blame, number_selections, unroll};
+use super::passes::{Op, Pass, StageOp, Tap, check_limits, number_selections, unroll};
 use super::publish::check_place;
 use super::settings::{Nonfinite, Overrides, RunSettings, Withheld};
 use super::shares::Demands;
@@ -72,27 +72,25 @@ impl Pipeline {
             .iter()
             .map(|stage| serde_json::json!({ "kind": stage.kind, "keys": stage.keys }))
             .collect();
-        let in_file = |error: Error| match error.path() {
-            None => error.at(&origin),
-            Some(_) => error,
-        };
-        let mut sorted = sort(self.stages).map_err(in_file)?;
+        let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
+        let mut sorted = sort(self.stages)?;
         let (source_kind, open) =
             sorted.source.ok_or_else(|| Error::pipeline("the pipeline reads nothing"))?;
         let (sinks, taps): (Vec<_>, Vec<_>) = sorted.sinks.into_iter().unzip();
-        let last_sink = last_sink(&sorted.ops, &taps).map_err(in_file)?;
+        let last_sink = last_sink(&sorted.ops, &taps)?;
         check_places(&*open, &sinks, &settings)?;
         let source = open.open()?;
         let (each, ranks) = each_input(&*source, &sinks, &settings)?;
         let schema = source.schema();
         check_transforms(&sorted.transforms, schema).map_err(in_file)?;
-        let selections = number_selections(&mut sorted.ops).map_err(in_file)?;
-        let passes = unroll(&sorted.ops, schema, &taps).map_err(in_file)?;
+        check_limits(&sorted.ops, schema)?;
+        let selections = number_selections(&mut sorted.ops)?;
+        let passes = unroll(&sorted.ops, schema, &taps)?;
         let withheld = match sorted.ops.is_empty() {
             true => Withheld::Keep,
             false => settings.withheld,
         };
-        let tagger = Tagger::new(schema, &selections, withheld, ranks.clone()).map_err(in_file)?;
+        let tagger = Tagger::new(schema, &selections, withheld, ranks.clone());
         let mills = mills(&sorted.ops, &sinks)?;
         let Stretch { factor: z_scale, doubt } = stretch(&settings, &*source, &sorted.ops)?;
         let lattice = match mills || settings.nonfinite == Nonfinite::Drop {
@@ -142,11 +140,11 @@ impl Pipeline {
 fn sort(stages: Vec<PlacedStage>) -> Result<Sorted> {
     let mut sorted = Sorted::default();
     for stage in stages {
-        let PlacedStage { kind, name, from, line, limits, role, .. } = stage;
-        let misplaced = |why: &str| {
-            Err(Error::pipeline(format!("line {line}: `{kind}` cannot stand here: {why}")))
-        };
-        let tile_op = |op| StageOp { kind: kind.clone(), line, op, limits, selection: 0 };
+        let PlacedStage { kind, name, from, written, limits, role, .. } = stage;
+        let misplaced =
+            |why: &str| Err(written.wrong(format!("`{kind}` cannot stand here: {why}")));
+        let tile_op =
+            |op| StageOp { kind: kind.clone(), written: written.clone(), op, limits, selection: 0 };
         match role {
             Role::Source(_) if sorted.source.is_some() => {
                 return misplaced("a pipeline has one source");
@@ -183,7 +181,7 @@ fn last_sink(ops: &[StageOp], taps: &[Tap]) -> Result<usize> {
     last.ok_or_else(|| match ops.last() {
         Some(stage) => {
             let told = format!("no output takes what `{}` leaves", stage.kind);
-            blame(stage, told).help("add a `write` behind it that has no `from`")
+            stage.written.wrong(told).help("add a `write` behind it that has no `from`")
         }
         None => Error::pipeline("the pipeline writes nothing"),
     })
@@ -217,7 +215,7 @@ fn check_places(
     match settings.scratch.as_ref().filter(|folder| !folder.is_dir()) {
         Some(folder) => Err(Error::new(ErrorKind::Io, "the folder for scratch does not exist")
             .at(folder)
-            .help("create it first, or name another with --scratch")),
+            .help("create it first, or name another with `run.scratch`")),
         None => Ok(()),
     }
 }
@@ -303,13 +301,13 @@ fn mills(ops: &[StageOp], sinks: &[Box<dyn CreateSink>]) -> Result<bool> {
         Some(sink) => {
             let told = match ops.is_empty() {
                 true => {
-                    "order = \"input\" is not possible in or beside an output in canonical order"
+                    "`write.order = \"input\"` is not possible in or beside an output in canonical order"
                 }
                 false => {
-                    "order = \"input\" is for pipelines that stream; tiles write the canonical order"
+                    "`write.order = \"input\"` is for pipelines that stream; tiles write the canonical order"
                 }
             };
-            Err(Error::pipeline(told).at(sink.path()).help("leave `order` out"))
+            Err(Error::pipeline(told).at(sink.path()).help("leave `write.order` out"))
         }
     }
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::scratch::Scratch;
+use crate::error::whereabouts;
 use crate::{Error, ErrorKind, Result};
 
 /// A file that is to appear at `path`.
@@ -97,7 +98,11 @@ pub fn check_place(path: &Path) -> Result<()> {
             .at(file)
             .help("write into a folder"));
     }
-    Err(Error::new(ErrorKind::Io, "the folder does not exist").at(folder).help("create it first"))
+    let help = match whereabouts(&folder) {
+        Some(help) => format!("create it first; {help}"),
+        None => "create it first".to_owned(),
+    };
+    Err(Error::new(ErrorKind::Io, "the folder does not exist").at(folder).help(help))
 }
 
 fn folder_of(path: &Path) -> PathBuf {

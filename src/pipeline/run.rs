@@ -334,7 +334,7 @@ fn check_disk(demands: &Demands, spill: &Scratch, kept_in_memory: u64) -> Result
             Bytes(free)
         ))
         .at(spill.parent())
-        .help("free some disk space, name another folder with --scratch, or give more --memory")),
+        .help("free some disk space, name another folder with `run.scratch`, or give more `run.memory`")),
         _ => Ok(()),
     }
 }

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use crate::budget::Bytes;
+use crate::error::shown;
 use crate::tile::{Folder, lock};
 use crate::{Error, Result};
 
@@ -81,7 +82,7 @@ fn make(parent: &Path) -> Result<Made> {
             Err(e) if e.kind() == io::ErrorKind::AlreadyExists && attempt < ATTEMPTS => continue,
             Err(e) => {
                 return Err(Error::io(parent, "create a scratch folder here", e)
-                    .help("make the folder writable, or name another with --scratch"));
+                    .help("make the folder writable, or name another with `run.scratch`"));
             }
         }
         match mark(&folder) {
@@ -183,8 +184,8 @@ pub fn memory_warning(folder: &Path, spilled: u64) -> Option<String> {
     let (_, name) = MEMORY.into_iter().find(|(magic, _)| *magic == kind).filter(|_| spilled > 0)?;
     Some(format!(
         "{}: {} were spilled to a file system in memory ({name}), beyond the budget of the run: name a \
-         folder on a disk with --scratch",
-        folder.display(),
+         folder on a disk with `run.scratch`",
+        shown(&folder),
         Bytes(spilled)
     ))
 }

@@ -1,8 +1,11 @@
 //! Values that an argument puts in the place of a pipeline file's: `--set stage.key=value`.
 
-use super::mistake::{Mistake, SourceText};
+use super::mistake::{self, Mistake, SourceText};
 use super::node::{self, Node, Place};
-use crate::{Error, Result};
+use crate::Result;
+
+/// The argument whose texts [`Set::parse`] reads, as errors name it.
+const ARGUMENT: &str = "--set";
 
 /// One value put in the place of a pipeline file's.
 ///
@@ -30,11 +33,14 @@ impl Set {
     /// that `write.path=out.laz` needs no quotes.
     pub fn parse(text: &str) -> Result<Set> {
         let Some((address, _)) = text.split_once('=') else {
-            return Err(Error::pipeline(format!("--set {text}: there is no `=`"))
-                .help("write --set stage.key=value"));
+            let told = Mistake::new(Place::new(1, 0..text.len()), "there is no `=`")
+                .note("write STAGE.KEY=VALUE, such as cells.max_angle=0.2 or run.threads=2");
+            let none = || SourceText { origin: String::new(), text: String::new(), setting: None };
+            let given = SourceText { origin: ARGUMENT.to_owned(), text: text.to_owned(), ..none() };
+            return Err(mistake::tell(vec![told], &[none(), given]));
         };
         Ok(Set {
-            argument: "--set".to_owned(),
+            argument: ARGUMENT.to_owned(),
             text: text.to_owned(),
             address: address.trim_end().to_owned(),
             value: Given::Text { from: address.len() + 1 },
@@ -57,7 +63,8 @@ impl Set {
 
     /// The text that errors show.
     pub(super) fn source(&self) -> SourceText {
-        SourceText { origin: self.argument.clone(), text: self.text.clone() }
+        let setting = matches!(self.value, Given::Json(_)).then(|| self.address.clone());
+        SourceText { origin: self.argument.clone(), text: self.text.clone(), setting }
     }
 
     /// The stage part and the key part of the address.

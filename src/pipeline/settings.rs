@@ -133,7 +133,7 @@ impl Simd {
         };
         simd::Simd::of(level).ok_or_else(|| {
             Error::pipeline(format!("this processor has no {}", level.name()))
-                .help("leave `simd` under [run] out: the fastest that is there is taken")
+                .help("leave `run.simd` out: the fastest that is there is taken")
         })
     }
 }

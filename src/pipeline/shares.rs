@@ -9,7 +9,7 @@ use crate::{Error, Result, geom::nearest::Nearest};
 
 /// Records that a batch of the decode takes.
 pub const BATCH: usize = 8192;
-/// Positions or records that a thread must be able to hold for the mill to be worth its name.
+/// Positions or records that a thread must be able to hold: with fewer, rims outweigh tiles.
 const FEWEST: usize = 16_384;
 /// Working memory that a thread makes use of; more goes to keeping the scan in memory.
 const THREAD_MOST: u64 = 192 << 20;
@@ -52,11 +52,11 @@ pub struct Demands {
 /// The division.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Shares {
-    /// Not leased to anyone: the program itself.
+    /// The program itself: what it holds already, stacks, the slack of the allocator.
     pub base: u64,
-    /// Work of all threads: decode first, then the merge, then the mill.
+    /// Work of all threads, in one phase after the other: decode, merge, mill; or stream.
     pub work: u64,
-    /// The index of the scan.
+    /// The indices of the sorted runs and of the merged scan.
     pub index: u64,
     /// Points that stay in memory.
     pub kept_in_memory: u64,
@@ -249,9 +249,9 @@ impl Demands {
             Bytes(needed)
         ))
         .help(format!(
-            "give --memory {} or more{}",
+            "give `run.memory = \"{}\"` or more{}",
             whole_mebibytes(needed),
-            if self.threads > 1 { ", or fewer --threads" } else { "" }
+            if self.threads > 1 { ", or fewer `run.threads`" } else { "" }
         ))
     }
 }
@@ -320,8 +320,15 @@ mod tests {
     fn a_refusal_names_a_limit_that_does() {
         let error = demands(32 << 20).divide().unwrap_err();
         let help = error.remedy().unwrap().to_owned();
-        let mebibytes: u64 =
-            help.split_once("--memory ").unwrap().1.split_once("MiB").unwrap().0.parse().unwrap();
+        let mebibytes: u64 = help
+            .split_once("run.memory = \"")
+            .unwrap()
+            .1
+            .split_once("MiB")
+            .unwrap()
+            .0
+            .parse()
+            .unwrap();
         assert!(demands(mebibytes << 20).divide().is_ok(), "{help}");
         assert!(demands((mebibytes - 2) << 20).divide().is_err(), "{help}");
     }

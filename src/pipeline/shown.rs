@@ -5,6 +5,7 @@ use std::fmt;
 use super::passes::{Call, Pass, needs};
 use super::plan::Plan;
 use crate::budget::Bytes;
+use crate::error::shown;
 
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -42,7 +43,7 @@ impl fmt::Display for Plan {
 }
 
 fn sink_line(f: &mut fmt::Formatter<'_>, path: &std::path::Path) -> fmt::Result {
-    writeln!(f, "sink     {}", path.display())
+    writeln!(f, "sink     {}", shown(&path))
 }
 
 impl Plan {

@@ -34,7 +34,7 @@ impl RunSettings {
             None => {
                 let doubt = units.doubt().map(|doubt| {
                     format!(
-                        "{doubt}; z is measured in the unit of x and y: set `run.z_scale = 1` if that \
+                        "{doubt}; z is measured in the unit of x and y: give `run.z_scale = 1` if that \
                          is right, or the factor that brings z there"
                     )
                 });
@@ -43,13 +43,13 @@ impl RunSettings {
             Some(Mismatch { z_scale: Some(factor), .. }) if auto => certain(factor),
             Some(Mismatch { message, z_scale: Some(factor) }) => {
                 Err(Error::new(ErrorKind::Data, message).help(format!(
-                    "set `run.z_scale = \"auto\"`, which measures with z times {factor}, or \
+                    "give `run.z_scale = \"auto\"`, which measures with z times {factor}, or \
                      `run.z_scale = 1` if the reference system is wrong; records keep their z"
                 )))
             }
             Some(Mismatch { message, z_scale: None }) => Err(Error::new(ErrorKind::Data, message)
                 .help(
-                    "project the scan to metres first, or set `run.z_scale` to a factor (1 if the \
+                    "project the scan to metres first, or give `run.z_scale` a factor (1 if the \
                      reference system is wrong)",
                 )),
         }
@@ -66,7 +66,7 @@ fn known(units: Units) -> Result<()> {
         units.words()
     );
     Err(Error::new(ErrorKind::Data, told).help(
-        "set `run.z_scale = 1` if z is in the unit of x and y, else the factor that brings it there, \
+        "give `run.z_scale = 1` if z is in the unit of x and y, else the factor that brings it there, \
          such as 0.3048 for feet above metres",
     ))
 }

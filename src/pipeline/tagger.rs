@@ -7,7 +7,6 @@ use crate::point::{
 };
 use crate::report::{ClassCounts, Tally};
 use crate::tile::{ASIDE, State, Tag};
-use crate::{Error, Result};
 
 /// Tells records apart as stages and settings ask.
 #[derive(Debug, Clone)]
@@ -21,30 +20,21 @@ pub(super) struct Tagger {
 
 impl Tagger {
     /// A tagger for records of `schema`; `inputs` are the numbers that tags carry for the inputs, if
-    /// they are to. Fails if a selection asks for what these do not have.
+    /// they are to. A selection by what these do not have selects nothing.
     pub fn new(
         schema: &Schema,
         selections: &[Selection],
         treatment: Withheld,
         inputs: Vec<u32>,
-    ) -> Result<Self> {
-        for selection in selections {
-            let asked = selection.with.iter().map(|flag| flag.dimension());
-            let class = (!selection.classes.is_empty()).then_some(names::CLASSIFICATION);
-            if let Some(missing) = asked.chain(class).find(|name| schema.find(name).is_none()) {
-                let told =
-                    format!("a stage is limited by {missing}, which the input does not have");
-                return Err(Error::pipeline(told).help("leave out `classes` or the flag in `with`"));
-            }
-        }
+    ) -> Self {
         let withheld = Selection { with: vec![Flag::Withheld], ..Selection::default() };
         let has_flag = schema.find(names::WITHHELD).is_some() && treatment != Withheld::Keep;
-        Ok(Tagger {
+        Tagger {
             selections: selections.iter().map(|selection| selection.of(schema)).collect(),
             withheld: has_flag.then(|| withheld.of(schema)),
             treatment,
             inputs,
-        })
+        }
     }
 
     /// True if records need tags.

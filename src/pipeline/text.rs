@@ -2,22 +2,26 @@
 
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::draft::{self, Draft, StageDraft};
+use super::foreign;
 use super::keys;
 use super::limits::{LimitKeys, Limits};
 use super::mistake::{self, Mistake, SourceText};
-use super::node::{self, Entry, Node, Place, Value};
+use super::node::{Entry, Node, Place, Value};
 use super::registry::{Registry, StagePlace};
 use super::set::Set;
 use super::settings::RunSettings;
+use super::written::Written;
+use crate::error::shown;
 use crate::stage::{Order, Role};
 use crate::{Error, Result};
 
 /// A pipeline that is right as far as its text tells: one source, then stages that work, then sinks.
 #[derive(Debug)]
 pub struct Pipeline {
-    /// The file it came from, as the user named it.
+    /// The file it came from, as the user named it; empty for a text that the user does not know.
     pub origin: String,
     /// The `[run]` table.
     pub settings: RunSettings,
@@ -36,6 +40,8 @@ pub struct PlacedStage {
     pub from: Option<String>,
     /// Line of its `kind`, from 1.
     pub line: usize,
+    /// How it is written.
+    pub(super) written: Written,
     /// The records that it is limited to.
     pub(super) limits: Limits,
     /// What it does.
@@ -51,7 +57,8 @@ impl fmt::Debug for PlacedStage {
 }
 
 impl Pipeline {
-    /// Reads a pipeline; `origin` is the name of its file for errors.
+    /// Reads a pipeline; `origin` is the name of its file for errors, empty for a text that the user
+    /// does not know: then errors name what is wrong without a place in it.
     ///
     /// The error tells every mistake of the text at once. Files that stages name are looked up, not
     /// opened.
@@ -66,16 +73,16 @@ impl Pipeline {
         registry: &Registry,
         sets: &[Set],
     ) -> Result<Pipeline> {
-        let file = SourceText { origin: origin.to_owned(), text: text.to_owned() };
-        let sources: Vec<SourceText> =
+        let file = SourceText { origin: origin.to_owned(), text: text.to_owned(), setting: None };
+        let sources: Arc<[SourceText]> =
             std::iter::once(file).chain(sets.iter().map(Set::source)).collect();
         let told = |mistakes| mistake::tell(mistakes, &sources);
-        let entries = node::parse(text, 0).map_err(told)?;
+        let entries = foreign::parse(text).map_err(told)?;
         let mut draft = draft::read(entries, text.len(), registry);
         for (i, set) in sets.iter().enumerate() {
             draft.apply(set, i + 1, registry);
         }
-        let (pipeline, mistakes) = build(draft, text, origin, registry);
+        let (pipeline, mistakes) = build(draft, &sources, registry);
         if mistakes.is_empty() { Ok(pipeline) } else { Err(told(mistakes)) }
     }
 
@@ -86,16 +93,16 @@ impl Pipeline {
             let valid = e.utf8_error().valid_up_to() as u64;
             Error::pipeline("the pipeline is not UTF-8 text").at(path).at_byte(valid)
         })?;
-        Pipeline::parse_with(&text, &path.display().to_string(), registry, sets)
+        Pipeline::parse_with(&text, &shown(path).to_string(), registry, sets)
     }
 }
 
 fn build(
     mut draft: Draft,
-    text: &str,
-    origin: &str,
+    sources: &Arc<[SourceText]>,
     registry: &Registry,
 ) -> (Pipeline, Vec<Mistake>) {
+    let origin = &sources[0].origin;
     let mut mistakes = std::mem::take(&mut draft.mistakes);
     let settings = keys::read("[run]", &draft.run).unwrap_or_else(|wrong| {
         mistakes.extend(wrong);
@@ -104,7 +111,7 @@ fn build(
     check_names(&draft.stages, registry, &mut mistakes);
     let mut stages = Vec::new();
     for stage in &draft.stages {
-        match place(stage, text, origin, registry) {
+        match place(stage, sources, registry) {
             Ok(placed) => stages.push(placed),
             Err(wrong) => mistakes.extend(wrong),
         }
@@ -113,18 +120,18 @@ fn build(
         check_chain(&draft.stages, &stages, &mut mistakes);
         check_files(&draft.run, &draft.stages, &stages, &settings, &mut mistakes);
     }
-    (Pipeline { origin: origin.to_owned(), settings, stages }, mistakes)
+    (Pipeline { origin: origin.clone(), settings, stages }, mistakes)
 }
 
 fn place(
     stage: &StageDraft,
-    text: &str,
-    origin: &str,
+    sources: &Arc<[SourceText]>,
     registry: &Registry,
 ) -> Result<PlacedStage, Vec<Mistake>> {
     let (kind, at) = &stage.kind;
+    let SourceText { text, origin, .. } = &sources[0];
     let line = text.as_bytes()[..at.start.min(text.len())].iter().filter(|&&b| b == b'\n').count();
-    let place = StagePlace::new(origin, line + 1);
+    let place = StagePlace::new(origin.as_str(), line + 1);
     let (limits, keys) = split_limits(&stage.keys);
     let Some(built) = registry.build(kind, &keys, &place) else {
         let kinds = registry.kinds().map(|(kind, _)| kind);
@@ -157,6 +164,7 @@ fn place(
         name: text(&stage.name),
         from: text(&stage.from),
         line: place.line(),
+        written: Written::new(sources, &stage.keys),
         limits: limits.limits(),
         role,
         keys: canonical,
@@ -218,7 +226,7 @@ fn check_chain(drafts: &[StageDraft], stages: &[PlacedStage], mistakes: &mut Vec
         let Role::Sink(sink) = &stage.role else { continue };
         if tiles && sink.order() == Order::Input {
             let told = "the input's order is kept only where no stage works on tiles";
-            let note = "leave `order` out: the order is canonical";
+            let note = "leave `write.order` out: the order is canonical";
             mistakes.push(Mistake::new(draft.kind.1.clone(), told).note(note));
         }
     }
@@ -276,10 +284,10 @@ fn check_files(
     for (path, at) in outputs {
         let file = resolved(path);
         if inputs.contains(&file) {
-            let told = format!("{} is an input: it cannot be written over", path.display());
+            let told = format!("{} is an input: it cannot be written over", shown(&path));
             mistakes.push(Mistake::new(at.clone(), told));
         } else if taken.contains(&file) {
-            let told = format!("{} is written twice", path.display());
+            let told = format!("{} is written twice", shown(&path));
             mistakes.push(Mistake::new(at.clone(), told));
         }
         taken.push(file);

@@ -7,6 +7,7 @@ use super::classes::class_name;
 use super::document::{Outcome, Report};
 use super::figures::{ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
 use crate::budget::Bytes;
+use crate::error::shown;
 
 /// A [`Report`] as a few lines for the terminal; lengths in the scan's unit.
 pub struct Table<'a> {
@@ -51,13 +52,13 @@ impl fmt::Display for Table<'_> {
             write!(f, "\nspill      {}", Bytes(run.spill_bytes))?;
         }
         for output in &run.outputs {
-            write!(f, "\noutput     {}", output.path)?;
+            write!(f, "\noutput     {}", shown(Path::new(&output.path)))?;
             if let Some(bytes) = output.bytes {
                 write!(f, ", {}", Bytes(bytes))?;
             }
         }
         if let Some(path) = self.path {
-            write!(f, "\nreport     {}", path.display())?;
+            write!(f, "\nreport     {}", shown(&path))?;
         }
         writeln!(f)
     }

@@ -16,7 +16,7 @@ pub struct Block {
     pub first: Position,
     /// Number of the first position among all of the scan.
     pub first_position: u64,
-    /// Number of the first position's first record among all (see `Sealed::records`).
+    /// Number of the first position's first record among all (see [`SealedTiles`](super::SealedTiles)).
     pub first_record: u64,
     address: Address,
     len: u16,

@@ -217,7 +217,7 @@ impl Loader {
             return Err(Error::memory(
                 "records of one position differ so much in class and flags that they do not fit",
             )
-            .help("give more --memory"));
+            .help("give more `run.memory`"));
         }
         self.columns(first, &places, in_core)
     }

@@ -57,7 +57,9 @@ pub fn parallel(threads: usize, work: impl Fn(usize) -> Result<()> + Sync) -> Re
                 Ok(Err(_)) => Err(Error::internal("a worker thread panicked")),
                 Err(cause) => {
                     let told = "the system refuses to start so many threads";
-                    Err(Error::new(ErrorKind::Io, told).because(cause).help("give fewer --threads"))
+                    Err(Error::new(ErrorKind::Io, told)
+                        .because(cause)
+                        .help("give fewer `run.threads`"))
                 }
             };
             let given_up = matches!(&result, Err(e) if e.kind() == ErrorKind::Interrupted);

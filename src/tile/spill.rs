@@ -1,5 +1,5 @@
-//! Where points wait between the decode and the mill: in memory while the budget allows, in scratch
-//! files beyond. Reading is the same call for both.
+//! What a run sets down between its phases (points, their order, states, columns): in memory while the
+//! budget allows, in scratch files beyond. Reading is the same call for both.
 
 use std::fs::File;
 use std::os::unix::fs::FileExt;
@@ -69,7 +69,7 @@ const IN_FILE: u64 = 1 << 63;
 const SEGMENT_BITS: u32 = 32;
 const FILE_BITS: u32 = 55;
 
-/// ScratchFile files of a spill at most: more threads than these write to them in turn.
+/// Scratch files of a spill at most: more threads than these write to them in turn.
 const FILES: usize = 8;
 
 impl Address {
@@ -177,7 +177,7 @@ impl ScratchFile {
         let full = cause.kind() == std::io::ErrorKind::StorageFull;
         let error = Error::io(&self.path, doing, cause);
         if full {
-            return error.help("free some disk space, or name another folder with --scratch");
+            return error.help("free some disk space, or name another folder with `run.scratch`");
         }
         error
     }

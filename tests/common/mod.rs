@@ -1,7 +1,9 @@
 //! What the tests of promises share: scans held as records, cut, shuffled and split into files, and
 //! pipelines run in this process with what they say of themselves.
-#![allow(dead_code, reason = "each test file uses a part of it")]
+#![allow(dead_code, unused_imports, reason = "each test file uses a part of it")]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
+
+pub mod real;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -17,6 +19,7 @@ use pointmill::point::{Layout, Metadata, PointBatch, Position, Schema, Value};
 use pointmill::report::{Report, result_bytes};
 use pointmill::stage::{OpenSource, Sink, Source};
 use pointmill::{Error, ErrorKind, Result};
+pub use real::scans;
 
 /// A small generator (splitmix64), so that a failing case is the same everywhere.
 pub struct Random(pub u64);
@@ -42,15 +45,6 @@ impl Random {
             list.swap(i, self.below(i + 1));
         }
     }
-}
-
-/// The folder of real scans, if the environment names one.
-pub fn scans() -> Option<PathBuf> {
-    let folder = std::env::var_os("POINTMILL_SCANS").map(PathBuf::from);
-    if folder.is_none() {
-        println!("POINTMILL_SCANS names no folder of scans: nothing was tested");
-    }
-    folder
 }
 
 /// The records of a scan and what its file says besides.

@@ -19,6 +19,16 @@ pub const TARGET: Target =
 /// How a file that is no good is refused.
 const REFUSED: &[ErrorKind] = &[Data];
 
+/// True if the points are compressed and have ones in a row that the decoder of the `laz` crate could
+/// overflow its stack by: it calls itself for each symbol that switches to another sequence of times,
+/// and ones are read as thousands of those. To be removed with that decoder.
+fn overflows_the_stack(data: &[u8]) -> bool {
+    const ONES: [u8; 6] = [0xff; 6];
+    let compressed = data.get(104).is_some_and(|format| format & 0x80 != 0);
+    let points = data.get(word::<4>(data, 96) as usize..).unwrap_or_default();
+    compressed && points.windows(ONES.len()).any(|bytes| bytes == ONES)
+}
+
 fn target(path: &Path, data: &[u8]) -> Judgement {
     if let Err(error) = describe(path) {
         judge::proper("describe", &error, REFUSED)?;
@@ -40,6 +50,10 @@ fn target(path: &Path, data: &[u8]) -> Judgement {
     let parts = magnitude(source.parts() as u64);
     marks.push(format!("size: 2^{} points in 2^{parts} parts", magnitude(source.points())));
     twice_the_file(path, &*source)?;
+    if overflows_the_stack(data) {
+        marks.push("ones in compressed points: they are not decoded".to_owned());
+        return Ok(Outcome { accepted: true, marks });
+    }
     let Some(read) = judge::read_twice(&*source, REFUSED)? else {
         marks.push("a part holds too much".to_owned());
         return Ok(Outcome { accepted: true, marks });

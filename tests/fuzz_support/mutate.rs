@@ -86,7 +86,7 @@ pub fn bytes(random: &mut Random, data: &mut Vec<u8>, other: &[u8], words: &[&[u
         data.extend_from_slice(other);
     }
     let at = random.below(data.len());
-    match random.below(13) {
+    match random.below(15) {
         0 => {
             if let Some(byte) = data.get_mut(at) {
                 *byte ^= 1 << random.below(8);
@@ -122,6 +122,7 @@ pub fn bytes(random: &mut Random, data: &mut Vec<u8>, other: &[u8], words: &[&[u
             insert(data, at, &copy.repeat(times));
         }
         11 if !words.is_empty() => insert(data, at, random.word(words)),
+        13 | 14 => fill(random, data),
         12 if !words.is_empty() => overwrite(data, at, random.word(words)),
         _ => {
             // The beginning of one and the end of the other.
@@ -129,6 +130,14 @@ pub fn bytes(random: &mut Random, data: &mut Vec<u8>, other: &[u8], words: &[&[u
             data.extend_from_slice(&other[random.below(other.len())..]);
         }
     }
+}
+
+/// Fills a stretch with one byte, as a hole in a sparse copy or a worn disk reads.
+pub fn fill(random: &mut Random, data: &mut [u8]) {
+    let any = random.number() as u8;
+    let byte = *random.of(&[0x00, 0x00, 0xff, 0xff, any]);
+    let stretch = random.stretch(data.len());
+    data[stretch].fill(byte);
 }
 
 /// Inserts `part` at `at`.

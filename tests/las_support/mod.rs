@@ -1,6 +1,9 @@
 //! What the tests of LAS share: whole files in and out, by the roles that a run uses.
-#![allow(dead_code, reason = "each test file uses a part of it")]
+#![allow(dead_code, unused_imports, reason = "each test file uses a part of it")]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
+
+#[path = "../common/real.rs"]
+pub mod real;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,6 +12,7 @@ use pointmill::Result;
 use pointmill::io::las::{LasOptions, create, open};
 use pointmill::point::{Metadata, PointBatch, Schema};
 use pointmill::stage::{SinkSummary, Source};
+pub use real::scans;
 
 /// Numbers for tests: splitmix64.
 pub struct Random(pub u64);
@@ -81,15 +85,6 @@ pub fn write(
 
 pub const LAS: LasOptions = LasOptions { compressed: false, normals: false };
 pub const LAZ: LasOptions = LasOptions { compressed: true, normals: false };
-
-/// The folder of real scans, if the environment names one.
-pub fn scans() -> Option<PathBuf> {
-    let folder = std::env::var_os("POINTMILL_SCANS").map(PathBuf::from);
-    if folder.is_none() {
-        println!("POINTMILL_SCANS names no folder of scans: nothing was tested");
-    }
-    folder
-}
 
 /// One line of the scans' manifest.
 pub struct Scan {

@@ -140,6 +140,14 @@ mod tests {
         }
     }
 
+    /// Every test that compares instruction sets compares those that the processor has; this one
+    /// says that there was something to compare.
+    #[test]
+    #[ignore = "needs a processor with AVX2"]
+    fn tests_compare_more_than_the_portable_kernels() {
+        assert!(Simd::all().any(|simd| simd.level() == Level::Avx2), "{:?}", Simd::best());
+    }
+
     #[test]
     fn the_best_is_the_last_of_all() {
         assert_eq!(Simd::all().last(), Some(Simd::best()));

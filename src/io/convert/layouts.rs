@@ -116,7 +116,7 @@ pub fn las_schema(from: &Schema, drop: &[String]) -> Result<(u8, Vec<(String, Sc
             "LAS cannot name extra bytes {}: a name has at most 32 bytes",
             quoted(&long)
         ))
-        .help(format!("drop = {long:?} leaves them out")));
+        .help(format!("`write.drop = {long:?}` leaves them out")));
     }
     Ok((format, extra))
 }

@@ -8,6 +8,7 @@ use super::native::Native;
 use super::read::Shift;
 use super::union::{Records, described};
 use super::vlr::Evlr;
+use crate::error::shown;
 use crate::{Error, Result};
 
 /// Offsets whose distance is this close to whole steps differ by whole steps: decimal offsets are
@@ -112,7 +113,7 @@ fn same<T: PartialEq + std::fmt::Debug>(
 }
 
 fn refuse(a: &Input, b: &Input, why: String) -> Error {
-    let (one, two) = (a.path.display(), b.path.display());
+    let (one, two) = (shown(&a.path), shown(&b.path));
     Error::data(&b.path, format!("{one} and {two} cannot be read as one scan: {why}"))
         .help("bring the files to one form first, or run them one by one")
 }

@@ -218,7 +218,9 @@ fn add_normals(vertex: &mut Schema) -> Result<[Dimension; 3]> {
                 return Ok(found.clone());
             }
             let message = format!("the input's {name} holds whole numbers: no normal fits");
-            return Err(Error::pipeline(message).help(format!("drop = [\"{name}\"]")));
+            return Err(
+                Error::pipeline(message).help(format!("`write.drop = [{name:?}]` leaves it out"))
+            );
         }
         let added = Dimension::new(name, Scalar::F32, vertex.stride);
         vertex.stride += added.scalar.size();

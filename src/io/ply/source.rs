@@ -154,7 +154,7 @@ fn agree(first: &PlyFile, other: &PlyFile) -> Result<()> {
 }
 
 fn disagree(first: &PlyFile, other: &PlyFile, what: &str) -> Error {
-    Error::data(&other.path, format!("its {what} is not that of {}", first.path.display()))
+    Error::data(&other.path, format!("its {what} is not that of {}", crate::error::shown(&first.path)))
         .help("files that are read together agree in encoding, vertex properties and coordinate reference system; convert one of them first")
 }
 
@@ -242,7 +242,7 @@ fn dropped(file: &PlyFile) -> Option<String> {
         format!(
             "{}: {} are not points: a binary PLY converted to PLY of the same encoding carries \
              them, all other outputs drop them",
-            file.path.display(),
+            crate::error::shown(&file.path),
             others.join(", ")
         )
     })

@@ -139,8 +139,9 @@ pub(super) fn forecast(cells: &Cells, samples: &[Vec<f64>]) -> Forecast {
     if cells.keep.is_none() && count > 0 && scatter > max_angle {
         let percent = (100.0 * sum / f64::from(count)).round();
         forecast.warning = Some(format!(
-            "normals scatter {rounded:.2} rad, above max_angle {max_angle}: expect about \
-             {percent} % of the points to stay; raise neighbors or max_angle, or use --keep"
+            "normals scatter {rounded:.2} rad, more than the largest angle of {max_angle}: expect about \
+             {percent} % of the points to stay; raise `normals.neighbors` or `cells.max_angle`, \
+             or say with `cells.keep` how many are to stay"
         ));
     }
     forecast

@@ -71,14 +71,14 @@ impl Threshold {
 
 fn too_few(keep: Keep, target: u64, least: u64) -> Error {
     let told = match keep {
-        Keep::Records(_) => format!("`keep` asks for {target} records"),
-        Keep::Share(_) => format!("`keep` asks for {keep}, which is {target} records"),
+        Keep::Records(_) => format!("`cells.keep` asks for {target} records"),
+        Keep::Share(_) => format!("`cells.keep` asks for {keep}, which is {target} records"),
     };
     Error::pipeline(format!(
         "{told}, and {least} stay however large the angle: one of every cell that must not be \
          larger, and one of every position without a normal"
     ))
-    .help(format!("keep {least} or more, or give a larger `side` (and `max_side`)"))
+    .help(format!("keep {least} or more, or give a larger `cells.side` (and `cells.max_side`)"))
 }
 
 /// The widest range whose divisions cannot all be made if `left` records more are to be left; takes

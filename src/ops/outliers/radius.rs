@@ -32,7 +32,7 @@ impl RadiusOutliers {
         mark: Option<Mark>,
     ) -> Result<Self, (&'static str, Error)> {
         if !(radius.is_finite() && radius > 0.0) {
-            let told = format!("`radius` must be a length above 0, not {radius}");
+            let told = format!("`outliers.radius` must be a length above 0, not {radius}");
             return Err(("radius", Error::pipeline(told)));
         }
         let min_neighbors = checked("min_neighbors", min_neighbors)?;

@@ -37,7 +37,7 @@ impl StatisticalOutliers {
     ) -> Result<Self, (&'static str, Error)> {
         let neighbors = checked("neighbors", neighbors)?;
         if !(multiplier.is_finite() && multiplier >= 0.0) {
-            let told = format!("`multiplier` must be a number from 0, not {multiplier}");
+            let told = format!("`outliers.multiplier` must be a number from 0, not {multiplier}");
             return Err(("multiplier", Error::pipeline(told)));
         }
         Ok(StatisticalOutliers { neighbors, multiplier, mark, step: 1.0, concluded: None })

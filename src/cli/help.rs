@@ -1,0 +1,161 @@
+//! The help of the commands: their flags in groups, with examples. The flags themselves stand in
+//! `arguments`. Completions and manual pages come from the same.
+
+use std::fs;
+use std::path::Path;
+
+use clap::{Command, CommandFactory};
+
+use super::arguments::{Arguments, Completions, Man};
+use super::print;
+use crate::{Error, Result};
+
+/// Groups of flags: the command, the heading, and the fields of its arguments.
+const GROUPS: &[(&str, &str, &[&str])] = &[
+    (
+        "reduce",
+        "How much to keep",
+        &["keep", "max_angle", "max_side", "min_spacing", "side", "min_points", "split", "passes"],
+    ),
+    ("reduce", "How the surface is measured", &["neighbors", "method", "z_scale"]),
+    ("reduce", "Which points", &["outliers", "classes", "withheld", "nonfinite"]),
+    (
+        "reduce",
+        "Output",
+        &["output", "outdir", "to", "mark", "scale", "offset", "drop", "encoding"],
+    ),
+    ("convert", "Output", &["output", "to", "scale", "offset", "drop", "encoding"]),
+];
+
+/// What stands below the help of a command.
+const EXAMPLES: &[(&str, &str)] = &[
+    (
+        "run",
+        "\
+Examples:
+  pointmill run pipelines/demo.toml
+  pointmill run thin.toml --set grid.side=0.25 --set write.path=thin.laz --memory 2GiB
+
+Relative paths, in the pipeline file too, start from the folder you are in.",
+    ),
+    (
+        "reduce",
+        "\
+Examples:
+  pointmill reduce survey/*.laz -o reduced.laz
+  pointmill reduce survey/*.laz -o reduced.laz --keep 10% --report reduced.json
+  pointmill reduce survey --outdir reduced --classes 2 --max-side 2
+  pointmill reduce part.ply -o part-reduced.ply --max-angle 6deg
+
+It runs the pipeline pipelines/reduce.toml, which can be copied and changed.",
+    ),
+    (
+        "convert",
+        "\
+Examples:
+  pointmill convert survey/*.las -o survey.laz
+  pointmill convert survey/*.las -o compressed/ --to laz
+  pointmill convert scan.ply -o scan.laz --scale 0.001 --drop confidence",
+    ),
+    ("info", "Examples:\n  pointmill info scan.laz\n  pointmill info --json survey/*.laz"),
+    ("plan", "Example:\n  pointmill plan pipelines/demo.toml --memory 1GiB --threads 4"),
+    ("check", "Example:\n  pointmill check pipelines/demo.toml"),
+    ("stages", "Examples:\n  pointmill stages\n  pointmill stages cells\n  pointmill stages run"),
+    ("synth", "Example:\n  pointmill synth als -n 1M -o landscape.laz --seed 7"),
+    (
+        "completions",
+        "Example:\n  pointmill completions bash > ~/.local/share/bash-completion/completions/pointmill",
+    ),
+    ("man", "Examples:\n  pointmill man | man -l -\n  pointmill man ~/.local/share/man/man1"),
+];
+
+/// The command line with its flags in groups and its examples.
+pub(super) fn command() -> Command {
+    let grouped = GROUPS.iter().fold(Arguments::command(), |all, (command, heading, flags)| {
+        let group = |sub: Command, flag: &&str| sub.mut_arg(*flag, |a| a.help_heading(*heading));
+        all.mut_subcommand(*command, |sub| flags.iter().fold(sub, group))
+    });
+    EXAMPLES.iter().fold(grouped, |all, (command, examples)| {
+        all.mut_subcommand(*command, |sub| sub.after_help(*examples))
+    })
+}
+
+/// Prints what a shell needs to complete commands and flags.
+pub(super) fn completions(arguments: &Completions) -> Result<()> {
+    let mut text = Vec::new();
+    clap_complete::generate(arguments.shell, &mut command(), "pointmill", &mut text);
+    print::result(String::from_utf8_lossy(&text))
+}
+
+/// Prints the manual page of the program, or writes it and one for each command into a folder.
+pub(super) fn man(arguments: &Man) -> Result<()> {
+    let Some(folder) = &arguments.folder else {
+        let mut text = Vec::new();
+        let failed = |e| Error::internal("the manual page could not be made").because(e);
+        clap_mangen::Man::new(command()).render(&mut text).map_err(failed)?;
+        return print::result(String::from_utf8_lossy(&text));
+    };
+    let folder = Path::new(folder);
+    fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create the folder", e))?;
+    let failed = |e| Error::io(folder, "write the manual pages", e);
+    clap_mangen::generate_to(command(), folder).map_err(failed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_flag_of_the_large_commands_is_in_a_group() {
+        let all = command();
+        for name in ["reduce", "convert"] {
+            let sub = all.find_subcommand(name).unwrap();
+            assert!(sub.get_arguments().count() > 10);
+            for flag in sub.get_arguments().filter(|flag| !flag.is_positional()) {
+                assert!(
+                    flag.get_help_heading().is_some(),
+                    "{name}: {} is in no group",
+                    flag.get_id()
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn no_value_is_refused_in_the_words_of_a_parser() {
+        let mut tried = 0;
+        for sub in command().get_subcommands() {
+            let name = sub.get_name();
+            for flag in sub.get_arguments().filter(|flag| flag.get_long().is_some()) {
+                if !flag.get_action().takes_values() {
+                    continue;
+                }
+                let typed = format!("--{}=?", flag.get_long().unwrap());
+                let told = match command().try_get_matches_from(["pointmill", name, &typed]) {
+                    Err(told) => told.to_string(),
+                    Ok(_) => String::new(),
+                };
+                for raw in ["invalid digit", "invalid float", "cannot parse", "too large to fit"] {
+                    assert!(!told.contains(raw), "{name} {typed}: {told}");
+                }
+                tried += 1;
+            }
+        }
+        assert!(tried > 50, "{tried} flags");
+    }
+
+    #[test]
+    fn every_command_has_an_example_that_can_be_typed() {
+        let all = command();
+        for sub in all.get_subcommands() {
+            let (_, text) = EXAMPLES.iter().find(|(name, _)| *name == sub.get_name()).unwrap();
+            let mut lines = text.lines().filter_map(|line| line.strip_prefix("  "));
+            let first = lines.next().unwrap();
+            for line in std::iter::once(first).chain(lines) {
+                let words = line.split(['|', '>']).next().unwrap().split_whitespace();
+                assert!(command().try_get_matches_from(words).is_ok(), "{line}");
+            }
+        }
+        command().debug_assert();
+    }
+}

@@ -1,0 +1,187 @@
+//! The words of what was typed: flags and the settings that they stand for, in one table a command.
+//! Pipelines take their values from it, and messages of the library, which name settings as a
+//! pipeline file has them, are put into the flags that the user of the command can type.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use super::arguments::Command;
+use super::{convert, run, stages};
+use crate::pipeline::Set;
+
+/// A flag of a command, the setting that it stands for, and its value if it was given.
+pub(super) struct Flag {
+    /// As it is typed: `--keep`, or `IN` for an argument without dashes.
+    pub name: &'static str,
+    /// As `--set` takes it: `cells.keep`.
+    pub address: &'static str,
+    /// What was given.
+    pub value: Option<Value>,
+}
+
+/// Flags from `(name, address, value)`.
+pub(super) fn flags<const N: usize>(
+    rows: [(&'static str, &'static str, Option<Value>); N],
+) -> Vec<Flag> {
+    rows.into_iter().map(|(name, address, value)| Flag { name, address, value }).collect()
+}
+
+/// The values that were given, for a pipeline.
+pub(super) fn sets(flags: Vec<Flag>) -> Vec<Set> {
+    let set = |flag: Flag| Some(Set::argument(flag.name, flag.address, flag.value?));
+    flags.into_iter().filter_map(set).collect()
+}
+
+/// What the user of one command can type for the settings that messages name.
+pub(super) struct Words {
+    flags: Vec<(&'static str, &'static str)>,
+    /// True if the command takes a pipeline file, which may have any setting.
+    has_file: bool,
+    settings: BTreeSet<String>,
+}
+
+impl Words {
+    /// The words of `command`.
+    pub fn of(command: &Command) -> Words {
+        let flags = match command {
+            Command::Run(_) | Command::Plan(_) | Command::Check(_) => Vec::new(),
+            Command::Reduce(reduce) => run::reduce_flags(reduce),
+            Command::Convert(convert) => convert::flags(convert, None, None),
+            Command::Synth(synth) => run::synth_flags(synth),
+            Command::Info(_) | Command::Stages(_) => Vec::new(),
+            Command::Completions(_) | Command::Man(_) => Vec::new(),
+        };
+        let common = command.common().map(|common| common.flags()).unwrap_or_default();
+        let flags = flags.into_iter().chain(common).map(|flag| (flag.address, flag.name));
+        Words {
+            flags: flags.collect(),
+            has_file: matches!(command, Command::Run(_) | Command::Plan(_) | Command::Check(_)),
+            settings: stages::settings(),
+        }
+    }
+
+    /// `message` with every setting that it names (`` `write.drop = ["GpsTime"]` ``) put into what can
+    /// be typed (`` `--drop GpsTime` ``).
+    pub fn told(&self, message: &str) -> String {
+        let mut out = String::with_capacity(message.len());
+        let mut rest = message;
+        while let Some((before, inside, behind)) = quoted(rest) {
+            out += before;
+            match self.typed(inside) {
+                Some(typed) => {
+                    out += &typed;
+                    rest = behind;
+                }
+                // What ends this quotation may begin another.
+                None => {
+                    out.push('`');
+                    rest = &rest[before.len() + 1..];
+                }
+            }
+        }
+        out + rest
+    }
+
+    /// What can be typed for a setting, with its value or without; None if `text` is no setting.
+    fn typed(&self, text: &str) -> Option<String> {
+        let (address, value) = match text.split_once(" = ") {
+            Some((address, value)) => (address, Some(value)),
+            None => (text, None),
+        };
+        let flag = self.flags.iter().find(|(known, _)| *known == address);
+        match (flag, value) {
+            (None, _) if !self.settings.contains(address) => None,
+            (None, _) if self.has_file => Some(format!("`{text}`")),
+            (None, _) => Some(format!("`{text}` in a pipeline file")),
+            (Some((_, name)), Some(value)) if !matches!(value, "true" | "false") => {
+                Some(format!("`{name} {}`", argument(value)))
+            }
+            (Some((_, name)), _) => Some(format!("`{name}`")),
+        }
+    }
+}
+
+/// The text before the first quotation in backticks, what it quotes, and the text behind it.
+fn quoted(text: &str) -> Option<(&str, &str, &str)> {
+    let (before, rest) = text.split_once('`')?;
+    let (inside, behind) = rest.split_once('`')?;
+    Some((before, inside, behind))
+}
+
+/// A TOML value as an argument of a shell's command: texts without their quotes, lists with commas.
+fn argument(value: &str) -> String {
+    let text = |value: &toml::Value| match value {
+        toml::Value::String(text) => text.clone(),
+        other => other.to_string(),
+    };
+    let plain = match toml::from_str::<toml::Table>(&format!("value = {value}")) {
+        Ok(table) => match table.get("value") {
+            Some(toml::Value::Array(list)) => list.iter().map(text).collect::<Vec<_>>().join(","),
+            Some(one) => text(one),
+            None => value.to_owned(),
+        },
+        Err(_) => value.to_owned(), // a placeholder, such as [x, y, z]
+    };
+    let is_safe = |c: char| c.is_alphanumeric() || "-_.,/:=+%@~".contains(c);
+    match !plain.is_empty() && plain.chars().all(is_safe) {
+        true => plain,
+        false => format!("'{}'", plain.replace('\'', r"'\''")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::super::arguments::Arguments;
+    use super::*;
+
+    fn words(command: &[&str]) -> Words {
+        let typed = [&["pointmill"], command].concat();
+        Words::of(&Arguments::try_parse_from(typed).unwrap().command)
+    }
+
+    #[test]
+    fn a_setting_becomes_the_flag_of_the_command() {
+        let reduce = words(&["reduce", "a.laz", "-o", "b.laz"]);
+        for (message, told) in [
+            ("give `run.memory = \"270MiB\"` or more", "give `--memory 270MiB` or more"),
+            ("`write.drop = [\"GpsTime\", \"a b\"]` is", "`--drop 'GpsTime,a b'` is"),
+            ("`write.offset = [1.0, -2.0, 0.0]`", "`--offset 1.0,-2.0,0.0`"),
+            ("fewer `run.threads`", "fewer `--threads`"),
+            ("`read.path` or `write.path`", "`IN` or `-o`"),
+            ("leave `write.order` out", "leave `write.order` in a pipeline file out"),
+            ("`cells.classes = [2]`", "`--classes 2`"),
+            ("`cells.keep = true`", "`--keep`"),
+            ("`run.nowhere = 1` and `x` and `a.laz`", "`run.nowhere = 1` and `x` and `a.laz`"),
+            ("a lone ` and `run.memory`", "a lone ` and `--memory`"),
+        ] {
+            assert_eq!(reduce.told(message), told);
+        }
+    }
+
+    #[test]
+    fn a_pipeline_file_keeps_its_keys_and_takes_the_common_flags() {
+        let run = words(&["run", "p.toml"]);
+        let message = "`run.scratch`, `run.nonfinite = \"drop\"`, `write.drop = [\"A\"]`";
+        let told = "`--scratch`, `run.nonfinite = \"drop\"`, `write.drop = [\"A\"]`";
+        assert_eq!(run.told(message), told);
+    }
+
+    #[test]
+    fn every_address_of_every_flag_is_a_setting() {
+        for command in [
+            &["reduce", "a.laz", "-o", "b.laz", "--outliers"][..],
+            &["convert", "a.laz", "-o", "b.laz"],
+            &["synth", "part", "-n", "1", "-o", "b.laz"],
+            &["run", "p.toml"],
+        ] {
+            let words = words(command);
+            assert!(words.flags.len() >= 4, "{command:?}");
+            for (address, flag) in &words.flags {
+                assert!(words.settings.contains(*address), "{flag} stands for {address}");
+            }
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! Messages in the words of what was typed: flags for commands, keys for pipeline files, and what to
+//! type instead.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
+
+mod scans_support;
+
+use std::fs;
+use std::os::unix::ffi::OsStrExt;
+use std::path::Path;
+
+use scans_support::command::{command, done, pointmill, scans};
+
+/// What a command that fails with `code` prints on stderr.
+fn told(at: &Path, arguments: &[&str], code: i32) -> String {
+    let (given, stdout, stderr) = pointmill(at, arguments);
+    assert_eq!((given, stdout.as_str()), (code, ""), "{arguments:?}: {stderr}");
+    stderr
+}
+
+/// A file of `tests/cases`, copied beside the others.
+fn case(at: &Path, name: &str) {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    fs::copy(cases.join(name), at.join(name)).unwrap();
+}
+
+#[test]
+fn remedies_are_flags_of_the_command_and_keys_of_a_pipeline_file() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    let help = |arguments: &[&str]| {
+        let told = told(at, arguments, 1);
+        told.lines().find(|line| line.starts_with("help: ")).unwrap().to_owned()
+    };
+    let small = help(&["reduce", "a.laz", "-o", "o.laz", "--memory", "10MiB", "--threads", "2"]);
+    assert!(small.starts_with("help: give `--memory "), "{small}");
+    assert!(small.ends_with("MiB` or more, or fewer `--threads`"), "{small}");
+    // What it names would do.
+    let budget = small.split(['`', ' ']).find(|word| word.ends_with("MiB")).unwrap();
+    done(at, &["reduce", "a.laz", "-o", "o.laz", "--memory", budget, "--threads", "2"]);
+    let text = "[[stage]]\nkind = 'read'\npath = 'a.laz'\n[[stage]]\nkind = 'write'\n\
+                path = 'o.ply'\n";
+    fs::write(at.join("p.toml"), text).unwrap();
+    let small = help(&["run", "p.toml", "--memory", "10MiB"]);
+    assert!(small.starts_with("help: give `--memory "), "{small}");
+}
+
+#[test]
+fn what_a_conversion_would_lose_is_told_as_flags_or_as_keys() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\n\
+               property double z\nproperty float a_name_of_more_than_thirty_two_bytes\nend_header\n\
+               1 2 3 4\n";
+    fs::write(at.join("a.ply"), ply).unwrap();
+    let one = told(at, &["convert", "a.ply", "-o", "o.las"], 2);
+    assert!(one.contains("\nhelp: give `--scale 0.001`, or what"), "{one}");
+    let one = told(at, &["convert", "a.ply", "-o", "o.las", "--scale", "0.001"], 2);
+    let name = "a_name_of_more_than_thirty_two_bytes";
+    assert!(one.contains(&format!("\nhelp: `--drop {name}` leaves them out\n")), "{one}");
+    let text = "[[stage]]\nkind = 'read'\npath = 'a.ply'\n[[stage]]\nkind = 'write'\n\
+                path = 'o.las'\nscale = 0.001\n";
+    fs::write(at.join("p.toml"), text).unwrap();
+    let one = told(at, &["run", "p.toml"], 2);
+    let help = format!("\nhelp: `write.drop = [\"{name}\"]` leaves them out\n");
+    assert!(one.contains(&help), "{one}");
+    let events = told(at, &["convert", "a.ply", "-o", "o.las", "--progress", "json"], 2);
+    let event: serde_json::Value = serde_json::from_str(events.lines().last().unwrap()).unwrap();
+    assert!(event["help"].as_str().unwrap().contains("`--scale 0.001`"), "{event}");
+}
+
+#[test]
+fn commands_never_tell_places_in_the_pipelines_behind_them() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    case(at, "98-noclass.ply");
+    let no_class = told(at, &["reduce", "98-noclass.ply", "-o", "o.ply", "--classes", "2,6"], 2);
+    assert_eq!(
+        no_class,
+        "error: --classes: selects points by Classification, which the input does not have\n   \
+         | 2 6\n   | ^^^\nhelp: leave `--classes` out\n"
+    );
+    let twice = ["reduce", "a.laz", "-o", "o.laz", "--passes", "3", "--keep", "10%"];
+    assert_eq!(
+        told(at, &twice, 2),
+        "error: `cells` looks at the whole scan and cannot be repeated\nhelp: leave `--passes` \
+         out, or run the pipeline twice\n"
+    );
+    let text = "[[stage]]\nkind = 'read'\npath = '98-noclass.ply'\n[[stage]]\nkind = 'normals'\n\
+                classes = [2]\n[[stage]]\nkind = 'write'\npath = 'o.ply'\n";
+    fs::write(at.join("p.toml"), text).unwrap();
+    assert_eq!(
+        told(at, &["check", "p.toml"], 2),
+        "error: p.toml:6:11: `normals.classes` selects points by Classification, which the input \
+         does not have\n  6 | classes = [2]\n    |           ^^^\nhelp: leave `normals.classes` \
+         out\n"
+    );
+}
+
+#[test]
+fn stages_that_do_not_fit_are_told_with_line_column_and_caret() {
+    let at = scans(&["a.laz"]);
+    let text = "[[stage]]\nkind = 'read'\npath = 'a.laz'\n[[stage]]\nkind = 'median'\n\
+                [[stage]]\nkind = 'write'\npath = 'o.laz'\n";
+    fs::write(at.path().join("p.toml"), text).unwrap();
+    assert_eq!(
+        told(at.path(), &["check", "p.toml"], 2),
+        "error: p.toml:5:8: `median` needs Normal, which nothing before it gives\n  \
+         5 | kind = 'median'\n    |        ^^^^^^^^\nhelp: put a `normals` stage before it\n"
+    );
+}
+
+#[test]
+fn almost_pipelines_are_told_what_to_type() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    case(at, "60k-stage-table.toml");
+    assert_eq!(
+        told(at, &["run", "60k-stage-table.toml"], 2),
+        "error: 60k-stage-table.toml:1:1: a stage is one of several tables: write [[stage]]\n  \
+         1 | [stage]\n    | ^^^^^^^\n    = so are lines 5, 8, 12, 15\n"
+    );
+    let write = "[[stage]]\nkind = 'write'\npath = 'o.laz'\n";
+    let read = "[[stage]]\nkind = 'read'\npath = 'a.laz'\n";
+    for (text, expected) in [
+        (
+            format!("{read}{write}").replace("[[stage]]", "[[stages]]"),
+            "error: p.toml:1:3: a pipeline file has no `stages`: write [[stage]]\n",
+        ),
+        (
+            format!("{read}[[stage]]\nname = 'normals'\n{write}"),
+            "error: p.toml:5:8: a stage needs `kind`: write kind = \"normals\"\n",
+        ),
+        (
+            format!("{read}[[stage]]\ntype = 'normal'\n{write}"),
+            "error: p.toml:5:1: a stage has no `type`: write `kind`\n",
+        ),
+        (
+            "{\n \"pipeline\": [ \"a.laz\", { \"type\": \"filters.normal\" } ]\n}".to_owned(),
+            "error: p.toml:1:1: this is a pipeline of PDAL, in JSON; a pipeline file of pointmill \
+             is TOML\n",
+        ),
+        (
+            "[ \"a.laz\", { \"type\": \"filters.normal\" } ]".to_owned(),
+            "error: p.toml:1:1: this is a pipeline of PDAL, in JSON",
+        ),
+        ("{ \"stage\": ".to_owned(), "error: p.toml:1:1: this is JSON; a pipeline file is TOML\n"),
+    ] {
+        fs::write(at.join("p.toml"), &text).unwrap();
+        let one = told(at, &["check", "p.toml"], 2);
+        assert!(one.starts_with(expected), "{text}\n{one}");
+    }
+    fs::write(at.join("p.toml"), format!("{read}[[stage]]\ntype = 'normal'\n{write}")).unwrap();
+    assert!(told(at, &["check", "p.toml"], 2).contains("= did you mean `normals`? kinds: cells, "));
+}
+
+#[test]
+fn files_that_are_not_there_are_told_what_their_paths_are_relative_to() {
+    let at = tempfile::tempdir().unwrap();
+    let folder = at.path().canonicalize().unwrap();
+    let relative = format!("the path is relative to the folder you are in, {}\n", folder.display());
+    let home = "`~` means your home folder in a shell alone: write its whole name\n";
+    let check = |read: &str, write: &str| {
+        let text = format!(
+            "[[stage]]\nkind = 'read'\npath = '{read}'\n[[stage]]\nkind = 'write'\npath = '{write}'\n"
+        );
+        fs::write(folder.join("p.toml"), text).unwrap();
+        told(&folder, &["check", "p.toml"], 1)
+    };
+    for read in ["no.laz", "no/*.laz"] {
+        let one = check(read, "o.laz");
+        assert!(one.ends_with(&relative), "{read}: {one}");
+    }
+    assert!(check("~/a.laz", "o.laz").ends_with(home));
+    let whole = check("/no/a.laz", "o.laz");
+    assert!(!whole.contains("relative"), "{whole}");
+    assert!(told(&folder, &["run", "no.toml"], 1).ends_with(&relative));
+    fs::write(folder.join("a.las"), b"").unwrap();
+    let one = check("a.las", "no/o.laz");
+    assert!(one.contains(&format!("help: create it first; {relative}")), "{one}");
+    assert!(check("a.las", "~/o.laz").contains(&format!("help: create it first; {home}")));
+}
+
+#[test]
+fn values_of_flags_are_told_what_is_right() {
+    let at = scans(&["a.laz"]);
+    let reduce = |flag: &str, value: &str| {
+        told(at.path(), &["reduce", "a.laz", "-o", "o.laz", flag, value], 2)
+    };
+    for (flag, value, expected) in [
+        ("--neighbors", "ten", "`ten` is no whole number such as 10, 10k or 1e6"),
+        ("--passes", "1.5", "`1.5` is no whole number such as"),
+        ("--max-side", "two", "`two` is no number such as 0.5 or 1e-3"),
+        ("--offset", "1,x,3", "`x` is no number such as"),
+        ("--classes", "grund", "classes are numbers from 0 to 255; ground is 2"),
+        ("--classes", "2,256", "classes are numbers from 0 to 255\n"),
+        ("--offset", "1,2", "error: --offset: takes a list of 3 values, not 2 values\n"),
+        ("--withheld", "drp", "error: --withheld: cannot be `drp`\n"),
+        ("--method", "pcb", "= did you mean `pca`? valid: pca, varady"),
+    ] {
+        let one = reduce(flag, value);
+        assert!(one.contains(expected), "{flag} {value}: {one}");
+    }
+    let set = told(at.path(), &["run", "p.toml", "--set", "cells"], 2);
+    let expected = "error: --set: there is no `=`\n   | cells\n   | ^^^^^\n   = write STAGE.KEY=VALUE, \
+                    such as cells.max_angle=0.2 or run.threads=2\n";
+    assert_eq!(set, expected);
+    let text =
+        "[[stage]]\nkind = 'read'\npath = 'a.laz'\n[[stage]]\nkind = 'write'\npath = 'o.ply'\n";
+    fs::write(at.path().join("p.toml"), text).unwrap();
+    let set = told(at.path(), &["run", "p.toml", "--set", "wirte.path=b.laz"], 2);
+    assert!(set.contains("no stage `wirte`") && set.contains("did you mean `write`?"), "{set}");
+}
+
+#[test]
+fn one_report_for_several_outputs_is_told_with_what_to_do() {
+    let at = scans(&["a.laz", "b.laz"]);
+    let several = ["convert", "a.laz", "b.laz", "-o", "out/", "--report", "r.json"];
+    assert_eq!(
+        told(at.path(), &several, 2),
+        "error: --report is for one output, and this makes several\nhelp: leave --report out, or \
+         convert the files one by one\n"
+    );
+}
+
+#[test]
+fn arguments_that_are_no_text_are_told_alike_and_their_folder_works() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    let name = std::ffi::OsStr::from_bytes(b"b\xff.laz");
+    fs::copy(at.join("a.laz"), at.join(name)).unwrap();
+    for before in [&["reduce", "-o", "o.laz"][..], &["convert", "-o", "o.laz"], &["info"], &["run"]]
+    {
+        let output = command(at, before).arg(name).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{before:?}");
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert!(told.starts_with("error: the argument `b\\xff.laz` is not UTF-8 text\n"), "{told}");
+        assert!(told.contains("help: rename the file, or name its folder"), "{told}");
+    }
+    let info = done(at, &["info", "b*.laz"]);
+    assert!(info.starts_with("b\\xff.laz\n"), "{info}");
+    done(at, &["convert", ".", "-o", "out.laz"]);
+}
+
+#[test]
+fn what_a_terminal_would_obey_is_never_printed() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    let odd = "\u{1b}]0;owned\u{7}\u{202e}x\nerror: y.laz";
+    fs::copy(at.join("a.laz"), at.join(odd)).unwrap();
+    let plain = |text: &str, what: &str| {
+        let obeyed = |c: char| {
+            c.is_control() && c != '\n'
+                || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+        };
+        assert!(!text.contains(obeyed), "{what}: {text:?}");
+        // A line of a name's own would be taken for one of the program's.
+        assert!(!text.lines().any(|line| line.starts_with("error: y.laz")), "{what}: {text}");
+    };
+    let shown = "\\u{1b}]0;owned\\u{7}\\u{202e}x\\nerror: y.laz";
+    let info = done(at, &["info", odd]);
+    plain(&info, "info");
+    assert!(info.starts_with(shown), "{info}");
+    let json = done(at, &["info", "--json", odd]);
+    plain(&json, "info --json");
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert!(json[0].to_string().contains("owned"), "{json}");
+    let output = format!("{odd}.las");
+    let table = done(at, &["reduce", odd, "-o", &output]);
+    plain(&table, "reduce");
+    assert!(table.contains(&format!("output     {shown}.las, ")), "{table}");
+    for arguments in [
+        &["reduce", odd, "-o", odd][..],
+        &["reduce", odd, "-o", "o.laz", "--method", odd],
+        &["reduce", odd, "-o", "o.laz", "--max-side", odd],
+        &["reduce", odd, "-o", "o.laz", "--progress", odd],
+        &["convert", "a.laz", "-o", "no/", "--to", odd],
+        &["convert", odd, "-o", &format!("{odd}/o.laz")],
+        &["run", &format!("{odd}.toml")],
+    ] {
+        let (code, stdout, stderr) = pointmill(at, arguments);
+        assert!(code > 0 && stdout.is_empty(), "{arguments:?}");
+        plain(&stderr, &format!("{arguments:?}"));
+    }
+    let (_, _, events) = pointmill(at, &["reduce", odd, "-o", "o.laz", "--progress", "json"]);
+    plain(&events, "events");
+    for line in events.lines() {
+        serde_json::from_str::<serde_json::Value>(line).unwrap();
+    }
+    fs::write(at.join("p.toml"), "[[stage]]\nkind = \"re\u{202e}ad\"\n").unwrap();
+    let (_, _, mistakes) = pointmill(at, &["check", "p.toml"]);
+    plain(&mistakes, "a pipeline's text");
+    assert!(mistakes.contains("there is no stage `re\\u{202e}ad`"), "{mistakes}");
+}
+
+#[test]
+fn completions_and_manual_pages_know_every_command_and_flag() {
+    let at = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let text = done(at.path(), &["completions", shell]);
+        for word in ["reduce", "max-angle", "completions"] {
+            assert!(text.contains(word), "{shell}: {word}");
+        }
+    }
+    let page = done(at.path(), &["man"]);
+    assert!(page.contains(".TH pointmill 1") && page.contains("Exit codes"), "{page}");
+    assert_eq!(done(at.path(), &["man", "new/man1"]), "");
+    let reduce = fs::read_to_string(at.path().join("new/man1/pointmill-reduce.1")).unwrap();
+    for word in ["\\-\\-max\\-angle", "Examples", "How much to keep"] {
+        assert!(reduce.contains(word), "{word}: {reduce}");
+    }
+    let pages = fs::read_dir(at.path().join("new/man1")).unwrap().count();
+    assert!(pages >= 11, "{pages} pages");
+}

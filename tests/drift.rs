@@ -1,0 +1,85 @@
+//! Sentences of the documentation that the code can contradict are held against it.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use pointmill::pipeline::Registry;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn page(name: &str) -> String {
+    fs::read_to_string(root().join(name)).unwrap()
+}
+
+/// The kinds of stages, their keys, and the words that these can be given.
+fn vocabulary() -> BTreeSet<String> {
+    let all: serde_json::Value = serde_json::from_str(&page("src/cli/stages.json")).unwrap();
+    let mut words = BTreeSet::new();
+    for described in all.as_array().unwrap() {
+        words.insert(described["kind"].as_str().unwrap().to_owned());
+        for key in described["keys"].as_array().unwrap() {
+            words.insert(key["key"].as_str().unwrap().to_owned());
+            let of_key = key["words"].as_array().unwrap().iter();
+            words.extend(of_key.map(|word| word["word"].as_str().unwrap().to_owned()));
+        }
+    }
+    assert!(words.len() > 50, "{words:?}");
+    words
+}
+
+#[test]
+fn what_the_method_lacks_is_not_there() {
+    /// Words of the vocabulary that mean something else in these lines: a "sliding median" is no
+    /// stage `median`, and "with" is English.
+    const ENGLISH: [&str; 3] = ["median", "normals", "with"];
+    let text = page("docs/paper.md");
+    let section = text.split("## Not there yet").nth(1).unwrap();
+    let lacking: Vec<&str> = section.lines().filter(|line| line.starts_with("- ")).collect();
+    assert!(lacking.len() >= 2, "{section}");
+    let words = vocabulary();
+    for line in lacking {
+        for word in line.split(|c: char| !c.is_alphanumeric() && c != '-' && c != '_') {
+            let exists = words.contains(word) && !ENGLISH.contains(&word);
+            assert!(!exists, "docs/paper.md says that `{word}` is not there: {line}");
+        }
+    }
+}
+
+#[test]
+fn the_files_that_pages_name_exist() {
+    let mut named = 0;
+    for name in ["docs/architecture.md", "docs/paper.md", "CONTRIBUTING.md"] {
+        let text = page(name);
+        for part in text.split('`').skip(1).step_by(2) {
+            let is_source = part.ends_with(".rs") && !part.contains([' ', '*', '{']);
+            let is_folder = part.ends_with('/') && part.starts_with("src/");
+            if !is_source && !is_folder {
+                continue;
+            }
+            // A file alone is named beside the folder that it is in.
+            let places = ["", "src", "tests", "examples", "src/ops", "src/ops/normals"];
+            let found = places.iter().any(|place| root().join(place).join(part).exists());
+            assert!(found, "{name} names {part}, which does not exist");
+            named += 1;
+        }
+    }
+    assert!(named > 30, "{named} files are named");
+}
+
+#[test]
+fn the_tour_names_every_stage_that_works_on_tiles() {
+    let tour = page("src/lib.rs");
+    let line = tour.split("[`ops`]: ").nth(1).unwrap().split("//! -").next().unwrap();
+    let modules = page("docs/architecture.md");
+    let ops = modules.lines().find(|line| line.contains("├── ops ")).unwrap();
+    for (kind, _) in Registry::builtin().kinds() {
+        let ends = ["read", "synth", "write"].contains(&kind);
+        assert_eq!(line.contains(&format!("`{kind}`")), !ends, "src/lib.rs: {kind}");
+        assert_eq!(ops.contains(kind), !ends, "docs/architecture.md: {kind}");
+    }
+}
