@@ -234,6 +234,9 @@ pub struct SinkSummary {
     pub bytes: u64,
     /// Things the user should know (rounding of a conversion, for example).
     pub notes: Vec<String>,
+    /// A file that the records refer to and that is to be beside the output, under its name with
+    /// another extension: where it is, and that extension.
+    pub beside: Option<(PathBuf, &'static str)>,
 }
 
 /// How much a sink encodes at once.

@@ -250,7 +250,7 @@ fn a_name_that_is_no_text_is_told_not_guessed() {
 
 #[test]
 fn info_is_json_with_the_same_keys_for_every_file_of_a_format() {
-    const LAS: [&str; 22] = [
+    const LAS: [&str; 23] = [
         "kind",
         "version",
         "point_format",
@@ -261,6 +261,7 @@ fn info_is_json_with_the_same_keys_for_every_file_of_a_format() {
         "min",
         "max",
         "crs",
+        "units",
         "system_identifier",
         "generating_software",
         "creation_day",

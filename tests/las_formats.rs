@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use las_support::{LAS, LAZ, Random, read_files, write};
 use pointmill::io::las::{LasOptions, fresh, layout};
-use pointmill::point::{Metadata, Scalar, Schema, names};
+use pointmill::point::{GpsTime, Metadata, Scalar, Schema, names};
 
 /// Records as scanners make them (runs, repeats, small steps) among ones of random bytes.
 fn records(schema: &Schema, points: usize, random: &mut Random) -> Vec<u8> {
@@ -170,11 +170,18 @@ fn wkt_is_carried_and_another_crs_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan.las");
     let schema = Arc::new(layout(7, &[], [0.01; 3], [0.0; 3]));
-    for (crs, carried) in [("PROJCS[\"Lambert-93\"]", true), ("EPSG:2154", false)] {
-        let metadata = fresh(&schema, Some(crs));
+    let cases = [
+        ("PROJCS[\"Lambert-93\"]", true, None),
+        ("EPSG:2154", true, Some("asks for WKT")),
+        ("a field of ours", false, Some("not carried")),
+    ];
+    for (crs, carried, told) in cases {
+        let gps_time = Some(GpsTime::Week);
+        let metadata = Metadata { gps_time, ..fresh(&schema, Some(crs)) };
         let summary = write(&path, LAS, &schema, &metadata, &[]).unwrap();
         let about = pointmill::io::las::describe(&path).unwrap();
         assert_eq!(about.crs.is_some(), carried);
-        assert_eq!(summary.notes.is_empty(), carried, "{:?}", summary.notes);
+        assert_eq!(summary.notes.len(), usize::from(told.is_some()), "{:?}", summary.notes);
+        assert!(summary.notes.iter().all(|note| note.contains(told.unwrap())), "{crs}");
     }
 }

@@ -118,7 +118,11 @@ fn comes_back_from_laz(format: u8, extra: bool) {
     let [old, new] = [&made.path, &back].map(|path| std::fs::read(path).unwrap());
     assert_eq!(old.len(), new.len());
     assert!(old[375..] == new[375..], "VLRs, records and EVLRs are the same bytes");
-    assert!(old[..107] == new[..107], "the header up to the counts");
+    assert!(old[..6] == new[..6] && old[8..58] == new[8..58], "the header up to the software");
+    assert!(new[58..90].starts_with(b"pointmill ") && old[90..107] == new[90..107]);
+    // Without a system, point formats 6 to 10 say WKT; the made-up file does not.
+    let bit = if format < 6 { 0 } else { 16 };
+    assert_eq!(new[6..8], [old[6] | bit, old[7]]);
     assert!(old[131..179] == new[131..179] && old[227..247] == new[227..247]);
     assert_eq!(old[247..255], new[247..255], "the count of points");
 }

@@ -134,9 +134,11 @@ fn assert_own(inputs: &[PathBuf], folder: &Path) {
             assert!(n <= known, "{}: a record that its input lacks", output.display());
         }
         let (one, two) = (fs::read(input).unwrap(), fs::read(&output).unwrap());
-        for (from, to) in [(0, 96), (100, 107), (131, 179)] {
+        // But for what made the file, and the record that names the stages.
+        for (from, to) in [(0, 26), (58, 96), (104, 107), (131, 179)] {
             assert_eq!(one[from..to], two[from..to], "header of {}", output.display());
         }
+        assert!(two[26..58].starts_with(b"EXTRACTION\0") && two[100] == one[100] + 1);
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub mod convert;
 mod describe;
+mod epsg;
 pub mod las;
 mod origin;
 pub mod ply;

@@ -1,6 +1,7 @@
 //! The units that a coordinate reference system names, in well-known text (WKT 1: OGC 01-009; WKT 2:
 //! OGC 18-010) or by its EPSG code. Knows no files.
 
+use super::epsg;
 use crate::point::{Horizontal, Units};
 
 /// A text with brackets nested deeper is none of a coordinate reference system.
@@ -8,61 +9,77 @@ const DEEPEST: usize = 64;
 /// Brackets that are looked into; a system has some hundreds.
 const MOST_NODES: usize = 20_000;
 
-/// The units of the system that `text` is: WKT, or `EPSG:code` with a vertical code behind `+`.
-/// Nothing is said for a text that is neither.
+/// The units of the system that `text` is: WKT, or `EPSG:code` with a vertical code behind `+`. Of
+/// another text, nothing is known.
 pub fn units(text: &str) -> Units {
-    let text = text.trim();
-    match text.strip_prefix("EPSG:") {
-        Some(codes) => {
-            let mut codes = codes.splitn(2, '+').map(|code| code.trim().parse::<u32>().ok());
-            let horizontal = codes.next().flatten().and_then(epsg_horizontal);
-            let vertical = codes.next().flatten().and_then(epsg_vertical);
-            Units { horizontal, vertical }
+    let unknown = Units { horizontal_unknown: true, ..Units::default() };
+    match codes_of(text) {
+        Some((across, up)) => {
+            let across = across.map_or(unknown, epsg::horizontal);
+            up.map_or(across, |up| across.or(of_vertical(up.and_then(epsg::vertical))))
         }
-        None => parse(text).map_or(Units::default(), |node| of_system(&node)),
+        None => parse(text).map_or(unknown, |trees| of_parts(parts(&trees))),
     }
 }
 
-/// Degrees for the geographic systems that scans come in. Codes of projected systems say nothing
-/// here: their files give the unit.
-fn epsg_horizontal(code: u32) -> Option<Horizontal> {
-    const GEOGRAPHIC: [u32; 30] = [
-        4148, 4152, 4167, 4171, 4230, 4258, 4267, 4269, 4277, 4283, 4289, 4312, 4313, 4314, 4326,
-        4490, 4612, 4617, 4674, 4759, 4937, 4965, 4979, 6318, 6319, 6668, 6706, 7844, 9057, 9755,
-    ];
-    GEOGRAPHIC.contains(&code).then_some(Horizontal::Degrees)
+/// The codes in `EPSG:code+code`, none for one that is no number; the second may be absent.
+fn codes_of(text: &str) -> Option<(Option<u32>, Option<Option<u32>>)> {
+    let codes = text.trim().strip_prefix("EPSG:")?;
+    let number = |code: &str| code.trim().parse::<u32>().ok();
+    Some(match codes.split_once('+') {
+        Some((across, up)) => (number(across), Some(number(up))),
+        None => (number(codes), None),
+    })
 }
 
-/// Metres in a unit of the vertical systems that scans come in.
-pub fn epsg_vertical(code: u32) -> Option<f64> {
-    match code {
-        // EGM2008, ODN, AHD, NAVD88, NAP, EGM96, IGN69, EGM84, Baltic 1977, LN02, DHHN92, CGVD28, EVRF2007,
-        // CGVD2013, JGD2011, NZVD2016, DHHN2016, CGVD2013a, EVRF2019
-        3855 | 5701 | 5703 | 5705 | 5709 | 5711 | 5713 | 5720 | 5728 | 5773 | 5783 | 5798
-        | 5621 | 6647 | 6695 | 7837 | 7839 | 9245 | 9389 => Some(1.0),
-        // NGVD29 and NAVD88 in US survey feet.
-        5702 | 6360 => Some(SURVEY_FOOT),
-        // NAVD88 in feet.
-        8228 => Some(FOOT),
-        _ => None,
+/// The system that `text` is by its EPSG codes: that of x and y, and that of z where there is one.
+/// None where one of them has no code.
+pub fn codes(text: &str) -> Option<(u32, Option<u32>)> {
+    match codes_of(text) {
+        Some((across, None)) => Some((across?, None)),
+        Some((across, Some(up))) => Some((across?, Some(up?))),
+        None => codes_of_parts(&parse(text)?),
     }
 }
 
-/// Metres in an international foot.
-const FOOT: f64 = 0.3048;
-/// Metres in a US survey foot.
-const SURVEY_FOOT: f64 = 1200.0 / 3937.0;
-
-/// Metres in the EPSG unit of length `code`, for those of surveys.
-pub fn epsg_unit(code: u16) -> Option<f64> {
-    match code {
-        9001 => Some(1.0),
-        9002 => Some(FOOT),
-        9003 => Some(SURVEY_FOOT),
-        9005 => Some(0.304_797_265_4), // Clarke's foot
-        9036 => Some(1000.0),
-        _ => None,
+fn codes_of_parts(trees: &[Node]) -> Option<(u32, Option<u32>)> {
+    let (mut across, mut up) = (None, None);
+    for part in parts(trees) {
+        let code = part.epsg()?;
+        let place = if part.is(&VERTICAL) { &mut up } else { &mut across };
+        if place.replace(code).is_some() {
+            return None;
+        }
     }
+    Some((across?, up))
+}
+
+/// The single systems of `trees`: those of compounds for each.
+fn parts(trees: &[Node]) -> Vec<&Node> {
+    let mut all = Vec::new();
+    for tree in trees {
+        match tree.is(&COMPOUND) {
+            // Beside the parts there are identifiers and remarks.
+            true => all.extend(tree.inner.iter().filter(|node| SYSTEMS.iter().any(|w| node.is(w)))),
+            false => all.push(tree),
+        }
+    }
+    all
+}
+
+/// True if both texts are WKT of one wording: spaces, the case of keywords, and how numbers are
+/// written aside.
+pub fn alike(one: &str, two: &str) -> bool {
+    let (Some(one), Some(two)) = (parse(one), parse(two)) else { return false };
+    one.len() == two.len() && one.iter().zip(&two).all(|(one, two)| one.is_like(two))
+}
+
+/// True if `text` begins like WKT 1 or 2.
+pub fn is_wkt(text: &str) -> bool {
+    let word = text.trim_start().split(['[', '(']).next().unwrap_or_default();
+    let named = Node { word: word.trim_end().to_owned(), ..Node::default() };
+    let is_system = named.is(&COMPOUND) || SYSTEMS.iter().any(|words| named.is(words));
+    is_system && word.len() < text.trim_start().len()
 }
 
 /// `WORD["text", number, WORD[…], …]`.
@@ -82,11 +99,31 @@ impl Node {
     fn find(&self, words: &[&str]) -> Option<&Node> {
         self.inner.iter().find(|node| node.is(words))
     }
+
+    /// Its own EPSG code.
+    fn epsg(&self) -> Option<u32> {
+        let [authority, code, ..] = &self.find(&["AUTHORITY", "ID"])?.values[..] else {
+            return None;
+        };
+        if authority.eq_ignore_ascii_case("EPSG") { code.parse().ok() } else { None }
+    }
+
+    fn is_like(&self, other: &Node) -> bool {
+        let number = |text: &str| text.parse::<f64>().ok();
+        let same = |(one, two): (&String, &String)| {
+            one == two || number(one).is_some_and(|one| number(two) == Some(one))
+        };
+        self.is(&[&other.word])
+            && (self.values.len(), self.inner.len()) == (other.values.len(), other.inner.len())
+            && self.values.iter().zip(&other.values).all(same)
+            && self.inner.iter().zip(&other.inner).all(|(one, two)| one.is_like(two))
+    }
 }
 
-/// The outermost node of `text`; None if its brackets do not match.
-fn parse(text: &str) -> Option<Node> {
-    let mut open: Vec<Node> = Vec::new();
+/// The outermost nodes of `text`, mostly one: some writers put the system of z behind that of x and
+/// y. None if a bracket is left open, or there is something outside of them.
+fn parse(text: &str) -> Option<Vec<Node>> {
+    let (mut trees, mut open) = (Vec::new(), Vec::<Node>::new());
     let mut word = String::new();
     let mut nodes = 0;
     let mut letters = text.chars().peekable();
@@ -100,6 +137,8 @@ fn parse(text: &str) -> Option<Node> {
                 let word = std::mem::take(&mut word);
                 open.push(Node { word: word.trim().to_owned(), ..Node::default() });
             }
+            // Some writers close a compound before its second part, and once more behind it.
+            ',' | ']' | ')' if open.is_empty() && word.trim().is_empty() => word.clear(),
             ']' | ')' | ',' => {
                 let node = open.last_mut()?;
                 let value = std::mem::take(&mut word);
@@ -110,7 +149,7 @@ fn parse(text: &str) -> Option<Node> {
                     let done = open.pop()?;
                     match open.last_mut() {
                         Some(outer) => outer.inner.push(done),
-                        None => return Some(done),
+                        None => trees.push(done),
                     }
                 }
             }
@@ -126,51 +165,75 @@ fn parse(text: &str) -> Option<Node> {
             _ => word.push(letter),
         }
     }
-    None
+    (open.is_empty() && word.trim().is_empty() && !trees.is_empty()).then_some(trees)
 }
 
+const COMPOUND: [&str; 2] = ["COMPD_CS", "COMPOUNDCRS"];
 const VERTICAL: [&str; 4] = ["VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS"];
 const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
 const GEODETIC: [&str; 5] = ["GEOGCS", "GEOGCRS", "GEOGRAPHICCRS", "GEODCRS", "GEODETICCRS"];
 const LOCAL: [&str; 4] = ["GEOCCS", "LOCAL_CS", "ENGCRS", "ENGINEERINGCRS"];
+const BOUND: [&str; 1] = ["BOUNDCRS"];
+/// All that are no compounds.
+const SYSTEMS: [&[&str]; 5] = [&VERTICAL, &PROJECTED, &GEODETIC, &LOCAL, &BOUND];
 const LENGTH: [&str; 2] = ["LENGTHUNIT", "UNIT"];
+
+/// The units of a system that is given in parts: what the first says that says something.
+fn of_parts<'a>(parts: impl IntoIterator<Item = &'a Node>) -> Units {
+    parts.into_iter().map(of_system).fold(Units::default(), Units::or)
+}
+
+fn of_vertical(metres: Option<f64>) -> Units {
+    Units { vertical: metres, vertical_unknown: metres.is_none(), ..Units::default() }
+}
 
 /// The units of the system that `node` is.
 fn of_system(node: &Node) -> Units {
-    if node.is(&["BOUNDCRS"]) {
-        let source = node.find(&["SOURCECRS"]).and_then(|source| source.inner.first());
-        return source.map_or(Units::default(), of_system);
-    }
-    if node.is(&["COMPD_CS", "COMPOUNDCRS"]) {
-        let parts = node.inner.iter().map(of_system);
-        return parts.fold(Units::default(), |all, part| Units {
-            horizontal: all.horizontal.or(part.horizontal),
-            vertical: all.vertical.or(part.vertical),
-        });
+    if node.is(&BOUND) {
+        let source = node.find(&["SOURCECRS"]).map_or(&[][..], |source| &source.inner);
+        return of_parts(parts(source));
     }
     if node.is(&VERTICAL) {
-        return Units { horizontal: None, vertical: metres(node) };
+        return of_vertical(match unit(node) {
+            Some(unit) => factor(unit),
+            None => node.epsg().and_then(epsg::vertical),
+        });
     }
+    let system = of_horizontal(node);
     // Some writers put the vertical system inside the projected one.
-    let vertical = node.find(&VERTICAL).and_then(metres).or_else(|| third_axis(node));
-    let geocentric = node
-        .find(&["CS"])
-        .and_then(|cs| cs.values.first())
-        .is_some_and(|kind| kind.eq_ignore_ascii_case("Cartesian"));
-    let horizontal = if node.is(&GEODETIC) && !geocentric {
-        Some(Horizontal::Degrees)
-    } else if node.is(&PROJECTED) || node.is(&GEODETIC) || node.is(&LOCAL) {
-        metres(node).map(Horizontal::Metres)
-    } else {
-        None
-    };
-    Units { horizontal, vertical }
+    let inside = node.find(&VERTICAL).map(of_system).unwrap_or_default();
+    let third = Units { vertical: third_axis(node), ..Units::default() };
+    inside.or(third).or(system)
 }
 
-/// Metres in the unit of length of `node`, or of its first axis.
-fn metres(node: &Node) -> Option<f64> {
-    let unit = node.find(&LENGTH).or_else(|| node.find(&["AXIS"]).and_then(|a| a.find(&LENGTH)))?;
-    factor(unit)
+/// The units of a system of x and y as it says them; where it says none, as its code does.
+fn of_horizontal(node: &Node) -> Units {
+    let unknown = Units { horizontal_unknown: true, ..Units::default() };
+    let of = |horizontal| Units { horizontal: Some(horizontal), ..Units::default() };
+    let cartesian = node.find(&["CS"]).and_then(|cs| cs.values.first());
+    let cartesian = cartesian.is_some_and(|kind| kind.eq_ignore_ascii_case("Cartesian"));
+    if node.is(&GEODETIC) && !cartesian {
+        return of(Horizontal::Degrees);
+    }
+    if ![&PROJECTED[..], &GEODETIC, &LOCAL].iter().any(|words| node.is(words)) {
+        return unknown;
+    }
+    let across = match unit(node) {
+        Some(unit) => factor(unit).map_or(unknown, |metres| of(Horizontal::Metres(metres))),
+        None => epsg::horizontal(node.epsg().unwrap_or(0)),
+    };
+    match across.horizontal {
+        // Three axes in one unit.
+        Some(Horizontal::Metres(metres)) if node.is(&GEODETIC) || node.is(&["GEOCCS"]) => {
+            Units { vertical: Some(metres), ..across }
+        }
+        _ => across,
+    }
+}
+
+/// The unit of length of `node`, or of its first axis.
+fn unit(node: &Node) -> Option<&Node> {
+    node.find(&LENGTH).or_else(|| node.find(&["AXIS"]).and_then(|axis| axis.find(&LENGTH)))
 }
 
 /// Metres in the unit of the third of three axes, where each has its own.
@@ -197,7 +260,12 @@ mod tests {
                        UNIT[\"metre\",1,AUTHORITY[\"EPSG\",\"9001\"]],AXIS[\"Easting\",EAST]]";
 
     fn of(horizontal: Option<Horizontal>, vertical: Option<f64>) -> Units {
-        Units { horizontal, vertical }
+        Units { horizontal, vertical, ..Units::default() }
+    }
+
+    /// Nothing known of a system that is there.
+    fn unknown() -> Units {
+        Units { horizontal_unknown: true, ..Units::default() }
     }
 
     #[test]
@@ -208,7 +276,7 @@ mod tests {
         assert_eq!(units(wkt2), of(Some(Horizontal::Metres(1.0)), None));
         let by_axis = "PROJCRS[\"a\",CS[Cartesian,2],AXIS[\"e\",east,LENGTHUNIT[\"foot\",0.3048]],\
                        AXIS[\"n\",north,LENGTHUNIT[\"foot\",0.3048]]]";
-        assert_eq!(units(by_axis), of(Some(Horizontal::Metres(FOOT)), None));
+        assert_eq!(units(by_axis), of(Some(Horizontal::Metres(0.3048)), None));
     }
 
     #[test]
@@ -236,37 +304,83 @@ mod tests {
             "GEOCCS[\"x\",UNIT[\"metre\",1]]",
             "GEODCRS[\"x\",CS[Cartesian,3],AXIS[\"X\",geocentricX],LENGTHUNIT[\"metre\",1]]",
         ] {
-            assert_eq!(units(text), of(Some(Horizontal::Metres(1.0)), None), "{text}");
+            assert_eq!(units(text), of(Some(Horizontal::Metres(1.0)), Some(1.0)), "{text}");
         }
         let bound = format!("BOUNDCRS[SOURCECRS[{UTM}],TARGETCRS[GEOGCRS[\"x\"]]]");
         assert_eq!(units(&bound), of(Some(Horizontal::Metres(1.0)), None));
     }
 
     #[test]
-    fn a_foot_of_one_metre_says_nothing() {
+    fn a_foot_of_one_metre_is_no_known_unit() {
         let text = UTM
             .replace("AXIS[\"Easting\",EAST]", "VERTCS[\"NAVD88\",UNIT[\"US survey foot\",1.0]]");
-        assert_eq!(units(&text), of(Some(Horizontal::Metres(1.0)), None));
+        let metres = of(Some(Horizontal::Metres(1.0)), None);
+        assert_eq!(units(&text), Units { vertical_unknown: true, ..metres });
+    }
+
+    #[test]
+    fn a_vertical_system_behind_the_projected_one_counts() {
+        for between in [",", "", "\n, "] {
+            let text =
+                format!("{UTM}{between}VERTCS[\"NAVD_1988\",UNIT[\"Foot_US\",0.3048006096]]");
+            assert_eq!(units(&text), of(Some(Horizontal::Metres(1.0)), Some(0.3048006096)));
+        }
+        assert_eq!(units(&format!("{UTM},VERTCS[")), unknown(), "cut short");
+        let early = format!("COMPD_CS[\"x\",{UTM}],VERT_CS[\"NAVD88\",UNIT[\"metres\",1.0]]]");
+        assert_eq!(units(&early), of(Some(Horizontal::Metres(1.0)), Some(1.0)));
+    }
+
+    #[test]
+    fn what_gives_no_unit_has_that_of_its_code() {
+        let text = "COMPD_CS[\"x\",PROJCS[\"Texas\",AUTHORITY[\"EPSG\",\"2277\"]],\
+                    VERT_CS[\"NAVD88\",AUTHORITY[\"EPSG\",\"5703\"]],AUTHORITY[\"EPSG\",\"9999\"]]";
+        assert_eq!(units(text), of(Some(Horizontal::Metres(1200.0 / 3937.0)), Some(1.0)));
+        assert_eq!(codes(text), Some((2277, Some(5703))));
+        let other = text.replace("5703", "5103");
+        assert!(units(&other).vertical_unknown);
+        let nonsense = text.replace("NAVD88\",", "NAVD88\",UNIT[\"US survey foot\",1.0],");
+        assert!(units(&nonsense).vertical_unknown, "which of the two is wrong, nobody knows");
     }
 
     #[test]
     fn codes_say_what_is_known_of_them() {
+        let metres = Some(Horizontal::Metres(1.0));
         assert_eq!(units("EPSG:4326"), of(Some(Horizontal::Degrees), None));
-        assert_eq!(units("EPSG:26910+6360"), of(None, Some(SURVEY_FOOT)));
-        assert_eq!(units("EPSG:none"), Units::default());
+        assert_eq!(units("EPSG:26910+6360"), of(metres, Some(1200.0 / 3937.0)));
+        assert_eq!(units("EPSG:25832"), of(metres, None));
+        let height = Units { vertical_unknown: true, ..of(metres, None) };
+        assert_eq!((units("EPSG:25832+5103"), units("EPSG:25832+x")), (height, height));
+        assert_eq!(units("EPSG:none"), unknown());
+        assert_eq!(
+            (codes("EPSG:1+2"), codes("EPSG:x"), codes(UTM)),
+            (Some((1, Some(2))), None, None)
+        );
     }
 
     #[test]
-    fn nonsense_says_nothing() {
+    fn wording_is_more_than_spaces_and_case() {
+        let other = UTM.replace("UNIT[\"metre\",1,", "Unit [ \"metre\" , 1.0,\n ");
+        assert!(alike(UTM, &other) && !alike(UTM, &UTM.replace("metre", "meter")));
+        assert!(!alike(UTM, &format!("{UTM},VERTCS[\"x\"]")) && !alike("", ""));
+    }
+
+    #[test]
+    fn wkt_is_told_from_other_text() {
+        assert!(is_wkt("PROJCS[\"x\"]") && is_wkt(" compoundcrs [\"x\"]"));
+        assert!(!is_wkt("EPSG:2154") && !is_wkt("PROJCS") && !is_wkt(" PROJCS "));
+    }
+
+    #[test]
+    fn of_nonsense_nothing_is_known() {
         let deep = "A[".repeat(1_000_000);
         let wide = format!("A[{}]", "B[1],".repeat(1_000_000));
         for text in
             ["", "PROJCS", "PROJCS[", "]]]]", "PROJCS[\"", "a,b", "UNIT[\"m\",1]", &deep, &wide]
         {
-            assert_eq!(units(text), Units::default());
+            assert_eq!(units(text), unknown());
         }
         let negative = UTM.replace("\"metre\",1", "\"metre\",-1");
-        assert_eq!(units(&negative), Units::default());
-        assert_eq!(units(&UTM.replace("\"metre\",1", "\"metre\",nan")), Units::default());
+        assert_eq!(units(&negative), unknown());
+        assert_eq!(units(&UTM.replace("\"metre\",1", "\"metre\",nan")), unknown());
     }
 }

@@ -227,7 +227,11 @@ impl Output {
         let mut projection = convert::Projection::new(schema, &layout, &self.write.drop)?;
         number_returns(schema, &layout, &self.write.drop, &mut projection)?;
         let projection = Some(projection);
-        let metadata = las::fresh(&layout, metadata.crs.as_deref());
+        let metadata = Metadata {
+            gps_time: metadata.gps_time,
+            pipeline: metadata.pipeline.clone(),
+            ..las::fresh(&layout, metadata.crs.as_deref())
+        };
         Ok(Target { schema: layout, metadata, projection })
     }
 }

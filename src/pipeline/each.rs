@@ -203,7 +203,8 @@ impl Each<'_> {
         let create = self.sinks.get(input).ok_or_else(missing)?;
         let staged = self.staged.get(input).ok_or_else(missing)?;
         let rank = *self.ranks.get(input).ok_or_else(missing)? as usize;
-        let metadata: Metadata = job.source.metadata_of(input)?;
+        let pipeline = Some(job.pipeline.clone());
+        let metadata = Metadata { pipeline, ..job.source.metadata_of(input)? };
         let mut sink = create.create(staged.file(), job.source.schema(), &metadata, false)?;
         let benches = Benches::of_one(job, tiles, sink.encoder(), counted, sink.chunk_points());
         let mut open = Open::new(0, sink.chunk_points(), records.wants_normals, false);

@@ -1,7 +1,7 @@
 //! What every phase of a run shares: the source, the stages, the budget, and how it is told to stop.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use super::Watch;
 use super::each::Each;
@@ -20,6 +20,8 @@ use crate::{Error, ErrorKind, Result};
 pub(super) struct Job<'a> {
     pub source: &'a dyn Source,
     pub source_kind: String,
+    /// The stages as outputs name them.
+    pub pipeline: Arc<str>,
     pub transforms: Vec<(String, Box<dyn Transform>)>,
     pub ops: Vec<StageOp>,
     pub passes: Vec<Pass>,

@@ -54,8 +54,9 @@ impl Format {
 /// Headers are read, compared and held against the files' lengths before any point is. Files that
 /// do not fit together are refused by name: LAS inputs agree in point format, record length, extra
 /// bytes, scales, GPS time type and coordinate reference system, PLY inputs in encoding, vertex
-/// properties and coordinate reference system. LAS offsets may differ by whole steps; the output has
-/// the smallest.
+/// properties, GPS time type and coordinate reference system. LAS systems agree if they mean the same:
+/// in WKT of one wording, spaces and zeros aside, or by equal EPSG codes; the output has the WKT. LAS
+/// offsets may differ by whole steps; the output has the smallest.
 ///
 /// A number of a PLY text is held in the type that its header says, but coordinates and GPS times are
 /// held as `double` where one of them has more digits than the `float` of its header has room for: a
@@ -127,10 +128,9 @@ impl StageKind for Synth {
 /// The end of every pipeline. The file grows in a scratch folder beside its place and appears under
 /// its name when it is complete; it never replaces an input.
 ///
-/// A record that is kept is the input's, byte for byte, wherever the format can hold it; LAS header
-/// fields that depend on the points are computed again and all others carried. From LAS to PLY or
-/// back every field keeps its name; one that cannot be held is an error unless `drop` names it. A
-/// point of which a PLY file tells no returns is return 1 of 1 in LAS. Variable length records that
+/// A record that is kept is the input's, byte for byte, wherever the format can hold it. From LAS to
+/// PLY or back every field keeps its name; one that cannot be held is an error unless `drop` names it.
+/// A point of which a PLY file tells no returns is return 1 of 1 in LAS. Variable length records that
 /// PLY does not hold are named in a warning.
 ///
 /// Colours keep their meaning: 255 of 8 bits in PLY is 65535 in LAS. From LAS to PLY they become
@@ -138,6 +138,16 @@ impl StageKind for Synth {
 /// as writers leave them that do not scale. Else they stay `ushort`, which many viewers do not read;
 /// a warning says so, and `colors` can ask for either. The type depends on all colours of the output,
 /// and on nothing else. From LAS to LAS and from PLY to PLY colours are not touched.
+///
+/// LAS header fields that depend on the points are computed again. The generating software is
+/// pointmill and its version. Where records went through stages, the system identifier is
+/// `EXTRACTION`, a variable length record (`pointmill`, 1) names the stages as JSON in the place of
+/// what an earlier run said, and the ranges of extra bytes, which were those of all points, are left
+/// out; where only `scale` or `offset` moved them, the identifier is `TRANSFORMATION`. All else is
+/// carried, and what is wrong in it mended with a warning: the bit that says that the system is WKT,
+/// and descriptors of extra bytes that the records do not have or that stand in several variable
+/// length records. Waveforms in a `.wdp` file are copied beside the output, under its name. From PLY,
+/// EPSG codes become GeoTIFF keys. No date but those of the inputs is written.
 ///
 /// With `path` all inputs become one file. With `folder` each input becomes a file of its own there:
 /// under its name, with its header, its records and its offset, holding those of its points that are

@@ -1,5 +1,6 @@
 //! From a pipeline file to a finished run: parse, plan, run.
 
+mod beside;
 mod builtin;
 mod chunks;
 mod clock;
@@ -36,6 +37,7 @@ mod settings;
 mod shares;
 mod shown;
 mod stream;
+mod stretch;
 mod survey;
 mod tagger;
 mod text;
@@ -57,5 +59,6 @@ pub use settings::{
     Existing, MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill, Treatment, ZScale,
     parse_bytes,
 };
+pub use stretch::Stretch;
 pub use text::{Pipeline, PlacedStage};
 pub use watch::{Quiet, Watch};

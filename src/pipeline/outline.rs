@@ -25,8 +25,8 @@ pub struct Outline {
 
 impl Plan {
     /// What the user should know before the plan is run. A run tells it too.
-    pub fn warnings(&self) -> &[String] {
-        &self.warnings
+    pub fn warnings(&self) -> Vec<String> {
+        self.source.warnings().into_iter().chain(self.warnings.clone()).collect()
     }
 
     /// What the plan reads, writes and uses.

@@ -9,6 +9,7 @@ use super::passes::{Op, Pass, StageOp, Tap, check_limits, number_selections, unr
 use super::publish::check_place;
 use super::settings::{Nonfinite, Overrides, RunSettings};
 use super::shares::Demands;
+use super::stretch::Stretch;
 use super::tagger::Tagger;
 use super::text::{Pipeline, PlacedStage};
 use crate::budget::default_limit;
@@ -98,7 +99,7 @@ impl Pipeline {
             tagger.treat(schema, &settings);
         }
         let mills = mills(&sorted.ops, &sinks)?;
-        let z_scale = z_scale(&settings, &*source, &sorted.ops)?;
+        let Stretch { factor: z_scale, doubt } = stretch(&settings, &*source, &sorted.ops)?;
         let lattice = match mills || settings.nonfinite == Nonfinite::Drop {
             true => Some(Lattice::stretched(schema, settings.lattice, z_scale)?),
             false => None,
@@ -121,7 +122,8 @@ impl Pipeline {
             ..Demands::of(&*source, &chunks, limit, threads)
         };
         demands.divide()?;
-        let warnings = warnings(&*source, &sinks, removes, &settings)?;
+        let mut warnings = warnings(&*source, &sinks, removes, &settings)?;
+        warnings.extend(doubt);
         Ok(Plan {
             warnings,
             settings,
@@ -298,15 +300,19 @@ fn chunks(sinks: &[Box<dyn CreateSink>], source: &dyn Source) -> Result<Vec<Chun
 }
 
 /// What z is multiplied by where stages measure distances; else 1.
-fn z_scale(settings: &RunSettings, source: &dyn Source, ops: &[StageOp]) -> Result<f64> {
+fn stretch(settings: &RunSettings, source: &dyn Source, ops: &[StageOp]) -> Result<Stretch> {
     if ops.is_empty() {
-        return Ok(1.0);
+        return Ok(Stretch { factor: 1.0, doubt: None });
     }
-    let stretch = settings.stretch(source.metadata().units);
-    stretch.map_err(|error| match source.inputs().first() {
-        Some(input) => error.at(&input.path),
-        None => error,
-    })
+    let first = source.inputs().into_iter().next();
+    match (settings.stretch(source.metadata().units), first) {
+        (Err(error), Some(input)) => Err(error.at(&input.path)),
+        (Ok(Stretch { factor, doubt }), Some(input)) => {
+            let doubt = doubt.map(|doubt| format!("{}: {doubt}", input.path.display()));
+            Ok(Stretch { factor, doubt })
+        }
+        (stretch, None) => stretch,
+    }
 }
 
 /// True if the run needs tiles: for its stages, or because an output is to be in canonical order.

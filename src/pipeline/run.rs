@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
+use super::beside::beside;
 use super::clock::Clock;
 use super::each::Each;
 use super::job::Job;
@@ -20,7 +21,7 @@ use super::stream::stream;
 use super::survey::{Lines, Measured};
 use super::tagger::ClassOf;
 use crate::budget::{Budget, Bytes};
-use crate::point::names;
+use crate::point::{Metadata, names};
 use crate::report::{
     ClassFigures, Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome,
     PassFigures, Removed, Report, RunFigures, Tally, check_written, peak_memory,
@@ -80,12 +81,15 @@ impl Plan {
             self.settings.report.as_deref().map(|path| first.also(path, trouble)).transpose()?;
         let tell = |error| outputs.iter().flatten().fold(error, |error, output| output.tell(error));
         let (finished, run) = self.work(&outputs, &mut clock, watch, trouble).map_err(tell)?;
+        let beside = beside(self.written(&finished), first, trouble)?;
         let (report, tiles) = self.account(finished, run, clock)?;
         if let Some(staged) = &staged_report {
             write_report(staged.file(), &report, &tiles).map_err(|error| staged.tell(error))?;
         }
         drop(tiles);
-        let outputs: Vec<Staged> = outputs.into_iter().flatten().collect();
+        // What an output refers to comes first, so that none refers to what is not there.
+        let outputs: Vec<Staged> =
+            beside.into_iter().chain(outputs.into_iter().flatten()).collect();
         publish(&outputs, staged_report.as_ref())?;
         Ok(Done { report, report_path: self.settings.report })
     }
@@ -126,15 +130,17 @@ impl Plan {
         watch: &dyn Watch,
         trouble: &Trouble,
     ) -> Result<(Finished, RunFigures)> {
-        let (schema, metadata) = (self.source.schema(), self.source.metadata());
+        let schema = self.source.schema();
         let whole = !self.mills
             && self.transforms.is_empty()
             && self.settings.nonfinite == Nonfinite::Refuse;
+        let pipeline = (!whole).then(|| self.pipeline());
+        let metadata = Metadata { pipeline, ..self.source.metadata().clone() };
         let mut sinks = Vec::new();
         for (sink, staged) in self.sinks.iter().zip(outputs) {
             // The outputs of the inputs are created one by one, when their records are known.
             let file = staged.first().filter(|_| !sink.is_folder());
-            let open = file.map(|file| sink.create(file.file(), schema, metadata, whole));
+            let open = file.map(|file| sink.create(file.file(), schema, &metadata, whole));
             sinks.push(open.transpose()?);
         }
         let shares = self.demands.divide()?;
@@ -175,6 +181,11 @@ impl Plan {
         Ok((finished, run))
     }
 
+    /// The stages as outputs name them.
+    fn pipeline(&self) -> Arc<str> {
+        self.stages.to_string().into()
+    }
+
     /// The dimensions that nobody looks at while points stream: no sink, and neither the counts of
     /// classes. What a transform looks at is not known for sure.
     fn unread(&self, job: &Job<'_>) -> Vec<String> {
@@ -203,6 +214,7 @@ impl Plan {
         Job {
             source: &*self.source,
             source_kind: self.source_kind.clone(),
+            pipeline: self.pipeline(),
             transforms: Vec::new(),
             ops: Vec::new(),
             passes: Vec::new(),

@@ -6,8 +6,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Deserializer, de};
 
 use crate::geom::simd::{self, Level};
-use crate::point::{Mismatch, Units};
-use crate::{Error, ErrorKind, Result};
+use crate::{Error, Result};
 
 /// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`,
 /// `withheld` and `noise` changes what is computed. All are optional; arguments of the same name take their
@@ -33,7 +32,9 @@ pub struct RunSettings {
     #[serde(deserialize_with = "some_step")]
     pub lattice: Option<f64>,
     /// What z is multiplied by wherever distances are measured, so that its unit is that of x and y;
-    /// the records keep their z. None: 1, where the units match or nothing is known of them.
+    /// the records keep their z. None: 1, where the units match or are not known; of units that give
+    /// reason for doubt (feet below heights of no unit, a reference system of no known unit) a run
+    /// warns, and of a scan without a reference system, or in metres without one for z, it does not.
     pub z_scale: Option<ZScale>,
     /// What becomes of scans whose x, y and z have different units, where stages measure distances.
     pub units: MixedUnits,
@@ -91,7 +92,7 @@ pub enum MixedUnits {
 /// What z is multiplied by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ZScale {
-    /// What the units in the coordinate reference system ask for.
+    /// What the units in the coordinate reference system ask for; refused where it does not tell both.
     Auto,
     /// This number, above 0.
     Factor(f64),
@@ -179,38 +180,6 @@ impl RunSettings {
             scratch: over.scratch.or(self.scratch),
             report: over.report.or(self.report),
             ..self
-        }
-    }
-}
-
-impl RunSettings {
-    /// What z is multiplied by on the lattice of a scan in `units`.
-    ///
-    /// # Errors
-    ///
-    /// Units that do not match and that neither a factor nor an override answers, and `auto` where
-    /// no factor makes them match.
-    pub fn stretch(&self, units: Units) -> crate::Result<f64> {
-        let mismatch = match (self.z_scale, self.units) {
-            (Some(ZScale::Factor(factor)), _) => return Ok(factor),
-            (None, MixedUnits::Ignore) => return Ok(1.0),
-            _ => units.mismatch(),
-        };
-        let auto = self.z_scale == Some(ZScale::Auto);
-        match mismatch {
-            None => Ok(1.0),
-            Some(Mismatch { z_scale: Some(factor), .. }) if auto => Ok(factor),
-            Some(Mismatch { message, z_scale: Some(factor) }) => {
-                Err(Error::new(ErrorKind::Data, message).help(format!(
-                    "give `run.z_scale = \"auto\"`, which measures with z times {factor}, or \
-                     `run.z_scale = 1` if the reference system is wrong; records keep their z"
-                )))
-            }
-            Some(Mismatch { message, z_scale: None }) => Err(Error::new(ErrorKind::Data, message)
-                .help(
-                    "project the scan to metres first, or give `run.z_scale` (1 if the reference \
-                     system is wrong)",
-                )),
         }
     }
 }
@@ -338,7 +307,6 @@ fn some_step<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::point::Horizontal;
 
     #[test]
     fn sizes_have_binary_and_decimal_units() {
@@ -370,26 +338,5 @@ mod tests {
         }
         assert!(parse_bytes("99999999TiB").unwrap_err().ends_with("too large"));
         assert!(parse_bytes("18446744073709551616").is_err());
-    }
-
-    #[test]
-    fn units_that_differ_need_a_factor_or_an_override() {
-        let feet = Units { horizontal: Some(Horizontal::Metres(1.0)), vertical: Some(0.3048) };
-        let degrees = Units { horizontal: Some(Horizontal::Degrees), vertical: None };
-        let with = |z_scale, units| RunSettings { z_scale, units, ..RunSettings::default() };
-        let (refuse, ignore) = (MixedUnits::Refuse, MixedUnits::Ignore);
-        let none = with(None, refuse);
-        assert_eq!(none.stretch(Units::default()).unwrap(), 1.0);
-        let told = none.stretch(feet).unwrap_err();
-        assert!(told.remedy().unwrap().contains("times 0.3048"), "{told:?}");
-        assert!(none.stretch(degrees).unwrap_err().remedy().unwrap().contains("project"));
-        let auto = with(Some(ZScale::Auto), refuse);
-        assert_eq!(auto.stretch(feet).unwrap(), 0.3048);
-        assert_eq!(auto.stretch(Units::default()).unwrap(), 1.0);
-        assert!(auto.stretch(degrees).is_err());
-        for units in [feet, degrees] {
-            assert_eq!(with(None, ignore).stretch(units).unwrap(), 1.0);
-            assert_eq!(with(Some(ZScale::Factor(2.0)), refuse).stretch(units).unwrap(), 2.0);
-        }
     }
 }

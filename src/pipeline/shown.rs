@@ -23,6 +23,9 @@ impl fmt::Display for Plan {
             true => self.sinks.iter().try_for_each(|sink| sink_line(f, sink.path()))?,
             false => self.passes_shown(f)?,
         }
+        if !self.ops.is_empty() {
+            self.units_shown(f)?;
+        }
         match &self.lattice {
             Some(lattice) => {
                 write!(f, "lattice  step {} world units", lattice.step)?;
@@ -44,6 +47,17 @@ fn sink_line(f: &mut fmt::Formatter<'_>, path: &std::path::Path) -> fmt::Result 
 }
 
 impl Plan {
+    fn units_shown(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let units = self.source.metadata().units;
+        write!(f, "units    {}", units.words())?;
+        match units.vertical {
+            None if units.mismatch().is_none() => {
+                writeln!(f, ": z is taken to be in that of x and y")
+            }
+            _ => writeln!(f),
+        }
+    }
+
     fn passes_shown(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (n, pass) in self.passes.iter().enumerate() {
             let sinks = |f: &mut fmt::Formatter<'_>, which: &[usize]| {

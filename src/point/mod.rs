@@ -12,7 +12,7 @@ mod units;
 pub use batch::PointBatch;
 pub use bounds::{Bounds, Position, distance2};
 pub use count::parse_count;
-pub use schema::{Bits, Dimension, Endian, Layout, Metadata, Scalar, Schema, Value};
+pub use schema::{Bits, Dimension, Endian, GpsTime, Layout, Metadata, Scalar, Schema, Value};
 pub use selection::{Chooser, Edit, Flag, Mark, Selection};
 pub use spare::Spare;
 pub use units::{Horizontal, Mismatch, Units};

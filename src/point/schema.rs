@@ -261,6 +261,15 @@ impl Schema {
     }
 }
 
+/// What the values of `GpsTime` count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GpsTime {
+    /// Seconds of the GPS week.
+    Week,
+    /// Seconds of GPS time minus 1e9, as LAS has it.
+    AdjustedStandard,
+}
+
 /// What a file says besides its points and that outputs carry on.
 #[derive(Clone, Default)]
 pub struct Metadata {
@@ -268,6 +277,11 @@ pub struct Metadata {
     pub crs: Option<String>,
     /// Units of the coordinates, as far as that says them.
     pub units: super::Units,
+    /// What GPS times count, where the source knows.
+    pub gps_time: Option<GpsTime>,
+    /// What the records went through, as outputs say it: the stages as one line of JSON. None where
+    /// every record comes as it is.
+    pub pipeline: Option<Arc<str>>,
     /// Free text lines, such as the comments of a PLY header.
     pub comments: Vec<String>,
     /// The format's own header and records, known to sources and sinks of that format alone.
@@ -279,6 +293,8 @@ impl std::fmt::Debug for Metadata {
         f.debug_struct("Metadata")
             .field("crs", &self.crs)
             .field("units", &self.units)
+            .field("gps_time", &self.gps_time)
+            .field("pipeline", &self.pipeline)
             .field("comments", &self.comments)
             .field("native", &self.native.is_some())
             .finish()

@@ -8,6 +8,10 @@ pub struct Units {
     pub horizontal: Option<Horizontal>,
     /// Metres in a unit of z.
     pub vertical: Option<f64>,
+    /// A system for x and y is named, and not its unit in words that are known here.
+    pub horizontal_unknown: bool,
+    /// A system for z is named, likewise.
+    pub vertical_unknown: bool,
 }
 
 /// The unit of x and y.
@@ -38,7 +42,8 @@ impl Units {
     /// ```
     /// use pointmill::point::{Horizontal, Units};
     ///
-    /// let mixed = Units { horizontal: Some(Horizontal::Metres(1.0)), vertical: Some(0.3048) };
+    /// let horizontal = Some(Horizontal::Metres(1.0));
+    /// let mixed = Units { horizontal, vertical: Some(0.3048), ..Units::default() };
     /// assert_eq!(mixed.mismatch().unwrap().z_scale, Some(0.3048));
     /// assert_eq!(Units::default().mismatch(), None);
     /// ```
@@ -63,23 +68,81 @@ impl Units {
         }
     }
 
+    /// What makes it doubtful that x, y and z have one unit, though nothing proves that they have not.
+    ///
+    /// There is no doubt where no reference system is named at all, and none about heights without a
+    /// unit above metres, the most common scans of all. Above feet there is: both are common there.
+    pub fn doubt(&self) -> Option<String> {
+        match (self.horizontal, self.vertical) {
+            (Some(Horizontal::Degrees), _) | (Some(_), Some(_)) => None,
+            (Some(Horizontal::Metres(across)), None) => {
+                let xy = name(across);
+                let why = match self.vertical_unknown {
+                    true => "its reference system is none whose unit is known here",
+                    false if xy != METRES => "nothing names it",
+                    false => return None,
+                };
+                Some(format!("x and y are in {xy} and the unit of z is not known: {why}"))
+            }
+            (None, Some(up)) if self.horizontal_unknown || name(up) != METRES => {
+                let z = name(up);
+                Some(format!("z is in {z} and the unit of x and y is not known"))
+            }
+            (None, None) if self.horizontal_unknown || self.vertical_unknown => Some(
+                "the reference system that the scan names is none whose units are known here"
+                    .to_owned(),
+            ),
+            (None, _) => None,
+        }
+    }
+
+    /// The units in words, those that are not known included.
+    pub fn words(&self) -> String {
+        let not_known = || "a unit that is not known".to_owned();
+        let xy = match self.horizontal {
+            Some(Horizontal::Degrees) => "degrees".to_owned(),
+            Some(Horizontal::Metres(metres)) => name(metres),
+            None => not_known(),
+        };
+        let z = self.vertical.map_or_else(not_known, name);
+        format!("x and y in {xy}, z in {z}")
+    }
+
     /// What `self` does not say as `other` says it, if both agree in what both say of x and y.
     pub fn or(self, other: Units) -> Units {
         match (self.horizontal, other.horizontal) {
             (Some(one), Some(two)) if one != two => self,
-            _ => Units {
-                horizontal: self.horizontal.or(other.horizontal),
-                vertical: self.vertical.or(other.vertical),
-            },
+            _ => {
+                let horizontal = self.horizontal.or(other.horizontal);
+                let vertical = self.vertical.or(other.vertical);
+                let either = |one: bool, two: bool, known: bool| (one || two) && !known;
+                Units {
+                    horizontal,
+                    vertical,
+                    horizontal_unknown: either(
+                        self.horizontal_unknown,
+                        other.horizontal_unknown,
+                        horizontal.is_some(),
+                    ),
+                    vertical_unknown: either(
+                        self.vertical_unknown,
+                        other.vertical_unknown,
+                        vertical.is_some(),
+                    ),
+                }
+            }
         }
     }
 }
+
+/// The unit that most scans have.
+const METRES: &str = "metres";
 
 /// A unit of `metres` in words.
 fn name(metres: f64) -> String {
     let close = |to: f64| ((metres - to) / to).abs() < 1e-9;
     match () {
-        () if close(1.0) => "metres".to_owned(),
+        () if close(1.0) => METRES.to_owned(),
         () if close(0.3048) => "feet".to_owned(),
         () if close(1200.0 / 3937.0) => "US survey feet".to_owned(),
         () => format!("units of {metres} m"),
@@ -94,7 +157,12 @@ mod tests {
     const SURVEY_FOOT: f64 = 1200.0 / 3937.0;
 
     fn units(across: f64, up: f64) -> Units {
-        Units { horizontal: Some(Horizontal::Metres(across)), vertical: Some(up) }
+        let horizontal = Some(Horizontal::Metres(across));
+        Units { horizontal, vertical: Some(up), ..Units::default() }
+    }
+
+    fn above(across: f64) -> Units {
+        Units { vertical: None, ..units(across, 1.0) }
     }
 
     #[test]
@@ -116,24 +184,53 @@ mod tests {
     #[test]
     fn degrees_match_no_height_and_no_factor_mends_them() {
         for vertical in [None, Some(1.0), Some(FOOT)] {
-            let units = Units { horizontal: Some(Horizontal::Degrees), vertical };
+            let horizontal = Some(Horizontal::Degrees);
+            let units = Units { horizontal, vertical, ..Units::default() };
+            assert_eq!(units.doubt(), None, "it is certain");
             assert_eq!(units.mismatch().unwrap().z_scale, None);
         }
     }
 
     #[test]
-    fn what_is_not_known_is_not_complained_of() {
-        for horizontal in [None, Some(Horizontal::Metres(FOOT))] {
-            assert_eq!(Units { horizontal, vertical: None }.mismatch(), None);
+    fn what_is_not_known_is_no_mismatch_and_may_be_a_doubt() {
+        let none = Units::default();
+        let heights = |up| Units { vertical: Some(up), ..none };
+        let unknown = |units| Units { vertical_unknown: true, ..units };
+        let silent = [none, above(1.0), heights(1.0), units(FOOT, FOOT)];
+        let doubtful = [
+            (above(SURVEY_FOOT), "the unit of z is not known: nothing names it"),
+            (unknown(above(1.0)), "x and y are in metres and the unit of z is not known"),
+            (heights(FOOT), "z is in feet and the unit of x and y is not known"),
+            (
+                Units { horizontal_unknown: true, ..heights(1.0) },
+                "the unit of x and y is not known",
+            ),
+            (unknown(none), "none whose units are known"),
+            (Units { horizontal_unknown: true, ..none }, "none whose units are known"),
+        ];
+        for units in silent {
+            assert_eq!((units.mismatch(), units.doubt()), (None, None), "{units:?}");
         }
-        assert_eq!(Units { horizontal: None, vertical: Some(FOOT) }.mismatch(), None);
+        for (units, told) in doubtful {
+            assert_eq!(units.mismatch(), None);
+            let doubt = units.doubt().unwrap();
+            assert!(doubt.contains(told), "{doubt}");
+        }
+    }
+
+    #[test]
+    fn units_in_words_say_what_is_not_known() {
+        assert_eq!(units(1.0, SURVEY_FOOT).words(), "x and y in metres, z in US survey feet");
+        assert_eq!(above(FOOT).words(), "x and y in feet, z in a unit that is not known");
     }
 
     #[test]
     fn a_second_opinion_fills_gaps_unless_it_contradicts() {
-        let known = Units { horizontal: Some(Horizontal::Metres(FOOT)), vertical: None };
+        let known = above(FOOT);
         assert_eq!(known.or(units(FOOT, 1.0)).vertical, Some(1.0));
         assert_eq!(known.or(units(1.0, 1.0)), known);
         assert_eq!(Units::default().or(known), known);
+        let unknown = Units { vertical_unknown: true, ..known };
+        assert_eq!((unknown.or(units(FOOT, 1.0)), known.or(unknown)), (units(FOOT, 1.0), unknown));
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::chunks::Chunks;
+use super::crs;
 use super::header::at;
 use super::input::{Input, Storage};
 use super::laz::Compressor;
@@ -33,6 +34,8 @@ pub struct Description {
     pub max: [f64; 3],
     /// Coordinate reference system as text.
     pub crs: Option<String>,
+    /// Units of the coordinates in words, as far as that tells them.
+    pub units: String,
     /// What made the points, as the header says.
     pub system_identifier: String,
     /// What wrote the file, as the header says.
@@ -107,7 +110,8 @@ pub fn describe(path: &Path) -> Result<Description> {
         offset: header.offset(),
         min,
         max,
-        crs: input.crs()?,
+        crs: crs::text(&input.vlrs, &input.evlrs)?,
+        units: crs::units(&input.vlrs, &input.evlrs)?.words(),
         system_identifier: header.text(at::SYSTEM),
         generating_software: header.text(at::SOFTWARE),
         creation_day: word(at::DAY),

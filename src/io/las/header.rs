@@ -3,6 +3,7 @@
 
 use super::file::InputFile;
 use super::format;
+use crate::point::GpsTime;
 use crate::{Error, Result};
 
 /// Byte offsets of the fields.
@@ -38,6 +39,8 @@ pub mod encoding {
     pub const GPS_STANDARD: u16 = 1;
     /// Waveform packets are in this file.
     pub const WAVEFORM_INTERNAL: u16 = 2;
+    /// Waveform packets are in a file beside this one.
+    pub const WAVEFORM_EXTERNAL: u16 = 4;
     /// The CRS is WKT.
     pub const WKT: u16 = 16;
 }
@@ -275,6 +278,31 @@ impl Header {
     /// The global encoding bits (see [`encoding`]); 0 for LAS 1.0 and 1.1, which have none.
     pub fn encoding(&self) -> u16 {
         if self.minor() < 2 { 0 } else { u16::from_le_bytes(self.get(at::GLOBAL_ENCODING)) }
+    }
+
+    /// What GPS times count.
+    pub fn gps_time(&self) -> GpsTime {
+        match self.encoding() & encoding::GPS_STANDARD {
+            0 => GpsTime::Week,
+            _ => GpsTime::AdjustedStandard,
+        }
+    }
+
+    /// Sets or clears one of the bits, which LAS 1.0 and 1.1 do not have.
+    pub fn put_encoding(&mut self, bit: u16, set: bool) {
+        if self.minor() >= 2 {
+            let others = self.encoding() & !bit;
+            let bits = if set { others | bit } else { others };
+            self.put(at::GLOBAL_ENCODING, &bits.to_le_bytes());
+        }
+    }
+
+    /// Sets a text field of 32 bytes; what exceeds it is cut off.
+    pub fn put_text(&mut self, at: usize, text: &str) {
+        let mut field = [0; 32];
+        let (text, _) = super::vlr::split_at_room(text, field.len());
+        field[..text.len()].copy_from_slice(text.as_bytes());
+        self.put(at, &field);
     }
 
     /// World units of one stored unit, per axis.

@@ -3,20 +3,22 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use super::chunks;
 use super::chunks::Chunks;
-use super::extra::{DESCRIPTOR_BYTES, Descriptor};
+use super::crs;
+use super::described::Described;
+use super::extra::Descriptor;
 use super::file::InputFile;
 use super::format;
-use super::header::Header;
+use super::header::{Header, encoding};
 use super::laz::{Compression, LASZIP};
+use super::system::CrsRecords;
 use super::vlr::{Evlr, VLR_HEAD, Vlr, read_evlrs, read_vlrs};
-use super::{chunks, crs};
+use super::waveforms::Waveforms;
 use crate::io::origin::Origin;
-use crate::point::{Schema, Units};
+use crate::point::Schema;
 use crate::{Error, Result};
 
-/// User and number of the record that names the extra bytes.
-pub const EXTRA_BYTES: (&str, u16) = ("LASF_Spec", 4);
 /// True for records that index the points of one file by their order: COPC's, and the LAX index of
 /// LAStools. Elsewhere they would point at the wrong points.
 fn is_index(user: &str, record: u16) -> bool {
@@ -57,8 +59,10 @@ pub struct Input {
     pub gap: Vec<u8>,
     /// Its extended records, all of them.
     pub evlrs: Vec<Evlr>,
-    /// The descriptors of the extra bytes where an extended record holds them.
-    extended_descriptors: Vec<Descriptor>,
+    /// What describes the extra bytes.
+    described: Described,
+    /// The file beside it that its records refer to for their waveforms.
+    pub waveforms: Option<PathBuf>,
     /// How the points are stored.
     pub storage: Storage,
     /// What the user should know.
@@ -88,7 +92,11 @@ impl Input {
             ));
         }
         let (path, origin) = (path.to_owned(), file.origin().clone());
-        let extended_descriptors = extended_descriptors(&evlrs)?;
+        let described = Described::of(&vlrs, &evlrs, extra_len(&header))?;
+        let odd = described.warning.clone().into_iter().chain(wrong_bit(&header, &vlrs, &evlrs)?);
+        warnings.extend(odd.map(path_said));
+        let waveforms = Waveforms::of(&path, &header);
+        warnings.extend(waveforms.missing.clone().map(path_said));
         Ok(Input {
             path,
             origin,
@@ -96,7 +104,8 @@ impl Input {
             vlrs,
             gap,
             evlrs,
-            extended_descriptors,
+            described,
+            waveforms: waveforms.there,
             storage,
             warnings,
         })
@@ -117,8 +126,7 @@ impl Input {
 
     /// Bytes behind the standard fields of a record.
     pub fn extra_len(&self) -> usize {
-        let least = format::record_size(self.header.format()).unwrap_or(0);
-        usize::from(self.header.record_length().saturating_sub(least))
+        extra_len(&self.header)
     }
 
     /// What records hold.
@@ -126,69 +134,54 @@ impl Input {
         let header = &self.header;
         format::schema(
             header.format(),
-            &self.descriptors(),
+            self.descriptors(),
             self.extra_len(),
             header.scale(),
             header.offset(),
         )
     }
 
-    /// Place among the records of the one that names the extra bytes: the first that describes them
-    /// all, else the first.
-    pub fn extra_record(&self) -> Option<usize> {
-        extra_record(&self.vlrs, self.extra_len())
-    }
-
     /// The descriptors of the extra bytes.
-    pub fn descriptors(&self) -> Vec<Descriptor> {
-        match self.extra_record() {
-            Some(i) => Descriptor::all(self.vlrs[i].payload()),
-            None => self.extended_descriptors.clone(),
-        }
+    pub fn descriptors(&self) -> &[Descriptor] {
+        &self.described.descriptors
     }
 
-    /// The records that outputs carry.
-    pub fn carried_vlrs(&self) -> Vec<Vlr> {
-        self.vlrs.iter().filter(|v| is_carried(v)).cloned().collect()
-    }
-
-    /// The extended records that outputs carry.
-    pub fn carried_evlrs(&self) -> Vec<Evlr> {
-        self.evlrs.iter().filter(|v| is_carried_extended(v)).cloned().collect()
+    /// The records that outputs carry, and the extended ones.
+    pub fn carried(&self) -> (Vec<Vlr>, Vec<Evlr>) {
+        let mut vlrs: Vec<Vlr> = self.vlrs.iter().filter(|v| is_carried(v)).cloned().collect();
+        let extended = self.evlrs.iter().filter(|v| is_carried_extended(v));
+        let mut evlrs: Vec<Evlr> = extended.cloned().collect();
+        self.described.carried(&mut vlrs, &mut evlrs);
+        (vlrs, evlrs)
     }
 
     /// The same without the records, whose payloads of thousands of files would add up.
     pub fn without_records(self) -> Self {
-        Input { vlrs: Vec::new(), gap: Vec::new(), evlrs: Vec::new(), ..self }
+        let described = Described::default();
+        Input { vlrs: Vec::new(), gap: Vec::new(), evlrs: Vec::new(), described, ..self }
     }
 
-    /// The coordinate reference system as text.
-    pub fn crs(&self) -> Result<Option<String>> {
-        crs::text(&self.vlrs, &self.evlrs)
-    }
-
-    /// The units of the coordinates, as far as that says them.
-    pub fn units(&self) -> Result<Units> {
-        crs::units(&self.vlrs, &self.evlrs)
+    /// The records that say in which coordinate reference system the points are.
+    pub fn crs_records(&self) -> Result<CrsRecords> {
+        CrsRecords::of(&self.vlrs, &self.evlrs)
     }
 }
 
-/// The descriptors of extra bytes in an extended record. There can be as many as a record has bytes.
-pub fn extended_descriptors(evlrs: &[Evlr]) -> Result<Vec<Descriptor>> {
-    let most = DESCRIPTOR_BYTES * usize::from(u16::MAX);
-    let record = evlrs.iter().find(|v| v.is(EXTRA_BYTES.0, EXTRA_BYTES.1));
-    let payload = record.map(|evlr| evlr.payload(most)).transpose()?.flatten();
-    Ok(payload.map_or(Vec::new(), |payload| Descriptor::all(&payload)))
+/// Bytes behind the standard fields of a record.
+pub fn extra_len(header: &Header) -> usize {
+    let least = format::record_size(header.format()).unwrap_or(0);
+    usize::from(header.record_length().saturating_sub(least))
 }
 
-/// See [`Input::extra_record`].
-pub fn extra_record(vlrs: &[Vlr], extra: usize) -> Option<usize> {
-    let described = |v: &Vlr| -> usize {
-        v.payload().as_chunks::<DESCRIPTOR_BYTES>().0.iter().map(|d| Descriptor(*d).size()).sum()
-    };
-    let ours = |v: &&Vlr| v.is(EXTRA_BYTES.0, EXTRA_BYTES.1);
-    let exact = vlrs.iter().position(|v| ours(&v) && described(v) == extra);
-    exact.or_else(|| vlrs.iter().position(|v| ours(&v)))
+/// What is odd about a bit that says GeoTIFF keys where the system is WKT.
+fn wrong_bit(header: &Header, vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<Option<String>> {
+    let wrong = header.encoding() & encoding::WKT == 0
+        && crs::has_wkt(vlrs, evlrs)?
+        && crs::wants_bit(header, vlrs, evlrs)?;
+    Ok(wrong.then(|| {
+        "the header does not say that the CRS is WKT, and it is: it is read, and outputs say so"
+            .to_owned()
+    }))
 }
 
 fn storage(

@@ -1,7 +1,6 @@
 //! Several files as one: what they must share, and what becomes of what they do not. Nothing here
 //! depends on the order of the inputs.
 
-use super::crs;
 use super::format::{has_gps_time, has_waveforms};
 use super::header::{Header, at, encoding};
 use super::input::Input;
@@ -26,8 +25,8 @@ pub struct Merge {
 
 impl Merge {
     /// Begins with one file.
-    pub fn of(first: Input) -> Self {
-        Merge { records: Records::of(&first), first }
+    pub fn of(first: Input) -> Result<Self> {
+        Ok(Merge { records: Records::of(&first)?, first })
     }
 
     /// Adds a file; fails if the two cannot be one.
@@ -43,11 +42,13 @@ impl Merge {
             return Ok((Native::of(&self.first), vec![Shift::default()]));
         }
         let (offset, shifts) = shifts(inputs)?;
-        let (vlrs, gap, evlrs) = self.records.finish();
+        let (vlrs, gap, evlrs) = self.records.finish()?;
         waveforms(inputs, &evlrs)?;
+        external(inputs)?;
         let mut header = header(inputs);
         header.put_floats(at::OFFSET, offset);
-        Ok((Native { header, vlrs, gap, evlrs }, shifts))
+        let native = Native { header, vlrs, gap, evlrs, waveforms: None, made: false };
+        Ok((native, shifts))
     }
 }
 
@@ -67,14 +68,35 @@ fn agree(a: &Input, b: &Input) -> Result<()> {
     if described(a) != described(b) {
         return Err(refuse(a, b, "their extra bytes are described differently".to_owned()));
     }
-    if crs::identity(&a.vlrs, &a.evlrs)? != crs::identity(&b.vlrs, &b.evlrs)? {
-        let text = |input: &Input| -> Result<String> {
-            Ok(input.crs()?.unwrap_or_else(|| "none".to_owned()))
-        };
-        let (one, two) = (text(a)?, text(b)?);
-        return Err(refuse(a, b, format!("their CRS differ: {} and {}", short(&one), short(&two))));
+    let (one, two) = (a.crs_records()?, b.crs_records()?);
+    if one.same_system(&two)? {
+        return Ok(());
     }
-    Ok(())
+    let (one, two) = told_apart(one.text()?, two.text()?);
+    Err(refuse(a, b, format!("their CRS differ: {one} and {two}")))
+}
+
+/// Two texts of systems as a message shows them: from the beginning if that tells them apart, else
+/// from shortly before they differ.
+fn told_apart(one: Option<String>, two: Option<String>) -> (String, String) {
+    let (Some(one), Some(two)) = (&one, &two) else {
+        return (
+            one.map_or("none".into(), |text| short(&text)),
+            two.map_or("none".into(), |text| short(&text)),
+        );
+    };
+    if one == two {
+        let shown = format!("{}, with other parameters", short(one));
+        return (short(one), shown);
+    }
+    if short(one) != short(two) {
+        return (short(one), short(two));
+    }
+    let alike = one.chars().zip(two.chars()).take_while(|(a, b)| a == b).count();
+    let end = |text: &str| {
+        format!("…{}", short(&text.chars().skip(alike.saturating_sub(20)).collect::<String>()))
+    };
+    (end(one), end(two))
 }
 
 fn same<T: PartialEq + std::fmt::Debug>(
@@ -182,6 +204,13 @@ fn header(inputs: &[Input]) -> Header {
     merged
 }
 
+/// Records refer to waveforms in the one file that has the name of theirs: two files cannot be one.
+fn external(inputs: &[Input]) -> Result<()> {
+    let Some(one) = inputs.iter().find(|input| input.waveforms.is_some()) else { return Ok(()) };
+    let other = inputs.iter().find(|input| input.path != one.path).unwrap_or(one);
+    Err(refuse(one, other, "their waveforms are in files of their own".to_owned()))
+}
+
 /// Records refer to waveforms by their place in one block: two blocks cannot be one.
 fn waveforms(inputs: &[Input], evlrs: &[Evlr]) -> Result<()> {
     let inside = |i: &&Input| {
@@ -195,4 +224,22 @@ fn waveforms(inputs: &[Input], evlrs: &[Evlr]) -> Result<()> {
     }
     let other = other.or_else(|| inputs.iter().find(|i| i.path != one.path)).unwrap_or(one);
     Err(refuse(one, other, "each has waveforms of its own".to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_texts_are_shown_where_they_differ() {
+        let long = |end: &str| Some(format!("PROJCS[\"{}\",{end}]", "name ".repeat(30)));
+        let (one, two) = told_apart(long("UNIT[1]"), long("UNIT[2]"));
+        assert!(
+            one.starts_with('…') && one.contains("UNIT[1]") && two.contains("UNIT[2]"),
+            "{one}"
+        );
+        assert_eq!(told_apart(None, Some("a".into())), ("none".into(), "a".into()));
+        let (one, two) = told_apart(Some("Here".into()), Some("Here".into()));
+        assert_ne!(one, two);
+    }
 }

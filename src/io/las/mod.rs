@@ -5,8 +5,10 @@
 //! what a file says of itself. A COPC file is read as the LAZ it is.
 
 mod chunks;
+mod credit;
 mod crs;
 mod describe;
+mod described;
 mod encode;
 mod extra;
 mod file;
@@ -21,8 +23,10 @@ mod own;
 mod read;
 mod sink;
 mod source;
+mod system;
 mod union;
 mod vlr;
+mod waveforms;
 
 pub use describe::{Description, ExtraBytes, Record, describe};
 pub use format::layout;

@@ -1,13 +1,18 @@
 //! What a LAS file says besides its points, as outputs carry it on.
 
+use std::path::PathBuf;
+
 use super::crs;
+use super::described::{Described, EXTRA_BYTES, describe};
 use super::extra::Descriptor;
 use super::file::InputFile;
 use super::format::record_size;
 use super::header::{Header, at, encoding};
-use super::input::{EXTRA_BYTES, Input, is_carried, is_carried_extended};
+use super::input::{Input, extra_len, is_carried, is_carried_extended};
 use super::vlr::{Evlr, Vlr, read_evlrs, read_vlrs};
+use super::waveforms::Waveforms;
 use crate::Result;
+use crate::io::wkt;
 use crate::point::{Layout, Metadata, Schema, names};
 
 /// Header and records of the input, without what describes how that file stored its points.
@@ -21,16 +26,23 @@ pub struct Native {
     pub gap: Vec<u8>,
     /// Extended variable length records.
     pub evlrs: Vec<Evlr>,
+    /// The file that records refer to for their waveforms, beside the input.
+    pub waveforms: Option<PathBuf>,
+    /// True if it was made for points that come from no LAS file.
+    pub made: bool,
 }
 
 impl Native {
     /// Of one input, as it is.
     pub fn of(input: &Input) -> Self {
+        let (vlrs, evlrs) = input.carried();
         Native {
             header: input.header.clone(),
-            vlrs: input.carried_vlrs(),
+            vlrs,
             gap: input.gap.clone(),
-            evlrs: input.carried_evlrs(),
+            evlrs,
+            waveforms: input.waveforms.clone(),
+            made: false,
         }
     }
 
@@ -44,9 +56,12 @@ impl Native {
         }
         let (mut vlrs, gap, _) = read_vlrs(file, header)?;
         let mut evlrs = read_evlrs(file, header)?;
+        let described = Described::of(&vlrs, &evlrs, extra_len(header))?;
         vlrs.retain(is_carried);
         evlrs.retain(is_carried_extended);
-        Ok(Native { header: now, vlrs, gap, evlrs })
+        described.carried(&mut vlrs, &mut evlrs);
+        let waveforms = Waveforms::of(file.path(), header).there;
+        Ok(Native { header: now, vlrs, gap, evlrs, waveforms, made: false })
     }
 
     /// True if it belongs to records of this schema.
@@ -56,32 +71,27 @@ impl Native {
     }
 
     /// A header for points that come from no LAS file: LAS 1.4, records in `schema`'s LAS layout,
-    /// its extra dimensions described, WKT carried if `crs` is WKT.
-    ///
-    /// The generating software is named without a version, so that outputs do not change with it.
+    /// its extra dimensions described, `crs` carried if it is WKT or EPSG codes.
     pub fn fresh(schema: &Schema, crs: Option<&str>) -> Self {
         let format = if let Layout::Las { format } = schema.layout { format } else { 0 };
         let length = u16::try_from(schema.stride).unwrap_or(u16::MAX);
         let mut header = Header::blank(4, format, length);
         header.put(at::SYSTEM, b"OTHER");
-        header.put(at::SOFTWARE, b"pointmill");
         if let Some(axes) = schema.coordinates() {
             header.put_floats(at::SCALE, axes.map(|d| d.scale));
             header.put_floats(at::OFFSET, axes.map(|d| d.origin));
         }
-        let wkt = crs.filter(|text| crs::is_wkt(text)).and_then(crs::wkt_record);
-        if wkt.is_some() || format >= 6 {
+        let record = crs.and_then(|text| crs::record(text).ok());
+        if format >= 6 || crs.is_some_and(|text| record.is_some() && wkt::is_wkt(text)) {
             // Section 2.4: formats 6 to 10 always say WKT.
-            header.put(at::GLOBAL_ENCODING, &encoding::WKT.to_le_bytes());
+            header.put_encoding(encoding::WKT, true);
         }
         let base = usize::from(record_size(format).unwrap_or(0));
         let extra = schema.dimensions.iter().filter(|d| d.offset >= base);
-        let payload: Vec<u8> = extra.flat_map(|d| *Descriptor::of(d).bytes()).collect();
-        let describe = !payload.is_empty() && u16::try_from(payload.len()).is_ok();
-        let described =
-            describe.then(|| Vlr::new(EXTRA_BYTES.0, EXTRA_BYTES.1, "Extra bytes", payload));
-        let vlrs = wkt.into_iter().chain(described).collect();
-        Native { header, vlrs, gap: Vec::new(), evlrs: Vec::new() }
+        let descriptors: Vec<Descriptor> = extra.map(Descriptor::of).collect();
+        let (mut vlrs, mut evlrs) = (record.into_iter().collect(), Vec::new());
+        describe(&mut vlrs, &mut evlrs, &descriptors);
+        Native { header, vlrs, gap: Vec::new(), evlrs, waveforms: None, made: true }
     }
 }
 
@@ -89,9 +99,9 @@ impl Native {
 pub fn fresh(schema: &Schema, crs: Option<&str>) -> Metadata {
     Metadata {
         crs: crs.map(str::to_owned),
-        units: crs.map(crate::io::wkt::units).unwrap_or_default(),
-        comments: Vec::new(),
+        units: crs.map(wkt::units).unwrap_or_default(),
         native: Some(std::sync::Arc::new(Native::fresh(schema, crs))),
+        ..Metadata::default()
     }
 }
 

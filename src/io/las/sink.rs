@@ -9,15 +9,16 @@ use std::sync::Arc;
 use laz::laszip::{ChunkTable, ChunkTableEntry};
 use laz::{LazVlr, LazVlrBuilder};
 
-use super::crs;
+use super::credit::{count_gps_time, credit, drop_ranges, name_system};
+use super::described::{Described, describe};
 use super::encode::{LasEncoder, Normals};
-use super::extra::{Descriptor, with_normals};
+use super::extra::{DESCRIPTOR_BYTES, with_normals};
 use super::format::record_size;
 use super::header::{COMPRESSED, Header, at, encoding};
-use super::input::{EXTRA_BYTES, extended_descriptors, extra_record};
 use super::laz::{CHUNK_POINTS, Compression};
 use super::native::Native;
 use super::vlr::Vlr;
+use super::waveforms;
 use crate::point::{Layout, Metadata, Schema};
 use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
@@ -38,7 +39,9 @@ pub struct LasOptions {
 /// Header and records come from `metadata` where it is that of LAS inputs, else they are made anew
 /// (see [`fresh`](super::fresh)). Recomputed are the counts of points, the box, the places of
 /// points, extended records and waveforms (where these are in the file), the LAZ bit and its record,
-/// and with `normals` the record length and the descriptors of extra bytes.
+/// the bit that says that the CRS is WKT, the generating software, with `normals` the record length and
+/// the descriptors of extra bytes; and if the records went through stages (`metadata.pipeline`), the
+/// system identifier, the ranges of extra bytes, and a record that names the stages.
 ///
 /// # Errors
 ///
@@ -58,8 +61,11 @@ pub fn create(
         Some(native) => native.clone(),
         None => Native::fresh(schema, metadata.crs.as_deref()),
     };
-    if let (Some(crs), None) = (&metadata.crs, crs::text(&native.vlrs, &native.evlrs)?) {
-        notes.push(format!("the CRS is not carried, for LAS takes WKT of 64 KiB at most: {crs}"));
+    name_system(&mut native, metadata, &mut notes)?;
+    count_gps_time(&mut native.header, metadata, &mut notes);
+    credit(&mut native, schema, metadata, &mut notes);
+    if metadata.pipeline.is_some() {
+        drop_ranges(&mut native, schema)?;
     }
     if let Some(axes) = schema.coordinates() {
         native.header.put_floats(at::SCALE, axes.map(|d| d.scale));
@@ -115,21 +121,12 @@ fn too_long(what: &str, format: u8) -> Error {
 /// Adds the descriptors of the normals behind those of all extra bytes before them.
 fn describe_normals(native: &mut Native, format: u8, schema: &Schema) -> Result<()> {
     let extra = schema.stride - usize::from(record_size(format).unwrap_or(0));
-    let record = extra_record(&native.vlrs, extra);
-    let known = match record {
-        Some(i) => Descriptor::all(native.vlrs[i].payload()),
-        None => extended_descriptors(&native.evlrs)?,
-    };
-    let payload: Vec<u8> = with_normals(&known, extra).iter().flat_map(|d| *d.bytes()).collect();
-    if u16::try_from(payload.len()).is_err() {
+    let known = Described::of(&native.vlrs, &native.evlrs, extra)?.descriptors;
+    let all = with_normals(&known, extra);
+    if u16::try_from(all.len().saturating_mul(DESCRIPTOR_BYTES)).is_err() {
         return Err(too_long("the extra bytes' descriptors of point format ", format));
     }
-    match record {
-        Some(i) => native.vlrs[i] = native.vlrs[i].with_payload(payload),
-        None => {
-            native.vlrs.push(Vlr::new(EXTRA_BYTES.0, EXTRA_BYTES.1, "Extra bytes", payload));
-        }
-    }
+    describe(&mut native.vlrs, &mut native.evlrs, &all);
     Ok(())
 }
 
@@ -315,6 +312,7 @@ impl Sink for LasSink {
         let header = self.native.header.bytes().to_vec();
         self.rewrite(0, &header)?;
         self.file.sync_all().map_err(|e| Error::io(&self.path, "write it to disk", e))?;
-        Ok(SinkSummary { points: self.points, bytes: self.at, notes: self.notes })
+        let beside = self.native.waveforms.map(|file| (file, waveforms::EXTENSION));
+        Ok(SinkSummary { points: self.points, bytes: self.at, notes: self.notes, beside })
     }
 }

@@ -6,8 +6,9 @@ use std::sync::Arc;
 use laz::DecompressionSelection;
 
 use super::chunks::{Chunk, Chunks};
+use super::crs;
 use super::file::WINDOW_BYTES;
-use super::format::selection;
+use super::format::{has_gps_time, selection};
 use super::input::{Input, Storage};
 use super::merge::Merge;
 use super::native::Native;
@@ -33,9 +34,9 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
         return Err(Error::pipeline("there is no input file"));
     };
     let first = Input::open(first)?;
-    let (mut schema, crs, units) = (first.schema(), first.crs()?, first.units()?);
+    let mut schema = first.schema();
     let mut inputs = vec![first.clone().without_records()];
-    let mut merge = Merge::of(first);
+    let mut merge = Merge::of(first)?;
     for path in others {
         let input = Input::open(path)?;
         merge.add(&input)?;
@@ -46,7 +47,11 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
         dimension.origin = native.header.offset()[axis];
     }
     let warnings = inputs.iter().flat_map(|i| i.warnings.clone()).collect();
-    let metadata = Metadata { crs, units, comments: Vec::new(), native: Some(Arc::new(native)) };
+    let (crs, units) =
+        (crs::text(&native.vlrs, &native.evlrs)?, crs::units(&native.vlrs, &native.evlrs)?);
+    let gps_time = has_gps_time(native.header.format()).then(|| native.header.gps_time());
+    let native = Some(Arc::new(native) as Arc<_>);
+    let metadata = Metadata { crs, units, gps_time, native, ..Metadata::default() };
     let files: Vec<Opened> = inputs.into_iter().zip(shifts).map(Opened::new).collect();
     let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i)).collect();
     Ok(Box::new(LasSource { files, parts, schema: Arc::new(schema), metadata, warnings }))

@@ -3,8 +3,11 @@
 
 use std::cmp::Ordering;
 
+use super::crs;
+use super::described::{EXTRA_BYTES, record};
 use super::extra::Descriptor;
-use super::input::{EXTRA_BYTES, Input, extra_record};
+use super::input::Input;
+use super::system::CrsRecords;
 use super::vlr::{Evlr, Vlr};
 use crate::Result;
 
@@ -18,39 +21,55 @@ pub struct Records {
     /// are left out, so that one record remains.
     without_ranges: Union<Vlr>,
     extended: Union<Evlr>,
+    /// Of records that name one system in different words, those that are carried.
+    crs: CrsRecords,
+    crs_differ: bool,
     /// The bytes between records and points, if all files have the same.
     gap: Option<Vec<u8>>,
 }
 
 impl Records {
     /// Those of one file.
-    pub fn of(first: &Input) -> Self {
-        let vlrs = first.carried_vlrs();
-        Records {
-            descriptors: first.descriptors(),
-            without_ranges: Union::of(without_ranges(first, vlrs.clone())),
+    pub fn of(first: &Input) -> Result<Self> {
+        let (vlrs, evlrs) = first.carried();
+        Ok(Records {
+            crs: first.crs_records()?,
+            crs_differ: false,
+            descriptors: first.descriptors().to_vec(),
+            without_ranges: Union::of(without_ranges(vlrs.clone())),
             as_they_are: Some(Union::of(vlrs)),
-            extended: Union::of(first.carried_evlrs()),
+            extended: Union::of(evlrs),
             gap: Some(first.gap.clone()),
-        }
+        })
     }
 
     /// Adds those of another file, which agrees with the first.
     pub fn add(&mut self, other: &Input) -> Result<()> {
+        let crs = other.crs_records()?;
+        self.crs_differ |= !crs.equal(&self.crs);
+        if crs.order(&self.crs) == Ordering::Less {
+            self.crs = crs;
+        }
         if other.descriptors() != self.descriptors {
             self.as_they_are = None;
         }
         self.gap.take_if(|gap| *gap != other.gap);
-        let vlrs = other.carried_vlrs();
-        self.without_ranges.add(without_ranges(other, vlrs.clone()))?;
+        let (vlrs, evlrs) = other.carried();
+        self.without_ranges.add(without_ranges(vlrs.clone()))?;
         self.as_they_are.as_mut().map_or(Ok(()), |all| all.add(vlrs))?;
-        self.extended.add(other.carried_evlrs())
+        self.extended.add(evlrs)
     }
 
     /// The records, the bytes behind them, the extended records.
-    pub fn finish(self) -> (Vec<Vlr>, Vec<u8>, Vec<Evlr>) {
-        let vlrs = self.as_they_are.unwrap_or(self.without_ranges).finish();
-        (vlrs, self.gap.unwrap_or_default(), self.extended.finish())
+    pub fn finish(self) -> Result<(Vec<Vlr>, Vec<u8>, Vec<Evlr>)> {
+        let mut vlrs = self.as_they_are.unwrap_or(self.without_ranges);
+        let mut evlrs = self.extended;
+        if self.crs_differ {
+            let is_crs = |user: String, record| crs::is_record(&user, record);
+            vlrs = vlrs.replaced(|v| is_crs(v.user(), v.record()), self.crs.vlrs)?;
+            evlrs = evlrs.replaced(|v| is_crs(v.user(), v.record()), self.crs.evlrs)?;
+        }
+        Ok((vlrs.finish(), self.gap.unwrap_or_default(), evlrs.finish()))
     }
 }
 
@@ -59,10 +78,10 @@ pub fn described(input: &Input) -> Vec<Descriptor> {
     input.descriptors().iter().map(Descriptor::without_range).collect()
 }
 
-fn without_ranges(input: &Input, mut vlrs: Vec<Vlr>) -> Vec<Vlr> {
-    if let Some(record) = extra_record(&vlrs, input.extra_len()) {
-        let payload = described(input).iter().flat_map(|d| *d.bytes()).collect();
-        vlrs[record] = Vlr::new(EXTRA_BYTES.0, EXTRA_BYTES.1, "Extra bytes", payload);
+fn without_ranges(mut vlrs: Vec<Vlr>) -> Vec<Vlr> {
+    for vlr in vlrs.iter_mut().filter(|v| v.is(EXTRA_BYTES.0, EXTRA_BYTES.1)) {
+        let all = Descriptor::all(vlr.payload());
+        *vlr = record(&all.iter().map(Descriptor::without_range).collect::<Vec<_>>());
     }
     vlrs
 }
@@ -130,6 +149,14 @@ impl<T: Item> Union<T> {
         }
         self.all.insert(low, item);
         Ok(())
+    }
+
+    /// The list with `those` for all items of a kind.
+    fn replaced(self, is_kind: impl Fn(&T) -> bool, those: Vec<T>) -> Result<Self> {
+        let mut replaced = Union::of(Vec::new());
+        let others = self.finish().into_iter().filter(|item| !is_kind(item));
+        others.chain(those).try_for_each(|item| replaced.insert(item))?;
+        Ok(replaced)
     }
 
     fn finish(self) -> Vec<T> {

@@ -4,15 +4,16 @@ use std::collections::BTreeMap;
 
 use super::header::{Element, Encoding, Kind, Property};
 use super::source::{Native, Rest};
-use super::{CRS, CRS_MORE, made, names};
-use crate::point::{Metadata, Schema};
+use super::{CRS, CRS_MORE, GPS_TIME, GPS_TIMES, made, names};
+use crate::point::{Metadata, Schema, names as point_names};
 
 /// Bytes of one piece of a long text: some readers refuse header lines of 1,024 bytes.
 const PIECE: usize = 900;
 
 /// The header, but for the count of vertices.
 pub(super) struct Headings {
-    /// To the end of the coordinate reference system, which the comment of [`made`] ends.
+    /// To the end of what comments say of the coordinates and times, which the comment of [`made`]
+    /// ends.
     start: String,
     comments: String,
     /// Elements before the vertices.
@@ -41,6 +42,10 @@ impl Headings {
         let mut start = format!("ply\nformat {} 1.0\n", encoding.word());
         for (n, piece) in metadata.crs.iter().flat_map(|crs| pieces(crs)).enumerate() {
             start += &line("comment", &format!("{}{piece}", if n == 0 { CRS } else { CRS_MORE }));
+        }
+        let told = metadata.gps_time.filter(|_| dimensions.contains(&point_names::GPS_TIME));
+        for (_, text) in GPS_TIMES.iter().filter(|(kind, _)| Some(*kind) == told) {
+            start += &line("comment", &format!("{GPS_TIME}{text}"));
         }
         let mut comments: String = properties
             .iter()

@@ -25,12 +25,19 @@ pub use info::{ElementInfo, PlyInfo, PropertyInfo, describe};
 pub(crate) use names::rank;
 
 use crate::Result;
-use crate::point::{Metadata, Schema};
+use crate::point::{GpsTime, Metadata, Schema};
 use crate::stage::{ChunkSize, Sink, Source};
 
 /// What begins the comment that holds the coordinate reference system, and its further pieces.
 const CRS: &str = "crs: ";
 const CRS_MORE: &str = "crs+ ";
+
+/// What begins the comment that says what the values of `GpsTime` count, and how it goes on.
+const GPS_TIME: &str = "gps_time: ";
+const GPS_TIMES: [(GpsTime, &str); 2] = [
+    (GpsTime::Week, "seconds of the GPS week"),
+    (GpsTime::AdjustedStandard, "seconds of GPS time minus 1e9"),
+];
 
 /// How a PLY output is written.
 #[derive(Debug, Clone, Default)]

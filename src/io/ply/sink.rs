@@ -248,6 +248,7 @@ impl Sink for PlySink {
         if let Some(narrow) = &self.plan.narrow {
             self.notes.extend(note(narrow.asked, self.depth));
         }
-        Ok(SinkSummary { points: self.points, bytes: self.bytes, notes: self.notes })
+        let (points, bytes, notes) = (self.points, self.bytes, self.notes);
+        Ok(SinkSummary { points, bytes, notes, beside: None })
     }
 }

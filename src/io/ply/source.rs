@@ -12,7 +12,7 @@ use super::header::{Element, Encoding, Kind, shown};
 use super::names;
 use crate::io::origin::Origin;
 use crate::point::names::{GPS_TIME, XYZ};
-use crate::point::{Dimension, Layout, Metadata, PointBatch, Scalar, Schema};
+use crate::point::{Dimension, GpsTime, Layout, Metadata, PointBatch, Scalar, Schema};
 use crate::stage::{Input, Part, Source};
 use crate::{Error, Result};
 
@@ -93,6 +93,7 @@ impl PlySource {
 /// What the comments of a file say to us, and the others.
 struct Texts {
     crs: Option<String>,
+    gps_time: Option<GpsTime>,
     dimensions: Vec<String>,
     comments: Vec<String>,
 }
@@ -104,6 +105,7 @@ impl Texts {
         let dimensions = names::dimensions(&properties, &header.comments);
         let properties: BTreeSet<&str> = properties.into_iter().collect();
         let mut crs: Option<String> = None;
+        let mut gps_time = None;
         let mut comments = Vec::new();
         // Only pieces right behind the first belong to it: other comments are free to look alike.
         let mut more = false;
@@ -118,13 +120,23 @@ impl Texts {
                 continue;
             }
             more = false;
+            if let (Some(kind), None) = (gps_time_told(comment), gps_time) {
+                gps_time = Some(kind);
+                continue;
+            }
             let of_ours = names::property_told(comment).is_some_and(|p| properties.contains(p));
             if !of_ours && !super::is_made(comment, file.points) {
                 comments.push(comment.clone());
             }
         }
-        Texts { crs, dimensions, comments }
+        Texts { crs, gps_time, dimensions, comments }
     }
+}
+
+/// What GPS times count, if `comment` is the one that says it.
+fn gps_time_told(comment: &str) -> Option<GpsTime> {
+    let text = comment.strip_prefix(super::GPS_TIME)?;
+    super::GPS_TIMES.iter().find(|(_, told)| *told == text).map(|(kind, _)| *kind)
 }
 
 /// Refuses two files whose vertices differ but for the types of properties.
@@ -136,6 +148,8 @@ fn agree((first, texts): (&PlyFile, &Texts), (other, of_other): (&PlyFile, &Text
         "encoding is"
     } else if names(first) != names(other) {
         "vertex properties are"
+    } else if texts.gps_time != of_other.gps_time {
+        "GPS time type is"
     } else if texts.crs != of_other.crs {
         "coordinate reference system is"
     } else if texts.dimensions != of_other.dimensions {
@@ -229,6 +243,8 @@ fn metadata(files: &[PlyFile], mut texts: Vec<Texts>) -> Metadata {
     Metadata {
         units: crs.as_deref().map(crate::io::wkt::units).unwrap_or_default(),
         crs,
+        gps_time: texts[0].gps_time,
+        pipeline: None,
         comments: union(texts.into_iter().map(|t| t.comments).collect()),
         native: Some(Arc::new(native)),
     }

@@ -20,7 +20,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::io::las;
-use crate::point::{Metadata, PointBatch, Schema};
+use crate::point::{GpsTime, Metadata, PointBatch, Schema};
 use crate::stage::{OpenSource, Part, Source};
 use crate::{Error, Result};
 
@@ -161,7 +161,7 @@ impl OpenSource for Synthetic {
         let (surface, scale, origin) = Surface::of(self, noise);
         let schema = las::layout(record::FORMAT, &[], [scale; 3], origin);
         Ok(Box::new(Scan {
-            metadata: las::fresh(&schema, None),
+            metadata: Metadata { gps_time: Some(GpsTime::Week), ..las::fresh(&schema, None) },
             schema: Arc::new(schema),
             points: self.points,
             surface,

@@ -1,0 +1,101 @@
+//! What an output says of itself and not of its points: in which system it is, what its times count,
+//! what made it of what.
+
+use super::crs;
+use super::described::{Described, describe};
+use super::extra::Descriptor;
+use super::format::{has_gps_time, record_size};
+use super::header::{Header, at, encoding};
+use super::native::Native;
+use super::vlr::{Vlr, split_at_room};
+use crate::Result;
+use crate::io::wkt;
+use crate::point::{GpsTime, Metadata, Schema};
+
+/// User and number of the record that names the stages which the records went through.
+const PIPELINE: (&str, u16) = ("pointmill", 1);
+/// What the generating software is.
+const SOFTWARE: &str = concat!("pointmill ", env!("CARGO_PKG_VERSION"));
+
+/// Has the header say rightly of what kind the records of the reference system are; notes what is
+/// not carried of it, or not as the point format wants it.
+pub fn name_system(
+    native: &mut Native,
+    metadata: &Metadata,
+    notes: &mut Vec<String>,
+) -> Result<()> {
+    if crs::wants_bit(&native.header, &native.vlrs, &native.evlrs)? {
+        native.header.put_encoding(encoding::WKT, true);
+    }
+    let Some(text) = &metadata.crs else { return Ok(()) };
+    let there = crs::text(&native.vlrs, &native.evlrs)?.is_some();
+    match crs::record(text) {
+        Err(why) if !there => {
+            let (shown, rest) = split_at_room(text, 100);
+            let more = if rest.is_empty() { "" } else { "…" };
+            notes.push(format!("the CRS is not carried: {why}: {shown}{more}"));
+        }
+        Ok(_) if native.made && native.header.format() >= 6 && !wkt::is_wkt(text) => {
+            notes.push(format!(
+                "the CRS {text} is written as GeoTIFF keys, for it is no WKT: point format {} asks for \
+                 WKT, and some readers will see no CRS",
+                native.header.format()
+            ));
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+/// Has the header say what GPS times count.
+pub fn count_gps_time(header: &mut Header, metadata: &Metadata, notes: &mut Vec<String>) {
+    if !has_gps_time(header.format()) {
+        return;
+    }
+    match metadata.gps_time {
+        Some(kind) => {
+            header.put_encoding(encoding::GPS_STANDARD, kind == GpsTime::AdjustedStandard)
+        }
+        None => notes.push(
+            "GpsTime is written as seconds of the GPS week: the input does not say what it counts"
+                .to_owned(),
+        ),
+    }
+}
+
+/// Says what made the output: always the program, and of records that went through stages what was
+/// done (LAS 1.4 R15, section 2.4: the system identifier) and by which stages, in the place of what an
+/// earlier run said. Nothing of it depends on when or where.
+pub fn credit(native: &mut Native, schema: &Schema, metadata: &Metadata, notes: &mut Vec<String>) {
+    let header = &mut native.header;
+    header.put_text(at::SOFTWARE, SOFTWARE);
+    let axes = schema.coordinates();
+    let moved = axes.is_some_and(|axes| {
+        axes.map(|d| d.scale) != header.scale() || axes.map(|d| d.origin) != header.offset()
+    });
+    if let Some(pipeline) = &metadata.pipeline {
+        header.put_text(at::SYSTEM, "EXTRACTION");
+        native.vlrs.retain(|v| !v.is(PIPELINE.0, PIPELINE.1));
+        match u16::try_from(pipeline.len()) {
+            Ok(_) => {
+                let payload = pipeline.as_bytes().to_vec();
+                native.vlrs.push(Vlr::new(PIPELINE.0, PIPELINE.1, "pipeline", payload));
+            }
+            Err(_) => notes.push("the pipeline is too long for a record that names it".to_owned()),
+        }
+    } else if moved {
+        header.put_text(at::SYSTEM, "TRANSFORMATION");
+    }
+}
+
+/// Ranges of extra bytes are those of all points of the input: they do not hold for some.
+pub fn drop_ranges(native: &mut Native, schema: &Schema) -> Result<()> {
+    let base = usize::from(record_size(native.header.format()).unwrap_or(0));
+    let known = Described::of(&native.vlrs, &native.evlrs, schema.stride.saturating_sub(base))?;
+    let without: Vec<Descriptor> =
+        known.descriptors.iter().map(Descriptor::without_range).collect();
+    if without != known.descriptors {
+        describe(&mut native.vlrs, &mut native.evlrs, &without);
+    }
+    Ok(())
+}

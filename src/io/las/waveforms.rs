@@ -1,0 +1,39 @@
+//! Waveform packets in a file of their own (LAS 1.4 R15, section 2.4, bit 2 of the global encoding): it
+//! has the name of the LAS file and the extension `wdp`.
+
+use std::path::{Path, PathBuf};
+
+use super::format::has_waveforms;
+use super::header::{Header, encoding};
+
+/// The extension of such files.
+pub const EXTENSION: &str = "wdp";
+
+/// The file that the records of a LAS file refer to.
+pub struct Waveforms {
+    /// Its path, if it is there.
+    pub there: Option<PathBuf>,
+    /// What the user should know if it is not.
+    pub missing: Option<String>,
+}
+
+impl Waveforms {
+    /// Those of the file at `path`.
+    pub fn of(path: &Path, header: &Header) -> Self {
+        let bits = header.encoding() & (encoding::WAVEFORM_INTERNAL | encoding::WAVEFORM_EXTERNAL);
+        if !has_waveforms(header.format()) || bits & encoding::WAVEFORM_INTERNAL != 0 {
+            return Waveforms { there: None, missing: None };
+        }
+        let names = [EXTENSION, "WDP"].map(|extension| path.with_extension(extension));
+        let there = names.into_iter().find(|path| path.is_file());
+        let told = there.is_none() && bits & encoding::WAVEFORM_EXTERNAL != 0;
+        let missing = told.then(|| {
+            format!(
+                "its records refer to waveforms in {}, which is not there: those of outputs will refer \
+                 to nothing",
+                path.with_extension(EXTENSION).display()
+            )
+        });
+        Waveforms { there, missing }
+    }
+}
