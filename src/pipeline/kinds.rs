@@ -8,6 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, de};
 use super::outputs::Outputs;
 use super::registry::{StageKind, StagePlace};
 use super::{connect, inputs};
+use crate::io::of_extension;
 use crate::io::synthetic::Scene;
 use crate::stage::{Order, Role};
 use crate::{Error, Result, point::names};
@@ -242,8 +243,18 @@ impl StageKind for Write {
 }
 
 pub(super) fn unknown_extension(path: &Path) -> Error {
-    Error::pipeline(format!("the extension of `{}` names no format", path.display()))
-        .help("use .las, .laz or .ply, or add `format`")
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let shown = path.display();
+    match of_extension(&extension) {
+        Some(format) => Error::pipeline(format!(
+            "`{shown}` is named as {format}, which is no format here"
+        ))
+        .help(
+            "LAS, LAZ and PLY are read and written: convert with another program, or add `format`",
+        ),
+        None => Error::pipeline(format!("the extension of `{shown}` names no format"))
+            .help("use .las, .laz or .ply, or add `format`"),
+    }
 }
 
 fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {

@@ -3,6 +3,7 @@
 
 use super::file::InputFile;
 use super::format;
+use crate::io::sniff;
 use crate::{Error, Result};
 
 /// Byte offsets of the fields.
@@ -79,22 +80,21 @@ impl Header {
     /// Reads the header of `file` and checks it against the file's length.
     pub fn read(file: &InputFile) -> Result<Self> {
         let smallest = Self::size_of(0);
+        let first = file.bytes(0, file.len().min(sniff::BYTES as u64) as usize)?;
+        if !sniff::is_las(&first) {
+            return Err(sniff::not("a LAS or LAZ file", file.path(), &first));
+        }
         if file.len() < smallest as u64 {
             return Err(file
                 .wrong(file.len(), "the file ends inside the LAS header")
-                .help("a LAS header has at least 227 bytes; the file is cut off or not LAS"));
+                .help("a LAS header has at least 227 bytes: the file is cut off"));
         }
-        let bytes = file.bytes(0, smallest)?;
-        if &bytes[..4] != b"LASF" {
-            return Err(file
-                .wrong(0, "this is not a LAS or LAZ file: it does not begin with LASF")
-                .help("give the file the extension of its real format"));
-        }
+        let bytes = first;
         let (major, minor) = (bytes[at::VERSION], bytes[at::VERSION + 1]);
         if major != 1 || minor > 4 {
             return Err(file
-                .wrong(at::VERSION as u64, format!("LAS {major}.{minor} is not known"))
-                .help("LAS 1.0 to 1.4 are read"));
+                .wrong(at::VERSION as u64, format!("LAS {major}.{minor} is not read"))
+                .help("LAS 1.0 to 1.4 are read: convert it with the program that wrote it"));
         }
         let size = u16::from_le_bytes([bytes[at::HEADER_SIZE], bytes[at::HEADER_SIZE + 1]]);
         let needed = Self::size_of(minor);
