@@ -107,3 +107,51 @@ fn pipes_folders_and_devices_are_refused_at_once() {
     assert_eq!(code, 2);
     assert!(text.contains("this is no pipeline: it has 68719476736 bytes"), "{text}");
 }
+
+#[test]
+fn copc_is_not_written_under_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for name in ["a.copc.laz", "a.COPC.LAZ"] {
+        let out = at(name);
+        let scan = case("80j-count-fewer.laz");
+        let (code, text) = told(&[Path::new("convert"), &scan, Path::new("-o"), &out]);
+        assert_eq!(code, 2, "{text}");
+        assert!(text.contains("is named as COPC, which is not written"), "{text}");
+        assert!(text.contains("name it `") && !out.exists(), "{text}");
+    }
+    // Outputs that take the names of inputs leave the word out.
+    std::fs::create_dir(at("in")).unwrap();
+    std::fs::copy(case("80j-count-fewer.laz"), at("in/tile.copc.laz")).unwrap();
+    let (input, [one, two]) = (at("in/tile.copc.laz"), [at("one"), at("two")]);
+    std::fs::create_dir(&one).unwrap();
+    let (code, text) = told(&[Path::new("convert"), &input, Path::new("-o"), &one]);
+    assert_eq!(code, 0, "{text}");
+    let (code, text) = told(&[Path::new("reduce"), &input, Path::new("--outdir"), &two]);
+    assert_eq!(code, 0, "{text}");
+    for folder in [one, two] {
+        let names: Vec<_> =
+            std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name()).collect();
+        assert_eq!(names, ["tile.laz"]);
+    }
+}
+
+#[test]
+fn names_that_are_no_text_are_refused_alike() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let name = std::ffi::OsStr::from_bytes(b"\xff.las");
+    std::fs::copy(case("20b-count-too-few.las"), folder.path().join(name)).unwrap();
+    let (pattern, out) = (folder.path().join("*.las"), folder.path().join("out.laz"));
+    for command in ["info", "convert", "reduce"] {
+        for input in [folder.path(), &pattern] {
+            let mut arguments = vec![Path::new(command), input];
+            if command != "info" {
+                arguments.extend([Path::new("-o"), &out]);
+            }
+            let (code, text) = told(&arguments);
+            assert_eq!(code, 2, "{command}: {text}");
+            assert!(text.contains("the name is not UTF-8 text"), "{command}: {text}");
+        }
+    }
+}

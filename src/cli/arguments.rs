@@ -221,6 +221,10 @@ pub(super) struct Reduce {
     /// Points whose coordinates are not finite: refuse the scan, or drop them [default: refuse]
     #[arg(long, value_name = "HOW")]
     pub nonfinite: Option<String>,
+    /// Scans whose points contradict their LAS header, as damaged ones do: refuse them, or warn
+    /// [default: refuse]
+    #[arg(long, value_name = "HOW")]
+    pub headers: Option<String>,
     /// What z is multiplied by where distances are measured, or auto: by what the units of the
     /// reference system say; the records keep their z [default: 1, and scans of mixed units are
     /// refused]
@@ -261,6 +265,10 @@ pub(super) struct Convert {
     /// Format: las, laz or ply [default: by extension; in a folder, the input's]
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
+    /// Scans whose points contradict their LAS header, as damaged ones do: refuse them, or warn
+    /// [default: refuse]
+    #[arg(long, value_name = "HOW")]
+    pub headers: Option<String>,
     #[command(flatten)]
     pub written: Written,
     #[command(flatten)]

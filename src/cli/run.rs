@@ -109,6 +109,7 @@ fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
         ("--classes", "median.classes", classes),
         ("--withheld", "run.withheld", arguments.withheld.clone().map(Value::from)),
         ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(Value::from)),
+        ("--headers", "run.headers", arguments.headers.clone().map(Value::from)),
         ("--z-scale", "run.z_scale", arguments.z_scale.as_deref().map(number_or_text)),
     ])
 }

@@ -41,6 +41,20 @@ impl Format {
         }
     }
 
+    /// The name of `path` without the part of its extension that says COPC, if it says that. COPC is
+    /// read as the LAZ that it is, and not written: readers of COPC refuse plain LAZ under its name.
+    pub fn without_copc(path: &Path) -> Option<PathBuf> {
+        let name = Path::new(path.file_name()?);
+        let stem = Path::new(name.file_stem()?);
+        let is_laz = Format::of(name) == Some(Format::Laz);
+        let is_copc = is_laz && stem.extension().is_some_and(|e| e.eq_ignore_ascii_case("copc"));
+        let plain = stem.file_stem().filter(|_| is_copc)?;
+        let mut plain = plain.to_owned();
+        plain.push(".");
+        plain.push(name.extension()?);
+        Some(path.with_file_name(plain))
+    }
+
     /// True if the two share their records: LAZ is LAS.
     pub fn same_records(self, other: Format) -> bool {
         (self == Format::Ply) == (other == Format::Ply)
@@ -125,7 +139,8 @@ impl StageKind for Synth {
 /// back every field keeps its name; one that cannot be held is an error unless `drop` names it.
 ///
 /// With `path` all inputs become one file. With `folder` each input becomes a file of its own there:
-/// under its name, with its header, its records and its offset, holding those of its points that are
+/// under its name (a `.copc` in it left out, for COPC is not written), with its header, its records and
+/// its offset, holding those of its points that are
 /// kept, even if that is none. The inputs are one scan all the same: neighbourhoods and cells go on
 /// from file to file, and the outputs together have the points that the one file would have.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -230,6 +245,12 @@ impl StageKind for Write {
                 let Some(format) = self.format.or(Format::of(&path)) else {
                     return Err(at.blame("path", unknown_extension(&path)));
                 };
+                if let Some(plain) = Format::without_copc(&path) {
+                    let told =
+                        format!("`{}` is named as COPC, which is not written", path.display());
+                    let help = format!("name it `{}`: it is plain LAZ", plain.display());
+                    return Err(at.blame("path", Error::pipeline(told).help(help)));
+                }
                 check(format)?;
                 let output = connect::Output { write: self, path, format, of_one: false };
                 Ok(Role::Sink(Box::new(output)))

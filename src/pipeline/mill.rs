@@ -36,6 +36,7 @@ pub(super) fn mill(
 ) -> Result<Finished> {
     clock.phase("decode", Some(job.source.points()));
     let (store, mut tally) = decode(job, lattice, shares, area)?;
+    job.check_headers()?;
     tally.work("runs", store.runs() as u64);
     clock.phase("merge", Some(tally.work.get("placed").copied().unwrap_or(0)));
     let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);

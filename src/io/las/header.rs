@@ -259,6 +259,34 @@ impl Header {
         }
     }
 
+    /// Byte and width of the counts of points by return, and the counts: those of 64 bits where the
+    /// version has them and they are set.
+    pub fn returns(&self) -> (usize, usize, Vec<u64>) {
+        let wide = |i: usize| u64::from_le_bytes(self.get(at::RETURNS + 8 * i));
+        if self.minor() >= 4 && (0..15).any(|i| wide(i) > 0) {
+            return (at::RETURNS, 8, (0..15).map(wide).collect());
+        }
+        let narrow = |i: usize| u64::from(u32::from_le_bytes(self.get(at::LEGACY_RETURNS + 4 * i)));
+        (at::LEGACY_RETURNS, 4, (0..5).map(narrow).collect())
+    }
+
+    /// What is odd about two counts of points that disagree. Formats 6 to 10 are to leave the one for
+    /// older readers at 0, others may.
+    pub fn odd_counts(&self) -> Option<String> {
+        if self.minor() < 4 {
+            return None;
+        }
+        let legacy = u64::from(u32::from_le_bytes(self.get(at::LEGACY_POINTS)));
+        let points = u64::from_le_bytes(self.get(at::POINTS));
+        let read = self.points();
+        (legacy != 0 && legacy != points).then(|| {
+            format!(
+                "the header counts {points} points and, in the field for older readers, {legacy}: \
+                 {read} are read"
+            )
+        })
+    }
+
     /// Where the extended variable length records start and how many are claimed.
     pub fn evlrs(&self) -> (u64, u32) {
         if self.minor() < 4 {

@@ -22,6 +22,7 @@ mod read;
 mod sink;
 mod source;
 mod union;
+mod verify;
 mod vlr;
 
 pub use describe::{Description, ExtraBytes, Record, describe};

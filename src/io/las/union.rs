@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 
 use super::extra::Descriptor;
 use super::input::{EXTRA_BYTES, Input, extra_record};
-use super::vlr::{Evlr, Vlr};
+use super::vlr::{Evlr, Vlr, check_held};
 use crate::Result;
 
 /// The records of the files that were added.
@@ -44,7 +44,8 @@ impl Records {
         let vlrs = other.carried_vlrs();
         self.without_ranges.add(without_ranges(other, vlrs.clone()))?;
         self.as_they_are.as_mut().map_or(Ok(()), |all| all.add(vlrs))?;
-        self.extended.add(other.carried_evlrs())
+        self.extended.add(other.carried_evlrs())?;
+        check_held(&self.without_ranges.all, &self.extended.all).map_err(|e| e.at(&other.path))
     }
 
     /// The records, the bytes behind them, the extended records.
