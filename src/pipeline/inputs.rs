@@ -18,8 +18,10 @@ use crate::{Error, ErrorKind, Result};
 ///   their paths; one that matches none is an error, like a file that is not there;
 /// - else it is a file that does not exist (yet): opening it will tell.
 ///
-/// Names that are not UTF-8 text are refused, however they are meant: neither a pipeline, nor a report,
-/// nor an argument could say them. Upper and lower case differ, and `*` and `?` do not match a dot at the beginning of a name, as in
+/// Names that are not UTF-8 text are refused, however they are meant: no pipeline and no report could
+/// say them. A pattern looks at a million names at most.
+///
+/// Upper and lower case differ, and `*` and `?` do not match a dot at the beginning of a name, as in
 /// a shell. A file meant twice, by whatever names, is an error: its points would be read twice.
 pub fn expand<P: AsRef<str>>(paths: &[P]) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = Vec::new();

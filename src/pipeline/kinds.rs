@@ -140,9 +140,9 @@ impl StageKind for Synth {
 ///
 /// With `path` all inputs become one file. With `folder` each input becomes a file of its own there:
 /// under its name (a `.copc` in it left out, for COPC is not written), with its header, its records and
-/// its offset, holding those of its points that are
-/// kept, even if that is none. The inputs are one scan all the same: neighbourhoods and cells go on
-/// from file to file, and the outputs together have the points that the one file would have.
+/// its offset, holding those of its points that are kept, even if that is none. The inputs are one scan
+/// all the same: neighbourhoods and cells go on from file to file, and the outputs together have the
+/// points that the one file would have.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Write {

@@ -207,9 +207,11 @@ impl Evidence {
         let axis = |i: usize| {
             let ends = [found.lo[i], found.hi[i]].map(|v| v as f64 * scale[i] + offset[i]);
             let (one, two) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+            let steps = |digits: &usize| scale[i].abs() * 10f64.powi(*digits as i32) >= 0.999;
+            let digits = (0..9).find(steps).unwrap_or(9);
             let name = ["x", "y", "z"][i];
             format!(
-                "{name} from {} to {} there and from {one} to {two} in the points",
+                "{name} from {} to {} there and from {one:.digits$} to {two:.digits$} in the points",
                 lo[i], hi[i]
             )
         };
@@ -244,7 +246,8 @@ impl Evidence {
         let told =
             format!("the header counts {said} points of return {}, and {is} were found", first + 1);
         // A point that changed its return is missed at one and too many at another.
-        let is_damage = self.compressed || (differ / 2).saturating_mul(SINGLE) <= found.points;
+        let is_damage =
+            self.compressed || differ.div_ceil(2).saturating_mul(SINGLE) <= found.points;
         Some((field + width * first, told, is_damage))
     }
 }
