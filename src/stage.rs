@@ -67,6 +67,12 @@ pub trait Source: Send + Sync {
     fn warnings(&self) -> Vec<String> {
         Vec::new()
     }
+
+    /// What headers say of points and is not so. Asked when every part was read to its end; of inputs
+    /// that were not, nothing is known.
+    fn contradictions(&self) -> Vec<Contradiction> {
+        Vec::new()
+    }
 }
 
 /// A file that a source reads.
@@ -76,6 +82,19 @@ pub struct Input {
     pub path: PathBuf,
     /// Its points; a source that does not find as many while it reads fails.
     pub points: u64,
+}
+
+/// Something that the header of an input says of its points and that is not so.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Contradiction {
+    /// The file.
+    pub path: PathBuf,
+    /// Byte of the header's field.
+    pub byte: u64,
+    /// What it says, and what was found.
+    pub message: String,
+    /// True if the points may be damaged, false if it must be the header that is wrong.
+    pub is_damage: bool,
 }
 
 /// A stretch of a source's records, in input order.

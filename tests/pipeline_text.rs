@@ -173,7 +173,7 @@ p.toml:2:10: `memory`: `2G` is no size such as 512MiB or 2GiB (units: B, KiB, Mi
 p.toml:3:1: `[run]` has no key `thraeds`
   3 | thraeds = 4
     | ^^^^^^^
-    = did you mean `threads`? keys: existing, lattice, memory, nonfinite, report, scratch, simd, spill, threads, tile_points, units, withheld, z_scale
+    = did you mean `threads`? keys: existing, headers, lattice, memory, noise, nonfinite, report, scratch, simd, spill, threads, tile_points, units, withheld, z_scale
 p.toml:7:9: `scene` cannot be `alps`
   7 | scene = \"alps\"
     |         ^^^^^^
@@ -332,7 +332,7 @@ fn an_input_is_never_written_over() {
 #[test]
 fn inputs_are_looked_up_and_their_formats_agree() {
     let folder = tempfile::tempdir().unwrap();
-    for name in ["b.laz", "a.las", "c.ply", "d.xyz"] {
+    for name in ["b.laz", "a.las", "c.ply", "d.abc"] {
         std::fs::write(folder.path().join(name), b"").unwrap();
     }
     let registry = registry().with::<pointmill::pipeline::Read>();
@@ -353,7 +353,7 @@ fn inputs_are_looked_up_and_their_formats_agree() {
         (at("*.e57"), "p.toml:3:8: no file matches"),
         (at("[ab]*.laz/"), "p.toml:3:8: no file matches"),
         (format!("[{}, {}]", at("a.las"), at("c.ply")), "cannot be read together"),
-        (at("d.xyz"), "names no format"),
+        (at("d.abc"), "names no format"),
         ("[]".to_owned(), "p.toml:3:8: no input is named"),
         ("3".to_owned(), "p.toml:3:8: `path`: takes a path or a list of paths, not 3"),
     ] {
@@ -366,7 +366,7 @@ fn inputs_are_looked_up_and_their_formats_agree() {
 fn keys_of_write_fit_its_format() {
     let told_of = |keys: &str| told(&GOOD.replace("path = \"out.laz\"", keys));
     for (keys, expected) in [
-        ("path = \"out.xyz\"", "p.toml:12:8: the extension of `out.xyz` names no format"),
+        ("path = \"out.abc\"", "p.toml:12:8: the extension of `out.abc` names no format"),
         ("path = \"a.ply\"\nscale = 1", "p.toml:13:9: `write.scale` is for las and laz"),
         ("path = \"a.laz\"\nencoding = \"ascii\"", "p.toml:13:12: `write.encoding` is for ply"),
         ("path = \"a.laz\"\nscale = [1, 2]", "p.toml:13:9: `scale`: takes a number above 0, or"),

@@ -267,6 +267,10 @@ pub(super) struct Reduce {
     /// or finer than it [default: what the coordinates are stored in, for floats 2^-30]
     #[arg(long, value_name = "LENGTH")]
     pub lattice: Option<f64>,
+    /// Scans whose points contradict their LAS header, as damaged ones do: refuse them, or warn
+    /// [default: refuse]
+    #[arg(long, value_name = "HOW")]
+    pub headers: Option<String>,
     /// What z is multiplied by where distances are measured, or auto: by what the units of the
     /// reference system say; the records keep their z [default: 1, and scans of mixed units are
     /// refused]
@@ -332,6 +336,10 @@ pub(super) struct Convert {
     /// cannot hold them; PLY can [default: refuse]
     #[arg(long, value_name = "HOW")]
     pub nonfinite: Option<String>,
+    /// Scans whose points contradict their LAS header, as damaged ones do: refuse them, or warn
+    /// [default: refuse]
+    #[arg(long, value_name = "HOW")]
+    pub headers: Option<String>,
     #[command(flatten)]
     pub filter: Filtered,
     #[command(flatten)]

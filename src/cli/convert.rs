@@ -141,6 +141,7 @@ pub(super) fn flags(
         ("IN", "read.path", inputs),
         ("-o", "write.path", output),
         ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
+        ("--headers", "run.headers", arguments.headers.as_deref().map(Value::from)),
         ("--nonfinite", "run.nonfinite", arguments.nonfinite.as_deref().map(Value::from)),
     ]);
     all.extend(filtered(&arguments.filter));
@@ -160,13 +161,14 @@ fn pipeline(
 }
 
 /// The output in `folder` of every input: its name, with the extension of the format that is asked
-/// for, or its own. No two may be the same.
+/// for, or its own; without `.copc`, which outputs are not. No two may be the same.
 fn outputs(inputs: &[PathBuf], folder: &Path, to: Option<&str>) -> Result<Vec<(PathBuf, PathBuf)>> {
     let mut taken: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     let mut all = Vec::new();
     for input in inputs {
         let own = || Format::of(input).map(Format::extension);
-        let name = input.file_name().map(Path::new);
+        let plain = Format::without_copc(input);
+        let name = plain.as_deref().unwrap_or(input).file_name().map(Path::new);
         let (Some(name), Some(extension)) = (name, to.or_else(own)) else {
             let told = format!("{}: its name says no format", shown(input));
             return Err(Error::pipeline(told).help("add --to las, laz or ply"));
@@ -204,6 +206,9 @@ mod tests {
     fn outputs_keep_names_and_take_the_extension() {
         assert_eq!(of(&["a/x.y.las", "b.PLY"], Some("laz")).unwrap(), ["out/x.y.laz", "out/b.laz"]);
         assert_eq!(of(&["a/x.LAS", "b.ply"], None).unwrap(), ["out/x.las", "out/b.ply"]);
+        let copc = ["a.copc.laz", "b.COPC.LAZ", "copc.laz"];
+        assert_eq!(of(&copc, None).unwrap(), ["out/a.laz", "out/b.laz", "out/copc.laz"]);
+        assert_eq!(of(&["a.copc.laz"], Some("las")).unwrap(), ["out/a.las"]);
     }
 
     #[test]

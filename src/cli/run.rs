@@ -135,6 +135,7 @@ pub(super) fn reduce_flags(arguments: &Reduce) -> Vec<Flag> {
         ("--noise", "run.noise", Some(json!(noise(arguments)))),
         ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(Value::from)),
         ("--lattice", "run.lattice", arguments.lattice.map(number)),
+        ("--headers", "run.headers", arguments.headers.clone().map(Value::from)),
         ("--z-scale", "run.z_scale", arguments.z_scale.as_deref().map(number_or_text)),
     ]);
     all.extend(filtered(&arguments.filter));

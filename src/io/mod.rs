@@ -7,8 +7,11 @@ pub mod las;
 mod origin;
 pub mod ply;
 mod project;
+mod sniff;
 pub mod synthetic;
 mod wkt;
 
 pub use describe::describe;
+pub use origin::open_plain;
 pub use project::Projected;
+pub use sniff::of_extension;

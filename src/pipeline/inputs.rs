@@ -19,6 +19,9 @@ use crate::{Error, ErrorKind, Result};
 ///   their paths; one that matches none is an error, like a file that is not there;
 /// - else it is a file that does not exist (yet): opening it will tell.
 ///
+/// Names that are not UTF-8 text are refused, however they are meant: no pipeline and no report could
+/// say them. A pattern looks at a million names at most.
+///
 /// Upper and lower case differ, and `*` and `?` do not match a dot at the beginning of a name, as in
 /// a shell. A file meant twice, by whatever names, is an error: its points would be read twice.
 pub fn expand<P: AsRef<str>>(paths: &[P]) -> Result<Vec<PathBuf>> {
@@ -26,6 +29,11 @@ pub fn expand<P: AsRef<str>>(paths: &[P]) -> Result<Vec<PathBuf>> {
     let mut named = BTreeSet::new();
     for path in paths.iter().map(AsRef::as_ref) {
         for file in one(path)? {
+            if file.to_str().is_none() {
+                return Err(Error::pipeline("the name is not UTF-8 text")
+                    .at(&file)
+                    .help("rename it: pipelines and reports could not say its name"));
+            }
             if !named.insert(file.canonicalize().unwrap_or_else(|_| file.clone())) {
                 let twice = shown(&file);
                 let path = shown(Path::new(path));
@@ -53,13 +61,18 @@ fn one(path: &str) -> Result<Vec<PathBuf>> {
             _ => Ok(vec![literal.to_owned()]),
         };
     }
-    let mut files = Vec::new();
+    if path.len() > LONGEST {
+        let told = format!("a pattern of {} bytes is longer than any path", path.len());
+        return Err(Error::pipeline(told));
+    }
     let start = if path.starts_with('/') { Path::new("/") } else { Path::new("") };
     let steps = steps(path)?;
+    let mut walk = Walk { pattern: path, ..Walk::default() };
     // A slash at the end asks for folders.
     if !path.ends_with('/') {
-        walk(start, &steps, &mut files)?;
+        walk.on(start, &steps)?;
     }
+    let mut files = walk.files;
     if files.is_empty() {
         let error = Error::new(ErrorKind::Io, format!("no file matches `{}`", shown(literal)));
         return Err(match whereabouts(literal) {
@@ -98,44 +111,81 @@ fn steps(path: &str) -> Result<Vec<Step<'_>>> {
     Ok(steps)
 }
 
-/// Collects the files that `steps` lead to from `at`.
-fn walk(at: &Path, steps: &[Step<'_>], files: &mut Vec<PathBuf>) -> Result<()> {
-    let Some((step, rest)) = steps.split_first() else {
-        if !at.is_dir() && at.exists() {
-            files.push(at.to_owned());
-        }
-        return Ok(());
-    };
-    match step {
-        Step::Name(name) => walk(&at.join(name), rest, files),
-        Step::Matching(pattern) => {
-            for name in entries(at)? {
-                // Bytes that are no text match `*` and `?` as the character that stands for such.
-                let text = name.to_string_lossy();
-                let hidden = text.starts_with('.') && !pattern.as_str().starts_with('.');
-                if !hidden && pattern.matches(&text) {
-                    walk(&at.join(name), rest, files)?;
-                }
+/// Bytes of the longest pattern: the system's longest path.
+const LONGEST: usize = 4096;
+/// Names that a pattern may look at.
+const NAMES_MOST: usize = 1 << 20;
+
+/// A search for the files that a pattern means.
+#[derive(Default)]
+struct Walk<'a> {
+    pattern: &'a str,
+    files: Vec<PathBuf>,
+    /// Folders with the number of steps that were left there: `*/..` leads to one from each of its
+    /// folders, and `*/../*/..` from each of these again.
+    seen: BTreeSet<(PathBuf, usize)>,
+    names: usize,
+}
+
+impl Walk<'_> {
+    /// Collects the files that `steps` lead to from `at`.
+    fn on(&mut self, at: &Path, steps: &[Step<'_>]) -> Result<()> {
+        let Some((step, rest)) = steps.split_first() else {
+            if !at.is_dir() && at.exists() {
+                self.files.push(at.to_owned());
             }
-            Ok(())
-        }
-        Step::Below => {
-            walk(at, rest, files)?;
-            for name in entries(at)? {
-                let inner = at.join(&name);
-                // A link could lead back up.
-                if !name.as_bytes().starts_with(b".") && inner.is_dir() && !inner.is_symlink() {
-                    walk(&inner, steps, files)?;
+            return Ok(());
+        };
+        match step {
+            Step::Name(name) => self.on(&at.join(name), rest),
+            Step::Matching(pattern) => {
+                for name in self.entries(at, steps.len())? {
+                    // Bytes that are no text match `*` and `?` as the character that stands for such.
+                    let text = name.to_string_lossy();
+                    let hidden = text.starts_with('.') && !pattern.as_str().starts_with('.');
+                    if !hidden && pattern.matches(&text) {
+                        self.on(&at.join(name), rest)?;
+                    }
                 }
+                Ok(())
             }
-            Ok(())
+            Step::Below => {
+                let names = self.entries(at, steps.len())?;
+                self.on(at, rest)?;
+                for name in names {
+                    let inner = at.join(&name);
+                    // A link could lead back up.
+                    if !name.as_bytes().starts_with(b".") && inner.is_dir() && !inner.is_symlink() {
+                        self.on(&inner, steps)?;
+                    }
+                }
+                Ok(())
+            }
         }
+    }
+
+    /// Names in a folder where `left` steps are left; none where there is no such folder, or where
+    /// the search was before.
+    fn entries(&mut self, folder: &Path, left: usize) -> Result<Vec<OsString>> {
+        let folder = if folder == Path::new("") { Path::new(".") } else { folder };
+        let Ok(real) = folder.canonicalize() else { return Ok(Vec::new()) };
+        if !self.seen.insert((real, left)) {
+            return Ok(Vec::new());
+        }
+        let mut names = entries(folder)?;
+        // Where two ways lead to one folder, the first by its name is gone.
+        names.sort_unstable();
+        self.names += names.len();
+        if self.names > NAMES_MOST {
+            let told = format!("`{}` looks at more than {NAMES_MOST} names", self.pattern);
+            return Err(Error::pipeline(told).help("name fewer folders, or one of them at a time"));
+        }
+        Ok(names)
     }
 }
 
 /// Names in a folder; none where there is no such folder.
 fn entries(folder: &Path) -> Result<Vec<OsString>> {
-    let folder = if folder == Path::new("") { Path::new(".") } else { folder };
     let failed = |e| Error::io(folder, "list the folder", e);
     if !folder.is_dir() {
         return Ok(Vec::new());
@@ -226,12 +276,28 @@ mod tests {
     }
 
     #[test]
-    fn names_that_are_no_text_are_found_too() {
+    fn names_that_are_no_text_are_refused_by_patterns_and_folders() {
         let at = folder_of(&["a.laz"]);
         let name = std::ffi::OsStr::from_bytes(b"\xff.laz");
         fs::write(at.path().join(name), b"").unwrap();
-        let files = expand(&[at.path().join("*.laz").to_str().unwrap()]).unwrap();
-        assert_eq!(files, [at.path().join("a.laz"), at.path().join(name)]);
+        for path in ["", "*.laz", "?.laz", "**/*.laz"] {
+            let refused = expand(&[at.path().join(path).to_str().unwrap()]).unwrap_err();
+            assert_eq!(refused.path(), Some(at.path().join(name).as_path()), "{path}");
+            assert!(refused.to_string().ends_with("not UTF-8 text"), "{refused}");
+        }
+        assert_eq!(names(at.path(), &["a*.laz"]).unwrap(), ["a.laz"]);
+    }
+
+    #[test]
+    fn patterns_that_go_up_again_and_again_end() {
+        let at = folder_of(&["a.laz"]);
+        (0..20).for_each(|i| fs::create_dir(at.path().join(format!("d{i}"))).unwrap());
+        let start = std::time::Instant::now();
+        let up = "*/../".repeat(40) + "*.laz";
+        assert_eq!(names(at.path(), &[&up]).unwrap(), ["a.laz"]);
+        assert!(start.elapsed() < std::time::Duration::from_secs(5), "{:?}", start.elapsed());
+        let long = names(at.path(), &[&("*/".repeat(3000) + "x")]).unwrap_err();
+        assert!(long.to_string().contains("longer than any path"), "{long}");
     }
 
     #[test]

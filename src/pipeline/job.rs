@@ -1,13 +1,16 @@
 //! What every phase of a run shares: the source, the stages, the budget, and how it is told to stop.
 
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
 use super::each::Each;
 use super::passes::{Pass, StageOp};
+use super::settings::Headers;
 use super::tagger::{ClassOf, LEFT_OUT, Tagger};
 use crate::budget::Budget;
+use crate::error::shown;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::geom::simd::Simd;
 use crate::point::PointBatch;
@@ -33,6 +36,7 @@ pub(super) struct Job<'a> {
     pub threads: usize,
     pub simd: Simd,
     pub drop_nonfinite: bool,
+    pub headers: Headers,
     pub tile_points: Option<usize>,
     pub run_records: Option<usize>,
     /// For each sink, whether it writes normals.
@@ -95,6 +99,29 @@ impl Job<'_> {
         if tally.work.get("placed").is_some_and(|&placed| placed > 0) {
             self.tagger.warnings(tally.selections).into_iter().for_each(|told| self.warn(told));
         }
+    }
+
+    /// Once all points are read: fails where they contradict their headers, or warns of it.
+    pub fn check_headers(&self) -> Result<()> {
+        let refuse = self.headers == Headers::Refuse;
+        let all = self.source.contradictions();
+        let (wrong, odd): (Vec<_>, Vec<_>) =
+            all.into_iter().partition(|told| told.is_damage && refuse);
+        for told in odd {
+            self.warn(format!("{}: {}", shown(&told.path), told.message));
+        }
+        let Some(first) = wrong.first() else { return Ok(()) };
+        let (of_first, others): (Vec<_>, Vec<_>) =
+            wrong.iter().partition(|told| told.path == first.path);
+        let mut said: Vec<String> = of_first.iter().map(|told| told.message.clone()).collect();
+        let others: BTreeSet<_> = others.iter().map(|told| &told.path).collect();
+        if !others.is_empty() {
+            said.push(format!("{} other inputs contradict their headers, too", others.len()));
+        }
+        Err(Error::data(&first.path, said.join("; ")).at_byte(first.byte).help(
+            "the file is damaged: get another copy; or what wrote it did not keep its header up: \
+             `run.headers = \"warn\"` reads it all the same",
+        ))
     }
 
     /// Tells of progress, and hears whether to go on.

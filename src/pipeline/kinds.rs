@@ -10,6 +10,7 @@ use super::outputs::Outputs;
 use super::registry::{StageKind, StagePlace};
 use super::{connect, inputs};
 use crate::error::shown;
+use crate::io::of_extension;
 use crate::io::ply::Colors;
 use crate::io::synthetic::Scene;
 use crate::stage::{Order, Role};
@@ -41,6 +42,20 @@ impl Format {
             Format::Laz => "laz",
             Format::Ply => "ply",
         }
+    }
+
+    /// The name of `path` without the part of its extension that says COPC, if it says that. COPC is
+    /// read as the LAZ that it is, and not written: readers of COPC refuse plain LAZ under its name.
+    pub fn without_copc(path: &Path) -> Option<PathBuf> {
+        let name = Path::new(path.file_name()?);
+        let stem = Path::new(name.file_stem()?);
+        let is_laz = Format::of(name) == Some(Format::Laz);
+        let is_copc = is_laz && stem.extension().is_some_and(|e| e.eq_ignore_ascii_case("copc"));
+        let plain = stem.file_stem().filter(|_| is_copc)?;
+        let mut plain = plain.to_owned();
+        plain.push(".");
+        plain.push(name.extension()?);
+        Some(path.with_file_name(plain))
     }
 
     /// True if the two share their records: LAZ is LAS.
@@ -150,9 +165,10 @@ impl StageKind for Synth {
 /// EPSG codes become GeoTIFF keys. No date but those of the inputs is written.
 ///
 /// With `path` all inputs become one file. With `folder` each input becomes a file of its own there:
-/// under its name, with its header, its records and its offset, holding those of its points that are
-/// kept, even if that is none. The inputs are one scan all the same: neighbourhoods and cells go on
-/// from file to file, and the outputs together have the points that the one file would have.
+/// under its name (a `.copc` in it left out, for COPC is not written), with its header, its records and
+/// its offset, holding those of its points that are kept, even if that is none. The inputs are one scan
+/// all the same: neighbourhoods and cells go on from file to file, and the outputs together have the
+/// points that the one file would have.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Write {
@@ -269,6 +285,12 @@ impl StageKind for Write {
                 let Some(format) = self.format.or(Format::of(&path)) else {
                     return Err(at.blame("path", unknown_extension(&path, "write.format")));
                 };
+                if let Some(plain) = Format::without_copc(&path) {
+                    let told =
+                        format!("`{}` is named as COPC, which is not written", path.display());
+                    let help = format!("name it `{}`: it is plain LAZ", plain.display());
+                    return Err(at.blame("path", Error::pipeline(told).help(help)));
+                }
                 check(format)?;
                 let output = connect::Output { write: self, path, format, of_one: false };
                 Ok(Role::Sink(Box::new(output)))
@@ -282,8 +304,16 @@ impl StageKind for Write {
 }
 
 pub(super) fn unknown_extension(path: &Path, setting: &str) -> Error {
-    Error::pipeline(format!("the extension of `{}` names no format", shown(&path)))
-        .help(format!("use .las, .laz or .ply, or give `{setting}`"))
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let name = shown(&path);
+    match of_extension(&extension) {
+        Some(format) => {
+            Error::pipeline(format!("`{name}` is named as {format}, which is no format here"))
+                .help(format!("LAS, LAZ and PLY are read and written: convert with another program, or give `{setting}`"))
+        }
+        None => Error::pipeline(format!("the extension of `{name}` names no format"))
+            .help(format!("use .las, .laz or .ply, or give `{setting}`")),
+    }
 }
 
 fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {

@@ -37,6 +37,7 @@ pub(super) fn mill(
 ) -> Result<Finished> {
     clock.phase("decode", Some(job.source.points()));
     let (store, mut tally) = decode(job, lattice, shares, area)?;
+    job.check_headers()?;
     job.tell_left_out(&tally);
     tally.work("runs", store.runs() as u64);
     clock.phase("merge", Some(tally.work.get("placed").copied().unwrap_or(0)));

@@ -51,7 +51,8 @@ impl Outputs {
 
     /// The output of the input at `path`: its name, with the extension of the format that is asked
     /// for unless it says that already.
-    fn of(&self, path: &Path) -> Result<Output> {
+    fn of(&self, input: &Path) -> Result<Output> {
+        let path = &Format::without_copc(input).unwrap_or_else(|| input.to_owned());
         let told = Format::of(path);
         let format =
             self.write.format.or(told).ok_or_else(|| unknown_extension(path, "write.format"))?;

@@ -225,6 +225,7 @@ impl Plan {
             threads: self.threads,
             simd: self.simd,
             drop_nonfinite: self.settings.nonfinite == Nonfinite::Drop,
+            headers: self.settings.headers,
             tile_points,
             run_records: tile_points.map(|n| n.saturating_mul(4).min(shares.run_records)),
             wants_normals: self.sinks.iter().map(|sink| sink.wants_normals()).collect(),

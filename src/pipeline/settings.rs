@@ -41,6 +41,11 @@ pub struct RunSettings {
     /// What becomes of points whose coordinates are not finite, where stages measure distances. A
     /// pipeline that streams copies them unless they are dropped: a conversion keeps its records.
     pub nonfinite: Nonfinite,
+    /// What becomes of scans whose points are not as their LAS header says, which damage looks like:
+    /// outside of its box, or counted otherwise by return. LAZ has no checksum; this is what stands in
+    /// for one. A box that holds none of a LAZ file's points (less than 99 in 100 of a LAS file's), or
+    /// that is not set, is told as a warning in any case; one wider than the points is right.
+    pub headers: Headers,
     /// What becomes of points with the withheld flag, in pipelines that work on tiles; others keep
     /// every point.
     pub withheld: Treatment,
@@ -76,6 +81,17 @@ pub enum Nonfinite {
     Refuse,
     /// They are removed, entered in the ledger as such.
     Drop,
+}
+
+/// What becomes of scans whose points contradict their header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Headers {
+    /// The run fails and names what differs.
+    #[default]
+    Refuse,
+    /// A warning names it: for files whose writer did not keep the header up.
+    Warn,
 }
 
 /// What becomes of scans whose x, y and z have different units.

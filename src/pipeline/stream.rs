@@ -79,6 +79,7 @@ pub(super) fn stream(
         guard.disarm();
         Ok(())
     })?;
+    job.check_headers()?;
     let (rest, kept) = {
         let (chunks, kept) = &mut *lock(&open);
         let rest = std::mem::take(chunks).into_iter().enumerate();

@@ -1,6 +1,7 @@
 //! From a pipeline file's text to its stages in their roles, or to every mistake in it.
 
 use std::fmt;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -16,8 +17,12 @@ use super::set::Set;
 use super::settings::RunSettings;
 use super::written::Written;
 use crate::error::shown;
+use crate::io::open_plain;
 use crate::stage::{Order, Role};
 use crate::{Error, Result};
+
+/// Bytes of the longest pipeline file: whoever names a scan in its place waits for no gigabytes.
+const LONGEST: u64 = 16 << 20;
 
 /// A pipeline that is right as far as its text tells: one source, then stages that work, then sinks.
 #[derive(Debug)]
@@ -102,7 +107,18 @@ impl Pipeline {
 
     /// Reads the pipeline file at `path`, as [`parse_with`](Pipeline::parse_with).
     pub fn read(path: &Path, registry: &Registry, sets: &[Set]) -> Result<Pipeline> {
-        let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read the pipeline", e))?;
+        let (file, about) = open_plain(path)?;
+        if about.len() > LONGEST {
+            let told = format!(
+                "this is no pipeline: it has {} bytes, and {LONGEST} are read",
+                about.len()
+            );
+            return Err(Error::pipeline(told).at(path));
+        }
+        let mut bytes = Vec::new();
+        file.take(LONGEST)
+            .read_to_end(&mut bytes)
+            .map_err(|e| Error::io(path, "read the pipeline", e))?;
         let text = String::from_utf8(bytes).map_err(|e| {
             let valid = e.utf8_error().valid_up_to() as u64;
             Error::pipeline("the pipeline is not UTF-8 text").at(path).at_byte(valid)

@@ -3,6 +3,7 @@
 
 use super::file::InputFile;
 use super::format;
+use crate::io::sniff;
 use crate::point::GpsTime;
 use crate::{Error, Result};
 
@@ -82,22 +83,21 @@ impl Header {
     /// Reads the header of `file` and checks it against the file's length.
     pub fn read(file: &InputFile) -> Result<Self> {
         let smallest = Self::size_of(0);
+        let first = file.bytes(0, file.len().min(sniff::BYTES as u64) as usize)?;
+        if !sniff::is_las(&first) {
+            return Err(sniff::not("a LAS or LAZ file", file.path(), &first));
+        }
         if file.len() < smallest as u64 {
             return Err(file
                 .wrong(file.len(), "the file ends inside the LAS header")
-                .help("a LAS header has at least 227 bytes; the file is cut off or not LAS"));
+                .help("a LAS header has at least 227 bytes: the file is cut off"));
         }
-        let bytes = file.bytes(0, smallest)?;
-        if &bytes[..4] != b"LASF" {
-            return Err(file
-                .wrong(0, "this is not a LAS or LAZ file: it does not begin with LASF")
-                .help("give the file the extension of its real format"));
-        }
+        let bytes = first;
         let (major, minor) = (bytes[at::VERSION], bytes[at::VERSION + 1]);
         if major != 1 || minor > 4 {
             return Err(file
-                .wrong(at::VERSION as u64, format!("LAS {major}.{minor} is not known"))
-                .help("LAS 1.0 to 1.4 are read"));
+                .wrong(at::VERSION as u64, format!("LAS {major}.{minor} is not read"))
+                .help("LAS 1.0 to 1.4 are read: convert it with the program that wrote it"));
         }
         let size = u16::from_le_bytes([bytes[at::HEADER_SIZE], bytes[at::HEADER_SIZE + 1]]);
         let needed = Self::size_of(minor);
@@ -260,6 +260,34 @@ impl Header {
             0 => legacy,
             points => points,
         }
+    }
+
+    /// Byte and width of the counts of points by return, and the counts: those of 64 bits where the
+    /// version has them and they are set.
+    pub fn returns(&self) -> (usize, usize, Vec<u64>) {
+        let wide = |i: usize| u64::from_le_bytes(self.get(at::RETURNS + 8 * i));
+        if self.minor() >= 4 && (0..15).any(|i| wide(i) > 0) {
+            return (at::RETURNS, 8, (0..15).map(wide).collect());
+        }
+        let narrow = |i: usize| u64::from(u32::from_le_bytes(self.get(at::LEGACY_RETURNS + 4 * i)));
+        (at::LEGACY_RETURNS, 4, (0..5).map(narrow).collect())
+    }
+
+    /// What is odd about two counts of points that disagree. Formats 6 to 10 are to leave the one for
+    /// older readers at 0, others may.
+    pub fn odd_counts(&self) -> Option<String> {
+        if self.minor() < 4 {
+            return None;
+        }
+        let legacy = u64::from(u32::from_le_bytes(self.get(at::LEGACY_POINTS)));
+        let points = u64::from_le_bytes(self.get(at::POINTS));
+        let read = self.points();
+        (legacy != 0 && legacy != points).then(|| {
+            format!(
+                "the header counts {points} points and, in the field for older readers, {legacy}: \
+                 {read} are read"
+            )
+        })
     }
 
     /// Where the extended variable length records start and how many are claimed.

@@ -80,14 +80,18 @@ impl Input {
         let behind = evlrs.iter().map(Evlr::position).min();
         let storage = storage(&file, &header, &vlrs, behind, &mut warnings)?;
         let path_said = |odd: String| format!("{}: {odd}", path.display());
-        warnings.extend(header.odd_scales().map(path_said));
+        warnings.extend(header.odd_scales().into_iter().chain(header.odd_counts()).map(path_said));
         let named = vlrs.iter().map(|v| (v.user(), v.record()));
         let named = named.chain(evlrs.iter().map(|v| (v.user(), v.record())));
         let indexes: BTreeSet<String> =
             named.filter(|(user, record)| is_index(user, *record)).map(|(user, _)| user).collect();
         for user in indexes {
+            let what = match user.as_str() {
+                "copc" => ": they are plain LAS or LAZ and not named .copc.laz",
+                _ => ", which would be wrong there",
+            };
             warnings.push(format!(
-                "{}: outputs do not carry the spatial index ({user}), which would be wrong there",
+                "{}: outputs do not carry the spatial index ({user}){what}",
                 path.display()
             ));
         }

@@ -10,6 +10,7 @@ use super::chunks::{Chunk, layered_head};
 use super::file::{InputFile, Window};
 use super::guard::unpanicked;
 use super::laz::{Compression, Compressor};
+use super::verify::Evidence;
 use crate::point::PointBatch;
 use crate::stage::Part;
 use crate::{Error, Result};
@@ -98,6 +99,8 @@ pub struct LazPart {
     now: Option<(Chunk, u64)>,
     /// Points after which the next chunk begins, where no table says it.
     in_a_row: Option<u64>,
+    /// Who is told of points that the header does not count.
+    evidence: Option<Arc<Evidence>>,
 }
 
 impl LazPart {
@@ -114,8 +117,23 @@ impl LazPart {
         let decoder = compression.decoder(Window::new(file.clone(), 0, 0));
         let chunks = chunks.into_iter();
         let selection = DecompressionSelection::all();
-        let now = None;
-        LazPart { file, source, shift, compression, selection, decoder, chunks, now, in_a_row }
+        LazPart {
+            file,
+            source,
+            shift,
+            compression,
+            selection,
+            decoder,
+            chunks,
+            now: None,
+            in_a_row,
+            evidence: None,
+        }
+    }
+
+    /// Tells `evidence` of points that the header does not count.
+    pub fn tell(self, evidence: Arc<Evidence>) -> Self {
+        LazPart { evidence: Some(evidence), ..self }
     }
 
     /// Decodes these layers alone, where there are layers.
@@ -164,13 +182,44 @@ impl LazPart {
     }
 
     /// A chunk of interleaved points ends where its decoder does: the only checksum there is.
-    fn check_end(&self, chunk: Chunk) -> Result<()> {
+    /// Points behind those that the header leaves for the last one are told, if they are points.
+    fn check_end(&mut self, chunk: Chunk) -> Result<()> {
         let known = self.in_a_row.is_none() && chunk.whole;
         let at = self.decoder.get().position();
-        if known && self.compression.compressor == Compressor::Chunked && at != chunk.end {
+        if !known || self.compression.compressor != Compressor::Chunked || at == chunk.end {
+            return Ok(());
+        }
+        let Some(more) = self.uncounted(chunk)? else {
             return Err(self.damaged(chunk, "the header's points end before its bytes"));
+        };
+        if let Some(evidence) = &self.evidence {
+            let path = self.file.path().display();
+            evidence.warn(format!(
+                "{path}: {more} points or more behind those that the header counts are not read"
+            ));
         }
         Ok(())
+    }
+
+    /// How many points follow in the chunk, whose points so far were read, up to its last byte; None
+    /// if what follows makes no points of this file.
+    fn uncounted(&mut self, chunk: Chunk) -> Result<Option<u64>> {
+        let full = u64::from(self.compression.chunk_points.unwrap_or(0));
+        let Some(evidence) = self.evidence.clone() else { return Ok(None) };
+        let mut record = vec![0; self.compression.stride];
+        let mut more = 0;
+        while self.decoder.get().position() != chunk.end {
+            let point = unpanicked(|| self.decoder.decompress_many(&mut record));
+            let is_point = matches!(point, Some(Ok(())));
+            if more >= full.saturating_sub(chunk.points) || !is_point {
+                return Ok(None);
+            }
+            if !evidence.are_likely(&record, self.compression.stride) {
+                return Ok(None);
+            }
+            more += 1;
+        }
+        Ok(Some(more))
     }
 
     fn damaged(&self, chunk: Chunk, why: &str) -> Error {

@@ -23,6 +23,9 @@ use crate::point::{Layout, Metadata, Schema};
 use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
+/// Bytes of header and records that are gathered before they are written.
+const HEAD_BYTES: usize = 64 << 10;
+
 /// What a LAS output is to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LasOptions {
@@ -177,7 +180,13 @@ impl LasSink {
             notes,
         };
         let mut head = sink.native.header.bytes().to_vec();
-        head.extend(sink.native.vlrs.iter().flat_map(Vlr::bytes));
+        for i in 0..sink.native.vlrs.len() {
+            head.extend(sink.native.vlrs[i].bytes());
+            if head.len() > HEAD_BYTES {
+                sink.write(&head)?;
+                head.clear();
+            }
+        }
         head.extend_from_slice(&sink.native.gap);
         if sink.encoder.compression.is_some() {
             head.extend((-1i64).to_le_bytes()); // the chunk table's place, set when it is known

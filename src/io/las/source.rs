@@ -13,6 +13,7 @@ use super::input::{Input, Storage};
 use super::merge::Merge;
 use super::native::Native;
 use super::read::{LazPart, PlainPart, Shift};
+use super::verify::{Evidence, Watched};
 use crate::point::{Metadata, Schema};
 use crate::stage::{self, Part, Source};
 use crate::{Error, Result};
@@ -70,11 +71,14 @@ struct Opened {
     input: Input,
     shift: Shift,
     compression: Option<Arc<super::laz::Compression>>,
+    evidence: Arc<Evidence>,
 }
 
 /// Which file a part is of, and its stretch there: records of a plain file, chunks of a LAZ.
 struct PartPlace {
     file: usize,
+    /// Its number among the parts of that file.
+    number: usize,
     first: u64,
     count: u64,
 }
@@ -85,33 +89,13 @@ impl Opened {
             Storage::Plain => None,
             Storage::Laz(compression, _) => Some(Arc::new(compression.clone())),
         };
-        Opened { input, shift, compression }
+        let evidence = Arc::new(Evidence::new(&input.header, stretches(&input).len()));
+        Opened { input, shift, compression, evidence }
     }
 
     fn parts(&self, file: usize) -> Vec<PartPlace> {
-        let place = |first, count| PartPlace { file, first, count };
-        match &self.input.storage {
-            Storage::Plain => {
-                let points = self.input.points();
-                (0..points.div_ceil(PLAIN_POINTS))
-                    .map(|i| i * PLAIN_POINTS)
-                    .map(|first| place(first, PLAIN_POINTS.min(points - first)))
-                    .collect()
-            }
-            Storage::Laz(_, Chunks::InARow { .. }) => vec![place(0, 1)],
-            Storage::Laz(_, Chunks::Known(chunks)) => {
-                let mut parts = Vec::new();
-                let (mut first, mut points) = (0, 0);
-                for (i, chunk) in chunks.iter().enumerate() {
-                    points += chunk.points;
-                    if points >= PART_POINTS || i + 1 == chunks.len() {
-                        parts.push(place(first as u64, (i + 1 - first) as u64));
-                        (first, points) = (i + 1, 0);
-                    }
-                }
-                parts
-            }
-        }
+        let place = |(number, (first, count))| PartPlace { file, number, first, count };
+        stretches(&self.input).into_iter().enumerate().map(place).collect()
     }
 
     fn part_bytes(&self) -> u64 {
@@ -123,7 +107,17 @@ impl Opened {
         held + WINDOW_BYTES as u64 + compression.state_bytes()
     }
 
+    /// Opens a part, its points looked at. Coordinates and returns are in layers that are always decoded.
     fn open(&self, place: &PartPlace, selection: DecompressionSelection) -> Result<Box<dyn Part>> {
+        let part = self.unwatched(place, selection)?;
+        Ok(Box::new(Watched::new(part, self.evidence.clone(), place.number, self.shift.0)))
+    }
+
+    fn unwatched(
+        &self,
+        place: &PartPlace,
+        selection: DecompressionSelection,
+    ) -> Result<Box<dyn Part>> {
         let file = self.input.reopen()?;
         let (shift, source) = (self.shift, place.file as u32);
         let (first, count) = (place.first as usize, place.count as usize);
@@ -144,7 +138,33 @@ impl Opened {
             .clone()
             .ok_or_else(|| Error::internal("a LAZ file without its compression"))?;
         let part = LazPart::new(file, source, shift, compression, chunks, in_a_row);
-        Ok(Box::new(part.select(selection)))
+        Ok(Box::new(part.select(selection).tell(self.evidence.clone())))
+    }
+}
+
+/// The stretches that the parts of a file are: first and count of records, or of chunks.
+fn stretches(input: &Input) -> Vec<(u64, u64)> {
+    match &input.storage {
+        Storage::Plain => {
+            let points = input.points();
+            (0..points.div_ceil(PLAIN_POINTS))
+                .map(|i| i * PLAIN_POINTS)
+                .map(|first| (first, PLAIN_POINTS.min(points - first)))
+                .collect()
+        }
+        Storage::Laz(_, Chunks::InARow { .. }) => vec![(0, 1)],
+        Storage::Laz(_, Chunks::Known(chunks)) => {
+            let mut parts = Vec::new();
+            let (mut first, mut points) = (0, 0);
+            for (i, chunk) in chunks.iter().enumerate() {
+                points += chunk.points;
+                if points >= PART_POINTS || i + 1 == chunks.len() {
+                    parts.push((first as u64, (i + 1 - first) as u64));
+                    (first, points) = (i + 1, 0);
+                }
+            }
+            parts
+        }
     }
 }
 
@@ -194,6 +214,12 @@ impl Source for LasSource {
     }
 
     fn warnings(&self) -> Vec<String> {
-        self.warnings.clone()
+        let found = self.files.iter().flat_map(|file| file.evidence.warnings());
+        self.warnings.iter().cloned().chain(found).collect()
+    }
+
+    fn contradictions(&self) -> Vec<stage::Contradiction> {
+        let of = |file: &Opened| file.evidence.contradictions(&file.input.path, &file.input.header);
+        self.files.iter().flat_map(of).collect()
     }
 }

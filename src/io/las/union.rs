@@ -8,7 +8,7 @@ use super::described::{EXTRA_BYTES, record};
 use super::extra::Descriptor;
 use super::input::Input;
 use super::system::CrsRecords;
-use super::vlr::{Evlr, Vlr};
+use super::vlr::{Evlr, Vlr, check_held};
 use crate::Result;
 
 /// The records of the files that were added.
@@ -57,7 +57,8 @@ impl Records {
         let (vlrs, evlrs) = other.carried();
         self.without_ranges.add(without_ranges(vlrs.clone()))?;
         self.as_they_are.as_mut().map_or(Ok(()), |all| all.add(vlrs))?;
-        self.extended.add(evlrs)
+        self.extended.add(evlrs)?;
+        check_held(&self.without_ranges.all, &self.extended.all).map_err(|e| e.at(&other.path))
     }
 
     /// The records, the bytes behind them, the extended records.

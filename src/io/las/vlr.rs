@@ -2,20 +2,23 @@
 //! ones stay in their file until they are written: one may hold gigabytes of waveforms.
 
 use std::cmp::Ordering;
+use std::sync::Arc;
 
 use super::file::InputFile;
 use super::header::{Header, at, encoding};
-use crate::Result;
+use crate::budget::Bytes;
 use crate::io::origin::Origin;
+use crate::{Error, ErrorKind, Result};
 
 /// Bytes of a record's head.
 pub const VLR_HEAD: usize = 54;
 /// Bytes of an extended record's head.
 pub const EVLR_HEAD: usize = 60;
-/// Bytes of variable length records that are held in memory; no file that means them has as many.
-const VLRS_HELD: u64 = 64 << 20;
-/// Extended records whose heads are held in memory; no file that means them has as many.
-const EVLRS_HELD: u32 = 1 << 18;
+/// Bytes of variable length records that are held in memory, of one file or as the union of several.
+/// No file that means them has as many, and a budget has room for them before it is known.
+const BYTES_HELD: u64 = 8 << 20;
+/// Variable length records, and as many extended ones, whose heads are held in memory.
+const RECORDS_HELD: usize = 1 << 14;
 /// Bytes between the records and the points that are carried; more are dropped with a warning.
 const GAP_CARRIED: u64 = 64 << 10;
 
@@ -35,7 +38,8 @@ pub fn split_at_room(text: &str, room: usize) -> (&str, &str) {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Vlr {
     head: [u8; VLR_HEAD],
-    payload: Vec<u8>,
+    /// Shared by all who carry the record.
+    payload: Arc<[u8]>,
 }
 
 impl Vlr {
@@ -47,7 +51,7 @@ impl Vlr {
             head[at..at + field.len()].copy_from_slice(field.as_bytes());
         }
         head[18..20].copy_from_slice(&record.to_le_bytes());
-        Vlr { head, payload: Vec::new() }.with_payload(payload)
+        Vlr { head, payload: Arc::default() }.with_payload(payload)
     }
 
     /// The same record with another payload (shorter than 64 KiB).
@@ -55,7 +59,7 @@ impl Vlr {
         debug_assert!(u16::try_from(payload.len()).is_ok());
         let mut head = self.head;
         head[20..22].copy_from_slice(&(payload.len() as u16).to_le_bytes());
-        Vlr { head, payload }
+        Vlr { head, payload: payload.into() }
     }
 
     /// Who defined it.
@@ -85,7 +89,7 @@ impl Vlr {
 
     /// Head and payload as in the file.
     pub fn bytes(&self) -> impl Iterator<Item = u8> + '_ {
-        self.head.iter().chain(&self.payload).copied()
+        self.head.iter().chain(self.payload.iter()).copied()
     }
 
     /// Bytes in the file.
@@ -215,6 +219,9 @@ pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>
             )
             .help("the record count or the start of the points is damaged"));
     }
+    if claimed as usize > RECORDS_HELD {
+        return Err(too_many(file, at::VLRS as u64, claimed, ""));
+    }
     let mut vlrs = Vec::new();
     let mut at = start;
     for i in 0..claimed {
@@ -227,10 +234,10 @@ pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>
         file.read_at(&mut head, at)?;
         let len = u16::from_le_bytes([head[20], head[21]]);
         at += VLR_HEAD as u64;
-        if at - start > VLRS_HELD {
-            return Err(file
-                .wrong(at::VLRS as u64, format!("{claimed} variable length records exceed 64 MiB"))
-                .help("the record count is damaged: no scan needs that many"));
+        if at + u64::from(len) - start > BYTES_HELD {
+            let told =
+                format!("the {claimed} variable length records exceed {}", Bytes(BYTES_HELD));
+            return Err(file.wrong(at::VLRS as u64, told).help(NOT_HELD));
         }
         if u64::from(len) > end - at {
             return Err(file
@@ -240,7 +247,7 @@ pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>
                 )
                 .help("the record count, this length or the start of the points is damaged"));
         }
-        vlrs.push(Vlr { head, payload: file.bytes(at, usize::from(len))? });
+        vlrs.push(Vlr { head, payload: file.bytes(at, usize::from(len))?.into() });
         at += u64::from(len);
     }
     let gap = end - at;
@@ -252,6 +259,32 @@ pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>
         return Ok((vlrs, Vec::new(), Some(warning)));
     }
     Ok((vlrs, file.bytes(at, gap as usize)?, None))
+}
+
+/// What is to be done about records that are not held.
+const NOT_HELD: &str = "no scan needs that many: the count is damaged, or another program has to \
+                        remove those without a meaning first";
+
+fn too_many(file: &InputFile, field: u64, claimed: u32, extended: &str) -> Error {
+    let told = format!(
+        "{claimed} {extended}variable length records are more than the {RECORDS_HELD} held"
+    );
+    file.wrong(field, told).help(NOT_HELD)
+}
+
+/// Refuses a union of records of several files that is more than is held of one.
+pub fn check_held(vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<()> {
+    let bytes: u64 = vlrs.iter().map(|vlr| vlr.len() as u64).sum();
+    if vlrs.len().max(evlrs.len()) <= RECORDS_HELD && bytes <= BYTES_HELD {
+        return Ok(());
+    }
+    let (vlrs, evlrs, most) = (vlrs.len(), evlrs.len(), Bytes(BYTES_HELD));
+    let told = format!(
+        "the inputs have {vlrs} different variable length records of {} and {evlrs} extended ones: \
+         {RECORDS_HELD} of each, and {most}, are held",
+        Bytes(bytes)
+    );
+    Err(Error::new(ErrorKind::Data, told).help("run them in several parts, or one by one"))
 }
 
 /// The extended records of a file. LAS 1.3 has at most one, the waveform packets.
@@ -278,10 +311,8 @@ pub fn read_evlrs(file: &InputFile, header: &Header) -> Result<Vec<Evlr>> {
             )
             .help("the file is cut off, or its header is damaged"));
     }
-    if claimed > EVLRS_HELD {
-        return Err(file
-            .wrong(field, format!("{claimed} extended records are more than any scan has"))
-            .help("the record count is damaged"));
+    if claimed as usize > RECORDS_HELD {
+        return Err(too_many(file, field, claimed, "extended "));
     }
     let mut evlrs = Vec::new();
     for i in 0..claimed {

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::io::sniff;
 use crate::point::{Endian, Scalar};
 use crate::{Error, Result};
 
@@ -216,8 +217,8 @@ fn parse(bytes: &[u8], whole: bool, path: &Path) -> Result<Option<Header>> {
     let mut lines = Lines::new(bytes);
     // Asked of a line without an end too: what is no PLY is told as such, whatever its size.
     if lines.next().is_none_or(|(_, line, _)| line.trim_ascii() != b"ply") {
-        return Err(fail(0, "not a PLY file: the first line is not `ply`".into())
-            .help("the file is cut off, or another format under this name"));
+        let first = &bytes[..bytes.len().min(sniff::BYTES)];
+        return Err(sniff::not("a PLY file", path, first));
     }
     let mut header = Partial { lines: 1, ..Partial::default() };
     while let Some((at, line, ended)) = lines.next() {

@@ -1,0 +1,224 @@
+//! What a file is that is not what its name says, told from its first bytes. Reads no format.
+
+use std::path::Path;
+
+use crate::Error;
+
+/// First bytes that are looked at.
+pub const BYTES: usize = 512;
+
+/// What a file is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Found {
+    /// LAS or LAZ.
+    Las,
+    /// PLY.
+    Ply,
+    /// Nothing is in it.
+    Empty,
+    /// A Git LFS pointer.
+    Pointer,
+    /// Another format, with its article.
+    Other(&'static str),
+    /// Something packed, with its article.
+    Packed(&'static str),
+    /// Text of numbers.
+    Numbers,
+    /// Nothing that is known.
+    Unknown,
+}
+
+/// First bytes of formats, each as their own specification has them.
+const MAGIC: [(&[u8], Found); 32] = [
+    (b"LASF", Found::Las),
+    (b"ply\n", Found::Ply),
+    (b"ply\r", Found::Ply),
+    (b"version https://git-lfs", Found::Pointer),
+    (b"~V", Found::Other("a well log (CWLS LAS, which shares the extension)")),
+    (b"~v", Found::Other("a well log (CWLS LAS, which shares the extension)")),
+    (b"ASTM-E57", Found::Other("an E57 file")),
+    (b"# .PCD", Found::Other("a PCD file")),
+    (b"VERSION .7", Found::Other("a PCD file")),
+    (b"pnts", Found::Other("a 3D tile of points")),
+    (b"DRACO", Found::Other("a Draco file")),
+    (b"glTF", Found::Other("a glTF file")),
+    (b"OFF\n", Found::Other("an OFF file")),
+    (b"OFF\r", Found::Other("an OFF file")),
+    (b"solid ", Found::Other("an STL file")),
+    (b"\x89HDF\r\n", Found::Other("an HDF5 file")),
+    (b"PAR1", Found::Other("a Parquet file")),
+    (b"SQLite format 3", Found::Other("an SQLite database")),
+    (b"II*\0", Found::Other("a TIFF image")),
+    (b"MM\0*", Found::Other("a TIFF image")),
+    (b"\x89PNG", Found::Other("a PNG image")),
+    (b"\xff\xd8\xff", Found::Other("a JPEG image")),
+    (b"%PDF", Found::Other("a PDF document")),
+    (b"<?xml", Found::Other("an XML document")),
+    (b"PK\x03\x04", Found::Packed("a ZIP archive")),
+    (b"\x1f\x8b", Found::Packed("a gzip file")),
+    (b"BZh", Found::Packed("a bzip2 file")),
+    (b"\xfd7zXZ", Found::Packed("an xz file")),
+    (b"7z\xbc\xaf\x27\x1c", Found::Packed("a 7z archive")),
+    (b"\x28\xb5\x2f\xfd", Found::Packed("a Zstandard file")),
+    (b"Rar!", Found::Packed("a RAR archive")),
+    (b"\x04\x22\x4d\x18", Found::Packed("an LZ4 file")),
+];
+
+impl Found {
+    fn of(first: &[u8]) -> Found {
+        if first.is_empty() {
+            return Found::Empty;
+        }
+        if let Some((_, found)) = MAGIC.iter().find(|(magic, _)| first.starts_with(magic)) {
+            return *found;
+        }
+        let Some(text) = text(first) else { return Found::Unknown };
+        // Comments stand in front of a well log's first section.
+        let is_comment = |line: &&str| line.starts_with('#') || line.trim().is_empty();
+        let mut lines = text.lines().skip_while(is_comment);
+        let line = lines.next().unwrap_or_default().trim_start_matches('\u{feff}').trim_start();
+        let word = line.get(..9).unwrap_or(line).to_ascii_lowercase();
+        if line.starts_with("~V") {
+            Found::Other("a well log (CWLS LAS, which shares the extension)")
+        } else if word.starts_with("<!doctype") || word.starts_with("<html") {
+            Found::Other("a web page")
+        } else if line.starts_with(['{', '[']) {
+            Found::Other("JSON text")
+        } else if is_numbers(line) {
+            Found::Numbers
+        } else {
+            Found::Unknown
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Found::Las => "a LAS or LAZ file",
+            Found::Ply => "a PLY file",
+            Found::Empty => "an empty file",
+            Found::Pointer => "a Git LFS pointer, a short text in the place of the file",
+            Found::Other(name) | Found::Packed(name) => name,
+            Found::Numbers => "text of numbers",
+            Found::Unknown => "none of the formats known here",
+        }
+    }
+
+    fn remedy(self) -> &'static str {
+        match self {
+            Found::Las => "name it .las or .laz, or say `read.format = \"las\"`",
+            Found::Ply => "name it .ply, or say `read.format = \"ply\"`",
+            Found::Empty => "what should have written it failed: make or copy it again",
+            Found::Pointer => "fetch the file itself with `git lfs pull`",
+            Found::Packed(_) => "unpack it first",
+            Found::Other("a web page" | "JSON text" | "an XML document") => {
+                "a server sent this instead of the file: fetch it again"
+            }
+            Found::Other(_) | Found::Numbers => {
+                "LAS, LAZ and PLY are read: convert it to one of them with another program first"
+            }
+            Found::Unknown => "LAS, LAZ and PLY are read; the file may be damaged",
+        }
+    }
+}
+
+/// `first` as text, without a character that the end of the stretch cut.
+fn text(first: &[u8]) -> Option<&str> {
+    let text = match std::str::from_utf8(first) {
+        Ok(text) => text,
+        Err(e) if first.len() - e.valid_up_to() < 4 => {
+            std::str::from_utf8(&first[..e.valid_up_to()]).ok()?
+        }
+        Err(_) => return None,
+    };
+    let control = |c: char| c.is_control() && !"\t\n\r".contains(c);
+    (!text.contains(control)).then_some(text)
+}
+
+/// True for three numbers or more.
+fn is_numbers(line: &str) -> bool {
+    let separators = |c: char| c.is_whitespace() || c == ',' || c == ';';
+    let words = || line.split(separators).filter(|word| !word.is_empty());
+    words().count() >= 3 && words().all(|word| word.parse::<f64>().is_ok())
+}
+
+/// True if `first`, the first bytes of a file, are those of LAS or LAZ.
+pub fn is_las(first: &[u8]) -> bool {
+    Found::of(first) == Found::Las
+}
+
+/// True if they are those of PLY.
+pub fn is_ply(first: &[u8]) -> bool {
+    // Damaged line ends are for the PLY header to tell.
+    first.starts_with(b"ply")
+}
+
+/// The error of the file at `path`, which begins with `first` and was to be `wanted`.
+pub fn not(wanted: &str, path: &Path, first: &[u8]) -> Error {
+    let found = Found::of(first);
+    let told = match found {
+        Found::Unknown => format!("this is not {wanted}, by its first bytes"),
+        _ => format!("this is {}, not {wanted}", found.name()),
+    };
+    Error::data(path, told).at_byte(0).help(found.remedy())
+}
+
+/// What files with this extension are, in lower case, if it is a format of points or meshes that is
+/// neither read nor written.
+pub fn of_extension(extension: &str) -> Option<&'static str> {
+    Some(match extension {
+        "e57" => "E57",
+        "pcd" => "PCD",
+        "xyz" | "txt" | "csv" | "asc" | "pts" | "ptx" | "neu" => "text of numbers",
+        "zlas" => "Esri's zLAS",
+        "rcp" | "rcs" => "Autodesk ReCap",
+        "fls" | "lsproj" => "FARO",
+        "rxp" | "rdbx" => "RIEGL",
+        "obj" => "OBJ",
+        "off" => "OFF",
+        "stl" => "STL",
+        "drc" => "Draco",
+        "glb" | "gltf" => "glTF",
+        "pnts" => "3D Tiles",
+        "zip" | "gz" | "7z" | "bz2" | "xz" | "zst" | "tar" => "a packed file",
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_called_what_they_are() {
+        let told = |first: &[u8]| {
+            let error = not("a LAS or LAZ file", Path::new("x"), first);
+            format!("{error}; {}", error.remedy().unwrap())
+        };
+        for (first, what, remedy) in [
+            (&b""[..], "an empty file", "make or copy it again"),
+            (b"version https://git-lfs.github.com/spec/v1\noid", "Git LFS pointer", "lfs pull"),
+            (b"~Version Information\nVERS. 2.0", "a well log", "another program"),
+            (b"# from a rig\n#\n~VERSION\n", "a well log", "another program"),
+            (b"ply\nformat ascii 1.0\n", "a PLY file", "read.format = \"ply\""),
+            (b"ASTM-E57\x01\0\0\0", "an E57 file", "another program"),
+            (b"# .PCD v0.7 - Point Cloud", "a PCD file", "another program"),
+            (b"PK\x03\x04\x14\0", "a ZIP archive", "unpack"),
+            (b"\x1f\x8b\x08", "a gzip file", "unpack"),
+            (b"<!DOCTYPE html>\n<html>", "a web page", "fetch it again"),
+            (b"{\"error\": 404}", "JSON text", "fetch it again"),
+            (b"100.5 200.25 3.5\n", "text of numbers", "another program"),
+            (b"\x00\x01\x02\x03", "by its first bytes", "may be damaged"),
+        ] {
+            let told = told(first);
+            assert!(told.contains(what) && told.contains(remedy), "{told}");
+        }
+        assert!(not("a PLY file", Path::new("x"), b"LASF\0").to_string().contains("a LAS or LAZ"));
+    }
+
+    #[test]
+    fn a_character_cut_at_the_end_of_what_is_looked_at_leaves_the_text_a_text() {
+        let numbers = "1 2 3\nä".as_bytes();
+        assert_eq!(Found::of(&numbers[..numbers.len() - 1]), Found::Numbers);
+        assert_eq!(Found::of(b"1 2 3\x80\x80\x80\x80\x80 4"), Found::Unknown);
+    }
+}
