@@ -110,7 +110,8 @@ impl Mistake {
         let shown: String = line.chars().take(WIDEST).map(plain).collect();
         let pad: String = before.chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
         let carets = text[start..end].chars().count().max(1);
-        let message = source.shortened(&self.message);
+        // Words of the text are quoted in it: a line's end there is no line's end here.
+        let message = source.shortened(&self.message).replace('\n', "\\n");
         if source.origin.is_empty() {
             // The user knows no such text: its places would say nothing.
             let note =
