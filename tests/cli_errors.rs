@@ -101,7 +101,11 @@ fn a_wrong_command_line_exits_with_2() {
     let progress = ["auto", "json", "never"];
     refused(at.path(), &["run", "p.toml", "--progress", "jsn"], &progress);
     refused(at.path(), &["run", "p.toml", "-q", "-v"], &["--quiet", "--verbose"]);
-    refused(at.path(), &["stages", "cels"], &["there is no stage `cels`", "help: stages: "]);
+    refused(
+        at.path(),
+        &["stages", "cels"],
+        &["there is no stage `cels`", "help: did you mean `cells`? stages: "],
+    );
     refused(
         at.path(),
         &["run", "p.toml", "--set", "x"],

@@ -218,12 +218,20 @@ fn values_of_flags_are_told_what_is_right() {
         ("--classes", "grund", "classes are numbers from 0 to 255; ground is 2"),
         ("--classes", "2,256", "classes are numbers from 0 to 255\n"),
         ("--offset", "1,2", "error: --offset: takes a list of 3 values, not 2 values\n"),
+        ("--mark", "keypoint", "= did you mean `key-point`?"),
+        ("--side", "atuo", "= did you mean `auto`?"),
+        ("--keep", "lots", "error: --keep: takes a share such as \"10%\", or a number of points"),
         ("--withheld", "drp", "error: --withheld: cannot be `drp`\n"),
         ("--method", "pcb", "= did you mean `pca`? valid: pca, varady"),
     ] {
         let one = reduce(flag, value);
         assert!(one.contains(expected), "{flag} {value}: {one}");
     }
+    let convert = ["convert", "a.laz", "-o", "o.ply", "--drop", "Intensty"];
+    assert!(told(at.path(), &convert, 2).starts_with(
+        "error: o.ply: `--drop` names `Intensty`, which the input does not have\nhelp: did you mean \
+         `Intensity`? it has X, Y, Z, "
+    ));
     let set = told(at.path(), &["run", "p.toml", "--set", "cells"], 2);
     let expected = "error: --set: there is no `=`\n   | cells\n   | ^^^^^\n   = write STAGE.KEY=VALUE, \
                     such as cells.max_angle=0.2 or run.threads=2\n";

@@ -242,7 +242,7 @@ impl StageKind for Write {
 }
 
 pub(super) fn unknown_extension(path: &Path, setting: &str) -> Error {
-    Error::pipeline(format!("the extension of `{}` names no format", shown(&path)))
+    Error::pipeline(format!("the extension of `{}` names no format", shown(path)))
         .help(format!("use .las, .laz or .ply, or give `{setting}`"))
 }
 

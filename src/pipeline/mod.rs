@@ -43,7 +43,6 @@ mod written;
 pub use inputs::expand;
 pub use kinds::{Encoding, Format, OutputOrder, Read, Synth, Write};
 pub use limits::{LimitKeys, Sees};
-pub(crate) use mistake::nearest;
 pub use outline::Outline;
 pub use plan::Plan;
 pub use registry::{Registry, StageKind, StagePlace};

@@ -87,13 +87,13 @@ impl CreateSink for Outputs {
         for Input { path, .. } in inputs {
             let output = self.of(path)?;
             if let Some(other) = taken.insert(output.path.clone(), path) {
-                let told = format!("{} and {} would both become this", shown(&other), shown(&path));
+                let told = format!("{} and {} would both become this", shown(other), shown(path));
                 return Err(Error::pipeline(told)
                     .at(&output.path)
                     .help("rename one of them, or run them one by one"));
             }
             if let Some(input) = identity(&output.path).and_then(|file| there.get(&file)) {
-                let told = format!("this is the input {} and would be overwritten", shown(&input));
+                let told = format!("this is the input {} and would be overwritten", shown(input));
                 return Err(Error::pipeline(told).at(&output.path).help("write to another folder"));
             }
             all.push(Box::new(output));

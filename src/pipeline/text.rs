@@ -284,10 +284,10 @@ fn check_files(
     for (path, at) in outputs {
         let file = resolved(path);
         if inputs.contains(&file) {
-            let told = format!("{} is an input: it cannot be written over", shown(&path));
+            let told = format!("{} is an input: it cannot be written over", shown(path));
             mistakes.push(Mistake::new(at.clone(), told));
         } else if taken.contains(&file) {
-            let told = format!("{} is written twice", shown(&path));
+            let told = format!("{} is written twice", shown(path));
             mistakes.push(Mistake::new(at.clone(), told));
         }
         taken.push(file);
