@@ -45,6 +45,36 @@ pub(crate) fn whereabouts(path: &Path) -> Option<String> {
     Some(format!("the path is relative to the folder you are in, {}", shown(&folder)))
 }
 
+/// The valid word that a misspelt one was meant to be, if one is near: two letters in five wrong
+/// at most, the first in the list among equals.
+pub(crate) fn nearest<'a>(word: &str, valid: &'a [String]) -> Option<&'a String> {
+    let near = valid.iter().map(|v| (distance(word, v), v)).min_by_key(|(d, _)| *d)?;
+    let letters = word.chars().count().max(near.1.chars().count());
+    (near.0 <= (2 * letters / 5).max(1) && near.0 < letters).then_some(near.1)
+}
+
+/// Letters to change, add, drop or swap with their neighbour until one word, its case aside, is the
+/// other (optimal string alignment).
+fn distance(a: &str, b: &str) -> usize {
+    let letters =
+        |s: &str| -> Vec<char> { s.chars().take(64).flat_map(char::to_lowercase).collect() };
+    let (a, b) = (letters(a), letters(b));
+    let mut rows = vec![(0..=b.len()).collect::<Vec<usize>>()];
+    for i in 1..=a.len() {
+        let mut row = vec![i];
+        for j in 1..=b.len() {
+            let change = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            let mut best = change.min(rows[i - 1][j] + 1).min(row[j - 1] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                best = best.min(rows[i - 2][j - 2] + 1);
+            }
+            row.push(best);
+        }
+        rows.push(row);
+    }
+    rows[a.len()][b.len()]
+}
+
 /// What kind of failure an [`Error`] is; the command line's exit code follows from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorKind {
@@ -218,5 +248,38 @@ impl fmt::Debug for Error {
 impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         self.0.source.as_deref().map(|e| e as _)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_word_is_one_slip_away() {
+        let valid = ["neighbors", "method", "orient"].map(String::from);
+        assert_eq!(nearest("neighbours", &valid), Some(&valid[0]));
+        assert_eq!(nearest("mehtod", &valid), Some(&valid[1]));
+        assert_eq!(nearest("ORIENT", &valid), Some(&valid[2]));
+        assert_eq!(nearest("colour", &valid), None);
+        assert_eq!(nearest("", &valid), None);
+    }
+
+    #[test]
+    fn letters_changed_added_dropped_and_swapped_count_one() {
+        for (a, b, d) in [("ab", "ab", 0), ("ab", "ba", 1), ("ab", "b", 1), ("ab", "abc", 1)] {
+            assert_eq!(distance(a, b), d, "{a} {b}");
+        }
+        assert_eq!(distance("kitten", "sitting"), 3);
+    }
+
+    #[test]
+    fn a_shown_path_has_nothing_that_a_terminal_obeys() {
+        use std::os::unix::ffi::OsStrExt;
+        let name = std::ffi::OsStr::from_bytes(b"a\xff\x1b[2J\xe2\x80\xae\n\xc3\xa9.laz");
+        let told = shown(name.as_ref()).to_string();
+        assert_eq!(told, "a\\xff\\u{1b}[2J\\u{202e}\\n\u{e9}.laz");
+        let error = Error::data(name, "odd");
+        assert_eq!(error.to_string(), format!("{told}: odd"));
     }
 }

@@ -206,7 +206,7 @@ fn scratch_in_memory_is_warned_of_if_anything_spilled_there() {
         let done = execute(&text, &overrides, &Quiet).unwrap();
         let warnings = done.report.run.warnings.join("\n");
         assert_eq!(warnings.contains("in memory (tmpfs)"), warned, "{warnings}");
-        assert_eq!(warnings.contains("--scratch"), warned, "{warnings}");
+        assert_eq!(warnings.contains("`run.scratch`"), warned, "{warnings}");
     }
     assert_holds(scratch.path(), &[]);
 }

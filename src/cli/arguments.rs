@@ -10,7 +10,8 @@ use serde_json::Value;
 
 use super::words::{Flag, flags};
 use crate::Result;
-use crate::pipeline::{nearest, parse_bytes};
+use crate::error::nearest;
+use crate::pipeline::parse_bytes;
 use crate::point::parse_count;
 
 const EXIT_CODES: &str = "\

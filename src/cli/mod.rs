@@ -43,6 +43,7 @@ pub fn main(registry: &Registry) -> ExitCode {
     let arguments = match typed.and_then(|typed| Arguments::from_arg_matches(&typed)) {
         Ok(arguments) => arguments,
         Err(told) => {
+            let told = as_shown(told);
             print::usage(&told);
             return ExitCode::from(if told.use_stderr() { 2 } else { 0 });
         }
@@ -55,6 +56,12 @@ pub fn main(registry: &Registry) -> ExitCode {
             ExitCode::from(exit_number(&error))
         }
     }
+}
+
+/// The same error with the arguments as they may be printed: what is typed is quoted in it.
+fn as_shown(told: clap::Error) -> clap::Error {
+    let plain = std::env::args_os().map(|argument| shown(argument.as_ref()).to_string());
+    help::command().try_get_matches_from(plain).err().unwrap_or(told)
 }
 
 fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<()> {

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::arguments::Stages;
 use super::print;
+use crate::error::nearest;
 use crate::pipeline::Registry;
 use crate::{Error, Result};
 
@@ -48,9 +49,11 @@ pub(super) fn stages(arguments: &Stages, registry: &Registry) -> Result<()> {
     let shown: Vec<&Described> = match &arguments.kind {
         None => all.iter().collect(),
         Some(kind) => vec![all.iter().find(|d| d.kind == *kind).ok_or_else(|| {
-            let kinds: Vec<&str> = all.iter().map(|d| d.kind.as_str()).collect();
+            let kinds: Vec<String> = all.iter().map(|d| d.kind.clone()).collect();
+            let near = nearest(kind, &kinds).map(|near| format!("did you mean `{near}`? "));
             let told = format!("there is no stage `{kind}`");
-            Error::pipeline(told).help(format!("stages: {}", kinds.join(", ")))
+            let near = near.unwrap_or_default();
+            Error::pipeline(told).help(format!("{near}stages: {}", kinds.join(", ")))
         })?],
     };
     if arguments.json {

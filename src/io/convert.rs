@@ -353,22 +353,22 @@ fn room(to: &Dimension) -> String {
     }
 }
 
-fn quoted(names: &[&str]) -> String {
+fn quoted(names: &[impl std::fmt::Display]) -> String {
     names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
 fn check_drop(from: &Schema, drop: &[String]) -> Result<()> {
     for name in drop {
         if XYZ.contains(&name.as_str()) {
-            let told = format!("`write.drop` names `{name}`: coordinates stay");
-            return Err(Error::pipeline(told));
+            return Err(Error::pipeline(format!("`write.drop` names `{name}`: coordinates stay")));
         }
         if from.find(name).is_none() {
-            let all: Vec<&str> = from.dimensions.iter().map(|d| d.name.as_str()).collect();
-            return Err(Error::pipeline(format!(
-                "`write.drop` names `{name}`, which the input does not have; it has {}",
-                quoted(&all)
-            )));
+            let all: Vec<String> = from.dimensions.iter().map(|d| d.name.clone()).collect();
+            let told = format!("`write.drop` names `{name}`, which the input does not have");
+            let near =
+                crate::error::nearest(name, &all).map(|near| format!("did you mean `{near}`? "));
+            let help = format!("{}it has {}", near.unwrap_or_default(), quoted(&all));
+            return Err(Error::pipeline(told).help(help));
         }
     }
     Ok(())

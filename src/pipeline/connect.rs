@@ -14,7 +14,7 @@ pub fn read(files: Vec<PathBuf>, formats: &[Format]) -> Box<dyn OpenSource> {
     Box::new(Files { ply: formats.first() == Some(&Format::Ply), files })
 }
 
-/// The source that makes a scan up.
+/// The source of synthetic scans.
 pub fn synth(synth: &Synth) -> Box<dyn OpenSource> {
     let Synth { scene, points, seed, noise } = *synth;
     Box::new(synthetic::Synthetic { scene, points, seed, noise })

@@ -10,6 +10,7 @@ use serde::de::{
 
 use super::mistake::Mistake;
 use super::node::{Entry, Node, Place, Value};
+use crate::error::nearest;
 
 /// Reads the table `keys` as a `T`, or tells every key that `subject` (a stage kind, `[run]`) does
 /// not have and every value that does not fit.
@@ -63,7 +64,8 @@ enum Problem {
     UnknownKey(String, Vec<&'static str>),
     UnknownWord(String, Vec<&'static str>),
     Missing(&'static str),
-    Wrong(String),
+    /// What is wrong, and a word that was meant, perhaps.
+    Wrong(String, Option<Box<str>>),
 }
 
 impl Fault {
@@ -96,7 +98,10 @@ impl Fault {
                 Mistake::word(place, format!("`{key}` cannot be `{word}`"), word, "valid", valid)
             }
             Problem::Missing(key) => Mistake::new(place, format!("`{subject}` needs `{key}`")),
-            Problem::Wrong(what) => Mistake::new(place, format!("`{key}`: {what}")),
+            Problem::Wrong(what, near) => {
+                let near = near.as_ref().map(|near| format!("did you mean `{near}`?"));
+                Mistake::new(place, format!("`{key}`: {what}")).note(near.unwrap_or_default())
+            }
         }
     }
 }
@@ -111,11 +116,19 @@ impl std::error::Error for Fault {}
 
 impl de::Error for Fault {
     fn custom<T: fmt::Display>(message: T) -> Self {
-        Fault::new(Problem::Wrong(message.to_string()))
+        Fault::new(Problem::Wrong(message.to_string(), None))
     }
 
     fn invalid_type(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
-        Fault::custom(format!("takes {}, not {}", plain(expected), found_words(found)))
+        let takes = plain(expected);
+        let told = format!("takes {takes}, not {}", found_words(found));
+        // What is expected quotes the words that it can be: a number above 0, or "auto".
+        let words: Vec<String> = takes.split('"').skip(1).step_by(2).map(str::to_owned).collect();
+        let near = match found {
+            Unexpected::Str(text) => nearest(text, &words).map(|near| near.as_str().into()),
+            _ => None,
+        };
+        Fault::new(Problem::Wrong(told, near))
     }
 
     fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {

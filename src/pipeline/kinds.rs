@@ -266,8 +266,7 @@ impl StageKind for Write {
         let check = |format| self.check(format).map_err(|(key, error)| at.blame(key, error));
         match (self.path.clone(), self.folder.clone()) {
             (Some(_), Some(_)) => {
-                let told =
-                    "`write.path` makes one file and `write.folder` one for each input: give one";
+                let told = "`write.path` makes one file and `write.folder` one for each input: give one of them";
                 Err(at.blame("folder", Error::pipeline(told)))
             }
             (None, None) => Err(Error::pipeline("a `write` needs `write.path` or `write.folder`")

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::node::Place;
-use crate::error::is_control;
+use crate::error::{is_control, nearest};
 use crate::{Error, ErrorKind};
 
 /// Mistakes that are told in full; a file with more of them is not a pipeline.
@@ -110,7 +110,8 @@ impl Mistake {
         let shown: String = line.chars().take(WIDEST).map(plain).collect();
         let pad: String = before.chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
         let carets = text[start..end].chars().count().max(1);
-        let message = source.shortened(&self.message);
+        // Words of the text are quoted in it: a line's end there is no line's end here.
+        let message = source.shortened(&self.message).replace('\n', "\\n");
         if source.origin.is_empty() {
             // The user knows no such text: its places would say nothing.
             let note =
@@ -169,36 +170,6 @@ pub(super) fn advice<S: AsRef<str>>(
     }
 }
 
-/// The valid word that a misspelt one was meant to be, if one is near: two letters in five wrong
-/// at most, the first in the list among equals.
-pub(crate) fn nearest<'a>(word: &str, valid: &'a [String]) -> Option<&'a String> {
-    let near = valid.iter().map(|v| (distance(word, v), v)).min_by_key(|(d, _)| *d)?;
-    let letters = word.chars().count().max(near.1.chars().count());
-    (near.0 <= (2 * letters / 5).max(1) && near.0 < letters).then_some(near.1)
-}
-
-/// Letters to change, add, drop or swap with their neighbour until one word, its case aside, is the
-/// other (optimal string alignment).
-fn distance(a: &str, b: &str) -> usize {
-    let letters =
-        |s: &str| -> Vec<char> { s.chars().take(64).flat_map(char::to_lowercase).collect() };
-    let (a, b) = (letters(a), letters(b));
-    let mut rows = vec![(0..=b.len()).collect::<Vec<usize>>()];
-    for i in 1..=a.len() {
-        let mut row = vec![i];
-        for j in 1..=b.len() {
-            let change = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
-            let mut best = change.min(rows[i - 1][j] + 1).min(row[j - 1] + 1);
-            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
-                best = best.min(rows[i - 2][j - 2] + 1);
-            }
-            row.push(best);
-        }
-        rows.push(row);
-    }
-    rows[a.len()][b.len()]
-}
-
 fn floor(text: &str, mut at: usize) -> usize {
     at = at.min(text.len());
     while !text.is_char_boundary(at) {
@@ -210,24 +181,6 @@ fn floor(text: &str, mut at: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_nearest_word_is_one_slip_away() {
-        let valid = ["neighbors", "method", "orient"].map(String::from);
-        assert_eq!(nearest("neighbours", &valid), Some(&valid[0]));
-        assert_eq!(nearest("mehtod", &valid), Some(&valid[1]));
-        assert_eq!(nearest("ORIENT", &valid), Some(&valid[2]));
-        assert_eq!(nearest("colour", &valid), None);
-        assert_eq!(nearest("", &valid), None);
-    }
-
-    #[test]
-    fn letters_changed_added_dropped_and_swapped_count_one() {
-        for (a, b, d) in [("ab", "ab", 0), ("ab", "ba", 1), ("ab", "b", 1), ("ab", "abc", 1)] {
-            assert_eq!(distance(a, b), d, "{a} {b}");
-        }
-        assert_eq!(distance("kitten", "sitting"), 3);
-    }
 
     #[test]
     fn a_place_at_the_end_of_the_text_or_inside_a_letter_is_rendered() {

@@ -48,7 +48,6 @@ pub(crate) use files::{Files, Use};
 pub use inputs::expand;
 pub use kinds::{Encoding, Format, OutputOrder, Read, Synth, Write};
 pub use limits::{LimitKeys, Sees};
-pub(crate) use mistake::nearest;
 pub use outline::Outline;
 pub use plan::Plan;
 pub(crate) use publish::{make_folder, refuse_existing};

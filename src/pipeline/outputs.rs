@@ -94,7 +94,7 @@ impl CreateSink for Outputs {
         for Input { path, .. } in inputs {
             let output = self.of(path)?;
             if let Some(other) = taken.insert(output.path.clone(), path) {
-                let told = format!("{} and {} would both become this", shown(&other), shown(&path));
+                let told = format!("{} and {} would both become this", shown(other), shown(path));
                 return Err(Error::pipeline(told)
                     .at(&output.path)
                     .help("rename one of them, or run them one by one"));

@@ -166,7 +166,7 @@ pub fn memory_warning(folder: &Path, spilled: u64) -> Option<String> {
     Some(format!(
         "{}: {} were spilled to a file system in memory ({name}), beyond the budget of the run: name a \
          folder on a disk with `run.scratch`",
-        shown(&folder),
+        shown(folder),
         Bytes(spilled)
     ))
 }

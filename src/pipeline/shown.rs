@@ -43,7 +43,7 @@ impl fmt::Display for Plan {
 }
 
 fn sink_line(f: &mut fmt::Formatter<'_>, path: &std::path::Path) -> fmt::Result {
-    writeln!(f, "sink     {}", shown(&path))
+    writeln!(f, "sink     {}", shown(path))
 }
 
 impl Plan {

@@ -60,7 +60,7 @@ impl fmt::Display for Table<'_> {
             }
         }
         if let Some(path) = self.path {
-            write!(f, "\nreport     {}", shown(&path))?;
+            write!(f, "\nreport     {}", shown(path))?;
         }
         writeln!(f)
     }
