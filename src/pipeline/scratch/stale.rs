@@ -11,6 +11,7 @@ use std::path::Path;
 use rustix::fs::{AtFlags, CWD, Dir, FileType, Mode, OFlags, fstat, openat, statat, unlinkat};
 use rustix::io::Errno;
 use rustix::path::Arg;
+use rustix::process::geteuid;
 
 /// How the names of scratch folders begin.
 pub(super) const PREFIX: &str = ".pointmill-";
@@ -68,13 +69,13 @@ pub(super) fn remove_stale(parent: &Path) -> Vec<String> {
     let flags = OFlags::RDONLY | OFlags::DIRECTORY | OFlags::CLOEXEC;
     let Ok(at) = openat(CWD, parent, flags, Mode::empty()) else { return Vec::new() };
     let names = Dir::read_from(&at).into_iter().flatten().flatten();
-    let (host, mut told) = (Host::this(), Vec::new());
+    let (host, user, mut told) = (Host::this(), geteuid().as_raw(), Vec::new());
     for entry in names {
         let name = entry.file_name();
         if !name.to_bytes().starts_with(PREFIX.as_bytes()) {
             continue;
         }
-        if let Err(cause) = remove_if_dead(&at, name, &host) {
+        if let Err(cause) = remove_if_dead(&at, name, &host, user) {
             let folder = parent.join(name.to_string_lossy().as_ref());
             let folder = folder.display();
             told.push(format!("{folder}: what a killed run left here cannot be removed: {cause}"));
@@ -83,12 +84,11 @@ pub(super) fn remove_stale(parent: &Path) -> Vec<String> {
     told
 }
 
-/// Removes the folder if it is scratch of a run that is gone. Spared is whatever is not sure to be:
+/// Removes the folder if it is scratch of a run of `user` that is gone. Spared is whatever is not sure to be:
 /// what another user made, or another machine, and what has no proper marker.
-fn remove_if_dead(at: &OwnedFd, name: &CStr, host: &Host) -> io::Result<()> {
+fn remove_if_dead(at: &OwnedFd, name: &CStr, host: &Host, user: u32) -> io::Result<()> {
     // A file, a link, gone by now, or not ours to look at.
     let Ok(folder) = open_folder(at, name) else { return Ok(()) };
-    let user = rustix::process::geteuid().as_raw();
     if fstat(&folder)?.st_uid != user {
         return Ok(());
     }
@@ -242,6 +242,20 @@ mod tests {
         let ours = dead(parent, 1, None);
         assert_eq!(remove_stale(parent), [""; 0]);
         assert!(foreign.join("1-records").exists() && !ours.exists());
+    }
+
+    #[test]
+    fn folders_of_other_users_are_theirs() {
+        let at = tempfile::tempdir().unwrap();
+        let folder = dead(at.path(), 0, None);
+        let name = folder.file_name().unwrap().as_encoded_bytes();
+        let name = CStr::from_bytes_with_nul(&[name, b"\0"].concat()).unwrap().to_owned();
+        let open = open_folder(CWD, at.path()).unwrap();
+        let (host, user) = (Host::this(), geteuid().as_raw());
+        remove_if_dead(&open, &name, &host, user + 1).unwrap();
+        assert!(folder.join("1-records").exists());
+        remove_if_dead(&open, &name, &host, user).unwrap();
+        assert!(!folder.exists());
     }
 
     #[test]
