@@ -14,7 +14,7 @@ use std::sync::Arc;
 use las_support::{LAS, LAZ, Random, write};
 use outdir_support::{assert_equal_files, convert_one, ends, named, write_each};
 use pointmill::io::las::{fresh, layout, open};
-use pointmill::pipeline::{Pipeline, Registry};
+use pointmill::pipeline::{Overrides, Pipeline, Registry};
 use pointmill::point::Scalar;
 
 /// Records of random bytes whose stored coordinates leave room for a shift.
