@@ -26,7 +26,7 @@ use crate::report::{
     ClassFigures, Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome,
     PassFigures, Removed, Report, RunFigures, Tally, check_written, peak_memory,
 };
-use crate::stage::{CreateSink, Input, SinkSummary, Source};
+use crate::stage::{CreateSink, Input, Sink, SinkSummary, Source};
 use crate::tile::{SpillArea, lock};
 use crate::{Error, Result};
 
@@ -122,14 +122,9 @@ impl Plan {
         Ok(outputs)
     }
 
-    /// Streams or mills into the staged outputs.
-    fn work(
-        &mut self,
-        outputs: &[Vec<Staged>],
-        clock: &mut Clock<'_>,
-        watch: &dyn Watch,
-        trouble: &Trouble,
-    ) -> Result<(Finished, RunFigures)> {
+    /// Opens the sinks but those of the inputs, which are created one by one, when their records are
+    /// known.
+    fn create_sinks(&self, outputs: &[Vec<Staged>]) -> Result<Vec<Option<Box<dyn Sink>>>> {
         let schema = self.source.schema();
         let whole = !self.mills
             && self.transforms.is_empty()
@@ -138,11 +133,22 @@ impl Plan {
         let metadata = Metadata { pipeline, ..self.source.metadata().clone() };
         let mut sinks = Vec::new();
         for (sink, staged) in self.sinks.iter().zip(outputs) {
-            // The outputs of the inputs are created one by one, when their records are known.
             let file = staged.first().filter(|_| !sink.is_folder());
             let open = file.map(|file| sink.create(file.file(), schema, &metadata, whole));
             sinks.push(open.transpose()?);
         }
+        Ok(sinks)
+    }
+
+    /// Streams or mills into the staged outputs.
+    fn work(
+        &mut self,
+        outputs: &[Vec<Staged>],
+        clock: &mut Clock<'_>,
+        watch: &dyn Watch,
+        trouble: &Trouble,
+    ) -> Result<(Finished, RunFigures)> {
+        let sinks = self.create_sinks(outputs)?;
         let shares = self.demands.divide()?;
         let budget = Budget::new(self.demands.limit);
         let _base = budget.lease(shares.base, "program")?;
