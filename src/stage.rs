@@ -318,6 +318,8 @@ pub struct Needs {
     /// Side in lattice steps of the cells whose points are decided together; 0 for none (or not
     /// settled yet).
     pub cell_side: i64,
+    /// True if it decides about the points of a cell together, also while their side is not settled.
+    pub cells: bool,
     /// True if cells of that side are octree nodes, so that no tile face cuts one.
     pub cell_aligned: bool,
     /// Working memory per position of the tile, rim included.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::pipeline::{Overrides, Set, parse_bytes};
+use crate::pipeline::{MOST_THREADS, Overrides, Set, parse_bytes};
 use crate::point::parse_count;
 use crate::{Error, Result};
 
@@ -118,8 +118,10 @@ pub(super) enum Progress {
 }
 
 fn parse_threads(text: &str) -> Result<NonZeroUsize, String> {
-    let refused = |_| format!("`{text}` is no number of threads: give 1 or more, or leave it out");
-    text.parse().map_err(refused)
+    let most = MOST_THREADS;
+    let refused = || format!("`{text}` is no number of threads: give 1 to {most}, or leave it out");
+    let within = |threads: &NonZeroUsize| threads.get() <= most;
+    text.parse().ok().filter(within).ok_or_else(refused)
 }
 
 /// One number for all axes, or three for X, Y and Z.

@@ -171,6 +171,7 @@ impl TileOp for Cells {
         Needs {
             reads: vec!["Normal".into()],
             writes: vec!["Cell".into()],
+            cells: true,
             cell_side: self.settled.map_or(0, |settled| settled.steps),
             cell_aligned: aligned,
             bytes_per_point: if aligned { BYTES } else { BYTES + SORTING_BYTES },

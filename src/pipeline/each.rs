@@ -40,7 +40,8 @@ pub fn ranks(inputs: &[Input]) -> Vec<u32> {
 
 /// Bytes that sorting by so many inputs holds.
 pub fn lists_bytes(inputs: usize) -> u64 {
-    (inputs * (list_bytes(inputs) + size_of::<List>())) as u64
+    let each = (list_bytes(inputs) + size_of::<List>()) as u64;
+    (inputs as u64).saturating_mul(each)
 }
 
 fn list_bytes(inputs: usize) -> usize {

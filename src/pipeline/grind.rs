@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::chunks::{Chunk, Counts, Cutter, Open, Stored};
-use super::cut::{neighbors, reach};
+use super::cut::{Cut, neighbors, reach};
 use super::each::ByInput;
 use super::job::{Job, StopOnDrop};
 use super::outlet::{Hands, Outlet};
@@ -45,17 +45,15 @@ pub(super) struct Milled {
 /// A sink with its number.
 pub(super) type Numbered = (usize, Box<dyn Sink>);
 
-/// Runs `pass` over the tiles `keys`, into the `sinks` with their numbers and into lists by input.
+/// Runs `pass` over the tiles of `cut`, into the `sinks` with their numbers and into lists by input.
 pub(super) fn grind(
     job: &Job<'_>,
-    pass: &Pass,
+    (pass, cut): (&Pass, &Cut),
     field: &Field<'_>,
     sieve: &Sieve,
-    capacity: usize,
-    keys: &[TileKey],
     (sinks, by_input): (Vec<Numbered>, Vec<ByInput>),
 ) -> Result<Milled> {
-    let tiles = &field.tiles;
+    let (tiles, keys) = (&field.tiles, &cut.keys);
     let numbers = sinks.iter().map(|(sink, _)| *sink).chain(by_input.iter().map(|by| by.sink));
     let wants_normals = numbers.into_iter().any(|sink| job.wants_normals[sink]);
     let outputs = sinks.iter().enumerate().map(|(n, (sink, open))| {
@@ -75,15 +73,15 @@ pub(super) fn grind(
     };
     let benches = Benches::new(job, tiles, &sinks);
     let outlet: Outlet<Product, Chunk> =
-        Outlet::new(sinks.into_iter().map(|(_, sink)| sink).collect(), job.threads);
+        Outlet::new(sinks.into_iter().map(|(_, sink)| sink).collect(), cut.millers);
     let total = Mutex::new((Tally::default(), 0, false));
     let next = AtomicUsize::new(0);
-    parallel(job.threads, |_| {
+    parallel(cut.millers, |_| {
         let guard = StopOnDrop::new(|| outlet.stop());
         let mut bench = benches.bench();
         let mut encode = |chunk| bench.encode(&benches, &chunk);
         let mut hands = Hands { commit: &commit, encode: &mut encode };
-        let mut worker = Worker::new(job, pass, field, sieve, capacity, wants_normals);
+        let mut worker = Worker::new(job, pass, field, sieve, cut.capacity, wants_normals);
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(&key) = keys.get(index) else { break };

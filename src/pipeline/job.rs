@@ -32,7 +32,6 @@ pub(super) struct Job<'a> {
     pub simd: Simd,
     pub drop_nonfinite: bool,
     pub tile_points: Option<usize>,
-    pub run_records: Option<usize>,
     /// For each sink, whether it writes normals.
     pub wants_normals: Vec<bool>,
     /// A sink of what all stages leave.

@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::chunks::Found;
 use super::clock::Clock;
-use super::cut::cut;
+use super::cut::{Cut, cut_all};
 use super::each::ByInput;
-use super::forecast::forecast;
+use super::forecast::{forecast, samples_capacity};
 use super::grind::{Field, grind};
 use super::job::Job;
 use super::passes::{Call, Op, Pass};
@@ -51,9 +51,15 @@ pub(super) fn mill(
         written: sinks.iter().map(|_| None).collect(),
         sinks,
     };
-    for pass in std::mem::take(&mut job.passes) {
-        course.run(job, &pass, &field, (shares, demands), &mut tally, clock)?;
+    let cuts = cut_all(job, lattice, shares, demands, &tiles)?;
+    let milling = |cut: &Arc<Cut>| demands.mill_bytes(cut.millers, cut.capacity as u64);
+    let looking = demands.mill_bytes(job.threads, samples_capacity(shares) as u64);
+    let most = cuts.iter().map(milling).max().unwrap_or(0).max(looking);
+    let working = job.budget.lease(most, "mill")?;
+    for (pass, cut) in std::mem::take(&mut job.passes).iter().zip(&cuts) {
+        course.run(job, (pass, cut), &field, shares, &mut tally, clock)?;
     }
+    drop((working, cuts));
     clock.phase("survey", Some(2 * tiles.positions()));
     let measured = survey(job, lattice, area, &tiles, &course.sieve)?;
     let unwritten = || Error::internal("an output was never written");
@@ -92,19 +98,17 @@ impl Course {
     fn run(
         &mut self,
         job: &mut Job<'_>,
-        pass: &Pass,
+        (pass, cut): (&Pass, &Cut),
         field: &Field<'_>,
-        (shares, demands): (&Shares, &Demands),
+        shares: &Shares,
         tally: &mut Tally,
         clock: &mut Clock<'_>,
     ) -> Result<()> {
         let tiles = &field.tiles;
         let sieve = pass.sieve(&self.sieve);
-        let (keys, capacity) = cut(job, pass, field.lattice, shares, demands, tiles)?;
-        let working = job.budget.lease(demands.mill_bytes(capacity as u64), "the mill")?;
         let ahead = |call: &&Call| self.forecasts[call.op].is_none();
         let ops: Vec<usize> = pass.calls.iter().filter(ahead).map(|call| call.op).collect();
-        for (op, foreseen) in forecast(job, pass, &ops, field, &sieve, capacity)? {
+        for (op, foreseen) in forecast(job, pass, &ops, field, &sieve, samples_capacity(shares))? {
             if let Some(warning) = foreseen.warning {
                 job.warn(warning);
             }
@@ -114,8 +118,9 @@ impl Course {
             if pass.gathers().is_some() { "gather" } else { "mill" },
             Some(tiles.positions()),
         );
-        tally.work("tiles", keys.len() as u64);
-        let levels: std::collections::BTreeSet<u32> = keys.iter().map(|key| key.level).collect();
+        tally.work("tiles", cut.keys.len() as u64);
+        let levels: std::collections::BTreeSet<u32> =
+            cut.keys.iter().map(|key| key.level).collect();
         tally.work("tile_levels", levels.len() as u64);
         let (mut sinks, mut by_input) = (Vec::new(), Vec::new());
         for &sink in pass.before.iter().chain(&pass.after) {
@@ -129,7 +134,7 @@ impl Course {
             sinks.push((sink, open.ok_or_else(|| Error::internal("an output is written twice"))?));
         }
         let which: Vec<usize> = sinks.iter().map(|(sink, _)| *sink).collect();
-        let milled = grind(job, pass, field, &sieve, capacity, &keys, (sinks, by_input))?;
+        let milled = grind(job, (pass, cut), field, &sieve, (sinks, by_input))?;
         tally.merge(&milled.tally);
         for lists in &milled.by_input {
             clock.phase("write", Some(lists.records()));
@@ -140,7 +145,6 @@ impl Course {
             tally.merge(&counted);
             self.written[lists.sink] = Some(written);
         }
-        drop(working);
         for (sink, outcome) in
             which.into_iter().zip(milled.counts.outputs.into_iter().zip(milled.written))
         {
@@ -200,7 +204,7 @@ fn decode(
     let next = AtomicUsize::new(0);
     job.parallel(|| {
         let mut tally = Tally::default();
-        let mut intake = Intake::new(&store, job.run_records.unwrap_or(shares.run_records));
+        let mut intake = Intake::new(&store, shares.run_records);
         let mut batch = PointBatch::new(job.source.schema().clone(), BATCH);
         let mut placed = Placed::default();
         loop {

@@ -47,7 +47,8 @@ pub use registry::{Registry, StageKind, StagePlace};
 pub use run::Done;
 pub use set::Set;
 pub use settings::{
-    MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill, Withheld, ZScale, parse_bytes,
+    MOST_THREADS, MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill, Withheld, ZScale,
+    parse_bytes,
 };
 pub use text::{Pipeline, PlacedStage};
 pub use watch::{Quiet, Watch};

@@ -2,7 +2,7 @@
 //! where a stage must have seen all tiles before it decides.
 
 use super::limits::{Limits, Sees};
-use crate::point::{Mark, Schema};
+use crate::point::{Mark, Schema, names};
 use crate::stage::{Needs, ScanOp, TileOp};
 use crate::tile::{SELECTIONS, Sieve};
 use crate::{Error, Result};
@@ -288,6 +288,14 @@ impl Layout<'_> {
             },
             _ if self.schema.find(name).is_none() => {
                 return missing("the input has no such dimension");
+            }
+            // What a tile has of its records are their positions.
+            _ if !names::XYZ.contains(&name) => {
+                let told =
+                    format!("`{kind}` needs {name}, which stages that work on tiles cannot read");
+                return Err(
+                    blame(stage, told).help("they read X, Y, Z and what stages above computed")
+                );
             }
             _ => {}
         }

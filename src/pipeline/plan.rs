@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::each::{lists_bytes, paths, ranks};
 use super::passes::{Op, Pass, StageOp, Tap, blame, number_selections, unroll};
 use super::publish::check_place;
-use super::settings::{Nonfinite, Overrides, RunSettings, Withheld};
+use super::settings::{MOST_THREADS, Nonfinite, Overrides, RunSettings, Withheld};
 use super::shares::Demands;
 use super::tagger::Tagger;
 use super::text::{Pipeline, PlacedStage, resolved};
@@ -99,17 +99,24 @@ impl Pipeline {
         let simd = settings.simd.resolve().map_err(in_file)?;
         let threads = match settings.threads {
             Some(threads) => threads.get(),
-            None => std::thread::available_parallelism().map_or(1, usize::from),
+            None => std::thread::available_parallelism().map_or(1, usize::from).min(MOST_THREADS),
         };
+        if threads > MOST_THREADS {
+            let told = format!("a run has at most {MOST_THREADS} threads, not {threads}");
+            return Err(Error::pipeline(told).help("leave `run.threads` out: all processors work"));
+        }
         let limit = settings.memory.unwrap_or_else(default_limit);
         let chunks = chunks(&sinks, &*source)?;
         let needs = passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect();
+        let has_cells = sorted.ops.iter().any(|stage| stage.op.tile().needs().cells);
         let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
         let demands = Demands {
             lists: folders.saturating_mul(lists_bytes(ranks.len())),
             mills,
             passes: needs,
             tagged: tagger.tags(),
+            run_most: settings.tile_points.map(|points| (points.get() as u64).saturating_mul(4)),
+            has_cells,
             ..Demands::of(&*source, &chunks, limit, threads)
         };
         demands.divide()?;

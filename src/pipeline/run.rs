@@ -15,7 +15,7 @@ use super::plan::Plan;
 use super::publish::{Staged, make_folder};
 use super::scratch::{Scratch, free_space, memory_warning};
 use super::settings::{Nonfinite, Spill};
-use super::shares::{Demands, Shares};
+use super::shares::Demands;
 use super::stream::stream;
 use super::survey::{Lines, Measured};
 use super::tagger::ClassOf;
@@ -140,7 +140,7 @@ impl Plan {
         let area = SpillArea::new(budget.clone(), kept_in_memory, Box::new(spill.clone()));
         let transforms = std::mem::take(&mut self.transforms);
         let (ops, passes) = (std::mem::take(&mut self.ops), std::mem::take(&mut self.passes));
-        let mut job = Job { transforms, ops, passes, ..self.job(outputs, &budget, &shares, watch) };
+        let mut job = Job { transforms, ops, passes, ..self.job(outputs, &budget, watch) };
         let finished = match &self.lattice {
             Some(lattice) if self.mills => {
                 check_disk(&self.demands, &spill, kept_in_memory)?;
@@ -176,7 +176,6 @@ impl Plan {
         &'a self,
         outputs: &'a [Vec<Staged>],
         budget: &Budget,
-        shares: &Shares,
         watch: &'a dyn Watch,
     ) -> Job<'a> {
         let each = self.each.iter().zip(&self.sinks).zip(outputs).map(|((each, sink), staged)| {
@@ -200,7 +199,6 @@ impl Plan {
             simd: self.simd,
             drop_nonfinite: self.settings.nonfinite == Nonfinite::Drop,
             tile_points,
-            run_records: tile_points.map(|n| n.saturating_mul(4).min(shares.run_records)),
             wants_normals: self.sinks.iter().map(|sink| sink.wants_normals()).collect(),
             last_sink: self.last_sink,
             watch,

@@ -19,7 +19,8 @@ pub struct RunSettings {
     /// control group has.
     #[serde(deserialize_with = "some_bytes")]
     pub memory: Option<u64>,
-    /// Threads that work at once; none: all processors.
+    /// Threads that work at once, at most 1024; none: all processors.
+    #[serde(deserialize_with = "some_threads")]
     pub threads: Option<NonZeroUsize>,
     /// Folder for what does not fit in memory; none: beside the output.
     pub scratch: Option<PathBuf>,
@@ -39,13 +40,17 @@ pub struct RunSettings {
     /// What becomes of points with the withheld flag, in pipelines that work on tiles; others keep
     /// every point.
     pub withheld: Withheld,
-    /// Most points a tile's cube holds, for tests; none: as the memory allows.
+    /// Most points a tile's cube holds, for tests, at least 64; none: as the memory allows.
+    #[serde(deserialize_with = "some_tile_points")]
     pub tile_points: Option<NonZeroUsize>,
     /// Which of the equal code paths runs, for tests.
     pub simd: Simd,
     /// Whether points may stay in memory, for tests.
     pub spill: Spill,
 }
+
+/// Threads that a run has at most.
+pub const MOST_THREADS: usize = 1024;
 
 /// What becomes of points whose coordinates are not finite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
@@ -305,6 +310,25 @@ impl<'de> Deserialize<'de> for ZScale {
             }
         }
         from.deserialize_any(Factor)
+    }
+}
+
+fn some_threads<'de, D: Deserializer<'de>>(from: D) -> Result<Option<NonZeroUsize>, D::Error> {
+    within(NonZeroUsize::deserialize(from)?, 1..=MOST_THREADS, "a whole number from 1 to 1024")
+}
+
+fn some_tile_points<'de, D: Deserializer<'de>>(from: D) -> Result<Option<NonZeroUsize>, D::Error> {
+    within(NonZeroUsize::deserialize(from)?, 64..=usize::MAX, "a whole number from 64")
+}
+
+fn within<E: de::Error>(
+    number: NonZeroUsize,
+    range: std::ops::RangeInclusive<usize>,
+    expected: &str,
+) -> Result<Option<NonZeroUsize>, E> {
+    match range.contains(&number.get()) {
+        true => Ok(Some(number)),
+        false => Err(E::invalid_value(de::Unexpected::Unsigned(number.get() as u64), &expected)),
     }
 }
 

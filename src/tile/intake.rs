@@ -81,14 +81,14 @@ pub struct Intake<'a> {
 
 impl<'a> Intake<'a> {
     /// Bytes that an intake holds for each record of `stride` bytes.
-    pub fn bytes_per_record(stride: usize, tagged: bool) -> usize {
+    pub fn bytes_per_record(stride: usize, tagged: bool) -> u64 {
         let tag = if tagged { size_of::<Tag>() } else { 0 };
-        stride + size_of::<Position>() + Order::BYTES + tag
+        (stride as u64).saturating_add((size_of::<Position>() + Order::BYTES + tag) as u64)
     }
 
     /// Bytes that an intake holds whatever its capacity.
-    pub fn fixed_bytes(stride: usize) -> usize {
-        2 * STRETCH + 2 * PIECE * stride
+    pub fn fixed_bytes(stride: usize) -> u64 {
+        (2 * PIECE as u64).saturating_mul(stride as u64).saturating_add(2 * STRETCH as u64)
     }
 
     /// An intake for runs of up to `capacity` records.

@@ -8,7 +8,7 @@ use super::block::{BLOCK, Block};
 use super::key::morton_cmp;
 use super::pieces::{PIECE, Pieces};
 use super::spill::Spill;
-use crate::budget::Lease;
+use crate::budget::{Budget, Lease};
 use crate::point::{Bounds, PointBatch, Position};
 use crate::{Error, Result};
 
@@ -38,7 +38,7 @@ pub struct SealedTiles {
     refs: Pieces,
     tagged: bool,
     records: Pieces,
-    _index: Lease,
+    index: Lease,
 }
 
 /// Bytes of a record's entry in the canonical order: its number in the store and, if records have
@@ -79,7 +79,7 @@ impl SealedTiles {
                 .collect();
             boxes.push(level.clone());
         }
-        SealedTiles { sequence, boxes, spill, refs, tagged, records, _index: index }
+        SealedTiles { sequence, boxes, spill, refs, tagged, records, index }
     }
 
     /// Distinct positions.
@@ -115,6 +115,11 @@ impl SealedTiles {
     /// True if records have tags.
     pub fn is_tagged(&self) -> bool {
         self.tagged
+    }
+
+    /// The budget that the scan's index is leased from.
+    pub(super) fn budget(&self) -> &Budget {
+        self.index.budget()
     }
 
     /// How many records are before block `index` in canonical order. Within a block, numbers of
@@ -320,8 +325,10 @@ pub struct Fetch {
 
 impl Fetch {
     /// Bytes that fetching `count` records of `stride` bytes holds.
-    pub fn bytes(count: usize, stride: usize) -> u64 {
-        (count * (size_of::<(u64, u32)>() + size_of::<&mut [u8]>()) + PIECE * (stride + 8)) as u64
+    pub fn bytes(count: u64, stride: usize) -> u64 {
+        let each = size_of::<(u64, u32)>() + size_of::<&mut [u8]>();
+        let piece = (PIECE as u64).saturating_mul((stride as u64).saturating_add(8));
+        count.saturating_mul(each as u64).saturating_add(piece)
     }
 
     /// Where the record numbered `number` in canonical order is stored.
@@ -344,5 +351,5 @@ impl Fetch {
 
 /// Memory that the index of `positions` positions takes, for a plan.
 pub fn index_bytes(positions: u64) -> u64 {
-    positions.div_ceil(BLOCK as u64) * (size_of::<Block>() as u64 + 8)
+    positions.div_ceil(BLOCK as u64).saturating_mul(size_of::<Block>() as u64 + 8)
 }

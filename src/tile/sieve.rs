@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::pieces::Pieces;
 use super::sealed::SealedTiles;
 use crate::Result;
+use crate::budget::Lease;
 use crate::point::Edit;
 
 /// Selections that a record can be in, a bit each; the highest bit is [`ASIDE`].
@@ -148,9 +149,43 @@ impl Run {
     }
 }
 
+/// Memory for runs beyond those that a plan reckons with: one a position. There are more where the
+/// copies of a position differ in what stages look at.
+#[derive(Debug, Default)]
+pub(super) struct MoreRuns(Option<Lease>);
+
+impl MoreRuns {
+    /// A run, and what the mill makes of it.
+    const BYTES: u64 = 3 * size_of::<Run>() as u64;
+
+    /// Holds memory for `runs` in all, of which `planned` are reckoned with.
+    pub(super) fn hold(&mut self, tiles: &SealedTiles, runs: usize, planned: usize) -> Result<()> {
+        let more = (runs.saturating_sub(planned) as u64).saturating_mul(Self::BYTES);
+        match &mut self.0 {
+            Some(lease) if lease.bytes() >= more => Ok(()),
+            Some(lease) => lease.resize(more),
+            None if more == 0 => Ok(()),
+            None => {
+                let what = "list of a tile's copies that differ in class or flags";
+                self.0 = Some(tiles.budget().lease(more, what)?);
+                Ok(())
+            }
+        }
+    }
+
+    /// Gives back what it holds, and with it the memory of `runs`.
+    pub(super) fn give_back(&mut self, runs: &mut Vec<Run>) {
+        runs.clear();
+        if self.0.take().is_some() {
+            *runs = Vec::new();
+        }
+    }
+}
+
 /// Reads the runs of blocks; keeps its memory.
 #[derive(Debug, Default)]
 pub(super) struct Runs {
+    more: MoreRuns,
     buffer: Vec<u8>,
     states: Vec<u8>,
     tags: Vec<u8>,
@@ -169,7 +204,7 @@ impl Runs {
     ) -> Result<()> {
         /// Records read at once: a position may have millions.
         const AT_ONCE: u64 = 4096;
-        self.runs.clear();
+        self.more.give_back(&mut self.runs);
         self.ends.clear();
         let (mut number, mut rank) = (tiles.block(index).first_record, tiles.rank_of_block(index));
         let end = number + copies.iter().map(|&n| u64::from(n)).sum::<u64>();
@@ -179,6 +214,8 @@ impl Runs {
             for _ in 0..count {
                 if !window.contains(&number) {
                     window = number..end.min(number + AT_ONCE);
+                    let runs = self.runs.len().saturating_add(AT_ONCE as usize);
+                    self.more.hold(tiles, runs, 2 * AT_ONCE as usize)?;
                     self.fill(tiles, sieve, number, rank, (window.end - number) as usize)?;
                 }
                 let at = (number - window.start) as usize;
