@@ -256,6 +256,12 @@ pub trait CreateSink: Send + Sync {
     /// The order in which records are wanted.
     fn order(&self) -> Order;
 
+    /// True if records that come in canonical order may be ordered by time within a chunk, because
+    /// the output is smaller then.
+    fn likes_time(&self) -> bool {
+        false
+    }
+
     /// True if it writes the normals that a stage computed.
     fn wants_normals(&self) -> bool;
 
@@ -288,7 +294,8 @@ pub enum Order {
     Auto,
     /// Morton order of the lattice, then record bytes.
     Canonical,
-    /// The order of the inputs; streaming pipelines only.
+    /// The order of the inputs: by file, as they are given, then by record. For one output of all
+    /// inputs, or pipelines that stream.
     Input,
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::job::Job;
 use super::passes::{Pass, StageOp};
-use super::shares::{Demands, Shares};
+use super::shares::{Demands, MILL_SPARE, Shares};
 use crate::budget::{Lease, whole_mebibytes};
 use crate::geom::lattice::Lattice;
 use crate::tile::{CutError, SealedTiles, TileKey};
@@ -93,7 +93,7 @@ fn cut(
     tiles: &SealedTiles,
 ) -> Result<Cut> {
     let wanted = job.tile_points.map_or(zone_of(shares.tile_positions), |points| points as u64);
-    let free = job.budget.free();
+    let free = job.budget.free().saturating_sub(MILL_SPARE);
     let largest = demands.tile_positions(job.threads, free).max(shares.tile_positions);
     let (good, lowest) = (cells.level(CELLS_ACROSS), cells.level(1));
     let mut tries =

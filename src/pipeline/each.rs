@@ -208,7 +208,7 @@ impl Each<'_> {
         let rank = *self.ranks.get(input).ok_or_else(missing)? as usize;
         let metadata: Metadata = job.source.metadata_of(input)?;
         let mut sink = create.create(staged.file(), job.source.schema(), &metadata, false)?;
-        let benches = Benches::of_one(job, tiles, sink.encoder(), counted, sink.chunk_points());
+        let benches = Benches::of_one(job, tiles, &*sink, counted, create.likes_time());
         let mut open = Open::new(0, sink.chunk_points(), records.wants_normals, false);
         let (mut given, mut full) = (0, Vec::new());
         let mut append = |chunk: Chunk| {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use super::by_rank::{ByRank, Starts, place};
 use super::chunks::Found;
 use super::clock::Clock;
 use super::cut::{Cut, cut_all};
@@ -35,13 +36,14 @@ pub(super) fn mill(
     clock: &mut Clock<'_>,
 ) -> Result<Finished> {
     clock.phase("decode", Some(job.source.points()));
-    let (store, mut tally) = decode(job, lattice, shares, area)?;
+    let (store, starts, mut tally) = decode(job, lattice, shares, area)?;
     tally.work("runs", store.runs() as u64);
     clock.phase("merge", Some(tally.work.get("placed").copied().unwrap_or(0)));
     let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
     tally.count("positions", tiles.positions());
     settle(job, lattice, &tiles)?;
-    let field = Field { lattice, area: area.clone(), tiles: tiles.clone() };
+    let starts = Arc::new(starts);
+    let field = Field { lattice, area: area.clone(), tiles: tiles.clone(), starts };
     let mut course = Course {
         sieve: Sieve::default(),
         alive: tiles.points(),
@@ -123,6 +125,7 @@ impl Course {
             cut.keys.iter().map(|key| key.level).collect();
         tally.work("tile_levels", levels.len() as u64);
         let (mut sinks, mut by_input) = (Vec::new(), Vec::new());
+        let (mut by_rank, mut ordered) = (Vec::new(), Vec::new());
         for &sink in pass.before.iter().chain(&pass.after) {
             if let Some(Some(each)) = job.each.get(sink) {
                 let (inputs, before) = (each.sinks.len(), pass.before.contains(&sink));
@@ -131,10 +134,17 @@ impl Course {
                 continue;
             }
             let open = self.sinks.get_mut(sink).and_then(Option::take);
-            sinks.push((sink, open.ok_or_else(|| Error::internal("an output is written twice"))?));
+            let open = open.ok_or_else(|| Error::internal("an output is written twice"))?;
+            if job.in_input_order[sink] {
+                let (normals, before) = (job.wants_normals[sink], pass.before.contains(&sink));
+                by_rank.push(ByRank::new(&field.area, sink, &field.starts, normals, before));
+                ordered.push(open);
+                continue;
+            }
+            sinks.push((sink, open));
         }
         let which: Vec<usize> = sinks.iter().map(|(sink, _)| *sink).collect();
-        let milled = grind(job, (pass, cut), field, &sieve, (sinks, by_input))?;
+        let milled = grind(job, (pass, cut), field, &sieve, (sinks, by_input, by_rank))?;
         tally.merge(&milled.tally);
         for lists in &milled.by_input {
             clock.phase("write", Some(lists.records()));
@@ -144,6 +154,13 @@ impl Course {
             let (written, counted) = each.write(job, tiles, lists, last)?;
             tally.merge(&counted);
             self.written[lists.sink] = Some(written);
+        }
+        for (lists, sink) in milled.by_rank.iter().zip(ordered) {
+            clock.phase("write", Some(lists.records));
+            let last = lists.sink == job.last_sink;
+            let (said, counted) = lists.write(job, tiles, sink, last)?;
+            tally.merge(&counted);
+            self.written[lists.sink] = Some(vec![(lists.records, said)]);
         }
         for (sink, outcome) in
             which.into_iter().zip(milled.counts.outputs.into_iter().zip(milled.written))
@@ -196,10 +213,15 @@ fn decode(
     lattice: &Lattice,
     shares: &Shares,
     area: &Arc<SpillArea>,
-) -> Result<(TileStore, Tally)> {
+) -> Result<(TileStore, Starts, Tally)> {
     let _working = job.budget.lease(shares.work, "decoding")?;
     let tagged = job.tagger.tags();
-    let store = TileStore::new(area, &job.budget, job.source.schema().stride, tagged);
+    let mut store = TileStore::new(area, &job.budget, job.source.schema().stride, tagged);
+    let ranked = job.in_input_order.contains(&true);
+    if ranked {
+        store = store.with_places();
+    }
+    let parts = Mutex::new(vec![0; if ranked { job.source.parts() } else { 0 }]);
     let total = Mutex::new(Tally::default());
     let next = AtomicUsize::new(0);
     job.parallel(|| {
@@ -213,16 +235,21 @@ fn decode(
                 break;
             }
             let mut part = job.source.part(index)?;
+            let mut read = 0;
             while job.read(&mut *part, &mut batch, &mut tally)? {
+                placed.first = place(index, read);
                 take(job, lattice, &batch, &mut placed, &mut intake, &mut tally)?;
+                read += batch.len() as u64;
             }
+            lock(&parts).get_mut(index).into_iter().for_each(|part| *part = read);
         }
         intake.flush()?;
         lock(&total).merge(&tally);
         Ok(())
     })?;
     let tally = std::mem::take(&mut *lock(&total));
-    Ok((store, tally))
+    let starts = Starts::of(&lock(&parts));
+    Ok((store, starts, tally))
 }
 
 /// What of a batch goes to the intake; keeps its memory.
@@ -230,6 +257,8 @@ fn decode(
 struct Placed {
     positions: Vec<Position>,
     tags: Vec<Tag>,
+    /// Place in the input of the batch's first record.
+    first: u64,
     /// Indices of records that do not go there.
     left_out: Vec<usize>,
 }
@@ -245,7 +274,7 @@ fn take(
 ) -> Result<()> {
     let stride = batch.schema().stride;
     let records = batch.records();
-    let Placed { positions, tags, left_out } = placed;
+    let Placed { positions, tags, left_out, first } = placed;
     positions.clear();
     tags.clear();
     left_out.clear();
@@ -281,6 +310,7 @@ fn take(
     for end in left_out.iter().copied().chain([batch.len()]) {
         let count = end - begin;
         let (these, of_these) = (&positions[at..at + count], &tags[at..at + count]);
+        intake.place(*first + begin as u64);
         intake.take(these, &records[begin * stride..end * stride], of_these)?;
         (begin, at) = (end + 1, at + count);
     }

@@ -1,6 +1,8 @@
 //! From a pipeline file to a finished run: parse, plan, run.
 
 mod builtin;
+mod by_rank;
+mod by_time;
 mod chunks;
 mod clock;
 mod connect;

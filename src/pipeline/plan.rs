@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use super::by_rank;
 use super::each::{lists_bytes, paths, ranks};
 use super::passes::{Op, Pass, StageOp, Tap, blame, number_selections, unroll};
 use super::publish::check_place;
@@ -110,8 +111,17 @@ impl Pipeline {
         let needs = passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect();
         let has_cells = sorted.ops.iter().any(|stage| stage.op.tile().needs().cells);
         let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
+        let of_input = |sink: &&Box<dyn CreateSink>| mills && sink.order() == Order::Input;
+        let ordered = sinks.iter().filter(of_input).count() as u64;
+        if ordered > 0 && source.parts() > by_rank::MOST_PARTS {
+            let told = "the inputs have too many parts for an output in their order";
+            return Err(Error::pipeline(told).help("leave `write.order` out"));
+        }
         let demands = Demands {
-            lists: folders.saturating_mul(lists_bytes(ranks.len())),
+            lists: folders
+                .saturating_mul(lists_bytes(ranks.len()))
+                .saturating_add(ordered.saturating_mul(by_rank::lists_bytes(source.points()))),
+            ranked: ordered > 0,
             mills,
             passes: needs,
             tagged: tagger.tags(),
@@ -293,22 +303,14 @@ fn z_scale(settings: &RunSettings, source: &dyn Source, ops: &[StageOp]) -> Resu
 
 /// True if the run needs tiles: for its stages, or because an output is to be in canonical order.
 fn mills(ops: &[StageOp], sinks: &[Box<dyn CreateSink>]) -> Result<bool> {
-    let of = |order: Order| sinks.iter().find(move |sink| sink.order() == order);
-    let (canonical, input) = (of(Order::Canonical), of(Order::Input));
-    let folder = sinks.iter().any(|sink| sink.is_folder());
-    let mills = !ops.is_empty() || canonical.is_some() || folder;
-    match input.filter(|_| mills) {
-        None => Ok(mills),
+    let canonical = sinks.iter().any(|sink| sink.order() == Order::Canonical);
+    let folder = |sink: &&Box<dyn CreateSink>| sink.is_folder() && sink.order() == Order::Input;
+    match sinks.iter().find(folder) {
+        None => Ok(!ops.is_empty() || canonical || sinks.iter().any(|sink| sink.is_folder())),
         Some(sink) => {
-            let told = match ops.is_empty() {
-                true => {
-                    "order = \"input\" is not possible in or beside an output in canonical order"
-                }
-                false => {
-                    "order = \"input\" is for pipelines that stream; tiles write the canonical order"
-                }
-            };
-            Err(Error::pipeline(told).at(sink.path()).help("leave `order` out"))
+            Err(Error::pipeline("`write.order = \"input\"` is for one file of all inputs")
+                .at(sink.path())
+                .help("give `write.path` instead of `write.folder`, or leave `write.order` out"))
         }
     }
 }

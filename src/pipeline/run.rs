@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
+use super::by_rank::LISTED;
 use super::clock::Clock;
 use super::each::Each;
 use super::job::Job;
@@ -25,7 +26,7 @@ use crate::report::{
     ClassFigures, Decision, FileFigures, LatticeFigures, Ledger, Machine, Outcome, PassFigures,
     Report, RunFigures, Tally, check_written, peak_memory,
 };
-use crate::stage::{CreateSink, Input, SinkSummary, Source};
+use crate::stage::{CreateSink, Input, Order, SinkSummary, Source};
 use crate::tile::{SpillArea, lock};
 use crate::{Error, Result};
 
@@ -200,6 +201,8 @@ impl Plan {
             drop_nonfinite: self.settings.nonfinite == Nonfinite::Drop,
             tile_points,
             wants_normals: self.sinks.iter().map(|sink| sink.wants_normals()).collect(),
+            in_input_order: self.sinks.iter().map(|sink| sink.order() == Order::Input).collect(),
+            by_time: self.sinks.iter().map(|sink| sink.likes_time()).collect(),
             last_sink: self.last_sink,
             watch,
             warnings: Mutex::default(),
@@ -308,7 +311,8 @@ fn input_figures(source: &dyn Source) -> Vec<FileFigures> {
 fn check_disk(demands: &Demands, spill: &Scratch, kept_in_memory: u64) -> Result<()> {
     // Records, their order, packed positions twice (runs and merged scan), states and fates twice
     // (of the pass before and of the pass at work), and columns between passes.
-    let order = if demands.tagged { 12 } else { 8 };
+    // Ranks in the input, and the lists that are sorted by them.
+    let order = if demands.tagged { 12 } else { 8 } + if demands.ranked { 8 + LISTED } else { 0 };
     let columns = if demands.passes.len() > 1 { 1 + 4 + 12 + 8 } else { 0 };
     let each = demands.stride as u64 + order + 2 * 8 + 1 + 4 + columns;
     let needed = demands.points.saturating_mul(each).saturating_sub(kept_in_memory);

@@ -40,7 +40,7 @@ pub struct RunSettings {
     /// What becomes of points with the withheld flag, in pipelines that work on tiles; others keep
     /// every point.
     pub withheld: Withheld,
-    /// Most points a tile's cube holds, for tests, at least 64; none: as the memory allows.
+    /// Most points a tile's cube holds, for tests, at least 16; none: as the memory allows.
     #[serde(deserialize_with = "some_tile_points")]
     pub tile_points: Option<NonZeroUsize>,
     /// Which of the equal code paths runs, for tests.
@@ -318,7 +318,7 @@ fn some_threads<'de, D: Deserializer<'de>>(from: D) -> Result<Option<NonZeroUsiz
 }
 
 fn some_tile_points<'de, D: Deserializer<'de>>(from: D) -> Result<Option<NonZeroUsize>, D::Error> {
-    within(NonZeroUsize::deserialize(from)?, 64..=usize::MAX, "a whole number from 64")
+    within(NonZeroUsize::deserialize(from)?, 16..=usize::MAX, "a whole number from 16")
 }
 
 fn within<E: de::Error>(

@@ -1,5 +1,6 @@
 //! How a run divides its memory: what it can tell before any work, as a pure function.
 
+use super::by_rank::ordering_bytes;
 use super::product::Product;
 use super::survey::survey_bytes;
 use crate::budget::{at_most_mebibytes, whole_mebibytes};
@@ -20,6 +21,8 @@ const RUNS: u64 = 64;
 /// Stacks, allocator slack and decoder tables of a thread, and the same for the process.
 const THREAD_OVERHEAD: u64 = 3 << 20;
 const PROCESS_OVERHEAD: u64 = 6 << 20;
+/// What tiles larger than planned leave for the list of all tiles.
+pub const MILL_SPARE: u64 = 1 << 20;
 /// By how much what is resident before a run differs from process to process: a budget that is named
 /// must do in the next.
 const RESIDENT_VARIES: u64 = 1 << 20;
@@ -49,6 +52,8 @@ pub struct Demands {
     pub mills: bool,
     /// True if records have tags.
     pub tagged: bool,
+    /// True if an output wants the order of the inputs.
+    pub ranked: bool,
     /// Records that a run has at most, if something other than the memory bounds it.
     pub run_most: Option<u64>,
     /// True if a stage decides about cells together: how many points those have only the decode
@@ -95,6 +100,7 @@ impl Demands {
             lists: 0,
             mills: false,
             tagged: false,
+            ranked: false,
             run_most: None,
             has_cells: false,
             passes: Vec::new(),
@@ -123,7 +129,7 @@ impl Demands {
 
     /// Bytes that an intake holds for each record.
     fn intake(&self) -> u64 {
-        Intake::bytes_per_record(self.stride, self.tagged).max(1)
+        Intake::bytes_per_record(self.stride, self.tagged, self.ranked).max(1)
     }
 
     /// Records of a run for which neither the decode, which holds one, nor the merge, which holds a
@@ -174,7 +180,8 @@ impl Demands {
         let stages = self.passes.iter().map(of).max().unwrap_or(0);
         let sieved = self.tagged || self.passes.len() > 1;
         let sieve = if sieved { Loader::SIEVE_BYTES_PER_POINT } else { 0 };
-        let own = Loader::BYTES_PER_POINT + sieve + 2 * Product::BYTES_PER_POINT;
+        let product = Product::BYTES_PER_POINT + if self.ranked { Product::PLACE_BYTES } else { 0 };
+        let own = Loader::BYTES_PER_POINT + sieve + 2 * product;
         own.saturating_add(stages) as u64
     }
 
@@ -192,6 +199,11 @@ impl Demands {
         let run = run_records.saturating_mul(self.intake());
         let decode = self.decode_fixed().saturating_add(run);
         let each = decode.max(self.merge(run_records)).max(survey_bytes());
+        let ordering = match self.ranked {
+            true => self.mill_fixed().saturating_add(ordering_bytes(self.points)),
+            false => 0,
+        };
+        let each = each.max(ordering);
         self.by_threads(each).max(self.mill_bytes(self.threads, tile_positions))
     }
 
@@ -237,9 +249,10 @@ impl Demands {
     /// Bytes that `shares` leave the mill at least.
     fn free(&self, shares: &Shares) -> u64 {
         let each = (self.stride as u64).saturating_add(KEPT_BYTES);
+        let each = each.saturating_add(if self.ranked { 8 } else { 0 });
         let kept = shares.kept_in_memory.min(self.points.saturating_mul(each));
         let taken = shares.base.saturating_add(shares.index).saturating_add(kept);
-        self.limit.saturating_sub(taken)
+        self.limit.saturating_sub(taken).saturating_sub(MILL_SPARE)
     }
 
     fn most_work(&self, least: u64) -> u64 {
@@ -306,8 +319,8 @@ impl Demands {
 /// The part of the memory to spare that goes to work, up to what it makes use of: 3 of 4.
 const SPARE: (u64, u64) = (3, 4);
 /// Bytes that a record kept in memory takes at most besides its own: its place in the order, its
-/// position in a run and in the merged scan, its copies, its state, its fate.
-const KEPT_BYTES: u64 = 8 + 24 + 24 + 4 + 1 + 4;
+/// position in a run and in the merged scan, its copies, its state, its fate; tags included.
+const KEPT_BYTES: u64 = 12 + 28 + 24 + 4 + 1 + 4;
 
 #[cfg(test)]
 mod tests {
@@ -326,6 +339,7 @@ mod tests {
             lists: 0,
             mills: true,
             tagged: false,
+            ranked: false,
             run_most: None,
             has_cells: true,
             passes: vec![vec![Needs { neighbors: 10, bytes_per_point: 40, ..Needs::default() }]],

@@ -109,6 +109,11 @@ impl Loader {
         self.rim_limit = self.rim_limit.min(positions);
     }
 
+    /// The scan that it loads from.
+    pub fn tiles(&self) -> &SealedTiles {
+        &self.tiles
+    }
+
     /// Loads the positions of `key`'s cube, of the `reach` around it that later stages look at
     /// together with it, and a rim in which to find the `neighbors` nearest of those.
     pub fn load(&mut self, key: TileKey, reach: i64, neighbors: usize) -> Result<&mut Tile> {

@@ -76,7 +76,7 @@ pub fn seal(
     let sequence = join(ranges, blocks);
     lease.resize(sequence.blocks.len() as u64 * each)?;
     let refs = (out.refs, out.tagged);
-    Ok(SealedTiles::new(sequence, out.positions, refs, store.records, lease))
+    Ok(SealedTiles::new(sequence, out.positions, refs, (store.records, store.places), lease))
 }
 
 /// A range of Morton order.

@@ -34,6 +34,15 @@ impl Pieces {
         first * PIECE as u64
     }
 
+    /// Reserves all numbers below `end`, if they are not yet.
+    pub fn reserve_below(&self, end: u64) {
+        let mut table = self.table.write().unwrap_or_else(PoisonError::into_inner);
+        let pieces = end.div_ceil(PIECE as u64) as usize;
+        if table.len() < pieces {
+            table.resize(pieces, None);
+        }
+    }
+
     /// How many numbers are reserved so far.
     pub fn reserved(&self) -> u64 {
         let table = self.table.read().unwrap_or_else(PoisonError::into_inner);
