@@ -263,7 +263,9 @@ impl Demands {
     pub fn divide(&self) -> Result<Shares> {
         let (base, index, least) = (self.base(), self.index(), self.least());
         let needed = base.saturating_add(index).saturating_add(least);
-        let Some(spare) = self.limit.checked_sub(needed) else {
+        // A sum that reached the end of the numbers is more than any memory.
+        let spare = self.limit.checked_sub(needed).filter(|_| needed < u64::MAX);
+        let Some(spare) = spare else {
             return Err(self.refusal(needed));
         };
         if !self.mills {
@@ -395,10 +397,11 @@ mod tests {
             for mills in [true, false] {
                 let worst = Demands { mills, ..worst.clone() };
                 assert_eq!(worst.divide().unwrap_err().kind(), crate::ErrorKind::Memory);
+                let most = (most as u64).min(1 << 40);
                 // One of them alone, whatever the others.
-                let one = Demands { limit: u64::MAX, points: most as u64, mills, ..demands(0) };
+                let one = Demands { limit: u64::MAX, points: most, mills, ..demands(0) };
                 assert!(one.divide().is_ok_and(|shares| !mills || shares.run_records > 0));
-                let one = Demands { threads: most, mills, ..demands(1 << 30) };
+                let one = Demands { threads: most as usize, mills, ..demands(1 << 30) };
                 assert!(one.divide().is_err());
             }
             assert!(worst.limit_for_tile(usize::MAX, u64::MAX) > 1 << 62);
