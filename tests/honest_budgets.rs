@@ -99,3 +99,34 @@ fn the_budget_that_a_refusal_names_does_and_sixteen_mebibytes_less_do_not() {
     assert!(after_the_decode >= 3, "{after_the_decode} refusals came from the points");
     assert!(fewer >= 1, "no scan was milled by fewer threads");
 }
+
+#[test]
+fn copies_that_differ_in_class_are_refused_with_a_lower_bound_and_fit_in_the_end() {
+    // 200,000 copies of one position: neighbours in the order of their bytes differ in class.
+    let even = Scan::synthetic(Scene::Als, 200_000, 3);
+    let mut scan = moved(&even, |_, _| [1_000, 2_000, 3_000]);
+    let class = scan.schema.find("Classification").unwrap().clone();
+    let (schema, mut random) = (scan.schema.clone(), Random(4));
+    for record in scan.records.chunks_exact_mut(schema.stride) {
+        let value = pointmill::point::Value::Unsigned(random.below(9) as u64);
+        assert!(class.put(record, schema.endian, value));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    scan.write(&at.join("scan.las"));
+    let command = "reduce scan.las -o out.las --threads 1 --classes 2,6";
+    let (mut budget, mut refusals, mut of_copies) = (1, 0, 0);
+    loop {
+        let (code, told) = with(at, command, budget);
+        if code == 0 {
+            break;
+        }
+        assert!(code == 1 && told.contains("at least"), "{told}");
+        assert!(named(&told) > budget, "{told}");
+        of_copies += usize::from(told.contains("copies that differ in class or flags"));
+        refusals += 1;
+        assert!(refusals < 5, "{told}");
+        budget = named(&told);
+    }
+    assert!(of_copies > 0, "the copies took no more than what is planned");
+}

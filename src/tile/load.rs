@@ -218,7 +218,8 @@ impl Loader {
                 places.push(j);
             }
         }
-        self.core.more.hold(&self.tiles, self.core.runs.len(), self.capacity)?;
+        let runs = self.core.runs.len();
+        self.core.more.hold(&self.tiles, runs, self.capacity, runs as u64)?;
         self.columns(first, &places, in_core)
     }
 

@@ -158,19 +158,27 @@ impl MoreRuns {
     /// A run, and what the mill makes of it.
     const BYTES: u64 = 3 * size_of::<Run>() as u64;
 
-    /// Holds memory for `runs` in all, of which `planned` are reckoned with.
-    pub(super) fn hold(&mut self, tiles: &SealedTiles, runs: usize, planned: usize) -> Result<()> {
+    /// Holds memory for `runs` in all, of which `planned` are reckoned with. Fails as
+    /// [`Budget::lease`](crate::budget::Budget::lease) does for `most`, as many as there may be.
+    pub(super) fn hold(
+        &mut self,
+        tiles: &SealedTiles,
+        runs: usize,
+        planned: usize,
+        most: u64,
+    ) -> Result<()> {
         let more = (runs.saturating_sub(planned) as u64).saturating_mul(Self::BYTES);
-        match &mut self.0 {
-            Some(lease) if lease.bytes() >= more => Ok(()),
-            Some(lease) => lease.resize(more),
-            None if more == 0 => Ok(()),
-            None => {
-                let what = "list of a tile's copies that differ in class or flags";
-                self.0 = Some(tiles.budget().lease(more, what)?);
-                Ok(())
-            }
+        if self.0.as_ref().map_or(0, Lease::bytes) >= more {
+            return Ok(());
         }
+        let what = "list of a tile's copies that differ in class or flags";
+        // What is held goes back first, so that a refusal counts it once.
+        self.0 = None;
+        self.0 = match tiles.budget().try_lease(more, what) {
+            None => Some(tiles.budget().lease(most.saturating_mul(Self::BYTES).max(more), what)?),
+            lease => lease,
+        };
+        Ok(())
     }
 
     /// Gives back what it holds, and with it the memory of `runs`.
@@ -215,7 +223,9 @@ impl Runs {
                 if !window.contains(&number) {
                     window = number..end.min(number + AT_ONCE);
                     let runs = self.runs.len().saturating_add(AT_ONCE as usize);
-                    self.more.hold(tiles, runs, 2 * AT_ONCE as usize)?;
+                    // Each record that is left may be a run, here and in the list of the tile.
+                    let most = (runs as u64).saturating_add(end - number).saturating_mul(2);
+                    self.more.hold(tiles, runs, 2 * AT_ONCE as usize, most)?;
                     self.fill(tiles, sieve, number, rank, (window.end - number) as usize)?;
                 }
                 let at = (number - window.start) as usize;
