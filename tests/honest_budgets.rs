@@ -50,7 +50,7 @@ fn moved(scan: &Scan, mut to: impl FnMut(usize, [i32; 3]) -> [i32; 3]) -> Scan {
     scan
 }
 
-/// Scans of 30,000 points that need very different tiles.
+/// Scans that need very different tiles; the last has more points than tiles take in least memory.
 fn scenes() -> Vec<(&'static str, Scan)> {
     let even = Scan::synthetic(Scene::Als, 30_000, 3);
     let mut random = Random(11);
@@ -60,7 +60,8 @@ fn scenes() -> Vec<(&'static str, Scan)> {
     });
     let line = moved(&even, |i, _| [17 * i as i32, 0, 0]);
     let copies = moved(&even, |i, p| if i % 4 == 0 { p } else { [5_000, 5_000, (i % 7) as i32] });
-    vec![("even", even), ("cluster", cluster), ("line", line), ("copies", copies)]
+    let heavy = Scan::synthetic(Scene::Als, 200_000, 5);
+    vec![("even", even), ("cluster", cluster), ("line", line), ("copies", copies), ("heavy", heavy)]
 }
 
 #[test]
@@ -72,7 +73,8 @@ fn the_budget_that_a_refusal_names_does_and_sixteen_mebibytes_less_do_not() {
         let at = folder.path();
         scan.write(&at.join("scan.las"));
         for (m, stages) in stages.iter().enumerate() {
-            let threads = 1 + (random.below(8) + n + m) % 8;
+            let most = if *what == "heavy" { 2 } else { 8 };
+            let threads = 1 + (random.below(8) + n + m) % most;
             let command = format!("reduce scan.las -o out.laz --threads {threads} {stages}");
             let mut budget = 1 + random.below(20) as u64;
             let (mut refusals, mut is_last) = (0, false);
@@ -96,7 +98,7 @@ fn the_budget_that_a_refusal_names_does_and_sixteen_mebibytes_less_do_not() {
             println!("{what}: {command}: {budget} MiB after {refusals} refusals");
         }
     }
-    assert!(after_the_decode >= 3, "{after_the_decode} refusals came from the points");
+    assert!(after_the_decode >= 1, "{after_the_decode} refusals came from the points");
     assert!(fewer >= 1, "no scan was milled by fewer threads");
 }
 

@@ -82,7 +82,10 @@ fn a_reduced_output_in_the_order_of_the_inputs_is_what_they_have_without_the_res
         assert!(written.records != canonical.records && written.points() > 1000);
         let mut rest = 0..scan.points();
         for i in 0..written.points() {
-            assert!(rest.any(|j| scan.record(j) == written.record(i)), "record {i} is out of order");
+            assert!(
+                rest.any(|j| scan.record(j) == written.record(i)),
+                "record {i} is out of order"
+            );
         }
     }
 }
@@ -142,7 +145,8 @@ fn chunks_of_laz_hold_what_their_rank_says_in_order_of_time() {
     let find = |name: &str| scan.schema.find(name).unwrap().clone();
     let (time, number) = (find(names::GPS_TIME), find(names::RETURN_NUMBER));
     let key = |scan: &Scan, i: usize| {
-        let get = |d: &pointmill::point::Dimension| d.get(scan.record(i), scan.schema.endian).as_f64();
+        let get =
+            |d: &pointmill::point::Dimension| d.get(scan.record(i), scan.schema.endian).as_f64();
         (get(&time), get(&number))
     };
     // Nothing is removed but copies.

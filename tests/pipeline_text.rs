@@ -272,7 +272,9 @@ fn a_chain_that_cannot_be_run_is_refused() {
             "p.toml:2:10: a.laz is written twice",
         ),
         (
-            format!("{synth}{thin}[[stage]]\nkind = \"write\"\nfolder = \"f\"\norder = \"input\"\n"),
+            format!(
+                "{synth}{thin}[[stage]]\nkind = \"write\"\nfolder = \"f\"\norder = \"input\"\n"
+            ),
             "p.toml:8:8: `order = \"input\"` is for one file of all inputs",
         ),
         ("run = 3\n".to_owned() + GOOD, "p.toml:1:1: `run` is a table: write [run]"),

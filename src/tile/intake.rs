@@ -166,10 +166,12 @@ impl<'a> Intake<'a> {
         if self.positions.is_empty() {
             return Ok(());
         }
-        let (store, records, tags) = (self.store, &self.records, &self.tags);
+        let (store, records, tags, places) = (self.store, &self.records, &self.tags, &self.places);
         let equal = |a: usize, b: usize| {
             let record = |i: usize| &records[i * store.stride..(i + 1) * store.stride];
-            record(a).cmp(record(b)).then_with(|| tags.get(a).cmp(&tags.get(b)))
+            let tagged = || tags.get(a).cmp(&tags.get(b));
+            let placed = || places.get(a).cmp(&places.get(b));
+            record(a).cmp(record(b)).then_with(tagged).then_with(placed)
         };
         let order = self.order.sort(&self.positions, &equal);
         let first_record = store.records.reserve(order.len() as u64);

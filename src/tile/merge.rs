@@ -365,8 +365,14 @@ impl<'a> Cursor<'a> {
     fn read_record(&self, record: &mut Vec<u8>) -> Result<()> {
         record.resize(self.store.stride, 0);
         self.store.records.read(self.number(), record)?;
-        // Equal records are told apart by their tags: by the input that they come from.
+        // Equal records are told apart by their tags, by the input that they come from, and where
+        // an output is in the order of the inputs by their place there.
         record.extend_from_slice(&self.tag().to_be_bytes());
+        if let Some(places) = &self.store.places {
+            let mut place = [0; 8];
+            places.read(self.number(), &mut place)?;
+            record.extend(place.iter().rev());
+        }
         Ok(())
     }
 }

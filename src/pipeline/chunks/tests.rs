@@ -36,7 +36,8 @@ fn chunks_are_cut_by_rank_and_copies_are_one_entry() {
     let outputs = vec![Open::new(0, 1000, true, false)];
     let copies = 10_000_000;
     let all = 8 + u64::from(copies);
-    let mut cutter = Cutter::new(&area, (8, all), (false, false), (outputs, Vec::new(), Vec::new()));
+    let mut cutter =
+        Cutter::new(&area, (8, all), (false, false), (outputs, Vec::new(), Vec::new()));
     let mut chunks = cutter.cut(&product(&[(0, 1), (1, 2), (7, copies)])).unwrap();
     assert_eq!(chunks.len(), 10_000);
     assert!(chunks.iter().all(|chunk| chunk.records.len() <= 3));
