@@ -111,8 +111,8 @@ impl Pipeline {
         let needs = passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect();
         let has_cells = sorted.ops.iter().any(|stage| stage.op.tile().needs().cells);
         let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
-        let of_input = |sink: &&Box<dyn CreateSink>| mills && sink.order() == Order::Input;
-        let ordered = sinks.iter().filter(of_input).count() as u64;
+        let ordered = sinks.iter().filter(|sink| mills && sink.order() == Order::Input).count();
+        let ordered = ordered as u64;
         if ordered > 0 && source.parts() > by_rank::MOST_PARTS {
             let told = "the inputs have too many parts for an output in their order";
             return Err(Error::pipeline(told).help("leave `write.order` out"));
@@ -304,8 +304,7 @@ fn z_scale(settings: &RunSettings, source: &dyn Source, ops: &[StageOp]) -> Resu
 /// True if the run needs tiles: for its stages, or because an output is to be in canonical order.
 fn mills(ops: &[StageOp], sinks: &[Box<dyn CreateSink>]) -> Result<bool> {
     let canonical = sinks.iter().any(|sink| sink.order() == Order::Canonical);
-    let folder = |sink: &&Box<dyn CreateSink>| sink.is_folder() && sink.order() == Order::Input;
-    match sinks.iter().find(folder) {
+    match sinks.iter().find(|sink| sink.is_folder() && sink.order() == Order::Input) {
         None => Ok(!ops.is_empty() || canonical || sinks.iter().any(|sink| sink.is_folder())),
         Some(sink) => {
             Err(Error::pipeline("`write.order = \"input\"` is for one file of all inputs")
