@@ -106,7 +106,7 @@ fn normals(positions: &[Position], stage: &Normals, simd: Simd) -> [f64; 4] {
     let (start, wall) = (cpu_seconds().unwrap(), Instant::now());
     let tiles = sealed(positions);
     let merged = cpu_seconds().unwrap();
-    let keys = tiles.cut(TILE, TILE, 0, 0).unwrap();
+    let keys = tiles.cut(TILE, TILE, 0, (0, 0)).unwrap();
     let mut loader = Loader::new(&tiles, &Sieve::default(), CAPACITY);
     loader.tile().0.compute_by(simd);
     let mut count = 0;

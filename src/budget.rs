@@ -92,11 +92,11 @@ impl Budget {
         let enough = used.saturating_add(bytes);
         Error::memory(format!(
             "the {what} needs {} of memory, but {} of the budget of {} is free",
-            Bytes(bytes),
-            Bytes(self.0.limit.saturating_sub(used)),
-            Bytes(self.0.limit)
+            whole_mebibytes(bytes),
+            at_most_mebibytes(self.0.limit.saturating_sub(used)),
+            at_most_mebibytes(self.0.limit)
         ))
-        .help(format!("give `run.memory = \"{}\"` or more", whole_mebibytes(enough)))
+        .help(format!("give at least `run.memory = \"{}\"`", whole_mebibytes(enough)))
     }
 }
 
@@ -110,6 +110,11 @@ pub struct Lease {
 }
 
 impl Lease {
+    /// What they are held of.
+    pub fn budget(&self) -> &Budget {
+        &self.budget
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> u64 {
         self.bytes
@@ -170,6 +175,16 @@ impl fmt::Display for Bytes {
 /// A budget as one writes it, rounded up: `137MiB`.
 pub fn whole_mebibytes(bytes: u64) -> String {
     format!("{}MiB", bytes.div_ceil(MIB).max(1))
+}
+
+/// What there is of something that is too small, rounded down: `137 MiB`, `269.9 MiB`. It differs from
+/// what [`whole_mebibytes`] says of more.
+pub fn at_most_mebibytes(bytes: u64) -> String {
+    match (bytes / MIB, bytes % MIB * 10 / MIB) {
+        (0, 0) => format!("{bytes} B"),
+        (whole, 0) => format!("{whole} MiB"),
+        (whole, tenth) => format!("{whole}.{tenth} MiB"),
+    }
 }
 
 /// The budget of a run that names none: half of the machine's memory or of the smallest limit of a
@@ -259,9 +274,9 @@ mod tests {
         assert_eq!(error.kind(), ErrorKind::Memory);
         assert_eq!(
             error.to_string(),
-            "the tile needs 40.0 MiB of memory, but 28 MiB of the budget of 128 MiB is free"
+            "the tile needs 41MiB of memory, but 28 MiB of the budget of 128 MiB is free"
         );
-        assert_eq!(error.remedy(), Some("give `run.memory = \"141MiB\"` or more"));
+        assert_eq!(error.remedy(), Some("give at least `run.memory = \"141MiB\"`"));
         assert_eq!(budget.used(), 100 * MIB);
     }
 
@@ -269,7 +284,7 @@ mod tests {
     fn the_budget_that_a_refusal_names_would_do() {
         let budget = Budget::new(10);
         let error = budget.lease(3 * MIB, "tile").unwrap_err();
-        assert_eq!(error.remedy(), Some("give `run.memory = \"3MiB\"` or more"));
+        assert_eq!(error.remedy(), Some("give at least `run.memory = \"3MiB\"`"));
         assert!(Budget::new(3 * MIB).lease(3 * MIB, "tile").is_ok());
     }
 
@@ -323,6 +338,17 @@ mod tests {
         let text =
             [0, 1023, 1024, 1536, 200 * MIB + 300_000, 3 << 39].map(|n| Bytes(n).to_string());
         assert_eq!(text, ["0 B", "1023 B", "1 KiB", "1.5 KiB", "200 MiB", "1.5 TiB"]);
+    }
+
+    #[test]
+    fn what_is_refused_never_reads_like_what_is_needed() {
+        for limit in [1, MIB - 1, MIB, 269 * MIB + 999_999, 270 * MIB - 1, u64::MAX - 1] {
+            let number = |text: &str| text.split([' ', 'M']).next().unwrap().to_owned();
+            let (less, enough) = (at_most_mebibytes(limit), whole_mebibytes(limit + 1));
+            assert!(less.ends_with(" B") || number(&less) != number(&enough), "{less} {enough}");
+        }
+        assert_eq!(at_most_mebibytes(270 * MIB - 1), "269.9 MiB");
+        assert_eq!(at_most_mebibytes(256 * MIB), "256 MiB");
     }
 
     #[test]

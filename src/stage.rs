@@ -291,6 +291,12 @@ pub trait CreateSink: Send + Sync {
     /// The order in which records are wanted.
     fn order(&self) -> Order;
 
+    /// True if records that come in canonical order may be ordered by time within a chunk, because
+    /// the output is smaller then.
+    fn likes_time(&self) -> bool {
+        false
+    }
+
     /// True if it writes the normals that a stage computed.
     fn wants_normals(&self) -> bool;
 
@@ -338,7 +344,8 @@ pub enum Order {
     Auto,
     /// Morton order of the lattice, then record bytes.
     Canonical,
-    /// The order of the inputs; streaming pipelines only.
+    /// The order of the inputs: by file, as they are given, then by record. For one output of all
+    /// inputs, or pipelines that stream.
     Input,
 }
 
@@ -368,6 +375,8 @@ pub struct Needs {
     /// Side in lattice steps of the cells whose points are decided together; 0 for none (or not
     /// settled yet).
     pub cell_side: i64,
+    /// True if it decides about the points of a cell together, also while their side is not settled.
+    pub cells: bool,
     /// True if cells of that side are octree nodes, so that no tile face cuts one.
     pub cell_aligned: bool,
     /// Working memory per position of the tile, rim included.

@@ -169,7 +169,7 @@ fn neighbors_are_exact(scan: &Scan) -> u64 {
     let mut all = positions;
     all.sort_unstable_by(morton_cmp);
     all.dedup();
-    let keys = tiles.cut(200, 400, 0, 0).unwrap();
+    let keys = tiles.cut(200, 400, 0, (0, 0)).unwrap();
     assert!(keys.len() >= 8, "{} tiles", keys.len());
     let mut loader = Loader::new(&tiles, &Sieve::default(), 1_000);
     loader.limit_rim(260);

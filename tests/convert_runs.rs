@@ -348,7 +348,7 @@ fn plan_tells_what_a_run_would_do_and_does_none_of_it() {
     ] {
         assert!(told.contains(part), "{part}:\n{told}");
     }
-    let parts = ["a memory budget of 10 MiB is too small", "help: give `--memory "];
+    let parts = ["a memory budget of 10 MiB is too small", "help: give `--memory ", "MiB"];
     fails(at, &plan(&["--memory", "10MiB"]), 1, &parts);
     assert_holds(at, &["a.las", "p.toml"]);
 }

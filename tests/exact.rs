@@ -96,7 +96,7 @@ fn neighbors_at_the_faces_of_tiles_of_a_real_scan_are_those_of_all_of_it() {
     assert!(all.len() + 2000 < positions.len(), "there are copies");
     let tiles = sealed(&scan, &positions);
     for (k, reach) in [(10, 0), (23, 37)] {
-        let keys = tiles.cut(TILE_POINTS as u64, 5_000, reach, 0).unwrap();
+        let keys = tiles.cut(TILE_POINTS as u64, 5_000, reach, (0, 0)).unwrap();
         let levels: BTreeSet<u32> = keys.iter().map(|key| key.level).collect();
         assert!(keys.len() >= 30 && levels.len() >= 2, "{} tiles, {levels:?}", keys.len());
         let mut loader = Loader::new(&tiles, &Sieve::default(), 6_000);
@@ -144,7 +144,7 @@ fn neighbors_at_the_faces_of_tiles_of_a_real_scan_are_those_of_all_of_it() {
 fn normals_written_by_a_tiled_run_are_those_of_brute_force_to_the_bit() {
     let scan = city();
     let all = distinct(&scan.positions());
-    let keys = sealed(&scan, &scan.positions()).cut(TILE_POINTS as u64, 5_000, 0, 0).unwrap();
+    let keys = sealed(&scan, &scan.positions()).cut(TILE_POINTS as u64, 5_000, 0, (0, 0)).unwrap();
     let cubes: Vec<Bounds> = keys.iter().map(|key| key.cube()).collect();
     let folder = tempfile::tempdir().unwrap();
     let files = scan.write_split(folder.path(), 3, &mut Random(6));

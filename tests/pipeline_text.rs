@@ -275,8 +275,10 @@ fn a_chain_that_cannot_be_run_is_refused() {
             "p.toml:2:10: a.laz is written twice",
         ),
         (
-            format!("{synth}{thin}{write}order = \"input\"\n"),
-            "p.toml:8:8: the input's order is kept only where no stage works on tiles",
+            format!(
+                "{synth}{thin}[[stage]]\nkind = \"write\"\nfolder = \"f\"\norder = \"input\"\n"
+            ),
+            "p.toml:8:8: `order = \"input\"` is for one file of all inputs",
         ),
         ("run = 3\n".to_owned() + GOOD, "p.toml:1:1: `run` is a table: write [run]"),
         ("stage = 3\n".to_owned(), "p.toml:1:1: a stage is one of several tables: write [[stage]]"),
@@ -557,4 +559,47 @@ fn a_neighbourhood_after_any_removal_is_a_second_pass() {
         assert!(unread.to_string().contains("that nothing has read"), "{unread}");
     }
     assert!(plan(&["normals", "cells", "median"]).is_ok());
+}
+
+/// A tile stage that reads a dimension of the records.
+#[derive(Serialize, Deserialize)]
+struct Bright {
+    dimension: String,
+}
+
+impl StageKind for Bright {
+    const KIND: &'static str = "bright";
+    const ABOUT: &'static str = "Reads a dimension.";
+
+    fn build(self, _: &StagePlace) -> Result<Role> {
+        Ok(Role::TileOp(Box::new(self)))
+    }
+}
+
+impl TileOp for Bright {
+    fn needs(&self) -> Needs {
+        Needs { reads: vec![self.dimension.clone()], ..Needs::default() }
+    }
+
+    fn run(&self, _: &mut Tile, _: &mut Tally) -> Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_stage_that_works_on_tiles_reads_no_dimension_that_these_have_not() {
+    let registry = Registry::builtin().with::<Bright>();
+    let plan = |dimension: &str| {
+        let text = format!(
+            "[[stage]]\nkind = 'synth'\nscene = 'plane'\npoints = 9\n[[stage]]\nkind = 'bright'\n\
+             dimension = '{dimension}'\n[[stage]]\nkind = 'write'\npath = 'never-written.las'\n"
+        );
+        Pipeline::parse(&text, "p.toml", &registry).unwrap().plan(&Overrides::default())
+    };
+    assert!(plan("Z").is_ok());
+    let told = plan("Intensity").err().unwrap();
+    assert!(told.to_string().contains("`bright` needs Intensity, which stages that work on tiles"));
+    assert!(told.to_string().contains("line 6"), "{told}");
+    let told = plan("Colour").err().unwrap();
+    assert!(told.to_string().contains("needs Colour, which nothing before it gives"), "{told}");
 }

@@ -130,8 +130,9 @@ fn the_memory_that_a_heavy_cell_is_said_to_need_does() {
         (run.status.code(), String::from_utf8(run.stderr).unwrap())
     };
     let named = |told: &str| -> u64 {
-        let number = told.split_once("--memory ").unwrap_or_else(|| panic!("{told}")).1;
-        number.split_once("MiB").unwrap().0.parse().unwrap()
+        let help = told.lines().rfind(|line| line.starts_with("help:")).unwrap();
+        let before = help.split_once("MiB").unwrap_or_else(|| panic!("{told}")).0;
+        before.rsplit(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap()
     };
     let (_, small) = with(1);
     let (code, heavy) = with(named(&small) + 2);

@@ -163,7 +163,7 @@ fn tiles_share_the_scan_out_and_their_neighborhoods_are_those_of_the_whole_scan(
     let all = distinct(&scan);
     let (tiles, _, _) = sealed(&scan, 2, 2_000, 50_000);
     for (capacity, reach, k) in [(300, 0, 10), (1_500, 12, 7)] {
-        let keys = tiles.cut(capacity, capacity, reach, 3).unwrap();
+        let keys = tiles.cut(capacity, capacity, reach, (3, 3)).unwrap();
         let levels: std::collections::BTreeSet<u32> = keys.iter().map(|key| key.level).collect();
         assert!(keys.len() >= 30 && levels.len() >= 2, "{} tiles, levels {levels:?}", keys.len());
         let mut loader = Loader::new(&tiles, &Sieve::default(), 2 * capacity as usize);
@@ -208,7 +208,7 @@ fn tiles_share_the_scan_out_and_their_neighborhoods_are_those_of_the_whole_scan(
 fn a_cube_that_cannot_be_cut_is_named_with_its_count() {
     let scan: Vec<Position> = (0..4_000).map(|i| [i % 16, i / 16 % 16, i / 256]).collect();
     let (tiles, _, _) = sealed(&scan, 1, 1_000, 1 << 20);
-    match tiles.cut(50, 100, 0, 4) {
+    match tiles.cut(50, 100, 0, (4, 4)) {
         Err(pointmill::tile::CutError::TooHeavy { key, positions }) => {
             assert_eq!((key.corner, key.level, positions), ([0; 3], 4, 4_000));
         }
@@ -223,20 +223,20 @@ fn of_several_cubes_too_heavy_the_heaviest_is_named() {
     let more = (0..100).map(|i| [32 + i % 10, i / 10, 5]);
     let scan: Vec<Position> = (0..4).flat_map(thin).chain(more).collect();
     let (tiles, _, _) = sealed(&scan, 1, 1_000, 1 << 20);
-    match tiles.cut(50, 90, 0, 4) {
+    match tiles.cut(50, 90, 0, (4, 4)) {
         Err(pointmill::tile::CutError::TooHeavy { key, positions }) => {
             assert_eq!((key.corner, positions), ([32, 0, 0], 200));
         }
         other => panic!("{other:?}"),
     }
-    assert_eq!(tiles.cut(50, 200, 0, 4).unwrap().len(), 4);
+    assert_eq!(tiles.cut(50, 200, 0, (4, 4)).unwrap().len(), 4);
 }
 
 #[test]
 fn an_empty_scan_has_no_tiles() {
     let (tiles, _, _) = sealed(&[], 2, 10, 0);
     assert_eq!((tiles.positions(), tiles.blocks()), (0, 0));
-    assert!(tiles.cut(10, 10, 5, 0).unwrap().is_empty());
+    assert!(tiles.cut(10, 10, 5, (0, 0)).unwrap().is_empty());
 }
 
 #[test]

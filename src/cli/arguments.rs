@@ -11,7 +11,7 @@ use serde_json::Value;
 use super::words::{Flag, flags};
 use crate::Result;
 use crate::error::nearest;
-use crate::pipeline::parse_bytes;
+use crate::pipeline::{MOST_THREADS, parse_bytes};
 use crate::point::parse_count;
 
 const EXIT_CODES: &str = "\
@@ -123,8 +123,10 @@ pub(super) enum Progress {
 }
 
 fn parse_threads(text: &str) -> Result<NonZeroUsize, String> {
-    let refused = |_| format!("`{text}` is no number of threads: give 1 or more, or leave it out");
-    text.parse().map_err(refused)
+    let most = MOST_THREADS;
+    let refused = || format!("`{text}` is no number of threads: give 1 to {most}, or leave it out");
+    let within = |threads: &NonZeroUsize| threads.get() <= most;
+    text.parse().ok().filter(within).ok_or_else(refused)
 }
 
 fn parse_whole(text: &str) -> Result<u64, String> {

@@ -180,6 +180,7 @@ impl TileOp for Cells {
         Needs {
             reads: std::iter::once("Normal").chain(class).map(str::to_owned).collect(),
             writes: vec!["Cell".into()],
+            cells: true,
             cell_side: self.settled.map_or(0, |settled| settled.steps),
             cell_aligned: aligned,
             bytes_per_point: if aligned { BYTES } else { BYTES + SORTING_BYTES },

@@ -86,6 +86,7 @@ impl TileOp for Grid {
     fn needs(&self) -> Needs {
         Needs {
             reads: crate::point::names::XYZ.map(str::to_owned).to_vec(),
+            cells: true,
             cell_side: self.settled.map_or(0, |settled| settled.steps),
             cell_aligned: self.settled.is_some_and(|settled| settled.steps.count_ones() == 1),
             bytes_per_point: BYTES,

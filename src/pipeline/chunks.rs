@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::by_rank::ByRank;
 use super::each::ByInput;
 use super::product::{Entry, Product};
 use crate::Result;
@@ -223,8 +224,12 @@ pub(super) struct Cutter {
     found: Found,
     outputs: Vec<Open>,
     by_input: Vec<ByInput>,
+    by_rank: Vec<ByRank>,
     counts: Counts,
 }
+
+/// What is written behind the last tile: by input, and in the order of the inputs.
+pub(super) type Lists = (Vec<ByInput>, Vec<ByRank>);
 
 /// Records behind a pass.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -238,13 +243,14 @@ pub(super) struct Counts {
 }
 
 impl Cutter {
-    /// A cutter for a scan of so many positions and records, into `outputs` and, where each input has
-    /// its own, `by_input`; the last two columns are stored if they are wanted.
+    /// A cutter for a scan of so many positions and records, into `outputs`, `by_input` where each
+    /// input has its own, and `by_rank` where the input's order is wanted; the last two columns are
+    /// stored if they are wanted.
     pub fn new(
         area: &Arc<SpillArea>,
         (positions, records): (u64, u64),
         (normals, figures): (bool, bool),
-        (outputs, by_input): (Vec<Open>, Vec<ByInput>),
+        (outputs, by_input, by_rank): (Vec<Open>, Vec<ByInput>, Vec<ByRank>),
     ) -> Result<Self> {
         use crate::tile::{FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES};
         let column = |name, item| Column::new(area, name, item, positions);
@@ -260,6 +266,7 @@ impl Cutter {
             },
             outputs,
             by_input,
+            by_rank,
             counts: Counts::default(),
         })
     }
@@ -274,7 +281,7 @@ impl Cutter {
             figures.add(&product.figures)?;
         }
         self.found.add(&product.found)?;
-        let mut full = Vec::new();
+        let (mut full, mut places) = (Vec::new(), &product.places[..]);
         for (n, entry) in product.entries.iter().enumerate() {
             self.states.repeat(entry.now.0, entry.count)?;
             self.counts.alive += if entry.now.is_alive() { u64::from(entry.count) } else { 0 };
@@ -284,12 +291,17 @@ impl Cutter {
                 output.take(entry, normal, &mut full);
             }
             self.by_input.iter_mut().try_for_each(|lists| lists.take(entry, normal))?;
+            if entry.was.is_written() && !places.is_empty() {
+                let (now, later) = places.split_at(places.len().min(entry.count as usize));
+                self.by_rank.iter_mut().try_for_each(|lists| lists.take(entry, now, normal))?;
+                places = later;
+            }
         }
         Ok(full)
     }
 
     /// The last chunks, the columns, the lists by input, and what was counted.
-    pub fn finish(mut self) -> Result<(Vec<Chunk>, Stored, Vec<ByInput>, Counts)> {
+    pub fn finish(mut self) -> Result<(Vec<Chunk>, Stored, Lists, Counts)> {
         let columns = [Some(&mut self.states), Some(&mut self.fates)];
         let more = [self.normals.as_mut(), self.figures.as_mut()];
         columns.into_iter().chain(more).flatten().try_for_each(Column::flush)?;
@@ -303,7 +315,7 @@ impl Cutter {
             figures: self.figures.map(|column| column.pieces),
             found: self.found,
         };
-        Ok((rest, stored, self.by_input, self.counts))
+        Ok((rest, stored, (self.by_input, self.by_rank), self.counts))
     }
 }
 

@@ -59,6 +59,10 @@ impl CreateSink for Output {
         self.write.stage_order()
     }
 
+    fn likes_time(&self) -> bool {
+        self.format == Format::Laz && self.order() == Order::Auto
+    }
+
     fn wants_normals(&self) -> bool {
         !self.write.dimensions.is_empty()
     }

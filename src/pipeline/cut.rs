@@ -1,9 +1,11 @@
 //! Cutting the decoded scan into tiles that fit the memory, wide enough for the stages' cells.
 
+use std::sync::Arc;
+
 use super::job::Job;
 use super::passes::{Pass, StageOp};
-use super::shares::{Demands, Shares};
-use crate::budget::whole_mebibytes;
+use super::shares::{Demands, MILL_SPARE, Shares};
+use crate::budget::{Lease, whole_mebibytes};
 use crate::geom::lattice::Lattice;
 use crate::tile::{CutError, SealedTiles, TileKey};
 use crate::{Error, Result};
@@ -20,43 +22,118 @@ pub(super) fn neighbors(ops: &[StageOp], pass: &Pass) -> usize {
     pass.needs(ops).map(|needs| needs.neighbors).max().unwrap_or(0)
 }
 
-/// Tiles are at least four cells wide, or their zones would be mostly their neighbours'.
+/// Tiles are at least four cells wide, or their zones would be mostly their neighbours'; one cell
+/// where they would not fit otherwise.
 const CELLS_ACROSS: u64 = 4;
 
-/// The tiles of a pass and the positions that an arena for them takes: as planned, or, where a cube
-/// that cannot be cut holds more, what the memory left after the decode can give.
-pub(super) fn cut(
+/// The tiles of a pass.
+pub(super) struct Cut {
+    pub keys: Vec<TileKey>,
+    /// Positions that the arena of a thread takes.
+    pub capacity: usize,
+    /// Threads that have one: all, unless a tile is so heavy that the memory does not do for all.
+    pub millers: usize,
+    _listed: Lease,
+}
+
+/// What the tiles of passes depend on; equal for all passes of most pipelines.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Cells {
+    side: u64,
+    reach: i64,
+}
+
+impl Cells {
+    fn of(ops: &[StageOp], pass: &Pass) -> Cells {
+        let side = pass.needs(ops).map(|needs| needs.cell_side).max().unwrap_or(0);
+        Cells { side: u64::try_from(side).unwrap_or(0), reach: reach(ops, pass) }
+    }
+
+    /// The level of the smallest octree node that is `across` cells wide.
+    fn level(self, across: u64) -> u32 {
+        match self.side.saturating_mul(across) {
+            0 => 0,
+            wide => wide.checked_next_power_of_two().map_or(64, u64::ilog2),
+        }
+    }
+}
+
+/// The tiles of every pass, before the first begins: a scan too heavy for the memory is refused when
+/// nothing but its decode is lost.
+pub(super) fn cut_all(
     job: &Job<'_>,
-    pass: &Pass,
     lattice: &Lattice,
     shares: &Shares,
     demands: &Demands,
     tiles: &SealedTiles,
-) -> Result<(Vec<TileKey>, usize)> {
-    let side = pass.needs(&job.ops).map(|needs| needs.cell_side).max().unwrap_or(0);
-    let lowest = match u64::try_from(side).unwrap_or(0).saturating_mul(CELLS_ACROSS) {
-        0 => 0,
-        wide => wide.checked_next_power_of_two().map_or(64, u64::ilog2),
-    };
+) -> Result<Vec<Arc<Cut>>> {
+    let mut known: Vec<(Cells, Arc<Cut>)> = Vec::new();
+    let mut cuts = Vec::new();
+    for pass in &job.passes {
+        let cells = Cells::of(&job.ops, pass);
+        let cut = match known.iter().find(|(same, _)| *same == cells) {
+            Some((_, cut)) => cut.clone(),
+            None => Arc::new(cut(job, cells, lattice, shares, demands, tiles)?),
+        };
+        known.push((cells, cut.clone()));
+        cuts.push(cut);
+    }
+    Ok(cuts)
+}
+
+/// The tiles of a pass and the positions that an arena for them takes: as planned; or, where a cube
+/// holds more, what the memory left after the decode can give; or cubes of a cell; or arenas of
+/// fewer threads.
+fn cut(
+    job: &Job<'_>,
+    cells: Cells,
+    lattice: &Lattice,
+    shares: &Shares,
+    demands: &Demands,
+    tiles: &SealedTiles,
+) -> Result<Cut> {
     let wanted = job.tile_points.map_or(zone_of(shares.tile_positions), |points| points as u64);
-    let reach = reach(&job.ops, pass);
-    let free = demands.tile_positions(job.budget.free());
-    let mut capacity = shares.tile_positions;
-    loop {
+    let free = job.budget.free().saturating_sub(MILL_SPARE);
+    let largest = demands.tile_positions(job.threads, free).max(shares.tile_positions);
+    let (good, lowest) = (cells.level(CELLS_ACROSS), cells.level(1));
+    let mut tries =
+        vec![(shares.tile_positions, good), (largest, good), (largest, lowest)].into_iter();
+    let mut millers = job.threads;
+    let mut at = tries.next();
+    while let Some((capacity, smallest)) = at {
         // Around all positions there is no rim.
         let all = capacity as u64 >= tiles.positions();
         let most = if all { tiles.positions() } else { zone_of(capacity) };
-        match tiles.cut(wanted, most, reach, lowest) {
-            Ok(keys) => return Ok((keys, capacity)),
-            Err(CutError::Read(error)) => return Err(error),
-            Err(CutError::TooHeavy { .. }) if capacity < free => capacity = free,
-            Err(CutError::TooHeavy { key, positions }) => {
-                let tile = (2 * positions + 1).min(tiles.positions());
-                let limit = demands.limit_for_tile(tile);
-                return Err(too_heavy(lattice, key, (positions, most), limit));
+        let (key, positions) = match tiles.cut(wanted, most, cells.reach, (good, smallest)) {
+            Ok(keys) => {
+                let bytes = keys.len().saturating_mul(size_of::<TileKey>()) as u64;
+                let _listed = job.budget.lease(bytes, "list of tiles")?;
+                return Ok(Cut { keys, capacity, millers, _listed });
             }
+            Err(CutError::Read(error)) => return Err(error),
+            Err(CutError::TooHeavy { key, positions }) => (key, positions),
+        };
+        at = tries.next();
+        if at.is_none() {
+            let tile = positions.saturating_mul(2).saturating_add(1).min(tiles.positions());
+            let fits = |millers: &usize| demands.tile_positions(*millers, free) as u64 >= tile;
+            let Some(fewer) = (1..millers).rev().find(fits) else {
+                return Err(too_heavy(
+                    lattice,
+                    key,
+                    (positions, most),
+                    demands.limit_for_tile(1, tile),
+                ));
+            };
+            let enough = whole_mebibytes(demands.limit_for_tile(millers, tile));
+            job.warn(format!(
+                "{positions} points lie so close that their tile leaves memory for {fewer} of {millers} \
+                 threads; `run.memory = \"{enough}\"` does for all"
+            ));
+            (millers, at) = (fewer, Some((demands.tile_positions(fewer, free), lowest)));
         }
     }
+    Err(Error::internal("a tile fits and does not"))
 }
 
 /// Positions of a tile's zone: half of its memory is for them, the other half for the rim.
@@ -72,7 +149,5 @@ fn too_heavy(lattice: &Lattice, key: TileKey, (positions, most): (u64, u64), lim
         "the cube from {lo:?} to {hi:?} and the cells around it hold {positions} positions, more \
          than the {most} that a tile may have"
     ))
-    .help(format!(
-        "give `run.memory = \"{limit}\"` or more, fewer `run.threads`, or a smaller cell side"
-    ))
+    .help(format!("give `run.memory = \"{limit}\"` or more, or a smaller cell side"))
 }

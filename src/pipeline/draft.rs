@@ -6,6 +6,9 @@ use super::node::{Entry, Node, Place, Value};
 use super::registry::Registry;
 use super::set::Set;
 
+/// Stages of a pipeline at most: each sink has a file open and memory of its own.
+const MOST_STAGES: usize = 256;
+
 /// The tables of a pipeline file.
 pub(super) struct Draft {
     /// The `[run]` table.
@@ -42,7 +45,12 @@ pub(super) fn read(entries: Vec<Entry>, len: usize, registry: &Registry) -> Draf
             ("run", _) => draft.mistakes.push(Mistake::new(at, "`run` is a table: write [run]")),
             ("stage", Value::List(list)) => {
                 any = true;
-                for node in list {
+                for (n, node) in list.into_iter().enumerate() {
+                    if n == MOST_STAGES {
+                        let told = format!("a pipeline has at most {MOST_STAGES} stages");
+                        draft.mistakes.push(Mistake::new(node.place, told));
+                        break;
+                    }
                     draft.stage(node, registry);
                 }
             }

@@ -40,7 +40,8 @@ pub fn ranks(inputs: &[Input]) -> Vec<u32> {
 
 /// Bytes that sorting by so many inputs holds.
 pub fn lists_bytes(inputs: usize) -> u64 {
-    (inputs * (list_bytes(inputs) + size_of::<List>())) as u64
+    let each = (list_bytes(inputs) + size_of::<List>()) as u64;
+    (inputs as u64).saturating_mul(each)
 }
 
 fn list_bytes(inputs: usize) -> usize {
@@ -206,7 +207,7 @@ impl Each<'_> {
         let pipeline = Some(job.pipeline.clone());
         let metadata = Metadata { pipeline, ..job.source.metadata_of(input)? };
         let mut sink = create.create(staged.file(), job.source.schema(), &metadata, false)?;
-        let benches = Benches::of_one(job, tiles, sink.encoder(), counted, sink.chunk_points());
+        let benches = Benches::of_one(job, tiles, &*sink, counted, create.likes_time());
         let mut open = Open::new(0, sink.chunk_points(), records.wants_normals, false);
         let (mut given, mut full) = (0, Vec::new());
         let mut append = |chunk: Chunk| {

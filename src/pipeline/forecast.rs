@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::grind::{Field, Worker};
 use super::job::Job;
 use super::passes::Pass;
+use super::shares::Shares;
 use crate::Result;
 use crate::stage::Forecast;
 use crate::tile::{Reader, SealedTiles, Sieve, TileKey, lock};
@@ -26,6 +27,11 @@ const RIM: usize = 16_384;
 /// Positions that a tile of a look takes.
 const CAPACITY: usize = 32_768;
 
+/// Positions that a tile of a look takes, of which each thread has one.
+pub(super) fn samples_capacity(shares: &Shares) -> usize {
+    shares.tile_positions.min(CAPACITY)
+}
+
 /// What those of the stages `ops` of `pass` expect that look at samples, each with its number, from samples that are a function of the
 /// points alone.
 pub(super) fn forecast(
@@ -43,7 +49,7 @@ pub(super) fn forecast(
         }
         let side = job.ops[op].op.tile().needs().cell_side.max(1);
         let keys = cubes(&field.tiles, side)?;
-        let samples = samples(job, pass, op, field, sieve, capacity.min(CAPACITY), &keys)?;
+        let samples = samples(job, pass, op, field, sieve, capacity, &keys)?;
         forecasts.push((op, job.ops[op].op.tile_mut().forecast(&samples)));
     }
     Ok(forecasts)

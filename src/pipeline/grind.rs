@@ -3,8 +3,10 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
+use super::by_rank::{ByRank, Starts};
+use super::by_time::ByTime;
 use super::chunks::{Chunk, Counts, Cutter, Open, Stored};
-use super::cut::{neighbors, reach};
+use super::cut::{Cut, neighbors, reach};
 use super::each::ByInput;
 use super::job::{Job, StopOnDrop};
 use super::outlet::{Hands, Outlet};
@@ -25,6 +27,8 @@ pub(super) struct Field<'a> {
     pub lattice: &'a Lattice,
     pub area: Arc<SpillArea>,
     pub tiles: Arc<SealedTiles>,
+    /// Where the parts of the input begin, if an output asks for its order.
+    pub starts: Arc<Starts>,
 }
 
 /// What a pass came to.
@@ -34,8 +38,9 @@ pub(super) struct Milled {
     pub counts: Counts,
     /// For each sink of the pass, what it said.
     pub written: Vec<SinkSummary>,
-    /// What goes to outputs that are one for each input.
+    /// What goes to outputs that are one for each input, and to those in the order of the inputs.
     pub by_input: Vec<ByInput>,
+    pub by_rank: Vec<ByRank>,
     /// Records that the pass's stages decide about.
     pub decided: u64,
     /// True if the pass oriented normals.
@@ -45,18 +50,17 @@ pub(super) struct Milled {
 /// A sink with its number.
 pub(super) type Numbered = (usize, Box<dyn Sink>);
 
-/// Runs `pass` over the tiles `keys`, into the `sinks` with their numbers and into lists by input.
+/// Runs `pass` over the tiles of `cut`, into the `sinks` with their numbers and into lists by input.
 pub(super) fn grind(
     job: &Job<'_>,
-    pass: &Pass,
+    (pass, cut): (&Pass, &Cut),
     field: &Field<'_>,
     sieve: &Sieve,
-    capacity: usize,
-    keys: &[TileKey],
-    (sinks, by_input): (Vec<Numbered>, Vec<ByInput>),
+    (sinks, by_input, by_rank): (Vec<Numbered>, Vec<ByInput>, Vec<ByRank>),
 ) -> Result<Milled> {
-    let tiles = &field.tiles;
+    let (tiles, keys) = (&field.tiles, &cut.keys);
     let numbers = sinks.iter().map(|(sink, _)| *sink).chain(by_input.iter().map(|by| by.sink));
+    let numbers = numbers.chain(by_rank.iter().map(|by| by.sink));
     let wants_normals = numbers.into_iter().any(|sink| job.wants_normals[sink]);
     let outputs = sinks.iter().enumerate().map(|(n, (sink, open))| {
         let before = pass.before.contains(sink);
@@ -66,7 +70,7 @@ pub(super) fn grind(
         &field.area,
         (tiles.positions(), tiles.points()),
         (pass.stores_normals, pass.stores_figures),
-        (outputs.collect(), by_input),
+        (outputs.collect(), by_input, by_rank),
     )?;
     let cutter = Mutex::new(Some(cutter));
     let commit = |product: Product| match &mut *lock(&cutter) {
@@ -75,15 +79,15 @@ pub(super) fn grind(
     };
     let benches = Benches::new(job, tiles, &sinks);
     let outlet: Outlet<Product, Chunk> =
-        Outlet::new(sinks.into_iter().map(|(_, sink)| sink).collect(), job.threads);
+        Outlet::new(sinks.into_iter().map(|(_, sink)| sink).collect(), cut.millers);
     let total = Mutex::new((Tally::default(), 0, false));
     let next = AtomicUsize::new(0);
-    parallel(job.threads, |_| {
+    parallel(cut.millers, |_| {
         let guard = StopOnDrop::new(|| outlet.stop());
         let mut bench = benches.bench();
         let mut encode = |chunk| bench.encode(&benches, &chunk);
         let mut hands = Hands { commit: &commit, encode: &mut encode };
-        let mut worker = Worker::new(job, pass, field, sieve, capacity, wants_normals);
+        let mut worker = Worker::new(job, pass, field, sieve, cut.capacity, wants_normals);
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(&key) = keys.get(index) else { break };
@@ -102,13 +106,14 @@ pub(super) fn grind(
         Ok(())
     })?;
     let unfinished = || Error::internal("a pass was finished twice");
-    let (rest, stored, by_input, counts) = lock(&cutter).take().ok_or_else(unfinished)?.finish()?;
+    let (rest, stored, (by_input, by_rank), counts) =
+        lock(&cutter).take().ok_or_else(unfinished)?.finish()?;
     let mut bench = benches.bench();
     let mut encode = |chunk| bench.encode(&benches, &chunk);
     let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
     let (mut tally, decided, oriented) = std::mem::take(&mut *lock(&total));
     tally.merge(&bench.tally);
-    Ok(Milled { tally, stored, counts, written, by_input, decided, oriented })
+    Ok(Milled { tally, stored, counts, written, by_input, by_rank, decided, oriented })
 }
 
 /// What threads need to encode chunks.
@@ -116,8 +121,12 @@ pub(super) struct Benches<'a> {
     job: &'a Job<'a>,
     tiles: &'a SealedTiles,
     encoders: Vec<Arc<dyn Encode>>,
+    /// For each, how the records of a chunk are ordered, if not as they come.
+    by_time: Vec<Option<ByTime>>,
     /// The sink by whose records classes are counted as kept: one of what all stages leave.
     counted: Option<usize>,
+    /// True if chunks tell where records are stored instead of their rank.
+    stored: bool,
     chunk_points: usize,
 }
 
@@ -127,6 +136,8 @@ impl<'a> Benches<'a> {
             job,
             tiles,
             encoders: sinks.iter().map(|(_, sink)| sink.encoder()).collect(),
+            by_time: sinks.iter().map(|(n, _)| by_time(job, job.by_time[*n])).collect(),
+            stored: false,
             counted: sinks.iter().position(|(sink, _)| *sink == job.last_sink),
             chunk_points: sinks.iter().map(|(_, sink)| sink.chunk_points()).max().unwrap_or(0),
         }
@@ -136,15 +147,28 @@ impl<'a> Benches<'a> {
     pub fn of_one(
         job: &'a Job<'a>,
         tiles: &'a SealedTiles,
-        encoder: Arc<dyn Encode>,
+        sink: &dyn Sink,
         counted: bool,
-        chunk_points: usize,
+        likes_time: bool,
     ) -> Self {
-        let counted = counted.then_some(0);
-        Benches { job, tiles, encoders: vec![encoder], counted, chunk_points }
+        Benches {
+            job,
+            tiles,
+            encoders: vec![sink.encoder()],
+            by_time: vec![by_time(job, likes_time)],
+            counted: counted.then_some(0),
+            stored: false,
+            chunk_points: sink.chunk_points(),
+        }
     }
 
-    fn bench(&self) -> Bench {
+    /// The same for chunks that tell where records are stored.
+    pub fn of_stored(self) -> Self {
+        Benches { stored: true, ..self }
+    }
+
+    /// What a thread holds to encode them.
+    pub fn bench(&self) -> Bench {
         Bench::new(self.job, self.chunk_points)
     }
 }
@@ -175,16 +199,27 @@ impl Bench {
         self.batch.clear();
         chunk.number(&mut self.numbers);
         chunk.states(&mut self.states);
-        all.tiles.fetch(&self.numbers, &mut self.fetch, &mut self.batch)?;
+        match all.stored {
+            false => all.tiles.fetch(&self.numbers, &mut self.fetch, &mut self.batch)?,
+            true => all.tiles.fetch_stored(&self.numbers, &mut self.fetch, &mut self.batch)?,
+        }
         if all.counted == Some(chunk.sink) {
             all.job.classes.keep_by_state(&self.batch, &self.states, &mut self.tally);
         }
+        let mut normals = chunk.spread_normals();
+        if let Some(by_time) = all.by_time.get(chunk.sink).and_then(Option::as_ref) {
+            by_time.sort(&mut self.batch, &mut self.states, normals.as_deref_mut());
+        }
         edit(&mut self.batch, &self.states)?;
-        self.batch.normals = chunk.spread_normals();
+        self.batch.normals = normals;
         let encoder = all.encoders.get(chunk.sink);
         let encoder = encoder.ok_or_else(|| Error::internal("a chunk is for no sink"))?;
         Ok((chunk.sink, encoder.encode(&self.batch)?))
     }
+}
+
+fn by_time(job: &Job<'_>, likes_time: bool) -> Option<ByTime> {
+    likes_time.then(|| ByTime::of(job.source.schema())).flatten()
 }
 
 /// Writes the edits of `states` into the records.
@@ -210,6 +245,9 @@ pub(super) struct Worker<'a> {
     reach: i64,
     neighbors: usize,
     wants_normals: bool,
+    /// True if records of the pass go to an output in the order of the inputs.
+    ranks: bool,
+    fetch: Fetch,
     /// Where positions are rounded, and unequal coordinates that share one are counted.
     rounded: Option<Rounded<'a>>,
     first: bool,
@@ -246,7 +284,10 @@ impl<'a> Worker<'a> {
         let reach = reach(&job.ops, pass);
         let tally = Tally::default();
         let (decided, oriented) = (0, false);
+        let ranks = pass.before.iter().chain(&pass.after).any(|sink| job.in_input_order[*sink]);
         Worker {
+            ranks,
+            fetch: Fetch::default(),
             job,
             pass,
             loader,
@@ -309,6 +350,9 @@ impl<'a> Worker<'a> {
             if self.first {
                 self.tally.merge(&counted);
             }
+        }
+        if self.ranks {
+            product.find_places(self.loader.tiles(), &mut self.fetch)?;
         }
         Ok(product)
     }

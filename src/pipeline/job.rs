@@ -38,9 +38,12 @@ pub(super) struct Job<'a> {
     pub drop_nonfinite: bool,
     pub headers: Headers,
     pub tile_points: Option<usize>,
-    pub run_records: Option<usize>,
     /// For each sink, whether it writes normals.
     pub wants_normals: Vec<bool>,
+    /// For each sink, whether it wants the order of the inputs.
+    pub in_input_order: Vec<bool>,
+    /// For each sink, whether the records of a chunk are ordered by time.
+    pub by_time: Vec<bool>,
     /// A sink of what all stages leave.
     pub last_sink: usize,
     pub watch: &'a dyn Watch,

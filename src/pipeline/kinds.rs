@@ -190,7 +190,8 @@ pub struct Write {
     /// Offset of LAS coordinates per axis, in world units; none: the input's, or 0.
     #[serde(default, deserialize_with = "some_offset")]
     pub offset: Option<[f64; 3]>,
-    /// Order of the records; none: canonical, or the input's where the pipeline streams.
+    /// Order of the records; none: canonical, in the chunks of LAZ (50,000 records) by GPS time and
+    /// return number, which compresses better; or the input's where the pipeline streams.
     #[serde(default)]
     pub order: Option<OutputOrder>,
     /// Computed dimensions that are written: none, or the three of the normal.
@@ -210,7 +211,9 @@ pub struct Write {
 pub enum OutputOrder {
     /// Morton order of the lattice, then record bytes.
     Canonical,
-    /// The order of the inputs.
+    /// The order of the inputs: by file, as they are given, then by record. So the output depends on
+    /// the order of the inputs; a scan that is marked has its records where the input has them. For
+    /// `path` alone.
     Input,
 }
 

@@ -6,11 +6,12 @@ use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use super::by_rank::{ByRank, Starts, place};
 use super::chunks::Found;
 use super::clock::Clock;
-use super::cut::cut;
+use super::cut::{Cut, cut_all};
 use super::each::ByInput;
-use super::forecast::forecast;
+use super::forecast::{forecast, samples_capacity};
 use super::grind::{Field, grind};
 use super::job::Job;
 use super::passes::{Call, Op, Pass};
@@ -36,7 +37,7 @@ pub(super) fn mill(
     clock: &mut Clock<'_>,
 ) -> Result<Finished> {
     clock.phase("decode", Some(job.source.points()));
-    let (store, mut tally) = decode(job, lattice, shares, area)?;
+    let (store, starts, mut tally) = decode(job, lattice, shares, area)?;
     job.check_headers()?;
     job.tell_left_out(&tally);
     tally.work("runs", store.runs() as u64);
@@ -44,8 +45,8 @@ pub(super) fn mill(
     let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
     tally.count("positions", tiles.positions());
     settle(job, lattice, &tiles)?;
-    let bounds = tiles.bounds();
-    let field = Field { lattice, area: area.clone(), tiles: tiles.clone() };
+    let (bounds, starts) = (tiles.bounds(), Arc::new(starts));
+    let field = Field { lattice, area: area.clone(), tiles: tiles.clone(), starts };
     let mut course = Course {
         sieve: Sieve::default(),
         alive: tiles.points(),
@@ -55,9 +56,15 @@ pub(super) fn mill(
         written: sinks.iter().map(|_| None).collect(),
         sinks,
     };
-    for pass in std::mem::take(&mut job.passes) {
-        course.run(job, &pass, &field, (shares, demands), &mut tally, clock)?;
+    let cuts = cut_all(job, lattice, shares, demands, &tiles)?;
+    let milling = |cut: &Arc<Cut>| demands.mill_bytes(cut.millers, cut.capacity as u64);
+    let looking = demands.mill_bytes(job.threads, samples_capacity(shares) as u64);
+    let most = cuts.iter().map(milling).max().unwrap_or(0).max(looking);
+    let working = job.budget.lease(most, "mill")?;
+    for (pass, cut) in std::mem::take(&mut job.passes).iter().zip(&cuts) {
+        course.run(job, (pass, cut), &field, shares, &mut tally, clock)?;
     }
+    drop((working, cuts));
     clock.phase("survey", Some(2 * tiles.positions()));
     let measured = survey(job, lattice, area, &tiles, &course.sieve)?;
     let unwritten = || Error::internal("an output was never written");
@@ -99,19 +106,17 @@ impl Course {
     fn run(
         &mut self,
         job: &mut Job<'_>,
-        pass: &Pass,
+        (pass, cut): (&Pass, &Cut),
         field: &Field<'_>,
-        (shares, demands): (&Shares, &Demands),
+        shares: &Shares,
         tally: &mut Tally,
         clock: &mut Clock<'_>,
     ) -> Result<()> {
         let tiles = &field.tiles;
         let sieve = pass.sieve(&self.sieve);
-        let (keys, capacity) = cut(job, pass, field.lattice, shares, demands, tiles)?;
-        let working = job.budget.lease(demands.mill_bytes(capacity as u64), "the mill")?;
         let ahead = |call: &&Call| self.forecasts[call.op].is_none();
         let ops: Vec<usize> = pass.calls.iter().filter(ahead).map(|call| call.op).collect();
-        for (op, foreseen) in forecast(job, pass, &ops, field, &sieve, capacity)? {
+        for (op, foreseen) in forecast(job, pass, &ops, field, &sieve, samples_capacity(shares))? {
             if let Some(warning) = foreseen.warning {
                 job.warn(warning);
             }
@@ -121,10 +126,12 @@ impl Course {
             if pass.gathers().is_some() { "gather" } else { "mill" },
             Some(tiles.positions()),
         );
-        tally.work("tiles", keys.len() as u64);
-        let levels: std::collections::BTreeSet<u32> = keys.iter().map(|key| key.level).collect();
+        tally.work("tiles", cut.keys.len() as u64);
+        let levels: std::collections::BTreeSet<u32> =
+            cut.keys.iter().map(|key| key.level).collect();
         tally.work("tile_levels", levels.len() as u64);
         let (mut sinks, mut by_input) = (Vec::new(), Vec::new());
+        let (mut by_rank, mut ordered) = (Vec::new(), Vec::new());
         for &sink in pass.before.iter().chain(&pass.after) {
             if let Some(Some(each)) = job.each.get(sink) {
                 let (inputs, before) = (each.sinks.len(), pass.before.contains(&sink));
@@ -133,10 +140,17 @@ impl Course {
                 continue;
             }
             let open = self.sinks.get_mut(sink).and_then(Option::take);
-            sinks.push((sink, open.ok_or_else(|| Error::internal("an output is written twice"))?));
+            let open = open.ok_or_else(|| Error::internal("an output is written twice"))?;
+            if job.in_input_order[sink] {
+                let (normals, before) = (job.wants_normals[sink], pass.before.contains(&sink));
+                by_rank.push(ByRank::new(&field.area, sink, &field.starts, normals, before));
+                ordered.push(open);
+                continue;
+            }
+            sinks.push((sink, open));
         }
         let which: Vec<usize> = sinks.iter().map(|(sink, _)| *sink).collect();
-        let milled = grind(job, pass, field, &sieve, capacity, &keys, (sinks, by_input))?;
+        let milled = grind(job, (pass, cut), field, &sieve, (sinks, by_input, by_rank))?;
         tally.merge(&milled.tally);
         for lists in &milled.by_input {
             clock.phase("write", Some(lists.records()));
@@ -147,7 +161,13 @@ impl Course {
             tally.merge(&counted);
             self.written[lists.sink] = Some(written);
         }
-        drop(working);
+        for (lists, sink) in milled.by_rank.iter().zip(ordered) {
+            clock.phase("write", Some(lists.records));
+            let last = lists.sink == job.last_sink;
+            let (said, counted) = lists.write(job, tiles, sink, last)?;
+            tally.merge(&counted);
+            self.written[lists.sink] = Some(vec![(lists.records, said)]);
+        }
         for (sink, outcome) in
             which.into_iter().zip(milled.counts.outputs.into_iter().zip(milled.written))
         {
@@ -199,15 +219,20 @@ fn decode(
     lattice: &Lattice,
     shares: &Shares,
     area: &Arc<SpillArea>,
-) -> Result<(TileStore, Tally)> {
+) -> Result<(TileStore, Starts, Tally)> {
     let _working = job.budget.lease(shares.work, "decoding")?;
     let tagged = job.tagger.tags();
-    let store = TileStore::new(area, &job.budget, job.source.schema().stride, tagged);
+    let mut store = TileStore::new(area, &job.budget, job.source.schema().stride, tagged);
+    let ranked = job.in_input_order.contains(&true);
+    if ranked {
+        store = store.with_places();
+    }
+    let parts = Mutex::new(vec![0; if ranked { job.source.parts() } else { 0 }]);
     let total = Mutex::new(Tally::default());
     let next = AtomicUsize::new(0);
     job.parallel(|| {
         let mut tally = Tally::default();
-        let mut intake = Intake::new(&store, job.run_records.unwrap_or(shares.run_records));
+        let mut intake = Intake::new(&store, shares.run_records);
         let mut batch = PointBatch::new(job.source.schema().clone(), BATCH);
         let mut placed = Placed::default();
         loop {
@@ -216,16 +241,21 @@ fn decode(
                 break;
             }
             let mut part = job.source.part(index)?;
+            let mut read = 0;
             while job.read(&mut *part, &mut batch, &mut tally)? {
+                placed.first = place(index, read);
                 take(job, lattice, &batch, &mut placed, &mut intake, &mut tally)?;
+                read += batch.len() as u64;
             }
+            lock(&parts).get_mut(index).into_iter().for_each(|part| *part = read);
         }
         intake.flush()?;
         lock(&total).merge(&tally);
         Ok(())
     })?;
     let tally = std::mem::take(&mut *lock(&total));
-    Ok((store, tally))
+    let starts = Starts::of(&lock(&parts));
+    Ok((store, starts, tally))
 }
 
 /// What of a batch goes to the intake; keeps its memory.
@@ -233,6 +263,8 @@ fn decode(
 struct Placed {
     positions: Vec<Position>,
     tags: Vec<Tag>,
+    /// Place in the input of the batch's first record.
+    first: u64,
     /// Indices of records that do not go there.
     left_out: Vec<usize>,
     /// How many of them the scan itself says are of no use, by reason.
@@ -250,7 +282,7 @@ fn take(
 ) -> Result<()> {
     let stride = batch.schema().stride;
     let records = batch.records();
-    let Placed { positions, tags, left_out, useless } = placed;
+    let Placed { positions, tags, left_out, useless, first } = placed;
     positions.clear();
     tags.clear();
     left_out.clear();
@@ -288,6 +320,7 @@ fn take(
     for end in left_out.iter().copied().chain([batch.len()]) {
         let count = end - begin;
         let (these, of_these) = (&positions[at..at + count], &tags[at..at + count]);
+        intake.place(*first + begin as u64);
         intake.take(these, &records[begin * stride..end * stride], of_these)?;
         (begin, at) = (end + 1, at + count);
     }

@@ -2,6 +2,8 @@
 
 mod beside;
 mod builtin;
+mod by_rank;
+mod by_time;
 mod chunks;
 mod clock;
 mod connect;
@@ -55,8 +57,8 @@ pub use registry::{Registry, StageKind, StagePlace};
 pub use run::Done;
 pub use set::Set;
 pub use settings::{
-    Existing, MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill, Treatment, ZScale,
-    parse_bytes,
+    Existing, MOST_THREADS, MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill, Treatment,
+    ZScale, parse_bytes,
 };
 pub use stretch::Stretch;
 pub use text::{Pipeline, PlacedStage};

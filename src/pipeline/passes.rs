@@ -314,6 +314,15 @@ impl Layout<'_> {
                 return missing("the input has no such dimension");
             }
             names::CLASSIFICATION => self.passes[at].reads_classes = true,
+            // What a tile has of its records are their positions and classes.
+            _ if !names::XYZ.contains(&name) => {
+                let told =
+                    format!("`{kind}` needs {name}, which stages that work on tiles cannot read");
+                return Err(stage
+                    .written
+                    .wrong(told)
+                    .help("they read X, Y, Z, Classification, and what stages above computed"));
+            }
             _ => {}
         }
         Ok(())

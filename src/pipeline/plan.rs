@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
+use super::by_rank;
 use super::each::{lists_bytes, paths, ranks};
 use super::files::{Clash, Files, Use};
 use super::look::look;
 use super::passes::{Op, Pass, StageOp, Tap, check_limits, number_selections, unroll};
 use super::publish::check_place;
-use super::settings::{Nonfinite, Overrides, RunSettings};
+use super::settings::{MOST_THREADS, Nonfinite, Overrides, RunSettings};
 use super::shares::Demands;
 use super::stretch::Stretch;
 use super::tagger::Tagger;
@@ -107,18 +108,34 @@ impl Pipeline {
         let simd = settings.simd.resolve().map_err(in_file)?;
         let threads = match settings.threads {
             Some(threads) => threads.get(),
-            None => std::thread::available_parallelism().map_or(1, usize::from),
+            None => std::thread::available_parallelism().map_or(1, usize::from).min(MOST_THREADS),
         };
+        if threads > MOST_THREADS {
+            let told = format!("a run has at most {MOST_THREADS} threads, not {threads}");
+            return Err(Error::pipeline(told).help("leave `run.threads` out: all processors work"));
+        }
         let limit = settings.memory.unwrap_or_else(default_limit);
         let chunks = chunks(&sinks, &*source)?;
         let needs = passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect();
+        let has_cells = sorted.ops.iter().any(|stage| stage.op.tile().needs().cells);
         let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
         let removes = !(sorted.transforms.is_empty() && sorted.ops.is_empty());
+        let ordered = sinks.iter().filter(|sink| mills && sink.order() == Order::Input).count();
+        let ordered = ordered as u64;
+        if ordered > 0 && source.parts() > by_rank::MOST_PARTS {
+            let told = "the inputs have too many parts for an output in their order";
+            return Err(Error::pipeline(told).help("leave `write.order` out"));
+        }
         let demands = Demands {
-            lists: folders.saturating_mul(lists_bytes(ranks.len())),
+            lists: folders
+                .saturating_mul(lists_bytes(ranks.len()))
+                .saturating_add(ordered.saturating_mul(by_rank::lists_bytes(source.points()))),
+            ranked: ordered > 0,
             mills,
             passes: needs,
             tagged: tagger.tags(),
+            run_most: settings.tile_points.map(|points| (points.get() as u64).saturating_mul(4)),
+            has_cells,
             ..Demands::of(&*source, &chunks, limit, threads)
         };
         demands.divide()?;
@@ -317,22 +334,13 @@ fn stretch(settings: &RunSettings, source: &dyn Source, ops: &[StageOp]) -> Resu
 
 /// True if the run needs tiles: for its stages, or because an output is to be in canonical order.
 fn mills(ops: &[StageOp], sinks: &[Box<dyn CreateSink>]) -> Result<bool> {
-    let of = |order: Order| sinks.iter().find(move |sink| sink.order() == order);
-    let (canonical, input) = (of(Order::Canonical), of(Order::Input));
-    let folder = sinks.iter().any(|sink| sink.is_folder());
-    let mills = !ops.is_empty() || canonical.is_some() || folder;
-    match input.filter(|_| mills) {
-        None => Ok(mills),
+    let canonical = sinks.iter().any(|sink| sink.order() == Order::Canonical);
+    match sinks.iter().find(|sink| sink.is_folder() && sink.order() == Order::Input) {
+        None => Ok(!ops.is_empty() || canonical || sinks.iter().any(|sink| sink.is_folder())),
         Some(sink) => {
-            let told = match ops.is_empty() {
-                true => {
-                    "`write.order = \"input\"` is not possible in or beside an output in canonical order"
-                }
-                false => {
-                    "`write.order = \"input\"` is for pipelines that stream; tiles write the canonical order"
-                }
-            };
-            Err(Error::pipeline(told).at(sink.path()).help("leave `write.order` out"))
+            Err(Error::pipeline("`write.order = \"input\"` is for one file of all inputs")
+                .at(sink.path())
+                .help("give `write.path` instead of `write.folder`, or leave `write.order` out"))
         }
     }
 }

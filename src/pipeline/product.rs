@@ -6,7 +6,8 @@ use super::survey::fate_code;
 use crate::Result;
 use crate::point::Mark;
 use crate::tile::{
-    ASIDE, Core, FATE_BYTES, FIGURE_BYTES, Fate, NORMAL_BYTES, Run, State, Tag, Tile,
+    ASIDE, Core, FATE_BYTES, FIGURE_BYTES, Fate, Fetch, NORMAL_BYTES, Run, SealedTiles, State, Tag,
+    Tile,
 };
 
 /// Records of one position that follow one another and share what becomes of them.
@@ -34,6 +35,9 @@ pub(super) struct Product {
     pub fates: Vec<u8>,
     pub normals: Vec<u8>,
     pub figures: Vec<u8>,
+    /// Of every record that is written before or behind the pass, in order, where it is stored and
+    /// its place in the input; empty if nobody asks for the input's order.
+    pub places: Vec<(u64, u64)>,
     /// What a first phase found.
     pub found: Vec<[u64; 2]>,
 }
@@ -42,6 +46,9 @@ impl Product {
     /// Bytes of a product for each position of the core, what a first phase finds aside.
     pub const BYTES_PER_POINT: usize =
         size_of::<Entry>() + FATE_BYTES + NORMAL_BYTES + size_of::<[f32; 3]>() + FIGURE_BYTES;
+
+    /// Bytes more where places in the input are looked up.
+    pub const PLACE_BYTES: usize = 2 * size_of::<(u64, u64)>();
 
     /// What `tile` leaves behind, whose core has the records `core`.
     pub fn of(tile: &Tile, core: &Core, pass: &Pass, wants_normals: bool) -> Result<Self> {
@@ -85,6 +92,15 @@ impl Product {
             Ok(())
         })?;
         Ok(product)
+    }
+
+    /// Looks up [`places`](Product::places).
+    pub fn find_places(&mut self, tiles: &SealedTiles, fetch: &mut Fetch) -> Result<()> {
+        let mut numbers = Vec::new();
+        for entry in self.entries.iter().filter(|entry| entry.was.is_written()) {
+            numbers.extend(entry.number..entry.number + u64::from(entry.count));
+        }
+        tiles.places(&numbers, fetch, &mut self.places)
     }
 
     /// Positions of the tile's core.

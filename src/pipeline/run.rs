@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex};
 
 use super::Watch;
 use super::beside::beside;
+use super::by_rank::LISTED;
 use super::clock::Clock;
 use super::each::Each;
 use super::job::Job;
@@ -16,7 +17,7 @@ use super::plan::Plan;
 use super::publish::{Staged, make_folder, publish};
 use super::scratch::{Scratch, Trouble, free_space, memory_warning};
 use super::settings::{Nonfinite, Spill};
-use super::shares::{Demands, Shares};
+use super::shares::Demands;
 use super::stream::stream;
 use super::survey::{Lines, Measured};
 use super::tagger::ClassOf;
@@ -26,7 +27,7 @@ use crate::report::{
     ClassFigures, Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome,
     PassFigures, Removed, Report, RunFigures, Tally, check_written, peak_memory,
 };
-use crate::stage::{CreateSink, Input, Sink, SinkSummary, Source};
+use crate::stage::{CreateSink, Input, Order, Sink, SinkSummary, Source};
 use crate::tile::{SpillArea, lock};
 use crate::{Error, Result};
 
@@ -164,7 +165,7 @@ impl Plan {
         let area = SpillArea::new(budget.clone(), kept_in_memory, Box::new(spill.clone()));
         let transforms = std::mem::take(&mut self.transforms);
         let (ops, passes) = (std::mem::take(&mut self.ops), std::mem::take(&mut self.passes));
-        let mut job = Job { transforms, ops, passes, ..self.job(outputs, &budget, &shares, watch) };
+        let mut job = Job { transforms, ops, passes, ..self.job(outputs, &budget, watch) };
         self.warnings.iter().for_each(|warning| job.warn(warning.clone()));
         let finished = match &self.lattice {
             Some(lattice) if self.mills => {
@@ -207,7 +208,6 @@ impl Plan {
         &'a self,
         outputs: &'a [Vec<Staged>],
         budget: &Budget,
-        shares: &Shares,
         watch: &'a dyn Watch,
     ) -> Job<'a> {
         let each = self.each.iter().zip(&self.sinks).zip(outputs).map(|((each, sink), staged)| {
@@ -233,8 +233,9 @@ impl Plan {
             drop_nonfinite: self.settings.nonfinite == Nonfinite::Drop,
             headers: self.settings.headers,
             tile_points,
-            run_records: tile_points.map(|n| n.saturating_mul(4).min(shares.run_records)),
             wants_normals: self.sinks.iter().map(|sink| sink.wants_normals()).collect(),
+            in_input_order: self.sinks.iter().map(|sink| sink.order() == Order::Input).collect(),
+            by_time: self.sinks.iter().map(|sink| sink.likes_time()).collect(),
             last_sink: self.last_sink,
             watch,
             warnings: Mutex::default(),
@@ -358,7 +359,8 @@ fn input_figures(source: &dyn Source) -> Vec<FileFigures> {
 fn check_disk(demands: &Demands, spill: &Scratch, kept_in_memory: u64) -> Result<()> {
     // Records, their order, packed positions twice (runs and merged scan), states and fates twice
     // (of the pass before and of the pass at work), and columns between passes.
-    let order = if demands.tagged { 12 } else { 8 };
+    // Ranks in the input, and the lists that are sorted by them.
+    let order = if demands.tagged { 12 } else { 8 } + if demands.ranked { 8 + LISTED } else { 0 };
     let columns = if demands.passes.len() > 1 { 1 + 4 + 12 + 8 } else { 0 };
     let each = demands.stride as u64 + order + 2 * 8 + 1 + 4 + columns;
     let needed = demands.points.saturating_mul(each).saturating_sub(kept_in_memory);

@@ -18,7 +18,8 @@ pub struct RunSettings {
     /// control group has.
     #[serde(deserialize_with = "some_bytes")]
     pub memory: Option<u64>,
-    /// Threads that work at once; none: all processors.
+    /// Threads that work at once, at most 1024; none: all processors.
+    #[serde(deserialize_with = "some_threads")]
     pub threads: Option<NonZeroUsize>,
     /// Folder for what does not fit in memory; none: beside the output.
     pub scratch: Option<PathBuf>,
@@ -52,7 +53,8 @@ pub struct RunSettings {
     /// What becomes of points of the classes 7 and 18, low and high noise, in pipelines that work on
     /// tiles; none: they are points like all others. The command `reduce` leaves them out.
     pub noise: Option<Treatment>,
-    /// Most points a tile's cube holds, for tests; none: as the memory allows.
+    /// Most points a tile's cube holds, for tests, at least 16; none: as the memory allows.
+    #[serde(deserialize_with = "some_tile_points")]
     pub tile_points: Option<NonZeroUsize>,
     /// Which of the equal code paths runs, for tests.
     pub simd: Simd,
@@ -71,6 +73,8 @@ pub enum Existing {
     /// replaced either.
     Refuse,
 }
+/// Threads that a run has at most.
+pub const MOST_THREADS: usize = 1024;
 
 /// What becomes of points whose coordinates are not finite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
@@ -309,6 +313,25 @@ impl<'de> Deserialize<'de> for ZScale {
             }
         }
         from.deserialize_any(Factor)
+    }
+}
+
+fn some_threads<'de, D: Deserializer<'de>>(from: D) -> Result<Option<NonZeroUsize>, D::Error> {
+    within(NonZeroUsize::deserialize(from)?, 1..=MOST_THREADS, "a whole number from 1 to 1024")
+}
+
+fn some_tile_points<'de, D: Deserializer<'de>>(from: D) -> Result<Option<NonZeroUsize>, D::Error> {
+    within(NonZeroUsize::deserialize(from)?, 16..=usize::MAX, "a whole number from 16")
+}
+
+fn within<E: de::Error>(
+    number: NonZeroUsize,
+    range: std::ops::RangeInclusive<usize>,
+    expected: &str,
+) -> Result<Option<NonZeroUsize>, E> {
+    match range.contains(&number.get()) {
+        true => Ok(Some(number)),
+        false => Err(E::invalid_value(de::Unexpected::Unsigned(number.get() as u64), &expected)),
     }
 }
 

@@ -1,7 +1,9 @@
 //! How a run divides its memory: what it can tell before any work, as a pure function.
 
+use super::by_rank::ordering_bytes;
 use super::product::Product;
-use crate::budget::{Bytes, whole_mebibytes};
+use super::survey::survey_bytes;
+use crate::budget::{at_most_mebibytes, whole_mebibytes};
 use crate::point::Position;
 use crate::stage::{ChunkSize, Needs, Source};
 use crate::tile::{
@@ -22,6 +24,11 @@ const RUNS: u64 = 64;
 /// Stacks, allocator slack and decoder tables of a thread, and the same for the process.
 const THREAD_OVERHEAD: u64 = 3 << 20;
 const PROCESS_OVERHEAD: u64 = 6 << 20;
+/// What tiles larger than planned leave for the list of all tiles.
+pub const MILL_SPARE: u64 = 1 << 20;
+/// By how much what is resident before a run differs from process to process: a budget that is named
+/// must do in the next.
+const RESIDENT_VARIES: u64 = 1 << 20;
 
 /// What the division depends on.
 #[derive(Debug, Clone)]
@@ -48,6 +55,13 @@ pub struct Demands {
     pub mills: bool,
     /// True if records have tags.
     pub tagged: bool,
+    /// True if an output wants the order of the inputs.
+    pub ranked: bool,
+    /// Records that a run has at most, if something other than the memory bounds it.
+    pub run_most: Option<u64>,
+    /// True if a stage decides about cells together: how many points those have only the decode
+    /// tells.
+    pub has_cells: bool,
     /// What the stages of each pass need.
     pub passes: Vec<Vec<Needs>>,
 }
@@ -89,39 +103,50 @@ impl Demands {
             lists: 0,
             mills: false,
             tagged: false,
+            ranked: false,
+            run_most: None,
+            has_cells: false,
             passes: Vec::new(),
         }
     }
 
     fn base(&self) -> u64 {
-        self.resident + self.lists + PROCESS_OVERHEAD + self.threads as u64 * THREAD_OVERHEAD
+        let threads = (self.threads as u64).saturating_mul(THREAD_OVERHEAD);
+        let fixed = self.resident.saturating_add(self.lists);
+        fixed.saturating_add(PROCESS_OVERHEAD).saturating_add(threads)
     }
 
     /// Bytes that a thread holds while it decodes, besides its run.
     fn decode_fixed(&self) -> u64 {
-        let placed = BATCH * (size_of::<Position>() + size_of::<Tag>() + size_of::<usize>());
-        let batch = BATCH * self.stride + placed;
-        self.part_bytes + (batch + Intake::fixed_bytes(self.stride)) as u64
+        let placed = size_of::<Position>() + size_of::<Tag>() + size_of::<usize>();
+        let batch =
+            (BATCH as u64).saturating_mul((self.stride as u64).saturating_add(placed as u64));
+        self.part_bytes.saturating_add(batch).saturating_add(Intake::fixed_bytes(self.stride))
     }
 
     /// Bytes that a thread holds while it merges runs of `run_records`.
     fn merge(&self, run_records: u64) -> u64 {
-        let runs = self.points / run_records.max(1) + self.threads as u64;
-        merge_bytes(usize::try_from(runs).unwrap_or(usize::MAX), self.stride)
+        let runs = (self.points / run_records.max(1)).saturating_add(self.threads as u64);
+        merge_bytes(runs, self.stride)
+    }
+
+    /// Bytes that an intake holds for each record.
+    fn intake(&self) -> u64 {
+        Intake::bytes_per_record(self.stride, self.tagged, self.ranked).max(1)
     }
 
     /// Records of a run for which neither the decode, which holds one, nor the merge, which holds a
     /// bit of each, takes more than they must.
     fn fewest_records(&self) -> u64 {
-        let each = Intake::bytes_per_record(self.stride, self.tagged).max(1) as u64;
-        let run = merge_bytes(1, self.stride) - merge_bytes(0, self.stride);
-        (self.points.saturating_mul(run) / each).isqrt().max(FEWEST as u64)
+        let run = merge_bytes(1, self.stride).saturating_sub(merge_bytes(0, self.stride));
+        let balanced = (self.points.saturating_mul(run) / self.intake()).isqrt();
+        balanced.max(FEWEST as u64).min(self.most_records())
     }
 
     /// Records of a run beyond which a larger one gains nothing: it is sorted and gathered outside of
     /// the caches, and its memory is written to for the first time.
     fn most_records(&self) -> u64 {
-        RUN_MOST.max(self.points / RUNS)
+        RUN_MOST.max(self.points / RUNS).min(self.run_most.unwrap_or(u64::MAX)).max(1)
     }
 
     /// Bytes that a thread holds in the mill, besides its tile: one chunk that it encodes and one
@@ -129,97 +154,134 @@ impl Demands {
     /// every other sink, and the records of the first with their numbers and normals.
     fn mill_fixed(&self) -> u64 {
         let ChunkSize { points, bytes } = self.chunk;
-        let batch = points as u64 * (self.stride as u64 + 8 + 12);
-        let open = self.sinks.saturating_sub(1) as u64 * points as u64 * 28;
-        let chunks = 2 * (bytes + points as u64 * 28);
-        Remote::BYTES + chunks + open + batch + Fetch::bytes(points, self.stride)
+        let points = points as u64;
+        let batch = points.saturating_mul((self.stride as u64).saturating_add(8 + 12));
+        let waiting = points.saturating_mul(28);
+        let open = (self.sinks.saturating_sub(1) as u64).saturating_mul(waiting);
+        let chunks = bytes.saturating_add(waiting).saturating_mul(2);
+        let fetch = Fetch::bytes(points, self.stride);
+        [chunks, open, batch, fetch].into_iter().fold(Remote::BYTES, u64::saturating_add)
     }
 
     /// Bytes that a thread of a stream holds: batches read and waiting for their turn, chunks filled,
     /// waiting, being encoded and encoded.
     fn stream(&self) -> u64 {
-        let records = self.chunk.points as u64 * self.stride as u64;
-        let open = self.sinks.saturating_sub(1) as u64 * records;
-        self.part_bytes
-            + 3 * (BATCH * self.stride) as u64
-            + 3 * records
-            + open
-            + 2 * self.chunk.bytes
+        let records = (self.chunk.points as u64).saturating_mul(self.stride as u64);
+        let open = (self.sinks.saturating_sub(1) as u64).saturating_mul(records);
+        let batches = (3 * BATCH as u64).saturating_mul(self.stride as u64);
+        let (full, encoded) = (records.saturating_mul(3), self.chunk.bytes.saturating_mul(2));
+        [batches, full, open, encoded].into_iter().fold(self.part_bytes, u64::saturating_add)
     }
 
     /// Bytes of a tile per position it holds, the product that it leaves behind included.
-    pub fn tile_bytes_per_point(&self) -> usize {
+    fn tile_bytes_per_point(&self) -> u64 {
         let of = |pass: &Vec<Needs>| {
             let looks = pass.iter().any(|n| n.neighbors > 0);
             let search = if looks { Nearest::BYTES_PER_POINT } else { 0 };
-            search + pass.iter().map(|n| n.bytes_per_point).sum::<usize>()
+            pass.iter().fold(search, |sum, n| sum.saturating_add(n.bytes_per_point))
         };
         let stages = self.passes.iter().map(of).max().unwrap_or(0);
         let sieved = self.tagged || self.passes.len() > 1;
         let sieve = if sieved { Loader::SIEVE_BYTES_PER_POINT } else { 0 };
-        Loader::BYTES_PER_POINT + sieve + stages + 2 * Product::BYTES_PER_POINT
+        let product = Product::BYTES_PER_POINT + if self.ranked { Product::PLACE_BYTES } else { 0 };
+        let own = Loader::BYTES_PER_POINT + sieve + 2 * product;
+        own.saturating_add(stages) as u64
     }
 
     fn index(&self) -> u64 {
         // That of the runs and that of the merged scan exist side by side for a moment.
-        if self.mills { 2 * index_bytes(self.points) + self.tables() } else { 0 }
+        match self.mills {
+            true => index_bytes(self.points).saturating_mul(2).saturating_add(self.tables()),
+            false => 0,
+        }
     }
 
     /// Bytes of the tables of all that is stored by number; that of the order has gaps.
     fn tables(&self) -> u64 {
         let order = if self.tagged { 12 } else { 8 };
         let states_and_fates = [1, 1, FATE_BYTES, FATE_BYTES];
+        let places = self.ranked.then_some(size_of::<u64>());
         let stores = [self.stride, order, order, NORMAL_BYTES, FIGURE_BYTES];
-        let all = stores.into_iter().chain(states_and_fates);
+        let all = stores.into_iter().chain(states_and_fates).chain(places);
         all.map(|stride| Pieces::table_bytes(self.points, stride)).fold(0, u64::saturating_add)
     }
 
+    /// Bytes that all threads hold at once where each holds `each`.
+    fn by_threads(&self, each: u64) -> u64 {
+        (self.threads as u64).saturating_mul(each)
+    }
+
     fn work(&self, run_records: u64, tile_positions: u64) -> u64 {
-        let decode = self.decode_fixed()
-            + run_records * Intake::bytes_per_record(self.stride, self.tagged) as u64;
-        let each = decode.max(self.merge(run_records));
-        (self.threads as u64 * each).max(self.mill_bytes(tile_positions))
+        let run = run_records.saturating_mul(self.intake());
+        let decode = self.decode_fixed().saturating_add(run);
+        let each = decode.max(self.merge(run_records)).max(survey_bytes());
+        let ordering = match self.ranked {
+            true => self.mill_fixed().saturating_add(ordering_bytes(self.points)),
+            false => 0,
+        };
+        let each = each.max(ordering);
+        self.by_threads(each).max(self.mill_bytes(self.threads, tile_positions))
     }
 
-    /// Bytes that the threads hold in the mill with tiles of `positions` positions, rim included.
-    pub fn mill_bytes(&self, positions: u64) -> u64 {
-        let tile = positions.saturating_mul(self.tile_bytes_per_point() as u64);
-        (self.threads as u64).saturating_mul(self.mill_fixed().saturating_add(tile))
+    /// Bytes that the mill holds where `millers` of the threads have tiles of `positions` positions,
+    /// rim included.
+    pub fn mill_bytes(&self, millers: usize, positions: u64) -> u64 {
+        let tiles = (millers as u64).saturating_mul(positions);
+        let tiles = tiles.saturating_mul(self.tile_bytes_per_point());
+        self.by_threads(self.mill_fixed()).saturating_add(tiles)
     }
 
-    /// Positions that each thread's tile may hold where the mill has `bytes`.
-    pub fn tile_positions(&self, bytes: u64) -> usize {
-        let share = (bytes / self.threads as u64).saturating_sub(self.mill_fixed());
-        (share / self.tile_bytes_per_point() as u64) as usize
+    /// Positions that the tile of each of `millers` threads may hold where the mill has `bytes`.
+    pub fn tile_positions(&self, millers: usize, bytes: u64) -> usize {
+        let tiles = bytes.saturating_sub(self.by_threads(self.mill_fixed()));
+        let share = tiles / (millers as u64).max(1) / self.tile_bytes_per_point().max(1);
+        usize::try_from(share).unwrap_or(usize::MAX)
     }
 
     fn least(&self) -> u64 {
         match self.mills {
             true => self.work(self.fewest_records(), FEWEST as u64),
-            false => self.threads as u64 * self.stream(),
+            false => self.by_threads(self.stream()),
         }
     }
 
-    /// A limit that does for tiles of `positions` positions, rim included.
-    pub fn limit_for_tile(&self, positions: u64) -> u64 {
-        let (least, mill) = (self.least(), self.mill_bytes(positions));
-        // Where a share of the limit suffices, or where all that is kept in memory leaves enough.
-        let share = least.saturating_add(mill.saturating_sub(least) / SPARE.0 * SPARE.1 + SPARE.1);
-        let kept = self.points.saturating_mul(self.stride as u64 + KEPT_BYTES).saturating_add(mill);
-        let fits = mill <= self.most_work(least);
-        let work = if fits { share.min(kept) } else { kept };
-        (self.base() + self.index()).saturating_add(work).saturating_add(1 << 20)
+    /// The least limit in whole mebibytes with which `millers` of the threads have tiles of
+    /// `positions` positions, rim included, whatever of the scan is kept in memory by then.
+    pub fn limit_for_tile(&self, millers: usize, positions: u64) -> u64 {
+        let needed = self.mill_bytes(millers, positions);
+        let does = |mebibytes: u64| {
+            let demands = Demands { limit: mebibytes << 20, ..self.clone() };
+            demands.divide().is_ok_and(|shares| demands.free(&shares) >= needed)
+        };
+        // More of a limit never leaves the mill less.
+        let (mut less, mut enough) = (0, 1 << 43);
+        while less + 1 < enough {
+            let between = less + (enough - less) / 2;
+            if does(between) { enough = between } else { less = between }
+        }
+        (enough << 20).saturating_add(RESIDENT_VARIES)
+    }
+
+    /// Bytes that `shares` leave the mill at least.
+    fn free(&self, shares: &Shares) -> u64 {
+        let each = (self.stride as u64).saturating_add(KEPT_BYTES);
+        let each = each.saturating_add(if self.ranked { 8 } else { 0 });
+        let kept = shares.kept_in_memory.min(self.points.saturating_mul(each));
+        let taken = shares.base.saturating_add(shares.index).saturating_add(kept);
+        self.limit.saturating_sub(taken).saturating_sub(MILL_SPARE)
     }
 
     fn most_work(&self, least: u64) -> u64 {
-        (THREAD_MOST * self.threads as u64).max(least)
+        self.by_threads(THREAD_MOST).max(least)
     }
 
     /// Divides the limit; an error names the one that would do.
     pub fn divide(&self) -> Result<Shares> {
         let (base, index, least) = (self.base(), self.index(), self.least());
-        let needed = base + index + least;
-        let Some(spare) = self.limit.checked_sub(needed) else {
+        let needed = base.saturating_add(index).saturating_add(least);
+        // A sum that reached the end of the numbers is more than any memory.
+        let spare = self.limit.checked_sub(needed).filter(|_| needed < u64::MAX);
+        let Some(spare) = spare else {
             return Err(self.refusal(needed));
         };
         if !self.mills {
@@ -235,16 +297,16 @@ impl Demands {
             });
         }
         let work = (least + spare / SPARE.1 * SPARE.0).min(self.most_work(least));
-        let share = work / self.threads as u64;
-        let each = Intake::bytes_per_record(self.stride, self.tagged).max(1) as u64;
+        let share = work / (self.threads as u64).max(1);
+        let records = share.saturating_sub(self.decode_fixed()) / self.intake();
+        let records = records.min(self.most_records());
         Ok(Shares {
             base,
             work,
             index,
             kept_in_memory: least + spare - work,
-            run_records: (share.saturating_sub(self.decode_fixed()) / each).min(self.most_records())
-                as usize,
-            tile_positions: self.tile_positions(work),
+            run_records: usize::try_from(records).unwrap_or(usize::MAX),
+            tile_positions: self.tile_positions(self.threads, work),
         })
     }
 
@@ -254,25 +316,29 @@ impl Demands {
             true => format!(" and an index of {points} points"),
             false => String::new(),
         };
-        Error::memory(format!(
-            "a memory budget of {} is too small: {threads} threads on records of {stride} bytes\
-             {index} need {}",
-            Bytes(self.limit),
-            Bytes(needed)
-        ))
-        .help(format!(
-            "give `run.memory = \"{}\"` or more{}",
-            whole_mebibytes(needed),
-            if self.threads > 1 { ", or fewer `run.threads`" } else { "" }
-        ))
+        let least = if self.has_cells { "at least " } else { "" };
+        let needed = whole_mebibytes(needed.saturating_add(RESIDENT_VARIES));
+        let threads_are =
+            if *threads == 1 { "1 thread".to_owned() } else { format!("{threads} threads") };
+        let error = Error::memory(format!(
+            "a memory budget of {} is too small: {threads_are} on records of {stride} bytes{index} \
+             need {least}{needed}",
+            at_most_mebibytes(self.limit),
+        ));
+        let fewer = if self.threads > 1 { ", or fewer `run.threads`" } else { "" };
+        let later = match self.has_cells {
+            true => "; how much the fullest cells need is known when the points are read",
+            false => "",
+        };
+        error.help(format!("give `run.memory = \"{needed}\"` or more{fewer}{later}"))
     }
 }
 
 /// The part of the memory to spare that goes to work, up to what it makes use of: 3 of 4.
 const SPARE: (u64, u64) = (3, 4);
 /// Bytes that a record kept in memory takes at most besides its own: its place in the order, its
-/// position in a run and in the merged scan, its copies, its state, its fate.
-const KEPT_BYTES: u64 = 8 + 24 + 24 + 4 + 1 + 4;
+/// position in a run and in the merged scan, its copies, its state, its fate; tags included.
+const KEPT_BYTES: u64 = 12 + 28 + 24 + 4 + 1 + 4;
 
 #[cfg(test)]
 mod tests {
@@ -291,6 +357,9 @@ mod tests {
             lists: 0,
             mills: true,
             tagged: false,
+            ranked: false,
+            run_most: None,
+            has_cells: true,
             passes: vec![vec![Needs { neighbors: 10, bytes_per_point: 40, ..Needs::default() }]],
         }
     }
@@ -311,14 +380,56 @@ mod tests {
     #[test]
     fn the_limit_for_a_heavy_tile_leaves_that_tile_its_memory() {
         for positions in [20_000, 1_000_000, 30_000_000] {
-            let named = demands(0).limit_for_tile(positions);
-            let there = demands(named);
-            let shares = there.divide().unwrap();
-            // What is kept in memory is no more than the scan.
-            let kept = shares.kept_in_memory.min(there.points * (30 + KEPT_BYTES));
-            let free = named - shares.base - shares.index - kept;
-            assert!(there.tile_positions(free) as u64 >= positions, "{positions}: {shares:?}");
+            let named = demands(0).limit_for_tile(1, positions);
+            let free = |limit: u64| {
+                let there = demands(limit);
+                let shares = there.divide().unwrap();
+                // What is kept in memory is no more than the scan.
+                let kept = shares.kept_in_memory.min(there.points * (30 + KEPT_BYTES));
+                there.tile_positions(1, limit - shares.base - shares.index - kept) as u64
+            };
+            assert!(free(named) >= positions, "{positions}: {named}");
+            assert!(named < 160 << 20 || free(named - (3 << 20)) < positions, "{positions}");
+            assert!(demands(0).limit_for_tile(2, positions) >= named);
         }
+    }
+
+    #[test]
+    fn numbers_at_their_extremes_are_refused_and_never_wrap() {
+        for most in [usize::MAX, usize::MAX / 2, 1 << 40, 1 << 32] {
+            let worst = Demands {
+                resident: most as u64,
+                threads: most,
+                stride: most,
+                points: most as u64,
+                part_bytes: most as u64,
+                chunk: ChunkSize { points: most, bytes: most as u64 },
+                sinks: most,
+                lists: most as u64,
+                run_most: Some(0),
+                passes: vec![vec![Needs { bytes_per_point: most, ..Needs::default() }; 3]],
+                ..demands(most as u64)
+            };
+            for mills in [true, false] {
+                let worst = Demands { mills, ..worst.clone() };
+                assert_eq!(worst.divide().unwrap_err().kind(), crate::ErrorKind::Memory);
+                let most = (most as u64).min(1 << 40);
+                // One of them alone, whatever the others.
+                let one = Demands { limit: u64::MAX, points: most, mills, ..demands(0) };
+                assert!(one.divide().is_ok_and(|shares| !mills || shares.run_records > 0));
+                let one = Demands { threads: most as usize, mills, ..demands(1 << 30) };
+                assert!(one.divide().is_err());
+            }
+            assert!(worst.limit_for_tile(usize::MAX, u64::MAX) > 1 << 62);
+        }
+    }
+
+    #[test]
+    fn runs_of_a_few_records_are_planned_with_the_memory_to_merge_them() {
+        let few = Demands { run_most: Some(100), ..demands(1 << 30) };
+        let shares = few.divide().unwrap();
+        assert_eq!(shares.run_records, 100);
+        assert!(shares.work >= 2 * few.merge(100), "{shares:?}");
     }
 
     #[test]
@@ -333,7 +444,7 @@ mod tests {
         let error = demands(32 << 20).divide().unwrap_err();
         let help = error.remedy().unwrap().to_owned();
         let mebibytes: u64 = help
-            .split_once("run.memory = \"")
+            .split_once("`run.memory = \"")
             .unwrap()
             .1
             .split_once("MiB")
@@ -342,6 +453,7 @@ mod tests {
             .parse()
             .unwrap();
         assert!(demands(mebibytes << 20).divide().is_ok(), "{help}");
-        assert!(demands((mebibytes - 2) << 20).divide().is_err(), "{help}");
+        assert!(demands((mebibytes - 3) << 20).divide().is_err(), "{help}");
+        assert!(error.to_string().ends_with(&format!("need at least {mebibytes}MiB")), "{error}");
     }
 }

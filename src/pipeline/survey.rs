@@ -139,6 +139,11 @@ pub(super) struct Measured {
     pub tiles: Lines,
 }
 
+/// Bytes that a thread of a survey holds.
+pub(super) fn survey_bytes() -> u64 {
+    2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64) + Stretches::BYTES
+}
+
 /// Measures, on all threads, the reduction of `tiles` whose positions have the stored fates and whose
 /// records have the stored states of `sieve`.
 pub(super) fn survey(
@@ -157,8 +162,8 @@ pub(super) fn survey(
         level,
     };
     let ranges = tiles.blocks().div_ceil(BLOCKS);
-    let each = 2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64) + Stretches::BYTES;
-    let _working = job.budget.lease(each * job.threads as u64, "survey")?;
+    let all_threads = survey_bytes().saturating_mul(job.threads as u64);
+    let _working = job.budget.lease(all_threads, "survey")?;
     let spill = Spill::new(area, "report");
     let all = Mutex::new((ScanSurvey::new(&tiles.bounds()), BTreeMap::new()));
     each_range(job, ranges, |range| {

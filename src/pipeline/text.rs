@@ -254,12 +254,11 @@ fn check_chain(drafts: &[StageDraft], stages: &[PlacedStage], mistakes: &mut Vec
         }
     }
     check_from(drafts, stages, mistakes);
-    let tiles = stages.iter().any(|s| matches!(s.role, Role::TileOp(_) | Role::ScanOp(_)));
     for (draft, stage) in drafts.iter().zip(stages) {
         let Role::Sink(sink) = &stage.role else { continue };
-        if tiles && sink.order() == Order::Input {
-            let told = "the input's order is kept only where no stage works on tiles";
-            let note = "leave `write.order` out: the order is canonical";
+        if sink.is_folder() && sink.order() == Order::Input {
+            let told = "`write.order = \"input\"` is for one file of all inputs";
+            let note = "give `write.path` instead of `write.folder`, or leave `write.order` out";
             mistakes.push(Mistake::new(draft.kind.1.clone(), told).note(note));
         }
     }

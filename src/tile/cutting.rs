@@ -6,8 +6,8 @@ use crate::Error;
 
 impl SealedTiles {
     /// Cuts the scan into octree nodes, in Morton order, none without a position: nodes whose cube
-    /// grown by `reach` has at most `wanted` positions, or that have the smallest side allowed,
-    /// 2^`lowest`, and at most `most`.
+    /// grown by `reach` has at most `wanted` positions; or at most `most`, where the side is 2^`good`
+    /// or less, so that smaller nodes would be mostly zone. None has a side below 2^`lowest`.
     ///
     /// If nodes of that side have more, the error names the one that has most and its count.
     pub fn cut(
@@ -15,7 +15,7 @@ impl SealedTiles {
         wanted: u64,
         most: u64,
         reach: i64,
-        lowest: u32,
+        (good, lowest): (u32, u32),
     ) -> Result<Vec<TileKey>, CutError> {
         let mut tiles = Vec::new();
         if self.positions() == 0 {
@@ -30,7 +30,8 @@ impl SealedTiles {
             }
             let zone = key.cube().grown(reach);
             let smallest = key.level <= lowest || key.level == 0;
-            let limit = if smallest { most } else { wanted.min(most) };
+            let is_good = smallest || key.level <= good;
+            let limit = if is_good { most } else { wanted.min(most) };
             if !self.holds_more(&zone, limit, &mut reader)? {
                 tiles.push(key);
                 continue;

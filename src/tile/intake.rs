@@ -35,6 +35,8 @@ pub struct TileStore {
     pub(super) tagged: bool,
     pub(super) positions: Spill,
     pub(super) records: Pieces,
+    /// The place in the input of each record, by the same numbers, if an output asks for it.
+    pub(super) places: Option<Pieces>,
     pub(super) runs: Mutex<Vec<Run>>,
     index: Mutex<Vec<Lease>>,
 }
@@ -49,9 +51,17 @@ impl TileStore {
             tagged,
             positions: Spill::new(area, "runs"),
             records: Pieces::new(area, "records", stride),
+            places: None,
             runs: Mutex::default(),
             index: Mutex::default(),
         }
+    }
+
+    /// The same store, which keeps the place in the input of each record.
+    #[must_use]
+    pub fn with_places(self) -> Self {
+        let places = Some(Pieces::new(&self.area, "places", size_of::<u64>()));
+        TileStore { places, ..self }
     }
 
     /// Runs stored so far.
@@ -75,20 +85,23 @@ pub struct Intake<'a> {
     records: Vec<u8>,
     positions: Vec<Position>,
     tags: Vec<u32>,
+    places: Vec<u64>,
+    next_place: u64,
     order: Order,
     packed: Vec<u8>,
 }
 
 impl<'a> Intake<'a> {
     /// Bytes that an intake holds for each record of `stride` bytes.
-    pub fn bytes_per_record(stride: usize, tagged: bool) -> usize {
+    pub fn bytes_per_record(stride: usize, tagged: bool, placed: bool) -> u64 {
         let tag = if tagged { size_of::<Tag>() } else { 0 };
-        stride + size_of::<Position>() + Order::BYTES + tag
+        let more = tag + if placed { size_of::<u64>() } else { 0 };
+        (stride as u64).saturating_add((size_of::<Position>() + Order::BYTES + more) as u64)
     }
 
     /// Bytes that an intake holds whatever its capacity.
-    pub fn fixed_bytes(stride: usize) -> usize {
-        2 * STRETCH + 2 * PIECE * stride
+    pub fn fixed_bytes(stride: usize) -> u64 {
+        (2 * PIECE as u64).saturating_mul(stride as u64).saturating_add(2 * STRETCH as u64)
     }
 
     /// An intake for runs of up to `capacity` records.
@@ -99,9 +112,16 @@ impl<'a> Intake<'a> {
             records: Vec::with_capacity(capacity * store.stride),
             positions: Vec::with_capacity(capacity),
             tags: Vec::with_capacity(if store.tagged { capacity } else { 0 }),
+            places: Vec::with_capacity(if store.places.is_some() { capacity } else { 0 }),
+            next_place: 0,
             order: Order::with_capacity(capacity),
             packed: Vec::with_capacity(STRETCH + 2 * BLOCK * 28),
         }
+    }
+
+    /// Says the place in the input of the record that is taken next; those behind it have the next.
+    pub fn place(&mut self, place: u64) {
+        self.next_place = place;
     }
 
     /// Takes one record at its position; its tag counts if the store has tags.
@@ -124,6 +144,11 @@ impl<'a> Intake<'a> {
             let (head, rest) = positions.split_at(now);
             self.positions.extend_from_slice(head);
             positions = rest;
+            if self.store.places.is_some() {
+                let end = self.next_place + now as u64;
+                self.places.extend(self.next_place..end);
+                self.next_place = end;
+            }
             let (head, rest) = records.split_at(now * self.store.stride);
             self.records.extend_from_slice(head);
             records = rest;
@@ -141,14 +166,20 @@ impl<'a> Intake<'a> {
         if self.positions.is_empty() {
             return Ok(());
         }
-        let (store, records, tags) = (self.store, &self.records, &self.tags);
+        let (store, records, tags, places) = (self.store, &self.records, &self.tags, &self.places);
         let equal = |a: usize, b: usize| {
             let record = |i: usize| &records[i * store.stride..(i + 1) * store.stride];
-            record(a).cmp(record(b)).then_with(|| tags.get(a).cmp(&tags.get(b)))
+            let tagged = || tags.get(a).cmp(&tags.get(b));
+            let placed = || places.get(a).cmp(&places.get(b));
+            record(a).cmp(record(b)).then_with(tagged).then_with(placed)
         };
         let order = self.order.sort(&self.positions, &equal);
         let first_record = store.records.reserve(order.len() as u64)?;
         store_records(store, order, records, first_record)?;
+        if let Some(stored) = &store.places {
+            store_places(stored, order, &self.places, first_record)?;
+            self.places.clear();
+        }
         let blocks = store_positions(store, order, &self.positions, tags, &mut self.packed)?;
         self.records.clear();
         self.positions.clear();
@@ -165,6 +196,18 @@ fn store_records(store: &TileStore, order: Sorted<'_>, records: &[u8], first: u6
         piece.clear();
         gather(records, store.stride, slots.indices(), &mut piece);
         store.records.put(number, &piece)?;
+    }
+    Ok(())
+}
+
+/// Stores `places` in `order`, numbered from `first` on.
+fn store_places(stored: &Pieces, order: Sorted<'_>, places: &[u64], first: u64) -> Result<()> {
+    stored.reserve_below(first + order.len() as u64)?;
+    let mut piece = Vec::with_capacity(PIECE * size_of::<u64>());
+    for (number, slots) in (first..).step_by(PIECE).zip(order.chunks(PIECE)) {
+        piece.clear();
+        slots.indices().for_each(|i| piece.extend_from_slice(&places[i].to_le_bytes()));
+        stored.put(number, &piece)?;
     }
     Ok(())
 }

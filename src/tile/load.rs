@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::pieces::Pieces;
 use super::sealed::{Reader, SealedTiles};
-use super::sieve::{FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, Run, Runs, Sieve};
+use super::sieve::{FATE_BYTES, FIGURE_BYTES, MoreRuns, NORMAL_BYTES, Run, Runs, Sieve};
 use super::{Fate, Tile, TileKey};
+use crate::Result;
 use crate::point::Bounds;
-use crate::{Error, Result};
 
 /// Loads tiles into one arena that it reuses; one a thread.
 #[derive(Debug)]
@@ -35,6 +35,7 @@ pub struct Core {
     first_records: Vec<u64>,
     /// The runs of its records, where a sieve may hold some back.
     runs: Vec<Run>,
+    more: MoreRuns,
     /// Stored fates of its positions; none before the first pass.
     fates: Vec<u8>,
 }
@@ -76,7 +77,7 @@ impl Core {
     fn clear(&mut self) {
         self.first_position = 0;
         self.first_records.clear();
-        self.runs.clear();
+        self.more.give_back(&mut self.runs);
         self.fates.clear();
     }
 }
@@ -106,6 +107,11 @@ impl Loader {
     /// for in the whole scan.
     pub fn limit_rim(&mut self, positions: usize) {
         self.rim_limit = self.rim_limit.min(positions);
+    }
+
+    /// The scan that it loads from.
+    pub fn tiles(&self) -> &SealedTiles {
+        &self.tiles
     }
 
     /// Loads the positions of `key`'s cube, of the `reach` around it that later stages look at
@@ -217,13 +223,8 @@ impl Loader {
                 places.push(j);
             }
         }
-        // Runs are one a position but where copies differ in what stages look at.
-        if core.runs.len() > 4 * self.capacity + (1 << 16) {
-            return Err(Error::memory(
-                "records of one position differ so much in class and flags that they do not fit",
-            )
-            .help("give more `run.memory`"));
-        }
+        let runs = self.core.runs.len();
+        self.core.more.hold(&self.tiles, runs, self.capacity, runs as u64)?;
         self.columns(first, &places, in_core)
     }
 

@@ -27,9 +27,10 @@ const RANGE_BLOCKS: usize = 256;
 /// run are read for a part of them.
 const RANGE_BLOCKS_EACH: usize = 4;
 /// Bytes that a thread holds while it merges `runs` runs of records of `stride` bytes.
-pub fn merge_bytes(runs: usize, stride: usize) -> u64 {
-    let cursor = BLOCK * (size_of::<Position>() + 4) + stride + 256;
-    (runs * cursor + Emitter::BYTES) as u64
+pub fn merge_bytes(runs: u64, stride: usize) -> u64 {
+    let fixed = BLOCK * (size_of::<Position>() + 4) + 256;
+    let cursor = (fixed as u64).saturating_add(stride as u64);
+    runs.saturating_mul(cursor).saturating_add(Emitter::BYTES as u64)
 }
 
 /// Merges the runs of `store` on `threads` threads; `advance` is told of records merged and says
@@ -40,9 +41,9 @@ pub fn seal(
     advance: &(dyn Fn(u64) -> Result<()> + Sync),
 ) -> Result<SealedTiles> {
     let runs = std::mem::take(&mut *lock(&store.runs));
-    let _working = store
-        .budget
-        .lease(merge_bytes(runs.len(), store.stride) * threads as u64, "merging of sorted runs")?;
+    let each = merge_bytes(runs.len() as u64, store.stride);
+    let _working =
+        store.budget.lease(each.saturating_mul(threads as u64), "merging of sorted runs")?;
     let ranges = ranges(&runs);
     // The merge leaves no more blocks than the runs have, but for one that is not full in each range.
     let blocks = runs.iter().map(|run| run.blocks.len()).sum::<usize>() + ranges.len();
@@ -75,7 +76,7 @@ pub fn seal(
     let sequence = join(ranges, blocks);
     lease.resize(sequence.blocks.len() as u64 * each)?;
     let refs = (out.refs, out.tagged);
-    Ok(SealedTiles::new(sequence, out.positions, refs, store.records, lease))
+    Ok(SealedTiles::new(sequence, out.positions, refs, (store.records, store.places), lease))
 }
 
 /// A range of Morton order.
@@ -364,8 +365,12 @@ impl<'a> Cursor<'a> {
     fn read_record(&self, record: &mut Vec<u8>, buffer: &mut Vec<u8>) -> Result<()> {
         record.clear();
         record.extend_from_slice(self.store.records.get(self.number(), 1, buffer)?);
-        // Equal records are told apart by their tags: by the input that they come from.
+        // Equal records are told apart by their tags, by the input that they come from, and where
+        // an output is in the order of the inputs by their place there.
         record.extend_from_slice(&self.tag().to_be_bytes());
+        if let Some(places) = &self.store.places {
+            record.extend(places.get(self.number(), 1, buffer)?.iter().rev());
+        }
         Ok(())
     }
 }

@@ -81,6 +81,17 @@ impl Pieces {
         Ok((first * PIECE) as u64)
     }
 
+    /// Reserves all numbers below `end`, if they are not yet.
+    pub fn reserve_below(&self, end: u64) -> Result<()> {
+        let mut table = self.change();
+        let pieces = end.div_ceil(PIECE as u64) as usize;
+        if let Some(more) = pieces.checked_sub(table.places.len()).filter(|&more| more > 0) {
+            table.hold(&self.area, more.saturating_mul(size_of::<Place>()))?;
+            table.places.resize(pieces, Place::default());
+        }
+        Ok(())
+    }
+
     /// How many numbers are reserved so far.
     pub fn reserved(&self) -> u64 {
         (self.table().places.len() * PIECE) as u64

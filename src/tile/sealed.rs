@@ -8,7 +8,7 @@ use super::block::{BLOCK, Block};
 use super::key::morton_cmp;
 use super::pieces::{PIECE, Pieces};
 use super::spill::Spill;
-use crate::budget::Lease;
+use crate::budget::{Budget, Lease};
 use crate::point::{Bounds, PointBatch, Position};
 use crate::{Error, Result};
 
@@ -38,7 +38,8 @@ pub struct SealedTiles {
     refs: Pieces,
     tagged: bool,
     records: Pieces,
-    _index: Lease,
+    places: Option<Pieces>,
+    index: Lease,
 }
 
 /// Bytes of a record's entry in the canonical order: its number in the store and, if records have
@@ -67,7 +68,7 @@ impl SealedTiles {
         sequence: Sequence,
         spill: Spill,
         (refs, tagged): (Pieces, bool),
-        records: Pieces,
+        (records, places): (Pieces, Option<Pieces>),
         index: Lease,
     ) -> Self {
         let mut boxes: Vec<Vec<Bounds>> = Vec::new();
@@ -79,7 +80,7 @@ impl SealedTiles {
                 .collect();
             boxes.push(level.clone());
         }
-        SealedTiles { sequence, boxes, spill, refs, tagged, records, _index: index }
+        SealedTiles { sequence, boxes, spill, refs, tagged, records, places, index }
     }
 
     /// Distinct positions.
@@ -115,6 +116,11 @@ impl SealedTiles {
     /// True if records have tags.
     pub fn is_tagged(&self) -> bool {
         self.tagged
+    }
+
+    /// The budget that the scan's index is leased from.
+    pub(super) fn budget(&self) -> &Budget {
+        self.index.budget()
     }
 
     /// How many records are before block `index` in canonical order. Within a block, numbers of
@@ -286,18 +292,63 @@ impl SealedTiles {
             let source = fetch.ref_of(&self.refs, self.tagged, number)?;
             fetch.sources.push((source, slot as u32));
         }
+        self.gather(fetch, batch)
+    }
+
+    /// Appends to `batch` the records that are stored at `sources`, in the order given.
+    pub fn fetch_stored(
+        &self,
+        sources: &[u64],
+        fetch: &mut Fetch,
+        batch: &mut PointBatch,
+    ) -> Result<()> {
+        fetch.sources.clear();
+        fetch.sources.extend(sources.iter().copied().zip(0..));
+        self.gather(fetch, batch)
+    }
+
+    /// Appends for each of the records with the given numbers, which must be ascending, where it is
+    /// stored and its place in the input.
+    pub fn places(
+        &self,
+        numbers: &[u64],
+        fetch: &mut Fetch,
+        places: &mut Vec<(u64, u64)>,
+    ) -> Result<()> {
+        let Some(stored) = &self.places else {
+            return Err(Error::internal("places in the input are asked for and were not kept"));
+        };
+        fetch.sources.clear();
+        for (slot, &number) in numbers.iter().enumerate() {
+            let source = fetch.ref_of(&self.refs, self.tagged, number)?;
+            fetch.sources.push((source, slot as u32));
+        }
         fetch.sources.sort_unstable();
+        let begin = places.len();
+        places.resize(begin + numbers.len(), (0, 0));
+        for (group, (first, last)) in groups(&fetch.sources) {
+            let count = (last - first + 1) as usize;
+            let (words, _) = stored.get(first, count, &mut fetch.records)?.as_chunks::<8>();
+            for &(source, slot) in group {
+                let place = u64::from_le_bytes(words[(source - first) as usize]);
+                places[begin + slot as usize] = (source, place);
+            }
+        }
+        Ok(())
+    }
+
+    /// Appends to `batch` the records that `fetch` names, each at its slot.
+    fn gather(&self, fetch: &mut Fetch, batch: &mut PointBatch) -> Result<()> {
+        fetch.sources.sort_unstable();
+        let count = fetch.sources.len();
         let stride = batch.schema().stride;
         let start = batch.len();
-        if start + numbers.len() > batch.capacity() {
+        if start + count > batch.capacity() {
             return Err(Error::internal("more records fetched than the batch takes"));
         }
         let mut records =
-            batch.refill_after(start, numbers.len()).chunks_exact_mut(stride).collect::<Vec<_>>();
-        for group in fetch.sources.chunk_by(|a, b| a.0 / PIECE as u64 == b.0 / PIECE as u64) {
-            let (Some(&(first, _)), Some(&(last, _))) = (group.first(), group.last()) else {
-                continue;
-            };
+            batch.refill_after(start, count).chunks_exact_mut(stride).collect::<Vec<_>>();
+        for (group, (first, last)) in groups(&fetch.sources) {
             let stored =
                 self.records.get(first, (last - first + 1) as usize, &mut fetch.records)?;
             for &(source, slot) in group {
@@ -307,6 +358,15 @@ impl SealedTiles {
         }
         Ok(())
     }
+}
+
+/// Stretches of sorted `sources` that are in one piece, each with its first and last number.
+fn groups(sources: &[(u64, u32)]) -> impl Iterator<Item = (&[(u64, u32)], (u64, u64))> {
+    let same_piece = |a: &(u64, u32), b: &(u64, u32)| a.0 / PIECE as u64 == b.0 / PIECE as u64;
+    sources.chunk_by(same_piece).filter_map(|group| {
+        let (first, last) = group.first().zip(group.last())?;
+        Some((group, (first.0, last.0)))
+    })
 }
 
 /// What fetching records needs and keeps from call to call.
@@ -320,8 +380,10 @@ pub struct Fetch {
 
 impl Fetch {
     /// Bytes that fetching `count` records of `stride` bytes holds.
-    pub fn bytes(count: usize, stride: usize) -> u64 {
-        (count * (size_of::<(u64, u32)>() + size_of::<&mut [u8]>()) + PIECE * (stride + 8)) as u64
+    pub fn bytes(count: u64, stride: usize) -> u64 {
+        let each = size_of::<(u64, u32)>() + size_of::<&mut [u8]>();
+        let piece = (PIECE as u64).saturating_mul((stride as u64).saturating_add(8));
+        count.saturating_mul(each as u64).saturating_add(piece)
     }
 
     /// Where the record numbered `number` in canonical order is stored.
@@ -344,5 +406,5 @@ impl Fetch {
 
 /// Memory that the index of `positions` positions takes, for a plan.
 pub fn index_bytes(positions: u64) -> u64 {
-    positions.div_ceil(BLOCK as u64) * (size_of::<Block>() as u64 + 8)
+    positions.div_ceil(BLOCK as u64).saturating_mul(size_of::<Block>() as u64 + 8)
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::pieces::Pieces;
 use super::sealed::SealedTiles;
 use crate::Result;
+use crate::budget::Lease;
 use crate::point::Edit;
 
 /// Selections that a record can be in, a bit each; the highest bit is [`ASIDE`].
@@ -168,9 +169,51 @@ impl Run {
     }
 }
 
+/// Memory for runs beyond those that a plan reckons with: one a position. There are more where the
+/// copies of a position differ in what stages look at.
+#[derive(Debug, Default)]
+pub(super) struct MoreRuns(Option<Lease>);
+
+impl MoreRuns {
+    /// A run, and what the mill makes of it.
+    const BYTES: u64 = 3 * size_of::<Run>() as u64;
+
+    /// Holds memory for `runs` in all, of which `planned` are reckoned with. Fails as
+    /// [`Budget::lease`](crate::budget::Budget::lease) does for `most`, as many as there may be.
+    pub(super) fn hold(
+        &mut self,
+        tiles: &SealedTiles,
+        runs: usize,
+        planned: usize,
+        most: u64,
+    ) -> Result<()> {
+        let more = (runs.saturating_sub(planned) as u64).saturating_mul(Self::BYTES);
+        if self.0.as_ref().map_or(0, Lease::bytes) >= more {
+            return Ok(());
+        }
+        let what = "list of a tile's copies that differ in class or flags";
+        // What is held goes back first, so that a refusal counts it once.
+        self.0 = None;
+        self.0 = match tiles.budget().try_lease(more, what) {
+            None => Some(tiles.budget().lease(most.saturating_mul(Self::BYTES).max(more), what)?),
+            lease => lease,
+        };
+        Ok(())
+    }
+
+    /// Gives back what it holds, and with it the memory of `runs`.
+    pub(super) fn give_back(&mut self, runs: &mut Vec<Run>) {
+        runs.clear();
+        if self.0.take().is_some() {
+            *runs = Vec::new();
+        }
+    }
+}
+
 /// Reads the runs of blocks; keeps its memory.
 #[derive(Debug, Default)]
 pub(super) struct Runs {
+    more: MoreRuns,
     buffer: Vec<u8>,
     states: Vec<u8>,
     tags: Vec<u8>,
@@ -189,7 +232,7 @@ impl Runs {
     ) -> Result<()> {
         /// Records read at once: a position may have millions.
         const AT_ONCE: u64 = 4096;
-        self.runs.clear();
+        self.more.give_back(&mut self.runs);
         self.ends.clear();
         let (mut number, mut rank) = (tiles.block(index).first_record, tiles.rank_of_block(index));
         let end = number + copies.iter().map(|&n| u64::from(n)).sum::<u64>();
@@ -199,6 +242,10 @@ impl Runs {
             for _ in 0..count {
                 if !window.contains(&number) {
                     window = number..end.min(number + AT_ONCE);
+                    let runs = self.runs.len().saturating_add(AT_ONCE as usize);
+                    // Each record that is left may be a run, here and in the list of the tile.
+                    let most = (runs as u64).saturating_add(end - number).saturating_mul(2);
+                    self.more.hold(tiles, runs, 2 * AT_ONCE as usize, most)?;
                     self.fill(tiles, sieve, number, rank, (window.end - number) as usize)?;
                 }
                 let at = (number - window.start) as usize;

@@ -36,7 +36,8 @@ fn chunks_are_cut_by_rank_and_copies_are_one_entry() {
     let outputs = vec![Open::new(0, 1000, true, false)];
     let copies = 10_000_000;
     let all = 8 + u64::from(copies);
-    let mut cutter = Cutter::new(&area, (8, all), (false, false), (outputs, Vec::new())).unwrap();
+    let outlets = (outputs, Vec::new(), Vec::new());
+    let mut cutter = Cutter::new(&area, (8, all), (false, false), outlets).unwrap();
     let mut chunks = cutter.cut(&product(&[(0, 1), (1, 2), (7, copies)])).unwrap();
     assert_eq!(chunks.len(), 10_000);
     assert!(chunks.iter().all(|chunk| chunk.records.len() <= 3));
@@ -71,7 +72,8 @@ fn chunks_are_cut_by_rank_and_copies_are_one_entry() {
 fn outputs_take_what_was_there_before_the_pass_or_what_it_leaves() {
     let area = SpillArea::new(Budget::new(1 << 20), 1 << 20, Box::new(Nowhere));
     let outputs = vec![Open::new(3, 2, false, true), Open::new(5, 2, false, false)];
-    let mut cutter = Cutter::new(&area, (3, 3), (false, false), (outputs, Vec::new())).unwrap();
+    let outlets = (outputs, Vec::new(), Vec::new());
+    let mut cutter = Cutter::new(&area, (3, 3), (false, false), outlets).unwrap();
     let mut product = product(&[(0, 1), (1, 1), (2, 1)]);
     product.entries[1].now = State::REMOVED;
     product.entries[2].now = State::ASIDE.edited(Edit::SetWithheld);
