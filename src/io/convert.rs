@@ -333,23 +333,23 @@ fn small(value: Value) -> Option<u8> {
 /// What a field holds, for a message.
 fn room(to: &Dimension) -> String {
     let kind = match to.scalar {
-        Scalar::U8 => "unsigned 8-bit integer",
-        Scalar::I8 => "signed 8-bit integer",
-        Scalar::U16 => "unsigned 16-bit integer",
-        Scalar::I16 => "signed 16-bit integer",
-        Scalar::U32 => "unsigned 32-bit integer",
-        Scalar::I32 => "signed 32-bit integer",
-        Scalar::U64 => "unsigned 64-bit integer",
-        Scalar::I64 => "signed 64-bit integer",
-        Scalar::F32 => "32-bit float",
-        Scalar::F64 => "64-bit float",
+        Scalar::U8 => "an unsigned 8-bit integer",
+        Scalar::I8 => "a signed 8-bit integer",
+        Scalar::U16 => "an unsigned 16-bit integer",
+        Scalar::I16 => "a signed 16-bit integer",
+        Scalar::U32 => "an unsigned 32-bit integer",
+        Scalar::I32 => "a signed 32-bit integer",
+        Scalar::U64 => "an unsigned 64-bit integer",
+        Scalar::I64 => "a signed 64-bit integer",
+        Scalar::F32 => "a 32-bit float",
+        Scalar::F64 => "a 64-bit float",
     };
     match to.bits {
         Some(bits) => format!("{} bit(s)", bits.width),
         None if to.scale != 1.0 || to.origin != 0.0 => {
-            format!("steps of {} from {} as a {kind}", to.scale, to.origin)
+            format!("steps of {} from {} as {kind}", to.scale, to.origin)
         }
-        None => format!("a {kind}"),
+        None => kind.to_owned(),
     }
 }
 
