@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use pointmill::ops::{Grid, Pick};
 use pointmill::point::{Bounds, Position};
+use pointmill::quantity::Length;
 use pointmill::report::Tally;
 use pointmill::stage::TileOp;
 use pointmill::tile::{Fate, Tile, morton_cmp};
@@ -17,7 +18,7 @@ use stages_support::*;
 const PICKS: [Pick; 3] = [Pick::Center, Pick::Median, Pick::First];
 
 fn settled(side: f64, pick: Pick, scan: &[Position], step: f64) -> Grid {
-    let mut stage = Grid::new(side, pick);
+    let mut stage = Grid::new(Length::of(side).unwrap(), pick);
     settle(&mut stage, scan, step);
     stage
 }

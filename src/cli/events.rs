@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 use super::{exit_number, print};
 use crate::pipeline::{Done, Outline};
+use crate::report::Decision;
 use crate::{Error, ErrorKind};
 
 /// Least time between two events of progress.
@@ -74,6 +75,11 @@ impl Events {
     /// Something the user should know.
     pub fn warn(&self, message: &str) {
         self.tell("warning", json!({ "message": message }));
+    }
+
+    /// Stages chose values of keys by what they saw of the scan.
+    pub fn chose(&self, values: &[Decision]) {
+        self.tell("chosen", json!({ "values": values }));
     }
 
     /// A run is done and its outputs are in place.

@@ -10,6 +10,7 @@ mod convert;
 mod describe;
 mod events;
 mod interrupt;
+mod preset;
 mod print;
 mod progress;
 mod run;

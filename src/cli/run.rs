@@ -4,11 +4,15 @@ use serde_json::{Value, json};
 
 use super::arguments::{Axes, Common, Reduce, Run, Synth, Written};
 use super::console::Console;
+use super::preset::Preset;
 use crate::Result;
 use crate::pipeline::{Done, Pipeline, Registry, Set};
 
 /// The pipeline of `reduce`, which users copy.
 const REDUCE: &str = include_str!("../../pipelines/reduce.toml");
+
+/// Behind what `reduce` chose by itself.
+const OTHERWISE: &str = "by the noise and spacing of the scan; --preset paper is the published method";
 
 /// The pipeline of `synth`.
 const SYNTH: &str = "\
@@ -29,7 +33,11 @@ pub(super) fn run(arguments: &Run, registry: &Registry, console: &Console) -> Re
 /// Runs `pipelines/reduce.toml` on other files and prints the closing table.
 pub(super) fn reduce(arguments: &Reduce, registry: &Registry, console: &Console) -> Result<()> {
     let written = written(&arguments.written);
-    let sets = [reduce_sets(arguments), written, arguments.common.sets()?].concat();
+    let preset = arguments.preset.map_or(Vec::new(), Preset::sets);
+    let sets = [preset, reduce_sets(arguments), written, arguments.common.sets()?].concat();
+    if arguments.preset.is_none() {
+        console.hint(OTHERWISE);
+    }
     let text = if arguments.outliers { with_outliers() } else { REDUCE.to_owned() };
     let pipeline = Pipeline::parse_with(&text, "pipelines/reduce.toml", registry, &sets)?;
     console.result(mill(pipeline, &arguments.common, console)?)
@@ -94,9 +102,11 @@ fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
         ("--to", "write.format", arguments.to.clone().map(Value::from)),
         ("--max-angle", "cells.max_angle", arguments.max_angle.as_deref().map(number_or_text)),
         ("--keep", "cells.keep", arguments.keep.as_deref().map(whole_or_text)),
-        ("--max-side", "cells.max_side", arguments.max_side.map(number)),
-        ("--min-spacing", "cells.min_spacing", arguments.min_spacing.map(number)),
-        ("--neighbors", "normals.neighbors", arguments.neighbors.map(Value::from)),
+        ("--max-side", "cells.max_side", arguments.max_side.as_deref().map(number_or_text)),
+        ("--min-spacing", "cells.min_spacing", arguments.min_spacing.as_deref().map(number_or_text)),
+        ("--measure", "cells.measure", arguments.measure.clone().map(Value::from)),
+        ("--reference", "cells.reference", arguments.reference.as_deref().map(numbers_or_text)),
+        ("--neighbors", "normals.neighbors", arguments.neighbors.as_deref().map(whole_or_text)),
         ("--side", "cells.side", arguments.side.as_deref().map(number_or_text)),
         ("--min-points", "cells.min_points", arguments.min_points.map(Value::from)),
         ("--split", "cells.split", arguments.split.clone().map(Value::from)),
@@ -140,6 +150,12 @@ fn whole_or_text(text: &str) -> Value {
 /// A number where the text is one, else the text (`6deg`, `auto`).
 fn number_or_text(text: &str) -> Value {
     text.parse().map_or_else(|_| json!(text), number)
+}
+
+/// A list of numbers where the text is one with commas, else the text (`x`).
+fn numbers_or_text(text: &str) -> Value {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    numbers.map_or_else(|_| json!(text), |numbers| numbers.into_iter().map(number).collect())
 }
 
 #[cfg(test)]

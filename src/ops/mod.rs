@@ -6,6 +6,7 @@ mod median;
 pub mod normals;
 pub mod outliers;
 mod removal;
+mod scatter;
 
 pub use cells::{Cells, Keep, Measure, Reference, Side, Split};
 pub use grid::{Grid, Pick};

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::grind::{Field, Worker};
 use super::job::Job;
 use super::passes::Pass;
+use super::shares::Demands;
 use crate::Result;
 use crate::stage::Forecast;
 use crate::tile::{Reader, SealedTiles, Sieve, TileKey, lock};
@@ -34,16 +35,16 @@ pub(super) fn forecast(
     ops: &[usize],
     field: &Field<'_>,
     sieve: &Sieve,
-    capacity: usize,
+    demands: &Demands,
 ) -> Result<Vec<(usize, Forecast)>> {
+    let capacity = demands.tile_positions(job.budget.free()).min(CAPACITY);
+    let _working = job.budget.lease(demands.mill_bytes(capacity as u64), "a look ahead")?;
     let mut forecasts = Vec::new();
     for &op in ops {
-        if !job.ops[op].op.tile().wants_sample() {
-            continue;
-        }
-        let side = job.ops[op].op.tile().needs().cell_side.max(1);
+        let Some(side) = job.ops[op].op.tile().sample_side() else { continue };
+        let side = side.max(1);
         let keys = cubes(&field.tiles, side)?;
-        let samples = samples(job, pass, op, field, sieve, capacity.min(CAPACITY), &keys)?;
+        let samples = samples(job, pass, op, field, sieve, capacity, &keys)?;
         forecasts.push((op, job.ops[op].op.tile_mut().forecast(&samples)));
     }
     Ok(forecasts)

@@ -13,7 +13,7 @@ use super::product::Product;
 use super::rounded::Rounded;
 use crate::geom::lattice::Lattice;
 use crate::point::{Edit, PointBatch};
-use crate::report::Tally;
+use crate::report::{Baseline, Tally};
 use crate::stage::{Encode, Encoded, Sink, SinkSummary};
 use crate::tile::{
     Fetch, Loader, Run, SealedTiles, Sieve, SpillArea, State, Tile, TileKey, lock, parallel,
@@ -40,6 +40,8 @@ pub(super) struct Milled {
     pub decided: u64,
     /// True if the pass oriented normals.
     pub oriented: bool,
+    /// Grids to compare the pass with, if it decides by normals.
+    pub baseline: Option<Baseline>,
 }
 
 /// A sink with its number.
@@ -76,7 +78,9 @@ pub(super) fn grind(
     let benches = Benches::new(job, tiles, &sinks);
     let outlet: Outlet<Product, Chunk> =
         Outlet::new(sinks.into_iter().map(|(_, sink)| sink).collect(), job.threads);
-    let total = Mutex::new((Tally::default(), 0, false));
+    let side = pass.compares(&job.ops);
+    let baseline = || side.map(|side| Baseline::new(side, tiles.levels()));
+    let total = Mutex::new(Sum { baseline: baseline(), ..Sum::default() });
     let next = AtomicUsize::new(0);
     parallel(job.threads, |_| {
         let guard = StopOnDrop::new(|| outlet.stop());
@@ -84,6 +88,7 @@ pub(super) fn grind(
         let mut encode = |chunk| bench.encode(&benches, &chunk);
         let mut hands = Hands { commit: &commit, encode: &mut encode };
         let mut worker = Worker::new(job, pass, field, sieve, capacity, wants_normals);
+        worker.sum.baseline = baseline();
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(&key) = keys.get(index) else { break };
@@ -93,11 +98,8 @@ pub(super) fn grind(
             job.advance(positions)?;
         }
         outlet.drain(&mut hands, |turn| turn.0 >= keys.len() as u64)?;
-        let mut total = lock(&total);
-        total.0.merge(&worker.tally);
-        total.0.merge(&bench.tally);
-        total.1 += worker.decided;
-        total.2 |= worker.oriented;
+        worker.sum.tally.merge(&bench.tally);
+        lock(&total).merge(&worker.sum);
         guard.disarm();
         Ok(())
     })?;
@@ -106,9 +108,29 @@ pub(super) fn grind(
     let mut bench = benches.bench();
     let mut encode = |chunk| bench.encode(&benches, &chunk);
     let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
-    let (mut tally, decided, oriented) = std::mem::take(&mut *lock(&total));
+    let Sum { mut tally, decided, oriented, baseline } = std::mem::take(&mut *lock(&total));
     tally.merge(&bench.tally);
-    Ok(Milled { tally, stored, counts, written, by_input, decided, oriented })
+    Ok(Milled { tally, stored, counts, written, by_input, decided, oriented, baseline })
+}
+
+/// What tiles come to, whichever thread milled them.
+#[derive(Default)]
+struct Sum {
+    tally: Tally,
+    decided: u64,
+    oriented: bool,
+    baseline: Option<Baseline>,
+}
+
+impl Sum {
+    fn merge(&mut self, other: &Sum) {
+        self.tally.merge(&other.tally);
+        self.decided += other.decided;
+        self.oriented |= other.oriented;
+        if let (Some(mine), Some(theirs)) = (&mut self.baseline, &other.baseline) {
+            mine.merge(theirs);
+        }
+    }
 }
 
 /// What threads need to encode chunks.
@@ -212,9 +234,7 @@ pub(super) struct Worker<'a> {
     wants_normals: bool,
     /// Where positions are rounded, and unequal coordinates that share one are counted.
     rounded: Option<Rounded<'a>>,
-    pub tally: Tally,
-    decided: u64,
-    oriented: bool,
+    sum: Sum,
 }
 
 impl<'a> Worker<'a> {
@@ -241,20 +261,8 @@ impl<'a> Worker<'a> {
         let rounds = field.lattice.rounds() && sieve.states.is_none();
         let rounded = rounds.then(|| Rounded::new(&field.tiles, job.source.schema()));
         let reach = reach(&job.ops, pass);
-        let tally = Tally::default();
-        let (decided, oriented) = (0, false);
-        Worker {
-            job,
-            pass,
-            loader,
-            reach,
-            neighbors,
-            wants_normals,
-            rounded,
-            tally,
-            decided,
-            oriented,
-        }
+        let sum = Sum::default();
+        Worker { job, pass, loader, reach, neighbors, wants_normals, rounded, sum }
     }
 
     /// Gives no tile a rim that makes it more than `positions`, for a look at a small cube.
@@ -276,8 +284,8 @@ impl<'a> Worker<'a> {
             let stage = &self.job.ops[call.op];
             tile.limits = stage.selection;
             match (&stage.op, call.gathers) {
-                (Op::Scan(op), true) => op.gather(tile, &mut found, &mut self.tally)?,
-                (op, _) => op.tile().run(tile, &mut self.tally)?,
+                (Op::Scan(op), true) => op.gather(tile, &mut found, &mut self.sum.tally)?,
+                (op, _) => op.tile().run(tile, &mut self.sum.tally)?,
             }
         }
         Ok((tile, found))
@@ -293,13 +301,16 @@ impl<'a> Worker<'a> {
                 positions.extend(runs.first().map(|run: &Run| (run.number, count)));
                 Ok(())
             })?;
-            self.tally.count("unequal_coordinates", rounded.count(positions.into_iter())?);
+            self.sum.tally.count("unequal_coordinates", rounded.count(positions.into_iter())?);
         }
-        self.decided += tile.copies[tile.core.clone()].iter().map(|&n| u64::from(n)).sum::<u64>();
-        self.oriented |= tile.oriented;
-        self.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
-        self.tally.work("unproven", tile.around.take_unproven());
-        self.tally.work("tied", tile.around.take_tied());
+        self.sum.decided += tile.copies[tile.core.clone()].iter().map(|&n| u64::from(n)).sum::<u64>();
+        self.sum.oriented |= tile.oriented;
+        self.sum.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
+        self.sum.tally.work("unproven", tile.around.take_unproven());
+        self.sum.tally.work("tied", tile.around.take_tied());
+        if let Some(baseline) = &mut self.sum.baseline {
+            baseline.add(tile);
+        }
         let mut product = Product::of(tile, core, self.pass, self.wants_normals)?;
         product.found = found;
         Ok(product)

@@ -5,6 +5,8 @@ use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use serde_json::Value;
+
 use super::chunks::Found;
 use super::clock::Clock;
 use super::cut::cut;
@@ -18,7 +20,7 @@ use super::shares::{BATCH, Demands, Shares};
 use super::survey::survey;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::{PointBatch, Position};
-use crate::report::{Decision, PassFigures, Tally};
+use crate::report::{Baseline, BaselineFigures, Decision, PassFigures, Tally};
 use crate::stage::{Gathered, ScanFacts, Sink, SinkSummary};
 use crate::tile::{Intake, SealedTiles, Sieve, SpillArea, Tag, TileStore, lock, seal};
 use crate::{Error, Result};
@@ -48,6 +50,7 @@ pub(super) fn mill(
         kept: tiles.points(),
         passes: Vec::new(),
         forecasts: vec![None; job.ops.len()],
+        compared: None,
         written: sinks.iter().map(|_| None).collect(),
         sinks,
     };
@@ -55,7 +58,8 @@ pub(super) fn mill(
         course.run(job, &pass, &field, (shares, demands), &mut tally, clock)?;
     }
     clock.phase("survey", Some(2 * tiles.positions()));
-    let measured = survey(job, lattice, area, &tiles, &course.sieve)?;
+    let mut measured = survey(job, lattice, area, &tiles, &course.sieve)?;
+    measured.totals.baseline = course.baseline(lattice);
     let unwritten = || Error::internal("an output was never written");
     Ok(Finished {
         read: tally.work.remove("read").unwrap_or(0),
@@ -82,10 +86,20 @@ struct Course {
     kept: u64,
     passes: Vec<PassFigures>,
     /// For each stage, what it said is to be expected.
-    forecasts: Vec<Option<Vec<(String, serde_json::Value)>>>,
+    forecasts: Vec<Option<Vec<(String, Value)>>>,
+    /// Grids to compare with, from the first pass that decided by normals.
+    compared: Option<Compared>,
     sinks: Vec<Option<Box<dyn Sink>>>,
     /// For each file of each sink, how many records it was given, and what it said in the end.
     written: Vec<Option<Vec<(u64, SinkSummary)>>>,
+}
+
+/// See [`Course::compared`].
+struct Compared {
+    baseline: Baseline,
+    /// Records that the pass decided about, and that it found.
+    decided: u64,
+    found: u64,
 }
 
 impl Course {
@@ -100,16 +114,28 @@ impl Course {
     ) -> Result<()> {
         let tiles = &field.tiles;
         let sieve = pass.sieve(&self.sieve);
-        let (keys, capacity) = cut(job, pass, field.lattice, shares, demands, tiles)?;
-        let working = job.budget.lease(demands.mill_bytes(capacity as u64), "the mill")?;
         let ahead = |call: &&Call| self.forecasts[call.op].is_none();
         let ops: Vec<usize> = pass.calls.iter().filter(ahead).map(|call| call.op).collect();
-        for (op, foreseen) in forecast(job, pass, &ops, field, &sieve, capacity)? {
+        let mut chosen = Vec::new();
+        for (op, foreseen) in forecast(job, pass, &ops, field, &sieve, demands)? {
             if let Some(warning) = foreseen.warning {
                 job.warn(warning);
             }
-            self.forecasts[op] = Some(foreseen.decisions);
+            let stage = &job.ops[op].kind;
+            let decision = |(name, value): &(String, Value)| Decision {
+                stage: stage.clone(),
+                name: name.clone(),
+                value: value.clone(),
+            };
+            chosen.extend(foreseen.chosen.iter().map(decision));
+            let all = foreseen.chosen.into_iter().chain(foreseen.decisions);
+            self.forecasts[op] = Some(all.collect());
         }
+        if !chosen.is_empty() {
+            job.watch.chose(&chosen);
+        }
+        let (keys, capacity) = cut(job, pass, field.lattice, shares, demands, tiles)?;
+        let working = job.budget.lease(demands.mill_bytes(capacity as u64), "the mill")?;
         clock.phase(
             if pass.gathers().is_some() { "gather" } else { "mill" },
             Some(tiles.positions()),
@@ -146,6 +172,10 @@ impl Course {
         {
             self.written[sink] = Some(vec![outcome]);
         }
+        let (decided, found) = (milled.decided, self.alive);
+        if let (Some(baseline), None) = (milled.baseline, &self.compared) {
+            self.compared = Some(Compared { baseline, decided, found });
+        }
         let stages = pass.calls.iter().map(|call| job.ops[call.op].kind.clone()).collect();
         self.passes.push(PassFigures { stages, before: self.alive, after: milled.counts.alive });
         let stored = milled.stored;
@@ -161,6 +191,13 @@ impl Course {
             Some(op) => conclude(job, op, stored.found, milled.decided),
             None => Ok(()),
         }
+    }
+
+    /// What a grid would have done that leaves as many of the records that the passes decided about.
+    fn baseline(&self, lattice: &Lattice) -> Option<BaselineFigures> {
+        let Compared { baseline, decided, found } = self.compared.as_ref()?;
+        let removed = found.checked_sub(self.alive)?;
+        baseline.figures(decided.checked_sub(removed)?, *decided, lattice)
     }
 }
 
@@ -297,7 +334,7 @@ fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<(
 /// What the stages settled by themselves and what they expected, in their order.
 fn decisions(
     job: &Job<'_>,
-    forecasts: Vec<Option<Vec<(String, serde_json::Value)>>>,
+    forecasts: Vec<Option<Vec<(String, Value)>>>,
 ) -> Vec<Decision> {
     let each = job.ops.iter().zip(forecasts).flat_map(|(stage, expected)| {
         let settled = stage.op.tile().decisions().into_iter().chain(expected.into_iter().flatten());

@@ -96,6 +96,13 @@ impl Pass {
         self.calls.iter().map(|&call| needs(ops, call))
     }
 
+    /// The side of the cells that it decides in by normals, if it does: what a grid of as many points
+    /// is compared with.
+    pub fn compares(&self, ops: &[StageOp]) -> Option<i64> {
+        let by_normals = self.needs(ops).any(|needs| decides_by_normals(&needs));
+        by_normals.then(|| self.needs(ops).map(|needs| needs.cell_side).max().unwrap_or(0))
+    }
+
     /// The stage of this pass that gathers.
     pub fn gathers(&self) -> Option<usize> {
         self.calls.iter().find(|call| call.gathers).map(|call| call.op)
@@ -118,6 +125,11 @@ impl Pass {
 /// True if a stage that needs this takes records away from the passes behind it.
 fn decides(needs: &Needs) -> bool {
     needs.removes || needs.mark.is_some()
+}
+
+/// True if a stage that needs this decides, and reads normals.
+pub(super) fn decides_by_normals(needs: &Needs) -> bool {
+    decides(needs) && needs.reads.iter().any(|column| column == "Normal")
 }
 
 /// Gives stages that are limited to some records a bit each, equal limits the same.

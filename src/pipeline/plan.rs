@@ -13,7 +13,7 @@ use super::text::{Pipeline, PlacedStage, resolved};
 use crate::budget::default_limit;
 use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
-use crate::point::Schema;
+use crate::point::{Schema, Units};
 use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Role, Source, Transform};
 use crate::tile::TAGGED_INPUTS;
 use crate::{Error, ErrorKind, Result};
@@ -83,6 +83,7 @@ impl Pipeline {
         let (each, ranks) = each_input(&*source, &sinks, &settings)?;
         let schema = source.schema();
         check_transforms(&sorted.transforms, schema).map_err(in_file)?;
+        convert_lengths(&mut sorted.ops, &source.metadata().units).map_err(in_file)?;
         let selections = number_selections(&mut sorted.ops).map_err(in_file)?;
         let passes = unroll(&sorted.ops, schema, &taps).map_err(in_file)?;
         let withheld = match sorted.ops.is_empty() {
@@ -251,6 +252,11 @@ fn each_input(
     }
     let folders = each.iter().any(|own| !own.is_empty());
     Ok((each, if folders { ranks(&inputs) } else { Vec::new() }))
+}
+
+/// Converts lengths with a unit of their own to the unit of the scan.
+fn convert_lengths(ops: &mut [StageOp], units: &Units) -> Result<()> {
+    ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().convert(units))
 }
 
 fn check_transforms(transforms: &[(String, Box<dyn Transform>)], schema: &Schema) -> Result<()> {

@@ -1,8 +1,10 @@
 //! How a run divides its memory: what it can tell before any work, as a pure function.
 
+use super::passes::decides_by_normals;
 use super::product::Product;
 use crate::budget::{Bytes, whole_mebibytes};
 use crate::point::Position;
+use crate::report::Baseline;
 use crate::stage::{ChunkSize, Needs, Source};
 use crate::tile::{Fetch, Intake, Loader, Remote, Tag, index_bytes, merge_bytes};
 use crate::{Error, Result, geom::nearest::Nearest};
@@ -129,7 +131,9 @@ impl Demands {
         let batch = points as u64 * (self.stride as u64 + 8 + 12);
         let open = self.sinks.saturating_sub(1) as u64 * points as u64 * 28;
         let chunks = 2 * (bytes + points as u64 * 28);
-        Remote::BYTES + chunks + open + batch + Fetch::bytes(points, self.stride)
+        let by_normals = self.passes.iter().flatten().any(decides_by_normals);
+        let baseline = if by_normals { Baseline::BYTES } else { 0 };
+        Remote::BYTES + baseline + chunks + open + batch + Fetch::bytes(points, self.stride)
     }
 
     /// Bytes that a thread of a stream holds: batches read and waiting for their turn, chunks filled,

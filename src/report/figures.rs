@@ -4,6 +4,7 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
+use super::baseline::BaselineFigures;
 use crate::geom::lattice::Lattice;
 use crate::point::Position;
 
@@ -92,6 +93,8 @@ pub struct Totals {
     pub scan_plane: Pair<Option<PlaneFigures>>,
     /// Of the removed records; None where there are none.
     pub deviation: Option<DeviationTotals>,
+    /// That of a voxel grid of as many points; None where no pass decides by normals.
+    pub baseline: Option<BaselineFigures>,
 }
 
 /// What a pass over the scan left.
