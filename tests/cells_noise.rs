@@ -140,7 +140,7 @@ fn a_forecast_warns_where_scatter_exceeds_the_angle() {
     assert_eq!(stage.forecast(&samples[..1]).warning, None);
     assert!(stage.forecast(&samples[1..2]).decisions.is_empty(), "nothing is planar");
     assert_eq!(stage.forecast(&[]), Default::default());
-    (stage.max_angle, stage.keep) = (None, Some(Keep::Records(9)));
+    (stage.max_angle, stage.keep) = (None, Some(Keep::Records(500)));
     let forecast = stage.forecast(&samples);
     assert_eq!((forecast.decisions.len(), forecast.warning), (1, None));
 }
@@ -183,12 +183,18 @@ fn what_is_auto_follows_from_the_scatter_and_the_number_to_keep() {
     // Between two levels by powers: 128 cubes of 16 / √2.
     let (_, side, spacing, _) = chosen(Some(Keep::Records(128)), 0.1, 1.0);
     assert_eq!((side, spacing), (Some(14.0.into()), Some(8.0.into())));
+    // More than a third of 1,024 positions: cells as small as that may be more than are to stay.
+    let (_, side, spacing, cell) = chosen(Some(Keep::Records(400)), 0.1, 1.0);
+    assert_eq!((side, spacing, cell), (None, Some("none".into()), 32));
     // Half of the positions are decided about: an eighth of those is 64, and nothing is known of
     // their spacing.
     let (_, side, spacing, _) = chosen(Some(Keep::Share(12_500_000)), 0.1, 0.5);
     assert_eq!((side, spacing), (Some(20.0.into()), Some("none".into())));
     let (angle, side, spacing, cell) = chosen(None, 0.1, 1.0);
-    assert_eq!((angle, side, spacing), (Some(0.4.into()), None, Some(f64::from(cell as u32 / 4).into())));
+    assert_eq!(
+        (angle, side, spacing),
+        (Some(0.4.into()), None, Some(f64::from(cell as u32 / 4).into()))
+    );
     assert_eq!(chosen(None, 0.01, 1.0).0, Some(0.1.into()), "the paper's angle at least");
     assert_eq!(chosen(None, 0.9, 1.0).0, Some(1.0.into()), "noise is no reason to lose edges");
     assert_eq!(chosen(None, f64::NAN, 1.0).0, Some(0.1.into()), "nothing is planar");

@@ -214,7 +214,7 @@ fn who_is_exactly_at_the_radius_counts() {
         let mut stage = RadiusOutliers::new(length(within), 1, None).unwrap();
         settle(&mut stage, &scan, 0.1);
         let fates = radius(&scan, scan.len(), &stage);
-        assert_eq!(fates.iter().filter(|f| f.1 == Fate::Kept).count(), kept, "{radius}");
+        assert_eq!(fates.iter().filter(|f| f.1 == Fate::Kept).count(), kept, "{within}");
     }
 }
 

@@ -12,7 +12,8 @@ use crate::pipeline::{Done, Pipeline, Registry, Set};
 const REDUCE: &str = include_str!("../../pipelines/reduce.toml");
 
 /// Behind what `reduce` chose by itself.
-const OTHERWISE: &str = "by the noise and spacing of the scan; --preset paper is the published method";
+const OTHERWISE: &str =
+    "by the noise and spacing of the scan; --preset paper is the published method";
 
 /// The pipeline of `synth`.
 const SYNTH: &str = "\
@@ -103,7 +104,11 @@ fn reduce_sets(arguments: &Reduce) -> Vec<Set> {
         ("--max-angle", "cells.max_angle", arguments.max_angle.as_deref().map(number_or_text)),
         ("--keep", "cells.keep", arguments.keep.as_deref().map(whole_or_text)),
         ("--max-side", "cells.max_side", arguments.max_side.as_deref().map(number_or_text)),
-        ("--min-spacing", "cells.min_spacing", arguments.min_spacing.as_deref().map(number_or_text)),
+        (
+            "--min-spacing",
+            "cells.min_spacing",
+            arguments.min_spacing.as_deref().map(number_or_text),
+        ),
         ("--measure", "cells.measure", arguments.measure.clone().map(Value::from)),
         ("--reference", "cells.reference", arguments.reference.as_deref().map(numbers_or_text)),
         ("--neighbors", "normals.neighbors", arguments.neighbors.as_deref().map(whole_or_text)),

@@ -88,7 +88,7 @@ pub struct Cells {
     /// steps for which occupied cubes hold 32 positions on average; with `keep` also large enough that
     /// there are at most half as many cubes as records are to stay. Or "spread": with `keep` 1.25 sides
     /// of a grid that keeps as many points, so that more than half of them are spread evenly and flat
-    /// regions stay covered; without, the same as "auto".
+    /// regions stay covered; without, or to keep more than a third, the same as "auto".
     pub side: Side,
     /// Largest θ_max − θ_min of a cell (the paper's α): radians from 0 to π, "6deg" or "0.1rad"; or
     /// "auto": four times `normal_scatter`, 0.1 to 1. Not together with `keep`.
@@ -101,8 +101,8 @@ pub struct Cells {
     /// Length beyond which no cell is kept whole.
     pub max_side: Option<Length>,
     /// Length up to which no cell is divided; or "auto": with `keep` 0.75 sides of a grid that keeps as
-    /// many points, without a quarter of `side`, and none where `classes` or flags select some of the
-    /// points; or "none".
+    /// many points, without a quarter of `side`, and none to keep more than a third, or where `classes`
+    /// or flags select some of the points; or "none".
     #[serde(deserialize_with = "Setting::or_none")]
     pub min_spacing: Option<Setting<Length>>,
     /// How a cell is divided.
@@ -269,9 +269,7 @@ impl Cells {
             return Err(("keep", error.help("give one of them")));
         }
         match (self.max_side, self.min_spacing) {
-            (Some(most), Some(Setting::Given(least)))
-                if most.is_less_than(least) =>
-            {
+            (Some(most), Some(Setting::Given(least))) if most.is_less_than(least) => {
                 let told = format!(
                     "`max_side` is {most}, less than `min_spacing`, {least}: cells between the two \
                      would have to be divided and must not be"

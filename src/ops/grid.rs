@@ -283,7 +283,9 @@ mod tests {
             let keys = keyed(&tile, 3);
             assert!(keys.iter().all(|key| key >> 32 == keys[0] >> 32), "{keys:x?}");
             let mut tally = Tally::default();
-            Grid { settled, ..Grid::new(Length::of(3.0).unwrap(), pick) }.run(&mut tile, &mut tally).unwrap();
+            Grid { settled, ..Grid::new(Length::of(3.0).unwrap(), pick) }
+                .run(&mut tile, &mut tally)
+                .unwrap();
             let kept: Vec<bool> = tile.fates.iter().map(|fate| *fate == Fate::Kept).collect();
             let first = pick != Pick::Center;
             assert_eq!(kept, [first, !first, first, !first, true], "{pick:?}");
@@ -297,8 +299,10 @@ mod tests {
             for pick in [Pick::Center, Pick::Median, Pick::First] {
                 let mut tile = Tile::of(vec![[-far; 3], [far; 3]]);
                 let length = 1.0;
-                let grid =
-                    Grid { settled: Some(Settled { steps: side, length }), ..Grid::new(Length::of(1.0).unwrap(), pick) };
+                let grid = Grid {
+                    settled: Some(Settled { steps: side, length }),
+                    ..Grid::new(Length::of(1.0).unwrap(), pick)
+                };
                 grid.run(&mut tile, &mut Tally::default()).unwrap();
                 assert!(tile.fates.iter().all(|fate| *fate == crate::tile::Fate::Kept));
             }

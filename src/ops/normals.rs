@@ -42,8 +42,7 @@ pub const MAX_NEIGHBORS: usize = 64;
 #[serde(deny_unknown_fields, default)]
 pub struct Normals {
     /// How many nearest other positions the fit uses (k), besides the position itself; 3 to 64, or
-    /// `"auto"`: as many as the noise of the scan asks for. The paper finds 6 to 20 useful and 10 best;
-    /// more smooth the noise, and the edges.
+    /// `"auto"`, by the noise. The paper finds 6 to 20 useful and 10 best; more smooth noise and edges.
     #[serde(deserialize_with = "checked_neighbors")]
     pub neighbors: Setting<usize>,
     /// How a normal is estimated.
@@ -190,11 +189,9 @@ fn check_neighbors(neighbors: u64) -> Result<(), String> {
 }
 
 fn checked_neighbors<'de, D: Deserializer<'de>>(from: D) -> Result<Setting<usize>, D::Error> {
-    let Setting::Given(neighbors) = Setting::<u64>::deserialize(from)? else {
-        return Ok(Setting::Auto);
-    };
-    check_neighbors(neighbors).map_err(serde::de::Error::custom)?;
-    Ok(Setting::Given(neighbors as usize))
+    let setting = Setting::<u64>::deserialize(from)?;
+    let given = setting.given().map(|k| check_neighbors(k).map(|()| k as usize)).transpose();
+    Ok(given.map_err(serde::de::Error::custom)?.map_or(Setting::Auto, Setting::Given))
 }
 
 /// How a normal is estimated.
@@ -395,7 +392,8 @@ mod tests {
         assert!(toml::from_str::<Normals>("neighbors = -1").is_err());
         assert!(toml::from_str::<Normals>("neighbours = 10").is_err());
         assert!(toml::from_str::<Normals>("method = \"quadric\"").is_err());
-        let (key, error) = Normals { neighbors: Setting::Given(2), ..Normals::default() }.check().unwrap_err();
+        let (key, error) =
+            Normals { neighbors: Setting::Given(2), ..Normals::default() }.check().unwrap_err();
         assert_eq!((key, &*error.to_string()), ("neighbors", "neighbors must be 3 to 64, not 2"));
     }
 }

@@ -303,7 +303,8 @@ impl<'a> Worker<'a> {
             })?;
             self.sum.tally.count("unequal_coordinates", rounded.count(positions.into_iter())?);
         }
-        self.sum.decided += tile.copies[tile.core.clone()].iter().map(|&n| u64::from(n)).sum::<u64>();
+        self.sum.decided +=
+            tile.copies[tile.core.clone()].iter().map(|&n| u64::from(n)).sum::<u64>();
         self.sum.oriented |= tile.oriented;
         self.sum.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
         self.sum.tally.work("unproven", tile.around.take_unproven());

@@ -332,13 +332,14 @@ fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<(
 }
 
 /// What the stages settled by themselves and what they expected, in their order.
-fn decisions(
-    job: &Job<'_>,
-    forecasts: Vec<Option<Vec<(String, Value)>>>,
-) -> Vec<Decision> {
+fn decisions(job: &Job<'_>, forecasts: Vec<Option<Vec<(String, Value)>>>) -> Vec<Decision> {
     let each = job.ops.iter().zip(forecasts).flat_map(|(stage, expected)| {
-        let settled = stage.op.tile().decisions().into_iter().chain(expected.into_iter().flatten());
-        settled.map(|(name, value)| Decision { stage: stage.kind.clone(), name, value })
+        let mut settled = stage.op.tile().decisions();
+        // What was chosen by samples may be among what is settled.
+        let is_new = |(name, _): &(String, Value)| settled.iter().all(|(other, _)| other != name);
+        let expected: Vec<_> = expected.into_iter().flatten().filter(is_new).collect();
+        settled.extend(expected);
+        settled.into_iter().map(|(name, value)| Decision { stage: stage.kind.clone(), name, value })
     });
     each.collect()
 }

@@ -96,11 +96,12 @@ impl Pass {
         self.calls.iter().map(|&call| needs(ops, call))
     }
 
-    /// The side of the cells that it decides in by normals, if it does: what a grid of as many points
-    /// is compared with.
+    /// The side of the cells that it decides in by normals, if it does: it is compared with grids of
+    /// such sides, whose cubes no face of a tile cuts.
     pub fn compares(&self, ops: &[StageOp]) -> Option<i64> {
         let by_normals = self.needs(ops).any(|needs| decides_by_normals(&needs));
-        by_normals.then(|| self.needs(ops).map(|needs| needs.cell_side).max().unwrap_or(0))
+        let side = self.needs(ops).map(|needs| needs.cell_side).max().filter(|side| *side > 0);
+        side.filter(|_| by_normals)
     }
 
     /// The stage of this pass that gathers.

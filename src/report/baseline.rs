@@ -118,7 +118,8 @@ impl Baseline {
     /// both sides of it, or nothing was measured.
     pub fn figures(&self, kept: u64, decided: u64, lattice: &Lattice) -> Option<BaselineFigures> {
         let wanted = kept as f64 * (self.records as f64 / decided as f64);
-        let fits = |pair: &[Level]| pair[0].cubes as f64 <= wanted && wanted <= pair[1].cubes as f64;
+        let fits =
+            |pair: &[Level]| pair[0].cubes as f64 <= wanted && wanted <= pair[1].cubes as f64;
         let at = self.levels.windows(2).position(fits)?;
         let [coarse, fine] = [&self.levels[at], &self.levels[at + 1]];
         let log = |count: f64| libm::log(count);

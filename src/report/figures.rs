@@ -29,7 +29,7 @@ pub struct PlaneFigures {
 /// How far removed records are from the plane of the point that stands for them, in world units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DeviationFigures {
-    /// Removed records.
+    /// Removed records of which it was measured.
     pub points: u64,
     /// sqrt(Σd²/n).
     pub rms: f64,
@@ -42,7 +42,7 @@ pub struct DeviationFigures {
 /// [`DeviationFigures`] of the whole scan, with percentiles.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DeviationTotals {
-    /// Removed records.
+    /// Removed records of which it was measured.
     pub points: u64,
     /// sqrt(Σd²/n).
     pub rms: f64,

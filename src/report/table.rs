@@ -102,7 +102,10 @@ fn totals_lines(f: &mut fmt::Formatter<'_>, totals: &Totals, result: &Outcome) -
         }
     }
     if rises {
-        write!(f, "\n           (points stay where the surface bends: those lie farther from one plane)")?;
+        write!(
+            f,
+            "\n           (points stay where the surface bends: those lie farther from one plane)"
+        )?;
     }
     Ok(())
 }

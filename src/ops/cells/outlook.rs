@@ -16,6 +16,9 @@ const WIDEST: f64 = 1.0;
 /// Measured by `cargo bench --bench quality`, whose table is in docs/paper.md.
 const SPREAD: f64 = 1.25;
 const SPACING: f64 = 0.75;
+/// Where more than one of so many positions stays, such cells could be more than the points to keep:
+/// they are nearly as small as the distance of neighbours.
+const SPREADABLE: u64 = 3;
 /// Without a number to keep: `min_spacing` in sides of the initial cells.
 const SPACING_OF_SIDE: f64 = 0.25;
 
@@ -74,7 +77,9 @@ pub(super) fn choose(cells: &mut Cells, sampled: &Sampled) -> Vec<(String, Value
     }
     // Of a selection no more is known than its share: its cubes are at most those of all.
     let records = (outlook.records as f64 * sampled.chosen) as u64;
-    let grid = cells.keep.map(|keep| outlook.grid_side(keep.of(records.max(1))));
+    let count = cells.keep.map(|keep| keep.of(records.max(1)));
+    let is_few = |count: &u64| *count <= outlook.levels.positions() / SPREADABLE;
+    let grid = count.filter(is_few).map(|count| outlook.grid_side(count));
     if let (Side::Spread, Some(grid)) = (cells.side, grid) {
         settled.steps = ((SPREAD * grid) as i64).clamp(1, LARGEST_SIDE);
         settled.length = settled.steps as f64 * outlook.step;
@@ -84,6 +89,7 @@ pub(super) fn choose(cells: &mut Cells, sampled: &Sampled) -> Vec<(String, Value
         let spacing = match grid {
             _ if sampled.chosen < 1.0 => 0.0,
             Some(grid) => SPACING * grid,
+            None if count.is_some() => 0.0,
             None => SPACING_OF_SIDE * settled.steps as f64,
         };
         settled.min_spacing = (spacing as u64).min(settled.max_side);

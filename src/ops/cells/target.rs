@@ -192,7 +192,8 @@ mod tests {
 
     #[test]
     fn a_share_without_its_sign_is_asked_about() {
-        for (text, share) in [("0.1", "10%"), ("'0.1'", "10%"), ("0.07", "7%"), ("2.5e-3", "0.25%")] {
+        for (text, share) in [("0.1", "10%"), ("'0.1'", "10%"), ("0.07", "7%"), ("2.5e-3", "0.25%")]
+        {
             let refusal = toml::from_str::<Cells>(&format!("keep = {text}")).unwrap_err();
             let asked = format!("did you mean \"{share}\"");
             assert!(refusal.to_string().contains(&asked), "{text}: {refusal}");
