@@ -7,6 +7,7 @@ use std::time::Instant;
 use pointmill::geom::lattice::Lattice;
 use pointmill::ops::{Cells, Median, Side, Split};
 use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
+use pointmill::quantity::Length;
 use pointmill::report::Tally;
 use pointmill::stage::{ScanFacts, TileOp};
 use pointmill::tile::{Fate, Levels, Tile, TileKey, morton_cmp};
@@ -50,7 +51,7 @@ fn plane(roughness: f64) -> Tile {
 
 fn settled(side: i64, split: Split, tile: &Tile) -> Cells {
     let mut stage = Cells::default();
-    (stage.side, stage.split) = (Side::Length(side as f64), split);
+    (stage.side, stage.split) = (Side::Length(Length::of(side as f64).unwrap()), split);
     let axes = ["X", "Y", "Z"].iter().zip([0, 8, 16]);
     let schema = Schema {
         layout: Layout::Ply,

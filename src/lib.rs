@@ -65,6 +65,7 @@
 //!   right. Its [`ErrorKind`] decides the exit code.
 //! - [`point`]: points side by side. A [`PointBatch`](point::PointBatch) holds records as their file's
 //!   own bytes; a [`Schema`](point::Schema) says where in them a dimension is, and reads it by name.
+//! - [`quantity`]: counts, angles and lengths as people write them.
 //! - [`geom`]: geometry on plain slices. The [`lattice`](geom::lattice) makes coordinates integers, so
 //!   that every decision is exact; [`nearest`](geom::nearest) finds neighbours, [`star`](geom::star),
 //!   [`plane`](geom::plane) and [`angle`](geom::angle) make normals of them and compare these.
@@ -93,6 +94,7 @@ pub mod io;
 pub mod ops;
 pub mod pipeline;
 pub mod point;
+pub mod quantity;
 pub mod report;
 pub mod stage;
 pub mod tile;

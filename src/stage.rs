@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::Result;
 use crate::geom::lattice::Lattice;
-use crate::point::{Bounds, Mark, Metadata, PointBatch, Schema};
+use crate::point::{Bounds, Mark, Metadata, PointBatch, Schema, Units};
 use crate::report::Tally;
 use crate::tile::{Levels, Tile};
 
@@ -124,6 +124,12 @@ pub trait TileOp: Send + Sync {
     /// What it needs; asked again after [`settle`](TileOp::settle).
     fn needs(&self) -> Needs;
 
+    /// Called once, when the headers are read: lengths that were given with a unit of their own are
+    /// converted to the scan's.
+    fn convert(&mut self, _units: &Units) -> Result<()> {
+        Ok(())
+    }
+
     /// Called once, after the decode and before the first tile, with what is known of the whole
     /// scan: the place to fix figures that depend on it.
     fn settle(&mut self, _scan: &ScanFacts) -> Result<()> {
@@ -147,10 +153,10 @@ pub trait TileOp: Send + Sync {
         Vec::new()
     }
 
-    /// True if it wants to look at a sample of the scan, after `settle` and before the first tile, to
-    /// say what is to be expected.
-    fn wants_sample(&self) -> bool {
-        false
+    /// The side in lattice steps of what it decides together, if it wants to look at samples of the scan
+    /// a few times as wide, after `settle` and before the first tile.
+    fn sample_side(&self) -> Option<i64> {
+        None
     }
 
     /// Called for each of a few hundred small cubes, spread evenly over the records, in order, after
@@ -159,7 +165,9 @@ pub trait TileOp: Send + Sync {
         Ok(Vec::new())
     }
 
-    /// Says what is to be expected of the whole scan, a function of what the samples said, in order.
+    /// Says what is to be expected of the whole scan, a function of what the samples said, in order, and
+    /// fixes what depends on it: the pass is cut into tiles afterwards, and [`needs`](TileOp::needs) is
+    /// asked again. It may not need more bytes or neighbours than it said before.
     fn forecast(&mut self, _samples: &[Vec<f64>]) -> Forecast {
         Forecast::default()
     }
@@ -170,6 +178,8 @@ pub trait TileOp: Send + Sync {
 pub struct Forecast {
     /// Figures for the report: name and value.
     pub decisions: Vec<(String, serde_json::Value)>,
+    /// The values of its keys that it chose by them: key and value. They go into the report, too.
+    pub chosen: Vec<(String, serde_json::Value)>,
     /// What the user should hear before the run.
     pub warning: Option<String>,
 }

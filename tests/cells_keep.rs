@@ -36,7 +36,7 @@ fn target(stage: &Cells, keep: Keep) -> Cells {
 
 fn angle(stage: &Cells, max_angle: Option<f64>) -> Cells {
     let mut stage = stage.clone();
-    stage.max_angle = max_angle;
+    stage.max_angle = max_angle.and_then(radians);
     stage
 }
 
@@ -88,7 +88,8 @@ fn any_stage() -> impl Strategy<Value = Cells> {
         prop::sample::select(vec![(None, None), (Some(2.0), Some(6.0)), (None, Some(4.0))]);
     (side, split, measure, bounds, 1usize..3).prop_map(|(side, split, measure, bounds, least)| {
         let mut stage = cells(side as f64, 0.1, split);
-        (stage.min_spacing, stage.max_side) = bounds;
+        stage.min_spacing = bounds.0.map(length).map(spacing);
+        stage.max_side = bounds.1.map(length);
         (stage.measure, stage.min_points) = (measure, least.try_into().unwrap());
         stage
     })

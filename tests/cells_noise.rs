@@ -4,8 +4,9 @@
 mod cells_scene;
 
 use cells_scene::*;
-use pointmill::ops::{Cells, Keep, Split};
+use pointmill::ops::{Cells, Keep, Side, Split};
 use pointmill::point::Position;
+use pointmill::quantity::{Angle, Setting};
 use pointmill::stage::TileOp;
 
 /// A number in [−1, 1) that looks random.
@@ -39,7 +40,9 @@ fn surface(
 /// What the stage says of the scan as one sample.
 fn sample(stage: &Cells, scan: &[Point]) -> [f64; 3] {
     let mut tile = tile(scan, whole(scan).cube(), 0);
-    stage.sample(&mut tile).unwrap().try_into().unwrap()
+    let [scatter, kept, of, decided, seen] = stage.sample(&mut tile).unwrap()[..] else { panic!() };
+    assert_eq!(decided, seen, "all are decided about");
+    [scatter, kept, of]
 }
 
 fn stage(scan: &[Point], side: f64) -> Cells {
@@ -117,24 +120,82 @@ fn a_forecast_warns_where_scatter_exceeds_the_angle() {
     let plane = surface(|_, _| 0, |_, _| [0.0; 2], 0.0);
     let mut stage = stage(&plane, 32.0);
     let samples: Vec<Vec<f64>> = [(0.08, 10.0), (f64::NAN, 90.0), (0.141_234, 40.0), (0.3, 68.0)]
-        .map(|(scatter, kept)| vec![scatter, kept, 100.0])
+        .map(|(scatter, kept)| vec![scatter, kept, 100.0, 1.0, 1.0])
         .into();
     let forecast = stage.forecast(&samples);
     assert_eq!(forecast.decisions, [("normal_scatter".to_owned(), 0.1412.into())]);
     assert_eq!(
         forecast.warning.as_deref(),
         Some(
-            "normals scatter 0.14 rad, above max_angle 0.1: expect about 52 % of the points to \
-             stay; raise neighbors or max_angle, or use --keep"
+            "normals scatter 0.14 rad, above `cells.max_angle = 0.1`: expect about 52 % of the points \
+             to stay; raise `normals.neighbors` or `cells.max_angle`, or give `cells.keep`"
         )
     );
-    stage.max_angle = Some(0.15);
+    stage.max_angle = radians(0.15);
     assert_eq!(stage.forecast(&samples).warning, None);
-    stage.max_angle = Some(0.1);
+    stage.max_angle = Some(Angle::degrees(6.0).unwrap().into());
+    let told = stage.forecast(&samples).warning.unwrap();
+    assert!(told.contains("8.1deg, above `cells.max_angle = \"6deg\"`"), "{told}");
+    stage.max_angle = radians(0.1);
     assert_eq!(stage.forecast(&samples[..1]).warning, None);
     assert!(stage.forecast(&samples[1..2]).decisions.is_empty(), "nothing is planar");
     assert_eq!(stage.forecast(&[]), Default::default());
-    (stage.max_angle, stage.keep) = (None, Some(Keep::Records(9)));
+    (stage.max_angle, stage.keep) = (None, Some(Keep::Records(500)));
     let forecast = stage.forecast(&samples);
     assert_eq!((forecast.decisions.len(), forecast.warning), (1, None));
+}
+
+#[test]
+fn so_few_points_that_a_percent_sign_may_be_missing_are_warned_of() {
+    let plane = surface(|_, _| 0, |_, _| [0.0; 2], 0.0);
+    let warning = |keep: Keep| {
+        let mut stage = Cells::default();
+        stage.keep = Some(keep);
+        settle(stage, &plane).forecast(&[]).warning
+    };
+    let told = warning(Keep::Records(10)).unwrap();
+    assert!(told.contains("leaves 10 of 1,024 points") && told.contains("\"10%\""), "{told}");
+    assert_eq!(warning(Keep::Records(11)), None, "more than a hundredth");
+    assert_eq!(warning(Keep::Share(10_000_000)), None);
+}
+
+#[test]
+fn what_is_auto_follows_from_the_scatter_and_the_number_to_keep() {
+    let plane = surface(|_, _| 0, |_, _| [0.0; 2], 0.0);
+    let chosen = |keep: Option<Keep>, scatter: f64, decided: f64| {
+        let mut stage = Cells::default();
+        (stage.side, stage.keep, stage.min_spacing) = (Side::Spread, keep, Some(Setting::Auto));
+        if keep.is_none() {
+            stage.max_angle = Some(Setting::Auto);
+        }
+        let mut stage = settle(stage, &plane);
+        let forecast = stage.forecast(&[vec![scatter, 0.0, 0.0, decided, 1.0]]);
+        let value = |key: &str| {
+            let found = forecast.chosen.iter().find(|(name, _)| name == key);
+            found.map(|(_, value)| value.clone())
+        };
+        (value("max_angle"), value("side"), value("min_spacing"), stage.needs().cell_side)
+    };
+    // A square of 32 × 32 positions, 4 steps apart: 8 × 8 cubes of side 16 are 64, and those of 1.25
+    // sides are as wide as 20 steps.
+    let (angle, side, spacing, cell) = chosen(Some(Keep::Records(64)), 0.1, 1.0);
+    assert_eq!((angle, side, spacing, cell), (None, Some(20.0.into()), Some(12.0.into()), 20));
+    // Between two levels by powers: 128 cubes of 16 / √2.
+    let (_, side, spacing, _) = chosen(Some(Keep::Records(128)), 0.1, 1.0);
+    assert_eq!((side, spacing), (Some(14.0.into()), Some(8.0.into())));
+    // More than a third of 1,024 positions: cells as small as that may be more than are to stay.
+    let (_, side, spacing, cell) = chosen(Some(Keep::Records(400)), 0.1, 1.0);
+    assert_eq!((side, spacing, cell), (None, Some("none".into()), 32));
+    // Half of the positions are decided about: an eighth of those is 64, and nothing is known of
+    // their spacing.
+    let (_, side, spacing, _) = chosen(Some(Keep::Share(12_500_000)), 0.1, 0.5);
+    assert_eq!((side, spacing), (Some(20.0.into()), Some("none".into())));
+    let (angle, side, spacing, cell) = chosen(None, 0.1, 1.0);
+    assert_eq!(
+        (angle, side, spacing),
+        (Some(0.4.into()), None, Some(f64::from(cell as u32 / 4).into()))
+    );
+    assert_eq!(chosen(None, 0.01, 1.0).0, Some(0.1.into()), "the paper's angle at least");
+    assert_eq!(chosen(None, 0.9, 1.0).0, Some(1.0.into()), "noise is no reason to lose edges");
+    assert_eq!(chosen(None, f64::NAN, 1.0).0, Some(0.1.into()), "nothing is planar");
 }

@@ -35,8 +35,8 @@ fn any_reference() -> impl Strategy<Value = Reference> {
 
 /// A least spacing and a largest side, in this order.
 fn any_lengths() -> impl Strategy<Value = (Option<f64>, Option<f64>)> {
-    let length = || 1i64..30;
-    (any::<bool>(), any::<bool>(), length(), length()).prop_map(|(has_least, has_most, a, b)| {
+    let steps = || 1i64..30;
+    (any::<bool>(), any::<bool>(), steps(), steps()).prop_map(|(has_least, has_most, a, b)| {
         let (least, most) = (a.min(b) as f64, a.max(b) as f64);
         (has_least.then_some(least), has_most.then_some(most))
     })
@@ -58,7 +58,8 @@ proptest! {
         let mut stage = cells(side as f64, delta, split);
         stage.min_points = NonZeroUsize::new(min_points).unwrap();
         (stage.measure, stage.reference) = (measure, reference);
-        (stage.min_spacing, stage.max_side) = bounds;
+        stage.min_spacing = bounds.0.map(length).map(spacing);
+        stage.max_side = bounds.1.map(length);
         let plain = plain_groups(&scan, &stage, side);
         let outcome = run_whole(stage.clone(), &scan);
         let positions = |g: &Vec<Point>| g.iter().map(|p| p.at).collect::<Vec<_>>();
@@ -247,7 +248,7 @@ fn no_cell_longer_than_max_side_is_kept_whole() {
     let mut stage = cells(1e6, 0.1, Split::Voronoi);
     stage.min_points = NonZeroUsize::new(1000).unwrap();
     assert_eq!(run_whole(stage.clone(), &plane).groups.len(), 1);
-    stage.max_side = Some(50.0);
+    stage.max_side = Some(length(50.0));
     let outcome = run_whole(stage.clone(), &plane);
     let groups = outcome.groups.len();
     assert!(lengths(&outcome).iter().all(|&length| length <= 50));
@@ -257,7 +258,7 @@ fn no_cell_longer_than_max_side_is_kept_whole() {
     assert!(divided < groups as u64 && groups as u64 <= 3 * divided + 1, "{divided}, {groups}");
     // A part of two sides of a ridge is divided by its angles, however long.
     let ridge = grid(2, |x, _| if x == 0 { [0.6, 0.0, 0.8] } else { [-0.6, 0.0, 0.8] });
-    (stage.max_side, stage.min_points) = (Some(9.0), NonZeroUsize::MIN);
+    (stage.max_side, stage.min_points) = (Some(length(9.0)), NonZeroUsize::MIN);
     let outcome = run_whole(stage, &ridge);
     assert_eq!((outcome.groups.len(), outcome.count("cells_by_max_side")), (4, 0));
 }
@@ -267,7 +268,7 @@ fn no_cell_of_min_spacing_is_divided() {
     let rough = grid(32, |x, y| if (x + y) % 2 == 0 { [0.6, 0.0, 0.8] } else { [-0.6, 0.0, 0.8] });
     let mut stage = cells(1e6, 0.1, Split::Octant);
     assert_eq!(run_whole(stage.clone(), &rough).groups.len(), 1024);
-    stage.min_spacing = Some(70.0);
+    stage.min_spacing = Some(spacing(length(70.0)));
     let outcome = run_whole(stage.clone(), &rough);
     assert!(lengths(&outcome).iter().all(|&length| length <= 70));
     assert_eq!(outcome.count("cells_by_min_spacing"), outcome.groups.len() as u64);
@@ -294,7 +295,7 @@ fn cones_see_what_turns_about_the_reference() {
     // Rows of one normal are 0.02 rad apart: a cone of 0.1 holds at most 6 of them.
     assert!(outcome.groups.iter().all(|g| g.iter().all(|p| (p[1] - g[0][1]).abs() <= 50)));
     // Normals that agree are in one cone even of angle 0, rounded as they are.
-    stage.max_angle = Some(0.0);
+    stage.max_angle = radians(0.0);
     let tilted = grid(20, |x, _| {
         let n = [0.267_261_24, 0.534_522_5, 0.801_783_7f32];
         if x % 2 == 0 { n } else { n.map(|v| -v) }

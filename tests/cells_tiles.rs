@@ -42,7 +42,9 @@ proptest! {
     ) {
         let mut stage = cells(side as f64, delta, split);
         stage.measure = measure;
-        (stage.min_spacing, stage.max_side) = bounds.unzip();
+        let bounds = bounds.unzip();
+        stage.min_spacing = bounds.0.map(length).map(spacing);
+        stage.max_side = bounds.1.map(length);
         let crossing = same_for_every_cut(stage, &scan, most)?;
         prop_assume!(crossing > 0);
     }

@@ -69,9 +69,11 @@ fn defaults_in_the_help_are_those_of_the_pipeline() {
     let help = pointmill(at.path(), &["reduce", "--help"]).stdout;
     let file = include_str!("../pipelines/reduce.toml");
     for (flag, key, default) in [
-        ("--max-angle", "max_angle", "0.1"),
-        ("--neighbors", "neighbors", "10"),
-        ("--side", "side", "auto"),
+        ("--max-angle", "max_angle", "auto"),
+        ("--neighbors", "neighbors", "auto"),
+        ("--side", "side", "spread"),
+        ("--min-spacing", "min_spacing", "auto"),
+        ("--measure", "measure", "cone"),
         ("--min-points", "min_points", "1"),
         ("--split", "split", "voronoi"),
         ("--method", "method", "varady"),

@@ -99,10 +99,12 @@ fn sort_of(subject: &str, field: &Field, files: &[String]) -> (String, Option<En
     let plain = inner.unwrap_or(&field.kind);
     let said = match (subject, field.name.as_str(), plain) {
         ("read", "path", _) => "text, or a list of texts",
-        ("cells", "side", _) => "a length, or `\"auto\"`",
-        ("cells", "max_angle", _) => "a number of radians, or text with a unit",
+        ("normals", "neighbors", _) => "a whole number, or `\"auto\"`",
+        ("cells", "side", _) => "a length, `\"auto\"` or `\"spread\"`",
+        ("cells", "max_angle", _) => "radians, text such as `\"6deg\"`, or `\"auto\"`",
         ("cells", "keep", _) => "a share such as `\"10%\"`, or a number such as `\"250k\"`",
-        ("cells", "max_side" | "min_spacing", _) => "a length",
+        ("cells", "min_spacing", _) => "a length, `\"auto\"` or `\"none\"`",
+        (_, _, "Length") => "a length: a number in the scan's unit, or such as `\"2m\"`",
         ("cells", "reference", _) => "`\"x\"`, `\"y\"`, `\"z\"`, or three numbers",
         ("write", "scale", _) => "a number, or three",
         ("run", "z_scale", _) => "a number, or `\"auto\"`",

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use pointmill::ops::{Grid, Pick};
 use pointmill::point::{Bounds, Position};
+use pointmill::quantity::Length;
 use pointmill::report::Tally;
 use pointmill::stage::TileOp;
 use pointmill::tile::{Fate, Tile, morton_cmp};
@@ -17,7 +18,7 @@ use stages_support::*;
 const PICKS: [Pick; 3] = [Pick::Center, Pick::Median, Pick::First];
 
 fn settled(side: f64, pick: Pick, scan: &[Position], step: f64) -> Grid {
-    let mut stage = Grid::new(side, pick);
+    let mut stage = Grid::new(Length::of(side).unwrap(), pick);
     settle(&mut stage, scan, step);
     stage
 }
@@ -152,6 +153,35 @@ fn with_normals_the_deviation_is_from_the_plane_of_the_point_that_stays() {
         };
         assert_eq!(fate, expected, "{p:?}");
     }
+}
+
+#[test]
+fn without_normals_the_deviation_is_from_the_least_squares_plane_of_the_cube() {
+    // On x + z = 7 but for one, which is above; the cube around 12 has too few, that around 20 a line.
+    let plane = [[0, 0, 7], [7, 0, 0], [0, 7, 7], [7, 7, 0], [3, 3, 4], [4, 4, 3]];
+    let line = [[20, 20, 20], [21, 21, 21], [22, 22, 22], [23, 23, 23]];
+    let few = [[12, 12, 12], [13, 12, 12], [12, 13, 12]];
+    let scan = sorted(plane.into_iter().chain(line).chain(few));
+    let stage = settled(8.0, Pick::Center, &scan, 1.0);
+    let (fates, tally) = run(&stage, &scan, &cubes(&scan, 99), &|_| ());
+    assert_eq!(removed(&tally, "grid", "represented"), 5 + 3 + 2);
+    for (p, fate) in &fates {
+        match fate {
+            Fate::Represented { deviation } => {
+                assert!(plane.contains(p) && *deviation < 1e-6, "{p:?}: {deviation}");
+            }
+            Fate::Removed => assert!(!plane.contains(p), "{p:?}"),
+            _ => {}
+        }
+    }
+    let measured = fates.iter().filter(|f| matches!(f.1, Fate::Represented { .. })).count();
+    assert_eq!(measured, 5, "of a line and of three positions no deviation is known");
+    // One of them 3 above the plane: what is not the plane is not called 0.
+    let bent = sorted(plane.map(|p| if p == [7, 7, 0] { [7, 7, 3] } else { p }));
+    let (fates, _) = run(&settled(8.0, Pick::First, &bent, 1.0), &bent, &cubes(&bent, 99), &|_| ());
+    let far =
+        |f: &(Position, Fate)| matches!(f.1, Fate::Represented { deviation } if deviation > 0.3);
+    assert!(fates.iter().any(far), "{fates:?}");
 }
 
 #[test]

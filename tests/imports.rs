@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 const LAYERS: [&[&str]; 9] = [
     &["error"],
     &["point"],
-    &["geom", "budget"],
+    &["geom", "quantity", "budget"],
     &["tile"],
     &["report"],
     &["stage"],

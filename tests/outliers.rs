@@ -7,6 +7,7 @@ mod stages_support;
 use pointmill::Result;
 use pointmill::ops::outliers::{RadiusOutliers, StatisticalOutliers};
 use pointmill::point::{Bounds, Mark, Position};
+use pointmill::quantity::Length;
 use pointmill::report::Tally;
 use pointmill::stage::{Gathered, ScanOp, TileOp};
 use pointmill::tile::{Fate, morton_cmp};
@@ -179,6 +180,10 @@ fn radius(scan: &[Position], most: usize, stage: &RadiusOutliers) -> Vec<(Positi
     all
 }
 
+fn length(radius: f64) -> Length {
+    Length::of(radius).unwrap()
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
     #[test]
@@ -187,7 +192,7 @@ proptest! {
         tenths in 1u32..60, least in 1usize..7,
     ) {
         let scan = sorted(points);
-        let mut stage = RadiusOutliers::new(f64::from(tenths) / 10.0, least, None).unwrap();
+        let mut stage = RadiusOutliers::new(length(f64::from(tenths) / 10.0), least, None).unwrap();
         settle(&mut stage, &scan, 0.1);
         let within = i128::from(tenths * tenths);
         let expected: Vec<(Position, Fate)> = scan
@@ -205,11 +210,11 @@ proptest! {
 #[test]
 fn who_is_exactly_at_the_radius_counts() {
     let scan = sorted([[0, 0, 0], [3, 0, 0], [100, 0, 0], [104, 0, 0]]);
-    for (length, kept) in [(0.299, 0), (0.3, 2), (0.399_999, 2), (0.4, 4)] {
-        let mut stage = RadiusOutliers::new(length, 1, None).unwrap();
+    for (within, kept) in [(0.299, 0), (0.3, 2), (0.399_999, 2), (0.4, 4)] {
+        let mut stage = RadiusOutliers::new(length(within), 1, None).unwrap();
         settle(&mut stage, &scan, 0.1);
         let fates = radius(&scan, scan.len(), &stage);
-        assert_eq!(fates.iter().filter(|f| f.1 == Fate::Kept).count(), kept, "{length}");
+        assert_eq!(fates.iter().filter(|f| f.1 == Fate::Kept).count(), kept, "{within}");
     }
 }
 

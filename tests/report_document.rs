@@ -8,9 +8,9 @@ use std::path::Path;
 
 use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
 use pointmill::report::{
-    ClassFigures, Decision, DeviationFigures, DeviationTotals, FileFigures, LatticeFigures, Ledger,
-    Machine, Outcome, Pair, Phase, PlaneFigures, Report, RunFigures, Tally, TileFigures, Totals,
-    result_bytes,
+    BaselineFigures, ClassFigures, Decision, DeviationFigures, DeviationTotals, FileFigures,
+    LatticeFigures, Ledger, Machine, Outcome, Pair, Phase, PlaneFigures, Report, RunFigures, Tally,
+    TileFigures, Totals, result_bytes,
 };
 use serde_json::{Value, json};
 
@@ -45,6 +45,7 @@ fn report(tiles: u64) -> Report {
             max: 0.08,
             at: [1.5, 2.5, 3.25],
         }),
+        baseline: Some(BaselineFigures { side: 0.25, points: 9_000, rms: 0.005, p95: 0.0123 }),
     };
     let result = Outcome {
         pipeline: json!({"stage": [{"kind": "read", "path": ["line\n,\n\"run\": "]}]}),
@@ -181,9 +182,11 @@ classes    2 ground           1,500,000 → 75,000 (5.0 %)
            5 high vegetation  499,000 → 49,900 (10.0 %)
            65                 1,000 → 1,000 (100.0 %)
 cells      812,300
+deviation  RMS 0.00400, 95 % ≤ 0.00900, max 0.0800 at (1.5, 2.5, 3.25)
+baseline   RMS 0.00500, 95 % ≤ 0.0123: a voxel grid of as many points, cubes of 0.250
 plane RMS  in tiles 0.0123
            whole scan 4.00 → 4.50
-deviation  RMS 0.00400, 95 % ≤ 0.00900, max 0.0800 at (1.5, 2.5, 3.25)
+           (points stay where the surface bends: those lie farther from one plane)
 memory     231 MiB at most, budget 256 MiB
 time       12.3 s: decode 4.1, mill 8.2
 spill      1.5 GiB

@@ -8,11 +8,12 @@ use clap_complete::Shell;
 
 use serde_json::Value;
 
+use super::preset::Preset;
 use super::words::{Flag, flags};
 use crate::Result;
 use crate::error::nearest;
 use crate::pipeline::{MOST_THREADS, parse_bytes};
-use crate::point::parse_count;
+use crate::quantity::parse_count;
 
 const EXIT_CODES: &str = "\
 Exit codes:
@@ -212,27 +213,39 @@ pub(super) struct Reduce {
     /// Format: las, laz or ply [default: by extension; in a folder, that of each input]
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
-    /// Largest range of normal angles in a cell, in radians or as 6deg [default: 0.1]
+    /// Settings for a kind of scan, or those of the published method (paper); other options take the
+    /// place of a preset's [default: by the noise and the spacing of the scan, which the run tells]
+    #[arg(long, value_name = "KIND")]
+    pub preset: Option<Preset>,
+    /// Largest range of normal angles in a cell: radians, 6deg, or auto, by the noise [default: auto]
     #[arg(long, value_name = "ANGLE")]
     pub max_angle: Option<String>,
-    /// Instead of an angle: how many points are to stay, such as 10% or 5M
+    /// Instead of an angle: how many points are to stay, such as 10%, 250k or 1e6
     #[arg(long, value_name = "TARGET", conflicts_with = "max_angle")]
     pub keep: Option<String>,
-    /// Nearest other positions that a normal is computed from [default: 10]
-    #[arg(long, value_name = "K", value_parser = parse_whole)]
-    pub neighbors: Option<u64>,
-    /// Side of the cells before any split, in the scan's unit [default: auto]
+    /// Nearest other positions that a normal is computed from; auto takes 10 or, where there is noise,
+    /// 20 [default: auto]
+    #[arg(long, value_name = "K")]
+    pub neighbors: Option<String>,
+    /// Side of the cells before any split: a length, auto, or spread evenly [default: spread]
     #[arg(long, value_name = "SIDE")]
     pub side: Option<String>,
     /// A cell with this many points or fewer is not split [default: 1]
     #[arg(long, value_name = "N", value_parser = parse_whole)]
     pub min_points: Option<u64>,
-    /// Largest side of a cell that is kept whole, in the scan's unit [default: none]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_number)]
-    pub max_side: Option<f64>,
-    /// No cell of this length or less is split, in the scan's unit [default: none]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_number)]
-    pub min_spacing: Option<f64>,
+    /// Largest side of a cell that is kept whole, in the scan's unit or as 2m [default: none]
+    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
+    pub max_side: Option<String>,
+    /// No cell of this length or less is split: in the scan's unit, as 5cm, auto or none [default: auto]
+    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
+    pub min_spacing: Option<String>,
+    /// What the angles of a cell are measured to: axis, one direction for all, or cone, the cell's own
+    /// [default: cone]
+    #[arg(long, value_name = "HOW")]
+    pub measure: Option<String>,
+    /// The direction of `--measure axis`: x, y, z or a vector such as 0,0,1 [default: x]
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
+    pub reference: Option<String>,
     /// How a cell is split: voronoi or octant [default: voronoi]
     #[arg(long, value_name = "HOW")]
     pub split: Option<String>,

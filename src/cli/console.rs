@@ -5,6 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
+use serde_json::Value;
+
 use super::arguments::{Command, Progress};
 use super::events::Events;
 use super::progress::Bars;
@@ -12,6 +14,7 @@ use super::words::Words;
 use super::{interrupt, print};
 use crate::error::shown;
 use crate::pipeline::{Done, Plan, Watch};
+use crate::report::{Decision, Short};
 use crate::{Error, Result};
 
 /// Where all that a command says goes through; called from several threads.
@@ -24,6 +27,8 @@ pub(super) struct Console {
     phase: Mutex<Option<(&'static str, Instant)>>,
     /// Set by Ctrl-C, once a run listens to it.
     interrupted: OnceLock<Arc<AtomicBool>>,
+    /// Said behind what a run chose by itself.
+    hint: OnceLock<&'static str>,
 }
 
 /// An error in the words of a command.
@@ -75,12 +80,18 @@ impl Console {
             verbose: common.is_some_and(|common| common.verbose),
             phase: Mutex::new(None),
             interrupted: OnceLock::new(),
+            hint: OnceLock::new(),
         }
     }
 
     /// From now on Ctrl-C asks the run to stop, rather than ending the process.
     pub fn hear_interrupts(&self) {
         self.interrupted.get_or_init(interrupt::flag);
+    }
+
+    /// Behind what a run chooses by itself, say this.
+    pub fn hint(&self, hint: &'static str) {
+        self.hint.get_or_init(|| hint);
     }
 
     /// Prints a result on stdout, unless nothing is wanted there.
@@ -138,6 +149,15 @@ impl Console {
     }
 }
 
+/// A value in as many digits as say something to a reader.
+fn in_short(value: &Value) -> String {
+    match (value, value.as_f64()) {
+        (Value::String(text), _) => text.clone(),
+        (_, Some(number)) if number.fract() != 0.0 => Short(number).to_string(),
+        _ => value.to_string(),
+    }
+}
+
 impl Watch for Console {
     fn phase(&self, name: &'static str, total: Option<u64>) {
         self.end();
@@ -168,6 +188,19 @@ impl Watch for Console {
             _ if self.quiet => {}
             Voice::Json(events) => events.warn(message),
             Voice::Text(bars) => bars.beside(|| print::warning(message)),
+        }
+    }
+
+    fn chose(&self, values: &[Decision]) {
+        match &self.voice {
+            _ if self.quiet => {}
+            Voice::Json(events) => events.chose(values),
+            Voice::Text(bars) => {
+                let each = values.iter().map(|d| format!("{} {}", d.name, in_short(&d.value)));
+                let all = each.chain(self.hint.get().map(|hint| (*hint).to_owned()));
+                let line = all.collect::<Vec<String>>().join(", ");
+                bars.beside(|| print::message(format_args!("chosen   {line}")));
+            }
         }
     }
 

@@ -11,6 +11,7 @@ use super::console::Told;
 use super::{exit_number, print};
 use crate::ErrorKind;
 use crate::pipeline::{Done, Outline};
+use crate::report::Decision;
 
 /// Least time between two events of progress.
 const EVERY: Duration = Duration::from_millis(250);
@@ -75,6 +76,11 @@ impl Events {
     /// Something the user should know.
     pub fn warn(&self, message: &str) {
         self.tell("warning", json!({ "message": message }));
+    }
+
+    /// Stages chose values of keys by what they saw of the scan.
+    pub fn chose(&self, values: &[Decision]) {
+        self.tell("chosen", json!({ "values": values }));
     }
 
     /// A run is done and its outputs are in place.

@@ -11,6 +11,7 @@ mod describe;
 mod events;
 mod help;
 mod interrupt;
+mod preset;
 mod print;
 mod progress;
 mod run;

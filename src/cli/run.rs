@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use super::arguments::{Axes, Common, Filtered, Reduce, Run, Synth, Written};
 use super::console::Console;
+use super::preset::Preset;
 use super::words::{self, Flag, flags};
 use crate::Result;
 use crate::pipeline::{Done, Overrides, Pipeline, Registry, Set};
@@ -13,6 +14,9 @@ const REDUCE: &str = include_str!("../../pipelines/reduce.toml");
 
 /// The origin of the pipelines of commands: users know the flags, not these texts.
 pub(super) const HIDDEN: &str = "";
+/// Behind what `reduce` chose by itself.
+const OTHERWISE: &str =
+    "by the noise and spacing of the scan; --preset paper is the published method";
 
 /// The pipeline of `synth`.
 const SYNTH: &str = "\
@@ -32,7 +36,11 @@ pub(super) fn run(arguments: &Run, registry: &Registry, console: &Console) -> Re
 
 /// Runs `pipelines/reduce.toml` on other files and prints the closing table.
 pub(super) fn reduce(arguments: &Reduce, registry: &Registry, console: &Console) -> Result<()> {
-    let sets = given([reduce_flags(arguments), arguments.common.flags()]);
+    let preset = arguments.preset.map_or(Vec::new(), Preset::sets);
+    let sets = [preset, given([reduce_flags(arguments), arguments.common.flags()])].concat();
+    if arguments.preset.is_none() {
+        console.hint(OTHERWISE);
+    }
     let outliers = arguments.outliers.then_some("outliers");
     let filter = arguments.filter.is_given().then_some("filter");
     let text = with_stages(REDUCE, filter.into_iter().chain(outliers));
@@ -118,9 +126,15 @@ pub(super) fn reduce_flags(arguments: &Reduce) -> Vec<Flag> {
         ("--to", "write.format", arguments.to.clone().map(Value::from)),
         ("--max-angle", "cells.max_angle", arguments.max_angle.as_deref().map(number_or_text)),
         ("--keep", "cells.keep", arguments.keep.as_deref().map(whole_or_text)),
-        ("--max-side", "cells.max_side", arguments.max_side.map(number)),
-        ("--min-spacing", "cells.min_spacing", arguments.min_spacing.map(number)),
-        ("--neighbors", "normals.neighbors", arguments.neighbors.map(Value::from)),
+        ("--max-side", "cells.max_side", arguments.max_side.as_deref().map(number_or_text)),
+        (
+            "--min-spacing",
+            "cells.min_spacing",
+            arguments.min_spacing.as_deref().map(number_or_text),
+        ),
+        ("--measure", "cells.measure", arguments.measure.clone().map(Value::from)),
+        ("--reference", "cells.reference", arguments.reference.as_deref().map(numbers_or_text)),
+        ("--neighbors", "normals.neighbors", arguments.neighbors.as_deref().map(whole_or_text)),
         ("--side", "cells.side", arguments.side.as_deref().map(number_or_text)),
         ("--min-points", "cells.min_points", arguments.min_points.map(Value::from)),
         ("--split", "cells.split", arguments.split.clone().map(Value::from)),
@@ -182,6 +196,12 @@ fn whole_or_text(text: &str) -> Value {
 /// A number where the text is one, else the text (`6deg`, `auto`).
 fn number_or_text(text: &str) -> Value {
     text.parse().map_or_else(|_| json!(text), number)
+}
+
+/// A list of numbers where the text is one with commas, else the text (`x`).
+fn numbers_or_text(text: &str) -> Value {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    numbers.map_or_else(|_| json!(text), |numbers| numbers.into_iter().map(number).collect())
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ mod gather;
 mod grouping;
 mod limit;
 mod noise;
+mod outlook;
 mod settings;
 mod target;
 mod threshold;
@@ -19,7 +20,8 @@ use serde_json::Value;
 use super::lengths::rounded;
 use crate::geom::angle::MaxAngle;
 use crate::geom::lattice::Lattice;
-use crate::point::names;
+use crate::point::{Units, names};
+use crate::quantity::{Angle, Length, Setting};
 use crate::report::Tally;
 use crate::stage::{Forecast, Needs, ScanFacts, TileOp};
 use crate::tile::{Cells as Partition, Levels, Tile};
@@ -28,6 +30,7 @@ use crate::{Error, Result};
 use division::{Counts, Division, Rule};
 use grouping::Grouping;
 use limit::Limit;
+use outlook::Outlook;
 pub use settings::{By, Measure, Reference, Side, Split};
 pub use target::Keep;
 use threshold::Threshold;
@@ -77,28 +80,33 @@ const SORTING_BYTES: usize = 32;
 /// radians, normals are off their linear trend where the scan is planar (root of the mean square, the
 /// median of the samples). Where that exceeds `max_angle` noise divides cells that are flat, and the
 /// run says so.
+///
+/// What is "auto" is settled then, by the points alone, and told in the report: a run with the values
+/// found gives the same bytes.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Cells {
-    /// Side of the initial cells: a length in world units, rounded to whole lattice steps, or "auto":
-    /// the smallest 2^j steps for which occupied cubes hold 32 positions on average; with `keep` also
-    /// large enough that there are at most half as many cubes as records are to stay.
+    /// Side of the initial cells: a length, rounded to whole lattice steps; or "auto": the smallest 2^j
+    /// steps for which occupied cubes hold 32 positions on average; with `keep` also large enough that
+    /// there are at most half as many cubes as records are to stay. Or "spread": with `keep` 1.25 sides
+    /// of a grid that keeps as many points, so that more than half of them are spread evenly and flat
+    /// regions stay covered; without, or to keep more than a third, the same as "auto".
     pub side: Side,
-    /// Largest θ_max − θ_min of a cell (the paper's α) in radians, 0 to π. In a pipeline file also
-    /// "6deg" or "0.1rad". Not together with `keep`.
-    #[serde(deserialize_with = "settings::angle")]
-    pub max_angle: Option<f64>,
+    /// Largest θ_max − θ_min of a cell (the paper's α): radians from 0 to π, "6deg" or "0.1rad"; or
+    /// "auto": four times `normal_scatter`, 0.1 to 1. Not together with `keep`.
+    pub max_angle: Option<Setting<Angle>>,
     /// How many records are to stay, instead of `max_angle`: a share of those that the stage decides
     /// about ("10%", to six decimals, rounded to whole records), or a number (500000, "250k", "5M").
     pub keep: Option<Keep>,
     /// Cells of so many positions or fewer are not divided (the paper's β).
     pub min_points: NonZeroUsize,
-    /// Length in world units beyond which no cell is kept whole.
-    #[serde(deserialize_with = "settings::length")]
-    pub max_side: Option<f64>,
-    /// Length in world units up to which no cell is divided.
-    #[serde(deserialize_with = "settings::length")]
-    pub min_spacing: Option<f64>,
+    /// Length beyond which no cell is kept whole.
+    pub max_side: Option<Length>,
+    /// Length up to which no cell is divided; or "auto": with `keep` 0.75 sides of a grid that keeps as
+    /// many points, without a quarter of `side`, and none to keep more than a third, or where `classes`
+    /// or flags select some of the points; or "none".
+    #[serde(deserialize_with = "Setting::or_none")]
+    pub min_spacing: Option<Setting<Length>>,
     /// What all positions of a cell have in common besides its cube: nothing, or ["Classification"]. A
     /// position has the class of its first record in canonical order.
     pub by: Vec<By>,
@@ -110,6 +118,9 @@ pub struct Cells {
     pub reference: Reference,
     #[serde(skip)]
     settled: Option<Settled>,
+    /// What is known of the scan, for what samples decide.
+    #[serde(skip)]
+    outlook: Option<Outlook>,
     #[serde(skip)]
     threshold: Option<Threshold>,
 }
@@ -121,9 +132,11 @@ struct Settled {
     steps: i64,
     /// The same in world units.
     length: f64,
-    /// `max_side` and `min_spacing` in lattice steps; the largest number and 0 where not given.
+    /// `max_side` and `min_spacing` in lattice steps; the largest number and 0 where there is none.
     max_side: u64,
     min_spacing: u64,
+    /// The largest range of angles in radians, where none is to be found.
+    max_angle: f64,
 }
 
 impl Settled {
@@ -146,6 +159,7 @@ impl Default for Cells {
             measure: Measure::Axis,
             reference: Reference::X,
             settled: None,
+            outlook: None,
             threshold: None,
         }
     }
@@ -154,10 +168,9 @@ impl Default for Cells {
 /// The keys; `max_angle` as what it is where it was not given.
 impl Serialize for Cells {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let max_angle = self.keep.is_none().then(|| self.max_angle());
         let mut keys = serializer.serialize_struct("Cells", 10)?;
         keys.serialize_field("side", &self.side)?;
-        keys.serialize_field("max_angle", &self.max_angle.or(max_angle))?;
+        keys.serialize_field("max_angle", &self.angle())?;
         keys.serialize_field("keep", &self.keep)?;
         keys.serialize_field("min_points", &self.min_points)?;
         keys.serialize_field("max_side", &self.max_side)?;
@@ -174,7 +187,7 @@ impl TileOp for Cells {
     fn needs(&self) -> Needs {
         let aligned = match self.settled {
             Some(settled) => settled.is_aligned(),
-            None => self.side == Side::Auto,
+            None => self.side == Side::Auto || self.side == Side::Spread && self.keep.is_none(),
         };
         let class = self.by.contains(&By::Classification).then_some(names::CLASSIFICATION);
         Needs {
@@ -188,34 +201,50 @@ impl TileOp for Cells {
         }
     }
 
+    fn convert(&mut self, units: &Units) -> Result<()> {
+        if let Side::Length(side) = &mut self.side {
+            *side = side.in_scan(units, "cells.side")?;
+        }
+        if let Some(side) = &mut self.max_side {
+            *side = side.in_scan(units, "cells.max_side")?;
+        }
+        if let Some(Setting::Given(spacing)) = &mut self.min_spacing {
+            *spacing = spacing.in_scan(units, "cells.min_spacing")?;
+        }
+        self.check().map_err(|(_, error)| error)
+    }
+
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
         self.check().map_err(|(_, error)| error)?;
         let steps = match self.side {
-            Side::Auto => 1 << self.auto_level(scan.levels, scan.points),
-            Side::Length(length) => scan.lattice.steps(length).min(LARGEST_SIDE),
+            // What "spread" comes to is known when samples are: these are as wide as the others.
+            Side::Auto | Side::Spread => 1 << self.auto_level(scan.levels, scan.points),
+            Side::Length(length) => scan.lattice.steps(length.value()).min(LARGEST_SIDE),
         };
-        let bound = |length: f64| scan.lattice.steps(length).unsigned_abs();
+        let bound = |length: Length| scan.lattice.steps(length.value()).unsigned_abs();
         self.settled = Some(Settled {
             steps,
             length: steps as f64 * scan.lattice.step,
             max_side: self.max_side.map_or(u64::MAX, bound),
-            min_spacing: self.min_spacing.map_or(0, bound),
+            min_spacing: self.min_spacing.and_then(Setting::given).map_or(0, bound),
+            max_angle: self.max_angle(),
         });
+        self.outlook = Some(Outlook::of(scan));
         Ok(())
     }
 
     fn warnings(&self, lattice: &Lattice) -> Vec<String> {
         let side = match self.side {
             Side::Length(length) => Some(length),
-            Side::Auto => None,
+            Side::Auto | Side::Spread => None,
         };
         let lengths = [
             ("cells.side", side),
             ("cells.max_side", self.max_side),
-            ("cells.min_spacing", self.min_spacing),
+            ("cells.min_spacing", self.min_spacing.and_then(Setting::given)),
         ];
         let each = lengths.into_iter();
-        each.filter_map(|(address, length)| rounded(lattice, address, length?)).collect()
+        each.filter_map(|(address, length)| rounded(lattice, address, length?.value())).collect()
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
@@ -242,8 +271,8 @@ impl TileOp for Cells {
         settled.chain(self.threshold.iter().flat_map(Threshold::decisions)).collect()
     }
 
-    fn wants_sample(&self) -> bool {
-        true
+    fn sample_side(&self) -> Option<i64> {
+        Some(self.settled.map_or(0, |settled| settled.steps))
     }
 
     fn sample(&self, tile: &mut Tile) -> Result<Vec<f64>> {
@@ -265,7 +294,7 @@ impl Cells {
             return Err(("keep", error.help("give one of them")));
         }
         match (self.max_side, self.min_spacing) {
-            (Some(most), Some(least)) if most < least => {
+            (Some(most), Some(Setting::Given(least))) if most.is_less_than(least) => {
                 let told = format!(
                     "`cells.max_side` is {most}, less than `cells.min_spacing`, {least}: cells between the two \
                      would have to be divided and must not be"
@@ -279,9 +308,15 @@ impl Cells {
         }
     }
 
-    /// The largest range of angles in radians, where none is to be found.
+    /// The largest range of angles as it was given, or the default; none where a target decides.
+    fn angle(&self) -> Option<Setting<Angle>> {
+        let default = || Angle::radians(MAX_ANGLE).map(Setting::Given);
+        self.max_angle.or_else(|| if self.keep.is_none() { default() } else { None })
+    }
+
+    /// The largest range of angles in radians, where none is to be found and before samples decide.
     fn max_angle(&self) -> f64 {
-        self.max_angle.unwrap_or(MAX_ANGLE)
+        self.max_angle.and_then(Setting::given).map_or(MAX_ANGLE, Angle::in_radians)
     }
 
     /// Binary logarithm of the side that is chosen by itself.
@@ -302,7 +337,9 @@ impl Cells {
     /// Which divisions a run makes.
     fn limit(&self) -> Result<Limit> {
         match (self.keep, &self.threshold) {
-            (None, _) => Ok(Limit { max_angle: MaxAngle::new(self.max_angle()), ties: None }),
+            (None, _) => {
+                Ok(Limit { max_angle: MaxAngle::new(self.settled()?.max_angle), ties: None })
+            }
             (Some(_), Some(threshold)) => Ok(threshold.limit()),
             (Some(_), None) => {
                 Err(Error::internal("the stage cells ran before its largest angle was found"))

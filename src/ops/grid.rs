@@ -2,15 +2,16 @@
 
 use std::ops::Range;
 
-use serde::de::{Error as _, Unexpected};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::lengths::rounded;
-use super::removal::{Account, keep_once, remove, represent};
+use super::removal::{Account, keep_once, remove, represent_by};
 use crate::geom::angle::is_known;
 use crate::geom::lattice::Lattice;
-use crate::point::{Bounds, Position, distance2};
+use crate::geom::plane::{Covariance, smallest};
+use crate::point::{Bounds, Position, Units, distance2};
+use crate::quantity::Length;
 use crate::report::Tally;
 use crate::stage::{Needs, ScanFacts, TileOp};
 use crate::tile::Tile;
@@ -18,23 +19,31 @@ use crate::{Error, Result};
 
 /// Cubes of this side, anchored at world 0, are the octants of the lattice: no larger side differs.
 const LARGEST_SIDE: i64 = 1 << 62;
-/// Bytes a position: its key, its cube and its index, and coordinates to take a median of. All
-/// positions may share one key.
-const BYTES: usize = size_of::<u64>() + size_of::<Entry>() + size_of::<i64>();
+/// Bytes a position: its key, its cube and its index, coordinates to take a median of, and an offset.
+/// All positions may share one key.
+const BYTES: usize =
+    size_of::<u64>() + size_of::<Entry>() + size_of::<i64>() + size_of::<[i64; 3]>();
+/// Positions of a cube from which on their least-squares plane says something of them: three are
+/// always on one.
+const FEWEST: usize = 4;
 
 /// The uniform grid of Martin et al., with which the paper compares; elsewhere called voxel thinning:
 /// of every occupied cube one record stays.
 ///
 /// The cubes are anchored at world 0 and have the side `side`, rounded to whole lattice steps, which
-/// the report names; a warning says if that is more than a thousandth off. It looks at nothing but positions, so no stage needs to come before it; after
-/// `normals`, the report also says how far what was removed lies from the plane of the point that stays.
-/// Copies weigh as one position and are removed as coincident.
+/// the report names; a warning says if that is more than a thousandth off. It looks at nothing but
+/// positions, so no stage needs to come before it. Copies weigh as one position and are removed as
+/// coincident.
+///
+/// The report says how far what was removed lies from the plane through the point that stays: after
+/// `normals` with the normal of that point; else with that of the least-squares plane of the cube's
+/// positions, where there are four or more that are not on one line. What is in other cubes is not
+/// measured, and the report counts what is.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
-    /// Side of the cubes, a length above 0 in the scan's unit; rounded to whole lattice steps.
-    #[serde(deserialize_with = "checked_side")]
-    pub side: f64,
+    /// Side of the cubes, a length above 0; rounded to whole lattice steps.
+    pub side: Length,
     /// Which position of a cube stays; of equally good ones the first in Morton order.
     #[serde(default)]
     pub pick: Pick,
@@ -68,18 +77,10 @@ struct Settled {
 type Entry = ([i64; 3], u32);
 
 impl Grid {
-    /// A grid of cubes of `side` world units.
-    pub fn new(side: f64, pick: Pick) -> Self {
+    /// A grid of cubes of that side.
+    pub fn new(side: Length, pick: Pick) -> Self {
         Grid { side, pick, settled: None }
     }
-}
-
-fn checked_side<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    let side = f64::deserialize(from)?;
-    if side.is_finite() && side > 0.0 {
-        return Ok(side);
-    }
-    Err(D::Error::invalid_value(Unexpected::Float(side), &"a length above 0 in the scan's unit"))
 }
 
 impl TileOp for Grid {
@@ -95,14 +96,19 @@ impl TileOp for Grid {
         }
     }
 
+    fn convert(&mut self, units: &Units) -> Result<()> {
+        self.side = self.side.in_scan(units, "grid.side")?;
+        Ok(())
+    }
+
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
-        let steps = scan.lattice.steps(self.side).min(LARGEST_SIDE);
+        let steps = scan.lattice.steps(self.side.value()).min(LARGEST_SIDE);
         self.settled = Some(Settled { steps, length: steps as f64 * scan.lattice.step });
         Ok(())
     }
 
     fn warnings(&self, lattice: &Lattice) -> Vec<String> {
-        rounded(lattice, "grid.side", self.side).into_iter().collect()
+        rounded(lattice, "grid.side", self.side.value()).into_iter().collect()
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
@@ -154,6 +160,8 @@ struct Counts {
     cubes: u64,
     coincident: u64,
     represented: u64,
+    /// Memory to work in.
+    offsets: Vec<[i64; 3]>,
 }
 
 impl Counts {
@@ -162,15 +170,34 @@ impl Counts {
         let core = tile.core.clone();
         let members = || group.iter().map(|(_, i)| *i as usize);
         self.cubes += u64::from(members().next().is_some_and(|first| core.contains(&first)));
+        let known = is_known(tile.normals[kept]).then(|| tile.normals[kept].map(f64::from));
+        let normal = known.or_else(|| self.plane(tile, group, kept));
         for i in members().filter(|i| core.contains(i)) {
             if i == kept {
                 self.coincident += keep_once(tile, i);
-            } else if is_known(tile.normals[kept]) {
-                self.represented += represent(tile, i, kept);
+            } else if let Some(normal) = normal {
+                self.represented += represent_by(tile, i, kept, normal);
             } else {
                 self.represented += remove(tile, i);
             }
         }
+    }
+
+    /// The normal of the least-squares plane of a cube's positions; none where there are too few for
+    /// a plane to say anything of them, or all on one line.
+    fn plane(&mut self, tile: &Tile, group: &[Entry], kept: usize) -> Option<[f64; 3]> {
+        if group.len() < FEWEST {
+            return None;
+        }
+        let (at, others) = (tile.positions[kept], group.iter().map(|(_, i)| *i as usize));
+        let offset = |i: usize| {
+            let p = tile.positions[i];
+            std::array::from_fn(|axis| p[axis].saturating_sub(at[axis]))
+        };
+        self.offsets.clear();
+        self.offsets.extend(others.filter(|&i| i != kept).map(offset));
+        let covariance = Covariance::of(&self.offsets);
+        (!covariance.is_of_a_line()).then(|| smallest(covariance.matrix()).1)
     }
 }
 
@@ -241,9 +268,9 @@ mod tests {
     #[test]
     fn the_side_must_be_given_and_above_0() {
         let grid: Grid = toml::from_str("side = 2").unwrap();
-        assert_eq!((grid.side, grid.pick), (2.0, Pick::Center));
+        assert_eq!((grid.side.value(), grid.pick), (2.0, Pick::Center));
         let grid: Grid = toml::from_str("side = 0.5\npick = 'median'").unwrap();
-        assert_eq!((grid.side, grid.pick), (0.5, Pick::Median));
+        assert_eq!((grid.side.value(), grid.pick), (0.5, Pick::Median));
         for wrong in ["", "side = 0", "side = -1", "side = nan", "side = inf", "side = 'auto'"] {
             assert!(toml::from_str::<Grid>(wrong).is_err(), "{wrong}");
         }
@@ -264,7 +291,9 @@ mod tests {
             let keys = keyed(&tile, 3);
             assert!(keys.iter().all(|key| key >> 32 == keys[0] >> 32), "{keys:x?}");
             let mut tally = Tally::default();
-            Grid { settled, ..Grid::new(3.0, pick) }.run(&mut tile, &mut tally).unwrap();
+            Grid { settled, ..Grid::new(Length::of(3.0).unwrap(), pick) }
+                .run(&mut tile, &mut tally)
+                .unwrap();
             let kept: Vec<bool> = tile.fates.iter().map(|fate| *fate == Fate::Kept).collect();
             let first = pick != Pick::Center;
             assert_eq!(kept, [first, !first, first, !first, true], "{pick:?}");
@@ -278,8 +307,10 @@ mod tests {
             for pick in [Pick::Center, Pick::Median, Pick::First] {
                 let mut tile = Tile::of(vec![[-far; 3], [far; 3]]);
                 let length = 1.0;
-                let grid =
-                    Grid { settled: Some(Settled { steps: side, length }), ..Grid::new(1.0, pick) };
+                let grid = Grid {
+                    settled: Some(Settled { steps: side, length }),
+                    ..Grid::new(Length::of(1.0).unwrap(), pick)
+                };
                 grid.run(&mut tile, &mut Tally::default()).unwrap();
                 assert!(tile.fates.iter().all(|fate| *fate == crate::tile::Fate::Kept));
             }

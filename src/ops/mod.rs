@@ -8,6 +8,7 @@ mod median;
 pub mod normals;
 pub mod outliers;
 mod removal;
+mod scatter;
 
 pub use cells::{By, Cells, Keep, Measure, Reference, Side, Split};
 pub use filter::Filter;

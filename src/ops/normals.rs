@@ -2,6 +2,7 @@
 
 mod bundle;
 mod fan;
+mod noise;
 mod orient;
 
 use serde::{Deserialize, Deserializer, Serialize};
@@ -11,8 +12,9 @@ use crate::geom::plane::{self, Covariance};
 use crate::geom::simd::Simd;
 use crate::geom::star::Star;
 use crate::point::names;
+use crate::quantity::Setting;
 use crate::report::Tally;
-use crate::stage::{Needs, ScanFacts, TileOp};
+use crate::stage::{Forecast, Needs, ScanFacts, TileOp};
 use crate::tile::{Neighborhood, Tile};
 use crate::{Error, Result};
 
@@ -32,13 +34,17 @@ pub const MAX_NEIGHBORS: usize = 64;
 ///
 /// What `orient` says decides how `cells` sees them: with `"none"` the normals of each cell are turned
 /// to one side first; with any other the signs stay, and the two sides of a thin wall are two surfaces.
+///
+/// With `neighbors = "auto"` it looks at a sample of the scan first: `scatter_of_10` of the report is how
+/// far, in radians, normals of 10 neighbours are off their linear trend where the scan is planar, which
+/// is what noise does. Up to 0.01 it takes 10 neighbours, beyond 20.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Normals {
-    /// How many nearest other positions the fit uses (k), besides the position itself; 3 to 64. The
-    /// paper finds 6 to 20 useful and 10 best; more smooth the noise, and the edges.
+    /// How many nearest other positions the fit uses (k), besides the position itself; 3 to 64, or
+    /// `"auto"`, by the noise. The paper finds 6 to 20 useful and 10 best; more smooth noise and edges.
     #[serde(deserialize_with = "checked_neighbors")]
-    pub neighbors: usize,
+    pub neighbors: Setting<usize>,
     /// How a normal is estimated.
     pub method: Method,
     /// To which side normals point.
@@ -47,16 +53,24 @@ pub struct Normals {
     pub viewpoint: Option<[f64; 3]>,
     #[serde(skip)]
     side: Option<Side>,
+    /// What `"auto"` came to.
+    #[serde(skip)]
+    found: Option<usize>,
+    /// Side of the cubes of 32 positions on average, for samples.
+    #[serde(skip)]
+    sample_side: i64,
 }
 
 impl Default for Normals {
     fn default() -> Self {
         Normals {
-            neighbors: 10,
+            neighbors: Setting::Given(10),
             method: Method::default(),
             orient: Orient::None,
             viewpoint: None,
             side: None,
+            found: None,
+            sample_side: 0,
         }
     }
 }
@@ -65,8 +79,8 @@ impl Normals {
     /// Refuses a number of neighbours outside 3 to 64 (reading a pipeline file does the same), and a
     /// viewpoint that is missing, not asked for or not finite; names the key to blame.
     pub fn check(&self) -> Result<(), (&'static str, Error)> {
-        check_neighbors(self.neighbors as u64)
-            .map_err(|told| ("neighbors", Error::pipeline(told)))?;
+        let given = self.neighbors.given().unwrap_or(MIN_NEIGHBORS);
+        check_neighbors(given as u64).map_err(|told| ("neighbors", Error::pipeline(told)))?;
         let (key, error) = match (self.orient, self.viewpoint) {
             (Orient::Viewpoint, None) => (
                 "orient",
@@ -87,6 +101,11 @@ impl Normals {
         };
         Err((key, error))
     }
+
+    /// The neighbours of the fit; the most that may be chosen until they are.
+    fn count(&self) -> usize {
+        self.neighbors.given().or(self.found).unwrap_or(noise::MOST)
+    }
 }
 
 impl TileOp for Normals {
@@ -94,7 +113,7 @@ impl TileOp for Normals {
         Needs {
             reads: names::XYZ.map(str::to_owned).to_vec(),
             writes: vec!["Normal".into()],
-            neighbors: self.neighbors,
+            neighbors: self.count(),
             ..Needs::default()
         }
     }
@@ -102,6 +121,7 @@ impl TileOp for Normals {
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
         self.check().map_err(|(_, error)| error)?;
         self.side = self.viewpoint.map(|at| Side::towards(at, scan.lattice));
+        self.sample_side = 1 << scan.levels.smallest_side(noise::POSITIONS_PER_CUBE);
         Ok(())
     }
 
@@ -131,7 +151,7 @@ impl TileOp for Normals {
                 None => {}
             }
         };
-        let outcome = tile.each_neighborhood(self.neighbors, |i, neighborhood| {
+        let outcome = tile.each_neighborhood(self.count(), |i, neighborhood| {
             estimator.take(i, neighborhood, &mut settle);
         });
         estimator.finish(&mut settle);
@@ -147,6 +167,18 @@ impl TileOp for Normals {
         tally.count("fallback_perpendicular", perpendicular);
         outcome
     }
+
+    fn sample_side(&self) -> Option<i64> {
+        self.neighbors.is_auto().then_some(self.sample_side)
+    }
+
+    fn sample(&self, tile: &mut Tile) -> Result<Vec<f64>> {
+        noise::sample(self, tile)
+    }
+
+    fn forecast(&mut self, samples: &[Vec<f64>]) -> Forecast {
+        noise::forecast(self, samples)
+    }
 }
 
 fn check_neighbors(neighbors: u64) -> Result<(), String> {
@@ -156,10 +188,10 @@ fn check_neighbors(neighbors: u64) -> Result<(), String> {
     Err(format!("neighbors must be {MIN_NEIGHBORS} to {MAX_NEIGHBORS}, not {neighbors}"))
 }
 
-fn checked_neighbors<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
-    let neighbors = u64::deserialize(from)?;
-    check_neighbors(neighbors).map_err(serde::de::Error::custom)?;
-    Ok(neighbors as usize)
+fn checked_neighbors<'de, D: Deserializer<'de>>(from: D) -> Result<Setting<usize>, D::Error> {
+    let setting = Setting::<u64>::deserialize(from)?;
+    let given = setting.given().map(|k| check_neighbors(k).map(|()| k as usize)).transpose();
+    Ok(given.map_err(serde::de::Error::custom)?.map_or(Setting::Auto, Setting::Given))
 }
 
 /// How a normal is estimated.
@@ -342,10 +374,12 @@ mod tests {
         assert_eq!(stage, Normals::default());
         assert_eq!(
             (stage.neighbors, stage.method, stage.orient),
-            (10, Method::Varady, Orient::None)
+            (Setting::Given(10), Method::Varady, Orient::None)
         );
         let stage: Normals = toml::from_str("neighbors = 64\nmethod = \"pca\"").unwrap();
-        assert_eq!((stage.neighbors, stage.method), (64, Method::Pca));
+        assert_eq!((stage.neighbors, stage.method), (Setting::Given(64), Method::Pca));
+        let stage: Normals = toml::from_str("neighbors = \"auto\"").unwrap();
+        assert_eq!((stage.neighbors, stage.needs().neighbors), (Setting::Auto, noise::MOST));
     }
 
     #[test]
@@ -358,7 +392,8 @@ mod tests {
         assert!(toml::from_str::<Normals>("neighbors = -1").is_err());
         assert!(toml::from_str::<Normals>("neighbours = 10").is_err());
         assert!(toml::from_str::<Normals>("method = \"quadric\"").is_err());
-        let (key, error) = Normals { neighbors: 2, ..Normals::default() }.check().unwrap_err();
+        let (key, error) =
+            Normals { neighbors: Setting::Given(2), ..Normals::default() }.check().unwrap_err();
         assert_eq!((key, &*error.to_string()), ("neighbors", "neighbors must be 3 to 64, not 2"));
     }
 }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use super::removal::Account;
 use crate::point::Mark;
+use crate::quantity::Length;
 use crate::stage::Role;
 use crate::{Error, Result};
 
@@ -49,8 +50,8 @@ pub struct Outliers {
     pub neighbors: Option<usize>,
     /// Of statistical: how many σ above the mean are still no outlier, 0 or more.
     pub multiplier: Option<f64>,
-    /// Of radius, and required there: how far to look, in the scan's unit.
-    pub radius: Option<f64>,
+    /// Of radius, and required there: how far to look.
+    pub radius: Option<Length>,
     /// Of radius, and required there: so many other positions make a point none, 1 to 64.
     pub min_neighbors: Option<usize>,
     /// How records are marked, instead of removing any.
@@ -178,13 +179,15 @@ mod tests {
             ("method = 'radius'", "method"),
             ("method = 'radius'\nradius = 1", "method"),
             ("method = 'radius'\nmin_neighbors = 1", "method"),
-            ("method = 'radius'\nradius = 0\nmin_neighbors = 1", "radius"),
-            ("method = 'radius'\nradius = -1\nmin_neighbors = 1", "radius"),
-            ("method = 'radius'\nradius = nan\nmin_neighbors = 1", "radius"),
             ("method = 'radius'\nradius = 1\nmin_neighbors = 0", "min_neighbors"),
             ("method = 'radius'\nradius = 1\nmin_neighbors = 65", "min_neighbors"),
         ] {
             assert_eq!(blamed(text), Some(key), "{text}");
+        }
+        for radius in ["0", "-1", "nan", "'1 mile'"] {
+            let wrong = format!("method = 'radius'\nradius = {radius}\nmin_neighbors = 1");
+            let told = toml::from_str::<Outliers>(&wrong).unwrap_err().to_string();
+            assert!(told.contains("a length above 0"), "{told}");
         }
         assert!(toml::from_str::<Outliers>("neighbours = 3").is_err());
         assert!(toml::from_str::<Outliers>("mark = 'deleted'").is_err());

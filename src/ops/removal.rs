@@ -24,9 +24,13 @@ pub(super) fn remove(tile: &mut Tile, i: usize) -> u64 {
 
 /// Lets `kept`, which has a normal, stand for position `i`; returns how many records that removes.
 pub(super) fn represent(tile: &mut Tile, i: usize, kept: usize) -> u64 {
+    represent_by(tile, i, kept, tile.normals[kept].map(f64::from))
+}
+
+/// The same, and the plane through `kept` has this unit normal.
+pub(super) fn represent_by(tile: &mut Tile, i: usize, kept: usize, normal: [f64; 3]) -> u64 {
     let records = records(tile, i);
     if records > 0 {
-        let normal = tile.normals[kept].map(f64::from);
         let (p, q) = (tile.positions[i], tile.positions[kept]);
         let [x, y, z]: [f64; 3] =
             std::array::from_fn(|axis| p[axis].saturating_sub(q[axis]) as f64 * normal[axis]);

@@ -60,6 +60,7 @@ impl StageKind for Normals {
 impl StageKind for Cells {
     const KIND: &'static str = "cells";
     const ABOUT: &'static str = "Divides the scan into cells whose normals agree.";
+    const EITHER: &'static [&'static str] = &["keep", "max_angle"];
 
     fn build(self, at: &StagePlace) -> Result<Role> {
         self.check().map_err(|(key, error)| at.blame(key, error))?;

@@ -28,6 +28,7 @@ const CELLS_ACROSS: u64 = 4;
 
 /// The tiles of a pass.
 pub(super) struct Cut {
+    cells: Cells,
     pub keys: Vec<TileKey>,
     /// Positions that the arena of a thread takes.
     pub capacity: usize,
@@ -73,12 +74,29 @@ pub(super) fn cut_all(
         let cells = Cells::of(&job.ops, pass);
         let cut = match known.iter().find(|(same, _)| *same == cells) {
             Some((_, cut)) => cut.clone(),
-            None => Arc::new(cut(job, cells, lattice, shares, demands, tiles)?),
+            None => Arc::new(cut(job, cells, lattice, (shares, demands), tiles, 0)?),
         };
         known.push((cells, cut.clone()));
         cuts.push(cut);
     }
     Ok(cuts)
+}
+
+/// The tiles of a pass whose stages may have chosen other cells since `cut` was made; the mill holds
+/// `held` bytes already.
+pub(super) fn cut_again(
+    job: &Job<'_>,
+    pass: &Pass,
+    lattice: &Lattice,
+    (shares, demands): (&Shares, &Demands),
+    tiles: &SealedTiles,
+    (made, held): (&Arc<Cut>, u64),
+) -> Result<Arc<Cut>> {
+    let cells = Cells::of(&job.ops, pass);
+    match cells == made.cells {
+        true => Ok(made.clone()),
+        false => cut(job, cells, lattice, (shares, demands), tiles, held).map(Arc::new),
+    }
 }
 
 /// The tiles of a pass and the positions that an arena for them takes: as planned; or, where a cube
@@ -88,12 +106,12 @@ fn cut(
     job: &Job<'_>,
     cells: Cells,
     lattice: &Lattice,
-    shares: &Shares,
-    demands: &Demands,
+    (shares, demands): (&Shares, &Demands),
     tiles: &SealedTiles,
+    held: u64,
 ) -> Result<Cut> {
     let wanted = job.tile_points.map_or(zone_of(shares.tile_positions), |points| points as u64);
-    let free = job.budget.free().saturating_sub(MILL_SPARE);
+    let free = job.budget.free().saturating_add(held).saturating_sub(MILL_SPARE);
     let largest = demands.tile_positions(job.threads, free).max(shares.tile_positions);
     let (good, lowest) = (cells.level(CELLS_ACROSS), cells.level(1));
     let mut tries =
@@ -108,7 +126,7 @@ fn cut(
             Ok(keys) => {
                 let bytes = keys.len().saturating_mul(size_of::<TileKey>()) as u64;
                 let _listed = job.budget.lease(bytes, "list of tiles")?;
-                return Ok(Cut { keys, capacity, millers, _listed });
+                return Ok(Cut { cells, keys, capacity, millers, _listed });
             }
             Err(CutError::Read(error)) => return Err(error),
             Err(CutError::TooHeavy { key, positions }) => (key, positions),

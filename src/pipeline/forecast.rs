@@ -32,8 +32,8 @@ pub(super) fn samples_capacity(shares: &Shares) -> usize {
     shares.tile_positions.min(CAPACITY)
 }
 
-/// What those of the stages `ops` of `pass` expect that look at samples, each with its number, from samples that are a function of the
-/// points alone.
+/// What those of the stages `ops` of `pass` expect that look at samples, each with its number, from
+/// samples that are a function of the points alone.
 pub(super) fn forecast(
     job: &mut Job<'_>,
     pass: &Pass,
@@ -44,10 +44,8 @@ pub(super) fn forecast(
 ) -> Result<Vec<(usize, Forecast)>> {
     let mut forecasts = Vec::new();
     for &op in ops {
-        if !job.ops[op].op.tile().wants_sample() {
-            continue;
-        }
-        let side = job.ops[op].op.tile().needs().cell_side.max(1);
+        let Some(side) = job.ops[op].op.tile().sample_side() else { continue };
+        let side = side.max(1);
         let keys = cubes(&field.tiles, side)?;
         let samples = samples(job, pass, op, field, sieve, capacity, &keys)?;
         forecasts.push((op, job.ops[op].op.tile_mut().forecast(&samples)));

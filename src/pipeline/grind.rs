@@ -15,7 +15,7 @@ use super::product::Product;
 use super::rounded::Rounded;
 use crate::geom::lattice::Lattice;
 use crate::point::{Edit, PointBatch};
-use crate::report::Tally;
+use crate::report::{Baseline, Tally};
 use crate::stage::{Encode, Encoded, Sink, SinkSummary};
 use crate::tile::{
     Fetch, Loader, Run, SealedTiles, Sieve, SpillArea, State, Tile, TileKey, lock, parallel,
@@ -45,6 +45,8 @@ pub(super) struct Milled {
     pub decided: u64,
     /// True if the pass oriented normals.
     pub oriented: bool,
+    /// Grids to compare the pass with, if it decides by normals.
+    pub baseline: Option<Baseline>,
 }
 
 /// A sink with its number.
@@ -80,7 +82,9 @@ pub(super) fn grind(
     let benches = Benches::new(job, tiles, &sinks);
     let outlet: Outlet<Product, Chunk> =
         Outlet::new(sinks.into_iter().map(|(_, sink)| sink).collect(), cut.millers);
-    let total = Mutex::new((Tally::default(), 0, false));
+    let side = pass.compares(&job.ops);
+    let baseline = || side.map(|side| Baseline::new(side, tiles.levels()));
+    let total = Mutex::new(Sum { baseline: baseline(), ..Sum::default() });
     let next = AtomicUsize::new(0);
     parallel(cut.millers, |_| {
         let guard = StopOnDrop::new(|| outlet.stop());
@@ -88,6 +92,7 @@ pub(super) fn grind(
         let mut encode = |chunk| bench.encode(&benches, &chunk);
         let mut hands = Hands { commit: &commit, encode: &mut encode };
         let mut worker = Worker::new(job, pass, field, sieve, cut.capacity, wants_normals);
+        worker.sum.baseline = baseline();
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let Some(&key) = keys.get(index) else { break };
@@ -97,11 +102,8 @@ pub(super) fn grind(
             job.advance(positions)?;
         }
         outlet.drain(&mut hands, |turn| turn.0 >= keys.len() as u64)?;
-        let mut total = lock(&total);
-        total.0.merge(&worker.tally);
-        total.0.merge(&bench.tally);
-        total.1 += worker.decided;
-        total.2 |= worker.oriented;
+        worker.sum.tally.merge(&bench.tally);
+        lock(&total).merge(&worker.sum);
         guard.disarm();
         Ok(())
     })?;
@@ -111,9 +113,29 @@ pub(super) fn grind(
     let mut bench = benches.bench();
     let mut encode = |chunk| bench.encode(&benches, &chunk);
     let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
-    let (mut tally, decided, oriented) = std::mem::take(&mut *lock(&total));
+    let Sum { mut tally, decided, oriented, baseline } = std::mem::take(&mut *lock(&total));
     tally.merge(&bench.tally);
-    Ok(Milled { tally, stored, counts, written, by_input, by_rank, decided, oriented })
+    Ok(Milled { tally, stored, counts, written, by_input, by_rank, decided, oriented, baseline })
+}
+
+/// What tiles come to, whichever thread milled them.
+#[derive(Default)]
+struct Sum {
+    tally: Tally,
+    decided: u64,
+    oriented: bool,
+    baseline: Option<Baseline>,
+}
+
+impl Sum {
+    fn merge(&mut self, other: &Sum) {
+        self.tally.merge(&other.tally);
+        self.decided += other.decided;
+        self.oriented |= other.oriented;
+        if let (Some(mine), Some(theirs)) = (&mut self.baseline, &other.baseline) {
+            mine.merge(theirs);
+        }
+    }
 }
 
 /// What threads need to encode chunks.
@@ -251,9 +273,7 @@ pub(super) struct Worker<'a> {
     /// Where positions are rounded, and unequal coordinates that share one are counted.
     rounded: Option<Rounded<'a>>,
     first: bool,
-    pub tally: Tally,
-    decided: u64,
-    oriented: bool,
+    sum: Sum,
 }
 
 impl<'a> Worker<'a> {
@@ -282,8 +302,6 @@ impl<'a> Worker<'a> {
         let rounded =
             rounds.then(|| Rounded::new(&field.tiles, field.lattice, job.source.schema()));
         let reach = reach(&job.ops, pass);
-        let tally = Tally::default();
-        let (decided, oriented) = (0, false);
         let ranks = pass.before.iter().chain(&pass.after).any(|sink| job.in_input_order[*sink]);
         Worker {
             ranks,
@@ -296,9 +314,7 @@ impl<'a> Worker<'a> {
             wants_normals,
             rounded,
             first,
-            tally,
-            decided,
-            oriented,
+            sum: Sum::default(),
         }
     }
 
@@ -321,8 +337,8 @@ impl<'a> Worker<'a> {
             let stage = &self.job.ops[call.op];
             tile.limits = stage.selection;
             match (&stage.op, call.gathers) {
-                (Op::Scan(op), true) => op.gather(tile, &mut found, &mut self.tally)?,
-                (op, _) => op.tile().run(tile, &mut self.tally)?,
+                (Op::Scan(op), true) => op.gather(tile, &mut found, &mut self.sum.tally)?,
+                (op, _) => op.tile().run(tile, &mut self.sum.tally)?,
             }
         }
         Ok((tile, found))
@@ -331,11 +347,15 @@ impl<'a> Worker<'a> {
     fn mill(&mut self, key: TileKey) -> Result<Product> {
         let (_, found) = self.run(key, None)?;
         let (tile, core) = self.loader.tile();
-        self.decided += tile.copies[tile.core.clone()].iter().map(|&n| u64::from(n)).sum::<u64>();
-        self.oriented |= tile.oriented;
-        self.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
-        self.tally.work("unproven", tile.around.take_unproven());
-        self.tally.work("tied", tile.around.take_tied());
+        self.sum.decided +=
+            tile.copies[tile.core.clone()].iter().map(|&n| u64::from(n)).sum::<u64>();
+        self.sum.oriented |= tile.oriented;
+        self.sum.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
+        self.sum.tally.work("unproven", tile.around.take_unproven());
+        self.sum.tally.work("tied", tile.around.take_tied());
+        if let Some(baseline) = &mut self.sum.baseline {
+            baseline.add(tile);
+        }
         let mut product = Product::of(tile, core, self.pass, self.wants_normals)?;
         product.found = found;
         if let Some(rounded) = &mut self.rounded {
@@ -348,7 +368,7 @@ impl<'a> Worker<'a> {
             let mut counted = Tally::default();
             rounded.enter(&positions, &mut product.fates, &mut counted)?;
             if self.first {
-                self.tally.merge(&counted);
+                self.sum.tally.merge(&counted);
             }
         }
         if self.ranks {

@@ -6,10 +6,12 @@ use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use serde_json::Value;
+
 use super::by_rank::{ByRank, Starts, place};
 use super::chunks::Found;
 use super::clock::Clock;
-use super::cut::{Cut, cut_all};
+use super::cut::{Cut, cut_again, cut_all};
 use super::each::ByInput;
 use super::forecast::{forecast, samples_capacity};
 use super::grind::{Field, grind};
@@ -18,9 +20,10 @@ use super::passes::{Call, Op, Pass};
 use super::run::Finished;
 use super::shares::{BATCH, Demands, Shares};
 use super::survey::survey;
+use crate::budget::Lease;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::{Bounds, PointBatch, Position};
-use crate::report::{Decision, Grouped, PassFigures, Tally};
+use crate::report::{Baseline, BaselineFigures, Decision, Grouped, PassFigures, Tally};
 use crate::stage::{Gathered, ScanFacts, Sink, SinkSummary};
 use crate::tile::{Intake, SealedTiles, Sieve, SpillArea, Tag, TileStore, lock, seal};
 use crate::{Error, Result};
@@ -53,6 +56,7 @@ pub(super) fn mill(
         kept: tiles.points(),
         passes: Vec::new(),
         forecasts: vec![None; job.ops.len()],
+        compared: None,
         written: sinks.iter().map(|_| None).collect(),
         sinks,
     };
@@ -60,13 +64,15 @@ pub(super) fn mill(
     let milling = |cut: &Arc<Cut>| demands.mill_bytes(cut.millers, cut.capacity as u64);
     let looking = demands.mill_bytes(job.threads, samples_capacity(shares) as u64);
     let most = cuts.iter().map(milling).max().unwrap_or(0).max(looking);
-    let working = job.budget.lease(most, "mill")?;
+    let mut working = job.budget.lease(most, "mill")?;
     for (pass, cut) in std::mem::take(&mut job.passes).iter().zip(&cuts) {
-        course.run(job, (pass, cut), &field, shares, &mut tally, clock)?;
+        let place = (pass, cut, &mut working);
+        course.run(job, place, &field, (shares, demands), &mut tally, clock)?;
     }
     drop((working, cuts));
     clock.phase("survey", Some(2 * tiles.positions()));
-    let measured = survey(job, lattice, area, &tiles, &course.sieve)?;
+    let mut measured = survey(job, lattice, area, &tiles, &course.sieve)?;
+    measured.totals.baseline = course.baseline(lattice);
     let unwritten = || Error::internal("an output was never written");
     Ok(Finished {
         read: tally.work.remove("read").unwrap_or(0),
@@ -96,19 +102,29 @@ struct Course {
     kept: u64,
     passes: Vec<PassFigures>,
     /// For each stage, what it said is to be expected.
-    forecasts: Vec<Option<Vec<(String, serde_json::Value)>>>,
+    forecasts: Vec<Option<Vec<(String, Value)>>>,
+    /// Grids to compare with, from the first pass that decided by normals.
+    compared: Option<Compared>,
     sinks: Vec<Option<Box<dyn Sink>>>,
     /// For each file of each sink, how many records it was given, and what it said in the end.
     written: Vec<Option<Vec<(u64, SinkSummary)>>>,
+}
+
+/// See [`Course::compared`].
+struct Compared {
+    baseline: Baseline,
+    /// Records that the pass decided about, and that it found.
+    decided: u64,
+    found: u64,
 }
 
 impl Course {
     fn run(
         &mut self,
         job: &mut Job<'_>,
-        (pass, cut): (&Pass, &Cut),
+        (pass, cut, working): (&Pass, &Arc<Cut>, &mut Lease),
         field: &Field<'_>,
-        shares: &Shares,
+        (shares, demands): (&Shares, &Demands),
         tally: &mut Tally,
         clock: &mut Clock<'_>,
     ) -> Result<()> {
@@ -116,12 +132,27 @@ impl Course {
         let sieve = pass.sieve(&self.sieve);
         let ahead = |call: &&Call| self.forecasts[call.op].is_none();
         let ops: Vec<usize> = pass.calls.iter().filter(ahead).map(|call| call.op).collect();
+        let mut chosen = Vec::new();
         for (op, foreseen) in forecast(job, pass, &ops, field, &sieve, samples_capacity(shares))? {
             if let Some(warning) = foreseen.warning {
                 job.warn(warning);
             }
-            self.forecasts[op] = Some(foreseen.decisions);
+            let stage = &job.ops[op].kind;
+            let decision = |(name, value): &(String, Value)| Decision {
+                stage: stage.clone(),
+                name: name.clone(),
+                value: value.clone(),
+            };
+            chosen.extend(foreseen.chosen.iter().map(decision));
+            let all = foreseen.chosen.into_iter().chain(foreseen.decisions);
+            self.forecasts[op] = Some(all.collect());
         }
+        if !chosen.is_empty() {
+            job.watch.chose(&chosen);
+        }
+        let held = working.bytes();
+        let cut = cut_again(job, pass, field.lattice, (shares, demands), tiles, (cut, held))?;
+        working.resize(held.max(demands.mill_bytes(cut.millers, cut.capacity as u64)))?;
         clock.phase(
             if pass.gathers().is_some() { "gather" } else { "mill" },
             Some(tiles.positions()),
@@ -150,7 +181,7 @@ impl Course {
             sinks.push((sink, open));
         }
         let which: Vec<usize> = sinks.iter().map(|(sink, _)| *sink).collect();
-        let milled = grind(job, (pass, cut), field, &sieve, (sinks, by_input, by_rank))?;
+        let milled = grind(job, (pass, &cut), field, &sieve, (sinks, by_input, by_rank))?;
         tally.merge(&milled.tally);
         for lists in &milled.by_input {
             clock.phase("write", Some(lists.records()));
@@ -173,6 +204,10 @@ impl Course {
         {
             self.written[sink] = Some(vec![outcome]);
         }
+        let (decided, found) = (milled.decided, self.alive);
+        if let (Some(baseline), None) = (milled.baseline, &self.compared) {
+            self.compared = Some(Compared { baseline, decided, found });
+        }
         let stages = pass.calls.iter().map(|call| job.ops[call.op].kind.clone()).collect();
         self.passes.push(PassFigures { stages, before: self.alive, after: milled.counts.alive });
         let stored = milled.stored;
@@ -188,6 +223,13 @@ impl Course {
             Some(op) => conclude(job, op, stored.found, milled.decided),
             None => Ok(()),
         }
+    }
+
+    /// What a grid would have done that leaves as many of the records that the passes decided about.
+    fn baseline(&self, lattice: &Lattice) -> Option<BaselineFigures> {
+        let Compared { baseline, decided, found } = self.compared.as_ref()?;
+        let removed = found.checked_sub(self.alive)?;
+        baseline.figures(decided.checked_sub(removed)?, *decided, lattice)
     }
 }
 
@@ -367,13 +409,14 @@ fn rounding(job: &Job<'_>, lattice: &Lattice, bounds: &Bounds, tally: &Tally) ->
 }
 
 /// What the stages settled by themselves and what they expected, in their order.
-fn decisions(
-    job: &Job<'_>,
-    forecasts: Vec<Option<Vec<(String, serde_json::Value)>>>,
-) -> Vec<Decision> {
+fn decisions(job: &Job<'_>, forecasts: Vec<Option<Vec<(String, Value)>>>) -> Vec<Decision> {
     let each = job.ops.iter().zip(forecasts).flat_map(|(stage, expected)| {
-        let settled = stage.op.tile().decisions().into_iter().chain(expected.into_iter().flatten());
-        settled.map(|(name, value)| Decision { stage: stage.kind.clone(), name, value })
+        let mut settled = stage.op.tile().decisions();
+        // What was chosen by samples may be among what is settled.
+        let is_new = |(name, _): &(String, Value)| settled.iter().all(|(other, _)| other != name);
+        let expected: Vec<_> = expected.into_iter().flatten().filter(is_new).collect();
+        settled.extend(expected);
+        settled.into_iter().map(|(name, value)| Decision { stage: stage.kind.clone(), name, value })
     });
     each.collect()
 }

@@ -99,6 +99,14 @@ impl Pass {
         self.calls.iter().map(|&call| needs(ops, call))
     }
 
+    /// The side of the cells that it decides in by normals, if it does: it is compared with grids of
+    /// such sides, whose cubes no face of a tile cuts.
+    pub fn compares(&self, ops: &[StageOp]) -> Option<i64> {
+        let by_normals = self.needs(ops).any(|needs| decides_by_normals(&needs));
+        let side = self.needs(ops).map(|needs| needs.cell_side).max().filter(|side| *side > 0);
+        side.filter(|_| by_normals)
+    }
+
     /// The stage of this pass that gathers.
     pub fn gathers(&self) -> Option<usize> {
         self.calls.iter().find(|call| call.gathers).map(|call| call.op)
@@ -122,6 +130,11 @@ impl Pass {
 /// True if a stage that needs this takes records away from the passes behind it.
 fn decides(needs: &Needs) -> bool {
     needs.removes || needs.mark.is_some()
+}
+
+/// True if a stage that needs this decides, and reads normals.
+pub(super) fn decides_by_normals(needs: &Needs) -> bool {
+    decides(needs) && needs.reads.iter().any(|column| column == "Normal")
 }
 
 /// Refuses stages that are limited by a class or a flag that records of `schema` do not have.

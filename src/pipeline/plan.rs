@@ -16,7 +16,7 @@ use super::text::{Pipeline, PlacedStage};
 use crate::budget::default_limit;
 use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
-use crate::point::Schema;
+use crate::point::{Schema, Units};
 use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Role, Source, Transform};
 use crate::tile::{CLASSED_INPUTS, TAGGED_INPUTS};
 use crate::{Error, ErrorKind, Result};
@@ -86,6 +86,7 @@ impl Pipeline {
         let schema = source.schema();
         check_transforms(&sorted.transforms, schema).map_err(in_file)?;
         check_limits(&sorted.ops, schema)?;
+        convert_lengths(&mut sorted.ops, &source.metadata().units)?;
         let selections = number_selections(&mut sorted.ops)?;
         let passes = unroll(&sorted.ops, schema, &taps)?;
         let classed = passes.iter().any(|pass| pass.reads_classes);
@@ -273,6 +274,11 @@ fn each_input(
     }
     let folders = each.iter().any(|own| !own.is_empty());
     Ok((each, if folders { ranks(&inputs) } else { Vec::new() }))
+}
+
+/// Converts lengths with a unit of their own to the unit of the scan.
+fn convert_lengths(ops: &mut [StageOp], units: &Units) -> Result<()> {
+    ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().convert(units))
 }
 
 fn check_transforms(transforms: &[(String, Box<dyn Transform>)], schema: &Schema) -> Result<()> {

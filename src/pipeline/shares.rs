@@ -1,10 +1,12 @@
 //! How a run divides its memory: what it can tell before any work, as a pure function.
 
 use super::by_rank::ordering_bytes;
+use super::passes::decides_by_normals;
 use super::product::Product;
 use super::survey::survey_bytes;
 use crate::budget::{at_most_mebibytes, whole_mebibytes};
 use crate::point::Position;
+use crate::report::Baseline;
 use crate::stage::{ChunkSize, Needs, Source};
 use crate::tile::{
     FATE_BYTES, FIGURE_BYTES, Fetch, Intake, Loader, NORMAL_BYTES, Pieces, Remote, Tag,
@@ -160,7 +162,9 @@ impl Demands {
         let open = (self.sinks.saturating_sub(1) as u64).saturating_mul(waiting);
         let chunks = bytes.saturating_add(waiting).saturating_mul(2);
         let fetch = Fetch::bytes(points, self.stride);
-        [chunks, open, batch, fetch].into_iter().fold(Remote::BYTES, u64::saturating_add)
+        let by_normals = self.passes.iter().flatten().any(decides_by_normals);
+        let baseline = if by_normals { Baseline::BYTES } else { 0 };
+        [baseline, chunks, open, batch, fetch].into_iter().fold(Remote::BYTES, u64::saturating_add)
     }
 
     /// Bytes that a thread of a stream holds: batches read and waiting for their turn, chunks filled,

@@ -1,5 +1,7 @@
 //! How a run tells its progress and hears that it should stop.
 
+use crate::report::Decision;
+
 /// Told what a run does; called from several threads. The command line draws bars from it.
 pub trait Watch: Sync {
     /// A phase begins; `total` is its amount of work in points, where known.
@@ -10,6 +12,9 @@ pub trait Watch: Sync {
 
     /// Something the user should know, once.
     fn warn(&self, message: &str);
+
+    /// The stages chose values of keys by what they saw of the scan, before a pass that works by them.
+    fn chose(&self, _values: &[Decision]) {}
 
     /// True if the run should stop; asked between batches and tiles.
     fn cancelled(&self) -> bool {

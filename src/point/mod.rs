@@ -2,7 +2,6 @@
 
 mod batch;
 mod bounds;
-mod count;
 pub mod names;
 mod schema;
 mod selection;
@@ -11,7 +10,6 @@ mod units;
 
 pub use batch::PointBatch;
 pub use bounds::{Bounds, Position, distance2};
-pub use count::parse_count;
 pub use schema::{Bits, Dimension, Endian, GpsTime, Layout, Metadata, Scalar, Schema, Value};
 pub use selection::{Chooser, Edit, Flag, Mark, Selection};
 pub use spare::Spare;

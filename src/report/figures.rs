@@ -4,6 +4,7 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
+use super::baseline::BaselineFigures;
 use crate::geom::lattice::Lattice;
 use crate::point::Position;
 
@@ -28,7 +29,7 @@ pub struct PlaneFigures {
 /// How far removed records are from the plane of the point that stands for them, in world units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DeviationFigures {
-    /// Removed records.
+    /// Removed records of which it was measured.
     pub points: u64,
     /// sqrt(Σd²/n).
     pub rms: f64,
@@ -41,7 +42,7 @@ pub struct DeviationFigures {
 /// [`DeviationFigures`] of the whole scan, with percentiles.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DeviationTotals {
-    /// Removed records.
+    /// Removed records of which it was measured.
     pub points: u64,
     /// sqrt(Σd²/n).
     pub rms: f64,
@@ -92,6 +93,8 @@ pub struct Totals {
     pub scan_plane: Pair<Option<PlaneFigures>>,
     /// Of the removed records; None where there are none.
     pub deviation: Option<DeviationTotals>,
+    /// That of a voxel grid of as many points; None where no pass decides by normals.
+    pub baseline: Option<BaselineFigures>,
 }
 
 /// What a pass over the scan left.

@@ -1,5 +1,6 @@
 //! What a run says it did: the ledger, the errors of tiles and scan, and how they are merged.
 
+mod baseline;
 mod classes;
 mod deviations;
 mod document;
@@ -12,6 +13,7 @@ mod survey;
 mod table;
 mod tally;
 
+pub use baseline::{Baseline, BaselineFigures};
 pub use classes::ClassCounts;
 pub use classes::class_name;
 pub use deviations::{Deviations, Histogram};
@@ -29,5 +31,5 @@ pub use sums::{Distances, FixedSum};
 pub use survey::{
     FittedScan, FittedTile, Lot, PlaneDistances, ScanSurvey, TileSurvey, report_tile_level,
 };
-pub use table::{Grouped, Table};
+pub use table::{Grouped, Short, Table};
 pub use tally::{Apart, Tally};

@@ -267,7 +267,7 @@ impl FittedScan {
         self.distances.sums.after.merge(&part.sums.after);
     }
 
-    /// The totals in world units.
+    /// The totals in world units, but for the baseline, which a pass measures.
     ///
     /// Fails with [`ErrorKind::Internal`](crate::ErrorKind::Internal) if the walks over the scan and
     /// its tiles did not see the same number of records, or a stage reported a deviation that is no
@@ -284,6 +284,7 @@ impl FittedScan {
             tile_plane: plane_figures(&survey.tile_distances, lattice),
             scan_plane: plane_figures(&distances.sums, lattice),
             deviation: deviation_totals(&survey.deviations, &survey.histogram, lattice),
+            baseline: None,
         })
     }
 }

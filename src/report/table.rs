@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
+use super::baseline::BaselineFigures;
 use super::classes::class_name;
 use super::document::{Outcome, Report};
 use super::figures::{ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
@@ -95,25 +96,49 @@ fn class_lines(f: &mut fmt::Formatter<'_>, classes: &[ClassFigures]) -> fmt::Res
     Ok(())
 }
 
+/// What the reduction did to the surface, then how flat the scan is.
 fn totals_lines(f: &mut fmt::Formatter<'_>, totals: &Totals, result: &Outcome) -> fmt::Result {
+    deviation_line(f, totals, result)?;
+    if let Some(BaselineFigures { side, rms, p95, .. }) = totals.baseline {
+        write!(f, "\nbaseline   RMS {}, 95 % ≤ {}", Short(rms), Short(p95))?;
+        write!(f, ": a voxel grid of as many points, cubes of {}", Short(side))?;
+    }
     let planes = [("in tiles", &totals.tile_plane), ("whole scan", &totals.scan_plane)];
-    let mut heading = "plane RMS";
+    let (mut heading, mut rises) = ("plane RMS", false);
     for (name, plane) in planes {
         if let Pair { before: Some(PlaneFigures { rms: before, .. }), after } = plane {
             write!(f, "\n{heading:9}  {name} {}", Short(*before))?;
             if let Some(after) = after {
                 write!(f, " → {}", Short(after.rms))?;
+                rises |= after.rms > *before;
             }
             heading = "";
         }
     }
-    if let Some(DeviationTotals { rms, p95, max, at, .. }) = totals.deviation {
-        write!(f, "\ndeviation  RMS {}, 95 % ≤ {}", Short(rms), Short(p95))?;
-        let step = result.lattice.map_or(0.0, |lattice| lattice.step);
-        let [x, y, z] = at.map(|at| Coordinate { at, step });
-        write!(f, ", max {} at ({x}, {y}, {z})", Short(max))?;
+    if rises {
+        write!(
+            f,
+            "\n           (points stay where the surface bends: those lie farther from one plane)"
+        )?;
     }
     Ok(())
+}
+
+/// How far removed records are from the surface, and of how many that is known.
+fn deviation_line(f: &mut fmt::Formatter<'_>, totals: &Totals, result: &Outcome) -> fmt::Result {
+    let removed = totals.points.before.saturating_sub(totals.points.after);
+    let Some(DeviationTotals { points, rms, p95, max, at, .. }) = totals.deviation else {
+        let told = removed > 0;
+        return if told { write!(f, "\ndeviation  not measured") } else { Ok(()) };
+    };
+    write!(f, "\ndeviation  RMS {}, 95 % ≤ {}", Short(rms), Short(p95))?;
+    let step = result.lattice.map_or(0.0, |lattice| lattice.step);
+    let [x, y, z] = at.map(|at| Coordinate { at, step });
+    write!(f, ", max {} at ({x}, {y}, {z})", Short(max))?;
+    match points < removed {
+        true => write!(f, ", of {} of {} removed points", Grouped(points), Grouped(removed)),
+        false => Ok(()),
+    }
 }
 
 fn time_line(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result {
@@ -174,7 +199,7 @@ impl fmt::Display for Grouped {
 }
 
 /// A length with three digits that mean something.
-struct Short(f64);
+pub struct Short(pub f64);
 
 impl fmt::Display for Short {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

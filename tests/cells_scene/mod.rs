@@ -8,6 +8,7 @@ use pointmill::geom::angle::{
 use pointmill::geom::lattice::Lattice;
 use pointmill::ops::{Cells, Measure, Median, Reference, Side, Split};
 use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
+use pointmill::quantity::{Angle, Length, Setting};
 use pointmill::report::Tally;
 use pointmill::stage::{ScanFacts, TileOp};
 use pointmill::tile::{Fate, Levels, Tile, TileKey, morton_cmp};
@@ -50,9 +51,23 @@ pub fn tile(scan: &[Point], cube: Bounds, side: i64) -> Tile {
     tile
 }
 
+/// As the keys of a stage.
+pub fn length(steps: f64) -> Length {
+    Length::of(steps).unwrap()
+}
+
+pub fn radians(angle: f64) -> Option<Setting<Angle>> {
+    Some(Angle::radians(angle).unwrap().into())
+}
+
+pub fn spacing(length: Length) -> Setting<Length> {
+    length.into()
+}
+
 pub fn cells(side: f64, max_angle: f64, split: Split) -> Cells {
     let mut stage = Cells::default();
-    (stage.side, stage.max_angle, stage.split) = (Side::Length(side), Some(max_angle), split);
+    (stage.side, stage.max_angle, stage.split) =
+        (Side::Length(length(side)), radians(max_angle), split);
     stage
 }
 
@@ -201,15 +216,17 @@ fn plain_divide(
     let angles = plain_angles(&cell, stage);
     let most = angles.iter().map(|a| a.0).fold(f64::NEG_INFINITY, f64::max);
     let least = angles.iter().map(|a| a.0).fold(f64::INFINITY, f64::min);
-    let max_angle = MaxAngle::new(stage.max_angle.unwrap_or(0.1));
+    let max_angle =
+        MaxAngle::new(stage.max_angle.and_then(Setting::given).map_or(0.1, Angle::in_radians));
     let is_wide = match stage.measure {
         Measure::Axis => max_angle.is_exceeded(most, least),
         Measure::Cone => max_angle.is_exceeded_by(1.0 + 2.0 * least),
     };
     let tight = Bounds::of(cell.iter().map(|p| p.at));
     let length = tight.extent().into_iter().max().unwrap() as f64;
-    let is_long = stage.max_side.is_some_and(|side| length > side);
-    let is_short = stage.min_spacing.is_some_and(|spacing| length <= spacing);
+    let is_long = stage.max_side.is_some_and(|side| length > side.value());
+    let is_short =
+        stage.min_spacing.and_then(Setting::given).is_some_and(|least| length <= least.value());
     if !is_long && (cell.len() <= stage.min_points.get() || !is_wide || is_short) {
         groups.push(cell);
         return;

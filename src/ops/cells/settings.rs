@@ -1,12 +1,12 @@
 //! What a pipeline file may say about cells.
 
-use std::f64::consts::PI;
 use std::fmt;
 
 use serde::de::{Deserializer, Error, SeqAccess, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 
 use crate::geom::angle::direction;
+use crate::quantity::Length;
 
 /// Side of the initial cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,8 +14,10 @@ pub enum Side {
     /// The smallest power of two of lattice steps for which occupied cubes hold 32 positions on
     /// average.
     Auto,
-    /// World units, above 0; rounded to whole lattice steps.
-    Length(f64),
+    /// With a number to keep, 1.25 sides of a grid that keeps as many; else as `Auto`.
+    Spread,
+    /// Rounded to whole lattice steps.
+    Length(Length),
 }
 
 /// How a cell is divided.
@@ -132,7 +134,8 @@ impl Serialize for Side {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Side::Auto => serializer.serialize_str("auto"),
-            Side::Length(length) => serializer.serialize_f64(*length),
+            Side::Spread => serializer.serialize_str("spread"),
+            Side::Length(length) => length.serialize(serializer),
         }
     }
 }
@@ -149,15 +152,12 @@ impl Visitor<'_> for SideVisitor {
     type Value = Side;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("a length above 0 in the scan's unit, or \"auto\"")
+        f.write_str("a length above 0 in the scan's unit, \"auto\" or \"spread\"")
     }
 
     fn visit_f64<E: Error>(self, length: f64) -> Result<Side, E> {
-        if length.is_finite() && length > 0.0 {
-            Ok(Side::Length(length))
-        } else {
-            Err(E::invalid_value(Unexpected::Float(length), &self))
-        }
+        let read = Length::of(length).map(Side::Length);
+        read.ok_or_else(|| E::invalid_value(Unexpected::Float(length), &self))
     }
 
     fn visit_i64<E: Error>(self, length: i64) -> Result<Side, E> {
@@ -171,96 +171,21 @@ impl Visitor<'_> for SideVisitor {
     fn visit_str<E: Error>(self, word: &str) -> Result<Side, E> {
         match word {
             "auto" => Ok(Side::Auto),
-            _ => Err(E::invalid_value(Unexpected::Str(word), &self)),
+            "spread" => Ok(Side::Spread),
+            _ => Length::read(word)
+                .map(Side::Length)
+                .ok_or_else(|| E::invalid_value(Unexpected::Str(word), &self)),
         }
-    }
-}
-
-/// A length in world units, above 0.
-pub(super) fn length<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
-    deserializer.deserialize_any(LengthVisitor).map(Some)
-}
-
-struct LengthVisitor;
-
-impl Visitor<'_> for LengthVisitor {
-    type Value = f64;
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("a length above 0 in the scan's unit")
-    }
-
-    fn visit_f64<E: Error>(self, length: f64) -> Result<f64, E> {
-        if length.is_finite() && length > 0.0 {
-            Ok(length)
-        } else {
-            Err(E::invalid_value(Unexpected::Float(length), &self))
-        }
-    }
-
-    fn visit_i64<E: Error>(self, length: i64) -> Result<f64, E> {
-        self.visit_f64(length as f64)
-    }
-
-    fn visit_u64<E: Error>(self, length: u64) -> Result<f64, E> {
-        self.visit_f64(length as f64)
-    }
-}
-
-/// An angle from 0 to π: a number of radians, or text with a unit.
-pub(super) fn angle<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
-    deserializer.deserialize_any(AngleVisitor).map(Some)
-}
-
-struct AngleVisitor;
-
-impl Visitor<'_> for AngleVisitor {
-    type Value = f64;
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("an angle from 0 to pi: radians such as 0.1, or text such as \"6deg\"")
-    }
-
-    fn visit_f64<E: Error>(self, radians: f64) -> Result<f64, E> {
-        if (0.0..=PI).contains(&radians) {
-            Ok(radians)
-        } else if radians > PI && radians <= 180.0 {
-            Err(E::custom(format!(
-                "an angle is in radians, at most pi, and {radians} is more: \
-                 for degrees write \"{radians}deg\""
-            )))
-        } else {
-            Err(E::invalid_value(Unexpected::Float(radians), &self))
-        }
-    }
-
-    fn visit_i64<E: Error>(self, radians: i64) -> Result<f64, E> {
-        self.visit_f64(radians as f64)
-    }
-
-    fn visit_u64<E: Error>(self, radians: u64) -> Result<f64, E> {
-        self.visit_f64(radians as f64)
-    }
-
-    fn visit_str<E: Error>(self, text: &str) -> Result<f64, E> {
-        let refused = || E::invalid_value(Unexpected::Str(text), &self);
-        let (number, half_turn) = text
-            .strip_suffix("deg")
-            .map(|number| (number, 180.0))
-            .or_else(|| text.strip_suffix("rad").map(|number| (number, PI)))
-            .ok_or_else(refused)?;
-        let value: f64 = number.trim().parse().map_err(|_| refused())?;
-        if !(0.0..=half_turn).contains(&value) {
-            return Err(refused());
-        }
-        Ok(if half_turn == PI { value } else { value / half_turn * PI })
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
     use crate::ops::Cells;
+    use crate::quantity::Setting;
 
     fn refusal(text: &str) -> String {
         toml::from_str::<Cells>(text).expect_err(text).to_string()
@@ -281,11 +206,13 @@ mod tests {
             ("0.25", 0.25),
             ("1", 1.0),
             ("'180deg'", PI),
+            ("'6°'", 6.0 / 180.0 * PI),
             ("'6 deg'", 6.0 / 180.0 * PI),
             ("'0.1rad'", 0.1),
         ] {
             let cells: Cells = toml::from_str(&format!("max_angle = {text}")).unwrap();
-            assert_eq!(cells.max_angle, Some(radians), "{text}");
+            let angle = cells.max_angle.unwrap().given().unwrap();
+            assert_eq!(angle.in_radians(), radians, "{text}");
         }
         assert!(refusal("max_angle = 6").contains("write \"6deg\""));
         for wrong in ["-0.1", "nan", "inf", "1000", "'6'", "'deg'", "'181deg'", "'-1rad'", "true"] {
@@ -296,9 +223,10 @@ mod tests {
     #[test]
     fn sides_are_lengths_or_auto() {
         let side = |text: &str| toml::from_str::<Cells>(&format!("side = {text}")).unwrap().side;
-        assert_eq!(side("2"), Side::Length(2.0));
-        assert_eq!(side("0.25"), Side::Length(0.25));
-        assert_eq!(side("'auto'"), Side::Auto);
+        assert_eq!(side("2"), Side::Length(Length::of(2.0).unwrap()));
+        assert_eq!(side("0.25"), Side::Length(Length::of(0.25).unwrap()));
+        assert_eq!(side("'5 cm'"), Side::Length(Length::read("5cm").unwrap()));
+        assert_eq!((side("'auto'"), side("'spread'")), (Side::Auto, Side::Spread));
         for wrong in ["0", "-1.0", "nan", "inf", "'big'", "[1]"] {
             assert!(refusal(&format!("side = {wrong}")).contains("\"auto\""), "{wrong}");
         }
@@ -307,8 +235,13 @@ mod tests {
     #[test]
     fn bounds_are_lengths() {
         let cells: Cells = toml::from_str("max_side = 2\nmin_spacing = 0.25").unwrap();
-        assert_eq!((cells.max_side, cells.min_spacing), (Some(2.0), Some(0.25)));
-        for wrong in ["0", "-1.0", "nan", "inf", "'auto'"] {
+        assert_eq!(cells.max_side, Length::of(2.0));
+        assert_eq!(cells.min_spacing, Length::of(0.25).map(Setting::Given));
+        let spacing = |text: &str| {
+            toml::from_str::<Cells>(&format!("min_spacing = {text}")).unwrap().min_spacing
+        };
+        assert_eq!((spacing("'auto'"), spacing("'none'")), (Some(Setting::Auto), None));
+        for wrong in ["0", "-1.0", "nan", "inf", "'2 miles'", "'0m'", "'m'", "true"] {
             assert!(refusal(&format!("max_side = {wrong}")).contains("above 0"), "{wrong}");
             assert!(refusal(&format!("min_spacing = {wrong}")).contains("above 0"), "{wrong}");
         }

@@ -5,6 +5,8 @@ use std::fmt;
 use serde::de::{Deserializer, Error, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 
+use crate::quantity::parse_count;
+
 /// How many records are to stay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Keep {
@@ -13,6 +15,9 @@ pub enum Keep {
     /// So many records.
     Records(u64),
 }
+
+/// Whole numbers below are exact as f64.
+const WHOLE: f64 = 9_007_199_254_740_992.0;
 
 /// Millionths of a percent that are all.
 const ALL: u64 = 100_000_000;
@@ -58,6 +63,16 @@ impl<'de> Deserialize<'de> for Keep {
     }
 }
 
+/// A share of 1 in percent, without the digits that a float does not hold: 0.07 is 7 %.
+struct Percent(f64);
+
+impl fmt::Display for Percent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let digits = format!("{:.6}", 100.0 * self.0);
+        f.write_str(digits.trim_end_matches('0').trim_end_matches('.'))
+    }
+}
+
 struct KeepVisitor;
 
 impl Visitor<'_> for KeepVisitor {
@@ -65,7 +80,7 @@ impl Visitor<'_> for KeepVisitor {
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(
-            "a share such as \"10%\", or a number of points such as 500000, \"250k\" or \"5M\"",
+            "a share such as \"10%\", or a number of points such as 500000, \"250k\" or 1e6",
         )
     }
 
@@ -84,7 +99,17 @@ impl Visitor<'_> for KeepVisitor {
     }
 
     fn visit_f64<E: Error>(self, count: f64) -> Result<Keep, E> {
-        Err(E::invalid_value(Unexpected::Float(count), &self))
+        if 0.0 < count && count < 1.0 {
+            return Err(E::custom(format!(
+                "{count} is no number of points; did you mean \"{}%\", that share of them?",
+                Percent(count)
+            )));
+        }
+        // 1e6 is a float in TOML.
+        match count.fract() == 0.0 && (1.0..WHOLE).contains(&count) {
+            true => Ok(Keep::Records(count as u64)),
+            false => Err(E::invalid_value(Unexpected::Float(count), &self)),
+        }
     }
 
     fn visit_str<E: Error>(self, text: &str) -> Result<Keep, E> {
@@ -92,12 +117,10 @@ impl Visitor<'_> for KeepVisitor {
             Some(percent) => decimal(percent.trim(), 6)
                 .filter(|share| (1..=ALL).contains(share))
                 .map(Keep::Share),
-            None => {
-                let units = [('k', 3), ('K', 3), ('M', 6), ('G', 9)];
-                let unit = |(unit, digits)| Some((text.strip_suffix(unit)?.trim(), digits));
-                let (number, digits) = units.into_iter().find_map(unit).unwrap_or((text, 0));
-                decimal(number, digits).filter(|&count| count > 0).map(Keep::Records)
-            }
+            None => match text.trim().parse::<f64>() {
+                Ok(number) if number.fract() != 0.0 => return self.visit_f64(number),
+                _ => parse_count(text).ok().filter(|&count| count > 0).map(Keep::Records),
+            },
         };
         keep.ok_or_else(|| E::invalid_value(Unexpected::Str(text), &self))
     }
@@ -136,13 +159,19 @@ mod tests {
             ("'2.5 M'", Keep::Records(2_500_000), "2500000"),
             ("'250k'", Keep::Records(250_000), "250000"),
             ("'1.25G'", Keep::Records(1_250_000_000), "1250000000"),
+            ("1e6", Keep::Records(1_000_000), "1000000"),
+            ("'1e3'", Keep::Records(1_000), "1000"),
+            ("'10k'", Keep::Records(10_000), "10000"),
+            ("'1_500'", Keep::Records(1_500), "1500"),
         ] {
             assert_eq!((keep(text), keep(text).to_string().as_str()), (expected, said), "{text}");
         }
         for wrong in [
             "0",
             "-1",
-            "0.1",
+            "1.5",
+            "1e300",
+            "'1.5'",
             "'0%'",
             "'101%'",
             "'1.2345678%'",
@@ -154,11 +183,20 @@ mod tests {
             "'1.0005k'",
             "'99999999999G'",
             "true",
-            "'1e3'",
             "'.5M'",
         ] {
             let refusal = toml::from_str::<Cells>(&format!("keep = {wrong}")).unwrap_err();
             assert!(refusal.to_string().contains("\"10%\""), "{wrong}: {refusal}");
+        }
+    }
+
+    #[test]
+    fn a_share_without_its_sign_is_asked_about() {
+        for (text, share) in [("0.1", "10%"), ("'0.1'", "10%"), ("0.07", "7%"), ("2.5e-3", "0.25%")]
+        {
+            let refusal = toml::from_str::<Cells>(&format!("keep = {text}")).unwrap_err();
+            let asked = format!("did you mean \"{share}\"");
+            assert!(refusal.to_string().contains(&asked), "{text}: {refusal}");
         }
     }
 

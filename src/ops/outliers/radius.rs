@@ -2,7 +2,8 @@
 
 use super::super::removal::remove;
 use super::{account, checked};
-use crate::point::{Mark, distance2, names};
+use crate::point::{Mark, Units, distance2, names};
+use crate::quantity::Length;
 use crate::report::Tally;
 use crate::stage::{Needs, ScanFacts, TileOp};
 use crate::tile::Tile;
@@ -15,8 +16,7 @@ const WHOLE: f64 = 1e-9;
 /// `outliers` by radius.
 #[derive(Debug, Clone)]
 pub struct RadiusOutliers {
-    /// World units.
-    radius: f64,
+    radius: Length,
     min_neighbors: usize,
     mark: Option<Mark>,
     /// The largest squared distance within the radius, in steps; settled by the scan's lattice.
@@ -24,17 +24,13 @@ pub struct RadiusOutliers {
 }
 
 impl RadiusOutliers {
-    /// Outliers are what has fewer than `min_neighbors` (1 to 64) other positions within `radius`
-    /// (above 0, world units). An error names the key to blame.
+    /// Outliers are what has fewer than `min_neighbors` (1 to 64) other positions within `radius`.
+    /// An error names the key to blame.
     pub fn new(
-        radius: f64,
+        radius: Length,
         min_neighbors: usize,
         mark: Option<Mark>,
     ) -> Result<Self, (&'static str, Error)> {
-        if !(radius.is_finite() && radius > 0.0) {
-            let told = format!("`outliers.radius` must be a length above 0, not {radius}");
-            return Err(("radius", Error::pipeline(told)));
-        }
         let min_neighbors = checked("min_neighbors", min_neighbors)?;
         Ok(RadiusOutliers { radius, min_neighbors, mark, within: None })
     }
@@ -63,8 +59,13 @@ impl TileOp for RadiusOutliers {
         }
     }
 
+    fn convert(&mut self, units: &Units) -> Result<()> {
+        self.radius = self.radius.in_scan(units, "outliers.radius")?;
+        Ok(())
+    }
+
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
-        self.within = Some(square(self.radius / scan.lattice.step));
+        self.within = Some(square(self.radius.value() / scan.lattice.step));
         Ok(())
     }
 

@@ -5,7 +5,7 @@
 /// The error says what a count looks like.
 ///
 /// ```
-/// use pointmill::point::parse_count;
+/// use pointmill::quantity::parse_count;
 ///
 /// assert_eq!(parse_count("2.5M"), Ok(2_500_000));
 /// assert_eq!(parse_count("1e5"), Ok(100_000));
@@ -21,7 +21,7 @@ pub fn parse_count(text: &str) -> Result<u64, String> {
         Some('G') => (&digits[..digits.len() - 1], 9),
         _ => (&digits[..], 0),
     };
-    let (number, power) = match number.split_once(['e', 'E']) {
+    let (number, power) = match number.trim_end().split_once(['e', 'E']) {
         Some((number, power)) if thousands == 0 => (number, power.parse().map_err(|_| refused())?),
         Some(_) => return Err(refused()),
         None => (number, thousands),
@@ -55,6 +55,7 @@ mod tests {
             ("1500", 1_500),
             ("1_500", 1_500),
             (" 10k ", 10_000),
+            ("2.5 M", 2_500_000),
             ("10K", 10_000),
             ("5M", 5_000_000),
             ("2.5M", 2_500_000),

@@ -1,0 +1,104 @@
+//! What samples decide for cells: the values of keys that are "auto". A function of the points alone.
+
+use serde_json::Value;
+
+use super::{Cells, LARGEST_SIDE, MAX_ANGLE, Side};
+use crate::quantity::Setting;
+use crate::stage::ScanFacts;
+use crate::tile::Levels;
+
+/// Scatters that the angle is wide. Of the 32 normals of a cube of noise the farthest is off by
+/// 1.9 scatters, and the range of angles to the axis is twice that: noise alone divides few.
+const SCATTERS: f64 = 4.0;
+/// The widest angle that noise leads to, in radians: beyond, edges would go with the noise.
+const WIDEST: f64 = 1.0;
+/// Initial cells that are to be spread, and `min_spacing`, in sides of a grid of as many points.
+/// Measured by `cargo bench --bench quality`, whose table is in docs/paper.md.
+const SPREAD: f64 = 1.25;
+const SPACING: f64 = 0.75;
+/// Where more than one of so many positions stays, such cells could be more than the points to keep:
+/// they are nearly as small as the distance of neighbours.
+const SPREADABLE: u64 = 3;
+/// Without a number to keep: `min_spacing` in sides of the initial cells.
+const SPACING_OF_SIDE: f64 = 0.25;
+
+/// What is known of the scan before a sample is looked at.
+#[derive(Debug, Clone)]
+pub(super) struct Outlook {
+    levels: Levels,
+    records: u64,
+    /// World units of a lattice step.
+    step: f64,
+}
+
+impl Outlook {
+    pub(super) fn of(scan: &ScanFacts) -> Self {
+        Outlook { levels: scan.levels.clone(), records: scan.points, step: scan.lattice.step }
+    }
+
+    /// Records of the scan.
+    pub(super) fn records(&self) -> u64 {
+        self.records
+    }
+
+    /// Side in steps of the cubes of a grid that keeps `count` positions: between the two octree levels
+    /// that keep more and fewer, by powers.
+    fn grid_side(&self, count: u64) -> f64 {
+        let count = count.clamp(self.levels.occupied(62).max(1), self.levels.positions());
+        let level = (0..62).find(|&j| self.levels.occupied(j + 1) <= count).unwrap_or(62);
+        let log = |cubes: u64| libm::log2(cubes as f64);
+        let (fine, coarse) = (self.levels.occupied(level), self.levels.occupied(level + 1));
+        let between = match fine > coarse {
+            true => (log(fine) - log(count)) / (log(fine) - log(coarse)),
+            false => 0.0,
+        };
+        libm::exp2(f64::from(level) + between.max(0.0))
+    }
+}
+
+/// What samples say of the scan.
+pub(super) struct Sampled {
+    /// How far normals scatter, in radians; none where nothing is planar.
+    pub(super) scatter: Option<f64>,
+    /// Share of the positions that the stage decides about.
+    pub(super) chosen: f64,
+}
+
+/// Settles what is left to it; returns the keys and values.
+pub(super) fn choose(cells: &mut Cells, sampled: &Sampled) -> Vec<(String, Value)> {
+    let (Some(outlook), Some(mut settled)) = (&cells.outlook, cells.settled) else {
+        return Vec::new();
+    };
+    let mut chosen: Vec<(String, Value)> = Vec::new();
+    if cells.max_angle.is_some_and(Setting::is_auto) {
+        let angle = sampled.scatter.map_or(MAX_ANGLE, |scatter| SCATTERS * scatter);
+        settled.max_angle = (angle.clamp(MAX_ANGLE, WIDEST) * 1e4).round() / 1e4;
+        chosen.push(("max_angle".into(), settled.max_angle.into()));
+    }
+    // Of a selection no more is known than its share: its cubes are at most those of all.
+    let records = (outlook.records as f64 * sampled.chosen) as u64;
+    let count = cells.keep.map(|keep| keep.of(records.max(1)));
+    let is_few = |count: &u64| *count <= outlook.levels.positions() / SPREADABLE;
+    let grid = count.filter(is_few).map(|count| outlook.grid_side(count));
+    if let (Side::Spread, Some(grid)) = (cells.side, grid) {
+        settled.steps = ((SPREAD * grid) as i64).clamp(1, LARGEST_SIDE);
+        settled.length = settled.steps as f64 * outlook.step;
+        chosen.push(("side".into(), settled.length.into()));
+    }
+    if cells.min_spacing.is_some_and(Setting::is_auto) {
+        let spacing = match grid {
+            _ if sampled.chosen < 1.0 => 0.0,
+            Some(grid) => SPACING * grid,
+            None if count.is_some() => 0.0,
+            None => SPACING_OF_SIDE * settled.steps as f64,
+        };
+        settled.min_spacing = (spacing as u64).min(settled.max_side);
+        let value = match settled.min_spacing {
+            0 => Value::from("none"),
+            steps => Value::from(steps as f64 * outlook.step),
+        };
+        chosen.push(("min_spacing".into(), value));
+    }
+    cells.settled = Some(settled);
+    chosen
+}

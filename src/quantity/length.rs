@@ -1,0 +1,172 @@
+//! Lengths: numbers in the scan's own unit, or with a unit of their own.
+
+use std::fmt;
+
+use serde::de::{Deserializer, Unexpected, Visitor};
+use serde::{Deserialize, Serialize, Serializer};
+
+use crate::point::{Horizontal, Units};
+use crate::{Error, Result};
+
+/// A unit of length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// `mm`
+    Millimetre,
+    /// `cm`
+    Centimetre,
+    /// `m`
+    Metre,
+    /// `km`
+    Kilometre,
+    /// `in`
+    Inch,
+    /// `ft`, the international foot
+    Foot,
+}
+
+impl Unit {
+    const ALL: [(&str, Unit, f64); 6] = [
+        ("mm", Unit::Millimetre, 0.001),
+        ("cm", Unit::Centimetre, 0.01),
+        ("km", Unit::Kilometre, 1000.0),
+        ("in", Unit::Inch, 0.0254),
+        ("ft", Unit::Foot, 0.3048),
+        ("m", Unit::Metre, 1.0),
+    ];
+
+    fn metres(self) -> f64 {
+        Unit::ALL.iter().find(|(_, unit, _)| *unit == self).map_or(1.0, |(.., metres)| *metres)
+    }
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = Unit::ALL.iter().find(|(_, unit, _)| unit == self).map_or("", |(name, ..)| name);
+        f.write_str(name)
+    }
+}
+
+/// A length above 0: in the scan's unit, or in the unit that it was given in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Length {
+    value: f64,
+    unit: Option<Unit>,
+}
+
+impl Length {
+    /// A length in the scan's unit; none if it is not a finite number above 0.
+    pub fn of(value: f64) -> Option<Length> {
+        (value.is_finite() && value > 0.0).then_some(Length { value, unit: None })
+    }
+
+    /// Reads a length with a unit: `2m`, `5 cm`; none of anything else.
+    pub fn read(text: &str) -> Option<Length> {
+        Unit::ALL.iter().find_map(|(name, unit, _)| {
+            let number = text.strip_suffix(name)?.trim().parse().ok()?;
+            Length::of(number).map(|length| Length { unit: Some(*unit), ..length })
+        })
+    }
+
+    /// The length in the scan's unit. One that has a unit of its own must be converted first.
+    pub fn value(self) -> f64 {
+        self.value
+    }
+
+    /// True if it is known to be less than `other`: lengths compare in one unit.
+    pub fn is_less_than(self, other: Length) -> bool {
+        match (self.unit, other.unit) {
+            (Some(one), Some(two)) => self.value * one.metres() < other.value * two.metres(),
+            (None, None) => self.value < other.value,
+            _ => false,
+        }
+    }
+
+    /// The length in the unit of x and y, which `units` tell.
+    ///
+    /// # Errors
+    /// Fails where the length has a unit and the scan's is not known or is an angle; `key` is who
+    /// takes it, as `cells.max_side`.
+    pub fn in_scan(self, units: &Units, key: &str) -> Result<Length> {
+        let Some(unit) = self.unit else { return Ok(self) };
+        let told = |why: &str, help: String| {
+            let assignment = format!("`{key} = \"{self}\"`");
+            Err(Error::pipeline(format!("{assignment} has a unit, and {why}")).help(help))
+        };
+        let metres = self.value * unit.metres();
+        match units.horizontal {
+            Some(Horizontal::Metres(metres_in_one)) => {
+                Ok(Length { value: metres / metres_in_one, unit: None })
+            }
+            None => told(
+                "the scan does not say what its coordinates are in",
+                format!("if they are in metres, give `{key} = {}`", Shown(metres)),
+            ),
+            Some(Horizontal::Degrees) => told(
+                "the scan's x and y are in degrees, in which it is no length",
+                "bring the scan to a projected reference system first".to_owned(),
+            ),
+        }
+    }
+}
+
+/// A number in at most nine digits: 5 cm are 0.05, not 0.05000000000000001.
+struct Shown(f64);
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let short = format!("{:.8e}", self.0).parse().unwrap_or(self.0);
+        write!(f, "{short}")
+    }
+}
+
+impl fmt::Display for Length {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.unit {
+            Some(unit) => write!(f, "{}{unit}", self.value),
+            None => write!(f, "{}", self.value),
+        }
+    }
+}
+
+/// A number in the scan's unit, or text with a unit, as it was given.
+impl Serialize for Length {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.unit {
+            Some(_) => serializer.collect_str(self),
+            None => serializer.serialize_f64(self.value),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Length {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(LengthVisitor)
+    }
+}
+
+struct LengthVisitor;
+
+impl Visitor<'_> for LengthVisitor {
+    type Value = Length;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a length above 0 in the scan's unit, or with a unit such as \"2m\" or \"5cm\"")
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<Length, E> {
+        Length::of(value).ok_or_else(|| E::invalid_value(Unexpected::Float(value), &self))
+    }
+
+    fn visit_i64<E: serde::de::Error>(self, value: i64) -> Result<Length, E> {
+        self.visit_f64(value as f64)
+    }
+
+    fn visit_u64<E: serde::de::Error>(self, value: u64) -> Result<Length, E> {
+        self.visit_f64(value as f64)
+    }
+
+    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Length, E> {
+        Length::read(text).ok_or_else(|| E::invalid_value(Unexpected::Str(text), &self))
+    }
+}

@@ -1,0 +1,12 @@
+//! Quantities as people write them: counts, angles, lengths with units, and values that are found
+//! instead of given. Reads, checks and shows them; knows no stage and no file.
+
+mod angle;
+mod count;
+mod length;
+mod setting;
+
+pub use angle::Angle;
+pub use count::parse_count;
+pub use length::{Length, Unit};
+pub use setting::Setting;

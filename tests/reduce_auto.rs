@@ -1,0 +1,92 @@
+//! What a pipeline leaves to the scan ("auto", "spread"): a function of the points alone, told in the
+//! report, and the same bytes when it is given by hand. And the baseline of the report.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
+
+mod common;
+
+use std::path::PathBuf;
+
+use common::*;
+use pointmill::io::synthetic::Scene;
+use serde_json::Value;
+
+const AUTO: &str = "[[stage]]\nkind = 'normals'\nneighbors = 'auto'\n[[stage]]\nkind = 'cells'\n\
+                    measure = 'cone'\nside = 'spread'\nmin_spacing = 'auto'\n";
+const MEDIAN: &str = "[[stage]]\nkind = 'median'\n";
+
+fn chosen(ran: &Ran, key: &str) -> Option<Value> {
+    let found = ran.report.result.decisions.iter().rev().find(|decision| decision.name == key);
+    found.map(|decision| decision.value.clone())
+}
+
+/// The pipeline with everything that `ran` chose given by hand.
+fn by_hand(ran: &Ran, limit: &str) -> String {
+    let value = |key: &str| chosen(ran, key).unwrap();
+    let side = if limit.is_empty() { "'spread'".to_owned() } else { value("side").to_string() };
+    let limit = match limit {
+        "" => format!("max_angle = {}", value("max_angle")),
+        keep => keep.to_owned(),
+    };
+    format!(
+        "[[stage]]\nkind = 'normals'\nneighbors = {}\n[[stage]]\nkind = 'cells'\nmeasure = 'cone'\n\
+         side = {side}\nmin_spacing = {}\n{limit}\n{MEDIAN}",
+        value("neighbors"),
+        value("min_spacing"),
+    )
+}
+
+#[test]
+fn what_is_chosen_is_told_and_gives_the_same_bytes_by_hand_and_however_the_scan_is_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let input: PathBuf = folder.path().join("in.las");
+    Scan::synthetic(Scene::Als, 12_000, 3).write(&input);
+    let go = |stages: &str, settings| {
+        run(folder.path(), std::slice::from_ref(&input), stages, "laz", settings).unwrap()
+    };
+    for limit in ["", "keep = '7%'", "keep = 300"] {
+        let angle = if limit.is_empty() { "max_angle = 'auto'" } else { limit };
+        let auto = format!("{AUTO}{angle}\n{MEDIAN}");
+        let whole = go(&auto, Settings::PLAIN);
+        let bytes = whole.bytes();
+        assert_eq!(chosen(&whole, "neighbors"), Some(20.into()), "the scan has noise");
+        let kept = whole.report.result.ledger.kept;
+        let expected = [("keep = '7%'", 840), ("keep = 300", 300)];
+        expected.iter().filter(|(keep, _)| *keep == limit).for_each(|(_, n)| assert_eq!(kept, *n));
+        let cut = go(&auto, Settings { tile_points: Some(400), threads: 2, ..Settings::PLAIN });
+        assert!(cut.count("tiles") >= 30, "{} tiles", cut.count("tiles"));
+        assert_same(&cut.bytes(), &bytes, limit);
+        assert_same(&cut.result, &whole.result, limit);
+        let hand = go(&by_hand(&whole, limit), Settings::PLAIN);
+        assert_same(&hand.bytes(), &bytes, limit);
+    }
+}
+
+#[test]
+fn the_baseline_is_that_of_a_grid_of_as_many_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let input: PathBuf = folder.path().join("in.las");
+    Scan::synthetic(Scene::Plane, 20_000, 5).write(&input);
+    let go = |stages: &str| {
+        let settings = Settings::PLAIN;
+        run(folder.path(), std::slice::from_ref(&input), stages, "las", settings).unwrap()
+    };
+    let reduced = go(&format!("{AUTO}keep = '4%'\n{MEDIAN}"));
+    let baseline = reduced.report.result.totals.unwrap().baseline.unwrap();
+    assert!(baseline.points > 10_000, "{baseline:?}");
+    let side = baseline.side;
+    let grid = go(&format!(
+        "[[stage]]\nkind = 'normals'\nneighbors = 20\n[[stage]]\nkind = 'grid'\nside = {side}\n"
+    ));
+    let totals = grid.report.result.totals.unwrap();
+    // Cubes of a plane that is in no direction special: as many as asked for, as far off.
+    let kept = totals.points.after as f64 / 800.0;
+    assert!((0.8..1.25).contains(&kept), "{kept}");
+    let rms = totals.deviation.unwrap().rms / baseline.rms;
+    assert!((0.75..1.33).contains(&rms), "{rms} of {baseline:?}");
+    assert_eq!(totals.baseline, None, "the grid does not decide by normals");
+    let all = go(
+        "[[stage]]\nkind = 'normals'\n[[stage]]\nkind = 'cells'\nmax_angle = 0\n[[stage]]\nkind = 'median'\n",
+    );
+    assert_eq!(all.report.result.totals.unwrap().baseline, None, "there is no grid of all points");
+}
