@@ -20,6 +20,7 @@ use pointmill::io::synthetic::{Scene, Synthetic};
 use pointmill::io::{las, ply};
 use pointmill::ops::normals::{Method, Normals};
 use pointmill::point::{PointBatch, Position};
+use pointmill::quantity::Setting;
 use pointmill::report::{Tally, cpu_seconds};
 use pointmill::stage::{OpenSource, Source, TileOp};
 use pointmill::tile::{
@@ -83,7 +84,8 @@ fn main() {
     let points = positions.len() as f64;
     for &method in &settings.methods {
         let mut stage = Normals::default();
-        (stage.neighbors, stage.method) = (settings.neighbors, method);
+        stage.neighbors = Setting::Given(settings.neighbors);
+        stage.method = method;
         let mut rounds: Vec<[f64; 4]> =
             (0..settings.rounds).map(|_| normals(&positions, &stage, settings.simd)).collect();
         rounds.sort_by(|a, b| (a[0] + a[1]).total_cmp(&(b[0] + b[1])));
@@ -111,7 +113,7 @@ fn normals(positions: &[Position], stage: &Normals, simd: Simd) -> [f64; 4] {
     loader.tile().0.compute_by(simd);
     let mut count = 0;
     for key in keys {
-        let tile = loader.load(key, 0, stage.neighbors).unwrap();
+        let tile = loader.load(key, 0, stage.needs().neighbors).unwrap();
         stage.run(tile, &mut Tally::default()).unwrap();
         count += tile.normals[tile.core.clone()].iter().filter(|n| !n[0].is_nan()).count();
     }

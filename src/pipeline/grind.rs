@@ -52,13 +52,16 @@ pub(super) struct Milled {
 /// A sink with its number.
 pub(super) type Numbered = (usize, Box<dyn Sink>);
 
+/// Outputs of a pass: sinks that grow while it mills, lists by input and by place in the input.
+pub(super) type PassOutputs = (Vec<Numbered>, Vec<ByInput>, Vec<ByRank>);
+
 /// Runs `pass` over the tiles of `cut`, into the `sinks` with their numbers and into lists by input.
 pub(super) fn grind(
     job: &Job<'_>,
     (pass, cut): (&Pass, &Cut),
     field: &Field<'_>,
     sieve: &Sieve,
-    (sinks, by_input, by_rank): (Vec<Numbered>, Vec<ByInput>, Vec<ByRank>),
+    (sinks, by_input, by_rank): PassOutputs,
 ) -> Result<Milled> {
     let (tiles, keys) = (&field.tiles, &cut.keys);
     let numbers = sinks.iter().map(|(sink, _)| *sink).chain(by_input.iter().map(|by| by.sink));

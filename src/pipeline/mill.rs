@@ -14,7 +14,7 @@ use super::clock::Clock;
 use super::cut::{Cut, cut_again, cut_all};
 use super::each::ByInput;
 use super::forecast::{forecast, samples_capacity};
-use super::grind::{Field, grind};
+use super::grind::{Field, Milled, PassOutputs, grind};
 use super::job::Job;
 use super::passes::{Call, Op, Pass};
 use super::run::Finished;
@@ -161,44 +161,11 @@ impl Course {
         let levels: std::collections::BTreeSet<u32> =
             cut.keys.iter().map(|key| key.level).collect();
         tally.work("tile_levels", levels.len() as u64);
-        let (mut sinks, mut by_input) = (Vec::new(), Vec::new());
-        let (mut by_rank, mut ordered) = (Vec::new(), Vec::new());
-        for &sink in pass.before.iter().chain(&pass.after) {
-            if let Some(Some(each)) = job.each.get(sink) {
-                let (inputs, before) = (each.sinks.len(), pass.before.contains(&sink));
-                let normals = job.wants_normals[sink];
-                by_input.push(ByInput::new(&field.area, sink, inputs, normals, before));
-                continue;
-            }
-            let open = self.sinks.get_mut(sink).and_then(Option::take);
-            let open = open.ok_or_else(|| Error::internal("an output is written twice"))?;
-            if job.in_input_order[sink] {
-                let (normals, before) = (job.wants_normals[sink], pass.before.contains(&sink));
-                by_rank.push(ByRank::new(&field.area, sink, &field.starts, normals, before));
-                ordered.push(open);
-                continue;
-            }
-            sinks.push((sink, open));
-        }
+        let ((sinks, by_input, by_rank), ordered) = self.outputs(job, pass, field)?;
         let which: Vec<usize> = sinks.iter().map(|(sink, _)| *sink).collect();
         let milled = grind(job, (pass, &cut), field, &sieve, (sinks, by_input, by_rank))?;
         tally.merge(&milled.tally);
-        for lists in &milled.by_input {
-            clock.phase("write", Some(lists.records()));
-            let unknown = || Error::internal("an output has no inputs");
-            let each = job.each[lists.sink].as_ref().ok_or_else(unknown)?;
-            let last = lists.sink == job.last_sink;
-            let (written, counted) = each.write(job, tiles, lists, last)?;
-            tally.merge(&counted);
-            self.written[lists.sink] = Some(written);
-        }
-        for (lists, sink) in milled.by_rank.iter().zip(ordered) {
-            clock.phase("write", Some(lists.records));
-            let last = lists.sink == job.last_sink;
-            let (said, counted) = lists.write(job, tiles, sink, last)?;
-            tally.merge(&counted);
-            self.written[lists.sink] = Some(vec![(lists.records, said)]);
-        }
+        self.write_lists(job, tiles, &milled, ordered, tally, clock)?;
         for (sink, outcome) in
             which.into_iter().zip(milled.counts.outputs.into_iter().zip(milled.written))
         {
@@ -230,6 +197,64 @@ impl Course {
         let Compared { baseline, decided, found } = self.compared.as_ref()?;
         let removed = found.checked_sub(self.alive)?;
         baseline.figures(decided.checked_sub(removed)?, *decided, lattice)
+    }
+
+    /// The outputs of a pass: those that grow while it mills, lists of those that are written behind
+    /// it, and the sinks that are then written in the order of the inputs.
+    fn outputs(
+        &mut self,
+        job: &Job<'_>,
+        pass: &Pass,
+        field: &Field<'_>,
+    ) -> Result<(PassOutputs, Vec<Box<dyn Sink>>)> {
+        let (mut sinks, mut by_input) = (Vec::new(), Vec::new());
+        let (mut by_rank, mut ordered) = (Vec::new(), Vec::new());
+        for &sink in pass.before.iter().chain(&pass.after) {
+            let (normals, before) = (job.wants_normals[sink], pass.before.contains(&sink));
+            if let Some(Some(each)) = job.each.get(sink) {
+                let inputs = each.sinks.len();
+                by_input.push(ByInput::new(&field.area, sink, inputs, normals, before));
+                continue;
+            }
+            let open = self.sinks.get_mut(sink).and_then(Option::take);
+            let open = open.ok_or_else(|| Error::internal("an output is written twice"))?;
+            if job.in_input_order[sink] {
+                by_rank.push(ByRank::new(&field.area, sink, &field.starts, normals, before));
+                ordered.push(open);
+            } else {
+                sinks.push((sink, open));
+            }
+        }
+        Ok(((sinks, by_input, by_rank), ordered))
+    }
+
+    /// Writes the outputs that are written behind a pass's last tile.
+    fn write_lists(
+        &mut self,
+        job: &Job<'_>,
+        tiles: &SealedTiles,
+        milled: &Milled,
+        ordered: Vec<Box<dyn Sink>>,
+        tally: &mut Tally,
+        clock: &mut Clock<'_>,
+    ) -> Result<()> {
+        for lists in &milled.by_input {
+            clock.phase("write", Some(lists.records()));
+            let unknown = || Error::internal("an output has no inputs");
+            let each = job.each[lists.sink].as_ref().ok_or_else(unknown)?;
+            let last = lists.sink == job.last_sink;
+            let (written, counted) = each.write(job, tiles, lists, last)?;
+            tally.merge(&counted);
+            self.written[lists.sink] = Some(written);
+        }
+        for (lists, sink) in milled.by_rank.iter().zip(ordered) {
+            clock.phase("write", Some(lists.records));
+            let last = lists.sink == job.last_sink;
+            let (said, counted) = lists.write(job, tiles, sink, last)?;
+            tally.merge(&counted);
+            self.written[lists.sink] = Some(vec![(lists.records, said)]);
+        }
+        Ok(())
     }
 }
 

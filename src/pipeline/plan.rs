@@ -1,5 +1,6 @@
 //! A pipeline that fits: its source open, its lattice fixed, its stages in passes, its memory divided.
 
+use std::num::NonZeroUsize;
 use std::path::Path;
 
 use super::by_rank;
@@ -107,26 +108,14 @@ impl Pipeline {
             false => None,
         };
         let simd = settings.simd.resolve().map_err(in_file)?;
-        let threads = match settings.threads {
-            Some(threads) => threads.get(),
-            None => std::thread::available_parallelism().map_or(1, usize::from).min(MOST_THREADS),
-        };
-        if threads > MOST_THREADS {
-            let told = format!("a run has at most {MOST_THREADS} threads, not {threads}");
-            return Err(Error::pipeline(told).help("leave `run.threads` out: all processors work"));
-        }
+        let threads = threads(&settings)?;
         let limit = settings.memory.unwrap_or_else(default_limit);
         let chunks = chunks(&sinks, &*source)?;
         let needs = passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect();
         let has_cells = sorted.ops.iter().any(|stage| stage.op.tile().needs().cells);
         let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
         let removes = !(sorted.transforms.is_empty() && sorted.ops.is_empty());
-        let ordered = sinks.iter().filter(|sink| mills && sink.order() == Order::Input).count();
-        let ordered = ordered as u64;
-        if ordered > 0 && source.parts() > by_rank::MOST_PARTS {
-            let told = "the inputs have too many parts for an output in their order";
-            return Err(Error::pipeline(told).help("leave `write.order` out"));
-        }
+        let ordered = if mills { in_input_order(&sinks, &*source)? } else { 0 };
         let demands = Demands {
             lists: folders
                 .saturating_mul(lists_bytes(ranks.len()))
@@ -315,6 +304,31 @@ fn warnings(
     let help = error.remedy().map_or(String::new(), |help| format!("; {help}"));
     warnings.push(format!("{error}: the run fails if such a point is kept{help}"));
     Ok(warnings)
+}
+
+/// Threads that work at once.
+fn threads(settings: &RunSettings) -> Result<usize> {
+    match settings.threads.map(NonZeroUsize::get) {
+        Some(threads) if threads > MOST_THREADS => {
+            let told = format!("a run has at most {MOST_THREADS} threads, not {threads}");
+            Err(Error::pipeline(told).help("leave `run.threads` out: all processors work"))
+        }
+        Some(threads) => Ok(threads),
+        None => {
+            let processors = std::thread::available_parallelism().map_or(1, usize::from);
+            Ok(processors.min(MOST_THREADS))
+        }
+    }
+}
+
+/// How many outputs want the order of the inputs, which has to be kept where the run needs tiles.
+fn in_input_order(sinks: &[Box<dyn CreateSink>], source: &dyn Source) -> Result<u64> {
+    let ordered = sinks.iter().filter(|sink| sink.order() == Order::Input).count();
+    if ordered > 0 && source.parts() > by_rank::MOST_PARTS {
+        let told = "the inputs have too many parts for an output in their order";
+        return Err(Error::pipeline(told).help("leave `write.order` out"));
+    }
+    Ok(ordered as u64)
 }
 
 /// The chunks of all outputs.

@@ -53,8 +53,7 @@ pub struct RunSettings {
     /// What becomes of points of the classes 7 and 18, low and high noise, in pipelines that work on
     /// tiles; none: they are points like all others. The command `reduce` leaves them out.
     pub noise: Option<Treatment>,
-    /// Most points a tile's cube holds, for tests, at least 16; none: as the memory allows.
-    #[serde(deserialize_with = "some_tile_points")]
+    /// Most points a tile's cube holds, for tests; none: as the memory allows.
     pub tile_points: Option<NonZeroUsize>,
     /// Which of the equal code paths runs, for tests.
     pub simd: Simd,
@@ -317,22 +316,12 @@ impl<'de> Deserialize<'de> for ZScale {
 }
 
 fn some_threads<'de, D: Deserializer<'de>>(from: D) -> Result<Option<NonZeroUsize>, D::Error> {
-    within(NonZeroUsize::deserialize(from)?, 1..=MOST_THREADS, "a whole number from 1 to 1024")
-}
-
-fn some_tile_points<'de, D: Deserializer<'de>>(from: D) -> Result<Option<NonZeroUsize>, D::Error> {
-    within(NonZeroUsize::deserialize(from)?, 16..=usize::MAX, "a whole number from 16")
-}
-
-fn within<E: de::Error>(
-    number: NonZeroUsize,
-    range: std::ops::RangeInclusive<usize>,
-    expected: &str,
-) -> Result<Option<NonZeroUsize>, E> {
-    match range.contains(&number.get()) {
-        true => Ok(Some(number)),
-        false => Err(E::invalid_value(de::Unexpected::Unsigned(number.get() as u64), &expected)),
+    let threads = NonZeroUsize::deserialize(from)?;
+    if threads.get() <= MOST_THREADS {
+        return Ok(Some(threads));
     }
+    let found = de::Unexpected::Unsigned(threads.get() as u64);
+    Err(de::Error::invalid_value(found, &"a whole number from 1 to 1024"))
 }
 
 fn some_step<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {

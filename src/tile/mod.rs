@@ -4,6 +4,7 @@ mod around;
 mod block;
 mod cutting;
 mod emit;
+mod fetch;
 mod gather;
 mod intake;
 mod key;
@@ -21,6 +22,7 @@ mod tournament;
 pub use around::{Around, Neighborhood};
 pub use block::{BLOCK, Block};
 pub use cutting::CutError;
+pub use fetch::Fetch;
 pub use intake::{Intake, TileStore};
 pub use key::{TileKey, morton_cmp};
 pub use levels::Levels;
@@ -28,7 +30,7 @@ pub use load::{Core, Loader};
 pub use merge::{merge_bytes, seal};
 pub use pieces::{PIECE, Pieces};
 pub use remote::Remote;
-pub use sealed::{Fetch, Reader, SealedTiles, index_bytes};
+pub use sealed::{Reader, SealedTiles, index_bytes};
 pub use sieve::{
     ASIDE, CLASSED_INPUTS, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, Run, SELECTIONS, Sieve, State,
     TAGGED_INPUTS, Tag,
