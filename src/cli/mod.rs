@@ -10,6 +10,7 @@ mod convert;
 mod describe;
 mod events;
 mod interrupt;
+mod picture;
 mod print;
 mod progress;
 mod run;
@@ -54,6 +55,7 @@ fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<
         Command::Check(arguments) => check::check(arguments, registry, console),
         Command::Stages(arguments) => stages::stages(arguments, registry),
         Command::Info(arguments) => describe::info(arguments),
+        Command::Picture(arguments) => picture::picture(arguments),
     }
 }
 

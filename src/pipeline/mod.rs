@@ -43,6 +43,7 @@ pub use kinds::{Encoding, Format, OutputOrder, Read, Synth, Write};
 pub use limits::{LimitKeys, Sees};
 pub use outline::Outline;
 pub use plan::Plan;
+pub(crate) use publish::publish_bytes;
 pub use registry::{Registry, StageKind, StagePlace};
 pub use run::Done;
 pub use set::Set;

@@ -307,7 +307,7 @@ fn mills(ops: &[StageOp], sinks: &[Box<dyn CreateSink>]) -> Result<bool> {
 }
 
 /// Refuses `output` if it is the file `input`, whatever its name.
-fn refuse_overwrite(input: &Path, output: &Path) -> Result<()> {
+pub(super) fn refuse_overwrite(input: &Path, output: &Path) -> Result<()> {
     use std::os::unix::fs::MetadataExt;
     let same = match (std::fs::metadata(input), std::fs::metadata(output)) {
         (Ok(a), Ok(b)) => (a.dev(), a.ino()) == (b.dev(), b.ino()),

@@ -2,9 +2,11 @@
 //! their place, are brought to disk, and get their names by a rename.
 
 use std::fs::{self, File};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::plan::refuse_overwrite;
 use super::scratch::Scratch;
 use crate::{Error, ErrorKind, Result};
 
@@ -64,6 +66,19 @@ impl Staged {
         let _ = File::open(folder_of(&self.path)).and_then(|folder| folder.sync_all());
         Ok(())
     }
+}
+
+/// Writes `bytes` to `path`, where they appear complete or not at all; never over one of `inputs`.
+pub fn publish_bytes(path: &Path, bytes: &[u8], inputs: &[PathBuf]) -> Result<()> {
+    inputs.iter().try_for_each(|input| refuse_overwrite(input, path))?;
+    let staged = Staged::beside(path)?;
+    let write = || {
+        let mut file = File::create(staged.file())?;
+        file.write_all(bytes)?;
+        file.sync_all()
+    };
+    write().map_err(|cause| staged.tell(Error::io(staged.file(), "write", cause)))?;
+    staged.publish()
 }
 
 /// Makes the folder for outputs if it does not exist; that it is in must.
