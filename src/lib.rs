@@ -79,6 +79,7 @@
 //!   stage of your own.
 //! - [`ops`]: the stages that work on tiles: `outliers`, `normals`, `cells`, `median` and `grid`.
 //! - [`io`]: LAS, LAZ and PLY, conversion between their records, and [synthetic](io::synthetic) scans.
+//! - [`picture`]: scans drawn from above or from a side, side by side.
 //! - [`pipeline`]: from a text to a finished run: [`Pipeline`](pipeline::Pipeline),
 //!   [`Plan`](pipeline::Plan), and the [`Registry`](pipeline::Registry) of kinds that a text may name.
 //! - [`cli`]: the command line. A program of yours with stages of its own calls [`cli::main`] with its
@@ -92,6 +93,7 @@ mod error;
 pub mod geom;
 pub mod io;
 pub mod ops;
+pub mod picture;
 pub mod pipeline;
 pub mod point;
 pub mod quantity;

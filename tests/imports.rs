@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The modules from the bottom up. Those of one layer do not import each other.
-const LAYERS: [&[&str]; 9] = [
+const LAYERS: [&[&str]; 10] = [
     &["error"],
     &["point"],
     &["geom", "quantity", "budget"],
@@ -16,6 +16,7 @@ const LAYERS: [&[&str]; 9] = [
     &["report"],
     &["stage"],
     &["ops", "io"],
+    &["picture"],
     &["pipeline"],
     &["cli"],
 ];

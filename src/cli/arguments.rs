@@ -48,6 +48,8 @@ pub(super) enum Command {
     Check(Plan),
     /// List the stages that a pipeline can have, with their keys
     Stages(Stages),
+    /// Draw scans side by side, from above or from a side
+    Picture(Picture),
     /// Make a synthetic scan
     Synth(Synth),
     /// Print what a shell needs to complete commands and flags
@@ -66,7 +68,7 @@ impl Command {
             | Command::Plan(Plan { common, .. })
             | Command::Check(Plan { common, .. })
             | Command::Synth(Synth { common, .. }) => Some(common),
-            Command::Info(_) | Command::Stages(_) => None,
+            Command::Info(_) | Command::Picture(_) | Command::Stages(_) => None,
             Command::Completions(_) | Command::Man(_) => None,
         }
     }
@@ -261,6 +263,10 @@ pub(super) struct Reduce {
     /// Mark the decision in the records and write them all: key-point, withheld, or class 7 or 18
     #[arg(long, value_name = "HOW")]
     pub mark: Option<String>,
+    /// Order of the records: canonical, a function of the points alone, or input, that of the inputs
+    /// [default: canonical]
+    #[arg(long, value_name = "HOW", conflicts_with = "outdir")]
+    pub order: Option<String>,
     /// Reduce the points of these classes alone, such as 2,6; all others stay, and are not seen as
     /// neighbours
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_class)]
@@ -372,6 +378,51 @@ pub(super) struct Info {
     /// Print a JSON list with one object a file
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Picture {
+    /// LAS, LAZ or PLY files, patterns or folders: a scan each, drawn side by side, 4 at most. Quote a
+    /// pattern, so that its files are one scan
+    #[arg(value_name = "IN", required = true)]
+    pub inputs: Vec<String>,
+    /// The picture: a .png file
+    #[arg(short, long, value_name = "OUT")]
+    pub output: PathBuf,
+    /// From where the scans are seen
+    #[arg(long, value_name = "WHERE", default_value = "above")]
+    pub from: From,
+    /// What points are coloured by
+    #[arg(long, value_name = "WHAT", default_value = "height")]
+    pub by: By,
+    /// Pixels that the picture is wide, 64 to 4096
+    #[arg(long, value_name = "PIXELS", default_value = "1600", value_parser = parse_width)]
+    pub width: u32,
+    /// Threads that work at once [default: all processors]
+    #[arg(long, value_name = "N", value_parser = parse_threads)]
+    pub threads: Option<NonZeroUsize>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum From {
+    Above,
+    South,
+    North,
+    East,
+    West,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum By {
+    Height,
+    Class,
+    Color,
+    Intensity,
+}
+
+fn parse_width(text: &str) -> Result<u32, String> {
+    let told = || format!("`{text}` is no width: give 64 to 4096 pixels");
+    text.parse().ok().filter(|width| (64..=4096).contains(width)).ok_or_else(told)
 }
 
 #[derive(Debug, Args)]

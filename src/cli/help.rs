@@ -15,16 +15,45 @@ const GROUPS: &[(&str, &str, &[&str])] = &[
     (
         "reduce",
         "How much to keep",
-        &["keep", "max_angle", "max_side", "min_spacing", "side", "min_points", "split", "passes"],
+        &[
+            "preset",
+            "keep",
+            "max_angle",
+            "max_side",
+            "min_spacing",
+            "side",
+            "min_points",
+            "split",
+            "measure",
+            "reference",
+            "passes",
+        ],
     ),
-    ("reduce", "How the surface is measured", &["neighbors", "method", "z_scale"]),
-    ("reduce", "Which points", &["outliers", "classes", "withheld", "nonfinite"]),
+    ("reduce", "How the surface is measured", &["neighbors", "method", "z_scale", "lattice"]),
+    (
+        "reduce",
+        "Which points",
+        &[
+            "outliers",
+            "classes",
+            "keep_classes",
+            "drop_classes",
+            "noise",
+            "withheld",
+            "nonfinite",
+            "headers",
+        ],
+    ),
     (
         "reduce",
         "Output",
-        &["output", "outdir", "to", "mark", "scale", "offset", "drop", "encoding"],
+        &[
+            "output", "outdir", "to", "mark", "order", "scale", "offset", "drop", "encoding",
+            "colors",
+        ],
     ),
-    ("convert", "Output", &["output", "to", "scale", "offset", "drop", "encoding"]),
+    ("convert", "Which points", &["keep_classes", "drop_classes", "nonfinite", "headers"]),
+    ("convert", "Output", &["output", "to", "scale", "offset", "drop", "encoding", "colors"]),
 ];
 
 /// What stands below the help of a command.
@@ -45,7 +74,8 @@ Examples:
   pointmill reduce survey/*.laz -o reduced.laz
   pointmill reduce survey/*.laz -o reduced.laz --keep 10% --report reduced.json
   pointmill reduce survey --outdir reduced --classes 2 --max-side 2
-  pointmill reduce part.ply -o part-reduced.ply --max-angle 6deg
+  pointmill reduce part.ply -o part-reduced.ply --preset part --max-angle 6deg
+  pointmill reduce survey.laz -o marked.laz --mark key-point --order input
 
 It runs the pipeline pipelines/reduce.toml, which can be copied and changed.",
     ),
@@ -58,6 +88,14 @@ Examples:
   pointmill convert scan.ply -o scan.laz --scale 0.001 --drop confidence",
     ),
     ("info", "Examples:\n  pointmill info scan.laz\n  pointmill info --json survey/*.laz"),
+    (
+        "picture",
+        "\
+Examples:
+  pointmill picture survey.laz -o survey.png
+  pointmill picture survey.laz reduced.laz -o both.png --by class --from south
+  pointmill picture 'survey/*.laz' -o survey.png --width 4096",
+    ),
     ("plan", "Example:\n  pointmill plan pipelines/demo.toml --memory 1GiB --threads 4"),
     ("check", "Example:\n  pointmill check pipelines/demo.toml"),
     ("stages", "Examples:\n  pointmill stages\n  pointmill stages cells\n  pointmill stages run"),

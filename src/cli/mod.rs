@@ -11,6 +11,7 @@ mod describe;
 mod events;
 mod help;
 mod interrupt;
+mod picture;
 mod preset;
 mod print;
 mod progress;
@@ -75,6 +76,7 @@ fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<
         Command::Check(arguments) => check::check(arguments, registry, console),
         Command::Stages(arguments) => stages::stages(arguments, registry),
         Command::Info(arguments) => describe::info(arguments, console),
+        Command::Picture(arguments) => picture::picture(arguments),
         Command::Completions(arguments) => help::completions(arguments),
         Command::Man(arguments) => help::man(arguments),
     }

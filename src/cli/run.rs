@@ -140,6 +140,7 @@ pub(super) fn reduce_flags(arguments: &Reduce) -> Vec<Flag> {
         ("--split", "cells.split", arguments.split.clone().map(Value::from)),
         ("--method", "normals.method", arguments.method.clone().map(Value::from)),
         ("--passes", "median.passes", arguments.passes.map(Value::from)),
+        ("--order", "write.order", arguments.order.clone().map(Value::from)),
         ("--mark", "median.mark", arguments.mark.as_deref().map(whole_or_text)),
         ("--classes", "outliers.classes", classes.clone().filter(|_| arguments.outliers)),
         ("--classes", "normals.classes", classes.clone()),

@@ -49,7 +49,7 @@ impl Words {
             Command::Reduce(reduce) => run::reduce_flags(reduce),
             Command::Convert(convert) => convert::flags(convert, None, None),
             Command::Synth(synth) => run::synth_flags(synth),
-            Command::Info(_) | Command::Stages(_) => Vec::new(),
+            Command::Info(_) | Command::Picture(_) | Command::Stages(_) => Vec::new(),
             Command::Completions(_) | Command::Man(_) => Vec::new(),
         };
         let common = command.common().map(|common| common.flags()).unwrap_or_default();

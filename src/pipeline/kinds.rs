@@ -13,7 +13,7 @@ use crate::error::shown;
 use crate::io::of_extension;
 use crate::io::ply::Colors;
 use crate::io::synthetic::Scene;
-use crate::stage::{Order, Role};
+use crate::stage::{OpenSource, Order, Role};
 use crate::{Error, Result, point::names};
 
 /// A format of files.
@@ -89,28 +89,37 @@ pub struct Read {
     pub format: Option<Format>,
 }
 
+impl Read {
+    /// The source of these files, none of which is opened yet.
+    ///
+    /// # Errors
+    ///
+    /// A path that names no file, a file whose name tells no format, and files of which the records
+    /// are not alike.
+    pub fn source(&self) -> Result<Box<dyn OpenSource>> {
+        let files = inputs::expand(&self.path)?;
+        let mut formats = Vec::new();
+        for file in &files {
+            let format = self.format.or(Format::of(file));
+            formats.push(format.ok_or_else(|| unknown_extension(file, "read.format"))?);
+        }
+        if let Some(i) = formats.iter().position(|f| !f.same_records(formats[0])) {
+            let (a, b) = (shown(&files[0]), shown(&files[i]));
+            let help = "read one of the two formats, or convert first";
+            let told = format!("{a} and {b} cannot be read together: LAS and PLY records differ");
+            return Err(Error::pipeline(told).help(help));
+        }
+        Ok(connect::read(files, &formats))
+    }
+}
+
 impl StageKind for Read {
     const KIND: &'static str = "read";
     const ABOUT: &'static str = "Reads LAS, LAZ or PLY files.";
     const PLACES: &'static [&'static str] = &["path", "format"];
 
     fn build(self, at: &StagePlace) -> Result<Role> {
-        let blame = |error| at.blame("path", error);
-        let files = inputs::expand(&self.path).map_err(blame)?;
-        let mut formats = Vec::new();
-        for file in &files {
-            formats.push(match self.format.or(Format::of(file)) {
-                Some(format) => format,
-                None => return Err(blame(unknown_extension(file, "read.format"))),
-            });
-        }
-        if let Some(i) = formats.iter().position(|f| !f.same_records(formats[0])) {
-            let (a, b) = (shown(&files[0]), shown(&files[i]));
-            let help = "read one of the two formats, or convert first";
-            let told = format!("{a} and {b} cannot be read together: LAS and PLY records differ");
-            return Err(blame(Error::pipeline(told).help(help)));
-        }
-        Ok(Role::Source(connect::read(files, &formats)))
+        Ok(Role::Source(self.source().map_err(|error| at.blame("path", error))?))
     }
 }
 

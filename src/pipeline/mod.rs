@@ -52,9 +52,10 @@ pub use kinds::{Encoding, Format, OutputOrder, Read, Synth, Write};
 pub use limits::{LimitKeys, Sees};
 pub use outline::Outline;
 pub use plan::Plan;
-pub(crate) use publish::{make_folder, refuse_existing};
+pub(crate) use publish::{make_folder, publish_bytes, refuse_existing};
 pub use registry::{Registry, StageKind, StagePlace};
 pub use run::Done;
+pub(crate) use scratch::Trouble;
 pub use set::Set;
 pub use settings::{
     Existing, MOST_THREADS, MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill, Treatment,

@@ -2,7 +2,7 @@
 //! their place, are brought to disk, and get their names by a rename.
 
 use std::fs::{self, File, OpenOptions};
-use std::io;
+use std::io::{self, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -168,6 +168,19 @@ fn sync_folder(folder: &Path) -> Result<()> {
             Error::io(folder, "bring the names of finished files to disk in this folder", e)
         }),
     }
+}
+
+/// Writes `bytes` to `path`, where they appear complete or not at all; what cannot be cleared away is
+/// added to `trouble`.
+pub fn publish_bytes(path: &Path, bytes: &[u8], trouble: &Trouble) -> Result<()> {
+    let staged = Staged::beside(path, Existing::Replace, trouble)?;
+    let write = || {
+        let mut file = File::create(staged.file())?;
+        file.write_all(bytes)?;
+        file.sync_all()
+    };
+    write().map_err(|cause| staged.tell(Error::io(staged.file(), "write", cause)))?;
+    publish(&[staged], None)
 }
 
 /// Makes the folder for outputs if it does not exist, and those that it is in; returns what it made,

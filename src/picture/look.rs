@@ -1,0 +1,214 @@
+//! The first look at a scan: its points, its extent as seen from somewhere, and the range of what it
+//! is coloured by; and the frame that follows from it.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::Settings;
+use crate::point::{Dimension, PointBatch};
+use crate::stage::{Part, Source};
+use crate::tile::{lock, parallel};
+use crate::{Error, ErrorKind, Result};
+
+/// From where a scan is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum View {
+    /// From above: x to the right, y up.
+    #[default]
+    Above,
+    /// From the south: x to the right, z up.
+    South,
+    /// From the north: −x to the right, z up.
+    North,
+    /// From the east: y to the right, z up.
+    East,
+    /// From the west: −y to the right, z up.
+    West,
+}
+
+impl View {
+    /// To the right, up, and towards the viewer.
+    pub(super) fn seen(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        match self {
+            View::Above => [x, y, z],
+            View::South => [x, z, -y],
+            View::North => [-x, z, y],
+            View::East => [y, z, x],
+            View::West => [-y, z, -x],
+        }
+    }
+}
+
+/// Points of which the middle range of figures is found, about.
+const SAMPLE: u64 = 100_000;
+/// Records read at once.
+const BATCH: usize = 8192;
+
+/// Calls `visit` with every point of `source` that is somewhere: its number in its part, the point as
+/// seen, and the values that it is coloured by. Each thread has a state of its own; all are returned.
+pub(super) fn each_point<S: Send>(
+    source: &dyn Source,
+    settings: &Settings,
+    begin: impl Fn() -> S + Sync,
+    visit: impl Fn(&mut S, u64, [f64; 3], &[f64]) + Sync,
+) -> Result<Vec<S>> {
+    let schema = source.schema();
+    let no_place = || Error::pipeline("the scan has no coordinates");
+    let axes = schema.coordinates().ok_or_else(no_place)?;
+    let fields: Vec<&Dimension> = settings.by.dimensions(schema)?;
+    let (next, states) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    parallel(settings.threads, |_| {
+        let mut state = begin();
+        let mut batch = PointBatch::new(schema.clone(), BATCH);
+        let mut values = vec![0.0; fields.len()];
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            if index >= source.parts() {
+                break;
+            }
+            let mut part = source.part(index)?;
+            let mut number = 0;
+            while refill(&mut *part, &mut batch)? {
+                for record in batch.iter() {
+                    let seen = settings.view.seen(axes.map(|a| a.world(record, schema.endian)));
+                    if seen.iter().all(|v| v.is_finite()) {
+                        for (value, field) in values.iter_mut().zip(&fields) {
+                            *value = field.world(record, schema.endian);
+                        }
+                        visit(&mut state, number, seen, &values);
+                    }
+                    number += 1;
+                }
+            }
+        }
+        lock(&states).push(state);
+        Ok(())
+    })?;
+    Ok(std::mem::take(&mut *lock(&states)))
+}
+
+/// Reads the next batch; false at the end.
+fn refill(part: &mut dyn Part, batch: &mut PointBatch) -> Result<bool> {
+    batch.clear();
+    part.read(batch)?;
+    Ok(!batch.is_empty())
+}
+
+/// A range that holds nothing.
+const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+/// What the first look found.
+#[derive(Debug, Clone)]
+pub(super) struct Look {
+    pub points: u64,
+    /// Smallest and largest to the right and up.
+    extent: [[f64; 2]; 2],
+    /// Smallest and largest value of any of the dimensions that colour.
+    pub values: [f64; 2],
+    /// Of about [`SAMPLE`] points, in no order: to the right, up, and the first value.
+    sample: Vec<[f64; 3]>,
+}
+
+impl Look {
+    const NOTHING: Look =
+        Look { points: 0, extent: [NOTHING; 2], values: NOTHING, sample: Vec::new() };
+
+    /// Looks at all points.
+    pub fn at(source: &dyn Source, settings: &Settings) -> Result<Look> {
+        let every = (source.points() / SAMPLE).max(1);
+        let visit = |look: &mut Look, number: u64, [right, up, _]: [f64; 3], values: &[f64]| {
+            look.points += 1;
+            for (range, at) in look.extent.iter_mut().zip([right, up]) {
+                *range = wider(*range, [at; 2]);
+            }
+            look.values = values.iter().fold(look.values, |range, &v| wider(range, [v; 2]));
+            if number.is_multiple_of(every) {
+                look.sample.push([right, up, values.first().copied().unwrap_or(0.0)]);
+            }
+        };
+        let mut looks = each_point(source, settings, || Look::NOTHING, visit)?;
+        let mut whole = looks.pop().unwrap_or(Look::NOTHING);
+        looks.into_iter().for_each(|look| whole.merge(look));
+        Ok(whole)
+    }
+
+    fn merge(&mut self, other: Look) {
+        self.points += other.points;
+        for (mine, theirs) in self.extent.iter_mut().zip(other.extent) {
+            *mine = wider(*mine, theirs);
+        }
+        self.values = wider(self.values, other.values);
+        self.sample.extend(other.sample);
+    }
+
+    /// The range of the middle 98 of 100 values of the sample.
+    pub fn middle_values(&self) -> [f64; 2] {
+        middle(self.sample.iter().map(|s| s[2]), 0.01)
+    }
+}
+
+fn wider(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+/// The range of `figures` without this share of them at either end.
+fn middle(figures: impl Iterator<Item = f64>, share: f64) -> [f64; 2] {
+    let mut sorted: Vec<f64> = figures.filter(|v| v.is_finite()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let Some(last) = sorted.len().checked_sub(1) else { return NOTHING };
+    let cut = (last as f64 * share) as usize;
+    [sorted[cut], sorted[last - cut]]
+}
+
+/// Where on the picture a point is.
+#[derive(Debug, Clone)]
+pub(super) struct Frame {
+    /// Pixels of a panel.
+    pub size: [u32; 2],
+    /// Side of a pixel in the scan's unit.
+    pub pixel: f64,
+    /// What is at the left and at the top edge.
+    corner: [f64; 2],
+}
+
+impl Frame {
+    /// The frame of all that was looked at, in at most so many pixels. A few points far from all
+    /// others are left outside.
+    pub fn of(looks: &[Look], most: [u32; 2]) -> Result<Frame> {
+        if looks.iter().all(|look| look.points == 0) {
+            return Err(Error::new(ErrorKind::Data, "there is no point to draw"));
+        }
+        let ranges = [0, 1].map(|axis| {
+            let whole = looks.iter().map(|look| look.extent[axis]).fold(NOTHING, wider);
+            let sample = looks.iter().flat_map(|look| look.sample.iter().map(|s| s[axis]));
+            let middle = middle(sample, 0.005);
+            let margin = 0.1 * (middle[1] - middle[0]);
+            let near = [middle[0] - margin, middle[1] + margin];
+            match whole[1] - whole[0] > 3.0 * (near[1] - near[0]) {
+                true => [near[0].max(whole[0]), near[1].min(whole[1])],
+                false => whole,
+            }
+        });
+        let sides = ranges.map(|range| range[1] - range[0]);
+        let most = most.map(|pixels| f64::from(pixels.max(2)) - 1.0);
+        let pixel = (sides[0] / most[0]).max(sides[1] / most[1]);
+        let pixel = if pixel > 0.0 && pixel.is_finite() { pixel } else { 1.0 };
+        let size = sides.map(|side| (side / pixel) as u32 + 1);
+        Ok(Frame { size, pixel, corner: [ranges[0][0], ranges[1][1]] })
+    }
+
+    /// The pixel of a point, from the left and from the top; none outside.
+    pub fn place(&self, [right, up, _]: [f64; 3]) -> Option<[u32; 2]> {
+        let at = [(right - self.corner[0]) / self.pixel, (self.corner[1] - up) / self.pixel];
+        let inside = |axis: usize| at[axis] >= 0.0 && at[axis] < f64::from(self.size[axis]);
+        (inside(0) && inside(1)).then(|| at.map(|v| v as u32))
+    }
+
+    /// Pixels that a point is wide, the same in all panels: so many that those of the scan with the
+    /// most points would about cover its panel.
+    pub fn dot(&self, looks: &[Look]) -> u32 {
+        let most = looks.iter().map(|look| look.points).max().unwrap_or(1).max(1);
+        let pixels = f64::from(self.size[0]) * f64::from(self.size[1]);
+        ((pixels / most as f64).sqrt().round() as u32).clamp(1, 5)
+    }
+}

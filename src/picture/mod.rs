@@ -1,0 +1,133 @@
+//! Pictures of scans: the points as a viewer sees them from above or from a side, as PNG. Knows no
+//! paths; a scan is whatever a [`Source`] yields.
+//!
+//! A scan is decoded twice: once for its extent and the range of what it is coloured by, since
+//! headers may be wrong about the first and silent about the second; once to draw. A pixel is one
+//! number, the nearness of its point above the point's colour, so that threads draw into one image by
+//! taking the larger number, and neither their number nor the order of points changes a pixel.
+
+mod color;
+mod look;
+mod paint;
+
+use crate::stage::Source;
+use crate::{Error, Result};
+
+pub use color::By;
+pub use look::View;
+use look::{Frame, Look};
+use paint::Canvas;
+
+/// Panels that are drawn side by side, at most.
+pub const MOST_PANELS: usize = 4;
+/// Pixels that a picture is wide and high, at most: its memory is 11 bytes a pixel.
+pub const WIDEST: u32 = 4096;
+const NARROWEST: u32 = 64;
+/// Pixels between panels.
+const GAP: u32 = 8;
+
+/// How scans are drawn.
+#[derive(Debug, Clone, Copy)]
+pub struct Settings {
+    /// From where.
+    pub view: View,
+    /// Coloured by what.
+    pub by: By,
+    /// Pixels that the picture is wide, all panels together: 64 to [`WIDEST`].
+    pub width: u32,
+    /// Threads that decode and draw.
+    pub threads: usize,
+}
+
+/// Scans drawn side by side, in one frame and with one range of colours.
+#[derive(Debug)]
+pub struct Picture {
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// Red, green and blue of each pixel, row by row from the top.
+    pub pixels: Vec<u8>,
+    /// Side of a pixel in the scan's unit.
+    pub pixel: f64,
+    /// What the first and the last colour stand for, where colours are a range of figures.
+    pub range: Option<[f64; 2]>,
+    /// For each panel its points, and how many of them lie outside of the frame.
+    pub panels: Vec<(u64, u64)>,
+}
+
+impl Picture {
+    /// Draws `sources`, a panel each.
+    ///
+    /// # Errors
+    ///
+    /// Those of the sources; a scan that does not have what it is to be coloured by; no point at all;
+    /// more than [`MOST_PANELS`] scans or a width out of bounds.
+    pub fn draw(sources: &[&dyn Source], settings: &Settings) -> Result<Picture> {
+        let panels = sources.len() as u32;
+        if sources.is_empty() || sources.len() > MOST_PANELS {
+            let told = format!("{} scans side by side: a picture shows 1 to {MOST_PANELS}", panels);
+            return Err(Error::pipeline(told));
+        }
+        if !(NARROWEST..=WIDEST).contains(&settings.width) {
+            let told = format!(
+                "a picture of {} pixels: it can be {NARROWEST} to {WIDEST} wide",
+                settings.width
+            );
+            return Err(Error::pipeline(told));
+        }
+        let looks = sources.iter().map(|source| Look::at(*source, settings));
+        let looks = looks.collect::<Result<Vec<Look>>>()?;
+        let wide = (settings.width - GAP * (panels - 1)) / panels;
+        let frame = Frame::of(&looks, [wide, settings.width])?;
+        let range = settings.by.range(&looks);
+        let dot = frame.dot(&looks);
+        let mut picture = Picture {
+            width: frame.size[0] * panels + GAP * (panels - 1),
+            height: frame.size[1],
+            pixels: Vec::new(),
+            pixel: frame.pixel,
+            range: settings.by.is_range().then_some(range),
+            panels: Vec::new(),
+        };
+        picture.pixels.resize(3 * picture.width as usize * picture.height as usize, 255);
+        for (n, source) in sources.iter().enumerate() {
+            let canvas = Canvas::new(frame.size, dot);
+            let outside = canvas.draw(*source, settings, &frame, range)?;
+            picture.panels.push((looks[n].points, outside));
+            picture.place(&canvas, n as u32 * (frame.size[0] + GAP));
+        }
+        Ok(picture)
+    }
+
+    /// Copies a panel to the columns from `left` on.
+    fn place(&mut self, canvas: &Canvas, left: u32) {
+        let [wide, high] = canvas.size();
+        for y in 0..high {
+            for x in 0..wide {
+                let at = 3 * (y as usize * self.width as usize + (left + x) as usize);
+                self.pixels[at..at + 3].copy_from_slice(&canvas.shaded(x, y));
+            }
+        }
+    }
+
+    /// The picture as a PNG file.
+    ///
+    /// # Errors
+    ///
+    /// Those of the encoder, which has none for a picture that was drawn.
+    pub fn png(&self) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let wrong = |cause| Error::internal("the picture cannot be encoded").because(cause);
+        let mut writer = encoder.write_header().map_err(wrong)?;
+        writer.write_image_data(&self.pixels).map_err(wrong)?;
+        writer.finish().map_err(wrong)?;
+        Ok(bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,159 @@
+use super::*;
+use crate::io::synthetic::{Scene, Synthetic};
+use crate::point::{Metadata, PointBatch, Schema};
+use crate::stage::{OpenSource, Part};
+use std::sync::Arc;
+
+fn settings(view: View, by: By, threads: usize) -> Settings {
+    Settings { view, by, width: 128, threads }
+}
+
+fn landscape(points: u64) -> Box<dyn Source> {
+    Synthetic { scene: Scene::Als, points, seed: 3, noise: None }.open().unwrap()
+}
+
+/// Records in parts of its own choice.
+struct Few {
+    schema: Arc<Schema>,
+    metadata: Metadata,
+    parts: Vec<Vec<u8>>,
+}
+
+struct Once<'a>(Option<&'a [u8]>);
+
+impl Part for Once<'_> {
+    fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
+        if let Some(records) = self.0.take() {
+            batch.extend(records);
+        }
+        Ok(())
+    }
+}
+
+impl Source for Few {
+    fn schema(&self) -> &Arc<Schema> {
+        &self.schema
+    }
+    fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+    fn points(&self) -> u64 {
+        self.parts.iter().map(|part| (part.len() / self.schema.stride) as u64).sum()
+    }
+    fn part_bytes(&self) -> u64 {
+        0
+    }
+    fn parts(&self) -> usize {
+        self.parts.len()
+    }
+    fn part(&self, index: usize) -> Result<Box<dyn Part + '_>> {
+        Ok(Box::new(Once(Some(&self.parts[index]))))
+    }
+}
+
+/// Points of a class each, all intensities 7.
+fn points(places: &[([f64; 3], u8)]) -> Few {
+    use crate::point::{Dimension, Endian, Layout, Scalar, names};
+    let axes = names::XYZ.iter().zip([0, 8, 16]);
+    let mut dimensions: Vec<Dimension> =
+        axes.map(|(name, at)| Dimension::new(*name, Scalar::F64, at)).collect();
+    dimensions.push(Dimension::new(names::CLASSIFICATION, Scalar::U8, 24));
+    let schema = Schema { layout: Layout::Ply, endian: Endian::Little, stride: 25, dimensions };
+    let record = |(place, class): &([f64; 3], u8)| {
+        let mut record: Vec<u8> = place.iter().flat_map(|v| v.to_le_bytes()).collect();
+        record.push(*class);
+        record
+    };
+    Few {
+        schema: Arc::new(schema),
+        metadata: Metadata::default(),
+        parts: places.iter().map(record).collect(),
+    }
+}
+
+/// The colour of a pixel without its shade: the same up to a factor.
+fn hue(picture: &Picture, x: u32, y: u32) -> [u8; 3] {
+    let at = 3 * (y * picture.width + x) as usize;
+    picture.pixels[at..at + 3].try_into().unwrap()
+}
+
+#[test]
+fn the_nearest_point_of_a_pixel_is_seen_from_every_side() {
+    // A corner each so that all views have one frame, and two points behind each other in the middle.
+    let corners = [[0.0; 3], [100.0; 3]].map(|at| (at, 0));
+    let middle = [([50.0, 50.0, 60.0], 6), ([50.0, 50.0, 40.0], 2), ([50.0, 40.0, 50.0], 5)];
+    let few = points(&[&corners[..], &middle[..]].concat());
+    let seen = |view| {
+        let picture = Picture::draw(&[&few], &settings(view, By::Class, 1)).unwrap();
+        assert_eq!((picture.width, picture.height), (128, 128));
+        hue(&picture, 63, 63)
+    };
+    // From above the roof hides the ground; from the south what is nearer hides nothing above it.
+    assert_eq!(seen(View::Above), By::Class.color(&[6.0], [0.0, 255.0]));
+    assert_eq!(seen(View::South), By::Class.color(&[5.0], [0.0, 255.0]));
+}
+
+#[test]
+fn threads_and_parts_change_no_pixel() {
+    let scan = landscape(30_000);
+    let draw = |threads| {
+        Picture::draw(&[&*scan], &settings(View::West, By::Intensity, threads)).unwrap()
+    };
+    let (one, three) = (draw(1), draw(3));
+    assert_eq!(one.pixels, three.pixels);
+    assert_eq!((&one.panels, one.range), (&three.panels, three.range));
+    let drawn = one.pixels.chunks_exact(3).filter(|pixel| **pixel != [255; 3]).count();
+    assert!(drawn > 1000, "{drawn} pixels are drawn");
+}
+
+#[test]
+fn panels_share_a_frame_and_a_range() {
+    let (scan, part) = (landscape(20_000), landscape(2_000));
+    let both = Picture::draw(&[&*scan, &*part], &settings(View::Above, By::Height, 2)).unwrap();
+    assert_eq!(both.panels, [(20_000, 0), (2_000, 0)]);
+    assert!(both.width <= 128 && both.pixels.len() == 3 * (both.width * both.height) as usize);
+    let [low, high] = both.range.unwrap();
+    assert!(low < high);
+    let decoder = png::Decoder::new(std::io::Cursor::new(both.png().unwrap()));
+    let info = decoder.read_info().unwrap();
+    assert_eq!((info.info().width, info.info().height), (both.width, both.height));
+}
+
+#[test]
+fn a_far_point_does_not_shrink_the_rest() {
+    let mut places: Vec<_> =
+        (0..1000).map(|i| ([f64::from(i % 40), f64::from(i / 40), 0.0], 2)).collect();
+    places.push(([1e9, 0.0, 0.0], 2));
+    let picture =
+        Picture::draw(&[&points(&places)], &settings(View::Above, By::Height, 1)).unwrap();
+    assert_eq!(picture.panels, [(1001, 1)]);
+    assert!(picture.pixel < 1.0, "{}", picture.pixel);
+}
+
+#[test]
+fn one_point_copies_and_points_that_are_nowhere_are_drawn() {
+    for places in [
+        vec![([5.0, 6.0, 7.0], 2)],
+        vec![([5.0, 6.0, 7.0], 2); 50],
+        vec![([5.0, 6.0, 7.0], 2), ([f64::NAN, 0.0, 0.0], 2), ([f64::INFINITY, 0.0, 0.0], 2)],
+    ] {
+        let few = points(&places);
+        let picture = Picture::draw(&[&few], &settings(View::East, By::Height, 2)).unwrap();
+        assert!(picture.pixels.chunks_exact(3).any(|pixel| *pixel != [255; 3]), "{places:?}");
+    }
+}
+
+#[test]
+fn what_cannot_be_drawn_is_told() {
+    let few = points(&[([0.0; 3], 2)]);
+    let told = |sources: &[&dyn Source], by, width| {
+        let settings = Settings { view: View::Above, by, width, threads: 1 };
+        Picture::draw(sources, &settings).unwrap_err().to_string()
+    };
+    assert!(told(&[&few], By::Color, 128).contains("no Red to be coloured by"));
+    assert!(told(&[&few], By::Intensity, 128).contains("no Intensity to be coloured by"));
+    assert!(told(&[&few; 5], By::Height, 128).contains("5 scans side by side"));
+    assert!(told(&[&few], By::Height, 63).contains("a picture of 63 pixels"));
+    let nowhere = points(&[([f64::NAN; 3], 2)]);
+    assert!(told(&[&nowhere], By::Height, 128).contains("no point to draw"));
+}
