@@ -152,7 +152,7 @@ fn what_cannot_be_drawn_is_told() {
     };
     assert!(told(&[&few], By::Color, 128).contains("no Red to be coloured by"));
     assert!(told(&[&few], By::Intensity, 128).contains("no Intensity to be coloured by"));
-    assert!(told(&[&few; 5], By::Height, 128).contains("5 scans side by side"));
+    assert!(told(&[&few, &few, &few, &few, &few], By::Height, 128).contains("5 scans side by side"));
     assert!(told(&[&few], By::Height, 63).contains("a picture of 63 pixels"));
     let nowhere = points(&[([f64::NAN; 3], 2)]);
     assert!(told(&[&nowhere], By::Height, 128).contains("no point to draw"));
