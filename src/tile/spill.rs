@@ -281,3 +281,49 @@ impl Drop for Spill {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[derive(Debug)]
+    struct In(PathBuf);
+
+    impl Folder for In {
+        fn file(&self, name: &str) -> Result<PathBuf> {
+            Ok(self.0.join(name))
+        }
+    }
+
+    fn spill(at: &Path) -> Spill {
+        let folder = Box::new(In(at.to_owned()));
+        Spill::new(&SpillArea::new(Budget::new(1 << 20), 0, folder), "found")
+    }
+
+    #[test]
+    fn a_stretch_that_comes_back_as_another_is_told_with_its_file_and_byte() {
+        let at = tempfile::tempdir().unwrap();
+        let spill = spill(at.path());
+        let first = spill.store(&[7; 300]).unwrap();
+        let second = spill.store(&[7; 300]).unwrap();
+        let mut into = Vec::new();
+        spill.load(&second, &mut into).unwrap();
+        assert_eq!(into, [7; 300]);
+        let file = at.path().join("found-0");
+        let mut bytes = std::fs::read(&file).unwrap();
+        for at in [300, 411, 599] {
+            bytes[at] ^= 1;
+            std::fs::write(&file, &bytes).unwrap();
+            let error = spill.load(&second, &mut into).unwrap_err();
+            assert_eq!((error.kind(), error.byte()), (ErrorKind::Io, Some(300)));
+            assert_eq!(error.path(), Some(file.as_path()));
+            assert!(error.remedy().unwrap().contains("`run.scratch`"), "{error:?}");
+            bytes[at] ^= 1;
+        }
+        spill.load(&first, &mut into).unwrap();
+        // Equal bytes at another address have another checksum.
+        assert_ne!(first.checksum, second.checksum);
+    }
+}
