@@ -171,3 +171,18 @@ fn chunks_of_laz_hold_what_their_rank_says_in_order_of_time() {
     }
     assert!(moved >= 2, "{moved} chunks were in another order before");
 }
+
+#[test]
+fn where_no_point_goes_the_order_of_the_inputs_is_kept_as_it_is() {
+    let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/181-order.las");
+    let scan = Scan::read(&case, usize::MAX);
+    let folder = tempfile::tempdir().unwrap();
+    let stages = "[[stage]]\nkind = \"outliers\"\nneighbors = 3\nmultiplier = 1e9\n";
+    let read = |write: &str| {
+        let ran = run(folder.path(), std::slice::from_ref(&case), stages, write, Settings::PLAIN);
+        Scan::read(&ran.unwrap().output, usize::MAX)
+    };
+    let written = read("las\norder = \"input\"");
+    assert_same(&scan.records, &written.records, "the records in their order");
+    assert!(read("las").records != scan.records, "in canonical order they are elsewhere");
+}

@@ -84,7 +84,7 @@ fn numbers_at_their_extremes_are_refused_and_never_wrap() {
 
 #[test]
 fn runs_of_a_few_records_are_planned_with_the_memory_to_merge_them() {
-    let few = Demands { run_most: Some(100), ..demands(1 << 30) };
+    let few = Demands { run_most: Some(100), points: 1_000_000, ..demands(1 << 30) };
     let shares = few.divide().unwrap();
     assert_eq!(shares.run_records, 100);
     assert!(shares.work >= 2 * few.merge(100), "{shares:?}");
