@@ -40,20 +40,20 @@ fn by_hand(ran: &Ran, limit: &str) -> String {
 fn what_is_chosen_is_told_and_gives_the_same_bytes_by_hand_and_however_the_scan_is_cut() {
     let folder = tempfile::tempdir().unwrap();
     let input: PathBuf = folder.path().join("in.las");
-    Scan::synthetic(Scene::Als, 12_000, 3).write(&input);
+    Scan::synthetic(Scene::Als, 30_000, 3).write(&input);
     let go = |stages: &str, settings| {
         run(folder.path(), std::slice::from_ref(&input), stages, "laz", settings).unwrap()
     };
-    for limit in ["", "keep = '7%'", "keep = 300"] {
+    for limit in ["", "keep = '25%'", "keep = 6000"] {
         let angle = if limit.is_empty() { "max_angle = 'auto'" } else { limit };
         let auto = format!("{AUTO}{angle}\n{MEDIAN}");
         let whole = go(&auto, Settings::PLAIN);
         let bytes = whole.bytes();
         assert_eq!(chosen(&whole, "neighbors"), Some(20.into()), "the scan has noise");
         let kept = whole.report.result.ledger.kept;
-        let expected = [("keep = '7%'", 840), ("keep = 300", 300)];
+        let expected = [("keep = '25%'", 7500), ("keep = 6000", 6000)];
         expected.iter().filter(|(keep, _)| *keep == limit).for_each(|(_, n)| assert_eq!(kept, *n));
-        let cut = go(&auto, Settings { tile_points: Some(400), threads: 2, ..Settings::PLAIN });
+        let cut = go(&auto, Settings { tile_points: Some(300), threads: 2, ..Settings::PLAIN });
         assert!(cut.count("tiles") >= 30, "{} tiles", cut.count("tiles"));
         assert_same(&cut.bytes(), &bytes, limit);
         assert_same(&cut.result, &whole.result, limit);

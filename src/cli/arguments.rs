@@ -233,7 +233,7 @@ pub(super) struct Reduce {
     #[arg(long, value_name = "SIDE")]
     pub side: Option<String>,
     /// A cell with this many points or fewer is not split [default: 1]
-    #[arg(long, value_name = "N", value_parser = parse_whole)]
+    #[arg(long, value_name = "N", value_parser = parse_count)]
     pub min_points: Option<u64>,
     /// Largest side of a cell that is kept whole, in the scan's unit or as 2m [default: none]
     #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
