@@ -7,7 +7,7 @@ use pointmill::point::{Horizontal, Units};
 use pointmill::quantity::{Angle, Length};
 
 fn in_units(text: &str, horizontal: Option<Horizontal>) -> Result<f64, String> {
-    let units = Units { horizontal, vertical: None };
+    let units = Units { horizontal, ..Units::default() };
     let length = Length::read(text).unwrap().in_scan(&units, "cells.max_side");
     let told = |error: pointmill::Error| format!("{error}; {}", error.remedy().unwrap_or(""));
     length.map(Length::value).map_err(told)

@@ -159,7 +159,7 @@ fn records_that_ply_does_not_hold_are_named_before_the_run() {
     let pipeline = text("", &[case("122-vlrs.las")], "", &output, "");
     let plan = Pipeline::parse(&pipeline, "test.toml", &Registry::builtin()).unwrap();
     let plan = plan.plan(&Overrides::default()).unwrap();
-    let [warning] = plan.warnings() else { panic!("{:?}", plan.warnings()) };
+    let [warning] = &plan.warnings()[..] else { panic!("{:?}", plan.warnings()) };
     assert!(warning.contains("these are lost: "), "{warning}");
     let (done, told) = go(&pipeline).unwrap();
     assert!(told.contains(warning) && done.report.run.warnings.contains(warning));
