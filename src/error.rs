@@ -54,9 +54,16 @@ impl Error {
     /// A refusal of the operating system at `path`; `doing` completes "cannot …".
     pub fn io(path: impl AsRef<Path>, doing: &str, cause: std::io::Error) -> Self {
         use std::io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
-        let is_full = matches!(cause.kind(), FileTooLarge | QuotaExceeded | StorageFull);
+        let help = match cause.kind() {
+            QuotaExceeded | StorageFull => Some("free some disk space, or write elsewhere"),
+            FileTooLarge => Some(
+                "the file would be larger than the file system or a limit of the shell (`ulimit -f`) \
+                 allows: raise the limit, or write elsewhere",
+            ),
+            _ => None,
+        };
         let error = Error::new(ErrorKind::Io, format!("cannot {doing}")).at(path).because(cause);
-        if is_full { error.help("free some disk space, or write elsewhere") } else { error }
+        if let Some(help) = help { error.help(help) } else { error }
     }
 
     /// Content of `path` that its format does not allow.

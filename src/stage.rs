@@ -247,8 +247,8 @@ pub trait CreateSink: Send + Sync {
     /// are created one after the other, each with [`Source::metadata_of`] its input, and an input of
     /// which no record is kept gets its output too.
     ///
-    /// Fails if two outputs would have one name, or one would replace an input. Makes nothing: the
-    /// folder is made by the run.
+    /// Fails if two outputs would have one name; that none replaces an input is the plan's to check.
+    /// Makes nothing: the folder is made by the run.
     fn each_input(&self, _inputs: &[Input]) -> Result<Option<Vec<Box<dyn CreateSink>>>> {
         Ok(None)
     }

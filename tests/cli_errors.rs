@@ -164,7 +164,7 @@ fn flags_of_reduce_are_told_as_they_were_typed() {
     reduce(&["--split", "octnt"], &["error: --split: ", "octnt", "did you mean `octant`?"]);
     reduce(&["--method", "vardy"], &["--method: ", "did you mean `varady`?"]);
     refused(at.path(), &["reduce", "a.laz", "-o", "b"], &["-o: the extension of `b` names no"]);
-    refused(at.path(), &["reduce", "a.laz", "-o", "./a.laz"], &["-o: ./a.laz is an input"]);
+    refused(at.path(), &["reduce", "a.laz", "-o", "./a.laz"], &["-o: ./a.laz is the input a.laz"]);
     reduce(&["--passes", "0"], &["--passes: "]);
     reduce(&["--mark", "keypoint"], &["--mark: ", "keypoint"]);
     reduce(&["--keep", "110%"], &["--keep: "]);
@@ -189,7 +189,7 @@ fn conversions_into_a_folder_are_checked_before_the_first() {
     convert(&["c.txt", "-o", "out/"], &["c.txt: its name says no format"]);
     convert(&["a.las", "b.las", "-o", "out/", "--report", "r.json"], &["--report is for one"]);
     convert(&["a.las", "b.las", "-o", "out/", "--to", "lax"], &["--to: ", "did you mean `las`?"]);
-    convert(&["a.las", "b.las", "-o", "."], &["is an input: it cannot be written over"]);
+    convert(&["a.las", "b.las", "-o", "."], &["-o: ./a.las is the input a.las: it cannot be"]);
     convert(&["a.las", "-o", "x.laz", "--scale", "-1"], &["--scale: ", "a number above 0"]);
     convert(
         &["a.las", "-o", "x.laz", "--scale", "1,2"],

@@ -29,7 +29,7 @@ fn what_cannot_be_written_is_refused_before_any_work() {
     let told = |overrides: Overrides| execute(&text, &overrides, &Quiet).unwrap_err();
     let report = |path: PathBuf| told(Overrides { report: Some(path), ..Overrides::default() });
     let same = report(case.path(".").join("out.ply"));
-    assert!(same.to_string().ends_with("the report would replace the output"), "{same}");
+    assert!(same.to_string().ends_with("out.ply: this is written twice"), "{same}");
     let missing = report(case.path("none/report.json"));
     assert!(missing.to_string().ends_with("none: the folder does not exist"));
     assert!(report(PathBuf::from("/dev/null")).to_string().contains("no regular file"));

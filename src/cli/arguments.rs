@@ -86,6 +86,9 @@ pub(super) struct Common {
     /// Write the report to this file
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
+    /// Replace no file: refuse the run, with exit code 1, if an output or the report exists
+    #[arg(long)]
+    pub no_clobber: bool,
 }
 
 impl Common {
@@ -101,12 +104,18 @@ impl Common {
     }
 
     /// Values put in the place of the pipeline's: `--report`, so that it is compared with the
-    /// inputs and outputs.
+    /// inputs and outputs, and `--no-clobber`.
     pub fn sets(&self) -> Result<Vec<Set>> {
-        let Some(path) = &self.report else { return Ok(Vec::new()) };
-        let told = || Error::pipeline("the name is not UTF-8 text").at(path);
-        let text = path.to_str().ok_or_else(told)?;
-        Ok(vec![Set::argument("--report", "run.report", text.into())])
+        let mut sets = Vec::new();
+        if let Some(path) = &self.report {
+            let told = || Error::pipeline("the name is not UTF-8 text").at(path);
+            let text = path.to_str().ok_or_else(told)?;
+            sets.push(Set::argument("--report", "run.report", text.into()));
+        }
+        if self.no_clobber {
+            sets.push(Set::argument("--no-clobber", "run.existing", "refuse".into()));
+        }
+        Ok(sets)
     }
 }
 

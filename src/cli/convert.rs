@@ -9,7 +9,10 @@ use super::arguments::Convert;
 use super::console::Console;
 use super::run::{given, mill, written};
 use crate::budget::Bytes;
-use crate::pipeline::{Done, Format, Pipeline, Registry, Watch, expand};
+use crate::pipeline::{
+    Done, Existing, Files, Format, Pipeline, Registry, Use, Watch, expand, make_folder,
+    refuse_existing,
+};
 use crate::report::Grouped;
 use crate::{Error, ErrorKind, Result};
 
@@ -28,20 +31,39 @@ pub(super) fn convert(arguments: &Convert, registry: &Registry, console: &Consol
     if inputs.len() > 1 && arguments.common.report.is_some() {
         return Err(Error::pipeline("--report is for one output; this makes several"));
     }
+    let pairs = outputs(&inputs, folder, arguments.to.as_deref())?;
+    check_files(&pairs, arguments)?;
     // Every pipeline is checked before the first is run.
     let mut runs = Vec::new();
-    for (input, output) in outputs(&inputs, folder, arguments.to.as_deref())? {
+    for (input, output) in pairs {
         let one = pipeline(arguments, text(&input)?, text(&output)?, registry)?;
         runs.push((input, one));
     }
-    let is_new = !folder.is_dir();
-    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, "create the folder", e))?;
-    let outcome = run_all(runs, arguments, console);
-    if outcome.is_err() && is_new {
+    let made = make_folder(folder)?;
+    let (done, outcome) = run_all(runs, arguments, console);
+    if done.is_empty() {
         // Left behind if any output is in it, which is as it should be.
-        let _ = std::fs::remove_dir(folder);
+        made.iter().rev().for_each(|made| drop(std::fs::remove_dir(made)));
+    } else {
+        console.result(Total::of(&done).told(&arguments.output, outcome.as_ref().err()))?;
     }
-    console.result(outcome?.told(&arguments.output))
+    outcome
+}
+
+/// No output of the whole batch may replace an input of it, be it one of another conversion that is
+/// reached through a link, nor another output.
+fn check_files(pairs: &[(PathBuf, PathBuf)], arguments: &Convert) -> Result<()> {
+    let mut files = Files::default();
+    pairs.iter().for_each(|(input, _)| files.read(input, Use::Input));
+    let existing = if arguments.common.no_clobber { Existing::Refuse } else { Existing::Replace };
+    for (_, output) in pairs {
+        files.write(output).map_err(|clash| {
+            Error::pipeline(format!("-o: {} {clash}", output.display()))
+                .help("convert into another folder")
+        })?;
+        refuse_existing(output, existing)?;
+    }
+    Ok(())
 }
 
 /// What several conversions came to.
@@ -65,9 +87,14 @@ impl Total {
         }
     }
 
-    fn told(&self, folder: &str) -> String {
+    /// The closing table; `failed` tells what became of the others.
+    fn told(&self, folder: &str, failed: Option<&Error>) -> String {
         let Total { files, points, bytes, peak_bytes, seconds } = self;
-        let mut told = format!("files      {files}\npoints     {}\n", Grouped(*points));
+        let mut told = format!("files      {files}\n");
+        if let Some(failed) = failed {
+            told += &format!("besides    {failed}\n");
+        }
+        told += &format!("points     {}\n", Grouped(*points));
         if let Some(peak) = peak_bytes {
             told += &format!("memory     {} at most\n", Bytes(*peak));
         }
@@ -76,23 +103,24 @@ impl Total {
 }
 
 /// Runs one pipeline after the other. One that fails is told at once and does not keep the others
-/// from running; the error in the end is of the first failure's kind.
+/// from running; the error in the end is of the first failure's kind. Returned are those that are
+/// done and what became of all.
 fn run_all(
     runs: Vec<(PathBuf, Pipeline)>,
     arguments: &Convert,
     console: &Console,
-) -> Result<Total> {
+) -> (Vec<Done>, Result<()>) {
     let total = runs.len();
-    let mut all = Vec::new();
+    let mut done = Vec::new();
     let mut failures: Vec<ErrorKind> = Vec::new();
     for (input, pipeline) in runs {
         if console.cancelled() {
-            return Err(Error::interrupted());
+            return (done, Err(Error::interrupted()));
         }
         match mill(pipeline, &arguments.common, console) {
-            Ok(done) => all.push(done),
+            Ok(one) => done.push(one),
             Err(error) if total == 1 || error.kind() == ErrorKind::Interrupted => {
-                return Err(error);
+                return (done, Err(error));
             }
             Err(error) => {
                 failures.push(error.kind());
@@ -100,12 +128,8 @@ fn run_all(
             }
         }
     }
-    match failures.first() {
-        Some(kind) => {
-            Err(Error::new(*kind, format!("{} of {total} conversions failed", failures.len())))
-        }
-        None => Ok(Total::of(&all)),
-    }
+    let told = format!("{} of {total} conversions failed", failures.len());
+    (done, failures.first().map_or(Ok(()), |kind| Err(Error::new(*kind, told))))
 }
 
 fn pipeline(

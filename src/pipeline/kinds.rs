@@ -1,6 +1,7 @@
 //! The stage kinds at both ends of a pipeline, `read`, `synth` and `write`: their keys.
 
 use std::fmt;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, de};
@@ -225,6 +226,15 @@ impl StageKind for Write {
             }
             (None, None) => Err(Error::pipeline("`write` needs `path` or `folder`")
                 .help("`path` is one file, `folder` gets one for each input")),
+            (Some(path), None) if path.as_os_str().as_bytes().ends_with(b"/") || path.is_dir() => {
+                let told = format!("`{}` is a folder, not a file to write", path.display());
+                let help = format!(
+                    "name a file in it, such as `{}`, or give the folder as `write.folder`, which gets \
+                     a file for each input",
+                    path.join("out.laz").display()
+                );
+                Err(at.blame("path", Error::pipeline(told).help(help)))
+            }
             (Some(path), None) => {
                 let Some(format) = self.format.or(Format::of(&path)) else {
                     return Err(at.blame("path", unknown_extension(&path)));

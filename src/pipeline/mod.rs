@@ -7,6 +7,7 @@ mod connect;
 mod cut;
 mod draft;
 mod each;
+mod files;
 mod forecast;
 mod grind;
 mod inputs;
@@ -38,16 +39,19 @@ mod tagger;
 mod text;
 mod watch;
 
+pub(crate) use files::{Files, Use};
 pub use inputs::expand;
 pub use kinds::{Encoding, Format, OutputOrder, Read, Synth, Write};
 pub use limits::{LimitKeys, Sees};
 pub use outline::Outline;
 pub use plan::Plan;
+pub(crate) use publish::{make_folder, refuse_existing};
 pub use registry::{Registry, StageKind, StagePlace};
 pub use run::Done;
 pub use set::Set;
 pub use settings::{
-    MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill, Withheld, ZScale, parse_bytes,
+    Existing, MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill, Withheld, ZScale,
+    parse_bytes,
 };
 pub use text::{Pipeline, PlacedStage};
 pub use watch::{Quiet, Watch};

@@ -1,10 +1,7 @@
-//! One output for each input, in a folder: their names, and that none takes the place of another
-//! or of an input.
+//! One output for each input, in a folder: their names, and that no two are alike.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::fs;
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -78,8 +75,6 @@ impl CreateSink for Outputs {
                 .at(&self.folder)
                 .help("write one file: give `path` instead of `folder`"));
         }
-        let there: BTreeMap<_, _> =
-            inputs.iter().filter_map(|i| Some((identity(&i.path)?, &i.path))).collect();
         let mut taken: BTreeMap<PathBuf, &Path> = BTreeMap::new();
         let mut all: Vec<Box<dyn CreateSink>> = Vec::with_capacity(inputs.len());
         for Input { path, .. } in inputs {
@@ -90,11 +85,6 @@ impl CreateSink for Outputs {
                 return Err(Error::pipeline(told)
                     .at(&output.path)
                     .help("rename one of them, or run them one by one"));
-            }
-            if let Some(input) = identity(&output.path).and_then(|file| there.get(&file)) {
-                let told =
-                    format!("this is the input {} and would be overwritten", input.display());
-                return Err(Error::pipeline(told).at(&output.path).help("write to another folder"));
             }
             all.push(Box::new(output));
         }
@@ -128,9 +118,4 @@ impl CreateSink for Outputs {
     ) -> Result<Box<dyn Sink>> {
         Err(Error::internal("a folder is not written as one file").at(&self.folder))
     }
-}
-
-/// What tells a file from others, whatever its name; none if there is no such file.
-fn identity(path: &Path) -> Option<(u64, u64)> {
-    fs::metadata(path).ok().map(|there| (there.dev(), there.ino()))
 }

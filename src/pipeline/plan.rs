@@ -1,15 +1,15 @@
 //! A pipeline that fits: its source open, its lattice fixed, its stages in passes, its memory divided.
 
-use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::each::{lists_bytes, paths, ranks};
+use super::files::{Clash, Files, Use};
 use super::passes::{Op, Pass, StageOp, Tap, blame, number_selections, unroll};
 use super::publish::check_place;
 use super::settings::{Nonfinite, Overrides, RunSettings, Withheld};
 use super::shares::Demands;
 use super::tagger::Tagger;
-use super::text::{Pipeline, PlacedStage, resolved};
+use super::text::{Pipeline, PlacedStage};
 use crate::budget::default_limit;
 use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
@@ -78,9 +78,9 @@ impl Pipeline {
             sorted.source.ok_or_else(|| Error::pipeline("the pipeline reads nothing"))?;
         let (sinks, taps): (Vec<_>, Vec<_>) = sorted.sinks.into_iter().unzip();
         let last_sink = last_sink(&sorted.ops, &taps).map_err(in_file)?;
-        check_places(&*open, &sinks, &settings)?;
+        let mut files = check_places(self.file.as_deref(), &*open, &sinks, &settings)?;
         let source = open.open()?;
-        let (each, ranks) = each_input(&*source, &sinks, &settings)?;
+        let (each, ranks) = each_input(&*source, &sinks, &settings, &mut files)?;
         let schema = source.schema();
         check_transforms(&sorted.transforms, schema).map_err(in_file)?;
         let selections = number_selections(&mut sorted.ops).map_err(in_file)?;
@@ -185,48 +185,46 @@ fn last_sink(ops: &[StageOp], taps: &[Tap]) -> Result<usize> {
     })
 }
 
-/// Refuses outputs that would replace an input or each other, or that cannot appear where they
-/// should.
+/// Refuses outputs that would replace what is read or each other, or that cannot appear where they
+/// should. The files of folders are not among them: [`each_input`] adds these to what is returned.
 fn check_places(
+    pipeline: Option<&Path>,
     source: &dyn OpenSource,
     sinks: &[Box<dyn CreateSink>],
     settings: &RunSettings,
-) -> Result<()> {
-    let outputs = || sinks.iter().map(|sink| sink.path()).chain(settings.report.as_deref());
-    for input in source.paths() {
-        outputs().try_for_each(|output| refuse_overwrite(&input, output))?;
-    }
-    let files = sinks.iter().filter(|sink| !sink.is_folder()).map(|sink| sink.path());
-    files.chain(settings.report.as_deref()).try_for_each(check_place)?;
-    let mut files = Vec::new();
-    for output in outputs() {
-        let file = resolved(output);
-        if files.contains(&file) {
-            let told = match settings.report.as_deref() == Some(output) {
-                true => "the report would replace the output",
-                false => "two outputs have this name",
-            };
-            return Err(Error::pipeline(told).at(output));
+) -> Result<Files> {
+    let mut files = Files::default();
+    pipeline.iter().for_each(|path| files.read(path, Use::Pipeline));
+    source.paths().iter().for_each(|path| files.read(path, Use::Input));
+    let outputs = sinks.iter().map(|sink| (sink.path(), sink.is_folder()));
+    for (path, is_folder) in outputs.chain(settings.report.as_deref().map(|path| (path, false))) {
+        files.write(path).map_err(|clash| refuse(&clash, path))?;
+        if !is_folder {
+            check_place(path, settings.existing)?;
         }
-        files.push(file);
     }
     match settings.scratch.as_ref().filter(|folder| !folder.is_dir()) {
         Some(folder) => Err(Error::new(ErrorKind::Io, "the folder for scratch does not exist")
             .at(folder)
             .help("create it first, or name another with --scratch")),
-        None => Ok(()),
+        None => Ok(files),
     }
+}
+
+fn refuse(clash: &Clash, output: &Path) -> Error {
+    Error::pipeline(format!("this {clash}")).at(output).help("write to another file")
 }
 
 /// Sinks of the inputs for each output that is a folder, and the ranks of the inputs if one is.
 type EachInput = (Vec<Vec<Box<dyn CreateSink>>>, Vec<u32>);
 
-/// Names the outputs of folders; refuses those that cannot appear there, or that would replace
-/// another output.
+/// Names the outputs of folders; refuses those that cannot appear there, or that would replace one of
+/// the other `files`.
 fn each_input(
     source: &dyn Source,
     sinks: &[Box<dyn CreateSink>],
     settings: &RunSettings,
+    files: &mut Files,
 ) -> Result<EachInput> {
     let inputs = source.inputs();
     if inputs.len() > TAGGED_INPUTS as usize && sinks.iter().any(|sink| sink.is_folder()) {
@@ -234,17 +232,12 @@ fn each_input(
         return Err(Error::pipeline(told).help("run them in several parts"));
     }
     let mut each = Vec::new();
-    let files = sinks.iter().filter(|sink| !sink.is_folder()).map(|sink| sink.path());
-    let mut taken: BTreeSet<PathBuf> =
-        files.chain(settings.report.as_deref()).map(resolved).collect();
     for sink in sinks {
         let own = sink.each_input(&inputs)?.unwrap_or_default();
         for path in paths(&own) {
-            if !taken.insert(resolved(&path)) {
-                return Err(Error::pipeline("two outputs have this name").at(path));
-            }
+            files.write(&path).map_err(|clash| refuse(&clash, &path))?;
             if sink.path().is_dir() {
-                check_place(&path)?;
+                check_place(&path, settings.existing)?;
             }
         }
         each.push(own);
@@ -304,19 +297,4 @@ fn mills(ops: &[StageOp], sinks: &[Box<dyn CreateSink>]) -> Result<bool> {
             Err(Error::pipeline(told).at(sink.path()).help("leave `order` out"))
         }
     }
-}
-
-/// Refuses `output` if it is the file `input`, whatever its name.
-fn refuse_overwrite(input: &Path, output: &Path) -> Result<()> {
-    use std::os::unix::fs::MetadataExt;
-    let same = match (std::fs::metadata(input), std::fs::metadata(output)) {
-        (Ok(a), Ok(b)) => (a.dev(), a.ino()) == (b.dev(), b.ino()),
-        _ => false,
-    };
-    if same {
-        return Err(Error::pipeline("this is an input and would be overwritten")
-            .at(output)
-            .help("write to another file"));
-    }
-    Ok(())
 }

@@ -12,8 +12,8 @@ use super::each::Each;
 use super::job::Job;
 use super::mill::mill;
 use super::plan::Plan;
-use super::publish::{Staged, make_folder};
-use super::scratch::{Scratch, free_space, memory_warning};
+use super::publish::{Staged, make_folder, publish};
+use super::scratch::{Scratch, Trouble, free_space, memory_warning};
 use super::settings::{Nonfinite, Spill};
 use super::shares::{Demands, Shares};
 use super::stream::stream;
@@ -60,22 +60,33 @@ impl std::fmt::Display for Done {
 impl Plan {
     /// Runs the plan. Outputs appear under their names when all of it is done; an error or a stop
     /// that `watch` asks for leaves nothing behind.
-    pub fn run(mut self, watch: &dyn Watch) -> Result<Done> {
+    ///
+    /// Outputs get their names one after the other, in the order of the pipeline's sinks and of the
+    /// inputs, and the report gets its own behind them.
+    pub fn run(self, watch: &dyn Watch) -> Result<Done> {
+        let trouble = Trouble::default();
+        let outcome = self.run_and_publish(watch, &trouble);
+        // All scratch is gone by now, or will not go.
+        lock(&trouble).iter().for_each(|told| watch.warn(told));
+        outcome
+    }
+
+    fn run_and_publish(mut self, watch: &dyn Watch, trouble: &Trouble) -> Result<Done> {
         let mut clock = Clock::new(watch);
-        let outputs = self.stage()?;
+        let outputs = self.stage(trouble)?;
         let nothing = || Error::pipeline("the pipeline writes nothing");
         let first = outputs.iter().flatten().next().ok_or_else(nothing)?;
         let staged_report =
-            self.settings.report.as_deref().map(|path| first.also(path)).transpose()?;
+            self.settings.report.as_deref().map(|path| first.also(path, trouble)).transpose()?;
         let tell = |error| outputs.iter().flatten().fold(error, |error, output| output.tell(error));
-        let (finished, run) = self.work(&outputs, &mut clock, watch).map_err(tell)?;
+        let (finished, run) = self.work(&outputs, &mut clock, watch, trouble).map_err(tell)?;
         let (report, tiles) = self.account(finished, run, clock)?;
         if let Some(staged) = &staged_report {
             write_report(staged.file(), &report, &tiles).map_err(|error| staged.tell(error))?;
         }
         drop(tiles);
-        outputs.into_iter().flatten().try_for_each(Staged::publish)?;
-        staged_report.map_or(Ok(()), Staged::publish)?;
+        let outputs: Vec<Staged> = outputs.into_iter().flatten().collect();
+        publish(&outputs, staged_report.as_ref())?;
         Ok(Done { report, report_path: self.settings.report })
     }
 
@@ -88,7 +99,7 @@ impl Plan {
     }
 
     /// Makes places for the files of all sinks.
-    fn stage(&self) -> Result<Vec<Vec<Staged>>> {
+    fn stage(&self, trouble: &Trouble) -> Result<Vec<Vec<Staged>>> {
         let mut outputs: Vec<Vec<Staged>> = Vec::new();
         for (n, sink) in self.sinks.iter().enumerate() {
             if sink.is_folder() {
@@ -97,8 +108,8 @@ impl Plan {
             let mut staged: Vec<Staged> = Vec::new();
             for file in self.files(n) {
                 let one = match staged.first().or(outputs.iter().flatten().next()) {
-                    Some(first) => first.also(file.path())?,
-                    None => Staged::beside(file.path())?,
+                    Some(first) => first.also(file.path(), trouble)?,
+                    None => Staged::beside(file.path(), self.settings.existing, trouble)?,
                 };
                 staged.push(one);
             }
@@ -113,6 +124,7 @@ impl Plan {
         outputs: &[Vec<Staged>],
         clock: &mut Clock<'_>,
         watch: &dyn Watch,
+        trouble: &Trouble,
     ) -> Result<(Finished, RunFigures)> {
         let (schema, metadata) = (self.source.schema(), self.source.metadata());
         let whole = !self.mills
@@ -130,7 +142,7 @@ impl Plan {
         let _base = budget.lease(shares.base, "program")?;
         let spill = match (&self.settings.scratch, outputs.iter().flatten().next()) {
             (None, Some(first)) => first.scratch().clone(),
-            (Some(folder), _) => Arc::new(Scratch::below(folder)),
+            (Some(folder), _) => Arc::new(Scratch::below(folder, trouble)),
             (None, None) => return Err(Error::pipeline("the pipeline writes nothing")),
         };
         let kept_in_memory = match self.settings.spill {

@@ -1,42 +1,54 @@
 //! Scratch folders: where a run spills and where its outputs grow before they get their names.
 //!
-//! A folder is `.pointmill-…` with a marker file that the run keeps locked. A killed run leaves the
-//! folder and the lock falls open; the next run beside it removes it. The marker is the last file to
-//! go, so that a folder whose removal was cut short is still known for what it is.
+//! A folder is `.pointmill-<boot>-<process>-<n>`, its user's alone, with a marker file that the run
+//! keeps locked and that names the machine. A killed run leaves the folder and the lock falls open;
+//! the next run beside it removes it. The marker is the last file to go, so that a folder whose
+//! removal was cut short is still known for what it is.
+
+mod stale;
 
 use std::fs::{self, File};
 use std::io::{self, Write};
-use std::os::unix::fs::MetadataExt;
+use std::os::fd::OwnedFd;
+use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
+
+use rustix::fs::{CWD, Mode, OFlags, openat};
+use rustix::io::Errno;
 
 use crate::budget::Bytes;
 use crate::tile::{Folder, lock};
 use crate::{Error, Result};
+use stale::{Host, MARKER, is_at, open_folder, remove, remove_stale};
 
-const PREFIX: &str = ".pointmill-";
-const MARKER: &str = "pointmill-scratch.json";
+/// What went wrong with scratch and fails no run: told when the run is over.
+pub type Trouble = Arc<Mutex<Vec<String>>>;
 
 /// A scratch folder below a parent, made when it is first needed and removed when dropped.
 #[derive(Debug)]
 pub struct Scratch {
     parent: PathBuf,
     made: Mutex<Option<Made>>,
+    trouble: Trouble,
 }
 
 #[derive(Debug)]
 struct Made {
     folder: PathBuf,
+    open: OwnedFd,
     files: u32,
     /// Locked for as long as the run lives.
     _marker: File,
 }
 
 impl Scratch {
-    /// A scratch folder to be made in `parent`. Removes what killed runs left there.
-    pub fn below(parent: &Path) -> Self {
-        remove_stale(parent);
-        Scratch { parent: parent.to_owned(), made: Mutex::default() }
+    /// A scratch folder to be made in `parent`. Removes what killed runs left there. `trouble` gets
+    /// to know of folders that cannot be removed.
+    pub fn below(parent: &Path, trouble: &Trouble) -> Self {
+        lock(trouble).extend(remove_stale(parent));
+        let (parent, trouble) = (parent.to_owned(), trouble.clone());
+        Scratch { parent, made: Mutex::default(), trouble }
     }
 
     /// The folder it is made in.
@@ -64,19 +76,23 @@ impl Folder for Arc<Scratch> {
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        if let Some(made) = lock(&self.made).take() {
-            // Nothing more can be done about a folder that will not go; the next run tries again.
-            let _ = remove(&made.folder);
+        let Some(made) = lock(&self.made).take() else { return };
+        if let Err(cause) = remove(CWD, &made.folder, &made.open) {
+            let folder = made.folder.display();
+            let told = format!("{folder}: this scratch folder cannot be removed: {cause}");
+            lock(&self.trouble).push(told);
         }
     }
 }
 
 fn make(parent: &Path) -> Result<Made> {
+    let host = Host::this();
     let mut attempt = 0u32;
     loop {
-        let folder = parent.join(format!("{PREFIX}{}-{attempt}", std::process::id()));
+        let name = format!("{}{}-{attempt}", host.prefix(), std::process::id());
+        let folder = parent.join(name);
         attempt += 1;
-        match fs::create_dir(&folder) {
+        match fs::DirBuilder::new().mode(0o700).create(&folder) {
             Ok(()) => {}
             Err(e) if e.kind() == io::ErrorKind::AlreadyExists && attempt < ATTEMPTS => continue,
             Err(e) => {
@@ -84,13 +100,20 @@ fn make(parent: &Path) -> Result<Made> {
                     .help("make the folder writable, or name another with --scratch"));
             }
         }
-        match mark(&folder) {
-            Ok(Some(marker)) => return Ok(Made { folder, files: 0, _marker: marker }),
+        let failed = |e: io::Error| Error::io(&folder, "mark the scratch folder", e);
+        let open = match open_folder(CWD, &folder) {
+            Ok(open) => open,
+            // Another run took it for that of a dead one.
+            Err(Errno::NOENT) if attempt < ATTEMPTS => continue,
+            Err(e) => return Err(failed(e.into())),
+        };
+        match mark(&open, &folder, &host) {
+            Ok(Some(marker)) => return Ok(Made { folder, open, files: 0, _marker: marker }),
             Ok(None) if attempt < ATTEMPTS => {}
             Ok(None) => return Err(Error::internal("scratch folders vanish").at(parent)),
             Err(e) => {
-                let _ = remove(&folder);
-                return Err(Error::io(&folder, "mark the scratch folder", e));
+                let _ = remove(CWD, &folder, &open);
+                return Err(failed(e));
             }
         }
     }
@@ -100,72 +123,30 @@ fn make(parent: &Path) -> Result<Made> {
 /// for that of a dead one.
 const ATTEMPTS: u32 = 10_000;
 
-/// Puts the marker into a new folder and locks it. None if another run took the folder before it was
-/// locked.
-fn mark(folder: &Path) -> io::Result<Option<File>> {
-    let path = folder.join(MARKER);
-    let mut marker = match File::create_new(&path) {
-        // The folder is gone, or was removed and made anew by a run that then marked it.
-        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::AlreadyExists) => {
-            return Ok(None);
-        }
-        marker => marker?,
+/// Puts the marker into the new folder, open as `open`, and locks it. None if another run took the
+/// folder before it was locked.
+fn mark(open: &OwnedFd, folder: &Path, host: &Host) -> io::Result<Option<File>> {
+    let flags = OFlags::RDWR | OFlags::CREATE | OFlags::EXCL | OFlags::NOFOLLOW | OFlags::CLOEXEC;
+    let mut marker = match openat(open, MARKER, flags, Mode::RUSR | Mode::WUSR) {
+        Ok(marker) => File::from(marker),
+        // The folder is gone.
+        Err(Errno::NOENT | Errno::EXIST) => return Ok(None),
+        Err(e) => return Err(e.into()),
     };
     // Where a file system has no locks, no other run can lock it either and take it for dead.
     let _ = marker.lock();
-    if !is_at(&marker, &path) {
+    if !is_at(&marker, CWD, folder.join(MARKER)) {
         return Ok(None);
     }
     let about = serde_json::json!({
         "about": "scratch of a pointmill run; safe to remove when no run uses it",
         "version": env!("CARGO_PKG_VERSION"),
         "process": std::process::id(),
+        "host": host.name,
+        "boot": host.boot,
     });
     writeln!(marker, "{about}")?;
     Ok(Some(marker))
-}
-
-/// True if the open `file` is the one that is at `path` now.
-fn is_at(file: &File, path: &Path) -> bool {
-    match (file.metadata(), fs::metadata(path)) {
-        (Ok(open), Ok(there)) => (open.dev(), open.ino()) == (there.dev(), there.ino()),
-        _ => false,
-    }
-}
-
-/// Removes scratch folders in `parent` whose runs are gone. What cannot be read or removed is left.
-fn remove_stale(parent: &Path) {
-    for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
-        if !entry.file_name().to_string_lossy().starts_with(PREFIX) {
-            continue;
-        }
-        let folder = entry.path();
-        match File::open(folder.join(MARKER)) {
-            // The lock is held until the folder is gone: a run that has just made it waits for that.
-            // A marker that is no longer there was that of an earlier folder of the same name.
-            Ok(marker) if marker.try_lock().is_ok() && is_at(&marker, &folder.join(MARKER)) => {
-                let _ = remove(&folder);
-            }
-            Ok(_) => {}
-            // A run killed before it could mark its folder; `remove_dir` spares any that is not empty.
-            Err(_) => {
-                let _ = fs::remove_dir(&folder);
-            }
-        }
-    }
-}
-
-/// Removes a scratch folder, its marker last.
-fn remove(folder: &Path) -> io::Result<()> {
-    let marker = folder.join(MARKER);
-    for entry in fs::read_dir(folder)? {
-        let path = entry?.path();
-        if path != marker {
-            fs::remove_file(path)?;
-        }
-    }
-    fs::remove_file(marker)?;
-    fs::remove_dir(folder)
 }
 
 /// Bytes free for this user on the file system of `folder`; None where the system does not tell.
@@ -191,6 +172,7 @@ pub fn memory_warning(folder: &Path, spilled: u64) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::stale::PREFIX;
     use super::*;
 
     fn scratch_folders(parent: &Path) -> usize {
@@ -204,7 +186,7 @@ mod tests {
     #[test]
     fn a_folder_lives_as_long_as_its_run() {
         let parent = tempfile::tempdir().unwrap();
-        let scratch = Scratch::below(parent.path());
+        let scratch = Scratch::below(parent.path(), &Trouble::default());
         assert_eq!(scratch_folders(parent.path()), 0);
         fs::write(scratch.path("a").unwrap(), "x").unwrap();
         assert_eq!(scratch_folders(parent.path()), 1);
@@ -219,10 +201,10 @@ mod tests {
             for _ in 0..4 {
                 threads.spawn(|| {
                     for _ in 0..200 {
-                        let scratch = Scratch::below(parent.path());
+                        let scratch = Scratch::below(parent.path(), &Trouble::default());
                         let file = scratch.path("a").unwrap();
                         fs::write(&file, "x").unwrap();
-                        remove_stale(parent.path());
+                        assert_eq!(remove_stale(parent.path()), [""; 0]);
                         assert_eq!(fs::read(&file).unwrap(), b"x");
                     }
                 });
@@ -234,35 +216,50 @@ mod tests {
     #[test]
     fn the_next_run_removes_what_a_killed_one_left_and_spares_the_living() {
         let parent = tempfile::tempdir().unwrap();
-        let living = Scratch::below(parent.path());
+        let trouble = Trouble::default();
+        let living = Scratch::below(parent.path(), &trouble);
         living.path("a").unwrap();
-        let dead = parent.path().join(format!("{PREFIX}1-7"));
+        let prefix = Host::this().prefix();
+        let dead = parent.path().join(format!("{prefix}1-7"));
         fs::create_dir(&dead).unwrap();
-        fs::write(dead.join(MARKER), "{}").unwrap();
+        // Killed before the marker was written.
+        fs::write(dead.join(MARKER), "").unwrap();
         fs::write(dead.join("1-records"), "data").unwrap();
-        fs::create_dir(parent.path().join(format!("{PREFIX}2-0"))).unwrap();
+        fs::create_dir(parent.path().join(format!("{prefix}2-0"))).unwrap();
         let foreign = parent.path().join(format!("{PREFIX}notes"));
         fs::create_dir(&foreign).unwrap();
         fs::write(foreign.join("mine.txt"), "keep").unwrap();
-        Scratch::below(parent.path());
+        Scratch::below(parent.path(), &trouble);
         assert!(!dead.exists() && foreign.join("mine.txt").exists());
         assert_eq!(scratch_folders(parent.path()), 2, "the living one and the foreign one");
+        assert_eq!(*lock(&trouble), [""; 0]);
     }
 
     #[test]
-    fn a_removal_that_was_cut_short_is_finished_by_the_next_run() {
+    fn scratch_is_its_users_alone() {
+        use std::os::unix::fs::PermissionsExt;
         let parent = tempfile::tempdir().unwrap();
-        let dead = parent.path().join(format!("{PREFIX}1-0"));
-        fs::create_dir(&dead).unwrap();
-        fs::write(dead.join(MARKER), "{}").unwrap();
-        fs::write(dead.join("1-records"), "data").unwrap();
-        // What stops a removal half-way: a folder where files are expected.
-        fs::create_dir(dead.join("2-refuses")).unwrap();
-        assert!(remove(&dead).is_err());
-        assert!(dead.join(MARKER).exists(), "the marker goes last");
-        fs::remove_dir(dead.join("2-refuses")).unwrap();
-        Scratch::below(parent.path());
-        assert!(!dead.exists());
+        let scratch = Scratch::below(parent.path(), &Trouble::default());
+        let folder = scratch.path("a").unwrap().parent().unwrap().to_owned();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        assert_eq!((mode(&folder), mode(&folder.join(MARKER))), (0o700, 0o600));
+        let marker = fs::read_to_string(folder.join(MARKER)).unwrap();
+        let marker: serde_json::Value = serde_json::from_str(&marker).unwrap();
+        assert_eq!(marker["boot"], Host::this().boot);
+        assert_eq!(marker["host"], Host::this().name);
+    }
+
+    #[test]
+    fn a_folder_that_will_not_go_is_told() {
+        let parent = tempfile::tempdir().unwrap();
+        let trouble = Trouble::default();
+        let scratch = Scratch::below(parent.path(), &trouble);
+        let folder = scratch.path("a").unwrap().parent().unwrap().to_owned();
+        fs::create_dir(folder.join("in the way")).unwrap();
+        drop(scratch);
+        let told = lock(&trouble).join("");
+        assert!(told.starts_with(folder.to_str().unwrap()), "{told}");
+        assert!(told.contains("cannot be removed"), "{told}");
     }
 
     #[test]
@@ -273,10 +270,10 @@ mod tests {
             for _ in 0..6 {
                 scope.spawn(|| {
                     for _ in 0..150 {
-                        let scratch = Scratch::below(parent.path());
+                        let scratch = Scratch::below(parent.path(), &Trouble::default());
                         let path = scratch.path("a").unwrap();
                         fs::write(&path, "mine").unwrap();
-                        remove_stale(parent.path());
+                        assert_eq!(remove_stale(parent.path()), [""; 0]);
                         assert_eq!(fs::read_to_string(path).unwrap(), "mine");
                         made.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
                     }

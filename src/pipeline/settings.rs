@@ -25,6 +25,8 @@ pub struct RunSettings {
     pub scratch: Option<PathBuf>,
     /// Where the report is written; none: nowhere.
     pub report: Option<PathBuf>,
+    /// What becomes of files that are already where an output or the report is to be.
+    pub existing: Existing,
     /// Lattice step in world units; none: as the inputs' headers have it.
     #[serde(deserialize_with = "some_step")]
     pub lattice: Option<f64>,
@@ -45,6 +47,18 @@ pub struct RunSettings {
     pub simd: Simd,
     /// Whether points may stay in memory, for tests.
     pub spill: Spill,
+}
+
+/// What becomes of files that are already where an output or the report is to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Existing {
+    /// They are replaced when the run is done, and keep their permissions.
+    #[default]
+    Replace,
+    /// The run is refused before any work, with exit code 1; a file that appears meanwhile is not
+    /// replaced either.
+    Refuse,
 }
 
 /// What becomes of points whose coordinates are not finite.

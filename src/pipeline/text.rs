@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use super::draft::{self, Draft, StageDraft};
+use super::files::{Files, Use};
 use super::keys;
 use super::limits::{LimitKeys, Limits};
 use super::mistake::{self, Mistake, SourceText};
@@ -24,6 +25,8 @@ pub struct Pipeline {
     /// The stages from top to bottom: a source, then transforms, tile stages and sinks. A sink takes
     /// from the last stage above that is no sink, or from the one it names.
     pub stages: Vec<PlacedStage>,
+    /// The file that it was read from, which no output may replace.
+    pub(super) file: Option<PathBuf>,
 }
 
 /// A stage and where it stands in its file.
@@ -66,6 +69,17 @@ impl Pipeline {
         registry: &Registry,
         sets: &[Set],
     ) -> Result<Pipeline> {
+        Pipeline::parse_of(None, text, origin, registry, sets)
+    }
+
+    /// Reads the text of the file at `path`, or one that is of no file.
+    fn parse_of(
+        path: Option<&Path>,
+        text: &str,
+        origin: &str,
+        registry: &Registry,
+        sets: &[Set],
+    ) -> Result<Pipeline> {
         let file = SourceText { origin: origin.to_owned(), text: text.to_owned() };
         let sources: Vec<SourceText> =
             std::iter::once(file).chain(sets.iter().map(Set::source)).collect();
@@ -75,7 +89,7 @@ impl Pipeline {
         for (i, set) in sets.iter().enumerate() {
             draft.apply(set, i + 1, registry);
         }
-        let (pipeline, mistakes) = build(draft, text, origin, registry);
+        let (pipeline, mistakes) = build(draft, text, (origin, path), registry);
         if mistakes.is_empty() { Ok(pipeline) } else { Err(told(mistakes)) }
     }
 
@@ -86,14 +100,15 @@ impl Pipeline {
             let valid = e.utf8_error().valid_up_to() as u64;
             Error::pipeline("the pipeline is not UTF-8 text").at(path).at_byte(valid)
         })?;
-        Pipeline::parse_with(&text, &path.display().to_string(), registry, sets)
+        let origin = path.display().to_string();
+        Pipeline::parse_of(Some(path), &text, &origin, registry, sets)
     }
 }
 
 fn build(
     mut draft: Draft,
     text: &str,
-    origin: &str,
+    (origin, file): (&str, Option<&Path>),
     registry: &Registry,
 ) -> (Pipeline, Vec<Mistake>) {
     let mut mistakes = std::mem::take(&mut draft.mistakes);
@@ -111,9 +126,10 @@ fn build(
     }
     if mistakes.is_empty() {
         check_chain(&draft.stages, &stages, &mut mistakes);
-        check_files(&draft.run, &draft.stages, &stages, &settings, &mut mistakes);
+        check_files(file, &draft, &stages, &settings, &mut mistakes);
     }
-    (Pipeline { origin: origin.to_owned(), settings, stages }, mistakes)
+    let file = file.map(Path::to_owned);
+    (Pipeline { origin: origin.to_owned(), settings, stages, file }, mistakes)
 }
 
 fn place(
@@ -248,19 +264,22 @@ fn check_from(drafts: &[StageDraft], stages: &[PlacedStage], mistakes: &mut Vec<
     }
 }
 
-/// No file is written twice, and none over an input.
+/// No file is written twice, and none over an input or over the pipeline, which is read from `file`.
 fn check_files(
-    run: &Node,
-    drafts: &[StageDraft],
+    file: Option<&Path>,
+    draft: &Draft,
     stages: &[PlacedStage],
     settings: &RunSettings,
     mistakes: &mut Vec<Mistake>,
 ) {
-    let mut inputs: Vec<PathBuf> = Vec::new();
+    let mut files = Files::default();
+    file.iter().for_each(|path| files.read(path, Use::Pipeline));
     let mut outputs: Vec<(&Path, &Place)> = Vec::new();
-    for (draft, stage) in drafts.iter().zip(stages) {
+    for (draft, stage) in draft.stages.iter().zip(stages) {
         match &stage.role {
-            Role::Source(source) => inputs.extend(source.paths().iter().map(|p| resolved(p))),
+            Role::Source(source) => {
+                source.paths().iter().for_each(|path| files.read(path, Use::Input));
+            }
             Role::Sink(sink) => {
                 let key = |key| draft.keys.at(key);
                 let at = key("path").or(key("folder")).unwrap_or(&draft.kind.1);
@@ -270,30 +289,11 @@ fn check_files(
         }
     }
     if let Some(report) = &settings.report {
-        outputs.push((report, run.at("report").unwrap_or(&run.place)));
+        outputs.push((report, draft.run.at("report").unwrap_or(&draft.run.place)));
     }
-    let mut taken: Vec<PathBuf> = Vec::new();
     for (path, at) in outputs {
-        let file = resolved(path);
-        if inputs.contains(&file) {
-            let told = format!("{} is an input: it cannot be written over", path.display());
-            mistakes.push(Mistake::new(at.clone(), told));
-        } else if taken.contains(&file) {
-            let told = format!("{} is written twice", path.display());
-            mistakes.push(Mistake::new(at.clone(), told));
+        if let Err(clash) = files.write(path) {
+            mistakes.push(Mistake::new(at.clone(), format!("{} {clash}", path.display())));
         }
-        taken.push(file);
-    }
-}
-
-/// The file that `path` means, links and dots resolved as far as it exists.
-pub(super) fn resolved(path: &Path) -> PathBuf {
-    if let Ok(file) = path.canonicalize() {
-        return file;
-    }
-    let folder = path.parent().map(|p| if p == Path::new("") { Path::new(".") } else { p });
-    match (folder.map(Path::canonicalize), path.file_name()) {
-        (Some(Ok(folder)), Some(name)) => folder.join(name),
-        _ => path.to_owned(),
     }
 }

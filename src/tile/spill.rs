@@ -3,7 +3,7 @@
 //! checksum of what was written, so that a disk that damages data fails a run and changes no output.
 
 use std::fs::File;
-use std::os::unix::fs::FileExt;
+use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard};
@@ -254,6 +254,7 @@ impl ScratchFile {
             .read(true)
             .write(true)
             .create_new(true)
+            .mode(0o600)
             .open(&path)
             .map_err(|e| Error::io(&path, "create a scratch file", e))?;
         Ok(ScratchFile { file, path, end: AtomicU64::new(0), writers: AtomicUsize::new(0) })
@@ -277,5 +278,51 @@ impl Drop for Spill {
             // The scratch folder is removed as a whole at the end; this only frees the disk early.
             let _ = std::fs::remove_file(&scratch.path);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[derive(Debug)]
+    struct In(PathBuf);
+
+    impl Folder for In {
+        fn file(&self, name: &str) -> Result<PathBuf> {
+            Ok(self.0.join(name))
+        }
+    }
+
+    fn spill(at: &Path) -> Spill {
+        let folder = Box::new(In(at.to_owned()));
+        Spill::new(&SpillArea::new(Budget::new(1 << 20), 0, folder), "found")
+    }
+
+    #[test]
+    fn a_stretch_that_comes_back_as_another_is_told_with_its_file_and_byte() {
+        let at = tempfile::tempdir().unwrap();
+        let spill = spill(at.path());
+        let first = spill.store(&[7; 300]).unwrap();
+        let second = spill.store(&[7; 300]).unwrap();
+        let mut into = Vec::new();
+        spill.load(&second, &mut into).unwrap();
+        assert_eq!(into, [7; 300]);
+        let file = at.path().join("found-0");
+        let mut bytes = std::fs::read(&file).unwrap();
+        for at in [300, 411, 599] {
+            bytes[at] ^= 1;
+            std::fs::write(&file, &bytes).unwrap();
+            let error = spill.load(&second, &mut into).unwrap_err();
+            assert_eq!((error.kind(), error.byte()), (ErrorKind::Io, Some(300)));
+            assert_eq!(error.path(), Some(file.as_path()));
+            assert!(error.remedy().unwrap().contains("`run.scratch`"), "{error:?}");
+            bytes[at] ^= 1;
+        }
+        spill.load(&first, &mut into).unwrap();
+        // Equal bytes at another address have another checksum.
+        assert_ne!(first.checksum, second.checksum);
     }
 }
