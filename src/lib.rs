@@ -77,7 +77,7 @@
 //! - [`report`]: what a run counts and measures, merged so that no order and no cut changes a byte.
 //! - [`stage`]: the roles that a stage can play and what it tells the plan. Implement one to add a
 //!   stage of your own.
-//! - [`ops`]: the stages that work on tiles: `outliers`, `normals`, `cells`, `median` and `grid`.
+//! - [`ops`]: the stages that compute or select: `filter`, `outliers`, `normals`, `cells`, `median` and `grid`.
 //! - [`io`]: LAS, LAZ and PLY, conversion between their records, and [synthetic](io::synthetic) scans.
 //! - [`picture`]: scans drawn from above or from a side, side by side.
 //! - [`pipeline`]: from a text to a finished run: [`Pipeline`](pipeline::Pipeline),

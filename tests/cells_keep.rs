@@ -229,7 +229,7 @@ fn a_target_below_the_cells_is_refused_with_the_number_that_would_do() {
     let error = stage.conclude(&found).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Pipeline);
     assert!(error.to_string().contains("20%, which is 13 records, and 19 stay"), "{error}");
-    assert!(error.remedy().unwrap().contains("keep 19 or more, or give a larger `side`"));
+    assert!(error.remedy().unwrap().contains("keep 19 or more, or give a larger `cells.side`"));
     let (mut stage, found) = gather(
         target(&cells(16.0, 0.1, Split::Voronoi), Keep::Records(19)),
         &scan,
@@ -264,7 +264,7 @@ fn keep_has_two_phases_and_stands_alone() {
         let error = role(text).err().expect(text);
         assert!(error.to_string().contains(part), "{text}: {error}");
     };
-    refused("keep = '10%'\nmax_angle = 0.1", "`max_angle` gives it");
+    refused("keep = '10%'\nmax_angle = 0.1", "`cells.max_angle` gives it");
     refused("max_side = 1\nmin_spacing = 2", "less than `min_spacing`");
     let json = |text: &str| serde_json::to_value(toml::from_str::<Cells>(text).unwrap()).unwrap();
     assert_eq!(json("")["max_angle"], 0.1);

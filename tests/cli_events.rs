@@ -65,6 +65,10 @@ fn every_line_is_an_event_and_they_tell_the_run() {
                     told.insert(event["phase"].as_str().unwrap());
                 }
             }
+            "chosen" => {
+                let values = event["values"].as_array().unwrap();
+                assert!(values.iter().any(|v| v["name"] == "neighbors"), "{event}");
+            }
             // So few points are noisy.
             "warning" => assert!(event["message"].as_str().unwrap().starts_with("normals scatter")),
             other => panic!("{other}: {event}"),

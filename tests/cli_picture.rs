@@ -13,7 +13,8 @@ fn scans_of_all_formats_are_drawn_side_by_side() {
     let at = scans(&["a.laz", "b.ply"]);
     let args = ["picture", "a.laz", "b.ply", "-o", "both.png", "--from", "south", "--width", "300"];
     let told = done(at.path(), &args);
-    let lines: Vec<&str> = told.lines().map(|line| line.split_whitespace().next().unwrap()).collect();
+    let lines: Vec<&str> =
+        told.lines().map(|line| line.split_whitespace().next().unwrap()).collect();
     assert_eq!(lines, ["scan", "scan", "colours", "pixel", "output"], "{told}");
     let bytes = fs::read(at.path().join("both.png")).unwrap();
     assert_eq!(&bytes[..8], b"\x89PNG\r\n\x1a\n");

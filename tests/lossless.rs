@@ -100,7 +100,9 @@ fn kept_records_are_those_of_the_input(format: u8, extra: bool) {
         let ledger = &done.report.result.ledger;
         assert!((10..3_000).contains(&ledger.kept), "{ledger:?}");
         assert!(ledger.removed.iter().any(|r| r.records > 0), "{ledger:?}");
-        assert!(done.report.run.warnings.is_empty(), "{:?}", done.report.run.warnings);
+        let asked = |line: &&String| line.contains(" are left out, ");
+        let told: Vec<_> = done.report.run.warnings.iter().filter(|line| !asked(line)).collect();
+        assert!(told.is_empty(), "{told:?}");
         outputs.push(kept);
     }
     assert!(outputs[0] == outputs[1], "LAS and LAZ keep the same records in the same order");

@@ -122,7 +122,7 @@ fn a_viewpoint_in_the_plane_leaves_the_sign_as_it_is() {
 #[test]
 fn a_viewpoint_and_its_orient_need_each_other() {
     let told = refusal("kind = 'normals'\norient = 'viewpoint'");
-    assert!(told.contains("p.toml:8") && told.contains("needs a `viewpoint`"), "{told}");
+    assert!(told.contains("p.toml:8") && told.contains("needs a `normals.viewpoint`"), "{told}");
     let told = refusal("kind = 'normals'\norient = 'up'\nviewpoint = [1, 2, 3]");
     assert!(told.contains("p.toml:9") && told.contains("does nothing without"), "{told}");
     let told = refusal("kind = 'normals'\norient = 'viewpoint'\nviewpoint = [1, 2, nan]");

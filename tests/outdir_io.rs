@@ -246,11 +246,22 @@ fn an_output_of_two_inputs_or_over_an_input_is_refused() {
     };
     let twice = told(&[&a, &c, &b], "new", "");
     assert!(twice.contains(a.to_str().unwrap()) && twice.contains(b.to_str().unwrap()), "{twice}");
-    assert!(told(&[&a, &c], "one", "").contains("would be overwritten"));
     fs::create_dir(at.path().join("links")).unwrap();
     std::os::unix::fs::symlink(&c, at.path().join("links/a.laz")).unwrap();
-    let linked = told(&[&a, &c], "links", "format = 'laz'");
-    assert!(linked.contains("c.laz and would be overwritten"), "{linked}");
+    let planned = |folder: &str, more: &str| {
+        let text = format!(
+            "[[stage]]\nkind = 'read'\npath = ['{}', '{}']\n[[stage]]\nkind = 'write'\n{}\n",
+            a.display(),
+            c.display(),
+            keys(&at.path().join(folder), more)
+        );
+        let pipeline = Pipeline::parse(&text, "p.toml", &Registry::builtin()).unwrap();
+        pipeline.plan(&Overrides::default()).err().unwrap().to_string()
+    };
+    let over = planned("one", "");
+    assert!(over.ends_with("one/a.las: this is an input: it cannot be written over"), "{over}");
+    let linked = planned("links", "format = 'laz'");
+    assert!(linked.contains("links/a.laz: this is the input "), "{linked}");
     assert!(told(&[&a], "two/c.laz", "").contains("no folder"));
     assert!(told(&[&a], "new/deep", "").contains("does not exist"));
     assert!(told(&[&a], "new", "encoding = 'ascii'").contains("`write.encoding` is for ply"));

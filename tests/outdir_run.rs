@@ -220,7 +220,7 @@ fn a_thousand_tiles_reduce_with_few_files_open() {
     let ran = Command::new("sh")
         .arg("-c")
         .arg(
-            "ulimit -n 64 && exec \"$0\" reduce \"$1\" --outdir \"$2\" --threads 3 --memory 256MiB",
+            "ulimit -n 64 && exec \"$0\" reduce \"$1\" --outdir \"$2\" --preset paper --threads 3 --memory 256MiB",
         )
         .args([program.as_ref(), pattern.as_os_str(), folder.as_os_str()])
         .output()

@@ -278,7 +278,7 @@ fn a_chain_that_cannot_be_run_is_refused() {
             format!(
                 "{synth}{thin}[[stage]]\nkind = \"write\"\nfolder = \"f\"\norder = \"input\"\n"
             ),
-            "p.toml:8:8: `order = \"input\"` is for one file of all inputs",
+            "p.toml:8:8: `write.order = \"input\"` is for one file of all inputs",
         ),
         ("run = 3\n".to_owned() + GOOD, "p.toml:1:1: `run` is a table: write [run]"),
         ("stage = 3\n".to_owned(), "p.toml:1:1: a stage is one of several tables: write [[stage]]"),
@@ -599,7 +599,7 @@ fn a_stage_that_works_on_tiles_reads_no_dimension_that_these_have_not() {
     assert!(plan("Z").is_ok());
     let told = plan("Intensity").err().unwrap();
     assert!(told.to_string().contains("`bright` needs Intensity, which stages that work on tiles"));
-    assert!(told.to_string().contains("line 6"), "{told}");
+    assert!(told.to_string().contains("p.toml:6:8: "), "{told}");
     let told = plan("Colour").err().unwrap();
     assert!(told.to_string().contains("needs Colour, which nothing before it gives"), "{told}");
 }

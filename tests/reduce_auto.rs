@@ -57,8 +57,10 @@ fn what_is_chosen_is_told_and_gives_the_same_bytes_by_hand_and_however_the_scan_
         assert!(cut.count("tiles") >= 30, "{} tiles", cut.count("tiles"));
         assert_same(&cut.bytes(), &bytes, limit);
         assert_same(&cut.result, &whole.result, limit);
+        let all = Scan::read(&whole.output, usize::MAX).records;
+        // The file says which keys were given, so it is its records that are compared.
         let hand = go(&by_hand(&whole, limit), Settings::PLAIN);
-        assert_same(&hand.bytes(), &bytes, limit);
+        assert_same(&Scan::read(&hand.output, usize::MAX).records, &all, limit);
     }
 }
 

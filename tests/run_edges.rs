@@ -284,7 +284,13 @@ fn offsets_move_no_point_and_scales_tell_what_they_round() {
     let schema = las::open(&[path("a.las").into()]).unwrap().schema().clone();
     let offset = schema.coordinates().unwrap().map(|d| d.origin);
     write(&back, &format!("offset = {offset:?}"), "c.las").unwrap();
-    assert_eq!(fs::read(path("a.las")).unwrap(), fs::read(path("c.las")).unwrap());
+    // But for the system identifier, which says that something was moved.
+    let bytes = |name: &str| {
+        let mut bytes = fs::read(path(name)).unwrap();
+        bytes[26..58].fill(0);
+        bytes
+    };
+    assert_eq!(bytes("a.las"), bytes("c.las"));
     let told = write(&read, "scale = 0.5", "d.las").unwrap();
     assert!(told[0].as_str().unwrap().contains("were rounded"), "{told}");
     for wrong in ["offset = [nan, 0.0, 0.0]", "offset = [0.0, 0.0, inf]", "scale = 0.0"] {

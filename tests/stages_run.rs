@@ -256,8 +256,9 @@ fn two_passes_are_two_runs_with_a_file_between() {
     let report = las(folder.path(), &format!("{stages}passes = 2\n"), "in.las", "twice.las");
     las(folder.path(), &stages, "in.las", "once.las");
     las(folder.path(), &stages, "once.las", "again.las");
-    let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
-    assert!(read("twice.las") == read("again.las"), "other bytes");
+    // What the files say of the pipelines that made them differs.
+    let read = |name: &str| records(&folder.path().join(name));
+    assert!(read("twice.las") == read("again.las"), "other records");
     assert!(read("twice.las").len() < read("once.las").len());
     assert_many_tiles(&report);
 }

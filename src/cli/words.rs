@@ -151,7 +151,7 @@ mod tests {
             ("`write.offset = [1.0, -2.0, 0.0]`", "`--offset 1.0,-2.0,0.0`"),
             ("fewer `run.threads`", "fewer `--threads`"),
             ("`read.path` or `write.path`", "`IN` or `-o`"),
-            ("leave `write.order` out", "leave `write.order` in a pipeline file out"),
+            ("leave `write.dimensions` out", "leave `write.dimensions` in a pipeline file out"),
             ("`cells.classes = [2]`", "`--classes 2`"),
             ("`cells.keep = true`", "`--keep`"),
             ("`run.nowhere = 1` and `x` and `a.laz`", "`run.nowhere = 1` and `x` and `a.laz`"),

@@ -280,7 +280,7 @@ mod tests {
         assert_eq!(lattice.finer(&bounds(1 << 61), 1e-30), None);
         assert_eq!(lattice.rounded(0.15), None);
         let coarse = Lattice::binary(0.1, 10.0, 1.0);
-        assert_eq!((coarse.rounded(0.15), coarse.rounded(0.3)), (Some(0.2), None));
+        assert_eq!((coarse.rounded(0.17), coarse.rounded(0.3)), (Some(0.2), None));
     }
 
     #[test]

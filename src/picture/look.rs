@@ -193,7 +193,7 @@ impl Frame {
         let most = most.map(|pixels| f64::from(pixels.max(2)) - 1.0);
         let pixel = (sides[0] / most[0]).max(sides[1] / most[1]);
         let pixel = if pixel > 0.0 && pixel.is_finite() { pixel } else { 1.0 };
-        let size = sides.map(|side| (side / pixel) as u32 + 1);
+        let size = sides.map(|side| (side / pixel).round() as u32 + 1);
         Ok(Frame { size, pixel, corner: [ranges[0][0], ranges[1][1]] })
     }
 

@@ -96,9 +96,8 @@ fn the_nearest_point_of_a_pixel_is_seen_from_every_side() {
 #[test]
 fn threads_and_parts_change_no_pixel() {
     let scan = landscape(30_000);
-    let draw = |threads| {
-        Picture::draw(&[&*scan], &settings(View::West, By::Intensity, threads)).unwrap()
-    };
+    let draw =
+        |threads| Picture::draw(&[&*scan], &settings(View::West, By::Intensity, threads)).unwrap();
     let (one, three) = (draw(1), draw(3));
     assert_eq!(one.pixels, three.pixels);
     assert_eq!((&one.panels, one.range), (&three.panels, three.range));
@@ -152,7 +151,9 @@ fn what_cannot_be_drawn_is_told() {
     };
     assert!(told(&[&few], By::Color, 128).contains("no Red to be coloured by"));
     assert!(told(&[&few], By::Intensity, 128).contains("no Intensity to be coloured by"));
-    assert!(told(&[&few, &few, &few, &few, &few], By::Height, 128).contains("5 scans side by side"));
+    assert!(
+        told(&[&few, &few, &few, &few, &few], By::Height, 128).contains("5 scans side by side")
+    );
     assert!(told(&[&few], By::Height, 63).contains("a picture of 63 pixels"));
     let nowhere = points(&[([f64::NAN; 3], 2)]);
     assert!(told(&[&nowhere], By::Height, 128).contains("no point to draw"));

@@ -21,7 +21,8 @@ pub fn parse_count(text: &str) -> Result<u64, String> {
         Some('G') => (&digits[..digits.len() - 1], 9),
         _ => (&digits[..], 0),
     };
-    let (number, power) = match number.trim_end().split_once(['e', 'E']) {
+    let number = number.trim_end();
+    let (number, power) = match number.split_once(['e', 'E']) {
         Some((number, power)) if thousands == 0 => (number, power.parse().map_err(|_| refused())?),
         Some(_) => return Err(refused()),
         None => (number, thousands),
