@@ -265,7 +265,7 @@ fn keep_has_two_phases_and_stands_alone() {
         assert!(error.to_string().contains(part), "{text}: {error}");
     };
     refused("keep = '10%'\nmax_angle = 0.1", "`cells.max_angle` gives it");
-    refused("max_side = 1\nmin_spacing = 2", "less than `min_spacing`");
+    refused("max_side = 1\nmin_spacing = 2", "less than `cells.min_spacing`");
     let json = |text: &str| serde_json::to_value(toml::from_str::<Cells>(text).unwrap()).unwrap();
     assert_eq!(json("")["max_angle"], 0.1);
     assert!(json("keep = '10%'")["max_angle"].is_null());

@@ -236,7 +236,7 @@ fn values_of_flags_are_told_what_is_right() {
     let convert = ["convert", "a.laz", "-o", "o.ply", "--drop", "Intensty"];
     assert!(told(at.path(), &convert, 2).starts_with(
         "error: o.ply: `--drop` names `Intensty`, which the input does not have\nhelp: did you mean \
-         `Intensity`? it has X, Y, Z, "
+         `Intensity`? it has `X`, `Y`, `Z`, "
     ));
     let set = told(at.path(), &["run", "p.toml", "--set", "cells"], 2);
     let expected = "error: --set: there is no `=`\n   | cells\n   | ^^^^^\n   = write STAGE.KEY=VALUE, \

@@ -223,7 +223,7 @@ fn a_key_of_the_other_method_is_told_with_its_place() {
     let told = refusal("kind = 'outliers'\nmin_neighbors = 3");
     assert!(told.contains("p.toml:8") && told.contains("belongs to `outliers.method"), "{told}");
     let told = refusal("kind = 'outliers'\nmethod = 'radius'\nmin_neighbors = 3");
-    assert!(told.contains("needs `radius`"), "{told}");
+    assert!(told.contains("needs `outliers.radius`"), "{told}");
     let told = refusal("kind = 'outliers'\nmethod = 'radios'");
     assert!(told.contains("did you mean `radius`"), "{told}");
 }

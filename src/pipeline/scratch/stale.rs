@@ -144,7 +144,11 @@ pub(super) fn remove(at: impl AsFd, name: impl Arg, folder: &OwnedFd) -> io::Res
         Ok(()) | Err(Errno::NOENT) => {}
         Err(cause) => return Err(cause.into()),
     }
-    Ok(unlinkat(at, name, AtFlags::REMOVEDIR)?)
+    // Another run that finds the same folder may have been quicker.
+    match unlinkat(at, name, AtFlags::REMOVEDIR) {
+        Ok(()) | Err(Errno::NOENT) => Ok(()),
+        Err(cause) => Err(cause.into()),
+    }
 }
 
 #[cfg(test)]
