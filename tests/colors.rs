@@ -163,7 +163,7 @@ fn the_number_of_bits_can_be_asked_for_where_las_becomes_ply_and_nowhere_else() 
     let again = folder.path().join("again.ply");
     std::fs::rename(output, &again).unwrap();
     for (input, write) in [(&again, "ply\ncolors = '8bit'"), (&input, "las\ncolors = '8bit'")] {
-        let refused = run(folder.path(), &[input.clone()], "", write, Settings::PLAIN);
+        let refused = run(folder.path(), std::slice::from_ref(input), "", write, Settings::PLAIN);
         assert!(refused.err().unwrap().to_string().contains("colors`"), "{write}");
     }
     let (output, _) = converted(folder.path(), &again, "ply");

@@ -316,7 +316,7 @@ impl StageKind for Write {
 
 pub(super) fn unknown_extension(path: &Path, setting: &str) -> Error {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let name = shown(&path);
+    let name = shown(path);
     match of_extension(&extension) {
         Some(format) => {
             Error::pipeline(format!("`{name}` is named as {format}, which is no format here"))

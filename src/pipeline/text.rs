@@ -317,7 +317,7 @@ fn check_files(
     }
     for (path, at) in outputs {
         if let Err(clash) = files.write(path) {
-            mistakes.push(Mistake::new(at.clone(), format!("{} {clash}", shown(&path))));
+            mistakes.push(Mistake::new(at.clone(), format!("{} {clash}", shown(path))));
         }
     }
 }
