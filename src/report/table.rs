@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::baseline::BaselineFigures;
 use super::classes::class_name;
-use super::document::{Outcome, Report};
+use super::document::{Decision, Outcome, Report};
 use super::figures::{ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
 use super::ledger::{Ledger, Removed};
 use crate::budget::Bytes;
@@ -39,8 +39,9 @@ impl fmt::Display for Table<'_> {
         if let Some(&cells) = result.counts.get("cells") {
             write!(f, "\ncells      {}", Grouped(cells))?;
         }
-        for found in result.decisions.iter().filter(|d| d.stage == "cells" && d.name == "max_angle")
-        {
+        // One that samples chose is told before the run.
+        let is_found = |d: &&Decision| d.stage == "cells" && d.name == "max_angle" && keeps(result);
+        for found in result.decisions.iter().filter(is_found) {
             let angle = found.value.as_f64().unwrap_or_default();
             write!(f, "\nangle      {angle:.4} rad, found for the number of points to keep")?;
         }
@@ -65,6 +66,12 @@ impl fmt::Display for Table<'_> {
         }
         writeln!(f)
     }
+}
+
+/// True if a number of points to keep was asked for.
+fn keeps(result: &Outcome) -> bool {
+    let stages = result.pipeline.as_array().into_iter().flatten();
+    stages.into_iter().any(|stage| !stage["keys"]["keep"].is_null())
 }
 
 /// What was removed for other reasons than that another point stands for it.
