@@ -6,7 +6,7 @@ use std::fmt;
 use serde::{Deserialize, Deserializer, Serialize, de};
 
 use super::names;
-use super::{Dimension, Endian, Layout, Schema, Value};
+use super::{Dimension, Endian, Layout, Scalar, Schema, Value};
 
 /// The class of overlap points in point formats 0 to 5.
 const OVERLAP_CLASS: u8 = 12;
@@ -49,11 +49,11 @@ impl Flag {
     /// Where records of `schema` have it: in LAS point formats 0 to 5 overlap is the class 12 (LAS
     /// 1.4 R15, table 9).
     fn place(self, schema: &Schema) -> Option<FlagPlace> {
-        let field = schema.find(self.dimension()).cloned().map(FlagPlace::Field);
+        let field = schema.find(self.dimension()).map(|field| FlagPlace::Field(Field::of(field)));
         let as_class = || {
             let is_old_las = self == Flag::Overlap && matches!(schema.layout, Layout::Las { .. });
             let class = schema.find(names::CLASSIFICATION).filter(|_| is_old_las)?;
-            Some(FlagPlace::Class(class.clone(), OVERLAP_CLASS))
+            Some(FlagPlace::Class(Field::of(class), OVERLAP_CLASS))
         };
         field.or_else(as_class)
     }
@@ -102,7 +102,7 @@ impl Selection {
         self.not_classes.iter().for_each(|&class| classes[usize::from(class)] = false);
         Chooser {
             endian: schema.endian,
-            class: schema.find(names::CLASSIFICATION).filter(|_| by_class).cloned(),
+            class: schema.find(names::CLASSIFICATION).filter(|_| by_class).map(Field::of),
             any_class: self.classes.is_empty(),
             classes: Box::new(classes),
             flags: flags.collect(),
@@ -131,7 +131,7 @@ impl fmt::Display for Selection {
 #[derive(Debug, Clone)]
 pub struct Chooser {
     endian: Endian,
-    class: Option<Dimension>,
+    class: Option<Field>,
     /// True if a class that is no whole number up to 255 will do.
     any_class: bool,
     /// For each class whether it will do.
@@ -150,15 +150,54 @@ impl Chooser {
     }
 
     fn is_of_class(&self, record: &[u8]) -> bool {
-        match self.class.as_ref().map(|field| field.get(record, self.endian)) {
+        match &self.class {
             None => self.classes[0],
-            Some(Value::Unsigned(class)) if class < 256 => self.classes[class as usize],
+            Some(Field::Byte(byte)) => self.classes[usize::from(byte.of(record))],
             // A PLY property of that name may hold what is no class.
-            Some(other) => {
-                let class = other.as_f64();
+            Some(Field::Other(field)) => {
+                let class = field.get(record, self.endian).as_f64();
                 let whole = (0.0..256.0).contains(&class) && class.fract() == 0.0;
                 if whole { self.classes[class as usize] } else { self.any_class }
             }
+        }
+    }
+}
+
+/// A field that is looked at in every record: nearly all are a byte or bits of one.
+#[derive(Debug, Clone)]
+enum Field {
+    Byte(Byte),
+    Other(Dimension),
+}
+
+/// Bits of the byte at `offset`.
+#[derive(Debug, Clone, Copy)]
+struct Byte {
+    offset: usize,
+    shift: u8,
+    mask: u8,
+}
+
+impl Byte {
+    fn of(self, record: &[u8]) -> u8 {
+        record[self.offset] >> self.shift & self.mask
+    }
+}
+
+impl Field {
+    fn of(dimension: &Dimension) -> Field {
+        if dimension.scalar != Scalar::U8 {
+            return Field::Other(dimension.clone());
+        }
+        let (shift, width) = dimension.bits.map_or((0, 8), |bits| (bits.shift, bits.width));
+        let mask = ((1u16 << width) - 1) as u8;
+        Field::Byte(Byte { offset: dimension.offset, shift, mask })
+    }
+
+    fn value(&self, record: &[u8], endian: Endian) -> f64 {
+        match self {
+            Field::Byte(byte) => f64::from(byte.of(record)),
+            Field::Other(field) => field.get(record, endian).as_f64(),
         }
     }
 }
@@ -167,18 +206,17 @@ impl Chooser {
 #[derive(Debug, Clone)]
 enum FlagPlace {
     /// A field of its own.
-    Field(Dimension),
+    Field(Field),
     /// Point formats 0 to 5 have no overlap flag, but a class for it.
-    Class(Dimension, u8),
+    Class(Field, u8),
 }
 
 impl FlagPlace {
     fn is_set(&self, record: &[u8], endian: Endian) -> bool {
         match self {
-            FlagPlace::Field(field) => field.get(record, endian).as_f64() != 0.0,
-            FlagPlace::Class(field, class) => {
-                field.get(record, endian).as_f64() == f64::from(*class)
-            }
+            FlagPlace::Field(Field::Byte(byte)) => byte.of(record) != 0,
+            FlagPlace::Field(field) => field.value(record, endian) != 0.0,
+            FlagPlace::Class(field, class) => field.value(record, endian) == f64::from(*class),
         }
     }
 }
