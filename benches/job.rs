@@ -59,8 +59,19 @@ impl Configuration {
             format!("write.path={output}"),
             format!("normals.method={}", self.method),
         ];
+        // The published method, whose cost can be compared over versions.
+        let paper = [
+            "normals.neighbors=10",
+            "cells.measure=axis",
+            "cells.max_angle=0.1",
+            "cells.side=auto",
+            "cells.min_spacing=none",
+        ];
         let mut arguments = vec!["run", pipeline, "--progress", "never", "--report", &report];
-        set.iter().for_each(|set| arguments.extend(["--set", set]));
+        set.iter()
+            .map(String::as_str)
+            .chain(paper)
+            .for_each(|set| arguments.extend(["--set", set]));
         arguments.extend(self.options.iter().map(String::as_str));
         pointmill(&arguments);
         let json: serde_json::Value =
