@@ -1,13 +1,9 @@
 //! Where the chunks of a LAZ file are. Every claim is held against the file's length before it
 //! costs memory.
 
-use laz::decoders::ArithmeticDecoder;
-use laz::decompressors::IntegerDecompressorBuilder;
-
-use super::file::{InputFile, Window};
-use super::guard::unpanicked;
+use super::file::InputFile;
 use super::header::Header;
-use super::laz::{Compression, Compressor};
+use super::laz::{Compression, Compressor, Numbers};
 use crate::Result;
 
 /// Points that one compressed byte can hold at most: a point costs six symbols or more, and no
@@ -140,10 +136,8 @@ fn table(
     compression: &Compression,
 ) -> Result<(Chunks, Option<String>), String> {
     let at = table_start(file, start).ok_or("the file has no chunk table where it says")?;
-    let mut window = Window::new(file.clone(), at, file.len());
     let variable = compression.chunk_points.is_none();
-    let entries = unpanicked(|| entries(&mut window, at - start - TABLE_OFFSET_BYTES, compression))
-        .ok_or("the chunk table is damaged")??;
+    let entries = entries(file, at, at - start - TABLE_OFFSET_BYTES, compression)?;
     let mut chunks = Vec::new();
     let (mut byte, mut left, mut unread) = (start + TABLE_OFFSET_BYTES, points, 0u64);
     for (bytes, held) in entries {
@@ -194,17 +188,16 @@ fn table_start(file: &InputFile, start: u64) -> Option<u64> {
     unset.then(|| told(file.len().checked_sub(8)?)).flatten().and_then(inside)
 }
 
-/// Bytes and points of every chunk, as the table at the window's place says. Stops as soon as they
+/// Bytes and points of every chunk, as the table at byte `at` says. Stops as soon as they
 /// exceed the `room` that chunks have, so that the list never outgrows the file.
 fn entries(
-    window: &mut Window,
+    file: &InputFile,
+    at: u64,
     room: u64,
     compression: &Compression,
 ) -> Result<Vec<(u64, u64)>, String> {
-    use std::io::Read;
-    let cut = |_| "the chunk table is cut off".to_owned();
-    let mut head = [0; 8];
-    window.read_exact(&mut head).map_err(cut)?;
+    let cut = || "the chunk table is cut off".to_owned();
+    let head = file.bytes(at, 8).map_err(|_| cut())?;
     let claimed = u32::from_le_bytes([head[4], head[5], head[6], head[7]]);
     if head[..4] != [0; 4] {
         return Err("the chunk table is of an unknown version".to_owned());
@@ -215,20 +208,18 @@ fn entries(
             "the chunk table claims {claimed} chunks, more than there is room for"
         ));
     }
-    let mut integers = IntegerDecompressorBuilder::new().bits(32).contexts(2).build_initialized();
-    let mut decoder = ArithmeticDecoder::new(window);
-    decoder.read_init_bytes().map_err(cut)?;
+    let mut numbers = Numbers::new(file, at + 8);
     let mut all = Vec::new();
     let (mut last_bytes, mut last_points, mut used) = (0i32, 0i32, 0u64);
     for _ in 0..claimed {
         let held = match compression.chunk_points {
             Some(fixed) => u64::from(fixed),
             None => {
-                last_points = integers.decompress(&mut decoder, last_points, 0).map_err(cut)?;
+                last_points = numbers.read(last_points, 0).ok_or_else(cut)?;
                 u64::from(last_points as u32)
             }
         };
-        last_bytes = integers.decompress(&mut decoder, last_bytes, 1).map_err(cut)?;
+        last_bytes = numbers.read(last_bytes, 1).ok_or_else(cut)?;
         let bytes = u64::from(last_bytes as u32);
         used += bytes;
         if used > room {

@@ -2,9 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use laz::DecompressionSelection;
-
 use super::extra::Descriptor;
+use super::laz::Layers;
 use crate::point::{Dimension, Endian, Layout, Scalar, Schema, names};
 
 /// Bytes of a record of `format` without extra bytes; None for formats that do not exist.
@@ -85,8 +84,7 @@ pub fn schema(
 
 /// The layers of compressed records of `schema` that are to be decoded if nobody looks at the
 /// dimensions `unread`: a layer is left out if it holds no others.
-pub fn selection(schema: &Schema, unread: &[String]) -> DecompressionSelection {
-    use DecompressionSelection as Layer;
+pub fn selection(schema: &Schema, unread: &[String]) -> Layers {
     const FLAGS: [&str; 6] = [
         names::SYNTHETIC,
         names::KEY_POINT,
@@ -95,28 +93,28 @@ pub fn selection(schema: &Schema, unread: &[String]) -> DecompressionSelection {
         names::SCAN_DIRECTION_FLAG,
         names::EDGE_OF_FLIGHT_LINE,
     ];
-    let Layout::Las { format } = schema.layout else { return Layer::all() };
+    let Layout::Las { format } = schema.layout else { return Layers::ALL };
     if unread.is_empty() {
-        return Layer::all();
+        return Layers::ALL;
     }
     let base = usize::from(record_size(format).unwrap_or(0));
     let layer = |dimension: &Dimension| match dimension.name.as_str() {
-        _ if dimension.offset >= base => Layer::ALL_EXTRA_BYTES,
-        names::CLASSIFICATION => Layer::CLASSIFICATION,
-        names::INTENSITY => Layer::INTENSITY,
-        names::SCAN_ANGLE => Layer::SCAN_ANGLE,
-        names::USER_DATA => Layer::USER_DATA,
-        names::POINT_SOURCE_ID => Layer::POINT_SOURCE_ID,
-        names::GPS_TIME => Layer::GPS_TIME,
-        names::RED | names::GREEN | names::BLUE => Layer::RGB,
-        names::NIR => Layer::NIR,
-        name if FLAGS.contains(&name) => Layer::FLAGS,
-        name if name.starts_with("Wave") => Layer::WAVEPACKET,
+        _ if dimension.offset >= base => Layers::EXTRA,
+        names::CLASSIFICATION => Layers::CLASS,
+        names::INTENSITY => Layers::INTENSITY,
+        names::SCAN_ANGLE => Layers::ANGLE,
+        names::USER_DATA => Layers::USER,
+        names::POINT_SOURCE_ID => Layers::SOURCE,
+        names::GPS_TIME => Layers::TIME,
+        names::RED | names::GREEN | names::BLUE => Layers::RGB,
+        names::NIR => Layers::NIR,
+        name if FLAGS.contains(&name) => Layers::FLAGS,
+        name if name.starts_with("Wave") => Layers::WAVES,
         // Coordinates and what is coded with them.
-        _ => Layer::Z,
+        _ => Layers::Z,
     };
     let read = schema.dimensions.iter().filter(|d| !unread.contains(&d.name));
-    Layer(read.fold(Layer::Z, |all, dimension| all | layer(dimension)))
+    read.fold(Layers::Z, |all, dimension| all.and(layer(dimension)))
 }
 
 /// The fields that the specification gives a format.

@@ -1,15 +1,10 @@
 //! Reading records straight into a batch: plain ones by position, compressed ones chunk by chunk.
 
-use std::io;
 use std::sync::Arc;
 
-use laz::DecompressionSelection;
-use laz::record::RecordDecompressor;
-
 use super::chunks::{Chunk, layered_head};
-use super::file::{InputFile, Window};
-use super::guard::unpanicked;
-use super::laz::{Compression, Compressor};
+use super::file::InputFile;
+use super::laz::{Compression, Compressor, Damage, Decoder, Layers, Why};
 use super::verify::Evidence;
 use crate::point::PointBatch;
 use crate::stage::Part;
@@ -92,8 +87,7 @@ pub struct LazPart {
     source: u32,
     shift: Shift,
     compression: Arc<Compression>,
-    selection: DecompressionSelection,
-    decoder: Box<dyn RecordDecompressor<Window> + Send>,
+    decoder: Decoder,
     chunks: std::vec::IntoIter<Chunk>,
     /// The chunk being read and how many of its points are left.
     now: Option<(Chunk, u64)>,
@@ -114,15 +108,13 @@ impl LazPart {
         chunks: Vec<Chunk>,
         in_a_row: Option<u64>,
     ) -> Self {
-        let decoder = compression.decoder(Window::new(file.clone(), 0, 0));
+        let decoder = Decoder::new(&compression, &file);
         let chunks = chunks.into_iter();
-        let selection = DecompressionSelection::all();
         LazPart {
             file,
             source,
             shift,
             compression,
-            selection,
             decoder,
             chunks,
             now: None,
@@ -137,8 +129,9 @@ impl LazPart {
     }
 
     /// Decodes these layers alone, where there are layers.
-    pub fn select(self, selection: DecompressionSelection) -> Self {
-        LazPart { selection, ..self }
+    pub fn select(mut self, wanted: Layers) -> Self {
+        self.decoder.select(wanted);
+        self
     }
 
     /// The chunk to read from and how many points to take from it at most; None at the end.
@@ -151,7 +144,7 @@ impl LazPart {
             if let Some(each) = self.in_a_row
                 && chunk.points > each
             {
-                let start = self.decoder.get().position();
+                let start = self.decoder.position();
                 let rest = Chunk { start, points: chunk.points - each, ..chunk };
                 return self.begin(rest).map(Some);
             }
@@ -173,21 +166,21 @@ impl LazPart {
                 return Err(self.damaged(chunk, &format!("it has {has} points, not {wanted}")));
             }
         }
-        self.decoder.get_mut().move_to(chunk.start, chunk.end);
-        self.compression.reset(&mut *self.decoder)?;
-        self.decoder.set_selection(self.selection);
+        self.decoder.begin(chunk.start, chunk.end);
         let left = self.in_a_row.map_or(chunk.points, |each| each.min(chunk.points));
         self.now = Some((chunk, left));
         Ok((chunk, left))
     }
 
-    /// A chunk of interleaved points ends where its decoder does: the only checksum there is.
-    /// Points behind those that the header leaves for the last one are told, if they are points.
+    /// A chunk ends where its decoder does. Points behind those that the header leaves for the last one
+    /// are told, if they are points.
     fn check_end(&mut self, chunk: Chunk) -> Result<()> {
-        let known = self.in_a_row.is_none() && chunk.whole;
-        let at = self.decoder.get().position();
-        if !known || self.compression.compressor != Compressor::Chunked || at == chunk.end {
+        if self.in_a_row.is_some() || !chunk.whole {
             return Ok(());
+        }
+        let Err(damage) = self.decoder.finish() else { return Ok(()) };
+        if self.compression.compressor != Compressor::Chunked || !matches!(damage.why, Why::Long) {
+            return Err(self.failed(chunk, damage));
         }
         let Some(more) = self.uncounted(chunk)? else {
             return Err(self.damaged(chunk, "the header's points end before its bytes"));
@@ -208,9 +201,8 @@ impl LazPart {
         let Some(evidence) = self.evidence.clone() else { return Ok(None) };
         let mut record = vec![0; self.compression.stride];
         let mut more = 0;
-        while self.decoder.get().position() != chunk.end {
-            let point = unpanicked(|| self.decoder.decompress_many(&mut record));
-            let is_point = matches!(point, Some(Ok(())));
+        while self.decoder.position() != chunk.end {
+            let is_point = self.decoder.read(&mut record).is_ok();
             if more >= full.saturating_sub(chunk.points) || !is_point {
                 return Ok(None);
             }
@@ -228,15 +220,16 @@ impl LazPart {
             .help("the file is cut off or damaged; ask for it again")
     }
 
-    fn failed(&self, chunk: Chunk, error: Option<io::Error>) -> Error {
-        let Some(error) = error else { return self.damaged(chunk, "its bytes make no points") };
-        if error.kind() == io::ErrorKind::UnexpectedEof {
-            return self.damaged(chunk, "its bytes end before its points");
-        }
-        match error.downcast::<Error>() {
-            Ok(ours) => ours,
-            Err(error) => self.damaged(chunk, "it cannot be decoded").because(error),
-        }
+    fn failed(&self, chunk: Chunk, damage: Damage) -> Error {
+        let Damage { why, byte, layer } = damage;
+        let what = match why {
+            Why::Unread(error) => return error,
+            Why::Short => "its bytes end before its points",
+            Why::Long => "its points end before its bytes",
+            Why::Wrong => "its bytes make no points",
+        };
+        let layer = layer.map_or_else(String::new, |name| format!(" (layer {name}, byte {byte})"));
+        self.damaged(chunk, &format!("{what}{layer}"))
     }
 }
 
@@ -258,10 +251,8 @@ impl LazPart {
             let Some((chunk, left)) = self.current()? else { break };
             let n = left.min((capacity - filled) as u64) as usize;
             let out = &mut batch.records_mut()[filled * stride..(filled + n) * stride];
-            match unpanicked(|| self.decoder.decompress_many(out)) {
-                Some(Ok(())) => {}
-                Some(Err(error)) => return Err(self.failed(chunk, Some(error))),
-                None => return Err(self.failed(chunk, None)),
+            if let Err(damage) = self.decoder.read(out) {
+                return Err(self.failed(chunk, damage));
             }
             if !self.shift.apply(out, stride) {
                 return Err(Shift::overflow(&self.file));

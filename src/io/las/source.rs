@@ -3,13 +3,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use laz::DecompressionSelection;
-
 use super::chunks::{Chunk, Chunks};
 use super::crs;
 use super::file::WINDOW_BYTES;
 use super::format::{has_gps_time, selection};
 use super::input::{Input, Storage};
+use super::laz::Layers;
 use super::merge::Merge;
 use super::native::Native;
 use super::read::{LazPart, PlainPart, Shift};
@@ -108,7 +107,7 @@ impl Opened {
     }
 
     /// Opens a part, its points looked at. Coordinates and returns are in layers that are always decoded.
-    fn open(&self, place: &PartPlace, selection: DecompressionSelection) -> Result<Box<dyn Part>> {
+    fn open(&self, place: &PartPlace, selection: Layers) -> Result<Box<dyn Part>> {
         let part = self.unwatched(place, selection)?;
         Ok(Box::new(Watched::new(part, self.evidence.clone(), place.number, self.shift.0)))
     }
@@ -116,7 +115,7 @@ impl Opened {
     fn unwatched(
         &self,
         place: &PartPlace,
-        selection: DecompressionSelection,
+        selection: Layers,
     ) -> Result<Box<dyn Part>> {
         let file = self.input.reopen()?;
         let (shift, source) = (self.shift, place.file as u32);

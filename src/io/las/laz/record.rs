@@ -2,15 +2,14 @@
 //! it, and the record that we write. Source: LASzip's `laszip.hpp` and the LAZ specification 1.4.
 
 use laz::record::{
-    LayeredPointRecordCompressor, LayeredPointRecordDecompressor, RecordCompressor,
-    RecordDecompressor, SequentialPointRecordCompressor, SequentialPointRecordDecompressor,
+    LayeredPointRecordCompressor, RecordCompressor, SequentialPointRecordCompressor,
 };
-use laz::{LazItem, LazItemType, LazVlr};
+use laz::{LazItem, LazVlr};
 
-use super::file::{InputFile, Window};
-use super::format::record_size;
-use super::guard::unpanicked;
-use super::vlr::Vlr;
+use super::super::file::InputFile;
+use super::super::format::record_size;
+use super::super::guard::unpanicked;
+use super::super::vlr::Vlr;
 use crate::{Error, Result};
 
 /// Points of a chunk that we write.
@@ -31,6 +30,18 @@ pub enum Compressor {
     Layered,
 }
 
+impl Item {
+    /// Bytes that these fields cost a point at most: two a symbol, eight a whole number.
+    pub fn most_bytes(&self) -> usize {
+        match self.kind {
+            6 => 64,
+            9 => 72,
+            0 | 14 => 2 * usize::from(self.size),
+            _ => 32,
+        }
+    }
+}
+
 /// How the points of a file are compressed.
 #[derive(Debug, Clone)]
 pub struct Compression {
@@ -42,11 +53,19 @@ pub struct Compression {
     pub layers: usize,
     /// Bytes of a record.
     pub stride: usize,
-    items: Vec<LazItem>,
+    items: Vec<Item>,
 }
 
-/// One field group as stored: type, bytes, version.
-type Item = (u16, u16, u16);
+/// One group of fields as the laszip record has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Item {
+    /// Its type.
+    pub kind: u16,
+    /// Its bytes in a record.
+    pub size: u16,
+    /// How it is compressed.
+    pub version: u16,
+}
 
 impl Compression {
     /// Reads the laszip record `vlr`, whose payload is at byte `at` of `file`, for records of
@@ -74,61 +93,37 @@ impl Compression {
         }
         let items: Vec<Item> = (0..usize::from(word(32)))
             .map(|i| 34 + 6 * i)
-            .map(|i| (word(i), word(i + 2), word(i + 4)))
+            .map(|i| Item { kind: word(i), size: word(i + 2), version: word(i + 4) })
             .collect();
         check_items(&items, format, stride).map_err(|why| wrong(34, why))?;
         let chunk = u32::from_le_bytes([bytes[12], bytes[13], bytes[14], bytes[15]]);
-        let parsed = LazVlr::from_buffer(bytes)
-            .map_err(|e| wrong(0, "the laszip record cannot be read".into()).because(e))?;
         Ok(Compression {
             compressor,
             chunk_points: (chunk != 0 && chunk != VARIABLE).then_some(chunk),
             layers: layers(&items),
             stride: usize::from(stride),
-            items: parsed.items().clone(),
+            items,
         })
     }
 
     /// The compression that we write for `format` with `stride` bytes a record, and its record.
     pub fn write(format: u8, stride: u16) -> Result<(Self, Vlr)> {
         let items = default_items(format, stride);
-        let kind: u16 = if format < 6 { 2 } else { 3 };
-        let mut payload = Vec::new();
-        payload.extend(kind.to_le_bytes());
-        payload.extend([0, 0, 2, 2, 0, 0]); // coder 0, LASzip 2.2 revision 0
-        payload.extend(0u32.to_le_bytes());
-        payload.extend(CHUNK_POINTS.to_le_bytes());
-        payload.extend([0xff; 16]); // no special extended records
-        payload.extend((items.len() as u16).to_le_bytes());
-        for (kind, size, version) in &items {
-            payload.extend([kind, size, version].iter().flat_map(|word| word.to_le_bytes()));
-        }
-        let parsed = LazVlr::from_buffer(&payload)
-            .map_err(|e| Error::internal("our own laszip record is wrong").because(e))?;
+        let compressor = if format < 6 { Compressor::Chunked } else { Compressor::Layered };
+        let payload = payload(compressor, &items);
         let compression = Compression {
-            compressor: if format < 6 { Compressor::Chunked } else { Compressor::Layered },
+            compressor,
             chunk_points: Some(CHUNK_POINTS),
             layers: layers(&items),
             stride: usize::from(stride),
-            items: parsed.items().clone(),
+            items,
         };
         Ok((compression, Vlr::new(LASZIP.0, LASZIP.1, LazVlr::DESCRIPTION, payload)))
     }
 
-    /// A decoder that reads from `window`; [`reset`](Self::reset) it at the start of each chunk.
-    pub fn decoder(&self, window: Window) -> Box<dyn RecordDecompressor<Window> + Send> {
-        match self.compressor {
-            Compressor::Layered => Box::new(LayeredPointRecordDecompressor::new(window)),
-            _ => Box::new(SequentialPointRecordDecompressor::new(window)),
-        }
-    }
-
-    /// Makes `decoder` expect the first point of a chunk.
-    pub fn reset(&self, decoder: &mut dyn RecordDecompressor<Window>) -> Result<()> {
-        decoder.reset();
-        decoder
-            .set_fields_from(&self.items)
-            .map_err(|e| Error::internal("the decoder refuses proven items").because(e))
+    /// The groups of fields of a record.
+    pub fn items(&self) -> &[Item] {
+        &self.items
     }
 
     /// Compresses records, a whole number of them, as one chunk behind what `out` holds.
@@ -139,7 +134,7 @@ impl Compression {
             _ => Box::new(SequentialPointRecordCompressor::new(out)),
         };
         unpanicked(move || {
-            encoder.set_fields_from(&self.items).map_err(|e| failed().because(e))?;
+            encoder.set_fields_from(&self.encoded_items()?).map_err(|e| failed().because(e))?;
             encoder.compress_many(records).map_err(|e| failed().because(e))?;
             encoder.done().map_err(|e| failed().because(e))?;
             Ok(encoder.box_into_inner())
@@ -147,13 +142,37 @@ impl Compression {
         .unwrap_or_else(|| Err(failed()))
     }
 
+    /// The items as the encoder takes them.
+    fn encoded_items(&self) -> Result<Vec<LazItem>> {
+        let record: Vec<u8> = payload(self.compressor, &self.items);
+        let parsed = LazVlr::from_buffer(&record)
+            .map_err(|e| Error::internal("our own laszip record is wrong").because(e))?;
+        Ok(parsed.items().clone())
+    }
+
     /// Upper estimate of what a decoder or an encoder holds besides bytes: models and contexts. Each
     /// extra byte has models of its own.
     pub fn state_bytes(&self) -> u64 {
-        let extra = |item: &&LazItem| matches!(item.item_type(), LazItemType::Byte(_));
-        let extra: u64 = self.items.iter().filter(extra).map(|item| u64::from(item.size())).sum();
+        let extra = |item: &&Item| matches!(item.kind, 0 | 14);
+        let extra: u64 = self.items.iter().filter(extra).map(|item| u64::from(item.size)).sum();
         (3 << 20) + 24 * 1024 * self.layers as u64 + 3 * 1024 * extra
     }
+}
+
+/// The laszip record that we write.
+fn payload(compressor: Compressor, items: &[Item]) -> Vec<u8> {
+    let kind: u16 = if compressor == Compressor::Layered { 3 } else { 2 };
+    let mut payload = Vec::new();
+    payload.extend(kind.to_le_bytes());
+    payload.extend([0, 0, 2, 2, 0, 0]); // coder 0, LASzip 2.2 revision 0
+    payload.extend(0u32.to_le_bytes());
+    payload.extend(CHUNK_POINTS.to_le_bytes());
+    payload.extend([0xff; 16]); // no special extended records
+    payload.extend((items.len() as u16).to_le_bytes());
+    for Item { kind, size, version } in items {
+        payload.extend([kind, size, version].iter().flat_map(|word| word.to_le_bytes()));
+    }
+    payload
 }
 
 /// Types of the fixed field groups of a format, in record order.
@@ -192,7 +211,7 @@ fn check_items(items: &[Item], format: u8, stride: u16) -> Result<(), String> {
     let fixed = types(format);
     let (bytes, versions) = if format < 6 { (0, 1..=2) } else { (14, 3..=4) };
     let mut total = 0u64;
-    for (i, &(kind, size, version)) in items.iter().enumerate() {
+    for (i, &Item { kind, size, version }) in items.iter().enumerate() {
         let expected = fixed.get(i).copied().unwrap_or(bytes);
         let right = if kind == bytes { size > 0 } else { size == size_of(kind) };
         if kind != expected || !right {
@@ -221,12 +240,13 @@ fn default_items(format: u8, stride: u16) -> Vec<Item> {
         _ if format < 6 => 2,
         _ => 3,
     };
+    let item = |kind, size| Item { kind, size, version: version(kind) };
     let mut items: Vec<Item> =
-        types(format).iter().map(|&kind| (kind, size_of(kind), version(kind))).collect();
+        types(format).iter().map(|&kind| item(kind, size_of(kind))).collect();
     let extra = stride - record_size(format).unwrap_or(0).min(stride);
     if extra > 0 {
         let kind = if format < 6 { 0 } else { 14 };
-        items.push((kind, extra, version(kind)));
+        items.push(item(kind, extra));
     }
     items
 }
@@ -236,7 +256,7 @@ fn default_items(format: u8, stride: u16) -> Vec<Item> {
 fn layers(items: &[Item]) -> usize {
     items
         .iter()
-        .map(|&(kind, size, _)| match kind {
+        .map(|&Item { kind, size, .. }| match kind {
             10 => 9,
             11 | 13 => 1,
             12 => 2,
