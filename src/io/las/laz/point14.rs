@@ -106,6 +106,7 @@ impl<M: Learned> Layer<M> {
 
     fn begin(&mut self, channel: usize, first: M::Value) {
         self.channels = [None, None, None, None];
+        self.channels[channel] = Some(M::new(first));
         self.now = channel;
         self.last[channel] = first;
     }
