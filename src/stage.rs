@@ -47,8 +47,7 @@ pub trait Source: Send + Sync {
     /// How many points the headers claim, cut to what the files could hold at most.
     fn points(&self) -> u64;
 
-    /// Bytes that reading one part holds besides the caller's batch (decoder state, read buffers,
-    /// the largest LAZ chunk where one must be held).
+    /// Bytes that reading one part holds besides the caller's batch (decoder state, read buffers).
     fn part_bytes(&self) -> u64;
 
     /// How many parts there are. Parts are independent and numbered in input order.

@@ -26,6 +26,8 @@ pub(super) struct Job<'a> {
     /// The stages as outputs name them.
     pub pipeline: Arc<str>,
     pub transforms: Vec<(String, Box<dyn Transform>)>,
+    /// Dimensions that nobody looks at.
+    pub unread: Vec<String>,
     pub ops: Vec<StageOp>,
     pub passes: Vec<Pass>,
     /// For each sink, where the outputs of the inputs go if each has its own.

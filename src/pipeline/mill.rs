@@ -307,7 +307,7 @@ fn decode(
             if index >= job.source.parts() {
                 break;
             }
-            let mut part = job.source.part(index)?;
+            let mut part = job.source.part_without(index, &job.unread)?;
             let mut read = 0;
             while job.read(&mut *part, &mut batch, &mut tally)? {
                 placed.first = place(index, read);

@@ -163,9 +163,10 @@ impl Plan {
             Spill::Always => 0,
         };
         let area = SpillArea::new(budget.clone(), kept_in_memory, Box::new(spill.clone()));
+        let unread = self.unread();
         let transforms = std::mem::take(&mut self.transforms);
         let (ops, passes) = (std::mem::take(&mut self.ops), std::mem::take(&mut self.passes));
-        let mut job = Job { transforms, ops, passes, ..self.job(outputs, &budget, watch) };
+        let mut job = Job { transforms, ops, passes, unread, ..self.job(outputs, &budget, watch) };
         self.warnings.iter().for_each(|warning| job.warn(warning.clone()));
         let finished = match &self.lattice {
             Some(lattice) if self.mills => {
@@ -175,7 +176,7 @@ impl Plan {
             lattice => {
                 clock.phase("convert", Some(self.source.points()));
                 let sinks = sinks.into_iter().flatten().collect();
-                stream(&job, &shares, sinks, lattice.as_ref(), &self.unread(&job))?
+                stream(&job, &shares, sinks, lattice.as_ref())?
             }
         };
         let earlier = std::mem::take(&mut *lock(&job.warnings));
@@ -193,13 +194,20 @@ impl Plan {
         self.stages.to_string().into()
     }
 
-    /// The dimensions that nobody looks at while points stream: no sink, and neither the counts of
-    /// classes. What a transform looks at is not known for sure.
-    fn unread(&self, job: &Job<'_>) -> Vec<String> {
+    /// The dimensions that nobody looks at: no sink, and neither what counts classes and tells records
+    /// apart by class and flags. What a transform looks at is not known for sure.
+    fn unread(&self) -> Vec<String> {
+        const LOOKED_AT: [&str; 5] = [
+            names::CLASSIFICATION,
+            names::SYNTHETIC,
+            names::KEY_POINT,
+            names::WITHHELD,
+            names::OVERLAP,
+        ];
         let Some((first, others)) = self.sinks.split_first() else { return Vec::new() };
         let by_all = |name: &&String| others.iter().all(|sink| sink.unread().contains(*name));
         let mut unread: Vec<String> = first.unread().iter().filter(by_all).cloned().collect();
-        unread.retain(|name| name != names::CLASSIFICATION && job.transforms.is_empty());
+        unread.retain(|name| !LOOKED_AT.contains(&name.as_str()) && self.transforms.is_empty());
         unread
     }
 
@@ -222,6 +230,7 @@ impl Plan {
             source_kind: self.source_kind.clone(),
             pipeline: self.pipeline(),
             transforms: Vec::new(),
+            unread: Vec::new(),
             ops: Vec::new(),
             passes: Vec::new(),
             each: each.collect(),

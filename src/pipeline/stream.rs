@@ -15,13 +15,12 @@ use crate::tile::{lock, parallel};
 use crate::{Error, Result};
 
 /// Streams all parts of the source into each of `sinks`. With a lattice, points that have no position on it
-/// are removed. Nobody looks at the dimensions `unread`.
+/// are removed.
 pub(super) fn stream(
     job: &Job<'_>,
     shares: &Shares,
     sinks: Vec<Box<dyn Sink>>,
     lattice: Option<&Lattice>,
-    unread: &[String],
 ) -> Result<Finished> {
     let _working = job.budget.lease(shares.work, "streaming")?;
     let schema = job.source.schema();
@@ -60,7 +59,7 @@ pub(super) fn stream(
             if index >= parts {
                 break;
             }
-            let mut part = job.source.part_without(index, unread)?;
+            let mut part = job.source.part_without(index, &job.unread)?;
             for number in 0.. {
                 let mut batch = spare_batches.take(|| PointBatch::new(schema.clone(), BATCH));
                 let more = job.read(&mut *part, &mut batch, &mut tally)?;

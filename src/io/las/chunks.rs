@@ -40,11 +40,13 @@ pub enum Chunks {
 }
 
 impl Chunks {
-    /// Finds the chunks of `file`. The second value is a warning, if there is one.
+    /// Finds the chunks of `file`, whose points end before byte `end`. The second value is a warning, if
+    /// there is one.
     pub fn read(
         file: &InputFile,
         header: &Header,
         compression: &Compression,
+        end: u64,
     ) -> Result<(Self, Option<String>)> {
         let points = header.points();
         let start = u64::from(header.points_start());
@@ -52,7 +54,7 @@ impl Chunks {
             return Ok((Chunks::Known(Vec::new()), None));
         }
         if compression.compressor == Compressor::PointWise {
-            let all = Chunk { start, end: file.len(), points, whole: false };
+            let all = Chunk { start, end, points, whole: true };
             return plausible(file, all).map(|()| (Chunks::Known(vec![all]), None));
         }
         let first = start + TABLE_OFFSET_BYTES;
@@ -88,14 +90,6 @@ impl Chunks {
         match self {
             Chunks::Known(chunks) => chunks.iter().map(|c| c.points).sum(),
             Chunks::InARow { all, .. } => all.points,
-        }
-    }
-
-    /// Bytes of the largest chunk (of them all where they are not known).
-    pub fn largest(&self) -> u64 {
-        match self {
-            Chunks::Known(chunks) => chunks.iter().map(|c| c.end - c.start).max().unwrap_or(0),
-            Chunks::InARow { all, .. } => all.end - all.start,
         }
     }
 }
@@ -265,8 +259,7 @@ pub struct LayeredHead {
     pub bytes: u64,
 }
 
-/// Reads the head of the layered chunk at `start`, which must not reach beyond `end`: the decoder
-/// allocates what the layers claim.
+/// Reads the head of the layered chunk at `start`, which must not reach beyond `end`.
 pub fn layered_head(
     file: &InputFile,
     start: u64,

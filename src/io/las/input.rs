@@ -215,7 +215,8 @@ fn storage(
     if let Some(bytes) = chunks::uncounted(file, header, evlrs_start, &compression) {
         return Err(uncounted(file, bytes));
     }
-    let (mut chunks, warning) = Chunks::read(file, header, &compression)?;
+    let end = behind_points(file, header, evlrs_start, u64::from(header.points_start()));
+    let (mut chunks, warning) = Chunks::read(file, header, &compression, end)?;
     warnings.extend(warning);
     check_last(file, &compression, &mut chunks, warnings)?;
     Ok(Storage::Laz(compression, chunks))
@@ -238,10 +239,7 @@ fn plain(file: &InputFile, header: &Header, evlrs_start: Option<u64>) -> Result<
             .help("the copy or download is incomplete, or the header's count is damaged"));
     }
     let end = start + points * each;
-    // Waveform packets that are not listed as a record stand behind the points too.
-    let waveforms = Some(header.waveform_start()).filter(|&at| at > 0);
-    let next = evlrs_start.into_iter().chain(waveforms).filter(|&at| at >= end).min();
-    let behind = next.unwrap_or(file.len()).min(file.len()).saturating_sub(end);
+    let behind = behind_points(file, header, evlrs_start, end) - end;
     if points == 0 && behind >= each {
         return Err(uncounted(file, behind));
     }
@@ -251,6 +249,14 @@ fn plain(file: &InputFile, header: &Header, evlrs_start: Option<u64>) -> Result<
             file.path().display()
         )
     }))
+}
+
+/// Where the next thing behind the points begins, which end at byte `end` or later, or the file ends.
+fn behind_points(file: &InputFile, header: &Header, evlrs_start: Option<u64>, end: u64) -> u64 {
+    // Waveform packets that are not listed as a record stand behind the points too.
+    let waveforms = Some(header.waveform_start()).filter(|&at| at > 0);
+    let next = evlrs_start.into_iter().chain(waveforms).filter(|&at| at >= end).min();
+    next.unwrap_or(file.len()).clamp(end, file.len().max(end))
 }
 
 /// A writer that did not come to its end leaves a count of 0 in front of the points.

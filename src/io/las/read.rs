@@ -91,6 +91,8 @@ pub struct LazPart {
     chunks: std::vec::IntoIter<Chunk>,
     /// The chunk being read and how many of its points are left.
     now: Option<(Chunk, u64)>,
+    /// Number of that chunk in the file, from 1.
+    number: u64,
     /// Points after which the next chunk begins, where no table says it.
     in_a_row: Option<u64>,
     /// Who is told of points that the header does not count.
@@ -98,14 +100,13 @@ pub struct LazPart {
 }
 
 impl LazPart {
-    /// Reads `chunks` one after the other. With `in_a_row`, they are one stretch of chunks of that
-    /// many points.
+    /// Reads `chunks` one after the other, before which the file has `before`. With `in_a_row`, they
+    /// are one stretch of chunks of that many points.
     pub fn new(
         file: InputFile,
-        source: u32,
-        shift: Shift,
+        (source, shift): (u32, Shift),
         compression: Arc<Compression>,
-        chunks: Vec<Chunk>,
+        (before, chunks): (u64, Vec<Chunk>),
         in_a_row: Option<u64>,
     ) -> Self {
         let decoder = Decoder::new(&compression, &file);
@@ -118,6 +119,7 @@ impl LazPart {
             decoder,
             chunks,
             now: None,
+            number: before,
             in_a_row,
             evidence: None,
         }
@@ -159,6 +161,7 @@ impl LazPart {
     }
 
     fn begin(&mut self, chunk: Chunk) -> Result<(Chunk, u64)> {
+        self.number += 1;
         if self.compression.compressor == Compressor::Layered {
             let head = layered_head(&self.file, chunk.start, chunk.end, &self.compression)?;
             if head.points < chunk.points || (chunk.whole && head.points > chunk.points) {
@@ -175,12 +178,14 @@ impl LazPart {
     /// A chunk ends where its decoder does. Points behind those that the header leaves for the last one
     /// are told, if they are points.
     fn check_end(&mut self, chunk: Chunk) -> Result<()> {
-        if self.in_a_row.is_some() || !chunk.whole {
-            return Ok(());
-        }
-        let Err(damage) = self.decoder.finish() else { return Ok(()) };
-        if self.compression.compressor != Compressor::Chunked || !matches!(damage.why, Why::Long) {
-            return Err(self.failed(chunk, damage));
+        let ended = match self.in_a_row {
+            Some(_) => self.decoder.pause(),
+            None if chunk.whole => self.decoder.finish(),
+            None => return Ok(()),
+        };
+        let Err(damage) = ended else { return Ok(()) };
+        if self.compression.compressor == Compressor::Layered || !matches!(damage.why, Why::Long) {
+            return Err(self.failed(chunk, None, damage));
         }
         let Some(more) = self.uncounted(chunk)? else {
             return Err(self.damaged(chunk, "the header's points end before its bytes"));
@@ -197,11 +202,14 @@ impl LazPart {
     /// How many points follow in the chunk, whose points so far were read, up to its last byte; None
     /// if what follows makes no points of this file.
     fn uncounted(&mut self, chunk: Chunk) -> Result<Option<u64>> {
-        let full = u64::from(self.compression.chunk_points.unwrap_or(0));
+        let full = match self.compression.compressor {
+            Compressor::PointWise => u64::MAX,
+            _ => u64::from(self.compression.chunk_points.unwrap_or(0)),
+        };
         let Some(evidence) = self.evidence.clone() else { return Ok(None) };
         let mut record = vec![0; self.compression.stride];
         let mut more = 0;
-        while self.decoder.position() != chunk.end {
+        while self.decoder.finish().is_err() {
             let is_point = self.decoder.read(&mut record).is_ok();
             if more >= full.saturating_sub(chunk.points) || !is_point {
                 return Ok(None);
@@ -215,21 +223,29 @@ impl LazPart {
     }
 
     fn damaged(&self, chunk: Chunk, why: &str) -> Error {
+        let number = self.number;
         self.file
-            .wrong(chunk.start, format!("the chunk of compressed points here is damaged: {why}"))
+            .wrong(
+                chunk.start,
+                format!("chunk {number} of the compressed points is damaged: {why}"),
+            )
             .help("the file is cut off or damaged; ask for it again")
     }
 
-    fn failed(&self, chunk: Chunk, damage: Damage) -> Error {
+    /// What the decoder found while it read these points of the chunk, or behind all of them.
+    fn failed(&self, chunk: Chunk, points: Option<(u64, u64)>, damage: Damage) -> Error {
         let Damage { why, byte, layer } = damage;
         let what = match why {
             Why::Unread(error) => return error,
-            Why::Short => "its bytes end before its points",
-            Why::Long => "its points end before its bytes",
-            Why::Wrong => "its bytes make no points",
+            Why::Short => "the bytes end before the points",
+            Why::Long => "the points end before the bytes",
+            Why::Wrong => "the bytes make no points",
         };
-        let layer = layer.map_or_else(String::new, |name| format!(" (layer {name}, byte {byte})"));
-        self.damaged(chunk, &format!("{what}{layer}"))
+        let layer = layer.map_or_else(String::new, |name| format!(" in the layer of {name}"));
+        let place = points.map_or("behind its points".to_owned(), |(first, last)| {
+            format!("while its points {first} to {last} are read")
+        });
+        self.damaged(chunk, &format!("{what}{layer}, which shows at byte {byte} {place}"))
     }
 }
 
@@ -252,7 +268,9 @@ impl LazPart {
             let n = left.min((capacity - filled) as u64) as usize;
             let out = &mut batch.records_mut()[filled * stride..(filled + n) * stride];
             if let Err(damage) = self.decoder.read(out) {
-                return Err(self.failed(chunk, damage));
+                let all = self.in_a_row.map_or(chunk.points, |each| each.min(chunk.points));
+                let read = all - left.min(all);
+                return Err(self.failed(chunk, Some((read + 1, read + n as u64)), damage));
             }
             if !self.shift.apply(out, stride) {
                 return Err(Shift::overflow(&self.file));

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use super::chunks::{Chunk, Chunks};
 use super::crs;
-use super::file::WINDOW_BYTES;
 use super::format::{has_gps_time, selection};
 use super::input::{Input, Storage};
 use super::laz::Layers;
@@ -98,12 +97,7 @@ impl Opened {
     }
 
     fn part_bytes(&self) -> u64 {
-        let Some(compression) = &self.compression else { return 0 };
-        let held = match &self.input.storage {
-            Storage::Laz(_, chunks) if compression.layers > 0 => chunks.largest(),
-            _ => 0,
-        };
-        held + WINDOW_BYTES as u64 + compression.state_bytes()
+        self.compression.as_ref().map_or(0, |compression| compression.state_bytes())
     }
 
     /// Opens a part, its points looked at. Coordinates and returns are in layers that are always decoded.
@@ -112,11 +106,7 @@ impl Opened {
         Ok(Box::new(Watched::new(part, self.evidence.clone(), place.number, self.shift.0)))
     }
 
-    fn unwatched(
-        &self,
-        place: &PartPlace,
-        selection: Layers,
-    ) -> Result<Box<dyn Part>> {
+    fn unwatched(&self, place: &PartPlace, selection: Layers) -> Result<Box<dyn Part>> {
         let file = self.input.reopen()?;
         let (shift, source) = (self.shift, place.file as u32);
         let (first, count) = (place.first as usize, place.count as usize);
@@ -136,7 +126,8 @@ impl Opened {
             .compression
             .clone()
             .ok_or_else(|| Error::internal("a LAZ file without its compression"))?;
-        let part = LazPart::new(file, source, shift, compression, chunks, in_a_row);
+        let chunks = (place.first, chunks);
+        let part = LazPart::new(file, (source, shift), compression, chunks, in_a_row);
         Ok(Box::new(part.select(selection).tell(self.evidence.clone())))
     }
 }

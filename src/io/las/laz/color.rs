@@ -65,10 +65,7 @@ pub struct Second {
 impl Second {
     /// Nothing is learned yet.
     pub const fn new() -> Self {
-        Second {
-            changes: Model::new(128),
-            bytes: [const { [const { Model::new(256) }; 2] }; 3],
-        }
+        Second { changes: Model::new(128), bytes: [const { [const { Model::new(256) }; 2] }; 3] }
     }
 
     /// Reads the colour that follows `last`.

@@ -48,9 +48,12 @@ impl Damage {
         if byte != end {
             return Err(Damage { why: Why::Long, byte, layer });
         }
-        if !coder.is_end() {
-            return Err(Damage { why: Why::Wrong, byte, layer });
-        }
-        Ok(())
+        Damage::at_pause(coder, layer)
+    }
+
+    /// What is wrong with a stream that an encoder ended here.
+    pub fn at_pause(coder: &mut Coder, layer: Option<&'static str>) -> Result<(), Damage> {
+        let byte = coder.bytes().position();
+        if coder.is_end() { Ok(()) } else { Err(Damage { why: Why::Wrong, byte, layer }) }
     }
 }

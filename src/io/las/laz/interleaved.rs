@@ -47,9 +47,9 @@ impl Fields {
             (8, 1) => Fields::Color1(Box::new(color::First::new()), color::unpack(first)),
             (8, _) => Fields::Color2(Box::new(color::Second::new()), color::unpack(first)),
             (9, _) => Fields::Wave(Box::new(Waves::new()), Packet::unpack(first.first_chunk()?)),
-            _ => Fields::Bytes(
-                first.iter().map(|&byte| (const { Model::new(256) }, byte)).collect(),
-            ),
+            _ => {
+                Fields::Bytes(first.iter().map(|&byte| (const { Model::new(256) }, byte)).collect())
+            }
         })
     }
 
@@ -161,6 +161,11 @@ impl Interleaved {
         }
         self.coder.start();
         Damage::of(&mut self.coder, None)
+    }
+
+    /// All points of a chunk were read that has no known end.
+    pub fn pause(&mut self) -> Result<(), Damage> {
+        Damage::at_pause(&mut self.coder, None)
     }
 
     /// All points of the chunk were read: its bytes must end here.

@@ -4,9 +4,10 @@ use super::coder::{Coder, Cursor};
 use super::color::{self, Infrared, Rgb};
 use super::context::Contexts;
 use super::damage::{Damage, Why};
+use super::layer::{BLOCK, MOST};
 use super::layers::Layers;
 use super::model::Model;
-use super::point14::{self, Point14};
+use super::point14::Point14;
 use super::record::Item;
 use super::stream::Bytes;
 use super::wave::{self, Packet, Waves};
@@ -44,7 +45,7 @@ impl Layer {
             }
             return;
         }
-        let mut cursor = self.coder.enter(point14::BLOCK * point14::MOST);
+        let mut cursor = self.coder.enter(BLOCK * MOST);
         for (context, out) in points {
             let (last, models) = contexts.turn(context, &new);
             read(models, last, Some(&mut cursor), out);
@@ -107,9 +108,8 @@ impl Fields {
     /// Reads those of a block, which begin at byte `at` of each record.
     fn read(&mut self, contexts: &[u8], records: &mut [u8], stride: usize, at: usize) {
         let points = records.chunks_exact_mut(stride).zip(contexts);
-        let points = points.filter_map(|(record, &context)| {
-            Some((usize::from(context), record.get_mut(at..)?))
-        });
+        let points = points
+            .filter_map(|(record, &context)| Some((usize::from(context), record.get_mut(at..)?)));
         match self {
             Fields::Color(all, layer) => {
                 let new = || Box::new(color::Second::new());
@@ -150,14 +150,19 @@ impl Fields {
                         Some((usize::from(context), record.get_mut(at + i..)?))
                     });
                     let new = || Box::new(const { Model::new(256) });
-                    layer.each(all, new, points, |model: &mut Model<257, 256>, last: &mut u8, cursor, out| {
-                        if let Some(cursor) = cursor {
-                            *last = last.wrapping_add(cursor.symbol(model) as u8);
-                        }
-                        if let Some(out) = out.first_mut() {
-                            *out = *last;
-                        }
-                    });
+                    layer.each(
+                        all,
+                        new,
+                        points,
+                        |model: &mut Model<257, 256>, last: &mut u8, cursor, out| {
+                            if let Some(cursor) = cursor {
+                                *last = last.wrapping_add(cursor.symbol(model) as u8);
+                            }
+                            if let Some(out) = out.first_mut() {
+                                *out = *last;
+                            }
+                        },
+                    );
                 }
             }
         }
@@ -232,7 +237,7 @@ impl Layered {
         if !first.is_empty() {
             self.first(first)?;
         }
-        for block in others.chunks_mut(point14::BLOCK * stride) {
+        for block in others.chunks_mut(BLOCK * stride) {
             let contexts = self.point.read(block, stride);
             for (at, fields) in &mut self.fields {
                 fields.read(contexts, block, stride, *at);

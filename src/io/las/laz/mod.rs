@@ -6,9 +6,11 @@ mod context;
 mod damage;
 mod integer;
 mod interleaved;
+mod layer;
 mod layered;
 mod layers;
 mod model;
+mod places;
 mod point10;
 mod point14;
 mod predict;
@@ -82,6 +84,14 @@ impl Decoder {
         }
     }
 
+    /// All points of a chunk were read that has no known end.
+    pub fn pause(&mut self) -> Result<(), Damage> {
+        match &mut self.kind {
+            Kind::Interleaved(decoder) => decoder.pause(),
+            Kind::Layered(decoder) => decoder.finish(),
+        }
+    }
+
     /// All points of the chunk were read: its bytes must end here.
     pub fn finish(&mut self) -> Result<(), Damage> {
         match &mut self.kind {
@@ -108,7 +118,7 @@ impl Numbers {
 
     /// The next number of its kind, 0 or 1; None if there are no more or the bytes are no numbers.
     pub fn read(&mut self, last: i32, kind: usize) -> Option<i32> {
-        let mut cursor = self.coder.enter(point14::MOST);
+        let mut cursor = self.coder.enter(layer::MOST);
         let number = self.integers.read(&mut cursor, last, kind & 1);
         let left = cursor.left();
         self.coder.leave(left);

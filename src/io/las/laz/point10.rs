@@ -126,8 +126,7 @@ impl First {
 
         let changed = coder.symbol(&mut self.changes);
         if changed & 32 != 0 {
-            last.intensity =
-                self.intensity.read(coder, i32::from(last.intensity), 0) as u16;
+            last.intensity = self.intensity.read(coder, i32::from(last.intensity), 0) as u16;
         }
         if changed & 16 != 0 {
             last.byte(at::RETURNS, coder, &mut self.returns);

@@ -150,12 +150,15 @@ impl Compression {
         Ok(parsed.items().clone())
     }
 
-    /// Upper estimate of what a decoder or an encoder holds besides bytes: models and contexts. Each
-    /// extra byte has models of its own.
+    /// Upper estimate of what a decoder or an encoder holds besides records: models of what was learned,
+    /// of four scanner channels, and a window of each stream. Each extra byte has models of its own.
     pub fn state_bytes(&self) -> u64 {
-        let extra = |item: &&Item| matches!(item.kind, 0 | 14);
-        let extra: u64 = self.items.iter().filter(extra).map(|item| u64::from(item.size)).sum();
-        (3 << 20) + 24 * 1024 * self.layers as u64 + 3 * 1024 * extra
+        let of = |kinds: [u16; 2]| {
+            let items = self.items.iter().filter(move |item| kinds.contains(&item.kind));
+            items.map(|item| u64::from(item.size)).sum::<u64>()
+        };
+        let waves = if of([9, 13]) > 0 { 1 << 20 } else { 0 };
+        (3 << 20) + waves + 24 * 1024 * self.layers as u64 + 8 * 1024 * of([0, 14])
     }
 }
 
