@@ -2,7 +2,7 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-use pointmill::point::PointBatch;
+use pointmill::point::{Layout, PointBatch};
 use pointmill::stage::Source;
 use pointmill::{Error, ErrorKind};
 
@@ -141,6 +141,17 @@ fn read(source: &dyn Source, capacity: usize, allowed: &[ErrorKind]) -> Result<R
     Ok(read)
 }
 
+/// Hashes a record, the same for a GPS time of 0 and of -0: LAZ writes the second as the first.
+fn hash(record: &[u8], layered: bool, hasher: &mut DefaultHasher) {
+    match record.split_at_checked(30).filter(|_| layered) {
+        Some((point, rest)) if point[22..] == (-0.0f64).to_le_bytes() => {
+            (&point[..22], &[0u8; 8][..], rest).hash(hasher);
+        }
+        Some((point, rest)) => (&point[..22], &point[22..], rest).hash(hasher),
+        None => record.hash(hasher),
+    }
+}
+
 /// Records read of a part, and whether these are all.
 fn read_part(
     source: &dyn Source,
@@ -157,7 +168,8 @@ fn read_part(
             return Ok((records, true));
         }
         assert!(batch.len() <= batch.capacity(), "a batch has more than its capacity");
-        batch.iter().for_each(|record| record.hash(hasher));
+        let layered = matches!(batch.schema().layout, Layout::Las { format } if format >= 6);
+        batch.iter().for_each(|record| hash(record, layered, hasher));
         records += batch.len();
     }
     Ok((records, false))

@@ -1,6 +1,8 @@
 //! How the points of a LAZ file are compressed: its laszip record, proven before the decoder sees
 //! it, and the record that we write. Source: LASzip's `laszip.hpp` and the LAZ specification 1.4.
 
+use std::borrow::Cow;
+
 use laz::record::{
     LayeredPointRecordCompressor, RecordCompressor, SequentialPointRecordCompressor,
 };
@@ -133,6 +135,8 @@ impl Compression {
             Compressor::Layered => Box::new(LayeredPointRecordCompressor::new(out)),
             _ => Box::new(SequentialPointRecordCompressor::new(out)),
         };
+        let records = self.without_signs_of_zero(records);
+        let records = &*records;
         unpanicked(move || {
             encoder.set_fields_from(&self.encoded_items()?).map_err(|e| failed().because(e))?;
             encoder.compress_many(records).map_err(|e| failed().because(e))?;
@@ -140,6 +144,23 @@ impl Compression {
             Ok(encoder.box_into_inner())
         })
         .unwrap_or_else(|| Err(failed()))
+    }
+
+    /// The encoder compares the GPS times of layered records as numbers and would take -0 for the 0
+    /// before it, at random as chunks are cut: here all of them are 0, which is the same time.
+    fn without_signs_of_zero<'a>(&self, records: &'a [u8]) -> Cow<'a, [u8]> {
+        const TIME: std::ops::Range<usize> = 22..30;
+        let negative = (-0.0f64).to_le_bytes();
+        let is_signed = |record: &[u8]| record.get(TIME) == Some(&negative[..]);
+        let layered = self.compressor == Compressor::Layered;
+        if !layered || !records.chunks_exact(self.stride).any(is_signed) {
+            return Cow::Borrowed(records);
+        }
+        let mut records = records.to_vec();
+        for record in records.chunks_exact_mut(self.stride).filter(|record| is_signed(record)) {
+            record[TIME].fill(0);
+        }
+        Cow::Owned(records)
     }
 
     /// The items as the encoder takes them.
