@@ -82,6 +82,9 @@ pub struct Input {
     pub path: PathBuf,
     /// Its points; a source that does not find as many while it reads fails.
     pub points: u64,
+    /// A file that its records refer to, such as waveforms, and that is to be beside outputs, under
+    /// their names with another extension: where it is, and that extension.
+    pub beside: Option<(PathBuf, &'static str)>,
 }
 
 /// Something that the header of an input says of its points and that is not so.
@@ -263,9 +266,6 @@ pub struct SinkSummary {
     pub bytes: u64,
     /// Things the user should know (rounding of a conversion, for example).
     pub notes: Vec<String>,
-    /// A file that the records refer to and that is to be beside the output, under its name with
-    /// another extension: where it is, and that extension.
-    pub beside: Option<(PathBuf, &'static str)>,
 }
 
 /// How much a sink encodes at once.
@@ -304,6 +304,12 @@ pub trait CreateSink: Send + Sync {
     /// True if records that come in canonical order may be ordered by time within a chunk, because
     /// the output is smaller then.
     fn likes_time(&self) -> bool {
+        false
+    }
+
+    /// True if its records still refer to the file beside the input ([`Input::beside`]), so that a
+    /// copy is to be beside the output.
+    fn wants_beside(&self) -> bool {
         false
     }
 

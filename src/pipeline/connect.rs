@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::kinds::{Encoding, Format, Synth, Write};
+use crate::error::shown;
 use crate::io::{Projected, convert, las, ply, synthetic};
 use crate::point::{Layout, Metadata, PointBatch, Schema, names};
 use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Sink, Source};
@@ -63,6 +64,10 @@ impl CreateSink for Output {
         self.format == Format::Laz && self.order() == Order::Auto
     }
 
+    fn wants_beside(&self) -> bool {
+        self.format != Format::Ply
+    }
+
     fn wants_normals(&self) -> bool {
         !self.write.dimensions.is_empty()
     }
@@ -91,17 +96,19 @@ impl CreateSink for Output {
             return Vec::new();
         }
         let lost = las::records_beside(metadata);
-        let named = match &lost[..] {
-            [] => return Vec::new(),
-            [first @ .., _] if first.len() >= NAMED => {
-                format!("{} and {} more", lost[..NAMED].join(", "), lost.len() - NAMED)
-            }
-            all => all.join(", "),
-        };
-        vec![format!(
-            "{}: PLY does not hold variable length records of LAS; these are lost: {named}",
-            self.path.display()
-        )]
+        let records = (!lost.is_empty()).then(|| {
+            let named = match &lost[..] {
+                [first @ .., _] if first.len() >= NAMED => {
+                    format!("{} and {} more", lost[..NAMED].join(", "), lost.len() - NAMED)
+                }
+                all => all.join(", "),
+            };
+            format!("variable length records of LAS; these are lost: {named}")
+        });
+        let waveforms = las::waveforms_of(metadata)
+            .map(|file| format!("waveforms of LAS; these are lost: those in {}", shown(&file)));
+        let told = |lost| format!("{}: PLY does not hold {lost}", shown(&self.path));
+        records.into_iter().chain(waveforms).map(told).collect()
     }
 
     fn checks(&self, schema: &Schema) -> bool {

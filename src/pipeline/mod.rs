@@ -46,7 +46,7 @@ mod text;
 mod watch;
 mod written;
 
-pub(crate) use files::{Files, Use};
+pub(crate) use files::{Clash, Files, Use};
 pub use inputs::expand;
 pub use kinds::{Encoding, Format, OutputOrder, Read, Synth, Write};
 pub use limits::{LimitKeys, Sees};

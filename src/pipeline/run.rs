@@ -7,7 +7,6 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
-use super::beside::beside;
 use super::by_rank::LISTED;
 use super::clock::Clock;
 use super::each::Each;
@@ -82,7 +81,8 @@ impl Plan {
             self.settings.report.as_deref().map(|path| first.also(path, trouble)).transpose()?;
         let tell = |error| outputs.iter().flatten().fold(error, |error, output| output.tell(error));
         let (finished, run) = self.work(&outputs, &mut clock, watch, trouble).map_err(tell)?;
-        let beside = beside(self.written(&finished), first, trouble)?;
+        let beside: Vec<Staged> =
+            self.beside.iter().map(|copy| copy.make(first, trouble)).collect::<Result<_>>()?;
         let (report, tiles) = self.account(finished, run, clock)?;
         if let Some(staged) = &staged_report {
             write_report(staged.file(), &report, &tiles).map_err(|error| staged.tell(error))?;

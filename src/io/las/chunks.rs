@@ -9,6 +9,7 @@ use super::guard::unpanicked;
 use super::header::Header;
 use super::laz::{Compression, Compressor};
 use crate::Result;
+use crate::error::shown;
 
 /// Points that one compressed byte can hold at most: a point costs six symbols or more, and no
 /// symbol costs less than 2^-9 bits.
@@ -72,13 +73,13 @@ impl Chunks {
         match (compression.compressor, compression.chunk_points) {
             (Compressor::Layered, _) => {
                 let chunks = walk(file, first, points, compression)?;
-                Ok((Chunks::Known(chunks), Some(format!("{}: {why}", file.path().display()))))
+                Ok((Chunks::Known(chunks), Some(format!("{}: {why}", shown(file.path())))))
             }
             (_, Some(chunk_points)) => {
                 let all = Chunk { start: first, end: file.len(), points, whole: false };
                 plausible(file, all)?;
                 let chunk_points = u64::from(chunk_points);
-                let warning = format!("{}: {why}; it is read by one thread", file.path().display());
+                let warning = format!("{}: {why}; it is read by one thread", shown(file.path()));
                 Ok((Chunks::InARow { all, chunk_points }, Some(warning)))
             }
             (_, None) => Err(file
@@ -169,7 +170,7 @@ fn table(
         let what = if variable { "points" } else { "chunks" };
         format!(
             "{}: {unread} {what} behind the {points} points of the header are not read",
-            file.path().display()
+            shown(file.path())
         )
     });
     Ok((Chunks::Known(chunks), warning))

@@ -15,6 +15,7 @@ use super::laz::{Compression, LASZIP};
 use super::system::CrsRecords;
 use super::vlr::{Evlr, VLR_HEAD, Vlr, read_evlrs, read_vlrs};
 use super::waveforms::Waveforms;
+use crate::error::shown;
 use crate::io::origin::Origin;
 use crate::point::Schema;
 use crate::{Error, Result};
@@ -79,7 +80,7 @@ impl Input {
         let evlrs = read_evlrs(&file, &header)?;
         let behind = evlrs.iter().map(Evlr::position).min();
         let storage = storage(&file, &header, &vlrs, behind, &mut warnings)?;
-        let path_said = |odd: String| format!("{}: {odd}", path.display());
+        let path_said = |odd: String| format!("{}: {odd}", shown(path));
         warnings.extend(header.odd_scales().into_iter().chain(header.odd_counts()).map(path_said));
         let named = vlrs.iter().map(|v| (v.user(), v.record()));
         let named = named.chain(evlrs.iter().map(|v| (v.user(), v.record())));
@@ -92,7 +93,7 @@ impl Input {
             };
             warnings.push(format!(
                 "{}: outputs do not carry the spatial index ({user}){what}",
-                path.display()
+                shown(path)
             ));
         }
         let (path, origin) = (path.to_owned(), file.origin().clone());
@@ -248,7 +249,7 @@ fn plain(file: &InputFile, header: &Header, evlrs_start: Option<u64>) -> Result<
     Ok((behind >= each).then(|| {
         format!(
             "{}: {behind} bytes behind the {points} points that the header counts are not read",
-            file.path().display()
+            shown(file.path())
         )
     }))
 }
@@ -285,7 +286,7 @@ fn check_last(
         last.whole = false;
         warnings.push(format!(
             "{}: {} points behind those that the header counts are not read",
-            file.path().display(),
+            shown(file.path()),
             head.points - last.points
         ));
     }

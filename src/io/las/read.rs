@@ -11,6 +11,7 @@ use super::file::{InputFile, Window};
 use super::guard::unpanicked;
 use super::laz::{Compression, Compressor};
 use super::verify::Evidence;
+use crate::error::shown;
 use crate::point::PointBatch;
 use crate::stage::Part;
 use crate::{Error, Result};
@@ -193,7 +194,7 @@ impl LazPart {
             return Err(self.damaged(chunk, "the header's points end before its bytes"));
         };
         if let Some(evidence) = &self.evidence {
-            let path = self.file.path().display();
+            let path = shown(self.file.path());
             evidence.warn(format!(
                 "{path}: {more} points or more behind those that the header counts are not read"
             ));

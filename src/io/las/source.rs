@@ -14,6 +14,7 @@ use super::merge::Merge;
 use super::native::Native;
 use super::read::{LazPart, PlainPart, Shift};
 use super::verify::{Evidence, Watched};
+use super::waveforms;
 use crate::point::{Metadata, Schema};
 use crate::stage::{self, Part, Source};
 use crate::{Error, Result};
@@ -178,8 +179,11 @@ impl Source for LasSource {
     }
 
     fn inputs(&self) -> Vec<stage::Input> {
-        let input =
-            |f: &Opened| stage::Input { path: f.input.path.clone(), points: f.input.points() };
+        let input = |f: &Opened| stage::Input {
+            path: f.input.path.clone(),
+            points: f.input.points(),
+            beside: f.input.waveforms.clone().map(|file| (file, waveforms::EXTENSION)),
+        };
         self.files.iter().map(input).collect()
     }
 

@@ -249,6 +249,6 @@ impl Sink for PlySink {
             self.notes.extend(note(narrow.asked, self.depth));
         }
         let (points, bytes, notes) = (self.points, self.bytes, self.notes);
-        Ok(SinkSummary { points, bytes, notes, beside: None })
+        Ok(SinkSummary { points, bytes, notes })
     }
 }
