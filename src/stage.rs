@@ -325,6 +325,12 @@ pub trait CreateSink: Send + Sync {
     /// memory. Fails where `create` would refuse the schema.
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize>;
 
+    /// Bytes that each record takes on the disk at least while the output is written, and those that
+    /// it may take besides, where a format writes a file anew; 0 where only the encoded records tell.
+    fn disk_bytes(&self, _schema: &Arc<Schema>, _metadata: &Metadata) -> Result<[u64; 2]> {
+        Ok([0; 2])
+    }
+
     /// What the output will not hold though the input has it, and nobody was asked; for a plan.
     fn warnings(&self, _schema: &Schema, _metadata: &Metadata) -> Vec<String> {
         Vec::new()

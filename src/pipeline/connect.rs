@@ -91,6 +91,14 @@ impl CreateSink for Output {
         Ok(if self.of_one { las::Shifted::chunk(chunk, schema) } else { chunk })
     }
 
+    fn disk_bytes(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<[u64; 2]> {
+        match self.format {
+            Format::Ply => ply::disk_bytes(&self.ply_options(false), schema, metadata),
+            Format::Las => Ok([self.las_target(schema, metadata)?.schema.stride as u64, 0]),
+            Format::Laz => Ok([0; 2]),
+        }
+    }
+
     fn warnings(&self, schema: &Schema, metadata: &Metadata) -> Vec<String> {
         if self.format != Format::Ply || schema.layout == Layout::Ply {
             return Vec::new();

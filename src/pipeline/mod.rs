@@ -31,6 +31,7 @@ mod plan;
 mod product;
 mod publish;
 mod registry;
+mod room;
 mod rounded;
 mod run;
 mod scratch;
