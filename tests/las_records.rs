@@ -8,7 +8,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use pointmill::io::{describe, las};
-use pointmill::pipeline::{Overrides, Pipeline, Registry};
+use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
 use pointmill::{Error, ErrorKind};
 
 /// Counts what is held, and the most that was.
@@ -48,11 +48,16 @@ fn held<T>(work: impl FnOnce() -> T) -> (T, usize) {
 /// A file of five points with `count` records, `payload` bytes each: variable length ones behind the
 /// header, or extended ones at the end.
 fn file(path: &Path, count: u32, payload: usize, extended: bool) {
+    file_of("test", path, count, payload, extended);
+}
+
+/// The same with records of this user.
+fn file_of(user: &str, path: &Path, count: u32, payload: usize, extended: bool) {
     let name = "19c-14count5-legacy3.las";
     let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name);
     let mut bytes = std::fs::read(case).unwrap();
     let mut record = vec![0; if extended { 60 } else { 54 } + payload];
-    record[2..6].copy_from_slice(b"test");
+    record[2..2 + user.len()].copy_from_slice(user.as_bytes());
     record[20..22].copy_from_slice(&(payload as u16).to_le_bytes());
     let numbered = |i: u32| {
         let mut record = record.clone();
@@ -92,12 +97,18 @@ fn more_records_than_any_scan_has_are_refused_before_they_are_held() {
     let _alone = ALONE.lock().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.las");
-    for (count, payload, extended, told) in [
-        (1_200_000, 0, false, "1200000 variable length records are more than the 16384 held"),
-        (1_000, 65_000, false, "the 1000 variable length records exceed 8 MiB"),
-        (262_144, 0, true, "262144 extended variable length records are more than"),
+    for (user, count, payload, extended, told) in [
+        (
+            "test",
+            1_200_000,
+            0,
+            false,
+            "1200000 variable length records are more than the 16384 held",
+        ),
+        ("liblas", 1_000, 65_000, false, "records that say what points are exceed 8 MiB"),
+        ("test", 262_144, 0, true, "262144 extended variable length records are more than"),
     ] {
-        file(&path, count, payload, extended);
+        file_of(user, &path, count, payload, extended);
         for work in [
             (&|path: &Path| las::open(&[path.to_owned()]).map(drop)) as &dyn Fn(&Path) -> _,
             &|path: &Path| describe(path).map(drop),
@@ -141,4 +152,45 @@ fn the_union_of_several_files_records_is_bounded_too() {
     assert!(las::open(&paths[..1]).is_ok());
     let error = las::open(&paths).map(drop).unwrap_err();
     assert!(error.to_string().contains("18000 different variable length records"), "{error}");
+}
+
+/// The bytes between the header and the points.
+fn records(path: &Path) -> Vec<u8> {
+    let bytes = std::fs::read(path).unwrap();
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    bytes[375..word(96)].to_vec()
+}
+
+#[test]
+fn many_bytes_of_records_are_carried_and_not_held() {
+    let _alone = ALONE.lock().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let [input, second, output] =
+        ["in.las", "second.las", "out.las"].map(|name| folder.path().join(name));
+    file(&input, 1_000, 65_000, false);
+    let run = |inputs: &[&Path]| {
+        let text = format!(
+            "[run]\nmemory = \"64MiB\"\nthreads = 1\n[[stage]]\nkind = \"read\"\npath = {inputs:?}\n\
+             [[stage]]\nkind = \"write\"\npath = {output:?}\n"
+        );
+        let pipeline = Pipeline::parse(&text, "test.toml", &Registry::builtin()).unwrap();
+        let (done, held) = held(|| pipeline.plan(&Overrides::default())?.run(&Quiet));
+        done.unwrap();
+        assert!(held < 40 * MIB, "{held} bytes");
+    };
+    let (about, held) = held(|| describe(&input).unwrap());
+    assert!(held < 2 * MIB, "{held} bytes");
+    let last = &about["vlrs"][999];
+    assert_eq!(last["length"], 65_000, "{last}");
+    run(&[&input]);
+    assert!(records(&input).len() > 60 * MIB);
+    let same = |a: &Path| records(&output).starts_with(&records(a));
+    assert!(same(&input), "the records are the same bytes");
+    // So are those of two files that have them all in common, and those of which only one has some.
+    std::fs::copy(&input, &second).unwrap();
+    run(&[&input, &second]);
+    assert!(same(&input));
+    file(&second, 1_010, 65_000, false);
+    run(&[&input, &second]);
+    assert!(records(&output) == records(&second), "the union");
 }

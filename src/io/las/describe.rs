@@ -156,7 +156,7 @@ fn records(input: &Input) -> Vec<Record> {
     let record = |v: &super::vlr::Vlr| Record {
         user_id: v.user(),
         record_id: v.record(),
-        length: v.payload().len() as u64,
+        length: v.payload_len().into(),
         description: v.description(),
     };
     input.vlrs.iter().map(record).collect()

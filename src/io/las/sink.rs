@@ -180,7 +180,7 @@ impl LasSink {
         };
         let mut head = sink.native.header.bytes().to_vec();
         for i in 0..sink.native.vlrs.len() {
-            head.extend(sink.native.vlrs[i].bytes());
+            sink.native.vlrs[i].append(&mut head)?;
             if head.len() > HEAD_BYTES {
                 sink.write(&head)?;
                 head.clear();
