@@ -8,8 +8,10 @@ use super::file::{InputFile, Window};
 use super::guard::unpanicked;
 use super::header::Header;
 use super::laz::{Compression, Compressor};
-use crate::Result;
+pub use super::table::Chunk;
+use super::table::Table;
 use crate::error::shown;
+use crate::{Error, Result};
 
 /// Points that one compressed byte can hold at most: a point costs six symbols or more, and no
 /// symbol costs less than 2^-9 bits.
@@ -17,24 +19,11 @@ const POINTS_PER_BYTE: u64 = 1 << 12;
 /// Bytes in front of the first chunk, which say where the chunk table is.
 const TABLE_OFFSET_BYTES: u64 = 8;
 
-/// One chunk: its stretch of the file and its points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Chunk {
-    /// First byte.
-    pub start: u64,
-    /// Byte behind the last.
-    pub end: u64,
-    /// Points to read.
-    pub points: u64,
-    /// True if the chunk holds no others.
-    pub whole: bool,
-}
-
 /// The chunks of a file.
 #[derive(Debug, Clone)]
 pub enum Chunks {
     /// Known one by one: they can be read in any order.
-    Known(Vec<Chunk>),
+    Known(Table),
     /// Known to follow each other: they are read in one go.
     InARow {
         /// All of them; `points` as the header claims.
@@ -54,11 +43,12 @@ impl Chunks {
         let points = header.points();
         let start = u64::from(header.points_start());
         if points == 0 {
-            return Ok((Chunks::Known(Vec::new()), None));
+            return Ok((Chunks::Known(Table::default()), None));
         }
         if compression.compressor == Compressor::PointWise {
             let all = Chunk { start, end: file.len(), points, whole: false };
-            return plausible(file, all).map(|()| (Chunks::Known(vec![all]), None));
+            plausible(file, all)?;
+            return Ok((Chunks::Known(Table::of(all)), None));
         }
         let first = start + TABLE_OFFSET_BYTES;
         if first > file.len() {
@@ -68,7 +58,8 @@ impl Chunks {
         }
         let why = match table(file, start, points, compression) {
             Ok(found) => return Ok(found),
-            Err(why) => why,
+            Err(Unusable::Because(why)) => why,
+            Err(Unusable::TooLong(table)) => return Err(too_many(file, &table)),
         };
         match (compression.compressor, compression.chunk_points) {
             (Compressor::Layered, _) => {
@@ -91,7 +82,7 @@ impl Chunks {
     /// Points to read.
     pub fn points(&self) -> u64 {
         match self {
-            Chunks::Known(chunks) => chunks.iter().map(|c| c.points).sum(),
+            Chunks::Known(chunks) => chunks.points(),
             Chunks::InARow { all, .. } => all.points,
         }
     }
@@ -99,7 +90,7 @@ impl Chunks {
     /// Bytes of the largest chunk (of them all where they are not known).
     pub fn largest(&self) -> u64 {
         match self {
-            Chunks::Known(chunks) => chunks.iter().map(|c| c.end - c.start).max().unwrap_or(0),
+            Chunks::Known(chunks) => chunks.largest(),
             Chunks::InARow { all, .. } => all.end - all.start,
         }
     }
@@ -133,38 +124,66 @@ pub fn uncounted(
     Some(end - first).filter(|&bytes| bytes > compression.stride as u64)
 }
 
+/// Why a chunk table is not used.
+enum Unusable {
+    /// It is damaged or missing.
+    Because(String),
+    /// It has more chunks than are held.
+    TooLong(Table),
+}
+
+impl<T: Into<String>> From<T> for Unusable {
+    fn from(why: T) -> Self {
+        Unusable::Because(why.into())
+    }
+}
+
+/// Refuses a file of more chunks than are held.
+fn too_many(file: &InputFile, chunks: &Table) -> Error {
+    let (chunks, points) = (chunks.chunks(), chunks.points());
+    let told =
+        format!("its first {chunks} chunks hold {points} points: that is a table too long to hold");
+    Error::data(file.path(), told).help(
+        "write it anew with chunks of more points (50,000 are usual); LASzip and PDAL do that by themselves",
+    )
+}
+
 /// The chunks as the chunk table says, or why it cannot be used.
 fn table(
     file: &InputFile,
     start: u64,
     points: u64,
     compression: &Compression,
-) -> Result<(Chunks, Option<String>), String> {
+) -> Result<(Chunks, Option<String>), Unusable> {
     let at = table_start(file, start).ok_or("the file has no chunk table where it says")?;
     let mut window = Window::new(file.clone(), at, file.len());
     let variable = compression.chunk_points.is_none();
-    let entries = unpanicked(|| entries(&mut window, at - start - TABLE_OFFSET_BYTES, compression))
-        .ok_or("the chunk table is damaged")??;
-    let mut chunks = Vec::new();
+    let mut chunks = Table::default();
     let (mut byte, mut left, mut unread) = (start + TABLE_OFFSET_BYTES, points, 0u64);
-    for (bytes, held) in entries {
+    let entry = |bytes: u64, held: u64| {
         if left == 0 {
             unread += if variable { held } else { 1 };
         } else if held > 0 {
             if bytes < compression.stride as u64 {
-                return Err("the chunk table's sizes cannot be".to_owned());
+                return Err("the chunk table's sizes cannot be".into());
             }
             // The table of fixed chunks does not say how many points the last one has.
             let whole = if variable { held <= left } else { true };
             let points = held.min(left);
-            chunks.push(Chunk { start: byte, end: byte + bytes, points, whole });
+            if !chunks.push(Chunk { start: byte, end: byte + bytes, points, whole }) {
+                return Err(Unusable::TooLong(std::mem::take(&mut chunks)));
+            }
             unread += if variable { held - points } else { 0 };
             left -= points;
         }
         byte += bytes;
-    }
+        Ok(())
+    };
+    let room = at - start - TABLE_OFFSET_BYTES;
+    unpanicked(|| entries(&mut window, room, compression, entry))
+        .ok_or("the chunk table is damaged")??;
     if left > 0 {
-        return Err("the chunk table holds fewer points than the header claims".to_owned());
+        return Err("the chunk table holds fewer points than the header claims".into());
     }
     let warning = (unread > 0).then(|| {
         let what = if variable { "points" } else { "chunks" };
@@ -173,7 +192,7 @@ fn table(
             shown(file.path())
         )
     });
-    Ok((Chunks::Known(chunks), warning))
+    Ok((Chunks::Known(chunks.closed()), warning))
 }
 
 /// Where the chunk table is: told in front of the first chunk, or, by writers that could not go
@@ -195,31 +214,30 @@ fn table_start(file: &InputFile, start: u64) -> Option<u64> {
     unset.then(|| told(file.len().checked_sub(8)?)).flatten().and_then(inside)
 }
 
-/// Bytes and points of every chunk, as the table at the window's place says. Stops as soon as they
-/// exceed the `room` that chunks have, so that the list never outgrows the file.
+/// Hands bytes and points of every chunk to `take`, as the table at the window's place says. Stops as
+/// soon as they exceed the `room` that chunks have.
 fn entries(
     window: &mut Window,
     room: u64,
     compression: &Compression,
-) -> Result<Vec<(u64, u64)>, String> {
+    mut take: impl FnMut(u64, u64) -> Result<(), Unusable>,
+) -> Result<(), Unusable> {
     use std::io::Read;
-    let cut = |_| "the chunk table is cut off".to_owned();
+    let cut = |_| Unusable::from("the chunk table is cut off");
     let mut head = [0; 8];
     window.read_exact(&mut head).map_err(cut)?;
     let claimed = u32::from_le_bytes([head[4], head[5], head[6], head[7]]);
     if head[..4] != [0; 4] {
-        return Err("the chunk table is of an unknown version".to_owned());
+        return Err("the chunk table is of an unknown version".into());
     }
     let smallest = compression.stride as u64;
     if u64::from(claimed) > room / smallest {
-        return Err(format!(
-            "the chunk table claims {claimed} chunks, more than there is room for"
-        ));
+        let told = format!("the chunk table claims {claimed} chunks, more than there is room for");
+        return Err(told.into());
     }
     let mut integers = IntegerDecompressorBuilder::new().bits(32).contexts(2).build_initialized();
     let mut decoder = ArithmeticDecoder::new(window);
     decoder.read_init_bytes().map_err(cut)?;
-    let mut all = Vec::new();
     let (mut last_bytes, mut last_points, mut used) = (0i32, 0i32, 0u64);
     for _ in 0..claimed {
         let held = match compression.chunk_points {
@@ -233,37 +251,34 @@ fn entries(
         let bytes = u64::from(last_bytes as u32);
         used += bytes;
         if used > room {
-            return Err("the chunk table's sizes exceed the bytes of the chunks".to_owned());
+            return Err("the chunk table's sizes exceed the bytes of the chunks".into());
         }
-        all.push((bytes, held));
+        take(bytes, held)?;
     }
     // Points of chunks of varying size cannot be found without the table: then it is taken as it is.
     let is_needed =
         compression.compressor != Compressor::Layered && compression.chunk_points.is_none();
     if used != room && !is_needed {
-        return Err("the chunk table's sizes do not add up to the bytes of the chunks".to_owned());
+        return Err("the chunk table's sizes do not add up to the bytes of the chunks".into());
     }
-    Ok(all)
+    Ok(())
 }
 
 /// The chunks of a layered file without a usable table: each says how long its layers are.
-fn walk(
-    file: &InputFile,
-    first: u64,
-    points: u64,
-    compression: &Compression,
-) -> Result<Vec<Chunk>> {
+fn walk(file: &InputFile, first: u64, points: u64, compression: &Compression) -> Result<Table> {
     let (mut start, mut left) = (first, points);
-    let mut chunks = Vec::new();
+    let mut chunks = Table::default();
     while left > 0 {
         let head = layered_head(file, start, file.len(), compression)?;
         let held = head.points.min(left);
         let end = start + head.bytes;
-        chunks.push(Chunk { start, end, points: held, whole: held == head.points });
+        if !chunks.push(Chunk { start, end, points: held, whole: held == head.points }) {
+            return Err(too_many(file, &chunks));
+        }
         left -= held;
         start = end;
     }
-    Ok(chunks)
+    Ok(chunks.closed())
 }
 
 /// What a layered chunk says of itself behind its first point.

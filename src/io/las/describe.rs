@@ -145,7 +145,7 @@ fn storage(storage: &Storage) -> (&'static str, Option<u32>, Option<u64>) {
         Compressor::Layered => "layered",
     };
     let count = match chunks {
-        Chunks::Known(chunks) => Some(chunks.len() as u64),
+        Chunks::Known(chunks) => Some(chunks.chunks()),
         Chunks::InARow { .. } => None,
     };
     let whole_file = compression.compressor == Compressor::PointWise;

@@ -129,6 +129,14 @@ impl Input {
         }
     }
 
+    /// Bytes that the table of its chunks takes.
+    pub fn table_bytes(&self) -> u64 {
+        match &self.storage {
+            Storage::Laz(_, Chunks::Known(table)) => table.bytes(),
+            _ => 0,
+        }
+    }
+
     /// Bytes behind the standard fields of a record.
     pub fn extra_len(&self) -> usize {
         extra_len(&self.header)
@@ -269,7 +277,7 @@ fn check_last(
     warnings: &mut Vec<String>,
 ) -> Result<()> {
     let Chunks::Known(chunks) = chunks else { return Ok(()) };
-    let Some(last) = chunks.last_mut().filter(|_| compression.layers > 0) else { return Ok(()) };
+    let Some(last) = chunks.last().filter(|_| compression.layers > 0) else { return Ok(()) };
     let head = chunks::layered_head(file, last.start, last.end, compression)?;
     if head.points < last.points {
         return Err(file

@@ -24,6 +24,7 @@ mod read;
 mod sink;
 mod source;
 mod system;
+mod table;
 mod union;
 mod verify;
 mod vlr;

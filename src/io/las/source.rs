@@ -13,6 +13,7 @@ use super::input::{Input, Storage};
 use super::merge::Merge;
 use super::native::Native;
 use super::read::{LazPart, PlainPart, Shift};
+use super::table::is_held;
 use super::verify::{Evidence, Watched};
 use super::waveforms;
 use crate::point::{Metadata, Schema};
@@ -21,8 +22,6 @@ use crate::{Error, Result};
 
 /// Plain records of one part.
 const PLAIN_POINTS: u64 = 1 << 18;
-/// Small chunks are read together until a part has this many points.
-const PART_POINTS: u64 = 50_000;
 
 /// Opens LAS and LAZ files as one scan: headers and records only, no point.
 ///
@@ -38,9 +37,16 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
     let first = Input::open(first)?;
     let mut schema = first.schema();
     let mut inputs = vec![first.clone().without_records()];
+    let (mut tables, mut points) = (first.table_bytes(), first.points());
     let mut merge = Merge::of(first)?;
     for path in others {
         let input = Input::open(path)?;
+        tables = tables.saturating_add(input.table_bytes());
+        points = points.saturating_add(input.points());
+        if !is_held(tables, points) {
+            let told = "the inputs up to this one have more chunks of few points than are held";
+            return Err(Error::data(path, told).help("run them in several parts"));
+        }
         merge.add(&input)?;
         inputs.push(input.without_records());
     }
@@ -75,7 +81,7 @@ struct Opened {
     evidence: Arc<Evidence>,
 }
 
-/// Which file a part is of, and its stretch there: records of a plain file, chunks of a LAZ.
+/// Which file a part is of, and its stretch there: records of a plain file, or a part of a LAZ.
 struct PartPlace {
     file: usize,
     /// Its number among the parts of that file.
@@ -105,7 +111,11 @@ impl Opened {
             Storage::Laz(_, chunks) if compression.layers > 0 => chunks.largest(),
             _ => 0,
         };
-        held + WINDOW_BYTES as u64 + compression.state_bytes()
+        let list = match &self.input.storage {
+            Storage::Laz(_, Chunks::Known(chunks)) => chunks.part_bytes(),
+            _ => 0,
+        };
+        held + list + WINDOW_BYTES as u64 + compression.state_bytes()
     }
 
     /// Opens a part, its points looked at. Coordinates and returns are in layers that are always decoded.
@@ -121,7 +131,6 @@ impl Opened {
     ) -> Result<Box<dyn Part>> {
         let file = self.input.reopen()?;
         let (shift, source) = (self.shift, place.file as u32);
-        let (first, count) = (place.first as usize, place.count as usize);
         let (chunks, in_a_row): (Vec<Chunk>, _) = match &self.input.storage {
             Storage::Plain => {
                 let header = &self.input.header;
@@ -132,7 +141,7 @@ impl Opened {
             Storage::Laz(_, Chunks::InARow { all, chunk_points }) => {
                 (vec![*all], Some(*chunk_points))
             }
-            Storage::Laz(_, Chunks::Known(chunks)) => (chunks[first..first + count].to_vec(), None),
+            Storage::Laz(_, Chunks::Known(chunks)) => (chunks.part(place.first as usize), None),
         };
         let compression = self
             .compression
@@ -143,7 +152,7 @@ impl Opened {
     }
 }
 
-/// The stretches that the parts of a file are: first and count of records, or of chunks.
+/// The stretches that the parts of a file are: first and count of records, or a part of its chunks.
 fn stretches(input: &Input) -> Vec<(u64, u64)> {
     match &input.storage {
         Storage::Plain => {
@@ -155,16 +164,7 @@ fn stretches(input: &Input) -> Vec<(u64, u64)> {
         }
         Storage::Laz(_, Chunks::InARow { .. }) => vec![(0, 1)],
         Storage::Laz(_, Chunks::Known(chunks)) => {
-            let mut parts = Vec::new();
-            let (mut first, mut points) = (0, 0);
-            for (i, chunk) in chunks.iter().enumerate() {
-                points += chunk.points;
-                if points >= PART_POINTS || i + 1 == chunks.len() {
-                    parts.push((first as u64, (i + 1 - first) as u64));
-                    (first, points) = (i + 1, 0);
-                }
-            }
-            parts
+            (0..chunks.parts() as u64).map(|i| (i, 1)).collect()
         }
     }
 }
