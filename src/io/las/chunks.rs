@@ -1,6 +1,8 @@
 //! Where the chunks of a LAZ file are. Every claim is held against the file's length before it
 //! costs memory.
 
+use std::io::{self, Read};
+
 use laz::decoders::ArithmeticDecoder;
 use laz::decompressors::IntegerDecompressorBuilder;
 
@@ -59,7 +61,7 @@ impl Chunks {
         let why = match table(file, start, points, compression) {
             Ok(found) => return Ok(found),
             Err(Unusable::Because(why)) => why,
-            Err(Unusable::TooLong(table)) => return Err(too_many(file, &table)),
+            Err(Unusable::Failed(error)) => return Err(error),
         };
         match (compression.compressor, compression.chunk_points) {
             (Compressor::Layered, _) => {
@@ -112,24 +114,24 @@ pub fn uncounted(
     header: &Header,
     evlrs_start: Option<u64>,
     compression: &Compression,
-) -> Option<u64> {
+) -> Result<Option<u64>> {
     let start = u64::from(header.points_start());
     let first = start + TABLE_OFFSET_BYTES;
     if header.points() > 0 || first > file.len() {
-        return None;
+        return Ok(None);
     }
-    let table = table_start(file, start);
+    let table = table_start(file, start)?;
     let end = table.or(evlrs_start.filter(|&at| at >= first)).unwrap_or(file.len());
     // Less than one stored point are an empty chunk table, or what a writer pads with.
-    Some(end - first).filter(|&bytes| bytes > compression.stride as u64)
+    Ok(Some(end - first).filter(|&bytes| bytes > compression.stride as u64))
 }
 
 /// Why a chunk table is not used.
 enum Unusable {
     /// It is damaged or missing.
     Because(String),
-    /// It has more chunks than are held.
-    TooLong(Table),
+    /// It cannot be read, so that what it says is not known, or is too long.
+    Failed(Error),
 }
 
 impl<T: Into<String>> From<T> for Unusable {
@@ -155,7 +157,8 @@ fn table(
     points: u64,
     compression: &Compression,
 ) -> Result<(Chunks, Option<String>), Unusable> {
-    let at = table_start(file, start).ok_or("the file has no chunk table where it says")?;
+    let at = table_start(file, start).map_err(Unusable::Failed)?;
+    let at = at.ok_or("the file has no chunk table where it says")?;
     let mut window = Window::new(file.clone(), at, file.len());
     let variable = compression.chunk_points.is_none();
     let mut chunks = Table::default();
@@ -171,7 +174,7 @@ fn table(
             let whole = if variable { held <= left } else { true };
             let points = held.min(left);
             if !chunks.push(Chunk { start: byte, end: byte + bytes, points, whole }) {
-                return Err(Unusable::TooLong(std::mem::take(&mut chunks)));
+                return Err(Unusable::Failed(too_many(file, &chunks)));
             }
             unread += if variable { held - points } else { 0 };
             left -= points;
@@ -197,21 +200,23 @@ fn table(
 
 /// Where the chunk table is: told in front of the first chunk, or, by writers that could not go
 /// back, at the end of the file.
-fn table_start(file: &InputFile, start: u64) -> Option<u64> {
+fn table_start(file: &InputFile, start: u64) -> Result<Option<u64>> {
     let inside = |at: u64| {
         let room = start + TABLE_OFFSET_BYTES..=file.len().checked_sub(8)?;
         room.contains(&at).then_some(at)
     };
-    let told = |byte: u64| {
-        let bytes = file.bytes(byte, 8).ok()?;
-        Some(u64::from_le_bytes(bytes.try_into().ok()?))
+    let told = |byte: u64| -> Result<u64> {
+        let mut bytes = [0; 8];
+        file.read_at(&mut bytes, byte)?;
+        Ok(u64::from_le_bytes(bytes))
     };
+    let Some(end) = file.len().checked_sub(8).filter(|end| start <= *end) else { return Ok(None) };
     let front = told(start)?;
-    if let Some(at) = inside(front) {
-        return Some(at);
-    }
     let unset = front as i64 <= start as i64;
-    unset.then(|| told(file.len().checked_sub(8)?)).flatten().and_then(inside)
+    match inside(front) {
+        None if unset => told(end).map(inside),
+        found => Ok(found),
+    }
 }
 
 /// Hands bytes and points of every chunk to `take`, as the table at the window's place says. Stops as
@@ -222,8 +227,10 @@ fn entries(
     compression: &Compression,
     mut take: impl FnMut(u64, u64) -> Result<(), Unusable>,
 ) -> Result<(), Unusable> {
-    use std::io::Read;
-    let cut = |_| Unusable::from("the chunk table is cut off");
+    let cut = |e: io::Error| match e.downcast::<Error>() {
+        Ok(error) => Unusable::Failed(error),
+        Err(_) => Unusable::from("the chunk table is cut off"),
+    };
     let mut head = [0; 8];
     window.read_exact(&mut head).map_err(cut)?;
     let claimed = u32::from_le_bytes([head[4], head[5], head[6], head[7]]);

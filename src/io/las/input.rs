@@ -221,7 +221,7 @@ fn storage(
     let at = (header.bytes().len() + before + VLR_HEAD) as u64;
     let (format, stride) = (header.format(), header.record_length());
     let compression = Compression::read(file, &vlrs[record], at, format, stride)?;
-    if let Some(bytes) = chunks::uncounted(file, header, evlrs_start, &compression) {
+    if let Some(bytes) = chunks::uncounted(file, header, evlrs_start, &compression)? {
         return Err(uncounted(file, bytes));
     }
     let (mut chunks, warning) = Chunks::read(file, header, &compression)?;
