@@ -81,6 +81,9 @@ pub struct Input {
     pub path: PathBuf,
     /// Its points; a source that does not find as many while it reads fails.
     pub points: u64,
+    /// A file that its records refer to, such as waveforms, and that is to be beside outputs, under
+    /// their names with another extension: where it is, and that extension.
+    pub beside: Option<(PathBuf, &'static str)>,
 }
 
 /// Something that the header of an input says of its points and that is not so.
@@ -262,9 +265,6 @@ pub struct SinkSummary {
     pub bytes: u64,
     /// Things the user should know (rounding of a conversion, for example).
     pub notes: Vec<String>,
-    /// A file that the records refer to and that is to be beside the output, under its name with
-    /// another extension: where it is, and that extension.
-    pub beside: Option<(PathBuf, &'static str)>,
 }
 
 /// How much a sink encodes at once.
@@ -306,6 +306,12 @@ pub trait CreateSink: Send + Sync {
         false
     }
 
+    /// True if its records still refer to the file beside the input ([`Input::beside`]), so that a
+    /// copy is to be beside the output.
+    fn wants_beside(&self) -> bool {
+        false
+    }
+
     /// True if it writes the normals that a stage computed.
     fn wants_normals(&self) -> bool;
 
@@ -317,6 +323,12 @@ pub trait CreateSink: Send + Sync {
     /// The chunks of the output that [`create`](CreateSink::create) would open, for a plan of the
     /// memory. Fails where `create` would refuse the schema.
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize>;
+
+    /// Bytes that each record takes on the disk at least while the output is written, and those that
+    /// it may take besides, where a format writes a file anew; 0 where only the encoded records tell.
+    fn disk_bytes(&self, _schema: &Arc<Schema>, _metadata: &Metadata) -> Result<[u64; 2]> {
+        Ok([0; 2])
+    }
 
     /// What the output will not hold though the input has it, and nobody was asked; for a plan.
     fn warnings(&self, _schema: &Schema, _metadata: &Metadata) -> Vec<String> {

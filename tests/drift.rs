@@ -99,3 +99,23 @@ fn the_tour_names_every_stage_that_works_on_tiles() {
         assert_eq!(ops.contains(kind), !ends, "docs/architecture.md: {kind}");
     }
 }
+
+#[test]
+fn a_path_in_a_message_is_shown_and_not_displayed() {
+    /// Documents that say paths as they are, and whose writers escape them: the report and the events.
+    const DOCUMENTS: [(&str, usize); 2] = [("src/pipeline/run.rs", 2), ("src/cli/events.rs", 3)];
+    let mut files = Vec::new();
+    below(&root().join("src"), &mut files);
+    let mut allowed = 0;
+    for file in files.iter().filter(|file| file.ends_with(".rs") && !file.ends_with("tests.rs")) {
+        let name = file.strip_prefix(root().to_str().unwrap()).unwrap().trim_start_matches('/');
+        let text = fs::read_to_string(file).unwrap();
+        let code = text.split("#[cfg(test)]\nmod tests").next().unwrap();
+        let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
+        let found = lines.filter(|line| line.contains(".display()")).count();
+        let document = DOCUMENTS.iter().find(|(of, _)| *of == name);
+        assert_eq!(found, document.map_or(0, |(_, of)| *of), "{name}: use `error::shown`");
+        allowed += found;
+    }
+    assert_eq!((allowed, files.len() > 150), (5, true));
+}

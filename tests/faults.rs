@@ -28,6 +28,17 @@ fn a_read_that_fails_fails_the_run_and_spares_what_is_there() {
 }
 
 #[test]
+fn what_cannot_be_read_of_a_header_or_a_table_is_not_taken_for_missing() {
+    let mut bench = Bench::new();
+    // The header, the records behind it, the chunk table and its place: before any point.
+    for n in 1..=12 {
+        let does = Does::Error(EIO);
+        bench.fails(&Fault { call: "pread", path: None, does, when: When::Nth(n) });
+    }
+    bench.hold(12);
+}
+
+#[test]
 fn a_write_that_fails_fails_the_run_and_spares_what_is_there() {
     let mut bench = Bench::new();
     each_fails(&mut bench, "write", EIO, 5);

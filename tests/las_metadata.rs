@@ -381,6 +381,75 @@ fn waveforms_in_a_file_of_their_own_are_beside_the_output() {
 }
 
 #[test]
+fn no_input_and_no_output_is_replaced_by_a_copy_of_waveforms() {
+    let bench = Bench::new();
+    for (file, name) in [("22-ext-waveform.las", "in.las"), ("22-ext-waveform.wdp", "in.wdp")] {
+        fs::copy(case(file), bench.path(name)).unwrap();
+    }
+    let before = fs::read(bench.path("in.wdp")).unwrap();
+    let run = |settings: &str, output: &str| {
+        let error = bench.run(&[bench.path("in.las")], settings, "", output).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Pipeline, "{error}");
+        error.to_string()
+    };
+    // What is read: the waveforms are an input like the points, whatever their name.
+    assert!(run("", "in.wdp\nformat = \"las\"").contains("this is an input"));
+    std::os::unix::fs::symlink("in.wdp", bench.path("link.las")).unwrap();
+    assert!(run("", "link.las").contains("this is the input"));
+    // What is written: another output, and the report.
+    let second = |name: &str, format: &str| {
+        let path = bench.path(name);
+        format!("out.las\n[[stage]]\nkind = \"write\"\npath = {path:?}\nformat = \"{format}\"")
+    };
+    assert!(run("", &second("out.wdp", "ply")).contains("out.wdp: this is written twice"));
+    let report = format!("report = {:?}", bench.path("out.wdp"));
+    assert!(run(&report, "out.las").contains("out.wdp: this is written twice"));
+    // A file that is to stay is found before any work.
+    fs::write(bench.path("out.wdp"), "mine").unwrap();
+    let stays = bench.run(&[bench.path("in.las")], "existing = \"refuse\"", "", "out.las");
+    assert!(stays.unwrap_err().to_string().contains("out.wdp: this file exists"));
+    assert!(!bench.path("out.las").exists());
+    assert_eq!(fs::read(bench.path("out.wdp")).unwrap(), b"mine");
+    assert!(fs::read(bench.path("in.wdp")).unwrap() == before);
+    // Outputs of one name have their waveforms in common.
+    bench.run(&[bench.path("in.las")], "", "", &second("out.laz", "laz")).unwrap();
+    assert!(fs::read(bench.path("out.wdp")).unwrap() == before);
+}
+
+#[test]
+fn waveforms_of_two_conversions_are_not_put_in_one_place() {
+    let bench = Bench::new();
+    for name in ["one/a.las", "two/a.laz"] {
+        fs::create_dir_all(bench.path(name).parent().unwrap()).unwrap();
+        bench.run(&[case("22-ext-waveform.las")], "", "", name).unwrap();
+    }
+    let convert = || {
+        let mut command = assert_cmd::Command::cargo_bin("pointmill").unwrap();
+        command.arg("convert").arg("-o").arg(bench.path("out/"));
+        let output = command.arg(bench.path("one/a.las")).arg(bench.path("two/a.laz")).output();
+        String::from_utf8(output.unwrap().stderr).unwrap()
+    };
+    let told = convert();
+    assert!(told.contains("out/a.wdp is written twice"), "{told}");
+    assert!(!bench.path("out").exists());
+}
+
+#[test]
+fn waveforms_that_ply_loses_are_told_once() {
+    let bench = Bench::new();
+    for stages in ["", GRID] {
+        let report = bench.run(&[case("22-ext-waveform.las")], "", stages, "out.ply").unwrap();
+        let told =
+            |w: &&String| w.contains("out.ply: PLY does not hold waveforms of LAS; these are lost");
+        let warnings = &report.run.warnings;
+        assert_eq!(warnings.iter().filter(told).count(), 1, "{warnings:?}");
+        assert!(!bench.path("out.wdp").exists());
+    }
+    let report = bench.run(&[case("22b-int-waveform.las")], "", "", "out.ply").unwrap();
+    assert!(told(&report.run.warnings, "LASF_Spec 65535"), "{:?}", report.run.warnings);
+}
+
+#[test]
 fn an_index_of_the_input_is_not_carried() {
     let bench = Bench::new();
     let (about, warnings) = bench.convert("17-lax-evlr.las");

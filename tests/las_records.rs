@@ -1,14 +1,21 @@
-//! What is held of a file's records is bounded, whatever it claims and however long it is.
+//! What is held of a file's records and of its table of chunks is bounded, whatever it claims and however
+//! long it is.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+mod las_support;
 
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::io::{Cursor, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+
+use las_support::{LAZ, read, write};
+use laz::laszip::{ChunkTable, ChunkTableEntry};
+use laz::{LasZipCompressor, LazVlr, LazVlrBuilder};
 use pointmill::io::{describe, las};
-use pointmill::pipeline::{Overrides, Pipeline, Registry};
+use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
 use pointmill::{Error, ErrorKind};
 
 /// Counts what is held, and the most that was.
@@ -48,11 +55,16 @@ fn held<T>(work: impl FnOnce() -> T) -> (T, usize) {
 /// A file of five points with `count` records, `payload` bytes each: variable length ones behind the
 /// header, or extended ones at the end.
 fn file(path: &Path, count: u32, payload: usize, extended: bool) {
+    file_of("test", path, count, payload, extended);
+}
+
+/// The same with records of this user.
+fn file_of(user: &str, path: &Path, count: u32, payload: usize, extended: bool) {
     let name = "19c-14count5-legacy3.las";
     let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name);
     let mut bytes = std::fs::read(case).unwrap();
     let mut record = vec![0; if extended { 60 } else { 54 } + payload];
-    record[2..6].copy_from_slice(b"test");
+    record[2..2 + user.len()].copy_from_slice(user.as_bytes());
     record[20..22].copy_from_slice(&(payload as u16).to_le_bytes());
     let numbered = |i: u32| {
         let mut record = record.clone();
@@ -92,12 +104,18 @@ fn more_records_than_any_scan_has_are_refused_before_they_are_held() {
     let _alone = ALONE.lock().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.las");
-    for (count, payload, extended, told) in [
-        (1_200_000, 0, false, "1200000 variable length records are more than the 16384 held"),
-        (1_000, 65_000, false, "the 1000 variable length records exceed 8 MiB"),
-        (262_144, 0, true, "262144 extended variable length records are more than"),
+    for (user, count, payload, extended, told) in [
+        (
+            "test",
+            1_200_000,
+            0,
+            false,
+            "1200000 variable length records are more than the 16384 held",
+        ),
+        ("liblas", 1_000, 65_000, false, "records that say what points are exceed 8 MiB"),
+        ("test", 262_144, 0, true, "262144 extended variable length records are more than"),
     ] {
-        file(&path, count, payload, extended);
+        file_of(user, &path, count, payload, extended);
         for work in [
             (&|path: &Path| las::open(&[path.to_owned()]).map(drop)) as &dyn Fn(&Path) -> _,
             &|path: &Path| describe(path).map(drop),
@@ -141,4 +159,141 @@ fn the_union_of_several_files_records_is_bounded_too() {
     assert!(las::open(&paths[..1]).is_ok());
     let error = las::open(&paths).map(drop).unwrap_err();
     assert!(error.to_string().contains("18000 different variable length records"), "{error}");
+}
+
+/// The bytes between the header and the points.
+fn records(path: &Path) -> Vec<u8> {
+    let bytes = std::fs::read(path).unwrap();
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    bytes[375..word(96)].to_vec()
+}
+
+#[test]
+fn many_bytes_of_records_are_carried_and_not_held() {
+    let _alone = ALONE.lock().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let [input, second, output] =
+        ["in.las", "second.las", "out.las"].map(|name| folder.path().join(name));
+    file(&input, 1_000, 65_000, false);
+    let run = |inputs: &[&Path]| {
+        let text = format!(
+            "[run]\nmemory = \"64MiB\"\nthreads = 1\n[[stage]]\nkind = \"read\"\npath = {inputs:?}\n\
+             [[stage]]\nkind = \"write\"\npath = {output:?}\n"
+        );
+        let pipeline = Pipeline::parse(&text, "test.toml", &Registry::builtin()).unwrap();
+        let (done, held) = held(|| pipeline.plan(&Overrides::default())?.run(&Quiet));
+        done.unwrap();
+        assert!(held < 40 * MIB, "{held} bytes");
+    };
+    let (about, held) = held(|| describe(&input).unwrap());
+    assert!(held < 2 * MIB, "{held} bytes");
+    let last = &about["vlrs"][999];
+    assert_eq!(last["length"], 65_000, "{last}");
+    run(&[&input]);
+    assert!(records(&input).len() > 60 * MIB);
+    let same = |a: &Path| records(&output).starts_with(&records(a));
+    assert!(same(&input), "the records are the same bytes");
+    // So are those of two files that have them all in common, and those of which only one has some.
+    std::fs::copy(&input, &second).unwrap();
+    run(&[&input, &second]);
+    assert!(same(&input));
+    file(&second, 1_010, 65_000, false);
+    run(&[&input, &second]);
+    assert!(records(&output) == records(&second), "the union");
+}
+
+/// Bytes of a record of point format 1.
+const RECORD: usize = 28;
+
+/// Head of a LAZ file of `points` points in chunks of varying size, and what its record says of them.
+fn chunked(path: &Path, points: u64) -> (Vec<u8>, LazVlr) {
+    let schema = Arc::new(las::layout(1, &[], [0.01; 3], [0.0; 3]));
+    write(path, LAZ, &schema, &las::fresh(&schema, None), &[0; RECORD]).unwrap();
+    let mut head = std::fs::read(path).unwrap();
+    head.truncate(u32::from_le_bytes(head[96..100].try_into().unwrap()) as usize);
+    let user = head.windows(14).position(|bytes| bytes == b"laszip encoded").unwrap();
+    let laszip = user + 52;
+    head[laszip + 12..laszip + 16].copy_from_slice(&u32::MAX.to_le_bytes());
+    head[107..111].copy_from_slice(&(points as u32).to_le_bytes());
+    head[247..255].copy_from_slice(&points.to_le_bytes());
+    // No box and no counts by return.
+    head[111..131].fill(0);
+    head[255..375].fill(0);
+    head[179..227].fill(0);
+    let builder = LazVlrBuilder::default().with_point_format(1, 0).unwrap();
+    (head, builder.with_variable_chunk_size().build())
+}
+
+/// A file whose table has `chunks` chunks of a point each; the points are not there to be read.
+fn tiny_chunks(path: &Path, chunks: u64) {
+    let (mut bytes, vlr) = chunked(path, chunks);
+    let table = bytes.len() + 8 + chunks as usize * RECORD;
+    bytes.extend((table as u64).to_le_bytes());
+    bytes.resize(table, 0);
+    let mut entries = ChunkTable::default();
+    (0..chunks)
+        .for_each(|_| entries.push(ChunkTableEntry { point_count: 1, byte_count: RECORD as u64 }));
+    entries.write_to(&mut bytes, &vlr).unwrap();
+    std::fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn a_table_of_millions_of_chunks_is_held_in_little_memory() {
+    let _alone = ALONE.lock().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("in.laz");
+    tiny_chunks(&path, 4_000_000);
+    let (source, held_by_one) = held(|| las::open(std::slice::from_ref(&path)).unwrap());
+    assert_eq!((source.points(), source.parts()), (4_000_000, 80));
+    assert!(held_by_one < 20 * MIB, "{held_by_one} bytes");
+    // A list of the chunks of one part is counted.
+    assert!(source.part_bytes() > 50_000 * 32, "{}", source.part_bytes());
+    drop(source);
+    // Files add up, and one has an end of its own.
+    let paths: Vec<PathBuf> =
+        ["a.laz", "b.laz", "c.laz"].map(|name| folder.path().join(name)).into();
+    paths.iter().for_each(|other| std::fs::hard_link(&path, other).unwrap());
+    let (opened, held_by_all) = held(|| las::open(&paths));
+    let error = opened.map(drop).unwrap_err();
+    assert!(
+        error.to_string().contains("c.laz: the inputs up to this one have more chunks"),
+        "{error}"
+    );
+    assert!(held_by_all < 40 * MIB, "{held_by_all} bytes");
+    tiny_chunks(&path, 9_000_000);
+    let (opened, held) = held(|| las::open(std::slice::from_ref(&path)));
+    let error = opened.map(drop).unwrap_err();
+    assert!(error.to_string().contains("its first 8"), "{error}");
+    assert!(error.remedy().unwrap().contains("50,000"), "{error:?}");
+    assert!(held < 40 * MIB, "{held} bytes");
+}
+
+#[test]
+fn points_of_tiny_chunks_are_read_in_their_order() {
+    let _alone = ALONE.lock().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("in.laz");
+    let mut records = vec![0; 120_000 * RECORD];
+    for (i, record) in records.chunks_exact_mut(RECORD).enumerate() {
+        record[..4].copy_from_slice(&(i as i32 * 7 % 10_007).to_le_bytes());
+        record[14] = 1 | 1 << 3;
+    }
+    let (head, vlr) = chunked(&path, 120_000);
+    let mut file = Cursor::new(head);
+    file.seek(SeekFrom::End(0)).unwrap();
+    let mut compressor = LasZipCompressor::new(file, vlr).unwrap();
+    // Chunks of a point between larger ones.
+    let (mut at, mut chunks) = (0, 0);
+    while at < 120_000 {
+        let points = if chunks % 4 == 3 { 1_000 } else { 1 };
+        let end = (at + points).min(120_000);
+        compressor.compress_many(&records[at * RECORD..end * RECORD]).unwrap();
+        compressor.finish_current_chunk().unwrap();
+        (at, chunks) = (end, chunks + 1);
+    }
+    compressor.done().unwrap();
+    std::fs::write(&path, compressor.into_inner().into_inner()).unwrap();
+    let source = las::open(std::slice::from_ref(&path)).unwrap();
+    assert!(chunks > 450 && source.parts() == 3, "{chunks} chunks, {} parts", source.parts());
+    assert!(read(&*source, usize::MAX / 4096).unwrap() == records);
 }

@@ -11,8 +11,9 @@ use super::run::{HIDDEN, filtered, given, mill, with_stages, written};
 use super::words::{self, Flag};
 use crate::budget::Bytes;
 use crate::error::shown;
+use crate::io::las;
 use crate::pipeline::{
-    Done, Existing, Files, Format, Pipeline, Registry, Use, Watch, expand, make_folder,
+    Clash, Done, Existing, Files, Format, Pipeline, Registry, Use, Watch, expand, make_folder,
     refuse_existing,
 };
 use crate::report::Grouped;
@@ -57,14 +58,25 @@ pub(super) fn convert(arguments: &Convert, registry: &Registry, console: &Consol
 /// reached through a link, nor another output.
 fn check_files(pairs: &[(PathBuf, PathBuf)], arguments: &Convert) -> Result<()> {
     let mut files = Files::default();
+    let beside: Vec<_> = pairs.iter().map(|(input, _)| las::beside(input)).collect();
     pairs.iter().for_each(|(input, _)| files.read(input, Use::Input));
+    beside.iter().flatten().for_each(|(file, _)| files.read(file, Use::Input));
     let existing = if arguments.common.no_clobber { Existing::Refuse } else { Existing::Replace };
+    let refuse = |clash: Clash, output: &Path| {
+        Error::pipeline(format!("-o: {} {clash}", shown(output)))
+            .help("convert into another folder")
+    };
     for (_, output) in pairs {
-        files.write(output).map_err(|clash| {
-            Error::pipeline(format!("-o: {} {clash}", output.display()))
-                .help("convert into another folder")
-        })?;
+        files.write(output).map_err(|clash| refuse(clash, output))?;
         refuse_existing(output, existing)?;
+    }
+    for ((_, output), beside) in pairs.iter().zip(&beside) {
+        let is_las = Format::of(output) != Some(Format::Ply);
+        let Some((from, extension)) = beside.as_ref().filter(|_| is_las) else { continue };
+        let to = output.with_extension(extension);
+        if files.copy(from, &to).map_err(|clash| refuse(clash, &to))? {
+            refuse_existing(&to, existing)?;
+        }
     }
     Ok(())
 }

@@ -1,36 +1,51 @@
 //! Files that the records of outputs refer to, such as waveforms: copied beside the outputs, under their
 //! names.
 
-use std::collections::BTreeSet;
 use std::fs::{self, File};
-use std::os::unix::fs::MetadataExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use super::files::{Clash, Files};
 use super::publish::Staged;
 use super::scratch::Trouble;
 use crate::error::shown;
-use crate::stage::{CreateSink, SinkSummary};
+use crate::stage::{CreateSink, Input};
 use crate::{Error, Result};
 
-/// Copies what is to be beside the outputs to places of their own, as `first` has one. A file that is
-/// there already, because an output is beside its input and has its name, is left alone.
-pub fn beside<'a>(
-    written: impl Iterator<Item = (&'a dyn CreateSink, &'a (u64, SinkSummary))>,
-    first: &Staged,
-    trouble: &Trouble,
-) -> Result<Vec<Staged>> {
-    let (mut copies, mut taken) = (Vec::new(), BTreeSet::new());
-    for (sink, (_, summary)) in written {
-        let Some((from, extension)) = &summary.beside else { continue };
+/// A copy that is to be made.
+pub(super) struct Beside {
+    from: PathBuf,
+    /// Where it is to be.
+    pub to: PathBuf,
+}
+
+impl Beside {
+    /// The copy of what is beside `input` for the output of `sink`, if there is to be one: a file that is
+    /// there already, because an output is beside its input and has its name, is left alone.
+    ///
+    /// # Errors
+    ///
+    /// Where it is to be and why not, if one of the `files` would be replaced.
+    pub fn of(
+        input: &Input,
+        sink: &dyn CreateSink,
+        files: &mut Files,
+    ) -> Result<Option<Beside>, (PathBuf, Clash)> {
+        let Some((from, extension)) = input.beside.as_ref().filter(|_| sink.wants_beside()) else {
+            return Ok(None);
+        };
         let to = sink.path().with_extension(extension);
-        if is_same(from, &to) || !taken.insert(to.clone()) {
-            continue;
+        match files.copy(from, &to) {
+            Ok(wanted) => Ok(wanted.then(|| Beside { from: from.clone(), to })),
+            Err(clash) => Err((to, clash)),
         }
-        let staged = first.also(&to, trouble)?;
-        copy(from, staged.file()).map_err(|error| staged.tell(error))?;
-        copies.push(staged);
     }
-    Ok(copies)
+
+    /// Makes the copy, in a place of its own, as `first` has one.
+    pub fn make(&self, first: &Staged, trouble: &Trouble) -> Result<Staged> {
+        let staged = first.also(&self.to, trouble)?;
+        copy(&self.from, staged.file()).map_err(|error| staged.tell(error))?;
+        Ok(staged)
+    }
 }
 
 /// Copies a file and brings the copy to disk.
@@ -40,12 +55,4 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
     }
     let copied = fs::copy(from, to).and_then(|_| File::open(to)).and_then(|file| file.sync_all());
     copied.map_err(|e| Error::io(to, &format!("copy {} to it", shown(from)), e))
-}
-
-/// True if both paths lead to one file.
-fn is_same(one: &Path, two: &Path) -> bool {
-    match (fs::metadata(one), fs::metadata(two)) {
-        (Ok(one), Ok(two)) => (one.dev(), one.ino()) == (two.dev(), two.ino()),
-        _ => false,
-    }
 }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::kinds::{Encoding, Format, Synth, Write};
+use crate::error::shown;
 use crate::io::{Projected, convert, las, ply, synthetic};
 use crate::point::{Layout, Metadata, PointBatch, Schema, names};
 use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Sink, Source};
@@ -63,6 +64,10 @@ impl CreateSink for Output {
         self.format == Format::Laz && self.order() == Order::Auto
     }
 
+    fn wants_beside(&self) -> bool {
+        self.format != Format::Ply
+    }
+
     fn wants_normals(&self) -> bool {
         !self.write.dimensions.is_empty()
     }
@@ -86,22 +91,32 @@ impl CreateSink for Output {
         Ok(if self.of_one { las::Shifted::chunk(chunk, schema) } else { chunk })
     }
 
+    fn disk_bytes(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<[u64; 2]> {
+        match self.format {
+            Format::Ply => ply::disk_bytes(&self.ply_options(false), schema, metadata),
+            Format::Las => Ok([self.las_target(schema, metadata)?.schema.stride as u64, 0]),
+            Format::Laz => Ok([0; 2]),
+        }
+    }
+
     fn warnings(&self, schema: &Schema, metadata: &Metadata) -> Vec<String> {
         if self.format != Format::Ply || schema.layout == Layout::Ply {
             return Vec::new();
         }
         let lost = las::records_beside(metadata);
-        let named = match &lost[..] {
-            [] => return Vec::new(),
-            [first @ .., _] if first.len() >= NAMED => {
-                format!("{} and {} more", lost[..NAMED].join(", "), lost.len() - NAMED)
-            }
-            all => all.join(", "),
-        };
-        vec![format!(
-            "{}: PLY does not hold variable length records of LAS; these are lost: {named}",
-            self.path.display()
-        )]
+        let records = (!lost.is_empty()).then(|| {
+            let named = match &lost[..] {
+                [first @ .., _] if first.len() >= NAMED => {
+                    format!("{} and {} more", lost[..NAMED].join(", "), lost.len() - NAMED)
+                }
+                all => all.join(", "),
+            };
+            format!("variable length records of LAS; these are lost: {named}")
+        });
+        let waveforms = las::waveforms_of(metadata)
+            .map(|file| format!("waveforms of LAS; these are lost: those in {}", shown(&file)));
+        let told = |lost| format!("{}: PLY does not hold {lost}", shown(&self.path));
+        records.into_iter().chain(waveforms).map(told).collect()
     }
 
     fn checks(&self, schema: &Schema) -> bool {

@@ -1,15 +1,22 @@
 //! The files that a command reads and those that it writes, and that none of them is another: names,
 //! links and further names of one file are the same here. Knows no stages.
 
-use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
+use crate::error::shown;
+
 /// All files of a command. What is read is entered first, then what is written.
 #[derive(Debug, Default)]
-pub struct Files(BTreeMap<Identity, (Use, PathBuf)>);
+pub struct Files {
+    all: BTreeMap<Identity, (Use, PathBuf)>,
+    /// Those that become copies of others: of which, and where.
+    copies: BTreeSet<(Identity, Identity)>,
+}
 
 /// What a command does with a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,7 +31,7 @@ pub enum Use {
 
 /// What tells a file from others, whatever its name: where it is on its device, or, as long as it
 /// does not exist, where it will be.
-#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 enum Identity {
     There(u64, u64),
     Place(PathBuf),
@@ -42,7 +49,7 @@ pub struct Clash {
 impl Files {
     /// Enters a file that is read.
     pub fn read(&mut self, path: &Path, used: Use) {
-        self.0.entry(Identity::of(path)).or_insert((used, path.to_owned()));
+        self.all.entry(Identity::of(path)).or_insert((used, path.to_owned()));
     }
 
     /// Enters a file that is written.
@@ -51,16 +58,32 @@ impl Files {
     ///
     /// If it is there already.
     pub fn write(&mut self, path: &Path) -> Result<(), Clash> {
-        match self.0.entry(Identity::of(path)) {
-            std::collections::btree_map::Entry::Vacant(free) => {
+        match self.all.entry(Identity::of(path)) {
+            Entry::Vacant(free) => {
                 free.insert((Use::Output, path.to_owned()));
                 Ok(())
             }
-            std::collections::btree_map::Entry::Occupied(taken) => {
+            Entry::Occupied(taken) => {
                 let (used, other) = taken.get();
                 Err(Clash { used: *used, other: (other != path).then(|| other.clone()) })
             }
         }
+    }
+
+    /// Enters a file that becomes a copy of `from`; false if there is nothing to do, because it is that
+    /// file or becomes its copy already.
+    ///
+    /// # Errors
+    ///
+    /// If it is there already as anything else.
+    pub fn copy(&mut self, from: &Path, to: &Path) -> Result<bool, Clash> {
+        let copy = (Identity::of(from), Identity::of(to));
+        if copy.0 == copy.1 || self.copies.contains(&copy) {
+            return Ok(false);
+        }
+        self.write(to)?;
+        self.copies.insert(copy);
+        Ok(true)
     }
 }
 
@@ -89,14 +112,14 @@ impl fmt::Display for Clash {
         match (self.used, &self.other) {
             (Use::Input, None) => f.write_str("is an input: it cannot be written over"),
             (Use::Input, Some(other)) => {
-                write!(f, "is the input {}: it cannot be written over", other.display())
+                write!(f, "is the input {}: it cannot be written over", shown(other))
             }
             (Use::Pipeline, _) => {
                 f.write_str("is the pipeline that is run: it cannot be written over")
             }
             (Use::Output, None) => f.write_str("is written twice"),
             (Use::Output, Some(other)) => {
-                write!(f, "is written twice, the other time as {}", other.display())
+                write!(f, "is written twice, the other time as {}", shown(other))
             }
         }
     }
@@ -145,6 +168,26 @@ mod tests {
         assert!(files.write(&path("link/none/deep/new.las")).is_err());
         assert!(files.write(&path("link/none/new.las")).is_ok());
         assert!(files.write(&path("link/new.laz")).is_ok());
+    }
+
+    #[test]
+    fn a_copy_is_made_once_and_replaces_nothing_of_the_command() {
+        let at = tempfile::tempdir().unwrap();
+        let path = |name: &str| at.path().join(name);
+        for name in ["a.wdp", "b.wdp", "in.las"] {
+            fs::write(path(name), name).unwrap();
+        }
+        symlink("a.wdp", path("link.wdp")).unwrap();
+        let mut files = Files::default();
+        for name in ["in.las", "a.wdp", "b.wdp"] {
+            files.read(&path(name), Use::Input);
+        }
+        assert!(!files.copy(&path("a.wdp"), &path("link.wdp")).unwrap(), "it is there already");
+        assert!(files.copy(&path("a.wdp"), &path("out.wdp")).unwrap());
+        assert!(!files.copy(&path("link.wdp"), &path("./out.wdp")).unwrap(), "the same again");
+        let told = |clash: Result<bool, Clash>| clash.unwrap_err().to_string();
+        assert!(told(files.copy(&path("b.wdp"), &path("out.wdp"))).contains("is written twice"));
+        assert!(told(files.copy(&path("a.wdp"), &path("in.las"))).contains("is an input"));
     }
 
     #[test]

@@ -297,9 +297,8 @@ impl StageKind for Write {
                     return Err(at.blame("path", unknown_extension(&path, "write.format")));
                 };
                 if let Some(plain) = Format::without_copc(&path) {
-                    let told =
-                        format!("`{}` is named as COPC, which is not written", path.display());
-                    let help = format!("name it `{}`: it is plain LAZ", plain.display());
+                    let told = format!("`{}` is named as COPC, which is not written", shown(&path));
+                    let help = format!("name it `{}`: it is plain LAZ", shown(&plain));
                     return Err(at.blame("path", Error::pipeline(told).help(help)));
                 }
                 check(format)?;

@@ -31,6 +31,7 @@ mod plan;
 mod product;
 mod publish;
 mod registry;
+mod room;
 mod rounded;
 mod run;
 mod scratch;
@@ -46,7 +47,7 @@ mod text;
 mod watch;
 mod written;
 
-pub(crate) use files::{Files, Use};
+pub(crate) use files::{Clash, Files, Use};
 pub use inputs::expand;
 pub use kinds::{Encoding, Format, OutputOrder, Read, Synth, Write};
 pub use limits::{LimitKeys, Sees};

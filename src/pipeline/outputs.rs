@@ -116,6 +116,10 @@ impl CreateSink for Outputs {
         self.any(schema).chunk(schema, metadata)
     }
 
+    fn disk_bytes(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<[u64; 2]> {
+        self.any(schema).disk_bytes(schema, metadata)
+    }
+
     fn warnings(&self, schema: &Schema, metadata: &Metadata) -> Vec<String> {
         self.any(schema).warnings(schema, metadata)
     }

@@ -1,8 +1,9 @@
 //! A pipeline that fits: its source open, its lattice fixed, its stages in passes, its memory divided.
 
 use std::num::NonZeroUsize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use super::beside::Beside;
 use super::by_rank;
 use super::each::{lists_bytes, paths, ranks};
 use super::files::{Clash, Files, Use};
@@ -15,6 +16,7 @@ use super::stretch::Stretch;
 use super::tagger::Tagger;
 use super::text::{Pipeline, PlacedStage};
 use crate::budget::default_limit;
+use crate::error::shown;
 use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
 use crate::point::{Schema, Units};
@@ -35,6 +37,8 @@ pub struct Plan {
     pub(super) sinks: Vec<Box<dyn CreateSink>>,
     /// For each sink, those of the inputs if it is a folder; else none.
     pub(super) each: Vec<Vec<Box<dyn CreateSink>>>,
+    /// What is to be copied beside outputs.
+    pub(super) beside: Vec<Beside>,
     /// See [`ranks`].
     pub(super) ranks: Vec<u32>,
     /// A sink of what all stages leave.
@@ -81,9 +85,12 @@ impl Pipeline {
             sorted.source.ok_or_else(|| Error::pipeline("the pipeline reads nothing"))?;
         let (sinks, taps): (Vec<_>, Vec<_>) = sorted.sinks.into_iter().unzip();
         let last_sink = last_sink(&sorted.ops, &taps)?;
-        let mut files = check_places(self.file.as_deref(), &*open, &sinks, &settings)?;
+        let pipeline = self.file.as_deref();
+        check_places(pipeline, &open.paths(), &sinks, &settings)?;
         let source = open.open()?;
+        let mut files = check_places(pipeline, &all_read(&*open, &*source), &sinks, &settings)?;
         let (each, ranks) = each_input(&*source, &sinks, &settings, &mut files)?;
+        let beside = copies(&*source, &sinks, &each, &settings, &mut files)?;
         let schema = source.schema();
         check_transforms(&sorted.transforms, schema).map_err(in_file)?;
         check_limits(&sorted.ops, schema)?;
@@ -143,6 +150,7 @@ impl Pipeline {
             passes,
             sinks,
             each,
+            beside,
             ranks,
             last_sink,
             tagger,
@@ -208,13 +216,13 @@ fn last_sink(ops: &[StageOp], taps: &[Tap]) -> Result<usize> {
 /// should. The files of folders are not among them: [`each_input`] adds these to what is returned.
 fn check_places(
     pipeline: Option<&Path>,
-    source: &dyn OpenSource,
+    inputs: &[PathBuf],
     sinks: &[Box<dyn CreateSink>],
     settings: &RunSettings,
 ) -> Result<Files> {
     let mut files = Files::default();
     pipeline.iter().for_each(|path| files.read(path, Use::Pipeline));
-    source.paths().iter().for_each(|path| files.read(path, Use::Input));
+    inputs.iter().for_each(|path| files.read(path, Use::Input));
     let outputs = sinks.iter().map(|sink| (sink.path(), sink.is_folder()));
     for (path, is_folder) in outputs.chain(settings.report.as_deref().map(|path| (path, false))) {
         files.write(path).map_err(|clash| refuse(&clash, path))?;
@@ -228,6 +236,37 @@ fn check_places(
             .help("create it first, or name another with `run.scratch`")),
         None => Ok(files),
     }
+}
+
+/// The inputs, and what their records refer to.
+fn all_read(open: &dyn OpenSource, source: &dyn Source) -> Vec<PathBuf> {
+    let beside = source.inputs().into_iter().filter_map(|input| input.beside);
+    open.paths().into_iter().chain(beside.map(|(path, _)| path)).collect()
+}
+
+/// What is to be copied beside outputs, none of which is one of the other `files`.
+fn copies(
+    source: &dyn Source,
+    sinks: &[Box<dyn CreateSink>],
+    each: &[Vec<Box<dyn CreateSink>>],
+    settings: &RunSettings,
+    files: &mut Files,
+) -> Result<Vec<Beside>> {
+    let mut copies = Vec::new();
+    for (n, input) in source.inputs().iter().enumerate() {
+        for (sink, own) in sinks.iter().zip(each) {
+            let sink = own.get(n).unwrap_or(sink);
+            let copy = Beside::of(input, &**sink, files);
+            if let Some(copy) = copy.map_err(|(to, clash)| refuse(&clash, &to))? {
+                // A folder that the run makes first has nothing in it.
+                if own.is_empty() || copy.to.parent().is_some_and(Path::is_dir) {
+                    check_place(&copy.to, settings.existing)?;
+                }
+                copies.push(copy);
+            }
+        }
+    }
+    Ok(copies)
 }
 
 fn refuse(clash: &Clash, output: &Path) -> Error {
@@ -345,7 +384,7 @@ fn stretch(settings: &RunSettings, source: &dyn Source, ops: &[StageOp]) -> Resu
     match (settings.stretch(source.metadata().units), first) {
         (Err(error), Some(input)) => Err(error.at(&input.path)),
         (Ok(Stretch { factor, doubt }), Some(input)) => {
-            let doubt = doubt.map(|doubt| format!("{}: {doubt}", input.path.display()));
+            let doubt = doubt.map(|doubt| format!("{}: {doubt}", shown(&input.path)));
             Ok(Stretch { factor, doubt })
         }
         (stretch, None) => stretch,

@@ -130,7 +130,7 @@ fn place_all<'a>(
 fn partly(placed: &[&Path], all: usize) -> String {
     /// Names that are listed.
     const NAMED: usize = 20;
-    let names: Vec<String> = placed.iter().take(NAMED).map(|p| p.display().to_string()).collect();
+    let names: Vec<String> = placed.iter().take(NAMED).map(|p| shown(p).to_string()).collect();
     let more = placed.len().saturating_sub(NAMED);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     let left = match all - placed.len() {

@@ -7,7 +7,6 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
-use super::beside::beside;
 use super::by_rank::LISTED;
 use super::clock::Clock;
 use super::each::Each;
@@ -15,13 +14,14 @@ use super::job::Job;
 use super::mill::mill;
 use super::plan::Plan;
 use super::publish::{Staged, make_folder, publish};
-use super::scratch::{Scratch, Trouble, free_space, memory_warning};
+use super::room::{self, Taken};
+use super::scratch::{Scratch, Trouble, memory_warning};
 use super::settings::{Nonfinite, Spill};
 use super::shares::Demands;
 use super::stream::stream;
 use super::survey::{Lines, Measured};
 use super::tagger::ClassOf;
-use crate::budget::{Budget, Bytes};
+use crate::budget::Budget;
 use crate::point::{Metadata, names};
 use crate::report::{
     ClassFigures, Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome,
@@ -82,7 +82,8 @@ impl Plan {
             self.settings.report.as_deref().map(|path| first.also(path, trouble)).transpose()?;
         let tell = |error| outputs.iter().flatten().fold(error, |error, output| output.tell(error));
         let (finished, run) = self.work(&outputs, &mut clock, watch, trouble).map_err(tell)?;
-        let beside = beside(self.written(&finished), first, trouble)?;
+        let beside: Vec<Staged> =
+            self.beside.iter().map(|copy| copy.make(first, trouble)).collect::<Result<_>>()?;
         let (report, tiles) = self.account(finished, run, clock)?;
         if let Some(staged) = &staged_report {
             write_report(staged.file(), &report, &tiles).map_err(|error| staged.tell(error))?;
@@ -167,10 +168,10 @@ impl Plan {
         let transforms = std::mem::take(&mut self.transforms);
         let (ops, passes) = (std::mem::take(&mut self.ops), std::mem::take(&mut self.passes));
         let mut job = Job { transforms, ops, passes, unread, ..self.job(outputs, &budget, watch) };
-        self.warnings.iter().for_each(|warning| job.warn(warning.clone()));
+        let doubts = self.check_room(outputs, spill.parent(), kept_in_memory, &job)?;
+        self.warnings.iter().cloned().chain(doubts).for_each(|warning| job.warn(warning));
         let finished = match &self.lattice {
             Some(lattice) if self.mills => {
-                check_disk(&self.demands, &spill, kept_in_memory)?;
                 mill(&mut job, lattice, &shares, &self.demands, &area, sinks, clock)?
             }
             lattice => {
@@ -187,6 +188,30 @@ impl Plan {
         run.warnings.iter().for_each(|warning| watch.warn(warning));
         run.warnings.splice(0..0, earlier);
         Ok((finished, run))
+    }
+
+    /// Refuses disks that have no room for what is spilled and, where nothing is removed, for outputs;
+    /// a warning where a disk may be too small.
+    fn check_room(
+        &self,
+        outputs: &[Vec<Staged>],
+        spill: &Path,
+        kept_in_memory: u64,
+        job: &Job<'_>,
+    ) -> Result<Vec<String>> {
+        let mut all = Vec::new();
+        if self.mills {
+            let bytes = spilled(&self.demands, kept_in_memory);
+            all.push(Taken { folder: spill, spilled: true, bytes, again: 0 });
+        }
+        let keeps = job.transforms.is_empty() && job.ops.is_empty() && !job.drop_nonfinite;
+        for (sink, staged) in self.sinks.iter().zip(outputs).filter(|_| keeps) {
+            let Some(staged) = staged.first() else { continue };
+            let each = sink.disk_bytes(self.source.schema(), self.source.metadata())?;
+            let [bytes, again] = each.map(|bytes| self.source.points().saturating_mul(bytes));
+            all.push(Taken { folder: staged.scratch().parent(), spilled: false, bytes, again });
+        }
+        room::check(all.into_iter())
     }
 
     /// The stages as outputs name them.
@@ -364,23 +389,12 @@ fn input_figures(source: &dyn Source) -> Vec<FileFigures> {
     source.inputs().into_iter().map(figures).collect()
 }
 
-/// Refuses a run whose spill would not fit on the scratch disk.
-fn check_disk(demands: &Demands, spill: &Scratch, kept_in_memory: u64) -> Result<()> {
-    // Records, their order, packed positions twice (runs and merged scan), states and fates twice
-    // (of the pass before and of the pass at work), and columns between passes.
-    // Ranks in the input, and the lists that are sorted by them.
+/// Bytes that a run spills: records, their order, packed positions twice (runs and merged scan),
+/// states and fates twice (of the pass before and of the pass at work), and columns between passes.
+/// Ranks in the input, and the lists that are sorted by them.
+fn spilled(demands: &Demands, kept_in_memory: u64) -> u64 {
     let order = if demands.tagged { 12 } else { 8 } + if demands.ranked { 8 + LISTED } else { 0 };
     let columns = if demands.passes.len() > 1 { 1 + 4 + 12 + 8 } else { 0 };
     let each = demands.stride as u64 + order + 2 * 8 + 1 + 4 + columns;
-    let needed = demands.points.saturating_mul(each).saturating_sub(kept_in_memory);
-    match free_space(spill.parent()) {
-        Some(free) if free < needed => Err(Error::memory(format!(
-            "the scan will spill about {}, and only {} are free here",
-            Bytes(needed),
-            Bytes(free)
-        ))
-        .at(spill.parent())
-        .help("free some disk space, name another folder with `run.scratch`, or give more `run.memory`")),
-        _ => Ok(()),
-    }
+    demands.points.saturating_mul(each).saturating_sub(kept_in_memory)
 }

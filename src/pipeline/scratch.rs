@@ -79,7 +79,7 @@ impl Drop for Scratch {
     fn drop(&mut self) {
         let Some(made) = lock(&self.made).take() else { return };
         if let Err(cause) = remove(CWD, &made.folder, &made.open) {
-            let folder = made.folder.display();
+            let folder = shown(&made.folder);
             let told = format!("{folder}: this scratch folder cannot be removed: {cause}");
             lock(&self.trouble).push(told);
         }

@@ -3,8 +3,11 @@
 
 use super::file::InputFile;
 use super::header::Header;
-use super::laz::{Compression, Compressor, Numbers};
-use crate::Result;
+use super::laz::{Compression, Compressor, Damage, Numbers, Why};
+pub use super::table::Chunk;
+use super::table::Table;
+use crate::error::shown;
+use crate::{Error, Result};
 
 /// Points that one compressed byte can hold at most: a point costs six symbols or more, and no
 /// symbol costs less than 2^-9 bits.
@@ -12,24 +15,11 @@ const POINTS_PER_BYTE: u64 = 1 << 12;
 /// Bytes in front of the first chunk, which say where the chunk table is.
 const TABLE_OFFSET_BYTES: u64 = 8;
 
-/// One chunk: its stretch of the file and its points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Chunk {
-    /// First byte.
-    pub start: u64,
-    /// Byte behind the last.
-    pub end: u64,
-    /// Points to read.
-    pub points: u64,
-    /// True if the chunk holds no others.
-    pub whole: bool,
-}
-
 /// The chunks of a file.
 #[derive(Debug, Clone)]
 pub enum Chunks {
     /// Known one by one: they can be read in any order.
-    Known(Vec<Chunk>),
+    Known(Table),
     /// Known to follow each other: they are read in one go.
     InARow {
         /// All of them; `points` as the header claims.
@@ -51,11 +41,12 @@ impl Chunks {
         let points = header.points();
         let start = u64::from(header.points_start());
         if points == 0 {
-            return Ok((Chunks::Known(Vec::new()), None));
+            return Ok((Chunks::Known(Table::default()), None));
         }
         if compression.compressor == Compressor::PointWise {
             let all = Chunk { start, end, points, whole: true };
-            return plausible(file, all).map(|()| (Chunks::Known(vec![all]), None));
+            plausible(file, all)?;
+            return Ok((Chunks::Known(Table::of(all)), None));
         }
         let first = start + TABLE_OFFSET_BYTES;
         if first > file.len() {
@@ -65,18 +56,19 @@ impl Chunks {
         }
         let why = match table(file, start, points, compression) {
             Ok(found) => return Ok(found),
-            Err(why) => why,
+            Err(Unusable::Because(why)) => why,
+            Err(Unusable::Failed(error)) => return Err(error),
         };
         match (compression.compressor, compression.chunk_points) {
             (Compressor::Layered, _) => {
                 let chunks = walk(file, first, points, compression)?;
-                Ok((Chunks::Known(chunks), Some(format!("{}: {why}", file.path().display()))))
+                Ok((Chunks::Known(chunks), Some(format!("{}: {why}", shown(file.path())))))
             }
             (_, Some(chunk_points)) => {
                 let all = Chunk { start: first, end: file.len(), points, whole: false };
                 plausible(file, all)?;
                 let chunk_points = u64::from(chunk_points);
-                let warning = format!("{}: {why}; it is read by one thread", file.path().display());
+                let warning = format!("{}: {why}; it is read by one thread", shown(file.path()));
                 Ok((Chunks::InARow { all, chunk_points }, Some(warning)))
             }
             (_, None) => Err(file
@@ -88,7 +80,7 @@ impl Chunks {
     /// Points to read.
     pub fn points(&self) -> u64 {
         match self {
-            Chunks::Known(chunks) => chunks.iter().map(|c| c.points).sum(),
+            Chunks::Known(chunks) => chunks.points(),
             Chunks::InARow { all, .. } => all.points,
         }
     }
@@ -110,16 +102,40 @@ pub fn uncounted(
     header: &Header,
     evlrs_start: Option<u64>,
     compression: &Compression,
-) -> Option<u64> {
+) -> Result<Option<u64>> {
     let start = u64::from(header.points_start());
     let first = start + TABLE_OFFSET_BYTES;
     if header.points() > 0 || first > file.len() {
-        return None;
+        return Ok(None);
     }
-    let table = table_start(file, start);
+    let table = table_start(file, start)?;
     let end = table.or(evlrs_start.filter(|&at| at >= first)).unwrap_or(file.len());
     // Less than one stored point are an empty chunk table, or what a writer pads with.
-    Some(end - first).filter(|&bytes| bytes > compression.stride as u64)
+    Ok(Some(end - first).filter(|&bytes| bytes > compression.stride as u64))
+}
+
+/// Why a chunk table is not used.
+enum Unusable {
+    /// It is damaged or missing.
+    Because(String),
+    /// It cannot be read, so that what it says is not known, or is too long.
+    Failed(Error),
+}
+
+impl<T: Into<String>> From<T> for Unusable {
+    fn from(why: T) -> Self {
+        Unusable::Because(why.into())
+    }
+}
+
+/// Refuses a file of more chunks than are held.
+fn too_many(file: &InputFile, chunks: &Table) -> Error {
+    let (chunks, points) = (chunks.chunks(), chunks.points());
+    let told =
+        format!("its first {chunks} chunks hold {points} points: that is a table too long to hold");
+    Error::data(file.path(), told).help(
+        "write it anew with chunks of more points (50,000 are usual); LASzip and PDAL do that by themselves",
+    )
 }
 
 /// The chunks as the chunk table says, or why it cannot be used.
@@ -128,126 +144,133 @@ fn table(
     start: u64,
     points: u64,
     compression: &Compression,
-) -> Result<(Chunks, Option<String>), String> {
-    let at = table_start(file, start).ok_or("the file has no chunk table where it says")?;
+) -> Result<(Chunks, Option<String>), Unusable> {
+    let at = table_start(file, start).map_err(Unusable::Failed)?;
+    let at = at.ok_or("the file has no chunk table where it says")?;
     let variable = compression.chunk_points.is_none();
-    let entries = entries(file, at, at - start - TABLE_OFFSET_BYTES, compression)?;
-    let mut chunks = Vec::new();
+    let mut chunks = Table::default();
     let (mut byte, mut left, mut unread) = (start + TABLE_OFFSET_BYTES, points, 0u64);
-    for (bytes, held) in entries {
+    let entry = |bytes: u64, held: u64| {
         if left == 0 {
             unread += if variable { held } else { 1 };
         } else if held > 0 {
             if bytes < compression.stride as u64 {
-                return Err("the chunk table's sizes cannot be".to_owned());
+                return Err("the chunk table's sizes cannot be".into());
             }
             // The table of fixed chunks does not say how many points the last one has.
             let whole = if variable { held <= left } else { true };
             let points = held.min(left);
-            chunks.push(Chunk { start: byte, end: byte + bytes, points, whole });
+            if !chunks.push(Chunk { start: byte, end: byte + bytes, points, whole }) {
+                return Err(Unusable::Failed(too_many(file, &chunks)));
+            }
             unread += if variable { held - points } else { 0 };
             left -= points;
         }
         byte += bytes;
-    }
+        Ok(())
+    };
+    let room = at - start - TABLE_OFFSET_BYTES;
+    entries(file, at, room, compression, entry)?;
     if left > 0 {
-        return Err("the chunk table holds fewer points than the header claims".to_owned());
+        return Err("the chunk table holds fewer points than the header claims".into());
     }
     let warning = (unread > 0).then(|| {
         let what = if variable { "points" } else { "chunks" };
         format!(
             "{}: {unread} {what} behind the {points} points of the header are not read",
-            file.path().display()
+            shown(file.path())
         )
     });
-    Ok((Chunks::Known(chunks), warning))
+    Ok((Chunks::Known(chunks.closed()), warning))
 }
 
 /// Where the chunk table is: told in front of the first chunk, or, by writers that could not go
 /// back, at the end of the file.
-fn table_start(file: &InputFile, start: u64) -> Option<u64> {
+fn table_start(file: &InputFile, start: u64) -> Result<Option<u64>> {
     let inside = |at: u64| {
         let room = start + TABLE_OFFSET_BYTES..=file.len().checked_sub(8)?;
         room.contains(&at).then_some(at)
     };
-    let told = |byte: u64| {
-        let bytes = file.bytes(byte, 8).ok()?;
-        Some(u64::from_le_bytes(bytes.try_into().ok()?))
+    let told = |byte: u64| -> Result<u64> {
+        let mut bytes = [0; 8];
+        file.read_at(&mut bytes, byte)?;
+        Ok(u64::from_le_bytes(bytes))
     };
+    let Some(end) = file.len().checked_sub(8).filter(|end| start <= *end) else { return Ok(None) };
     let front = told(start)?;
-    if let Some(at) = inside(front) {
-        return Some(at);
-    }
     let unset = front as i64 <= start as i64;
-    unset.then(|| told(file.len().checked_sub(8)?)).flatten().and_then(inside)
+    match inside(front) {
+        None if unset => told(end).map(inside),
+        found => Ok(found),
+    }
 }
 
-/// Bytes and points of every chunk, as the table at byte `at` says. Stops as soon as they
-/// exceed the `room` that chunks have, so that the list never outgrows the file.
+/// Hands bytes and points of every chunk to `take`, as the table at byte `at` says. Stops as
+/// soon as they exceed the `room` that chunks have.
 fn entries(
     file: &InputFile,
     at: u64,
     room: u64,
     compression: &Compression,
-) -> Result<Vec<(u64, u64)>, String> {
-    let cut = || "the chunk table is cut off".to_owned();
-    let head = file.bytes(at, 8).map_err(|_| cut())?;
+    mut take: impl FnMut(u64, u64) -> Result<(), Unusable>,
+) -> Result<(), Unusable> {
+    let cut = |damage: Damage| match damage.why {
+        Why::Unread(error) => Unusable::Failed(error),
+        _ => Unusable::from("the chunk table is cut off"),
+    };
+    let mut head = [0; 8];
+    file.read_at(&mut head, at).map_err(Unusable::Failed)?;
     let claimed = u32::from_le_bytes([head[4], head[5], head[6], head[7]]);
     if head[..4] != [0; 4] {
-        return Err("the chunk table is of an unknown version".to_owned());
+        return Err("the chunk table is of an unknown version".into());
     }
     let smallest = compression.stride as u64;
     if u64::from(claimed) > room / smallest {
-        return Err(format!(
-            "the chunk table claims {claimed} chunks, more than there is room for"
-        ));
+        let told = format!("the chunk table claims {claimed} chunks, more than there is room for");
+        return Err(told.into());
     }
     let mut numbers = Numbers::new(file, at + 8);
-    let mut all = Vec::new();
     let (mut last_bytes, mut last_points, mut used) = (0i32, 0i32, 0u64);
     for _ in 0..claimed {
         let held = match compression.chunk_points {
             Some(fixed) => u64::from(fixed),
             None => {
-                last_points = numbers.read(last_points, 0).ok_or_else(cut)?;
+                last_points = numbers.read(last_points, 0).map_err(cut)?;
                 u64::from(last_points as u32)
             }
         };
-        last_bytes = numbers.read(last_bytes, 1).ok_or_else(cut)?;
+        last_bytes = numbers.read(last_bytes, 1).map_err(cut)?;
         let bytes = u64::from(last_bytes as u32);
         used += bytes;
         if used > room {
-            return Err("the chunk table's sizes exceed the bytes of the chunks".to_owned());
+            return Err("the chunk table's sizes exceed the bytes of the chunks".into());
         }
-        all.push((bytes, held));
+        take(bytes, held)?;
     }
     // Points of chunks of varying size cannot be found without the table: then it is taken as it is.
     let is_needed =
         compression.compressor != Compressor::Layered && compression.chunk_points.is_none();
     if used != room && !is_needed {
-        return Err("the chunk table's sizes do not add up to the bytes of the chunks".to_owned());
+        return Err("the chunk table's sizes do not add up to the bytes of the chunks".into());
     }
-    Ok(all)
+    Ok(())
 }
 
 /// The chunks of a layered file without a usable table: each says how long its layers are.
-fn walk(
-    file: &InputFile,
-    first: u64,
-    points: u64,
-    compression: &Compression,
-) -> Result<Vec<Chunk>> {
+fn walk(file: &InputFile, first: u64, points: u64, compression: &Compression) -> Result<Table> {
     let (mut start, mut left) = (first, points);
-    let mut chunks = Vec::new();
+    let mut chunks = Table::default();
     while left > 0 {
         let head = layered_head(file, start, file.len(), compression)?;
         let held = head.points.min(left);
         let end = start + head.bytes;
-        chunks.push(Chunk { start, end, points: held, whole: held == head.points });
+        if !chunks.push(Chunk { start, end, points: held, whole: held == head.points }) {
+            return Err(too_many(file, &chunks));
+        }
         left -= held;
         start = end;
     }
-    Ok(chunks)
+    Ok(chunks.closed())
 }
 
 /// What a layered chunk says of itself behind its first point.

@@ -145,7 +145,7 @@ fn storage(storage: &Storage) -> (&'static str, Option<u32>, Option<u64>) {
         Compressor::Layered => "layered",
     };
     let count = match chunks {
-        Chunks::Known(chunks) => Some(chunks.len() as u64),
+        Chunks::Known(chunks) => Some(chunks.chunks()),
         Chunks::InARow { .. } => None,
     };
     let whole_file = compression.compressor == Compressor::PointWise;
@@ -156,7 +156,7 @@ fn records(input: &Input) -> Vec<Record> {
     let record = |v: &super::vlr::Vlr| Record {
         user_id: v.user(),
         record_id: v.record(),
-        length: v.payload().len() as u64,
+        length: v.payload_len().into(),
         description: v.description(),
     };
     input.vlrs.iter().map(record).collect()

@@ -15,6 +15,7 @@ use super::laz::{Compression, LASZIP};
 use super::system::CrsRecords;
 use super::vlr::{Evlr, VLR_HEAD, Vlr, read_evlrs, read_vlrs};
 use super::waveforms::Waveforms;
+use crate::error::shown;
 use crate::io::origin::Origin;
 use crate::point::Schema;
 use crate::{Error, Result};
@@ -79,7 +80,7 @@ impl Input {
         let evlrs = read_evlrs(&file, &header)?;
         let behind = evlrs.iter().map(Evlr::position).min();
         let storage = storage(&file, &header, &vlrs, behind, &mut warnings)?;
-        let path_said = |odd: String| format!("{}: {odd}", path.display());
+        let path_said = |odd: String| format!("{}: {odd}", shown(path));
         warnings.extend(header.odd_scales().into_iter().chain(header.odd_counts()).map(path_said));
         let named = vlrs.iter().map(|v| (v.user(), v.record()));
         let named = named.chain(evlrs.iter().map(|v| (v.user(), v.record())));
@@ -92,7 +93,7 @@ impl Input {
             };
             warnings.push(format!(
                 "{}: outputs do not carry the spatial index ({user}){what}",
-                path.display()
+                shown(path)
             ));
         }
         let (path, origin) = (path.to_owned(), file.origin().clone());
@@ -125,6 +126,14 @@ impl Input {
         match &self.storage {
             Storage::Plain => self.header.points(),
             Storage::Laz(_, chunks) => chunks.points(),
+        }
+    }
+
+    /// Bytes that the table of its chunks takes.
+    pub fn table_bytes(&self) -> u64 {
+        match &self.storage {
+            Storage::Laz(_, Chunks::Known(table)) => table.bytes(),
+            _ => 0,
         }
     }
 
@@ -212,7 +221,7 @@ fn storage(
     let at = (header.bytes().len() + before + VLR_HEAD) as u64;
     let (format, stride) = (header.format(), header.record_length());
     let compression = Compression::read(file, &vlrs[record], at, format, stride)?;
-    if let Some(bytes) = chunks::uncounted(file, header, evlrs_start, &compression) {
+    if let Some(bytes) = chunks::uncounted(file, header, evlrs_start, &compression)? {
         return Err(uncounted(file, bytes));
     }
     let end = behind_points(file, header, evlrs_start, u64::from(header.points_start()));
@@ -246,7 +255,7 @@ fn plain(file: &InputFile, header: &Header, evlrs_start: Option<u64>) -> Result<
     Ok((behind >= each).then(|| {
         format!(
             "{}: {behind} bytes behind the {points} points that the header counts are not read",
-            file.path().display()
+            shown(file.path())
         )
     }))
 }
@@ -274,7 +283,7 @@ fn check_last(
     warnings: &mut Vec<String>,
 ) -> Result<()> {
     let Chunks::Known(chunks) = chunks else { return Ok(()) };
-    let Some(last) = chunks.last_mut().filter(|_| compression.layers > 0) else { return Ok(()) };
+    let Some(last) = chunks.last().filter(|_| compression.layers > 0) else { return Ok(()) };
     let head = chunks::layered_head(file, last.start, last.end, compression)?;
     if head.points < last.points {
         return Err(file
@@ -291,7 +300,7 @@ fn check_last(
         last.whole = false;
         warnings.push(format!(
             "{}: {} points behind those that the header counts are not read",
-            file.path().display(),
+            shown(file.path()),
             head.points - last.points
         ));
     }

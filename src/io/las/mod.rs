@@ -24,6 +24,7 @@ mod read;
 mod sink;
 mod source;
 mod system;
+mod table;
 mod union;
 mod verify;
 mod vlr;
@@ -31,8 +32,9 @@ mod waveforms;
 
 pub use describe::{Description, ExtraBytes, Record, describe};
 pub use format::layout;
-pub use native::{fresh, records_beside};
+pub use native::{fresh, records_beside, waveforms_of};
 pub use own::{Shifted, own_form};
 pub use read::Shift;
 pub use sink::{LasOptions, chunk, create};
 pub use source::open;
+pub use waveforms::beside;

@@ -120,6 +120,11 @@ pub fn records_beside(metadata: &Metadata) -> Vec<String> {
     vlrs.chain(evlrs).collect()
 }
 
+/// The file that the records of a LAS input refer to for their waveforms, if it is there.
+pub fn waveforms_of(metadata: &Metadata) -> Option<PathBuf> {
+    metadata.native.as_ref()?.downcast_ref::<Native>()?.waveforms.clone()
+}
+
 /// The three dimensions that hold a normal already, if all are there.
 pub fn normals_of(schema: &Schema) -> Option<[&crate::point::Dimension; 3]> {
     let [x, y, z] = names::NORMAL.map(|name| schema.find(name));

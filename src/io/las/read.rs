@@ -6,6 +6,7 @@ use super::chunks::{Chunk, layered_head};
 use super::file::InputFile;
 use super::laz::{Compression, Compressor, Damage, Decoder, Layers, Why};
 use super::verify::Evidence;
+use crate::error::shown;
 use crate::point::PointBatch;
 use crate::stage::Part;
 use crate::{Error, Result};
@@ -191,7 +192,7 @@ impl LazPart {
             return Err(self.damaged(chunk, "the header's points end before its bytes"));
         };
         if let Some(evidence) = &self.evidence {
-            let path = self.file.path().display();
+            let path = shown(self.file.path());
             evidence.warn(format!(
                 "{path}: {more} points or more behind those that the header counts are not read"
             ));

@@ -18,7 +18,6 @@ use super::header::{COMPRESSED, Header, at, encoding};
 use super::laz::{CHUNK_POINTS, Compression};
 use super::native::Native;
 use super::vlr::Vlr;
-use super::waveforms;
 use crate::point::{Layout, Metadata, Schema};
 use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
@@ -181,7 +180,7 @@ impl LasSink {
         };
         let mut head = sink.native.header.bytes().to_vec();
         for i in 0..sink.native.vlrs.len() {
-            head.extend(sink.native.vlrs[i].bytes());
+            sink.native.vlrs[i].append(&mut head)?;
             if head.len() > HEAD_BYTES {
                 sink.write(&head)?;
                 head.clear();
@@ -321,7 +320,6 @@ impl Sink for LasSink {
         let header = self.native.header.bytes().to_vec();
         self.rewrite(0, &header)?;
         self.file.sync_all().map_err(|e| Error::io(&self.path, "write it to disk", e))?;
-        let beside = self.native.waveforms.map(|file| (file, waveforms::EXTENSION));
-        Ok(SinkSummary { points: self.points, bytes: self.at, notes: self.notes, beside })
+        Ok(SinkSummary { points: self.points, bytes: self.at, notes: self.notes })
     }
 }

@@ -11,15 +11,15 @@ use super::laz::Layers;
 use super::merge::Merge;
 use super::native::Native;
 use super::read::{LazPart, PlainPart, Shift};
+use super::table::is_held;
 use super::verify::{Evidence, Watched};
+use super::waveforms;
 use crate::point::{Metadata, Schema};
 use crate::stage::{self, Part, Source};
 use crate::{Error, Result};
 
 /// Plain records of one part.
 const PLAIN_POINTS: u64 = 1 << 18;
-/// Small chunks are read together until a part has this many points.
-const PART_POINTS: u64 = 50_000;
 
 /// Opens LAS and LAZ files as one scan: headers and records only, no point.
 ///
@@ -35,9 +35,16 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
     let first = Input::open(first)?;
     let mut schema = first.schema();
     let mut inputs = vec![first.clone().without_records()];
+    let (mut tables, mut points) = (first.table_bytes(), first.points());
     let mut merge = Merge::of(first)?;
     for path in others {
         let input = Input::open(path)?;
+        tables = tables.saturating_add(input.table_bytes());
+        points = points.saturating_add(input.points());
+        if !is_held(tables, points) {
+            let told = "the inputs up to this one have more chunks of few points than are held";
+            return Err(Error::data(path, told).help("run them in several parts"));
+        }
         merge.add(&input)?;
         inputs.push(input.without_records());
     }
@@ -72,7 +79,7 @@ struct Opened {
     evidence: Arc<Evidence>,
 }
 
-/// Which file a part is of, and its stretch there: records of a plain file, chunks of a LAZ.
+/// Which file a part is of, and its stretch there: records of a plain file, or a part of a LAZ.
 struct PartPlace {
     file: usize,
     /// Its number among the parts of that file.
@@ -97,7 +104,12 @@ impl Opened {
     }
 
     fn part_bytes(&self) -> u64 {
-        self.compression.as_ref().map_or(0, |compression| compression.state_bytes())
+        let Some(compression) = &self.compression else { return 0 };
+        let list = match &self.input.storage {
+            Storage::Laz(_, Chunks::Known(chunks)) => chunks.part_bytes(),
+            _ => 0,
+        };
+        list + compression.state_bytes()
     }
 
     /// Opens a part, its points looked at. Coordinates and returns are in layers that are always decoded.
@@ -109,8 +121,7 @@ impl Opened {
     fn unwatched(&self, place: &PartPlace, selection: Layers) -> Result<Box<dyn Part>> {
         let file = self.input.reopen()?;
         let (shift, source) = (self.shift, place.file as u32);
-        let (first, count) = (place.first as usize, place.count as usize);
-        let (chunks, in_a_row): (Vec<Chunk>, _) = match &self.input.storage {
+        let (before, chunks, in_a_row): (u64, Vec<Chunk>, _) = match &self.input.storage {
             Storage::Plain => {
                 let header = &self.input.header;
                 let each = u64::from(header.record_length());
@@ -118,21 +129,24 @@ impl Opened {
                 return Ok(Box::new(PlainPart { file, source, at, left: place.count, shift }));
             }
             Storage::Laz(_, Chunks::InARow { all, chunk_points }) => {
-                (vec![*all], Some(*chunk_points))
+                (0, vec![*all], Some(*chunk_points))
             }
-            Storage::Laz(_, Chunks::Known(chunks)) => (chunks[first..first + count].to_vec(), None),
+            Storage::Laz(_, Chunks::Known(chunks)) => {
+                let part = place.first as usize;
+                (chunks.before(part), chunks.part(part), None)
+            }
         };
         let compression = self
             .compression
             .clone()
             .ok_or_else(|| Error::internal("a LAZ file without its compression"))?;
-        let chunks = (place.first, chunks);
+        let chunks = (before, chunks);
         let part = LazPart::new(file, (source, shift), compression, chunks, in_a_row);
         Ok(Box::new(part.select(selection).tell(self.evidence.clone())))
     }
 }
 
-/// The stretches that the parts of a file are: first and count of records, or of chunks.
+/// The stretches that the parts of a file are: first and count of records, or a part of its chunks.
 fn stretches(input: &Input) -> Vec<(u64, u64)> {
     match &input.storage {
         Storage::Plain => {
@@ -144,16 +158,7 @@ fn stretches(input: &Input) -> Vec<(u64, u64)> {
         }
         Storage::Laz(_, Chunks::InARow { .. }) => vec![(0, 1)],
         Storage::Laz(_, Chunks::Known(chunks)) => {
-            let mut parts = Vec::new();
-            let (mut first, mut points) = (0, 0);
-            for (i, chunk) in chunks.iter().enumerate() {
-                points += chunk.points;
-                if points >= PART_POINTS || i + 1 == chunks.len() {
-                    parts.push((first as u64, (i + 1 - first) as u64));
-                    (first, points) = (i + 1, 0);
-                }
-            }
-            parts
+            (0..chunks.parts() as u64).map(|i| (i, 1)).collect()
         }
     }
 }
@@ -168,8 +173,11 @@ impl Source for LasSource {
     }
 
     fn inputs(&self) -> Vec<stage::Input> {
-        let input =
-            |f: &Opened| stage::Input { path: f.input.path.clone(), points: f.input.points() };
+        let input = |f: &Opened| stage::Input {
+            path: f.input.path.clone(),
+            points: f.input.points(),
+            beside: f.input.waveforms.clone().map(|file| (file, waveforms::EXTENSION)),
+        };
         self.files.iter().map(input).collect()
     }
 

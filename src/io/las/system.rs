@@ -61,7 +61,8 @@ impl CrsRecords {
 
     /// Of several that say the same, outputs carry the least: those with WKT first, then by bytes.
     pub fn order(&self, other: &Self) -> Ordering {
-        let bytes = |records: &Self| records.vlrs.iter().flat_map(Vlr::bytes).collect::<Vec<u8>>();
+        let bytes =
+            |records: &Self| records.vlrs.iter().flat_map(Vlr::held_bytes).collect::<Vec<u8>>();
         (self.rank, &self.payloads)
             .cmp(&(other.rank, &other.payloads))
             .then_with(|| bytes(self).cmp(&bytes(other)))

@@ -94,7 +94,7 @@ trait Item: Clone {
 
 impl Item for Vlr {
     fn compare(&self, other: &Self) -> Result<Ordering> {
-        Ok(self.order(other))
+        self.order(other)
     }
 }
 

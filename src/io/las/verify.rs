@@ -231,7 +231,7 @@ impl Evidence {
 
     /// Counts of points by return that are others than the header's. One that has none, or whose
     /// counts exceed its points, was not kept up by its writer, and points without return numbers say
-    /// nothing.
+    /// nothing: some writers count those among the first returns.
     fn of_returns(&self, header: &Header, found: &Found) -> Option<(usize, String, bool)> {
         let (field, width, counts) = header.returns();
         let sum = counts.iter().fold(0u64, |sum, n| sum.saturating_add(*n));
@@ -243,11 +243,20 @@ impl Evidence {
         let first = pairs().position(|(said, is)| said != is)?;
         let differ: u64 = pairs().map(|(said, is)| said.abs_diff(*is)).sum();
         let (said, is) = (counts[first], found.returns[first + 1]);
-        let told =
-            format!("the header counts {said} points of return {}, and {is} were found", first + 1);
+        let unnumbered = found.returns[0];
+        let as_first = unnumbered > 0 && first == 0 && said.checked_sub(is) == Some(unnumbered);
+        let as_first = as_first && differ == unnumbered;
+        let besides = match as_first {
+            true => format!(", besides {unnumbered} without a return number"),
+            false => String::new(),
+        };
+        let told = format!(
+            "the header counts {said} points of return {}, and {is} were found{besides}",
+            first + 1
+        );
         // A point that changed its return is missed at one and too many at another.
-        let is_damage =
-            self.compressed || differ.div_ceil(2).saturating_mul(SINGLE) <= found.points;
+        let few = differ.div_ceil(2).saturating_mul(SINGLE) <= found.points;
+        let is_damage = !as_first && (self.compressed || few);
         Some((field + width * first, told, is_damage))
     }
 }

@@ -1,12 +1,15 @@
 //! Variable length records (LAS 1.4 R15, sections 2.5 and 2.7), carried as their bytes. Extended
-//! ones stay in their file until they are written: one may hold gigabytes of waveforms.
+//! ones stay in their file until they are written: one may hold gigabytes of waveforms. So do others
+//! where there are many bytes of them.
 
+use std::borrow::Cow;
 use std::cmp::Ordering;
 use std::sync::Arc;
 
 use super::file::InputFile;
 use super::header::{Header, at, encoding};
 use crate::budget::Bytes;
+use crate::error::shown;
 use crate::io::origin::Origin;
 use crate::{Error, ErrorKind, Result};
 
@@ -14,13 +17,20 @@ use crate::{Error, ErrorKind, Result};
 pub const VLR_HEAD: usize = 54;
 /// Bytes of an extended record's head.
 pub const EVLR_HEAD: usize = 60;
-/// Bytes of variable length records that are held in memory, of one file or as the union of several.
-/// No file that means them has as many, and a budget has room for them before it is known.
+/// Bytes of variable length records that are held in memory, of one file or as the union of several: a
+/// budget has room for them before it is known. More of those that mean something here are refused, more
+/// of others are left in their files.
 const BYTES_HELD: u64 = 8 << 20;
 /// Variable length records, and as many extended ones, whose heads are held in memory.
 const RECORDS_HELD: usize = 1 << 14;
 /// Bytes between the records and the points that are carried; more are dropped with a warning.
 const GAP_CARRIED: u64 = 64 << 10;
+
+/// True for records whose payload means something here: systems, extra bytes, how points are compressed.
+fn is_read(user: &str, record: u16) -> bool {
+    let users = ["LASF_Projection", "liblas", "laszip encoded"];
+    users.contains(&user) || (user, record) == ("LASF_Spec", 4)
+}
 
 /// A text field: its bytes up to the first zero, those that are no UTF-8 replaced.
 pub fn text(bytes: &[u8]) -> String {
@@ -38,8 +48,16 @@ pub fn split_at_room(text: &str, room: usize) -> (&str, &str) {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Vlr {
     head: [u8; VLR_HEAD],
+    payload: Payload,
+}
+
+/// What a variable length record holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Payload {
     /// Shared by all who carry the record.
-    payload: Arc<[u8]>,
+    Held(Arc<[u8]>),
+    /// Left in the file, from this byte.
+    Left(Arc<Origin>, u64),
 }
 
 impl Vlr {
@@ -51,7 +69,7 @@ impl Vlr {
             head[at..at + field.len()].copy_from_slice(field.as_bytes());
         }
         head[18..20].copy_from_slice(&record.to_le_bytes());
-        Vlr { head, payload: Arc::default() }.with_payload(payload)
+        Vlr { head, payload: Payload::Held(Arc::default()) }.with_payload(payload)
     }
 
     /// The same record with another payload (shorter than 64 KiB).
@@ -59,7 +77,7 @@ impl Vlr {
         debug_assert!(u16::try_from(payload.len()).is_ok());
         let mut head = self.head;
         head[20..22].copy_from_slice(&(payload.len() as u16).to_le_bytes());
-        Vlr { head, payload: payload.into() }
+        Vlr { head, payload: Payload::Held(payload.into()) }
     }
 
     /// Who defined it.
@@ -77,9 +95,39 @@ impl Vlr {
         text(&self.head[22..])
     }
 
-    /// What it holds.
+    /// What it holds; nothing for a record that is left in its file, which means nothing here.
     pub fn payload(&self) -> &[u8] {
-        &self.payload
+        match &self.payload {
+            Payload::Held(bytes) => bytes,
+            Payload::Left(..) => &[],
+        }
+    }
+
+    /// Bytes of what it holds.
+    pub fn payload_len(&self) -> u16 {
+        u16::from_le_bytes([self.head[20], self.head[21]])
+    }
+
+    /// What it holds, read from its file if it is left there.
+    fn whole_payload(&self) -> Result<Cow<'_, [u8]>> {
+        match &self.payload {
+            Payload::Held(bytes) => Ok(Cow::Borrowed(bytes)),
+            Payload::Left(origin, at) => {
+                let bytes =
+                    InputFile::reopen(origin)?.bytes(*at, usize::from(self.payload_len()))?;
+                Ok(Cow::Owned(bytes))
+            }
+        }
+    }
+
+    /// Head and payload as in the file, as far as they are held.
+    pub fn held_bytes(&self) -> impl Iterator<Item = u8> + '_ {
+        self.head.iter().chain(self.payload()).copied()
+    }
+
+    /// Bytes that it takes in memory.
+    fn held(&self) -> u64 {
+        (VLR_HEAD + self.payload().len()) as u64
     }
 
     /// True if it is record `record` of `user`.
@@ -87,21 +135,27 @@ impl Vlr {
         self.record() == record && self.user() == user
     }
 
-    /// Head and payload as in the file.
-    pub fn bytes(&self) -> impl Iterator<Item = u8> + '_ {
-        self.head.iter().chain(self.payload.iter()).copied()
+    /// Adds head and payload to `to`, as in the file.
+    pub fn append(&self, to: &mut Vec<u8>) -> Result<()> {
+        to.extend(self.head);
+        to.extend_from_slice(&self.whole_payload()?);
+        Ok(())
     }
 
     /// Bytes in the file.
     pub fn len(&self) -> usize {
-        VLR_HEAD + self.payload.len()
+        VLR_HEAD + usize::from(self.payload_len())
     }
 
     /// The order of a union of records: user, number, bytes.
-    pub fn order(&self, other: &Self) -> Ordering {
-        (self.user(), self.record())
+    pub fn order(&self, other: &Self) -> Result<Ordering> {
+        let heads = (self.user(), self.record())
             .cmp(&(other.user(), other.record()))
-            .then_with(|| self.bytes().cmp(other.bytes()))
+            .then_with(|| self.head.cmp(&other.head));
+        match heads {
+            Ordering::Equal => Ok(self.whole_payload()?.cmp(&other.whole_payload()?)),
+            _ => Ok(heads),
+        }
     }
 }
 
@@ -223,7 +277,8 @@ pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>
         return Err(too_many(file, at::VLRS as u64, claimed, ""));
     }
     let mut vlrs = Vec::new();
-    let mut at = start;
+    let (mut at, mut held) = (start, 0);
+    let (origin, room) = (Arc::new(file.origin().clone()), end - start <= BYTES_HELD);
     for i in 0..claimed {
         if end - at < VLR_HEAD as u64 {
             return Err(file
@@ -234,11 +289,6 @@ pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>
         file.read_at(&mut head, at)?;
         let len = u16::from_le_bytes([head[20], head[21]]);
         at += VLR_HEAD as u64;
-        if at + u64::from(len) - start > BYTES_HELD {
-            let told =
-                format!("the {claimed} variable length records exceed {}", Bytes(BYTES_HELD));
-            return Err(file.wrong(at::VLRS as u64, told).help(NOT_HELD));
-        }
         if u64::from(len) > end - at {
             return Err(file
                 .wrong(
@@ -247,14 +297,26 @@ pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>
                 )
                 .help("the record count, this length or the start of the points is damaged"));
         }
-        vlrs.push(Vlr { head, payload: file.bytes(at, usize::from(len))?.into() });
+        let mut vlr = Vlr { head, payload: Payload::Left(origin.clone(), at) };
+        if room || is_read(&vlr.user(), vlr.record()) {
+            vlr.payload = Payload::Held(file.bytes(at, usize::from(len))?.into());
+            held += vlr.held();
+        }
+        if held > BYTES_HELD {
+            let told = format!(
+                "the variable length records that say what points are exceed {}",
+                Bytes(BYTES_HELD)
+            );
+            return Err(file.wrong(at::VLRS as u64, told).help(NOT_HELD));
+        }
+        vlrs.push(vlr);
         at += u64::from(len);
     }
     let gap = end - at;
     if gap > GAP_CARRIED {
         let warning = format!(
             "{}: {gap} bytes between the records and the points are not carried",
-            file.path().display()
+            shown(file.path())
         );
         return Ok((vlrs, Vec::new(), Some(warning)));
     }
@@ -274,7 +336,7 @@ fn too_many(file: &InputFile, field: u64, claimed: u32, extended: &str) -> Error
 
 /// Refuses a union of records of several files that is more than is held of one.
 pub fn check_held(vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<()> {
-    let bytes: u64 = vlrs.iter().map(|vlr| vlr.len() as u64).sum();
+    let bytes: u64 = vlrs.iter().map(Vlr::held).sum();
     if vlrs.len().max(evlrs.len()) <= RECORDS_HELD && bytes <= BYTES_HELD {
         return Ok(());
     }

@@ -3,8 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
+use super::file::InputFile;
 use super::format::has_waveforms;
 use super::header::{Header, encoding};
+use crate::error::shown;
 
 /// The extension of such files.
 pub const EXTENSION: &str = "wdp";
@@ -24,16 +26,29 @@ impl Waveforms {
         if !has_waveforms(header.format()) || bits & encoding::WAVEFORM_INTERNAL != 0 {
             return Waveforms { there: None, missing: None };
         }
-        let names = [EXTENSION, "WDP"].map(|extension| path.with_extension(extension));
-        let there = names.into_iter().find(|path| path.is_file());
+        let there = named(path);
         let told = there.is_none() && bits & encoding::WAVEFORM_EXTERNAL != 0;
         let missing = told.then(|| {
             format!(
                 "its records refer to waveforms in {}, which is not there: those of outputs will refer \
                  to nothing",
-                path.with_extension(EXTENSION).display()
+                shown(&path.with_extension(EXTENSION))
             )
         });
         Waveforms { there, missing }
     }
+}
+
+/// The file of waveforms that the name of `path` means.
+fn named(path: &Path) -> Option<PathBuf> {
+    let names = [EXTENSION, "WDP"].map(|extension| path.with_extension(extension));
+    names.into_iter().find(|path| path.is_file())
+}
+
+/// The file of waveforms that a LAS file refers to, and the extension that it has beside outputs; None as
+/// well for what is no LAS file, which whoever reads its points will be told.
+pub fn beside(path: &Path) -> Option<(PathBuf, &'static str)> {
+    named(path)?;
+    let header = Header::read(&InputFile::open(path).ok()?).ok()?;
+    Waveforms::of(path, &header).there.map(|file| (file, EXTENSION))
 }

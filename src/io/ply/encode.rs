@@ -169,6 +169,22 @@ impl Plan {
         self.full.vertex.stride + text + widened
     }
 
+    /// Bytes that one vertex takes in the file at least, and in a second one that
+    /// [`rewrite`](super::sink::PlySink) may write while the first is there.
+    pub fn disk_bytes(&self) -> [u64; 2] {
+        // A number in text has a digit and what ends it.
+        let bytes = |vertex: &Schema| match self.encoding {
+            Encoding::Ascii => 2 * vertex.dimensions.len() as u64,
+            _ => vertex.stride as u64,
+        };
+        let full = bytes(&self.full.vertex);
+        match &self.narrow {
+            None => [full, 0],
+            Some(narrow) if narrow.asked == Colors::Eight => [bytes(narrow.vertex()), 0],
+            Some(narrow) => [bytes(narrow.vertex()), full],
+        }
+    }
+
     /// The most bytes that one vertex takes in the file.
     pub fn vertex_bytes(&self) -> usize {
         match self.encoding {

@@ -99,7 +99,7 @@ impl PlyFile {
         };
         Some(format!(
             "{}: {what} behind the {} vertices that the header counts are not read",
-            self.path.display(),
+            crate::error::shown(&self.path),
             self.points
         ))
     }
@@ -111,7 +111,7 @@ impl PlyFile {
             format!(
                 "{}: {numbers} numbers of `float` properties have more digits than a `float` holds \
                  and were rounded to it; `double` in its header keeps them",
-                self.path.display()
+                crate::error::shown(&self.path)
             )
         })
     }

@@ -82,6 +82,12 @@ pub fn chunk(options: &PlyOptions, schema: &Schema, metadata: &Metadata) -> Resu
     sink::PlySink::chunk(options, schema, metadata)
 }
 
+/// Bytes of a vertex in the file that [`create`] would write, at least, and those in its second copy,
+/// where colours may turn out to have another number of bits when many points are written already.
+pub fn disk_bytes(options: &PlyOptions, schema: &Schema, metadata: &Metadata) -> Result<[u64; 2]> {
+    sink::PlySink::disk_bytes(options, schema, metadata)
+}
+
 /// What says who wrote a file, and with blanks behind it brings every header of one file to one length,
 /// whatever its count of vertices.
 const MADE: &str = "made by pointmill";

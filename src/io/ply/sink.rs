@@ -85,6 +85,16 @@ impl PlySink {
         Ok(Plan::new(options, schema, native.as_deref())?.chunk())
     }
 
+    /// Bytes of a vertex on the disk; see [`super::disk_bytes`].
+    pub fn disk_bytes(
+        options: &PlyOptions,
+        schema: &Schema,
+        metadata: &Metadata,
+    ) -> Result<[u64; 2]> {
+        let native = native_of(schema, metadata);
+        Ok(Plan::new(options, schema, native.as_deref())?.disk_bytes())
+    }
+
     /// Makes the colours of a chunk and those of the file so far have as many bits.
     fn fit_colors(&mut self, chunk: &mut Encoded) -> Result<()> {
         let plan = self.plan.clone();
@@ -249,6 +259,6 @@ impl Sink for PlySink {
             self.notes.extend(note(narrow.asked, self.depth));
         }
         let (points, bytes, notes) = (self.points, self.bytes, self.notes);
-        Ok(SinkSummary { points, bytes, notes, beside: None })
+        Ok(SinkSummary { points, bytes, notes })
     }
 }

@@ -292,7 +292,7 @@ fn cut(file: &PlyFile) -> Option<String> {
     file.ends_in_a_number.then(|| {
         format!(
             "{}: the file ends without the end of a line: its last number may be cut short",
-            file.path.display()
+            crate::error::shown(&file.path)
         )
     })
 }
@@ -307,7 +307,8 @@ impl Source for PlySource {
     }
 
     fn inputs(&self) -> Vec<Input> {
-        self.files.iter().map(|f| Input { path: f.path.clone(), points: f.points }).collect()
+        let input = |f: &PlyFile| Input { path: f.path.clone(), points: f.points, beside: None };
+        self.files.iter().map(input).collect()
     }
 
     fn metadata_of(&self, input: usize) -> Result<Metadata> {

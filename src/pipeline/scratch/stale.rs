@@ -8,6 +8,8 @@ use std::io::{self, Read};
 use std::os::fd::{AsFd, OwnedFd};
 use std::path::Path;
 
+use crate::error::shown;
+
 use rustix::fs::{AtFlags, CWD, Dir, FileType, Mode, OFlags, fstat, openat, statat, unlinkat};
 use rustix::io::Errno;
 use rustix::path::Arg;
@@ -77,7 +79,7 @@ pub(super) fn remove_stale(parent: &Path) -> Vec<String> {
         }
         if let Err(cause) = remove_if_dead(&at, name, &host, user) {
             let folder = parent.join(name.to_string_lossy().as_ref());
-            let folder = folder.display();
+            let folder = shown(&folder);
             told.push(format!("{folder}: what a killed run left here cannot be removed: {cause}"));
         }
     }

@@ -116,12 +116,12 @@ impl Numbers {
         Numbers { coder, integers: Box::new(Integers::new()) }
     }
 
-    /// The next number of its kind, 0 or 1; None if there are no more or the bytes are no numbers.
-    pub fn read(&mut self, last: i32, kind: usize) -> Option<i32> {
+    /// The next number of its kind, 0 or 1.
+    pub fn read(&mut self, last: i32, kind: usize) -> Result<i32, Damage> {
         let mut cursor = self.coder.enter(layer::MOST);
         let number = self.integers.read(&mut cursor, last, kind & 1);
         let left = cursor.left();
         self.coder.leave(left);
-        Damage::of(&mut self.coder, None).is_ok().then_some(number)
+        Damage::of(&mut self.coder, None).map(|()| number)
     }
 }
