@@ -11,6 +11,9 @@ use super::stream::{Bytes, WINDOW};
 use super::time::{self, Times};
 use super::wave::{self, Packet, Waves};
 
+/// Bytes of a stream that are read between two looks at the window.
+const PIECE: usize = WINDOW / 4;
+
 /// The decoder of one group of fields.
 enum Fields {
     Point1(Box<point10::First>),
@@ -85,13 +88,16 @@ impl Fields {
                     last.pack(out);
                 }
             }
-            Fields::Bytes(bytes) => {
-                for ((model, last), out) in bytes.iter_mut().zip(out) {
-                    *last = last.wrapping_add(coder.symbol(model) as u8);
-                    *out = *last;
-                }
-            }
+            Fields::Bytes(bytes) => read_bytes(bytes, coder, out),
         }
+    }
+}
+
+/// Reads extra bytes.
+fn read_bytes(bytes: &mut [(Model<257, 256>, u8)], coder: &mut Cursor, out: &mut [u8]) {
+    for ((model, last), out) in bytes.iter_mut().zip(out) {
+        *last = last.wrapping_add(coder.symbol(model) as u8);
+        *out = *last;
     }
 }
 
@@ -110,7 +116,7 @@ impl Interleaved {
     /// A decoder that stands nowhere yet.
     pub fn new(items: &[Item], bytes: Bytes) -> Self {
         let most: usize = items.iter().map(Item::most_bytes).sum();
-        let block = (WINDOW / 4 / most).clamp(1, 64);
+        let block = (PIECE / most.max(1)).clamp(1, 64);
         let (items, fields, coder) = (items.to_vec(), Vec::new(), Coder::new(bytes));
         Interleaved { items, fields, coder, block, most }
     }
@@ -133,6 +139,10 @@ impl Interleaved {
         if !first.is_empty() {
             self.first(first)?;
         }
+        if self.most > PIECE {
+            others.chunks_exact_mut(stride).for_each(|record| self.read_long(record));
+            return Damage::of(&mut self.coder, None);
+        }
         for block in others.chunks_mut(self.block * stride) {
             let mut cursor = self.coder.enter(self.block * self.most);
             for record in block.chunks_exact_mut(stride) {
@@ -147,6 +157,28 @@ impl Interleaved {
             self.coder.leave(left);
         }
         Damage::of(&mut self.coder, None)
+    }
+
+    /// Reads a record that may cost more than a window: its extra bytes some at a time.
+    fn read_long(&mut self, record: &mut [u8]) {
+        let mut rest = record;
+        for (size, fields) in &mut self.fields {
+            let Some((out, behind)) = rest.split_at_mut_checked(*size) else { break };
+            if let Fields::Bytes(bytes) = fields {
+                for (bytes, out) in bytes.chunks_mut(PIECE / 2).zip(out.chunks_mut(PIECE / 2)) {
+                    let mut cursor = self.coder.enter(PIECE);
+                    read_bytes(bytes, &mut cursor, out);
+                    let left = cursor.left();
+                    self.coder.leave(left);
+                }
+            } else {
+                let mut cursor = self.coder.enter(PIECE);
+                fields.read(&mut cursor, out);
+                let left = cursor.left();
+                self.coder.leave(left);
+            }
+            rest = behind;
+        }
     }
 
     /// The first point of a chunk is stored as it is.
