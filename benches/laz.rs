@@ -1,7 +1,8 @@
 //! The decoder of compressed points beside the `laz` crate, on the same file, in turn: CPU time of this
 //! thread a point, and whether the bytes are the same.
 //!
-//! `cargo bench --bench laz -- SCAN.laz …`
+//! `cargo bench --bench laz -- SCAN.laz …`; with one scan and `pointmill` or `crate`, that one alone, once,
+//! as a line of JSON.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints and may fail")]
 
@@ -103,9 +104,22 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
+/// One decoder alone, as a line of JSON.
+fn alone(path: &Path, decode: fn(&Path, bool) -> Run) {
+    let start = std::time::Instant::now();
+    let (seconds, points, _) = decode(path, false);
+    let wall = start.elapsed().as_secs_f64();
+    println!("{{\"cpu_seconds\": {seconds}, \"wall_seconds\": {wall}, \"kept\": {points}}}");
+}
+
 fn main() {
     let paths: Vec<PathBuf> =
         std::env::args_os().skip(1).filter(|a| a != "--bench").map(PathBuf::from).collect();
+    match &paths[..] {
+        [path, which] if which.as_os_str() == "pointmill" => return alone(path, ours),
+        [path, which] if which.as_os_str() == "crate" => return alone(path, theirs),
+        _ => {}
+    }
     println!("| file | points | ns a point | laz crate | ratio | same |");
     println!("|---|--:|--:|--:|--:|---|");
     for path in &paths {

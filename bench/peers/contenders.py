@@ -29,6 +29,7 @@ def pointmill(name: str, job: str, output: str, *arguments: str) -> Contender:
 
 REDUCE, GRID, TO_LAZ, TO_LAS = "LAZ → reduced → LAZ", "LAZ → voxel grid → LAZ", "LAZ → LAZ", "LAZ → LAS"
 NORMALS = "normals, in process"
+DECODE = "LAZ decoded by one thread, in process"
 TO_PLY, FROM_PLY = "LAS → PLY", "PLY → LAS"
 OUT, OUT_LAS, OUT_PLY = "{work}/out.laz", "{work}/out.las", "{work}/out.ply"
 
@@ -52,6 +53,10 @@ CONTENDERS = [
               "--set", "write.path=" + OUT, "--set", "grid.side={side}"),
     python("small_gicp + laspy", GRID, "whole_job", "small_gicp", "{laz}", OUT, "{side}", "{threads}", "grid"),
     python("Open3D + laspy", GRID, "whole_job", "open3d", "{laz}", OUT, "{side}", "{threads}", "grid"),
+    Contender("pointmill", DECODE, ["{cache}/laz", "{laz}", "pointmill"], "bench"),
+    Contender("laz crate", DECODE, ["{cache}/laz", "{laz}", "crate"], "bench"),
+    python("laspy + lazrs", DECODE, "decode", "{laz}", "Lazrs"),
+    python("laspy + LASzip", DECODE, "decode", "{laz}", "Laszip"),
     pointmill("pointmill", TO_LAZ, OUT, "convert", "{laz}", "-o", OUT),
     python("laspy + lazrs", TO_LAZ, "convert", "{laz}", OUT),
     pointmill("pointmill", TO_LAS, OUT_LAS, "convert", "{laz}", "-o", OUT_LAS),

@@ -49,19 +49,22 @@ def python_peers(cache: Path) -> str | None:
 
 
 def bench(cache: Path) -> str | None:
-    """Builds pointmill's bench of search, unless it is fresh, as `search`; why it could not be built, or None."""
-    command = ["cargo", "bench", "--bench", "search", "--no-run", "--message-format=json"]
-    with open(cache / "search.log", "wb") as sink:
+    """Builds pointmill's benches of search and of LAZ, unless they are fresh; why they could not be built, or None."""
+    names = ("search", "laz")
+    chosen = [word for name in names for word in ("--bench", name)]
+    command = ["cargo", "bench", *chosen, "--no-run", "--message-format=json"]
+    with open(cache / "benches.log", "wb") as sink:
         try:
             built = subprocess.run(command, cwd=HERE, stdout=subprocess.PIPE, stderr=sink)
         except OSError as error:
             return f"not built: {error.strerror}"
     if built.returncode != 0:
-        return "not built: see search.log"
+        return "not built: see benches.log"
     messages = [json.loads(line) for line in built.stdout.splitlines()]
-    path = next(m["executable"] for m in messages if m.get("executable") and m["target"]["name"] == "search")
-    (cache / "search").unlink(missing_ok=True)
-    (cache / "search").symlink_to(path)
+    for name in names:
+        path = next(m["executable"] for m in messages if m.get("executable") and m["target"]["name"] == name)
+        (cache / name).unlink(missing_ok=True)
+        (cache / name).symlink_to(path)
     return None
 
 
