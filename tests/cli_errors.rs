@@ -69,7 +69,7 @@ fn defaults_in_the_help_are_those_of_the_pipeline() {
     let help = pointmill(at.path(), &["reduce", "--help"]).stdout;
     let file = include_str!("../pipelines/reduce.toml");
     for (flag, key, default) in [
-        ("--max-angle", "max_angle", "auto"),
+        ("--keep", "keep", "auto"),
         ("--neighbors", "neighbors", "auto"),
         ("--side", "side", "spread"),
         ("--min-spacing", "min_spacing", "auto"),

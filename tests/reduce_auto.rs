@@ -26,6 +26,7 @@ fn by_hand(ran: &Ran, limit: &str) -> String {
     let side = if limit.is_empty() { "'spread'".to_owned() } else { value("side").to_string() };
     let limit = match limit {
         "" => format!("max_angle = {}", value("max_angle")),
+        "keep = 'auto'" => format!("keep = {}", value("keep")),
         keep => keep.to_owned(),
     };
     format!(
@@ -44,7 +45,7 @@ fn what_is_chosen_is_told_and_gives_the_same_bytes_by_hand_and_however_the_scan_
     let go = |stages: &str, settings| {
         run(folder.path(), std::slice::from_ref(&input), stages, "laz", settings).unwrap()
     };
-    for limit in ["", "keep = '25%'", "keep = 6000"] {
+    for limit in ["", "keep = '25%'", "keep = 6000", "keep = 'auto'"] {
         let angle = if limit.is_empty() { "max_angle = 'auto'" } else { limit };
         let auto = format!("{AUTO}{angle}\n{MEDIAN}");
         let whole = go(&auto, Settings::PLAIN);

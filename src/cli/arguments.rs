@@ -219,10 +219,12 @@ pub(super) struct Reduce {
     /// place of a preset's [default: by the noise and the spacing of the scan, which the run tells]
     #[arg(long, value_name = "KIND")]
     pub preset: Option<Preset>,
-    /// Largest range of normal angles in a cell: radians, 6deg, or auto, by the noise [default: auto]
+    /// Instead of a number of points: the largest range of normal angles in a cell, in radians, as 6deg,
+    /// or auto, by the noise
     #[arg(long, value_name = "ANGLE")]
     pub max_angle: Option<String>,
-    /// Instead of an angle: how many points are to stay, such as 10%, 250k or 1e6
+    /// How many points are to stay: 10%, 250k, 1e6, or auto, as many as the noise asks for
+    /// [default: auto]
     #[arg(long, value_name = "TARGET", conflicts_with = "max_angle")]
     pub keep: Option<String>,
     /// Nearest other positions that a normal is computed from; auto takes 10 or, where there is noise,

@@ -116,6 +116,12 @@ fn noise(arguments: &Reduce) -> &str {
     }
 }
 
+/// True if what is left is to be reduced again and nothing says by what: a number would be met at once.
+fn again(arguments: &Reduce) -> bool {
+    let limit = arguments.keep.is_some() || arguments.max_angle.is_some();
+    arguments.passes.is_some_and(|passes| passes > 1) && !limit && arguments.preset.is_none()
+}
+
 /// The flags of `reduce`.
 pub(super) fn reduce_flags(arguments: &Reduce) -> Vec<Flag> {
     let classes = (!arguments.classes.is_empty()).then(|| json!(arguments.classes));
@@ -140,6 +146,7 @@ pub(super) fn reduce_flags(arguments: &Reduce) -> Vec<Flag> {
         ("--split", "cells.split", arguments.split.clone().map(Value::from)),
         ("--method", "normals.method", arguments.method.clone().map(Value::from)),
         ("--passes", "median.passes", arguments.passes.map(Value::from)),
+        ("--passes", "cells.max_angle", again(arguments).then(|| json!("auto"))),
         ("--order", "write.order", arguments.order.clone().map(Value::from)),
         ("--mark", "median.mark", arguments.mark.as_deref().map(whole_or_text)),
         ("--classes", "outliers.classes", classes.clone().filter(|_| arguments.outliers)),

@@ -96,7 +96,10 @@ pub struct Cells {
     /// "auto": four times `normal_scatter`, 0.1 to 1. Not together with `keep`.
     pub max_angle: Option<Setting<Angle>>,
     /// How many records are to stay, instead of `max_angle`: a share of those that the stage decides
-    /// about ("10%", to six decimals, rounded to whole records), or a number (500000, "250k", "5M").
+    /// about ("10%", to six decimals, rounded to whole records), a number (500000, "250k", "5M"), or
+    /// "auto": as many as `max_angle = "auto"` would leave of cubes of 32 positions with a quarter of
+    /// their side as `min_spacing`, by samples. Their number decides then, and the angle is found again
+    /// for what `side` and `min_spacing` come to.
     pub keep: Option<Keep>,
     /// Cells of so many positions or fewer are not divided (the paper's β).
     pub min_points: NonZeroUsize,
@@ -137,6 +140,8 @@ struct Settled {
     min_spacing: u64,
     /// The largest range of angles in radians, where none is to be found.
     max_angle: f64,
+    /// How many records are to stay, where samples decide.
+    target: Option<u64>,
 }
 
 impl Settled {
@@ -228,6 +233,7 @@ impl TileOp for Cells {
             max_side: self.max_side.map_or(u64::MAX, bound),
             min_spacing: self.min_spacing.and_then(Setting::given).map_or(0, bound),
             max_angle: self.max_angle(),
+            target: None,
         });
         self.outlook = Some(Outlook::of(scan));
         Ok(())
@@ -322,7 +328,10 @@ impl Cells {
     /// Binary logarithm of the side that is chosen by itself.
     fn auto_level(&self, levels: &Levels, records: u64) -> u32 {
         let fewest = levels.occupied(62);
-        let most = self.keep.map_or(u64::MAX, |keep| keep.of(records) / 2);
+        let most = match self.keep {
+            None | Some(Keep::Auto) => u64::MAX,
+            Some(keep) => keep.of(records) / 2,
+        };
         let level = levels.smallest_side(POSITIONS_PER_CUBE);
         (level..62)
             .find(|&level| [fewest, most].iter().any(|&n| levels.occupied(level) <= n))

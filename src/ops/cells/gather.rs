@@ -55,7 +55,8 @@ impl ScanOp for Cells {
 
     fn conclude(&mut self, found: &dyn Gathered) -> Result<()> {
         let keep = self.keep.ok_or_else(|| Error::internal("there is no target to reach"))?;
-        self.threshold = Some(Threshold::find(found, keep)?);
+        let auto = self.settled()?.target;
+        self.threshold = Some(Threshold::find(found, keep, auto)?);
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use super::division::{Division, Rule};
 use super::limit::Limit;
-use super::outlook::{self, Sampled};
+use super::outlook::{self, LADDER, Sampled};
 use super::{Cells, Keep};
 use crate::Result;
 use crate::geom::angle::{MaxAngle, is_known};
@@ -13,24 +13,43 @@ use crate::report::Grouped;
 use crate::stage::Forecast;
 use crate::tile::{Cells as Partition, Tile};
 
+/// `min_spacing` of what samples are divided into, as a share of the side.
+const QUARTER: i64 = 4;
+
 /// What a sample says: the scatter of its normals in radians, NaN if it is not planar; how many of how
-/// many positions are expected to stay, 0 of 0 where a target or the scatter decides about that; and
-/// how many of how many positions the stage decides about.
+/// many positions are expected to stay, 0 of 0 where a target or the scatter decides about that;
+/// how many of how many positions the stage decides about; and where the target is left to the scan, how
+/// many are expected to stay at each angle of [`LADDER`].
 pub(super) fn sample(cells: &Cells, tile: &mut Tile) -> Result<Vec<f64>> {
     let scatter = scatter(tile).unwrap_or(f64::NAN);
     let is_given = cells.keep.is_none() && !cells.max_angle.is_some_and(Setting::is_auto);
-    let (kept, of) = if is_given { divided(cells, tile)? } else { (0, 0) };
+    let given = cells.rule(limit(cells.max_angle()))?;
+    let (kept, mut of) = if is_given { divided(given, tile) } else { (0, 0) };
+    let mut steps = Vec::new();
+    if cells.keep == Some(Keep::Auto) {
+        // The side of `side = "auto"` is a power of two of lattice steps; this is one of the scan alone.
+        let side = cells.outlook.as_ref().map_or(given.side, |outlook| outlook.cube(given.side));
+        for angle in LADDER {
+            let min_spacing = given.min_spacing.max((side / QUARTER).unsigned_abs());
+            let rule = Rule { limit: limit(angle), min_spacing, side, ..given };
+            let (kept, positions) = divided(rule, tile);
+            steps.push(kept as f64);
+            of = positions;
+        }
+    }
     let decided = tile.core.clone().filter(|&i| tile.is_chosen(i)).count();
     let counts = [kept, of, decided, tile.core.len()].map(|n| n as f64);
-    Ok([&[scatter], &counts[..]].concat())
+    Ok([&[scatter], &counts[..], &steps].concat())
+}
+
+fn limit(angle: f64) -> Limit {
+    Limit { max_angle: MaxAngle::new(angle), ties: None }
 }
 
 /// Divides the initial cells that lie in the sample as the stage would: how many records of how many
 /// positions stay. Cells are anchored at the sample's corner, so that whole ones are in it.
-fn divided(cells: &Cells, tile: &mut Tile) -> Result<(usize, usize)> {
-    let max_angle = MaxAngle::new(cells.max_angle());
-    let limit = Limit { max_angle, ties: None };
-    let rule = Rule { origin: tile.cube.lo, ..cells.rule(limit)? };
+fn divided(rule: Rule, tile: &mut Tile) -> (usize, usize) {
+    let rule = Rule { origin: tile.cube.lo, ..rule };
     let mut partition = Partition::default();
     let whole = |p: Position| initial_cell(&rule, tile.cube.hi, p);
     let mut placed: Vec<([i64; 3], u32)> = (tile.core.clone())
@@ -49,7 +68,7 @@ fn divided(cells: &Cells, tile: &mut Tile) -> Result<(usize, usize)> {
         division.run(start..start + cell.len(), &mut partition, |_, _| {});
         start += cell.len();
     }
-    Ok((partition.ends.len() + without_normal, positions))
+    (partition.ends.len() + without_normal, positions)
 }
 
 /// Which initial cell `p` is in; none if it is not all within a cube that ends with `last`, unless it
@@ -73,11 +92,29 @@ pub(super) fn forecast(cells: &mut Cells, samples: &[Vec<f64>]) -> Forecast {
     let column = |at: usize| samples.iter().filter_map(move |s| s.get(at).copied());
     let scatter = typical(column(0));
     let (decided, seen) = (column(3).sum::<f64>(), column(4).sum::<f64>());
-    let sampled = Sampled { scatter, chosen: if seen > 0.0 { decided / seen } else { 1.0 } };
+    let chosen = if seen > 0.0 { decided / seen } else { 1.0 };
+    let sampled = Sampled { scatter, chosen, shares: shares(samples) };
     let chosen = outlook::choose(cells, &sampled);
     let decisions = scatter.map(|scatter| ("normal_scatter".into(), scatter.into()));
     let warning = few_asked_for(cells).or_else(|| noisy(cells, samples, scatter?));
     Forecast { decisions: decisions.into_iter().collect(), chosen, warning }
+}
+
+/// The share that stays at each angle of [`LADDER`]. Samples are drawn by rank: each stands for as many
+/// records, however many positions it has.
+fn shares(samples: &[Vec<f64>]) -> Option<[f64; LADDER.len()]> {
+    let each = samples.iter().filter_map(|sample| match sample[..] {
+        [_, _, of, _, _, ref steps @ ..] if of > 0.0 && steps.len() == LADDER.len() => {
+            Some((of, steps))
+        }
+        _ => None,
+    });
+    let (mut sums, mut count) = ([0.0; LADDER.len()], 0.0);
+    for (of, steps) in each {
+        sums.iter_mut().zip(steps).for_each(|(sum, kept)| *sum += kept / of);
+        count += 1.0;
+    }
+    (count > 0.0).then(|| sums.map(|sum| sum / count))
 }
 
 /// Warns of a `keep` that is a handful of a large scan: a percent sign may have been forgotten.

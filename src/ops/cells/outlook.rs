@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{Cells, LARGEST_SIDE, MAX_ANGLE, Side};
+use super::{Cells, Keep, LARGEST_SIDE, MAX_ANGLE, POSITIONS_PER_CUBE, Side};
 use crate::quantity::Setting;
 use crate::stage::ScanFacts;
 use crate::tile::Levels;
@@ -22,6 +22,9 @@ const SPREADABLE: u64 = 3;
 /// Without a number to keep: `min_spacing` in sides of the initial cells.
 const SPACING_OF_SIDE: f64 = 0.25;
 
+/// Angles in radians at which samples are divided, where their number is left to the scan.
+pub(super) const LADDER: [f64; 6] = [MAX_ANGLE, 0.2, 0.35, 0.5, 0.7, WIDEST];
+
 /// What is known of the scan before a sample is looked at.
 #[derive(Debug, Clone)]
 pub(super) struct Outlook {
@@ -39,6 +42,12 @@ impl Outlook {
     /// Records of the scan.
     pub(super) fn records(&self) -> u64 {
         self.records
+    }
+
+    /// Side in steps, `most` or less, of cubes of about as many positions as those of `side = "auto"`.
+    pub(super) fn cube(&self, most: i64) -> i64 {
+        let cubes = self.levels.positions() / POSITIONS_PER_CUBE;
+        (self.grid_side(cubes.max(1)) as i64).clamp(1, most)
     }
 
     /// Side in steps of the cubes of a grid that keeps `count` positions: between the two octree levels
@@ -62,6 +71,31 @@ pub(super) struct Sampled {
     pub(super) scatter: Option<f64>,
     /// Share of the positions that the stage decides about.
     pub(super) chosen: f64,
+    /// Share of those that stays at each angle of [`LADDER`], where that was looked at.
+    pub(super) shares: Option<[f64; LADDER.len()]>,
+}
+
+impl Sampled {
+    /// The angle that noise asks for.
+    fn angle(&self) -> f64 {
+        let angle = self.scatter.map_or(MAX_ANGLE, |scatter| SCATTERS * scatter);
+        (angle.clamp(MAX_ANGLE, WIDEST) * 1e4).round() / 1e4
+    }
+
+    /// Share that stays at that angle: between the two next ones, by powers.
+    fn share(&self) -> Option<f64> {
+        let (angle, shares) = (self.angle(), self.shares?);
+        let at = LADDER.windows(2).position(|step| angle <= step[1])?;
+        let part = libm::log2(angle / LADDER[at]) / libm::log2(LADDER[at + 1] / LADDER[at]);
+        let (from, to) = (libm::log2(shares[at]), libm::log2(shares[at + 1]));
+        Some(libm::exp2(from + part * (to - from)))
+    }
+}
+
+/// A count in three digits: more say nothing, and a user may want to give it by hand.
+fn rounded(count: u64) -> u64 {
+    let unit = 10u64.pow(count.max(1).ilog10().saturating_sub(2));
+    (count / unit).max(1) * unit
 }
 
 /// Settles what is left to it; returns the keys and values.
@@ -71,13 +105,19 @@ pub(super) fn choose(cells: &mut Cells, sampled: &Sampled) -> Vec<(String, Value
     };
     let mut chosen: Vec<(String, Value)> = Vec::new();
     if cells.max_angle.is_some_and(Setting::is_auto) {
-        let angle = sampled.scatter.map_or(MAX_ANGLE, |scatter| SCATTERS * scatter);
-        settled.max_angle = (angle.clamp(MAX_ANGLE, WIDEST) * 1e4).round() / 1e4;
+        settled.max_angle = sampled.angle();
         chosen.push(("max_angle".into(), settled.max_angle.into()));
     }
     // Of a selection no more is known than its share: its cubes are at most those of all.
     let records = (outlook.records as f64 * sampled.chosen) as u64;
-    let count = cells.keep.map(|keep| keep.of(records.max(1)));
+    if cells.keep == Some(Keep::Auto) {
+        let share = sampled.share().unwrap_or(1.0);
+        let count = ((share * records as f64).round() as u64).clamp(1, records.max(1));
+        settled.target = Some(rounded(count));
+        chosen.push(("keep".into(), rounded(count).into()));
+    }
+    let keep = settled.target.map(Keep::Records).or(cells.keep);
+    let count = keep.map(|keep| keep.of(records.max(1)));
     let is_few = |count: &u64| *count <= outlook.levels.positions() / SPREADABLE;
     let grid = count.filter(is_few).map(|count| outlook.grid_side(count));
     if let (Side::Spread, Some(grid)) = (cells.side, grid) {

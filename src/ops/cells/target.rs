@@ -14,6 +14,8 @@ pub enum Keep {
     Share(u64),
     /// So many records.
     Records(u64),
+    /// As many as an angle by the noise of the scan would leave, by samples.
+    Auto,
 }
 
 /// Whole numbers below are exact as f64.
@@ -23,9 +25,11 @@ const WHOLE: f64 = 9_007_199_254_740_992.0;
 const ALL: u64 = 100_000_000;
 
 impl Keep {
-    /// How many of `records` are to stay: rounded to whole ones, halves upwards, at least one.
+    /// How many of `records` are to stay: rounded to whole ones, halves upwards, at least one. All where
+    /// samples decide, until they do.
     pub(super) fn of(self, records: u64) -> u64 {
         match self {
+            Keep::Auto => records,
             Keep::Records(count) => count,
             Keep::Share(share) => {
                 let parts = u128::from(records) * u128::from(share);
@@ -40,6 +44,7 @@ impl fmt::Display for Keep {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Keep::Records(count) => write!(f, "{count}"),
+            Keep::Auto => f.write_str("auto"),
             Keep::Share(share) => {
                 let digits = format!("{}.{:06}", share / 1_000_000, share % 1_000_000);
                 write!(f, "{}%", digits.trim_end_matches('0').trim_end_matches('.'))
@@ -52,7 +57,7 @@ impl Serialize for Keep {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Keep::Records(count) => serializer.serialize_u64(*count),
-            Keep::Share(_) => serializer.collect_str(self),
+            Keep::Share(_) | Keep::Auto => serializer.collect_str(self),
         }
     }
 }
@@ -80,7 +85,7 @@ impl Visitor<'_> for KeepVisitor {
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(
-            "a share such as \"10%\", or a number of points such as 500000, \"250k\" or 1e6",
+            "a share such as \"10%\", a number of points such as 500000, \"250k\" or 1e6, or \"auto\"",
         )
     }
 
@@ -113,6 +118,9 @@ impl Visitor<'_> for KeepVisitor {
     }
 
     fn visit_str<E: Error>(self, text: &str) -> Result<Keep, E> {
+        if text.trim() == "auto" {
+            return Ok(Keep::Auto);
+        }
         let keep = match text.strip_suffix('%') {
             Some(percent) => decimal(percent.trim(), 6)
                 .filter(|share| (1..=ALL).contains(share))

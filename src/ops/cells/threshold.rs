@@ -26,19 +26,20 @@ pub(super) struct Threshold {
 
 impl Threshold {
     /// Of all divisions in order of their ranges, the widest first, and of equal ones in canonical
-    /// order, makes as many as leave no more records than `keep` says. Walks what was found five
-    /// times.
-    pub(super) fn find(found: &dyn Gathered, keep: Keep) -> Result<Self> {
-        let target = keep.of(found.records());
+    /// order, makes as many as leave no more records than `keep` says, or than `auto` where that is left
+    /// to the scan. Walks what was found five times.
+    pub(super) fn find(found: &dyn Gathered, keep: Keep, auto: Option<u64>) -> Result<Self> {
+        let mut target = auto.unwrap_or_else(|| keep.of(found.records()));
         let (mut least, mut more) = (0, 0);
         entry::each(found, |entry| match entry {
             Entry::Kept(records) => least += records,
             Entry::Cell(_) => {}
             Entry::Division { parts, .. } => more += parts,
         })?;
-        if target < least {
+        if target < least && auto.is_none() {
             return Err(too_few(keep, target, least));
         }
+        target = target.max(least);
         let mut left = target - least;
         if more <= left {
             let limit = Limit { max_angle: MaxAngle::NONE, ties: None };
@@ -72,7 +73,9 @@ impl Threshold {
 fn too_few(keep: Keep, target: u64, least: u64) -> Error {
     let told = match keep {
         Keep::Records(_) => format!("`cells.keep` asks for {target} records"),
-        Keep::Share(_) => format!("`cells.keep` asks for {keep}, which is {target} records"),
+        Keep::Share(_) | Keep::Auto => {
+            format!("`cells.keep` asks for {keep}, which is {target} records")
+        }
     };
     Error::pipeline(format!(
         "{told}, and {least} stay however large the angle: one of every cell that must not be \
