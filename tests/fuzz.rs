@@ -12,7 +12,7 @@ use std::time::Duration;
 use fuzz_support::campaign::Campaign;
 use fuzz_support::harness::Harness;
 use fuzz_support::judge::{Judgement, Outcome, refused};
-use fuzz_support::{TARGETS, Target, las, las_seeds, mutate, pipeline, ply, text};
+use fuzz_support::{TARGETS, Target, las, las_seeds, laz, memory, mutate, pipeline, ply, text};
 
 /// Time that one input may take.
 const MOST_TIME: Duration = Duration::from_secs(5);
@@ -50,6 +50,11 @@ fn bounded(target: Target, executions: u64, fewest: usize) {
 #[test]
 fn las_files_of_any_bytes_fail_or_read() {
     bounded(las::TARGET, 2500, 80);
+}
+
+#[test]
+fn compressed_points_of_any_bytes_fail_or_read() {
+    bounded(laz::TARGET, 20_000, 100);
 }
 
 #[test]
@@ -155,4 +160,18 @@ fn planted_failures_are_found_and_made_small() {
         campaign.findings.values().all(|finding| finding.input.len() == 4),
         "as small as can be"
     );
+}
+
+/// A thread that makes what others give back is not taken for one that holds it.
+#[test]
+fn memory_that_other_threads_give_back_does_not_count() {
+    for _ in 0..48 {
+        let large: Vec<u8> = Vec::with_capacity(64 << 20);
+        std::thread::spawn(move || drop(large)).join().unwrap();
+    }
+    let (bytes, peak) = memory::peak_of(|| std::hint::black_box(vec![1u8; 1 << 20]).len());
+    assert_eq!(bytes, 1 << 20);
+    assert!((1 << 20..2 << 20).contains(&peak), "{peak}");
+    let refused = memory::peak_of(|| Vec::<u8>::new().try_reserve_exact(3 << 30).is_err());
+    assert!(refused.0, "so much is refused");
 }

@@ -95,19 +95,36 @@ pub struct Read {
     pub error: Option<String>,
 }
 
+/// Bytes that a part of a source may hold for it to be worth trying.
+const MOST_BYTES: usize = 16 << 20;
+
+/// Reads a source without the dimensions `unread`; none if a part holds too much to be worth trying. The
+/// error is a broken promise.
+pub fn read_without(
+    source: &dyn Source,
+    unread: &[String],
+    allowed: &[ErrorKind],
+) -> Result<Option<Read>, String> {
+    let (stride, says) = (source.schema().stride, source.part_bytes());
+    if says > MOST_BYTES as u64 || stride == 0 {
+        return Ok(None);
+    }
+    read(source, (BATCH_BYTES / stride).clamp(1, 129), unread, allowed).map(Some)
+}
+
 /// Reads a source twice, in batches of different capacity, and compares; none if a part holds too
 /// much to be worth trying. The error is a broken promise.
 pub fn read_twice(source: &dyn Source, allowed: &[ErrorKind]) -> Result<Option<Read>, String> {
     let stride = source.schema().stride;
     let says = usize::try_from(source.part_bytes()).unwrap_or(usize::MAX);
-    if says > 16 << 20 || stride == 0 {
+    if says > MOST_BYTES || stride == 0 {
         return Ok(None);
     }
     // Powers of two divide the number of records after which reading stops.
     let large = (BATCH_BYTES / stride).clamp(1, MOST_RECORDS);
     let large = if large.is_power_of_two() { large } else { large.next_power_of_two() / 2 };
-    let one = read(source, large, allowed)?;
-    let (two, peak) = memory::peak_of(|| read(source, (large / 32).max(1), allowed));
+    let one = read(source, large, &[], allowed)?;
+    let (two, peak) = memory::peak_of(|| read(source, (large / 32).max(1), &[], allowed));
     let two = two?;
     if one.error.is_some() != two.error.is_some() || (one.error.is_none() && one != two) {
         return Err(format!("read twice, it differs: {one:?} and {two:?}"));
@@ -121,12 +138,17 @@ pub fn read_twice(source: &dyn Source, allowed: &[ErrorKind]) -> Result<Option<R
     Ok(Some(one))
 }
 
-fn read(source: &dyn Source, capacity: usize, allowed: &[ErrorKind]) -> Result<Read, String> {
+fn read(
+    source: &dyn Source,
+    capacity: usize,
+    unread: &[String],
+    allowed: &[ErrorKind],
+) -> Result<Read, String> {
     let mut hasher = DefaultHasher::new();
     let mut read = Read { records: 0, hash: 0, all: source.parts() <= MOST_PARTS, error: None };
     let mut batch = PointBatch::new(source.schema().clone(), capacity);
     for index in 0..source.parts().min(MOST_PARTS) {
-        match read_part(source, index, &mut batch, &mut hasher) {
+        match read_part(source, index, unread, &mut batch, &mut hasher) {
             Ok((records, all)) => {
                 read.records += records as u64;
                 read.all &= all;
@@ -156,10 +178,11 @@ fn hash(record: &[u8], layered: bool, hasher: &mut DefaultHasher) {
 fn read_part(
     source: &dyn Source,
     index: usize,
+    unread: &[String],
     batch: &mut PointBatch,
     hasher: &mut DefaultHasher,
 ) -> pointmill::Result<(usize, bool)> {
-    let mut part = source.part(index)?;
+    let mut part = source.part_without(index, unread)?;
     let mut records = 0;
     while records < MOST_RECORDS {
         batch.clear();

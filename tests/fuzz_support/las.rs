@@ -19,16 +19,6 @@ pub const TARGET: Target =
 /// How a file that is no good is refused.
 const REFUSED: &[ErrorKind] = &[Data];
 
-/// True if the points are compressed and have ones in a row that the decoder of the `laz` crate could
-/// overflow its stack by: it calls itself for each symbol that switches to another sequence of times,
-/// and ones are read as thousands of those. To be removed with that decoder.
-fn overflows_the_stack(data: &[u8]) -> bool {
-    const ONES: [u8; 6] = [0xff; 6];
-    let compressed = data.get(104).is_some_and(|format| format & 0x80 != 0);
-    let points = data.get(word::<4>(data, 96) as usize..).unwrap_or_default();
-    compressed && points.windows(ONES.len()).any(|bytes| bytes == ONES)
-}
-
 fn target(path: &Path, data: &[u8]) -> Judgement {
     if let Err(error) = describe(path) {
         judge::proper("describe", &error, REFUSED)?;
@@ -50,10 +40,6 @@ fn target(path: &Path, data: &[u8]) -> Judgement {
     let parts = magnitude(source.parts() as u64);
     marks.push(format!("size: 2^{} points in 2^{parts} parts", magnitude(source.points())));
     twice_the_file(path, &*source)?;
-    if overflows_the_stack(data) {
-        marks.push("ones in compressed points: they are not decoded".to_owned());
-        return Ok(Outcome { accepted: true, marks });
-    }
     let Some(read) = judge::read_twice(&*source, REFUSED)? else {
         marks.push("a part holds too much".to_owned());
         return Ok(Outcome { accepted: true, marks });
@@ -177,7 +163,8 @@ const WORDS: [&[u8]; 10] = [
     b"\xaf\x87",
 ];
 
-fn change(random: &mut Random, data: &mut Vec<u8>, other: &[u8]) {
+/// Changes what describes the points, and bytes anywhere.
+pub fn change(random: &mut Random, data: &mut Vec<u8>, other: &[u8]) {
     match random.below(10) {
         0..3 => {
             let &(at, width) = random.of(&FIELDS);
@@ -193,7 +180,8 @@ fn change(random: &mut Random, data: &mut Vec<u8>, other: &[u8]) {
     }
 }
 
-fn word<const N: usize>(data: &[u8], at: usize) -> u64 {
+/// The number of `N` bytes at `at`.
+pub fn word<const N: usize>(data: &[u8], at: usize) -> u64 {
     let mut bytes = [0; 8];
     if let Some(field) = data.get(at..at + N) {
         bytes[..N].copy_from_slice(field);

@@ -3,14 +3,16 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-/// Bytes that a thread may hold while it takes an input. What asks for more gets nothing, so that the
+/// Bytes that a thread may hold while it takes an input, beyond those before. What asks for more gets nothing, so that the
 /// machine stays usable; code that cannot do without ends the process.
 const REFUSED: isize = 2 << 30;
 
 thread_local! {
     static LIVE: Cell<isize> = const { Cell::new(0) };
     static PEAK: Cell<isize> = const { Cell::new(0) };
-    static WATCHED: Cell<bool> = const { Cell::new(false) };
+    /// What the thread held when the work began that is watched. What it holds at all says little: memory
+    /// that another thread gives back is counted there.
+    static WATCHED: Cell<Option<isize>> = const { Cell::new(None) };
 }
 
 /// Bytes that this thread holds more than it gave back.
@@ -22,7 +24,8 @@ pub fn live() -> isize {
 /// May be nested.
 pub fn peak_of<T>(work: impl FnOnce() -> T) -> (T, usize) {
     let (start, outer) = (LIVE.get(), PEAK.replace(LIVE.get()));
-    let watched = WATCHED.replace(true);
+    let watched = WATCHED.get();
+    WATCHED.set(watched.or(Some(start)));
     let result = work();
     WATCHED.set(watched);
     let peak = PEAK.get();
@@ -39,7 +42,8 @@ fn count(change: isize) -> bool {
     LIVE.try_with(|live| {
         let now = live.get() + change;
         let _ = PEAK.try_with(|peak| peak.set(peak.get().max(now)));
-        if change > 0 && now > REFUSED && WATCHED.try_with(Cell::get).unwrap_or(false) {
+        let start = WATCHED.try_with(Cell::get).ok().flatten();
+        if change > 0 && start.is_some_and(|start| now - start > REFUSED) {
             return false;
         }
         live.set(now);

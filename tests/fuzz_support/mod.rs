@@ -9,6 +9,9 @@ pub mod harness;
 pub mod judge;
 pub mod las;
 pub mod las_seeds;
+pub mod laz;
+#[path = "../laz_support/mod.rs"]
+pub mod laz_support;
 pub mod memory;
 pub mod mutate;
 pub mod pipeline;
@@ -38,4 +41,5 @@ pub struct Target {
 }
 
 /// Every target.
-pub const TARGETS: [Target; 4] = [las::TARGET, ply::TARGET, pipeline::TARGET, text::TARGET];
+pub const TARGETS: [Target; 5] =
+    [las::TARGET, laz::TARGET, ply::TARGET, pipeline::TARGET, text::TARGET];

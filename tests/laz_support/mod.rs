@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
 
 mod colors;
+pub mod damage;
 pub mod points;
 
 use std::fs::File;
@@ -21,6 +22,8 @@ use pointmill::stage::Source;
 pub const RECORD: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 /// Bytes of the header of LAS 1.4.
 const HEADER: usize = 375;
+/// Step of stored coordinates.
+const SCALE: f64 = 0.01;
 
 /// How the points of a file are cut into chunks.
 #[derive(Debug, Clone)]
@@ -125,7 +128,13 @@ impl Recipe {
             file[6] = 16; // The coordinate reference system is WKT.
         }
         for axis in 0..3 {
-            put(&mut file, 131 + 8 * axis, &0.01f64.to_le_bytes());
+            put(&mut file, 131 + 8 * axis, &SCALE.to_le_bytes());
+            let stored = records.chunks(self.stride()).filter_map(|record| {
+                record[4 * axis..].first_chunk().map(|bytes| i32::from_le_bytes(*bytes))
+            });
+            let (lo, hi) = stored.fold((i32::MAX, i32::MIN), |(lo, hi), v| (lo.min(v), hi.max(v)));
+            put(&mut file, 179 + 16 * axis, &(f64::from(hi) * SCALE).to_le_bytes());
+            put(&mut file, 187 + 16 * axis, &(f64::from(lo) * SCALE).to_le_bytes());
         }
         put(&mut file, 247, &u64::from(points).to_le_bytes());
         put(&mut file, HEADER + 2, b"laszip encoded");
