@@ -226,7 +226,7 @@ fn values_of_flags_are_told_what_is_right() {
         ("--offset", "1,2", "error: --offset: takes a list of 3 values, not 2 values\n"),
         ("--mark", "keypoint", "= did you mean `key-point`?"),
         ("--side", "atuo", "= did you mean `auto`?"),
-        ("--keep", "lots", "error: --keep: takes a share such as \"10%\", or a number of points"),
+        ("--keep", "lots", "error: --keep: takes a share such as \"10%\", a number of points"),
         ("--withheld", "drp", "error: --withheld: cannot be `drp`\n"),
         ("--method", "pcb", "= did you mean `pca`? valid: pca, varady"),
     ] {

@@ -119,6 +119,7 @@ impl Pipeline {
         let limit = settings.memory.unwrap_or_else(default_limit);
         let chunks = chunks(&sinks, &*source)?;
         let needs = passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect();
+        let gathers = sorted.ops.iter().any(|stage| matches!(stage.op, Op::Scan(_)));
         let has_cells = sorted.ops.iter().any(|stage| stage.op.tile().needs().cells);
         let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
         let removes = !(sorted.transforms.is_empty() && sorted.ops.is_empty());
@@ -132,6 +133,7 @@ impl Pipeline {
             passes: needs,
             tagged: tagger.tags(),
             run_most: settings.tile_points.map(|points| (points.get() as u64).saturating_mul(4)),
+            gathers,
             has_cells,
             ..Demands::of(&*source, &chunks, limit, threads)
         };

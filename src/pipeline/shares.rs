@@ -61,6 +61,8 @@ pub struct Demands {
     pub ranked: bool,
     /// Records that a run has at most, if something other than the memory bounds it.
     pub run_most: Option<u64>,
+    /// True if a stage decides by figures of the whole scan, which are kept until it does.
+    pub gathers: bool,
     /// True if a stage decides about cells together: how many points those have only the decode
     /// tells.
     pub has_cells: bool,
@@ -107,6 +109,7 @@ impl Demands {
             tagged: false,
             ranked: false,
             run_most: None,
+            gathers: false,
             has_cells: false,
             passes: Vec::new(),
         }
@@ -270,6 +273,7 @@ impl Demands {
     fn free(&self, shares: &Shares) -> u64 {
         let each = (self.stride as u64).saturating_add(KEPT_BYTES);
         let each = each.saturating_add(if self.ranked { 8 } else { 0 });
+        let each = each.saturating_add(if self.gathers { GATHERED_BYTES } else { 0 });
         let kept = shares.kept_in_memory.min(self.points.saturating_mul(each));
         let taken = shares.base.saturating_add(shares.index).saturating_add(kept);
         self.limit.saturating_sub(taken).saturating_sub(MILL_SPARE)
@@ -343,6 +347,9 @@ const SPARE: (u64, u64) = (3, 4);
 /// Bytes that a record kept in memory takes at most besides its own: its place in the order, its
 /// position in a run and in the merged scan, its copies, its state, its fate; tags included.
 const KEPT_BYTES: u64 = 12 + 28 + 24 + 4 + 1 + 4;
+
+/// The same of what a first phase leaves: a normal, a figure, and two entries of what it found.
+const GATHERED_BYTES: u64 = (NORMAL_BYTES + FIGURE_BYTES + 2 * size_of::<[u64; 2]>()) as u64;
 
 #[cfg(test)]
 mod tests;

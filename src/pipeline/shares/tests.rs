@@ -17,6 +17,7 @@ fn demands(limit: u64) -> Demands {
         tagged: false,
         ranked: false,
         run_most: None,
+        gathers: false,
         has_cells: true,
         passes: vec![vec![Needs { neighbors: 10, bytes_per_point: 40, ..Needs::default() }]],
     }
