@@ -111,7 +111,8 @@ fn cut(
     held: u64,
 ) -> Result<Cut> {
     let wanted = job.tile_points.map_or(zone_of(shares.tile_positions), |points| points as u64);
-    let free = job.budget.free().saturating_add(held).saturating_sub(MILL_SPARE);
+    let later = demands.gathered(shares).saturating_add(MILL_SPARE);
+    let free = job.budget.free().saturating_add(held).saturating_sub(later);
     let largest = demands.tile_positions(job.threads, free).max(shares.tile_positions);
     let (good, lowest) = (cells.level(CELLS_ACROSS), cells.level(1));
     let mut tries =

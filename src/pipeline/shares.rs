@@ -269,12 +269,18 @@ impl Demands {
         (enough << 20).saturating_add(RESIDENT_VARIES)
     }
 
+    /// Bytes of memory that first phases of stages leave at most, while the mill has its tiles.
+    pub fn gathered(&self, shares: &Shares) -> u64 {
+        let each = if self.gathers { GATHERED_BYTES } else { 0 };
+        shares.kept_in_memory.min(self.points.saturating_mul(each))
+    }
+
     /// Bytes that `shares` leave the mill at least.
     fn free(&self, shares: &Shares) -> u64 {
         let each = (self.stride as u64).saturating_add(KEPT_BYTES);
         let each = each.saturating_add(if self.ranked { 8 } else { 0 });
-        let each = each.saturating_add(if self.gathers { GATHERED_BYTES } else { 0 });
         let kept = shares.kept_in_memory.min(self.points.saturating_mul(each));
+        let kept = kept.saturating_add(self.gathered(shares)).min(shares.kept_in_memory);
         let taken = shares.base.saturating_add(shares.index).saturating_add(kept);
         self.limit.saturating_sub(taken).saturating_sub(MILL_SPARE)
     }
