@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::arguments::Convert;
 use super::console::Console;
 use super::run::{HIDDEN, filtered, given, mill, with_stages, written};
-use super::words::{self, Flag};
+use super::words::{self, Flag, Given};
 use crate::budget::Bytes;
 use crate::error::shown;
 use crate::io::las;
@@ -150,11 +150,11 @@ pub(super) fn flags(
     output: Option<Value>,
 ) -> Vec<Flag> {
     let mut all = words::flags([
-        ("IN", "read.path", inputs),
-        ("-o", "write.path", output),
-        ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
-        ("--headers", "run.headers", arguments.headers.as_deref().map(Value::from)),
-        ("--nonfinite", "run.nonfinite", arguments.nonfinite.as_deref().map(Value::from)),
+        ("IN", "read.path", inputs.map(Given::from)),
+        ("-o", "write.path", output.map(Given::from)),
+        ("--to", "write.format", arguments.to.clone().map(Given::from)),
+        ("--headers", "run.headers", arguments.headers.clone().map(Given::from)),
+        ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(Given::from)),
     ]);
     all.extend(filtered(&arguments.filter));
     all.extend(written(&arguments.written));

@@ -56,7 +56,7 @@ fn settings(arguments: &arguments::Picture) -> Settings {
             arguments::By::Intensity => By::Intensity,
         },
         width: arguments.width,
-        threads: arguments.threads.map_or_else(processors, usize::from),
+        threads: arguments.threads.unwrap_or_else(processors),
     }
 }
 

@@ -364,7 +364,7 @@ fn some_scale<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D:
         type Value = [f64; 3];
 
         fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("a number above 0, or three of them")
+            f.write_str("a number above 0 without a unit, or three of them")
         }
 
         fn visit_i64<E: de::Error>(self, scale: i64) -> Result<Self::Value, E> {
