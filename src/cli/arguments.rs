@@ -232,7 +232,7 @@ pub(super) struct Reduce {
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
     /// Settings for a kind of scan, or those of the published method (paper); other options take the
-    /// place of a preset's [default: by the noise and the spacing of the scan, which the run tells]
+    /// place of a preset's [default: by the noise and the spacing of the scan; the run says what it chose]
     #[arg(long, value_name = "KIND")]
     pub preset: Option<Preset>,
     /// Instead of a number of points: the largest range of normal angles in a cell, in radians, as 6deg,

@@ -66,7 +66,7 @@ pub(super) fn told(error: &clap::Error, all: &Command, typed: &[OsString]) -> Op
         }
         ErrorKind::InvalidValue if value.is_empty() => {
             let lacks = argument.split_whitespace().nth(1).unwrap_or("a value");
-            message(&format!("{name}: there is no {lacks} behind it"), name, "")
+            message(&format!("{name} needs a value: {lacks}"), name, "")
         }
         ErrorKind::InvalidValue => {
             let valid = contexts(error, ContextKind::ValidValue);
@@ -102,7 +102,7 @@ pub(super) fn told(error: &clap::Error, all: &Command, typed: &[OsString]) -> Op
             let others: Vec<&str> =
                 others.iter().filter_map(|other| other.split_whitespace().next()).collect();
             match others.contains(&name) {
-                true => message(&format!("{name}: is given twice"), name, ""),
+                true => message(&format!("{name} is given twice"), name, ""),
                 false => format!(
                     "error: {name} and {} do not go together\nhelp: leave one of them out",
                     others.join(", ")
@@ -127,9 +127,14 @@ fn context(error: &clap::Error, kind: ContextKind) -> String {
 
 /// As the mistakes of pipelines are told.
 fn message(told: &str, typed: &str, note: &str) -> String {
+    format!("error: {}", marked(told, typed, note))
+}
+
+/// What is wrong with the text `typed`, which is shown with a caret below it.
+pub(super) fn marked(told: &str, typed: &str, note: &str) -> String {
     let carets = "^".repeat(typed.chars().count().max(1));
     let note = if note.is_empty() { String::new() } else { format!("\n   = {note}") };
-    format!("error: {told}\n   | {typed}\n   | {carets}{note}")
+    format!("{told}\n   | {typed}\n   | {carets}{note}")
 }
 
 /// "did you mean `--output` or `--outdir`? ", or nothing.
@@ -141,13 +146,14 @@ fn meant<'a>(words: impl Iterator<Item = &'a String>) -> String {
     }
 }
 
-/// The options that a wrong one may mean: those that it is the beginning of, in the order of the help,
+/// The options that a wrong one may mean: those that it is the beginning of, first what has a short name,
 /// else the nearest.
 fn like(command: &Command, option: &str) -> Vec<String> {
     let shown = |argument: &Arg| !argument.is_hide_set();
-    let names = command.get_arguments().filter(|argument| shown(argument));
-    let names: Vec<String> =
-        names.filter_map(|argument| Some(format!("--{}", argument.get_long()?))).collect();
+    let mut known: Vec<&Arg> = command.get_arguments().filter(|argument| shown(argument)).collect();
+    known.sort_by_key(|argument| argument.get_short().is_none());
+    let name = |argument: &Arg| Some(format!("--{}", argument.get_long()?));
+    let names: Vec<String> = known.into_iter().filter_map(name).collect();
     let begun = names.iter().filter(|name| option.len() > 3 && name.starts_with(option));
     let begun: Vec<String> = begun.cloned().collect();
     match begun.is_empty() {

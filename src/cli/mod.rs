@@ -34,7 +34,7 @@ use console::Console;
 
 /// What helps where an argument is no text.
 const UNREADABLE: &str = "\
-    help: rename the file, or name its folder or a pattern: the files that these mean may have any name";
+    help: rename the file: pipelines and reports could not say its name";
 
 /// Runs the command that the process was started with; pipelines may name the kinds of `registry`.
 pub fn main(registry: &Registry) -> ExitCode {

@@ -101,7 +101,12 @@ impl Fault {
             Problem::Missing(key) => Mistake::new(place, format!("`{subject}` needs `{key}`")),
             Problem::Wrong(what, near) => {
                 let near = near.as_ref().map(|near| format!("did you mean `{near}`?"));
-                Mistake::new(place, format!("`{key}`: {what}")).note(near.unwrap_or_default())
+                // A message may begin with the key that it is about.
+                let told = match what.strip_prefix(key).and_then(|rest| rest.strip_prefix(' ')) {
+                    Some(rest) => format!("`{key}`: {rest}"),
+                    None => format!("`{key}`: {what}"),
+                };
+                Mistake::new(place, told).note(near.unwrap_or_default())
             }
         }
     }
