@@ -230,7 +230,7 @@ fn a_run_that_leaves_nothing_says_so() {
         let filter = "[[stage]]\nkind = 'filter'\nkeep_classes = [40]\n";
         let told = heard(&scan, "laz", &format!("{filter}{stages}"), "");
         assert_eq!(told.0.result.ledger.kept, 0);
-        assert_told(told, &["no point is left of 3,000: 3,000 removed (filter)"]);
+        assert_told(told, &["no point is left of 3,000: 3,000 (filter)"]);
     }
 }
 
@@ -252,7 +252,12 @@ fn a_scan_without_classes_has_none_to_keep_and_none_to_drop() {
     assert_eq!(done.report.result.ledger.kept, 2);
     let error = run("keep_classes = [2]").unwrap_err();
     let told = error.to_string();
-    assert!(told.contains("`filter` keeps by Classification, which the input does not"), "{told}");
+    assert!(
+        told.contains(
+            "`filter.keep_classes` selects points by Classification, which the input does not"
+        ),
+        "{told}"
+    );
     assert!(error.remedy().unwrap().contains("filter.keep_classes"));
 }
 

@@ -131,7 +131,7 @@ impl de::Error for Fault {
         // What is expected quotes the words that it can be: a number above 0, or "auto".
         // Its examples ("10%", "2m") are none that anyone meant.
         let words = takes.split('"').skip(1).step_by(2);
-        let is_word = |word: &&str| word.chars().all(char::is_alphabetic);
+        let is_word = |word: &&str| !word.contains(|c: char| c.is_ascii_digit());
         let words: Vec<String> = words.filter(is_word).map(str::to_owned).collect();
         let near = match found {
             Unexpected::Str(text) => nearest(text, &words).map(|near| near.as_str().into()),
