@@ -216,7 +216,10 @@ fn a_limit_that_no_point_meets_is_said() {
     let scan = Scan::synthetic(Scene::Als, 3_000, 2);
     let limited = |limit: &str| REDUCE.replace("'\n", &format!("'\n{limit}\n"));
     let told = heard(&scan, "laz", &limited("classes = [40, 41]"), "");
-    assert_told(told, &["no point is of class 40 or 41: stages that are limited"]);
+    assert_told(
+        told,
+        &["no point is of class 40 or 41: what was asked for those points did nothing"],
+    );
     let told = heard(&scan, "laz", &limited("with = ['synthetic']"), "");
     assert_told(told, &["no point is with the flag synthetic"]);
     let (_, silent) = heard(&scan, "laz", &limited("classes = [2]"), "");
@@ -230,7 +233,7 @@ fn a_run_that_leaves_nothing_says_so() {
         let filter = "[[stage]]\nkind = 'filter'\nkeep_classes = [40]\n";
         let told = heard(&scan, "laz", &format!("{filter}{stages}"), "");
         assert_eq!(told.0.result.ledger.kept, 0);
-        assert_told(told, &["no point is left of 3,000: 3,000 (filter)"]);
+        assert_told(told, &["no point is left of 3,000: 3,000 removed (filter)"]);
     }
 }
 
