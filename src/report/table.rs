@@ -80,7 +80,11 @@ fn removed_line(f: &mut fmt::Formatter<'_>, ledger: &Ledger) -> fmt::Result {
     for (i, Removed { stage, reason, records }) in ledger.removed.iter().filter(others).enumerate()
     {
         let before = if i == 0 { "\nleft out   " } else { ", " };
-        write!(f, "{before}{} {reason} ({stage})", Grouped(*records))?;
+        let records = Grouped(*records);
+        match reason.as_str() {
+            "removed" => write!(f, "{before}{records} ({stage})")?,
+            _ => write!(f, "{before}{records} {reason} ({stage})")?,
+        }
     }
     Ok(())
 }

@@ -125,7 +125,9 @@ impl<'de> Visitor<'de> for ReferenceVisitor {
         }
         match direction(vector) {
             Some(_) => Ok(Reference::Vector(vector)),
-            None => Err(A::Error::invalid_value(Unexpected::Other("no direction"), &self)),
+            None => {
+                Err(A::Error::custom("a vector [x, y, z] is of finite numbers, one of them not 0"))
+            }
         }
     }
 }
