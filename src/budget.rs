@@ -279,7 +279,7 @@ mod tests {
         assert_eq!(error.kind(), ErrorKind::Memory);
         assert_eq!(
             error.to_string(),
-            "the tile needs 41MiB of memory, but 28 MiB of the budget of 128 MiB is free"
+            "the tile needs 41 MiB of memory, but 28 MiB of the budget of 128 MiB is free"
         );
         assert_eq!(error.remedy(), Some("give at least `run.memory = \"141MiB\"`"));
         assert_eq!(budget.used(), 100 * MIB);

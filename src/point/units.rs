@@ -204,8 +204,11 @@ mod tests {
                 Units { horizontal_unknown: true, ..heights(1.0) },
                 "the unit of x and y is not known",
             ),
-            (unknown(none), "none whose units are known"),
-            (Units { horizontal_unknown: true, ..none }, "none whose units are known"),
+            (unknown(none), "the units of the scan's reference system are not known here"),
+            (
+                Units { horizontal_unknown: true, ..none },
+                "the units of the scan's reference system are not known here",
+            ),
         ];
         for units in silent {
             assert_eq!((units.mismatch(), units.doubt()), (None, None), "{units:?}");
