@@ -127,7 +127,7 @@ fn a_forecast_warns_where_scatter_exceeds_the_angle() {
     assert_eq!(
         forecast.warning.as_deref(),
         Some(
-            "normals scatter 0.14 rad, above `cells.max_angle = 0.1`: expect about 52 % of the points \
+            "normals scatter 0.14 rad, more than the largest angle of a cell, 0.1 rad: expect about 52 % of the points \
              to stay; raise `normals.neighbors` or `cells.max_angle`, or give `cells.keep`"
         )
     );

@@ -258,7 +258,9 @@ fn meant(text: &str) -> Option<String> {
     let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic())?);
     let of = |unit: &str| UNITS.iter().find(|(known, _)| known.eq_ignore_ascii_case(unit));
     let (unit, _) = of(unit).or_else(|| of(&format!("{unit}iB")))?;
-    Some(format!("{}{unit}", number.trim_end())).filter(|size| parse_bytes(size).is_ok())
+    // What is written as it was typed is wrong for another reason.
+    Some(format!("{}{unit}", number.trim_end()))
+        .filter(|size| size != text && parse_bytes(size).is_ok())
 }
 
 fn some_bytes<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u64>, D::Error> {
