@@ -418,6 +418,7 @@ pub(super) enum From {
 pub(super) enum By {
     Height,
     Class,
+    #[value(alias = "colour")]
     Color,
     Intensity,
 }
