@@ -116,6 +116,11 @@ pub trait Transform: Send + Sync {
         Ok(())
     }
 
+    /// What it was asked to do and has nothing to do of with records of a schema.
+    fn warnings(&self, _schema: &Schema) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Called for every batch, from several threads at once. Points that it removes are entered in
     /// the ledger by the caller.
     fn apply(&self, batch: &mut PointBatch) -> Result<()>;

@@ -135,7 +135,7 @@ fn a_forecast_warns_where_scatter_exceeds_the_angle() {
     assert_eq!(stage.forecast(&samples).warning, None);
     stage.max_angle = Some(Angle::degrees(6.0).unwrap().into());
     let told = stage.forecast(&samples).warning.unwrap();
-    assert!(told.contains("8.1deg, above `cells.max_angle = \"6deg\"`"), "{told}");
+    assert!(told.contains("8.1deg, ") && told.contains("6deg"), "{told}");
     stage.max_angle = radians(0.1);
     assert_eq!(stage.forecast(&samples[..1]).warning, None);
     assert!(stage.forecast(&samples[1..2]).decisions.is_empty(), "nothing is planar");

@@ -57,7 +57,8 @@ proptest! {
     ) {
         let mut stage = cells(side as f64, delta, split);
         stage.min_points = NonZeroUsize::new(min_points).unwrap();
-        (stage.measure, stage.reference) = (measure, reference);
+        stage.measure = measure;
+        stage.reference = (measure == Measure::Axis).then_some(reference);
         stage.min_spacing = bounds.0.map(length).map(spacing);
         stage.max_side = bounds.1.map(length);
         let plain = plain_groups(&scan, &stage, side);
@@ -287,9 +288,9 @@ fn cones_see_what_turns_about_the_reference() {
     });
     let mut stage = cells(1e6, 0.1, Split::Voronoi);
     assert_eq!(run_whole(stage.clone(), &roll).groups.len(), 1, "blind");
-    stage.reference = Reference::Y;
+    stage.reference = Some(Reference::Y);
     assert!(run_whole(stage.clone(), &roll).groups.len() >= 8);
-    (stage.measure, stage.reference) = (Measure::Cone, Reference::X);
+    (stage.measure, stage.reference) = (Measure::Cone, None);
     let outcome = run_whole(stage.clone(), &roll);
     assert!((8..=40).contains(&outcome.groups.len()), "{}", outcome.groups.len());
     // Rows of one normal are 0.02 rad apart: a cone of 0.1 holds at most 6 of them.

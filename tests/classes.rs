@@ -251,8 +251,15 @@ fn a_scan_without_classes_has_none_to_keep_and_none_to_drop() {
         let pipeline = Pipeline::parse(&text, "test.toml", &Registry::builtin()).unwrap();
         pipeline.plan(&Overrides::default())?.run(&Heard::default())
     };
-    let done = run("drop_classes = [7, 18]").unwrap();
+    let done = run("drop_classes = [7, 18]\ndrop_flags = ['withheld']").unwrap();
     assert_eq!(done.report.result.ledger.kept, 2);
+    assert_eq!(
+        done.report.run.warnings,
+        [
+            "the input has no classes: `filter.drop_classes` leaves no point out",
+            "the input has no flag withheld: `filter.drop_flags` leaves no point out by it"
+        ]
+    );
     let error = run("keep_classes = [2]").unwrap_err();
     let told = error.to_string();
     assert!(

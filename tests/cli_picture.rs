@@ -6,7 +6,7 @@ mod scans_support;
 
 use std::fs;
 
-use scans_support::command::{done, fails, scans};
+use scans_support::command::{done, fails, pointmill, scans};
 
 #[test]
 fn scans_of_all_formats_are_drawn_side_by_side() {
@@ -42,4 +42,36 @@ fn what_is_wrong_with_a_picture_is_told() {
     fails(at.path(), &["picture", "a.laz", "-o", "p.png", "--width", "5"], 2, &["64 to 4096"]);
     fails(at.path(), &["picture", "none.laz", "-o", "p.png"], 1, &["none.laz: "]);
     assert!(!at.path().join("p.png").exists());
+}
+
+#[test]
+fn a_scan_without_colours_is_drawn_and_told_to_be_black() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let ply = |red: u8| {
+        let vertices: String =
+            (0..9).map(|i| format!("{}.00001 {}.00002 {i} {red} 0 0 0\n", i % 3, i / 3)).collect();
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 9\nproperty double x\nproperty double y\n\
+             property double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+             property ushort intensity\nend_header\n{vertices}"
+        )
+    };
+    fs::write(at.join("none.ply"), ply(0)).unwrap();
+    fs::write(at.join("red.ply"), ply(9)).unwrap();
+    let drawn = |by: &str| {
+        let both = ["picture", "none.ply", "red.ply", "-o", "p.png", "--by", by, "--width", "4096"];
+        let (code, stdout, stderr) = pointmill(at, &both);
+        assert_eq!(code, 0, "{stderr}");
+        assert!(stdout.contains("pixel      0.000978\n"), "{stdout}");
+        stderr
+    };
+    let told = "warning: none.ply: all colours are 0, so that the scan is drawn black: use `--by height` or";
+    for by in ["color", "colour"] {
+        let stderr = drawn(by);
+        assert!(stderr.starts_with(told) && stderr.lines().count() == 1, "{stderr}");
+    }
+    let stderr = drawn("intensity");
+    assert_eq!(stderr.matches("all intensities are 0").count(), 2, "{stderr}");
+    assert_eq!(drawn("height"), "");
 }

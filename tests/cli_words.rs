@@ -529,3 +529,61 @@ fn completions_and_manual_pages_know_every_command_and_flag() {
     let pages = fs::read_dir(at.path().join("new/man1")).unwrap().count();
     assert!(pages >= 11, "{pages} pages");
 }
+
+#[test]
+fn a_reference_is_never_ignored() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    let reduce = ["reduce", "a.laz", "-o", "o.laz", "--reference", "z"];
+    let wrong = told(at, &reduce, 2);
+    assert!(wrong.contains("`--reference` needs `--measure axis`"), "{wrong}");
+    assert!(wrong.contains("add `--measure axis`, or leave `--reference` out"), "{wrong}");
+    done(at, &[&reduce[..], &["--measure", "axis"]].concat());
+    done(at, &[&reduce[..], &["--preset", "paper"]].concat());
+}
+
+#[test]
+fn a_scan_without_gps_time_is_told_nothing_of_it() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    case(at, "50-rgb8.ply");
+    done(at, &["convert", "50-rgb8.ply", "-o", "x.las", "--scale", "0.001"]);
+    let ply = |time: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\n\
+             property double z\nproperty double {time}\nend_header\n1 2 3 4\n"
+        )
+    };
+    fs::write(at.join("timed.ply"), ply("gps_time")).unwrap();
+    let convert = ["convert", "timed.ply", "-o", "x.las", "--scale", "0.001"];
+    let (code, _, stderr) = pointmill(at, &convert);
+    assert!(code == 0 && stderr.contains("the input does not say what it counts"), "{stderr}");
+    done(at, &[&convert[..], &["--drop", "GpsTime"]].concat());
+}
+
+#[test]
+fn classes_that_no_record_has_are_told_in_every_command() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    case(at, "98-noclass.ply");
+    for command in ["reduce", "convert"] {
+        let drop = [command, "98-noclass.ply", "-o", "o.ply", "--drop-classes", "7"];
+        let (code, _, stderr) = pointmill(at, &drop);
+        assert_eq!(code, 0, "{stderr}");
+        let warning = "warning: the input has no classes: `--drop-classes` leaves no point out";
+        assert!(stderr.contains(warning), "{stderr}");
+        told(at, &[command, "98-noclass.ply", "-o", "o.ply", "--keep-classes", "2"], 2);
+    }
+}
+
+#[test]
+fn a_scan_of_which_no_point_fits_is_refused_before_the_work() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    case(at, "108-float-utm.ply");
+    let reduce = ["reduce", "108-float-utm.ply", "-o", "x.las", "--scale", "0.001"];
+    let refused = told(at, &reduce, 1);
+    assert!(refused.contains("help: ") && refused.contains("--offset"), "{refused}");
+    assert!(!refused.contains("if such a point is kept"), "{refused}");
+    assert!(!refused.contains("chosen"), "it is told after the decode: {refused}");
+}

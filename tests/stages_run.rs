@@ -221,6 +221,7 @@ fn a_median_that_marks_sets_the_key_point_flag_of_what_it_would_keep() {
         assert_many_tiles(&report);
         assert_eq!(report["result"]["ledger"]["kept"], input.len());
         assert_eq!(report["result"]["counts"]["median_marked"], input.len() - reduced.len());
+        assert_eq!(report["result"]["counts"]["key_points"], reduced.len());
     }
 }
 

@@ -428,6 +428,7 @@ pub(super) enum From {
 pub(super) enum By {
     Height,
     Class,
+    #[value(alias = "colour")]
     Color,
     Intensity,
 }

@@ -9,7 +9,7 @@ use crate::budget::Bytes;
 use crate::error::shown;
 use crate::picture::{By, Picture, Settings, View};
 use crate::pipeline::{Files, Read, Trouble, Use, publish_bytes};
-use crate::report::Grouped;
+use crate::report::{Grouped, Short};
 use crate::stage::Source;
 use crate::tile::lock;
 use crate::{Error, Result};
@@ -39,6 +39,8 @@ pub(super) fn picture(arguments: &arguments::Picture) -> Result<()> {
     let trouble = Trouble::default();
     publish_bytes(path, &bytes, &trouble)?;
     lock(&trouble).iter().for_each(|told| print::warning(told));
+    let black = arguments.inputs.iter().zip(&picture.black).filter(|(_, black)| **black);
+    black.for_each(|(input, _)| print::warning(&blackness(input, arguments.by)));
     print::result(told(&picture, arguments, bytes.len() as u64))
 }
 
@@ -63,6 +65,24 @@ fn settings(arguments: &arguments::Picture) -> Settings {
     }
 }
 
+/// What is told of a scan that is black throughout.
+fn blackness(input: &str, by: arguments::By) -> String {
+    let what = if by == arguments::By::Intensity { "intensities" } else { "colours" };
+    format!(
+        "{input}: all {what} are 0, so that the scan is drawn black: use `--by height` or `--by class`"
+    )
+}
+
+/// The ends of a range in as many digits as tell a thousandth of it apart.
+fn range([low, high]: [f64; 2]) -> String {
+    let span = high - low;
+    if !(span > 0.0 && span.is_finite()) {
+        return format!("{} to {}", Short(low), Short(high));
+    }
+    let decimals = (2.0 - span.log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{low:.decimals$} to {high:.decimals$}")
+}
+
 /// What the picture shows, as a few lines.
 fn told(picture: &Picture, arguments: &arguments::Picture, bytes: u64) -> String {
     let mut told = String::new();
@@ -73,12 +93,28 @@ fn told(picture: &Picture, arguments: &arguments::Picture, bytes: u64) -> String
         }
         told.push('\n');
     }
-    if let Some([low, high]) = picture.range {
-        told += &format!("colours    {low} to {high}\n");
+    if let Some(ends) = picture.range {
+        told += &format!("colours    {}\n", range(ends));
     }
     let Picture { width, height, pixel, .. } = picture;
     let (path, bytes) = (shown(&arguments.output), Bytes(bytes));
-    told + &format!(
-        "pixel      {pixel:.4}\noutput     {path}, {width} × {height} pixels, {bytes}\n"
-    )
+    let pixel = Short(*pixel);
+    told + &format!("pixel      {pixel}\noutput     {path}, {width} × {height} pixels, {bytes}\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_have_the_digits_that_tell_a_thousandth_apart() {
+        for (ends, told) in [
+            ([-2.921_750_068_664_551, 13.456_789], "-2.9 to 13.5"),
+            ([0.0, 65_535.0], "0 to 65535"),
+            ([1e-6, 3e-6], "0.00000100 to 0.00000300"),
+            ([2.5, 2.5], "2.50 to 2.50"),
+        ] {
+            assert_eq!(range(ends), told);
+        }
+    }
 }

@@ -117,8 +117,9 @@ pub struct Cells {
     pub split: Split,
     /// What the range of angles of a cell is.
     pub measure: Measure,
-    /// Direction N that `measure = "axis"` takes angles to: an axis, or a vector of any length.
-    pub reference: Reference,
+    /// Direction N that `measure = "axis"` takes angles to: an axis, or a vector of any length. Not with
+    /// `measure = "cone"`, which has no use for it.
+    pub reference: Option<Reference>,
     #[serde(skip)]
     settled: Option<Settled>,
     /// What is known of the scan, for what samples decide.
@@ -162,7 +163,7 @@ impl Default for Cells {
             by: Vec::new(),
             split: Split::Voronoi,
             measure: Measure::Axis,
-            reference: Reference::X,
+            reference: None,
             settled: None,
             outlook: None,
             threshold: None,
@@ -170,7 +171,7 @@ impl Default for Cells {
     }
 }
 
-/// The keys; `max_angle` as what it is where it was not given.
+/// The keys; `max_angle` and `reference` as what they are where they were not given.
 impl Serialize for Cells {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut keys = serializer.serialize_struct("Cells", 10)?;
@@ -183,7 +184,7 @@ impl Serialize for Cells {
         keys.serialize_field("by", &self.by)?;
         keys.serialize_field("split", &self.split)?;
         keys.serialize_field("measure", &self.measure)?;
-        keys.serialize_field("reference", &self.reference)?;
+        keys.serialize_field("reference", &self.direction())?;
         keys.end()
     }
 }
@@ -307,8 +308,16 @@ impl Cells {
                 );
                 Err(("max_side", Error::pipeline(told)))
             }
-            _ if self.reference.direction().is_none() => {
+            _ if self.reference.is_some_and(|given| given.direction().is_none()) => {
                 Err(("reference", Error::pipeline("`cells.reference` has no direction")))
+            }
+            _ if self.reference.is_some() && self.measure == Measure::Cone => {
+                let error = Error::pipeline(
+                    "`cells.reference` needs `cells.measure = \"axis\"`: the measure is \"cone\", which takes \
+                     angles to each cell's own axis",
+                );
+                let help = "add `cells.measure = \"axis\"`, or leave `cells.reference` out";
+                Err(("reference", error.help(help)))
             }
             _ => Ok(()),
         }
@@ -318,6 +327,12 @@ impl Cells {
     fn angle(&self) -> Option<Setting<Angle>> {
         let default = || Angle::radians(MAX_ANGLE).map(Setting::Given);
         self.max_angle.or_else(|| if self.keep.is_none() { default() } else { None })
+    }
+
+    /// The direction that angles are taken to, as it was given, or the default; none where each cell has
+    /// its own.
+    fn direction(&self) -> Option<Reference> {
+        (self.measure == Measure::Axis).then(|| self.reference.unwrap_or(Reference::X))
     }
 
     /// The largest range of angles in radians, where none is to be found and before samples decide.
@@ -358,10 +373,7 @@ impl Cells {
 
     fn rule(&self, limit: Limit) -> Result<Rule> {
         let Settled { steps: side, max_side, min_spacing, .. } = self.settled()?;
-        let reference = match self.measure {
-            Measure::Axis => self.reference.direction(),
-            Measure::Cone => None,
-        };
+        let reference = self.direction().and_then(Reference::direction);
         let (min_points, split) = (self.min_points.get(), self.split);
         Ok(Rule {
             reference,
@@ -384,10 +396,7 @@ impl Cells {
         }
         let mut cells = std::mem::take(&mut tile.cells);
         cells.clear();
-        cells.reference = match self.measure {
-            Measure::Axis => self.reference.direction(),
-            Measure::Cone => None,
-        };
+        cells.reference = self.direction().and_then(Reference::direction);
         let crossing = Grouping { tile, side, by_class: !self.by.is_empty() }.run(&mut cells);
         cells.turned.resize(cells.members.len(), false);
         Ok((cells, crossing))

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::point::{Flag, PointBatch, Schema, Selection};
+use crate::point::{Flag, PointBatch, Schema, Selection, names};
 use crate::stage::{Needs, Transform};
 use crate::{Error, Result};
 
@@ -10,7 +10,7 @@ use crate::{Error, Result};
 ///
 /// A record stays if its class is among `keep_classes` (where any are given) and not among
 /// `drop_classes`, and if it has all of `keep_flags` and none of `drop_flags`. A scan without classes
-/// has nothing of a class to drop; to keep some of its classes is an error. Point formats 0 to 5 have no
+/// has nothing of a class to drop, which the run says; to keep some of its classes is an error. Point formats 0 to 5 have no
 /// overlap flag: there the flag `overlap` is class 12.
 ///
 /// It stands between the source and the stages that work on tiles, so they neither see nor count what
@@ -70,6 +70,18 @@ impl Transform for Filter {
         };
         let told = format!("{key} selects points by {missing}, which the input does not have");
         Err(Error::pipeline(told).help(remedy))
+    }
+
+    fn warnings(&self, schema: &Schema) -> Vec<String> {
+        let class = (!self.drop_classes.is_empty() && schema.find(names::CLASSIFICATION).is_none())
+            .then(|| {
+                "the input has no classes: `filter.drop_classes` leaves no point out".to_owned()
+            });
+        let flag = |flag: Flag| {
+            let name = flag.name();
+            format!("the input has no flag {name}: `filter.drop_flags` leaves no point out by it")
+        };
+        class.into_iter().chain(self.selection().idle(schema).into_iter().map(flag)).collect()
     }
 
     fn apply(&self, batch: &mut PointBatch) -> Result<()> {

@@ -32,7 +32,8 @@ pub const MAX_PASSES: usize = 16;
 ///
 /// With `mark`, every record is written and the decision is in the records: `"key-point"` sets the
 /// key-point flag of those that stay and clears it of the others, `"withheld"` sets the withheld flag
-/// of the others, 7 and 18 make that their class. The report counts them as `median_marked`.
+/// of the others, 7 and 18 make that their class. The report counts the others as `median_marked`, and
+/// those that got the key-point flag as `key_points`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Median {

@@ -55,6 +55,12 @@ impl By {
         matches!(self, By::Height | By::Intensity)
     }
 
+    /// True if what points of this look are coloured by is 0 everywhere: a scan whose records have room
+    /// for it and whose scanner did not measure it.
+    pub(super) fn is_black(self, look: &Look) -> bool {
+        matches!(self, By::Color | By::Intensity) && look.values == [0.0; 2]
+    }
+
     /// The dimensions that it looks at.
     ///
     /// # Errors

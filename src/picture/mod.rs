@@ -54,6 +54,8 @@ pub struct Picture {
     pub range: Option<[f64; 2]>,
     /// For each panel its points, and how many of them lie outside of the frame.
     pub panels: Vec<(u64, u64)>,
+    /// For each panel if it is black, since all colours or intensities of its scan are 0.
+    pub black: Vec<bool>,
 }
 
 impl Picture {
@@ -89,6 +91,7 @@ impl Picture {
             pixel: frame.pixel,
             range: settings.by.is_range().then_some(range),
             panels: Vec::new(),
+            black: looks.iter().map(|look| settings.by.is_black(look)).collect(),
         };
         picture.pixels.resize(3 * picture.width as usize * picture.height as usize, 255);
         for (n, source) in sources.iter().enumerate() {

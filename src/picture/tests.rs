@@ -143,6 +143,17 @@ fn one_point_copies_and_points_that_are_nowhere_are_drawn() {
 }
 
 #[test]
+fn a_scan_whose_colours_are_all_0_is_known_to_be_black() {
+    let scene = |scene| Synthetic { scene, points: 2000, seed: 3, noise: None }.open().unwrap();
+    let black = |by, scan: &dyn Source| {
+        Picture::draw(&[scan], &settings(View::Above, by, 1)).unwrap().black
+    };
+    assert_eq!(black(By::Intensity, &*scene(Scene::Als)), [false]);
+    assert_eq!(black(By::Height, &*scene(Scene::Plane)), [false]);
+    assert_eq!(black(By::Class, &points(&[([1.0; 3], 0)])), [false], "class 0 is grey");
+}
+
+#[test]
 fn what_cannot_be_drawn_is_told() {
     let few = points(&[([0.0; 3], 2)]);
     let told = |sources: &[&dyn Source], by, width| {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::kinds::{Encoding, Format, Synth, Write};
 use crate::error::shown;
 use crate::io::{Projected, convert, las, ply, synthetic};
-use crate::point::{Layout, Metadata, PointBatch, Schema, names};
+use crate::point::{GpsTime, Layout, Metadata, PointBatch, Schema, names};
 use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Sink, Source};
 use crate::{Error, Result};
 
@@ -246,8 +246,11 @@ impl Output {
         let mut projection = convert::Projection::new(schema, &layout, &self.write.drop)?;
         number_returns(schema, &layout, &self.write.drop, &mut projection)?;
         let projection = Some(projection);
+        // Times that are all 0, since the input has none, count nothing that were to be told.
+        let is_timed = schema.find(names::GPS_TIME).is_some();
+        let is_timed = is_timed && !self.write.drop.iter().any(|name| name == names::GPS_TIME);
         let metadata = Metadata {
-            gps_time: metadata.gps_time,
+            gps_time: metadata.gps_time.or((!is_timed).then_some(GpsTime::Week)),
             pipeline: metadata.pipeline.clone(),
             ..las::fresh(&layout, metadata.crs.as_deref())
         };

@@ -15,7 +15,7 @@ use super::product::Product;
 use super::rounded::Rounded;
 use crate::geom::lattice::Lattice;
 use crate::point::{Edit, PointBatch};
-use crate::report::{Baseline, Tally};
+use crate::report::{Baseline, KEY_POINTS, Tally};
 use crate::stage::{Encode, Encoded, Sink, SinkSummary};
 use crate::tile::{
     Fetch, Loader, Run, SealedTiles, Sieve, SpillArea, State, Tile, TileKey, lock, parallel,
@@ -230,6 +230,7 @@ impl Bench {
         }
         if all.counted == Some(chunk.sink) {
             all.job.classes.keep_by_state(&self.batch, &self.states, &mut self.tally);
+            count_key_points(&self.states, &mut self.tally);
         }
         let mut normals = chunk.spread_normals();
         if let Some(by_time) = all.by_time.get(chunk.sink).and_then(Option::as_ref) {
@@ -245,6 +246,15 @@ impl Bench {
 
 fn by_time(job: &Job<'_>, likes_time: bool) -> Option<ByTime> {
     likes_time.then(|| ByTime::of(job.source.schema())).flatten()
+}
+
+/// Counts the records that are written with the key-point flag because they stay.
+fn count_key_points(states: &[State], tally: &mut Tally) {
+    let is_set = |state: &&State| state.edits() & Edit::SetKeyPoint as u8 != 0;
+    match states.iter().filter(is_set).count() as u64 {
+        0 => {}
+        some => tally.count(KEY_POINTS, some),
+    }
 }
 
 /// Writes the edits of `states` into the records.

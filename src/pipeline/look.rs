@@ -11,13 +11,24 @@ const PARTS: usize = 8;
 const RECORDS: usize = 1024;
 const BYTES: usize = 1 << 20;
 
+/// Records of a part that are looked at one by one where one does not fit.
+const SINGLES: usize = 64;
+
+/// What a look found that does not fit.
+pub(super) struct Unfit {
+    /// What writing one of the records would be.
+    pub error: Error,
+    /// True if none of those that were looked at fits the output that one does not.
+    pub none_fits: bool,
+}
+
 /// Looks at some records for all `sinks`. Returns the first error that writing one of them would be;
 /// reading fails as a run would.
 pub(super) fn look(
     source: &dyn Source,
     sinks: &[Box<dyn CreateSink>],
     drop_nonfinite: bool,
-) -> Result<Option<Error>> {
+) -> Result<Option<Unfit>> {
     let schema = source.schema();
     let looking: Vec<_> = sinks.iter().filter(|sink| sink.checks(schema)).collect();
     if looking.is_empty() {
@@ -25,20 +36,39 @@ pub(super) fn look(
     }
     let records = RECORDS.min(BYTES / schema.stride.max(1)).max(1);
     let mut batch = PointBatch::new(schema.clone(), records);
-    let parts = source.parts();
-    let step = parts.div_ceil(PARTS).max(1);
-    for index in (0..parts).step_by(step) {
-        source.part(index)?.read(&mut batch)?;
+    let step = source.parts().div_ceil(PARTS).max(1);
+    let parts = || (0..source.parts()).step_by(step);
+    let read = |index: usize, batch: &mut PointBatch| {
+        batch.clear();
+        source.part(index)?.read(batch)?;
         if drop_nonfinite {
             batch.retain(|_, record| is_finite(record, schema));
         }
+        Ok::<_, Error>(())
+    };
+    for index in parts() {
+        read(index, &mut batch)?;
         for sink in &looking {
-            if let Err(error) = sink.check(source.metadata(), &batch) {
-                return Ok(Some(error.at(sink.path())));
+            let Err(error) = sink.check(source.metadata(), &batch) else { continue };
+            let mut none_fits = true;
+            for other in parts() {
+                read(other, &mut batch)?;
+                none_fits = none_fits && !any_fits(source, sink.as_ref(), &batch);
             }
+            return Ok(Some(Unfit { error: error.at(sink.path()), none_fits }));
         }
     }
     Ok(None)
+}
+
+/// True if one of some records of `batch` fits `sink`.
+fn any_fits(source: &dyn Source, sink: &dyn CreateSink, batch: &PointBatch) -> bool {
+    let mut single = PointBatch::new(source.schema().clone(), 1);
+    batch.iter().step_by(batch.len().div_ceil(SINGLES).max(1)).any(|record| {
+        single.clear();
+        single.extend(record);
+        sink.check(source.metadata(), &single).is_ok()
+    })
 }
 
 fn is_finite(record: &[u8], schema: &Schema) -> bool {

@@ -7,7 +7,7 @@ use super::beside::Beside;
 use super::by_rank;
 use super::each::{lists_bytes, paths, ranks};
 use super::files::{Clash, Files, Use};
-use super::look::look;
+use super::look::{Unfit, look};
 use super::passes::{Op, Pass, StageOp, Tap, check_limits, number_selections, unroll};
 use super::publish::check_place;
 use super::settings::{MOST_THREADS, Nonfinite, Overrides, RunSettings};
@@ -139,6 +139,8 @@ impl Pipeline {
         };
         demands.divide()?;
         let mut warnings = warnings(&*source, &sinks, removes, &settings)?;
+        let idle = sorted.transforms.iter().flat_map(|(_, stage)| stage.warnings(schema));
+        warnings.extend(idle);
         warnings.extend(doubt);
         Ok(Plan {
             warnings,
@@ -327,7 +329,7 @@ fn check_transforms(transforms: &[(String, Box<dyn Transform>)], schema: &Schema
 }
 
 /// What outputs will not hold. Records that they cannot hold are an error where all are written, and
-/// a warning where a stage may remove them first (`removes`).
+/// a warning where a stage may remove them first (`removes`) and leave others.
 fn warnings(
     source: &dyn Source,
     sinks: &[Box<dyn CreateSink>],
@@ -336,10 +338,13 @@ fn warnings(
 ) -> Result<Vec<String>> {
     let lost = sinks.iter().flat_map(|sink| sink.warnings(source.schema(), source.metadata()));
     let mut warnings: Vec<String> = lost.collect();
-    let Some(error) = look(source, sinks, settings.nonfinite == Nonfinite::Drop)? else {
+    let Some(Unfit { error, none_fits }) =
+        look(source, sinks, settings.nonfinite == Nonfinite::Drop)?
+    else {
         return Ok(warnings);
     };
-    if !removes {
+    // Where none fits there is nothing that stages could leave.
+    if !removes || none_fits {
         return Err(error);
     }
     let help = error.remedy().map_or(String::new(), |help| format!("; {help}"));

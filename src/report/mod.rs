@@ -32,4 +32,4 @@ pub use survey::{
     FittedScan, FittedTile, Lot, PlaneDistances, ScanSurvey, TileSurvey, report_tile_level,
 };
 pub use table::{Grouped, Short, Table};
-pub use tally::{Apart, Tally};
+pub use tally::{Apart, KEY_POINTS, Tally};

@@ -3,11 +3,14 @@
 use std::fmt;
 use std::path::Path;
 
+use serde_json::Value;
+
 use super::baseline::BaselineFigures;
 use super::classes::class_name;
 use super::document::{Decision, Outcome, Report};
 use super::figures::{ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
 use super::ledger::{Ledger, Removed};
+use super::tally::KEY_POINTS;
 use crate::budget::Bytes;
 use crate::error::shown;
 
@@ -30,12 +33,8 @@ impl fmt::Display for Table<'_> {
         let (read, kept) = (result.ledger.read, result.ledger.kept);
         write!(f, "points     {} in, {} out{}", Grouped(read), Grouped(kept), Share(kept, read))?;
         removed_line(f, &result.ledger)?;
-        class_lines(f, &result.classes)?;
-        for (name, &records) in &result.counts {
-            if let Some(stage) = name.strip_suffix("_marked") {
-                write!(f, "\nmarked     {} by {stage}", Grouped(records))?;
-            }
-        }
+        class_lines(f, &result.classes, marks(result).next().is_some())?;
+        marked_lines(f, result)?;
         if let Some(&cells) = result.counts.get("cells") {
             write!(f, "\ncells      {}", Grouped(cells))?;
         }
@@ -89,8 +88,40 @@ fn removed_line(f: &mut fmt::Formatter<'_>, ledger: &Ledger) -> fmt::Result {
     Ok(())
 }
 
-/// A line a class, unless none was reduced: then all say the same as the scan's.
-fn class_lines(f: &mut fmt::Formatter<'_>, classes: &[ClassFigures]) -> fmt::Result {
+/// The stages that mark, by kind, and how: as they are in the pipeline.
+fn marks(result: &Outcome) -> impl Iterator<Item = (&str, &Value)> {
+    let stages = result.pipeline.as_array().into_iter().flatten();
+    let mark = |stage: &'_ Value| !stage["keys"]["mark"].is_null();
+    let stages = stages.filter(move |stage| mark(stage));
+    stages.filter_map(|stage| Some((stage["kind"].as_str()?, &stage["keys"]["mark"])))
+}
+
+/// How many records each stage marked, and as what.
+fn marked_lines(f: &mut fmt::Formatter<'_>, result: &Outcome) -> fmt::Result {
+    let count = |name: &str| Grouped(result.counts.get(name).copied().unwrap_or(0));
+    let mut key_points = false;
+    for (stage, mark) in marks(result) {
+        let marked = count(&format!("{stage}_marked"));
+        write!(f, "\nmarked     {marked} ")?;
+        match mark.as_str() {
+            // The flag is set on those that stay, and cleared on what the stage counts.
+            Some("key-point") => {
+                key_points = true;
+                write!(f, "as no key-points by {stage}")?;
+            }
+            Some(flag) => write!(f, "as {flag} by {stage}")?,
+            None => write!(f, "as class {mark} by {stage}")?,
+        }
+    }
+    match key_points {
+        true => write!(f, "\nmarked     {} as key-points", count(KEY_POINTS)),
+        false => Ok(()),
+    }
+}
+
+/// A line a class, unless none was reduced: then all say the same as the scan's. Of a scan that is
+/// `marked` no point need be gone.
+fn class_lines(f: &mut fmt::Formatter<'_>, classes: &[ClassFigures], marked: bool) -> fmt::Result {
     if classes.iter().all(|c| c.before == c.after) {
         return Ok(());
     }
@@ -102,7 +133,11 @@ fn class_lines(f: &mut fmt::Formatter<'_>, classes: &[ClassFigures]) -> fmt::Res
     for (i, &ClassFigures { class, before, after }) in classes.iter().enumerate() {
         let heading = if i == 0 { "classes" } else { "" };
         write!(f, "\n{heading:9}  {:width$}  ", name(class))?;
-        write!(f, "{} → {}{}", Grouped(before), Grouped(after), Share(after, before))?;
+        let (share, before, after) = (Share(after, before), Grouped(before), Grouped(after));
+        match marked {
+            true => write!(f, "{before}, {after} of them stay by their marks{share}")?,
+            false => write!(f, "{before} → {after}{share}")?,
+        }
     }
     Ok(())
 }

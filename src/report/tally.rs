@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use super::ClassCounts;
 
+/// The count of records that were written with the key-point flag that a stage set.
+pub const KEY_POINTS: &str = "key_points";
+
 /// Counts that a tile or a stream reports; merged by addition, so that order does not matter.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Tally {

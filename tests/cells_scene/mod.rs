@@ -165,7 +165,7 @@ pub fn plain_groups(scan: &[Point], stage: &Cells, side: i64) -> Vec<Vec<Point>>
 /// Of each member a number that falls as its angle grows, and whether its normal is turned.
 fn plain_angles(cell: &[Point], stage: &Cells) -> Vec<(f64, bool)> {
     let axis = dominant_axis(outer_sum(cell.iter().map(|p| p.normal)));
-    let n = match stage.reference {
+    let n = match stage.reference.unwrap_or(Reference::X) {
         Reference::X => X,
         Reference::Y => [0.0, 1.0, 0.0],
         Reference::Z => [0.0, 0.0, 1.0],

@@ -199,7 +199,7 @@ mod tests {
         assert_eq!((cells.side, cells.max_angle()), (Side::Auto, 0.1));
         assert_eq!((cells.keep, cells.max_side, cells.min_spacing), (None, None, None));
         assert_eq!((cells.min_points.get(), cells.split), (1, Split::Voronoi));
-        assert_eq!((cells.measure, cells.reference), (Measure::Axis, Reference::X));
+        assert_eq!((cells.measure, cells.reference), (Measure::Axis, None));
     }
 
     #[test]
@@ -253,7 +253,7 @@ mod tests {
     fn references_are_axes_or_vectors_of_any_length() {
         let direction = |text: &str| {
             let cells: Cells = toml::from_str(&format!("reference = {text}")).unwrap();
-            cells.reference.direction().unwrap()
+            cells.reference.unwrap().direction().unwrap()
         };
         assert_eq!(direction("'y'"), [0.0, 1.0, 0.0]);
         assert_eq!(direction("[0, 0, -7]"), [0.0, 0.0, -1.0]);
@@ -264,6 +264,20 @@ mod tests {
             ["'w'", "[0, 0, 0]", "[1, 2]", "[1, 2, 3, 4]", "[nan, 0, 1]", "[inf, 0, 1]", "1"];
         for wrong in wrong {
             assert!(refusal(&format!("reference = {wrong}")).contains("[x, y, z]"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_reference_that_the_measure_does_not_use_is_refused() {
+        let check = |text: &str| toml::from_str::<Cells>(text).unwrap().check();
+        for used in ["reference = 'z'", "reference = 'x'\nmeasure = 'axis'", "measure = 'cone'"] {
+            assert!(check(used).is_ok(), "{used}");
+        }
+        for unused in ["'x'", "'z'", "[1, 2, 3]"] {
+            let (key, error) =
+                check(&format!("reference = {unused}\nmeasure = 'cone'")).unwrap_err();
+            assert_eq!(key, "reference");
+            assert!(error.to_string().contains("needs `cells.measure = \"axis\"`"), "{error}");
         }
     }
 
