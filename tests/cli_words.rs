@@ -536,7 +536,7 @@ fn a_reference_is_never_ignored() {
     let at = at.path();
     let reduce = ["reduce", "a.laz", "-o", "o.laz", "--reference", "z"];
     let wrong = told(at, &reduce, 2);
-    assert!(wrong.contains("`--reference` needs `--measure axis`"), "{wrong}");
+    assert!(wrong.contains("--reference: needs `--measure axis`"), "{wrong}");
     assert!(wrong.contains("add `--measure axis`, or leave `--reference` out"), "{wrong}");
     done(at, &[&reduce[..], &["--measure", "axis"]].concat());
     done(at, &[&reduce[..], &["--preset", "paper"]].concat());
