@@ -187,9 +187,17 @@ fn values_that_the_output_cannot_hold_are_told_before_the_work() {
         let error = plan(input, "", keys).err().unwrap_or_else(|| panic!("{input}"));
         assert!(error.to_string().contains(told), "{error}");
         assert!(error.remedy().unwrap().contains(help), "{error:?}");
-        // A stage may remove the point: then it is a warning.
-        let warned = plan(input, REDUCE, keys).unwrap();
-        assert!(warned.warnings().iter().any(|w| w.contains(told) && w.contains(help)));
+        // A stage may remove the point: then it is a warning, unless none of the points fits.
+        match plan(input, REDUCE, keys) {
+            Ok(warned) => {
+                assert!(warned.warnings().iter().any(|w| w.contains(told) && w.contains(help)));
+                assert!(!input.starts_with("51c") && !input.starts_with("108"), "{input}");
+            }
+            Err(error) => {
+                assert!(error.to_string().contains(told), "{error}");
+                assert!(input.starts_with("51c") || input.starts_with("108"), "{error}");
+            }
+        }
     }
     // What the help says does.
     let offset = "scale = 0.001\noffset = [346000.0, 5600000.0, 0.0]";
