@@ -288,7 +288,8 @@ pub(super) struct Reduce {
     #[arg(long, value_name = "HOW")]
     pub nonfinite: Option<String>,
     /// Length of a step of the lattice on which points are compared, for scans far from their origin
-    /// or finer than it [default: what the coordinates are stored in, for floats 2^-30]
+    /// or finer than it. Sides that are chosen follow from it, and with them the number of points
+    /// [default: what the coordinates are stored in, for floats 2^-30]
     #[arg(long, value_name = "LENGTH", value_parser = parse_number)]
     pub lattice: Option<f64>,
     /// Scans whose points contradict their LAS header, as damaged ones do: refuse them, or warn
