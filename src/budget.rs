@@ -92,7 +92,7 @@ impl Budget {
         let enough = used.saturating_add(bytes);
         Error::memory(format!(
             "the {what} needs {} of memory, but {} of the budget of {} is free",
-            whole_mebibytes(bytes),
+            at_least_mebibytes(bytes),
             at_most_mebibytes(self.0.limit.saturating_sub(used)),
             at_most_mebibytes(self.0.limit)
         ))
@@ -172,9 +172,14 @@ impl fmt::Display for Bytes {
     }
 }
 
-/// A budget as one writes it, rounded up: `137MiB`.
+/// A budget as it is typed, rounded up: `137MiB`.
 pub fn whole_mebibytes(bytes: u64) -> String {
     format!("{}MiB", bytes.div_ceil(MIB).max(1))
+}
+
+/// The same in a sentence: `137 MiB`.
+pub fn at_least_mebibytes(bytes: u64) -> String {
+    format!("{} MiB", bytes.div_ceil(MIB).max(1))
 }
 
 /// What there is of something that is too small, rounded down: `137 MiB`, `269.9 MiB`. It differs from
@@ -274,7 +279,7 @@ mod tests {
         assert_eq!(error.kind(), ErrorKind::Memory);
         assert_eq!(
             error.to_string(),
-            "the tile needs 41MiB of memory, but 28 MiB of the budget of 128 MiB is free"
+            "the tile needs 41 MiB of memory, but 28 MiB of the budget of 128 MiB is free"
         );
         assert_eq!(error.remedy(), Some("give at least `run.memory = \"141MiB\"`"));
         assert_eq!(budget.used(), 100 * MIB);

@@ -127,7 +127,7 @@ fn a_forecast_warns_where_scatter_exceeds_the_angle() {
     assert_eq!(
         forecast.warning.as_deref(),
         Some(
-            "normals scatter 0.14 rad, above `cells.max_angle = 0.1`: expect about 52 % of the points \
+            "normals scatter 0.14 rad, more than the largest angle of a cell, 0.1 rad: expect about 52 % of the points \
              to stay; raise `normals.neighbors` or `cells.max_angle`, or give `cells.keep`"
         )
     );
@@ -135,7 +135,7 @@ fn a_forecast_warns_where_scatter_exceeds_the_angle() {
     assert_eq!(stage.forecast(&samples).warning, None);
     stage.max_angle = Some(Angle::degrees(6.0).unwrap().into());
     let told = stage.forecast(&samples).warning.unwrap();
-    assert!(told.contains("8.1deg, above `cells.max_angle = \"6deg\"`"), "{told}");
+    assert!(told.contains("8.1deg, ") && told.contains("6deg"), "{told}");
     stage.max_angle = radians(0.1);
     assert_eq!(stage.forecast(&samples[..1]).warning, None);
     assert!(stage.forecast(&samples[1..2]).decisions.is_empty(), "nothing is planar");

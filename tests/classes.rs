@@ -216,7 +216,10 @@ fn a_limit_that_no_point_meets_is_said() {
     let scan = Scan::synthetic(Scene::Als, 3_000, 2);
     let limited = |limit: &str| REDUCE.replace("'\n", &format!("'\n{limit}\n"));
     let told = heard(&scan, "laz", &limited("classes = [40, 41]"), "");
-    assert_told(told, &["no point is of class 40 or 41: stages that are limited"]);
+    assert_told(
+        told,
+        &["no point is of class 40 or 41: what was asked for those points did nothing"],
+    );
     let told = heard(&scan, "laz", &limited("with = ['synthetic']"), "");
     assert_told(told, &["no point is with the flag synthetic"]);
     let (_, silent) = heard(&scan, "laz", &limited("classes = [2]"), "");
@@ -259,7 +262,12 @@ fn a_scan_without_classes_has_none_to_keep_and_none_to_drop() {
     );
     let error = run("keep_classes = [2]").unwrap_err();
     let told = error.to_string();
-    assert!(told.contains("`filter` keeps by Classification, which the input does not"), "{told}");
+    assert!(
+        told.contains(
+            "`filter.keep_classes` selects points by Classification, which the input does not"
+        ),
+        "{told}"
+    );
     assert!(error.remedy().unwrap().contains("filter.keep_classes"));
 }
 

@@ -97,8 +97,11 @@ fn a_wrong_command_line_exits_with_2() {
     refused(at.path(), &[], &["Usage: pointmill"]);
     refused(at.path(), &["redcue"], &["redcue", "reduce"]);
     refused(at.path(), &["reduce", "a.laz"], &["--output <OUT>"]);
+    let text =
+        "[[stage]]\nkind = 'read'\npath = 'a.las'\n[[stage]]\nkind = 'write'\npath = 'o.laz'\n";
+    fs::write(at.path().join("p.toml"), text).unwrap();
     refused(at.path(), &["run", "p.toml", "--memory", "2G"], &["--memory", "512MiB or 2GiB"]);
-    let threads = ["--threads", "`0` is no number of threads: give 1 to 1024"];
+    let threads = ["--threads", "--threads: takes a whole number from 1 to 1024, not 0"];
     refused(at.path(), &["run", "p.toml", "--threads", "0"], &threads);
     let progress = ["auto", "json", "never"];
     refused(at.path(), &["run", "p.toml", "--progress", "jsn"], &progress);
@@ -175,10 +178,13 @@ fn flags_of_reduce_are_told_as_they_were_typed() {
     reduce(&["--method", "vardy"], &["--method: ", "did you mean `varady`?"]);
     refused(at.path(), &["reduce", "a.laz", "-o", "b"], &["-o: the extension of `b` names no"]);
     refused(at.path(), &["reduce", "a.laz", "-o", "./a.laz"], &["-o: ./a.laz is the input a.laz"]);
-    reduce(&["--passes", "0"], &["error: --passes: must be 1 to 16, not 0"]);
+    reduce(&["--passes", "0"], &["error: --passes: takes a whole number from 1 to 16, not 0"]);
     reduce(&["--mark", "keypoint"], &["--mark: ", "keypoint"]);
     reduce(&["--keep", "110%"], &["--keep: "]);
-    reduce(&["--keep", "10%", "--max-angle", "0.2"], &["--keep <TARGET>", "--max-angle"]);
+    reduce(
+        &["--keep", "10%", "--max-angle", "0.2"],
+        &["--keep", "--max-angle", "do not go together"],
+    );
     reduce(&["--withheld", "drp"], &["--withheld: ", "did you mean `drop`?"]);
     reduce(&["--classes", "2,256"], &["--classes", "256"]);
     reduce(&["--report", "a.laz"], &["--report: a.laz is an input"]);
@@ -197,13 +203,13 @@ fn conversions_into_a_folder_are_checked_before_the_first() {
     };
     convert(&["a.las", "a.laz", "-o", "out/", "--to", "ply"], &["would both become out/a.ply"]);
     convert(&["c.txt", "-o", "out/"], &["c.txt: its name says no format"]);
-    convert(&["a.las", "b.las", "-o", "out/", "--report", "r.json"], &["--report is for one"]);
+    convert(&["a.las", "b.las", "-o", "out/", "--report", "r.json"], &["--report: is for one"]);
     convert(&["a.las", "b.las", "-o", "out/", "--to", "lax"], &["--to: ", "did you mean `las`?"]);
     convert(&["a.las", "b.las", "-o", "."], &["-o: ./a.las is the input a.las: it cannot be"]);
     convert(&["a.las", "-o", "x.laz", "--scale", "-1"], &["--scale: ", "a number above 0"]);
     convert(
         &["a.las", "-o", "x.laz", "--scale", "1,2"],
-        &["--scale", "neither a number nor three"],
+        &["--scale: takes a number above 0 without a unit, or three", "not 2 values"],
     );
     convert(&["a.las", "-o", "x.laz", "--scale", "1,0,1"], &["--scale: ", "a number above 0"]);
     convert(&["a.las", "-o", "x.ply", "--encoding", "txt"], &["--encoding: ", "ascii, binary"]);
@@ -222,7 +228,7 @@ fn flags_of_synth_are_told_as_they_were_typed() {
     synth("part", &["--noise", "nan"], &["--noise: "]);
     for count in ["1.5", "5MB", "1e"] {
         let arguments = ["synth", "part", "-n", count, "-o", "a.laz"];
-        refused(at.path(), &arguments, &["--points", "is no count such as 1500, 10k, 5M or 1e6"]);
+        refused(at.path(), &arguments, &["error: -n: takes a whole number"]);
     }
 }
 

@@ -74,7 +74,7 @@ fn every_line_is_an_event_and_they_tell_the_run() {
             other => panic!("{other}: {event}"),
         }
     }
-    assert_eq!(told, BTreeSet::from(["decode", "merge", "mill", "survey"]));
+    assert_eq!(told, BTreeSet::from(["decode", "gather", "merge", "mill", "survey"]));
 
     let written: Value =
         serde_json::from_slice(&fs::read(at.path().join("r.json")).unwrap()).unwrap();

@@ -30,7 +30,12 @@ fn scans_of_all_formats_are_drawn_side_by_side() {
 fn what_is_wrong_with_a_picture_is_told() {
     let at = scans(&["a.laz"]);
     let input = fs::read(at.path().join("a.laz")).unwrap();
-    fails(at.path(), &["picture", "a.laz", "-o", "a.jpg"], 2, &["a.jpg: ", "does not end in .png"]);
+    fails(
+        at.path(),
+        &["picture", "a.laz", "-o", "a.jpg"],
+        2,
+        &["error: -o: a picture is a PNG file", "| a.jpg\n   | ^^^^^\n   = write -o a.png"],
+    );
     fs::hard_link(at.path().join("a.laz"), at.path().join("a.png")).unwrap();
     fails(at.path(), &["picture", "a.laz", "-o", "a.png"], 2, &["a.png: ", "is the input a.laz"]);
     assert!(fs::read(at.path().join("a.laz")).unwrap() == input);

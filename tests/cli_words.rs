@@ -102,7 +102,7 @@ fn commands_never_tell_places_in_the_pipelines_behind_them() {
     assert_eq!(
         no_class,
         "error: --classes: selects points by Classification, which the input does not have\n   \
-         | 2 6\n   | ^^^\nhelp: leave `--classes` out\n"
+         | 2,6\n   | ^^^\nhelp: leave `--classes` out\n"
     );
     let twice = ["reduce", "a.laz", "-o", "o.laz", "--passes", "3", "--keep", "10%"];
     assert_eq!(
@@ -217,16 +217,28 @@ fn values_of_flags_are_told_what_is_right() {
         told(at.path(), &["reduce", "a.laz", "-o", "o.laz", flag, value], 2)
     };
     for (flag, value, expected) in [
-        ("--neighbors", "ten", "--neighbors: takes a whole number from 0, not the text \"ten\""),
-        ("--passes", "1.5", "`1.5` is no whole number such as"),
+        (
+            "--neighbors",
+            "ten",
+            "--neighbors: takes a whole number from 3 to 64, not the text \"ten\"",
+        ),
+        ("--passes", "1.5", "--passes: takes a whole number from 1 to 16, not 1.5"),
         ("--max-side", "two", "--max-side: "),
-        ("--offset", "1,x,3", "`x` is no number such as"),
-        ("--classes", "grund", "classes are numbers from 0 to 255; ground is 2"),
-        ("--classes", "2,256", "classes are numbers from 0 to 255\n"),
+        ("--offset", "1,x,3", "--offset: takes a number, not the text \"x\""),
+        (
+            "--classes",
+            "grund",
+            "classes are numbers from 0 to 255, or ranges such as 3-5; ground is 2",
+        ),
+        ("--classes", "2,256", "classes are numbers from 0 to 255, or ranges such as 3-5\n"),
         ("--offset", "1,2", "error: --offset: takes a list of 3 values, not 2 values\n"),
         ("--mark", "keypoint", "= did you mean `key-point`?"),
         ("--side", "atuo", "= did you mean `auto`?"),
-        ("--keep", "lots", "error: --keep: takes a share such as \"10%\", a number of points"),
+        (
+            "--keep",
+            "lots",
+            "error: --keep: takes a share of up to 100% such as \"10%\", a number of points",
+        ),
         ("--withheld", "drp", "error: --withheld: cannot be `drp`\n"),
         ("--method", "pcb", "= did you mean `pca`? valid: pca, varady"),
     ] {
@@ -250,61 +262,170 @@ fn values_of_flags_are_told_what_is_right() {
 }
 
 #[test]
-fn a_reference_is_never_ignored() {
+fn every_wrong_value_has_a_caret_below_what_was_typed() {
     let at = scans(&["a.laz"]);
-    let at = at.path();
-    let reduce = ["reduce", "a.laz", "-o", "o.laz", "--reference", "z"];
-    let wrong = told(at, &reduce, 2);
-    assert!(wrong.contains("`--reference` needs `--measure axis`"), "{wrong}");
-    assert!(wrong.contains("add `--measure axis`, or leave `--reference` out"), "{wrong}");
-    done(at, &[&reduce[..], &["--measure", "axis"]].concat());
-    done(at, &[&reduce[..], &["--preset", "paper"]].concat());
-}
-
-#[test]
-fn a_scan_without_gps_time_is_told_nothing_of_it() {
-    let at = tempfile::tempdir().unwrap();
-    let at = at.path();
-    case(at, "50-rgb8.ply");
-    done(at, &["convert", "50-rgb8.ply", "-o", "x.las", "--scale", "0.001"]);
-    let ply = |time: &str| {
-        format!(
-            "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\n\
-             property double z\nproperty double {time}\nend_header\n1 2 3 4\n"
-        )
-    };
-    fs::write(at.join("timed.ply"), ply("gps_time")).unwrap();
-    let convert = ["convert", "timed.ply", "-o", "x.las", "--scale", "0.001"];
-    let (code, _, stderr) = pointmill(at, &convert);
-    assert!(code == 0 && stderr.contains("the input does not say what it counts"), "{stderr}");
-    done(at, &[&convert[..], &["--drop", "GpsTime"]].concat());
-}
-
-#[test]
-fn classes_that_no_record_has_are_told_in_every_command() {
-    let at = tempfile::tempdir().unwrap();
-    let at = at.path();
-    case(at, "98-noclass.ply");
-    for command in ["reduce", "convert"] {
-        let drop = [command, "98-noclass.ply", "-o", "o.ply", "--drop-classes", "7"];
-        let (code, _, stderr) = pointmill(at, &drop);
-        assert_eq!(code, 0, "{stderr}");
-        let warning = "warning: the input has no classes: `--drop-classes` leaves no point out";
-        assert!(stderr.contains(warning), "{stderr}");
-        told(at, &[command, "98-noclass.ply", "-o", "o.ply", "--keep-classes", "2"], 2);
+    for (flag, value, expected) in [
+        ("--max-side", "-2m", "takes a length above 0 in the scan's unit, or with a unit"),
+        ("--min-points", "-1", "takes a whole number from 1, not -1"),
+        ("--keep", "-5", "takes a share of up to 100% such as"),
+        ("--keep", "0%", "takes a share of up to 100% such as"),
+        ("--keep", "110%", "takes a share of up to 100% such as"),
+        ("--max-side", "2k", "takes a length above 0"),
+        ("--max-angle", "-6deg", "takes an angle from 0 to pi"),
+        ("--max-angle", "6", "an angle is in radians, at most pi, and 6 is more"),
+        ("--z-scale", "0", "takes a number above 0, or \"auto\", not 0"),
+        ("--reference", "0,0,0", "a vector [x, y, z] is of finite numbers, one of them not 0"),
+        ("--scale", "1cm", "takes a number above 0 without a unit"),
+        (
+            "--lattice",
+            "1mm",
+            "takes a number above 0, in the scan's unit and without a unit behind it",
+        ),
+        ("--neighbors", "1e2", "takes a whole number from 3 to 64, not 100"),
+        ("--threads", "2k", "takes a whole number from 1 to 1024, not 2000"),
+        ("--memory", "2G", "`2G` is no size such as 512MiB or 2GiB: write 2GiB (units"),
+        ("--memory", "-1", "`-1` is no size"),
+        ("--classes", "5-1", "`5-1` is no range of classes: write 1-5"),
+        ("--preset", "papr", "cannot be `papr`"),
+        ("--progress", "jsn", "cannot be `jsn`"),
+    ] {
+        let one = told(at.path(), &["reduce", "a.laz", "-o", "o.laz", flag, value], 2);
+        let carets = "^".repeat(value.len());
+        assert!(one.starts_with(&format!("error: {flag}: {expected}")), "{flag} {value}: {one}");
+        let shown = format!("\n   | {value}\n   | {carets}\n");
+        assert!(one.contains(&shown), "{flag} {value}: {one}");
+        assert!(!one.contains("did you mean `1") && !one.contains("did you mean `2"), "{one}");
+        assert!(!one.contains("For more information"), "{one}");
+    }
+    let synth = ["synth", "plane", "-n", "9", "-o", "o.laz"];
+    for (flag, value) in [("--seed", "-1"), ("--noise", "1mm"), ("-n", "-9")] {
+        let given =
+            if flag == "-n" { &[&synth[..2], &synth[4..]].concat()[..] } else { &synth[..] };
+        let one = told(at.path(), &[given, &[flag, value]].concat(), 2);
+        assert!(one.contains(&format!("{flag}: takes a ")), "{one}");
+        assert!(one.contains(&format!("\n   | {value}\n   | ^^")), "{one}");
     }
 }
 
 #[test]
-fn a_scan_of_which_no_point_fits_is_refused_before_the_work() {
-    let at = tempfile::tempdir().unwrap();
+fn numbers_and_ranges_are_read_in_every_form() {
+    let at = scans(&["a.laz"]);
     let at = at.path();
-    case(at, "108-float-utm.ply");
-    let reduce = ["reduce", "108-float-utm.ply", "-o", "x.las", "--scale", "0.001"];
-    let refused = told(at, &reduce, 1);
-    assert!(refused.contains("help: ") && refused.contains("--offset"), "{refused}");
-    assert!(!refused.contains("if such a point is kept"), "{refused}");
-    assert!(!refused.contains("chosen"), "it is told after the decode: {refused}");
+    let reduce = |more: &[&str]| {
+        let all = [&["reduce", "a.laz", "-o", "o.laz", "--keep", "1e2"], more].concat();
+        let (code, _, stderr) = pointmill(at, &all);
+        assert_eq!(code, 0, "{stderr}");
+        fs::read(at.join("o.laz")).unwrap()
+    };
+    let plain = reduce(&["--neighbors", "10", "--min-points", "2", "--threads", "2"]);
+    let forms = ["--neighbors", "1e1", "--min-points", "2.0", "--threads", "2e0"];
+    assert_eq!(reduce(&forms), plain);
+    let classes = |given: &str| reduce(&["--classes", given]);
+    assert_eq!(classes("1-3,5"), classes("1,2,3,5"));
+    let text = "[[stage]]\nkind = 'read'\npath = 'a.laz'\n[[stage]]\nkind = 'normals'\n\
+                neighbors = '1e1'\n[[stage]]\nkind = 'cells'\nmin_points = '1k'\n[[stage]]\n\
+                kind = 'median'\npasses = 1e0\n[[stage]]\nkind = 'write'\npath = 'o.laz'\n";
+    fs::write(at.join("p.toml"), text).unwrap();
+    done(at, &["check", "p.toml", "--set", "normals.neighbors=2e1"]);
+    let one = told(at, &["check", "p.toml", "--set", "median.passes=0"], 2);
+    assert!(one.contains("--set: `passes`: takes a whole number from 1 to 16, not 0\n"), "{one}");
+}
+
+#[test]
+fn options_that_are_not_there_and_outputs_without_one_are_told_what_to_type() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    let one = told(at, &["reduce", "a.laz", "--out", "x.laz"], 2);
+    assert!(one.contains("did you mean `--output` or "), "{one}");
+    for command in ["reduce", "convert"] {
+        let one = told(at, &[command, "a.laz", "out.laz"], 2);
+        assert!(one.ends_with("help: if `out.laz` is the output, write `-o out.laz`\n"), "{one}");
+    }
+    let one = told(at, &["convert", "a.laz", "a.laz"], 2);
+    assert!(!one.contains("is the output"), "a file that is there is an input: {one}");
+    let one = told(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "1", "--keep", "2"], 2);
+    assert!(one.starts_with("error: --keep is given twice\n"), "{one}");
+}
+
+#[test]
+fn what_is_no_scan_or_no_pipeline_is_called_what_it_is() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    for arguments in
+        [&["reduce", "nowhere", "-o", "o.laz"][..], &["picture", "no", "where", "-o", "o.png"]]
+    {
+        let one = told(at, arguments, 1);
+        assert!(
+            one.contains(": cannot open it") && one.contains("No such file"),
+            "{arguments:?}: {one}"
+        );
+    }
+    let one = told(at, &["run", "a.laz"], 1);
+    assert!(one.contains("this is a LAS or LAZ file, not a pipeline file"), "{one}");
+    assert!(one.contains("`pointmill reduce a.laz -o OUT`"), "{one}");
+    for name in ["a.e57", "a.xyz"] {
+        fs::write(at.join(name), b"1 2 3\n").unwrap();
+        let one = told(at, &["reduce", name, "-o", "o.laz"], 2);
+        assert!(one.contains("which is not read") && !one.contains("read.format"), "{one}");
+    }
+    let text = "[[stage]]\nkind = 'read'\npath = 'a.laz'\nkind = 'write'\npath = 'o.laz'\n";
+    fs::write(at.join("p.toml"), text).unwrap();
+    let one = told(at, &["check", "p.toml"], 2);
+    assert!(one.contains("= a second stage begins with a line [[stage]] of its own"), "{one}");
+    let ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty half x\nend_header\n1\n";
+    fs::write(at.join("h.ply"), ply).unwrap();
+    let one = told(at, &["info", "h.ply"], 1);
+    assert!(one.contains("no property has the type `half`; types are char, uchar"), "{one}");
+}
+
+#[test]
+fn messages_name_no_flag_that_was_not_typed_and_no_stage_that_a_command_hides() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    case(at, "98-noclass.ply");
+    let warned = |arguments: &[&str]| pointmill(at, arguments).2;
+    let none = warned(&["reduce", "a.laz", "-o", "o.laz", "--classes", "33"]);
+    assert!(none.contains("no point is of class 33: what was asked for those points"), "{none}");
+    let paper = warned(&["reduce", "a.laz", "-o", "o.laz", "--preset", "paper"]);
+    assert!(paper.contains("more than the largest angle of a cell, 0.1 rad:"), "{paper}");
+    let keep = ["reduce", "98-noclass.ply", "-o", "o.ply", "--keep-classes", "2"];
+    let keep = told(at, &keep, 2);
+    assert!(
+        keep.contains("`--keep-classes` selects points by Classification")
+            && keep.ends_with("help: leave `--keep-classes` out\n"),
+        "{keep}"
+    );
+}
+
+#[test]
+fn commands_that_write_nothing_neither_offer_nor_take_flags_about_files() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    for command in ["plan", "check"] {
+        let help = done(at, &[command, "--help"]);
+        assert!(help.contains("--memory"), "{help}");
+        for flags in [&["--report", "r.json"][..], &["--no-clobber"]] {
+            assert!(!help.contains(flags[0]), "{help}");
+            let one = told(at, &[&[command, "p.toml"], flags].concat(), 2);
+            let expected = format!("error: {}: is for commands that write files\n", flags[0]);
+            assert!(one.starts_with(&expected), "{one}");
+        }
+    }
+}
+
+#[test]
+fn one_name_that_is_no_text_does_not_keep_the_other_files_from_being_converted() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    fs::create_dir(at.join("in")).unwrap();
+    fs::copy(at.join("a.laz"), at.join("in/a.laz")).unwrap();
+    fs::copy(at.join("a.laz"), at.join("in").join(std::ffi::OsStr::from_bytes(b"b\xff.laz")))
+        .unwrap();
+    let (code, stdout, stderr) = pointmill(at, &["convert", "in", "-o", "out/", "--to", "ply"]);
+    assert_eq!(code, 2, "{stderr}");
+    assert!(at.join("out/a.ply").exists());
+    assert!(stderr.contains("in/b\\xff.laz: the name is not UTF-8 text"), "{stderr}");
+    assert!(stdout.contains("incomplete 1 of 2 conversions failed"), "{stdout}");
 }
 
 #[test]
@@ -375,8 +496,8 @@ fn one_report_for_several_outputs_is_told_with_what_to_do() {
     let several = ["convert", "a.laz", "b.laz", "-o", "out/", "--report", "r.json"];
     assert_eq!(
         told(at.path(), &several, 2),
-        "error: --report is for one output, and this makes several\nhelp: leave --report out, or \
-         convert the files one by one\n"
+        "error: --report: is for one output, and this makes several\n   | r.json\n   | ^^^^^^\n   = \
+         leave --report out, or convert the files one by one\n"
     );
 }
 
@@ -392,7 +513,7 @@ fn arguments_that_are_no_text_are_told_alike_and_their_folder_works() {
         assert_eq!(output.status.code(), Some(2), "{before:?}");
         let told = String::from_utf8(output.stderr).unwrap();
         assert!(told.starts_with("error: the argument `b\\xff.laz` is not UTF-8 text\n"), "{told}");
-        assert!(told.contains("help: rename the file, or name its folder"), "{told}");
+        assert!(told.contains("help: rename the file: pipelines and reports"), "{told}");
     }
     // A name that a pattern or a folder leads to is refused alike.
     for found in [&["info", "b*.laz"][..], &["convert", ".", "-o", "out.laz"]] {
@@ -469,4 +590,62 @@ fn completions_and_manual_pages_know_every_command_and_flag() {
     }
     let pages = fs::read_dir(at.path().join("new/man1")).unwrap().count();
     assert!(pages >= 11, "{pages} pages");
+}
+
+#[test]
+fn a_reference_is_never_ignored() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    let reduce = ["reduce", "a.laz", "-o", "o.laz", "--reference", "z"];
+    let wrong = told(at, &reduce, 2);
+    assert!(wrong.contains("`--reference` needs `--measure axis`"), "{wrong}");
+    assert!(wrong.contains("add `--measure axis`, or leave `--reference` out"), "{wrong}");
+    done(at, &[&reduce[..], &["--measure", "axis"]].concat());
+    done(at, &[&reduce[..], &["--preset", "paper"]].concat());
+}
+
+#[test]
+fn a_scan_without_gps_time_is_told_nothing_of_it() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    case(at, "50-rgb8.ply");
+    done(at, &["convert", "50-rgb8.ply", "-o", "x.las", "--scale", "0.001"]);
+    let ply = |time: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\n\
+             property double z\nproperty double {time}\nend_header\n1 2 3 4\n"
+        )
+    };
+    fs::write(at.join("timed.ply"), ply("gps_time")).unwrap();
+    let convert = ["convert", "timed.ply", "-o", "x.las", "--scale", "0.001"];
+    let (code, _, stderr) = pointmill(at, &convert);
+    assert!(code == 0 && stderr.contains("the input does not say what it counts"), "{stderr}");
+    done(at, &[&convert[..], &["--drop", "GpsTime"]].concat());
+}
+
+#[test]
+fn classes_that_no_record_has_are_told_in_every_command() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    case(at, "98-noclass.ply");
+    for command in ["reduce", "convert"] {
+        let drop = [command, "98-noclass.ply", "-o", "o.ply", "--drop-classes", "7"];
+        let (code, _, stderr) = pointmill(at, &drop);
+        assert_eq!(code, 0, "{stderr}");
+        let warning = "warning: the input has no classes: `--drop-classes` leaves no point out";
+        assert!(stderr.contains(warning), "{stderr}");
+        told(at, &[command, "98-noclass.ply", "-o", "o.ply", "--keep-classes", "2"], 2);
+    }
+}
+
+#[test]
+fn a_scan_of_which_no_point_fits_is_refused_before_the_work() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    case(at, "108-float-utm.ply");
+    let reduce = ["reduce", "108-float-utm.ply", "-o", "x.las", "--scale", "0.001"];
+    let refused = told(at, &reduce, 1);
+    assert!(refused.contains("help: ") && refused.contains("--offset"), "{refused}");
+    assert!(!refused.contains("if such a point is kept"), "{refused}");
+    assert!(!refused.contains("chosen"), "it is told after the decode: {refused}");
 }

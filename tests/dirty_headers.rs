@@ -156,7 +156,7 @@ fn a_file_cut_anywhere_in_its_head_is_refused() {
 fn counts_that_lie_are_told() {
     let whole = las(6);
     let more = put(&whole, 247, &4_000_000_000_000u64.to_le_bytes());
-    refused("points", "in.las", &more, None, "of the 4000000000000 points");
+    refused("points", "in.las", &more, None, "of the 4,000,000,000,000 points");
     let packed = laz(6);
     for count in [401u64, 50_000, u64::MAX] {
         let lie = put(&packed, 247, &count.to_le_bytes());

@@ -64,13 +64,17 @@ fn other_formats_under_a_known_name_are_called_what_they_are() {
 
 #[test]
 fn extensions_of_formats_that_are_not_read_are_told_by_name() {
-    for (name, what) in [("x.e57", "E57"), ("x.pcd", "PCD"), ("x.csv", "text of numbers")] {
-        let (code, text) = told(&["convert", name, "-o", "out.las"]);
+    for (name, what) in [("x.e57", "E57"), ("x.pcd", "PCD"), ("x.csv", "a text of numbers")] {
+        let folder = tempfile::tempdir().unwrap();
+        let input = folder.path().join(name);
+        std::fs::write(&input, b"").unwrap();
+        let (code, text) =
+            told(&[Path::new("convert"), &input, Path::new("-o"), Path::new("out.las")]);
         assert_eq!(code, 2, "{text}");
-        assert!(text.contains(&format!("is named as {what}")), "{text}");
+        assert!(text.contains(&format!("` is {what}, which is not read")), "{text}");
         let (code, text) = told(&["convert", "a.las", "-o", name]);
         assert_eq!(code, 2, "{text}");
-        assert!(text.contains(&format!("is named as {what}")), "{text}");
+        assert!(text.contains(&format!("` is {what}, which is not written")), "{text}");
     }
 }
 

@@ -112,7 +112,9 @@ fn what_is_not_known_of_units_is_said_where_it_matters_and_auto_refuses() {
     // The vertical code of the case is made one that nobody has given out.
     let bytes = fs::read(case("15c-geokeys-epsg-only-2277-5703.las")).unwrap();
     let at = bytes.windows(2).rposition(|w| w == 5703u16.to_le_bytes()).unwrap();
-    for (code, why) in [(5103u16, "none whose unit is known"), (0, "nothing names it")] {
+    for (code, why) in
+        [(5103u16, "the unit of its reference system is not known here"), (0, "nothing names it")]
+    {
         let mut other = bytes.clone();
         other[at..at + 2].copy_from_slice(&code.to_le_bytes());
         fs::write(&feet, &other).unwrap();

@@ -94,7 +94,7 @@ fn points_outside_of_the_box_of_a_laz_header_are_an_error_with_a_switch() {
             let (code, told) = program(&arguments);
             assert_eq!(code, 1, "{command}: {told}");
             assert!(told.contains("bad.laz: at byte 211: "), "{told}");
-            assert!(told.contains("of 120000 points lie outside of the header's box: z from 50"));
+            assert!(told.contains("of 120,000 points lie outside of the header's box: z from 50"));
             assert!(told.contains("to 50.8 there"), "{told}");
             assert!(told.contains("headers") && told.contains("warn"), "{told}");
             assert!(!out.exists());
@@ -123,7 +123,10 @@ fn boxes_that_are_unset_wider_or_wrong_as_a_whole_are_their_writers() {
         }
         let (code, told) = convert(&scan(folder.path(), name, 1, moved), &[]);
         assert_eq!(code, 0, "{told}");
-        assert!(told.contains("120000 of 120000 points lie outside of the header's box"), "{told}");
+        assert!(
+            told.contains("120,000 of 120,000 points lie outside of the header's box"),
+            "{told}"
+        );
     }
 }
 
@@ -134,7 +137,7 @@ fn a_bit_that_flipped_in_a_plain_file_is_an_error() {
     let flip = |bytes: &mut [u8]| bytes[start(bytes) + 28 * 777 + 11] ^= 0x10;
     let (code, told) = convert(&scan(folder.path(), "a.las", 1, flip), &[]);
     assert_eq!(code, 1, "{told}");
-    assert!(told.contains("1 of 120000 points lie outside of the header's box: z from"), "{told}");
+    assert!(told.contains("1 of 120,000 points lie outside of the header's box: z from"), "{told}");
     let flip = |bytes: &mut [u8]| bytes[start(bytes) + 28 * 777 + 14] ^= 0x04;
     let (code, told) = convert(&scan(folder.path(), "a.las", 1, flip), &[]);
     assert_eq!(code, 1, "{told}");

@@ -167,7 +167,7 @@ kind = \"write\"
 ";
     let expected = "\
 12 mistakes
-p.toml:2:10: `memory`: `2G` is no size such as 512MiB or 2GiB (units: B, KiB, MiB, GiB, TiB, kB, MB, GB, TB)
+p.toml:2:10: `memory`: `2G` is no size such as 512MiB or 2GiB: write 2GiB (units: B, KiB, MiB, GiB, TiB, kB, MB, GB, TB)
   2 | memory = \"2G\"
     |          ^^^^
 p.toml:3:1: `[run]` has no key `thraeds`
@@ -374,7 +374,10 @@ fn keys_of_write_fit_its_format() {
         ("path = \"out.abc\"", "p.toml:12:8: the extension of `out.abc` names no format"),
         ("path = \"a.ply\"\nscale = 1", "p.toml:13:9: `write.scale` is for las and laz"),
         ("path = \"a.laz\"\nencoding = \"ascii\"", "p.toml:13:12: `write.encoding` is for ply"),
-        ("path = \"a.laz\"\nscale = [1, 2]", "p.toml:13:9: `scale`: takes a number above 0, or"),
+        (
+            "path = \"a.laz\"\nscale = [1, 2]",
+            "p.toml:13:9: `scale`: takes a number above 0 without a unit",
+        ),
         ("path = \"a.laz\"\nscale = [1, 2, 3, 4]", "`scale`: has 1 values too many"),
         ("path = \"a.laz\"\nscale = [1, 0, 1]", "p.toml:13:13: `scale`: takes a number above 0"),
         ("path = \"a.laz\"\ndimensions = [\"NormalX\"]", "p.toml:13:14: `dimensions`: takes [] or"),

@@ -1,18 +1,18 @@
 //! What can be typed.
 
-use std::num::NonZeroUsize;
+use std::fmt;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 
-use serde_json::Value;
-
 use super::preset::Preset;
-use super::words::{Flag, flags};
+use super::run::whole_or_text;
+use super::words::{Flag, Given, flags};
 use crate::Result;
 use crate::error::nearest;
-use crate::pipeline::{MOST_THREADS, parse_bytes};
+use crate::pipeline::MOST_THREADS;
 use crate::quantity::parse_count;
 
 const EXIT_CODES: &str = "\
@@ -79,11 +79,11 @@ impl Command {
 #[command(next_help_heading = "Run options")]
 pub(super) struct Common {
     /// Bound of the peak memory, such as 512MiB or 2GiB [default: half of what there is]
-    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
-    pub memory: Option<u64>,
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
     /// Threads that work at once [default: all processors]
-    #[arg(long, value_name = "N", value_parser = parse_threads)]
-    pub threads: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N")]
+    pub threads: Option<String>,
     /// Folder for what does not fit in memory [default: beside the output]
     #[arg(long, value_name = "DIR")]
     pub scratch: Option<String>,
@@ -107,12 +107,12 @@ pub(super) struct Common {
 impl Common {
     /// The flags that stand for `[run]` settings.
     pub fn flags(&self) -> Vec<Flag> {
-        let existing = self.no_clobber.then(|| Value::from("refuse"));
+        let existing = self.no_clobber.then(|| Given::from("refuse"));
         flags([
-            ("--memory", "run.memory", self.memory.map(Value::from)),
-            ("--threads", "run.threads", self.threads.map(|n| n.get().into())),
-            ("--scratch", "run.scratch", self.scratch.clone().map(Value::from)),
-            ("--report", "run.report", self.report.clone().map(Value::from)),
+            ("--memory", "run.memory", self.memory.clone().map(Given::from)),
+            ("--threads", "run.threads", self.threads.as_deref().map(whole_or_text)),
+            ("--scratch", "run.scratch", self.scratch.clone().map(Given::from)),
+            ("--report", "run.report", self.report.clone().map(Given::from)),
             ("--no-clobber", "run.existing", existing),
         ])
     }
@@ -125,19 +125,14 @@ pub(super) enum Progress {
     Never,
 }
 
-fn parse_threads(text: &str) -> Result<NonZeroUsize, String> {
-    let most = MOST_THREADS;
-    let refused = || format!("`{text}` is no number of threads: give 1 to {most}, or leave it out");
-    let within = |threads: &NonZeroUsize| threads.get() <= most;
-    text.parse().ok().filter(within).ok_or_else(refused)
+/// A whole number within bounds, as the keys of a pipeline take it.
+fn within(text: &str, least: u64, most: u64) -> Result<u64, String> {
+    let right = parse_count(text).ok().filter(|number| (least..=most).contains(number));
+    right.ok_or_else(|| format!("takes a whole number from {least} to {most}"))
 }
 
-fn parse_whole(text: &str) -> Result<u64, String> {
-    parse_count(text).map_err(|_| format!("`{text}` is no whole number such as 10, 10k or 1e6"))
-}
-
-fn parse_number(text: &str) -> Result<f64, String> {
-    text.trim().parse().map_err(|_| format!("`{text}` is no number such as 0.5 or 1e-3"))
+fn parse_threads(text: &str) -> Result<usize, String> {
+    within(text, 1, MOST_THREADS as u64).map(|threads| threads as usize)
 }
 
 /// Classes that have a name in the LAS specification (1.4 R15, table 17).
@@ -154,25 +149,46 @@ const CLASSES: [(&str, u8); 10] = [
     ("road", 11),
 ];
 
-fn parse_class(text: &str) -> Result<u8, String> {
-    text.trim().parse().map_err(|_| {
-        let names = CLASSES.map(|(name, _)| name.to_owned());
-        let near = nearest(text, &names).and_then(|near| CLASSES.iter().find(|(n, _)| n == near));
-        let meant = near.map_or(String::new(), |(name, class)| format!("; {name} is {class}"));
-        format!("classes are numbers from 0 to 255{meant}")
-    })
+/// A class, or those from one to another.
+#[derive(Debug, Clone)]
+pub(super) struct Classes(RangeInclusive<u8>);
+
+impl Classes {
+    /// Every one of them.
+    pub fn each(&self) -> RangeInclusive<u8> {
+        self.0.clone()
+    }
+
+    /// True if `class` is one of them.
+    pub fn has(&self, class: u8) -> bool {
+        self.0.contains(&class)
+    }
 }
 
-/// One number for all axes, or three for X, Y and Z.
-#[derive(Debug, Clone)]
-pub(super) struct Axes(pub Vec<f64>);
-
-fn parse_axes(text: &str) -> Result<Axes, String> {
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
-    match numbers {
-        Ok(numbers) if [1, 3].contains(&numbers.len()) => Ok(Axes(numbers)),
-        _ => Err(format!("`{text}` is neither a number nor three with commas between them")),
+/// As it is typed: `2`, `3-5`.
+impl fmt::Display for Classes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (first, last) = (self.0.start(), self.0.end());
+        match first == last {
+            true => write!(f, "{first}"),
+            false => write!(f, "{first}-{last}"),
+        }
     }
+}
+
+fn parse_classes(text: &str) -> Result<Classes, String> {
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    match (first.trim().parse(), last.trim().parse()) {
+        (Ok(first), Ok(last)) if first <= last => return Ok(Classes(first..=last)),
+        (Ok(first), Ok::<u8, _>(last)) => {
+            return Err(format!("`{text}` is no range of classes: write {last}-{first}"));
+        }
+        _ => {}
+    }
+    let names = CLASSES.map(|(name, _)| name.to_owned());
+    let near = nearest(text, &names).and_then(|near| CLASSES.iter().find(|(n, _)| n == near));
+    let meant = near.map_or(String::new(), |(name, class)| format!("; {name} is {class}"));
+    Err(format!("classes are numbers from 0 to 255, or ranges such as 3-5{meant}"))
 }
 
 #[derive(Debug, Args)]
@@ -216,7 +232,7 @@ pub(super) struct Reduce {
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
     /// Settings for a kind of scan, or those of the published method (paper); other options take the
-    /// place of a preset's [default: by the noise and the spacing of the scan, which the run tells]
+    /// place of a preset's [default: by the noise and the spacing of the scan; the run says what it chose]
     #[arg(long, value_name = "KIND")]
     pub preset: Option<Preset>,
     /// Instead of a number of points: the largest range of normal angles in a cell, in radians, as 6deg,
@@ -235,20 +251,20 @@ pub(super) struct Reduce {
     #[arg(long, value_name = "SIDE")]
     pub side: Option<String>,
     /// A cell with this many points or fewer is not split [default: 1]
-    #[arg(long, value_name = "N", value_parser = parse_count)]
-    pub min_points: Option<u64>,
+    #[arg(long, value_name = "N")]
+    pub min_points: Option<String>,
     /// Largest side of a cell that is kept whole, in the scan's unit or as 2m [default: none]
-    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
+    #[arg(long, value_name = "LENGTH")]
     pub max_side: Option<String>,
     /// No cell of this length or less is split: in the scan's unit, as 5cm, auto or none [default: auto]
-    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
+    #[arg(long, value_name = "LENGTH")]
     pub min_spacing: Option<String>,
     /// What the angles of a cell are measured to: axis, one direction for all, or cone, the cell's own
     /// [default: cone]
     #[arg(long, value_name = "HOW")]
     pub measure: Option<String>,
     /// The direction of `--measure axis`: x, y, z or a vector such as 0,0,1 [default: x]
-    #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
+    #[arg(long, value_name = "AXIS")]
     pub reference: Option<String>,
     /// How a cell is split: voronoi or octant [default: voronoi]
     #[arg(long, value_name = "HOW")]
@@ -260,8 +276,8 @@ pub(super) struct Reduce {
     #[arg(long)]
     pub outliers: bool,
     /// Reduce what is left again, until it was reduced this often [default: 1]
-    #[arg(long, value_name = "N", value_parser = parse_whole)]
-    pub passes: Option<u64>,
+    #[arg(long, value_name = "N")]
+    pub passes: Option<String>,
     /// Mark the decision in the records and write them all: key-point, withheld, or class 7 or 18
     #[arg(long, value_name = "HOW")]
     pub mark: Option<String>,
@@ -271,8 +287,8 @@ pub(super) struct Reduce {
     pub order: Option<String>,
     /// Reduce the points of these classes alone, such as 2,6; all others stay, and are not seen as
     /// neighbours
-    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_class)]
-    pub classes: Vec<u8>,
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_classes)]
+    pub classes: Vec<Classes>,
     /// Points of classes 7 and 18, which are noise: drop them, keep them as points like all others, or
     /// ignore them and write them as they are [default: drop; ignore with --mark; keep where --classes
     /// or --keep-classes names one of them]
@@ -287,11 +303,11 @@ pub(super) struct Reduce {
     /// Points whose coordinates are not finite: refuse the scan, or drop them [default: refuse]
     #[arg(long, value_name = "HOW")]
     pub nonfinite: Option<String>,
-    /// Length of a step of the lattice on which points are compared, for scans far from their origin
-    /// or finer than it. Sides that are chosen follow from it, and with them the number of points
-    /// [default: what the coordinates are stored in, for floats 2^-30]
-    #[arg(long, value_name = "LENGTH", value_parser = parse_number)]
-    pub lattice: Option<f64>,
+    /// Length of a step of the lattice on which points are compared, in the scan's unit, for scans far
+    /// from their origin or finer than it. Sides that are chosen follow from it, and with them how many
+    /// points stay [default: what the coordinates are stored in, for floats 2^-30]
+    #[arg(long, value_name = "NUMBER")]
+    pub lattice: Option<String>,
     /// Scans whose points contradict their LAS header, as damaged ones do: refuse them, or warn
     /// [default: refuse]
     #[arg(long, value_name = "HOW")]
@@ -311,28 +327,22 @@ pub(super) struct Reduce {
 #[derive(Debug, Args)]
 pub(super) struct Filtered {
     /// Keep the points of these classes alone, such as 2,6
-    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_class)]
-    pub keep_classes: Vec<u8>,
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_classes)]
+    pub keep_classes: Vec<Classes>,
     /// Leave the points of these classes out, such as 7,18
-    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_class)]
-    pub drop_classes: Vec<u8>,
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_classes)]
+    pub drop_classes: Vec<Classes>,
 }
 
 /// How the output is written.
 #[derive(Debug, Args)]
 pub(super) struct Written {
     /// Scale of LAS coordinates, or three for X, Y and Z [default: the input's; PLY to LAS must say it]
-    #[arg(long, value_name = "SCALE", allow_hyphen_values = true, value_parser = parse_axes)]
-    pub scale: Option<Axes>,
+    #[arg(long, value_name = "SCALE")]
+    pub scale: Option<String>,
     /// Offset of LAS coordinates on each axis [default: the input's, or 0]
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        value_delimiter = ',',
-        allow_hyphen_values = true,
-        value_parser = parse_number
-    )]
-    pub offset: Vec<f64>,
+    #[arg(long, value_name = "X,Y,Z")]
+    pub offset: Option<String>,
     /// Dimensions that may get lost, such as GpsTime,UserData
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub drop: Vec<String>,
@@ -403,7 +413,7 @@ pub(super) struct Picture {
     pub width: u32,
     /// Threads that work at once [default: all processors]
     #[arg(long, value_name = "N", value_parser = parse_threads)]
-    pub threads: Option<NonZeroUsize>,
+    pub threads: Option<usize>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -425,8 +435,7 @@ pub(super) enum By {
 }
 
 fn parse_width(text: &str) -> Result<u32, String> {
-    let told = || format!("`{text}` is no width: give 64 to 4096 pixels");
-    text.parse().ok().filter(|width| (64..=4096).contains(width)).ok_or_else(told)
+    within(text, 64, 4096).map(|width| width as u32)
 }
 
 #[derive(Debug, Args)]
@@ -459,17 +468,17 @@ pub(super) struct Synth {
     #[arg(value_name = "KIND")]
     pub scene: String,
     /// How many points, such as 1500, 10k, 5M or 1e6
-    #[arg(short = 'n', long = "points", value_name = "N", value_parser = parse_count)]
-    pub points: u64,
+    #[arg(short = 'n', long = "points", value_name = "N")]
+    pub points: String,
     /// The file: .las, .laz or .ply
     #[arg(short, long, value_name = "OUT")]
     pub output: String,
     /// Equal seeds give equal scans [default: 0]
-    #[arg(long, value_name = "SEED", value_parser = parse_whole)]
-    pub seed: Option<u64>,
+    #[arg(long, value_name = "SEED")]
+    pub seed: Option<String>,
     /// Standard deviation of the noise in world units [default: the scene's own]
-    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true, value_parser = parse_number)]
-    pub noise: Option<f64>,
+    #[arg(long, value_name = "NUMBER")]
+    pub noise: Option<String>,
     #[command(flatten)]
     pub common: Common,
 }

@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use super::arguments::Plan;
 use super::console::Console;
+use super::mistyped::marked;
 use super::print;
 use super::run::parse_sets;
 use crate::error::shown;
 use crate::pipeline::{Outline, Overrides, Pipeline, Registry, Watch};
 use crate::report::Grouped;
 use crate::stage::Role;
-use crate::{Result, io};
+use crate::{Error, Result, io};
 
 /// Prints how a pipeline would be run.
 pub(super) fn plan(arguments: &Plan, registry: &Registry, console: &Console) -> Result<()> {
@@ -42,6 +43,14 @@ pub(super) fn check(arguments: &Plan, registry: &Registry, console: &Console) ->
 }
 
 fn read(arguments: &Plan, registry: &Registry) -> Result<Pipeline> {
+    let flags = [
+        ("--report", arguments.common.report.is_some()),
+        ("--no-clobber", arguments.common.no_clobber),
+    ];
+    if let Some((flag, _)) = flags.into_iter().find(|(_, is_given)| *is_given) {
+        let told = marked(&format!("{flag}: is for commands that write files"), flag, "");
+        return Err(Error::pipeline(told).help("give it to `run`"));
+    }
     let sets = parse_sets(&arguments.sets, &arguments.common)?;
     Pipeline::read(&arguments.pipeline, registry, &sets)
 }

@@ -7,14 +7,15 @@ use serde_json::{Value, json};
 
 use super::arguments::Convert;
 use super::console::Console;
+use super::mistyped::marked;
 use super::run::{HIDDEN, filtered, given, mill, with_stages, written};
-use super::words::{self, Flag};
+use super::words::{self, Flag, Given};
 use crate::budget::Bytes;
 use crate::error::shown;
 use crate::io::las;
 use crate::pipeline::{
-    Clash, Done, Existing, Files, Format, Pipeline, Registry, Use, Watch, expand, make_folder,
-    refuse_existing,
+    Clash, Done, Existing, Files, Format, Pipeline, Registry, Use, Watch, expand_any, make_folder,
+    refuse_existing, unreadable,
 };
 use crate::report::Grouped;
 use crate::{Error, ErrorKind, Result};
@@ -30,21 +31,29 @@ pub(super) fn convert(arguments: &Convert, registry: &Registry, console: &Consol
         let one = pipeline(arguments, json!(arguments.inputs), json!(arguments.output), registry);
         return console.result(mill(one?, console)?);
     }
-    let inputs = expand(&arguments.inputs)?;
+    let (inputs, odd): (Vec<PathBuf>, Vec<PathBuf>) =
+        expand_any(&arguments.inputs)?.into_iter().partition(|input| input.to_str().is_some());
+    if let ([], [first, ..]) = (&inputs[..], &odd[..]) {
+        return Err(unreadable(first));
+    }
     if inputs.len() > 1 && arguments.common.report.is_some() {
-        return Err(Error::pipeline("--report is for one output, and this makes several")
-            .help("leave --report out, or convert the files one by one"));
+        let told = "--report: is for one output, and this makes several";
+        let report = arguments.common.report.as_deref().unwrap_or_default();
+        let note = "leave --report out, or convert the files one by one";
+        return Err(Error::pipeline(marked(told, report, note)));
     }
     let pairs = outputs(&inputs, folder, arguments.to.as_deref())?;
     check_files(&pairs, arguments)?;
     // Every pipeline is checked before the first is run.
     let mut runs = Vec::new();
     for (input, output) in pairs {
-        let one = pipeline(arguments, text(&input)?, text(&output)?, registry)?;
+        // Names of inputs are text, and so is what is added to them.
+        let text = |path: &Path| json!(path.to_string_lossy());
+        let one = pipeline(arguments, text(&input), text(&output), registry)?;
         runs.push((input, one));
     }
     let made = make_folder(folder)?;
-    let (done, outcome) = run_all(runs, console);
+    let (done, outcome) = run_all(runs, odd, console);
     if done.is_empty() {
         // Left behind if any output is in it, which is as it should be.
         made.iter().rev().for_each(|made| drop(std::fs::remove_dir(made)));
@@ -107,7 +116,7 @@ impl Total {
         let Total { files, points, bytes, peak_bytes, seconds } = self;
         let mut told = format!("files      {files}\n");
         if let Some(failed) = failed {
-            told += &format!("besides    {failed}\n");
+            told += &format!("incomplete {failed}\n");
         }
         told += &format!("points     {}\n", Grouped(*points));
         if let Some(peak) = peak_bytes {
@@ -118,12 +127,20 @@ impl Total {
 }
 
 /// Runs one pipeline after the other. One that fails is told at once and does not keep the others
-/// from running; the error in the end is of the first failure's kind. Returned are those that are
-/// done and what became of all.
-fn run_all(runs: Vec<(PathBuf, Pipeline)>, console: &Console) -> (Vec<Done>, Result<()>) {
-    let total = runs.len();
+/// from running, as do `odd` names, of which there can be no pipeline; the error in the end is of the
+/// first failure's kind. Returned are those that are done and what became of all.
+fn run_all(
+    runs: Vec<(PathBuf, Pipeline)>,
+    odd: Vec<PathBuf>,
+    console: &Console,
+) -> (Vec<Done>, Result<()>) {
+    let total = runs.len() + odd.len();
     let mut done = Vec::new();
     let mut failures: Vec<ErrorKind> = Vec::new();
+    for error in odd.iter().map(|name| unreadable(name)) {
+        failures.push(error.kind());
+        console.error(&error);
+    }
     for (input, pipeline) in runs {
         if console.cancelled() {
             return (done, Err(Error::interrupted()));
@@ -150,11 +167,11 @@ pub(super) fn flags(
     output: Option<Value>,
 ) -> Vec<Flag> {
     let mut all = words::flags([
-        ("IN", "read.path", inputs),
-        ("-o", "write.path", output),
-        ("--to", "write.format", arguments.to.as_deref().map(Value::from)),
-        ("--headers", "run.headers", arguments.headers.as_deref().map(Value::from)),
-        ("--nonfinite", "run.nonfinite", arguments.nonfinite.as_deref().map(Value::from)),
+        ("IN", "read.path", inputs.map(Given::from)),
+        ("-o", "write.path", output.map(Given::from)),
+        ("--to", "write.format", arguments.to.clone().map(Given::from)),
+        ("--headers", "run.headers", arguments.headers.clone().map(Given::from)),
+        ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(Given::from)),
     ]);
     all.extend(filtered(&arguments.filter));
     all.extend(written(&arguments.written));
@@ -193,15 +210,6 @@ fn outputs(inputs: &[PathBuf], folder: &Path, to: Option<&str>) -> Result<Vec<(P
         all.push((input.clone(), output));
     }
     Ok(all)
-}
-
-fn text(path: &Path) -> Result<Value> {
-    let told = || {
-        Error::pipeline("the name is not UTF-8 text")
-            .at(path)
-            .help("rename it, or convert the folder that it is in to one file")
-    };
-    Ok(json!(path.to_str().ok_or_else(told)?))
 }
 
 #[cfg(test)]

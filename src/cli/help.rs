@@ -56,6 +56,9 @@ const GROUPS: &[(&str, &str, &[&str])] = &[
     ("convert", "Output", &["output", "to", "scale", "offset", "drop", "encoding", "colors"]),
 ];
 
+/// Commands with the flags of a run that write nothing: they refuse those about what is written.
+const WRITE_NOTHING: [&str; 2] = ["plan", "check"];
+
 /// What stands below the help of a command.
 const EXAMPLES: &[(&str, &str)] = &[
     (
@@ -113,7 +116,11 @@ pub(super) fn command() -> Command {
         let group = |sub: Command, flag: &&str| sub.mut_arg(*flag, |a| a.help_heading(*heading));
         all.mut_subcommand(*command, |sub| flags.iter().fold(sub, group))
     });
-    EXAMPLES.iter().fold(grouped, |all, (command, examples)| {
+    let hidden = WRITE_NOTHING.iter().fold(grouped, |all, command| {
+        let hide = |sub: Command, flag| sub.mut_arg(flag, |a| a.hide(true));
+        all.mut_subcommand(*command, |sub| ["report", "no_clobber"].into_iter().fold(sub, hide))
+    });
+    EXAMPLES.iter().fold(hidden, |all, (command, examples)| {
         all.mut_subcommand(*command, |sub| sub.after_help(*examples))
     })
 }

@@ -11,6 +11,7 @@ mod describe;
 mod events;
 mod help;
 mod interrupt;
+mod mistyped;
 mod picture;
 mod preset;
 mod print;
@@ -20,6 +21,7 @@ mod stages;
 mod table;
 mod words;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::FromArgMatches;
@@ -32,7 +34,7 @@ use console::Console;
 
 /// What helps where an argument is no text.
 const UNREADABLE: &str = "\
-    help: rename the file, or name its folder or a pattern: the files that these mean may have any name";
+    help: rename the file: pipelines and reports could not say its name";
 
 /// Runs the command that the process was started with; pipelines may name the kinds of `registry`.
 pub fn main(registry: &Registry) -> ExitCode {
@@ -41,12 +43,19 @@ pub fn main(registry: &Registry) -> ExitCode {
         print::message(format_args!("error: the argument `{odd}` is not UTF-8 text\n{UNREADABLE}"));
         return ExitCode::from(2);
     }
-    let typed = help::command().try_get_matches();
+    let known = help::command();
+    let given = mistyped::tied(&known, std::env::args_os().collect());
+    let typed = known.clone().try_get_matches_from(&given);
     let arguments = match typed.and_then(|typed| Arguments::from_arg_matches(&typed)) {
         Ok(arguments) => arguments,
         Err(told) => {
-            let told = as_shown(told);
-            print::usage(&told);
+            let given: Vec<OsString> =
+                given.iter().map(|argument| shown(argument.as_ref()).to_string().into()).collect();
+            let told = as_shown(told, &known, &given);
+            match mistyped::told(&told, &known, &given) {
+                Some(told) => print::message(told),
+                None => print::usage(&told),
+            }
             return ExitCode::from(if told.use_stderr() { 2 } else { 0 });
         }
     };
@@ -61,9 +70,8 @@ pub fn main(registry: &Registry) -> ExitCode {
 }
 
 /// The same error with the arguments as they may be printed: what is typed is quoted in it.
-fn as_shown(told: clap::Error) -> clap::Error {
-    let plain = std::env::args_os().map(|argument| shown(argument.as_ref()).to_string());
-    help::command().try_get_matches_from(plain).err().unwrap_or(told)
+fn as_shown(told: clap::Error, known: &clap::Command, shown: &[OsString]) -> clap::Error {
+    known.clone().try_get_matches_from(shown).err().unwrap_or(told)
 }
 
 fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<()> {

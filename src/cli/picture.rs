@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::arguments::{self, From};
+use super::mistyped::marked;
 use super::print;
 use crate::budget::Bytes;
 use crate::error::shown;
@@ -17,8 +18,10 @@ use crate::{Error, Result};
 pub(super) fn picture(arguments: &arguments::Picture) -> Result<()> {
     let path = &arguments.output;
     if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("png")) {
-        let told = "a picture is a PNG file, and this name does not end in .png";
-        return Err(Error::pipeline(told).at(path));
+        let told = "-o: a picture is a PNG file, whose name ends in .png";
+        let png = path.with_extension("png");
+        let note = format!("write -o {}", shown(&png));
+        return Err(Error::pipeline(marked(told, &shown(path).to_string(), &note)));
     }
     let (mut sources, mut files): (Vec<Box<dyn Source>>, Vec<PathBuf>) = Default::default();
     for input in &arguments.inputs {
@@ -58,7 +61,7 @@ fn settings(arguments: &arguments::Picture) -> Settings {
             arguments::By::Intensity => By::Intensity,
         },
         width: arguments.width,
-        threads: arguments.threads.map_or_else(processors, usize::from),
+        threads: arguments.threads.unwrap_or_else(processors),
     }
 }
 
@@ -96,9 +99,7 @@ fn told(picture: &Picture, arguments: &arguments::Picture, bytes: u64) -> String
     let Picture { width, height, pixel, .. } = picture;
     let (path, bytes) = (shown(&arguments.output), Bytes(bytes));
     let pixel = Short(*pixel);
-    told + &format!(
-        "pixel      {pixel}\noutput     {path}, {width} × {height} pixels, {bytes}\n"
-    )
+    told + &format!("pixel      {pixel}\noutput     {path}, {width} × {height} pixels, {bytes}\n")
 }
 
 #[cfg(test)]

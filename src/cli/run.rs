@@ -2,12 +2,13 @@
 
 use serde_json::{Value, json};
 
-use super::arguments::{Axes, Common, Filtered, Reduce, Run, Synth, Written};
+use super::arguments::{Classes, Common, Filtered, Reduce, Run, Synth, Written};
 use super::console::Console;
 use super::preset::Preset;
-use super::words::{self, Flag, flags};
+use super::words::{self, Flag, Given, flags};
 use crate::Result;
 use crate::pipeline::{Done, Overrides, Pipeline, Registry, Set};
+use crate::quantity::parse_count;
 
 /// The pipeline of `reduce`, which users copy.
 const REDUCE: &str = include_str!("../../pipelines/reduce.toml");
@@ -71,7 +72,7 @@ pub(super) fn given<const N: usize>(tables: [Vec<Flag>; N]) -> Vec<Set> {
 }
 
 /// A number as a pipeline's value; one that JSON cannot hold is left for the stage to refuse.
-pub(super) fn number(value: f64) -> Value {
+fn number(value: f64) -> Value {
     serde_json::Number::from_f64(value).map_or_else(|| json!(value.to_string()), Value::from)
 }
 
@@ -98,19 +99,18 @@ impl Filtered {
 
 /// Which points are left out, as the keys of `filter`.
 pub(super) fn filtered(arguments: &Filtered) -> Vec<Flag> {
-    let list = |classes: &[u8]| (!classes.is_empty()).then(|| json!(classes));
     flags([
-        ("--keep-classes", "filter.keep_classes", list(&arguments.keep_classes)),
-        ("--drop-classes", "filter.drop_classes", list(&arguments.drop_classes)),
+        ("--keep-classes", "filter.keep_classes", classes(&arguments.keep_classes)),
+        ("--drop-classes", "filter.drop_classes", classes(&arguments.drop_classes)),
     ])
 }
 
 /// What becomes of noise: left out, unless all points are to be written, or noise is asked for.
 fn noise(arguments: &Reduce) -> &str {
-    let asked = arguments.classes.iter().chain(&arguments.filter.keep_classes);
+    let mut asked = arguments.classes.iter().chain(&arguments.filter.keep_classes);
     match &arguments.noise {
         Some(noise) => noise,
-        None if asked.into_iter().any(|class| [7, 18].contains(class)) => "keep",
+        None if asked.any(|classes| classes.has(7) || classes.has(18)) => "keep",
         None if arguments.mark.is_some() => "ignore",
         None => "drop",
     }
@@ -118,18 +118,19 @@ fn noise(arguments: &Reduce) -> &str {
 
 /// True if what is left is to be reduced again and nothing says by what: a number would be met at once.
 fn again(arguments: &Reduce) -> bool {
+    let passes = arguments.passes.as_deref().and_then(|passes| parse_count(passes).ok());
     let limit = arguments.keep.is_some() || arguments.max_angle.is_some();
-    arguments.passes.is_some_and(|passes| passes > 1) && !limit && arguments.preset.is_none()
+    passes.is_some_and(|passes| passes > 1) && !limit && arguments.preset.is_none()
 }
 
 /// The flags of `reduce`.
 pub(super) fn reduce_flags(arguments: &Reduce) -> Vec<Flag> {
-    let classes = (!arguments.classes.is_empty()).then(|| json!(arguments.classes));
+    let classes = || classes(&arguments.classes);
     let mut all = flags([
-        ("IN", "read.path", Some(json!(arguments.inputs))),
-        ("-o", "write.path", arguments.output.clone().map(Value::from)),
-        ("--outdir", "write.folder", arguments.outdir.clone().map(Value::from)),
-        ("--to", "write.format", arguments.to.clone().map(Value::from)),
+        ("IN", "read.path", Some(json!(arguments.inputs).into())),
+        ("-o", "write.path", arguments.output.clone().map(Given::from)),
+        ("--outdir", "write.folder", arguments.outdir.clone().map(Given::from)),
+        ("--to", "write.format", arguments.to.clone().map(Given::from)),
         ("--max-angle", "cells.max_angle", arguments.max_angle.as_deref().map(number_or_text)),
         ("--keep", "cells.keep", arguments.keep.as_deref().map(whole_or_text)),
         ("--max-side", "cells.max_side", arguments.max_side.as_deref().map(number_or_text)),
@@ -138,26 +139,26 @@ pub(super) fn reduce_flags(arguments: &Reduce) -> Vec<Flag> {
             "cells.min_spacing",
             arguments.min_spacing.as_deref().map(number_or_text),
         ),
-        ("--measure", "cells.measure", arguments.measure.clone().map(Value::from)),
+        ("--measure", "cells.measure", arguments.measure.clone().map(Given::from)),
         ("--reference", "cells.reference", arguments.reference.as_deref().map(numbers_or_text)),
         ("--neighbors", "normals.neighbors", arguments.neighbors.as_deref().map(whole_or_text)),
         ("--side", "cells.side", arguments.side.as_deref().map(number_or_text)),
-        ("--min-points", "cells.min_points", arguments.min_points.map(Value::from)),
-        ("--split", "cells.split", arguments.split.clone().map(Value::from)),
-        ("--method", "normals.method", arguments.method.clone().map(Value::from)),
-        ("--passes", "median.passes", arguments.passes.map(Value::from)),
-        ("--passes", "cells.max_angle", again(arguments).then(|| json!("auto"))),
-        ("--order", "write.order", arguments.order.clone().map(Value::from)),
+        ("--min-points", "cells.min_points", arguments.min_points.as_deref().map(whole_or_text)),
+        ("--split", "cells.split", arguments.split.clone().map(Given::from)),
+        ("--method", "normals.method", arguments.method.clone().map(Given::from)),
+        ("--passes", "median.passes", arguments.passes.as_deref().map(whole_or_text)),
+        ("--passes", "cells.max_angle", again(arguments).then(|| "auto".into())),
+        ("--order", "write.order", arguments.order.clone().map(Given::from)),
         ("--mark", "median.mark", arguments.mark.as_deref().map(whole_or_text)),
-        ("--classes", "outliers.classes", classes.clone().filter(|_| arguments.outliers)),
-        ("--classes", "normals.classes", classes.clone()),
-        ("--classes", "cells.classes", classes.clone()),
-        ("--classes", "median.classes", classes),
-        ("--withheld", "run.withheld", arguments.withheld.clone().map(Value::from)),
-        ("--noise", "run.noise", Some(json!(noise(arguments)))),
-        ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(Value::from)),
-        ("--lattice", "run.lattice", arguments.lattice.map(number)),
-        ("--headers", "run.headers", arguments.headers.clone().map(Value::from)),
+        ("--classes", "outliers.classes", classes().filter(|_| arguments.outliers)),
+        ("--classes", "normals.classes", classes()),
+        ("--classes", "cells.classes", classes()),
+        ("--classes", "median.classes", classes()),
+        ("--withheld", "run.withheld", arguments.withheld.clone().map(Given::from)),
+        ("--noise", "run.noise", Some(noise(arguments).into())),
+        ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(Given::from)),
+        ("--lattice", "run.lattice", arguments.lattice.as_deref().map(number_or_text)),
+        ("--headers", "run.headers", arguments.headers.clone().map(Given::from)),
         ("--z-scale", "run.z_scale", arguments.z_scale.as_deref().map(number_or_text)),
     ]);
     all.extend(filtered(&arguments.filter));
@@ -168,48 +169,59 @@ pub(super) fn reduce_flags(arguments: &Reduce) -> Vec<Flag> {
 /// The flags of `synth`.
 pub(super) fn synth_flags(arguments: &Synth) -> Vec<Flag> {
     flags([
-        ("KIND", "synth.scene", Some(json!(arguments.scene))),
-        ("-n", "synth.points", Some(json!(arguments.points))),
-        ("-o", "write.path", Some(json!(arguments.output))),
-        ("--seed", "synth.seed", arguments.seed.map(Value::from)),
-        ("--noise", "synth.noise", arguments.noise.map(number)),
+        ("KIND", "synth.scene", Some(arguments.scene.clone().into())),
+        ("-n", "synth.points", Some(whole_or_text(&arguments.points))),
+        ("-o", "write.path", Some(arguments.output.clone().into())),
+        ("--seed", "synth.seed", arguments.seed.as_deref().map(whole_or_text)),
+        ("--noise", "synth.noise", arguments.noise.as_deref().map(number_or_text)),
     ])
 }
 
 /// How the output is written, as the keys of `write`.
 pub(super) fn written(arguments: &Written) -> Vec<Flag> {
-    let list = |given: bool, value: Value| given.then_some(value);
+    let names = (!arguments.drop.is_empty()).then(|| json!(arguments.drop).into());
     flags([
-        ("--scale", "write.scale", arguments.scale.as_ref().map(axes)),
-        ("--offset", "write.offset", list(!arguments.offset.is_empty(), json!(arguments.offset))),
-        ("--drop", "write.drop", list(!arguments.drop.is_empty(), json!(arguments.drop))),
-        ("--encoding", "write.encoding", arguments.encoding.as_deref().map(Value::from)),
-        ("--colors", "write.colors", arguments.colors.as_deref().map(Value::from)),
+        ("--scale", "write.scale", arguments.scale.as_deref().map(numbers_or_text)),
+        ("--offset", "write.offset", arguments.offset.as_deref().map(numbers_or_text)),
+        ("--drop", "write.drop", names),
+        ("--encoding", "write.encoding", arguments.encoding.clone().map(Given::from)),
+        ("--colors", "write.colors", arguments.colors.clone().map(Given::from)),
     ])
 }
 
-/// One number, or a list of them.
-fn axes(Axes(numbers): &Axes) -> Value {
-    match numbers[..] {
-        [one] => number(one),
-        _ => numbers.iter().map(|&axis| number(axis)).collect(),
+/// All classes of several numbers and ranges.
+fn classes(given: &[Classes]) -> Option<Given> {
+    let all: Vec<u8> = given.iter().flat_map(Classes::each).collect();
+    let typed: Vec<String> = given.iter().map(Classes::to_string).collect();
+    (!all.is_empty()).then(|| Given::of(&typed.join(","), json!(all)))
+}
+
+/// A whole number where the text is one (`10k`, `1e1`), else a number or the text.
+pub(super) fn whole_or_text(text: &str) -> Given {
+    match parse_count(text) {
+        Ok(count) => Given::of(text, count.into()),
+        Err(_) => number_or_text(text),
     }
 }
 
-/// A whole number where the text is one, else the text.
-fn whole_or_text(text: &str) -> Value {
-    text.parse::<u64>().map_or_else(|_| json!(text), Value::from)
-}
-
 /// A number where the text is one, else the text (`6deg`, `auto`).
-fn number_or_text(text: &str) -> Value {
-    text.parse().map_or_else(|_| json!(text), number)
+fn number_or_text(text: &str) -> Given {
+    Given::of(text, plain(text))
 }
 
-/// A list of numbers where the text is one with commas, else the text (`x`).
-fn numbers_or_text(text: &str) -> Value {
-    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
-    numbers.map_or_else(|_| json!(text), |numbers| numbers.into_iter().map(number).collect())
+/// A list of numbers where the text has commas (what is no number there is told), else a number or the
+/// text (`x`).
+fn numbers_or_text(text: &str) -> Given {
+    let list = || text.split(',').map(plain).collect();
+    Given::of(text, if text.contains(',') { list() } else { plain(text) })
+}
+
+fn plain(text: &str) -> Value {
+    let text = text.trim();
+    match text.parse::<i64>() {
+        Ok(whole) => whole.into(),
+        Err(_) => text.parse().map_or_else(|_| json!(text), number),
+    }
 }
 
 #[cfg(test)]

@@ -17,19 +17,46 @@ pub(super) struct Flag {
     /// As `--set` takes it: `cells.keep`.
     pub address: &'static str,
     /// What was given.
-    pub value: Option<Value>,
+    pub given: Option<Given>,
 }
 
-/// Flags from `(name, address, value)`.
+/// The value of a flag.
+pub(super) struct Given {
+    value: Value,
+    /// What was typed, where the value may be written otherwise: `6`, a number, is 6.0.
+    typed: Option<String>,
+}
+
+impl Given {
+    /// The value that `text` was typed for.
+    pub fn of(text: &str, value: Value) -> Given {
+        Given { value, typed: Some(text.to_owned()) }
+    }
+}
+
+impl<T: Into<Value>> From<T> for Given {
+    fn from(value: T) -> Given {
+        Given { value: value.into(), typed: None }
+    }
+}
+
+/// Flags from `(name, address, what was given)`.
 pub(super) fn flags<const N: usize>(
-    rows: [(&'static str, &'static str, Option<Value>); N],
+    rows: [(&'static str, &'static str, Option<Given>); N],
 ) -> Vec<Flag> {
-    rows.into_iter().map(|(name, address, value)| Flag { name, address, value }).collect()
+    rows.into_iter().map(|(name, address, given)| Flag { name, address, given }).collect()
 }
 
 /// The values that were given, for a pipeline.
 pub(super) fn sets(flags: Vec<Flag>) -> Vec<Set> {
-    let set = |flag: Flag| Some(Set::argument(flag.name, flag.address, flag.value?));
+    let set = |flag: Flag| {
+        let Given { value, typed } = flag.given?;
+        let set = Set::argument(flag.name, flag.address, value);
+        Some(match typed {
+            Some(typed) => set.typed(typed),
+            None => set,
+        })
+    };
     flags.into_iter().filter_map(set).collect()
 }
 

@@ -7,7 +7,7 @@ pub mod las;
 mod origin;
 pub mod ply;
 mod project;
-mod sniff;
+pub(crate) mod sniff;
 pub mod synthetic;
 mod wkt;
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::convert::Projection;
 use crate::point::{PointBatch, Schema, Spare};
+use crate::report::{Grouped, Short};
 use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -84,8 +85,13 @@ impl Sink for Projected {
         let (points, largest) = self.rounded;
         let mut summary = self.inner.finish()?;
         if points > 0 {
+            let whose = match points {
+                1 => "the coordinates of 1 point".to_owned(),
+                _ => format!("the coordinates of {} points", Grouped(points)),
+            };
             summary.notes.push(format!(
-                "coordinates of {points} points were rounded to the output's scale, by at most {largest:.3e}"
+                "{whose} were rounded to the output's scale, by at most {}",
+                Short(largest)
             ));
         }
         Ok(summary)

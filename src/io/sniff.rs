@@ -98,7 +98,7 @@ impl Found {
             Found::Empty => "an empty file",
             Found::Pointer => "a Git LFS pointer, a short text in the place of the file",
             Found::Other(name) | Found::Packed(name) => name,
-            Found::Numbers => "text of numbers",
+            Found::Numbers => "a text of numbers",
             Found::Unknown => "none of the formats known here",
         }
     }
@@ -168,7 +168,7 @@ pub fn of_extension(extension: &str) -> Option<&'static str> {
     Some(match extension {
         "e57" => "E57",
         "pcd" => "PCD",
-        "xyz" | "txt" | "csv" | "asc" | "pts" | "ptx" | "neu" => "text of numbers",
+        "xyz" | "txt" | "csv" | "asc" | "pts" | "ptx" | "neu" => "a text of numbers",
         "zlas" => "Esri's zLAS",
         "rcp" | "rcs" => "Autodesk ReCap",
         "fls" | "lsproj" => "FARO",

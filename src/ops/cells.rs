@@ -97,9 +97,9 @@ pub struct Cells {
     pub max_angle: Option<Setting<Angle>>,
     /// How many records are to stay, instead of `max_angle`: a share of those that the stage decides
     /// about ("10%", to six decimals, rounded to whole records), a number (500000, "250k", "5M"), or
-    /// "auto": as many as `max_angle = "auto"` would leave of cubes of 32 positions with a quarter of
-    /// their side as `min_spacing`, by samples. Their number decides then, and the angle is found again
-    /// for what `side` and `min_spacing` come to.
+    /// "auto": as many as `max_angle = "auto"` would leave of the cubes of `side = "auto"` with a quarter
+    /// of their side as `min_spacing`, by samples, a third at most. The angle is found again for what
+    /// `side` and `min_spacing` come to then.
     pub keep: Option<Keep>,
     /// Cells of so many positions or fewer are not divided (the paper's β).
     pub min_points: NonZeroUsize,

@@ -61,9 +61,15 @@ impl Transform for Filter {
     }
 
     fn check(&self, schema: &Schema) -> Result<()> {
-        let Some(missing) = self.selection().missing(schema) else { return Ok(()) };
-        Err(Error::pipeline(format!("`filter` keeps by {missing}, which the input does not have"))
-            .help("leave out `filter.keep_classes`, and the flag in `filter.keep_flags`"))
+        let selection = self.selection();
+        let Some(missing) = selection.missing(schema) else { return Ok(()) };
+        let by_class = Selection { with: Vec::new(), ..selection }.missing(schema).is_some();
+        let (key, remedy) = match by_class {
+            true => ("`filter.keep_classes`", "leave `filter.keep_classes` out"),
+            false => ("`filter.keep_flags`", "leave the flag in `filter.keep_flags` out"),
+        };
+        let told = format!("{key} selects points by {missing}, which the input does not have");
+        Err(Error::pipeline(told).help(remedy))
     }
 
     fn warnings(&self, schema: &Schema) -> Vec<String> {

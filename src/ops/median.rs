@@ -8,6 +8,7 @@ use super::removal::{Account, keep_once, represent};
 use crate::geom::angle::{cosine, dominant_axis, is_known, outer_sum, sine2};
 use crate::geom::wide::Wide;
 use crate::point::{Mark, Position};
+use crate::quantity::Whole;
 use crate::report::Tally;
 use crate::stage::{Needs, TileOp};
 use crate::tile::{Cells as Partition, Tile};
@@ -66,9 +67,8 @@ fn check_passes(passes: u64) -> Result<(), String> {
 }
 
 fn checked_passes<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
-    let passes = u64::deserialize(from)?;
-    check_passes(passes).map_err(serde::de::Error::custom)?;
-    Ok(passes as usize)
+    let passes = Whole::<1, { MAX_PASSES as u64 }>::deserialize(from)?;
+    Ok(passes.get() as usize)
 }
 
 impl TileOp for Median {

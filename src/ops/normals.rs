@@ -12,7 +12,7 @@ use crate::geom::plane::{self, Covariance};
 use crate::geom::simd::Simd;
 use crate::geom::star::Star;
 use crate::point::names;
-use crate::quantity::Setting;
+use crate::quantity::{Setting, Whole};
 use crate::report::Tally;
 use crate::stage::{Forecast, Needs, ScanFacts, TileOp};
 use crate::tile::{Neighborhood, Tile};
@@ -190,9 +190,9 @@ fn check_neighbors(neighbors: u64) -> Result<(), String> {
 }
 
 fn checked_neighbors<'de, D: Deserializer<'de>>(from: D) -> Result<Setting<usize>, D::Error> {
-    let setting = Setting::<u64>::deserialize(from)?;
-    let given = setting.given().map(|k| check_neighbors(k).map(|()| k as usize)).transpose();
-    Ok(given.map_err(serde::de::Error::custom)?.map_or(Setting::Auto, Setting::Given))
+    type Count = Whole<{ MIN_NEIGHBORS as u64 }, { MAX_NEIGHBORS as u64 }>;
+    let given = Setting::<Count>::deserialize(from)?.given();
+    Ok(given.map_or(Setting::Auto, |count| Setting::Given(count.get() as usize)))
 }
 
 /// How a normal is estimated.

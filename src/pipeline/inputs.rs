@@ -19,21 +19,35 @@ use crate::{Error, ErrorKind, Result};
 ///   their paths; one that matches none is an error, like a file that is not there;
 /// - else it is a file that does not exist (yet): opening it will tell.
 ///
-/// Names that are not UTF-8 text are refused, however they are meant: no pipeline and no report could
-/// say them. A pattern looks at a million names at most.
+/// Names that are not UTF-8 text are refused, however they are meant ([`unreadable`]). A pattern looks at
+/// a million names at most.
 ///
 /// Upper and lower case differ, and `*` and `?` do not match a dot at the beginning of a name, as in
 /// a shell. A file meant twice, by whatever names, is an error: its points would be read twice.
 pub fn expand<P: AsRef<str>>(paths: &[P]) -> Result<Vec<PathBuf>> {
+    let files = expand_any(paths)?;
+    match files.iter().find(|file| file.to_str().is_none()) {
+        Some(odd) => Err(unreadable(odd)),
+        None => Ok(files),
+    }
+}
+
+/// The error of a file whose name is not UTF-8 text: no pipeline and no report could say it.
+pub fn unreadable(file: &Path) -> Error {
+    Error::pipeline("the name is not UTF-8 text")
+        .at(file)
+        .help("rename it: pipelines and reports could not say its name")
+}
+
+/// As [`expand`], but names may be of any bytes.
+///
+/// # Errors
+/// Those of [`expand`] but for such names.
+pub fn expand_any<P: AsRef<str>>(paths: &[P]) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = Vec::new();
     let mut named = BTreeSet::new();
     for path in paths.iter().map(AsRef::as_ref) {
         for file in one(path)? {
-            if file.to_str().is_none() {
-                return Err(Error::pipeline("the name is not UTF-8 text")
-                    .at(&file)
-                    .help("rename it: pipelines and reports could not say its name"));
-            }
             if !named.insert(file.canonicalize().unwrap_or_else(|_| file.clone())) {
                 let twice = shown(&file);
                 let path = shown(Path::new(path));

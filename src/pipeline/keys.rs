@@ -11,6 +11,7 @@ use serde::de::{
 use super::mistake::Mistake;
 use super::node::{Entry, Node, Place, Value};
 use crate::error::nearest;
+use crate::quantity::parse_count;
 
 /// Reads the table `keys` as a `T`, or tells every key that `subject` (a stage kind, `[run]`) does
 /// not have and every value that does not fit.
@@ -100,7 +101,12 @@ impl Fault {
             Problem::Missing(key) => Mistake::new(place, format!("`{subject}` needs `{key}`")),
             Problem::Wrong(what, near) => {
                 let near = near.as_ref().map(|near| format!("did you mean `{near}`?"));
-                Mistake::new(place, format!("`{key}`: {what}")).note(near.unwrap_or_default())
+                // A message may begin with the key that it is about.
+                let told = match what.strip_prefix(key).and_then(|rest| rest.strip_prefix(' ')) {
+                    Some(rest) => format!("`{key}`: {rest}"),
+                    None => format!("`{key}`: {what}"),
+                };
+                Mistake::new(place, told).note(near.unwrap_or_default())
             }
         }
     }
@@ -123,7 +129,10 @@ impl de::Error for Fault {
         let takes = plain(expected);
         let told = format!("takes {takes}, not {}", found_words(found));
         // What is expected quotes the words that it can be: a number above 0, or "auto".
-        let words: Vec<String> = takes.split('"').skip(1).step_by(2).map(str::to_owned).collect();
+        // Its examples ("10%", "2m") are none that anyone meant.
+        let words = takes.split('"').skip(1).step_by(2);
+        let is_word = |word: &&str| !word.contains(|c: char| c.is_ascii_digit());
+        let words: Vec<String> = words.filter(is_word).map(str::to_owned).collect();
         let near = match found {
             Unexpected::Str(text) => nearest(text, &words).map(|near| near.as_str().into()),
             _ => None,
@@ -193,7 +202,21 @@ struct Reader<'a> {
     unknown: &'a RefCell<Vec<Fault>>,
 }
 
+/// Below it floats hold all whole numbers.
+const WHOLE: f64 = (1u64 << 53) as f64;
+
 impl<'de> Reader<'de> {
+    /// A whole number, also one that is written as a count is: "10k".
+    fn whole<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        let Value::Text(text) = &self.node.value else { return self.deserialize_any(visitor) };
+        match parse_count(text) {
+            Ok(count) => {
+                visitor.visit_u64(count).map_err(|fault: Fault| fault.at(&self.node.place))
+            }
+            Err(_) => self.deserialize_any(visitor),
+        }
+    }
+
     fn table<V: Visitor<'de>>(
         self,
         entries: &'de [Entry],
@@ -218,6 +241,8 @@ impl<'de> Deserializer<'de> for Reader<'de> {
         match &self.node.value {
             Value::Text(v) => visitor.visit_borrowed_str(v),
             Value::Flag(v) => visitor.visit_bool(*v),
+            // 1e1 is a float in TOML.
+            Value::Number(v) if v.fract() == 0.0 && v.abs() < WHOLE => visitor.visit_i64(*v as i64),
             Value::Number(v) => visitor.visit_f64(*v),
             Value::Whole(v) => match (i64::try_from(*v), u64::try_from(*v)) {
                 (Ok(v), _) => visitor.visit_i64(v),
@@ -288,8 +313,20 @@ impl<'de> Deserializer<'de> for Reader<'de> {
         .map_err(|fault: Fault| fault.at(&self.node.place))
     }
 
+    fn deserialize_u8<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        self.whole(visitor)
+    }
+
+    fn deserialize_u32<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        self.whole(visitor)
+    }
+
+    fn deserialize_u64<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        self.whole(visitor)
+    }
+
     serde::forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit
+        bool i8 i16 i32 i64 i128 u16 u128 f32 f64 char str string bytes byte_buf unit
         seq tuple tuple_struct map identifier ignored_any
     }
 }

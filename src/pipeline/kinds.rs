@@ -101,7 +101,11 @@ impl Read {
         let mut formats = Vec::new();
         for file in &files {
             let format = self.format.or(Format::of(file));
-            formats.push(format.ok_or_else(|| unknown_extension(file, "read.format"))?);
+            let unknown = || match std::fs::metadata(file) {
+                Ok(_) => unknown_extension(file, "read.format"),
+                Err(e) => Error::io(file, "open it", e),
+            };
+            formats.push(format.ok_or_else(unknown)?);
         }
         if let Some(i) = formats.iter().position(|f| !f.same_records(formats[0])) {
             let (a, b) = (shown(&files[0]), shown(&files[i]));
@@ -314,13 +318,19 @@ impl StageKind for Write {
     }
 }
 
+/// The error of a file of which neither its extension nor `setting` says the format.
 pub(super) fn unknown_extension(path: &Path, setting: &str) -> Error {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let name = shown(path);
+    let is_read = setting.starts_with("read");
+    let can = if is_read { "read" } else { "written" };
     match of_extension(&extension) {
         Some(format) => {
-            Error::pipeline(format!("`{name}` is named as {format}, which is no format here"))
-                .help(format!("LAS, LAZ and PLY are read and written: convert with another program, or give `{setting}`"))
+            let told = format!("by its extension `{name}` is {format}, which is not {can}");
+            Error::pipeline(told).help(match is_read {
+                true => "convert it to LAS, LAZ or PLY with another program first",
+                false => "name it .las, .laz or .ply",
+            })
         }
         None => Error::pipeline(format!("the extension of `{name}` names no format"))
             .help(format!("use .las, .laz or .ply, or give `{setting}`")),
@@ -365,7 +375,7 @@ fn some_scale<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D:
         type Value = [f64; 3];
 
         fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("a number above 0, or three of them")
+            f.write_str("a number above 0 without a unit, or three of them")
         }
 
         fn visit_i64<E: de::Error>(self, scale: i64) -> Result<Self::Value, E> {

@@ -23,7 +23,7 @@ use super::survey::survey;
 use crate::budget::Lease;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::{Bounds, PointBatch, Position};
-use crate::report::{Baseline, BaselineFigures, Decision, Grouped, PassFigures, Tally};
+use crate::report::{Baseline, BaselineFigures, Decision, Grouped, PassFigures, Short, Tally};
 use crate::stage::{Gathered, ScanFacts, Sink, SinkSummary};
 use crate::tile::{Intake, SealedTiles, Sieve, SpillArea, Tag, TileStore, lock, seal};
 use crate::{Error, Result};
@@ -421,12 +421,12 @@ fn rounding(job: &Job<'_>, lattice: &Lattice, bounds: &Bounds, tally: &Tally) ->
             None => "no step that is finer reaches the scan from its origin".to_owned(),
         };
         job.warn(format!(
-            "{} of {} positions hold points of unequal coordinates, up to {:.2e} from each other: \
-             the lattice has steps of {:.2e}; {finer}",
+            "{} of {} positions hold points of unequal coordinates, up to {} from each other: \
+             the lattice has steps of {}; {finer}",
             Grouped(unequal),
             Grouped(positions),
-            apart.farthest,
-            lattice.step
+            Short(apart.farthest),
+            Short(lattice.step)
         ));
     }
     let (stage, name) = ("run".to_owned(), "unequal_coordinates_apart".to_owned());

@@ -48,7 +48,7 @@ mod watch;
 mod written;
 
 pub(crate) use files::{Clash, Files, Use};
-pub use inputs::expand;
+pub use inputs::{expand, expand_any, unreadable};
 pub use kinds::{Encoding, Format, OutputOrder, Read, Synth, Write};
 pub use limits::{LimitKeys, Sees};
 pub use outline::Outline;

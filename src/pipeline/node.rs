@@ -79,7 +79,12 @@ pub(super) fn parse(text: &str, source: usize) -> Result<Vec<Entry>, Vec<Mistake
         .iter()
         .map(|e| {
             let place = Place::new(source, e.span().unwrap_or(text.len()..text.len()));
-            Mistake::new(place, format!("not TOML: {}", e.message()))
+            let mistake = Mistake::new(place, format!("not TOML: {}", e.message()));
+            let key = e.span().and_then(|span| text.get(span)).unwrap_or_default();
+            match e.message().starts_with("duplicate key") && key.trim() == "kind" {
+                true => mistake.note("a second stage begins with a line [[stage]] of its own"),
+                false => mistake,
+            }
         })
         .collect();
     let entries = entries(table.into_inner(), source, &mut mistakes);

@@ -338,7 +338,9 @@ fn warnings(
 ) -> Result<Vec<String>> {
     let lost = sinks.iter().flat_map(|sink| sink.warnings(source.schema(), source.metadata()));
     let mut warnings: Vec<String> = lost.collect();
-    let Some(Unfit { error, none_fits }) = look(source, sinks, settings.nonfinite == Nonfinite::Drop)? else {
+    let Some(Unfit { error, none_fits }) =
+        look(source, sinks, settings.nonfinite == Nonfinite::Drop)?
+    else {
         return Ok(warnings);
     };
     // Where none fits there is nothing that stages could leave.

@@ -53,12 +53,17 @@ impl Set {
             serde_json::Value::String(text) => text.clone(),
             serde_json::Value::Array(list) => {
                 let text = |v: &serde_json::Value| v.as_str().map_or(v.to_string(), str::to_owned);
-                list.iter().map(text).collect::<Vec<_>>().join(" ")
+                list.iter().map(text).collect::<Vec<_>>().join(",")
             }
             other => other.to_string(),
         };
         let (argument, address) = (argument.to_owned(), address.to_owned());
         Set { argument, text, address, value: Given::Json(value) }
+    }
+
+    /// The same value, which `text` was typed for: errors show it.
+    pub fn typed(self, text: String) -> Set {
+        Set { text, ..self }
     }
 
     /// The text that errors show.

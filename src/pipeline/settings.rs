@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Deserializer, de};
 
 use crate::geom::simd::{self, Level};
+use crate::quantity::Whole;
 use crate::{Error, Result};
 
 /// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`,
@@ -228,8 +229,10 @@ const UNITS: [(&str, u64); 9] = [
 pub fn parse_bytes(text: &str) -> Result<u64, String> {
     let refused = || {
         let units: Vec<&str> = UNITS.iter().map(|(unit, _)| *unit).collect();
-        let text: String = text.chars().take(40).collect();
-        format!("`{text}` is no size such as 512MiB or 2GiB (units: {})", units.join(", "))
+        let short: String = text.chars().take(40).collect();
+        let meant = meant(text).map_or(String::new(), |meant| format!(": write {meant}"));
+        let units = units.join(", ");
+        format!("`{short}` is no size such as 512MiB or 2GiB{meant} (units: {units})")
     };
     let text = text.trim();
     let split = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
@@ -248,6 +251,17 @@ pub fn parse_bytes(text: &str) -> Result<u64, String> {
         Ok(bytes) => Ok(bytes),
         Err(_) => Err(format!("{}: too large", refused())),
     }
+}
+
+/// The size that was meant by a unit of other letters: `2GiB` for `2G` and `2gb`.
+fn meant(text: &str) -> Option<String> {
+    let text = text.trim();
+    let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic())?);
+    let of = |unit: &str| UNITS.iter().find(|(known, _)| known.eq_ignore_ascii_case(unit));
+    let (unit, _) = of(unit).or_else(|| of(&format!("{unit}iB")))?;
+    // What is written as it was typed is wrong for another reason.
+    Some(format!("{}{unit}", number.trim_end()))
+        .filter(|size| size != text && parse_bytes(size).is_ok())
 }
 
 fn some_bytes<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u64>, D::Error> {
@@ -317,20 +331,35 @@ impl<'de> Deserialize<'de> for ZScale {
 }
 
 fn some_threads<'de, D: Deserializer<'de>>(from: D) -> Result<Option<NonZeroUsize>, D::Error> {
-    let threads = NonZeroUsize::deserialize(from)?;
-    if threads.get() <= MOST_THREADS {
-        return Ok(Some(threads));
-    }
-    let found = de::Unexpected::Unsigned(threads.get() as u64);
-    Err(de::Error::invalid_value(found, &"a whole number from 1 to 1024"))
+    let threads = Whole::<1, { MOST_THREADS as u64 }>::deserialize(from)?;
+    Ok(NonZeroUsize::new(threads.get() as usize))
 }
 
 fn some_step<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
-    let step = f64::deserialize(from)?;
-    if step.is_finite() && step > 0.0 {
-        return Ok(Some(step));
+    struct Step;
+    impl de::Visitor<'_> for Step {
+        type Value = f64;
+
+        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            f.write_str("a number above 0, in the scan's unit and without a unit behind it")
+        }
+
+        fn visit_f64<E: de::Error>(self, step: f64) -> Result<f64, E> {
+            match step.is_finite() && step > 0.0 {
+                true => Ok(step),
+                false => Err(E::invalid_value(de::Unexpected::Float(step), &self)),
+            }
+        }
+
+        fn visit_i64<E: de::Error>(self, step: i64) -> Result<f64, E> {
+            self.visit_f64(step as f64)
+        }
+
+        fn visit_u64<E: de::Error>(self, step: u64) -> Result<f64, E> {
+            self.visit_f64(step as f64)
+        }
     }
-    Err(de::Error::invalid_value(de::Unexpected::Float(step), &"a number above 0"))
+    from.deserialize_any(Step).map(Some)
 }
 
 #[cfg(test)]

@@ -4,9 +4,9 @@ use super::by_rank::ordering_bytes;
 use super::passes::decides_by_normals;
 use super::product::Product;
 use super::survey::survey_bytes;
-use crate::budget::{at_most_mebibytes, whole_mebibytes};
+use crate::budget::{at_least_mebibytes, at_most_mebibytes, whole_mebibytes};
 use crate::point::Position;
-use crate::report::Baseline;
+use crate::report::{Baseline, Grouped};
 use crate::stage::{ChunkSize, Needs, Source};
 use crate::tile::{
     FATE_BYTES, FIGURE_BYTES, Fetch, Intake, Loader, NORMAL_BYTES, Pieces, Remote, Tag,
@@ -327,11 +327,12 @@ impl Demands {
     fn refusal(&self, needed: u64) -> Error {
         let Demands { threads, stride, points, .. } = self;
         let index = match self.mills {
-            true => format!(" and an index of {points} points"),
+            true => format!(" and an index of {} points", Grouped(*points)),
             false => String::new(),
         };
         let least = if self.has_cells { "at least " } else { "" };
-        let needed = whole_mebibytes(needed.saturating_add(RESIDENT_VARIES));
+        let needed = needed.saturating_add(RESIDENT_VARIES);
+        let (needed, enough) = (at_least_mebibytes(needed), whole_mebibytes(needed));
         let threads_are =
             if *threads == 1 { "1 thread".to_owned() } else { format!("{threads} threads") };
         let error = Error::memory(format!(
@@ -344,7 +345,7 @@ impl Demands {
             true => "; how much the fullest cells need is known when the points are read",
             false => "",
         };
-        error.help(format!("give `run.memory = \"{needed}\"` or more{fewer}{later}"))
+        error.help(format!("give `run.memory = \"{enough}\"` or more{fewer}{later}"))
     }
 }
 

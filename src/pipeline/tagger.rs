@@ -102,9 +102,7 @@ impl Tagger {
     pub fn warnings(&self, met: u8) -> Vec<String> {
         let nobody = |(n, (selection, _)): (usize, &(Selection, Chooser))| {
             (met >> n & 1 == 0).then(|| {
-                format!(
-                    "no point is {selection}: stages that are limited to such points did nothing"
-                )
+                format!("no point is {selection}: what was asked for those points did nothing")
             })
         };
         let idle = |flag: &Flag| {

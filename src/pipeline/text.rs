@@ -17,7 +17,7 @@ use super::set::Set;
 use super::settings::RunSettings;
 use super::written::Written;
 use crate::error::shown;
-use crate::io::open_plain;
+use crate::io::{open_plain, sniff};
 use crate::stage::{Order, Role};
 use crate::{Error, Result};
 
@@ -107,7 +107,15 @@ impl Pipeline {
 
     /// Reads the pipeline file at `path`, as [`parse_with`](Pipeline::parse_with).
     pub fn read(path: &Path, registry: &Registry, sets: &[Set]) -> Result<Pipeline> {
-        let (file, about) = open_plain(path)?;
+        let (mut file, about) = open_plain(path)?;
+        let failed = |e| Error::io(path, "read the pipeline", e);
+        let mut bytes = Vec::new();
+        file.by_ref().take(sniff::BYTES as u64).read_to_end(&mut bytes).map_err(failed)?;
+        if sniff::is_las(&bytes) || sniff::is_ply(&bytes) {
+            let name = shown(path);
+            return Err(sniff::not("a pipeline file", path, &bytes)
+                .help(format!("a scan is reduced by `pointmill reduce {name} -o OUT`")));
+        }
         if about.len() > LONGEST {
             let told = format!(
                 "this is no pipeline: it has {} bytes, and {LONGEST} are read",
@@ -115,10 +123,7 @@ impl Pipeline {
             );
             return Err(Error::pipeline(told).at(path));
         }
-        let mut bytes = Vec::new();
-        file.take(LONGEST)
-            .read_to_end(&mut bytes)
-            .map_err(|e| Error::io(path, "read the pipeline", e))?;
+        file.take(LONGEST).read_to_end(&mut bytes).map_err(failed)?;
         let text = String::from_utf8(bytes).map_err(|e| {
             let valid = e.utf8_error().valid_up_to() as u64;
             Error::pipeline("the pipeline is not UTF-8 text").at(path).at_byte(valid)

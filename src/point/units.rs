@@ -78,7 +78,7 @@ impl Units {
             (Some(Horizontal::Metres(across)), None) => {
                 let xy = name(across);
                 let why = match self.vertical_unknown {
-                    true => "its reference system is none whose unit is known here",
+                    true => "the unit of its reference system is not known here",
                     false if xy != METRES => "nothing names it",
                     false => return None,
                 };
@@ -88,10 +88,9 @@ impl Units {
                 let z = name(up);
                 Some(format!("z is in {z} and the unit of x and y is not known"))
             }
-            (None, None) if self.horizontal_unknown || self.vertical_unknown => Some(
-                "the reference system that the scan names is none whose units are known here"
-                    .to_owned(),
-            ),
+            (None, None) if self.horizontal_unknown || self.vertical_unknown => {
+                Some("the units of the scan's reference system are not known here".to_owned())
+            }
             (None, _) => None,
         }
     }
@@ -223,8 +222,11 @@ mod tests {
                 Units { horizontal_unknown: true, ..heights(1.0) },
                 "the unit of x and y is not known",
             ),
-            (unknown(none), "none whose units are known"),
-            (Units { horizontal_unknown: true, ..none }, "none whose units are known"),
+            (unknown(none), "the units of the scan's reference system are not known here"),
+            (
+                Units { horizontal_unknown: true, ..none },
+                "the units of the scan's reference system are not known here",
+            ),
         ];
         for units in silent {
             assert_eq!((units.mismatch(), units.doubt()), (None, None), "{units:?}");

@@ -39,11 +39,11 @@ impl Angle {
         }
     }
 
-    /// As the value of a key in TOML.
-    pub fn as_toml(self) -> String {
+    /// For a sentence, with its unit.
+    pub fn told(self) -> String {
         match self.degrees {
-            Some(_) => format!("\"{self}\""),
-            None => self.to_string(),
+            Some(_) => self.to_string(),
+            None => format!("{self} rad"),
         }
     }
 

@@ -5,8 +5,10 @@ mod angle;
 mod count;
 mod length;
 mod setting;
+mod whole;
 
 pub use angle::Angle;
 pub use count::parse_count;
 pub use length::{Length, Unit};
 pub use setting::Setting;
+pub use whole::Whole;

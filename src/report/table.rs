@@ -89,7 +89,11 @@ fn removed_line(f: &mut fmt::Formatter<'_>, ledger: &Ledger) -> fmt::Result {
     for (i, Removed { stage, reason, records }) in ledger.removed.iter().filter(others).enumerate()
     {
         let before = if i == 0 { "\nleft out   " } else { ", " };
-        write!(f, "{before}{} {reason} ({stage})", Grouped(*records))?;
+        let records = Grouped(*records);
+        match reason.as_str() {
+            "removed" => write!(f, "{before}{records} ({stage})")?,
+            _ => write!(f, "{before}{records} {reason} ({stage})")?,
+        }
     }
     Ok(())
 }
@@ -127,11 +131,7 @@ fn marked_lines(f: &mut fmt::Formatter<'_>, result: &Outcome) -> fmt::Result {
 
 /// A line a class, unless none was reduced: then all say the same as the scan's. Of a scan that is
 /// `marked` no point need be gone.
-fn class_lines(
-    f: &mut fmt::Formatter<'_>,
-    classes: &[ClassFigures],
-    marked: bool,
-) -> fmt::Result {
+fn class_lines(f: &mut fmt::Formatter<'_>, classes: &[ClassFigures], marked: bool) -> fmt::Result {
     if classes.iter().all(|c| c.before == c.after) {
         return Ok(());
     }

@@ -37,7 +37,7 @@ pub fn name_system(
         }
         Ok(_) if native.made && native.header.format() >= 6 && !wkt::is_wkt(text) => {
             notes.push(format!(
-                "the CRS {text} is written as GeoTIFF keys, for it is no WKT: point format {} asks for \
+                "the CRS {text} is not WKT and is written as GeoTIFF keys: point format {} asks for \
                  WKT, and some readers will see no CRS",
                 native.header.format()
             ));

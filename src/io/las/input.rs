@@ -18,6 +18,7 @@ use super::waveforms::Waveforms;
 use crate::error::shown;
 use crate::io::origin::Origin;
 use crate::point::Schema;
+use crate::report::Grouped;
 use crate::{Error, Result};
 
 /// True for records that index the points of one file by their order: COPC's, and the LAX index of
@@ -241,8 +242,10 @@ fn plain(file: &InputFile, header: &Header, evlrs_start: Option<u64>) -> Result<
             .wrong(
                 file.len(),
                 format!(
-                    "the file ends after {held} of the {points} points that its header claims, \
-                     {each} bytes each from byte {start}"
+                    "the file ends after {} of the {} points that its header claims, {each} bytes \
+                     each from byte {start}",
+                    Grouped(held),
+                    Grouped(points)
                 ),
             )
             .help("the copy or download is incomplete, or the header's count is damaged"));
@@ -254,8 +257,10 @@ fn plain(file: &InputFile, header: &Header, evlrs_start: Option<u64>) -> Result<
     }
     Ok((behind >= each).then(|| {
         format!(
-            "{}: {behind} bytes behind the {points} points that the header counts are not read",
-            shown(file.path())
+            "{}: {} bytes behind the {} points that the header counts are not read",
+            shown(file.path()),
+            Grouped(behind),
+            Grouped(points)
         )
     }))
 }

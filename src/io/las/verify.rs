@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex};
 use super::header::{Header, at};
 use crate::Result;
 use crate::point::PointBatch;
+use crate::report::Grouped;
 use crate::stage::{Contradiction, Part};
 use crate::tile::lock;
 
@@ -219,7 +220,9 @@ impl Evidence {
         let axes: Vec<String> = (0..3).filter(wrong).map(axis).collect();
         let Found { points, outside, .. } = *found;
         let told = format!(
-            "{outside} of {points} points lie outside of the header's box: {}",
+            "{} of {} points lie outside of the header's box: {}",
+            Grouped(outside),
+            Grouped(points),
             axes.join(", ")
         );
         let is_damage = match self.compressed {

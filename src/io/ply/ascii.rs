@@ -100,6 +100,7 @@ impl<'a> AsciiPart<'a> {
         let fail = |place: usize, message: String| {
             Error::data(self.path, format!("line {}: {message}", self.lines.line))
                 .at_byte(self.lines.from + place as u64)
+                .help("correct the line, or write the file again: each line has the values of its vertex")
         };
         let mut place = 0;
         for (n, (name, scalar, offset)) in self.fields.iter().enumerate() {

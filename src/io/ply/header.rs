@@ -101,6 +101,10 @@ pub(super) fn type_name(scalar: Scalar) -> &'static str {
     }
 }
 
+/// The types that [`scalar_of`] knows, for messages.
+const KINDS: &str = "char, uchar, short, ushort, int, uint, float and double, or int8 to int64, uint8 to \
+                     uint64, float32 and float64";
+
 fn scalar_of(word: &str) -> Option<Scalar> {
     Some(match word {
         "char" | "int8" => Scalar::I8,
@@ -320,7 +324,10 @@ impl Partial {
 
     fn property(&mut self, words: &[&str]) -> Result<(), String> {
         let scalar = |word: &str| {
-            scalar_of(word).ok_or_else(|| format!("type `{}` is not known", shown(word)))
+            scalar_of(word).ok_or_else(|| {
+                let (word, known) = (shown(word), KINDS);
+                format!("no property has the type `{word}`; types are {known}")
+            })
         };
         let (name, kind) = match *words {
             ["list", count, item, name] => {

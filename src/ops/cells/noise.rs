@@ -27,11 +27,9 @@ pub(super) fn sample(cells: &Cells, tile: &mut Tile) -> Result<Vec<f64>> {
     let (kept, mut of) = if is_given { divided(given, tile) } else { (0, 0) };
     let mut steps = Vec::new();
     if cells.keep == Some(Keep::Auto) {
-        // The side of `side = "auto"` is a power of two of lattice steps; this is one of the scan alone.
-        let side = cells.outlook.as_ref().map_or(given.side, |outlook| outlook.cube(given.side));
         for angle in LADDER {
-            let min_spacing = given.min_spacing.max((side / QUARTER).unsigned_abs());
-            let rule = Rule { limit: limit(angle), min_spacing, side, ..given };
+            let min_spacing = given.min_spacing.max((given.side / QUARTER).unsigned_abs());
+            let rule = Rule { limit: limit(angle), min_spacing, ..given };
             let (kept, positions) = divided(rule, tile);
             steps.push(kept as f64);
             of = positions;
@@ -146,9 +144,9 @@ fn noisy(cells: &Cells, samples: &[Vec<f64>], scatter: f64) -> Option<String> {
     }
     let percent = (100.0 * sum / f64::from(count)).round();
     Some(format!(
-        "normals scatter {}, above `cells.max_angle = {}`: expect about {percent} % of the points to \
+        "normals scatter {}, more than the largest angle of a cell, {}: expect about {percent} % of the points to \
          stay; raise `normals.neighbors` or `cells.max_angle`, or give `cells.keep`",
         Angle::told_like(scatter, given),
-        given.as_toml(),
+        given.told(),
     ))
 }

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{Cells, Keep, LARGEST_SIDE, MAX_ANGLE, POSITIONS_PER_CUBE, Side};
+use super::{Cells, Keep, LARGEST_SIDE, MAX_ANGLE, Side};
 use crate::quantity::Setting;
 use crate::stage::ScanFacts;
 use crate::tile::Levels;
@@ -42,12 +42,6 @@ impl Outlook {
     /// Records of the scan.
     pub(super) fn records(&self) -> u64 {
         self.records
-    }
-
-    /// Side in steps, `most` or less, of cubes of about as many positions as those of `side = "auto"`.
-    pub(super) fn cube(&self, most: i64) -> i64 {
-        let cubes = self.levels.positions() / POSITIONS_PER_CUBE;
-        (self.grid_side(cubes.max(1)) as i64).clamp(1, most)
     }
 
     /// Side in steps of the cubes of a grid that keeps `count` positions: between the two octree levels
@@ -112,7 +106,9 @@ pub(super) fn choose(cells: &mut Cells, sampled: &Sampled) -> Vec<(String, Value
     let records = (outlook.records as f64 * sampled.chosen) as u64;
     if cells.keep == Some(Keep::Auto) {
         let share = sampled.share().unwrap_or(1.0);
-        let count = ((share * records as f64).round() as u64).clamp(1, records.max(1));
+        // No more than can be spread.
+        let most = (outlook.levels.positions() / SPREADABLE).min(records);
+        let count = ((share * records as f64).round() as u64).clamp(1, most.max(1));
         settled.target = Some(rounded(count));
         chosen.push(("keep".into(), rounded(count).into()));
     }

@@ -125,7 +125,9 @@ impl<'de> Visitor<'de> for ReferenceVisitor {
         }
         match direction(vector) {
             Some(_) => Ok(Reference::Vector(vector)),
-            None => Err(A::Error::invalid_value(Unexpected::Other("no direction"), &self)),
+            None => {
+                Err(A::Error::custom("a vector [x, y, z] is of finite numbers, one of them not 0"))
+            }
         }
     }
 }
@@ -272,7 +274,8 @@ mod tests {
             assert!(check(used).is_ok(), "{used}");
         }
         for unused in ["'x'", "'z'", "[1, 2, 3]"] {
-            let (key, error) = check(&format!("reference = {unused}\nmeasure = 'cone'")).unwrap_err();
+            let (key, error) =
+                check(&format!("reference = {unused}\nmeasure = 'cone'")).unwrap_err();
             assert_eq!(key, "reference");
             assert!(error.to_string().contains("needs `cells.measure = \"axis\"`"), "{error}");
         }

@@ -113,5 +113,5 @@ fn a_refusal_names_a_limit_that_does() {
         .unwrap();
     assert!(demands(mebibytes << 20).divide().is_ok(), "{help}");
     assert!(demands((mebibytes - 3) << 20).divide().is_err(), "{help}");
-    assert!(error.to_string().ends_with(&format!("need at least {mebibytes}MiB")), "{error}");
+    assert!(error.to_string().ends_with(&format!("need at least {mebibytes} MiB")), "{error}");
 }
