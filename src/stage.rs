@@ -398,6 +398,8 @@ pub struct Needs {
     pub writes: Vec<String>,
     /// Nearest other positions that each position's result is computed from; 0 for none.
     pub neighbors: usize,
+    /// True if it may come to take fewer, once the scan is known.
+    pub fewer_neighbors: bool,
     /// Side in lattice steps of the cells whose points are decided together; 0 for none (or not
     /// settled yet).
     pub cell_side: i64,

@@ -429,6 +429,69 @@ fn one_name_that_is_no_text_does_not_keep_the_other_files_from_being_converted()
 }
 
 #[test]
+fn what_is_marked_is_told_by_its_number() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    let marked = |how: &str| {
+        let told = done(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "1000", "--mark", how]);
+        assert!(told.starts_with("points     3,000 in, 3,000 out (100.0 %)\n"), "{told}");
+        assert!(!told.contains("→ 1,000"), "nothing is gone: {told}");
+        assert!(told.contains(" of them stay by their marks ("), "{told}");
+        let lines = told.lines().filter(|line| line.starts_with("marked  "));
+        lines.map(|line| line["marked     ".len()..].to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(marked("key-point"), ["2,000 as no key-points by median", "1,000 as key-points"]);
+    assert_eq!(marked("withheld"), ["2,000 as withheld by median"]);
+    assert_eq!(marked("18"), ["2,000 as class 18 by median"]);
+}
+
+#[test]
+fn the_summary_says_units_and_what_was_not_measured() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    let plain = done(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "500"]);
+    assert!(plain.contains("\nangle      ") && plain.contains(" rad at most: what normals of"));
+    let has_unit = |line: &str| line.split([' ', ',']).any(|word| word == "m");
+    let lengths = |told: &str| {
+        let heads = ["deviation", "baseline", "plane RMS"];
+        let is_length = |line: &&str| heads.iter().any(|head| line.starts_with(head));
+        told.lines().filter(is_length).map(str::to_owned).collect::<Vec<String>>()
+    };
+    assert_eq!(lengths(&plain).len(), 3, "{plain}");
+    assert!(!lengths(&plain).iter().any(|line| has_unit(line)), "no unit is known: {plain}");
+    // A scan in metres.
+    done(at, &["convert", "a.laz", "-o", "a.ply", "--encoding", "ascii"]);
+    let text = fs::read_to_string(at.join("a.ply")).unwrap();
+    let text = text.replacen("comment", "comment crs: EPSG:32632\ncomment", 1);
+    fs::write(at.join("m.ply"), text).unwrap();
+    let (_, told, chosen) = pointmill(at, &["reduce", "m.ply", "-o", "o.ply"]);
+    assert!(lengths(&told).iter().all(|line| has_unit(line)), "{told}");
+    assert!(chosen.contains("side ") && chosen.contains(" m, min spacing "), "{chosen}");
+    let most = done(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "2900"]);
+    assert!(most.contains("\nbaseline   not measured: a voxel grid of so many"), "{most}");
+}
+
+#[test]
+fn a_scan_without_points_and_a_number_above_all_are_told() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    let (_, _, told) = pointmill(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "1e9"]);
+    let warning =
+        "warning: `--keep 1000000000` is more than the 3000 points that there are: as many stay";
+    assert!(told.contains(warning), "{told}");
+    pointmill(at, &["convert", "a.laz", "-o", "none.laz", "--keep-classes", "200"]);
+    for command in ["reduce", "convert"] {
+        let (code, _, told) = pointmill(at, &[command, "none.laz", "-o", "o.laz"]);
+        assert_eq!(code, 0, "{told}");
+        assert!(told.contains("warning: the inputs have no points"), "{told}");
+    }
+    let (_, _, plan) = pointmill(at, &["reduce", "a.laz", "-o", "o.laz", "-v"]);
+    assert!(plan.contains(", up to 20 nearest neighbours"), "{plan}");
+    let (_, _, plan) = pointmill(at, &["reduce", "a.laz", "-o", "o.laz", "-v", "--neighbors", "9"]);
+    assert!(plan.contains(", 9 nearest neighbours"), "{plan}");
+}
+
+#[test]
 fn one_report_for_several_outputs_is_told_with_what_to_do() {
     let at = scans(&["a.laz", "b.laz"]);
     let several = ["convert", "a.laz", "b.laz", "-o", "out/", "--report", "r.json"];

@@ -85,7 +85,10 @@ fn the_format_is_that_of_the_extension_or_the_one_that_is_asked_for() {
     done(at, &["convert", "a.las", "-o", "x.data", "--to", "laz"]);
     let laz = begins("x.data", b"LASF");
     assert_eq!(laz[104] & 0x80, 0x80, "compressed");
-    done(at, &["convert", "a.las", "-o", "y.las", "--to", "ply"]);
+    let misnamed = ["convert", "a.las", "-o", "y.las", "--to", "ply"];
+    let (code, _, stderr) = pointmill(at, &misnamed);
+    let told = "warning: y.las: this is named as LAS and becomes PLY, as `--to` says: programs";
+    assert!(code == 0 && stderr.starts_with(told) && stderr.lines().count() == 1, "{stderr}");
     begins("y.las", b"ply\nformat binary_little_endian");
     done(at, &["convert", "a.las", "-o", "z.PLY", "--encoding", "ascii"]);
     begins("z.PLY", b"ply\nformat ascii");
@@ -249,7 +252,7 @@ fn a_name_that_is_no_text_is_told_not_guessed() {
 
 #[test]
 fn info_is_json_with_the_same_keys_for_every_file_of_a_format() {
-    const LAS: [&str; 23] = [
+    const LAS: [&str; 24] = [
         "kind",
         "version",
         "point_format",
@@ -261,6 +264,7 @@ fn info_is_json_with_the_same_keys_for_every_file_of_a_format() {
         "max",
         "crs",
         "units",
+        "gps_time",
         "system_identifier",
         "generating_software",
         "creation_day",

@@ -354,10 +354,23 @@ fn a_system_that_las_cannot_name_is_told_for_its_own_reason() {
 fn waveforms_in_a_file_of_their_own_are_beside_the_output() {
     let bench = Bench::new();
     let name = "22-ext-waveform.las";
+    for (file, of) in [("22-ext-waveform.wdp", "from.wdp"), (name, "from.las")] {
+        fs::copy(case(file), bench.path(of)).unwrap();
+    }
+    let modes = |mode: u32| {
+        let mode = std::os::unix::fs::PermissionsExt::from_mode(mode);
+        fs::set_permissions(bench.path("from.wdp"), mode).unwrap();
+    };
+    modes(0o444);
     for stages in ["", GRID] {
-        bench.run(&[case(name)], "", stages, "out.las").unwrap();
+        let report = bench.run(&[bench.path("from.las")], "", stages, "out.las").unwrap();
         let copied = fs::read(bench.path("out.wdp")).unwrap();
         assert!(copied == fs::read(case("22-ext-waveform.wdp")).unwrap(), "{stages}");
+        let about = fs::metadata(bench.path("out.wdp")).unwrap();
+        let mode = fs::metadata(bench.path("out.las")).unwrap().permissions();
+        assert_eq!(about.permissions(), mode, "as other outputs, not as its source");
+        let listed: Vec<_> = report.run.outputs.iter().map(|o| (&*o.path, o.bytes)).collect();
+        assert_eq!(listed[1..], [(bench.path("out.wdp").to_str().unwrap(), Some(about.len()))]);
         fs::remove_file(bench.path("out.wdp")).unwrap();
     }
     // An output beside its input, under its name, has them already.

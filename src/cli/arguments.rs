@@ -304,7 +304,8 @@ pub(super) struct Reduce {
     #[arg(long, value_name = "HOW")]
     pub nonfinite: Option<String>,
     /// Length of a step of the lattice on which points are compared, in the scan's unit, for scans far
-    /// from their origin or finer than it [default: what the coordinates are stored in, for floats 2^-30]
+    /// from their origin or finer than it. Sides that are chosen follow from it, and with them how many
+    /// points stay [default: what the coordinates are stored in, for floats 2^-30]
     #[arg(long, value_name = "NUMBER")]
     pub lattice: Option<String>,
     /// Scans whose points contradict their LAS header, as damaged ones do: refuse them, or warn

@@ -29,6 +29,8 @@ pub(super) struct Console {
     interrupted: OnceLock<Arc<AtomicBool>>,
     /// Said behind what a run chose by itself.
     hint: OnceLock<&'static str>,
+    /// The sign of the unit that lengths of the planned run are in.
+    unit: Mutex<Option<&'static str>>,
 }
 
 /// An error in the words of a command.
@@ -81,6 +83,7 @@ impl Console {
             phase: Mutex::new(None),
             interrupted: OnceLock::new(),
             hint: OnceLock::new(),
+            unit: Mutex::new(None),
         }
     }
 
@@ -102,6 +105,7 @@ impl Console {
     /// Tells what a plan decided.
     pub fn planned(&self, plan: &Plan) {
         let outline = plan.outline();
+        *self.unit.lock().unwrap_or_else(PoisonError::into_inner) = plan.unit();
         match &self.voice {
             Voice::Json(events) if !self.quiet => events.planned(&outline, &plan.to_string()),
             Voice::Text(_) if self.verbose => {
@@ -149,11 +153,23 @@ impl Console {
     }
 }
 
+/// A value that a run chose, in the words of flags: `min spacing 0.64 m`.
+fn in_words(Decision { name, value, .. }: &Decision, unit: Option<&str>) -> String {
+    let unit = match name.as_str() {
+        _ if !value.is_number() => None,
+        "max_angle" => Some("rad"),
+        "side" | "max_side" | "min_spacing" => unit,
+        _ => None,
+    };
+    let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
+    format!("{} {}{unit}", name.replace('_', " "), in_short(value))
+}
+
 /// A value in as many digits as say something to a reader.
 fn in_short(value: &Value) -> String {
     match (value, value.as_f64()) {
         (Value::String(text), _) => text.clone(),
-        (_, Some(number)) if number.fract() != 0.0 => Short(number).to_string(),
+        (Value::Number(written), Some(number)) if written.is_f64() => Short(number).to_string(),
         _ => value.to_string(),
     }
 }
@@ -196,7 +212,8 @@ impl Watch for Console {
             _ if self.quiet => {}
             Voice::Json(events) => events.chose(values),
             Voice::Text(bars) => {
-                let each = values.iter().map(|d| format!("{} {}", d.name, in_short(&d.value)));
+                let unit = *self.unit.lock().unwrap_or_else(PoisonError::into_inner);
+                let each = values.iter().map(|decision| in_words(decision, unit));
                 let all = each.chain(self.hint.get().map(|hint| (*hint).to_owned()));
                 let line = all.collect::<Vec<String>>().join(", ");
                 bars.beside(|| print::message(format_args!("chosen   {line}")));
@@ -206,5 +223,25 @@ impl Watch for Console {
 
     fn cancelled(&self) -> bool {
         self.interrupted.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn what_is_chosen_is_told_in_words_and_units() {
+        let told = |name: &str, value: Value, unit| {
+            let (stage, name) = ("cells".to_owned(), name.to_owned());
+            in_words(&Decision { stage, name, value }, unit)
+        };
+        assert_eq!(told("min_spacing", json!(0.6401), Some("m")), "min spacing 0.640 m");
+        assert_eq!(told("min_spacing", json!("none"), Some("m")), "min spacing none");
+        assert_eq!(told("side", json!(2.0), None), "side 2.00");
+        assert_eq!(told("max_angle", json!(0.1), Some("m")), "max angle 0.100 rad");
+        assert_eq!(told("keep", json!(20_000), Some("m")), "keep 20000");
     }
 }

@@ -251,7 +251,9 @@ impl TileOp for Cells {
             ("cells.min_spacing", self.min_spacing.and_then(Setting::given)),
         ];
         let each = lengths.into_iter();
-        each.filter_map(|(address, length)| rounded(lattice, address, length?.value())).collect()
+        let rounded =
+            each.filter_map(|(address, length)| rounded(lattice, address, length?.value()));
+        rounded.chain(self.all_stay()).collect()
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
@@ -321,6 +323,18 @@ impl Cells {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Says that more records are to stay than there are.
+    fn all_stay(&self) -> Option<String> {
+        let Some(Keep::Records(count)) = self.keep else { return None };
+        let records = self.outlook.as_ref()?.records();
+        (count > records).then(|| {
+            format!(
+                "`cells.keep = {count}` is more than the {records} points that there are: as many stay as \
+                 cells can be made"
+            )
+        })
     }
 
     /// The largest range of angles as it was given, or the default; none where a target decides.

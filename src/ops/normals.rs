@@ -114,6 +114,7 @@ impl TileOp for Normals {
             reads: names::XYZ.map(str::to_owned).to_vec(),
             writes: vec!["Normal".into()],
             neighbors: self.count(),
+            fewer_neighbors: self.neighbors.given().or(self.found).is_none(),
             ..Needs::default()
         }
     }

@@ -1,7 +1,8 @@
 //! Files that the records of outputs refer to, such as waveforms: copied beside the outputs, under their
 //! names.
 
-use std::fs::{self, File};
+use std::fs::File;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use super::files::{Clash, Files};
@@ -48,11 +49,15 @@ impl Beside {
     }
 }
 
-/// Copies a file and brings the copy to disk.
+/// Copies what is in a file, with the mode that all new files get, and brings the copy to disk.
 fn copy(from: &Path, to: &Path) -> Result<()> {
-    if !fs::metadata(from).map_err(|e| Error::io(from, "find it again", e))?.is_file() {
+    let mut source = File::open(from).map_err(|e| Error::io(from, "find it again", e))?;
+    if !source.metadata().map_err(|e| Error::io(from, "find it again", e))?.is_file() {
         return Err(Error::data(from, "this is not a plain file any more"));
     }
-    let copied = fs::copy(from, to).and_then(|_| File::open(to)).and_then(|file| file.sync_all());
+    let copied = File::create(to).and_then(|mut file| {
+        io::copy(&mut source, &mut file)?;
+        file.sync_all()
+    });
     copied.map_err(|e| Error::io(to, &format!("copy {} to it", shown(from)), e))
 }

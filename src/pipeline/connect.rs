@@ -100,8 +100,9 @@ impl CreateSink for Output {
     }
 
     fn warnings(&self, schema: &Schema, metadata: &Metadata) -> Vec<String> {
+        let misnamed = self.misnamed();
         if self.format != Format::Ply || schema.layout == Layout::Ply {
-            return Vec::new();
+            return misnamed.into_iter().collect();
         }
         let lost = las::records_beside(metadata);
         let records = (!lost.is_empty()).then(|| {
@@ -116,7 +117,7 @@ impl CreateSink for Output {
         let waveforms = las::waveforms_of(metadata)
             .map(|file| format!("waveforms of LAS; these are lost: those in {}", shown(&file)));
         let told = |lost| format!("{}: PLY does not hold {lost}", shown(&self.path));
-        records.into_iter().chain(waveforms).map(told).collect()
+        misnamed.into_iter().chain(records.into_iter().chain(waveforms).map(told)).collect()
     }
 
     fn checks(&self, schema: &Schema) -> bool {
@@ -169,6 +170,17 @@ impl Output {
             Some(own) => Box::new(las::Shifted::new(staged, open(&own.0)?, own)),
             None => open(schema)?,
         })
+    }
+
+    /// Says that the name is that of another format.
+    fn misnamed(&self) -> Option<String> {
+        let named = Format::of(&self.path).filter(|named| !self.of_one && *named != self.format)?;
+        let [named, is] = [named, self.format].map(|format| format.extension().to_uppercase());
+        Some(format!(
+            "{}: this is named as {named} and becomes {is}, as `write.format` says: programs that go by \
+             names will not read it",
+            shown(&self.path)
+        ))
     }
 
     fn ply_options(&self, whole: bool) -> ply::PlyOptions {

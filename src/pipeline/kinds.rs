@@ -191,7 +191,8 @@ pub struct Write {
     /// The folder that gets a file for each input; it is made if it does not exist.
     #[serde(default)]
     pub folder: Option<PathBuf>,
-    /// The format; none: as the extension says, in a folder that of the input.
+    /// The format; none: as the extension says, in a folder that of the input. A file whose extension
+    /// says another is written, with a warning.
     #[serde(default)]
     pub format: Option<Format>,
     /// Dimensions that the output need not hold.

@@ -29,6 +29,11 @@ impl Plan {
         self.source.warnings().into_iter().chain(self.warnings.clone()).collect()
     }
 
+    /// The sign of the unit that lengths of the scan are in, where it says that.
+    pub fn unit(&self) -> Option<&'static str> {
+        self.source.metadata().units.sign()
+    }
+
     /// What the plan reads, writes and uses.
     pub fn outline(&self) -> Outline {
         let outputs: Vec<PathBuf> = self.sinks.iter().map(|sink| sink.path().to_owned()).collect();

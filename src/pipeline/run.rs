@@ -51,11 +51,13 @@ pub struct Done {
     pub report: Report,
     /// The file of the whole report, if one was wanted.
     pub report_path: Option<PathBuf>,
+    /// The sign of the unit that lengths are in, where the scan says it.
+    pub unit: Option<&'static str>,
 }
 
 impl std::fmt::Display for Done {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        self.report.table(self.report_path.as_deref()).fmt(f)
+        self.report.table(self.report_path.as_deref()).in_unit(self.unit).fmt(f)
     }
 }
 
@@ -81,9 +83,13 @@ impl Plan {
         let staged_report =
             self.settings.report.as_deref().map(|path| first.also(path, trouble)).transpose()?;
         let tell = |error| outputs.iter().flatten().fold(error, |error, output| output.tell(error));
-        let (finished, run) = self.work(&outputs, &mut clock, watch, trouble).map_err(tell)?;
+        let (finished, mut run) = self.work(&outputs, &mut clock, watch, trouble).map_err(tell)?;
         let beside: Vec<Staged> =
             self.beside.iter().map(|copy| copy.make(first, trouble)).collect::<Result<_>>()?;
+        run.outputs.extend(beside.iter().zip(&self.beside).map(|(staged, copy)| {
+            let bytes = fs::metadata(staged.file()).ok().map(|about| about.len());
+            FileFigures::of(&copy.to, 0, bytes)
+        }));
         let (report, tiles) = self.account(finished, run, clock)?;
         if let Some(staged) = &staged_report {
             write_report(staged.file(), &report, &tiles).map_err(|error| staged.tell(error))?;
@@ -93,7 +99,8 @@ impl Plan {
         let outputs: Vec<Staged> =
             beside.into_iter().chain(outputs.into_iter().flatten()).collect();
         publish(&outputs, staged_report.as_ref())?;
-        Ok(Done { report, report_path: self.settings.report })
+        let unit = self.unit();
+        Ok(Done { report, report_path: self.settings.report, unit })
     }
 
     /// The files of a sink, one for each input where it is a folder.
@@ -291,10 +298,8 @@ impl Plan {
         let mut warnings = self.source.warnings();
         let all = finished.written.iter().flatten();
         warnings.extend(all.flat_map(|(_, sink)| sink.notes.iter().cloned()));
-        let outputs = self.written(finished).map(|(sink, (_, summary))| FileFigures {
-            path: sink.path().display().to_string(),
-            points: summary.points,
-            bytes: Some(summary.bytes),
+        let outputs = self.written(finished).map(|(sink, (_, summary))| {
+            FileFigures::of(sink.path(), summary.points, Some(summary.bytes))
         });
         RunFigures {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -352,10 +357,13 @@ impl Plan {
     }
 }
 
-/// Says that an output is empty though its input was not, and what removed the points.
+/// Says that an output is empty: that its input was so too, or what removed the points.
 fn nothing_left(finished: &Finished) -> Option<String> {
     let ledger = Ledger::new(finished.read, finished.kept, &finished.tally);
-    if ledger.kept > 0 || ledger.read == 0 {
+    if ledger.read == 0 {
+        return Some("the inputs have no points: what is written has none either".to_owned());
+    }
+    if ledger.kept > 0 {
         return None;
     }
     let by = |r: &Removed| format!("{} {} ({})", Grouped(r.records), r.reason, r.stage);
@@ -381,10 +389,9 @@ fn write_report(staged: &Path, report: &Report, tiles: &Option<Lines>) -> Result
 }
 
 fn input_figures(source: &dyn Source) -> Vec<FileFigures> {
-    let figures = |input: Input| FileFigures {
-        bytes: fs::metadata(&input.path).ok().map(|m| m.len()),
-        path: input.path.display().to_string(),
-        points: input.points,
+    let figures = |input: Input| {
+        let bytes = fs::metadata(&input.path).ok().map(|about| about.len());
+        FileFigures::of(&input.path, input.points, bytes)
     };
     source.inputs().into_iter().map(figures).collect()
 }

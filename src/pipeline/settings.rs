@@ -30,7 +30,8 @@ pub struct RunSettings {
     pub existing: Existing,
     /// Lattice step in world units; none: as the inputs' headers have it, or 2^-30 where coordinates
     /// are floats. A run warns where that merges more than one position in a thousand whose points
-    /// have unequal coordinates, and says what step does not.
+    /// have unequal coordinates, and says what step does not. Sides that are "auto" are powers of two of
+    /// steps: another step gives them other lengths, and other points are kept, also in number.
     #[serde(deserialize_with = "some_step")]
     pub lattice: Option<f64>,
     /// What z is multiplied by wherever distances are measured, so that its unit is that of x and y;

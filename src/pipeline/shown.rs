@@ -88,7 +88,8 @@ impl Plan {
             write!(f, ", writes {}", needs.writes.join(", "))?;
         }
         if needs.neighbors > 0 {
-            write!(f, ", {} nearest neighbours", needs.neighbors)?;
+            let most = if needs.fewer_neighbors { "up to " } else { "" };
+            write!(f, ", {most}{} nearest neighbours", needs.neighbors)?;
         }
         if needs.removes || needs.mark.is_some() {
             write!(f, ", {}", if needs.mark.is_some() { "marks" } else { "removes" })?;

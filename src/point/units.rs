@@ -95,8 +95,24 @@ impl Units {
         }
     }
 
+    /// The sign of the unit that distances are in, behind a number; none where that is not known.
+    pub fn sign(&self) -> Option<&'static str> {
+        match self.horizontal? {
+            Horizontal::Degrees => None,
+            Horizontal::Metres(metres) => match name(metres).as_str() {
+                METRES => Some("m"),
+                FEET => Some("ft"),
+                SURVEY_FEET => Some("US survey ft"),
+                _ => None,
+            },
+        }
+    }
+
     /// The units in words, those that are not known included.
     pub fn words(&self) -> String {
+        if self.horizontal.is_none() && self.vertical.is_none() {
+            return "not known".to_owned();
+        }
         let not_known = || "a unit that is not known".to_owned();
         let xy = match self.horizontal {
             Some(Horizontal::Degrees) => "degrees".to_owned(),
@@ -136,14 +152,16 @@ impl Units {
 
 /// The unit that most scans have.
 const METRES: &str = "metres";
+const FEET: &str = "feet";
+const SURVEY_FEET: &str = "US survey feet";
 
 /// A unit of `metres` in words.
 fn name(metres: f64) -> String {
     let close = |to: f64| ((metres - to) / to).abs() < 1e-9;
     match () {
         () if close(1.0) => METRES.to_owned(),
-        () if close(0.3048) => "feet".to_owned(),
-        () if close(1200.0 / 3937.0) => "US survey feet".to_owned(),
+        () if close(0.3048) => FEET.to_owned(),
+        () if close(1200.0 / 3937.0) => SURVEY_FEET.to_owned(),
         () => format!("units of {metres} m"),
     }
 }
@@ -224,6 +242,16 @@ mod tests {
     fn units_in_words_say_what_is_not_known() {
         assert_eq!(units(1.0, SURVEY_FOOT).words(), "x and y in metres, z in US survey feet");
         assert_eq!(above(FOOT).words(), "x and y in feet, z in a unit that is not known");
+        assert_eq!(Units::default().words(), "not known");
+    }
+
+    #[test]
+    fn lengths_have_the_sign_of_x_and_y() {
+        let signs = [1.0, FOOT, SURVEY_FOOT, 1000.0].map(|across| above(across).sign());
+        assert_eq!(signs, [Some("m"), Some("ft"), Some("US survey ft"), None]);
+        assert_eq!(Units::default().sign(), None);
+        let degrees = Units { horizontal: Some(Horizontal::Degrees), ..Units::default() };
+        assert_eq!(degrees.sign(), None);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, BufRead, Write};
+use std::path::Path;
 
 use serde::Serialize;
 
@@ -104,6 +105,13 @@ pub struct FileFigures {
     pub points: u64,
     /// Length; None where it is not known.
     pub bytes: Option<u64>,
+}
+
+impl FileFigures {
+    /// Those of a file: its path as it is, since the document's writer escapes it.
+    pub fn of(path: &Path, points: u64, bytes: Option<u64>) -> Self {
+        FileFigures { path: path.display().to_string(), points, bytes }
+    }
 }
 
 /// A phase of the run.

@@ -18,12 +18,21 @@ use crate::error::shown;
 pub struct Table<'a> {
     report: &'a Report,
     path: Option<&'a Path>,
+    unit: Option<&'a str>,
+}
+
+impl<'a> Table<'a> {
+    /// The same with this unit behind lengths.
+    #[must_use]
+    pub fn in_unit(self, unit: Option<&'a str>) -> Self {
+        Table { unit, ..self }
+    }
 }
 
 impl Report {
     /// The report as a few lines for the terminal; `path` is where the whole of it is.
     pub fn table<'a>(&'a self, path: Option<&'a Path>) -> Table<'a> {
-        Table { report: self, path }
+        Table { report: self, path, unit: None }
     }
 }
 
@@ -42,10 +51,11 @@ impl fmt::Display for Table<'_> {
         let is_found = |d: &&Decision| d.stage == "cells" && d.name == "max_angle" && keeps(result);
         for found in result.decisions.iter().filter(is_found) {
             let angle = found.value.as_f64().unwrap_or_default();
-            write!(f, "\nangle      {angle:.4} rad, found for the number of points to keep")?;
+            let told = "normals of a cell differ by, for the number of points to keep";
+            write!(f, "\nangle      {angle:.4} rad at most: what {told}")?;
         }
         if let Some(totals) = &result.totals {
-            totals_lines(f, totals, result)?;
+            totals_lines(f, totals, result, self.unit)?;
         }
         if let Some(peak) = run.peak_memory_bytes {
             write!(f, "\nmemory     {} at most, budget {}", Bytes(peak), Bytes(run.memory_bytes))?;
@@ -143,19 +153,22 @@ fn class_lines(f: &mut fmt::Formatter<'_>, classes: &[ClassFigures], marked: boo
 }
 
 /// What the reduction did to the surface, then how flat the scan is.
-fn totals_lines(f: &mut fmt::Formatter<'_>, totals: &Totals, result: &Outcome) -> fmt::Result {
-    deviation_line(f, totals, result)?;
-    if let Some(BaselineFigures { side, rms, p95, .. }) = totals.baseline {
-        write!(f, "\nbaseline   RMS {}, 95 % ≤ {}", Short(rms), Short(p95))?;
-        write!(f, ": a voxel grid of as many points, cubes of {}", Short(side))?;
-    }
+fn totals_lines(
+    f: &mut fmt::Formatter<'_>,
+    totals: &Totals,
+    result: &Outcome,
+    unit: Option<&str>,
+) -> fmt::Result {
+    let long = |length: f64| Long(length, unit);
+    deviation_line(f, totals, result, unit)?;
+    baseline_line(f, totals, result, unit)?;
     let planes = [("in tiles", &totals.tile_plane), ("whole scan", &totals.scan_plane)];
     let (mut heading, mut rises) = ("plane RMS", false);
     for (name, plane) in planes {
         if let Pair { before: Some(PlaneFigures { rms: before, .. }), after } = plane {
-            write!(f, "\n{heading:9}  {name} {}", Short(*before))?;
+            write!(f, "\n{heading:9}  {name} {}", long(*before))?;
             if let Some(after) = after {
-                write!(f, " → {}", Short(after.rms))?;
+                write!(f, " → {}", long(after.rms))?;
                 rises |= after.rms > *before;
             }
             heading = "";
@@ -171,19 +184,54 @@ fn totals_lines(f: &mut fmt::Formatter<'_>, totals: &Totals, result: &Outcome) -
 }
 
 /// How far removed records are from the surface, and of how many that is known.
-fn deviation_line(f: &mut fmt::Formatter<'_>, totals: &Totals, result: &Outcome) -> fmt::Result {
+fn deviation_line(
+    f: &mut fmt::Formatter<'_>,
+    totals: &Totals,
+    result: &Outcome,
+    unit: Option<&str>,
+) -> fmt::Result {
+    let long = |length: f64| Long(length, unit);
     let removed = totals.points.before.saturating_sub(totals.points.after);
     let Some(DeviationTotals { points, rms, p95, max, at, .. }) = totals.deviation else {
         let told = removed > 0;
         return if told { write!(f, "\ndeviation  not measured") } else { Ok(()) };
     };
-    write!(f, "\ndeviation  RMS {}, 95 % ≤ {}", Short(rms), Short(p95))?;
+    write!(f, "\ndeviation  RMS {}, 95 % ≤ {}", long(rms), long(p95))?;
     let step = result.lattice.map_or(0.0, |lattice| lattice.step);
     let [x, y, z] = at.map(|at| Coordinate { at, step });
-    write!(f, ", max {} at ({x}, {y}, {z})", Short(max))?;
+    write!(f, ", max {} at ({x}, {y}, {z})", long(max))?;
     match points < removed {
         true => write!(f, ", of {} of {} removed points", Grouped(points), Grouped(removed)),
         false => Ok(()),
+    }
+}
+
+/// What a voxel grid of as many points would have done, where points were reduced by their normals; or
+/// why that is not known.
+fn baseline_line(
+    f: &mut fmt::Formatter<'_>,
+    totals: &Totals,
+    result: &Outcome,
+    unit: Option<&str>,
+) -> fmt::Result {
+    let Pair { before, after } = totals.points;
+    match totals.baseline {
+        Some(BaselineFigures { side, rms, p95, .. }) => {
+            let [side, rms, p95] = [side, rms, p95].map(|length| Long(length, unit));
+            write!(f, "\nbaseline   RMS {rms}, 95 % ≤ {p95}")?;
+            write!(f, ": a voxel grid of as many points, cubes of {side}")
+        }
+        None if !result.counts.contains_key("cells") || before == after => Ok(()),
+        // The finest grid that is measured keeps three of four positions.
+        None if after > before / 4 * 3 => {
+            write!(
+                f,
+                "\nbaseline   not measured: a voxel grid of so many points removes hardly any"
+            )
+        }
+        None => {
+            write!(f, "\nbaseline   not measured: none of the voxel grids keeps as many points")
+        }
     }
 }
 
@@ -258,6 +306,16 @@ impl fmt::Display for Short {
                 write!(f, "{v:.*}", decimals as usize)
             }
         }
+    }
+}
+
+/// A length in short, with its unit where that is known.
+struct Long<'a>(f64, Option<&'a str>);
+
+impl fmt::Display for Long<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Short(self.0).fmt(f)?;
+        self.1.map_or(Ok(()), |unit| write!(f, " {unit}"))
     }
 }
 

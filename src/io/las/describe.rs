@@ -6,10 +6,12 @@ use serde::Serialize;
 
 use super::chunks::Chunks;
 use super::crs;
+use super::format::has_gps_time;
 use super::header::at;
 use super::input::{Input, Storage};
 use super::laz::Compressor;
 use crate::Result;
+use crate::point::GpsTime;
 
 /// A LAS or LAZ file as its header and records describe it; no point is read.
 #[derive(Debug, Clone, Serialize)]
@@ -36,6 +38,8 @@ pub struct Description {
     pub crs: Option<String>,
     /// Units of the coordinates in words, as far as that tells them.
     pub units: String,
+    /// What GPS times count, where the records have them.
+    pub gps_time: Option<&'static str>,
     /// What made the points, as the header says.
     pub system_identifier: String,
     /// What wrote the file, as the header says.
@@ -112,6 +116,10 @@ pub fn describe(path: &Path) -> Result<Description> {
         max,
         crs: crs::text(&input.vlrs, &input.evlrs)?,
         units: crs::units(&input.vlrs, &input.evlrs)?.words(),
+        gps_time: has_gps_time(header.format()).then(|| match header.gps_time() {
+            GpsTime::Week => "seconds of the GPS week",
+            GpsTime::AdjustedStandard => "adjusted standard GPS time",
+        }),
         system_identifier: header.text(at::SYSTEM),
         generating_software: header.text(at::SOFTWARE),
         creation_day: word(at::DAY),
