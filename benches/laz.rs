@@ -3,6 +3,10 @@
 //!
 //! `cargo bench --bench laz -- SCAN.laz …`; with one scan and `pointmill` or `crate`, that one alone, once,
 //! as a line of JSON.
+//! `cargo bench --bench laz -- SCAN.laz layers` tells what each layer of formats 6 to 10 costs: the time of
+//! the points without anything but x, y, returns and z, and what each other layer adds to that. With the
+//! name of a dimension in the place of `layers`, that layer alone beside those, as a line of JSON: for a
+//! profiler that counts instructions.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints and may fail")]
 
@@ -38,12 +42,19 @@ fn hash(sum: u64, bytes: &[u8]) -> u64 {
 type Run = (f64, u64, u64);
 
 fn ours(path: &Path, checked: bool) -> Run {
+    without(path, checked, |_| false)
+}
+
+/// The same without the dimensions that `unread` says.
+fn without(path: &Path, checked: bool, unread: impl Fn(&str) -> bool) -> Run {
     let start = cpu();
     let source = las::open(&[path.to_owned()]).unwrap();
+    let names = source.schema().dimensions.iter().map(|dimension| dimension.name.clone());
+    let unread: Vec<String> = names.filter(|name| unread(name)).collect();
     let mut batch = PointBatch::new(source.schema().clone(), AT_ONCE);
     let (mut points, mut sum) = (0, 0);
     for part in 0..source.parts() {
-        let mut part = source.part(part).unwrap();
+        let mut part = source.part_without(part, &unread).unwrap();
         loop {
             part.read(&mut batch).unwrap();
             if batch.is_empty() {
@@ -104,8 +115,54 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
+/// Dimensions that are read whatever else is: those of the layer that all others need, and heights.
+fn always(name: &str) -> bool {
+    const OTHERS: [&str; 4] = ["X", "Y", "Z", "ReturnNumber"];
+    OTHERS.contains(&name) || name == "NumberOfReturns"
+}
+
+/// What each layer of a file costs.
+fn by_layer(path: &Path) {
+    const LAYERS: [&str; 11] = [
+        "Classification",
+        "Withheld",
+        "Intensity",
+        "ScanAngle",
+        "UserData",
+        "PointSourceId",
+        "GpsTime",
+        "Red",
+        "NIR",
+        "WavePacketIndex",
+        "*",
+    ];
+    let source = las::open(&[path.to_owned()]).unwrap();
+    let has = |layer: &&&str| **layer == "*" || source.schema().find(layer).is_some();
+    let layers: Vec<&str> = LAYERS.iter().filter(has).copied().collect();
+    let mut times = vec![Vec::new(); layers.len() + 1];
+    let mut points = 1;
+    for _ in 0..ROUNDS {
+        let (seconds, read, _) = without(path, false, |name| !always(name));
+        points = read.max(1);
+        times[0].push(seconds);
+        for (layer, times) in layers.iter().zip(&mut times[1..]) {
+            let all = *layer == "*";
+            times.push(without(path, false, |name| !all && !always(name) && name != *layer).0);
+        }
+    }
+    let mut each = times.into_iter().map(|times| median(times) * 1e9 / points as f64);
+    let least = each.next().unwrap();
+    println!("| layer | ns a point |\n|---|--:|\n| x, y, returns, z | {least:.1} |");
+    for (layer, time) in layers.iter().zip(each) {
+        match *layer {
+            "*" => println!("| all | {time:.1} |"),
+            layer => println!("| {layer} | + {:.1} |", time - least),
+        }
+    }
+}
+
 /// One decoder alone, as a line of JSON.
-fn alone(path: &Path, decode: fn(&Path, bool) -> Run) {
+fn alone(path: &Path, decode: impl Fn(&Path, bool) -> Run) {
     let start = std::time::Instant::now();
     let (seconds, points, _) = decode(path, false);
     let wall = start.elapsed().as_secs_f64();
@@ -118,6 +175,11 @@ fn main() {
     match &paths[..] {
         [path, which] if which.as_os_str() == "pointmill" => return alone(path, ours),
         [path, which] if which.as_os_str() == "crate" => return alone(path, theirs),
+        [path, which] if which.as_os_str() == "layers" => return by_layer(path),
+        [path, layer] if !layer.exists() => {
+            let unread = |name: &str| !always(name) && layer.as_os_str() != name;
+            return alone(path, |path, checked| without(path, checked, unread));
+        }
         _ => {}
     }
     println!("| file | points | ns a point | laz crate | ratio | same |");

@@ -1,0 +1,5 @@
+//! The repository itself: what imports what, what pages say, what it depends on.
+
+mod dependencies;
+mod drift;
+mod imports;

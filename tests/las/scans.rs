@@ -1,0 +1,149 @@
+//! Real files: all that can be read is read and survives LAS → LAZ → LAS; damage is told.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
+
+use crate::las_support;
+
+use las_support::{BROKEN, LAS, LAZ, manifest, read, scans, write};
+use pointmill::io::las::{describe, open};
+use pointmill::stage::Source;
+
+/// Files above this are read in part.
+const PARTLY: u64 = 300_000;
+const PART: usize = 20_000;
+
+#[test]
+#[ignore = "needs the real scans: POINTMILL_SCANS"]
+fn every_readable_scan_has_the_points_of_the_manifest_and_survives_a_round_trip() {
+    let folder = scans();
+    let temporary = tempfile::tempdir().unwrap();
+    let mut tested = 0;
+    for scan in manifest(&folder) {
+        if BROKEN.contains(&scan.name.as_str()) {
+            continue;
+        }
+        let source = open(std::slice::from_ref(&scan.path)).unwrap_or_else(|e| panic!("{e:?}"));
+        if let Some(points) = scan.points {
+            assert_eq!(source.points(), points, "{}", scan.name);
+        }
+        let whole = source.points() <= PARTLY;
+        let limit = if whole { usize::MAX / 4096 } else { PART };
+        let records = read(&*source, limit).unwrap_or_else(|e| panic!("{e:?}"));
+        if whole {
+            assert_eq!(records.len() as u64, source.points() * source.schema().stride as u64);
+        }
+        for warning in source.warnings() {
+            println!("{warning}");
+        }
+        round_trip(&scan.name, &*source, &records, temporary.path());
+        tested += 1;
+    }
+    assert!(tested > 100, "only {tested} scans");
+}
+
+/// LAS → LAZ → LAS: records, header and records beside the points are the same bytes again.
+fn round_trip(name: &str, source: &dyn Source, records: &[u8], folder: &std::path::Path) {
+    let [one, two, three] = ["1.las", "2.laz", "3.las"].map(|file| folder.join(file));
+    write(&one, LAS, source.schema(), source.metadata(), records).unwrap();
+    let plain = open(std::slice::from_ref(&one)).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+    assert_eq!(plain.schema(), source.schema(), "{name}");
+    write(&two, LAZ, plain.schema(), plain.metadata(), records).unwrap();
+    let packed = open(std::slice::from_ref(&two)).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+    let unpacked = read(&*packed, usize::MAX / 4096).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+    assert!(unpacked == records, "{name}: records differ");
+    write(&three, LAS, packed.schema(), packed.metadata(), &unpacked).unwrap();
+    let bytes = [&one, &three].map(|path| std::fs::read(path).unwrap());
+    assert!(bytes[0] == bytes[1], "{name}: LAS → LAZ → LAS changed the file");
+}
+
+#[test]
+#[ignore = "needs the real scans: POINTMILL_SCANS"]
+fn a_plain_file_written_again_keeps_all_but_recomputed_fields() {
+    let folder = scans();
+    let temporary = tempfile::tempdir().unwrap();
+    let mut tested = 0;
+    for scan in manifest(&folder) {
+        let plain = scan.name.ends_with(".las") && !BROKEN.contains(&scan.name.as_str());
+        if !plain || scan.points.is_none_or(|n| n > PARTLY) {
+            continue;
+        }
+        let source = open(std::slice::from_ref(&scan.path)).unwrap();
+        let records = read(&*source, usize::MAX / 4096).unwrap();
+        let path = temporary.path().join("again.las");
+        write(&path, LAS, source.schema(), source.metadata(), &records).unwrap();
+        let (old, new) = (std::fs::read(&scan.path).unwrap(), std::fs::read(&path).unwrap());
+        let start = u32::from_le_bytes(old[96..100].try_into().unwrap()) as usize;
+        let size = usize::from(u16::from_le_bytes(old[94..96].try_into().unwrap()));
+        // Counts (107 to 131, 247 to 375) and box (179 to 227) follow the points, the extended
+        // records (235 to 247) the end of the points. Bits of the encoding (6 to 8) may be mended, and
+        // the software (58 to 90) is ours.
+        for (from, to) in [(0, 6), (8, 58), (90, 107)] {
+            assert!(old[from..to] == new[from..to], "{}", scan.name);
+        }
+        assert!(old[131..179] == new[131..179], "{}", scan.name);
+        assert!(old[size..start + records.len()] == new[size..start + records.len()]);
+        tested += 1;
+    }
+    assert!(tested > 40, "only {tested} scans");
+}
+
+#[test]
+#[ignore = "needs the real scans: POINTMILL_SCANS"]
+fn broken_scans_fail_with_path_and_place() {
+    let folder = scans();
+    for name in BROKEN {
+        let path = folder.join(name);
+        let result = open(std::slice::from_ref(&path)).and_then(|s| read(&*s, 1 << 22).map(drop));
+        let error = result.expect_err(name);
+        println!("{error:?}");
+        assert_eq!(error.path(), Some(path.as_path()));
+        assert!(error.byte().is_some(), "{error:?}");
+    }
+}
+
+#[test]
+#[ignore = "needs the real scans: POINTMILL_SCANS"]
+fn every_scan_describes_itself() {
+    let folder = scans();
+    for scan in manifest(&folder) {
+        if BROKEN.contains(&scan.name.as_str()) {
+            continue;
+        }
+        let about = describe(&scan.path).unwrap();
+        assert_eq!(about.kind == "LAZ", about.compressor != "none", "{}", scan.name);
+        assert!(about.dimensions.len() >= 15);
+        serde_json::to_string(&about).unwrap();
+    }
+    let copc = describe(&folder.join("laspy/simple.copc.laz")).unwrap();
+    assert!(copc.warnings.iter().any(|w| w.contains("copc")));
+    let wkt = describe(&folder.join("laspy/1_4_w_evlr.laz")).unwrap();
+    assert!(wkt.crs.is_some() && wkt.evlrs.len() == 1);
+    let keys = describe(&folder.join("pdal/las/test_utm16.las")).unwrap();
+    assert_eq!(keys.crs.as_deref(), Some("EPSG:26916"));
+}
+
+#[test]
+#[ignore = "needs the real scans: POINTMILL_SCANS"]
+fn plain_and_compressed_files_of_the_same_points_decode_alike() {
+    let folder = scans();
+    let pairs = [
+        "laz-rs/point10",
+        "laz-rs/point-color",
+        "laz-rs/point-time",
+        "laz-rs/point-time-color",
+        "laz-rs/extra-bytes",
+        "laz-rs/point-version-1-point-wise",
+        "loaders.gl/las/pdrf4-1.3",
+        "loaders.gl/las/pdrf7-v4-1.4",
+        "laspy/1_4_w_evlr",
+        "pasture/10_points_format_5",
+        "pasture/10_points_format_8",
+    ];
+    for name in pairs {
+        let [plain, packed] = ["las", "laz"].map(|extension| {
+            let path = folder.join(format!("{name}.{extension}"));
+            read(&*open(&[path]).unwrap(), usize::MAX / 4096).unwrap()
+        });
+        assert!(!plain.is_empty() && plain == packed, "{name}");
+    }
+}

@@ -1,0 +1,8 @@
+//! Runs of several passes.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod exact;
+mod lossless;
+mod same_bytes;

@@ -1,0 +1,89 @@
+//! The words of messages: the library names settings as a pipeline file has them, and only settings
+//! that there are; flags are for the command line to tell.
+
+#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn sources(folder: &Path, into: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        match path.is_dir() {
+            true => sources(&path, into),
+            false if path.extension().is_some_and(|e| e == "rs") => into.push(path),
+            false => {}
+        }
+    }
+}
+
+/// The lines of the library's code that hold a text, each with its place; comments aside.
+fn texts() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    sources(&root.join("src"), &mut files);
+    files.retain(|file| !file.starts_with(root.join("src/cli")));
+    let mut lines = Vec::new();
+    for file in &files {
+        let code = fs::read_to_string(file).unwrap();
+        for (i, line) in code.lines().enumerate() {
+            let line = line.trim_start();
+            if !line.starts_with("//") {
+                let name = file.strip_prefix(root).unwrap().display();
+                lines.push((format!("{name}:{}", i + 1), line.to_owned()));
+            }
+        }
+    }
+    assert!(files.len() > 100 && lines.len() > 10_000, "{} files", files.len());
+    lines
+}
+
+/// The settings that `stages --json` lists, as `--set` takes them.
+fn settings() -> BTreeSet<String> {
+    let json = include_str!("../../src/cli/stages.json");
+    let all: serde_json::Value = serde_json::from_str(json).unwrap();
+    let mut settings = BTreeSet::new();
+    for described in all.as_array().unwrap() {
+        for key in described["keys"].as_array().unwrap() {
+            let (kind, key) = (&described["kind"], &key["key"]);
+            settings.insert(format!("{}.{}", kind.as_str().unwrap(), key.as_str().unwrap()));
+        }
+    }
+    settings
+}
+
+#[test]
+fn the_library_names_no_flag() {
+    let is_flag = |text: &str| {
+        let mut dashes = text.match_indices("--");
+        dashes.any(|(at, _)| text[at + 2..].starts_with(|c: char| c.is_ascii_lowercase()))
+    };
+    assert!(is_flag("give --memory"));
+    for (place, line) in texts() {
+        // `Set` reads the text of `--set`, and is named by it.
+        if !place.starts_with("src/pipeline/set.rs") {
+            assert!(!is_flag(&line), "{place} names a flag: {line}");
+        }
+    }
+}
+
+#[test]
+fn every_setting_that_a_message_names_exists() {
+    let settings = settings();
+    let kinds: BTreeSet<&str> =
+        settings.iter().filter_map(|s| Some(s.split_once('.')?.0)).collect();
+    let mut named = 0;
+    for (place, line) in texts() {
+        for part in line.split('`').skip(1) {
+            let address = part.split(" = ").next().unwrap();
+            let Some((kind, key)) = address.split_once('.') else { continue };
+            let word = |c: char| c.is_ascii_lowercase() || c == '_';
+            if kinds.contains(kind) && !key.is_empty() && key.chars().all(word) {
+                assert!(settings.contains(address), "{place}: `{address}` is no setting");
+                named += 1;
+            }
+        }
+    }
+    assert!(named >= 30, "{named} settings are named");
+}

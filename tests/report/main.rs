@@ -1,0 +1,4 @@
+//! The report.
+
+mod document;
+mod survey;
