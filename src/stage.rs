@@ -203,8 +203,8 @@ pub trait ScanOp: TileOp {
     /// over all tiles must not depend on how they are cut, or only sums of it may be used.
     fn gather(&self, tile: &mut Tile, found: &mut Vec<[u64; 2]>, tally: &mut Tally) -> Result<()>;
 
-    /// Called once, between the phases.
-    fn conclude(&mut self, found: &dyn Gathered) -> Result<()>;
+    /// Called once, between the phases. Returns what the user is to be warned of.
+    fn conclude(&mut self, found: &dyn Gathered) -> Result<Option<String>>;
 }
 
 /// What the tiles of a [`ScanOp`]'s first phase found, wherever it is stored.

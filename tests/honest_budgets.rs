@@ -103,6 +103,33 @@ fn the_budget_that_a_refusal_names_does_and_sixteen_mebibytes_less_do_not() {
 }
 
 #[test]
+fn a_side_that_samples_choose_is_refused_with_a_lower_bound_before_them_and_fits_in_the_end() {
+    // Most points lie in one place: what the first cells take is not what the last do.
+    let even = Scan::synthetic(Scene::Als, 400_000, 3);
+    let mut random = Random(7);
+    let scan = moved(&even, |i, p| match i % 4 {
+        0 => p,
+        _ => [0, 1, 2].map(|axis| [7_000, 7_000, 300][axis] + random.below(60) as i32),
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    scan.write(&at.join("scan.las"));
+    let (mut budget, mut refusals, mut was_last) = (12, 0, false);
+    loop {
+        let (code, told) = with(at, "reduce scan.las -o out.las --threads 1", budget);
+        if code == 0 {
+            break;
+        }
+        assert!(code == 1 && named(&told) > budget && !was_last, "{told}");
+        was_last = !told.contains("at least");
+        refusals += 1;
+        assert!(refusals < 5, "{told}");
+        budget = named(&told);
+    }
+    assert!(refusals > 1, "{refusals}");
+}
+
+#[test]
 fn copies_that_differ_in_class_are_refused_with_a_lower_bound_and_fit_in_the_end() {
     // 200,000 copies of one position: neighbours in the order of their bytes differ in class.
     let even = Scan::synthetic(Scene::Als, 200_000, 3);

@@ -65,6 +65,39 @@ fn what_is_chosen_is_told_and_gives_the_same_bytes_by_hand_and_however_the_scan_
     }
 }
 
+/// Two planes that meet in a ridge along x, with no noise but that of the lattice.
+fn roof() -> Scan {
+    let mut scan = Scan::synthetic(Scene::Plane, 40_000, 7);
+    let mut random = Random(3);
+    for record in scan.records.chunks_exact_mut(scan.schema.stride) {
+        let (x, y) = (random.below(20_000) as i32, random.below(20_000) as i32 - 10_000);
+        let stored = [x, y, 9_000 - (y / 2).abs()];
+        for (bytes, v) in record[..12].as_chunks_mut::<4>().0.iter_mut().zip(stored) {
+            *bytes = v.to_le_bytes();
+        }
+    }
+    scan
+}
+
+#[test]
+fn where_planes_have_no_noise_cells_at_edges_are_as_small_as_those_need() {
+    let folder = tempfile::tempdir().unwrap();
+    let input: PathBuf = folder.path().join("in.las");
+    roof().write(&input);
+    let go = |stages: &str| {
+        let settings = Settings::PLAIN;
+        run(folder.path(), std::slice::from_ref(&input), stages, "las", settings).unwrap()
+    };
+    let ran = go(&format!("{AUTO}keep = '5%'\n{MEDIAN}"));
+    assert_eq!(chosen(&ran, "min_spacing"), Some("none".into()));
+    let side = chosen(&ran, "side").unwrap().as_f64().unwrap();
+    let spaced = AUTO.replace("min_spacing = 'auto'", &format!("min_spacing = {}", 0.6 * side));
+    let spaced = go(&format!("{spaced}keep = '5%'\n{MEDIAN}"));
+    let rms = |ran: Ran| ran.report.result.totals.unwrap().deviation.unwrap().rms;
+    let (free, spaced) = (rms(ran), rms(spaced));
+    assert!(free < spaced / 2.0, "{free} beside {spaced}");
+}
+
 #[test]
 fn the_baseline_is_that_of_a_grid_of_as_many_points() {
     let folder = tempfile::tempdir().unwrap();

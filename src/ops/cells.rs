@@ -106,8 +106,9 @@ pub struct Cells {
     /// Length beyond which no cell is kept whole.
     pub max_side: Option<Length>,
     /// Length up to which no cell is divided; or "auto": with `keep` 0.75 sides of a grid that keeps as
-    /// many points, without a quarter of `side`, and none to keep more than a third, or where `classes`
-    /// or flags select some of the points; or "none".
+    /// many points, without a quarter of `side`, and none to keep more than a third, where planes have
+    /// no noise (`normal_scatter` up to 0.01), or where `classes` or flags select some of the points; or
+    /// "none".
     #[serde(deserialize_with = "Setting::or_none")]
     pub min_spacing: Option<Setting<Length>>,
     /// What all positions of a cell have in common besides its cube: nothing, or ["Classification"]. A
@@ -251,9 +252,7 @@ impl TileOp for Cells {
             ("cells.min_spacing", self.min_spacing.and_then(Setting::given)),
         ];
         let each = lengths.into_iter();
-        let rounded =
-            each.filter_map(|(address, length)| rounded(lattice, address, length?.value()));
-        rounded.chain(self.all_stay()).collect()
+        each.filter_map(|(address, length)| rounded(lattice, address, length?.value())).collect()
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
@@ -323,18 +322,6 @@ impl Cells {
             }
             _ => Ok(()),
         }
-    }
-
-    /// Says that more records are to stay than there are.
-    fn all_stay(&self) -> Option<String> {
-        let Some(Keep::Records(count)) = self.keep else { return None };
-        let records = self.outlook.as_ref()?.records();
-        (count > records).then(|| {
-            format!(
-                "`cells.keep = {count}` is more than the {records} points that there are: as many stay as \
-                 cells can be made"
-            )
-        })
     }
 
     /// The largest range of angles as it was given, or the default; none where a target decides.

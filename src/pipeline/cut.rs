@@ -134,15 +134,14 @@ fn cut(
         };
         at = tries.next();
         if at.is_none() {
+            let found = (key, positions);
+            let (key, positions) = heaviest(tiles, wanted, cells.reach, (good, lowest), found)?;
             let tile = positions.saturating_mul(2).saturating_add(1).min(tiles.positions());
             let fits = |millers: &usize| demands.tile_positions(*millers, free) as u64 >= tile;
             let Some(fewer) = (1..millers).rev().find(fits) else {
-                return Err(too_heavy(
-                    lattice,
-                    key,
-                    (positions, most),
-                    demands.limit_for_tile(1, tile),
-                ));
+                let limit = demands.limit_for_tile(1, tile);
+                let error = too_heavy(lattice, key, (positions, most));
+                return Err(error.help(remedy(limit, held == 0 && is_sampled(job))));
             };
             let enough = whole_mebibytes(demands.limit_for_tile(millers, tile));
             job.warn(format!(
@@ -155,18 +154,52 @@ fn cut(
     Err(Error::internal("a tile fits and does not"))
 }
 
+/// The heaviest of the cubes that cannot be cut, of which one was found: a memory that does for that one
+/// does for all. Each try passes over all that are no heavier than the last.
+fn heaviest(
+    tiles: &SealedTiles,
+    wanted: u64,
+    reach: i64,
+    levels: (u32, u32),
+    mut found: (TileKey, u64),
+) -> Result<(TileKey, u64)> {
+    loop {
+        match tiles.cut(wanted, found.1, reach, levels) {
+            Ok(_) => return Ok(found),
+            Err(CutError::Read(error)) => return Err(error),
+            Err(CutError::TooHeavy { key, positions }) => found = (key, positions),
+        }
+    }
+}
+
 /// Positions of a tile's zone: half of its memory is for them, the other half for the rim.
 fn zone_of(tile_positions: usize) -> u64 {
     (tile_positions / 2) as u64
 }
 
 /// The error of a cube that cannot be cut and holds more positions than the most that fit.
-fn too_heavy(lattice: &Lattice, key: TileKey, (positions, most): (u64, u64), limit: u64) -> Error {
+fn too_heavy(lattice: &Lattice, key: TileKey, (positions, most): (u64, u64)) -> Error {
     let (lo, hi) = (lattice.world(key.cube().lo), lattice.world(key.cube().hi));
-    let limit = whole_mebibytes(limit);
     Error::memory(format!(
         "the cube from {lo:?} to {hi:?} and the cells around it hold {positions} positions, more \
          than the {most} that a tile may have"
     ))
-    .help(format!("give `run.memory = \"{limit}\"` or more, or a smaller cell side"))
+}
+
+/// True if a stage may choose wider cells than those that are cut by now.
+fn is_sampled(job: &Job<'_>) -> bool {
+    let sampled = |op: &StageOp| op.op.tile().sample_side().is_some();
+    job.ops.iter().any(sampled)
+}
+
+/// What does for the heaviest tile.
+fn remedy(limit: u64, may_grow: bool) -> String {
+    let limit = whole_mebibytes(limit);
+    match may_grow {
+        false => format!("give `run.memory = \"{limit}\"` or more, or a smaller cell side"),
+        true => format!(
+            "give `run.memory = \"{limit}\"` at least, or a smaller cell side: a side that is \
+             chosen by samples of the points is known behind this, and may take more"
+        ),
+    }
 }

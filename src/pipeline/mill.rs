@@ -275,10 +275,12 @@ impl Gathered for Whole {
 }
 
 fn conclude(job: &mut Job<'_>, op: usize, found: Found, records: u64) -> Result<()> {
-    match &mut job.ops[op].op {
-        Op::Scan(op) => op.conclude(&Whole { found, records }),
-        Op::Tile(_) => Err(Error::internal("a stage gathered that has one phase")),
-    }
+    let warning = match &mut job.ops[op].op {
+        Op::Scan(op) => op.conclude(&Whole { found, records })?,
+        Op::Tile(_) => return Err(Error::internal("a stage gathered that has one phase")),
+    };
+    warning.into_iter().for_each(|warning| job.warn(warning));
+    Ok(())
 }
 
 fn decode(

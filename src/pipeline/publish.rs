@@ -229,6 +229,11 @@ pub fn check_place(path: &Path, existing: Existing) -> Result<()> {
                 .at(path)
                 .help("write to a file"));
         }
+        Err(error) if error.kind() == io::ErrorKind::InvalidFilename => {
+            return Err(Error::new(ErrorKind::Io, "the name is too long for its file system")
+                .at(path)
+                .help("give a shorter one"));
+        }
         _ => {}
     }
     refuse_existing(path, existing)?;

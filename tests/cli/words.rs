@@ -477,7 +477,7 @@ fn a_scan_without_points_and_a_number_above_all_are_told() {
     let at = at.path();
     let (_, _, told) = pointmill(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "1e9"]);
     let warning =
-        "warning: `--keep 1000000000` is more than the 3000 points that there are: as many stay";
+        "warning: `--keep` asks for 1000000000 records, and 3000 stay however small the angle";
     assert!(told.contains(warning), "{told}");
     pointmill(at, &["convert", "a.laz", "-o", "none.laz", "--keep-classes", "200"]);
     for command in ["reduce", "convert"] {
@@ -489,6 +489,58 @@ fn a_scan_without_points_and_a_number_above_all_are_told() {
     assert!(plan.contains(", up to 20 nearest neighbours"), "{plan}");
     let (_, _, plan) = pointmill(at, &["reduce", "a.laz", "-o", "o.laz", "-v", "--neighbors", "9"]);
     assert!(plan.contains(", 9 nearest neighbours"), "{plan}");
+}
+
+#[test]
+fn points_without_a_normal_are_counted_and_a_better_grid_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let head = "ply\nformat ascii 1.0\nelement vertex 40\nproperty double x\nproperty double y\n\
+                property double z\nend_header\n";
+    let line: String = (0..40).map(|i| format!("{i} 0 0\n")).collect();
+    fs::write(at.join("line.ply"), format!("{head}{line}")).unwrap();
+    let told = done(at, &["reduce", "line.ply", "-o", "o.ply"]);
+    assert!(told.contains("40 in, 40 out"), "{told}");
+    assert!(
+        told.contains("\ncells      0, and 40 points in none: they have no normal, since"),
+        "{told}"
+    );
+    // Leaves, of which no plane tells anything.
+    done(at, &["synth", "als", "-n", "30k", "--noise", "3", "-o", "leaves.laz"]);
+    let told = done(at, &["reduce", "leaves.laz", "-o", "o.laz", "--keep", "2%"]);
+    let baseline = told.lines().find(|line| line.starts_with("baseline ")).unwrap();
+    let rms = |line: &str| -> f64 {
+        line.split("RMS ").nth(1).unwrap().split([' ', ',']).next().unwrap().parse().unwrap()
+    };
+    let deviation = told.lines().find(|line| line.starts_with("deviation ")).unwrap();
+    let is_worse = rms(deviation) > 1.02 * rms(baseline);
+    assert!(is_worse, "the scene is to be one where a grid is better: {told}");
+    assert!(baseline.ends_with(", which loses less here"), "{told}");
+}
+
+#[test]
+fn a_name_too_long_for_its_file_system_is_told_before_the_work() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    let long = "n".repeat(300);
+    let named = [format!("{long}.laz"), format!("{long}.json")];
+    let pipeline = format!(
+        "[[stage]]\nkind = 'read'\npath = 'a.laz'\n[[stage]]\nkind = 'write'\npath = '{}'\n",
+        named[0]
+    );
+    fs::write(at.join("p.toml"), pipeline).unwrap();
+    for arguments in [
+        &["reduce", "a.laz", "-o", &named[0]][..],
+        &["reduce", "a.laz", "-o", "o.laz", "--report", &named[1]],
+        &["convert", "a.laz", "-o", &named[0]],
+        &["check", "p.toml"],
+        &["plan", "p.toml"],
+    ] {
+        let (code, _, told) = pointmill(at, arguments);
+        assert_ne!(code, 0, "{arguments:?}: {told}");
+        assert!(told.contains("the name is too long for its file system"), "{told}");
+        assert!(!at.join("o.laz").exists(), "{arguments:?}");
+    }
 }
 
 #[test]

@@ -3,6 +3,7 @@
 #![allow(dead_code, unused_imports, reason = "each test file uses a part of it")]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
 
+#[allow(clippy::duplicate_mod, reason = "helpers are used apart, and by some together")]
 pub mod real;
 
 use std::collections::BTreeMap;

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
 
 #[path = "../common/real.rs"]
+#[allow(clippy::duplicate_mod, reason = "helpers are used apart, and by some together")]
 pub mod real;
 
 use std::path::{Path, PathBuf};

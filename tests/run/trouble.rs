@@ -170,11 +170,12 @@ impl ScanOp for ScanTrouble {
         found.push([tile.core.len() as u64; 2]);
         self.meet("gather")
     }
-    fn conclude(&mut self, found: &dyn Gathered) -> Result<()> {
+    fn conclude(&mut self, found: &dyn Gathered) -> Result<Option<String>> {
         found.each(&mut |rows| match rows.is_empty() {
             true => Err(Error::internal("an empty stretch")),
             false => self.meet("conclude"),
-        })
+        })?;
+        Ok(None)
     }
 }
 

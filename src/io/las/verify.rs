@@ -185,7 +185,12 @@ impl Evidence {
             return Vec::new();
         }
         let found = &gathered.found;
-        let told = [self.of_box(header, found), self.of_returns(header, found)];
+        let unset = (self.claimed.is_none() && found.points > 0).then(|| {
+            let told =
+                "the header has no box of the points: programs that go by it will not find them";
+            (at::BOX, told.to_owned(), false)
+        });
+        let told = [unset, self.of_box(header, found), self.of_returns(header, found)];
         let contradiction = |(byte, message, is_damage): (usize, String, bool)| Contradiction {
             path: path.to_owned(),
             byte: byte as u64,

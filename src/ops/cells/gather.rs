@@ -53,11 +53,13 @@ impl ScanOp for Cells {
         Ok(())
     }
 
-    fn conclude(&mut self, found: &dyn Gathered) -> Result<()> {
+    fn conclude(&mut self, found: &dyn Gathered) -> Result<Option<String>> {
         let keep = self.keep.ok_or_else(|| Error::internal("there is no target to reach"))?;
         let auto = self.settled()?.target;
-        self.threshold = Some(Threshold::find(found, keep, auto)?);
-        Ok(())
+        let threshold = Threshold::find(found, keep, auto)?;
+        let warning = if auto.is_none() { threshold.warning(keep) } else { None };
+        self.threshold = Some(threshold);
+        Ok(warning)
     }
 }
 

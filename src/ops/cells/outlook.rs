@@ -19,6 +19,9 @@ const SPACING: f64 = 0.75;
 /// Where more than one of so many positions stays, such cells could be more than the points to keep:
 /// they are nearly as small as the distance of neighbours.
 const SPREADABLE: u64 = 3;
+/// Scatter in radians up to which normals disagree at edges alone: cells may then be as small as those
+/// need.
+const CLEAN: f64 = 0.01;
 /// Without a number to keep: `min_spacing` in sides of the initial cells.
 const SPACING_OF_SIDE: f64 = 0.25;
 
@@ -76,6 +79,11 @@ impl Sampled {
         (angle.clamp(MAX_ANGLE, WIDEST) * 1e4).round() / 1e4
     }
 
+    /// True if there are planes, and no noise on them.
+    fn is_clean(&self) -> bool {
+        self.scatter.is_some_and(|scatter| scatter <= CLEAN)
+    }
+
     /// Share that stays at that angle: between the two next ones, by powers.
     fn share(&self) -> Option<f64> {
         let (angle, shares) = (self.angle(), self.shares?);
@@ -123,7 +131,7 @@ pub(super) fn choose(cells: &mut Cells, sampled: &Sampled) -> Vec<(String, Value
     }
     if cells.min_spacing.is_some_and(Setting::is_auto) {
         let spacing = match grid {
-            _ if sampled.chosen < 1.0 => 0.0,
+            _ if sampled.chosen < 1.0 || sampled.is_clean() => 0.0,
             Some(grid) => SPACING * grid,
             None if count.is_some() => 0.0,
             None => SPACING_OF_SIDE * settled.steps as f64,

@@ -56,6 +56,18 @@ impl Threshold {
         self.limit
     }
 
+    /// Says that fewer records stay than asked for.
+    pub(super) fn warning(&self, keep: Keep) -> Option<String> {
+        let Threshold { target, kept, .. } = *self;
+        self.is_all.then(|| {
+            format!(
+                "{}, and {kept} stay however small the angle: cells whose normals are equal, or that are \
+                 no larger than `cells.min_spacing` and `cells.min_points` say, are not divided",
+                asked(keep, target)
+            )
+        })
+    }
+
     /// The largest angle in radians, and how many records are left.
     pub(super) fn decisions(&self) -> Vec<(String, Value)> {
         let mut said: Vec<(String, Value)> = vec![
@@ -70,13 +82,18 @@ impl Threshold {
     }
 }
 
-fn too_few(keep: Keep, target: u64, least: u64) -> Error {
-    let told = match keep {
+/// What was asked for.
+fn asked(keep: Keep, target: u64) -> String {
+    match keep {
         Keep::Records(_) => format!("`cells.keep` asks for {target} records"),
         Keep::Share(_) | Keep::Auto => {
             format!("`cells.keep` asks for {keep}, which is {target} records")
         }
-    };
+    }
+}
+
+fn too_few(keep: Keep, target: u64, least: u64) -> Error {
+    let told = asked(keep, target);
     Error::pipeline(format!(
         "{told}, and {least} stay however large the angle: one of every cell that must not be \
          larger, and one of every position without a normal"

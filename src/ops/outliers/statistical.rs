@@ -119,7 +119,7 @@ impl ScanOp for StatisticalOutliers {
         Ok(())
     }
 
-    fn conclude(&mut self, found: &dyn Gathered) -> Result<()> {
+    fn conclude(&mut self, found: &dyn Gathered) -> Result<Option<String>> {
         let mut sums = Sums::default();
         let (mut rows, mut filled) = ([[0; 2]; Sums::ROWS], 0);
         found.each(&mut |stretch| {
@@ -137,7 +137,7 @@ impl ScanOp for StatisticalOutliers {
             return Err(Error::internal("the sums that outliers gathered are cut off"));
         }
         self.concluded = Some(Conclusion::of(&sums, self.multiplier));
-        Ok(())
+        Ok(None)
     }
 }
 
