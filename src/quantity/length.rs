@@ -5,6 +5,7 @@ use std::fmt;
 use serde::de::{Deserializer, Unexpected, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 
+use super::Figure;
 use crate::point::{Horizontal, Units};
 use crate::{Error, Result};
 
@@ -100,23 +101,13 @@ impl Length {
             }
             None => told(
                 "the scan does not say what its coordinates are in",
-                format!("if they are in metres, give `{key} = {}`", Shown(metres)),
+                format!("if they are in metres, give `{key} = {}`", Figure(metres)),
             ),
             Some(Horizontal::Degrees) => told(
                 "the scan's x and y are in degrees, in which it is no length",
                 "bring the scan to a projected reference system first".to_owned(),
             ),
         }
-    }
-}
-
-/// A number in at most nine digits: 5 cm are 0.05, not 0.05000000000000001.
-struct Shown(f64);
-
-impl fmt::Display for Shown {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let short = format!("{:.8e}", self.0).parse().unwrap_or(self.0);
-        write!(f, "{short}")
     }
 }
 
