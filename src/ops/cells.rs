@@ -103,7 +103,8 @@ pub struct Cells {
     pub keep: Option<Keep>,
     /// Cells of so many positions or fewer are not divided (the paper's β).
     pub min_points: NonZeroUsize,
-    /// Length beyond which no cell is kept whole.
+    /// Length beyond which no cell is kept whole; or "none".
+    #[serde(deserialize_with = "Length::or_none")]
     pub max_side: Option<Length>,
     /// Length up to which no cell is divided; or "auto": with `keep` 0.75 sides of a grid that keeps as
     /// many points, without a quarter of `side`, and none to keep more than a third, or where `classes`

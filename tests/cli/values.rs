@@ -54,3 +54,27 @@ fn colors_have_as_many_bits_as_are_asked_for() {
     }
     pointmill(&["convert", "--colors", "9bit"], "50e-las-rgb16.las", &output).failure();
 }
+
+#[test]
+fn what_has_no_limit_by_default_takes_none_and_lengths_take_every_foot() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = |name: &str| folder.path().join(name);
+    let reduce = |flags: &[&str], name: &str| {
+        let command = [&["reduce"], flags].concat();
+        pointmill(&command, "100e-geokey.las", &output(name)).success();
+        std::fs::read(output(name)).unwrap()
+    };
+    let plain = reduce(&[], "plain.las");
+    assert_eq!(reduce(&["--max-side", "none"], "none.las"), plain);
+    let side = reduce(&["--side", "1us-ft"], "feet.las");
+    assert_eq!(reduce(&["--side", "304.8006096mm"], "metres.las"), side);
+}
+
+#[test]
+fn figures_have_as_many_digits_as_were_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.las");
+    let refused = pointmill(&["reduce"], "15c-geokeys-epsg-only-2277-5703.las", &output).failure();
+    let told = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+    assert!(told.contains("measures with z times 3.280833333, or"), "{told}");
+}
