@@ -341,6 +341,13 @@ fn options_that_are_not_there_and_outputs_without_one_are_told_what_to_type() {
         let one = told(at, &[command, "a.laz", "out.laz"], 2);
         assert!(one.ends_with("help: if `out.laz` is the output, write `-o out.laz`\n"), "{one}");
     }
+    let one = told(at, &["reduce"], 2);
+    assert!(
+        one.starts_with("error: `reduce` needs --output <OUT> or --outdir <DIR>, and <IN>..."),
+        "{one}"
+    );
+    let one = told(at, &["convert"], 2);
+    assert!(one.starts_with("error: `convert` needs --output <OUT> and <IN>..."), "{one}");
     let one = told(at, &["convert", "a.laz", "a.laz"], 2);
     assert!(!one.contains("is the output"), "a file that is there is an input: {one}");
     let one = told(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "1", "--keep", "2"], 2);
@@ -367,6 +374,14 @@ fn what_is_no_scan_or_no_pipeline_is_called_what_it_is() {
         fs::write(at.join(name), b"1 2 3\n").unwrap();
         let one = told(at, &["reduce", name, "-o", "o.laz"], 2);
         assert!(one.contains("which is not read") && !one.contains("read.format"), "{one}");
+    }
+    // What is not there is told alike, whatever its name.
+    for (command, output) in [("reduce", "o.laz"), ("convert", "o.laz"), ("picture", "o.png")] {
+        for name in ["no.laz", "no.ply", "no.txt", "no"] {
+            let one = told(at, &[command, name, "-o", output], 1);
+            let expected = format!("error: {name}: cannot open it\n  No such file or directory");
+            assert!(one.starts_with(&expected), "{command:?} {name}: {one}");
+        }
     }
     let text = "[[stage]]\nkind = 'read'\npath = 'a.laz'\nkind = 'write'\npath = 'o.laz'\n";
     fs::write(at.join("p.toml"), text).unwrap();
