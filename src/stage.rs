@@ -137,6 +137,12 @@ pub trait TileOp: Send + Sync {
         Ok(())
     }
 
+    /// The lengths that it was given, in the scan's unit, each with its key as in `grid.side`; those
+    /// that the lattice cannot hold are refused before the work.
+    fn lengths(&self) -> Vec<(&'static str, f64)> {
+        Vec::new()
+    }
+
     /// Called once, after the decode and before the first tile, with what is known of the whole
     /// scan: the place to fix figures that depend on it.
     fn settle(&mut self, _scan: &ScanFacts) -> Result<()> {

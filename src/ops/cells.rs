@@ -221,6 +221,19 @@ impl TileOp for Cells {
         self.check().map_err(|(_, error)| error)
     }
 
+    fn lengths(&self) -> Vec<(&'static str, f64)> {
+        let side = match self.side {
+            Side::Length(length) => Some(length),
+            Side::Auto | Side::Spread => None,
+        };
+        let lengths = [
+            ("cells.side", side),
+            ("cells.max_side", self.max_side),
+            ("cells.min_spacing", self.min_spacing.and_then(Setting::given)),
+        ];
+        lengths.into_iter().filter_map(|(key, length)| Some((key, length?.value()))).collect()
+    }
+
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
         self.check().map_err(|(_, error)| error)?;
         let steps = match self.side {
@@ -242,18 +255,8 @@ impl TileOp for Cells {
     }
 
     fn warnings(&self, lattice: &Lattice) -> Vec<String> {
-        let side = match self.side {
-            Side::Length(length) => Some(length),
-            Side::Auto | Side::Spread => None,
-        };
-        let lengths = [
-            ("cells.side", side),
-            ("cells.max_side", self.max_side),
-            ("cells.min_spacing", self.min_spacing.and_then(Setting::given)),
-        ];
-        let each = lengths.into_iter();
-        let rounded =
-            each.filter_map(|(address, length)| rounded(lattice, address, length?.value()));
+        let each = self.lengths().into_iter();
+        let rounded = each.filter_map(|(address, length)| rounded(lattice, address, length));
         rounded.chain(self.all_stay()).collect()
     }
 

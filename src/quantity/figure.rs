@@ -8,8 +8,12 @@ pub struct Figure(pub f64);
 
 impl fmt::Display for Figure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let short = format!("{:.9e}", self.0).parse().unwrap_or(self.0);
-        write!(f, "{short}")
+        let short: f64 = format!("{:.9e}", self.0).parse().unwrap_or(self.0);
+        // As many zeros as 1e308 has say nothing.
+        match short.abs() {
+            size if size >= 1e16 || size < 1e-9 && size > 0.0 => write!(f, "{short:e}"),
+            _ => write!(f, "{short}"),
+        }
     }
 }
 
@@ -25,6 +29,9 @@ mod tests {
             (5.0 * 0.01, "0.05"),
             (0.3048, "0.3048"),
             (1.0, "1"),
+            (0.0, "0"),
+            (1e308, "1e308"),
+            (-1e-12, "-1e-12"),
             (3.0 * 0.1, "0.3"),
         ] {
             assert_eq!(Figure(number).to_string(), told);

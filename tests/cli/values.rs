@@ -78,3 +78,23 @@ fn figures_have_as_many_digits_as_were_measured() {
     let told = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
     assert!(told.contains("measures with z times 3.280833333, or"), "{told}");
 }
+
+#[test]
+fn lengths_that_no_scan_has_are_refused_and_the_longest_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.las");
+    let case = "100e-geokey.las";
+    for flag in ["--side", "--max-side", "--min-spacing"] {
+        for (length, shown) in [("1e308", "1e308"), ("4.7e16", "4.7e16"), ("9e300km", "9e303")] {
+            let command = ["reduce", flag, length];
+            let refused = pointmill(&command, case, &output).code(2);
+            let told = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+            let expected = format!(
+                "error: `{flag} {shown}` is longer than any scan in steps of 0.01\n\
+                 help: give 4.59e16 or less\n"
+            );
+            assert_eq!(told, expected);
+        }
+    }
+    pointmill(&["reduce", "--side", "4.59e16"], case, &output).success();
+}

@@ -283,6 +283,17 @@ fn every_wrong_value_has_a_caret_below_what_was_typed() {
         ),
         ("--neighbors", "1e2", "takes a whole number from 3 to 64, not 100"),
         ("--threads", "2k", "takes a whole number from 1 to 1024, not 2000"),
+        (
+            "--threads",
+            "18446744073709551616",
+            "takes a whole number from 1 to 1024, not 18446744073709551616\n",
+        ),
+        (
+            "--neighbors",
+            "-99999999999999999999",
+            "takes a whole number from 3 to 64, not -99999999999999999999\n",
+        ),
+        ("--passes", "1e300", "takes a whole number from 1 to 16, not 1e300\n"),
         ("--memory", "2G", "`2G` is no size such as 512MiB or 2GiB: write 2GiB (units"),
         ("--memory", "-1", "`-1` is no size"),
         ("--classes", "5-1", "`5-1` is no range of classes: write 1-5"),
