@@ -98,3 +98,21 @@ fn lengths_that_no_scan_has_are_refused_and_the_longest_is_told() {
     }
     pointmill(&["reduce", "--side", "4.59e16"], case, &output).success();
 }
+
+#[test]
+fn scales_that_no_offset_helps_are_told_to_be_larger() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.las");
+    let help = |scale: &str| {
+        let refused = pointmill(&["convert", "--scale", scale], "108-float-utm.ply", &output);
+        let told = String::from_utf8(refused.failure().get_output().stderr.clone()).unwrap();
+        told.lines().find(|line| line.starts_with("help: ")).unwrap().to_owned()
+    };
+    let near = help("1e-6");
+    assert!(near.starts_with("help: give an offset near the points, `--offset "), "{near}");
+    // It helps.
+    let offset = near.split(['`', ' ']).find(|word| word.contains(',') && word.len() > 9).unwrap();
+    pointmill(&["convert", "--scale", "1e-6", "--offset", offset], "108-float-utm.ply", &output)
+        .success();
+    assert_eq!(help("1e-12"), "help: give a larger `--scale`: no offset would do");
+}
