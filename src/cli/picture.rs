@@ -25,9 +25,9 @@ pub(super) fn picture(arguments: &arguments::Picture) -> Result<()> {
     }
     let (mut sources, mut files): (Vec<Box<dyn Source>>, Vec<PathBuf>) = Default::default();
     for input in &arguments.inputs {
-        let open = Read { path: vec![input.clone()], format: None }.source()?;
+        let open = Read { path: vec![input.clone()], format: None }.source().map_err(renamed)?;
         files.extend(open.paths());
-        sources.push(open.open()?);
+        sources.push(open.open().map_err(renamed)?);
     }
     let mut all = Files::default();
     files.iter().for_each(|file| all.read(file, Use::Input));
@@ -48,6 +48,15 @@ pub(super) fn picture(arguments: &arguments::Picture) -> Result<()> {
     let black = arguments.inputs.iter().zip(&picture.black).filter(|(_, black)| **black);
     black.for_each(|(input, _)| print::warning(&blackness(input, arguments.by)));
     print::result(told(&picture, arguments, bytes.len() as u64))
+}
+
+/// The error without what a pipeline file could say of the format: none draws a picture.
+fn renamed(error: Error) -> Error {
+    let name = error.remedy().and_then(|help| help.split_once(", or give `read.format"));
+    match name.map(|(name, _)| name.to_owned()) {
+        Some(name) => error.help(name),
+        None => error,
+    }
 }
 
 fn settings(arguments: &arguments::Picture) -> Settings {

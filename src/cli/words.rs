@@ -120,7 +120,7 @@ impl Words {
         match (flag, value) {
             (None, _) if !self.settings.contains(address) => None,
             (None, _) if self.has_file => Some(format!("`{text}`")),
-            (None, _) => Some(format!("`{text}` in a pipeline file")),
+            (None, _) => Some(format!("`{text}` in a pipeline file (`pointmill run FILE`)")),
             (Some((_, name)), Some(value)) if !matches!(value, "true" | "false") => {
                 Some(format!("`{name} {}`", argument(value)))
             }
@@ -178,7 +178,10 @@ mod tests {
             ("`write.offset = [1.0, -2.0, 0.0]`", "`--offset 1.0,-2.0,0.0`"),
             ("fewer `run.threads`", "fewer `--threads`"),
             ("`read.path` or `write.path`", "`IN` or `-o`"),
-            ("leave `write.dimensions` out", "leave `write.dimensions` in a pipeline file out"),
+            (
+                "or give `write.dimensions`",
+                "or give `write.dimensions` in a pipeline file (`pointmill run FILE`)",
+            ),
             ("`cells.classes = [2]`", "`--classes 2`"),
             ("`cells.keep = true`", "`--keep`"),
             ("`run.nowhere = 1` and `x` and `a.laz`", "`run.nowhere = 1` and `x` and `a.laz`"),

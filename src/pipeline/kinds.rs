@@ -335,7 +335,7 @@ pub(super) fn unknown_extension(path: &Path, setting: &str) -> Error {
             })
         }
         None => Error::pipeline(format!("the extension of `{name}` names no format"))
-            .help(format!("use .las, .laz or .ply, or give `{setting}`")),
+            .help(format!("name it .las, .laz or .ply, or give `{setting}`")),
     }
 }
 

@@ -676,3 +676,23 @@ fn a_scan_of_which_no_point_fits_is_refused_before_the_work() {
     assert!(!refused.contains("if such a point is kept"), "{refused}");
     assert!(!refused.contains("chosen"), "it is told after the decode: {refused}");
 }
+
+#[test]
+fn files_of_unclear_format_are_told_what_helps_the_command() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    case(at, "160-las-named.ply");
+    fs::write(at.join("a.bin"), b"LASF").unwrap();
+    let file = "in a pipeline file (`pointmill run FILE`)\n";
+    let las = told(at, &["convert", "160-las-named.ply", "-o", "o.laz"], 1);
+    let help = format!("help: name it .las or .laz, or give `read.format = \"las\"` {file}");
+    assert!(las.ends_with(&help), "{las}");
+    let bin = told(at, &["convert", "a.bin", "-o", "o.laz"], 2);
+    let help = format!("= name it .las, .laz or .ply, or give `read.format` {file}");
+    assert!(bin.ends_with(&help), "{bin}");
+    // No pipeline draws a picture.
+    let las = told(at, &["picture", "160-las-named.ply", "-o", "o.png"], 1);
+    assert!(las.ends_with("\nhelp: name it .las or .laz\n"), "{las}");
+    let bin = told(at, &["picture", "a.bin", "-o", "o.png"], 2);
+    assert!(bin.ends_with("\nhelp: name it .las, .laz or .ply\n"), "{bin}");
+}
