@@ -678,6 +678,41 @@ fn a_scan_of_which_no_point_fits_is_refused_before_the_work() {
 }
 
 #[test]
+fn classes_that_no_point_is_of_are_told_by_their_flags() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    let warned = |arguments: &[&str]| {
+        let (code, _, stderr) = pointmill(at, arguments);
+        assert_eq!(code, 0, "{stderr}");
+        stderr
+    };
+    let none = "warning: no point is of class 77 or 78: `--drop-classes` leaves no point out\n";
+    for command in ["reduce", "convert"] {
+        let arguments = [command, "a.laz", "-o", "o.laz"];
+        let dropped = warned(&[&arguments[..], &["--drop-classes", "77-78"]].concat());
+        assert_eq!(dropped.matches(none).count(), 1, "{dropped}");
+        // One of several is enough, as it is for `--classes`.
+        let dropped = warned(&[&arguments[..], &["--drop-classes", "2,77"]].concat());
+        assert!(!dropped.contains("leaves no point out"), "{dropped}");
+        let kept = warned(&[&arguments[..], &["--keep-classes", "77"]].concat());
+        assert!(kept.contains(" removed (`--keep-classes`)\n"), "{kept}");
+        assert!(kept.contains("warning: no point is left of "), "{kept}");
+        let both = ["--keep-classes", "77", "--drop-classes", "2"];
+        let both = warned(&[&arguments[..], &both].concat());
+        assert!(both.contains(" removed (`--keep-classes` and `--drop-classes`)\n"), "{both}");
+    }
+    let text = "[[stage]]\nkind = 'read'\npath = 'a.laz'\n[[stage]]\nkind = 'filter'\n\
+                drop_classes = [77]\ndrop_flags = ['withheld']\n[[stage]]\nkind = 'write'\n\
+                path = 'o.laz'\n";
+    fs::write(at.join("p.toml"), text).unwrap();
+    let warned = warned(&["run", "p.toml"]);
+    for key in ["of class 77: `filter.drop_classes`", "with the flag withheld: `filter.drop_flags`"]
+    {
+        assert!(warned.contains(&format!("no point is {key} leaves no point out\n")), "{warned}");
+    }
+}
+
+#[test]
 fn files_of_unclear_format_are_told_what_helps_the_command() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();
