@@ -145,8 +145,9 @@ fn argument(value: &str) -> String {
     let plain = match toml::from_str::<toml::Table>(&format!("value = {value}")) {
         Ok(table) => match table.get("value") {
             Some(toml::Value::Array(list)) => list.iter().map(text).collect::<Vec<_>>().join(","),
-            Some(one) => text(one),
-            None => value.to_owned(),
+            Some(toml::Value::String(text)) => text.clone(),
+            // As it is written: TOML shows 1e308 in 309 digits.
+            _ => value.to_owned(),
         },
         Err(_) => value.to_owned(), // a placeholder, such as [x, y, z]
     };
@@ -184,6 +185,7 @@ mod tests {
             ),
             ("`cells.classes = [2]`", "`--classes 2`"),
             ("`cells.keep = true`", "`--keep`"),
+            ("`cells.side = 1e308`", "`--side 1e308`"),
             ("`run.nowhere = 1` and `x` and `a.laz`", "`run.nowhere = 1` and `x` and `a.laz`"),
             ("a lone ` and `run.memory`", "a lone ` and `--memory`"),
         ] {
