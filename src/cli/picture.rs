@@ -89,9 +89,11 @@ fn others(sources: &[&dyn Source]) -> String {
         (By::Intensity, "intensity"),
     ];
     let can = |by: By| sources.iter().all(|source| by.is_in(source.schema()));
-    let flags: Vec<String> =
+    let mut flags: Vec<String> =
         all.iter().filter(|(by, _)| can(*by)).map(|(_, word)| format!("`--by {word}`")).collect();
-    format!("use {}", flags.join(" or "))
+    let last = flags.pop().unwrap_or_default();
+    let before = if flags.is_empty() { "" } else { " or " };
+    format!("use {}{before}{last}", flags.join(", "))
 }
 
 /// What is told of a scan with points that are not on the picture.
