@@ -12,6 +12,7 @@ use columns::{BLOCK, Column, Records, Targets};
 
 use crate::point::names::{BLUE, GREEN, NIR, RED, XYZ};
 use crate::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
+use crate::report::Short;
 use crate::{Error, ErrorKind, Result};
 
 /// What a conversion of coordinates rounded.
@@ -301,17 +302,20 @@ struct Unfit<'a> {
 fn placed(world: Option<[f64; 3]>, to: &Dimension, value: f64) -> String {
     // Whole thousands near the point: a scan around it fits, and its digits stay readable.
     let round = |at: f64| (at / 1000.0).round() * 1000.0;
-    // Half of what can be stored is left for the points around it.
-    let fits = (value - round(value)).abs() / to.scale < f64::from(1 << 30);
+    let reach = to.scale * f64::from(1 << 30) * 2.0;
     match world.map(|world| world.map(round)) {
         Some(near) if near.iter().any(|at| !at.is_finite()) => {
             "give a larger `write.scale`, or a `write.offset` nearer to the points".to_owned()
         }
-        Some([x, y, z]) if fits && round(value) != to.origin => format!(
+        Some([x, y, z]) if reach >= 1000.0 && round(value) != to.origin => format!(
             "give an offset near the points, `write.offset = [{x:?}, {y:?}, {z:?}]`, or a larger \
              `write.scale`"
         ),
-        _ => "give a larger `write.scale`: no offset would do".to_owned(),
+        _ => format!(
+            "give a larger `write.scale`: with this one coordinates reach {} from the offset, and no \
+             farther",
+            Short(reach)
+        ),
     }
 }
 
