@@ -358,7 +358,7 @@ fn options_that_are_not_there_and_outputs_without_one_are_told_what_to_type() {
         "{one}"
     );
     let one = told(at, &["convert"], 2);
-    assert!(one.starts_with("error: `convert` needs --output <OUT> and <IN>..."), "{one}");
+    assert!(one.starts_with("error: `convert` needs --output <OUT|DIR> and <IN>..."), "{one}");
     let one = told(at, &["convert", "a.laz", "a.laz"], 2);
     assert!(!one.contains("is the output"), "a file that is there is an input: {one}");
     let one = told(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "1", "--keep", "2"], 2);
