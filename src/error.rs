@@ -45,6 +45,19 @@ pub(crate) fn whereabouts(path: &Path) -> Option<String> {
     Some(format!("the path is relative to the folder you are in, {}", shown(&folder)))
 }
 
+/// What helps where the process, or the whole system, may not have more files open.
+fn too_many_open(cause: &std::io::Error) -> Option<&'static str> {
+    use rustix::io::Errno;
+    match Errno::from_io_error(cause)? {
+        Errno::MFILE => Some(
+            "the shell allows a process no more open files (`ulimit -n` tells how many): raise the limit, \
+             such as by `ulimit -n 1024`, or give fewer inputs at once",
+        ),
+        Errno::NFILE => Some("the whole system has too many files open: close other programs"),
+        _ => None,
+    }
+}
+
 /// The valid word that a misspelt one was meant to be, if one is near: two letters in five wrong
 /// at most, the first in the list among equals.
 pub(crate) fn nearest<'a>(word: &str, valid: &'a [String]) -> Option<&'a String> {
@@ -134,7 +147,7 @@ impl Error {
                     .to_owned(),
             ),
             NotFound => whereabouts(path),
-            _ => None,
+            _ => too_many_open(&cause).map(str::to_owned),
         };
         let error = Error::new(ErrorKind::Io, format!("cannot {doing}")).at(path).because(cause);
         match help {
@@ -271,6 +284,17 @@ mod tests {
             assert_eq!(distance(a, b), d, "{a} {b}");
         }
         assert_eq!(distance("kitten", "sitting"), 3);
+    }
+
+    #[test]
+    fn too_many_open_files_have_a_remedy() {
+        use rustix::io::Errno;
+        for (errno, help) in [(Errno::MFILE, "`ulimit -n 1024`"), (Errno::NFILE, "other programs")]
+        {
+            let error = Error::io("a.laz", "open it", errno.into());
+            assert!(error.remedy().is_some_and(|told| told.contains(help)), "{error:?}");
+        }
+        assert_eq!(Error::io("a.laz", "open it", Errno::ACCESS.into()).remedy(), None);
     }
 
     #[test]

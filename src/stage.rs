@@ -121,6 +121,17 @@ pub trait Transform: Send + Sync {
         Vec::new()
     }
 
+    /// What it was asked to do and did not, where it removed no point of a scan whose records are of a
+    /// schema. It need not repeat its [`warnings`](Transform::warnings).
+    fn idle(&self, _schema: &Schema) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// The keys that say what it removes, each with its stage, as in `filter.keep_classes`.
+    fn removes_by(&self) -> Vec<&'static str> {
+        Vec::new()
+    }
+
     /// Called for every batch, from several threads at once. Points that it removes are entered in
     /// the ledger by the caller.
     fn apply(&self, batch: &mut PointBatch) -> Result<()>;
@@ -135,6 +146,12 @@ pub trait TileOp: Send + Sync {
     /// converted to the scan's.
     fn convert(&mut self, _units: &Units) -> Result<()> {
         Ok(())
+    }
+
+    /// The lengths that it was given, in the scan's unit, each with its key as in `grid.side`; those
+    /// that the lattice cannot hold are refused before the work.
+    fn lengths(&self) -> Vec<(&'static str, f64)> {
+        Vec::new()
     }
 
     /// Called once, after the decode and before the first tile, with what is known of the whole

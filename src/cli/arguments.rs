@@ -253,7 +253,8 @@ pub(super) struct Reduce {
     /// A cell with this many points or fewer is not split [default: 1]
     #[arg(long, value_name = "N")]
     pub min_points: Option<String>,
-    /// Largest side of a cell that is kept whole, in the scan's unit or as 2m [default: none]
+    /// Largest side of a cell that is kept whole: in the scan's unit, as 2m, or none [default:
+    /// none]
     #[arg(long, value_name = "LENGTH")]
     pub max_side: Option<String>,
     /// No cell of this length or less is split: in the scan's unit, as 5cm, auto or none [default: auto]

@@ -7,6 +7,7 @@ use super::console::Console;
 use super::{print, table};
 use crate::error::shown;
 use crate::pipeline::expand;
+use crate::report::Coordinate;
 use crate::{Error, Result, io};
 
 /// Prints what the headers of files say. A file that cannot be read is told, the others are shown.
@@ -26,7 +27,7 @@ pub(super) fn info(arguments: &Info, console: &Console) -> Result<()> {
         print::json(&format!("{all:#}"))?;
     } else {
         let text = |(file, facts): (std::path::PathBuf, Value)| {
-            format!("{}\n{}", shown(&file), table::render(&facts, 2))
+            format!("{}\n{}", shown(&file), table::render(&in_short(facts), 2))
         };
         let all: Vec<String> = described.into_iter().map(text).collect();
         if !all.is_empty() {
@@ -41,5 +42,42 @@ pub(super) fn info(arguments: &Info, console: &Console) -> Result<()> {
             failures.iter().chain([&last]).for_each(|error| console.error(error));
             Err(Error::new(kind, format!("{n} of {total} files cannot be described")))
         }
+    }
+}
+
+/// The facts of a file with the corners of its box in as many digits as its scale tells apart: headers
+/// hold what was computed of it.
+fn in_short(mut facts: Value) -> Value {
+    let scale: Vec<f64> = numbers(&facts["scale"]);
+    for corner in ["min", "max"] {
+        let each = numbers(&facts[corner]);
+        // Of PLY files and of what is no number nothing is known that could be shorter.
+        if each.len() == 3 && scale.len() == 3 {
+            let short = each.iter().zip(&scale).map(|(&at, &step)| Coordinate { at, step });
+            let number = |short: Coordinate| short.to_string().parse().unwrap_or(short.at);
+            facts[corner] = short.map(number).collect();
+        }
+    }
+    facts
+}
+
+fn numbers(list: &Value) -> Vec<f64> {
+    list.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn corners_have_the_digits_of_the_scale() {
+        let facts = json!({ "scale": [0.01, 0.01, 0.001], "min": [1.5, 2.0, -3.25],
+                            "max": [119.94, 19.990_000_000_000_002, 1.0] });
+        let short = in_short(facts);
+        assert_eq!(short["max"], json!([119.94, 19.99, 1.0]));
+        assert_eq!(short["min"], json!([1.5, 2.0, -3.25]));
+        assert_eq!(in_short(json!({ "points": 5 }))["points"], 5);
     }
 }

@@ -92,7 +92,7 @@ pub(super) fn told(error: &clap::Error, all: &Command, typed: &[OsString]) -> Op
             message(&format!("there is no command `{word}`"), &word, &note)
         }
         ErrorKind::MissingRequiredArgument => {
-            let lacking = contexts(error, ContextKind::InvalidArg).join(" and ");
+            let lacking = lacking(command, &contexts(error, ContextKind::InvalidArg));
             let told = format!("error: `{}` needs {lacking}", command.get_name());
             let help = output(typed).filter(|_| lacking.contains("--output"));
             told + &help.map_or(String::new(), |help| format!("\nhelp: {help}"))
@@ -111,6 +111,17 @@ pub(super) fn told(error: &clap::Error, all: &Command, typed: &[OsString]) -> Op
         }
         _ => return None,
     })
+}
+
+/// What is needed, each with what can be given in its place.
+fn lacking(command: &Command, needed: &[String]) -> String {
+    let folder = command.get_arguments().any(|argument| argument.get_long() == Some("outdir"));
+    let each = |needed: &String| match needed.starts_with("--output") && folder {
+        true => format!("{needed} or --outdir <DIR>"),
+        false => needed.clone(),
+    };
+    let all: Vec<String> = needed.iter().map(each).collect();
+    all.join(if folder { ", and " } else { " and " })
 }
 
 fn contexts(error: &clap::Error, kind: ContextKind) -> Vec<String> {

@@ -25,23 +25,38 @@ pub(super) fn picture(arguments: &arguments::Picture) -> Result<()> {
     }
     let (mut sources, mut files): (Vec<Box<dyn Source>>, Vec<PathBuf>) = Default::default();
     for input in &arguments.inputs {
-        let open = Read { path: vec![input.clone()], format: None }.source()?;
+        let open = Read { path: vec![input.clone()], format: None }.source().map_err(renamed)?;
         files.extend(open.paths());
-        sources.push(open.open()?);
+        sources.push(open.open().map_err(renamed)?);
     }
     let mut all = Files::default();
     files.iter().for_each(|file| all.read(file, Use::Input));
     all.write(path).map_err(|clash| Error::pipeline(format!("this {clash}")).at(path))?;
     let settings = settings(arguments);
     let each: Vec<&dyn Source> = sources.iter().map(|source| &**source).collect();
+    for (input, source) in arguments.inputs.iter().zip(&each) {
+        let told = settings.by.dimensions(source.schema()).map(drop);
+        told.map_err(|error| error.at(input).help(others(&each)))?;
+    }
     let picture = Picture::draw(&each, &settings)?;
     let bytes = picture.png()?;
     let trouble = Trouble::default();
     publish_bytes(path, &bytes, &trouble)?;
     lock(&trouble).iter().for_each(|told| print::warning(told));
+    let nowhere = arguments.inputs.iter().zip(&picture.nowhere).filter(|(_, points)| **points > 0);
+    nowhere.for_each(|(input, points)| print::warning(&nowhereness(input, *points)));
     let black = arguments.inputs.iter().zip(&picture.black).filter(|(_, black)| **black);
     black.for_each(|(input, _)| print::warning(&blackness(input, arguments.by)));
     print::result(told(&picture, arguments, bytes.len() as u64))
+}
+
+/// The error without what a pipeline file could say of the format: none draws a picture.
+fn renamed(error: Error) -> Error {
+    let name = error.remedy().and_then(|help| help.split_once(", or give `read.format"));
+    match name.map(|(name, _)| name.to_owned()) {
+        Some(name) => error.help(name),
+        None => error,
+    }
 }
 
 fn settings(arguments: &arguments::Picture) -> Settings {
@@ -65,6 +80,28 @@ fn settings(arguments: &arguments::Picture) -> Settings {
     }
 }
 
+/// What all of the scans can be coloured by.
+fn others(sources: &[&dyn Source]) -> String {
+    let all = [
+        (By::Height, "height"),
+        (By::Class, "class"),
+        (By::Color, "color"),
+        (By::Intensity, "intensity"),
+    ];
+    let can = |by: By| sources.iter().all(|source| by.is_in(source.schema()));
+    let mut flags: Vec<String> =
+        all.iter().filter(|(by, _)| can(*by)).map(|(_, word)| format!("`--by {word}`")).collect();
+    let last = flags.pop().unwrap_or_default();
+    let before = if flags.is_empty() { "" } else { " or " };
+    format!("use {}{before}{last}", flags.join(", "))
+}
+
+/// What is told of a scan with points that are not on the picture.
+fn nowhereness(input: &str, points: u64) -> String {
+    let points = Grouped(points);
+    format!("{input}: {points} points cannot be drawn: their coordinates are not finite numbers")
+}
+
 /// What is told of a scan that is black throughout.
 fn blackness(input: &str, by: arguments::By) -> String {
     let what = if by == arguments::By::Intensity { "intensities" } else { "colours" };
@@ -79,7 +116,15 @@ fn range([low, high]: [f64; 2]) -> String {
     if !(span > 0.0 && span.is_finite()) {
         return format!("{} to {}", Short(low), Short(high));
     }
-    let decimals = (2.0 - span.log10().floor()).clamp(0.0, 9.0) as usize;
+    let power = |v: f64| v.log10().floor();
+    let largest = low.abs().max(high.abs());
+    // All that f64 has are 17 digits.
+    let digits = (power(largest) - power(span) + 2.0).clamp(0.0, 16.0);
+    let decimals = (digits - power(largest)).max(0.0) as usize;
+    if decimals > 9 && largest < 1e-4 {
+        let digits = digits as usize;
+        return format!("{low:.digits$e} to {high:.digits$e}");
+    }
     format!("{low:.decimals$} to {high:.decimals$}")
 }
 
@@ -113,6 +158,9 @@ mod tests {
             ([0.0, 65_535.0], "0 to 65535"),
             ([1e-6, 3e-6], "0.00000100 to 0.00000300"),
             ([2.5, 2.5], "2.50 to 2.50"),
+            ([0.0, 2e-12], "0.00e0 to 2.00e-12"),
+            ([1e-15, 2e-15], "1.00e-15 to 2.00e-15"),
+            ([5.0, 5.000_000_000_002], "5.00000000000000 to 5.00000000000200"),
         ] {
             assert_eq!(range(ends), told);
         }

@@ -200,8 +200,16 @@ fn classes(given: &[Classes]) -> Option<Given> {
 pub(super) fn whole_or_text(text: &str) -> Given {
     match parse_count(text) {
         Ok(count) => Given::of(text, count.into()),
+        // As a float it would be told in other digits than were typed.
+        Err(_) if is_too_large(text) => Given::of(text, json!(text.trim())),
         Err(_) => number_or_text(text),
     }
+}
+
+/// True for a whole number that no integer holds.
+fn is_too_large(text: &str) -> bool {
+    let digits = text.trim().trim_start_matches(['-', '+']);
+    digits.len() > 15 && digits.chars().all(|c| c.is_ascii_digit())
 }
 
 /// A number where the text is one, else the text (`6deg`, `auto`).

@@ -120,7 +120,7 @@ impl Words {
         match (flag, value) {
             (None, _) if !self.settings.contains(address) => None,
             (None, _) if self.has_file => Some(format!("`{text}`")),
-            (None, _) => Some(format!("`{text}` in a pipeline file")),
+            (None, _) => Some(format!("`{text}` in a pipeline file (`pointmill run FILE`)")),
             (Some((_, name)), Some(value)) if !matches!(value, "true" | "false") => {
                 Some(format!("`{name} {}`", argument(value)))
             }
@@ -145,8 +145,9 @@ fn argument(value: &str) -> String {
     let plain = match toml::from_str::<toml::Table>(&format!("value = {value}")) {
         Ok(table) => match table.get("value") {
             Some(toml::Value::Array(list)) => list.iter().map(text).collect::<Vec<_>>().join(","),
-            Some(one) => text(one),
-            None => value.to_owned(),
+            Some(toml::Value::String(text)) => text.clone(),
+            // As it is written: TOML shows 1e308 in 309 digits.
+            _ => value.to_owned(),
         },
         Err(_) => value.to_owned(), // a placeholder, such as [x, y, z]
     };
@@ -178,9 +179,13 @@ mod tests {
             ("`write.offset = [1.0, -2.0, 0.0]`", "`--offset 1.0,-2.0,0.0`"),
             ("fewer `run.threads`", "fewer `--threads`"),
             ("`read.path` or `write.path`", "`IN` or `-o`"),
-            ("leave `write.dimensions` out", "leave `write.dimensions` in a pipeline file out"),
+            (
+                "or give `write.dimensions`",
+                "or give `write.dimensions` in a pipeline file (`pointmill run FILE`)",
+            ),
             ("`cells.classes = [2]`", "`--classes 2`"),
             ("`cells.keep = true`", "`--keep`"),
+            ("`cells.side = 1e308`", "`--side 1e308`"),
             ("`run.nowhere = 1` and `x` and `a.laz`", "`run.nowhere = 1` and `x` and `a.laz`"),
             ("a lone ` and `run.memory`", "a lone ` and `--memory`"),
         ] {

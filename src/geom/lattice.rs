@@ -104,6 +104,11 @@ impl Lattice {
         ((length / self.step).round() as i64).max(1)
     }
 
+    /// The longest length in world units: farther apart no two positions are.
+    pub fn longest(&self) -> f64 {
+        FARTHEST * self.step
+    }
+
     /// What a length in world units is on the lattice, if that is more than a thousandth beside it.
     pub fn rounded(&self, length: f64) -> Option<f64> {
         let held = self.steps(length) as f64 * self.step;

@@ -12,6 +12,7 @@ use columns::{BLOCK, Column, Records, Targets};
 
 use crate::point::names::{BLUE, GREEN, NIR, RED, XYZ};
 use crate::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
+use crate::report::Short;
 use crate::{Error, ErrorKind, Result};
 
 /// What a conversion of coordinates rounded.
@@ -280,16 +281,11 @@ impl Projection {
             if !value.as_f64().is_finite() {
                 return error.help("`run.nonfinite = \"drop\"` leaves such points out");
             }
-            // Whole thousands near the point: a scan around it fits, and its digits stay readable.
-            let near = self.from.coordinates().map(|axes| {
-                axes.map(|axis| (axis.world(record, self.from.endian) / 1000.0).round() * 1000.0)
-            });
-            return error.help(match near {
-                Some([x, y, z]) if [x, y, z].iter().all(|v| v.is_finite()) => {
-                    format!("give an offset near the points, `write.offset = [{x:?}, {y:?}, {z:?}]`, or a larger `write.scale`")
-                }
-                _ => "give a larger `write.scale`, or a `write.offset` nearer to the points".to_owned(),
-            });
+            let world = self
+                .from
+                .coordinates()
+                .map(|axes| axes.map(|axis| axis.world(record, self.from.endian)));
+            return error.help(placed(world, to, value.as_f64()));
         }
         error.help(format!("`write.drop = [{name:?}]` leaves the dimension out"))
     }
@@ -299,6 +295,28 @@ impl Projection {
 struct Unfit<'a> {
     to: &'a Dimension,
     value: Value,
+}
+
+/// What helps where the coordinate `value` of the point at `world` does not fit `to`: an offset, if there
+/// is one that does, and a larger scale.
+fn placed(world: Option<[f64; 3]>, to: &Dimension, value: f64) -> String {
+    // Whole thousands near the point: a scan around it fits, and its digits stay readable.
+    let round = |at: f64| (at / 1000.0).round() * 1000.0;
+    let reach = to.scale * f64::from(1 << 30) * 2.0;
+    match world.map(|world| world.map(round)) {
+        Some(near) if near.iter().any(|at| !at.is_finite()) => {
+            "give a larger `write.scale`, or a `write.offset` nearer to the points".to_owned()
+        }
+        Some([x, y, z]) if reach >= 1000.0 && round(value) != to.origin => format!(
+            "give an offset near the points, `write.offset = [{x:?}, {y:?}, {z:?}]`, or a larger \
+             `write.scale`"
+        ),
+        _ => format!(
+            "give a larger `write.scale`: with this one coordinates reach {} from the offset, and no \
+             farther",
+            Short(reach)
+        ),
+    }
 }
 
 /// The stored number whose world value is nearest to `world` (halves to the even one), and that

@@ -105,8 +105,8 @@ impl Found {
 
     fn remedy(self) -> &'static str {
         match self {
-            Found::Las => "name it .las or .laz, or say `read.format = \"las\"`",
-            Found::Ply => "name it .ply, or say `read.format = \"ply\"`",
+            Found::Las => "name it .las or .laz, or give `read.format = \"las\"`",
+            Found::Ply => "name it .ply, or give `read.format = \"ply\"`",
             Found::Empty => "what should have written it failed: make or copy it again",
             Found::Pointer => "fetch the file itself with `git lfs pull`",
             Found::Packed(_) => "unpack it first",

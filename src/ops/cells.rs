@@ -103,7 +103,8 @@ pub struct Cells {
     pub keep: Option<Keep>,
     /// Cells of so many positions or fewer are not divided (the paper's β).
     pub min_points: NonZeroUsize,
-    /// Length beyond which no cell is kept whole.
+    /// Length beyond which no cell is kept whole; or "none".
+    #[serde(deserialize_with = "Length::or_none")]
     pub max_side: Option<Length>,
     /// Length up to which no cell is divided; or "auto": with `keep` 0.75 sides of a grid that keeps as
     /// many points, without a quarter of `side`, and none to keep more than a third, where planes have
@@ -221,6 +222,19 @@ impl TileOp for Cells {
         self.check().map_err(|(_, error)| error)
     }
 
+    fn lengths(&self) -> Vec<(&'static str, f64)> {
+        let side = match self.side {
+            Side::Length(length) => Some(length),
+            Side::Auto | Side::Spread => None,
+        };
+        let lengths = [
+            ("cells.side", side),
+            ("cells.max_side", self.max_side),
+            ("cells.min_spacing", self.min_spacing.and_then(Setting::given)),
+        ];
+        lengths.into_iter().filter_map(|(key, length)| Some((key, length?.value()))).collect()
+    }
+
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
         self.check().map_err(|(_, error)| error)?;
         let steps = match self.side {
@@ -242,17 +256,8 @@ impl TileOp for Cells {
     }
 
     fn warnings(&self, lattice: &Lattice) -> Vec<String> {
-        let side = match self.side {
-            Side::Length(length) => Some(length),
-            Side::Auto | Side::Spread => None,
-        };
-        let lengths = [
-            ("cells.side", side),
-            ("cells.max_side", self.max_side),
-            ("cells.min_spacing", self.min_spacing.and_then(Setting::given)),
-        ];
-        let each = lengths.into_iter();
-        each.filter_map(|(address, length)| rounded(lattice, address, length?.value())).collect()
+        let each = self.lengths().into_iter();
+        each.filter_map(|(address, length)| rounded(lattice, address, length)).collect()
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {

@@ -84,6 +84,30 @@ impl Transform for Filter {
         class.into_iter().chain(self.selection().idle(schema).into_iter().map(flag)).collect()
     }
 
+    fn idle(&self, schema: &Schema) -> Vec<String> {
+        let classes = Selection { classes: self.drop_classes.clone(), ..Selection::default() };
+        let is_there = |dropped: &Selection| !dropped.is_all() && dropped.missing(schema).is_none();
+        let told = |dropped: Selection, key| {
+            format!("no point is {dropped}: `filter.{key}` leaves no point out")
+        };
+        let classes = Some(classes).filter(is_there).map(|which| told(which, "drop_classes"));
+        let flag = |flag: &Flag| {
+            let with = Selection { with: vec![*flag], ..Selection::default() };
+            Some(with).filter(is_there).map(|which| told(which, "drop_flags"))
+        };
+        classes.into_iter().chain(self.drop_flags.iter().filter_map(flag)).collect()
+    }
+
+    fn removes_by(&self) -> Vec<&'static str> {
+        let keys = [
+            ("filter.keep_classes", self.keep_classes.is_empty()),
+            ("filter.drop_classes", self.drop_classes.is_empty()),
+            ("filter.keep_flags", self.keep_flags.is_empty()),
+            ("filter.drop_flags", self.drop_flags.is_empty()),
+        ];
+        keys.into_iter().filter(|(_, is_empty)| !is_empty).map(|(key, _)| key).collect()
+    }
+
     fn apply(&self, batch: &mut PointBatch) -> Result<()> {
         let selection = self.selection();
         if !selection.is_all() {

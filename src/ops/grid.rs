@@ -101,6 +101,10 @@ impl TileOp for Grid {
         Ok(())
     }
 
+    fn lengths(&self) -> Vec<(&'static str, f64)> {
+        vec![("grid.side", self.side.value())]
+    }
+
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
         let steps = scan.lattice.steps(self.side.value()).min(LARGEST_SIDE);
         self.settled = Some(Settled { steps, length: steps as f64 * scan.lattice.step });

@@ -61,23 +61,30 @@ impl By {
         matches!(self, By::Color | By::Intensity) && look.values == [0.0; 2]
     }
 
+    /// The names of the dimensions that it looks at, and what they are in words.
+    fn names(self) -> (&'static [&'static str], &'static str) {
+        match self {
+            By::Height => (&["Z"], "heights"),
+            By::Class => (&[names::CLASSIFICATION], "classes"),
+            By::Color => (&[names::RED, names::GREEN, names::BLUE], "colours"),
+            By::Intensity => (&[names::INTENSITY], "intensities"),
+        }
+    }
+
+    /// True if records of `schema` can be coloured by it.
+    pub fn is_in(self, schema: &Schema) -> bool {
+        self.names().0.iter().all(|name| schema.find(name).is_some())
+    }
+
     /// The dimensions that it looks at.
     ///
     /// # Errors
     ///
     /// A scan that does not have them.
-    pub(super) fn dimensions(self, schema: &Schema) -> Result<Vec<&Dimension>> {
-        let names: &[&str] = match self {
-            By::Height => &["Z"],
-            By::Class => &[names::CLASSIFICATION],
-            By::Color => &[names::RED, names::GREEN, names::BLUE],
-            By::Intensity => &[names::INTENSITY],
-        };
-        let find = |name: &&str| {
-            let missing = || Error::pipeline(format!("the scan has no {name} to be coloured by"));
-            schema.find(name).ok_or_else(missing)
-        };
-        names.iter().map(find).collect()
+    pub fn dimensions(self, schema: &Schema) -> Result<Vec<&Dimension>> {
+        let (names, what) = self.names();
+        let missing = || Error::pipeline(format!("the scan has no {what}"));
+        names.iter().map(|name| schema.find(name).ok_or_else(missing)).collect()
     }
 
     /// What the first and the last colour stand for: the range of the middle 98 of 100 points, so

@@ -4,7 +4,7 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::Settings;
+use super::{NARROWEST, Settings};
 use crate::point::{Dimension, PointBatch};
 use crate::stage::{Part, Source};
 use crate::tile::{lock, parallel};
@@ -45,12 +45,14 @@ const SAMPLE: u64 = 100_000;
 const BATCH: usize = 8192;
 
 /// Calls `visit` with every point of `source` that is somewhere: its number in its part, the point as
-/// seen, and the values that it is coloured by. Each thread has a state of its own; all are returned.
+/// seen, and the values that it is coloured by; and `nowhere` for each of the others. Each thread has a
+/// state of its own; all are returned.
 pub(super) fn each_point<S: Send>(
     source: &dyn Source,
     settings: &Settings,
     begin: impl Fn() -> S + Sync,
     visit: impl Fn(&mut S, u64, [f64; 3], &[f64]) + Sync,
+    nowhere: impl Fn(&mut S) + Sync,
 ) -> Result<Vec<S>> {
     let schema = source.schema();
     let no_place = || Error::pipeline("the scan has no coordinates");
@@ -76,6 +78,8 @@ pub(super) fn each_point<S: Send>(
                             *value = field.world(record, schema.endian);
                         }
                         visit(&mut state, number, seen, &values);
+                    } else {
+                        nowhere(&mut state);
                     }
                     number += 1;
                 }
@@ -101,6 +105,8 @@ const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 #[derive(Debug, Clone)]
 pub(super) struct Look {
     pub points: u64,
+    /// Points that are nowhere: a coordinate is no finite number.
+    pub nowhere: u64,
     /// Smallest and largest to the right and up.
     extent: [[f64; 2]; 2],
     /// Smallest and largest value of any of the dimensions that colour.
@@ -111,7 +117,7 @@ pub(super) struct Look {
 
 impl Look {
     const NOTHING: Look =
-        Look { points: 0, extent: [NOTHING; 2], values: NOTHING, sample: Vec::new() };
+        Look { points: 0, nowhere: 0, extent: [NOTHING; 2], values: NOTHING, sample: Vec::new() };
 
     /// Looks at all points.
     pub fn at(source: &dyn Source, settings: &Settings) -> Result<Look> {
@@ -126,7 +132,8 @@ impl Look {
                 look.sample.push([right, up, values.first().copied().unwrap_or(0.0)]);
             }
         };
-        let mut looks = each_point(source, settings, || Look::NOTHING, visit)?;
+        let mut looks =
+            each_point(source, settings, || Look::NOTHING, visit, |look| look.nowhere += 1)?;
         let mut whole = looks.pop().unwrap_or(Look::NOTHING);
         looks.into_iter().for_each(|look| whole.merge(look));
         Ok(whole)
@@ -134,6 +141,7 @@ impl Look {
 
     fn merge(&mut self, other: Look) {
         self.points += other.points;
+        self.nowhere += other.nowhere;
         for (mine, theirs) in self.extent.iter_mut().zip(other.extent) {
             *mine = wider(*mine, theirs);
         }
@@ -172,11 +180,19 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// The frame of all that was looked at, in at most so many pixels. A few points far from all
-    /// others are left outside.
+    /// The frame of all that was looked at, in at most so many pixels, and in no fewer than
+    /// [`NARROWEST`] where there is room: what has no width, as a line of points, is in the middle. A few
+    /// points far from all others are left outside.
     pub fn of(looks: &[Look], most: [u32; 2]) -> Result<Frame> {
         if looks.iter().all(|look| look.points == 0) {
-            return Err(Error::new(ErrorKind::Data, "there is no point to draw"));
+            let nowhere: u64 = looks.iter().map(|look| look.nowhere).sum();
+            let told = match nowhere {
+                0 => "there is no point to draw".to_owned(),
+                all => {
+                    format!("there is no point to draw: {all} have coordinates that are not finite")
+                }
+            };
+            return Err(Error::new(ErrorKind::Data, told));
         }
         let ranges = [0, 1].map(|axis| {
             let whole = looks.iter().map(|look| look.extent[axis]).fold(NOTHING, wider);
@@ -190,11 +206,13 @@ impl Frame {
             }
         });
         let sides = ranges.map(|range| range[1] - range[0]);
-        let most = most.map(|pixels| f64::from(pixels.max(2)) - 1.0);
-        let pixel = (sides[0] / most[0]).max(sides[1] / most[1]);
+        let steps = most.map(|pixels| f64::from(pixels.max(2)) - 1.0);
+        let pixel = (sides[0] / steps[0]).max(sides[1] / steps[1]);
         let pixel = if pixel > 0.0 && pixel.is_finite() { pixel } else { 1.0 };
-        let size = sides.map(|side| (side / pixel).round() as u32 + 1);
-        Ok(Frame { size, pixel, corner: [ranges[0][0], ranges[1][1]] })
+        let filled = sides.map(|side| (side / pixel).round() as u32 + 1);
+        let size = [0, 1].map(|axis| filled[axis].max(NARROWEST.min(most[axis])));
+        let margin = [0, 1].map(|axis| f64::from((size[axis] - filled[axis]) / 2) * pixel);
+        Ok(Frame { size, pixel, corner: [ranges[0][0] - margin[0], ranges[1][1] + margin[1]] })
     }
 
     /// The pixel of a point, from the left and from the top; none outside.

@@ -22,6 +22,7 @@ use paint::Canvas;
 pub const MOST_PANELS: usize = 4;
 /// Pixels that a picture is wide and high, at most: its memory is 11 bytes a pixel.
 pub const WIDEST: u32 = 4096;
+/// Pixels that it is wide and high, at least.
 const NARROWEST: u32 = 64;
 /// Pixels between panels.
 const GAP: u32 = 8;
@@ -54,6 +55,8 @@ pub struct Picture {
     pub range: Option<[f64; 2]>,
     /// For each panel its points, and how many of them lie outside of the frame.
     pub panels: Vec<(u64, u64)>,
+    /// For each panel the points that are drawn nowhere, since a coordinate of theirs is not finite.
+    pub nowhere: Vec<u64>,
     /// For each panel if it is black, since all colours or intensities of its scan are 0.
     pub black: Vec<bool>,
 }
@@ -91,6 +94,7 @@ impl Picture {
             pixel: frame.pixel,
             range: settings.by.is_range().then_some(range),
             panels: Vec::new(),
+            nowhere: looks.iter().map(|look| look.nowhere).collect(),
             black: looks.iter().map(|look| settings.by.is_black(look)).collect(),
         };
         picture.pixels.resize(3 * picture.width as usize * picture.height as usize, 255);

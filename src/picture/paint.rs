@@ -55,6 +55,7 @@ impl Canvas {
                 }
                 None => *outside += 1,
             },
+            |_| {},
         )?;
         Ok(outside.into_iter().sum())
     }

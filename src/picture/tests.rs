@@ -139,6 +139,30 @@ fn one_point_copies_and_points_that_are_nowhere_are_drawn() {
         let few = points(&places);
         let picture = Picture::draw(&[&few], &settings(View::East, By::Height, 2)).unwrap();
         assert!(picture.pixels.chunks_exact(3).any(|pixel| *pixel != [255; 3]), "{places:?}");
+        let nowhere = places.iter().filter(|(at, _)| !at.iter().all(|v| v.is_finite())).count();
+        assert_eq!(picture.nowhere, [nowhere as u64]);
+    }
+}
+
+#[test]
+fn what_has_no_width_is_in_the_middle_of_a_picture_that_can_be_seen() {
+    let line = |at: fn(f64) -> [f64; 3]| -> Vec<([f64; 3], u8)> {
+        (0..=1000).map(|i| (at(f64::from(i)), 2)).collect()
+    };
+    for (places, size) in [
+        (line(|v| [v, 7.0, 0.0]), [128, 64]),
+        (line(|v| [7.0, v, 0.0]), [64, 128]),
+        (vec![([5.0, 6.0, 7.0], 2)], [64, 64]),
+    ] {
+        let picture =
+            Picture::draw(&[&points(&places)], &settings(View::Above, By::Height, 1)).unwrap();
+        assert_eq!([picture.width, picture.height], size);
+        assert_eq!(picture.panels, [(places.len() as u64, 0)]);
+        let drawn = |x: u32, y: u32| hue(&picture, x, y) != [255; 3];
+        let (x, y) = (size[0] / 2 - 1, size[1] / 2 - 1);
+        assert!(drawn(x, y), "{size:?}");
+        let edges = [drawn(0, 0), drawn(size[0] - 1, 0), drawn(0, size[1] - 1)];
+        assert_eq!(edges, [false; 3], "{size:?}");
     }
 }
 
@@ -160,12 +184,12 @@ fn what_cannot_be_drawn_is_told() {
         let settings = Settings { view: View::Above, by, width, threads: 1 };
         Picture::draw(sources, &settings).unwrap_err().to_string()
     };
-    assert!(told(&[&few], By::Color, 128).contains("no Red to be coloured by"));
-    assert!(told(&[&few], By::Intensity, 128).contains("no Intensity to be coloured by"));
+    assert!(told(&[&few], By::Color, 128).contains("the scan has no colours"));
+    assert!(told(&[&few], By::Intensity, 128).contains("the scan has no intensities"));
     assert!(
         told(&[&few, &few, &few, &few, &few], By::Height, 128).contains("5 scans side by side")
     );
     assert!(told(&[&few], By::Height, 63).contains("a picture of 63 pixels"));
     let nowhere = points(&[([f64::NAN; 3], 2)]);
-    assert!(told(&[&nowhere], By::Height, 128).contains("no point to draw"));
+    assert!(told(&[&nowhere], By::Height, 128).contains("no point to draw: 1 have"));
 }

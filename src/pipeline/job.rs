@@ -89,8 +89,20 @@ impl Job<'_> {
         lock(&self.warnings).push(message);
     }
 
+    /// Says which transforms removed no point of all that were read.
+    pub fn tell_idle(&self, tally: &Tally) {
+        let removed = |kind: &str| tally.removed.keys().any(|(by, _)| by == kind);
+        if tally.work.get("read").is_none_or(|&read| read == 0) {
+            return;
+        }
+        let idle = self.transforms.iter().filter(|(kind, _)| !removed(kind));
+        let told = idle.flat_map(|(_, transform)| transform.idle(self.source.schema()));
+        told.for_each(|told| self.warn(told));
+    }
+
     /// Says what the decode left out without being asked, and which stages have nothing to do.
     pub fn tell_left_out(&self, tally: &Tally) {
+        self.tell_idle(tally);
         for (reason, setting, which) in LEFT_OUT {
             let key = (self.source_kind.clone(), reason);
             if let Some(&points) = tally.removed.get(&key) {

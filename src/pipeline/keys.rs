@@ -11,7 +11,7 @@ use serde::de::{
 use super::mistake::Mistake;
 use super::node::{Entry, Node, Place, Value};
 use crate::error::nearest;
-use crate::quantity::parse_count;
+use crate::quantity::{Figure, parse_count};
 
 /// Reads the table `keys` as a `T`, or tells every key that `subject` (a stage kind, `[run]`) does
 /// not have and every value that does not fit.
@@ -187,7 +187,7 @@ fn found_words(found: Unexpected<'_>) -> String {
         Unexpected::Bool(v) => v.to_string(),
         Unexpected::Unsigned(v) => v.to_string(),
         Unexpected::Signed(v) => v.to_string(),
-        Unexpected::Float(v) => v.to_string(),
+        Unexpected::Float(v) => Figure(v).to_string(),
         Unexpected::Str(v) => format!("the text \"{}\"", v.chars().take(60).collect::<String>()),
         Unexpected::Seq => "a list".to_owned(),
         Unexpected::Map => "a table".to_owned(),

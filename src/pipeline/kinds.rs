@@ -98,14 +98,16 @@ impl Read {
     /// are not alike.
     pub fn source(&self) -> Result<Box<dyn OpenSource>> {
         let files = inputs::expand(&self.path)?;
+        let known = |file: &PathBuf| self.format.or(Format::of(file));
+        // A file that is not there is told when it is opened, whatever its name.
+        let missing = files.iter().find_map(known).unwrap_or(Format::Las);
         let mut formats = Vec::new();
         for file in &files {
-            let format = self.format.or(Format::of(file));
-            let unknown = || match std::fs::metadata(file) {
-                Ok(_) => unknown_extension(file, "read.format"),
-                Err(e) => Error::io(file, "open it", e),
-            };
-            formats.push(format.ok_or_else(unknown)?);
+            formats.push(match known(file) {
+                Some(format) => format,
+                None if std::fs::metadata(file).is_err() => missing,
+                None => return Err(unknown_extension(file, "read.format")),
+            });
         }
         if let Some(i) = formats.iter().position(|f| !f.same_records(formats[0])) {
             let (a, b) = (shown(&files[0]), shown(&files[i]));
@@ -333,7 +335,7 @@ pub(super) fn unknown_extension(path: &Path, setting: &str) -> Error {
             })
         }
         None => Error::pipeline(format!("the extension of `{name}` names no format"))
-            .help(format!("use .las, .laz or .ply, or give `{setting}`")),
+            .help(format!("name it .las, .laz or .ply, or give `{setting}`")),
     }
 }
 

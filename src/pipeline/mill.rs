@@ -20,6 +20,7 @@ use super::passes::{Call, Op, Pass};
 use super::run::Finished;
 use super::shares::{BATCH, Demands, Shares};
 use super::survey::survey;
+use super::tagger::NOT_FINITE;
 use crate::budget::Lease;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::{Bounds, PointBatch, Position};
@@ -376,7 +377,7 @@ fn take(
     );
     for (i, why) in misplaced {
         if why == Misplaced::NotFinite && job.drop_nonfinite {
-            tally.remove(&job.source_kind, "not finite", 1);
+            tally.remove(&job.source_kind, NOT_FINITE, 1);
             left_out.push(i);
         } else {
             return Err(job.misplaced(batch, i, why));

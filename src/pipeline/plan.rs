@@ -20,6 +20,7 @@ use crate::error::shown;
 use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
 use crate::point::{Schema, Units};
+use crate::quantity::Figure;
 use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Role, Source, Transform};
 use crate::tile::{CLASSED_INPUTS, TAGGED_INPUTS};
 use crate::{Error, ErrorKind, Result};
@@ -114,6 +115,9 @@ impl Pipeline {
             true => Some(Lattice::stretched(schema, settings.lattice, z_scale)?),
             false => None,
         };
+        if let Some(lattice) = &lattice {
+            check_lengths(&sorted.ops, lattice)?;
+        }
         let simd = settings.simd.resolve().map_err(in_file)?;
         let threads = threads(&settings)?;
         let limit = settings.memory.unwrap_or_else(default_limit);
@@ -311,6 +315,21 @@ fn each_input(
 /// Converts lengths with a unit of their own to the unit of the scan.
 fn convert_lengths(ops: &mut [StageOp], units: &Units) -> Result<()> {
     ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().convert(units))
+}
+
+/// Refuses lengths that are longer than the lattice.
+fn check_lengths(ops: &[StageOp], lattice: &Lattice) -> Result<()> {
+    let longest = lattice.longest();
+    let mut lengths = ops.iter().flat_map(|stage| stage.op.tile().lengths());
+    match lengths.find(|(_, length)| *length > longest) {
+        None => Ok(()),
+        Some((key, length)) => {
+            let (length, steps) = (Figure(length), Figure(lattice.step));
+            let told = format!("`{key} = {length}` is longer than any scan in steps of {steps}");
+            // In three digits, and never more than it is.
+            Err(Error::pipeline(told).help(format!("give {:.2e} or less", longest * 0.995)))
+        }
+    }
 }
 
 fn check_transforms(transforms: &[(String, Box<dyn Transform>)], schema: &Schema) -> Result<()> {

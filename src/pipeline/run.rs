@@ -20,14 +20,14 @@ use super::settings::{Nonfinite, Spill};
 use super::shares::Demands;
 use super::stream::stream;
 use super::survey::{Lines, Measured};
-use super::tagger::ClassOf;
+use super::tagger::{ClassOf, LEFT_OUT, NOT_FINITE};
 use crate::budget::Budget;
 use crate::point::{Metadata, names};
 use crate::report::{
     ClassFigures, Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome,
     PassFigures, Removed, Report, RunFigures, Tally, check_written, peak_memory,
 };
-use crate::stage::{CreateSink, Input, Order, Sink, SinkSummary, Source};
+use crate::stage::{CreateSink, Input, Order, Sink, SinkSummary, Source, Transform};
 use crate::tile::{SpillArea, lock};
 use crate::{Error, Result};
 
@@ -188,9 +188,10 @@ impl Plan {
             }
         };
         let earlier = std::mem::take(&mut *lock(&job.warnings));
+        let nothing_left = nothing_left(&finished, &job.transforms);
         drop(job);
         let mut run = self.figures(&finished, &budget, area.written());
-        run.warnings.extend(nothing_left(&finished));
+        run.warnings.extend(nothing_left);
         run.warnings.extend(memory_warning(spill.parent(), area.written()));
         run.warnings.iter().for_each(|warning| watch.warn(warning));
         run.warnings.splice(0..0, earlier);
@@ -357,8 +358,12 @@ impl Plan {
     }
 }
 
-/// Says that an output is empty: that its input was so too, or what removed the points.
-fn nothing_left(finished: &Finished) -> Option<String> {
+/// Says that an output is empty: that its input was so too, or what removed the points, by the settings
+/// that say so where there are any: the stages of commands are nothing that their users know.
+fn nothing_left(
+    finished: &Finished,
+    transforms: &[(String, Box<dyn Transform>)],
+) -> Option<String> {
     let ledger = Ledger::new(finished.read, finished.kept, &finished.tally);
     if ledger.read == 0 {
         return Some("the inputs have no points: what is written has none either".to_owned());
@@ -366,7 +371,18 @@ fn nothing_left(finished: &Finished) -> Option<String> {
     if ledger.kept > 0 {
         return None;
     }
-    let by = |r: &Removed| format!("{} {} ({})", Grouped(r.records), r.reason, r.stage);
+    let keys = |r: &Removed| -> Vec<&str> {
+        let ours = transforms.iter().filter(|(kind, _)| *kind == r.stage);
+        let run = LEFT_OUT.iter().filter(|(reason, ..)| *reason == r.reason);
+        let nonfinite = (r.reason == NOT_FINITE).then_some("run.nonfinite");
+        let of_run = run.map(|(_, setting, _)| *setting).chain(nonfinite);
+        ours.flat_map(|(_, stage)| stage.removes_by()).chain(of_run).collect()
+    };
+    let by = |r: &Removed| {
+        let keys: Vec<String> = keys(r).iter().map(|key| format!("`{key}`")).collect();
+        let by = if keys.is_empty() { r.stage.clone() } else { keys.join(" and ") };
+        format!("{} {} ({by})", Grouped(r.records), r.reason)
+    };
     let by: Vec<String> = ledger.removed.iter().map(by).collect();
     Some(format!("no point is left of {}: {}", Grouped(ledger.read), by.join(", ")))
 }

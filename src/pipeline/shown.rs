@@ -6,6 +6,7 @@ use super::passes::{Call, Pass, needs};
 use super::plan::Plan;
 use crate::budget::Bytes;
 use crate::error::shown;
+use crate::quantity::Figure;
 
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -30,7 +31,7 @@ impl fmt::Display for Plan {
             Some(lattice) => {
                 write!(f, "lattice  step {} world units", lattice.step)?;
                 if lattice.z_scale() != 1.0 {
-                    write!(f, ", z times {}", lattice.z_scale())?;
+                    write!(f, ", z times {}", Figure(lattice.z_scale()))?;
                 }
                 writeln!(f)?;
             }

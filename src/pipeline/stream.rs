@@ -7,6 +7,7 @@ use super::job::{Job, StopOnDrop};
 use super::outlet::{Hands, Outlet};
 use super::run::Finished;
 use super::shares::{BATCH, Shares};
+use super::tagger::NOT_FINITE;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::{PointBatch, Spare};
 use crate::report::Tally;
@@ -87,6 +88,7 @@ pub(super) fn stream(
     let mut encode = encode;
     let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
     let mut tally = std::mem::take(&mut *lock(&total));
+    job.tell_idle(&tally);
     Ok(Finished {
         read: tally.work.remove("read").unwrap_or(0),
         kept,
@@ -139,7 +141,7 @@ fn drop_nonfinite(
             }
         },
     );
-    tally.remove(&job.source_kind, "not finite", misplaced.len() as u64);
+    tally.remove(&job.source_kind, NOT_FINITE, misplaced.len() as u64);
     if !misplaced.is_empty() {
         batch.retain(|i, _| misplaced.binary_search(&i).is_err());
     }

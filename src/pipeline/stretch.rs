@@ -3,6 +3,7 @@
 
 use super::settings::{MixedUnits, RunSettings, ZScale};
 use crate::point::{Mismatch, Units};
+use crate::quantity::Figure;
 use crate::{Error, ErrorKind, Result};
 
 /// What z is multiplied by on a scan's lattice, and why that may be wrong.
@@ -43,8 +44,9 @@ impl RunSettings {
             Some(Mismatch { z_scale: Some(factor), .. }) if auto => certain(factor),
             Some(Mismatch { message, z_scale: Some(factor) }) => {
                 Err(Error::new(ErrorKind::Data, message).help(format!(
-                    "give `run.z_scale = \"auto\"`, which measures with z times {factor}, or \
-                     `run.z_scale = 1` if the reference system is wrong; records keep their z"
+                    "give `run.z_scale = \"auto\"`, which measures with z times {}, or \
+                     `run.z_scale = 1` if the reference system is wrong; records keep their z",
+                    Figure(factor)
                 )))
             }
             Some(Mismatch { message, z_scale: None }) => Err(Error::new(ErrorKind::Data, message)

@@ -37,6 +37,8 @@ pub(super) const LEFT_OUT: [(&str, &str, &str); 2] = [
     ("withheld", "run.withheld", "with the withheld flag"),
     ("noise", "run.noise", "of the classes 7 and 18 (noise)"),
 ];
+/// The reason for which it has those whose coordinates are no numbers, by `run.nonfinite`.
+pub(super) const NOT_FINITE: &str = "not finite";
 const NOISE: [u8; 2] = [7, 18];
 
 impl Tagger {

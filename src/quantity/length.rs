@@ -5,6 +5,7 @@ use std::fmt;
 use serde::de::{Deserializer, Unexpected, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 
+use super::Figure;
 use crate::point::{Horizontal, Units};
 use crate::{Error, Result};
 
@@ -23,15 +24,18 @@ pub enum Unit {
     Inch,
     /// `ft`, the international foot
     Foot,
+    /// `us-ft`, the US survey foot, which is longer by two millionths
+    SurveyFoot,
 }
 
 impl Unit {
-    const ALL: [(&str, Unit, f64); 6] = [
+    const ALL: [(&str, Unit, f64); 7] = [
         ("mm", Unit::Millimetre, 0.001),
         ("cm", Unit::Centimetre, 0.01),
         ("km", Unit::Kilometre, 1000.0),
         ("in", Unit::Inch, 0.0254),
         ("ft", Unit::Foot, 0.3048),
+        ("us-ft", Unit::SurveyFoot, 1200.0 / 3937.0),
         ("m", Unit::Metre, 1.0),
     ];
 
@@ -100,23 +104,13 @@ impl Length {
             }
             None => told(
                 "the scan does not say what its coordinates are in",
-                format!("if they are in metres, give `{key} = {}`", Shown(metres)),
+                format!("if they are in metres, give `{key} = {}`", Figure(metres)),
             ),
             Some(Horizontal::Degrees) => told(
                 "the scan's x and y are in degrees, in which it is no length",
                 "bring the scan to a projected reference system first".to_owned(),
             ),
         }
-    }
-}
-
-/// A number in at most nine digits: 5 cm are 0.05, not 0.05000000000000001.
-struct Shown(f64);
-
-impl fmt::Display for Shown {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let short = format!("{:.8e}", self.0).parse().unwrap_or(self.0);
-        write!(f, "{short}")
     }
 }
 
@@ -145,13 +139,62 @@ impl<'de> Deserialize<'de> for Length {
     }
 }
 
+impl Length {
+    /// Reads a length that can also be taken back: `"none"` is as good as no key.
+    ///
+    /// # Errors
+    /// All but that word and a length.
+    pub fn or_none<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Self>, D::Error> {
+        deserializer.deserialize_any(OrNone)
+    }
+}
+
+/// Reads the word itself and leaves all else to [`LengthVisitor`].
+struct OrNone;
+
+impl Visitor<'_> for OrNone {
+    type Value = Option<Length>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        LengthVisitor.expecting(f)?;
+        f.write_str(", or \"none\"")
+    }
+
+    fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<Self::Value, E> {
+        Length::of(value).map(Some).ok_or_else(|| E::invalid_value(Unexpected::Float(value), &self))
+    }
+
+    fn visit_i64<E: serde::de::Error>(self, value: i64) -> Result<Self::Value, E> {
+        self.visit_f64(value as f64)
+    }
+
+    fn visit_u64<E: serde::de::Error>(self, value: u64) -> Result<Self::Value, E> {
+        self.visit_f64(value as f64)
+    }
+
+    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Self::Value, E> {
+        match (text, Length::read(text)) {
+            ("none", _) => Ok(None),
+            (_, Some(length)) => Ok(Some(length)),
+            _ => Err(E::invalid_value(Unexpected::Str(text), &self)),
+        }
+    }
+
+    fn visit_unit<E: serde::de::Error>(self) -> Result<Self::Value, E> {
+        Ok(None)
+    }
+}
+
 struct LengthVisitor;
 
 impl Visitor<'_> for LengthVisitor {
     type Value = Length;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a length above 0 in the scan's unit, or with a unit such as \"2m\" or \"5cm\"")
+        f.write_str(
+            "a length above 0 in the scan's unit, or with a unit such as \"2m\" or \"5cm\" (mm, cm, m, \
+             km, in, ft or us-ft)",
+        )
     }
 
     fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<Length, E> {
@@ -168,5 +211,43 @@ impl Visitor<'_> for LengthVisitor {
 
     fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Length, E> {
         Length::read(text).ok_or_else(|| E::invalid_value(Unexpected::Str(text), &self))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn metres(text: &str) -> Option<f64> {
+        let units = Units { horizontal: Some(Horizontal::Metres(1.0)), ..Units::default() };
+        Some(Length::read(text)?.in_scan(&units, "cells.side").ok()?.value())
+    }
+
+    #[test]
+    fn lengths_are_read_in_every_unit() {
+        for (text, length) in [
+            ("2m", 2.0),
+            ("5 cm", 0.05),
+            ("3mm", 0.003),
+            ("1km", 1000.0),
+            ("10in", 0.254),
+            ("10ft", 3.048),
+            ("3937 us-ft", 1200.0),
+            ("3937us-ft", 1200.0),
+        ] {
+            let read = metres(text).unwrap();
+            assert!((read - length).abs() < 1e-12 * length, "{text}: {read}");
+        }
+        for wrong in ["2", "us-ft", "2 us ft", "2-ft", "0us-ft", "-1us-ft", "2 miles"] {
+            assert_eq!(metres(wrong), None, "{wrong}");
+        }
+        assert_eq!(Length::read("2.5 us-ft").unwrap().to_string(), "2.5us-ft");
+    }
+
+    #[test]
+    fn feet_of_a_survey_are_longer_than_feet() {
+        let read = |text: &str| Length::read(text).unwrap();
+        assert!(read("1ft").is_less_than(read("1us-ft")));
+        assert!(!read("1us-ft").is_less_than(read("1ft")));
     }
 }

@@ -3,12 +3,14 @@
 
 mod angle;
 mod count;
+mod figure;
 mod length;
 mod setting;
 mod whole;
 
 pub use angle::Angle;
 pub use count::parse_count;
+pub use figure::Figure;
 pub use length::{Length, Unit};
 pub use setting::Setting;
 pub use whole::Whole;

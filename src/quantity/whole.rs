@@ -65,6 +65,10 @@ impl<const LEAST: u64, const MOST: u64> Visitor<'_> for WholeVisitor<LEAST, MOST
     fn visit_str<E: Error>(self, text: &str) -> Result<Self::Value, E> {
         match parse_count(text) {
             Ok(number) => self.visit_u64(number),
+            // A number that is too large for any type is told as it was written.
+            Err(_) if text.parse::<f64>().is_ok() => {
+                Err(E::invalid_value(Unexpected::Other(text), &self))
+            }
             Err(_) => Err(E::invalid_value(Unexpected::Str(text), &self)),
         }
     }

@@ -31,5 +31,5 @@ pub use sums::{Distances, FixedSum};
 pub use survey::{
     FittedScan, FittedTile, Lot, PlaneDistances, ScanSurvey, TileSurvey, report_tile_level,
 };
-pub use table::{Grouped, Short, Table};
+pub use table::{Coordinate, Grouped, Short, Table};
 pub use tally::{Apart, KEY_POINTS, Tally};

@@ -272,19 +272,35 @@ impl fmt::Display for Share {
     }
 }
 
-/// A coordinate in the digits that tell it from its neighbours on the lattice: those of the single
-/// precision number that it is, if it is one.
-struct Coordinate {
-    at: f64,
-    step: f64,
+/// A coordinate in the digits that tell it from its neighbours on a grid of this step: those of the
+/// single precision number that it is, if it is one.
+pub struct Coordinate {
+    /// The coordinate.
+    pub at: f64,
+    /// Step of the lattice, or scale of the file; 0 where there is none.
+    pub step: f64,
+}
+
+impl Coordinate {
+    /// The fewest decimals that are the coordinate but for what sums and products in f64 add to it; None
+    /// where all its digits are needed.
+    fn decimals(&self) -> Option<usize> {
+        let rounding = 4.0 * f64::EPSILON * self.at.abs();
+        let slack = (self.step * 1e-3).max(rounding).min(self.step / 2.0);
+        let is_it = |text: String| text.parse().is_ok_and(|v: f64| (v - self.at).abs() <= slack);
+        (0..=12).find(|&decimals| is_it(format!("{:.decimals$}", self.at)))
+    }
 }
 
 impl fmt::Display for Coordinate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let single = self.at as f32;
-        match (f64::from(single) - self.at).abs() <= self.step / 2.0 {
-            true => write!(f, "{single}"),
-            false => write!(f, "{}", self.at),
+        if (f64::from(single) - self.at).abs() <= self.step / 2.0 {
+            return write!(f, "{single}");
+        }
+        match self.decimals() {
+            Some(decimals) => write!(f, "{:.decimals$}", self.at),
+            None => write!(f, "{}", self.at),
         }
     }
 }
@@ -351,6 +367,14 @@ mod tests {
         assert_eq!(shown(5_600_018.349, 0.001), "5600018.349");
         assert_eq!(shown(12.123456789, binary), "12.123456789");
         assert_eq!(shown(-0.1, 0.0), "-0.1");
+        assert_eq!(shown(6_277_535.589_999_999, 0.01), "6277535.59");
+        assert_eq!(shown(77_051_903.0 * 0.01, 0.01), "770519.03");
+        assert_eq!(shown(0.1 + 0.2, 0.1), "0.3");
+        assert_eq!(
+            shown(6_277_535.125_499_999, 0.25),
+            "6277535.1255",
+            "an offset beside the steps"
+        );
     }
 
     #[test]

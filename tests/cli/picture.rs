@@ -75,3 +75,23 @@ fn a_scan_without_colours_is_drawn_and_told_to_be_black() {
     assert_eq!(stderr.matches("all intensities are 0").count(), 2, "{stderr}");
     assert_eq!(drawn("height"), "");
 }
+
+#[test]
+fn what_a_picture_lacks_is_told_in_words_and_with_what_can_be_done() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let header = "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\n\
+                  property double z\nproperty ushort intensity\nend_header\n";
+    let points = "1 2 3 9\nnan 2 3 9\n2 2 inf 9\n4 2 3 9\n";
+    fs::write(at.join("a.ply"), format!("{header}{points}")).unwrap();
+    let told =
+        ["error: a.ply: the scan has no colours\nhelp: use `--by height` or `--by intensity`\n"];
+    fails(at, &["picture", "a.ply", "-o", "p.png", "--by", "color"], 2, &told);
+    let class = ["error: a.ply: the scan has no classes\n"];
+    fails(at, &["picture", "a.ply", "-o", "p.png", "--by", "class"], 2, &class);
+    let (code, stdout, stderr) = pointmill(at, &["picture", "a.ply", "-o", "p.png"]);
+    assert_eq!((code, stdout.contains("a.ply, 2 points\n")), (0, true), "{stdout}{stderr}");
+    let nowhere = "warning: a.ply: 2 points cannot be drawn: their coordinates are not finite";
+    assert!(stderr.starts_with(nowhere) && stderr.lines().count() == 1, "{stderr}");
+    assert!(stdout.contains("1600 × 64 pixels"), "a line of points: {stdout}");
+}

@@ -54,3 +54,72 @@ fn colors_have_as_many_bits_as_are_asked_for() {
     }
     pointmill(&["convert", "--colors", "9bit"], "50e-las-rgb16.las", &output).failure();
 }
+
+#[test]
+fn what_has_no_limit_by_default_takes_none_and_lengths_take_every_foot() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = |name: &str| folder.path().join(name);
+    let reduce = |flags: &[&str], name: &str| {
+        let command = [&["reduce"], flags].concat();
+        pointmill(&command, "100e-geokey.las", &output(name)).success();
+        std::fs::read(output(name)).unwrap()
+    };
+    let plain = reduce(&[], "plain.las");
+    assert_eq!(reduce(&["--max-side", "none"], "none.las"), plain);
+    // The header tells what was typed; the records are the same.
+    let records = |file: Vec<u8>| {
+        let start = u32::from_le_bytes(file[96..100].try_into().unwrap()) as usize;
+        file[start..].to_vec()
+    };
+    let side = records(reduce(&["--side", "1us-ft"], "feet.las"));
+    assert!(!side.is_empty());
+    assert_eq!(records(reduce(&["--side", "304.8006096mm"], "metres.las")), side);
+}
+
+#[test]
+fn figures_have_as_many_digits_as_were_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.las");
+    let refused = pointmill(&["reduce"], "15c-geokeys-epsg-only-2277-5703.las", &output).failure();
+    let told = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+    assert!(told.contains("measures with z times 3.280833333, or"), "{told}");
+}
+
+#[test]
+fn lengths_that_no_scan_has_are_refused_and_the_longest_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.las");
+    let case = "100e-geokey.las";
+    for flag in ["--side", "--max-side", "--min-spacing"] {
+        for (length, shown) in [("1e308", "1e308"), ("4.7e16", "4.7e16"), ("9e300km", "9e303")] {
+            let command = ["reduce", flag, length];
+            let refused = pointmill(&command, case, &output).code(2);
+            let told = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+            let expected = format!(
+                "error: `{flag} {shown}` is longer than any scan in steps of 0.01\n\
+                 help: give 4.59e16 or less\n"
+            );
+            assert_eq!(told, expected);
+        }
+    }
+    pointmill(&["reduce", "--side", "4.59e16"], case, &output).success();
+}
+
+#[test]
+fn scales_that_no_offset_helps_are_told_to_be_larger() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.las");
+    let help = |scale: &str| {
+        let refused = pointmill(&["convert", "--scale", scale], "108-float-utm.ply", &output);
+        let told = String::from_utf8(refused.failure().get_output().stderr.clone()).unwrap();
+        told.lines().find(|line| line.starts_with("help: ")).unwrap().to_owned()
+    };
+    let near = help("1e-6");
+    assert!(near.starts_with("help: give an offset near the points, `--offset "), "{near}");
+    // It helps.
+    let offset = near.split(['`', ' ']).find(|word| word.contains(',') && word.len() > 9).unwrap();
+    pointmill(&["convert", "--scale", "1e-6", "--offset", offset], "108-float-utm.ply", &output)
+        .success();
+    let larger = "help: give a larger `--scale`: with this one coordinates reach ";
+    assert_eq!(help("1e-12"), format!("{larger}0.00215 from the offset, and no farther"));
+}

@@ -283,6 +283,17 @@ fn every_wrong_value_has_a_caret_below_what_was_typed() {
         ),
         ("--neighbors", "1e2", "takes a whole number from 3 to 64, not 100"),
         ("--threads", "2k", "takes a whole number from 1 to 1024, not 2000"),
+        (
+            "--threads",
+            "18446744073709551616",
+            "takes a whole number from 1 to 1024, not 18446744073709551616\n",
+        ),
+        (
+            "--neighbors",
+            "-99999999999999999999",
+            "takes a whole number from 3 to 64, not -99999999999999999999\n",
+        ),
+        ("--passes", "1e300", "takes a whole number from 1 to 16, not 1e300\n"),
         ("--memory", "2G", "`2G` is no size such as 512MiB or 2GiB: write 2GiB (units"),
         ("--memory", "-1", "`-1` is no size"),
         ("--classes", "5-1", "`5-1` is no range of classes: write 1-5"),
@@ -341,6 +352,13 @@ fn options_that_are_not_there_and_outputs_without_one_are_told_what_to_type() {
         let one = told(at, &[command, "a.laz", "out.laz"], 2);
         assert!(one.ends_with("help: if `out.laz` is the output, write `-o out.laz`\n"), "{one}");
     }
+    let one = told(at, &["reduce"], 2);
+    assert!(
+        one.starts_with("error: `reduce` needs --output <OUT> or --outdir <DIR>, and <IN>..."),
+        "{one}"
+    );
+    let one = told(at, &["convert"], 2);
+    assert!(one.starts_with("error: `convert` needs --output <OUT|DIR> and <IN>..."), "{one}");
     let one = told(at, &["convert", "a.laz", "a.laz"], 2);
     assert!(!one.contains("is the output"), "a file that is there is an input: {one}");
     let one = told(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "1", "--keep", "2"], 2);
@@ -367,6 +385,14 @@ fn what_is_no_scan_or_no_pipeline_is_called_what_it_is() {
         fs::write(at.join(name), b"1 2 3\n").unwrap();
         let one = told(at, &["reduce", name, "-o", "o.laz"], 2);
         assert!(one.contains("which is not read") && !one.contains("read.format"), "{one}");
+    }
+    // What is not there is told alike, whatever its name.
+    for (command, output) in [("reduce", "o.laz"), ("convert", "o.laz"), ("picture", "o.png")] {
+        for name in ["no.laz", "no.ply", "no.txt", "no"] {
+            let one = told(at, &[command, name, "-o", output], 1);
+            let expected = format!("error: {name}: cannot open it\n  No such file or directory");
+            assert!(one.starts_with(&expected), "{command:?} {name}: {one}");
+        }
     }
     let text = "[[stage]]\nkind = 'read'\npath = 'a.laz'\nkind = 'write'\npath = 'o.laz'\n";
     fs::write(at.join("p.toml"), text).unwrap();
@@ -701,4 +727,59 @@ fn a_scan_of_which_no_point_fits_is_refused_before_the_work() {
     assert!(refused.contains("help: ") && refused.contains("--offset"), "{refused}");
     assert!(!refused.contains("if such a point is kept"), "{refused}");
     assert!(!refused.contains("chosen"), "it is told after the decode: {refused}");
+}
+
+#[test]
+fn classes_that_no_point_is_of_are_told_by_their_flags() {
+    let at = scans(&["a.laz"]);
+    let at = at.path();
+    let warned = |arguments: &[&str]| {
+        let (code, _, stderr) = pointmill(at, arguments);
+        assert_eq!(code, 0, "{stderr}");
+        stderr
+    };
+    let none = "warning: no point is of class 77 or 78: `--drop-classes` leaves no point out\n";
+    for command in ["reduce", "convert"] {
+        let arguments = [command, "a.laz", "-o", "o.laz"];
+        let dropped = warned(&[&arguments[..], &["--drop-classes", "77-78"]].concat());
+        assert_eq!(dropped.matches(none).count(), 1, "{dropped}");
+        // One of several is enough, as it is for `--classes`.
+        let dropped = warned(&[&arguments[..], &["--drop-classes", "0-77"]].concat());
+        assert!(!dropped.contains("leaves no point out"), "{dropped}");
+        let kept = warned(&[&arguments[..], &["--keep-classes", "77"]].concat());
+        assert!(kept.contains(" removed (`--keep-classes`)\n"), "{kept}");
+        assert!(kept.contains("warning: no point is left of "), "{kept}");
+        let both = ["--keep-classes", "77", "--drop-classes", "2"];
+        let both = warned(&[&arguments[..], &both].concat());
+        assert!(both.contains(" removed (`--keep-classes` and `--drop-classes`)\n"), "{both}");
+    }
+    let text = "[[stage]]\nkind = 'read'\npath = 'a.laz'\n[[stage]]\nkind = 'filter'\n\
+                drop_classes = [77]\ndrop_flags = ['withheld']\n[[stage]]\nkind = 'write'\n\
+                path = 'o.laz'\n";
+    fs::write(at.join("p.toml"), text).unwrap();
+    let warned = warned(&["run", "p.toml"]);
+    for key in ["of class 77: `filter.drop_classes`", "with the flag withheld: `filter.drop_flags`"]
+    {
+        assert!(warned.contains(&format!("no point is {key} leaves no point out\n")), "{warned}");
+    }
+}
+
+#[test]
+fn files_of_unclear_format_are_told_what_helps_the_command() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    case(at, "160-las-named.ply");
+    fs::write(at.join("a.bin"), b"LASF").unwrap();
+    let file = "in a pipeline file (`pointmill run FILE`)\n";
+    let las = told(at, &["convert", "160-las-named.ply", "-o", "o.laz"], 1);
+    let help = format!("help: name it .las or .laz, or give `read.format = \"las\"` {file}");
+    assert!(las.ends_with(&help), "{las}");
+    let bin = told(at, &["convert", "a.bin", "-o", "o.laz"], 2);
+    let help = format!("= name it .las, .laz or .ply, or give `read.format` {file}");
+    assert!(bin.ends_with(&help), "{bin}");
+    // No pipeline draws a picture.
+    let las = told(at, &["picture", "160-las-named.ply", "-o", "o.png"], 1);
+    assert!(las.ends_with("\nhelp: name it .las or .laz\n"), "{las}");
+    let bin = told(at, &["picture", "a.bin", "-o", "o.png"], 2);
+    assert!(bin.ends_with("\nhelp: name it .las, .laz or .ply\n"), "{bin}");
 }

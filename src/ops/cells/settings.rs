@@ -243,6 +243,11 @@ mod tests {
             toml::from_str::<Cells>(&format!("min_spacing = {text}")).unwrap().min_spacing
         };
         assert_eq!((spacing("'auto'"), spacing("'none'")), (Some(Setting::Auto), None));
+        assert_eq!(toml::from_str::<Cells>("max_side = 'none'").unwrap().max_side, None);
+        assert_eq!(
+            toml::from_str::<Cells>("max_side = '2 us-ft'").unwrap().max_side,
+            Length::read("2us-ft")
+        );
         for wrong in ["0", "-1.0", "nan", "inf", "'2 miles'", "'0m'", "'m'", "true"] {
             assert!(refusal(&format!("max_side = {wrong}")).contains("above 0"), "{wrong}");
             assert!(refusal(&format!("min_spacing = {wrong}")).contains("above 0"), "{wrong}");

@@ -64,6 +64,10 @@ impl TileOp for RadiusOutliers {
         Ok(())
     }
 
+    fn lengths(&self) -> Vec<(&'static str, f64)> {
+        vec![("outliers.radius", self.radius.value())]
+    }
+
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
         self.within = Some(square(self.radius.value() / scan.lattice.step));
         Ok(())
