@@ -300,14 +300,16 @@ struct Unfit<'a> {
 /// What helps where the coordinate `value` of the point at `world` does not fit `to`: an offset, if there
 /// is one that does, and a larger scale.
 fn placed(world: Option<[f64; 3]>, to: &Dimension, value: f64) -> String {
-    // Whole thousands near the point: a scan around it fits, and its digits stay readable.
-    let round = |at: f64| (at / 1000.0).round() * 1000.0;
     let reach = to.scale * f64::from(1 << 30) * 2.0;
+    // Whole thousands near the point: a scan around it fits, and its digits stay readable. Where these
+    // are out of reach, what is in reach; no scan is so small that less than 1 would do.
+    let unit = [1000.0, 100.0, 10.0, 1.0].into_iter().find(|unit| 2.0 * unit <= reach);
+    let round = |at: f64| unit.map_or(at, |unit| (at / unit).round() * unit);
     match world.map(|world| world.map(round)) {
         Some(near) if near.iter().any(|at| !at.is_finite()) => {
             "give a larger `write.scale`, or a `write.offset` nearer to the points".to_owned()
         }
-        Some([x, y, z]) if reach >= 1000.0 && round(value) != to.origin => format!(
+        Some([x, y, z]) if unit.is_some() && round(value) != to.origin => format!(
             "give an offset near the points, `write.offset = [{x:?}, {y:?}, {z:?}]`, or a larger \
              `write.scale`"
         ),

@@ -120,6 +120,9 @@ fn scales_that_no_offset_helps_are_told_to_be_larger() {
     let offset = near.split(['`', ' ']).find(|word| word.contains(',') && word.len() > 9).unwrap();
     pointmill(&["convert", "--scale", "1e-6", "--offset", offset], "108-float-utm.ply", &output)
         .success();
+    // What is in reach of a finer scale is no thousand.
+    let near = help("1e-8");
+    assert!(near.contains("`--offset 350000.0,5600000.0,100.0`"), "{near}");
     let larger = "help: give a larger `--scale`: with this one coordinates reach ";
     assert_eq!(help("1e-12"), format!("{larger}0.00215 from the offset, and no farther"));
 }

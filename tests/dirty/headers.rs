@@ -262,7 +262,9 @@ fn boxes_are_hints_and_nothing_else() {
             let lie: Vec<u8> = (0..6)
                 .flat_map(|i| if i % 2 == 0 { value } else { -value }.to_le_bytes())
                 .collect();
-            reads_as(&format!("a box of {value}"), name, &put(&whole, 179, &lie), &whole, "");
+            // A wide one may be that of a file that had more points.
+            let says = if value == 8e8 { "" } else { "the header has no box of the points" };
+            reads_as(&format!("a box of {value}"), name, &put(&whole, 179, &lie), &whole, says);
         }
     }
 }

@@ -204,6 +204,9 @@ impl LasFile<'_> {
         for axis in 0..3 {
             put(131 + 8 * axis, &self.scale[axis].to_le_bytes());
             put(155 + 8 * axis, &self.offset[axis].to_le_bytes());
+            let [lo, hi] = self.bounds(axis);
+            put(179 + 16 * axis, &hi.to_le_bytes());
+            put(187 + 16 * axis, &lo.to_le_bytes());
         }
         let end = (start + self.records.len()) as u64;
         put(235, &(if self.evlrs.is_empty() { 0 } else { end }).to_le_bytes());
@@ -211,6 +214,19 @@ impl LasFile<'_> {
         put(247, &points.to_le_bytes());
         let evlrs: Vec<u8> = self.evlrs.iter().flat_map(|v| beside(v, true)).collect();
         [&header, &vlrs, self.records, &evlrs].into_iter().flatten().copied().collect()
+    }
+}
+
+impl LasFile<'_> {
+    /// The least and the largest coordinate of the points; 0 without points.
+    fn bounds(&self, axis: usize) -> [f64; 2] {
+        let stored = self
+            .records
+            .chunks_exact(self.stride)
+            .map(|record| i32::from_le_bytes(record[4 * axis..4 * axis + 4].try_into().unwrap()));
+        let world = |v: i32| f64::from(v) * self.scale[axis] + self.offset[axis];
+        let (lo, hi) = (stored.clone().map(world), stored.map(world));
+        [lo.reduce(f64::min).unwrap_or(0.0), hi.reduce(f64::max).unwrap_or(0.0)]
     }
 }
 

@@ -233,7 +233,7 @@ fn a_run_that_leaves_nothing_says_so() {
         let filter = "[[stage]]\nkind = 'filter'\nkeep_classes = [40]\n";
         let told = heard(&scan, "laz", &format!("{filter}{stages}"), "");
         assert_eq!(told.0.result.ledger.kept, 0);
-        assert_told(told, &["no point is left of 3,000: 3,000 removed (filter)"]);
+        assert_told(told, &["no point is left of 3,000: 3,000 removed (`filter.keep_classes`)"]);
     }
 }
 
