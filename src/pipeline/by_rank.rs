@@ -5,8 +5,8 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use super::chunks::{Chunk, Open};
-use super::grind::Benches;
+use super::chunk::{Chunk, Open};
+use super::encoding::ChunkEncoders;
 use super::job::{Job, StopOnDrop};
 use super::outlet::{Hands, Outlet};
 use super::product::Entry;
@@ -197,7 +197,7 @@ impl ByRank {
         sink: Box<dyn Sink>,
         counted: bool,
     ) -> Result<(SinkSummary, Tally)> {
-        let benches = Benches::of_one(job, tiles, &*sink, counted, false).of_stored();
+        let encoders = ChunkEncoders::of_one(job, tiles, &*sink, counted, false).of_stored();
         let open = Mutex::new(Open::new(0, sink.chunk_points(), self.wants_normals, false));
         let commit = |records: Vec<Ranked>| -> Result<Vec<Chunk>> {
             let (mut open, mut full) = (lock(&open), Vec::new());
@@ -212,8 +212,8 @@ impl ByRank {
         let (next, total) = (AtomicUsize::new(0), Mutex::new(Tally::default()));
         parallel(job.threads, |_| {
             let guard = StopOnDrop::new(|| outlet.stop());
-            let mut bench = benches.bench();
-            let mut encode = |chunk| bench.encode(&benches, &chunk);
+            let mut encoder = encoders.one();
+            let mut encode = |chunk| encoder.encode(&encoders, &chunk);
             let mut hands = Hands { commit: &commit, encode: &mut encode };
             loop {
                 let number = next.fetch_add(1, Ordering::Relaxed);
@@ -226,16 +226,16 @@ impl ByRank {
                 job.advance(count)?;
             }
             outlet.drain(&mut hands, |turn| turn.0 >= self.lists.len() as u64)?;
-            lock(&total).merge(&bench.tally);
+            lock(&total).merge(&encoder.tally);
             guard.disarm();
             Ok(())
         })?;
         let rest = lock(&open).rest().into_iter().collect();
-        let mut bench = benches.bench();
-        let mut encode = |chunk| bench.encode(&benches, &chunk);
+        let mut encoder = encoders.one();
+        let mut encode = |chunk| encoder.encode(&encoders, &chunk);
         let said = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
         let mut tally = std::mem::take(&mut *lock(&total));
-        tally.merge(&bench.tally);
+        tally.merge(&encoder.tally);
         let summary = said.into_iter().next();
         Ok((summary.ok_or_else(|| Error::internal("an output said nothing"))?, tally))
     }

@@ -2,7 +2,8 @@
 //! arguments put in their place.
 
 use super::mistake::{Mistake, advice};
-use super::node::{Entry, Node, Place, Value};
+use super::node::{Entry, Node, Value};
+use super::place::Place;
 use super::registry::Registry;
 use super::set::Set;
 

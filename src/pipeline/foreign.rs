@@ -1,7 +1,8 @@
 //! Pipeline texts that are not quite: tables in single brackets, and pipelines of other programs.
 
 use super::mistake::Mistake;
-use super::node::{self, Entry, Place};
+use super::node::{self, Entry};
+use super::place::Place;
 
 /// Reads a pipeline file's text as TOML, or says every place where it is none, or the one thing that
 /// it is instead.

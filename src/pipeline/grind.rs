@@ -3,22 +3,22 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
+use super::by_input::ByInput;
 use super::by_rank::{ByRank, Starts};
-use super::by_time::ByTime;
-use super::chunks::{Chunk, Counts, Cutter, Open, Stored};
+use super::chunk::{Chunk, Open};
+use super::chunks::{Counts, Cutter, Stored};
 use super::cut::{Cut, neighbors, reach};
-use super::each::ByInput;
+use super::encoding::ChunkEncoders;
 use super::job::{Job, StopOnDrop};
 use super::outlet::{Hands, Outlet};
 use super::passes::{Op, Pass};
 use super::product::Product;
 use super::rounded::Rounded;
 use crate::geom::lattice::Lattice;
-use crate::point::{Edit, PointBatch};
-use crate::report::{Baseline, KEY_POINTS, Tally};
-use crate::stage::{Encode, Encoded, Sink, SinkSummary};
+use crate::report::{Baseline, Tally};
+use crate::stage::{Sink, SinkSummary};
 use crate::tile::{
-    Fetch, Loader, Run, SealedTiles, Sieve, SpillArea, State, Tile, TileKey, lock, parallel,
+    Fetch, Loader, Run, SealedTiles, Sieve, SpillArea, Tile, TileKey, lock, parallel,
 };
 use crate::{Error, Result};
 
@@ -82,7 +82,7 @@ pub(super) fn grind(
         Some(cutter) => cutter.cut(&product),
         None => Err(Error::internal("a tile came behind the last")),
     };
-    let benches = Benches::new(job, tiles, &sinks);
+    let encoders = ChunkEncoders::new(job, tiles, &sinks);
     let outlet: Outlet<Product, Chunk> =
         Outlet::new(sinks.into_iter().map(|(_, sink)| sink).collect(), cut.millers);
     let side = pass.compares(&job.ops);
@@ -91,8 +91,8 @@ pub(super) fn grind(
     let next = AtomicUsize::new(0);
     parallel(cut.millers, |_| {
         let guard = StopOnDrop::new(|| outlet.stop());
-        let mut bench = benches.bench();
-        let mut encode = |chunk| bench.encode(&benches, &chunk);
+        let mut encoder = encoders.one();
+        let mut encode = |chunk| encoder.encode(&encoders, &chunk);
         let mut hands = Hands { commit: &commit, encode: &mut encode };
         let mut worker = Worker::new(job, pass, field, sieve, cut.capacity, wants_normals);
         worker.sum.baseline = baseline();
@@ -105,7 +105,7 @@ pub(super) fn grind(
             job.advance(positions)?;
         }
         outlet.drain(&mut hands, |turn| turn.0 >= keys.len() as u64)?;
-        worker.sum.tally.merge(&bench.tally);
+        worker.sum.tally.merge(&encoder.tally);
         lock(&total).merge(&worker.sum);
         guard.disarm();
         Ok(())
@@ -113,11 +113,11 @@ pub(super) fn grind(
     let unfinished = || Error::internal("a pass was finished twice");
     let (rest, stored, (by_input, by_rank), counts) =
         lock(&cutter).take().ok_or_else(unfinished)?.finish()?;
-    let mut bench = benches.bench();
-    let mut encode = |chunk| bench.encode(&benches, &chunk);
+    let mut encoder = encoders.one();
+    let mut encode = |chunk| encoder.encode(&encoders, &chunk);
     let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
     let Sum { mut tally, decided, oriented, baseline } = std::mem::take(&mut *lock(&total));
-    tally.merge(&bench.tally);
+    tally.merge(&encoder.tally);
     Ok(Milled { tally, stored, counts, written, by_input, by_rank, decided, oriented, baseline })
 }
 
@@ -139,137 +139,6 @@ impl Sum {
             mine.merge(theirs);
         }
     }
-}
-
-/// What threads need to encode chunks.
-pub(super) struct Benches<'a> {
-    job: &'a Job<'a>,
-    tiles: &'a SealedTiles,
-    encoders: Vec<Arc<dyn Encode>>,
-    /// For each, how the records of a chunk are ordered, if not as they come.
-    by_time: Vec<Option<ByTime>>,
-    /// The sink by whose records classes are counted as kept: one of what all stages leave.
-    counted: Option<usize>,
-    /// True if chunks tell where records are stored instead of their rank.
-    stored: bool,
-    chunk_points: usize,
-}
-
-impl<'a> Benches<'a> {
-    fn new(job: &'a Job<'a>, tiles: &'a SealedTiles, sinks: &[(usize, Box<dyn Sink>)]) -> Self {
-        Benches {
-            job,
-            tiles,
-            encoders: sinks.iter().map(|(_, sink)| sink.encoder()).collect(),
-            by_time: sinks.iter().map(|(n, _)| by_time(job, job.by_time[*n])).collect(),
-            stored: false,
-            counted: sinks.iter().position(|(sink, _)| *sink == job.last_sink),
-            chunk_points: sinks.iter().map(|(_, sink)| sink.chunk_points()).max().unwrap_or(0),
-        }
-    }
-
-    /// For chunks of one output, by whose records classes are counted or not.
-    pub fn of_one(
-        job: &'a Job<'a>,
-        tiles: &'a SealedTiles,
-        sink: &dyn Sink,
-        counted: bool,
-        likes_time: bool,
-    ) -> Self {
-        Benches {
-            job,
-            tiles,
-            encoders: vec![sink.encoder()],
-            by_time: vec![by_time(job, likes_time)],
-            counted: counted.then_some(0),
-            stored: false,
-            chunk_points: sink.chunk_points(),
-        }
-    }
-
-    /// The same for chunks that tell where records are stored.
-    pub fn of_stored(self) -> Self {
-        Benches { stored: true, ..self }
-    }
-
-    /// What a thread holds to encode them.
-    pub fn bench(&self) -> Bench {
-        Bench::new(self.job, self.chunk_points)
-    }
-}
-
-/// What a thread holds to encode chunks.
-pub(super) struct Bench {
-    numbers: Vec<u64>,
-    states: Vec<State>,
-    fetch: Fetch,
-    batch: PointBatch,
-    pub tally: Tally,
-}
-
-impl Bench {
-    /// For chunks of up to `chunk_points` records.
-    pub fn new(job: &Job<'_>, chunk_points: usize) -> Self {
-        Bench {
-            numbers: Vec::with_capacity(chunk_points),
-            states: Vec::with_capacity(chunk_points),
-            fetch: Fetch::default(),
-            batch: PointBatch::new(job.source.schema().clone(), chunk_points),
-            tally: Tally::default(),
-        }
-    }
-
-    /// The chunk's records, encoded, and for which of the sinks.
-    pub fn encode(&mut self, all: &Benches<'_>, chunk: &Chunk) -> Result<(usize, Encoded)> {
-        self.batch.clear();
-        chunk.number(&mut self.numbers);
-        chunk.states(&mut self.states);
-        match all.stored {
-            false => all.tiles.fetch(&self.numbers, &mut self.fetch, &mut self.batch)?,
-            true => all.tiles.fetch_stored(&self.numbers, &mut self.fetch, &mut self.batch)?,
-        }
-        if all.counted == Some(chunk.sink) {
-            all.job.classes.keep_by_state(&self.batch, &self.states, &mut self.tally);
-            count_key_points(&self.states, &mut self.tally);
-        }
-        let mut normals = chunk.spread_normals();
-        if let Some(by_time) = all.by_time.get(chunk.sink).and_then(Option::as_ref) {
-            by_time.sort(&mut self.batch, &mut self.states, normals.as_deref_mut());
-        }
-        edit(&mut self.batch, &self.states)?;
-        self.batch.normals = normals;
-        let encoder = all.encoders.get(chunk.sink);
-        let encoder = encoder.ok_or_else(|| Error::internal("a chunk is for no sink"))?;
-        Ok((chunk.sink, encoder.encode(&self.batch)?))
-    }
-}
-
-fn by_time(job: &Job<'_>, likes_time: bool) -> Option<ByTime> {
-    likes_time.then(|| ByTime::of(job.source.schema())).flatten()
-}
-
-/// Counts the records that are written with the key-point flag because they stay.
-fn count_key_points(states: &[State], tally: &mut Tally) {
-    let is_set = |state: &&State| state.edits() & Edit::SetKeyPoint as u8 != 0;
-    match states.iter().filter(is_set).count() as u64 {
-        0 => {}
-        some => tally.count(KEY_POINTS, some),
-    }
-}
-
-/// Writes the edits of `states` into the records.
-fn edit(batch: &mut PointBatch, states: &[State]) -> Result<()> {
-    let schema = batch.schema().clone();
-    for (record, state) in batch.records_mut().chunks_exact_mut(schema.stride).zip(states) {
-        for edit in Edit::of(state.edits()) {
-            let field = schema.find(edit.dimension());
-            if !field.is_some_and(|field| edit.write(field, &schema, record)) {
-                let name = edit.dimension();
-                return Err(Error::pipeline(format!("the records cannot hold the mark in {name}")));
-            }
-        }
-    }
-    Ok(())
 }
 
 /// What a thread needs to mill tiles.

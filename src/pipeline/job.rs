@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
-use super::each::Each;
 use super::passes::{Pass, StageOp};
+use super::publish::Staged;
 use super::settings::Headers;
 use super::tagger::{ClassOf, LEFT_OUT, Tagger};
 use crate::budget::Budget;
@@ -15,7 +15,7 @@ use crate::geom::lattice::{Lattice, Misplaced};
 use crate::geom::simd::Simd;
 use crate::point::PointBatch;
 use crate::report::{Grouped, Tally};
-use crate::stage::{Part, Source, Transform};
+use crate::stage::{CreateSink, Part, Source, Transform};
 use crate::tile::{lock, parallel};
 use crate::{Error, ErrorKind, Result};
 
@@ -212,4 +212,13 @@ impl<F: Fn()> Drop for StopOnDrop<F> {
             stop();
         }
     }
+}
+
+/// The outputs of all inputs, in the order of these, and where they grow.
+pub(super) struct Each<'a> {
+    pub sinks: &'a [Box<dyn CreateSink>],
+    pub staged: &'a [Staged],
+    pub ranks: &'a [u32],
+    /// Records of a chunk.
+    pub chunk_points: usize,
 }

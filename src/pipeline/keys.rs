@@ -9,7 +9,8 @@ use serde::de::{
 };
 
 use super::mistake::Mistake;
-use super::node::{Entry, Node, Place, Value};
+use super::node::{Entry, Node, Value};
+use super::place::Place;
 use crate::error::nearest;
 use crate::quantity::{Figure, parse_count};
 

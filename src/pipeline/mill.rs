@@ -8,16 +8,16 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::Value;
 
+use super::by_input::ByInput;
 use super::by_rank::{ByRank, Starts, place};
 use super::chunks::Found;
 use super::clock::Clock;
 use super::cut::{Cut, cut_again, cut_all};
-use super::each::ByInput;
+use super::finished::Finished;
 use super::forecast::{forecast, samples_capacity};
 use super::grind::{Field, Milled, PassOutputs, grind};
 use super::job::Job;
 use super::passes::{Call, Op, Pass};
-use super::run::Finished;
 use super::shares::{BATCH, Demands, Shares};
 use super::survey::survey;
 use super::tagger::NOT_FINITE;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::node::Place;
+use super::place::Place;
 use crate::error::{is_control, nearest};
 use crate::{Error, ErrorKind};
 

@@ -2,15 +2,20 @@
 
 mod beside;
 mod builtin;
+mod by_input;
 mod by_rank;
 mod by_time;
+mod chunk;
 mod chunks;
 mod clock;
 mod connect;
 mod cut;
 mod draft;
 mod each;
+mod encoding;
+mod ends;
 mod files;
+mod finished;
 mod forecast;
 mod foreign;
 mod grind;
@@ -27,6 +32,7 @@ mod outlet;
 mod outline;
 mod outputs;
 mod passes;
+mod place;
 mod plan;
 mod product;
 mod publish;

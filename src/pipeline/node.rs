@@ -1,29 +1,10 @@
 //! A pipeline file's values, each with its place in the text it was read from.
 
-use std::ops::Range;
-
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::mistake::Mistake;
-
-/// A stretch of one of the texts that make up a pipeline: the file (0) or an argument (1, 2, …).
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Place {
-    /// Which text.
-    pub source: usize,
-    /// First byte of the stretch.
-    pub start: usize,
-    /// The byte behind its last.
-    pub end: usize,
-}
-
-impl Place {
-    /// The bytes `span` of text `source`.
-    pub fn new(source: usize, span: Range<usize>) -> Self {
-        Place { source, start: span.start, end: span.end }
-    }
-}
+use super::place::Place;
 
 /// A value and where it is written.
 #[derive(Debug, Clone)]

@@ -4,8 +4,8 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use super::beside::Beside;
+use super::by_input::{lists_bytes, ranks};
 use super::by_rank;
-use super::each::{lists_bytes, paths, ranks};
 use super::files::{Clash, Files, Use};
 use super::look::{Unfit, look};
 use super::passes::{Op, Pass, StageOp, Tap, check_limits, number_selections, unroll};
@@ -300,7 +300,7 @@ fn each_input(
     let mut each = Vec::new();
     for sink in sinks {
         let own = sink.each_input(&inputs)?.unwrap_or_default();
-        for path in paths(&own) {
+        for path in own.iter().map(|sink| sink.path().to_owned()) {
             files.write(&path).map_err(|clash| refuse(&clash, &path))?;
             if sink.path().is_dir() {
                 check_place(&path, settings.existing)?;

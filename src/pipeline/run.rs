@@ -9,8 +9,8 @@ use std::sync::{Arc, Mutex};
 use super::Watch;
 use super::by_rank::LISTED;
 use super::clock::Clock;
-use super::each::Each;
-use super::job::Job;
+use super::finished::Finished;
+use super::job::{Each, Job};
 use super::mill::mill;
 use super::plan::Plan;
 use super::publish::{Staged, make_folder, publish};
@@ -19,30 +19,17 @@ use super::scratch::{Scratch, Trouble, memory_warning};
 use super::settings::{Nonfinite, Spill};
 use super::shares::Demands;
 use super::stream::stream;
-use super::survey::{Lines, Measured};
+use super::survey::Lines;
 use super::tagger::{ClassOf, LEFT_OUT, NOT_FINITE};
 use crate::budget::Budget;
 use crate::point::{Metadata, names};
 use crate::report::{
-    ClassFigures, Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome,
-    PassFigures, Removed, Report, RunFigures, Tally, check_written, peak_memory,
+    Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome, Removed, Report,
+    RunFigures, check_written, peak_memory,
 };
 use crate::stage::{CreateSink, Input, Order, Sink, SinkSummary, Source, Transform};
 use crate::tile::{SpillArea, lock};
 use crate::{Error, Result};
-
-/// What a stream or a mill came to.
-pub(super) struct Finished {
-    pub read: u64,
-    pub kept: u64,
-    /// For each file of each sink, the records that it was given, and what it says.
-    pub written: Vec<Vec<(u64, SinkSummary)>>,
-    pub tally: Tally,
-    pub decisions: Vec<Decision>,
-    pub classes: Vec<ClassFigures>,
-    pub passes: Vec<PassFigures>,
-    pub measured: Option<Measured>,
-}
 
 /// A run that is done. Displayed as a few lines for the terminal.
 #[derive(Debug)]

@@ -1,7 +1,8 @@
 //! Values that an argument puts in the place of a pipeline file's: `--set stage.key=value`.
 
 use super::mistake::{self, Mistake, SourceText};
-use super::node::{self, Node, Place};
+use super::node::{self, Node};
+use super::place::Place;
 use crate::Result;
 
 /// The argument whose texts [`Set::parse`] reads, as errors name it.

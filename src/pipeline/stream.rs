@@ -3,9 +3,9 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use super::finished::Finished;
 use super::job::{Job, StopOnDrop};
 use super::outlet::{Hands, Outlet};
-use super::run::Finished;
 use super::shares::{BATCH, Shares};
 use super::tagger::NOT_FINITE;
 use crate::geom::lattice::{Lattice, Misplaced};

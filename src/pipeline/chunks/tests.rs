@@ -1,9 +1,10 @@
 //! Products cut into the chunks of sinks.
 
+use super::super::product::Entry;
 use super::*;
 use crate::budget::Budget;
 use crate::point::Edit;
-use crate::tile::{FATE_BYTES, Folder, Tag};
+use crate::tile::{FATE_BYTES, Folder, State, Tag};
 
 #[derive(Debug)]
 struct Nowhere;
