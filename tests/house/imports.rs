@@ -129,6 +129,83 @@ fn imports_point_down() {
     assert!(down.is_empty(), "modules in no layer: {:?}", down.keys());
 }
 
+/// The names in its room that a file's text reaches, `depth` levels below the room.
+fn reached_aside(text: &str, room: &str, depth: usize) -> Vec<String> {
+    let text = without_comments(text);
+    let (ladder, absolute) = ("super::".repeat(depth), format!("crate::{room}::"));
+    let mut names: Vec<String> = Vec::new();
+    for way in [&ladder, &absolute] {
+        for (at, found) in text.match_indices(way.as_str()) {
+            let behind = &text[at + found.len()..];
+            if !text[..at].ends_with("super::") && !behind.starts_with("super::") {
+                names.extend(first_names(behind).iter().map(|name| (*name).to_owned()));
+            }
+        }
+    }
+    names
+}
+
+/// A circle among `imports`, if there is one: files each of which imports the next.
+fn circle(imports: &BTreeMap<String, Vec<String>>) -> Option<Vec<String>> {
+    let mut left = imports.clone();
+    // Files that import none that is left cannot be in a circle.
+    loop {
+        let is_left = |names: &Vec<String>| names.iter().any(|name| left.contains_key(name));
+        let done: Vec<String> =
+            left.iter().filter(|(_, to)| !is_left(to)).map(|(name, _)| name.clone()).collect();
+        if done.is_empty() {
+            break;
+        }
+        done.iter().for_each(|name| drop(left.remove(name)));
+    }
+    let mut way: Vec<String> = vec![left.keys().next()?.clone()];
+    loop {
+        let next = left[way.last()?].iter().find(|name| left.contains_key(*name))?.clone();
+        if let Some(begin) = way.iter().position(|name| *name == next) {
+            return Some(way.split_off(begin));
+        }
+        way.push(next);
+    }
+}
+
+#[test]
+fn no_files_of_the_pipeline_import_each_other_in_a_circle() {
+    let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/pipeline");
+    let mut imports: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for file in files(&room) {
+        let within = file.strip_prefix(&room).unwrap().with_extension("");
+        let path: Vec<&str> = within.iter().map(|part| part.to_str().unwrap()).collect();
+        if path == ["mod"] || path.last() == Some(&"tests") {
+            continue;
+        }
+        let text = fs::read_to_string(&file).unwrap();
+        let code = text.split("#[cfg(test)]\nmod tests").next().unwrap();
+        let to = reached_aside(code, "pipeline", path.len());
+        let own = path[0].to_owned();
+        imports.entry(own.clone()).or_default().extend(to.into_iter().filter(|name| *name != own));
+    }
+    let count: usize = imports.values().map(Vec::len).sum();
+    assert!(imports.len() > 40 && count > 150, "{} files, {count} imports", imports.len());
+    assert_eq!(circle(&imports), None);
+}
+
+#[test]
+fn circles_of_imports_are_found() {
+    let imports = |arrows: &[(&str, &[&str])]| {
+        let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+        arrows.iter().map(|&(from, to)| (from.to_owned(), names(to))).collect::<BTreeMap<_, _>>()
+    };
+    let none = imports(&[("a", &["b", "c"]), ("b", &["c"]), ("c", &["elsewhere"])]);
+    assert_eq!(circle(&none), None);
+    let some = imports(&[("a", &["b"]), ("b", &["c"]), ("c", &["d", "b"]), ("d", &[])]);
+    assert_eq!(circle(&some).unwrap(), ["b", "c"]);
+    let text = "use super::chunk::{Chunk, Open};\nfn f() { super::super::tile::lock(super::job::NONE) }\n\
+                use super::{each, files::Use};\nuse crate::pipeline::Watch; // super::comment";
+    let mut names = reached_aside(text, "pipeline", 1);
+    names.sort_unstable();
+    assert_eq!(names, ["Watch", "chunk", "each", "files", "job"]);
+}
+
 #[test]
 fn an_import_that_points_up_or_aside_is_found_however_it_is_written() {
     for (module, depth, text) in [
