@@ -3,8 +3,10 @@
 Without LIST the hashes are printed, a line each; with one that was printed before, lines that differ
 are, and the exit code is 1 if there are any. For changes of structure, which must change no byte:
 
-    python3 bench/same_bytes.py old/pointmill scans > before.txt
-    python3 bench/same_bytes.py new/pointmill scans before.txt
+    python3 bench/same_bytes.py old/pointmill scans > bench/same_bytes.txt
+    python3 bench/same_bytes.py new/pointmill scans bench/same_bytes.txt
+
+The list that is kept is of 2026-11-28, before files and rooms were divided anew.
 """
 
 import hashlib
