@@ -46,7 +46,10 @@ impl fmt::Display for Table<'_> {
         marked_lines(f, result)?;
         if let Some(&cells) = result.counts.get("cells") {
             write!(f, "\ncells      {}", Grouped(cells))?;
-            if let Some(&without @ 1..) = result.counts.get("no_normal") {
+            // Passes that compute normals again count the same points again.
+            let computed =
+                result.passes.iter().filter(|pass| pass.stages.iter().any(|s| s == "normals"));
+            if let (Some(&without @ 1..), 1) = (result.counts.get("no_normal"), computed.count()) {
                 write!(f, ", and {} points in none: they have no normal, since", Grouped(without))?;
                 f.write_str(" their neighbours lie on a line or at one place, and stay")?;
             }

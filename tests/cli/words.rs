@@ -531,6 +531,9 @@ fn points_without_a_normal_are_counted_and_a_better_grid_is_told() {
         told.contains("\ncells      0, and 40 points in none: they have no normal, since"),
         "{told}"
     );
+    // Each pass looks at them again.
+    let told = done(at, &["reduce", "line.ply", "-o", "o.ply", "--passes", "3"]);
+    assert!(told.contains("40 in, 40 out") && !told.contains("120 points"), "{told}");
     // Leaves, of which no plane tells anything.
     done(at, &["synth", "als", "-n", "30k", "--noise", "3", "-o", "leaves.laz"]);
     let told = done(at, &["reduce", "leaves.laz", "-o", "o.laz", "--keep", "2%"]);
