@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
 use serde_json::Value;
@@ -15,6 +15,7 @@ use super::{interrupt, print};
 use crate::error::shown;
 use crate::pipeline::{Done, Plan, Watch};
 use crate::report::{Decision, Short};
+use crate::tile::lock;
 use crate::{Error, Result};
 
 /// Where all that a command says goes through; called from several threads.
@@ -105,7 +106,7 @@ impl Console {
     /// Tells what a plan decided.
     pub fn planned(&self, plan: &Plan) {
         let outline = plan.outline();
-        *self.unit.lock().unwrap_or_else(PoisonError::into_inner) = plan.unit();
+        *lock(&self.unit) = plan.unit();
         match &self.voice {
             Voice::Json(events) if !self.quiet => events.planned(&outline, &plan.to_string()),
             Voice::Text(_) if self.verbose => {
@@ -146,7 +147,7 @@ impl Console {
         if let Voice::Text(bars) = &self.voice {
             bars.clear();
         }
-        let ended = self.phase.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let ended = lock(&self.phase).take();
         if let Some((name, since)) = ended {
             print::message(format_args!("{name:8} {:.1} s", since.elapsed().as_secs_f64()));
         }
@@ -182,7 +183,7 @@ impl Watch for Console {
             Voice::Json(_) => {}
             Voice::Text(bars) => {
                 if self.verbose {
-                    let mut phase = self.phase.lock().unwrap_or_else(PoisonError::into_inner);
+                    let mut phase = lock(&self.phase);
                     *phase = Some((name, Instant::now()));
                 }
                 bars.phase(name, total);
@@ -212,7 +213,7 @@ impl Watch for Console {
             _ if self.quiet => {}
             Voice::Json(events) => events.chose(values),
             Voice::Text(bars) => {
-                let unit = *self.unit.lock().unwrap_or_else(PoisonError::into_inner);
+                let unit = *lock(&self.unit);
                 let each = values.iter().map(|decision| in_words(decision, unit));
                 let all = each.chain(self.hint.get().map(|hint| (*hint).to_owned()));
                 let line = all.collect::<Vec<String>>().join(", ");

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use clap::ValueEnum;
+
 use super::arguments::{self, From};
 use super::mistyped::marked;
 use super::print;
@@ -69,28 +71,28 @@ fn settings(arguments: &arguments::Picture) -> Settings {
             From::East => View::East,
             From::West => View::West,
         },
-        by: match arguments.by {
-            arguments::By::Height => By::Height,
-            arguments::By::Class => By::Class,
-            arguments::By::Color => By::Color,
-            arguments::By::Intensity => By::Intensity,
-        },
+        by: looked_at(arguments.by),
         width: arguments.width,
         threads: arguments.threads.unwrap_or_else(processors),
     }
 }
 
+fn looked_at(by: arguments::By) -> By {
+    match by {
+        arguments::By::Height => By::Height,
+        arguments::By::Class => By::Class,
+        arguments::By::Color => By::Color,
+        arguments::By::Intensity => By::Intensity,
+    }
+}
+
 /// What all of the scans can be coloured by.
 fn others(sources: &[&dyn Source]) -> String {
-    let all = [
-        (By::Height, "height"),
-        (By::Class, "class"),
-        (By::Color, "color"),
-        (By::Intensity, "intensity"),
-    ];
-    let can = |by: By| sources.iter().all(|source| by.is_in(source.schema()));
-    let mut flags: Vec<String> =
-        all.iter().filter(|(by, _)| can(*by)).map(|(_, word)| format!("`--by {word}`")).collect();
+    let can =
+        |by: &&arguments::By| sources.iter().all(|source| looked_at(**by).is_in(source.schema()));
+    let word = |by: &arguments::By| by.to_possible_value().map(|value| value.get_name().to_owned());
+    let can = arguments::By::value_variants().iter().filter(can).filter_map(word);
+    let mut flags: Vec<String> = can.map(|word| format!("`--by {word}`")).collect();
     let last = flags.pop().unwrap_or_default();
     let before = if flags.is_empty() { "" } else { " or " };
     format!("use {}{before}{last}", flags.join(", "))

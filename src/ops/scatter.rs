@@ -4,6 +4,8 @@ use crate::geom::angle::is_known;
 use crate::geom::plane::{Covariance, across, dot, smallest};
 use crate::tile::Tile;
 
+/// Scatter in radians up to which there is no noise: normals disagree at edges alone.
+pub(super) const SMOOTH: f64 = 0.01;
 /// Positions that a sample has, at least, if its normals are to be judged.
 const FEWEST: usize = 12;
 /// Smallest variance over the middle one, up to which positions are planar: an eighth as thick as

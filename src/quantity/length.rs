@@ -135,7 +135,8 @@ impl Serialize for Length {
 
 impl<'de> Deserialize<'de> for Length {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(LengthVisitor)
+        let read = deserializer.deserialize_any(LengthVisitor { none: false })?;
+        read.ok_or_else(|| serde::de::Error::custom("there is no length"))
     }
 }
 
@@ -145,19 +146,24 @@ impl Length {
     /// # Errors
     /// All but that word and a length.
     pub fn or_none<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Self>, D::Error> {
-        deserializer.deserialize_any(OrNone)
+        deserializer.deserialize_any(LengthVisitor { none: true })
     }
 }
 
-/// Reads the word itself and leaves all else to [`LengthVisitor`].
-struct OrNone;
+struct LengthVisitor {
+    /// True if `"none"` is a word, too.
+    none: bool,
+}
 
-impl Visitor<'_> for OrNone {
+impl Visitor<'_> for LengthVisitor {
     type Value = Option<Length>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        LengthVisitor.expecting(f)?;
-        f.write_str(", or \"none\"")
+        f.write_str(
+            "a length above 0 in the scan's unit, or with a unit such as \"2m\" or \"5cm\" (mm, cm, m, \
+             km, in, ft or us-ft)",
+        )?;
+        f.write_str(if self.none { ", or \"none\"" } else { "" })
     }
 
     fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<Self::Value, E> {
@@ -173,44 +179,18 @@ impl Visitor<'_> for OrNone {
     }
 
     fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Self::Value, E> {
-        match (text, Length::read(text)) {
-            ("none", _) => Ok(None),
-            (_, Some(length)) => Ok(Some(length)),
-            _ => Err(E::invalid_value(Unexpected::Str(text), &self)),
+        match Length::read(text) {
+            None if self.none && text == "none" => Ok(None),
+            None => Err(E::invalid_value(Unexpected::Str(text), &self)),
+            length => Ok(length),
         }
     }
 
     fn visit_unit<E: serde::de::Error>(self) -> Result<Self::Value, E> {
-        Ok(None)
-    }
-}
-
-struct LengthVisitor;
-
-impl Visitor<'_> for LengthVisitor {
-    type Value = Length;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(
-            "a length above 0 in the scan's unit, or with a unit such as \"2m\" or \"5cm\" (mm, cm, m, \
-             km, in, ft or us-ft)",
-        )
-    }
-
-    fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<Length, E> {
-        Length::of(value).ok_or_else(|| E::invalid_value(Unexpected::Float(value), &self))
-    }
-
-    fn visit_i64<E: serde::de::Error>(self, value: i64) -> Result<Length, E> {
-        self.visit_f64(value as f64)
-    }
-
-    fn visit_u64<E: serde::de::Error>(self, value: u64) -> Result<Length, E> {
-        self.visit_f64(value as f64)
-    }
-
-    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Length, E> {
-        Length::read(text).ok_or_else(|| E::invalid_value(Unexpected::Str(text), &self))
+        match self.none {
+            true => Ok(None),
+            false => Err(E::invalid_type(Unexpected::Unit, &self)),
+        }
     }
 }
 

@@ -62,7 +62,7 @@ impl fmt::Display for Table<'_> {
             write!(f, "\nangle      {angle:.4} rad at most: what {told}")?;
         }
         if let Some(totals) = &result.totals {
-            totals_lines(f, totals, result, self.unit)?;
+            self.totals_lines(f, totals)?;
         }
         if let Some(peak) = run.peak_memory_bytes {
             write!(f, "\nmemory     {} at most, budget {}", Bytes(peak), Bytes(run.memory_bytes))?;
@@ -159,94 +159,84 @@ fn class_lines(f: &mut fmt::Formatter<'_>, classes: &[ClassFigures], marked: boo
     Ok(())
 }
 
-/// What the reduction did to the surface, then how flat the scan is.
-fn totals_lines(
-    f: &mut fmt::Formatter<'_>,
-    totals: &Totals,
-    result: &Outcome,
-    unit: Option<&str>,
-) -> fmt::Result {
-    let long = |length: f64| Long(length, unit);
-    deviation_line(f, totals, result, unit)?;
-    baseline_line(f, totals, result, unit)?;
-    let planes = [("in tiles", &totals.tile_plane), ("whole scan", &totals.scan_plane)];
-    let (mut heading, mut rises) = ("plane RMS", false);
-    for (name, plane) in planes {
-        if let Pair { before: Some(PlaneFigures { rms: before, .. }), after } = plane {
-            write!(f, "\n{heading:9}  {name} {}", long(*before))?;
-            if let Some(after) = after {
-                write!(f, " → {}", long(after.rms))?;
-                rises |= after.rms > *before;
-            }
-            heading = "";
-        }
-    }
-    if rises {
-        write!(
-            f,
-            "\n           (points stay where the surface bends: those lie farther from one plane)"
-        )?;
-    }
-    Ok(())
-}
-
-/// How far removed records are from the surface, and of how many that is known.
-fn deviation_line(
-    f: &mut fmt::Formatter<'_>,
-    totals: &Totals,
-    result: &Outcome,
-    unit: Option<&str>,
-) -> fmt::Result {
-    let long = |length: f64| Long(length, unit);
-    let removed = totals.points.before.saturating_sub(totals.points.after);
-    let Some(DeviationTotals { points, rms, p95, max, at, .. }) = totals.deviation else {
-        let told = removed > 0;
-        return if told { write!(f, "\ndeviation  not measured") } else { Ok(()) };
-    };
-    write!(f, "\ndeviation  RMS {}, 95 % ≤ {}", long(rms), long(p95))?;
-    let step = result.lattice.map_or(0.0, |lattice| lattice.step);
-    let [x, y, z] = at.map(|at| Coordinate { at, step });
-    write!(f, ", max {} at ({x}, {y}, {z})", long(max))?;
-    match points < removed {
-        true => write!(f, ", of {} of {} removed points", Grouped(points), Grouped(removed)),
-        false => Ok(()),
-    }
-}
-
 /// Deviations are alike up to this factor: one of the two depends on where its cubes lie.
 const ABOUT: f64 = 1.02;
 
-/// What a voxel grid of as many points would have done, where points were reduced by their normals; or
-/// why that is not known.
-fn baseline_line(
-    f: &mut fmt::Formatter<'_>,
-    totals: &Totals,
-    result: &Outcome,
-    unit: Option<&str>,
-) -> fmt::Result {
-    let Pair { before, after } = totals.points;
-    match totals.baseline {
-        Some(ref baseline) => {
-            let BaselineFigures { side, rms, p95, .. } = *baseline;
-            let [side, rms, p95] = [side, rms, p95].map(|length| Long(length, unit));
-            write!(f, "\nbaseline   RMS {rms}, 95 % ≤ {p95}")?;
-            write!(f, ": a voxel grid of as many points, cubes of {side}")?;
-            let is_less = |of: &DeviationTotals| baseline.rms * ABOUT < of.rms;
-            match totals.deviation.as_ref().is_some_and(is_less) {
-                true => f.write_str(", which loses less here"),
-                false => Ok(()),
+impl Table<'_> {
+    fn long(&self, length: f64) -> Long<'_> {
+        Long(length, self.unit)
+    }
+
+    /// What the reduction did to the surface, then how flat the scan is.
+    fn totals_lines(&self, f: &mut fmt::Formatter<'_>, totals: &Totals) -> fmt::Result {
+        self.deviation_line(f, totals)?;
+        self.baseline_line(f, totals)?;
+        let planes = [("in tiles", &totals.tile_plane), ("whole scan", &totals.scan_plane)];
+        let (mut heading, mut rises) = ("plane RMS", false);
+        for (name, plane) in planes {
+            if let Pair { before: Some(PlaneFigures { rms: before, .. }), after } = plane {
+                write!(f, "\n{heading:9}  {name} {}", self.long(*before))?;
+                if let Some(after) = after {
+                    write!(f, " → {}", self.long(after.rms))?;
+                    rises |= after.rms > *before;
+                }
+                heading = "";
             }
         }
-        None if !result.counts.contains_key("cells") || before == after => Ok(()),
-        // The finest grid that is measured keeps three of four positions.
-        None if after > before / 4 * 3 => {
+        if rises {
             write!(
                 f,
-                "\nbaseline   not measured: a voxel grid of so many points removes hardly any"
-            )
+                "\n           (points stay where the surface bends: those lie farther from one plane)"
+            )?;
         }
-        None => {
-            write!(f, "\nbaseline   not measured: none of the voxel grids keeps as many points")
+        Ok(())
+    }
+
+    /// How far removed records are from the surface, and of how many that is known.
+    fn deviation_line(&self, f: &mut fmt::Formatter<'_>, totals: &Totals) -> fmt::Result {
+        let removed = totals.points.before.saturating_sub(totals.points.after);
+        let Some(DeviationTotals { points, rms, p95, max, at, .. }) = totals.deviation else {
+            let told = removed > 0;
+            return if told { write!(f, "\ndeviation  not measured") } else { Ok(()) };
+        };
+        write!(f, "\ndeviation  RMS {}, 95 % ≤ {}", self.long(rms), self.long(p95))?;
+        let step = self.report.result.lattice.map_or(0.0, |lattice| lattice.step);
+        let [x, y, z] = at.map(|at| Coordinate { at, step });
+        write!(f, ", max {} at ({x}, {y}, {z})", self.long(max))?;
+        match points < removed {
+            true => write!(f, ", of {} of {} removed points", Grouped(points), Grouped(removed)),
+            false => Ok(()),
+        }
+    }
+
+    /// What a voxel grid of as many points would have done, where points were reduced by their normals; or
+    /// why that is not known.
+    fn baseline_line(&self, f: &mut fmt::Formatter<'_>, totals: &Totals) -> fmt::Result {
+        let result = &self.report.result;
+        let Pair { before, after } = totals.points;
+        match totals.baseline {
+            Some(ref baseline) => {
+                let BaselineFigures { side, rms, p95, .. } = *baseline;
+                let [side, rms, p95] = [side, rms, p95].map(|length| self.long(length));
+                write!(f, "\nbaseline   RMS {rms}, 95 % ≤ {p95}")?;
+                write!(f, ": a voxel grid of as many points, cubes of {side}")?;
+                let is_less = |of: &DeviationTotals| baseline.rms * ABOUT < of.rms;
+                match totals.deviation.as_ref().is_some_and(is_less) {
+                    true => f.write_str(", which loses less here"),
+                    false => Ok(()),
+                }
+            }
+            None if !result.counts.contains_key("cells") || before == after => Ok(()),
+            // The finest grid that is measured keeps three of four positions.
+            None if after > before / 4 * 3 => {
+                write!(
+                    f,
+                    "\nbaseline   not measured: a voxel grid of so many points removes hardly any"
+                )
+            }
+            None => {
+                write!(f, "\nbaseline   not measured: none of the voxel grids keeps as many points")
+            }
         }
     }
 }

@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::{Cells, Keep, LARGEST_SIDE, MAX_ANGLE, Side};
+use crate::ops::scatter::SMOOTH;
 use crate::quantity::Setting;
 use crate::stage::ScanFacts;
 use crate::tile::Levels;
@@ -19,9 +20,6 @@ const SPACING: f64 = 0.75;
 /// Where more than one of so many positions stays, such cells could be more than the points to keep:
 /// they are nearly as small as the distance of neighbours.
 const SPREADABLE: u64 = 3;
-/// Scatter in radians up to which normals disagree at edges alone: cells may then be as small as those
-/// need.
-const CLEAN: f64 = 0.01;
 /// Without a number to keep: `min_spacing` in sides of the initial cells.
 const SPACING_OF_SIDE: f64 = 0.25;
 
@@ -79,9 +77,9 @@ impl Sampled {
         (angle.clamp(MAX_ANGLE, WIDEST) * 1e4).round() / 1e4
     }
 
-    /// True if there are planes, and no noise on them.
+    /// True if there are planes, and no noise on them: cells may be as small as edges need.
     fn is_clean(&self) -> bool {
-        self.scatter.is_some_and(|scatter| scatter <= CLEAN)
+        self.scatter.is_some_and(|scatter| scatter <= SMOOTH)
     }
 
     /// Share that stays at that angle: between the two next ones, by powers.

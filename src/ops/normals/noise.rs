@@ -2,7 +2,7 @@
 
 use super::Normals;
 use crate::Result;
-use crate::ops::scatter::{scatter, typical};
+use crate::ops::scatter::{SMOOTH, scatter, typical};
 use crate::quantity::Setting;
 use crate::report::Tally;
 use crate::stage::{Forecast, TileOp};
@@ -10,8 +10,6 @@ use crate::tile::Tile;
 
 /// Neighbours that the noise is measured with: those of the paper.
 const FIRST: usize = 10;
-/// Scatter in radians of normals of so many up to which they do.
-const SMOOTH: f64 = 0.01;
 /// Neighbours beyond: as good as 30 on every scene of `cargo bench --bench quality`, and cheaper. A
 /// plan's memory is for these.
 pub(super) const MOST: usize = 20;
