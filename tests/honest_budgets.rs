@@ -34,32 +34,16 @@ fn named(told: &str) -> u64 {
     help[begin..end].parse().unwrap()
 }
 
-/// Moves the stored coordinates of every record of a copy of `scan`.
-fn moved(scan: &Scan, mut to: impl FnMut(usize, [i32; 3]) -> [i32; 3]) -> Scan {
-    let mut scan = scan.clone();
-    for (i, record) in scan.records.chunks_exact_mut(scan.schema.stride).enumerate() {
-        let mut stored = [0; 3];
-        for (axis, bytes) in record[..12].as_chunks::<4>().0.iter().enumerate() {
-            stored[axis] = i32::from_le_bytes(*bytes);
-        }
-        let stored = to(i, stored);
-        for (bytes, v) in record[..12].as_chunks_mut::<4>().0.iter_mut().zip(stored) {
-            *bytes = v.to_le_bytes();
-        }
-    }
-    scan
-}
-
 /// Scans that need very different tiles; the last has more points than tiles take in least memory.
 fn scenes() -> Vec<(&'static str, Scan)> {
     let even = Scan::synthetic(Scene::Als, 30_000, 3);
     let mut random = Random(11);
-    let cluster = moved(&even, |i, p| match i % 3 {
+    let cluster = even.moved(|i, p| match i % 3 {
         0 => p,
         _ => [0, 1, 2].map(|axis| [700, 700, 300][axis] + random.below(400) as i32),
     });
-    let line = moved(&even, |i, _| [17 * i as i32, 0, 0]);
-    let copies = moved(&even, |i, p| if i % 4 == 0 { p } else { [5_000, 5_000, (i % 7) as i32] });
+    let line = even.moved(|i, _| [17 * i as i32, 0, 0]);
+    let copies = even.moved(|i, p| if i % 4 == 0 { p } else { [5_000, 5_000, (i % 7) as i32] });
     let heavy = Scan::synthetic(Scene::Als, 200_000, 5);
     vec![("even", even), ("cluster", cluster), ("line", line), ("copies", copies), ("heavy", heavy)]
 }
@@ -107,7 +91,7 @@ fn a_side_that_samples_choose_is_refused_with_a_lower_bound_before_them_and_fits
     // Most points lie in one place: what the first cells take is not what the last do.
     let even = Scan::synthetic(Scene::Als, 400_000, 3);
     let mut random = Random(7);
-    let scan = moved(&even, |i, p| match i % 4 {
+    let scan = even.moved(|i, p| match i % 4 {
         0 => p,
         _ => [0, 1, 2].map(|axis| [7_000, 7_000, 300][axis] + random.below(60) as i32),
     });
@@ -133,7 +117,7 @@ fn a_side_that_samples_choose_is_refused_with_a_lower_bound_before_them_and_fits
 fn copies_that_differ_in_class_are_refused_with_a_lower_bound_and_fit_in_the_end() {
     // 200,000 copies of one position: neighbours in the order of their bytes differ in class.
     let even = Scan::synthetic(Scene::Als, 200_000, 3);
-    let mut scan = moved(&even, |_, _| [1_000, 2_000, 3_000]);
+    let mut scan = even.moved(|_, _| [1_000, 2_000, 3_000]);
     let class = scan.schema.find("Classification").unwrap().clone();
     let (schema, mut random) = (scan.schema.clone(), Random(4));
     for record in scan.records.chunks_exact_mut(schema.stride) {

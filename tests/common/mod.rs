@@ -63,6 +63,23 @@ impl Scan {
         Scan::of(&*source, usize::MAX)
     }
 
+    /// A copy whose records lie elsewhere in stored coordinates: `to` gets the number of each and where
+    /// it lies.
+    pub fn moved(&self, mut to: impl FnMut(usize, [i32; 3]) -> [i32; 3]) -> Scan {
+        let mut scan = self.clone();
+        for (i, record) in scan.records.chunks_exact_mut(scan.schema.stride).enumerate() {
+            let mut stored = [0; 3];
+            for (axis, bytes) in record[..12].as_chunks::<4>().0.iter().enumerate() {
+                stored[axis] = i32::from_le_bytes(*bytes);
+            }
+            let stored = to(i, stored);
+            for (bytes, v) in record[..12].as_chunks_mut::<4>().0.iter_mut().zip(stored) {
+                *bytes = v.to_le_bytes();
+            }
+        }
+        scan
+    }
+
     /// At most the first `limit` records of a file.
     pub fn read(path: &Path, limit: usize) -> Scan {
         let paths = [path.to_owned()];

@@ -61,23 +61,20 @@ fn first_names(text: &str) -> Vec<&str> {
     names
 }
 
+/// The first names behind each `way` in a text, such as `crate::`.
+fn behind<'a>(text: &'a str, way: &str) -> Vec<&'a str> {
+    let is_whole = |before: &str| !before.ends_with(|c: char| c.is_alphanumeric() || c == '_');
+    let whole = text.match_indices(way).filter(|(at, _)| is_whole(&text[..*at]));
+    whole.flat_map(|(at, found)| first_names(&text[at + found.len()..])).collect()
+}
+
 /// The names at the root of the crate that the text of a file reaches, from a module that is `depth`
 /// levels below the root: by `crate::`, or by as many `super::`.
 fn reached(text: &str, depth: usize) -> Vec<String> {
     let text = without_comments(text);
-    let mut names: Vec<String> = Vec::new();
-    for (at, found) in text.match_indices("crate::") {
-        if !text[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_') {
-            names.extend(first_names(&text[at + found.len()..]).iter().map(|n| (*n).to_owned()));
-        }
-    }
-    let ladder = "super::".repeat(depth);
-    for (at, found) in text.match_indices(&ladder) {
-        let known = |name: &&str| layer(name).is_some();
-        let from_root = first_names(&text[at + found.len()..]);
-        names.extend(from_root.into_iter().filter(known).map(str::to_owned));
-    }
-    names
+    let from_root = behind(&text, &"super::".repeat(depth));
+    let known = from_root.into_iter().filter(|name| layer(name).is_some());
+    behind(&text, "crate::").into_iter().chain(known).map(str::to_owned).collect()
 }
 
 /// What is wrong with a file of `module`, and to how many lower layers' names it leads.
@@ -131,18 +128,11 @@ fn imports_point_down() {
 
 /// The names in its room that a file's text reaches, `depth` levels below the room.
 fn reached_aside(text: &str, room: &str, depth: usize) -> Vec<String> {
-    let text = without_comments(text);
-    let (ladder, absolute) = ("super::".repeat(depth), format!("crate::{room}::"));
-    let mut names: Vec<String> = Vec::new();
-    for way in [&ladder, &absolute] {
-        for (at, found) in text.match_indices(way.as_str()) {
-            let behind = &text[at + found.len()..];
-            if !text[..at].ends_with("super::") && !behind.starts_with("super::") {
-                names.extend(first_names(behind).iter().map(|name| (*name).to_owned()));
-            }
-        }
-    }
-    names
+    // Longer ladders lead out of the room, whose files have no such names.
+    let text = without_comments(text).replace(&"super::".repeat(depth + 1), "crate::");
+    let ladder = behind(&text, &"super::".repeat(depth));
+    let absolute = behind(&text, &format!("crate::{room}::"));
+    ladder.into_iter().chain(absolute).map(str::to_owned).collect()
 }
 
 /// A circle among `imports`, if there is one: files each of which imports the next.
