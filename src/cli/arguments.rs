@@ -12,7 +12,7 @@ use super::run::whole_or_text;
 use super::words::{Flag, Given, flags};
 use crate::Result;
 use crate::error::nearest;
-use crate::pipeline::MOST_THREADS;
+use crate::graph::MOST_THREADS;
 use crate::quantity::parse_count;
 
 const EXIT_CODES: &str = "\

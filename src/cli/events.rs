@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 use super::console::Told;
 use super::{exit_number, print};
 use crate::ErrorKind;
-use crate::pipeline::{Done, Outline};
+use crate::engine::Done;
+use crate::plan::Outline;
 use crate::report::Decision;
 
 /// Least time between two events of progress.

@@ -27,7 +27,7 @@ use std::process::ExitCode;
 use clap::FromArgMatches;
 
 use crate::error::shown;
-use crate::pipeline::Registry;
+use crate::language::Registry;
 use crate::{Error, ErrorKind, Result};
 use arguments::{Arguments, Command};
 use console::Console;

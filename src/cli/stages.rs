@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::arguments::Stages;
 use super::print;
 use crate::error::nearest;
-use crate::pipeline::Registry;
+use crate::language::Registry;
 use crate::{Error, Result};
 
 /// The `[run]` table, then every built-in kind: written from the documentation of their keys by the

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::arguments::Command;
 use super::{convert, run, stages};
-use crate::pipeline::Set;
+use crate::language::Set;
 
 /// A flag of a command, the setting that it stands for, and its value if it was given.
 pub(super) struct Flag {

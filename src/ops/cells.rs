@@ -23,8 +23,9 @@ use crate::geom::lattice::Lattice;
 use crate::point::{Units, names};
 use crate::quantity::{Angle, Length, Setting};
 use crate::report::Tally;
-use crate::stage::{Forecast, Needs, ScanFacts, TileOp};
-use crate::tile::{Cells as Partition, Levels, Tile};
+use crate::stage::{Forecast, Needs, Role, ScanFacts, StageKind, StagePlace, TileOp};
+use crate::store::Levels;
+use crate::tile::{Cells as Partition, Tile};
 use crate::{Error, Result};
 
 use division::{Counts, Division, Rule};
@@ -188,6 +189,20 @@ impl Serialize for Cells {
         keys.serialize_field("measure", &self.measure)?;
         keys.serialize_field("reference", &self.direction())?;
         keys.end()
+    }
+}
+
+impl StageKind for Cells {
+    const KIND: &'static str = "cells";
+    const ABOUT: &'static str = "Divides the scan into cells whose normals agree.";
+    const EITHER: &'static [&'static str] = &["keep", "max_angle"];
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.check().map_err(|(key, error)| at.blame(key, error))?;
+        Ok(match self.keep {
+            Some(_) => Role::ScanOp(Box::new(self)),
+            None => Role::TileOp(Box::new(self)),
+        })
     }
 }
 

@@ -25,7 +25,7 @@ pub use figures::{
     Totals,
 };
 pub use ledger::{Ledger, Removed, check_written};
-pub use machine::{Machine, cpu_seconds, peak_memory, resident_now};
+pub use machine::Machine;
 pub use moments::{Moments, Plane};
 pub use sums::{Distances, FixedSum};
 pub use survey::{

@@ -19,7 +19,8 @@ use super::moments::{Moments, Plane};
 use super::sums::Distances;
 use crate::geom::lattice::Lattice;
 use crate::point::{Bounds, Position};
-use crate::tile::{Fate, Levels, TileKey};
+use crate::store::{Levels, TileKey};
+use crate::tile::Fate;
 use crate::{Error, Result};
 
 /// Positions that an occupied report tile holds on average, at least.

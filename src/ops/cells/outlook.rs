@@ -6,7 +6,7 @@ use super::{Cells, Keep, LARGEST_SIDE, MAX_ANGLE, Side};
 use crate::ops::scatter::SMOOTH;
 use crate::quantity::Setting;
 use crate::stage::ScanFacts;
-use crate::tile::Levels;
+use crate::store::Levels;
 
 /// Scatters that the angle is wide. Of the 32 normals of a cube of noise the farthest is off by
 /// 1.9 scatters, and the range of angles to the axis is twice that: noise alone divides few.
