@@ -1,10 +1,5 @@
-//! Lists side by side: row i has the i-th number of each list, so that what is done to a row is done
-//! to all of them. Knows no tiles, no stages.
-
-use super::simd::LANES;
-
-/// One number of each of 16 lists.
-pub type Row = [f64; LANES];
+//! Sorting lists side by side: row i has the i-th number of each list, so that what is done to a row
+//! is done to all of them. Knows no tiles, no stages.
 
 /// Numbers of several lists side by side.
 pub trait Ordered: Copy {

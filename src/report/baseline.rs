@@ -8,10 +8,8 @@
 
 use std::ops::Range;
 
-use serde::Serialize;
-
 use super::deviations::{Deviations, Histogram};
-use super::figures::world_length;
+use super::figures::{BaselineFigures, world_length};
 use crate::geom::angle::is_known;
 use crate::geom::lattice::Lattice;
 use crate::point::{Position, distance2};
@@ -21,19 +19,6 @@ use crate::tile::{Levels, Tile, TileKey};
 const LEVELS: usize = 6;
 /// Positions, and cubes of the coarsest level, that are enough for figures of the whole scan.
 const ENOUGH: (u64, u64) = (1 << 17, 1 << 12);
-
-/// The deviation of a voxel grid that keeps as many points, in world units.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct BaselineFigures {
-    /// Side of the cubes of a grid of that many points.
-    pub side: f64,
-    /// Removed records whose deviation was measured for it.
-    pub points: u64,
-    /// sqrt(Σd²/n), between those of two octree levels.
-    pub rms: f64,
-    /// 95 % deviate no more, likewise.
-    pub p95: f64,
-}
 
 /// Grids of several octree levels, of each cube the position nearest to the centre standing for the
 /// others. Merged in any order they are the same, however the scan is cut into tiles.

@@ -2,8 +2,8 @@
 
 use std::cmp::Ordering;
 
+use super::lot::Lot;
 use super::sums::{FixedSum, OpenSum};
-use super::survey::Lot;
 use crate::point::Position;
 use crate::tile::morton_cmp;
 

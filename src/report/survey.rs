@@ -15,11 +15,12 @@ use super::figures::{
     DeviationFigures, DeviationTotals, Pair, PlaneFigures, TileFigures, Totals, world_length,
     world_point,
 };
+use super::lot::Lot;
 use super::moments::{Moments, Plane};
 use super::sums::Distances;
 use crate::geom::lattice::Lattice;
 use crate::point::{Bounds, Position};
-use crate::tile::{Fate, Levels, TileKey};
+use crate::tile::{Levels, TileKey};
 use crate::{Error, Result};
 
 /// Positions that an occupied report tile holds on average, at least.
@@ -34,35 +35,6 @@ pub fn report_tile_level(levels: &Levels) -> u32 {
     let level = levels.smallest_side(POSITIONS_PER_TILE);
     let fewest = levels.occupied(level);
     (0..level).find(|&j| levels.occupied(j) == fewest).unwrap_or(level)
-}
-
-/// What became of the records of a position.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lot {
-    /// Records.
-    pub copies: u32,
-    /// Those of them that are kept.
-    pub kept: u32,
-    /// How far the others are from the surface of what stands for them, in lattice steps; None where
-    /// nothing does.
-    pub deviation: Option<f32>,
-}
-
-impl Lot {
-    /// The lot of `copies` records that share a fate: copies of a kept position are on the surface.
-    pub fn of(copies: u32, fate: Fate) -> Lot {
-        let (kept, deviation) = match fate {
-            Fate::Kept => (copies, None),
-            Fate::KeptOnce => (copies.min(1), Some(0.0)),
-            Fate::Removed => (0, None),
-            Fate::Represented { deviation } => (0, Some(deviation)),
-        };
-        Lot { copies, kept, deviation }
-    }
-
-    pub(super) fn removed(self) -> u32 {
-        self.copies.saturating_sub(self.kept)
-    }
 }
 
 fn no_moments(bounds: &Bounds) -> Pair<Moments> {

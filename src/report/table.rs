@@ -5,10 +5,9 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::baseline::BaselineFigures;
 use super::classes::class_name;
 use super::document::{Decision, Outcome, Report};
-use super::figures::{ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
+use super::figures::{BaselineFigures, ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
 use super::ledger::{Ledger, Removed};
 use super::tally::KEY_POINTS;
 use crate::budget::Bytes;

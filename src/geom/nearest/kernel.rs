@@ -3,9 +3,9 @@
 //! Squared distances are ((dx·dx) + dy·dy) + dz·dz everywhere, boxes included: rounding is
 //! monotonic, so no point of a box gets a smaller float than its box does.
 
-use super::tree::{LANES, Leaf, Node};
-use crate::geom::rows::Row;
-use crate::geom::simd::{COLUMNS, Kernel, Lanes, joined, smaller};
+use super::refine::Leaf;
+use super::tree::Node;
+use crate::geom::simd::{COLUMNS, Kernel, LANES, Lanes, Row, joined, smaller};
 
 /// What is farther than any point: no candidate yet.
 pub(super) const NONE: f64 = f64::from_bits((f32::MAX.to_bits() as u64) << 32 | u32::MAX as u64);

@@ -27,11 +27,11 @@ mod walk;
 
 use exact::{ExactWalk, Neighbor};
 use kernel::{Batch, distance_of};
-use tree::{EXACT, LANES, Node, Tree};
+use tree::{EXACT, Node, Tree};
 use walk::Walk;
 pub use walk::Work;
 
-use crate::geom::simd::Simd;
+use crate::geom::simd::{LANES, Simd};
 use crate::point::{Position, distance2};
 
 /// The relative error of the root of a float distance, 2.5 · 2^-24, rounded up.

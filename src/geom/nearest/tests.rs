@@ -316,7 +316,7 @@ fn building_again_within_the_reserve_allocates_nothing() {
             assert!(Nearest::bytes(points, k) - bytes <= k * 256 + 1024);
         }
         nearest.reserve(points);
-        let sizes = [size_of::<tree::Leaf>(), size_of::<Node>(), 48];
+        let sizes = [size_of::<refine::Leaf>(), size_of::<Node>(), 48];
         let allocated: usize =
             nearest.tree.capacity().iter().zip(sizes).map(|(n, size)| n * size).sum();
         assert_eq!(allocated, bytes, "what is promised is what is held");

@@ -4,33 +4,14 @@
 //! exact (or as fine as the node is small) wherever in the world it lies and however far away the
 //! farthest point of the set is.
 
-use super::refine::{RUN, Run};
+use super::refine::{Leaf, RUN, Run};
+use crate::geom::simd::LANES;
 use crate::point::{Bounds, Position};
 
-/// Points in a leaf, boxes in a node.
-pub(super) const LANES: usize = crate::geom::simd::LANES;
 /// Integers up to here are exact in f32.
 pub(super) const EXACT: i64 = 1 << 24;
 /// Levels of a tree of 2^32 points at most.
 const MAX_LEVELS: usize = 8;
-
-/// Up to 16 points in the frame of their node; unused lanes are infinitely far.
-#[derive(Debug, Clone)]
-#[repr(align(64))]
-pub(super) struct Leaf {
-    /// x, y and z.
-    pub at: [[f32; LANES]; 3],
-    /// Index of each point in the positions.
-    pub rank: [u32; LANES],
-}
-
-impl Leaf {
-    /// One of the points.
-    #[inline(always)]
-    pub fn point(&self, lane: usize) -> [f32; 3] {
-        [self.at[0][lane], self.at[1][lane], self.at[2][lane]]
-    }
-}
 
 /// Up to 16 boxes in the node's frame. The children of level 0 are leaves.
 #[derive(Debug, Clone)]

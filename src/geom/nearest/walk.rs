@@ -2,8 +2,8 @@
 //! ancestor down into whatever is near enough to matter.
 
 use super::kernel::{Batch, Boxes, Home, Visit};
-use super::tree::{EXACT, LANES, Tree, above, below};
-use crate::geom::simd::Simd;
+use super::tree::{EXACT, Tree, above, below};
+use crate::geom::simd::{LANES, Simd};
 use crate::point::Position;
 
 /// Above level 0, boxes are measured against bounds this much larger. Their distances are those of

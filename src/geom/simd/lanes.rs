@@ -2,12 +2,14 @@
 //! find in loops.
 
 use super::real::{EIGHT, Eight, Real};
-use crate::geom::rows::{self, Row};
+use crate::geom::rows;
 
 /// Numbers side by side.
 pub const LANES: usize = 16;
 /// Columns of a list that [`Lanes::insert`] inserts into.
 pub const COLUMNS: usize = 4;
+/// One number of each of 16 lists.
+pub type Row = [f64; LANES];
 
 /// Operations on 16 f32 at once, a value of an implementing type being the witness that the
 /// processor has them. Every implementation gives the bits of [`Portable`].
@@ -57,6 +59,18 @@ pub trait Lanes: Copy {
         low: &[u32; LANES],
         hits: u32,
     );
+}
+
+/// Code that is worth compiling for wider vectors.
+pub trait Kernel {
+    /// What it computes.
+    type Output;
+
+    /// Computes it. Implementations, and what they call in their inner loops, are `inline(always)`:
+    /// only what is inlined is compiled for the instruction set chosen, and closures around `lanes`
+    /// are not. Loops over arrays of numbers become vector instructions by themselves; `lanes` is for
+    /// what they do not.
+    fn run<L: Lanes>(self, lanes: L) -> Self::Output;
 }
 
 /// What every processor can do.

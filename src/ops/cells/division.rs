@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::Split;
 use super::limit::Limit;
+use super::settings::Split;
 use crate::geom::angle::{
     cone, cosine, direction, dominant_axis, is_turned, outer_sum, range, sine2,
 };

@@ -1,9 +1,10 @@
 //! How far normals scatter where the scan is planar, and what that means for the reduction.
 
+use super::auto::{self, LADDER, Sampled};
 use super::division::{Division, Rule};
+use super::keys::Cells;
 use super::limit::Limit;
-use super::outlook::{self, LADDER, Sampled};
-use super::{Cells, Keep};
+use super::target::Keep;
 use crate::Result;
 use crate::geom::angle::{MaxAngle, is_known};
 use crate::ops::scatter::{scatter, typical};
@@ -92,7 +93,7 @@ pub(super) fn forecast(cells: &mut Cells, samples: &[Vec<f64>]) -> Forecast {
     let (decided, seen) = (column(3).sum::<f64>(), column(4).sum::<f64>());
     let chosen = if seen > 0.0 { decided / seen } else { 1.0 };
     let sampled = Sampled { scatter, chosen, shares: shares(samples) };
-    let chosen = outlook::choose(cells, &sampled);
+    let chosen = auto::choose(cells, &sampled);
     let decisions = scatter.map(|scatter| ("normal_scatter".into(), scatter.into()));
     let warning = few_asked_for(cells).or_else(|| noisy(cells, samples, scatter?));
     Forecast { decisions: decisions.into_iter().collect(), chosen, warning }

@@ -2,9 +2,9 @@
 
 use serde_json::Value;
 
-use super::Keep;
 use super::entry::{self, Entry};
 use super::limit::{Limit, Ties};
+use super::target::Keep;
 use crate::geom::angle::MaxAngle;
 use crate::stage::Gathered;
 use crate::{Error, Result};

@@ -1,16 +1,13 @@
 //! Neighbourhoods estimated side by side: every lane does what
-//! [`Estimator::estimate`](super::Estimator::estimate) does, to
-//! the last bit.
+//! [`Estimator::estimate`](super::Estimator::estimate) does, to the last bit.
 
-use super::fan::Fan;
-use super::{Estimate, Fallback, Method, Outcome, alone, settled, varady};
+use super::estimate::{Estimate, Fallback, Method, Outcome, alone, settled, varady};
+use super::fan::{Fan, MOST, Row, load};
 use crate::geom::plane::{self, Covariance};
 use crate::geom::simd::{EIGHT, Kernel, Lanes, Mask, Real, Simd};
 use crate::geom::star::Star;
 use crate::tile::Neighborhood;
 
-/// Most neighbours of a neighbourhood that is not estimated alone.
-pub(super) const MOST: usize = 64;
 /// Binary logarithm of positions times offset up to which all sums of products are exact in f64:
 /// their squares.
 const EXACT_BITS: u32 = 26;
@@ -28,9 +25,6 @@ pub(super) fn shift(offsets: &[[i64; 3]], farthest2: u128) -> Option<u32> {
     let shared = offsets.iter().fold(0, |all, o| all | o[0] | o[1] | o[2]).trailing_zeros();
     (shared >= excess).then_some(shared)
 }
-
-/// One number of each neighbourhood.
-pub(super) type Row = [f64; EIGHT];
 
 /// Up to eight neighbourhoods of equally many neighbours, nearest first.
 #[derive(Debug, Default)]
@@ -214,12 +208,6 @@ impl Kernel for Together<'_> {
 #[inline(always)]
 fn store<L: Lanes>(lanes: L, rows: [L::F64; 3]) -> [Row; 3] {
     [lanes.store_eight(rows[0]), lanes.store_eight(rows[1]), lanes.store_eight(rows[2])]
-}
-
-/// Three rows.
-#[inline(always)]
-pub(super) fn load<L: Lanes>(lanes: L, rows: &[Row; 3]) -> [L::F64; 3] {
-    [lanes.load_eight(&rows[0]), lanes.load_eight(&rows[1]), lanes.load_eight(&rows[2])]
 }
 
 /// n·Σxy − Σx·Σy as in [`Covariance`].

@@ -4,16 +4,20 @@
 
 #![expect(clippy::needless_range_loop, reason = "one index walks several arrays of lanes")]
 
-use super::bundle::{MOST, Row, load};
 use crate::geom::plane::{across, choose, dot, unit_or_nan};
 use crate::geom::simd::{EIGHT, Lanes, Mask, Real};
 use crate::geom::star::{Projected, ROUNDING, cross};
 
+/// Most neighbours of a neighbourhood that is not estimated alone.
+pub(super) const MOST: usize = 64;
 /// Size of a turn that leaves no doubt, relative to the square of the largest inverted distance: far
 /// above what a star takes for none, so that every way around the hull meets the same corners.
 const CLEAR: f64 = 1.0 / (1u64 << 24) as f64;
 /// The nearest neighbour is in no doubt where no other is as near, up to this factor (of squares).
 const RIVAL: f64 = 1.0 + 1.0 / (1u64 << 36) as f64;
+
+/// One number of each neighbourhood.
+pub(super) type Row = [f64; EIGHT];
 
 /// The neighbours of eight points in their planes, a row for each; memory that stays.
 #[derive(Debug, Default)]
@@ -240,6 +244,12 @@ impl Fan {
         }
         unit_or_nan(sum)
     }
+}
+
+/// Three rows.
+#[inline(always)]
+pub(super) fn load<L: Lanes>(lanes: L, rows: &[Row; 3]) -> [L::F64; 3] {
+    [lanes.load_eight(&rows[0]), lanes.load_eight(&rows[1]), lanes.load_eight(&rows[2])]
 }
 
 /// A corner of each lane's hull, and where the walk around it has come to.

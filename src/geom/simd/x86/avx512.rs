@@ -4,8 +4,8 @@ use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
 use super::avx2::insert;
-use crate::geom::rows::{self, Ordered, Row};
-use crate::geom::simd::lanes::{COLUMNS, LANES, Lanes};
+use crate::geom::rows::{self, Ordered};
+use crate::geom::simd::lanes::{COLUMNS, LANES, Lanes, Row};
 use crate::geom::simd::real::{EIGHT, EXPONENT, Mask, Real};
 
 // SAFETY, of every block here: a value of a type of this module comes from `witness` alone, which is
