@@ -1,28 +1,16 @@
 //! What can be typed.
 
-use std::fmt;
-use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 
+use super::classes::{Classes, parse_classes};
+use super::exit::EXIT_CODES;
 use super::preset::Preset;
-use super::run::whole_or_text;
-use super::words::{Flag, Given, flags};
-use crate::Result;
-use crate::error::nearest;
+use super::seen::{ColoredBy, SeenFrom};
 use crate::pipeline::MOST_THREADS;
 use crate::quantity::parse_count;
-
-const EXIT_CODES: &str = "\
-Exit codes:
-  0    done
-  1    the run failed: I/O, bad data, over budget
-  2    the command or the pipeline is wrong
-  130  interrupted
-
-Results go to stdout, progress and messages to stderr.";
 
 /// Reduces laser scans that do not fit in memory to the points that matter.
 #[derive(Debug, Parser)]
@@ -104,20 +92,6 @@ pub(super) struct Common {
     pub no_clobber: bool,
 }
 
-impl Common {
-    /// The flags that stand for `[run]` settings.
-    pub fn flags(&self) -> Vec<Flag> {
-        let existing = self.no_clobber.then(|| Given::from("refuse"));
-        flags([
-            ("--memory", "run.memory", self.memory.clone().map(Given::from)),
-            ("--threads", "run.threads", self.threads.as_deref().map(whole_or_text)),
-            ("--scratch", "run.scratch", self.scratch.clone().map(Given::from)),
-            ("--report", "run.report", self.report.clone().map(Given::from)),
-            ("--no-clobber", "run.existing", existing),
-        ])
-    }
-}
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Progress {
     Auto,
@@ -133,62 +107,6 @@ fn within(text: &str, least: u64, most: u64) -> Result<u64, String> {
 
 fn parse_threads(text: &str) -> Result<usize, String> {
     within(text, 1, MOST_THREADS as u64).map(|threads| threads as usize)
-}
-
-/// Classes that have a name in the LAS specification (1.4 R15, table 17).
-const CLASSES: [(&str, u8); 10] = [
-    ("unclassified", 1),
-    ("ground", 2),
-    ("low-vegetation", 3),
-    ("medium-vegetation", 4),
-    ("high-vegetation", 5),
-    ("building", 6),
-    ("noise", 7),
-    ("water", 9),
-    ("rail", 10),
-    ("road", 11),
-];
-
-/// A class, or those from one to another.
-#[derive(Debug, Clone)]
-pub(super) struct Classes(RangeInclusive<u8>);
-
-impl Classes {
-    /// Every one of them.
-    pub fn each(&self) -> RangeInclusive<u8> {
-        self.0.clone()
-    }
-
-    /// True if `class` is one of them.
-    pub fn has(&self, class: u8) -> bool {
-        self.0.contains(&class)
-    }
-}
-
-/// As it is typed: `2`, `3-5`.
-impl fmt::Display for Classes {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (first, last) = (self.0.start(), self.0.end());
-        match first == last {
-            true => write!(f, "{first}"),
-            false => write!(f, "{first}-{last}"),
-        }
-    }
-}
-
-fn parse_classes(text: &str) -> Result<Classes, String> {
-    let (first, last) = text.split_once('-').unwrap_or((text, text));
-    match (first.trim().parse(), last.trim().parse()) {
-        (Ok(first), Ok(last)) if first <= last => return Ok(Classes(first..=last)),
-        (Ok(first), Ok::<u8, _>(last)) => {
-            return Err(format!("`{text}` is no range of classes: write {last}-{first}"));
-        }
-        _ => {}
-    }
-    let names = CLASSES.map(|(name, _)| name.to_owned());
-    let near = nearest(text, &names).and_then(|near| CLASSES.iter().find(|(n, _)| n == near));
-    let meant = near.map_or(String::new(), |(name, class)| format!("; {name} is {class}"));
-    Err(format!("classes are numbers from 0 to 255, or ranges such as 3-5{meant}"))
 }
 
 #[derive(Debug, Args)]
@@ -405,34 +323,16 @@ pub(super) struct Picture {
     pub output: PathBuf,
     /// From where the scans are seen
     #[arg(long, value_name = "WHERE", default_value = "above")]
-    pub from: From,
+    pub from: SeenFrom,
     /// What points are coloured by
     #[arg(long, value_name = "WHAT", default_value = "height")]
-    pub by: By,
+    pub by: ColoredBy,
     /// Pixels that the picture is wide, 64 to 4096
     #[arg(long, value_name = "PIXELS", default_value = "1600", value_parser = parse_width)]
     pub width: u32,
     /// Threads that work at once [default: all processors]
     #[arg(long, value_name = "N", value_parser = parse_threads)]
     pub threads: Option<usize>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum From {
-    Above,
-    South,
-    North,
-    East,
-    West,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum By {
-    Height,
-    Class,
-    #[value(alias = "colour")]
-    Color,
-    Intensity,
 }
 
 fn parse_width(text: &str) -> Result<u32, String> {

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::arguments::{Command, Progress};
 use super::events::Events;
 use super::progress::Bars;
-use super::words::Words;
+use super::words::{Told, Words};
 use super::{interrupt, print};
 use crate::error::shown;
 use crate::pipeline::{Done, Plan, Watch};
@@ -32,32 +32,6 @@ pub(super) struct Console {
     hint: OnceLock<&'static str>,
     /// The sign of the unit that lengths of the planned run are in.
     unit: Mutex<Option<&'static str>>,
-}
-
-/// An error in the words of a command.
-pub(super) struct Told<'a> {
-    /// Its kind, file and byte.
-    pub error: &'a Error,
-    /// Place and message.
-    pub message: String,
-    /// The causes beneath, from the first to the deepest.
-    pub causes: Vec<String>,
-    /// What the user can do.
-    pub help: Option<String>,
-}
-
-impl<'a> Told<'a> {
-    /// `error` in these words.
-    pub fn of(error: &'a Error, words: &Words) -> Self {
-        let first = std::error::Error::source(error);
-        let causes = std::iter::successors(first, |cause| cause.source());
-        Told {
-            error,
-            message: words.told(&error.to_string()),
-            causes: causes.map(|cause| words.told(&cause.to_string())).collect(),
-            help: error.remedy().map(|help| words.told(help)),
-        }
-    }
 }
 
 enum Voice {

@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 
 use super::arguments::Convert;
 use super::console::Console;
+use super::flags::{common_flags, convert_flags, given};
 use super::mistyped::marked;
-use super::run::{HIDDEN, filtered, given, mill, with_stages, written};
-use super::words::{self, Flag, Given};
+use super::run::{HIDDEN, mill, with_stages};
 use crate::budget::Bytes;
 use crate::error::shown;
 use crate::io::las;
@@ -160,31 +160,16 @@ fn run_all(
     (done, failures.first().map_or(Ok(()), |kind| Err(Error::new(*kind, told))))
 }
 
-/// The flags of `convert`, for a run that reads and writes these.
-pub(super) fn flags(
-    arguments: &Convert,
-    inputs: Option<Value>,
-    output: Option<Value>,
-) -> Vec<Flag> {
-    let mut all = words::flags([
-        ("IN", "read.path", inputs.map(Given::from)),
-        ("-o", "write.path", output.map(Given::from)),
-        ("--to", "write.format", arguments.to.clone().map(Given::from)),
-        ("--headers", "run.headers", arguments.headers.clone().map(Given::from)),
-        ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(Given::from)),
-    ]);
-    all.extend(filtered(&arguments.filter));
-    all.extend(written(&arguments.written));
-    all
-}
-
 fn pipeline(
     arguments: &Convert,
     inputs: Value,
     output: Value,
     registry: &Registry,
 ) -> Result<Pipeline> {
-    let sets = given([flags(arguments, Some(inputs), Some(output)), arguments.common.flags()]);
+    let sets = given([
+        convert_flags(arguments, Some(inputs), Some(output)),
+        common_flags(&arguments.common),
+    ]);
     let filter = arguments.filter.is_given().then_some("filter");
     Pipeline::parse_with(&with_stages(CONVERT, filter.into_iter()), HIDDEN, registry, &sets)
 }

@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use super::console::Told;
-use super::{exit_number, print};
+use super::exit::exit_number;
+use super::print;
+use super::words::Told;
 use crate::ErrorKind;
 use crate::pipeline::{Done, Outline};
 use crate::report::Decision;

@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
 
-use super::console::Told;
+use super::words::Told;
 use crate::error::is_control;
 use crate::{Error, Result};
 

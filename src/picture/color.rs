@@ -1,22 +1,7 @@
 //! What a point's colour says.
 
 use super::look::Look;
-use crate::point::{Dimension, Schema, names};
-use crate::{Error, Result};
-
-/// What points are coloured by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum By {
-    /// Their height: from dark blue through green and yellow to red.
-    #[default]
-    Height,
-    /// Their class: ground brown, vegetation green, buildings red, water blue, noise magenta.
-    Class,
-    /// Their own colour.
-    Color,
-    /// Their intensity: from black to light grey.
-    Intensity,
-}
+use super::settings::By;
 
 /// Red, green and blue.
 pub(super) type Rgb = [u8; 3];
@@ -59,32 +44,6 @@ impl By {
     /// for it and whose scanner did not measure it.
     pub(super) fn is_black(self, look: &Look) -> bool {
         matches!(self, By::Color | By::Intensity) && look.values == [0.0; 2]
-    }
-
-    /// The names of the dimensions that it looks at, and what they are in words.
-    fn names(self) -> (&'static [&'static str], &'static str) {
-        match self {
-            By::Height => (&["Z"], "heights"),
-            By::Class => (&[names::CLASSIFICATION], "classes"),
-            By::Color => (&[names::RED, names::GREEN, names::BLUE], "colours"),
-            By::Intensity => (&[names::INTENSITY], "intensities"),
-        }
-    }
-
-    /// True if records of `schema` can be coloured by it.
-    pub fn is_in(self, schema: &Schema) -> bool {
-        self.names().0.iter().all(|name| schema.find(name).is_some())
-    }
-
-    /// The dimensions that it looks at.
-    ///
-    /// # Errors
-    ///
-    /// A scan that does not have them.
-    pub fn dimensions(self, schema: &Schema) -> Result<Vec<&Dimension>> {
-        let (names, what) = self.names();
-        let missing = || Error::pipeline(format!("the scan has no {what}"));
-        names.iter().map(|name| schema.find(name).ok_or_else(missing)).collect()
     }
 
     /// What the first and the last colour stand for: the range of the middle 98 of 100 points, so

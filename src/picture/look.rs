@@ -4,40 +4,11 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::{NARROWEST, Settings};
+use super::settings::{NARROWEST, Settings};
 use crate::point::{Dimension, PointBatch};
 use crate::stage::{Part, Source};
 use crate::tile::{lock, parallel};
 use crate::{Error, ErrorKind, Result};
-
-/// From where a scan is seen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum View {
-    /// From above: x to the right, y up.
-    #[default]
-    Above,
-    /// From the south: x to the right, z up.
-    South,
-    /// From the north: −x to the right, z up.
-    North,
-    /// From the east: y to the right, z up.
-    East,
-    /// From the west: −y to the right, z up.
-    West,
-}
-
-impl View {
-    /// To the right, up, and towards the viewer.
-    pub(super) fn seen(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
-        match self {
-            View::Above => [x, y, z],
-            View::South => [x, z, -y],
-            View::North => [-x, z, y],
-            View::East => [y, z, x],
-            View::West => [-y, z, -x],
-        }
-    }
-}
 
 /// Points of which the middle range of figures is found, about.
 const SAMPLE: u64 = 100_000;

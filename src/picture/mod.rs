@@ -9,36 +9,20 @@
 mod color;
 mod look;
 mod paint;
+mod settings;
 
 use crate::stage::Source;
 use crate::{Error, Result};
 
-pub use color::By;
-pub use look::View;
 use look::{Frame, Look};
 use paint::Canvas;
+use settings::NARROWEST;
+pub use settings::{By, Settings, View, WIDEST};
 
 /// Panels that are drawn side by side, at most.
 pub const MOST_PANELS: usize = 4;
-/// Pixels that a picture is wide and high, at most: its memory is 11 bytes a pixel.
-pub const WIDEST: u32 = 4096;
-/// Pixels that it is wide and high, at least.
-const NARROWEST: u32 = 64;
 /// Pixels between panels.
 const GAP: u32 = 8;
-
-/// How scans are drawn.
-#[derive(Debug, Clone, Copy)]
-pub struct Settings {
-    /// From where.
-    pub view: View,
-    /// Coloured by what.
-    pub by: By,
-    /// Pixels that the picture is wide, all panels together: 64 to [`WIDEST`].
-    pub width: u32,
-    /// Threads that decode and draw.
-    pub threads: usize,
-}
 
 /// Scans drawn side by side, in one frame and with one range of colours.
 #[derive(Debug)]

@@ -2,9 +2,9 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::Settings;
 use super::color::Rgb;
 use super::look::{Frame, each_point};
+use super::settings::Settings;
 use crate::Result;
 use crate::stage::Source;
 
