@@ -10,7 +10,8 @@ use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Sche
 use pointmill::quantity::Length;
 use pointmill::report::Tally;
 use pointmill::stage::{ScanFacts, TileOp};
-use pointmill::tile::{Fate, Levels, Tile, TileKey, morton_cmp};
+use pointmill::store::{Levels, TileKey, morton_cmp};
+use pointmill::tile::{Fate, Tile};
 
 /// Positions a side of the plane.
 const SIDE: i64 = 1000;

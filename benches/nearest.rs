@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use pointmill::geom::nearest::Nearest;
 use pointmill::point::Position;
-use pointmill::tile::morton_cmp;
+use pointmill::store::morton_cmp;
 
 fn main() {
     let numbers: Vec<usize> = std::env::args().filter_map(|a| a.parse().ok()).collect();

@@ -16,16 +16,16 @@ use std::time::Instant;
 use pointmill::budget::Budget;
 use pointmill::geom::lattice::Lattice;
 use pointmill::geom::simd::Simd;
-use pointmill::io::synthetic::{Scene, Synthetic};
+use pointmill::host::process::cpu_seconds;
 use pointmill::io::{las, ply};
 use pointmill::ops::normals::{Method, Normals};
 use pointmill::point::{PointBatch, Position};
 use pointmill::quantity::Setting;
-use pointmill::report::{Tally, cpu_seconds};
+use pointmill::report::Tally;
 use pointmill::stage::{OpenSource, Source, TileOp};
-use pointmill::tile::{
-    Folder, Intake, Loader, SealedTiles, Sieve, SpillArea, Tag, TileStore, seal,
-};
+use pointmill::store::{Folder, Intake, SealedTiles, SpillArea, Tag, TileStore, seal};
+use pointmill::synth::{Scene, Synthetic};
+use pointmill::tile::{Loader, Sieve};
 
 /// Records of a run, positions of a tile's cube, and of a tile with its rim, as a plan of ample memory
 /// has them.

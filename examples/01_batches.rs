@@ -8,9 +8,9 @@
 use std::collections::BTreeMap;
 use std::error::Error;
 
-use pointmill::io::synthetic::{Scene, Synthetic};
 use pointmill::point::{PointBatch, names};
 use pointmill::stage::OpenSource;
+use pointmill::synth::{Scene, Synthetic};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let points = std::env::args().nth(1).map_or(Ok(200_000), |n| n.parse())?;

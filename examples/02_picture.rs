@@ -11,9 +11,9 @@ use std::error::Error;
 use std::fmt::Write;
 
 use pointmill::io::las;
-use pointmill::io::synthetic::{Scene, Synthetic};
 use pointmill::point::PointBatch;
 use pointmill::stage::{OpenSource, Source};
+use pointmill::synth::{Scene, Synthetic};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -6,12 +6,13 @@
 
 #![allow(clippy::print_stdout, reason = "an example shows its results")]
 
-use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry, StageKind, StagePlace};
 use pointmill::point::{PointBatch, names};
 use pointmill::report::Tally;
 use pointmill::stage::{Needs, Role, TileOp, Transform};
+use pointmill::stage::{StageKind, StagePlace};
 use pointmill::tile::{Fate, Tile};
 use pointmill::{Error, Result};
+use pointmill::{Graph, Overrides, Quiet, Registry};
 use serde::{Deserialize, Serialize};
 
 /// Keeps the points of one class. The fields are the stage's keys in a pipeline file.
@@ -119,7 +120,7 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;
     let text = PIPELINE.replace("ground.laz", &folder.path().join("ground.laz").to_string_lossy());
     let registry = Registry::builtin().with::<Class>().with::<Lowest>();
-    let plan = Pipeline::parse(&text, "ground.toml", &registry)?.plan(&Overrides::default())?;
+    let plan = Graph::parse(&text, "ground.toml", &registry)?.plan(&Overrides::default())?;
     let done = plan.run(&Quiet)?;
 
     println!("{done}");

@@ -1,17 +1,12 @@
 //! The one place that counts bytes: memory is leased from the budget before it is allocated.
 
 use std::fmt;
-use std::fs;
-use std::path::{Component, Path};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::{Error, Result};
 
 const MIB: u64 = 1 << 20;
-
-/// What is taken for the machine's memory where the system does not tell.
-const ASSUMED_MEMORY: u64 = 4 << 30;
 
 /// A number of bytes that is shared by everything in a run that grows with its settings or its scan.
 /// Clones are the same budget.
@@ -192,68 +187,6 @@ pub fn at_most_mebibytes(bytes: u64) -> String {
     }
 }
 
-/// The budget of a run that names none: half of the machine's memory or of the smallest limit of a
-/// control group around this process, whichever is less.
-pub fn default_limit() -> u64 {
-    let installed = fs::read_to_string("/proc/meminfo").ok().and_then(|text| total_memory(&text));
-    let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
-    let limit = group_limit(Path::new("/sys/fs/cgroup"), &groups).unwrap_or(u64::MAX);
-    installed.unwrap_or(ASSUMED_MEMORY).min(limit) / 2
-}
-
-/// `MemTotal` of /proc/meminfo (proc(5)), in bytes.
-fn total_memory(meminfo: &str) -> Option<u64> {
-    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
-}
-
-/// The smallest memory limit of the control groups that /proc/self/cgroup names (cgroups(7)) and of
-/// those around them, mounted at `root`. A line is `hierarchy:controllers:path`; version 2 has number
-/// 0 and no controllers.
-fn group_limit(root: &Path, groups: &str) -> Option<u64> {
-    let mut smallest = None;
-    for line in groups.lines() {
-        let mut fields = line.splitn(3, ':');
-        let (Some(number), Some(controllers), Some(path)) =
-            (fields.next(), fields.next(), fields.next())
-        else {
-            continue;
-        };
-        let limits = if number == "0" && controllers.is_empty() {
-            // Beside version 1, version 2 is mounted at `unified`.
-            [(root.to_owned(), "memory.max"), (root.join("unified"), "memory.max")]
-                .map(|(mount, file)| limit_along(&mount, path, file))
-        } else if controllers.split(',').any(|name| name == "memory") {
-            [limit_along(&root.join("memory"), path, "memory.limit_in_bytes"), None]
-        } else {
-            continue;
-        };
-        smallest = limits.into_iter().flatten().chain(smallest).min();
-    }
-    smallest
-}
-
-/// The smallest figure in `file` of the group at `path` and of every group around it. A group that is
-/// not visible in this mount (a container's) is passed over.
-fn limit_along(mount: &Path, path: &str, file: &str) -> Option<u64> {
-    let names = Path::new(path).components().filter_map(|part| match part {
-        Component::Normal(name) => Some(name),
-        _ => None,
-    });
-    let mut folder = mount.to_owned();
-    let mut smallest = limit_in(&folder.join(file));
-    for name in names {
-        folder.push(name);
-        smallest = limit_in(&folder.join(file)).into_iter().chain(smallest).min();
-    }
-    smallest
-}
-
-/// The figure in a limit's file; None if there is none or it says `max`.
-fn limit_in(file: &Path) -> Option<u64> {
-    fs::read_to_string(file).ok()?.trim().parse().ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -354,37 +287,5 @@ mod tests {
         }
         assert_eq!(at_most_mebibytes(270 * MIB - 1), "269.9 MiB");
         assert_eq!(at_most_mebibytes(256 * MIB), "256 MiB");
-    }
-
-    #[test]
-    fn the_default_is_half_of_some_memory() {
-        assert!(default_limit() > 16 * MIB && default_limit() <= u64::MAX / 2);
-        assert_eq!(
-            total_memory("MemTotal:       16316284 kB\nMemFree: 1 kB\n"),
-            Some(16316284 << 10)
-        );
-        assert_eq!(total_memory("MemFree: 1 kB\n"), None);
-    }
-
-    #[test]
-    fn the_smallest_limit_of_nested_groups_counts() {
-        let root = tempfile::tempdir().unwrap();
-        let write = |path: &str, text: &str| {
-            let path = root.path().join(path);
-            fs::create_dir_all(path.parent().unwrap()).unwrap();
-            fs::write(path, text).unwrap();
-        };
-        assert_eq!(group_limit(root.path(), "0::/a/b\n"), None);
-        write("memory.max", "max\n");
-        write("a/memory.max", "5000\n");
-        write("a/b/memory.max", "max\n");
-        assert_eq!(group_limit(root.path(), "0::/a/b\n"), Some(5000));
-        assert_eq!(group_limit(root.path(), "0::/a/b/c\n"), Some(5000));
-        assert_eq!(group_limit(root.path(), "0::/\n"), None);
-        write("memory/memory.limit_in_bytes", "9223372036854771712\n");
-        write("memory/x/memory.limit_in_bytes", "4000\n");
-        let both = "9:name=systemd:/a\n4:cpu,memory:/x/y\n0::/../a\n";
-        assert_eq!(group_limit(root.path(), both), Some(4000));
-        assert_eq!(group_limit(root.path(), "4:memory:/elsewhere\n"), Some(9223372036854771712));
     }
 }

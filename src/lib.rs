@@ -5,7 +5,7 @@
 //! the stages fit each other, the inputs and the memory?) and run; what comes back is a report.
 //!
 //! ```
-//! use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
+//! use pointmill::{Graph, Overrides, Quiet, Registry};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let folder = tempfile::tempdir()?;
@@ -37,8 +37,8 @@
 //!     "#,
 //!     reduced.display()
 //! );
-//! let pipeline = Pipeline::parse(&text, "tour.toml", &Registry::builtin())?;
-//! let report = pipeline.plan(&Overrides::default())?.run(&Quiet)?.report;
+//! let graph = Graph::parse(&text, "tour.toml", &Registry::builtin())?;
+//! let report = graph.plan(&Overrides::default())?.run(&Quiet)?.report;
 //!
 //! // Every record is accounted for, and the file holds those that were kept.
 //! let ledger = &report.result.ledger;
@@ -59,46 +59,63 @@
 //! # }
 //! ```
 //!
-//! The modules from the bottom up; each uses those before it:
+//! The rooms of the house from the bottom up; each uses those before it:
 //!
 //! - [`Error`] is the one error type: what went wrong, at which file and byte, and what would be
 //!   right. Its [`ErrorKind`] decides the exit code.
-//! - [`point`]: points side by side. A [`PointBatch`](point::PointBatch) holds records as their file's
-//!   own bytes; a [`Schema`](point::Schema) says where in them a dimension is, and reads it by name.
+//! - [`host`]: what differs from system to system: memory and its limits, disks, threads.
+//! - [`point`]: points side by side. A [`PointBatch`](point::PointBatch) holds records as their
+//!   file's own bytes; a [`Schema`](point::Schema) says where in them a dimension is.
 //! - [`quantity`]: counts, angles and lengths as people write them.
-//! - [`geom`]: geometry on plain slices. The [`lattice`](geom::lattice) makes coordinates integers, so
-//!   that every decision is exact; [`nearest`](geom::nearest) finds neighbours, [`star`](geom::star),
-//!   [`plane`](geom::plane) and [`angle`](geom::angle) make normals of them and compare these.
 //! - [`budget`]: the one place that counts bytes. Whoever allocates by the size of the input takes a
 //!   [`Lease`](budget::Lease) first.
-//! - [`tile`]: scans larger than memory. A [`TileStore`](tile::TileStore) takes records in any order,
-//!   [`seal`](tile::seal) merges them into one canonical sequence, and a [`Tile`](tile::Tile) is the
-//!   points of a cube with neighbourhoods that are exact beyond its faces.
+//! - [`geom`]: geometry on plain slices. The [`lattice`](geom::lattice) makes coordinates integers,
+//!   so that every decision is exact; [`nearest`](geom::nearest) finds neighbours,
+//!   [`star`](geom::star), [`plane`](geom::plane) and [`angle`](geom::angle) make normals of them
+//!   and compare these.
+//! - [`store`]: scans larger than memory. A [`TileStore`](store::TileStore) takes records in any
+//!   order, [`seal`](store::seal) merges them into one canonical sequence.
+//! - [`tile`]: a [`Tile`](tile::Tile) is the points of a cube with neighbourhoods that are exact
+//!   beyond its faces.
 //! - [`report`]: what a run counts and measures, merged so that no order and no cut changes a byte.
 //! - [`stage`]: the roles that a stage can play and what it tells the plan. Implement one to add a
 //!   stage of your own.
-//! - [`ops`]: the stages that compute or select: `filter`, `outliers`, `normals`, `cells`, `median` and `grid`.
-//! - [`io`]: LAS, LAZ and PLY, conversion between their records, and [synthetic](io::synthetic) scans.
+//! - [`io`]: LAS, LAZ and PLY, conversion between their records, and the stages `read` and `write`.
+//! - [`synth`]: synthetic scans, and the stage `synth`.
+//! - [`ops`]: the stages that compute or select: `filter`, `outliers`, `normals`, `cells`, `median`
+//!   and `grid`.
 //! - [`picture`]: scans drawn from above or from a side, side by side.
-//! - [`pipeline`]: from a text to a finished run: [`Pipeline`](pipeline::Pipeline),
-//!   [`Plan`](pipeline::Plan), and the [`Registry`](pipeline::Registry) of kinds that a text may name.
-//! - [`cli`]: the command line. A program of yours with stages of its own calls [`cli::main`] with its
-//!   registry and has the same commands.
+//! - [`graph`]: what a pipeline is, whoever wrote it: a [`Graph`] of stages.
+//! - [`engine`]: from a plan to a report, in phases over the store, on threads.
+//! - [`plan`]: from a graph, headers and memory to a [`Plan`].
+//! - [`language`]: from a text to a graph, and the [`Registry`] of kinds that a text may name.
+//! - [`cli`]: the command line. A program of yours with stages of its own calls [`cli::main`] with
+//!   its registry and has the same commands.
 //!
 //! The programs in `examples/` go on from here, and `docs/architecture.md` tells why it is so.
 
 pub mod budget;
 pub mod cli;
+pub mod engine;
 mod error;
 pub mod geom;
+pub mod graph;
+pub mod host;
 pub mod io;
+pub mod language;
 pub mod ops;
 pub mod picture;
-pub mod pipeline;
+pub mod plan;
 pub mod point;
 pub mod quantity;
 pub mod report;
 pub mod stage;
+pub mod store;
+pub mod synth;
 pub mod tile;
 
+pub use engine::{Done, Quiet, Watch};
 pub use error::{Error, ErrorKind, Result};
+pub use graph::{Graph, Overrides};
+pub use language::{Registry, Set};
+pub use plan::{Outline, Plan};

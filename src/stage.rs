@@ -1,6 +1,8 @@
 //! The roles a stage can play and what it tells the plan. Roles are closed, stages are open: an
 //! embedding program adds its own by implementing one of these traits.
 
+mod kind;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -8,7 +10,10 @@ use crate::Result;
 use crate::geom::lattice::Lattice;
 use crate::point::{Bounds, Mark, Metadata, PointBatch, Schema, Units};
 use crate::report::Tally;
-use crate::tile::{Levels, Tile};
+use crate::store::Levels;
+use crate::tile::Tile;
+
+pub use kind::{StageKind, StagePlace};
 
 /// Opens the inputs of a source: headers only, no point.
 pub trait OpenSource: Send + Sync {

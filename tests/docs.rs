@@ -16,11 +16,13 @@ use assert_cmd::Command;
 use docs_support::formats::{agree, documented};
 use docs_support::keys::{self, Default, Key};
 use docs_support::{Enum, Field, enum_of, item_docs, struct_of};
+use pointmill::graph::{LimitKeys, RunSettings};
+use pointmill::io::ends::{Read, Write};
 use pointmill::ops::normals::Normals;
 use pointmill::ops::{Cells, Filter, Grid, Median, Outliers};
-use pointmill::pipeline::{
-    LimitKeys, Overrides, Pipeline, Quiet, Read, Registry, RunSettings, StageKind, Synth, Write,
-};
+use pointmill::stage::StageKind;
+use pointmill::synth::Synth;
+use pointmill::{Graph, Overrides, Quiet, Registry};
 use serde_json::Value;
 
 const SAYS_SO: &str = "written by `POINTMILL_WRITE_DOCS=1 cargo test --test docs`; do not edit";
@@ -69,14 +71,14 @@ fn page<K: StageKind>(file: &'static str, required: &'static str) -> Page {
     Page { kind, about, file, words: &[], more: None, required, keys: keys_of::<K> }
 }
 
-const KINDS: &str = "src/pipeline/kinds.rs";
+const KINDS: &str = "src/io/ends/kinds.rs";
 
 fn pages() -> Vec<Page> {
-    let expand = ("What a path means", "src/pipeline/inputs.rs", "expand");
+    let expand = ("What a path means", "src/io/ends/inputs.rs", "expand");
     vec![
         Page { more: Some(expand), ..page::<Read>(KINDS, "path = 'scan.laz'") },
         Page {
-            words: &["src/io/synthetic/mod.rs"],
+            words: &["src/synth/mod.rs"],
             ..page::<Synth>(KINDS, "scene = 'als'\npoints = 1000")
         },
         Page { words: &["src/point/selection.rs"], ..page::<Filter>("src/ops/filter.rs", "") },
@@ -157,7 +159,7 @@ fn keys_said(
 
 /// The keys that every stage on tiles takes besides its own.
 fn limit_keys() -> Vec<Key> {
-    let text = source("src/pipeline/limits.rs");
+    let text = source("src/graph/limits.rs");
     let (_, fields) = struct_of(&text, "LimitKeys");
     let names: Vec<&str> = fields.iter().map(|field| field.name.as_str()).collect();
     assert_eq!(names, LimitKeys::KEYS);
@@ -232,7 +234,7 @@ fn every_stage_has_a_page_that_says_what_the_code_does() {
         keep(&format!("docs/stages/{}.md", page.kind), &text);
         let _ = writeln!(index, "| [{0}]({0}.md) | {1} |", page.kind, page.about);
     }
-    let (limits, _) = struct_of(&source("src/pipeline/limits.rs"), "LimitKeys");
+    let (limits, _) = struct_of(&source("src/graph/limits.rs"), "LimitKeys");
     let _ = write!(index, "\n## Limits\n\n{limits}\n\n{}", keys::markdown(&limit_keys()));
     index += "\nWhat stands above all of them: [the `[run]` table](../run.md).\n";
     keep("docs/stages/README.md", &index);
@@ -242,7 +244,7 @@ fn every_stage_has_a_page_that_says_what_the_code_does() {
 
 /// The page of the `[run]` table, and what `pointmill stages` says of it.
 fn run_page() -> (String, Value) {
-    let text = source("src/pipeline/settings.rs");
+    let text = source("src/graph/settings.rs");
     let (docs, fields) = struct_of(&text, "RunSettings");
     assert!(fields.len() >= 8, "fields were not read");
     let default = |field: &Field, words: Option<&Enum>| match (words, &field.kind) {
@@ -324,7 +326,7 @@ fn reduce(folder: &Path, output: &str) -> Value {
         at("scan.laz"),
         at(output)
     );
-    let pipeline = Pipeline::parse(&text, "docs.toml", &Registry::builtin()).unwrap();
+    let pipeline = Graph::parse(&text, "docs.toml", &Registry::builtin()).unwrap();
     pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
     serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap()
 }
@@ -338,7 +340,7 @@ fn the_formats_that_are_documented_are_those_that_are_written() {
          [[stage]]\nkind = 'write'\npath = '{}'\n",
         scan.display()
     );
-    let pipeline = Pipeline::parse(&text, "docs.toml", &Registry::builtin()).unwrap();
+    let pipeline = Graph::parse(&text, "docs.toml", &Registry::builtin()).unwrap();
     pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
 
     let report = reduce(folder.path(), "reduced.laz");

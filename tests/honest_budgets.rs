@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use assert_cmd::Command;
 use common::{Random, Scan};
-use pointmill::io::synthetic::Scene;
+use pointmill::synth::Scene;
 
 /// Runs pointmill in `folder` with a budget; gives its exit code and what it told on stderr.
 fn with(folder: &Path, command: &str, mebibytes: u64) -> (i32, String) {

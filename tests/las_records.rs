@@ -15,8 +15,8 @@ use las_support::{LAZ, read, write};
 use laz::laszip::{ChunkTable, ChunkTableEntry};
 use laz::{LasZipCompressor, LazVlr, LazVlrBuilder};
 use pointmill::io::{describe, las};
-use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
 use pointmill::{Error, ErrorKind};
+use pointmill::{Graph, Overrides, Quiet, Registry};
 
 /// Counts what is held, and the most that was.
 struct Watched;
@@ -91,7 +91,7 @@ fn convert(input: &Path, output: &Path) -> Result<(), Error> {
     let text = format!(
         "[[stage]]\nkind = \"read\"\npath = {input:?}\n\n[[stage]]\nkind = \"write\"\npath = {output:?}\n"
     );
-    let pipeline = Pipeline::parse(&text, "test.toml", &Registry::builtin())?;
+    let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin())?;
     let plan = pipeline.plan(&Overrides::default())?;
     drop(plan);
     Ok(())
@@ -180,7 +180,7 @@ fn many_bytes_of_records_are_carried_and_not_held() {
             "[run]\nmemory = \"64MiB\"\nthreads = 1\n[[stage]]\nkind = \"read\"\npath = {inputs:?}\n\
              [[stage]]\nkind = \"write\"\npath = {output:?}\n"
         );
-        let pipeline = Pipeline::parse(&text, "test.toml", &Registry::builtin()).unwrap();
+        let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin()).unwrap();
         let (done, held) = held(|| pipeline.plan(&Overrides::default())?.run(&Quiet));
         done.unwrap();
         assert!(held < 40 * MIB, "{held} bytes");

@@ -8,7 +8,7 @@ mod common;
 use std::path::PathBuf;
 
 use common::*;
-use pointmill::io::synthetic::Scene;
+use pointmill::synth::Scene;
 use serde_json::Value;
 
 const AUTO: &str = "[[stage]]\nkind = 'normals'\nneighbors = 'auto'\n[[stage]]\nkind = 'cells'\n\

@@ -9,8 +9,8 @@ use common::{
     Memory, Ran, Random, Scan, Settings, assert_not_empty, assert_same, instruction_sets, run,
     scans,
 };
-use pointmill::io::synthetic::Scene;
-use pointmill::tile::morton_cmp;
+use pointmill::store::morton_cmp;
+use pointmill::synth::Scene;
 
 /// `normals`, `cells` and `median` with the given keys.
 fn reduction(normals: &str, cells: &str) -> String {

@@ -15,8 +15,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 
+use pointmill::io::ends::Format;
 use pointmill::io::{las, ply};
-use pointmill::pipeline::Format;
 use pointmill::point::PointBatch;
 use scans_support::{Setup, accounted, assert_contained, convert, open, read_some, reduce};
 use serde_json::json;

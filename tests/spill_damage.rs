@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use pointmill::ErrorKind;
-use pointmill::pipeline::{Overrides, Quiet, Watch};
+use pointmill::{Overrides, Quiet, Watch};
 use serde_json::Value;
 
 use run_support::{Case, execute};

@@ -9,10 +9,10 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use pointmill::io::synthetic::{Scene, Synthetic};
-use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
 use pointmill::point::{PointBatch, names};
 use pointmill::stage::OpenSource;
+use pointmill::synth::{Scene, Synthetic};
+use pointmill::{Graph, Overrides, Quiet, Registry};
 use serde_json::Value;
 
 const SAYS_SO: &str =
@@ -62,7 +62,7 @@ fn reduce(folder: &Path, scene: Scene, points: u64, noise: f64, neighbors: u64) 
         report.display(),
         folder.join("reduced.las").display()
     );
-    let pipeline = Pipeline::parse(&text, "paper.toml", &Registry::builtin()).unwrap();
+    let pipeline = Graph::parse(&text, "paper.toml", &Registry::builtin()).unwrap();
     pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
     let report: Value = serde_json::from_slice(&fs::read(report).unwrap()).unwrap();
     let result = &report["result"];

@@ -9,7 +9,7 @@ use super::classes::{Classes, parse_classes};
 use super::exit::EXIT_CODES;
 use super::preset::Preset;
 use super::seen::{ColoredBy, SeenFrom};
-use crate::pipeline::MOST_THREADS;
+use crate::graph::MOST_THREADS;
 use crate::quantity::parse_count;
 
 /// Reduces laser scans that do not fit in memory to the points that matter.

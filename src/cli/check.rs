@@ -7,8 +7,12 @@ use super::console::Console;
 use super::mistyped::marked;
 use super::print;
 use super::run::parse_sets;
+use crate::engine::Watch;
 use crate::error::shown;
-use crate::pipeline::{Outline, Overrides, Pipeline, Registry, Watch};
+use crate::graph::Graph;
+use crate::graph::Overrides;
+use crate::language::Registry;
+use crate::plan::Outline;
 use crate::report::Grouped;
 use crate::stage::Role;
 use crate::{Error, Result, io};
@@ -42,7 +46,7 @@ pub(super) fn check(arguments: &Plan, registry: &Registry, console: &Console) ->
     }
 }
 
-fn read(arguments: &Plan, registry: &Registry) -> Result<Pipeline> {
+fn read(arguments: &Plan, registry: &Registry) -> Result<Graph> {
     let flags = [
         ("--report", arguments.common.report.is_some()),
         ("--no-clobber", arguments.common.no_clobber),
@@ -52,10 +56,10 @@ fn read(arguments: &Plan, registry: &Registry) -> Result<Pipeline> {
         return Err(Error::pipeline(told).help("give it to `run`"));
     }
     let sets = parse_sets(&arguments.sets, &arguments.common)?;
-    Pipeline::read(&arguments.pipeline, registry, &sets)
+    Graph::read(&arguments.pipeline, registry, &sets)
 }
 
-fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
+fn inputs(pipeline: &Graph) -> Vec<PathBuf> {
     let paths = |role: &Role| match role {
         Role::Source(source) => source.paths(),
         _ => Vec::new(),

@@ -12,10 +12,11 @@ use super::events::Events;
 use super::progress::Bars;
 use super::words::{Told, Words};
 use super::{interrupt, print};
+use crate::engine::{Done, Watch};
 use crate::error::shown;
-use crate::pipeline::{Done, Plan, Watch};
+use crate::host::lock;
+use crate::plan::Plan;
 use crate::report::{Decision, Short};
-use crate::tile::lock;
 use crate::{Error, Result};
 
 /// Where all that a command says goes through; called from several threads.

@@ -11,12 +11,14 @@ use super::flags::{common_flags, convert_flags, given};
 use super::mistyped::marked;
 use super::run::{HIDDEN, mill, with_stages};
 use crate::budget::Bytes;
+use crate::engine::{Done, Watch, make_folder, refuse_existing};
 use crate::error::shown;
+use crate::graph::Existing;
+use crate::graph::Graph;
+use crate::host::{Clash, Files, Use};
+use crate::io::ends::{Format, expand_any, unreadable};
 use crate::io::las;
-use crate::pipeline::{
-    Clash, Done, Existing, Files, Format, Pipeline, Registry, Use, Watch, expand_any, make_folder,
-    refuse_existing, unreadable,
-};
+use crate::language::Registry;
 use crate::report::Grouped;
 use crate::{Error, ErrorKind, Result};
 
@@ -130,7 +132,7 @@ impl Total {
 /// from running, as do `odd` names, of which there can be no pipeline; the error in the end is of the
 /// first failure's kind. Returned are those that are done and what became of all.
 fn run_all(
-    runs: Vec<(PathBuf, Pipeline)>,
+    runs: Vec<(PathBuf, Graph)>,
     odd: Vec<PathBuf>,
     console: &Console,
 ) -> (Vec<Done>, Result<()>) {
@@ -165,13 +167,13 @@ fn pipeline(
     inputs: Value,
     output: Value,
     registry: &Registry,
-) -> Result<Pipeline> {
+) -> Result<Graph> {
     let sets = given([
         convert_flags(arguments, Some(inputs), Some(output)),
         common_flags(&arguments.common),
     ]);
     let filter = arguments.filter.is_given().then_some("filter");
-    Pipeline::parse_with(&with_stages(CONVERT, filter.into_iter()), HIDDEN, registry, &sets)
+    Graph::parse_with(&with_stages(CONVERT, filter.into_iter()), HIDDEN, registry, &sets)
 }
 
 /// The output in `folder` of every input: its name, with the extension of the format that is asked

@@ -6,7 +6,7 @@ use super::arguments::Info;
 use super::console::Console;
 use super::{print, table};
 use crate::error::shown;
-use crate::pipeline::expand;
+use crate::io::ends::expand;
 use crate::report::Coordinate;
 use crate::{Error, Result, io};
 

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::pipeline::Registry;
+use crate::language::Registry;
 use crate::{Error, Result};
 
 /// The `[run]` table, then every built-in kind: written from the documentation of their keys by the

@@ -11,7 +11,8 @@ use super::exit::exit_number;
 use super::print;
 use super::words::Told;
 use crate::ErrorKind;
-use crate::pipeline::{Done, Outline};
+use crate::engine::Done;
+use crate::plan::Outline;
 use crate::report::Decision;
 
 /// Least time between two events of progress.

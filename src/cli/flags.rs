@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::arguments::{Common, Convert, Filtered, Reduce, Synth, Written};
 use super::classes::Classes;
-use crate::pipeline::Set;
+use crate::language::Set;
 use crate::quantity::parse_count;
 
 /// A flag of a command, the setting that it stands for, and its value if it was given.

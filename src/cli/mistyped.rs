@@ -8,7 +8,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, Command};
 
 use crate::error::nearest;
-use crate::pipeline::Format;
+use crate::io::ends::Format;
 
 /// The arguments of the process with every value that begins with a minus and a digit tied to its
 /// option (`--max-side=-2m`): it is a value, which the option may refuse, and no option of its own.

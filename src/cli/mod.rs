@@ -33,7 +33,7 @@ use clap::FromArgMatches;
 
 use crate::Result;
 use crate::error::shown;
-use crate::pipeline::Registry;
+use crate::language::Registry;
 use arguments::{Arguments, Command};
 use console::Console;
 use exit::exit_number;

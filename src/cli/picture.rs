@@ -9,12 +9,14 @@ use super::mistyped::marked;
 use super::print;
 use super::seen::ColoredBy;
 use crate::budget::Bytes;
+use crate::engine::{Trouble, publish_bytes};
 use crate::error::shown;
+use crate::host::lock;
+use crate::host::{Files, Use};
+use crate::io::ends::Read;
 use crate::picture::{Picture, Settings};
-use crate::pipeline::{Files, Read, Trouble, Use, publish_bytes};
 use crate::report::{Grouped, Short};
 use crate::stage::Source;
-use crate::tile::lock;
 use crate::{Error, Result};
 
 /// Draws the inputs and prints what the picture shows.

@@ -4,7 +4,7 @@
 use clap::ValueEnum;
 use serde_json::{Value, json};
 
-use crate::pipeline::Set;
+use crate::language::Set;
 
 /// What a scan is of, or whose method it is reduced by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

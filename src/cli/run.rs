@@ -5,7 +5,10 @@ use super::console::Console;
 use super::flags::{common_flags, given, reduce_flags, synth_flags};
 use super::preset::Preset;
 use crate::Result;
-use crate::pipeline::{Done, Overrides, Pipeline, Registry, Set};
+use crate::engine::Done;
+use crate::graph::Graph;
+use crate::graph::Overrides;
+use crate::language::{Registry, Set};
 
 /// The pipeline of `reduce`, which users copy.
 const REDUCE: &str = include_str!("../../pipelines/reduce.toml");
@@ -28,7 +31,7 @@ kind = \"write\"
 /// Runs a pipeline file and prints its closing table.
 pub(super) fn run(arguments: &Run, registry: &Registry, console: &Console) -> Result<()> {
     let sets = parse_sets(&arguments.sets, &arguments.common)?;
-    let pipeline = Pipeline::read(&arguments.pipeline, registry, &sets)?;
+    let pipeline = Graph::read(&arguments.pipeline, registry, &sets)?;
     console.result(mill(pipeline, console)?)
 }
 
@@ -42,19 +45,19 @@ pub(super) fn reduce(arguments: &Reduce, registry: &Registry, console: &Console)
     let outliers = arguments.outliers.then_some("outliers");
     let filter = arguments.filter.is_given().then_some("filter");
     let text = with_stages(REDUCE, filter.into_iter().chain(outliers));
-    let pipeline = Pipeline::parse_with(&text, HIDDEN, registry, &sets)?;
+    let pipeline = Graph::parse_with(&text, HIDDEN, registry, &sets)?;
     console.result(mill(pipeline, console)?)
 }
 
 /// Writes a made-up scan and prints the closing table.
 pub(super) fn synth(arguments: &Synth, registry: &Registry, console: &Console) -> Result<()> {
     let sets = given([synth_flags(arguments), common_flags(&arguments.common)]);
-    let pipeline = Pipeline::parse_with(SYNTH, HIDDEN, registry, &sets)?;
+    let pipeline = Graph::parse_with(SYNTH, HIDDEN, registry, &sets)?;
     console.result(mill(pipeline, console)?)
 }
 
 /// Plans and runs a pipeline; Ctrl-C asks it to stop.
-pub(super) fn mill(pipeline: Pipeline, console: &Console) -> Result<Done> {
+pub(super) fn mill(pipeline: Graph, console: &Console) -> Result<Done> {
     console.hear_interrupts();
     let plan = pipeline.plan(&Overrides::default())?;
     console.planned(&plan);

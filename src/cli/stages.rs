@@ -6,7 +6,7 @@ use super::arguments::Stages;
 use super::described::{Described, Key, Word, described};
 use super::print;
 use crate::error::nearest;
-use crate::pipeline::Registry;
+use crate::language::Registry;
 use crate::{Error, Result};
 
 /// Columns of a terminal that text is wrapped to.

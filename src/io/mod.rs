@@ -1,14 +1,15 @@
-//! Formats: one folder each, plain sources and sinks of records.
+//! Formats: one folder each, plain sources and sinks of records; conversion between records; and the
+//! stages that name files. Knows nothing of tiles.
 
 pub mod convert;
 mod describe;
+pub mod ends;
 mod epsg;
 pub mod las;
 mod origin;
 pub mod ply;
 mod project;
 pub(crate) mod sniff;
-pub mod synthetic;
 mod wkt;
 
 pub use describe::describe;

@@ -21,7 +21,7 @@ use crate::geom::lattice::Lattice;
 use crate::point::{Units, names};
 use crate::quantity::{Length, Setting};
 use crate::report::Tally;
-use crate::stage::{Forecast, Needs, ScanFacts, TileOp};
+use crate::stage::{Forecast, Needs, Role, ScanFacts, StageKind, StagePlace, TileOp};
 use crate::tile::Tile;
 
 use division::{Counts, Division};
@@ -36,6 +36,20 @@ use threshold::Threshold;
 const BYTES: usize = 4 + 1 + 4 + 4 + 4;
 /// Bytes a position where positions are sorted by cell.
 const SORTING_BYTES: usize = 32;
+
+impl StageKind for Cells {
+    const KIND: &'static str = "cells";
+    const ABOUT: &'static str = "Divides the scan into cells whose normals agree.";
+    const EITHER: &'static [&'static str] = &["keep", "max_angle"];
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.check().map_err(|(key, error)| at.blame(key, error))?;
+        Ok(match self.keep {
+            Some(_) => Role::ScanOp(Box::new(self)),
+            None => Role::TileOp(Box::new(self)),
+        })
+    }
+}
 
 impl TileOp for Cells {
     fn needs(&self) -> Needs {

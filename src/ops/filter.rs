@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::point::{Flag, PointBatch, Schema, Selection, names};
-use crate::stage::{Needs, Transform};
+use crate::stage::{Needs, Role, StageKind, StagePlace, Transform};
 use crate::{Error, Result};
 
 /// Keeps the records of some classes and flags, and removes all others as they are decoded.
@@ -52,6 +52,16 @@ impl Filter {
             with: self.keep_flags.clone(),
             without: self.drop_flags.clone(),
         }
+    }
+}
+
+impl StageKind for Filter {
+    const KIND: &'static str = "filter";
+    const ABOUT: &'static str = "Removes records by class and flags.";
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.check().map_err(|(key, error)| at.blame(key, error))?;
+        Ok(Role::Transform(Box::new(self)))
     }
 }
 

@@ -13,7 +13,7 @@ use crate::geom::plane::{Covariance, smallest};
 use crate::point::{Bounds, Position, Units, distance2};
 use crate::quantity::Length;
 use crate::report::Tally;
-use crate::stage::{Needs, ScanFacts, TileOp};
+use crate::stage::{Needs, Role, ScanFacts, StageKind, StagePlace, TileOp};
 use crate::tile::Tile;
 use crate::{Error, Result};
 
@@ -80,6 +80,15 @@ impl Grid {
     /// A grid of cubes of that side.
     pub fn new(side: Length, pick: Pick) -> Self {
         Grid { side, pick, settled: None }
+    }
+}
+
+impl StageKind for Grid {
+    const KIND: &'static str = "grid";
+    const ABOUT: &'static str = "Keeps one point of every cube of a uniform grid.";
+
+    fn build(self, _: &StagePlace) -> Result<Role> {
+        Ok(Role::TileOp(Box::new(self)))
     }
 }
 

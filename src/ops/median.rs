@@ -10,7 +10,7 @@ use crate::geom::wide::Wide;
 use crate::point::{Mark, Position};
 use crate::quantity::Whole;
 use crate::report::Tally;
-use crate::stage::{Needs, TileOp};
+use crate::stage::{Needs, Role, StageKind, StagePlace, TileOp};
 use crate::tile::{Cells as Partition, Tile};
 use crate::{Error, Result};
 
@@ -69,6 +69,16 @@ fn check_passes(passes: u64) -> Result<(), String> {
 fn checked_passes<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error> {
     let passes = Whole::<1, { MAX_PASSES as u64 }>::deserialize(from)?;
     Ok(passes.get() as usize)
+}
+
+impl StageKind for Median {
+    const KIND: &'static str = "median";
+    const ABOUT: &'static str = "Keeps the median point of every cell.";
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.check().map_err(|(key, error)| at.blame(key, error))?;
+        Ok(Role::TileOp(Box::new(self)))
+    }
 }
 
 impl TileOp for Median {

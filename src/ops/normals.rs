@@ -14,7 +14,7 @@ use crate::geom::angle::is_known;
 use crate::point::names;
 use crate::quantity::{Setting, Whole};
 use crate::report::Tally;
-use crate::stage::{Forecast, Needs, ScanFacts, TileOp};
+use crate::stage::{Forecast, Needs, Role, ScanFacts, StageKind, StagePlace, TileOp};
 use crate::tile::Tile;
 use crate::{Error, Result};
 
@@ -106,6 +106,17 @@ impl Normals {
     /// The neighbours of the fit; the most that may be chosen until they are.
     fn count(&self) -> usize {
         self.neighbors.given().or(self.found).unwrap_or(noise::MOST)
+    }
+}
+
+impl StageKind for Normals {
+    const KIND: &'static str = "normals";
+    const ABOUT: &'static str =
+        "Computes a surface normal at every point from its nearest neighbours.";
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.check().map_err(|(key, error)| at.blame(key, error))?;
+        Ok(Role::TileOp(Box::new(self)))
     }
 }
 

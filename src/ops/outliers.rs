@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use super::removal::Account;
 use crate::point::Mark;
 use crate::quantity::Length;
-use crate::stage::Role;
+use crate::stage::{Role, StageKind, StagePlace};
 use crate::{Error, Result};
 
 pub use radius::RadiusOutliers;
@@ -138,6 +138,15 @@ impl Serialize for Outliers {
         keys.serialize_field("min_neighbors", &self.min_neighbors)?;
         keys.serialize_field("mark", &self.mark)?;
         keys.end()
+    }
+}
+
+impl StageKind for Outliers {
+    const KIND: &'static str = "outliers";
+    const ABOUT: &'static str = "Removes points that are far from all others.";
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.role().map_err(|(key, error)| at.blame(key, error))
     }
 }
 

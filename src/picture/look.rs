@@ -5,9 +5,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::settings::{NARROWEST, Settings};
+use crate::host::{lock, parallel};
 use crate::point::{Dimension, PointBatch};
 use crate::stage::{Part, Source};
-use crate::tile::{lock, parallel};
 use crate::{Error, ErrorKind, Result};
 
 /// Points of which the middle range of figures is found, about.

@@ -1,7 +1,7 @@
 use super::*;
-use crate::io::synthetic::{Scene, Synthetic};
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{OpenSource, Part};
+use crate::synth::{Scene, Synthetic};
 use std::sync::Arc;
 
 fn settings(view: View, by: By, threads: usize) -> Settings {

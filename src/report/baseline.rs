@@ -13,7 +13,8 @@ use super::figures::{BaselineFigures, world_length};
 use crate::geom::angle::is_known;
 use crate::geom::lattice::Lattice;
 use crate::point::{Position, distance2};
-use crate::tile::{Levels, Tile, TileKey};
+use crate::store::{Levels, TileKey};
+use crate::tile::Tile;
 
 /// Levels that are measured at most.
 const LEVELS: usize = 6;

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use super::lot::Lot;
 use super::sums::{FixedSum, OpenSum};
 use crate::point::Position;
-use crate::tile::morton_cmp;
+use crate::store::morton_cmp;
 
 /// Deviations of removed records, in lattice steps: number, sum of squares, the largest and where.
 /// Merged in any order and by any split they are the same.

@@ -27,7 +27,7 @@ pub use figures::{
 };
 pub use ledger::{Ledger, Removed, check_written};
 pub use lot::Lot;
-pub use machine::{Machine, cpu_seconds, peak_memory, resident_now};
+pub use machine::Machine;
 pub use moments::{Moments, Plane};
 pub use sums::{Distances, FixedSum};
 pub use survey::{

@@ -20,7 +20,7 @@ use super::moments::{Moments, Plane};
 use super::sums::Distances;
 use crate::geom::lattice::Lattice;
 use crate::point::{Bounds, Position};
-use crate::tile::{Levels, TileKey};
+use crate::store::{Levels, TileKey};
 use crate::{Error, Result};
 
 /// Positions that an occupied report tile holds on average, at least.

@@ -3,15 +3,15 @@
 
 use std::sync::Arc;
 
-use super::key::morton_cmp;
 use super::remote::Remote;
-use super::sealed::SealedTiles;
 use super::sieve::Sieve;
 use super::{Bounds, Position, Tile, chosen};
 use crate::Result;
 use crate::geom::nearest::Nearest;
 use crate::geom::simd::Simd;
 use crate::point::distance2;
+use crate::store::SealedTiles;
+use crate::store::morton_cmp;
 
 /// The search of a tile, and how to look beyond it.
 #[derive(Debug, Default)]

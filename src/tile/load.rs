@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
-use super::pieces::Pieces;
-use super::sealed::{Reader, SealedTiles};
-use super::sieve::{FATE_BYTES, FIGURE_BYTES, MoreRuns, NORMAL_BYTES, Run, Runs, Sieve};
-use super::{Fate, Tile, TileKey};
+use super::sieve::{MoreRuns, Run, Runs, Sieve};
+use super::{Fate, Tile};
 use crate::Result;
 use crate::point::Bounds;
+use crate::store::Pieces;
+use crate::store::TileKey;
+use crate::store::{FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES};
+use crate::store::{Reader, SealedTiles};
 
 /// Loads tiles into one arena that it reuses; one a thread.
 #[derive(Debug)]

@@ -1,77 +1,19 @@
-//! Octree tiles of scans larger than memory: one decode, a sorted spill, exact neighbourhoods.
+//! Tiles: the points of one cube with neighbourhoods that are exact beyond its faces, as a pass sees
+//! them. Knows no stage that works on them.
 
 mod around;
-mod block;
-mod cutting;
-mod emit;
-mod fetch;
-mod gather;
-mod intake;
-mod key;
-mod levels;
 mod load;
-mod merge;
-mod order;
-mod pieces;
 mod remote;
-mod sealed;
 mod sieve;
-mod spill;
-mod tournament;
 
 pub use around::{Around, Neighborhood};
-pub use block::{BLOCK, Block};
-pub use cutting::CutError;
-pub use fetch::Fetch;
-pub use intake::{Intake, TileStore};
-pub use key::{TileKey, morton_cmp};
-pub use levels::Levels;
 pub use load::{Core, Loader};
-pub use merge::{merge_bytes, seal};
-pub use pieces::{PIECE, Pieces};
 pub use remote::Remote;
-pub use sealed::{Reader, SealedTiles, index_bytes};
-pub use sieve::{
-    ASIDE, CLASSED_INPUTS, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, Run, SELECTIONS, Sieve, State,
-    TAGGED_INPUTS, Tag,
-};
-pub use spill::{Address, Checksum, Folder, Spill, SpillArea, Stretch, lock};
+pub use sieve::{Run, Sieve};
 
 use std::ops::Range;
 
 use crate::point::{Bounds, Position};
-use crate::{Error, ErrorKind, Result};
-
-/// Runs `work` on `threads` threads, each told its number, and returns the first error that is not
-/// merely a thread giving up because another failed. A panic is an error, on one thread too.
-pub fn parallel(threads: usize, work: impl Fn(usize) -> Result<()> + Sync) -> Result<()> {
-    std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads.max(1))
-            .map(|n| {
-                let work = &work;
-                std::thread::Builder::new().spawn_scoped(scope, move || work(n))
-            })
-            .collect();
-        let mut result: Result<()> = Ok(());
-        for worker in workers {
-            let outcome = match worker.map(|worker| worker.join()) {
-                Ok(Ok(outcome)) => outcome,
-                Ok(Err(_)) => Err(Error::internal("a worker thread panicked")),
-                Err(cause) => {
-                    let told = "the system refuses to start so many threads";
-                    Err(Error::new(ErrorKind::Io, told)
-                        .because(cause)
-                        .help("give fewer `run.threads`"))
-                }
-            };
-            let given_up = matches!(&result, Err(e) if e.kind() == ErrorKind::Interrupted);
-            if result.is_ok() || given_up && outcome.is_err() {
-                result = outcome;
-            }
-        }
-        result
-    })
-}
 
 /// The points of one cube, then a rim of its neighbours' points.
 ///

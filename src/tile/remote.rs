@@ -3,11 +3,11 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::key::morton_cmp;
-use super::sealed::{Reader, SealedTiles};
 use super::sieve::{Runs, Sieve};
 use crate::Result;
 use crate::point::{Position, distance2};
+use crate::store::morton_cmp;
+use crate::store::{Reader, SealedTiles};
 
 /// Decoded blocks that a search keeps for the next one.
 const CACHED: usize = 64;
@@ -37,7 +37,7 @@ impl Default for Remote {
 impl Remote {
     /// Bytes that it holds.
     pub const BYTES: u64 =
-        ((CACHED + 2) * super::block::BLOCK * size_of::<Position>()) as u64 + (64 << 10);
+        ((CACHED + 2) * crate::store::BLOCK * size_of::<Position>()) as u64 + (64 << 10);
 
     /// The `k` positions nearest to `p` other than itself, by exact squared distance, ties by Morton
     /// order, of those that `sieve` lets be seen; fewer if there are fewer. `bound` is a squared distance within which `k` others are

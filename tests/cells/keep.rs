@@ -5,10 +5,10 @@ use crate::cells_scene;
 
 use cells_scene::*;
 use pointmill::ops::{Cells, Keep, Measure, Side, Split};
-use pointmill::pipeline::{StageKind, StagePlace};
 use pointmill::point::{Bounds, Position};
 use pointmill::report::Tally;
 use pointmill::stage::{Gathered, Role, ScanOp, TileOp};
+use pointmill::stage::{StageKind, StagePlace};
 use pointmill::{ErrorKind, Result};
 use proptest::prelude::*;
 

@@ -11,7 +11,8 @@ use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Sche
 use pointmill::quantity::{Angle, Length, Setting};
 use pointmill::report::Tally;
 use pointmill::stage::{ScanFacts, TileOp};
-use pointmill::tile::{Fate, Levels, Tile, TileKey, morton_cmp};
+use pointmill::store::{Levels, TileKey, morton_cmp};
+use pointmill::tile::{Fate, Tile};
 use proptest::prelude::*;
 
 pub const NONE: [f32; 3] = [f32::NAN; 3];

@@ -8,7 +8,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use pointmill::pipeline::{Registry, RunSettings};
+use pointmill::Registry;
+use pointmill::graph::RunSettings;
 use scans_support::command::{done, fails, scans};
 use serde_json::Value;
 

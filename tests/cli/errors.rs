@@ -240,7 +240,7 @@ fn the_pipelines_that_users_copy_are_right() {
         fs::write(at.path().join("survey").join(name), b"").unwrap();
     }
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines");
-    let registry = pointmill::pipeline::Registry::builtin();
+    let registry = pointmill::Registry::builtin();
     let inputs = serde_json::json!(at.path().join("survey"));
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -248,9 +248,9 @@ fn the_pipelines_that_users_copy_are_right() {
         let name = path.file_name().unwrap().to_str().unwrap().to_owned();
         let sets = match name.as_str() {
             "demo.toml" => vec![],
-            _ => vec![pointmill::pipeline::Set::argument("IN", "read.path", inputs.clone())],
+            _ => vec![pointmill::Set::argument("IN", "read.path", inputs.clone())],
         };
-        let parsed = pointmill::pipeline::Pipeline::read(&path, &registry, &sets);
+        let parsed = pointmill::Graph::read(&path, &registry, &sets);
         assert!(parsed.is_ok(), "{parsed:?}");
         names.push(name);
     }

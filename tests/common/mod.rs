@@ -14,12 +14,12 @@ use pointmill::geom::lattice::Lattice;
 use pointmill::geom::simd::Simd;
 use pointmill::io::las::{self, LasOptions};
 use pointmill::io::ply::{self, PlyOptions};
-use pointmill::io::synthetic::{Scene, Synthetic};
-use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
 use pointmill::point::{Layout, Metadata, PointBatch, Position, Schema, Value};
 use pointmill::report::{Report, result_bytes};
 use pointmill::stage::{OpenSource, Sink, Source};
+use pointmill::synth::{Scene, Synthetic};
 use pointmill::{Error, ErrorKind, Result};
+use pointmill::{Graph, Overrides, Quiet, Registry};
 pub use real::scans;
 
 /// A small generator (splitmix64), so that a failing case is the same everywhere.
@@ -359,7 +359,7 @@ pub fn run_with(
         )
     };
     let go = |memory| {
-        let pipeline = Pipeline::parse(&text(memory), "test.toml", &Registry::builtin())?;
+        let pipeline = Graph::parse(&text(memory), "test.toml", &Registry::builtin())?;
         pipeline.plan(&Overrides::default())?.run(&Quiet)
     };
     let more = match settings.memory {

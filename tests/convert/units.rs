@@ -46,7 +46,7 @@ fn quantities_are_shown_as_they_were_given() {
 
 use crate::run_support;
 
-use pointmill::pipeline::Quiet;
+use pointmill::Quiet;
 
 #[test]
 fn a_pipeline_with_a_length_in_metres_is_refused_before_work_if_the_scan_does_not_tell_its_unit() {

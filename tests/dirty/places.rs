@@ -12,7 +12,7 @@ use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use pointmill::ErrorKind;
-use pointmill::pipeline::{Overrides, Quiet, Watch};
+use pointmill::{Overrides, Quiet, Watch};
 use run_support::{Case, REDUCE, execute};
 use scans_support::command::{done, fails};
 use scans_support::{assert_holds, read};

@@ -8,7 +8,7 @@ use crate::scans_support;
 use std::fs;
 
 use pointmill::ErrorKind;
-use pointmill::pipeline::{Overrides, Quiet};
+use pointmill::{Overrides, Quiet};
 use run_support::{Case, REDUCE, execute};
 use scans_support::{Beside, LasFile, STRIDES, Setup, assert_holds, read, reduce};
 use serde_json::json;

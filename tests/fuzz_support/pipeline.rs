@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use pointmill::ErrorKind::{self, Data, Io, Memory, Pipeline as Wrong};
-use pointmill::pipeline::{Overrides, Pipeline, Registry};
+use pointmill::{Graph, Overrides, Registry};
 
 use super::judge::{self, Judgement, Outcome, shape};
 use super::random::Random;
@@ -37,7 +37,7 @@ fn target(_: &Path, data: &[u8]) -> Judgement {
         return Ok(Outcome { accepted: false, marks: vec!["leaves home".to_owned()] });
     }
     let registry = Registry::builtin();
-    let parse = || Pipeline::parse(text, "p.toml", &registry);
+    let parse = || Graph::parse(text, "p.toml", &registry);
     let pipeline = match (parse(), parse()) {
         (Ok(one), Ok(two)) if format!("{one:?}") == format!("{two:?}") => one,
         (Err(one), Err(two)) if one.to_string() == two.to_string() => {
@@ -62,7 +62,7 @@ fn target(_: &Path, data: &[u8]) -> Judgement {
 }
 
 /// The stages of a pipeline that is right.
-fn keys(pipeline: &Pipeline) -> String {
+fn keys(pipeline: &Graph) -> String {
     let kinds: Vec<&str> = pipeline.stages.iter().map(|stage| stage.kind.as_str()).collect();
     format!("parsed: {}", kinds.join(" "))
 }

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use pointmill::pipeline::{Pipeline, Registry, Set, parse_bytes};
+use pointmill::graph::parse_bytes;
+use pointmill::{Graph, Registry, Set};
 
 use super::judge::{self, Judgement, Outcome, shape};
 use super::pipeline::{furnish, leaves_home};
@@ -57,7 +58,7 @@ fn target(_: &Path, data: &[u8]) -> Judgement {
     };
     let same = Set::argument("--keep", text.split('=').next().unwrap_or(""), value.into());
     for set in [set, same] {
-        match Pipeline::parse_with(PIPELINE, "p.toml", &Registry::builtin(), &[set]) {
+        match Graph::parse_with(PIPELINE, "p.toml", &Registry::builtin(), &[set]) {
             Ok(pipeline) => {
                 let keys: Vec<String> =
                     pipeline.stages.iter().map(|stage| shape(&stage.keys.to_string())).collect();

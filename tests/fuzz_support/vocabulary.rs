@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
-use pointmill::pipeline::{Pipeline, Registry};
+use pointmill::{Graph, Registry};
 
 /// What stands in pipeline files besides words of the registry.
 const OTHERS: &[&str] = &[
@@ -84,7 +84,7 @@ pub fn words() -> &'static [&'static [u8]] {
 
 fn learned() -> BTreeSet<String> {
     let registry = Registry::builtin();
-    let told = |text: String| match Pipeline::parse(&text, "words", &registry) {
+    let told = |text: String| match Graph::parse(&text, "words", &registry) {
         Ok(_) => Vec::new(),
         Err(error) => listed(&error.to_string()),
     };

@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 use common::Scan;
 use pointmill::io::las::{self, Description};
 use pointmill::io::ply;
-use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
 use pointmill::point::GpsTime;
 use pointmill::report::Report;
 use pointmill::{ErrorKind, Result};
+use pointmill::{Graph, Overrides, Quiet, Registry};
 use tempfile::TempDir;
 
 /// Removes next to nothing, but might.
@@ -54,7 +54,7 @@ impl Bench {
              path = {inputs:?}\n{stages}\n[[stage]]\nkind = \"write\"\npath = {:?}\n{keys}\n",
             self.path(name)
         );
-        let pipeline = Pipeline::parse(&text, "test.toml", &Registry::builtin())?;
+        let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin())?;
         Ok(pipeline.plan(&Overrides::default())?.run(&Quiet)?.report)
     }
 

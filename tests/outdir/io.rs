@@ -14,8 +14,8 @@ use std::sync::Arc;
 use las_support::{LAS, LAZ, Random, write};
 use outdir_support::{assert_equal_files, convert_one, ends, named, write_each};
 use pointmill::io::las::{fresh, layout, open};
-use pointmill::pipeline::{Overrides, Pipeline, Registry};
 use pointmill::point::Scalar;
+use pointmill::{Graph, Overrides, Registry};
 
 /// Records of random bytes whose stored coordinates leave room for a shift.
 fn records(stride: usize, points: usize, random: &mut Random) -> Vec<u8> {
@@ -220,7 +220,7 @@ fn outputs_are_named_after_their_inputs() {
     assert!(!at.path().join("new").exists(), "naming makes nothing");
     let (source, _) = ends(&inputs[..1], &keys(at.path(), "")).unwrap();
     let text = "[[stage]]\nkind = 'read'\npath = 'x.las'\n[[stage]]\nkind = 'write'\nfolder = 'x'";
-    let mut parsed = Pipeline::parse(text, "t", &Registry::builtin()).unwrap();
+    let mut parsed = Graph::parse(text, "t", &Registry::builtin()).unwrap();
     let Some(pointmill::stage::Role::Sink(sink)) = parsed.stages.pop().map(|s| s.role) else {
         panic!("no sink")
     };
@@ -255,7 +255,7 @@ fn an_output_of_two_inputs_or_over_an_input_is_refused() {
             c.display(),
             keys(&at.path().join(folder), more)
         );
-        let pipeline = Pipeline::parse(&text, "p.toml", &Registry::builtin()).unwrap();
+        let pipeline = Graph::parse(&text, "p.toml", &Registry::builtin()).unwrap();
         pipeline.plan(&Overrides::default()).err().unwrap().to_string()
     };
     let over = planned("one", "");
@@ -273,7 +273,7 @@ fn a_write_stage_takes_a_path_or_a_folder() {
         let text = format!(
             "[[stage]]\nkind = 'read'\npath = 'in.las'\n[[stage]]\nkind = 'write'\n{keys}\n"
         );
-        Pipeline::parse(&text, "p.toml", &Registry::builtin())
+        Graph::parse(&text, "p.toml", &Registry::builtin())
     };
     let told = |keys: &str| parse(keys).unwrap_err().to_string();
     assert!(parse("folder = 'out'").is_ok() && parse("path = 'out.las'").is_ok());
@@ -286,8 +286,8 @@ fn a_write_stage_takes_a_path_or_a_folder() {
     // An argument takes the place of the other key.
     let text =
         "[[stage]]\nkind = 'read'\npath = 'in.las'\n[[stage]]\nkind = 'write'\npath = 'out.las'\n";
-    let set = [pointmill::pipeline::Set::parse("write.folder=out").unwrap()];
-    let pipeline = Pipeline::parse_with(text, "p.toml", &Registry::builtin(), &set).unwrap();
+    let set = [pointmill::Set::parse("write.folder=out").unwrap()];
+    let pipeline = Graph::parse_with(text, "p.toml", &Registry::builtin(), &set).unwrap();
     let Some(pointmill::stage::Role::Sink(sink)) = pipeline.stages.last().map(|s| &s.role) else {
         panic!("no sink")
     };

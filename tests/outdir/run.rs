@@ -15,9 +15,9 @@ use assert_cmd::Command;
 use common::{Random, Scan};
 use outdir_support::{assert_equal_files, convert_one};
 use pointmill::Result;
-use pointmill::io::synthetic::Scene;
-use pointmill::pipeline::{Done, Overrides, Pipeline, Quiet, Registry};
 use pointmill::report::result_bytes;
+use pointmill::synth::Scene;
+use pointmill::{Done, Graph, Overrides, Quiet, Registry};
 
 const STAGES: &str = "[[stage]]\nkind = 'normals'\n[[stage]]\nkind = 'cells'\n\
                       [[stage]]\nkind = 'median'\n";
@@ -102,7 +102,7 @@ fn run(inputs: &[PathBuf], write: &str, report: &Path, cut: Cut) -> Result<Done>
          spill = {spill:?}\nreport = {report:?}\n\
          [[stage]]\nkind = 'read'\npath = {inputs:?}\n{STAGES}[[stage]]\nkind = 'write'\n{write}\n"
     );
-    let pipeline = Pipeline::parse(&text, "test.toml", &Registry::builtin())?;
+    let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin())?;
     pipeline.plan(&Overrides::default())?.run(&Quiet)
 }
 

@@ -5,9 +5,9 @@
 use std::path::{Path, PathBuf};
 
 use pointmill::Result;
-use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
 use pointmill::point::PointBatch;
 use pointmill::stage::{CreateSink, Role, Source};
+use pointmill::{Graph, Overrides, Quiet, Registry};
 
 /// A pipeline that reads `inputs` and writes with `keys`.
 pub fn text(inputs: &[PathBuf], keys: &str) -> String {
@@ -18,7 +18,7 @@ pub fn text(inputs: &[PathBuf], keys: &str) -> String {
 
 /// Both ends of that pipeline, the source open.
 pub fn ends(inputs: &[PathBuf], keys: &str) -> Result<(Box<dyn Source>, Box<dyn CreateSink>)> {
-    let mut pipeline = Pipeline::parse(&text(inputs, keys), "outdir.toml", &Registry::builtin())?;
+    let mut pipeline = Graph::parse(&text(inputs, keys), "outdir.toml", &Registry::builtin())?;
     let Some(Role::Sink(sink)) = pipeline.stages.pop().map(|s| s.role) else { panic!("no sink") };
     let Some(Role::Source(open)) = pipeline.stages.pop().map(|s| s.role) else {
         panic!("no source")
@@ -94,7 +94,7 @@ fn write_all(
 /// A run that converts `inputs` into one file.
 pub fn convert_one(inputs: &[PathBuf], output: &Path, keys: &str) {
     let text = text(inputs, &format!("path = '{}'\n{keys}", output.display()));
-    let pipeline = Pipeline::parse(&text, "one.toml", &Registry::builtin()).unwrap();
+    let pipeline = Graph::parse(&text, "one.toml", &Registry::builtin()).unwrap();
     pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
 }
 

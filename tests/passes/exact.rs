@@ -8,10 +8,10 @@ use crate::common;
 use std::collections::{BTreeMap, BTreeSet};
 
 use common::{Memory, Ran, Random, Scan, Settings, run, run_with};
-use pointmill::io::synthetic::Scene;
 use pointmill::ops::normals::{Estimate, Estimator, Method};
 use pointmill::point::{Position, distance2, names};
-use pointmill::tile::morton_cmp;
+use pointmill::store::morton_cmp;
+use pointmill::synth::Scene;
 
 const TILED: Settings = Settings {
     tile_points: Some(100),

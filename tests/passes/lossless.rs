@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use common::{Memory, Ran, Random, Scan, Settings, run_with};
-use pointmill::io::synthetic::Scene;
+use pointmill::synth::Scene;
 
 const TILED: Settings = Settings {
     tile_points: Some(100),

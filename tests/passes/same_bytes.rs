@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use common::{Memory, Ran, Random, Scan, Settings, assert_same, instruction_sets, run_with};
-use pointmill::io::synthetic::Scene;
+use pointmill::synth::Scene;
 
 /// A pipeline to run the scan through in many configurations.
 #[derive(Clone, Copy)]

@@ -4,14 +4,15 @@
 
 use std::path::Path;
 
-use pointmill::pipeline::{
-    MixedUnits, Nonfinite, Overrides, Pipeline, Registry, Set, Simd, StageKind, StagePlace, Synth,
-    Write, ZScale,
-};
+use pointmill::graph::{MixedUnits, Nonfinite, Simd, ZScale};
+use pointmill::io::ends::Write;
 use pointmill::report::Tally;
 use pointmill::stage::{Needs, Role, TileOp};
+use pointmill::stage::{StageKind, StagePlace};
+use pointmill::synth::Synth;
 use pointmill::tile::Tile;
 use pointmill::{Error, ErrorKind, Result};
+use pointmill::{Graph, Overrides, Registry, Set};
 use serde::{Deserialize, Serialize};
 
 /// A tile stage with a key of every sort.
@@ -80,13 +81,13 @@ kind = \"write\"
 path = \"out.laz\"
 ";
 
-fn parse(text: &str) -> Result<Pipeline> {
-    Pipeline::parse(text, "p.toml", &registry())
+fn parse(text: &str) -> Result<Graph> {
+    Graph::parse(text, "p.toml", &registry())
 }
 
-fn with(sets: &[&str]) -> Result<Pipeline> {
+fn with(sets: &[&str]) -> Result<Graph> {
     let sets = sets.iter().map(|s| Set::parse(s)).collect::<Result<Vec<_>>>()?;
-    Pipeline::parse_with(GOOD, "p.toml", &registry(), &sets)
+    Graph::parse_with(GOOD, "p.toml", &registry(), &sets)
 }
 
 /// What is told of a wrong pipeline.
@@ -101,7 +102,7 @@ fn a_pipeline_reads_top_to_bottom() {
     let pipeline = parse(GOOD).unwrap();
     let kinds: Vec<&str> = pipeline.stages.iter().map(|s| s.kind.as_str()).collect();
     assert_eq!(kinds, ["synth", "thin", "write"]);
-    let lines: Vec<usize> = pipeline.stages.iter().map(|s| s.line).collect();
+    let lines: Vec<usize> = pipeline.stages.iter().filter_map(|s| s.line).collect();
     assert_eq!(lines, [2, 7, 11]);
     assert!(matches!(pipeline.stages[0].role, Role::Source(_)));
     assert!(matches!(pipeline.stages[1].role, Role::TileOp(_)));
@@ -299,10 +300,17 @@ fn from_names_an_earlier_stage() {
     let write =
         |from: &str| format!("[[stage]]\nkind = \"write\"\npath = \"a.laz\"\nfrom = \"{from}\"\n");
     let good = parse(&format!("{synth}{thin}{}", write("less"))).unwrap();
-    assert_eq!(good.stages[1].from.as_deref(), Some("scan"));
+    assert_eq!((&good.stages[1].from[..], &good.stages[2].from[..]), (&[0][..], &[1][..]));
     assert_eq!(good.stages[1].name.as_deref(), Some("less"));
     // A sink may take from any stage above; what works on the points is one chain.
-    parse(&format!("{synth}{thin}{}", write("scan"))).unwrap();
+    let both = parse(&format!(
+        "{synth}{thin}{}{}",
+        write("scan"),
+        write("less").replace("a.laz", "b.laz")
+    ));
+    assert_eq!(both.unwrap().stages[2].from, [0]);
+    let unused = told(&format!("{synth}{thin}{}", write("scan")));
+    assert!(unused.contains("no output takes what `thin` leaves"), "{unused}");
     let other = told(&format!("{synth}{thin}{thin}{}", write("scan")).replacen("less", "few", 1));
     assert!(other.contains("only a sink can take from another stage"), "{other}");
     let unknown = told(&format!("{synth}{thin}{}", write("lest")));
@@ -329,8 +337,8 @@ fn an_input_is_never_written_over() {
         scan = scan.display(),
         other = folder.path().join(".").join("scan.laz").display(),
     );
-    let registry = registry().with::<pointmill::pipeline::Read>();
-    let told = Pipeline::parse(&text, "p.toml", &registry).unwrap_err().to_string();
+    let registry = registry().with::<pointmill::io::ends::Read>();
+    let told = Graph::parse(&text, "p.toml", &registry).unwrap_err().to_string();
     assert!(told.starts_with("p.toml:6:8: ") && told.contains("is an input"), "{told}");
 }
 
@@ -340,13 +348,13 @@ fn inputs_are_looked_up_and_their_formats_agree() {
     for name in ["b.laz", "a.las", "c.ply", "d.abc"] {
         std::fs::write(folder.path().join(name), b"").unwrap();
     }
-    let registry = registry().with::<pointmill::pipeline::Read>();
+    let registry = registry().with::<pointmill::io::ends::Read>();
     let at = |name: &str| format!("\"{}\"", folder.path().join(name).display());
     let read = |path: &str| {
         let text = format!(
             "[[stage]]\nkind = \"read\"\npath = {path}\n[[stage]]\nkind = \"write\"\npath = \"out.laz\"\n"
         );
-        Pipeline::parse(&text, "p.toml", &registry).map(|pipeline| {
+        Graph::parse(&text, "p.toml", &registry).map(|pipeline| {
             let Role::Source(source) = &pipeline.stages[0].role else { panic!("read is a source") };
             assert_eq!(pipeline.stages[0].keys.to_string(), "{}");
             source.paths()
@@ -420,7 +428,7 @@ fn an_argument_mends_the_file() {
     let broken = GOOD.replace("neighbors = 12", "neighbors = \"many\"");
     assert!(parse(&broken).is_err());
     let sets = [Set::parse("thin.neighbors=4").unwrap()];
-    assert!(Pipeline::parse_with(&broken, "p.toml", &registry(), &sets).is_ok());
+    assert!(Graph::parse_with(&broken, "p.toml", &registry(), &sets).is_ok());
 }
 
 #[test]
@@ -431,7 +439,7 @@ fn several_stages_of_a_kind_are_told_apart() {
     );
     let set = |sets: &[&str]| {
         let sets: Vec<Set> = sets.iter().map(|s| Set::parse(s).unwrap()).collect();
-        Pipeline::parse_with(&text, "p.toml", &registry(), &sets)
+        Graph::parse_with(&text, "p.toml", &registry(), &sets)
     };
     let good = set(&["thin.1.angle=1", "thin.2.neighbors=2", "last.angle=2"]).unwrap();
     assert_eq!(good.stages[1].keys.to_string(), r#"{"angle":1.0,"names":[],"neighbors":12}"#);
@@ -499,13 +507,13 @@ fn told_len(text: &str) -> usize {
 
 #[test]
 fn a_pipeline_file_is_named_when_it_cannot_be_read() {
-    let missing = Pipeline::read(Path::new("/no/such.toml"), &registry(), &[]).unwrap_err();
+    let missing = Graph::read(Path::new("/no/such.toml"), &registry(), &[]).unwrap_err();
     assert_eq!(missing.kind(), ErrorKind::Io);
     assert_eq!(missing.path(), Some(Path::new("/no/such.toml")));
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("p.toml");
     std::fs::write(&file, b"a = \"\xff\"").unwrap();
-    let binary = Pipeline::read(&file, &registry(), &[]).unwrap_err();
+    let binary = Graph::read(&file, &registry(), &[]).unwrap_err();
     assert_eq!((binary.kind(), binary.byte()), (ErrorKind::Pipeline, Some(5)));
 }
 
@@ -547,7 +555,7 @@ fn a_neighbourhood_after_any_removal_is_a_second_pass() {
             text += &format!("[[stage]]\nkind = '{kind}'\n");
         }
         text += "[[stage]]\nkind = 'write'\npath = 'never-written.las'\n";
-        Pipeline::parse(&text, "p.toml", &registry).unwrap().plan(&Overrides::default())
+        Graph::parse(&text, "p.toml", &registry).unwrap().plan(&Overrides::default())
     };
     for removal in ["lonely", "cubes"] {
         let passes = |stages: &[&str]| {
@@ -597,7 +605,7 @@ fn a_stage_that_works_on_tiles_reads_no_dimension_that_these_have_not() {
             "[[stage]]\nkind = 'synth'\nscene = 'plane'\npoints = 9\n[[stage]]\nkind = 'bright'\n\
              dimension = '{dimension}'\n[[stage]]\nkind = 'write'\npath = 'never-written.las'\n"
         );
-        Pipeline::parse(&text, "p.toml", &registry).unwrap().plan(&Overrides::default())
+        Graph::parse(&text, "p.toml", &registry).unwrap().plan(&Overrides::default())
     };
     assert!(plan("Z").is_ok());
     let told = plan("Intensity").err().unwrap();

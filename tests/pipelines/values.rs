@@ -10,9 +10,9 @@ use std::sync::Mutex;
 
 use pointmill::Result;
 use pointmill::io::{las, ply};
-use pointmill::pipeline::{Done, Overrides, Pipeline, Registry, Watch};
 use pointmill::point::{PointBatch, Scalar, Schema};
 use pointmill::stage::Source;
+use pointmill::{Done, Graph, Overrides, Registry, Watch};
 use run_support::REDUCE;
 
 fn case(name: &str) -> PathBuf {
@@ -42,7 +42,7 @@ fn text(run: &str, inputs: &[PathBuf], stages: &str, output: &Path, write: &str)
 
 /// Plans and runs; what came out and all that was warned of.
 fn go(text: &str) -> Result<(Done, Vec<String>)> {
-    let pipeline = Pipeline::parse(text, "test.toml", &Registry::builtin())?;
+    let pipeline = Graph::parse(text, "test.toml", &Registry::builtin())?;
     let ear = Ear::default();
     let done = pipeline.plan(&Overrides::default())?.run(&ear)?;
     Ok((done, ear.0.into_inner().unwrap()))
@@ -157,7 +157,7 @@ fn records_that_ply_does_not_hold_are_named_before_the_run() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.ply");
     let pipeline = text("", &[case("122-vlrs.las")], "", &output, "");
-    let plan = Pipeline::parse(&pipeline, "test.toml", &Registry::builtin()).unwrap();
+    let plan = Graph::parse(&pipeline, "test.toml", &Registry::builtin()).unwrap();
     let plan = plan.plan(&Overrides::default()).unwrap();
     let [warning] = &plan.warnings()[..] else { panic!("{:?}", plan.warnings()) };
     assert!(warning.contains("these are lost: "), "{warning}");
@@ -173,7 +173,7 @@ fn values_that_the_output_cannot_hold_are_told_before_the_work() {
     let output = folder.path().join("out.las");
     let plan = |input: &str, stages: &str, keys: &str| {
         let text = text("", &[case(input)], stages, &output, keys);
-        let pipeline = Pipeline::parse(&text, "test.toml", &Registry::builtin()).unwrap();
+        let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin()).unwrap();
         pipeline.plan(&Overrides::default())
     };
     let keys = "scale = 0.001";

@@ -62,7 +62,7 @@ fn the_library_names_no_flag() {
     assert!(is_flag("give --memory"));
     for (place, line) in texts() {
         // `Set` reads the text of `--set`, and is named by it.
-        if !place.starts_with("src/pipeline/set.rs") {
+        if !place.starts_with("src/language/set.rs") {
             assert!(!is_flag(&line), "{place} names a flag: {line}");
         }
     }

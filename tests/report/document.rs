@@ -6,12 +6,12 @@ use std::collections::BTreeMap;
 use std::io::{BufReader, ErrorKind};
 use std::path::Path;
 
-use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
 use pointmill::report::{
     BaselineFigures, ClassFigures, Decision, DeviationFigures, DeviationTotals, FileFigures,
     LatticeFigures, Ledger, Machine, Outcome, Pair, Phase, PlaneFigures, Report, RunFigures, Tally,
     TileFigures, Totals, result_bytes,
 };
+use pointmill::{Graph, Overrides, Quiet, Registry};
 use serde_json::{Value, json};
 
 fn plane(rms: f64) -> Pair<Option<PlaneFigures>> {
@@ -200,7 +200,7 @@ fn a_report_says_how_many_records_each_input_had() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).display().to_string();
     let run = |text: &str| {
-        let pipeline = Pipeline::parse(text, "test.toml", &Registry::builtin()).unwrap();
+        let pipeline = Graph::parse(text, "test.toml", &Registry::builtin()).unwrap();
         pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap().report.run
     };
     for (name, points) in [("a.las", 1000), ("b.las", 2500)] {

@@ -7,7 +7,8 @@ use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Sche
 use pointmill::report::{
     Lot, Moments, Pair, Plane, ScanSurvey, TileFigures, Totals, report_tile_level,
 };
-use pointmill::tile::{Fate, Levels, TileKey, morton_cmp};
+use pointmill::store::{Levels, TileKey, morton_cmp};
+use pointmill::tile::Fate;
 use pointmill::{ErrorKind, Result};
 use proptest::prelude::*;
 

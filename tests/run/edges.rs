@@ -10,8 +10,8 @@ use std::path::Path;
 use std::process::Command;
 
 use pointmill::io::las;
-use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
 use pointmill::{Error, ErrorKind};
+use pointmill::{Graph, Overrides, Quiet, Registry};
 use serde_json::Value;
 
 use run_support::{Case, REDUCE, execute};
@@ -152,7 +152,7 @@ fn a_stream_of_any_length_needs_no_memory_for_an_index() {
          points = 4000000000\n[[stage]]\nkind = 'write'\npath = '{}'\n",
         at.path().join("out.laz").display()
     );
-    let pipeline = Pipeline::parse(&text, "test.toml", &Registry::builtin()).unwrap();
+    let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin()).unwrap();
     let plan = pipeline.plan(&Overrides::default()).unwrap();
     assert!(plan.to_string().contains("memory   128 MiB"));
 }

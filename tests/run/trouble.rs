@@ -10,12 +10,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use pointmill::pipeline::{Overrides, Quiet, Registry, StageKind, StagePlace, Watch};
 use pointmill::point::PointBatch;
 use pointmill::report::Tally;
 use pointmill::stage::{Gathered, Needs, Role, ScanOp, TileOp, Transform};
+use pointmill::stage::{StageKind, StagePlace};
 use pointmill::tile::Tile;
 use pointmill::{Error, ErrorKind, Result};
+use pointmill::{Overrides, Quiet, Registry, Watch};
 use serde::{Deserialize, Serialize};
 
 use run_support::{Case, REDUCE, execute, execute_with};

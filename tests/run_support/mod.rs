@@ -6,7 +6,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use pointmill::Result;
-use pointmill::pipeline::{Done, Overrides, Pipeline, Quiet, Registry, Watch};
+use pointmill::{Done, Graph, Overrides, Quiet, Registry, Watch};
 use serde_json::Value;
 
 /// The three stages of a reduction, as they come.
@@ -97,5 +97,5 @@ pub fn execute_with(
     overrides: &Overrides,
     watch: &dyn Watch,
 ) -> Result<Done> {
-    Pipeline::parse(text, "test.toml", registry)?.plan(overrides)?.run(watch)
+    Graph::parse(text, "test.toml", registry)?.plan(overrides)?.run(watch)
 }

@@ -9,10 +9,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pointmill::Result;
+use pointmill::io::ends::Format;
 use pointmill::io::{las, ply};
-use pointmill::pipeline::{Done, Format, Overrides, Pipeline, Quiet, Registry, Set};
 use pointmill::point::{PointBatch, Schema};
 use pointmill::stage::Source;
+use pointmill::{Done, Graph, Overrides, Quiet, Registry, Set};
 use serde_json::{Value, json};
 
 /// The pipelines that users copy.
@@ -68,7 +69,7 @@ pub fn run(text: &str, inputs: &[PathBuf], output: &Path, setup: &Setup) -> Resu
     let files = [("read.path", json!(inputs)), ("write.path", json!(output))];
     let set = |(address, value): &(&str, Value)| Set::argument("test", address, value.clone());
     let sets: Vec<Set> = files.iter().chain(&setup.sets).map(set).collect();
-    let pipeline = Pipeline::parse_with(text, "test.toml", &Registry::builtin(), &sets)?;
+    let pipeline = Graph::parse_with(text, "test.toml", &Registry::builtin(), &sets)?;
     let overrides = Overrides {
         memory: Some(setup.memory),
         threads: std::num::NonZeroUsize::new(setup.threads),

@@ -11,13 +11,13 @@ use std::sync::Arc;
 
 use common::{Memory, Random, Scan, Settings, assert_same, run};
 use pointmill::budget::Budget;
-use pointmill::io::synthetic::Scene;
+use pointmill::host::parallel;
 use pointmill::point::{
     Dimension, Endian, Layout, Metadata, Position, Scalar, Schema, distance2, names,
 };
-use pointmill::tile::{
-    Folder, Intake, Loader, Sieve, SpillArea, Tag, TileStore, morton_cmp, parallel, seal,
-};
+use pointmill::store::{Folder, Intake, SpillArea, Tag, TileStore, morton_cmp, seal};
+use pointmill::synth::Scene;
+use pointmill::tile::{Loader, Sieve};
 use serde_json::Value;
 
 /// A landscape's records, each moved to where `place` says.

@@ -10,9 +10,9 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use common::{Memory, Ran, Random, Scan, Settings, assert_same, run_with};
-use pointmill::io::synthetic::Scene;
-use pointmill::pipeline::{Overrides, Pipeline, Registry, Watch};
 use pointmill::report::Report;
+use pointmill::synth::Scene;
+use pointmill::{Graph, Overrides, Registry, Watch};
 
 const TILED: Settings = Settings {
     tile_points: Some(100),
@@ -182,7 +182,7 @@ fn heard(scan: &Scan, extension: &str, stages: &str, keys: &str) -> (Report, Vec
         at("out")
     );
     let heard = Heard::default();
-    let pipeline = Pipeline::parse(&text, "test.toml", &Registry::builtin()).unwrap();
+    let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin()).unwrap();
     let done = pipeline.plan(&Overrides::default()).unwrap().run(&heard).unwrap();
     (done.report, heard.0.into_inner().unwrap())
 }
@@ -248,7 +248,7 @@ fn a_scan_without_classes_has_none_to_keep_and_none_to_drop() {
              [[stage]]\nkind = 'write'\npath = {:?}\n",
             folder.path().join("out.ply")
         );
-        let pipeline = Pipeline::parse(&text, "test.toml", &Registry::builtin()).unwrap();
+        let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin()).unwrap();
         pipeline.plan(&Overrides::default())?.run(&Heard::default())
     };
     let done = run("drop_classes = [7, 18]\ndrop_flags = ['withheld']").unwrap();

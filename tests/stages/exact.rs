@@ -11,12 +11,11 @@ use std::sync::Arc;
 
 use common::{Memory, Random, Scan, Settings, run, scans};
 use pointmill::budget::Budget;
+use pointmill::host::parallel;
 use pointmill::ops::normals::{Estimate, Estimator, Method};
 use pointmill::point::{Bounds, Position, distance2, names};
-use pointmill::tile::{
-    Folder, Intake, Loader, SealedTiles, Sieve, SpillArea, Tag, TileStore, morton_cmp, parallel,
-    seal,
-};
+use pointmill::store::{Folder, Intake, SealedTiles, SpillArea, Tag, TileStore, morton_cmp, seal};
+use pointmill::tile::{Loader, Sieve};
 
 /// Tiles that both tests cut: small, and cut where the pipeline cuts them.
 const TILE_POINTS: usize = 400;

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
 use pointmill::ErrorKind;
-use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry};
+use pointmill::{Graph, Overrides, Quiet, Registry};
 
 /// Runs pointmill in `folder`; gives its exit code and what it told on stderr.
 fn pointmill(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
@@ -121,7 +121,7 @@ fn numbers_of_every_stage_work_or_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let text = pipeline(folder.path(), "600", stage, key, &value);
         let begun = Instant::now();
-        let outcome = Pipeline::parse(&text, "p.toml", &Registry::builtin())
+        let outcome = Graph::parse(&text, "p.toml", &Registry::builtin())
             .and_then(|p| p.plan(&Overrides::default()))
             .and_then(|plan| plan.run(&Quiet));
         match outcome {
@@ -142,7 +142,7 @@ fn points_without_end_are_planned_or_refused() {
     let folder = tempfile::tempdir().unwrap();
     for points in WHOLE {
         let text = pipeline(folder.path(), points, "", "", "");
-        let plan = Pipeline::parse(&text, "p.toml", &Registry::builtin())
+        let plan = Graph::parse(&text, "p.toml", &Registry::builtin())
             .and_then(|p| p.plan(&Overrides::default()));
         if let Err(error) = plan {
             assert_ne!(error.kind(), ErrorKind::Internal, "{points}: {error:?}");
@@ -171,11 +171,8 @@ fn threads_and_memory_beyond_reason_are_refused_in_a_message() {
         assert_eq!(code, Some(2), "{threads}: {told}");
         assert!(told.contains("threads"), "{told}");
     }
-    let plan = Pipeline::parse(
-        &pipeline(folder.path(), "600", "", "", ""),
-        "p.toml",
-        &Registry::builtin(),
-    );
+    let plan =
+        Graph::parse(&pipeline(folder.path(), "600", "", "", ""), "p.toml", &Registry::builtin());
     let threads = std::num::NonZeroUsize::new(usize::MAX);
     let error = plan.unwrap().plan(&Overrides { threads, ..Overrides::default() }).err().unwrap();
     assert_eq!(error.kind(), ErrorKind::Pipeline);

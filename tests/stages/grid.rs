@@ -11,7 +11,8 @@ use pointmill::point::{Bounds, Position};
 use pointmill::quantity::Length;
 use pointmill::report::Tally;
 use pointmill::stage::TileOp;
-use pointmill::tile::{Fate, Tile, morton_cmp};
+use pointmill::store::morton_cmp;
+use pointmill::tile::{Fate, Tile};
 use proptest::prelude::*;
 use stages_support::*;
 

@@ -8,8 +8,8 @@ use crate::common;
 use std::path::Path;
 
 use common::{Memory, Random, Scan, Settings, assert_same, run};
-use pointmill::io::synthetic::Scene;
 use pointmill::point::names;
+use pointmill::synth::Scene;
 
 const REDUCTION: &str = "[[stage]]\nkind = \"normals\"\n[[stage]]\nkind = \"cells\"\n\
                          [[stage]]\nkind = \"median\"\n";

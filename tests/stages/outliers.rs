@@ -10,7 +10,8 @@ use pointmill::point::{Bounds, Mark, Position};
 use pointmill::quantity::Length;
 use pointmill::report::Tally;
 use pointmill::stage::{Gathered, ScanOp, TileOp};
-use pointmill::tile::{Fate, morton_cmp};
+use pointmill::store::morton_cmp;
+use pointmill::tile::Fate;
 use proptest::prelude::*;
 use stages_support::*;
 

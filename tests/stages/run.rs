@@ -10,9 +10,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use pointmill::pipeline::{Overrides, Pipeline, Quiet, Registry, Set};
 use pointmill::point::Position;
-use pointmill::tile::morton_cmp;
+use pointmill::store::morton_cmp;
+use pointmill::{Graph, Overrides, Quiet, Registry, Set};
 use run_support::{Case, REDUCE, execute};
 use serde_json::Value;
 use stages_support::{far2, noise, sorted};
@@ -310,8 +310,7 @@ fn the_pipelines_that_users_copy_run() {
             Set::argument("OUT", "write.path", out.display().to_string().into()),
         ];
         let registry = Registry::builtin();
-        let pipeline =
-            Pipeline::read(&copies.join(format!("{name}.toml")), &registry, &sets).unwrap();
+        let pipeline = Graph::read(&copies.join(format!("{name}.toml")), &registry, &sets).unwrap();
         let done = pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
         let ledger = &done.report.result.ledger;
         assert_eq!(ledger.read, 8000);

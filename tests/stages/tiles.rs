@@ -7,13 +7,14 @@ use std::sync::Arc;
 
 use pointmill::budget::Budget;
 use pointmill::geom::lattice::Lattice;
+use pointmill::host::parallel;
 use pointmill::point::{
     Dimension, Endian, Layout, PointBatch, Position, Scalar, Schema, distance2, names,
 };
-use pointmill::tile::{
-    Fetch, Folder, Intake, Loader, Reader, SealedTiles, Sieve, SpillArea, Tag, TileStore,
-    morton_cmp, parallel, seal,
+use pointmill::store::{
+    Fetch, Folder, Intake, Reader, SealedTiles, SpillArea, Tag, TileStore, morton_cmp, seal,
 };
+use pointmill::tile::{Loader, Sieve};
 
 /// A small generator, so that a failing case is the same everywhere.
 struct Random(u64);
@@ -209,7 +210,7 @@ fn a_cube_that_cannot_be_cut_is_named_with_its_count() {
     let scan: Vec<Position> = (0..4_000).map(|i| [i % 16, i / 16 % 16, i / 256]).collect();
     let (tiles, _, _) = sealed(&scan, 1, 1_000, 1 << 20);
     match tiles.cut(50, 100, 0, (4, 4)) {
-        Err(pointmill::tile::CutError::TooHeavy { key, positions }) => {
+        Err(pointmill::store::CutError::TooHeavy { key, positions }) => {
             assert_eq!((key.corner, key.level, positions), ([0; 3], 4, 4_000));
         }
         other => panic!("{other:?}"),
@@ -224,7 +225,7 @@ fn of_several_cubes_too_heavy_the_heaviest_is_named() {
     let scan: Vec<Position> = (0..4).flat_map(thin).chain(more).collect();
     let (tiles, _, _) = sealed(&scan, 1, 1_000, 1 << 20);
     match tiles.cut(50, 90, 0, (4, 4)) {
-        Err(pointmill::tile::CutError::TooHeavy { key, positions }) => {
+        Err(pointmill::store::CutError::TooHeavy { key, positions }) => {
             assert_eq!((key.corner, positions), ([32, 0, 0], 200));
         }
         other => panic!("{other:?}"),

@@ -5,7 +5,8 @@ use pointmill::geom::lattice::Lattice;
 use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
 use pointmill::report::Tally;
 use pointmill::stage::{ScanFacts, TileOp};
-use pointmill::tile::{Fate, Levels, Tile, TileKey, morton_cmp};
+use pointmill::store::{Levels, TileKey, morton_cmp};
+use pointmill::tile::{Fate, Tile};
 
 /// Distinct positions in Morton order.
 pub fn sorted(positions: impl IntoIterator<Item = Position>) -> Vec<Position> {
@@ -94,8 +95,8 @@ pub fn refusal(stage: &str) -> String {
         "[[stage]]\nkind = 'synth'\nscene = 'plane'\npoints = 10\n\n[[stage]]\n{stage}\n\n\
          [[stage]]\nkind = 'write'\npath = 'out.las'\n"
     );
-    let registry = pointmill::pipeline::Registry::builtin();
-    match pointmill::pipeline::Pipeline::parse(&text, "p.toml", &registry) {
+    let registry = pointmill::Registry::builtin();
+    match pointmill::Graph::parse(&text, "p.toml", &registry) {
         Ok(_) => panic!("not refused: {stage}"),
         Err(error) => format!("{error:?}\n{error}"),
     }

@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex};
 
 use super::header::{Header, at};
 use crate::Result;
+use crate::host::lock;
 use crate::point::PointBatch;
 use crate::report::Grouped;
 use crate::stage::{Contradiction, Part};
-use crate::tile::lock;
 
 /// Steps that a point may lie outside of the box: writers compute it before or after they round.
 const SLACK: f64 = 1.0;

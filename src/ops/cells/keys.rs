@@ -13,7 +13,7 @@ use super::target::Keep;
 use super::threshold::Threshold;
 use crate::geom::angle::MaxAngle;
 use crate::quantity::{Angle, Length, Setting};
-use crate::tile::Levels;
+use crate::store::Levels;
 use crate::{Error, Result};
 
 /// Largest range of angles where nothing is said, in radians.

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use crate::geom::angle::MaxAngle;
 use crate::point::Position;
-use crate::tile::morton_cmp;
+use crate::store::morton_cmp;
 
 /// Which of the divisions that could be made are made.
 #[derive(Debug, Clone, Copy)]

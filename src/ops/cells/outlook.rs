@@ -1,7 +1,7 @@
 //! What is known of the scan before a sample is looked at.
 
 use crate::stage::ScanFacts;
-use crate::tile::Levels;
+use crate::store::Levels;
 
 /// How many records and positions there are, and how many cubes of every side they occupy.
 #[derive(Debug, Clone)]

@@ -1,0 +1,143 @@
+//! The records of outputs that are one for each input, sorted by input while tiles leave their products.
+
+use std::sync::Arc;
+
+use super::product::Entry;
+use crate::stage::Input;
+use crate::store::{Spill, SpillArea, State, Stretch, Tag};
+use crate::{Error, Result};
+
+/// Bytes that all lists of records hold in memory before they go to the spill.
+pub const LISTS_BYTES: usize = 8 << 20;
+/// What the list of one input holds at least and at most.
+const LIST: (usize, usize) = (512, 64 << 10);
+/// Bytes of an entry of a list: number, count, state; a normal if there is one.
+const ENTRY: usize = 8 + 4 + 1;
+const NORMAL: usize = 12;
+
+/// The rank of each input by its name: what tells equal records of two inputs apart, so that the
+/// order in which inputs are named decides nothing.
+pub fn ranks(inputs: &[Input]) -> Vec<u32> {
+    let mut order: Vec<usize> = (0..inputs.len()).collect();
+    order.sort_by_key(|&i| (inputs[i].path.file_name(), &inputs[i].path));
+    let mut ranks = vec![0; inputs.len()];
+    for (rank, i) in order.into_iter().enumerate() {
+        ranks[i] = u32::try_from(rank).unwrap_or(u32::MAX);
+    }
+    ranks
+}
+
+/// Bytes that sorting by so many inputs holds.
+pub fn lists_bytes(inputs: usize) -> u64 {
+    let each = (list_bytes(inputs) + size_of::<List>()) as u64;
+    (inputs as u64).saturating_mul(each)
+}
+
+fn list_bytes(inputs: usize) -> usize {
+    (LISTS_BYTES / inputs.max(1)).clamp(LIST.0, LIST.1)
+}
+
+/// The records of one input that were not yet stored, and where the others are.
+#[derive(Debug, Default)]
+struct List {
+    open: Vec<u8>,
+    stretches: Vec<Stretch>,
+    records: u64,
+}
+
+/// The records that an output gets, sorted by input; within one they stay in their order.
+pub(crate) struct ByInput {
+    /// Which output.
+    pub sink: usize,
+    /// True if it writes normals.
+    pub wants_normals: bool,
+    /// True if it takes what was there before the pass.
+    before: bool,
+    spill: Spill,
+    lists: Vec<List>,
+    list_bytes: usize,
+}
+
+impl ByInput {
+    /// Output `sink`, for so many inputs, without a record.
+    pub fn new(
+        area: &Arc<SpillArea>,
+        sink: usize,
+        inputs: usize,
+        wants_normals: bool,
+        before: bool,
+    ) -> Self {
+        let spill = Spill::new(area, "inputs");
+        let mut lists = Vec::new();
+        lists.resize_with(inputs, List::default);
+        ByInput { sink, wants_normals, before, spill, lists, list_bytes: list_bytes(inputs) }
+    }
+
+    /// Takes what becomes of an entry.
+    pub fn take(&mut self, entry: &Entry, normal: Option<[f32; 3]>) -> Result<()> {
+        let state = if self.before { entry.was } else { entry.now };
+        if !state.is_written() {
+            return Ok(());
+        }
+        let rank = entry.tag.input(self.lists.len()) as usize;
+        let list = self.lists.get_mut(rank).ok_or_else(|| {
+            Error::internal(format!("a record of input {rank} came, which there is not"))
+        })?;
+        list.open.extend_from_slice(&entry.number.to_le_bytes());
+        list.open.extend_from_slice(&entry.count.to_le_bytes());
+        list.open.push(state.0);
+        if self.wants_normals {
+            let normal = normal.unwrap_or([f32::NAN; 3]);
+            normal.iter().for_each(|v| list.open.extend_from_slice(&v.to_le_bytes()));
+        }
+        list.records += u64::from(entry.count);
+        if list.open.len() + ENTRY + NORMAL > self.list_bytes {
+            list.stretches.push(self.spill.store(&list.open)?);
+            list.open.clear();
+        }
+        Ok(())
+    }
+
+    /// Calls `visit` with the entries of the input of `rank`, in canonical order.
+    pub fn each(
+        &self,
+        rank: usize,
+        mut visit: impl FnMut(&Entry, Option<[f32; 3]>) -> Result<()>,
+    ) -> Result<()> {
+        let Some(list) = self.lists.get(rank) else { return Ok(()) };
+        let mut bytes = Vec::new();
+        let mut visit_all = |bytes: &[u8]| {
+            let size = if self.wants_normals { ENTRY + NORMAL } else { ENTRY };
+            bytes.chunks_exact(size).try_for_each(|item| {
+                let (entry, normal) = unpack(item);
+                visit(&entry, normal)
+            })
+        };
+        for stretch in &list.stretches {
+            self.spill.load(stretch, &mut bytes)?;
+            visit_all(&bytes)?;
+        }
+        visit_all(&list.open)
+    }
+
+    /// Records of all inputs.
+    pub fn records(&self) -> u64 {
+        self.lists.iter().map(|list| list.records).sum()
+    }
+}
+
+/// An entry as stored, and its normal if there is one.
+fn unpack(item: &[u8]) -> (Entry, Option<[f32; 3]>) {
+    let field = |at: usize| {
+        let mut bytes = [0; 4];
+        bytes.copy_from_slice(&item[at..at + 4]);
+        bytes
+    };
+    let word = |at| u32::from_le_bytes(field(at));
+    let state = State(item[12]);
+    let number = u64::from(word(0)) | u64::from(word(4)) << 32;
+    let entry = Entry { number, count: word(8), tag: Tag::default(), was: state, now: state };
+    let normal =
+        (item.len() > ENTRY).then(|| [0, 4, 8].map(|at| f32::from_le_bytes(field(ENTRY + at))));
+    (entry, normal)
+}

@@ -1,0 +1,261 @@
+//! Outputs in the order of the inputs: while tiles leave their products the records that such an output
+//! gets are sorted into stretches of the input, and behind the last tile each stretch is ordered in
+//! memory, and all are written one after the other.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+
+use super::chunk::{Chunk, Open};
+use super::encoding::ChunkEncoders;
+use super::job::{Job, StopOnDrop};
+use super::outlet::{Hands, Outlet};
+use super::product::Entry;
+use crate::host::{lock, parallel};
+use crate::report::Tally;
+use crate::stage::{Sink, SinkSummary};
+use crate::store::{SealedTiles, Spill, SpillArea, State, Stretch, Tag};
+use crate::{Error, Result};
+
+/// Bits of a place in the input that number the records of a part; above them is the part's number.
+const RECORD_BITS: u32 = 40;
+/// Parts that places can tell apart.
+pub const MOST_PARTS: usize = 1 << (u64::BITS - RECORD_BITS);
+
+/// Bytes that all lists hold in memory before they go to the spill, about.
+const LISTS_BYTES: usize = 8 << 20;
+/// What the list of one stretch holds at least and at most.
+const LIST: (usize, usize) = (512, 64 << 10);
+/// Stretches that the input is cut into at most, and records that one has at least.
+const STRETCHES: u64 = 16_384;
+const STRETCH: u64 = 1 << 16;
+/// Bytes of an entry of a list: its place in the stretch, where it is stored, state, normal.
+const ENTRY: usize = 8 + 8 + 1;
+const NORMAL: usize = 12;
+/// Bytes that a record has in the lists at most.
+pub const LISTED: u64 = (ENTRY + NORMAL) as u64;
+
+/// The place of record `index` of part `part` in the input.
+pub(crate) fn place(part: usize, index: u64) -> u64 {
+    (part as u64) << RECORD_BITS | index
+}
+
+/// Records of a stretch of an input of so many.
+fn stretch_records(records: u64) -> u64 {
+    records.div_ceil(STRETCHES).max(STRETCH)
+}
+
+fn list_bytes(stretches: usize) -> usize {
+    (LISTS_BYTES / stretches.max(1)).clamp(LIST.0, LIST.1)
+}
+
+/// Bytes that the lists of an input of so many records hold in memory.
+pub(crate) fn lists_bytes(records: u64) -> u64 {
+    let stretches = records.div_ceil(stretch_records(records));
+    let each = list_bytes(usize::try_from(stretches).unwrap_or(usize::MAX)) + size_of::<List>();
+    stretches.saturating_mul(each as u64)
+}
+
+/// Bytes that a thread holds while it orders stretches: one at work, and what waits for its turn.
+pub(crate) fn ordering_bytes(records: u64) -> u64 {
+    let most = records.min(stretch_records(records));
+    most.saturating_mul((3 * size_of::<Ranked>() + ENTRY + NORMAL) as u64)
+}
+
+/// How many records of the input come before each part's: what a place is counted from.
+#[derive(Debug, Default)]
+pub(crate) struct Starts {
+    before: Vec<u64>,
+    records: u64,
+}
+
+impl Starts {
+    /// Of parts that have so many records each.
+    pub fn of(parts: &[u64]) -> Starts {
+        let mut records = 0u64;
+        let before = parts.iter().map(|&n| {
+            records += n;
+            records - n
+        });
+        Starts { before: before.collect(), records }
+    }
+
+    fn rank(&self, place: u64) -> Result<u64> {
+        let before = self.before.get((place >> RECORD_BITS) as usize);
+        let unknown = || Error::internal("a record came from a part that there is not");
+        Ok(before.ok_or_else(unknown)? + (place & ((1 << RECORD_BITS) - 1)))
+    }
+}
+
+/// A record in its stretch of the input.
+#[derive(Debug, Clone, Copy)]
+struct Ranked {
+    rank: u64,
+    stored: u64,
+    state: State,
+    normal: [f32; 3],
+}
+
+/// The records of one stretch that were not yet stored, and where the others are.
+#[derive(Debug, Default)]
+struct List {
+    open: Vec<u8>,
+    stretches: Vec<Stretch>,
+}
+
+/// The records that an output gets, by stretches of the input.
+pub(crate) struct ByRank {
+    /// Which output.
+    pub sink: usize,
+    wants_normals: bool,
+    /// True if it takes what was there before the pass.
+    before: bool,
+    starts: Arc<Starts>,
+    stretch: u64,
+    spill: Spill,
+    lists: Vec<List>,
+    list_bytes: usize,
+    /// Records of all stretches.
+    pub records: u64,
+}
+
+impl ByRank {
+    /// Output `sink` without a record.
+    pub fn new(
+        area: &Arc<SpillArea>,
+        sink: usize,
+        starts: &Arc<Starts>,
+        wants_normals: bool,
+        before: bool,
+    ) -> Self {
+        let stretch = stretch_records(starts.records);
+        let mut lists = Vec::new();
+        lists.resize_with(starts.records.div_ceil(stretch) as usize, List::default);
+        ByRank {
+            sink,
+            wants_normals,
+            before,
+            starts: starts.clone(),
+            stretch,
+            spill: Spill::new(area, "ranks"),
+            list_bytes: list_bytes(lists.len()),
+            lists,
+            records: 0,
+        }
+    }
+
+    /// Takes what becomes of an entry, whose records are stored and were read at `places`.
+    pub fn take(
+        &mut self,
+        entry: &Entry,
+        places: &[(u64, u64)],
+        normal: Option<[f32; 3]>,
+    ) -> Result<()> {
+        let state = if self.before { entry.was } else { entry.now };
+        if !state.is_written() {
+            return Ok(());
+        }
+        for &(stored, place) in places {
+            let rank = self.starts.rank(place)?;
+            let list = self.lists.get_mut((rank / self.stretch) as usize);
+            let list =
+                list.ok_or_else(|| Error::internal("a record is behind the input's last"))?;
+            list.open.extend_from_slice(&rank.to_le_bytes());
+            list.open.extend_from_slice(&stored.to_le_bytes());
+            list.open.push(state.0);
+            if self.wants_normals {
+                let normal = normal.unwrap_or([f32::NAN; 3]);
+                normal.iter().for_each(|v| list.open.extend_from_slice(&v.to_le_bytes()));
+            }
+            if list.open.len() + ENTRY + NORMAL > self.list_bytes {
+                list.stretches.push(self.spill.store(&list.open)?);
+                list.open.clear();
+            }
+        }
+        self.records += places.len() as u64;
+        Ok(())
+    }
+
+    /// The records of list `number` in the order of the input.
+    fn ordered(&self, number: usize) -> Result<Vec<Ranked>> {
+        let Some(list) = self.lists.get(number) else { return Ok(Vec::new()) };
+        let size = if self.wants_normals { ENTRY + NORMAL } else { ENTRY };
+        let (mut ranked, mut bytes) = (Vec::new(), Vec::new());
+        for stretch in &list.stretches {
+            self.spill.load(stretch, &mut bytes)?;
+            ranked.extend(bytes.chunks_exact(size).map(unpack));
+        }
+        ranked.extend(list.open.chunks_exact(size).map(unpack));
+        ranked.sort_unstable_by_key(|record: &Ranked| record.rank);
+        Ok(ranked)
+    }
+
+    /// Writes all records into `sink` on all threads; what it said. `counted` if classes are counted
+    /// by these records.
+    pub fn write(
+        &self,
+        job: &Job<'_>,
+        tiles: &SealedTiles,
+        sink: Box<dyn Sink>,
+        counted: bool,
+    ) -> Result<(SinkSummary, Tally)> {
+        let encoders = ChunkEncoders::of_one(job, tiles, &*sink, counted, false).of_stored();
+        let open = Mutex::new(Open::new(0, sink.chunk_points(), self.wants_normals, false));
+        let commit = |records: Vec<Ranked>| -> Result<Vec<Chunk>> {
+            let (mut open, mut full) = (lock(&open), Vec::new());
+            for Ranked { stored, state, normal, .. } in records {
+                let (was, now) = (state, state);
+                let entry = Entry { number: stored, count: 1, tag: Tag::default(), was, now };
+                open.take(&entry, Some(normal), &mut full);
+            }
+            Ok(full)
+        };
+        let outlet: Outlet<Vec<Ranked>, Chunk> = Outlet::new(vec![sink], job.threads);
+        let (next, total) = (AtomicUsize::new(0), Mutex::new(Tally::default()));
+        parallel(job.threads, |_| {
+            let guard = StopOnDrop::new(|| outlet.stop());
+            let mut encoder = encoders.one();
+            let mut encode = |chunk| encoder.encode(&encoders, &chunk);
+            let mut hands = Hands { commit: &commit, encode: &mut encode };
+            loop {
+                let number = next.fetch_add(1, Ordering::Relaxed);
+                if number >= self.lists.len() {
+                    break;
+                }
+                let records = self.ordered(number)?;
+                let count = records.len() as u64;
+                outlet.deliver((number as u64, 0), records, true, &mut hands)?;
+                job.advance(count)?;
+            }
+            outlet.drain(&mut hands, |turn| turn.0 >= self.lists.len() as u64)?;
+            lock(&total).merge(&encoder.tally);
+            guard.disarm();
+            Ok(())
+        })?;
+        let rest = lock(&open).rest().into_iter().collect();
+        let mut encoder = encoders.one();
+        let mut encode = |chunk| encoder.encode(&encoders, &chunk);
+        let said = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
+        let mut tally = std::mem::take(&mut *lock(&total));
+        tally.merge(&encoder.tally);
+        let summary = said.into_iter().next();
+        Ok((summary.ok_or_else(|| Error::internal("an output said nothing"))?, tally))
+    }
+}
+
+/// An entry as stored.
+fn unpack(item: &[u8]) -> Ranked {
+    let word = |at: usize| {
+        let mut bytes = [0; 8];
+        bytes.copy_from_slice(&item[at..at + 8]);
+        u64::from_le_bytes(bytes)
+    };
+    let normal = match item.len() > ENTRY {
+        true => [0, 4, 8].map(|at| {
+            let mut bytes = [0; 4];
+            bytes.copy_from_slice(&item[ENTRY + at..ENTRY + at + 4]);
+            f32::from_le_bytes(bytes)
+        }),
+        false => [f32::NAN; 3],
+    };
+    Ranked { rank: word(0), stored: word(8), state: State(item[16]), normal }
+}

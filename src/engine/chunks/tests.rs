@@ -1,0 +1,97 @@
+//! Products cut into the chunks of sinks.
+
+use super::*;
+use crate::budget::Budget;
+use crate::engine::product::Entry;
+use crate::point::Edit;
+use crate::store::{FATE_BYTES, Folder, State, Tag};
+
+#[derive(Debug)]
+struct Nowhere;
+
+impl Folder for Nowhere {
+    fn file(&self, _name: &str) -> Result<std::path::PathBuf> {
+        Err(crate::Error::internal("nothing spills here"))
+    }
+}
+
+fn product(kept: &[(u64, u32)]) -> Product {
+    let entry = |&(number, count): &(u64, u32)| Entry {
+        number,
+        count,
+        tag: Tag::default(),
+        was: State::ALIVE,
+        now: State::ALIVE,
+    };
+    Product {
+        entries: kept.iter().map(entry).collect(),
+        entry_normals: Some(kept.iter().map(|&(first, _)| [first as f32; 3]).collect()),
+        fates: vec![0; kept.len() * FATE_BYTES],
+        ..Product::default()
+    }
+}
+
+#[test]
+fn chunks_are_cut_by_rank_and_copies_are_one_entry() {
+    let area = SpillArea::new(Budget::new(1 << 26), 1 << 26, Box::new(Nowhere));
+    let outputs = vec![Open::new(0, 1000, true, false)];
+    let copies = 10_000_000;
+    let all = 8 + u64::from(copies);
+    let outlets = (outputs, Vec::new(), Vec::new());
+    let mut cutter = Cutter::new(&area, (8, all), (false, false), outlets).unwrap();
+    let mut chunks = cutter.cut(&product(&[(0, 1), (1, 2), (7, copies)])).unwrap();
+    assert_eq!(chunks.len(), 10_000);
+    assert!(chunks.iter().all(|chunk| chunk.records.len() <= 3));
+    chunks.extend(cutter.cut(&product(&[(20_000_000, 5)])).unwrap());
+    let (rest, stored, _, counts) = cutter.finish().unwrap();
+    chunks.extend(rest);
+    assert_eq!(counts, Counts { alive: all, written: all, outputs: vec![all] });
+    let mut buffer = Vec::new();
+    assert_eq!(stored.states.get(all - 3, 3, &mut buffer).unwrap(), [State::ALIVE.0; 3]);
+    let (mut numbers, mut states, mut ranks) = (Vec::new(), Vec::new(), 0);
+    let expected = (0..3).chain(7..7 + u64::from(copies)).chain(20_000_000..20_000_005);
+    let mut expected = expected.peekable();
+    for chunk in &chunks {
+        chunk.number(&mut numbers);
+        assert!(numbers.iter().all(|&number| expected.next() == Some(number)));
+        let normals = chunk.spread_normals().unwrap();
+        chunk.states(&mut states);
+        assert_eq!((normals.len(), states.len()), (numbers.len(), numbers.len()));
+        assert!(numbers.iter().zip(normals).all(|(&n, normal)| match n {
+            0 => normal[0] == 0.0,
+            1..3 => normal[0] == 1.0,
+            7..20_000_000 => normal[0] == 7.0,
+            _ => normal[0] == 2e7,
+        }));
+        ranks += numbers.len();
+        assert!(ranks % 1000 == 0 || expected.peek().is_none());
+    }
+    assert_eq!(expected.next(), None);
+}
+
+#[test]
+fn outputs_take_what_was_there_before_the_pass_or_what_it_leaves() {
+    let area = SpillArea::new(Budget::new(1 << 20), 1 << 20, Box::new(Nowhere));
+    let outputs = vec![Open::new(3, 2, false, true), Open::new(5, 2, false, false)];
+    let outlets = (outputs, Vec::new(), Vec::new());
+    let mut cutter = Cutter::new(&area, (3, 3), (false, false), outlets).unwrap();
+    let mut product = product(&[(0, 1), (1, 1), (2, 1)]);
+    product.entries[1].now = State::REMOVED;
+    product.entries[2].now = State::ASIDE.edited(Edit::SetWithheld);
+    let mut chunks = cutter.cut(&product).unwrap();
+    let (rest, _, _, counts) = cutter.finish().unwrap();
+    chunks.extend(rest);
+    assert_eq!(counts, Counts { alive: 1, written: 2, outputs: vec![3, 2] });
+    let of = |sink: usize| {
+        let mut all = Vec::new();
+        for chunk in chunks.iter().filter(|chunk| chunk.sink == sink) {
+            let (mut numbers, mut states) = (Vec::new(), Vec::new());
+            chunk.number(&mut numbers);
+            chunk.states(&mut states);
+            all.extend(numbers.into_iter().zip(states.into_iter().map(State::edits)));
+        }
+        all
+    };
+    assert_eq!(of(3), [(0, 0), (1, 0), (2, 0)]);
+    assert_eq!(of(5), [(0, 0), (2, Edit::SetWithheld as u8)]);
+}

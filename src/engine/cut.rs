@@ -1,0 +1,205 @@
+//! Cutting the decoded scan into tiles that fit the memory, wide enough for the stages' cells.
+
+use std::sync::Arc;
+
+use super::job::Job;
+use super::pass::{Pass, StageOp};
+use super::shares::{Demands, MILL_SPARE, Shares};
+use crate::budget::{Lease, whole_mebibytes};
+use crate::geom::lattice::Lattice;
+use crate::store::{CutError, SealedTiles, TileKey};
+use crate::{Error, Result};
+
+/// How far beyond its cube a tile's columns must be right: the sides of the cells that its faces
+/// may cut, which add along the chain.
+pub(crate) fn reach(ops: &[StageOp], pass: &Pass) -> i64 {
+    pass.needs(ops)
+        .filter(|needs| !needs.cell_aligned)
+        .fold(0, |sum, needs| sum.saturating_add(needs.cell_side))
+}
+
+pub(crate) fn neighbors(ops: &[StageOp], pass: &Pass) -> usize {
+    pass.needs(ops).map(|needs| needs.neighbors).max().unwrap_or(0)
+}
+
+/// Tiles are at least four cells wide, or their zones would be mostly their neighbours'; one cell
+/// where they would not fit otherwise.
+const CELLS_ACROSS: u64 = 4;
+
+/// The tiles of a pass.
+pub(crate) struct Cut {
+    cells: Cells,
+    pub keys: Vec<TileKey>,
+    /// Positions that the arena of a thread takes.
+    pub capacity: usize,
+    /// Threads that have one: all, unless a tile is so heavy that the memory does not do for all.
+    pub millers: usize,
+    _listed: Lease,
+}
+
+/// What the tiles of passes depend on; equal for all passes of most pipelines.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Cells {
+    side: u64,
+    reach: i64,
+}
+
+impl Cells {
+    fn of(ops: &[StageOp], pass: &Pass) -> Cells {
+        let side = pass.needs(ops).map(|needs| needs.cell_side).max().unwrap_or(0);
+        Cells { side: u64::try_from(side).unwrap_or(0), reach: reach(ops, pass) }
+    }
+
+    /// The level of the smallest octree node that is `across` cells wide.
+    fn level(self, across: u64) -> u32 {
+        match self.side.saturating_mul(across) {
+            0 => 0,
+            wide => wide.checked_next_power_of_two().map_or(64, u64::ilog2),
+        }
+    }
+}
+
+/// The tiles of every pass, before the first begins: a scan too heavy for the memory is refused when
+/// nothing but its decode is lost.
+pub(crate) fn cut_all(
+    job: &Job<'_>,
+    lattice: &Lattice,
+    shares: &Shares,
+    demands: &Demands,
+    tiles: &SealedTiles,
+) -> Result<Vec<Arc<Cut>>> {
+    let mut known: Vec<(Cells, Arc<Cut>)> = Vec::new();
+    let mut cuts = Vec::new();
+    for pass in &job.passes {
+        let cells = Cells::of(&job.ops, pass);
+        let cut = match known.iter().find(|(same, _)| *same == cells) {
+            Some((_, cut)) => cut.clone(),
+            None => Arc::new(cut(job, cells, lattice, (shares, demands), tiles, 0)?),
+        };
+        known.push((cells, cut.clone()));
+        cuts.push(cut);
+    }
+    Ok(cuts)
+}
+
+/// The tiles of a pass whose stages may have chosen other cells since `cut` was made; the mill holds
+/// `held` bytes already.
+pub(crate) fn cut_again(
+    job: &Job<'_>,
+    pass: &Pass,
+    lattice: &Lattice,
+    (shares, demands): (&Shares, &Demands),
+    tiles: &SealedTiles,
+    (made, held): (&Arc<Cut>, u64),
+) -> Result<Arc<Cut>> {
+    let cells = Cells::of(&job.ops, pass);
+    match cells == made.cells {
+        true => Ok(made.clone()),
+        false => cut(job, cells, lattice, (shares, demands), tiles, held).map(Arc::new),
+    }
+}
+
+/// The tiles of a pass and the positions that an arena for them takes: as planned; or, where a cube
+/// holds more, what the memory left after the decode can give; or cubes of a cell; or arenas of
+/// fewer threads.
+fn cut(
+    job: &Job<'_>,
+    cells: Cells,
+    lattice: &Lattice,
+    (shares, demands): (&Shares, &Demands),
+    tiles: &SealedTiles,
+    held: u64,
+) -> Result<Cut> {
+    let wanted = job.tile_points.map_or(zone_of(shares.tile_positions), |points| points as u64);
+    let later = demands.gathered(shares).saturating_add(MILL_SPARE);
+    let free = job.budget.free().saturating_add(held).saturating_sub(later);
+    let largest = demands.tile_positions(job.threads, free).max(shares.tile_positions);
+    let (good, lowest) = (cells.level(CELLS_ACROSS), cells.level(1));
+    let mut tries =
+        vec![(shares.tile_positions, good), (largest, good), (largest, lowest)].into_iter();
+    let mut millers = job.threads;
+    let mut at = tries.next();
+    while let Some((capacity, smallest)) = at {
+        // Around all positions there is no rim.
+        let all = capacity as u64 >= tiles.positions();
+        let most = if all { tiles.positions() } else { zone_of(capacity) };
+        let (key, positions) = match tiles.cut(wanted, most, cells.reach, (good, smallest)) {
+            Ok(keys) => {
+                let bytes = keys.len().saturating_mul(size_of::<TileKey>()) as u64;
+                let _listed = job.budget.lease(bytes, "list of tiles")?;
+                return Ok(Cut { cells, keys, capacity, millers, _listed });
+            }
+            Err(CutError::Read(error)) => return Err(error),
+            Err(CutError::TooHeavy { key, positions }) => (key, positions),
+        };
+        at = tries.next();
+        if at.is_none() {
+            let found = (key, positions);
+            let (key, positions) = heaviest(tiles, wanted, cells.reach, (good, lowest), found)?;
+            let tile = positions.saturating_mul(2).saturating_add(1).min(tiles.positions());
+            let fits = |millers: &usize| demands.tile_positions(*millers, free) as u64 >= tile;
+            let Some(fewer) = (1..millers).rev().find(fits) else {
+                let limit = demands.limit_for_tile(1, tile);
+                let error = too_heavy(lattice, key, (positions, most));
+                return Err(error.help(remedy(limit, held == 0 && is_sampled(job))));
+            };
+            let enough = whole_mebibytes(demands.limit_for_tile(millers, tile));
+            job.warn(format!(
+                "{positions} points lie so close that their tile leaves memory for {fewer} of {millers} \
+                 threads; `run.memory = \"{enough}\"` does for all"
+            ));
+            (millers, at) = (fewer, Some((demands.tile_positions(fewer, free), lowest)));
+        }
+    }
+    Err(Error::internal("a tile fits and does not"))
+}
+
+/// The heaviest of the cubes that cannot be cut, of which one was found: a memory that does for that one
+/// does for all. Each try passes over all that are no heavier than the last.
+fn heaviest(
+    tiles: &SealedTiles,
+    wanted: u64,
+    reach: i64,
+    levels: (u32, u32),
+    mut found: (TileKey, u64),
+) -> Result<(TileKey, u64)> {
+    loop {
+        match tiles.cut(wanted, found.1, reach, levels) {
+            Ok(_) => return Ok(found),
+            Err(CutError::Read(error)) => return Err(error),
+            Err(CutError::TooHeavy { key, positions }) => found = (key, positions),
+        }
+    }
+}
+
+/// Positions of a tile's zone: half of its memory is for them, the other half for the rim.
+fn zone_of(tile_positions: usize) -> u64 {
+    (tile_positions / 2) as u64
+}
+
+/// The error of a cube that cannot be cut and holds more positions than the most that fit.
+fn too_heavy(lattice: &Lattice, key: TileKey, (positions, most): (u64, u64)) -> Error {
+    let (lo, hi) = (lattice.world(key.cube().lo), lattice.world(key.cube().hi));
+    Error::memory(format!(
+        "the cube from {lo:?} to {hi:?} and the cells around it hold {positions} positions, more \
+         than the {most} that a tile may have"
+    ))
+}
+
+/// True if a stage may choose wider cells than those that are cut by now.
+fn is_sampled(job: &Job<'_>) -> bool {
+    let sampled = |op: &StageOp| op.op.tile().sample_side().is_some();
+    job.ops.iter().any(sampled)
+}
+
+/// What does for the heaviest tile.
+fn remedy(limit: u64, may_grow: bool) -> String {
+    let limit = whole_mebibytes(limit);
+    match may_grow {
+        false => format!("give `run.memory = \"{limit}\"` or more, or a smaller cell side"),
+        true => format!(
+            "give `run.memory = \"{limit}\"` at least, or a smaller cell side: a side that is \
+             chosen by samples of the points is known behind this, and may take more"
+        ),
+    }
+}

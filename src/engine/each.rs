@@ -1,0 +1,82 @@
+//! One output for each input: while tiles leave their products the records that an output gets are
+//! sorted by input, and behind the last tile each input's file is written, a file a thread.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::by_input::ByInput;
+use super::chunk::{Chunk, Open};
+use super::encoding::{ChunkEncoder, ChunkEncoders};
+use super::job::{Each, Job};
+use super::product::Entry;
+use crate::host::lock;
+use crate::point::Metadata;
+use crate::report::Tally;
+use crate::stage::SinkSummary;
+use crate::store::SealedTiles;
+use crate::{Error, Result};
+
+impl Each<'_> {
+    /// Writes every input's output, each thread one at a time; for each input, the records that its
+    /// output was given and what it said. `counted` if classes are counted by these records.
+    pub fn write(
+        &self,
+        job: &Job<'_>,
+        tiles: &SealedTiles,
+        records: &ByInput,
+        counted: bool,
+    ) -> Result<(Vec<(u64, SinkSummary)>, Tally)> {
+        let next = AtomicUsize::new(0);
+        let done = Mutex::new((BTreeMap::new(), Tally::default()));
+        job.parallel(|| {
+            let mut encoder = ChunkEncoder::new(job, self.chunk_points);
+            loop {
+                let input = next.fetch_add(1, Ordering::Relaxed);
+                if input >= self.sinks.len() {
+                    break;
+                }
+                job.advance(0)?;
+                let summary = self.write_one(job, tiles, records, input, &mut encoder, counted)?;
+                lock(&done).0.insert(input, summary);
+            }
+            lock(&done).1.merge(&encoder.tally);
+            Ok(())
+        })?;
+        let (written, tally) = std::mem::take(&mut *lock(&done));
+        Ok((written.into_values().collect(), tally))
+    }
+
+    fn write_one(
+        &self,
+        job: &Job<'_>,
+        tiles: &SealedTiles,
+        records: &ByInput,
+        input: usize,
+        encoder: &mut ChunkEncoder,
+        counted: bool,
+    ) -> Result<(u64, SinkSummary)> {
+        let missing = || Error::internal(format!("input {input} has no output"));
+        let create = self.sinks.get(input).ok_or_else(missing)?;
+        let staged = self.staged.get(input).ok_or_else(missing)?;
+        let rank = *self.ranks.get(input).ok_or_else(missing)? as usize;
+        let pipeline = Some(job.pipeline.clone());
+        let metadata = Metadata { pipeline, ..job.source.metadata_of(input)? };
+        let mut sink = create.create(staged.file(), job.source.schema(), &metadata, false)?;
+        let encoders = ChunkEncoders::of_one(job, tiles, &*sink, counted, create.likes_time());
+        let mut open = Open::new(0, sink.chunk_points(), records.wants_normals, false);
+        let (mut given, mut full) = (0, Vec::new());
+        let mut append = |chunk: Chunk| {
+            let (_, encoded) = encoder.encode(&encoders, &chunk)?;
+            sink.append(encoded)?;
+            job.advance(0)
+        };
+        records.each(rank, |entry: &Entry, normal| {
+            given += u64::from(entry.count);
+            open.take(entry, normal, &mut full);
+            full.drain(..).try_for_each(&mut append)
+        })?;
+        open.rest().map_or(Ok(()), append)?;
+        Ok((given, sink.finish()?))
+    }
+}

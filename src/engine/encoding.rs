@@ -1,0 +1,144 @@
+//! From chunks to bytes: records are fetched, put in order, edited and encoded, by any thread.
+
+use std::sync::Arc;
+
+use super::by_time::ByTime;
+use super::chunk::Chunk;
+use super::job::Job;
+use crate::point::{Edit, PointBatch};
+use crate::report::{KEY_POINTS, Tally};
+use crate::stage::{Encode, Encoded, Sink};
+use crate::store::{Fetch, SealedTiles, State};
+use crate::{Error, Result};
+
+/// What threads need to encode chunks.
+pub(crate) struct ChunkEncoders<'a> {
+    job: &'a Job<'a>,
+    tiles: &'a SealedTiles,
+    encoders: Vec<Arc<dyn Encode>>,
+    /// For each, how the records of a chunk are ordered, if not as they come.
+    by_time: Vec<Option<ByTime>>,
+    /// The sink by whose records classes are counted as kept: one of what all stages leave.
+    counted: Option<usize>,
+    /// True if chunks tell where records are stored instead of their rank.
+    stored: bool,
+    chunk_points: usize,
+}
+
+impl<'a> ChunkEncoders<'a> {
+    /// For chunks of these sinks.
+    pub fn new(job: &'a Job<'a>, tiles: &'a SealedTiles, sinks: &[(usize, Box<dyn Sink>)]) -> Self {
+        ChunkEncoders {
+            job,
+            tiles,
+            encoders: sinks.iter().map(|(_, sink)| sink.encoder()).collect(),
+            by_time: sinks.iter().map(|(n, _)| by_time(job, job.by_time[*n])).collect(),
+            stored: false,
+            counted: sinks.iter().position(|(sink, _)| *sink == job.last_sink),
+            chunk_points: sinks.iter().map(|(_, sink)| sink.chunk_points()).max().unwrap_or(0),
+        }
+    }
+
+    /// For chunks of one output, by whose records classes are counted or not.
+    pub fn of_one(
+        job: &'a Job<'a>,
+        tiles: &'a SealedTiles,
+        sink: &dyn Sink,
+        counted: bool,
+        likes_time: bool,
+    ) -> Self {
+        ChunkEncoders {
+            job,
+            tiles,
+            encoders: vec![sink.encoder()],
+            by_time: vec![by_time(job, likes_time)],
+            counted: counted.then_some(0),
+            stored: false,
+            chunk_points: sink.chunk_points(),
+        }
+    }
+
+    /// The same for chunks that tell where records are stored.
+    pub fn of_stored(self) -> Self {
+        ChunkEncoders { stored: true, ..self }
+    }
+
+    /// What a thread holds to encode them.
+    pub fn one(&self) -> ChunkEncoder {
+        ChunkEncoder::new(self.job, self.chunk_points)
+    }
+}
+
+/// What a thread holds to encode chunks.
+pub(crate) struct ChunkEncoder {
+    numbers: Vec<u64>,
+    states: Vec<State>,
+    fetch: Fetch,
+    batch: PointBatch,
+    pub tally: Tally,
+}
+
+impl ChunkEncoder {
+    /// For chunks of up to `chunk_points` records.
+    pub fn new(job: &Job<'_>, chunk_points: usize) -> Self {
+        ChunkEncoder {
+            numbers: Vec::with_capacity(chunk_points),
+            states: Vec::with_capacity(chunk_points),
+            fetch: Fetch::default(),
+            batch: PointBatch::new(job.source.schema().clone(), chunk_points),
+            tally: Tally::default(),
+        }
+    }
+
+    /// The chunk's records, encoded, and for which of the sinks.
+    pub fn encode(&mut self, all: &ChunkEncoders<'_>, chunk: &Chunk) -> Result<(usize, Encoded)> {
+        self.batch.clear();
+        chunk.number(&mut self.numbers);
+        chunk.states(&mut self.states);
+        match all.stored {
+            false => all.tiles.fetch(&self.numbers, &mut self.fetch, &mut self.batch)?,
+            true => all.tiles.fetch_stored(&self.numbers, &mut self.fetch, &mut self.batch)?,
+        }
+        if all.counted == Some(chunk.sink) {
+            all.job.classes.keep_by_state(&self.batch, &self.states, &mut self.tally);
+            count_key_points(&self.states, &mut self.tally);
+        }
+        let mut normals = chunk.spread_normals();
+        if let Some(by_time) = all.by_time.get(chunk.sink).and_then(Option::as_ref) {
+            by_time.sort(&mut self.batch, &mut self.states, normals.as_deref_mut());
+        }
+        edit(&mut self.batch, &self.states)?;
+        self.batch.normals = normals;
+        let encoder = all.encoders.get(chunk.sink);
+        let encoder = encoder.ok_or_else(|| Error::internal("a chunk is for no sink"))?;
+        Ok((chunk.sink, encoder.encode(&self.batch)?))
+    }
+}
+
+fn by_time(job: &Job<'_>, likes_time: bool) -> Option<ByTime> {
+    likes_time.then(|| ByTime::of(job.source.schema())).flatten()
+}
+
+/// Counts the records that are written with the key-point flag because they stay.
+fn count_key_points(states: &[State], tally: &mut Tally) {
+    let is_set = |state: &&State| state.edits() & Edit::SetKeyPoint as u8 != 0;
+    match states.iter().filter(is_set).count() as u64 {
+        0 => {}
+        some => tally.count(KEY_POINTS, some),
+    }
+}
+
+/// Writes the edits of `states` into the records.
+fn edit(batch: &mut PointBatch, states: &[State]) -> Result<()> {
+    let schema = batch.schema().clone();
+    for (record, state) in batch.records_mut().chunks_exact_mut(schema.stride).zip(states) {
+        for edit in Edit::of(state.edits()) {
+            let field = schema.find(edit.dimension());
+            if !field.is_some_and(|field| edit.write(field, &schema, record)) {
+                let name = edit.dimension();
+                return Err(Error::pipeline(format!("the records cannot hold the mark in {name}")));
+            }
+        }
+    }
+    Ok(())
+}

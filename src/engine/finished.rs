@@ -1,0 +1,18 @@
+//! What the phases of a run come to, whichever there were.
+
+use super::survey::Measured;
+use crate::report::{ClassFigures, Decision, PassFigures, Tally};
+use crate::stage::SinkSummary;
+
+/// What a stream or a mill came to.
+pub(crate) struct Finished {
+    pub read: u64,
+    pub kept: u64,
+    /// For each file of each sink, the records that it was given, and what it says.
+    pub written: Vec<Vec<(u64, SinkSummary)>>,
+    pub tally: Tally,
+    pub decisions: Vec<Decision>,
+    pub classes: Vec<ClassFigures>,
+    pub passes: Vec<PassFigures>,
+    pub measured: Option<Measured>,
+}

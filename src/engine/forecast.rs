@@ -1,0 +1,110 @@
+//! A look at a sample of the scan before a pass: small cubes, spread evenly over its positions.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::grind::{Field, Worker};
+use super::job::Job;
+use super::pass::Pass;
+use super::shares::Shares;
+use crate::Result;
+use crate::host::lock;
+use crate::stage::Forecast;
+use crate::store::{Reader, SealedTiles, TileKey};
+use crate::tile::Sieve;
+
+/// Cubes that are looked at, at most and at least.
+const SAMPLES: (u64, u64) = (256, 32);
+/// Between the two, one cube of so many: a look costs a small part of the pass.
+const ONE_OF: u64 = 8;
+/// Cells that a cube is wide, about: of one cell too little is seen to tell noise from shape.
+const CELLS_ACROSS: u64 = 4;
+/// Positions that a cube has on average, at most, however large the cells.
+const MOST_POSITIONS: u64 = 2048;
+/// Positions of a cube beyond which it is left out; as many fit into any plan's tiles.
+const HEAVIEST: u64 = 8192;
+/// Positions that are loaded around a cube and in it, at most.
+const RIM: usize = 16_384;
+/// Positions that a tile of a look takes.
+const CAPACITY: usize = 32_768;
+
+/// Positions that a tile of a look takes, of which each thread has one.
+pub(crate) fn samples_capacity(shares: &Shares) -> usize {
+    shares.tile_positions.min(CAPACITY)
+}
+
+/// What those of the stages `ops` of `pass` expect that look at samples, each with its number, from
+/// samples that are a function of the points alone.
+pub(crate) fn forecast(
+    job: &mut Job<'_>,
+    pass: &Pass,
+    ops: &[usize],
+    field: &Field<'_>,
+    sieve: &Sieve,
+    capacity: usize,
+) -> Result<Vec<(usize, Forecast)>> {
+    let mut forecasts = Vec::new();
+    for &op in ops {
+        let Some(side) = job.ops[op].op.tile().sample_side() else { continue };
+        let side = side.max(1);
+        let keys = cubes(&field.tiles, side)?;
+        let samples = samples(job, pass, op, field, sieve, capacity, &keys)?;
+        forecasts.push((op, job.ops[op].op.tile_mut().forecast(&samples)));
+    }
+    Ok(forecasts)
+}
+
+/// What stage `op` says of the cubes `keys`, in their order, those left out that are too heavy.
+fn samples(
+    job: &Job<'_>,
+    pass: &Pass,
+    op: usize,
+    field: &Field<'_>,
+    sieve: &Sieve,
+    capacity: usize,
+    keys: &[TileKey],
+) -> Result<Vec<Vec<f64>>> {
+    let samples = Mutex::new(BTreeMap::new());
+    let next = AtomicUsize::new(0);
+    job.parallel(|| {
+        let mut worker = Worker::new(job, pass, field, sieve, capacity, false);
+        worker.limit_rim(RIM);
+        let mut reader = Reader::default();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(&key) = keys.get(index) else { return Ok(()) };
+            job.advance(0)?;
+            if field.tiles.holds_more(&key.cube(), HEAVIEST, &mut reader)? {
+                continue;
+            }
+            let (tile, _) = worker.run(key, Some(op))?;
+            tile.limits = job.ops[op].selection;
+            let sample = job.ops[op].op.tile().sample(tile)?;
+            lock(&samples).insert(index, sample);
+        }
+    })?;
+    let samples = std::mem::take(&mut *lock(&samples));
+    Ok(samples.into_values().collect())
+}
+
+/// The octree nodes, a few times `side` steps wide, that hold positions spread evenly
+/// over Morton order.
+fn cubes(tiles: &SealedTiles, side: i64) -> Result<Vec<TileKey>> {
+    let wide = (side as u64).saturating_mul(CELLS_ACROSS).checked_next_power_of_two();
+    let level = wide.map_or(63, u64::ilog2);
+    let level = level.min(tiles.levels().smallest_side(MOST_POSITIONS));
+    let mut reader = Reader::default();
+    let mut keys: Vec<TileKey> = Vec::new();
+    let samples = tiles.levels().occupied(level) / ONE_OF;
+    let samples = samples.clamp(SAMPLES.1, SAMPLES.0).min(tiles.positions());
+    for n in 0..samples {
+        let rank = (u128::from(tiles.positions()) * (2 * u128::from(n) + 1)
+            / (2 * u128::from(samples))) as u64;
+        let block = tiles.block_with(rank);
+        let (positions, _) = tiles.read(block, &mut reader)?;
+        let within = (rank - tiles.block(block).first_position) as usize;
+        keys.extend(positions.get(within).map(|&p| TileKey::around(p, level)));
+    }
+    Ok(keys)
+}

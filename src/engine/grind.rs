@@ -1,0 +1,261 @@
+//! One pass: tile after tile through the stages, and what they leave into stored columns and sinks.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+
+use super::by_input::ByInput;
+use super::by_rank::{ByRank, Starts};
+use super::chunk::{Chunk, Open};
+use super::chunks::{Counts, Cutter, Stored};
+use super::cut::{Cut, neighbors, reach};
+use super::encoding::ChunkEncoders;
+use super::job::{Job, StopOnDrop};
+use super::outlet::{Hands, Outlet};
+use super::pass::{Op, Pass};
+use super::product::Product;
+use super::rounded::Rounded;
+use crate::geom::lattice::Lattice;
+use crate::host::{lock, parallel};
+use crate::report::{Baseline, Tally};
+use crate::stage::{Sink, SinkSummary};
+use crate::store::{Fetch, SealedTiles, SpillArea, TileKey};
+use crate::tile::{Loader, Run, Sieve, Tile};
+use crate::{Error, Result};
+
+/// What all passes go over.
+pub(crate) struct Field<'a> {
+    pub lattice: &'a Lattice,
+    pub area: Arc<SpillArea>,
+    pub tiles: Arc<SealedTiles>,
+    /// Where the parts of the input begin, if an output asks for its order.
+    pub starts: Arc<Starts>,
+}
+
+/// What a pass came to.
+pub(crate) struct Milled {
+    pub tally: Tally,
+    pub stored: Stored,
+    pub counts: Counts,
+    /// For each sink of the pass, what it said.
+    pub written: Vec<SinkSummary>,
+    /// What goes to outputs that are one for each input, and to those in the order of the inputs.
+    pub by_input: Vec<ByInput>,
+    pub by_rank: Vec<ByRank>,
+    /// Records that the pass's stages decide about.
+    pub decided: u64,
+    /// True if the pass oriented normals.
+    pub oriented: bool,
+    /// Grids to compare the pass with, if it decides by normals.
+    pub baseline: Option<Baseline>,
+}
+
+/// A sink with its number.
+pub(crate) type Numbered = (usize, Box<dyn Sink>);
+
+/// Outputs of a pass: sinks that grow while it mills, lists by input and by place in the input.
+pub(crate) type PassOutputs = (Vec<Numbered>, Vec<ByInput>, Vec<ByRank>);
+
+/// Runs `pass` over the tiles of `cut`, into the `sinks` with their numbers and into lists by input.
+pub(crate) fn grind(
+    job: &Job<'_>,
+    (pass, cut): (&Pass, &Cut),
+    field: &Field<'_>,
+    sieve: &Sieve,
+    (sinks, by_input, by_rank): PassOutputs,
+) -> Result<Milled> {
+    let (tiles, keys) = (&field.tiles, &cut.keys);
+    let numbers = sinks.iter().map(|(sink, _)| *sink).chain(by_input.iter().map(|by| by.sink));
+    let numbers = numbers.chain(by_rank.iter().map(|by| by.sink));
+    let wants_normals = numbers.into_iter().any(|sink| job.wants_normals[sink]);
+    let outputs = sinks.iter().enumerate().map(|(n, (sink, open))| {
+        let before = pass.before.contains(sink);
+        Open::new(n, open.chunk_points(), job.wants_normals[*sink], before)
+    });
+    let cutter = Cutter::new(
+        &field.area,
+        (tiles.positions(), tiles.points()),
+        (pass.stores_normals, pass.stores_figures),
+        (outputs.collect(), by_input, by_rank),
+    )?;
+    let cutter = Mutex::new(Some(cutter));
+    let commit = |product: Product| match &mut *lock(&cutter) {
+        Some(cutter) => cutter.cut(&product),
+        None => Err(Error::internal("a tile came behind the last")),
+    };
+    let encoders = ChunkEncoders::new(job, tiles, &sinks);
+    let outlet: Outlet<Product, Chunk> =
+        Outlet::new(sinks.into_iter().map(|(_, sink)| sink).collect(), cut.millers);
+    let side = pass.compares(&job.ops);
+    let baseline = || side.map(|side| Baseline::new(side, tiles.levels()));
+    let total = Mutex::new(Sum { baseline: baseline(), ..Sum::default() });
+    let next = AtomicUsize::new(0);
+    parallel(cut.millers, |_| {
+        let guard = StopOnDrop::new(|| outlet.stop());
+        let mut encoder = encoders.one();
+        let mut encode = |chunk| encoder.encode(&encoders, &chunk);
+        let mut hands = Hands { commit: &commit, encode: &mut encode };
+        let mut worker = Worker::new(job, pass, field, sieve, cut.capacity, wants_normals);
+        worker.sum.baseline = baseline();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(&key) = keys.get(index) else { break };
+            let product = worker.mill(key)?;
+            let positions = product.positions();
+            outlet.deliver((index as u64, 0), product, true, &mut hands)?;
+            job.advance(positions)?;
+        }
+        outlet.drain(&mut hands, |turn| turn.0 >= keys.len() as u64)?;
+        worker.sum.tally.merge(&encoder.tally);
+        lock(&total).merge(&worker.sum);
+        guard.disarm();
+        Ok(())
+    })?;
+    let unfinished = || Error::internal("a pass was finished twice");
+    let (rest, stored, (by_input, by_rank), counts) =
+        lock(&cutter).take().ok_or_else(unfinished)?.finish()?;
+    let mut encoder = encoders.one();
+    let mut encode = |chunk| encoder.encode(&encoders, &chunk);
+    let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
+    let Sum { mut tally, decided, oriented, baseline } = std::mem::take(&mut *lock(&total));
+    tally.merge(&encoder.tally);
+    Ok(Milled { tally, stored, counts, written, by_input, by_rank, decided, oriented, baseline })
+}
+
+/// What tiles come to, whichever thread milled them.
+#[derive(Default)]
+struct Sum {
+    tally: Tally,
+    decided: u64,
+    oriented: bool,
+    baseline: Option<Baseline>,
+}
+
+impl Sum {
+    fn merge(&mut self, other: &Sum) {
+        self.tally.merge(&other.tally);
+        self.decided += other.decided;
+        self.oriented |= other.oriented;
+        if let (Some(mine), Some(theirs)) = (&mut self.baseline, &other.baseline) {
+            mine.merge(theirs);
+        }
+    }
+}
+
+/// What a thread needs to mill tiles.
+pub(crate) struct Worker<'a> {
+    job: &'a Job<'a>,
+    pass: &'a Pass,
+    loader: Loader,
+    reach: i64,
+    neighbors: usize,
+    wants_normals: bool,
+    /// True if records of the pass go to an output in the order of the inputs.
+    ranks: bool,
+    fetch: Fetch,
+    /// Where positions are rounded, and unequal coordinates that share one are counted.
+    rounded: Option<Rounded<'a>>,
+    first: bool,
+    sum: Sum,
+}
+
+impl<'a> Worker<'a> {
+    pub fn new(
+        job: &'a Job<'a>,
+        pass: &'a Pass,
+        field: &'a Field<'_>,
+        sieve: &Sieve,
+        capacity: usize,
+        wants_normals: bool,
+    ) -> Self {
+        let neighbors = neighbors(&job.ops, pass);
+        let mut loader = Loader::new(&field.tiles, sieve, capacity);
+        if let Some(points) = job.tile_points {
+            // Half for the zone, half for the rim, as where memory decides.
+            loader.limit_rim(points.saturating_mul(2));
+        }
+        let tile = loader.tile().0;
+        tile.compute_by(job.simd);
+        if neighbors > 0 {
+            tile.around.reserve(capacity);
+        }
+        // Counted once, in the first pass; fates are stored by every pass that removes.
+        let first = sieve.states.is_none();
+        let rounds = field.lattice.rounds() && (first || pass.removes);
+        let rounded =
+            rounds.then(|| Rounded::new(&field.tiles, field.lattice, job.source.schema()));
+        let reach = reach(&job.ops, pass);
+        let ranks = pass.before.iter().chain(&pass.after).any(|sink| job.in_input_order[*sink]);
+        Worker {
+            ranks,
+            fetch: Fetch::default(),
+            job,
+            pass,
+            loader,
+            reach,
+            neighbors,
+            wants_normals,
+            rounded,
+            first,
+            sum: Sum::default(),
+        }
+    }
+
+    /// Gives no tile a rim that makes it more than `positions`, for a look at a small cube.
+    pub fn limit_rim(&mut self, positions: usize) {
+        self.loader.limit_rim(positions);
+    }
+
+    /// Loads a tile and runs the stages of the pass on it, those before stage `until` if one is
+    /// given.
+    pub fn run(
+        &mut self,
+        key: TileKey,
+        until: Option<usize>,
+    ) -> Result<(&mut Tile, Vec<[u64; 2]>)> {
+        self.loader.load(key, if until.is_some() { 0 } else { self.reach }, self.neighbors)?;
+        let (tile, _) = self.loader.tile();
+        let mut found = Vec::new();
+        for call in self.pass.calls.iter().take_while(|call| Some(call.op) != until) {
+            let stage = &self.job.ops[call.op];
+            tile.limits = stage.selection;
+            match (&stage.op, call.gathers) {
+                (Op::Scan(op), true) => op.gather(tile, &mut found, &mut self.sum.tally)?,
+                (op, _) => op.tile().run(tile, &mut self.sum.tally)?,
+            }
+        }
+        Ok((tile, found))
+    }
+
+    fn mill(&mut self, key: TileKey) -> Result<Product> {
+        let (_, found) = self.run(key, None)?;
+        let (tile, core) = self.loader.tile();
+        self.sum.decided +=
+            tile.copies[tile.core.clone()].iter().map(|&n| u64::from(n)).sum::<u64>();
+        self.sum.oriented |= tile.oriented;
+        self.sum.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
+        self.sum.tally.work("unproven", tile.around.take_unproven());
+        self.sum.tally.work("tied", tile.around.take_tied());
+        if let Some(baseline) = &mut self.sum.baseline {
+            baseline.add(tile);
+        }
+        let mut product = Product::of(tile, core, self.pass, self.wants_normals)?;
+        product.found = found;
+        if let Some(rounded) = &mut self.rounded {
+            let mut positions = Vec::new();
+            core.each(tile, |runs, _| {
+                let count = runs.iter().map(|run| run.count).sum::<u32>();
+                positions.extend(runs.first().map(|run: &Run| (run.number, count)));
+                Ok(())
+            })?;
+            let mut counted = Tally::default();
+            rounded.enter(&positions, &mut product.fates, &mut counted)?;
+            if self.first {
+                self.sum.tally.merge(&counted);
+            }
+        }
+        if self.ranks {
+            product.find_places(self.loader.tiles(), &mut self.fetch)?;
+        }
+        Ok(product)
+    }
+}

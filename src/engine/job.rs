@@ -1,0 +1,224 @@
+//! What every phase of a run shares: the source, the stages, the budget, and how it is told to stop.
+
+use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+use super::Watch;
+use super::pass::{Pass, StageOp};
+use super::publish::Staged;
+use super::tagger::{ClassOf, LEFT_OUT, Tagger};
+use crate::budget::Budget;
+use crate::error::shown;
+use crate::geom::lattice::{Lattice, Misplaced};
+use crate::geom::simd::Simd;
+use crate::graph::Headers;
+use crate::host::{lock, parallel};
+use crate::point::PointBatch;
+use crate::report::{Grouped, Tally};
+use crate::stage::{CreateSink, Part, Source, Transform};
+use crate::{Error, ErrorKind, Result};
+
+/// What every phase of a run needs.
+pub(crate) struct Job<'a> {
+    pub source: &'a dyn Source,
+    pub source_kind: String,
+    /// The stages as outputs name them.
+    pub pipeline: Arc<str>,
+    pub transforms: Vec<(String, Box<dyn Transform>)>,
+    /// Dimensions that nobody looks at.
+    pub unread: Vec<String>,
+    pub ops: Vec<StageOp>,
+    pub passes: Vec<Pass>,
+    /// For each sink, where the outputs of the inputs go if each has its own.
+    pub each: Vec<Option<Each<'a>>>,
+    pub tagger: Tagger,
+    pub classes: ClassOf,
+    pub budget: Budget,
+    pub threads: usize,
+    pub simd: Simd,
+    pub drop_nonfinite: bool,
+    pub headers: Headers,
+    pub tile_points: Option<usize>,
+    /// For each sink, whether it writes normals.
+    pub wants_normals: Vec<bool>,
+    /// For each sink, whether it wants the order of the inputs.
+    pub in_input_order: Vec<bool>,
+    /// For each sink, whether the records of a chunk are ordered by time.
+    pub by_time: Vec<bool>,
+    /// A sink of what all stages leave.
+    pub last_sink: usize,
+    pub watch: &'a dyn Watch,
+    /// What the user was warned of before the end.
+    pub warnings: Mutex<Vec<String>>,
+    /// Set once a thread has failed.
+    pub failed: AtomicBool,
+}
+
+impl Job<'_> {
+    /// Reads the next batch of a part through the transforms; false at its end.
+    pub fn read(
+        &self,
+        part: &mut dyn Part,
+        batch: &mut PointBatch,
+        tally: &mut Tally,
+    ) -> Result<bool> {
+        batch.clear();
+        part.read(batch)?;
+        let read = batch.len() as u64;
+        if read == 0 {
+            return Ok(false);
+        }
+        tally.work("read", read);
+        self.classes.read(batch, tally);
+        for (kind, transform) in &self.transforms {
+            let before = batch.len();
+            transform.apply(batch)?;
+            let removed = before
+                .checked_sub(batch.len())
+                .ok_or_else(|| Error::internal(format!("the stage {kind} made points up")))?;
+            tally.remove(kind, "removed", removed as u64);
+        }
+        self.advance(read)?;
+        Ok(true)
+    }
+
+    /// Warns of something now, and again in the report.
+    pub fn warn(&self, message: String) {
+        self.watch.warn(&message);
+        lock(&self.warnings).push(message);
+    }
+
+    /// Says which transforms removed no point of all that were read.
+    pub fn tell_idle(&self, tally: &Tally) {
+        let removed = |kind: &str| tally.removed.keys().any(|(by, _)| by == kind);
+        if tally.work.get("read").is_none_or(|&read| read == 0) {
+            return;
+        }
+        let idle = self.transforms.iter().filter(|(kind, _)| !removed(kind));
+        let told = idle.flat_map(|(_, transform)| transform.idle(self.source.schema()));
+        told.for_each(|told| self.warn(told));
+    }
+
+    /// Says what the decode left out without being asked, and which stages have nothing to do.
+    pub fn tell_left_out(&self, tally: &Tally) {
+        self.tell_idle(tally);
+        for (reason, setting, which) in LEFT_OUT {
+            let key = (self.source_kind.clone(), reason);
+            if let Some(&points) = tally.removed.get(&key) {
+                let points = Grouped(points);
+                self.warn(format!(
+                    "points {which} are left out, {points} of them; `{setting} = \"keep\"` keeps \
+                     them, `{setting} = \"ignore\"` writes them as they are"
+                ));
+            }
+        }
+        if tally.work.get("placed").is_some_and(|&placed| placed > 0) {
+            self.tagger.warnings(tally.selections).into_iter().for_each(|told| self.warn(told));
+        }
+    }
+
+    /// Once all points are read: fails where they contradict their headers, or warns of it.
+    pub fn check_headers(&self) -> Result<()> {
+        let refuse = self.headers == Headers::Refuse;
+        let all = self.source.contradictions();
+        let (wrong, odd): (Vec<_>, Vec<_>) =
+            all.into_iter().partition(|told| told.is_damage && refuse);
+        for told in odd {
+            self.warn(format!("{}: {}", shown(&told.path), told.message));
+        }
+        let Some(first) = wrong.first() else { return Ok(()) };
+        let (of_first, others): (Vec<_>, Vec<_>) =
+            wrong.iter().partition(|told| told.path == first.path);
+        let mut said: Vec<String> = of_first.iter().map(|told| told.message.clone()).collect();
+        let others: BTreeSet<_> = others.iter().map(|told| &told.path).collect();
+        if !others.is_empty() {
+            said.push(format!("{} other inputs contradict their headers, too", others.len()));
+        }
+        Err(Error::data(&first.path, said.join("; ")).at_byte(first.byte).help(
+            "the file is damaged: get another copy; or what wrote it did not keep its header up: \
+             `run.headers = \"warn\"` reads it all the same",
+        ))
+    }
+
+    /// Tells of progress, and hears whether to go on.
+    pub fn advance(&self, points: u64) -> Result<()> {
+        self.watch.advance(points);
+        let stop = self.watch.cancelled() || self.failed.load(Ordering::Relaxed);
+        if stop { Err(Error::interrupted()) } else { Ok(()) }
+    }
+
+    /// Runs `work` on all threads; once one has failed, [`advance`](Job::advance) stops the others.
+    pub fn parallel(&self, work: impl Fn() -> Result<()> + Sync) -> Result<()> {
+        parallel(self.threads, |_| {
+            let guard = StopOnDrop::new(|| self.failed.store(true, Ordering::Relaxed));
+            work()?;
+            guard.disarm();
+            Ok(())
+        })
+    }
+
+    /// The error of a record that has no place on the lattice.
+    pub fn misplaced(&self, batch: &PointBatch, index: usize, why: Misplaced) -> Error {
+        let schema = batch.schema();
+        let record = &batch.records()[index * schema.stride..(index + 1) * schema.stride];
+        let point = schema.coordinates().map(|axes| axes.map(|d| d.world(record, schema.endian)));
+        let (what, help) = match why {
+            Misplaced::NotFinite => {
+                let help = "`run.nonfinite = \"drop\"` leaves such points out".to_owned();
+                ("is not finite", help)
+            }
+            Misplaced::TooFar => {
+                let farthest = point
+                    .unwrap_or_default()
+                    .into_iter()
+                    .fold(0.0, |far: f64, v| f64::max(far, v.abs()));
+                let step = Lattice::reaching(farthest);
+                let help = format!(
+                    "`run.lattice = {step:e}` reaches it; or move the scan nearer to its origin"
+                );
+                ("lies beyond the lattice", help)
+            }
+        };
+        let error = Error::new(
+            ErrorKind::Data,
+            format!("the point {:?} {what}", point.unwrap_or_default()),
+        )
+        .help(help);
+        match self.source.inputs().get(batch.source as usize) {
+            Some(input) => error.at(&input.path),
+            None => error,
+        }
+    }
+}
+
+/// Calls its function when dropped, unless disarmed: what a thread does that leaves by an error or
+/// a panic.
+pub(crate) struct StopOnDrop<F: Fn()>(Option<F>);
+
+impl<F: Fn()> StopOnDrop<F> {
+    pub fn new(stop: F) -> Self {
+        StopOnDrop(Some(stop))
+    }
+
+    pub fn disarm(mut self) {
+        self.0 = None;
+    }
+}
+
+impl<F: Fn()> Drop for StopOnDrop<F> {
+    fn drop(&mut self) {
+        if let Some(stop) = &self.0 {
+            stop();
+        }
+    }
+}
+
+/// The outputs of all inputs, in the order of these, and where they grow.
+pub(crate) struct Each<'a> {
+    pub sinks: &'a [Box<dyn CreateSink>],
+    pub staged: &'a [Staged],
+    pub ranks: &'a [u32],
+    /// Records of a chunk.
+    pub chunk_points: usize,
+}

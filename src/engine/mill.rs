@@ -1,0 +1,452 @@
+//! The mill: decode into the tile store, then pass after pass over the tiles, in canonical order into
+//! the sinks.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use serde_json::Value;
+
+use super::by_input::ByInput;
+use super::by_rank::{ByRank, Starts, place};
+use super::chunks::Found;
+use super::clock::Clock;
+use super::cut::{Cut, cut_again, cut_all};
+use super::finished::Finished;
+use super::forecast::{forecast, samples_capacity};
+use super::grind::{Field, Milled, PassOutputs, grind};
+use super::job::Job;
+use super::pass::{Call, Op, Pass};
+use super::shares::{BATCH, Demands, Shares};
+use super::survey::survey;
+use super::tagger::NOT_FINITE;
+use crate::budget::Lease;
+use crate::geom::lattice::{Lattice, Misplaced};
+use crate::host::lock;
+use crate::point::{Bounds, PointBatch, Position};
+use crate::report::{Baseline, BaselineFigures, Decision, Grouped, PassFigures, Short, Tally};
+use crate::stage::{Gathered, ScanFacts, Sink, SinkSummary};
+use crate::store::{Intake, SealedTiles, SpillArea, Tag, TileStore, seal};
+use crate::tile::Sieve;
+use crate::{Error, Result};
+
+/// Runs a pipeline with tile stages (or one that only sorts) into `sinks`; none where each input has
+/// an output of its own.
+pub(crate) fn mill(
+    job: &mut Job<'_>,
+    lattice: &Lattice,
+    shares: &Shares,
+    demands: &Demands,
+    area: &Arc<SpillArea>,
+    sinks: Vec<Option<Box<dyn Sink>>>,
+    clock: &mut Clock<'_>,
+) -> Result<Finished> {
+    clock.phase("decode", Some(job.source.points()));
+    let (store, starts, mut tally) = decode(job, lattice, shares, area)?;
+    job.check_headers()?;
+    job.tell_left_out(&tally);
+    tally.work("runs", store.runs() as u64);
+    clock.phase("merge", Some(tally.work.get("placed").copied().unwrap_or(0)));
+    let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
+    tally.count("positions", tiles.positions());
+    settle(job, lattice, &tiles)?;
+    let (bounds, starts) = (tiles.bounds(), Arc::new(starts));
+    let field = Field { lattice, area: area.clone(), tiles: tiles.clone(), starts };
+    let mut course = Course {
+        sieve: Sieve::default(),
+        alive: tiles.points(),
+        kept: tiles.points(),
+        passes: Vec::new(),
+        forecasts: vec![None; job.ops.len()],
+        compared: None,
+        written: sinks.iter().map(|_| None).collect(),
+        sinks,
+    };
+    let cuts = cut_all(job, lattice, shares, demands, &tiles)?;
+    let milling = |cut: &Arc<Cut>| demands.mill_bytes(cut.millers, cut.capacity as u64);
+    let looking = demands.mill_bytes(job.threads, samples_capacity(shares) as u64);
+    let most = cuts.iter().map(milling).max().unwrap_or(0).max(looking);
+    let mut working = job.budget.lease(most, "mill")?;
+    for (pass, cut) in std::mem::take(&mut job.passes).iter().zip(&cuts) {
+        let place = (pass, cut, &mut working);
+        course.run(job, place, &field, (shares, demands), &mut tally, clock)?;
+    }
+    drop((working, cuts));
+    clock.phase("survey", Some(2 * tiles.positions()));
+    let mut measured = survey(job, lattice, area, &tiles, &course.sieve)?;
+    measured.totals.baseline = course.baseline(lattice);
+    let unwritten = || Error::internal("an output was never written");
+    Ok(Finished {
+        read: tally.work.remove("read").unwrap_or(0),
+        kept: course.kept,
+        written: course
+            .written
+            .into_iter()
+            .map(|w| w.ok_or_else(unwritten))
+            .collect::<Result<_>>()?,
+        decisions: rounding(job, lattice, &bounds, &tally)
+            .into_iter()
+            .chain(decisions(job, course.forecasts))
+            .collect(),
+        classes: tally.classes.take().map_or(Vec::new(), |classes| classes.figures()),
+        passes: course.passes,
+        tally,
+        measured: Some(measured),
+    })
+}
+
+/// How far a mill has come.
+struct Course {
+    /// What the passes so far left.
+    sieve: Sieve,
+    /// Records that the next pass finds, and that are written if none follows.
+    alive: u64,
+    kept: u64,
+    passes: Vec<PassFigures>,
+    /// For each stage, what it said is to be expected.
+    forecasts: Vec<Option<Vec<(String, Value)>>>,
+    /// Grids to compare with, from the first pass that decided by normals.
+    compared: Option<Compared>,
+    sinks: Vec<Option<Box<dyn Sink>>>,
+    /// For each file of each sink, how many records it was given, and what it said in the end.
+    written: Vec<Option<Vec<(u64, SinkSummary)>>>,
+}
+
+/// See [`Course::compared`].
+struct Compared {
+    baseline: Baseline,
+    /// Records that the pass decided about, and that it found.
+    decided: u64,
+    found: u64,
+}
+
+impl Course {
+    fn run(
+        &mut self,
+        job: &mut Job<'_>,
+        (pass, cut, working): (&Pass, &Arc<Cut>, &mut Lease),
+        field: &Field<'_>,
+        (shares, demands): (&Shares, &Demands),
+        tally: &mut Tally,
+        clock: &mut Clock<'_>,
+    ) -> Result<()> {
+        let tiles = &field.tiles;
+        let sieve = pass.sieve(&self.sieve);
+        let ahead = |call: &&Call| self.forecasts[call.op].is_none();
+        let ops: Vec<usize> = pass.calls.iter().filter(ahead).map(|call| call.op).collect();
+        let mut chosen = Vec::new();
+        for (op, foreseen) in forecast(job, pass, &ops, field, &sieve, samples_capacity(shares))? {
+            if let Some(warning) = foreseen.warning {
+                job.warn(warning);
+            }
+            let stage = &job.ops[op].kind;
+            let decision = |(name, value): &(String, Value)| Decision {
+                stage: stage.clone(),
+                name: name.clone(),
+                value: value.clone(),
+            };
+            chosen.extend(foreseen.chosen.iter().map(decision));
+            let all = foreseen.chosen.into_iter().chain(foreseen.decisions);
+            self.forecasts[op] = Some(all.collect());
+        }
+        if !chosen.is_empty() {
+            job.watch.chose(&chosen);
+        }
+        let held = working.bytes();
+        let cut = cut_again(job, pass, field.lattice, (shares, demands), tiles, (cut, held))?;
+        working.resize(held.max(demands.mill_bytes(cut.millers, cut.capacity as u64)))?;
+        clock.phase(
+            if pass.gathers().is_some() { "gather" } else { "mill" },
+            Some(tiles.positions()),
+        );
+        tally.work("tiles", cut.keys.len() as u64);
+        let levels: std::collections::BTreeSet<u32> =
+            cut.keys.iter().map(|key| key.level).collect();
+        tally.work("tile_levels", levels.len() as u64);
+        let ((sinks, by_input, by_rank), ordered) = self.outputs(job, pass, field)?;
+        let which: Vec<usize> = sinks.iter().map(|(sink, _)| *sink).collect();
+        let milled = grind(job, (pass, &cut), field, &sieve, (sinks, by_input, by_rank))?;
+        tally.merge(&milled.tally);
+        self.write_lists(job, tiles, &milled, ordered, tally, clock)?;
+        for (sink, outcome) in
+            which.into_iter().zip(milled.counts.outputs.into_iter().zip(milled.written))
+        {
+            self.written[sink] = Some(vec![outcome]);
+        }
+        let (decided, found) = (milled.decided, self.alive);
+        if let (Some(baseline), None) = (milled.baseline, &self.compared) {
+            self.compared = Some(Compared { baseline, decided, found });
+        }
+        let stages = pass.calls.iter().map(|call| job.ops[call.op].kind.clone()).collect();
+        self.passes.push(PassFigures { stages, before: self.alive, after: milled.counts.alive });
+        let stored = milled.stored;
+        self.sieve.states = Some(stored.states);
+        self.sieve.fates = Some(stored.fates);
+        self.sieve.figures = stored.figures;
+        if stored.normals.is_some() {
+            self.sieve.oriented = milled.oriented;
+        }
+        self.sieve.normals = stored.normals.or(self.sieve.normals.take());
+        (self.alive, self.kept) = (milled.counts.alive, milled.counts.written);
+        match pass.gathers() {
+            Some(op) => conclude(job, op, stored.found, milled.decided),
+            None => Ok(()),
+        }
+    }
+
+    /// What a grid would have done that leaves as many of the records that the passes decided about.
+    fn baseline(&self, lattice: &Lattice) -> Option<BaselineFigures> {
+        let Compared { baseline, decided, found } = self.compared.as_ref()?;
+        let removed = found.checked_sub(self.alive)?;
+        baseline.figures(decided.checked_sub(removed)?, *decided, lattice)
+    }
+
+    /// The outputs of a pass: those that grow while it mills, lists of those that are written behind
+    /// it, and the sinks that are then written in the order of the inputs.
+    fn outputs(
+        &mut self,
+        job: &Job<'_>,
+        pass: &Pass,
+        field: &Field<'_>,
+    ) -> Result<(PassOutputs, Vec<Box<dyn Sink>>)> {
+        let (mut sinks, mut by_input) = (Vec::new(), Vec::new());
+        let (mut by_rank, mut ordered) = (Vec::new(), Vec::new());
+        for &sink in pass.before.iter().chain(&pass.after) {
+            let (normals, before) = (job.wants_normals[sink], pass.before.contains(&sink));
+            if let Some(Some(each)) = job.each.get(sink) {
+                let inputs = each.sinks.len();
+                by_input.push(ByInput::new(&field.area, sink, inputs, normals, before));
+                continue;
+            }
+            let open = self.sinks.get_mut(sink).and_then(Option::take);
+            let open = open.ok_or_else(|| Error::internal("an output is written twice"))?;
+            if job.in_input_order[sink] {
+                by_rank.push(ByRank::new(&field.area, sink, &field.starts, normals, before));
+                ordered.push(open);
+            } else {
+                sinks.push((sink, open));
+            }
+        }
+        Ok(((sinks, by_input, by_rank), ordered))
+    }
+
+    /// Writes the outputs that are written behind a pass's last tile.
+    fn write_lists(
+        &mut self,
+        job: &Job<'_>,
+        tiles: &SealedTiles,
+        milled: &Milled,
+        ordered: Vec<Box<dyn Sink>>,
+        tally: &mut Tally,
+        clock: &mut Clock<'_>,
+    ) -> Result<()> {
+        for lists in &milled.by_input {
+            clock.phase("write", Some(lists.records()));
+            let unknown = || Error::internal("an output has no inputs");
+            let each = job.each[lists.sink].as_ref().ok_or_else(unknown)?;
+            let last = lists.sink == job.last_sink;
+            let (written, counted) = each.write(job, tiles, lists, last)?;
+            tally.merge(&counted);
+            self.written[lists.sink] = Some(written);
+        }
+        for (lists, sink) in milled.by_rank.iter().zip(ordered) {
+            clock.phase("write", Some(lists.records));
+            let last = lists.sink == job.last_sink;
+            let (said, counted) = lists.write(job, tiles, sink, last)?;
+            tally.merge(&counted);
+            self.written[lists.sink] = Some(vec![(lists.records, said)]);
+        }
+        Ok(())
+    }
+}
+
+/// What a first phase found, for its stage.
+struct Whole {
+    found: Found,
+    records: u64,
+}
+
+impl Gathered for Whole {
+    fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()> {
+        self.found.each(visit)
+    }
+
+    fn records(&self) -> u64 {
+        self.records
+    }
+}
+
+fn conclude(job: &mut Job<'_>, op: usize, found: Found, records: u64) -> Result<()> {
+    let warning = match &mut job.ops[op].op {
+        Op::Scan(op) => op.conclude(&Whole { found, records })?,
+        Op::Tile(_) => return Err(Error::internal("a stage gathered that has one phase")),
+    };
+    warning.into_iter().for_each(|warning| job.warn(warning));
+    Ok(())
+}
+
+fn decode(
+    job: &Job<'_>,
+    lattice: &Lattice,
+    shares: &Shares,
+    area: &Arc<SpillArea>,
+) -> Result<(TileStore, Starts, Tally)> {
+    let _working = job.budget.lease(shares.work, "decoding")?;
+    let tagged = job.tagger.tags();
+    let mut store = TileStore::new(area, &job.budget, job.source.schema().stride, tagged);
+    let ranked = job.in_input_order.contains(&true);
+    if ranked {
+        store = store.with_places();
+    }
+    let parts = Mutex::new(vec![0; if ranked { job.source.parts() } else { 0 }]);
+    let total = Mutex::new(Tally::default());
+    let next = AtomicUsize::new(0);
+    job.parallel(|| {
+        let mut tally = Tally::default();
+        let mut intake = Intake::new(&store, shares.run_records);
+        let mut batch = PointBatch::new(job.source.schema().clone(), BATCH);
+        let mut placed = Placed::default();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            if index >= job.source.parts() {
+                break;
+            }
+            let mut part = job.source.part_without(index, &job.unread)?;
+            let mut read = 0;
+            while job.read(&mut *part, &mut batch, &mut tally)? {
+                placed.first = place(index, read);
+                take(job, lattice, &batch, &mut placed, &mut intake, &mut tally)?;
+                read += batch.len() as u64;
+            }
+            lock(&parts).get_mut(index).into_iter().for_each(|part| *part = read);
+        }
+        intake.flush()?;
+        lock(&total).merge(&tally);
+        Ok(())
+    })?;
+    let tally = std::mem::take(&mut *lock(&total));
+    let starts = Starts::of(&lock(&parts));
+    Ok((store, starts, tally))
+}
+
+/// What of a batch goes to the intake; keeps its memory.
+#[derive(Default)]
+struct Placed {
+    positions: Vec<Position>,
+    tags: Vec<Tag>,
+    /// Place in the input of the batch's first record.
+    first: u64,
+    /// Indices of records that do not go there.
+    left_out: Vec<usize>,
+    /// How many of them the scan itself says are of no use, by reason.
+    useless: BTreeMap<&'static str, u64>,
+}
+
+/// Places a batch's records on the lattice and hands them to the intake.
+fn take(
+    job: &Job<'_>,
+    lattice: &Lattice,
+    batch: &PointBatch,
+    placed: &mut Placed,
+    intake: &mut Intake<'_>,
+    tally: &mut Tally,
+) -> Result<()> {
+    let stride = batch.schema().stride;
+    let records = batch.records();
+    let Placed { positions, tags, left_out, useless, first } = placed;
+    positions.clear();
+    tags.clear();
+    left_out.clear();
+    useless.clear();
+    let mut misplaced = Vec::new();
+    let tagger = &job.tagger;
+    lattice.place(
+        batch.schema(),
+        records,
+        |i, position| match tagger.look(&records[i * stride..(i + 1) * stride], batch.source) {
+            Err(reason) => {
+                *useless.entry(reason).or_default() += 1;
+                left_out.push(i);
+            }
+            Ok(tag) => {
+                tally.selections |= tag.selections();
+                positions.push(position);
+                tags.push(tag);
+            }
+        },
+        |i, why| misplaced.push((i, why)),
+    );
+    for (i, why) in misplaced {
+        if why == Misplaced::NotFinite && job.drop_nonfinite {
+            tally.remove(&job.source_kind, NOT_FINITE, 1);
+            left_out.push(i);
+        } else {
+            return Err(job.misplaced(batch, i, why));
+        }
+    }
+    useless.iter().for_each(|(reason, &count)| tally.remove(&job.source_kind, reason, count));
+    tally.work("placed", positions.len() as u64);
+    left_out.sort_unstable();
+    let (mut begin, mut at) = (0, 0);
+    for end in left_out.iter().copied().chain([batch.len()]) {
+        let count = end - begin;
+        let (these, of_these) = (&positions[at..at + count], &tags[at..at + count]);
+        intake.place(*first + begin as u64);
+        intake.take(these, &records[begin * stride..end * stride], of_these)?;
+        (begin, at) = (end + 1, at + count);
+    }
+    Ok(())
+}
+
+fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<()> {
+    let facts = ScanFacts {
+        points: tiles.points(),
+        positions: tiles.positions(),
+        bounds: tiles.bounds(),
+        lattice,
+        levels: tiles.levels(),
+    };
+    job.ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().settle(&facts))?;
+    let warnings = job.ops.iter().flat_map(|stage| stage.op.tile().warnings(lattice));
+    // Stages that are applied several times say it once.
+    let warnings: std::collections::BTreeSet<String> = warnings.collect();
+    warnings.into_iter().for_each(|warning| job.warn(warning));
+    Ok(())
+}
+
+/// What the lattice rounded, as a decision of the report; a warning where it rounded much.
+fn rounding(job: &Job<'_>, lattice: &Lattice, bounds: &Bounds, tally: &Tally) -> Option<Decision> {
+    let apart = tally.apart?;
+    let count = |name| tally.counts.get(name).copied().unwrap_or(0);
+    let (unequal, positions) = (count("unequal_coordinates"), count("positions"));
+    if unequal > positions / 1000 {
+        let finer = match lattice.finer(bounds, apart.nearest) {
+            Some(step) => format!("`run.lattice = {step:e}` tells them apart"),
+            None => "no step that is finer reaches the scan from its origin".to_owned(),
+        };
+        job.warn(format!(
+            "{} of {} positions hold points of unequal coordinates, up to {} from each other: \
+             the lattice has steps of {}; {finer}",
+            Grouped(unequal),
+            Grouped(positions),
+            Short(apart.farthest),
+            Short(lattice.step)
+        ));
+    }
+    let (stage, name) = ("run".to_owned(), "unequal_coordinates_apart".to_owned());
+    Some(Decision { stage, name, value: apart.farthest.into() })
+}
+
+/// What the stages settled by themselves and what they expected, in their order.
+fn decisions(job: &Job<'_>, forecasts: Vec<Option<Vec<(String, Value)>>>) -> Vec<Decision> {
+    let each = job.ops.iter().zip(forecasts).flat_map(|(stage, expected)| {
+        let mut settled = stage.op.tile().decisions();
+        // What was chosen by samples may be among what is settled.
+        let is_new = |(name, _): &(String, Value)| settled.iter().all(|(other, _)| other != name);
+        let expected: Vec<_> = expected.into_iter().flatten().filter(is_new).collect();
+        settled.extend(expected);
+        settled.into_iter().map(|(name, value)| Decision { stage: stage.kind.clone(), name, value })
+    });
+    each.collect()
+}

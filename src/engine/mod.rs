@@ -1,0 +1,37 @@
+//! From a plan to a report: the phases of a run over the store, on threads; outputs that appear when
+//! they are complete. Knows no format, and no stage by name.
+
+pub(crate) mod beside;
+pub(crate) mod by_input;
+pub(crate) mod by_rank;
+mod by_time;
+mod chunk;
+mod chunks;
+mod clock;
+mod cut;
+mod each;
+mod encoding;
+mod finished;
+mod forecast;
+mod grind;
+pub(crate) mod job;
+mod mill;
+mod outlet;
+pub(crate) mod pass;
+mod product;
+pub(crate) mod publish;
+mod room;
+mod rounded;
+mod run;
+pub(crate) mod scratch;
+pub(crate) mod shares;
+mod stream;
+mod survey;
+pub(crate) mod tagger;
+pub(crate) mod task;
+mod watch;
+
+pub(crate) use publish::{make_folder, publish_bytes, refuse_existing};
+pub use run::Done;
+pub(crate) use scratch::Trouble;
+pub use watch::{Quiet, Watch};

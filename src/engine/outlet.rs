@@ -1,0 +1,225 @@
+//! From products that come in any order to files in one order: what several threads deliver is
+//! committed in turn, cut into chunks, encoded by whoever has time, and appended in turn again.
+//!
+//! What waits is bounded: products and chunks by the number of threads, and nobody encodes further
+//! ahead of what is appended than twice that, however slow the disk or another thread is.
+//!
+//! The threads cannot wait for each other: whoever is to deliver next never waits for its turn, and
+//! whoever encodes or appends the chunk that comes next waits for nothing. A thread that leaves early
+//! must call [`Outlet::stop`], or the others would wait for what it owes.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+
+use crate::host::lock;
+use crate::stage::{Encoded, Sink, SinkSummary};
+use crate::{Error, Result};
+
+/// A product's place in the order: its tile or part, and which product of it.
+pub type Place = (u64, u64);
+
+/// What threads share while they deliver products `R`, which are cut into chunks `P`.
+pub struct Outlet<R, P> {
+    state: Mutex<State<R, P>>,
+    changed: Condvar,
+    /// Products that may wait for their turn, and chunks that may wait to be encoded.
+    window: usize,
+    /// Chunks that may be encoded, or being encoded, and not yet appended.
+    ahead: u64,
+}
+
+struct State<R, P> {
+    turn: Place,
+    waiting: BTreeMap<Place, (R, bool)>,
+    committing: bool,
+    chunks: VecDeque<(u64, P)>,
+    numbered: u64,
+    encoded: BTreeMap<u64, (usize, Encoded)>,
+    appended: u64,
+    sinks: Option<Vec<Box<dyn Sink>>>,
+    stopped: bool,
+}
+
+/// The two things that a thread does with what it takes from an outlet.
+pub struct Hands<'a, R, P> {
+    /// Cuts a product, in its turn, into complete chunks; called by one thread at a time.
+    pub commit: &'a (dyn Fn(R) -> Result<Vec<P>> + Sync),
+    /// Encodes a chunk and says for which of the sinks.
+    pub encode: &'a mut dyn FnMut(P) -> Result<(usize, Encoded)>,
+}
+
+impl<R, P> Outlet<R, P> {
+    /// An outlet into `sinks` for `threads` threads.
+    pub fn new(sinks: Vec<Box<dyn Sink>>, threads: usize) -> Self {
+        Outlet {
+            state: Mutex::new(State {
+                turn: (0, 0),
+                waiting: BTreeMap::new(),
+                committing: false,
+                chunks: VecDeque::new(),
+                numbered: 0,
+                encoded: BTreeMap::new(),
+                appended: 0,
+                sinks: Some(sinks),
+                stopped: false,
+            }),
+            changed: Condvar::new(),
+            window: threads,
+            ahead: 2 * threads.max(1) as u64,
+        }
+    }
+
+    /// Delivers the product at `place`; `last` if none of the same tile or part follows.
+    pub fn deliver(
+        &self,
+        place: Place,
+        product: R,
+        last: bool,
+        hands: &mut Hands<'_, R, P>,
+    ) -> Result<()> {
+        let mut state = lock(&self.state);
+        state.waiting.insert(place, (product, last));
+        loop {
+            state = self.commit_waiting(state, hands)?;
+            let is_early = place > state.turn && state.waiting.len() > self.window;
+            if !is_early && state.chunks.len() <= self.window {
+                return Ok(());
+            }
+            let (progress, next) = self.encode_one(state, hands)?;
+            state = next;
+            if !progress {
+                state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+            }
+        }
+    }
+
+    /// Encodes and appends until all that was delivered is written; each thread calls it when it
+    /// has nothing more to deliver.
+    pub fn drain(&self, hands: &mut Hands<'_, R, P>, done: impl Fn(Place) -> bool) -> Result<()> {
+        let mut state = lock(&self.state);
+        loop {
+            state = self.commit_waiting(state, hands)?;
+            let (progress, next) = self.encode_one(state, hands)?;
+            state = next;
+            let all =
+                done(state.turn) && state.chunks.is_empty() && state.appended == state.numbered;
+            if all && !state.committing {
+                self.changed.notify_all();
+                return Ok(());
+            }
+            if !progress {
+                state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+            }
+        }
+    }
+
+    /// Adds the chunks that are left when all products are committed.
+    pub fn close(&self, rest: Vec<P>, hands: &mut Hands<'_, R, P>) -> Result<Vec<SinkSummary>> {
+        let mut state = lock(&self.state);
+        state.queue(rest);
+        loop {
+            let (progress, next) = self.encode_one(state, hands)?;
+            state = next;
+            if !progress && state.appended == state.numbered {
+                break;
+            }
+        }
+        match state.sinks.take() {
+            Some(sinks) => sinks.into_iter().map(|sink| sink.finish()).collect(),
+            None => Err(Error::internal("an output was closed twice")),
+        }
+    }
+
+    /// Wakes every thread and makes it give up; for the thread that met an error.
+    pub fn stop(&self) {
+        lock(&self.state).stopped = true;
+        self.changed.notify_all();
+    }
+
+    /// Commits the products whose turn it is, unless another thread is at it.
+    fn commit_waiting<'s>(
+        &'s self,
+        mut state: MutexGuard<'s, State<R, P>>,
+        hands: &mut Hands<'_, R, P>,
+    ) -> Result<MutexGuard<'s, State<R, P>>> {
+        while !state.committing && !state.stopped {
+            let turn = state.turn;
+            let Some((product, last)) = state.waiting.remove(&turn) else { break };
+            state.committing = true;
+            drop(state);
+            let chunks = (hands.commit)(product);
+            state = lock(&self.state);
+            state.committing = false;
+            state.turn = if last { (turn.0 + 1, 0) } else { (turn.0, turn.1 + 1) };
+            match chunks {
+                Ok(chunks) => state.queue(chunks),
+                Err(error) => return Err(self.fail(state, error)),
+            }
+            self.changed.notify_all();
+        }
+        if state.stopped { Err(Error::interrupted()) } else { Ok(state) }
+    }
+
+    /// Encodes one chunk if there is one within reach and appends what is complete; says whether it
+    /// did. One beyond reach means that another thread is at the chunk that is appended next.
+    fn encode_one<'s>(
+        &'s self,
+        mut state: MutexGuard<'s, State<R, P>>,
+        hands: &mut Hands<'_, R, P>,
+    ) -> Result<(bool, MutexGuard<'s, State<R, P>>)> {
+        let reach = state.appended + self.ahead;
+        if state.chunks.front().is_none_or(|(number, _)| *number >= reach) {
+            return Ok((false, state));
+        }
+        let Some((number, chunk)) = state.chunks.pop_front() else { return Ok((false, state)) };
+        drop(state);
+        let encoded = (hands.encode)(chunk);
+        state = lock(&self.state);
+        match encoded {
+            Ok(encoded) => state.encoded.insert(number, encoded),
+            Err(error) => return Err(self.fail(state, error)),
+        };
+        while !state.stopped
+            && let Some(mut sinks) = state.sinks.take()
+        {
+            let next = state.appended;
+            let Some((to, encoded)) = state.encoded.remove(&next) else {
+                state.sinks = Some(sinks);
+                break;
+            };
+            drop(state);
+            let outcome = match sinks.get_mut(to) {
+                Some(sink) => sink.append(encoded),
+                None => Err(Error::internal("a chunk is for a sink that is not there")),
+            };
+            state = lock(&self.state);
+            state.sinks = Some(sinks);
+            state.appended += 1;
+            if let Err(error) = outcome {
+                return Err(self.fail(state, error));
+            }
+            self.changed.notify_all();
+        }
+        self.changed.notify_all();
+        Ok((true, state))
+    }
+
+    fn fail(&self, mut state: MutexGuard<'_, State<R, P>>, error: Error) -> Error {
+        state.stopped = true;
+        drop(state);
+        self.changed.notify_all();
+        error
+    }
+}
+
+impl<R, P> State<R, P> {
+    fn queue(&mut self, chunks: Vec<P>) {
+        for chunk in chunks {
+            self.chunks.push_back((self.numbered, chunk));
+            self.numbered += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

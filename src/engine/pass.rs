@@ -1,0 +1,129 @@
+//! Passes over the scan: which tile stages run on each tile in turn, what they see, and what is stored.
+
+use std::sync::Arc;
+
+use crate::graph::{Limits, Written};
+use crate::point::Mark;
+use crate::stage::{Needs, ScanOp, TileOp};
+use crate::tile::Sieve;
+
+/// A tile stage and where it stands.
+pub(crate) struct StageOp {
+    pub kind: String,
+    /// How it is written in its pipeline.
+    pub written: Arc<dyn Written>,
+    pub op: Op,
+    pub limits: Limits,
+    /// The bit of the records that it is limited to; 0 for all.
+    pub selection: u8,
+}
+
+/// The role of a tile stage.
+pub(crate) enum Op {
+    Tile(Box<dyn TileOp>),
+    Scan(Box<dyn ScanOp>),
+}
+
+impl Op {
+    pub fn tile(&self) -> &dyn TileOp {
+        match self {
+            Op::Tile(op) => &**op,
+            Op::Scan(op) => &**op,
+        }
+    }
+
+    pub fn tile_mut(&mut self) -> &mut dyn TileOp {
+        match self {
+            Op::Tile(op) => &mut **op,
+            Op::Scan(op) => &mut **op,
+        }
+    }
+}
+
+/// One of a pass's stages, in one of its phases.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Call {
+    /// Which of the tile stages.
+    pub op: usize,
+    /// True for the first phase of a scan stage.
+    pub gathers: bool,
+}
+
+/// Stages that run on each tile in turn.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Pass {
+    pub calls: Vec<Call>,
+    /// How often the stages were applied before, where they are repeated.
+    pub round: usize,
+    /// True if a stage reads the class of positions.
+    pub reads_classes: bool,
+    /// Selections of the records that are seen as neighbours, and of those that are decided about.
+    pub seen: u8,
+    pub decided: u8,
+    pub removes: bool,
+    pub mark: Option<Mark>,
+    /// Columns that an earlier pass stored and this one reads.
+    pub loads_normals: bool,
+    pub loads_figures: bool,
+    /// Columns that this pass stores.
+    pub stores_normals: bool,
+    pub stores_figures: bool,
+    /// Sinks of what is there before the pass removes anything, and of what it leaves.
+    pub before: Vec<usize>,
+    pub after: Vec<usize>,
+    pub writes_normals: bool,
+    pub writes_cells: bool,
+    pub looks: bool,
+}
+
+/// What a call needs.
+pub(crate) fn needs(ops: &[StageOp], call: Call) -> Needs {
+    match (&ops[call.op].op, call.gathers) {
+        (Op::Scan(op), true) => op.gather_needs(),
+        (op, _) => op.tile().needs(),
+    }
+}
+
+impl Pass {
+    /// What the pass's calls need, in order.
+    pub fn needs<'a>(&'a self, ops: &'a [StageOp]) -> impl Iterator<Item = Needs> + 'a {
+        self.calls.iter().map(|&call| needs(ops, call))
+    }
+
+    /// The side of the cells that it decides in by normals, if it does: it is compared with grids of
+    /// such sides, whose cubes no face of a tile cuts.
+    pub fn compares(&self, ops: &[StageOp]) -> Option<i64> {
+        let by_normals = self.needs(ops).any(|needs| decides_by_normals(&needs));
+        let side = self.needs(ops).map(|needs| needs.cell_side).max().filter(|side| *side > 0);
+        side.filter(|_| by_normals)
+    }
+
+    /// The stage of this pass that gathers.
+    pub fn gathers(&self) -> Option<usize> {
+        self.calls.iter().find(|call| call.gathers).map(|call| call.op)
+    }
+
+    /// What the pass sees, with what earlier passes stored.
+    pub fn sieve(&self, stored: &Sieve) -> Sieve {
+        let Pass { seen, decided, .. } = *self;
+        let classes = self.reads_classes;
+        let mut sieve = Sieve { classes, seen, decided, ..stored.clone() };
+        if !self.loads_normals {
+            sieve.normals = None;
+        }
+        if !self.loads_figures {
+            sieve.figures = None;
+        }
+        sieve
+    }
+}
+
+/// True if a stage that needs this takes records away from the passes behind it.
+pub(crate) fn decides(needs: &Needs) -> bool {
+    needs.removes || needs.mark.is_some()
+}
+
+/// True if a stage that needs this decides, and reads normals.
+pub(crate) fn decides_by_normals(needs: &Needs) -> bool {
+    decides(needs) && needs.reads.iter().any(|column| column == "Normal")
+}

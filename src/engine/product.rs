@@ -1,0 +1,179 @@
+//! What a tile leaves behind: what becomes of each record of its core, and the columns that later
+//! passes read.
+
+use super::pass::Pass;
+use super::survey::fate_code;
+use crate::Result;
+use crate::point::Mark;
+use crate::store::{ASIDE, FATE_BYTES, FIGURE_BYTES, Fetch, NORMAL_BYTES, SealedTiles, State, Tag};
+use crate::tile::{Core, Fate, Run, Tile};
+
+/// Records of one position that follow one another and share what becomes of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Entry {
+    /// Number of the first.
+    pub number: u64,
+    /// How many.
+    pub count: u32,
+    /// What accompanies them.
+    pub tag: Tag,
+    /// Their state before the pass and behind it.
+    pub was: State,
+    pub now: State,
+}
+
+/// What a tile leaves behind.
+#[derive(Debug, Default)]
+pub(crate) struct Product {
+    /// All records of the core, in canonical order.
+    pub entries: Vec<Entry>,
+    /// Normals of the entries, if a sink wants them.
+    pub entry_normals: Option<Vec<[f32; 3]>>,
+    /// Columns of the core's positions, as stored; the last two are empty if nobody reads them.
+    pub fates: Vec<u8>,
+    pub normals: Vec<u8>,
+    pub figures: Vec<u8>,
+    /// Of every record that is written before or behind the pass, in order, where it is stored and
+    /// its place in the input; empty if nobody asks for the input's order.
+    pub places: Vec<(u64, u64)>,
+    /// What a first phase found.
+    pub found: Vec<[u64; 2]>,
+}
+
+impl Product {
+    /// Bytes of a product for each position of the core, what a first phase finds aside.
+    pub const BYTES_PER_POINT: usize =
+        size_of::<Entry>() + FATE_BYTES + NORMAL_BYTES + size_of::<[f32; 3]>() + FIGURE_BYTES;
+
+    /// Bytes more where places in the input are looked up.
+    pub const PLACE_BYTES: usize = 2 * size_of::<(u64, u64)>();
+
+    /// What `tile` leaves behind, whose core has the records `core`.
+    pub fn of(tile: &Tile, core: &Core, pass: &Pass, wants_normals: bool) -> Result<Self> {
+        let records = tile.core.len();
+        let mut product = Product {
+            entries: Vec::with_capacity(records),
+            entry_normals: wants_normals.then(|| Vec::with_capacity(records)),
+            fates: Vec::with_capacity(records * FATE_BYTES),
+            ..Product::default()
+        };
+        let columns = pass.stores_normals || pass.stores_figures || wants_normals;
+        if let Some(first_records) = core.first_records()
+            && !(columns || pass.decided != 0 || pass.mark.is_some())
+        {
+            product.enter_all(tile, first_records, pass.removes);
+            return Ok(product);
+        }
+        core.each(tile, |runs, stored| {
+            let slot = runs.first().map_or(Run::UNSEEN, |run| run.slot);
+            let fate = match slot {
+                Run::UNSEEN => Fate::Kept,
+                slot => tile.fates[slot as usize],
+            };
+            match (fate, stored) {
+                (Fate::Kept, Some(code)) => product.fates.extend_from_slice(&code),
+                (fate, _) => product.fates.extend_from_slice(&fate_code(fate)),
+            }
+            let at = (slot != Run::UNSEEN).then_some(slot as usize);
+            let normal = at.map_or([f32::NAN; 3], |i| tile.normals[i]);
+            if pass.stores_normals {
+                normal.iter().for_each(|v| product.normals.extend_from_slice(&v.to_le_bytes()));
+            }
+            if pass.stores_figures {
+                let figure = at.and_then(|i| tile.figures.get(i)).copied().unwrap_or(f64::NAN);
+                product.figures.extend_from_slice(&figure.to_le_bytes());
+            }
+            product.enter(runs, fate, pass);
+            if let Some(normals) = &mut product.entry_normals {
+                normals.resize(product.entries.len(), normal);
+            }
+            Ok(())
+        })?;
+        Ok(product)
+    }
+
+    /// Looks up [`places`](Product::places).
+    pub fn find_places(&mut self, tiles: &SealedTiles, fetch: &mut Fetch) -> Result<()> {
+        let mut numbers = Vec::new();
+        for entry in self.entries.iter().filter(|entry| entry.was.is_written()) {
+            numbers.extend(entry.number..entry.number + u64::from(entry.count));
+        }
+        tiles.places(&numbers, fetch, &mut self.places)
+    }
+
+    /// Positions of the tile's core.
+    pub fn positions(&self) -> u64 {
+        (self.fates.len() / FATE_BYTES) as u64
+    }
+
+    /// Enters the records of all positions of the core, which are alike to every stage and follow
+    /// their first.
+    fn enter_all(&mut self, tile: &Tile, first_records: &[u64], removes: bool) {
+        let core = tile.core.clone();
+        let each = first_records.iter().zip(&tile.copies[core.clone()]).zip(&tile.fates[core]);
+        for ((&number, &count), &fate) in each {
+            self.fates.extend_from_slice(&fate_code(fate));
+            let kept = match fate {
+                _ if !removes => count,
+                Fate::Kept => count,
+                Fate::KeptOnce => count.min(1),
+                Fate::Removed | Fate::Represented { .. } => 0,
+            };
+            let entry = Entry {
+                number,
+                count: kept,
+                tag: Tag::default(),
+                was: State::ALIVE,
+                now: State::ALIVE,
+            };
+            if kept > 0 {
+                self.entries.push(entry);
+            }
+            if count > kept {
+                let (number, count) = (number + u64::from(kept), count - kept);
+                self.entries.push(Entry { number, count, now: State::REMOVED, ..entry });
+            }
+        }
+    }
+
+    /// Enters the records of one position.
+    fn enter(&mut self, runs: &[Run], fate: Fate, pass: &Pass) {
+        // How many of the records that the pass decides about are still to be kept.
+        let mut keep = match fate {
+            Fate::Kept => u32::MAX,
+            Fate::KeptOnce => 1,
+            Fate::Removed | Fate::Represented { .. } => 0,
+        };
+        for run in runs {
+            let was = match run.tag.selections() & ASIDE {
+                0 => run.state,
+                _ if run.state.is_alive() => State::ASIDE,
+                _ => run.state,
+            };
+            let Run { mut number, count, tag, .. } = *run;
+            let mut push = |count: u32, now: State| {
+                if count > 0 {
+                    self.entries.push(Entry { number, count, tag, was, now });
+                    number += u64::from(count);
+                }
+            };
+            if !pass.removes || run.slot == Run::UNSEEN || !run.is_in(pass.decided) {
+                push(count, was);
+                continue;
+            }
+            let kept = count.min(keep);
+            if keep != u32::MAX {
+                keep -= kept;
+            }
+            push(kept, marked(pass.mark, true, was));
+            push(count - kept, marked(pass.mark, false, was));
+        }
+    }
+}
+
+/// The state of a record that was in `state` and is kept, or would be removed.
+fn marked(mark: Option<Mark>, kept: bool, state: State) -> State {
+    let Some(mark) = mark else { return if kept { state } else { State::REMOVED } };
+    let state = if kept { state } else { state.aside() };
+    mark.edit(kept).map_or(state, |edit| state.edited(edit))
+}

@@ -1,0 +1,409 @@
+//! The last walk over the decoded scan: what the reduction did to each report tile and to all.
+
+use std::collections::BTreeMap;
+use std::io::{self, BufRead, Read};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+
+use super::job::Job;
+use crate::geom::lattice::Lattice;
+use crate::host::lock;
+use crate::point::Position;
+use crate::report::{Lot, ScanSurvey, TileFigures, Totals, report_tile_level};
+use crate::store::{
+    BLOCK, FATE_BYTES, PIECE, Pieces, Reader, SealedTiles, Spill, SpillArea, State, Stretch,
+    TileKey,
+};
+use crate::tile::{Fate, Sieve};
+use crate::{Error, Result};
+
+const KEPT: f32 = -1.0;
+const KEPT_ONCE: f32 = -2.0;
+const REMOVED: f32 = -3.0;
+/// Blocks that a thread surveys at once.
+const BLOCKS: usize = 256;
+
+/// A fate as stored: the deviation, or a negative number for what is kept.
+pub(crate) fn fate_code(fate: Fate) -> [u8; FATE_BYTES] {
+    match fate {
+        Fate::Kept => KEPT,
+        Fate::KeptOnce => KEPT_ONCE,
+        Fate::Removed => REMOVED,
+        Fate::Represented { deviation } => deviation,
+    }
+    .to_le_bytes()
+}
+
+/// The stored fate of a position whose records are up to `apart` steps from each other, because the
+/// lattice rounds: where one of them is kept, that is how far the others deviate. Stored as the negative
+/// of it, which is never one of the codes above.
+pub(crate) fn apart_code(code: [u8; FATE_BYTES], apart: f64) -> [u8; FATE_BYTES] {
+    if f32::from_le_bytes(code) != KEPT_ONCE {
+        return code;
+    }
+    let apart = (apart as f32).max(f32::MIN_POSITIVE);
+    let taken = [KEPT, KEPT_ONCE, REMOVED].contains(&-apart);
+    (if taken { -apart.next_up() } else { -apart }).to_le_bytes()
+}
+
+/// How far the removed records of a position are from the surface, by its stored fate: copies of a
+/// kept one are on it, unless the lattice rounds; None where nothing stands for them, as for those
+/// that took no part.
+fn deviation_of(code: [u8; FATE_BYTES]) -> Option<f32> {
+    match f32::from_le_bytes(code) {
+        REMOVED | KEPT => None,
+        KEPT_ONCE => Some(0.0),
+        apart if apart < 0.0 => Some(-apart),
+        deviation => Some(deviation),
+    }
+}
+
+/// Lines of the report's tiles, in order, wherever points are kept: there may be millions.
+pub(crate) struct Lines {
+    spill: Spill,
+    stretches: Vec<Stretch>,
+}
+
+impl Lines {
+    /// Reads the lines one stretch after the other.
+    pub fn reader(&self) -> LineReader<'_> {
+        LineReader { spill: &self.spill, left: self.stretches.iter(), open: Vec::new(), at: 0 }
+    }
+}
+
+/// See [`Lines::reader`]. Its errors hold the [`Error`] of the spill.
+pub(crate) struct LineReader<'a> {
+    spill: &'a Spill,
+    left: std::slice::Iter<'a, Stretch>,
+    open: Vec<u8>,
+    at: usize,
+}
+
+impl BufRead for LineReader<'_> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        if self.at == self.open.len() {
+            self.open.clear();
+            self.at = 0;
+            if let Some(stretch) = self.left.next() {
+                self.spill.load(stretch, &mut self.open).map_err(io::Error::other)?;
+            }
+        }
+        Ok(&self.open[self.at..])
+    }
+
+    fn consume(&mut self, bytes: usize) {
+        self.at += bytes;
+    }
+}
+
+impl Read for LineReader<'_> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let read = self.fill_buf()?.read(into)?;
+        self.consume(read);
+        Ok(read)
+    }
+}
+
+/// Lines are handed to the spill in stretches of about this size.
+const LINES_AT_ONCE: usize = 1 << 18;
+
+/// The lines of the tiles that begin in one range.
+struct RangeLines<'a> {
+    spill: &'a Spill,
+    open: Vec<u8>,
+    stretches: Vec<Stretch>,
+}
+
+impl RangeLines<'_> {
+    fn add(&mut self, figures: &TileFigures) -> Result<()> {
+        figures
+            .write_line(&mut self.open)
+            .map_err(|e| Error::internal("a report line could not be written").because(e))?;
+        if self.open.len() >= LINES_AT_ONCE { self.store() } else { Ok(()) }
+    }
+
+    fn store(&mut self) -> Result<()> {
+        if !self.open.is_empty() {
+            self.stretches.push(self.spill.store(&self.open)?);
+            self.open.clear();
+        }
+        Ok(())
+    }
+}
+
+/// What was measured.
+pub(crate) struct Measured {
+    /// Side of the report tiles in world units.
+    pub tile_side: f64,
+    /// Figures of the scan.
+    pub totals: Totals,
+    /// Lines of the report's tiles, in order.
+    pub tiles: Lines,
+}
+
+/// Bytes that a thread of a survey holds.
+pub(crate) fn survey_bytes() -> u64 {
+    2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64) + Stretches::BYTES
+}
+
+/// Measures, on all threads, the reduction of `tiles` whose positions have the stored fates and whose
+/// records have the stored states of `sieve`.
+pub(crate) fn survey(
+    job: &Job<'_>,
+    lattice: &Lattice,
+    area: &Arc<SpillArea>,
+    tiles: &SealedTiles,
+    sieve: &Sieve,
+) -> Result<Measured> {
+    let level = report_tile_level(tiles.levels());
+    let missing = || Error::internal("a scan is surveyed that no pass went over");
+    let walk = Walk {
+        tiles,
+        fates: sieve.fates.as_ref().ok_or_else(missing)?,
+        states: sieve.states.as_ref().ok_or_else(missing)?,
+        level,
+    };
+    let ranges = tiles.blocks().div_ceil(BLOCKS);
+    let all_threads = survey_bytes().saturating_mul(job.threads as u64);
+    let _working = job.budget.lease(all_threads, "survey")?;
+    let spill = Spill::new(area, "report");
+    let all = Mutex::new((ScanSurvey::new(&tiles.bounds()), BTreeMap::new()));
+    each_range(job, ranges, |range| {
+        let mut scan = ScanSurvey::new(&tiles.bounds());
+        let mut lines = RangeLines { spill: &spill, open: Vec::new(), stretches: Vec::new() };
+        let positions = walk.tiles_from(range, lattice, &mut scan, &mut lines)?;
+        lines.store()?;
+        let mut all = lock(&all);
+        all.0.merge(&scan);
+        all.1.insert(range, lines.stretches);
+        Ok(positions)
+    })?;
+    let (scan, lines) =
+        std::mem::replace(&mut *lock(&all), (ScanSurvey::new(&tiles.bounds()), BTreeMap::new()));
+    let fitted = Mutex::new(scan.fit());
+    let empty = lock(&fitted).part();
+    each_range(job, ranges, |range| {
+        let mut part = empty.clone();
+        let mut positions = 0;
+        let mut stretches = Stretches::new(1);
+        for block in range * BLOCKS..((range + 1) * BLOCKS).min(tiles.blocks()) {
+            let (these, lots) = stretches.of(&walk, block)?;
+            part.measure_all(these, lots);
+            positions += these.len() as u64;
+        }
+        lock(&fitted).merge(&part);
+        Ok(positions)
+    })?;
+    let fitted = fitted.into_inner().map_err(|_| Error::internal("a survey thread panicked"))?;
+    Ok(Measured {
+        tile_side: (level as f64).exp2() * lattice.step,
+        totals: fitted.finish(lattice)?,
+        tiles: Lines { spill, stretches: lines.into_values().flatten().collect() },
+    })
+}
+
+/// Calls `work` for every range, on all threads; it returns how many positions it did.
+fn each_range(
+    job: &Job<'_>,
+    ranges: usize,
+    work: impl Fn(usize) -> Result<u64> + Sync,
+) -> Result<()> {
+    let next = AtomicUsize::new(0);
+    job.parallel(|| {
+        loop {
+            let range = next.fetch_add(1, Ordering::Relaxed);
+            if range >= ranges {
+                return Ok(());
+            }
+            job.advance(work(range)?)?;
+        }
+    })
+}
+
+struct Walk<'a> {
+    tiles: &'a SealedTiles,
+    fates: &'a Pieces,
+    states: &'a Pieces,
+    level: u32,
+}
+
+/// A block with the lots of its positions.
+#[derive(Default)]
+struct Seen {
+    block: Option<usize>,
+    reader: Reader,
+    lots: Vec<Lot>,
+}
+
+impl Seen {
+    fn load(&mut self, walk: &Walk<'_>, block: usize, columns: &mut Columns) -> Result<()> {
+        self.block = None;
+        let (positions, copies) = walk.tiles.read(block, &mut self.reader)?;
+        let records = copies.iter().map(|&n| u64::from(n)).sum::<u64>();
+        let Columns { fates, states, buffer } = columns;
+        let first = walk.tiles.block(block).first_position;
+        walk.fates.collect(first, positions.len() as u64, buffer, fates)?;
+        let fates = fates.as_chunks().0.iter().copied().map(deviation_of);
+        let rank = walk.tiles.rank_of_block(block);
+        self.lots.clear();
+        if records == positions.len() as u64 {
+            walk.states.collect(rank, records, buffer, states)?;
+            self.lots.extend(fates.zip(&*states).map(|(deviation, &state)| {
+                let kept = State(state).is_alive().into();
+                Lot { copies: 1, kept, deviation }
+            }));
+        } else {
+            let unkept = |(&copies, deviation)| Lot { copies, kept: 0, deviation };
+            self.lots.extend(copies.iter().zip(fates).map(unkept));
+            let (mut lots, mut left) = (self.lots.iter_mut(), 0);
+            let mut lot = lots.next();
+            walk.states.each(rank, records, states, |_, states| {
+                for &state in states {
+                    if lot.as_ref().is_some_and(|lot| lot.copies == left) {
+                        (lot, left) = (lots.next(), 0);
+                    }
+                    left += 1;
+                    if let Some(lot) = &mut lot {
+                        lot.kept += u32::from(State(state).is_alive());
+                    }
+                }
+                Ok(())
+            })?;
+        }
+        self.block = Some(block);
+        Ok(())
+    }
+}
+
+/// Memory for what is stored of a block.
+#[derive(Default)]
+struct Columns {
+    fates: Vec<u8>,
+    states: Vec<u8>,
+    buffer: Vec<u8>,
+}
+
+/// Blocks that a walk keeps: a tile is walked twice.
+const KEPT_BLOCKS: usize = 64;
+
+/// The blocks last seen.
+struct Stretches {
+    kept: Vec<Seen>,
+    columns: Columns,
+}
+
+impl Stretches {
+    /// Bytes that they hold.
+    const BYTES: u64 = (KEPT_BLOCKS * BLOCK * (2 * size_of::<Position>() + size_of::<Lot>() + 4)
+        + 3 * PIECE
+        + BLOCK * FATE_BYTES) as u64;
+
+    fn new(blocks: usize) -> Self {
+        let kept = (0..blocks).map(|_| Seen::default()).collect();
+        Stretches { kept, columns: Columns::default() }
+    }
+
+    /// The positions of a block and their lots.
+    fn of(&mut self, walk: &Walk<'_>, block: usize) -> Result<(&[Position], &[Lot])> {
+        let slot = block % self.kept.len();
+        let stretch = &mut self.kept[slot];
+        if stretch.block != Some(block) {
+            stretch.load(walk, block, &mut self.columns)?;
+        }
+        Ok((stretch.reader.positions(), &stretch.lots))
+    }
+}
+
+impl Walk<'_> {
+    /// Surveys the report tiles that begin in a range of blocks; returns how many positions they
+    /// have.
+    fn tiles_from(
+        &self,
+        range: usize,
+        lattice: &Lattice,
+        scan: &mut ScanSurvey,
+        lines: &mut RangeLines<'_>,
+    ) -> Result<u64> {
+        let end = ((range + 1) * BLOCKS).min(self.tiles.blocks());
+        let mut stretches = Stretches::new(KEPT_BLOCKS);
+        let mut at = (range * BLOCKS, 0);
+        if let Some(before) = at.0.checked_sub(1)
+            && let Some(&last) = stretches.of(self, before)?.0.last()
+        {
+            // The tile that reaches into this range belongs to the one before.
+            at = self.end_of(TileKey::around(last, self.level), at.0, &mut stretches)?;
+        }
+        let mut positions = 0;
+        while at.0 < end {
+            let key = TileKey::around(stretches.of(self, at.0)?.0[at.1], self.level);
+            let mut tile = scan.tile(key);
+            let (next, seen) = self.visit(&mut stretches, at, key, |positions, lots| {
+                tile.add_all(positions, lots);
+                scan.add_all(positions, lots);
+            })?;
+            let mut fitted = tile.fit();
+            self.visit(&mut stretches, at, key, |positions, lots| {
+                fitted.measure_all(positions, lots);
+            })?;
+            lines.add(&fitted.finish(lattice, scan)?)?;
+            positions += seen;
+            at = next;
+        }
+        Ok(positions)
+    }
+
+    /// The first position behind the cube of `key`, which reaches to the beginning of block `from` or
+    /// into it.
+    fn end_of(
+        &self,
+        key: TileKey,
+        from: usize,
+        stretches: &mut Stretches,
+    ) -> Result<(usize, usize)> {
+        let cube = key.cube();
+        let (mut inside, mut behind) = (from, self.tiles.blocks());
+        while inside < behind {
+            let middle = inside + (behind - inside) / 2;
+            match cube.contains(self.tiles.block(middle).first) {
+                true => inside = middle + 1,
+                false => behind = middle,
+            }
+        }
+        if inside == from {
+            return Ok((from, 0));
+        }
+        // The last block that begins in the cube may end behind it.
+        let (positions, _) = stretches.of(self, inside - 1)?;
+        let end = positions.partition_point(|p| cube.contains(*p));
+        let whole = end == positions.len();
+        Ok(if whole { (inside, 0) } else { (inside - 1, end) })
+    }
+
+    /// Visits the positions of the cube of `key` from block and index `at` on, block by block; returns
+    /// where they end and how many there were.
+    fn visit(
+        &self,
+        stretches: &mut Stretches,
+        mut at: (usize, usize),
+        key: TileKey,
+        mut visit: impl FnMut(&[Position], &[Lot]),
+    ) -> Result<((usize, usize), u64)> {
+        let cube = key.cube();
+        let mut seen = 0;
+        while at.0 < self.tiles.blocks() {
+            let (positions, lots) = stretches.of(self, at.0)?;
+            let rest = &positions[at.1..];
+            let count = match rest.last() {
+                Some(&last) if cube.contains(last) => rest.len(),
+                _ => rest.partition_point(|p| cube.contains(*p)),
+            };
+            visit(&rest[..count], &lots[at.1..at.1 + count]);
+            seen += count as u64;
+            if count < rest.len() {
+                return Ok(((at.0, at.1 + count), seen));
+            }
+            at = (at.0 + 1, 0);
+        }
+        Ok((at, seen))
+    }
+}

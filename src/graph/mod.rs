@@ -1,0 +1,170 @@
+//! What a pipeline is, whoever wrote it: stages, and who takes from whom. Knows neither the language
+//! that it was written in, nor the inputs that it will be fitted to.
+//!
+//! A [`Graph`] is a tree of stages below one or several sources. It is checked in one place, when it is
+//! whole ([`Graph::mistakes`]): the language tells what is found there with the places in its text, the
+//! plan as an error.
+
+mod limits;
+mod settings;
+mod written;
+
+use std::fmt;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::stage::{Order, Role};
+
+pub use limits::{LimitKeys, Limits, Sees};
+pub use settings::{
+    Existing, Headers, MOST_THREADS, MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill,
+    Treatment, ZScale, parse_bytes,
+};
+pub use written::Written;
+
+/// A pipeline: stages, each of which takes from stages before it.
+#[derive(Default)]
+pub struct Graph {
+    /// The file it came from, as the user named it; empty for a text that the user does not know.
+    pub origin: String,
+    /// What the run may use and where it leaves things.
+    pub settings: RunSettings,
+    /// The stages; none takes from one behind it.
+    pub stages: Vec<GraphStage>,
+    /// The file that it was read from, which no output may replace.
+    pub(crate) file: Option<PathBuf>,
+}
+
+/// A stage and where it stands.
+pub struct GraphStage {
+    /// Its kind.
+    pub kind: String,
+    /// The name that it has in its text.
+    pub name: Option<String>,
+    /// The numbers of the stages that it takes from; none for a source.
+    pub from: Vec<usize>,
+    /// What it does.
+    pub role: Role,
+    /// Its keys with all defaults filled in, those that name files left out.
+    pub keys: serde_json::Value,
+    /// Line of its `kind` in its text, from 1.
+    pub line: Option<usize>,
+    /// The records that it is limited to.
+    pub(crate) limits: Limits,
+    /// How it is written.
+    pub(crate) written: Arc<dyn Written>,
+}
+
+/// What is wrong with the way in which the stages of a graph hang together.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Misplaced {
+    /// The number of the stage.
+    pub stage: usize,
+    /// What is wrong.
+    pub told: String,
+    /// What would be right, where it is known.
+    pub help: Option<&'static str>,
+}
+
+impl Graph {
+    /// A graph without stages.
+    pub fn new(settings: RunSettings) -> Self {
+        Graph { settings, ..Graph::default() }
+    }
+
+    /// Adds a stage that takes from those with the numbers `from`; returns its own.
+    pub fn add(&mut self, kind: &str, role: Role, from: &[usize]) -> usize {
+        let written = Arc::new(written::Unwritten::new(kind, self.stages.len()));
+        self.stages.push(GraphStage {
+            kind: kind.to_owned(),
+            name: None,
+            from: from.to_vec(),
+            role,
+            keys: serde_json::json!({}),
+            line: None,
+            limits: Limits::default(),
+            written,
+        });
+        self.stages.len() - 1
+    }
+
+    /// The numbers of the stages that take from stage `number`, in order.
+    pub fn takers(&self, number: usize) -> impl Iterator<Item = usize> + '_ {
+        let takes = move |(_, stage): &(usize, &GraphStage)| stage.from.contains(&number);
+        self.stages.iter().enumerate().filter(takes).map(|(taker, _)| taker)
+    }
+
+    /// Everything that is wrong with how the stages hang together.
+    pub fn mistakes(&self) -> Vec<Misplaced> {
+        let mut wrong = Vec::new();
+        let mut tell = |stage, told: &str, help| {
+            wrong.push(Misplaced { stage, told: told.to_owned(), help });
+        };
+        let is_source = |n: &usize| matches!(self.stages[*n].role, Role::Source(_));
+        let is_sink = |n: &usize| matches!(self.stages[*n].role, Role::Sink(_));
+        for (n, stage) in self.stages.iter().enumerate() {
+            if stage.from.iter().any(|from| *from >= n) {
+                tell(n, "a stage takes from stages before it", None);
+                continue;
+            }
+            match (is_source(&n), &stage.from[..]) {
+                (true, [_, ..]) => tell(n, "a source takes from no stage", None),
+                (false, []) => tell(n, "the first stage must be a source, such as `read`", None),
+                (false, from) if from.iter().any(is_sink) => {
+                    tell(n, "a sink gives no points that a stage could take", None);
+                }
+                (false, [_, _, ..]) if !stage.from.iter().all(is_source) => {
+                    tell(n, "only sources can be merged", None);
+                }
+                _ => {}
+            }
+            if !is_sink(&n) && self.takers(n).next().is_none() {
+                match n + 1 == self.stages.len() {
+                    true => tell(n, "nothing takes these points: end with `write`", None),
+                    false => {
+                        let told = format!("no output takes what `{}` leaves", stage.kind);
+                        tell(n, &told, Some("add a `write` behind it that has no `from`"));
+                    }
+                }
+            }
+            if let Role::Sink(sink) = &stage.role
+                && sink.is_folder()
+                && sink.order() == Order::Input
+            {
+                let told = "`write.order = \"input\"` is for one file of all inputs";
+                let help =
+                    "give `write.path` instead of `write.folder`, or leave `write.order` out";
+                tell(n, told, Some(help));
+            }
+        }
+        wrong
+    }
+
+    /// The graph as JSON: for each stage its kind, name, keys, and the numbers of those it takes from.
+    pub fn to_json(&self) -> serde_json::Value {
+        let stage = |stage: &GraphStage| {
+            serde_json::json!({
+                "kind": stage.kind, "name": stage.name, "from": stage.from, "keys": stage.keys,
+            })
+        };
+        self.stages.iter().map(stage).collect()
+    }
+}
+
+impl fmt::Display for Graph {
+    /// A line a stage: its number, kind and keys, and where it takes from.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (n, GraphStage { kind, from, keys, .. }) in self.stages.iter().enumerate() {
+            let from: Vec<String> = from.iter().map(usize::to_string).collect();
+            let takes = if from.is_empty() { String::new() } else { " <- ".to_owned() };
+            writeln!(f, "{n} {kind} {keys}{takes}{}", from.join(", "))?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Debug for Graph {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {:?}\n{self}", self.origin, self.settings)
+    }
+}

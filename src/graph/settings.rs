@@ -1,0 +1,401 @@
+//! The `[run]` settings of a pipeline file and what a command line puts in their place.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Deserializer, de};
+
+use crate::geom::simd;
+use crate::geom::simd::Level;
+use crate::quantity::Whole;
+use crate::{Error, Result};
+
+/// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`,
+/// `withheld` and `noise` changes what is computed. All are optional; arguments of the same name take their
+/// place.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RunSettings {
+    /// Bound of the process's peak resident memory, in bytes; none: half of what the machine or its
+    /// control group has.
+    #[serde(deserialize_with = "some_bytes")]
+    pub memory: Option<u64>,
+    /// Threads that work at once, at most 1024; none: all processors.
+    #[serde(deserialize_with = "some_threads")]
+    pub threads: Option<NonZeroUsize>,
+    /// Folder for what does not fit in memory; none: beside the output.
+    pub scratch: Option<PathBuf>,
+    /// Where the report is written; none: nowhere.
+    pub report: Option<PathBuf>,
+    /// What becomes of files that are already where an output or the report is to be.
+    pub existing: Existing,
+    /// Lattice step in world units; none: as the inputs' headers have it, or 2^-30 where coordinates
+    /// are floats. A run warns where that merges more than one position in a thousand whose points
+    /// have unequal coordinates, and says what step does not. Sides that are "auto" are powers of two of
+    /// steps: another step gives them other lengths, and other points are kept, also in number.
+    #[serde(deserialize_with = "some_step")]
+    pub lattice: Option<f64>,
+    /// What z is multiplied by wherever distances are measured, so that its unit is that of x and y;
+    /// the records keep their z. None: 1, where the units match or are not known; of units that give
+    /// reason for doubt (feet below heights of no unit, a reference system of no known unit) a run
+    /// warns, and of a scan without a reference system, or in metres without one for z, it does not.
+    pub z_scale: Option<ZScale>,
+    /// What becomes of scans whose x, y and z have different units, where stages measure distances.
+    pub units: MixedUnits,
+    /// What becomes of points whose coordinates are not finite, where stages measure distances. A
+    /// pipeline that streams copies them unless they are dropped: a conversion keeps its records.
+    pub nonfinite: Nonfinite,
+    /// What becomes of scans whose points are not as their LAS header says, which damage looks like:
+    /// outside of its box, or counted otherwise by return. LAZ has no checksum; this is what stands in
+    /// for one. A box that holds none of a LAZ file's points (less than 99 in 100 of a LAS file's), or
+    /// that is not set, is told as a warning in any case; one wider than the points is right.
+    pub headers: Headers,
+    /// What becomes of points with the withheld flag, in pipelines that work on tiles; others keep
+    /// every point.
+    pub withheld: Treatment,
+    /// What becomes of points of the classes 7 and 18, low and high noise, in pipelines that work on
+    /// tiles; none: they are points like all others. The command `reduce` leaves them out.
+    pub noise: Option<Treatment>,
+    /// Most points a tile's cube holds, for tests; none: as the memory allows.
+    pub tile_points: Option<NonZeroUsize>,
+    /// Which of the equal code paths runs, for tests.
+    pub simd: Simd,
+    /// Whether points may stay in memory, for tests.
+    pub spill: Spill,
+}
+
+/// What becomes of files that are already where an output or the report is to be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Existing {
+    /// They are replaced when the run is done, and keep their permissions.
+    #[default]
+    Replace,
+    /// The run is refused before any work, with exit code 1; a file that appears meanwhile is not
+    /// replaced either.
+    Refuse,
+}
+/// Threads that a run has at most.
+pub const MOST_THREADS: usize = 1024;
+
+/// What becomes of points whose coordinates are not finite.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Nonfinite {
+    /// The run fails and names the first.
+    #[default]
+    Refuse,
+    /// They are removed, entered in the ledger as such.
+    Drop,
+}
+
+/// What becomes of scans whose points contradict their header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Headers {
+    /// The run fails and names what differs.
+    #[default]
+    Refuse,
+    /// A warning names it: for files whose writer did not keep the header up.
+    Warn,
+}
+
+/// What becomes of scans whose x, y and z have different units.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MixedUnits {
+    /// The run fails and names the units, unless `z_scale` is given.
+    #[default]
+    Refuse,
+    /// All are taken for one unit.
+    Ignore,
+}
+
+/// What z is multiplied by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ZScale {
+    /// What the units in the coordinate reference system ask for; refused where it does not tell both.
+    Auto,
+    /// This number, above 0.
+    Factor(f64),
+}
+
+/// What becomes of points that the scan itself says are of no use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Treatment {
+    /// They take no part and are removed, entered in the ledger as such.
+    #[default]
+    Drop,
+    /// They are points like all others.
+    Keep,
+    /// They take no part and are written as they are.
+    Ignore,
+}
+
+/// Where decoded points wait for the mill.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Spill {
+    /// In memory as far as it goes, on disk beyond.
+    #[default]
+    Auto,
+    /// On disk, all of them.
+    Always,
+}
+
+/// Which of the equal code paths runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Simd {
+    /// The fastest that the processor has.
+    #[default]
+    Auto,
+    /// 256-bit vectors of x86-64; the run is refused where the processor has none.
+    Avx2,
+    /// 512-bit vectors of x86-64, likewise.
+    Avx512,
+    /// The one that every processor has.
+    Portable,
+}
+
+impl Simd {
+    /// What kernels are to run by.
+    ///
+    /// # Errors
+    ///
+    /// If this processor does not have it.
+    pub(crate) fn resolve(self) -> Result<simd::Simd> {
+        let level = match self {
+            Simd::Auto => return Ok(simd::Simd::best()),
+            Simd::Avx2 => Level::Avx2,
+            Simd::Avx512 => Level::Avx512,
+            Simd::Portable => Level::Portable,
+        };
+        simd::Simd::of(level).ok_or_else(|| {
+            Error::pipeline(format!("this processor has no {}", level.name()))
+                .help("leave `run.simd` out: the fastest that is there is taken")
+        })
+    }
+}
+
+/// What a command line or a program puts in the place of `[run]` settings.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Overrides {
+    /// For [`RunSettings::memory`], in bytes.
+    pub memory: Option<u64>,
+    /// For [`RunSettings::threads`].
+    pub threads: Option<NonZeroUsize>,
+    /// For [`RunSettings::scratch`].
+    pub scratch: Option<PathBuf>,
+    /// For [`RunSettings::report`].
+    pub report: Option<PathBuf>,
+}
+
+impl RunSettings {
+    /// These settings with those of `overrides` that are given.
+    pub fn with(self, overrides: &Overrides) -> RunSettings {
+        let over = overrides.clone();
+        RunSettings {
+            memory: over.memory.or(self.memory),
+            threads: over.threads.or(self.threads),
+            scratch: over.scratch.or(self.scratch),
+            report: over.report.or(self.report),
+            ..self
+        }
+    }
+}
+
+/// Bytes in a unit; the first of each is the one that messages use.
+const UNITS: [(&str, u64); 9] = [
+    ("B", 1),
+    ("KiB", 1 << 10),
+    ("MiB", 1 << 20),
+    ("GiB", 1 << 30),
+    ("TiB", 1 << 40),
+    ("kB", 1_000),
+    ("MB", 1_000_000),
+    ("GB", 1_000_000_000),
+    ("TB", 1_000_000_000_000),
+];
+
+/// Reads a size: `512MiB`, `1.5 GiB`, `2GB`, or bytes without a unit. A fraction of a byte is cut off.
+///
+/// The error says what a size looks like.
+///
+/// ```
+/// assert_eq!(pointmill::graph::parse_bytes("1.5GiB"), Ok(1_610_612_736));
+/// assert!(pointmill::graph::parse_bytes("2G").is_err());
+/// ```
+pub fn parse_bytes(text: &str) -> Result<u64, String> {
+    let refused = || {
+        let units: Vec<&str> = UNITS.iter().map(|(unit, _)| *unit).collect();
+        let short: String = text.chars().take(40).collect();
+        let meant = meant(text).map_or(String::new(), |meant| format!(": write {meant}"));
+        let units = units.join(", ");
+        format!("`{short}` is no size such as 512MiB or 2GiB{meant} (units: {units})")
+    };
+    let text = text.trim();
+    let split = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let (number, unit) = (&text[..split], text[split..].trim_start());
+    let scale = match unit {
+        "" => 1,
+        _ => UNITS.iter().find(|(name, _)| *name == unit).ok_or_else(refused)?.1,
+    };
+    let (whole, fraction) = number.split_once('.').unwrap_or((number, "0"));
+    let fraction = &fraction[..fraction.len().min(9)];
+    let parse = |digits: &str| digits.parse::<u64>().map_err(|_| refused());
+    let part = u128::from(parse(fraction)?) * u128::from(scale) / 10u128.pow(fraction.len() as u32);
+    let bytes = u128::from(parse(whole)?) * u128::from(scale) + part;
+    match u64::try_from(bytes) {
+        Ok(0) => Err(format!("{}: a size is at least one byte", refused())),
+        Ok(bytes) => Ok(bytes),
+        Err(_) => Err(format!("{}: too large", refused())),
+    }
+}
+
+/// The size that was meant by a unit of other letters: `2GiB` for `2G` and `2gb`.
+fn meant(text: &str) -> Option<String> {
+    let text = text.trim();
+    let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic())?);
+    let of = |unit: &str| UNITS.iter().find(|(known, _)| known.eq_ignore_ascii_case(unit));
+    let (unit, _) = of(unit).or_else(|| of(&format!("{unit}iB")))?;
+    // What is written as it was typed is wrong for another reason.
+    Some(format!("{}{unit}", number.trim_end()))
+        .filter(|size| size != text && parse_bytes(size).is_ok())
+}
+
+fn some_bytes<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u64>, D::Error> {
+    struct Size;
+    impl de::Visitor<'_> for Size {
+        type Value = u64;
+
+        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            f.write_str("a size such as \"2GiB\", or bytes")
+        }
+
+        fn visit_str<E: de::Error>(self, text: &str) -> Result<u64, E> {
+            parse_bytes(text).map_err(E::custom)
+        }
+
+        fn visit_u64<E: de::Error>(self, bytes: u64) -> Result<u64, E> {
+            match bytes {
+                0 => Err(E::invalid_value(de::Unexpected::Unsigned(0), &self)),
+                _ => Ok(bytes),
+            }
+        }
+
+        fn visit_i64<E: de::Error>(self, bytes: i64) -> Result<u64, E> {
+            match u64::try_from(bytes) {
+                Ok(bytes) => self.visit_u64(bytes),
+                Err(_) => Err(E::invalid_value(de::Unexpected::Signed(bytes), &self)),
+            }
+        }
+    }
+    from.deserialize_any(Size).map(Some)
+}
+
+impl<'de> Deserialize<'de> for ZScale {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct Factor;
+        impl de::Visitor<'_> for Factor {
+            type Value = ZScale;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a number above 0, or \"auto\"")
+            }
+
+            fn visit_f64<E: de::Error>(self, factor: f64) -> Result<ZScale, E> {
+                match factor.is_finite() && factor > 0.0 {
+                    true => Ok(ZScale::Factor(factor)),
+                    false => Err(E::invalid_value(de::Unexpected::Float(factor), &self)),
+                }
+            }
+
+            fn visit_i64<E: de::Error>(self, factor: i64) -> Result<ZScale, E> {
+                self.visit_f64(factor as f64)
+            }
+
+            fn visit_u64<E: de::Error>(self, factor: u64) -> Result<ZScale, E> {
+                self.visit_f64(factor as f64)
+            }
+
+            fn visit_str<E: de::Error>(self, word: &str) -> Result<ZScale, E> {
+                match word {
+                    "auto" => Ok(ZScale::Auto),
+                    _ => Err(E::invalid_value(de::Unexpected::Str(word), &self)),
+                }
+            }
+        }
+        from.deserialize_any(Factor)
+    }
+}
+
+fn some_threads<'de, D: Deserializer<'de>>(from: D) -> Result<Option<NonZeroUsize>, D::Error> {
+    let threads = Whole::<1, { MOST_THREADS as u64 }>::deserialize(from)?;
+    Ok(NonZeroUsize::new(threads.get() as usize))
+}
+
+fn some_step<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    struct Step;
+    impl de::Visitor<'_> for Step {
+        type Value = f64;
+
+        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            f.write_str("a number above 0, in the scan's unit and without a unit behind it")
+        }
+
+        fn visit_f64<E: de::Error>(self, step: f64) -> Result<f64, E> {
+            match step.is_finite() && step > 0.0 {
+                true => Ok(step),
+                false => Err(E::invalid_value(de::Unexpected::Float(step), &self)),
+            }
+        }
+
+        fn visit_i64<E: de::Error>(self, step: i64) -> Result<f64, E> {
+            self.visit_f64(step as f64)
+        }
+
+        fn visit_u64<E: de::Error>(self, step: u64) -> Result<f64, E> {
+            self.visit_f64(step as f64)
+        }
+    }
+    from.deserialize_any(Step).map(Some)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_have_binary_and_decimal_units() {
+        for (text, bytes) in [
+            ("1", 1),
+            ("1024", 1024),
+            ("1B", 1),
+            ("1KiB", 1 << 10),
+            ("512MiB", 512 << 20),
+            ("2GiB", 2 << 30),
+            (" 2 GiB ", 2 << 30),
+            ("1.5GiB", 3 << 29),
+            ("3TiB", 3 << 40),
+            ("1kB", 1000),
+            ("1MB", 1_000_000),
+            ("0.25GB", 250_000_000),
+            ("1TB", 1_000_000_000_000),
+            ("18446744073709551615", u64::MAX),
+        ] {
+            assert_eq!(parse_bytes(text), Ok(bytes), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_size_is_refused() {
+        let wrong = ["", "GiB", "2G", "2gib", "-1", "1e3", "1.2.3GiB", "1,5GiB", "0", "0.1B", "１"];
+        for text in wrong {
+            assert!(parse_bytes(text).is_err(), "{text}");
+        }
+        assert!(parse_bytes("99999999TiB").unwrap_err().ends_with("too large"));
+        assert!(parse_bytes("18446744073709551616").is_err());
+    }
+}

@@ -1,0 +1,32 @@
+//! Where a stage is written, for what turns out to be wrong once the inputs are known.
+
+use crate::Error;
+
+/// How a stage was written, by whoever made the graph.
+pub trait Written: Send + Sync {
+    /// An error about the stage, told where it is written.
+    fn wrong(&self, told: String) -> Error;
+
+    /// An error about the value of `key`, told where that is written.
+    fn wrong_key(&self, key: &str, told: String) -> Error;
+}
+
+/// A stage that a program put there.
+pub struct Unwritten(String);
+
+impl Unwritten {
+    /// Stage `number`, of this kind.
+    pub fn new(kind: &str, number: usize) -> Self {
+        Unwritten(format!("stage {number} (`{kind}`)"))
+    }
+}
+
+impl Written for Unwritten {
+    fn wrong(&self, told: String) -> Error {
+        Error::pipeline(format!("{}: {told}", self.0))
+    }
+
+    fn wrong_key(&self, _: &str, told: String) -> Error {
+        self.wrong(told)
+    }
+}

@@ -1,0 +1,10 @@
+//! What differs from system to system, and what every room needs of it: the process's memory and its
+//! limits, disks, the identity of files, threads. Knows neither points nor runs.
+
+pub(crate) mod disk;
+pub(crate) mod files;
+pub mod process;
+pub(crate) mod threads;
+
+pub(crate) use files::{Clash, Files, Use};
+pub use threads::{lock, parallel};

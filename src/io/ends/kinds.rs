@@ -1,0 +1,314 @@
+//! The stage kinds at both ends of a pipeline, `read`, `synth` and `write`: their keys.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Deserializer, Serialize, de};
+
+use crate::error::shown;
+use crate::io::of_extension;
+use crate::io::ply::Colors;
+use crate::point::names;
+use crate::stage::Order;
+use crate::{Error, Result};
+
+/// A format of files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Format {
+    /// ASPRS LAS, uncompressed.
+    Las,
+    /// LAS compressed by LASzip.
+    Laz,
+    /// PLY with a vertex element.
+    Ply,
+}
+
+impl Format {
+    /// The format that the extension of `path` names, its case aside.
+    pub fn of(path: &Path) -> Option<Format> {
+        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        [Format::Las, Format::Laz, Format::Ply].into_iter().find(|f| f.extension() == extension)
+    }
+
+    /// The extension of its files, without the dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Format::Las => "las",
+            Format::Laz => "laz",
+            Format::Ply => "ply",
+        }
+    }
+
+    /// The name of `path` without the part of its extension that says COPC, if it says that. COPC is
+    /// read as the LAZ that it is, and not written: readers of COPC refuse plain LAZ under its name.
+    pub fn without_copc(path: &Path) -> Option<PathBuf> {
+        let name = Path::new(path.file_name()?);
+        let stem = Path::new(name.file_stem()?);
+        let is_laz = Format::of(name) == Some(Format::Laz);
+        let is_copc = is_laz && stem.extension().is_some_and(|e| e.eq_ignore_ascii_case("copc"));
+        let plain = stem.file_stem().filter(|_| is_copc)?;
+        let mut plain = plain.to_owned();
+        plain.push(".");
+        plain.push(name.extension()?);
+        Some(path.with_file_name(plain))
+    }
+
+    /// True if the two share their records: LAZ is LAS.
+    pub fn same_records(self, other: Format) -> bool {
+        (self == Format::Ply) == (other == Format::Ply)
+    }
+}
+
+/// The source of most pipelines. Several files are one scan; all are LAS or LAZ, or all are PLY.
+///
+/// Headers are read, compared and held against the files' lengths before any point is. Files that
+/// do not fit together are refused by name: LAS inputs agree in point format, record length, extra
+/// bytes, scales, GPS time type and coordinate reference system, PLY inputs in encoding, vertex
+/// properties, GPS time type and coordinate reference system. LAS systems agree if they mean the same:
+/// in WKT of one wording, spaces and zeros aside, or by equal EPSG codes; the output has the WKT. LAS
+/// offsets may differ by whole steps; the output has the smallest.
+///
+/// A number of a PLY text is held in the type that its header says, but coordinates and GPS times are
+/// held as `double` where one of them has more digits than the `float` of its header has room for: a
+/// text is looked through for such before it is read. `scalar_Intensity` and other scalar fields, as
+/// CloudCompare writes them, are the dimensions that they are named after. A text that ends within a
+/// line is told, since its last number may be cut short.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Read {
+    /// A file, a pattern, a folder, or a list of them.
+    #[serde(deserialize_with = "one_or_more")]
+    pub path: Vec<String>,
+    /// Format of all of them; none: as their extensions say.
+    #[serde(default)]
+    pub format: Option<Format>,
+}
+
+/// The end of every pipeline. The file grows in a scratch folder beside its place and appears under
+/// its name when it is complete; it never replaces an input.
+///
+/// A record that is kept is the input's, byte for byte, wherever the format can hold it. From LAS to
+/// PLY or back every field keeps its name; one that cannot be held is an error unless `drop` names it.
+/// A point of which a PLY file tells no returns is return 1 of 1 in LAS. Variable length records that
+/// PLY does not hold are named in a warning.
+///
+/// Colours keep their meaning: 255 of 8 bits in PLY is 65535 in LAS. From LAS to PLY they become
+/// `uchar` where that loses nothing: where each is a multiple of 257 or of 256, or all are below 256,
+/// as writers leave them that do not scale. Else they stay `ushort`, which many viewers do not read;
+/// a warning says so, and `colors` can ask for either. The type depends on all colours of the output,
+/// and on nothing else. From LAS to LAS and from PLY to PLY colours are not touched.
+///
+/// LAS header fields that depend on the points are computed again. The generating software is
+/// pointmill and its version. Where records went through stages, the system identifier is
+/// `EXTRACTION`, a variable length record (`pointmill`, 1) names the stages as JSON in the place of
+/// what an earlier run said, and the ranges of extra bytes, which were those of all points, are left
+/// out; where only `scale` or `offset` moved them, the identifier is `TRANSFORMATION`. All else is
+/// carried, and what is wrong in it mended with a warning: the bit that says that the system is WKT,
+/// and descriptors of extra bytes that the records do not have or that stand in several variable
+/// length records. Waveforms in a `.wdp` file are copied beside the output, under its name. From PLY,
+/// EPSG codes become GeoTIFF keys. No date but those of the inputs is written.
+///
+/// With `path` all inputs become one file. With `folder` each input becomes a file of its own there:
+/// under its name (a `.copc` in it left out, for COPC is not written), with its header, its records and
+/// its offset, holding those of its points that are kept, even if that is none. The inputs are one scan
+/// all the same: neighbourhoods and cells go on from file to file, and the outputs together have the
+/// points that the one file would have.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Write {
+    /// The file; it appears under this name when it is complete. Either this or `folder` is given.
+    #[serde(default)]
+    pub path: Option<PathBuf>,
+    /// The folder that gets a file for each input; it is made if it does not exist.
+    #[serde(default)]
+    pub folder: Option<PathBuf>,
+    /// The format; none: as the extension says, in a folder that of the input. A file whose extension
+    /// says another is written, with a warning.
+    #[serde(default)]
+    pub format: Option<Format>,
+    /// Dimensions that the output need not hold.
+    #[serde(default)]
+    pub drop: Vec<String>,
+    /// Scale of LAS coordinates per axis, in world units; none: the input's.
+    #[serde(default, deserialize_with = "some_scale")]
+    pub scale: Option<[f64; 3]>,
+    /// Offset of LAS coordinates per axis, in world units; none: the input's, or 0.
+    #[serde(default, deserialize_with = "some_offset")]
+    pub offset: Option<[f64; 3]>,
+    /// Order of the records; none: canonical, in the chunks of LAZ (50,000 records) by GPS time and
+    /// return number, which compresses better; or the input's where the pipeline streams.
+    #[serde(default)]
+    pub order: Option<OutputOrder>,
+    /// Computed dimensions that are written: none, or the three of the normal.
+    #[serde(default, deserialize_with = "all_or_none")]
+    pub dimensions: Vec<String>,
+    /// Encoding of a PLY file; none: the input's.
+    #[serde(default)]
+    pub encoding: Option<Encoding>,
+    /// Bits of a colour in a PLY file of LAS points; none: `"auto"`.
+    #[serde(default)]
+    pub colors: Option<Colors>,
+}
+
+/// Order of the records of an output, as a file names it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OutputOrder {
+    /// Morton order of the lattice, then record bytes.
+    Canonical,
+    /// The order of the inputs: by file, as they are given, then by record. So the output depends on
+    /// the order of the inputs; a scan that is marked has its records where the input has them. For
+    /// `path` alone.
+    Input,
+}
+
+/// Encoding of a PLY file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Encoding {
+    /// Numbers as text, shortest form that reads back equal.
+    Ascii,
+    /// Numbers as bytes.
+    Binary,
+}
+
+impl Write {
+    /// The order as stages know it.
+    pub fn stage_order(&self) -> Order {
+        match self.order {
+            None => Order::Auto,
+            Some(OutputOrder::Canonical) => Order::Canonical,
+            Some(OutputOrder::Input) => Order::Input,
+        }
+    }
+}
+
+impl Write {
+    /// Refuses keys that an output of `format` does not have; tells which.
+    pub(crate) fn check(&self, format: Format) -> Result<(), (&'static str, Error)> {
+        let only = |key: &'static str, formats: &str| {
+            let told =
+                format!("`write.{key}` is for {formats}, the output is {}", format.extension());
+            Err((key, Error::pipeline(told)))
+        };
+        match format {
+            Format::Ply if self.scale.is_some() => only("scale", "las and laz"),
+            Format::Ply if self.offset.is_some() => only("offset", "las and laz"),
+            Format::Las | Format::Laz if self.encoding.is_some() => only("encoding", "ply"),
+            Format::Las | Format::Laz if self.colors.is_some() => only("colors", "ply"),
+            _ if self.offset.is_some_and(|offset| offset.iter().any(|v| !v.is_finite())) => {
+                Err(("offset", Error::pipeline("an offset is three finite numbers")))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The error of a file of which neither its extension nor `setting` says the format.
+pub(crate) fn unknown_extension(path: &Path, setting: &str) -> Error {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let name = shown(path);
+    let is_read = setting.starts_with("read");
+    let can = if is_read { "read" } else { "written" };
+    match of_extension(&extension) {
+        Some(format) => {
+            let told = format!("by its extension `{name}` is {format}, which is not {can}");
+            Error::pipeline(told).help(match is_read {
+                true => "convert it to LAS, LAZ or PLY with another program first",
+                false => "name it .las, .laz or .ply",
+            })
+        }
+        None => Error::pipeline(format!("the extension of `{name}` names no format"))
+            .help(format!("name it .las, .laz or .ply, or give `{setting}`")),
+    }
+}
+
+fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+    struct Paths;
+    impl<'de> de::Visitor<'de> for Paths {
+        type Value = Vec<String>;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a path or a list of paths")
+        }
+
+        fn visit_str<E: de::Error>(self, path: &str) -> Result<Self::Value, E> {
+            Ok(vec![path.to_owned()])
+        }
+
+        fn visit_seq<A: de::SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
+            let mut paths = Vec::new();
+            while let Some(path) = list.next_element()? {
+                paths.push(path);
+            }
+            Ok(paths)
+        }
+    }
+    from.deserialize_any(Paths)
+}
+
+fn some_scale<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D::Error> {
+    struct Scale;
+    impl<'de> de::Visitor<'de> for Scale {
+        type Value = [f64; 3];
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a number above 0 without a unit, or three of them")
+        }
+
+        fn visit_i64<E: de::Error>(self, scale: i64) -> Result<Self::Value, E> {
+            self.visit_f64(scale as f64)
+        }
+
+        fn visit_f64<E: de::Error>(self, scale: f64) -> Result<Self::Value, E> {
+            match scale.is_finite() && scale > 0.0 {
+                true => Ok([scale; 3]),
+                false => Err(E::invalid_value(de::Unexpected::Float(scale), &self)),
+            }
+        }
+
+        fn visit_seq<A: de::SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
+            let mut scale = [0.0; 3];
+            for (i, axis) in scale.iter_mut().enumerate() {
+                let next: Option<Positive> = list.next_element()?;
+                *axis = next.ok_or_else(|| de::Error::invalid_length(i, &Scale))?.0;
+            }
+            Ok(scale)
+        }
+    }
+    from.deserialize_any(Scale).map(Some)
+}
+
+fn some_offset<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D::Error> {
+    let offset = <[f64; 3]>::deserialize(from)?;
+    match offset.iter().find(|v| !v.is_finite()) {
+        Some(&v) => Err(de::Error::invalid_value(de::Unexpected::Float(v), &"finite numbers")),
+        None => Ok(Some(offset)),
+    }
+}
+
+/// A number above 0, refused at its own place.
+struct Positive(f64);
+
+impl<'de> Deserialize<'de> for Positive {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let number = f64::deserialize(from)?;
+        match number.is_finite() && number > 0.0 {
+            true => Ok(Positive(number)),
+            false => {
+                let found = de::Unexpected::Float(number);
+                Err(de::Error::invalid_value(found, &"a number above 0"))
+            }
+        }
+    }
+}
+
+fn all_or_none<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+    let mut given: Vec<String> = Vec::deserialize(from)?;
+    given.sort();
+    if given.is_empty() || given == names::NORMAL {
+        return Ok(given);
+    }
+    Err(de::Error::custom(format!("takes [] or all of {}", names::NORMAL.join(", "))))
+}

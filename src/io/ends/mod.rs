@@ -1,0 +1,11 @@
+//! The stages at both ends of a pipeline that name files, `read` and `write`: from their keys to sources
+//! and sinks of formats.
+
+mod connect;
+mod inputs;
+mod kinds;
+mod outputs;
+mod roles;
+
+pub use inputs::{expand, expand_any, unreadable};
+pub use kinds::{Encoding, Format, OutputOrder, Read, Write};

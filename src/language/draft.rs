@@ -1,0 +1,218 @@
+//! A pipeline file's tables as written, before any stage is built: settings, stages, and what
+//! arguments put in their place.
+
+use super::mistake::{Mistake, advice};
+use super::node::{Entry, Node, Value};
+use super::place::Place;
+use super::registry::Registry;
+use super::set::Set;
+
+/// Stages of a pipeline at most: each sink has a file open and memory of its own.
+const MOST_STAGES: usize = 256;
+
+/// The tables of a pipeline file.
+pub(crate) struct Draft {
+    /// The `[run]` table.
+    pub run: Node,
+    /// The `[[stage]]` tables, from top to bottom.
+    pub stages: Vec<StageDraft>,
+    /// What is wrong so far.
+    pub mistakes: Vec<Mistake>,
+}
+
+/// A `[[stage]]` table.
+pub(crate) struct StageDraft {
+    /// Its kind and where it is written.
+    pub kind: (String, Place),
+    /// Its name, if it has one.
+    pub name: Option<(String, Place)>,
+    /// The stage that it takes from, if it says.
+    pub from: Option<(String, Place)>,
+    /// All other keys.
+    pub keys: Node,
+}
+
+/// Sorts the tables of a file whose first text is `len` bytes long.
+pub(crate) fn read(entries: Vec<Entry>, len: usize, registry: &Registry) -> Draft {
+    let whole = Place::new(0, 0..0);
+    let run = Node { place: whole, value: Value::Table(Vec::new()) };
+    let mut draft = Draft { run, stages: Vec::new(), mistakes: Vec::new() };
+    let mut any = false;
+    for Entry { key, at, node } in entries {
+        match (key.as_str(), node.value) {
+            ("run", Value::Table(table)) => {
+                draft.run = Node { place: at, value: Value::Table(table) };
+            }
+            ("run", _) => draft.mistakes.push(Mistake::new(at, "`run` is a table: write [run]")),
+            ("stage", Value::List(list)) => {
+                any = true;
+                for (n, node) in list.into_iter().enumerate() {
+                    if n == MOST_STAGES {
+                        let told = format!("a pipeline has at most {MOST_STAGES} stages");
+                        draft.mistakes.push(Mistake::new(node.place, told));
+                        break;
+                    }
+                    draft.stage(node, registry);
+                }
+            }
+            ("stage", _) => {
+                any = true;
+                let told = "a stage is one of several tables: write [[stage]]";
+                draft.mistakes.push(Mistake::new(at, told));
+            }
+            ("stages", Value::List(list)) => {
+                any = true;
+                let told = "a pipeline file has no `stages`: write [[stage]]";
+                draft.mistakes.push(Mistake::new(at, told));
+                for node in list {
+                    draft.stage(node, registry);
+                }
+            }
+            (word, _) => draft.mistakes.push(Mistake::word(
+                at,
+                format!("a pipeline file has no `{word}`"),
+                word,
+                "tables",
+                ["run", "stage"],
+            )),
+        }
+    }
+    if !any {
+        let told = Mistake::new(Place::new(0, len..len), "a pipeline needs stages")
+            .note("begin with [[stage]] and kind = \"read\"");
+        draft.mistakes.push(told);
+    }
+    draft
+}
+
+/// What a stage without a kind is told: the key that was meant to be it, if there is one.
+fn without_kind(
+    place: Place,
+    entries: &[Entry],
+    name: Option<(String, Place)>,
+    registry: &Registry,
+) -> Mistake {
+    if let Some((name, at)) = name.filter(|(name, _)| registry.has(name)) {
+        return Mistake::new(at, format!("a stage needs `kind`: write kind = \"{name}\""))
+            .note("`name` is a word of your own, for the `from` of other stages");
+    }
+    let kinds = || registry.kinds().map(|(kind, _)| kind);
+    if let Some(Entry { at, node, .. }) = entries.iter().find(|e| e.key == "type") {
+        let word = if let Value::Text(word) = &node.value { word.as_str() } else { "" };
+        let told = "a stage has no `type`: write `kind`";
+        return Mistake::word(at.clone(), told, word, "kinds", kinds());
+    }
+    Mistake::new(place, "a stage needs `kind`").note(advice("", "kinds", kinds()))
+}
+
+impl Draft {
+    fn stage(&mut self, node: Node, registry: &Registry) {
+        let Value::Table(mut entries) = node.value else {
+            self.mistakes.push(Mistake::new(node.place, "a stage is a table: write [[stage]]"));
+            return;
+        };
+        let kind = self.take(&mut entries, "kind");
+        let name = self.take(&mut entries, "name");
+        let from = self.take(&mut entries, "from");
+        match kind {
+            Some(Some(kind)) => {
+                let keys = Node { place: kind.1.clone(), value: Value::Table(entries) };
+                let (name, from) = (name.flatten(), from.flatten());
+                self.stages.push(StageDraft { kind, name, from, keys });
+            }
+            Some(None) => {}
+            None => {
+                let mistake = without_kind(node.place, &entries, name.flatten(), registry);
+                self.mistakes.push(mistake);
+            }
+        }
+    }
+
+    /// Takes the text `key` out of a stage's keys: none if it is not there, some none if it is not a
+    /// text, which is told.
+    fn take(&mut self, entries: &mut Vec<Entry>, key: &str) -> Option<Option<(String, Place)>> {
+        let at = entries.iter().position(|e| e.key == key)?;
+        let Node { place, value } = entries.remove(at).node;
+        if let Value::Text(text) = value {
+            return Some(Some((text, place)));
+        }
+        self.mistakes.push(Mistake::new(place, format!("`{key}` takes a text in quotes")));
+        Some(None)
+    }
+
+    /// Puts the value of `set`, which is text `source`, in its place.
+    pub fn apply(&mut self, set: &Set, source: usize, registry: &Registry) {
+        match self.apply_to_table(set, source, registry) {
+            Ok(()) => {}
+            Err(mistakes) => self.mistakes.extend(mistakes),
+        }
+    }
+
+    fn apply_to_table(
+        &mut self,
+        set: &Set,
+        source: usize,
+        registry: &Registry,
+    ) -> Result<(), Vec<Mistake>> {
+        let Some((stage, key)) = set.address() else {
+            let told = Mistake::new(set.place(source, ""), "the value has no address");
+            return Err(vec![told.note("write stage.key=value, or run.key=value")]);
+        };
+        if stage != "run" && ["kind", "name", "from"].contains(&key) {
+            let told = format!("`{key}` is for the pipeline file alone");
+            return Err(vec![Mistake::new(set.place(source, key), told)]);
+        }
+        let node = set.value(source)?;
+        let at = set.place(source, key);
+        let (table, kind) = match stage {
+            "run" => (&mut self.run, "run"),
+            _ => {
+                let addressed = self.addressed(stage).map_err(|(told, note)| {
+                    vec![Mistake::new(set.place(source, stage), told).note(note)]
+                })?;
+                (&mut addressed.keys, addressed.kind.0.as_str())
+            }
+        };
+        let Value::Table(entries) = &mut table.value else { return Ok(()) };
+        entries.retain(|e| e.key != key && registry.others(kind, key).all(|other| e.key != other));
+        entries.push(Entry { key: key.to_owned(), at, node });
+        Ok(())
+    }
+
+    /// The stage that `address` means: a name, a kind, or `kind.N` counted from 1; else
+    /// what is wrong, and what is right.
+    fn addressed(&mut self, address: &str) -> Result<&mut StageDraft, (String, String)> {
+        let named = |s: &StageDraft| s.name.as_ref().is_some_and(|(name, _)| name == address);
+        if let Some(i) = self.stages.iter().position(named) {
+            return Ok(&mut self.stages[i]);
+        }
+        let of = |kind: &str| -> Vec<usize> {
+            (0..self.stages.len()).filter(|&i| self.stages[i].kind.0 == kind).collect()
+        };
+        let numbered = address.rsplit_once('.').and_then(|(kind, n)| {
+            let n: usize = n.parse().ok()?;
+            of(kind).get(n.checked_sub(1)?).copied()
+        });
+        let all = of(address);
+        match (&all[..], numbered) {
+            (_, Some(one)) | (&[one], None) => Ok(&mut self.stages[one]),
+            (&[], None) => Err((
+                format!("this pipeline has no stage `{address}`"),
+                advice(address, "stages", self.addresses()),
+            )),
+            (several, None) => {
+                let valid = (1..=several.len()).map(|n| format!("{address}.{n}"));
+                Err((
+                    format!("{} stages are `{address}`", several.len()),
+                    advice("", "write", valid),
+                ))
+            }
+        }
+    }
+
+    fn addresses(&self) -> Vec<String> {
+        let kinds = self.stages.iter().map(|s| s.kind.0.clone());
+        let names = self.stages.iter().filter_map(|s| Some(s.name.as_ref()?.0.clone()));
+        kinds.chain(names).chain(["run".to_owned()]).collect()
+    }
+}

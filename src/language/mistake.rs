@@ -1,0 +1,194 @@
+//! Mistakes of a pipeline: each with its place, the line's text and the nearest valid word.
+
+use std::fmt::Write as _;
+
+use super::place::Place;
+use crate::error::{is_control, nearest};
+use crate::{Error, ErrorKind};
+
+/// Mistakes that are told in full; a file with more of them is not a pipeline.
+const MOST_TOLD: usize = 20;
+
+/// Characters of a line that are shown.
+const WIDEST: usize = 160;
+
+/// One of the texts that make up a pipeline.
+#[derive(Debug, Clone)]
+pub(crate) struct SourceText {
+    /// The file's name, or the argument's (`--set`); empty for a text that the user does not know.
+    pub origin: String,
+    /// What it says.
+    pub text: String,
+    /// The setting that the argument stands for, where its name says it (`--keep`): messages at this
+    /// place need not name it again.
+    pub setting: Option<String>,
+}
+
+impl SourceText {
+    /// `message` as it is told behind the name of this text.
+    fn shortened<'a>(&self, message: &'a str) -> &'a str {
+        let Some(setting) = &self.setting else { return message };
+        let key = setting.rsplit('.').next().unwrap_or(setting);
+        let told = |name: &str| message.strip_prefix(&format!("`{name}`"));
+        match told(setting).or_else(|| told(key)) {
+            Some(rest) => {
+                let rest = rest.trim_start_matches(':').trim_start();
+                rest.strip_prefix(key).and_then(|rest| rest.strip_prefix(' ')).unwrap_or(rest)
+            }
+            None => message,
+        }
+    }
+}
+
+/// Something wrong at a place.
+#[derive(Debug, Clone)]
+pub(crate) struct Mistake {
+    place: Place,
+    message: String,
+    note: String,
+    kind: ErrorKind,
+}
+
+impl Mistake {
+    /// `message` at `place`.
+    pub fn new(place: Place, message: impl Into<String>) -> Self {
+        Mistake { place, message: message.into(), note: String::new(), kind: ErrorKind::Pipeline }
+    }
+
+    /// A word that is none of the `valid` ones; `all` says what those are ("keys").
+    pub fn word<S: AsRef<str>>(
+        place: Place,
+        message: impl Into<String>,
+        word: &str,
+        all: &str,
+        valid: impl IntoIterator<Item = S>,
+    ) -> Self {
+        Mistake::new(place, message).note(advice(word, all, valid))
+    }
+
+    /// An error that a stage gave, at `place`.
+    pub fn of(place: Place, error: &Error) -> Self {
+        let mut message = error.to_string();
+        let mut cause = std::error::Error::source(error);
+        while let Some(inner) = cause {
+            let _ = write!(message, ": {inner}"); // writing to a String cannot fail
+            cause = inner.source();
+        }
+        let mistake = Mistake::new(place, message).note(error.remedy().unwrap_or_default());
+        Mistake { kind: error.kind(), ..mistake }
+    }
+
+    /// Adds what the user can do, shown behind the caret.
+    pub fn note(mut self, note: impl Into<String>) -> Self {
+        self.note = note.into();
+        self
+    }
+
+    /// The same mistake elsewhere.
+    pub fn moved_to(self, place: Place) -> Self {
+        Mistake { place, ..self }
+    }
+
+    fn render(&self, sources: &[SourceText]) -> String {
+        let Some(source) = sources.get(self.place.source) else { return self.message.clone() };
+        let text = &source.text;
+        let start = floor(text, self.place.start);
+        let from = text[..start].rfind('\n').map_or(0, |i| i + 1);
+        let to = text[start..].find('\n').map_or(text.len(), |i| start + i);
+        let line = text[from..to].trim_end_matches('\r');
+        let end = floor(text, self.place.end.clamp(start, from + line.len().max(start - from)));
+        let number = text[..from].matches('\n').count() + 1;
+        let before = &text[from..start];
+        let (place, gutter) = if self.place.source == 0 {
+            let column = before.chars().count() + 1;
+            (format!("{}:{number}:{column}", source.origin), number.to_string())
+        } else {
+            (source.origin.clone(), String::new())
+        };
+        // One character each, so that the carets stay below what they mean.
+        let plain = |c: char| if c != '\t' && is_control(c) { '\u{fffd}' } else { c };
+        let shown: String = line.chars().take(WIDEST).map(plain).collect();
+        let pad: String = before.chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
+        let carets = text[start..end].chars().count().max(1);
+        // Words of the text are quoted in it: a line's end there is no line's end here.
+        let message = source.shortened(&self.message).replace('\n', "\\n");
+        if source.origin.is_empty() {
+            // The user knows no such text: its places would say nothing.
+            let note =
+                if self.note.is_empty() { String::new() } else { format!("\n  = {}", self.note) };
+            return format!("{message}{note}");
+        }
+        let mut out = format!("{place}: {message}");
+        let blank = " ".repeat(gutter.len());
+        if pad.chars().count() + carets <= WIDEST {
+            let carets = "^".repeat(carets);
+            let _ = write!(out, "\n  {gutter} | {shown}\n  {blank} | {pad}{carets}");
+        }
+        if !self.note.is_empty() {
+            let _ = write!(out, "\n  {blank} = {}", self.note);
+        }
+        out
+    }
+}
+
+/// All mistakes as one error, in the order of their places.
+///
+/// Its kind is [`ErrorKind::Pipeline`], unless all of them are of one other kind.
+pub(crate) fn tell(mut mistakes: Vec<Mistake>, sources: &[SourceText]) -> Error {
+    mistakes.sort_by(|a, b| a.place.cmp(&b.place));
+    let kind = match mistakes.first() {
+        Some(first) if mistakes.iter().all(|m| m.kind == first.kind) => first.kind,
+        _ => ErrorKind::Pipeline,
+    };
+    let told: Vec<String> = mistakes.iter().take(MOST_TOLD).map(|m| m.render(sources)).collect();
+    if let [one] = &told[..] {
+        return Error::new(kind, one.clone());
+    }
+    let mut message = format!("{} mistakes\n{}", mistakes.len(), told.join("\n"));
+    if mistakes.len() > MOST_TOLD {
+        let _ = write!(message, "\nand {} more", mistakes.len() - MOST_TOLD);
+    }
+    Error::new(kind, message)
+}
+
+/// "did you mean `x`? keys: x, y, z" for a word that is not among `valid`.
+pub(crate) fn advice<S: AsRef<str>>(
+    word: &str,
+    all: &str,
+    valid: impl IntoIterator<Item = S>,
+) -> String {
+    let mut valid: Vec<String> = valid.into_iter().map(|v| v.as_ref().to_owned()).collect();
+    valid.sort();
+    valid.dedup();
+    if valid.is_empty() {
+        return format!("{all}: none");
+    }
+    let list = format!("{all}: {}", valid.join(", "));
+    match nearest(word, &valid) {
+        Some(near) => format!("did you mean `{near}`? {list}"),
+        None => list,
+    }
+}
+
+fn floor(text: &str, mut at: usize) -> usize {
+    at = at.min(text.len());
+    while !text.is_char_boundary(at) {
+        at -= 1;
+    }
+    at
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_at_the_end_of_the_text_or_inside_a_letter_is_rendered() {
+        let sources =
+            [SourceText { origin: "p.toml".into(), text: "a = 'ö'\r\nb".into(), setting: None }];
+        let at = |span| Mistake::new(Place::new(0, span), "wrong").render(&sources);
+        assert_eq!(at(10..10), "p.toml:2:1: wrong\n  2 | b\n    | ^");
+        assert_eq!(at(99..120), "p.toml:2:2: wrong\n  2 | b\n    |  ^");
+        assert_eq!(at(6..8), "p.toml:1:6: wrong\n  1 | a = 'ö'\n    |      ^^");
+    }
+}

@@ -1,0 +1,97 @@
+//! The stage kinds that a pipeline file may name: a value, so that a program can add its own.
+
+use std::collections::BTreeMap;
+
+use super::keys;
+use super::mistake::Mistake;
+use super::node::Node;
+use crate::stage::{Role, StageKind, StagePlace};
+use crate::{Error, Result};
+
+/// The stage kinds that a pipeline file may name.
+#[derive(Clone, Default)]
+pub struct Registry {
+    kinds: BTreeMap<&'static str, Kind>,
+}
+
+type Read = fn(&Node, &StagePlace) -> Result<(Role, serde_json::Value), Vec<Mistake>>;
+
+#[derive(Clone, Copy)]
+struct Kind {
+    about: &'static str,
+    either: &'static [&'static str],
+    read: Read,
+}
+
+impl Registry {
+    /// No kinds.
+    pub fn empty() -> Self {
+        Registry::default()
+    }
+
+    /// The same and `K`, which takes the place of a kind of that name.
+    #[must_use]
+    pub fn with<K: StageKind>(mut self) -> Self {
+        self.kinds.insert(K::KIND, Kind { about: K::ABOUT, either: K::EITHER, read: read::<K> });
+        self
+    }
+
+    /// The kinds by name, each with what it does.
+    pub fn kinds(&self) -> impl Iterator<Item = (&'static str, &'static str)> + '_ {
+        self.kinds.iter().map(|(name, kind)| (*name, kind.about))
+    }
+
+    /// True if there is a kind of that name.
+    pub fn has(&self, kind: &str) -> bool {
+        self.kinds.contains_key(kind)
+    }
+
+    /// Keys that `key` of a stage of that kind takes the place of.
+    pub(crate) fn others(&self, kind: &str, key: &str) -> impl Iterator<Item = &'static str> {
+        let either = self.kinds.get(kind).map_or(&[][..], |kind| kind.either);
+        let either = if either.contains(&key) { either } else { &[] };
+        either.iter().copied().filter(move |other| *other != key)
+    }
+
+    /// Builds a stage from its keys; none if there is no such kind.
+    pub(crate) fn build(
+        &self,
+        kind: &str,
+        keys: &Node,
+        at: &StagePlace,
+    ) -> Option<Result<(Role, serde_json::Value), Vec<Mistake>>> {
+        self.kinds.get(kind).map(|kind| (kind.read)(keys, at))
+    }
+}
+
+fn read<K: StageKind>(
+    keys: &Node,
+    at: &StagePlace,
+) -> Result<(Role, serde_json::Value), Vec<Mistake>> {
+    let stage: K = keys::read(K::KIND, keys)?;
+    let wrong = |error: Error| vec![Mistake::of(keys.place.clone(), &error)];
+    let canonical = canonical(&stage).map_err(wrong)?;
+    stage.build(at).map(|role| (role, canonical)).map_err(|error| {
+        let blamed = at.blamed();
+        let place = blamed.as_deref().and_then(|key| keys.at(key)).unwrap_or(&keys.place);
+        vec![Mistake::of(place.clone(), &error)]
+    })
+}
+
+/// The stage's keys with all defaults filled in, sorted by name; those without a value and those
+/// that name files are left out.
+fn canonical<K: StageKind>(stage: &K) -> Result<serde_json::Value> {
+    let value = serde_json::to_value(stage).map_err(|e| {
+        Error::internal(format!("cannot list the keys of `{}`", K::KIND)).because(e)
+    })?;
+    Ok(match value {
+        serde_json::Value::Object(keys) => keys
+            .into_iter()
+            .filter(|(key, value)| !value.is_null() && !K::PLACES.contains(&key.as_str()))
+            .collect::<BTreeMap<_, _>>()
+            .into_iter()
+            .collect::<serde_json::Map<_, _>>()
+            .into(),
+        _ => serde_json::Map::new().into(),
+    })
+}

@@ -1,0 +1,77 @@
+//! A look at some records before a run, so that values which an output cannot hold are told before the
+//! work and not in the middle of it. It finds what is common, and proves nothing.
+
+use crate::point::{PointBatch, Schema};
+use crate::stage::{CreateSink, Source};
+use crate::{Error, Result};
+
+/// Parts that are looked at, spread evenly over the source.
+const PARTS: usize = 8;
+/// Records of each, from its beginning, and the most bytes that they take.
+const RECORDS: usize = 1024;
+const BYTES: usize = 1 << 20;
+
+/// Records of a part that are looked at one by one where one does not fit.
+const SINGLES: usize = 64;
+
+/// What a look found that does not fit.
+pub(crate) struct Unfit {
+    /// What writing one of the records would be.
+    pub error: Error,
+    /// True if none of those that were looked at fits the output that one does not.
+    pub none_fits: bool,
+}
+
+/// Looks at some records for all `sinks`. Returns the first error that writing one of them would be;
+/// reading fails as a run would.
+pub(crate) fn look(
+    source: &dyn Source,
+    sinks: &[Box<dyn CreateSink>],
+    drop_nonfinite: bool,
+) -> Result<Option<Unfit>> {
+    let schema = source.schema();
+    let looking: Vec<_> = sinks.iter().filter(|sink| sink.checks(schema)).collect();
+    if looking.is_empty() {
+        return Ok(None);
+    }
+    let records = RECORDS.min(BYTES / schema.stride.max(1)).max(1);
+    let mut batch = PointBatch::new(schema.clone(), records);
+    let step = source.parts().div_ceil(PARTS).max(1);
+    let parts = || (0..source.parts()).step_by(step);
+    let read = |index: usize, batch: &mut PointBatch| {
+        batch.clear();
+        source.part(index)?.read(batch)?;
+        if drop_nonfinite {
+            batch.retain(|_, record| is_finite(record, schema));
+        }
+        Ok::<_, Error>(())
+    };
+    for index in parts() {
+        read(index, &mut batch)?;
+        for sink in &looking {
+            let Err(error) = sink.check(source.metadata(), &batch) else { continue };
+            let mut none_fits = true;
+            for other in parts() {
+                read(other, &mut batch)?;
+                none_fits = none_fits && !any_fits(source, sink.as_ref(), &batch);
+            }
+            return Ok(Some(Unfit { error: error.at(sink.path()), none_fits }));
+        }
+    }
+    Ok(None)
+}
+
+/// True if one of some records of `batch` fits `sink`.
+fn any_fits(source: &dyn Source, sink: &dyn CreateSink, batch: &PointBatch) -> bool {
+    let mut single = PointBatch::new(source.schema().clone(), 1);
+    batch.iter().step_by(batch.len().div_ceil(SINGLES).max(1)).any(|record| {
+        single.clear();
+        single.extend(record);
+        sink.check(source.metadata(), &single).is_ok()
+    })
+}
+
+fn is_finite(record: &[u8], schema: &Schema) -> bool {
+    let axes = schema.coordinates();
+    axes.is_none_or(|axes| axes.iter().all(|d| d.world(record, schema.endian).is_finite()))
+}

@@ -1,0 +1,13 @@
+//! From a graph, the headers of its inputs and the memory to a [`Plan`]: do the stages fit each other, the
+//! inputs and the memory? Knows no stage by name, and reads no point but a few that it looks at.
+
+mod look;
+mod outline;
+mod passes;
+mod plan;
+mod shown;
+mod stretch;
+
+pub use outline::Outline;
+pub use plan::Plan;
+pub use stretch::Stretch;

@@ -1,0 +1,122 @@
+//! A plan as text: what a run would do and what it would use.
+
+use std::fmt;
+
+use super::plan::Plan;
+use crate::budget::Bytes;
+use crate::engine::pass::{Call, Pass, needs};
+use crate::error::shown;
+use crate::quantity::Figure;
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "source   {} ({} files, {} points by their headers)",
+            self.0.source_kind,
+            self.0.source.inputs().len(),
+            self.0.source.points()
+        )?;
+        for (kind, _) in &self.0.transforms {
+            writeln!(f, "streams  {kind}")?;
+        }
+        match self.0.ops.is_empty() {
+            true => self.0.sinks.iter().try_for_each(|sink| sink_line(f, sink.path()))?,
+            false => self.passes_shown(f)?,
+        }
+        if !self.0.ops.is_empty() {
+            self.units_shown(f)?;
+        }
+        match &self.0.lattice {
+            Some(lattice) => {
+                write!(f, "lattice  step {} world units", lattice.step)?;
+                if lattice.z_scale() != 1.0 {
+                    write!(f, ", z times {}", Figure(lattice.z_scale()))?;
+                }
+                writeln!(f)?;
+            }
+            None => writeln!(f, "lattice  none: records stream by as they are")?,
+        }
+        writeln!(f, "order    {}", if self.0.mills { "canonical" } else { "of the input" })?;
+        writeln!(f, "threads  {}", self.0.threads)?;
+        self.memory(f)
+    }
+}
+
+fn sink_line(f: &mut fmt::Formatter<'_>, path: &std::path::Path) -> fmt::Result {
+    writeln!(f, "sink     {}", shown(path))
+}
+
+impl Plan {
+    fn units_shown(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let units = self.0.source.metadata().units;
+        write!(f, "units    {}", units.words())?;
+        match units.vertical {
+            None if units.mismatch().is_none() => {
+                writeln!(f, ": z is taken to be in that of x and y")
+            }
+            _ => writeln!(f),
+        }
+    }
+
+    fn passes_shown(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (n, pass) in self.0.passes.iter().enumerate() {
+            let sinks = |f: &mut fmt::Formatter<'_>, which: &[usize]| {
+                which.iter().try_for_each(|&sink| sink_line(f, self.0.sinks[sink].path()))
+            };
+            let label = format!("pass {}", n + 1);
+            sinks(f, &pass.before)?;
+            for (i, &call) in pass.calls.iter().enumerate() {
+                write!(f, "{:<8} ", if i == 0 { &label } else { "" })?;
+                self.call_shown(f, pass, call)?;
+            }
+            sinks(f, &pass.after)?;
+        }
+        Ok(())
+    }
+
+    fn call_shown(&self, f: &mut fmt::Formatter<'_>, pass: &Pass, call: Call) -> fmt::Result {
+        let (stage, needs) = (&self.0.ops[call.op], needs(&self.0.ops, call));
+        write!(f, "{}", stage.kind)?;
+        if pass.round > 1 {
+            write!(f, " (round {})", pass.round)?;
+        }
+        if call.gathers {
+            write!(f, " gathers over the whole scan")?;
+        }
+        write!(f, ": reads {}", needs.reads.join(", "))?;
+        if !needs.writes.is_empty() {
+            write!(f, ", writes {}", needs.writes.join(", "))?;
+        }
+        if needs.neighbors > 0 {
+            let most = if needs.fewer_neighbors { "up to " } else { "" };
+            write!(f, ", {most}{} nearest neighbours", needs.neighbors)?;
+        }
+        if needs.removes || needs.mark.is_some() {
+            write!(f, ", {}", if needs.mark.is_some() { "marks" } else { "removes" })?;
+        }
+        if !stage.limits.selection.is_all() {
+            write!(f, ", of some classes or flags only")?;
+        }
+        writeln!(f)
+    }
+
+    fn memory(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let shares = self.0.demands.divide().map_err(|_| fmt::Error)?;
+        write!(f, "memory   {}", Bytes(self.0.demands.limit))?;
+        if self.0.mills {
+            write!(
+                f,
+                ": {} for the program, {} for the index, {} for work, {} to keep points in\n         \
+                 runs of {} records, tiles of {} positions with their rims",
+                Bytes(shares.base),
+                Bytes(shares.index),
+                Bytes(shares.work),
+                Bytes(shares.kept_in_memory),
+                shares.run_records,
+                shares.tile_positions
+            )?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,72 @@
+//! What a pipeline file may name: the kind of a stage, whose keys are the fields of a struct.
+
+use std::cell::RefCell;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::Role;
+use crate::{Error, Result};
+
+/// What a `[[stage]]` of a pipeline file may be. The struct's fields are the stage's keys.
+///
+/// Keys that are no field are refused whatever the struct says; a field without a serde default is
+/// a key that must be given. `flatten` and `untagged` hide keys and places and are not supported.
+pub trait StageKind: DeserializeOwned + Serialize {
+    /// Its name in a file: one plain word, or two with a hyphen.
+    const KIND: &'static str;
+
+    /// What it does, in one sentence.
+    const ABOUT: &'static str;
+
+    /// Keys that say where files are rather than what is computed: they stay out of the report's
+    /// `pipeline`, which must not depend on where a scan lies and how it is split into files.
+    const PLACES: &'static [&'static str] = &[];
+
+    /// Keys of which a stage takes one: an argument that gives one takes the place of the others,
+    /// where a file gives several the stage tells.
+    const EITHER: &'static [&'static str] = &[];
+
+    /// Puts the stage in its role. Called once every key fits its field; an error is told with the
+    /// stage's place in the file, or that of a key if it went through [`StagePlace::blame`].
+    fn build(self, at: &StagePlace) -> Result<Role>;
+}
+
+/// Where in a pipeline file a stage stands.
+///
+/// Relative paths in a pipeline file are relative to the working directory, as they are on the
+/// command line, so that `--set read.path=…` and the file mean the same.
+#[derive(Debug)]
+pub struct StagePlace {
+    file: String,
+    line: usize,
+    blamed: RefCell<Option<String>>,
+}
+
+impl StagePlace {
+    /// A stage at line `line` (from 1) of `file`.
+    pub fn new(file: impl Into<String>, line: usize) -> Self {
+        StagePlace { file: file.into(), line, blamed: RefCell::new(None) }
+    }
+
+    /// The pipeline file, as the user named it.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// The line of its `kind`, from 1.
+    pub fn line(&self) -> usize {
+        self.line
+    }
+
+    /// Returns `error`, noting that the value of `key` is to blame for it.
+    pub fn blame(&self, key: &str, error: Error) -> Error {
+        self.blamed.replace(Some(key.to_owned()));
+        error
+    }
+
+    /// The key that is to blame, if one was named.
+    pub(crate) fn blamed(&self) -> Option<String> {
+        self.blamed.borrow().clone()
+    }
+}

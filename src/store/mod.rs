@@ -1,0 +1,34 @@
+//! The decoded scan: sorted runs as the decode leaves them, their merge, and what comes of it, sealed:
+//! distinct positions in Morton order with their records, in memory or on disk. Knows neither tiles,
+//! nor stages, nor formats.
+
+mod block;
+mod cutting;
+mod emit;
+mod fetch;
+mod gather;
+mod intake;
+mod key;
+mod levels;
+mod merge;
+mod order;
+pub(crate) mod pieces;
+mod record;
+mod sealed;
+pub(crate) mod spill;
+mod tournament;
+
+pub use block::{BLOCK, Block};
+pub use cutting::CutError;
+pub use fetch::Fetch;
+pub use intake::{Intake, TileStore};
+pub use key::{TileKey, morton_cmp};
+pub use levels::Levels;
+pub use merge::{merge_bytes, seal};
+pub use pieces::{PIECE, Pieces};
+pub use record::{
+    ASIDE, CLASSED_INPUTS, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, SELECTIONS, State,
+    TAGGED_INPUTS, Tag,
+};
+pub use sealed::{Reader, SealedTiles, index_bytes};
+pub use spill::{Address, Checksum, Folder, Spill, SpillArea, Stretch};

@@ -1,0 +1,103 @@
+//! What the store keeps beside each record, and the sizes of what it keeps for each position.
+
+use crate::point::Edit;
+
+/// Selections that a record can be in, a bit each; the highest bit is [`ASIDE`].
+pub const SELECTIONS: u32 = 7;
+/// Set in the selections of a record that takes no part in any pass and is written as it is.
+pub const ASIDE: u8 = 1 << SELECTIONS;
+
+/// What accompanies a record from the decode on: the selections that it is in, a bit each, its class
+/// where a stage reads it, and the number of its input.
+///
+/// From the lowest bit: 16 bits of the input's number, 8 bits of the class or, in runs that need no
+/// classes, more of the input's number, and 8 bits of selections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub struct Tag(pub u32);
+
+/// Inputs that a tag can tell apart.
+pub const TAGGED_INPUTS: u32 = 1 << 24;
+/// Inputs that a tag can tell apart if it holds a class too.
+pub const CLASSED_INPUTS: u32 = 1 << 16;
+
+impl Tag {
+    /// A tag of selections and the number of an input.
+    pub fn new(selections: u8, input: u32) -> Tag {
+        Tag(u32::from(selections) << 24 | input & (TAGGED_INPUTS - 1))
+    }
+
+    /// The selections, a bit each.
+    pub fn selections(self) -> u8 {
+        (self.0 >> 24) as u8
+    }
+
+    /// The same tag with the class of the record; the number of its input is below
+    /// [`CLASSED_INPUTS`].
+    #[must_use]
+    pub fn of_class(self, class: u8) -> Tag {
+        Tag(self.0 & !(0xff << 16) | u32::from(class) << 16)
+    }
+
+    /// The class of the record, in runs that need classes.
+    pub fn class(self) -> u8 {
+        (self.0 >> 16) as u8
+    }
+
+    /// The number of the input, one of so many.
+    pub fn input(self, inputs: usize) -> u32 {
+        let short = inputs <= CLASSED_INPUTS as usize;
+        self.0 & (if short { CLASSED_INPUTS } else { TAGGED_INPUTS } - 1)
+    }
+}
+
+/// The state of a record between passes, as it is stored: a byte.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct State(pub u8);
+
+impl State {
+    /// In the scan.
+    pub const ALIVE: State = State(0);
+    /// Removed.
+    pub const REMOVED: State = State(1);
+    /// Written, but no longer looked at.
+    pub const ASIDE: State = State(2);
+
+    /// The same state with an edit of the record more.
+    #[must_use]
+    pub fn edited(self, edit: Edit) -> State {
+        State(self.0 & 3 | edit.added_to(self.edits()) << 2)
+    }
+
+    /// Set aside, with the edits that it has.
+    #[must_use]
+    pub fn aside(self) -> State {
+        State(self.0 & !3 | State::ASIDE.0)
+    }
+
+    /// True if later passes look at the record.
+    pub fn is_alive(self) -> bool {
+        self.0 & 3 == 0
+    }
+
+    /// True if the record is in the output.
+    pub fn is_written(self) -> bool {
+        self.0 & 3 != 1
+    }
+
+    /// True if the record is in the output and no mark says that it would be removed.
+    pub fn is_kept(self) -> bool {
+        self.is_alive() || self == State::ASIDE
+    }
+
+    /// The set of edits that the record is written with: see [`Edit::of`].
+    pub fn edits(self) -> u8 {
+        self.0 >> 2
+    }
+}
+
+/// Bytes of a stored fate; see the survey.
+pub const FATE_BYTES: usize = size_of::<f32>();
+/// Bytes of a stored normal.
+pub const NORMAL_BYTES: usize = size_of::<[f32; 3]>();
+/// Bytes of a stored figure.
+pub const FIGURE_BYTES: usize = size_of::<f64>();

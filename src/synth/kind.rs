@@ -1,0 +1,42 @@
+//! The stage `synth`.
+
+use serde::{Deserialize, Deserializer, Serialize, de};
+
+use super::{Scene, Synthetic};
+use crate::Result;
+use crate::stage::{Role, StageKind, StagePlace};
+
+/// A source that needs no file: for trying, for tests, and to see what a setting does where the
+/// truth is known. It streams at any size, and equal keys give equal bytes on every machine.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Synth {
+    /// What is scanned.
+    pub scene: Scene,
+    /// How many points.
+    pub points: u64,
+    /// Equal seeds give equal scans.
+    #[serde(default)]
+    pub seed: u64,
+    /// Standard deviation of the noise in world units; none: the scene's own.
+    #[serde(default, deserialize_with = "some_length")]
+    pub noise: Option<f64>,
+}
+
+impl StageKind for Synth {
+    const KIND: &'static str = "synth";
+    const ABOUT: &'static str = "Makes a synthetic scan: of a simple surface, a machine part, projected squares or a landscape.";
+
+    fn build(self, _at: &StagePlace) -> Result<Role> {
+        let Synth { scene, points, seed, noise } = self;
+        Ok(Role::Source(Box::new(Synthetic { scene, points, seed, noise })))
+    }
+}
+
+fn some_length<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    let length = f64::deserialize(from)?;
+    match length.is_finite() && length >= 0.0 {
+        true => Ok(Some(length)),
+        false => Err(de::Error::invalid_value(de::Unexpected::Float(length), &"a number from 0")),
+    }
+}
