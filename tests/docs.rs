@@ -78,7 +78,7 @@ fn pages() -> Vec<Page> {
     vec![
         Page { more: Some(expand), ..page::<Read>(KINDS, "path = 'scan.laz'") },
         Page {
-            words: &["src/synth/mod.rs"],
+            words: &["src/synth/scene.rs"],
             ..page::<Synth>(KINDS, "scene = 'als'\npoints = 1000")
         },
         Page { words: &["src/point/selection.rs"], ..page::<Filter>("src/ops/filter.rs", "") },

@@ -3,12 +3,14 @@
 
 mod columns;
 mod layouts;
+mod step;
 
 pub use layouts::{las_schema, ply_schema};
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use columns::{BLOCK, Column, Records, Targets};
+use step::{Move, push, step};
 
 use crate::point::names::{BLUE, GREEN, NIR, RED, XYZ};
 use crate::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
@@ -35,23 +37,6 @@ pub struct Projection {
     blank: Vec<u8>,
     /// The same steps over columns, for those that have such a form.
     columns: Vec<Option<Column>>,
-}
-
-/// One step of a projection.
-#[derive(Debug, Clone)]
-enum Move {
-    /// Bytes that mean the same in both.
-    Copy { from: usize, to: usize, length: usize },
-    /// A number in the other byte order.
-    Swap { from: usize, to: usize, size: usize },
-    /// A stored number in another type; scale and origin are equal.
-    Stored { from: Dimension, to: Dimension },
-    /// A stored number into some bits of a byte.
-    Narrow { from: Dimension, to: Dimension, shift: u8, mask: u8 },
-    /// A world value rounded to the target's steps (coordinates).
-    Rounded { from: Dimension, to: Dimension },
-    /// A world value that the target must hold.
-    Exact { from: Dimension, to: Dimension },
 }
 
 impl Projection {
@@ -401,48 +386,6 @@ fn widens(from: &Schema, source: &Dimension, to: &Schema, target: &Dimension) ->
         && matches!(to.layout, Layout::Las { .. })
         && [RED, GREEN, BLUE, NIR].contains(&target.name.as_str())
         && (source.scalar, target.scalar) == (Scalar::U8, Scalar::U16)
-}
-
-fn step(from: &Dimension, from_endian: Endian, to: &Dimension, to_endian: Endian) -> Move {
-    let size = from.scalar.size();
-    if from.scale == to.scale && from.origin == to.origin {
-        let alike = from.scalar == to.scalar && from.bits.is_none() && to.bits.is_none();
-        return match alike {
-            true if size == 1 || from_endian == to_endian => {
-                Move::Copy { from: from.offset, to: to.offset, length: size }
-            }
-            true => Move::Swap { from: from.offset, to: to.offset, size },
-            false => stored(from, to),
-        };
-    }
-    if XYZ.contains(&to.name.as_str()) {
-        return Move::Rounded { from: from.clone(), to: to.clone() };
-    }
-    Move::Exact { from: from.clone(), to: to.clone() }
-}
-
-fn stored(from: &Dimension, to: &Dimension) -> Move {
-    let (from, to) = (from.clone(), to.clone());
-    match to.bits {
-        Some(bits) if to.scalar == Scalar::U8 && bits.shift + bits.width <= 8 && bits.width < 8 => {
-            Move::Narrow { from, to, shift: bits.shift, mask: (1 << bits.width) - 1 }
-        }
-        _ => Move::Stored { from, to },
-    }
-}
-
-/// Adds a step; bytes that follow those of the step before join it.
-fn push(moves: &mut Vec<Move>, step: Move) {
-    if let Move::Copy { from, to, length } = step
-        && let Some(Move::Copy { from: from_before, to: to_before, length: before }) =
-            moves.last_mut()
-        && *from_before + *before == from
-        && *to_before + *before == to
-    {
-        *before += length;
-        return;
-    }
-    moves.push(step);
 }
 
 #[cfg(test)]

@@ -3,9 +3,9 @@
 
 use std::f64::consts::PI;
 
-use super::Truth;
 use super::random::{Random, key};
 use super::record::{Record, STRIDE, stored};
+use super::truth::Truth;
 
 /// World units of a stored step.
 pub const SCALE: f64 = 1e-5;

@@ -1,8 +1,8 @@
 //! A tilted plane, seen evenly in random order.
 
-use super::Truth;
 use super::random::{Random, key};
 use super::record::{Record, STRIDE, stored};
+use super::truth::Truth;
 
 /// World units of a stored step.
 pub const SCALE: f64 = 1e-4;

@@ -2,7 +2,7 @@
 //! falls off, and a dome that meets the first plane at an angle. Nothing of it is hidden from the
 //! front, so every place of the plan has one height.
 
-use super::Truth;
+use super::truth::Truth;
 
 /// Width (along x) and length (along y) from world 0, in millimetres.
 pub const WIDTH: f64 = 120.0;

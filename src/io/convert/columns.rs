@@ -1,7 +1,7 @@
 //! The steps of a projection over many records at once: field by field, each a loop of its own over
 //! strided loads and stores. What a step finds unfit it leaves to the road that goes record by record.
 
-use super::Move;
+use super::step::Move;
 use crate::point::{Dimension, Endian, Scalar};
 
 /// Records that the steps take at once: with their targets and a column of numbers they stay in the

@@ -127,7 +127,7 @@ fn wkt(vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<Option<String>> {
 
 /// The first text in records of this kind that is not empty.
 fn first_text(vlrs: &[Vlr], evlrs: &[Evlr], user: &str, record: u16) -> Result<Option<String>> {
-    let filled = |payload: &[u8]| Some(super::vlr::text(payload)).filter(|text| !text.is_empty());
+    let filled = |payload: &[u8]| Some(super::text::text(payload)).filter(|text| !text.is_empty());
     let mut plain = vlrs.iter().filter(|v| v.is(user, record));
     if let Some(text) = plain.find_map(|v| filled(v.payload())) {
         return Ok(Some(text));
@@ -226,7 +226,7 @@ fn geotiff(vlrs: &[Vlr]) -> Option<String> {
         let entry = keys.0.iter().find(|e| e[0] == *key && e[1] == GEO_ASCII)?;
         let start = usize::from(entry[3]);
         let bytes = ascii.get(start..start.checked_add(usize::from(entry[2]))?)?;
-        let citation = super::vlr::text(bytes).trim_end_matches('|').to_owned();
+        let citation = super::text::text(bytes).trim_end_matches('|').to_owned();
         (!citation.is_empty()).then_some(citation)
     })
 }

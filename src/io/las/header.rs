@@ -3,6 +3,7 @@
 
 use super::file::InputFile;
 use super::format;
+use super::text::{split_at_room, text};
 use crate::io::sniff;
 use crate::point::GpsTime;
 use crate::{Error, Result};
@@ -328,7 +329,7 @@ impl Header {
     /// Sets a text field of 32 bytes; what exceeds it is cut off.
     pub fn put_text(&mut self, at: usize, text: &str) {
         let mut field = [0; 32];
-        let (text, _) = super::vlr::split_at_room(text, field.len());
+        let (text, _) = split_at_room(text, field.len());
         field[..text.len()].copy_from_slice(text.as_bytes());
         self.put(at, &field);
     }
@@ -398,6 +399,6 @@ impl Header {
 
     /// A text field without its trailing zeros, bytes that are no UTF-8 replaced.
     pub fn text(&self, at: usize) -> String {
-        super::vlr::text(&self.get::<32>(at))
+        text(&self.get::<32>(at))
     }
 }

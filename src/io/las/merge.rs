@@ -119,7 +119,7 @@ fn refuse(a: &Input, b: &Input, why: String) -> Error {
 }
 
 fn short(text: &str) -> String {
-    let (head, tail) = super::vlr::split_at_room(text, 60);
+    let (head, tail) = super::text::split_at_room(text, 60);
     if tail.is_empty() { head.to_owned() } else { format!("{head}…") }
 }
 

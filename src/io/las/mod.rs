@@ -25,6 +25,7 @@ mod sink;
 mod source;
 mod system;
 mod table;
+mod text;
 mod union;
 mod verify;
 mod vlr;
