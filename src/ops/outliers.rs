@@ -1,22 +1,21 @@
 //! The stage `outliers`: points far from all others are removed before anything is computed.
 
+mod neighbors;
 mod radius;
 mod statistical;
 
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::removal::Account;
 use crate::point::Mark;
 use crate::quantity::Length;
 use crate::stage::{Role, StageKind, StagePlace};
 use crate::{Error, Result};
 
+pub use neighbors::MAX_NEIGHBORS;
 pub use radius::RadiusOutliers;
 pub use statistical::StatisticalOutliers;
 
-/// Most neighbours that the stage takes.
-pub const MAX_NEIGHBORS: usize = 64;
 const NEIGHBORS: usize = 10;
 const MULTIPLIER: f64 = 2.0;
 
@@ -111,19 +110,6 @@ fn given<T>(key: &'static str, value: Option<T>) -> Result<T, (&'static str, Err
                 .help("for example `outliers.radius = 1.0` and `outliers.min_neighbors = 4`");
         ("method", error)
     })
-}
-
-/// Refuses a number of neighbours outside 1 to 64.
-fn checked(key: &'static str, neighbors: usize) -> Result<usize, (&'static str, Error)> {
-    if (1..=MAX_NEIGHBORS).contains(&neighbors) {
-        return Ok(neighbors);
-    }
-    let told = format!("`{key}` must be 1 to {MAX_NEIGHBORS}, not {neighbors}");
-    Err((key, Error::pipeline(told)))
-}
-
-fn account(mark: Option<Mark>) -> Account {
-    Account { stage: "outliers", marked: "outliers_marked", mark }
 }
 
 /// With the defaults that the method has, as the report names the stage.

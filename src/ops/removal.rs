@@ -60,6 +60,11 @@ pub(super) struct Account {
 }
 
 impl Account {
+    /// That of `outliers`.
+    pub(super) fn of_outliers(mark: Option<Mark>) -> Account {
+        Account { stage: "outliers", marked: "outliers_marked", mark }
+    }
+
     /// Enters `records` as removed for `reason`; marked ones are all still there, and only counted.
     pub(super) fn enter(&self, tally: &mut Tally, reason: &'static str, records: u64) {
         match self.mark {

@@ -1,7 +1,7 @@
 //! Outliers with too few neighbours within a radius: a tile at a time.
 
-use super::super::removal::remove;
-use super::{account, checked};
+use super::super::removal::{Account, remove};
+use super::neighbors::checked;
 use crate::point::{Mark, Units, distance2, names};
 use crate::quantity::Length;
 use crate::report::Tally;
@@ -89,7 +89,7 @@ impl TileOp for RadiusOutliers {
                 records += remove(tile, i);
             }
         }
-        account(self.mark).enter(tally, "outlier", records);
+        Account::of_outliers(self.mark).enter(tally, "outlier", records);
         Ok(())
     }
 }

@@ -3,8 +3,8 @@
 
 use serde_json::Value;
 
-use super::super::removal::remove;
-use super::{account, checked};
+use super::super::removal::{Account, remove};
+use super::neighbors::checked;
 use crate::geom::wide::Wide;
 use crate::point::{Mark, Position, distance2, names};
 use crate::report::Tally;
@@ -72,7 +72,7 @@ impl TileOp for StatisticalOutliers {
                 records += remove(tile, i);
             }
         }
-        account(self.mark).enter(tally, "outlier", records);
+        Account::of_outliers(self.mark).enter(tally, "outlier", records);
         Ok(())
     }
 
