@@ -1,5 +1,6 @@
 //! The lattice: where points are, as integers, so that every decision is exact.
 
+use super::decimal::{decimal_step, multiple};
 use crate::point::{Bounds, Endian, Layout, Position, Scalar, Schema};
 use crate::{Error, Result};
 
@@ -171,14 +172,6 @@ impl Lattice {
     }
 }
 
-/// The largest power of ten that is at most `length`, which is above 0; 1e-300 at least.
-fn decimal_step(length: f64) -> f64 {
-    let power = |exponent: i32| format!("1e{exponent}").parse::<f64>().unwrap_or(f64::MAX);
-    // The logarithm may be off by a little, so the first of the larger ones that fits is taken.
-    let above = if length > 1e-300 { libm::ceil(libm::log10(length)) as i32 } else { -300 };
-    (0..3).map(|less| power(above - less)).find(|&step| step <= length).unwrap_or(1e-300)
-}
-
 /// 2^62: far enough from the ends of i64 that a box around a position can grow.
 const FARTHEST: f64 = (1u64 << 62) as f64;
 
@@ -242,14 +235,6 @@ fn decimal(mut scale: [f64; 3], mut origin: [f64; 3], z_scale: f64) -> Option<La
     }
     shift[2] /= z_scale;
     Some(Lattice { step, shift, z_scale, placement: Placement::Integer { times, plus } })
-}
-
-/// How many steps a scale is, if it is a whole number of them within the rounding of decimals.
-fn multiple(scale: f64, step: f64) -> Option<i64> {
-    let ratio = scale / step;
-    let whole = ratio.round();
-    let whole_number = (1.0..1e15).contains(&whole) && (ratio - whole).abs() <= 1e-12 * whole;
-    whole_number.then_some(whole as i64)
 }
 
 #[cfg(test)]

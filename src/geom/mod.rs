@@ -2,6 +2,7 @@
 //! Knows no tiles, no files.
 
 pub mod angle;
+mod decimal;
 pub mod lattice;
 pub mod nearest;
 pub mod plane;

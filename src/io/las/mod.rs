@@ -11,6 +11,7 @@ mod describe;
 mod described;
 mod encode;
 mod extra;
+mod fields;
 mod file;
 mod format;
 mod guard;

@@ -6,8 +6,9 @@ use std::borrow::Cow;
 use std::cmp::Ordering;
 use std::sync::Arc;
 
+use super::fields::{at, encoding};
 use super::file::InputFile;
-use super::header::{Header, at, encoding};
+use super::header::Header;
 use super::text::{split_at_room, text};
 use crate::budget::Bytes;
 use crate::error::shown;
