@@ -23,39 +23,39 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Run a pipeline file
-    Run(Run),
+    Run(RunArguments),
     /// Reduce scans to the points that matter
-    Reduce(Box<Reduce>),
+    Reduce(Box<ReduceArguments>),
     /// Convert between LAS, LAZ and PLY
-    Convert(Convert),
+    Convert(ConvertArguments),
     /// Show what files contain, from their headers
-    Info(Info),
+    Info(InfoArguments),
     /// Show how a pipeline would be run, without running it
-    Plan(Plan),
+    Plan(PlanArguments),
     /// Check a pipeline and tell every mistake; reads its inputs' headers, writes nothing
-    Check(Plan),
+    Check(PlanArguments),
     /// List the stages that a pipeline can have, with their keys
-    Stages(Stages),
+    Stages(StagesArguments),
     /// Draw scans side by side, from above or from a side
-    Picture(Picture),
+    Picture(PictureArguments),
     /// Make a synthetic scan
-    Synth(Synth),
+    Synth(SynthArguments),
     /// Print what a shell needs to complete commands and flags
-    Completions(Completions),
+    Completions(CompletionsArguments),
     /// Print the manual page, or write those of all commands into a folder
-    Man(Man),
+    Man(ManArguments),
 }
 
 impl Command {
     /// What commands that plan or run a pipeline have in common.
-    pub fn common(&self) -> Option<&Common> {
+    pub fn common(&self) -> Option<&CommonArguments> {
         match self {
             Command::Reduce(reduce) => Some(&reduce.common),
-            Command::Run(Run { common, .. })
-            | Command::Convert(Convert { common, .. })
-            | Command::Plan(Plan { common, .. })
-            | Command::Check(Plan { common, .. })
-            | Command::Synth(Synth { common, .. }) => Some(common),
+            Command::Run(RunArguments { common, .. })
+            | Command::Convert(ConvertArguments { common, .. })
+            | Command::Plan(PlanArguments { common, .. })
+            | Command::Check(PlanArguments { common, .. })
+            | Command::Synth(SynthArguments { common, .. }) => Some(common),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => None,
             Command::Completions(_) | Command::Man(_) => None,
         }
@@ -65,7 +65,7 @@ impl Command {
 /// Common to all commands that run a pipeline.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Run options")]
-pub(super) struct Common {
+pub(super) struct CommonArguments {
     /// Bound of the peak memory, such as 512MiB or 2GiB [default: half of what there is]
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,
@@ -110,7 +110,7 @@ fn parse_threads(text: &str) -> Result<usize, String> {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Run {
+pub(super) struct RunArguments {
     /// The pipeline file
     #[arg(value_name = "PIPELINE")]
     pub pipeline: PathBuf,
@@ -119,11 +119,11 @@ pub(super) struct Run {
     #[arg(long = "set", value_name = "STAGE.KEY=VALUE")]
     pub sets: Vec<String>,
     #[command(flatten)]
-    pub common: Common,
+    pub common: CommonArguments,
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Plan {
+pub(super) struct PlanArguments {
     /// The pipeline file
     #[arg(value_name = "PIPELINE")]
     pub pipeline: PathBuf,
@@ -131,11 +131,11 @@ pub(super) struct Plan {
     #[arg(long = "set", value_name = "STAGE.KEY=VALUE")]
     pub sets: Vec<String>,
     #[command(flatten)]
-    pub common: Common,
+    pub common: CommonArguments,
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Reduce {
+pub(super) struct ReduceArguments {
     /// LAS, LAZ or PLY files, patterns or folders
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
@@ -149,20 +149,21 @@ pub(super) struct Reduce {
     /// Format: las, laz or ply [default: by extension; in a folder, that of each input]
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
-    /// Settings for a kind of scan, or those of the published method (paper); other options take the
-    /// place of a preset's [default: by the noise and the spacing of the scan; the run says what it chose]
+    /// Settings for a kind of scan, or those of the published method (paper); other options take
+    /// the place of a preset's [default: by the noise and the spacing of the scan; the run says
+    /// what it chose]
     #[arg(long, value_name = "KIND")]
     pub preset: Option<Preset>,
-    /// Instead of a number of points: the largest range of normal angles in a cell, in radians, as 6deg,
-    /// or auto, by the noise
+    /// Instead of a number of points: the largest range of normal angles in a cell, in radians, as
+    /// 6deg, or auto, by the noise
     #[arg(long, value_name = "ANGLE")]
     pub max_angle: Option<String>,
     /// How many points are to stay: 10%, 250k, 1e6, or auto, as many as the noise asks for
     /// [default: auto]
     #[arg(long, value_name = "TARGET", conflicts_with = "max_angle")]
     pub keep: Option<String>,
-    /// Nearest other positions that a normal is computed from; auto takes 10 or, where there is noise,
-    /// 20 [default: auto]
+    /// Nearest other positions that a normal is computed from; auto takes 10 or, where there is
+    /// noise, 20 [default: auto]
     #[arg(long, value_name = "K")]
     pub neighbors: Option<String>,
     /// Side of the cells before any split: a length, auto, or spread evenly [default: spread]
@@ -175,11 +176,12 @@ pub(super) struct Reduce {
     /// none]
     #[arg(long, value_name = "LENGTH")]
     pub max_side: Option<String>,
-    /// No cell of this length or less is split: in the scan's unit, as 5cm, auto or none [default: auto]
+    /// No cell of this length or less is split: in the scan's unit, as 5cm, auto or none [default:
+    /// auto]
     #[arg(long, value_name = "LENGTH")]
     pub min_spacing: Option<String>,
-    /// What the angles of a cell are measured to: axis, one direction for all, or cone, the cell's own
-    /// [default: cone]
+    /// What the angles of a cell are measured to: axis, one direction for all, or cone, the cell's
+    /// own [default: cone]
     #[arg(long, value_name = "HOW")]
     pub measure: Option<String>,
     /// The direction of `--measure axis`: x, y, z or a vector such as 0,0,1 [default: x]
@@ -200,31 +202,31 @@ pub(super) struct Reduce {
     /// Mark the decision in the records and write them all: key-point, withheld, or class 7 or 18
     #[arg(long, value_name = "HOW")]
     pub mark: Option<String>,
-    /// Order of the records: canonical, a function of the points alone, or input, that of the inputs
-    /// [default: canonical]
+    /// Order of the records: canonical, a function of the points alone, or input, that of the
+    /// inputs [default: canonical]
     #[arg(long, value_name = "HOW", conflicts_with = "outdir")]
     pub order: Option<String>,
     /// Reduce the points of these classes alone, such as 2,6; all others stay, and are not seen as
     /// neighbours
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_classes)]
     pub classes: Vec<Classes>,
-    /// Points of classes 7 and 18, which are noise: drop them, keep them as points like all others, or
-    /// ignore them and write them as they are [default: drop; ignore with --mark; keep where --classes
-    /// or --keep-classes names one of them]
+    /// Points of classes 7 and 18, which are noise: drop them, keep them as points like all others,
+    /// or ignore them and write them as they are [default: drop; ignore with --mark; keep where
+    /// --classes or --keep-classes names one of them]
     #[arg(long, value_name = "HOW")]
     pub noise: Option<String>,
     #[command(flatten)]
-    pub filter: Filtered,
-    /// Points with the withheld flag: drop them, keep them as points like all others, or ignore them
-    /// and write them as they are [default: drop]
+    pub filter: FilterArguments,
+    /// Points with the withheld flag: drop them, keep them as points like all others, or ignore
+    /// them and write them as they are [default: drop]
     #[arg(long, value_name = "HOW")]
     pub withheld: Option<String>,
     /// Points whose coordinates are not finite: refuse the scan, or drop them [default: refuse]
     #[arg(long, value_name = "HOW")]
     pub nonfinite: Option<String>,
-    /// Length of a step of the lattice on which points are compared, in the scan's unit, for scans far
-    /// from their origin or finer than it. Sides that are chosen follow from it, and with them how many
-    /// points stay [default: what the coordinates are stored in, for floats 2^-30]
+    /// Length of a step of the lattice on which points are compared, in the scan's unit, for scans
+    /// far from their origin or finer than it. Sides that are chosen follow from it, and with them
+    /// how many points stay [default: what the coordinates are stored in, for floats 2^-30]
     #[arg(long, value_name = "NUMBER")]
     pub lattice: Option<String>,
     /// Scans whose points contradict their LAS header, as damaged ones do: refuse them, or warn
@@ -237,14 +239,14 @@ pub(super) struct Reduce {
     #[arg(long, value_name = "FACTOR")]
     pub z_scale: Option<String>,
     #[command(flatten)]
-    pub written: Written,
+    pub written: WrittenArguments,
     #[command(flatten)]
-    pub common: Common,
+    pub common: CommonArguments,
 }
 
 /// Which points are left out as they are read.
 #[derive(Debug, Args)]
-pub(super) struct Filtered {
+pub(super) struct FilterArguments {
     /// Keep the points of these classes alone, such as 2,6
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_classes)]
     pub keep_classes: Vec<Classes>,
@@ -255,8 +257,9 @@ pub(super) struct Filtered {
 
 /// How the output is written.
 #[derive(Debug, Args)]
-pub(super) struct Written {
-    /// Scale of LAS coordinates, or three for X, Y and Z [default: the input's; PLY to LAS must say it]
+pub(super) struct WrittenArguments {
+    /// Scale of LAS coordinates, or three for X, Y and Z [default: the input's; PLY to LAS must say
+    /// it]
     #[arg(long, value_name = "SCALE")]
     pub scale: Option<String>,
     /// Offset of LAS coordinates on each axis [default: the input's, or 0]
@@ -275,7 +278,7 @@ pub(super) struct Written {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Convert {
+pub(super) struct ConvertArguments {
     /// LAS, LAZ or PLY files, patterns or folders
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
@@ -295,15 +298,15 @@ pub(super) struct Convert {
     #[arg(long, value_name = "HOW")]
     pub headers: Option<String>,
     #[command(flatten)]
-    pub filter: Filtered,
+    pub filter: FilterArguments,
     #[command(flatten)]
-    pub written: Written,
+    pub written: WrittenArguments,
     #[command(flatten)]
-    pub common: Common,
+    pub common: CommonArguments,
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Info {
+pub(super) struct InfoArguments {
     /// LAS, LAZ or PLY files, patterns or folders
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<String>,
@@ -313,9 +316,9 @@ pub(super) struct Info {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Picture {
-    /// LAS, LAZ or PLY files, patterns or folders: a scan each, drawn side by side, 4 at most. Quote a
-    /// pattern, so that its files are one scan
+pub(super) struct PictureArguments {
+    /// LAS, LAZ or PLY files, patterns or folders: a scan each, drawn side by side, 4 at most.
+    /// Quote a pattern, so that its files are one scan
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
     /// The picture: a .png file
@@ -340,7 +343,7 @@ fn parse_width(text: &str) -> Result<u32, String> {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Stages {
+pub(super) struct StagesArguments {
     /// One stage, or `run` for the settings above all stages
     #[arg(value_name = "KIND")]
     pub kind: Option<String>,
@@ -350,21 +353,21 @@ pub(super) struct Stages {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Completions {
+pub(super) struct CompletionsArguments {
     /// The shell
     #[arg(value_name = "SHELL")]
     pub shell: Shell,
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Man {
+pub(super) struct ManArguments {
     /// The folder; it is made if it does not exist
     #[arg(value_name = "DIR")]
     pub folder: Option<String>,
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Synth {
+pub(super) struct SynthArguments {
     /// What is scanned: plane, part, sphere, squares-random, squares-uniform or als
     #[arg(value_name = "KIND")]
     pub scene: String,
@@ -381,5 +384,5 @@ pub(super) struct Synth {
     #[arg(long, value_name = "NUMBER")]
     pub noise: Option<String>,
     #[command(flatten)]
-    pub common: Common,
+    pub common: CommonArguments,
 }

@@ -41,7 +41,8 @@ enum Voice {
 }
 
 impl Console {
-    /// As the arguments of a command ask for, in its words; one that has none of these speaks plainly.
+    /// As the arguments of a command ask for, in its words; one that has none of these speaks
+    /// plainly.
     pub fn new(command: &Command) -> Self {
         let common = command.common();
         let progress = common.map_or(Progress::Never, |common| common.progress);

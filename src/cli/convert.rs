@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::arguments::Convert;
+use super::arguments::ConvertArguments;
 use super::console::Console;
 use super::flags::{common_flags, convert_flags, given};
 use super::mistyped::marked;
@@ -27,7 +27,11 @@ const CONVERT: &str = include_str!("../../pipelines/convert.toml");
 
 /// Converts all inputs into one file, or each into a file of its own in a folder; prints a closing
 /// table.
-pub(super) fn convert(arguments: &Convert, registry: &Registry, console: &Console) -> Result<()> {
+pub(super) fn convert(
+    arguments: &ConvertArguments,
+    registry: &Registry,
+    console: &Console,
+) -> Result<()> {
     let folder = Path::new(&arguments.output);
     if !(arguments.output.ends_with('/') || folder.is_dir()) {
         let one = pipeline(arguments, json!(arguments.inputs), json!(arguments.output), registry);
@@ -67,7 +71,7 @@ pub(super) fn convert(arguments: &Convert, registry: &Registry, console: &Consol
 
 /// No output of the whole batch may replace an input of it, be it one of another conversion that is
 /// reached through a link, nor another output.
-fn check_files(pairs: &[(PathBuf, PathBuf)], arguments: &Convert) -> Result<()> {
+fn check_files(pairs: &[(PathBuf, PathBuf)], arguments: &ConvertArguments) -> Result<()> {
     let mut files = Files::default();
     let beside: Vec<_> = pairs.iter().map(|(input, _)| las::beside(input)).collect();
     pairs.iter().for_each(|(input, _)| files.read(input, Use::Input));
@@ -129,8 +133,8 @@ impl Total {
 }
 
 /// Runs one pipeline after the other. One that fails is told at once and does not keep the others
-/// from running, as do `odd` names, of which there can be no pipeline; the error in the end is of the
-/// first failure's kind. Returned are those that are done and what became of all.
+/// from running, as do `odd` names, of which there can be no pipeline; the error in the end is of
+/// the first failure's kind. Returned are those that are done and what became of all.
 fn run_all(
     runs: Vec<(PathBuf, Graph)>,
     odd: Vec<PathBuf>,
@@ -163,7 +167,7 @@ fn run_all(
 }
 
 fn pipeline(
-    arguments: &Convert,
+    arguments: &ConvertArguments,
     inputs: Value,
     output: Value,
     registry: &Registry,

@@ -14,7 +14,7 @@ const DESCRIBED: &str = include_str!("stages.json");
 
 /// A kind of stage, or the `[run]` table.
 #[derive(Deserialize, Serialize)]
-pub(super) struct Described {
+pub(super) struct StageDescription {
     pub kind: String,
     pub about: String,
     /// None for a kind that an embedding program brings: its keys are not known here.
@@ -40,24 +40,24 @@ pub(super) struct Word {
 /// The addresses of all settings that are described, as `--set` takes them.
 pub(super) fn settings() -> BTreeSet<String> {
     // The description is the program's own; a test reads it.
-    let known: Vec<Described> = serde_json::from_str(DESCRIBED).unwrap_or_default();
-    let keys = |d: Described| -> Vec<String> {
+    let known: Vec<StageDescription> = serde_json::from_str(DESCRIBED).unwrap_or_default();
+    let keys = |d: StageDescription| -> Vec<String> {
         d.keys.iter().flatten().map(|key| format!("{}.{}", d.kind, key.key)).collect()
     };
     known.into_iter().flat_map(keys).collect()
 }
 
 /// The `[run]` table, then the kinds of the registry in their order.
-pub(super) fn described(registry: &Registry) -> Result<Vec<Described>> {
-    let mut known: Vec<Described> = serde_json::from_str(DESCRIBED)
+pub(super) fn described(registry: &Registry) -> Result<Vec<StageDescription>> {
+    let mut known: Vec<StageDescription> = serde_json::from_str(DESCRIBED)
         .map_err(|e| Error::internal("the built-in description of stages is wrong").because(e))?;
-    let mut all: Vec<Described> = known.extract_if(.., |d| d.kind == "run").collect();
+    let mut all: Vec<StageDescription> = known.extract_if(.., |d| d.kind == "run").collect();
     for (kind, about) in registry.kinds() {
         // A program's own kind may have the name of a built-in one.
         let built_in = known.iter().position(|d| d.kind == kind && d.about == about);
         all.push(match built_in {
             Some(at) => known.swap_remove(at),
-            None => Described { kind: kind.to_owned(), about: about.to_owned(), keys: None },
+            None => StageDescription { kind: kind.to_owned(), about: about.to_owned(), keys: None },
         });
     }
     Ok(all)

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
-use super::arguments;
+use super::arguments::PictureArguments;
 use super::mistyped::marked;
 use super::print;
 use super::seen::ColoredBy;
@@ -20,7 +20,7 @@ use crate::stage::Source;
 use crate::{Error, Result};
 
 /// Draws the inputs and prints what the picture shows.
-pub(super) fn picture(arguments: &arguments::Picture) -> Result<()> {
+pub(super) fn picture(arguments: &PictureArguments) -> Result<()> {
     let path = &arguments.output;
     if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("png")) {
         let told = "-o: a picture is a PNG file, whose name ends in .png";
@@ -114,7 +114,7 @@ fn range([low, high]: [f64; 2]) -> String {
 }
 
 /// What the picture shows, as a few lines.
-fn told(picture: &Picture, arguments: &arguments::Picture, bytes: u64) -> String {
+fn told(picture: &Picture, arguments: &PictureArguments, bytes: u64) -> String {
     let mut told = String::new();
     for (input, (points, outside)) in arguments.inputs.iter().zip(&picture.panels) {
         told += &format!("scan       {input}, {} points", Grouped(*points));

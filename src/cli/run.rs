@@ -1,6 +1,6 @@
 //! `run`, `reduce` and `synth`: arguments to a pipeline, and the pipeline's run.
 
-use super::arguments::{Common, Reduce, Run, Synth};
+use super::arguments::{CommonArguments, ReduceArguments, RunArguments, SynthArguments};
 use super::console::Console;
 use super::flags::{common_flags, given, reduce_flags, synth_flags};
 use super::preset::Preset;
@@ -29,14 +29,18 @@ kind = \"write\"
 ";
 
 /// Runs a pipeline file and prints its closing table.
-pub(super) fn run(arguments: &Run, registry: &Registry, console: &Console) -> Result<()> {
+pub(super) fn run(arguments: &RunArguments, registry: &Registry, console: &Console) -> Result<()> {
     let sets = parse_sets(&arguments.sets, &arguments.common)?;
     let pipeline = Graph::read(&arguments.pipeline, registry, &sets)?;
     console.result(mill(pipeline, console)?)
 }
 
 /// Runs `pipelines/reduce.toml` on other files and prints the closing table.
-pub(super) fn reduce(arguments: &Reduce, registry: &Registry, console: &Console) -> Result<()> {
+pub(super) fn reduce(
+    arguments: &ReduceArguments,
+    registry: &Registry,
+    console: &Console,
+) -> Result<()> {
     let preset = arguments.preset.map_or(Vec::new(), Preset::sets);
     let sets = [preset, given([reduce_flags(arguments), common_flags(&arguments.common)])].concat();
     if arguments.preset.is_none() {
@@ -50,7 +54,11 @@ pub(super) fn reduce(arguments: &Reduce, registry: &Registry, console: &Console)
 }
 
 /// Writes a made-up scan and prints the closing table.
-pub(super) fn synth(arguments: &Synth, registry: &Registry, console: &Console) -> Result<()> {
+pub(super) fn synth(
+    arguments: &SynthArguments,
+    registry: &Registry,
+    console: &Console,
+) -> Result<()> {
     let sets = given([synth_flags(arguments), common_flags(&arguments.common)]);
     let pipeline = Graph::parse_with(SYNTH, HIDDEN, registry, &sets)?;
     console.result(mill(pipeline, console)?)
@@ -67,7 +75,7 @@ pub(super) fn mill(pipeline: Graph, console: &Console) -> Result<Done> {
 }
 
 /// The values of `--set`, and those of other arguments.
-pub(super) fn parse_sets(sets: &[String], common: &Common) -> Result<Vec<Set>> {
+pub(super) fn parse_sets(sets: &[String], common: &CommonArguments) -> Result<Vec<Set>> {
     let sets = sets.iter().map(|set| Set::parse(set)).collect::<Result<Vec<Set>>>()?;
     Ok([sets, given([common_flags(common)])].concat())
 }

@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use crate::picture::{By, View};
+use crate::picture::{ColorBy, View};
 
 /// From where scans are seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -39,12 +39,12 @@ pub(super) enum ColoredBy {
 
 impl ColoredBy {
     /// The same for the library.
-    pub fn shown(self) -> By {
+    pub fn shown(self) -> ColorBy {
         match self {
-            ColoredBy::Height => By::Height,
-            ColoredBy::Class => By::Class,
-            ColoredBy::Color => By::Color,
-            ColoredBy::Intensity => By::Intensity,
+            ColoredBy::Height => ColorBy::Height,
+            ColoredBy::Class => ColorBy::Class,
+            ColoredBy::Color => ColorBy::Color,
+            ColoredBy::Intensity => ColorBy::Intensity,
         }
     }
 }

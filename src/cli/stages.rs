@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use super::arguments::Stages;
-use super::described::{Described, Key, Word, described};
+use super::arguments::StagesArguments;
+use super::described::{Key, StageDescription, Word, described};
 use super::print;
 use crate::error::nearest;
 use crate::language::Registry;
@@ -13,9 +13,9 @@ use crate::{Error, Result};
 const COLUMNS: usize = 96;
 
 /// Prints the `[run]` table and all kinds of stages, or one of them.
-pub(super) fn stages(arguments: &Stages, registry: &Registry) -> Result<()> {
+pub(super) fn stages(arguments: &StagesArguments, registry: &Registry) -> Result<()> {
     let all = described(registry)?;
-    let shown: Vec<&Described> = match &arguments.kind {
+    let shown: Vec<&StageDescription> = match &arguments.kind {
         None => all.iter().collect(),
         Some(kind) => vec![all.iter().find(|d| d.kind == *kind).ok_or_else(|| {
             let kinds: Vec<String> = all.iter().map(|d| d.kind.clone()).collect();
@@ -37,7 +37,7 @@ pub(super) fn stages(arguments: &Stages, registry: &Registry) -> Result<()> {
     print::result(text.join("\n"))
 }
 
-fn text(described: &Described) -> String {
+fn text(described: &StageDescription) -> String {
     let heading = match described.kind.as_str() {
         "run" => "[run]",
         kind => kind,

@@ -36,8 +36,8 @@ impl Words {
         }
     }
 
-    /// `message` with every setting that it names (`` `write.drop = ["GpsTime"]` ``) put into what can
-    /// be typed (`` `--drop GpsTime` ``).
+    /// `message` with every setting that it names (`` `write.drop = ["GpsTime"]` ``) put into what
+    /// can be typed (`` `--drop GpsTime` ``).
     pub fn told(&self, message: &str) -> String {
         let mut out = String::with_capacity(message.len());
         let mut rest = message;

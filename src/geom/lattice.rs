@@ -45,10 +45,11 @@ impl Lattice {
         Lattice::stretched(schema, step, 1.0)
     }
 
-    /// The lattice of records of `schema` whose z is multiplied by `z_scale`, for scans whose heights
-    /// have another unit than their x and y. Records stay as they are: only where their points are
-    /// for each other changes, and lengths are in the unit of x and y. It is exact where a decimal
-    /// step of 1e-9 or more divides the stretched scale too; else positions are rounded to 2^-30.
+    /// The lattice of records of `schema` whose z is multiplied by `z_scale`, for scans whose
+    /// heights have another unit than their x and y. Records stay as they are: only where their
+    /// points are for each other changes, and lengths are in the unit of x and y. It is exact where
+    /// a decimal step of 1e-9 or more divides the stretched scale too; else positions are rounded
+    /// to 2^-30.
     ///
     /// # Errors
     ///
@@ -87,8 +88,9 @@ impl Lattice {
         Lattice { step, shift: [0.0; 3], z_scale, placement: Placement::Float { per_unit } }
     }
 
-    /// World coordinates of a position, z as the records have it. Where a world unit is a whole number of steps they are
-    /// divided, which rounds to the decimal that one expects: 12.345 and not 12.345000000000001.
+    /// World coordinates of a position, z as the records have it. Where a world unit is a whole
+    /// number of steps they are divided, which rounds to the decimal that one expects: 12.345 and
+    /// not 12.345000000000001.
     pub fn world(&self, p: Position) -> [f64; 3] {
         let per_unit = (1.0 / self.step).round();
         let whole = 1.0 / per_unit == self.step;
@@ -116,8 +118,8 @@ impl Lattice {
         ((held - length).abs() > 1e-3 * length).then_some(held)
     }
 
-    /// A decimal step that tells points apart which are `apart` in one coordinate, and still reaches
-    /// the ends of `bounds`; None where that is no finer than the step of this lattice.
+    /// A decimal step that tells points apart which are `apart` in one coordinate, and still
+    /// reaches the ends of `bounds`; None where that is no finer than the step of this lattice.
     pub fn finer(&self, bounds: &Bounds, apart: f64) -> Option<f64> {
         let ends = bounds.lo.iter().chain(&bounds.hi);
         let farthest = ends.map(|end| end.unsigned_abs()).max()? as f64 * self.step;
@@ -175,8 +177,8 @@ impl Lattice {
 /// 2^62: far enough from the ends of i64 that a box around a position can grow.
 const FARTHEST: f64 = (1u64 << 62) as f64;
 
-/// A height times `z_scale`. A finite one that overflows stays finite: it is too far, and not a point
-/// to be dropped as not finite.
+/// A height times `z_scale`. A finite one that overflows stays finite: it is too far, and not a
+/// point to be dropped as not finite.
 fn stretched(z: f64, z_scale: f64) -> f64 {
     let scaled = z * z_scale;
     if z.is_finite() { scaled.clamp(f64::MIN, f64::MAX) } else { z }

@@ -1,5 +1,5 @@
-//! Geometry on plain slices: the lattice, nearest neighbours, the star of a point, planes and angles.
-//! Knows no tiles, no files.
+//! Geometry on plain slices: the lattice, nearest neighbours, the star of a point, planes and
+//! angles. Knows no tiles, no files.
 
 pub mod angle;
 mod decimal;

@@ -24,9 +24,9 @@ use crate::report::Tally;
 use crate::stage::{Forecast, Needs, Role, ScanFacts, StageKind, StagePlace, TileOp};
 use crate::tile::Tile;
 
-use division::{Counts, Division};
+use division::{Division, DivisionCounts};
 pub use keys::Cells;
-use keys::{LARGEST_SIDE, Settled};
+use keys::{LARGEST_SIDE, SettledCells};
 use outlook::Outlook;
 pub use settings::{By, Measure, Reference, Side, Split};
 pub use target::Keep;
@@ -103,7 +103,7 @@ impl TileOp for Cells {
             Side::Length(length) => scan.lattice.steps(length.value()).min(LARGEST_SIDE),
         };
         let bound = |length: Length| scan.lattice.steps(length.value()).unsigned_abs();
-        self.settled = Some(Settled {
+        self.settled = Some(SettledCells {
             steps,
             length: steps as f64 * scan.lattice.step,
             max_side: self.max_side.map_or(u64::MAX, bound),
@@ -158,7 +158,7 @@ impl TileOp for Cells {
 }
 
 impl Cells {
-    fn count(&self, counts: Counts, tally: &mut Tally) {
+    fn count(&self, counts: DivisionCounts, tally: &mut Tally) {
         tally.count("cells_initial", counts.initial);
         tally.count("cells", counts.cells);
         if counts.cut_deep > 0 {

@@ -21,7 +21,7 @@ use crate::{Error, Result};
 pub use estimate::{Estimate, Fallback, Method, Outcome};
 pub use estimator::Estimator;
 pub use orient::Orient;
-use orient::Side;
+use orient::SignRule;
 
 /// Fewest neighbours that the stage takes; two make a plane, but no estimate of a surface.
 pub const MIN_NEIGHBORS: usize = 3;
@@ -33,17 +33,19 @@ pub const MAX_NEIGHBORS: usize = 64;
 /// Positions with fewer than two others in the whole scan, or with neighbours on one line, have
 /// none.
 ///
-/// What `orient` says decides how `cells` sees them: with `"none"` the normals of each cell are turned
-/// to one side first; with any other the signs stay, and the two sides of a thin wall are two surfaces.
+/// What `orient` says decides how `cells` sees them: with `"none"` the normals of each cell are
+/// turned to one side first; with any other the signs stay, and the two sides of a thin wall are
+/// two surfaces.
 ///
-/// With `neighbors = "auto"` it looks at a sample of the scan first: `scatter_of_10` of the report is how
-/// far, in radians, normals of 10 neighbours are off their linear trend where the scan is planar, which
-/// is what noise does. Up to 0.01 it takes 10 neighbours, beyond 20.
+/// With `neighbors = "auto"` it looks at a sample of the scan first: `scatter_of_10` of the report
+/// is how far, in radians, normals of 10 neighbours are off their linear trend where the scan is
+/// planar, which is what noise does. Up to 0.01 it takes 10 neighbours, beyond 20.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Normals {
     /// How many nearest other positions the fit uses (k), besides the position itself; 3 to 64, or
-    /// `"auto"`, by the noise. The paper finds 6 to 20 useful and 10 best; more smooth noise and edges.
+    /// `"auto"`, by the noise. The paper finds 6 to 20 useful and 10 best; more smooth noise and
+    /// edges.
     #[serde(deserialize_with = "checked_neighbors")]
     pub neighbors: Setting<usize>,
     /// How a normal is estimated.
@@ -53,7 +55,7 @@ pub struct Normals {
     /// What normals point to with `orient = "viewpoint"`, and only then: x, y, z in world units.
     pub viewpoint: Option<[f64; 3]>,
     #[serde(skip)]
-    side: Option<Side>,
+    side: Option<SignRule>,
     /// What `"auto"` came to.
     #[serde(skip)]
     found: Option<usize>,
@@ -77,8 +79,8 @@ impl Default for Normals {
 }
 
 impl Normals {
-    /// Refuses a number of neighbours outside 3 to 64 (reading a pipeline file does the same), and a
-    /// viewpoint that is missing, not asked for or not finite; names the key to blame.
+    /// Refuses a number of neighbours outside 3 to 64 (reading a pipeline file does the same), and
+    /// a viewpoint that is missing, not asked for or not finite; names the key to blame.
     pub fn check(&self) -> Result<(), (&'static str, Error)> {
         let given = self.neighbors.given().unwrap_or(MIN_NEIGHBORS);
         check_neighbors(given as u64).map_err(|told| ("neighbors", Error::pipeline(told)))?;
@@ -133,15 +135,15 @@ impl TileOp for Normals {
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
         self.check().map_err(|(_, error)| error)?;
-        self.side = self.viewpoint.map(|at| Side::towards(at, scan.lattice));
+        self.side = self.viewpoint.map(|at| SignRule::towards(at, scan.lattice));
         self.sample_side = 1 << scan.levels.smallest_side(noise::POSITIONS_PER_CUBE);
         Ok(())
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let side = match (self.orient, self.side) {
-            (Orient::None, _) => Side::Any,
-            (Orient::Up, _) => Side::Up,
+            (Orient::None, _) => SignRule::Any,
+            (Orient::Up, _) => SignRule::Up,
             (Orient::Viewpoint, Some(side)) => side,
             (Orient::Viewpoint, None) => {
                 return Err(Error::internal("normals ran before their viewpoint was settled"));
@@ -169,7 +171,7 @@ impl TileOp for Normals {
         });
         estimator.finish(&mut settle);
         (tile.normals, tile.copies) = (normals, copies);
-        tile.oriented = side != Side::Any;
+        tile.oriented = side != SignRule::Any;
         for i in 0..tile.positions.len() {
             if tile.oriented && is_known(tile.normals[i]) {
                 tile.normals[i] = side.settled(tile.normals[i], tile.positions[i]);

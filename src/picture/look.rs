@@ -1,5 +1,5 @@
-//! The first look at a scan: its points, its extent as seen from somewhere, and the range of what it
-//! is coloured by; and the frame that follows from it.
+//! The first look at a scan: its points, its extent as seen from somewhere, and the range of what
+//! it is coloured by; and the frame that follows from it.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -15,9 +15,9 @@ const SAMPLE: u64 = 100_000;
 /// Records read at once.
 const BATCH: usize = 8192;
 
-/// Calls `visit` with every point of `source` that is somewhere: its number in its part, the point as
-/// seen, and the values that it is coloured by; and `nowhere` for each of the others. Each thread has a
-/// state of its own; all are returned.
+/// Calls `visit` with every point of `source` that is somewhere: its number in its part, the point
+/// as seen, and the values that it is coloured by; and `nowhere` for each of the others. Each
+/// thread has a state of its own; all are returned.
 pub(super) fn each_point<S: Send>(
     source: &dyn Source,
     settings: &Settings,
@@ -152,8 +152,8 @@ pub(super) struct Frame {
 
 impl Frame {
     /// The frame of all that was looked at, in at most so many pixels, and in no fewer than
-    /// [`NARROWEST`] where there is room: what has no width, as a line of points, is in the middle. A few
-    /// points far from all others are left outside.
+    /// [`NARROWEST`] where there is room: what has no width, as a line of points, is in the middle.
+    /// A few points far from all others are left outside.
     pub fn of(looks: &[Look], most: [u32; 2]) -> Result<Frame> {
         if looks.iter().all(|look| look.points == 0) {
             let nowhere: u64 = looks.iter().map(|look| look.nowhere).sum();

@@ -14,7 +14,7 @@ pub struct Settings {
     /// From where.
     pub view: View,
     /// Coloured by what.
-    pub by: By,
+    pub by: ColorBy,
     /// Pixels that the picture is wide, all panels together: 64 to [`WIDEST`].
     pub width: u32,
     /// Threads that decode and draw.
@@ -52,7 +52,7 @@ impl View {
 
 /// What points are coloured by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum By {
+pub enum ColorBy {
     /// Their height: from dark blue through green and yellow to red.
     #[default]
     Height,
@@ -64,14 +64,14 @@ pub enum By {
     Intensity,
 }
 
-impl By {
+impl ColorBy {
     /// The names of the dimensions that it looks at, and what they are in words.
     fn names(self) -> (&'static [&'static str], &'static str) {
         match self {
-            By::Height => (&["Z"], "heights"),
-            By::Class => (&[names::CLASSIFICATION], "classes"),
-            By::Color => (&[names::RED, names::GREEN, names::BLUE], "colours"),
-            By::Intensity => (&[names::INTENSITY], "intensities"),
+            ColorBy::Height => (&["Z"], "heights"),
+            ColorBy::Class => (&[names::CLASSIFICATION], "classes"),
+            ColorBy::Color => (&[names::RED, names::GREEN, names::BLUE], "colours"),
+            ColorBy::Intensity => (&[names::INTENSITY], "intensities"),
         }
     }
 

@@ -9,8 +9,8 @@ pub struct Lot {
     pub copies: u32,
     /// Those of them that are kept.
     pub kept: u32,
-    /// How far the others are from the surface of what stands for them, in lattice steps; None where
-    /// nothing does.
+    /// How far the others are from the surface of what stands for them, in lattice steps; None
+    /// where nothing does.
     pub deviation: Option<f32>,
 }
 

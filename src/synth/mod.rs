@@ -1,6 +1,6 @@
-//! Scans that are computed instead of read: seeded, of any size, never held. A scan is a function of
-//! its scene, number of points, seed and noise alone, whatever the batches and whoever makes which
-//! part. Knows no files.
+//! Scans that are computed instead of read: seeded, of any size, never held. A scan is a function
+//! of its scene, number of points, seed and noise alone, whatever the batches and whoever makes
+//! which part. Knows no files.
 
 mod als;
 mod kind;

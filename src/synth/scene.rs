@@ -18,17 +18,17 @@ pub enum Scene {
     /// A machined part, a box of 120 × 80 × 30 with four through holes and a dome, from all sides:
     /// sharp edges, even by area, in random order. `UserData` is the number of the face.
     Part,
-    /// A sphere of radius 50 around world 0, even by area, in random order. `UserData` is the number of
-    /// the octant: 1, 2 and 4 for negative x, y and z.
+    /// A sphere of radius 50 around world 0, even by area, in random order. `UserData` is the
+    /// number of the octant: 1, 2 and 4 for negative x, y and z.
     Sphere,
-    /// The paper's experiment: squares of 60 × 60 pixels at random places of a window of 1200 × 1600,
-    /// projected on the front of an object, a point for each. The object is ours, the paper names
-    /// none: 120 × 160 mm with two planes that meet in an edge, and a dome. `UserData` is the number of
-    /// the face.
+    /// The paper's experiment: squares of 60 × 60 pixels at random places of a window of 1200 ×
+    /// 1600, projected on the front of an object, a point for each. The object is ours, the paper
+    /// names none: 120 × 160 mm with two planes that meet in an edge, and a dome. `UserData` is the
+    /// number of the face.
     SquaresRandom,
-    /// The same with the squares on a grid, 60 pixels apart and 520 a run, each run 2 pixels further
-    /// in x; after 30 runs also 2 pixels lower. `PointSourceId` is the number of the run. After
-    /// 468,000 points all places are taken and come again with other noise.
+    /// The same with the squares on a grid, 60 pixels apart and 520 a run, each run 2 pixels
+    /// further in x; after 30 runs also 2 pixels lower. `PointSourceId` is the number of the run.
+    /// After 468,000 points all places are taken and come again with other noise.
     SquaresUniform,
     /// An airborne scan in metres: ground (class 2), trees (5) and gabled roofs (6) in overlapping
     /// strips, about 10 points a square metre, in the order of acquisition.

@@ -64,11 +64,11 @@ struct Scan {
 
 /// A scene with its figures settled.
 enum Surface {
-    Plane(plane::Plane),
-    Part(part::Part),
-    Sphere(sphere::Sphere),
-    Squares(squares::Squares),
-    Als(Box<als::Als>),
+    Plane(plane::PlaneScene),
+    Part(part::PartScene),
+    Sphere(sphere::SphereScene),
+    Squares(squares::SquaresScene),
+    Als(Box<als::AlsScene>),
 }
 
 impl Surface {
@@ -76,22 +76,24 @@ impl Surface {
     fn of(scan: &Synthetic, noise: f64) -> (Surface, f64, [f64; 3]) {
         let (points, seed) = (scan.points, scan.seed);
         let squares = |pattern| {
-            let squares = squares::Squares::new(pattern, seed, noise);
+            let squares = squares::SquaresScene::new(pattern, seed, noise);
             (Surface::Squares(squares), squares::SCALE, [0.0; 3])
         };
         match scan.scene {
             Scene::Plane => {
-                let plane = plane::Plane::new(points, seed, noise);
+                let plane = plane::PlaneScene::new(points, seed, noise);
                 (Surface::Plane(plane), plane::SCALE, [0.0; 3])
             }
-            Scene::Part => (Surface::Part(part::Part::new(seed, noise)), part::SCALE, [0.0; 3]),
+            Scene::Part => {
+                (Surface::Part(part::PartScene::new(seed, noise)), part::SCALE, [0.0; 3])
+            }
             Scene::Sphere => {
-                (Surface::Sphere(sphere::Sphere::new(seed, noise)), sphere::SCALE, [0.0; 3])
+                (Surface::Sphere(sphere::SphereScene::new(seed, noise)), sphere::SCALE, [0.0; 3])
             }
             Scene::SquaresRandom => squares(squares::Pattern::Random),
             Scene::SquaresUniform => squares(squares::Pattern::Uniform),
             Scene::Als => {
-                let als = als::Als::new(points, seed, noise);
+                let als = als::AlsScene::new(points, seed, noise);
                 (Surface::Als(Box::new(als)), als::SCALE, als::ORIGIN)
             }
         }
@@ -123,7 +125,7 @@ impl Source for Scan {
     }
 
     fn part_bytes(&self) -> u64 {
-        size_of::<Stretch>() as u64
+        size_of::<PartInMaking>() as u64
     }
 
     fn parts(&self) -> usize {
@@ -133,17 +135,17 @@ impl Source for Scan {
     fn part(&self, index: usize) -> Result<Box<dyn Part + '_>> {
         let start = (index as u64).saturating_mul(PART_POINTS).min(self.points);
         let end = start.saturating_add(PART_POINTS).min(self.points);
-        Ok(Box::new(Stretch { surface: &self.surface, numbers: start..end }))
+        Ok(Box::new(PartInMaking { surface: &self.surface, numbers: start..end }))
     }
 }
 
 /// The points of a part that are still to be made.
-struct Stretch<'a> {
+struct PartInMaking<'a> {
     surface: &'a Surface,
     numbers: Range<u64>,
 }
 
-impl Part for Stretch<'_> {
+impl Part for PartInMaking<'_> {
     fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
         let left = self.numbers.end - self.numbers.start;
         let count = left.min(batch.capacity() as u64);

@@ -26,7 +26,7 @@ impl Leaf {
 }
 
 /// The points of a run side by side, and room to part them.
-pub(super) struct Run {
+pub(super) struct LeafRun {
     at: [[f32; RUN]; 3],
     rank: [u32; RUN],
     keys: [i32; RUN],
@@ -34,9 +34,9 @@ pub(super) struct Run {
     parted_rank: [u32; RUN],
 }
 
-impl Run {
-    pub fn new() -> Box<Run> {
-        Box::new(Run {
+impl LeafRun {
+    pub fn new() -> Box<LeafRun> {
+        Box::new(LeafRun {
             at: [[0.0; RUN]; 3],
             rank: [0; RUN],
             keys: [0; RUN],

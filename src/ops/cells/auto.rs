@@ -1,4 +1,5 @@
-//! What samples decide for cells: the values of keys that are "auto". A function of the points alone.
+//! What samples decide for cells: the values of keys that are "auto". A function of the points
+//! alone.
 
 use serde_json::Value;
 
@@ -17,8 +18,8 @@ const WIDEST: f64 = 1.0;
 /// Measured by `cargo bench --bench quality`, whose table is in docs/paper.md.
 const SPREAD: f64 = 1.25;
 const SPACING: f64 = 0.75;
-/// Where more than one of so many positions stays, such cells could be more than the points to keep:
-/// they are nearly as small as the distance of neighbours.
+/// Where more than one of so many positions stays, such cells could be more than the points to
+/// keep: they are nearly as small as the distance of neighbours.
 const SPREADABLE: u64 = 3;
 /// Without a number to keep: `min_spacing` in sides of the initial cells.
 const SPACING_OF_SIDE: f64 = 0.25;

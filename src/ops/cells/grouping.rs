@@ -38,8 +38,9 @@ pub(super) struct Grouping<'a> {
 }
 
 impl Grouping<'_> {
-    /// Makes each cell with a core position a group of `cells`: the chosen positions of it that have a
-    /// normal, in Morton order. Returns how many groups have positions on both sides of a face of the tile.
+    /// Makes each cell with a core position a group of `cells`: the chosen positions of it that
+    /// have a normal, in Morton order. Returns how many groups have positions on both sides of a
+    /// face of the tile.
     pub(super) fn run(&self, cells: &mut Partition) -> u64 {
         if self.tile.core.is_empty() {
             return 0;
@@ -158,8 +159,8 @@ impl Grouping<'_> {
         mixed.chunk_by(|a, b| class(a) == class(b)).map(one).sum()
     }
 
-    /// Ends the group of the members from `start` on, or drops them if none is in the core. Returns 1
-    /// if only some are.
+    /// Ends the group of the members from `start` on, or drops them if none is in the core. Returns
+    /// 1 if only some are.
     fn close_one(&self, cells: &mut Partition, start: usize) -> u64 {
         let group = &cells.members[start..];
         let before = group.partition_point(|&i| (i as usize) < self.tile.core.start);

@@ -32,8 +32,8 @@ impl Outlook {
         self.step
     }
 
-    /// Side in steps of the cubes of a grid that keeps `count` positions: between the two octree levels
-    /// that keep more and fewer, by powers.
+    /// Side in steps of the cubes of a grid that keeps `count` positions: between the two octree
+    /// levels that keep more and fewer, by powers.
     pub(super) fn grid_side(&self, count: u64) -> f64 {
         let count = count.clamp(self.levels.occupied(62).max(1), self.levels.positions());
         let level = (0..62).find(|&j| self.levels.occupied(j + 1) <= count).unwrap_or(62);

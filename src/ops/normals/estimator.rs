@@ -26,8 +26,8 @@ impl Estimator {
         Estimator { method, simd, ..Estimator::default() }
     }
 
-    /// The normal at a position whose neighbours are at `offsets` from it, in lattice steps: none of
-    /// them 0, all distinct, in Morton order, each smaller than 2^63.
+    /// The normal at a position whose neighbours are at `offsets` from it, in lattice steps: none
+    /// of them 0, all distinct, in Morton order, each smaller than 2^63.
     ///
     /// The result is a function of `offsets` alone, the same bits on every platform.
     pub fn estimate(&mut self, offsets: &[[i64; 3]]) -> Outcome {
@@ -63,8 +63,8 @@ mod tests {
     use crate::point::distance2;
     use proptest::prelude::*;
 
-    /// Noisy surfaces, grids full of ties and cocircular points, lines, scan lines, edges, walls, far
-    /// points; most with equally many neighbours.
+    /// Noisy surfaces, grids full of ties and cocircular points, lines, scan lines, edges, walls,
+    /// far points; most with equally many neighbours.
     fn neighborhoods() -> impl Strategy<Value = Vec<Vec<[i64; 3]>>> {
         let count = prop::sample::select(vec![1usize, 2, 3, 8, 10, 10, 10, 16, 64, 66]);
         count.prop_flat_map(|count| prop::collection::vec(neighborhood(count), 1..40))
