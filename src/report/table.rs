@@ -5,10 +5,9 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::baseline::BaselineFigures;
 use super::classes::class_name;
 use super::document::{Decision, Outcome, Report};
-use super::figures::{ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
+use super::figures::{BaselineFigures, ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
 use super::ledger::{Ledger, Removed};
 use super::tally::KEY_POINTS;
 use crate::budget::Bytes;
@@ -231,8 +230,8 @@ impl Table<'_> {
         }
     }
 
-    /// What a voxel grid of as many points would have done, where points were reduced by their normals; or
-    /// why that is not known.
+    /// What a voxel grid of as many points would have done, where points were reduced by their
+    /// normals; or why that is not known.
     fn baseline_line(
         &self,
         f: &mut fmt::Formatter<'_>,
@@ -301,8 +300,8 @@ pub struct Coordinate {
 }
 
 impl Coordinate {
-    /// The fewest decimals that are the coordinate but for what sums and products in f64 add to it; None
-    /// where all its digits are needed.
+    /// The fewest decimals that are the coordinate but for what sums and products in f64 add to it;
+    /// None where all its digits are needed.
     fn decimals(&self) -> Option<usize> {
         let rounding = 4.0 * f64::EPSILON * self.at.abs();
         let slack = (self.step * 1e-3).max(rounding).min(self.step / 2.0);
