@@ -95,6 +95,7 @@
 //! The programs in `examples/` go on from here, and `docs/architecture.md` tells why it is so.
 
 pub mod budget;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod engine;
 mod error;

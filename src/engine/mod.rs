@@ -32,7 +32,9 @@ pub(crate) mod tagger;
 pub(crate) mod task;
 mod watch;
 
+#[cfg(feature = "cli")]
 pub(crate) use publish::{make_folder, publish_bytes, refuse_existing};
 pub use run::Done;
+#[cfg(feature = "cli")]
 pub(crate) use scratch::Trouble;
 pub use watch::{Quiet, Watch};

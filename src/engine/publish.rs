@@ -172,6 +172,7 @@ fn sync_folder(folder: &Path) -> Result<()> {
 
 /// Writes `bytes` to `path`, where they appear complete or not at all; what cannot be cleared away is
 /// added to `trouble`.
+#[cfg(feature = "cli")]
 pub fn publish_bytes(path: &Path, bytes: &[u8], trouble: &Trouble) -> Result<()> {
     let staged = Staged::beside(path, Existing::Replace, trouble)?;
     let write = || {
