@@ -79,7 +79,7 @@ fn pages() -> Vec<Page> {
         Page { more: Some(expand), ..page::<Read>(KINDS, "path = 'scan.laz'") },
         Page {
             words: &["src/synth/scene.rs"],
-            ..page::<Synth>(KINDS, "scene = 'als'\npoints = 1000")
+            ..page::<Synth>("src/synth/kind.rs", "scene = 'als'\npoints = 1000")
         },
         Page { words: &["src/point/selection.rs"], ..page::<Filter>("src/ops/filter.rs", "") },
         page::<Outliers>("src/ops/outliers.rs", ""),

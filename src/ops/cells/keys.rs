@@ -47,8 +47,8 @@ pub(super) const LARGEST_SIDE: i64 = 1 << 62;
 /// on that angle, so all divisions are made once, those of the widest ranges count first, and of
 /// those of exactly the last range the first in canonical order (initial cells by their
 /// Morton-first position; each part before its own parts): as many as leave the number of records
-/// asked for. A position without a normal keeps a record and is among them. With `split =
-/// "voronoi"` the number is met exactly, as each division adds one record; a cut in eight adds up
+/// asked for. A position without a normal keeps a record and is among them. With
+/// `split = "voronoi"` the number is met exactly, as each division adds one record; a cut in eight adds up
 /// to seven, and the first in that order that would exceed the number ends it. If all divisions
 /// leave fewer, all are made. A division needs angles that differ: of a perfect plane no more can
 /// be kept than its initial cells.
@@ -75,8 +75,8 @@ pub struct Cells {
     pub max_angle: Option<Setting<Angle>>,
     /// How many records are to stay, instead of `max_angle`: a share of those that the stage
     /// decides about ("10%", to six decimals, rounded to whole records), a number (500000, "250k",
-    /// "5M"), or "auto": as many as `max_angle = "auto"` would leave of the cubes of `side =
-    /// "auto"` with a quarter of their side as `min_spacing`, by samples, a third at most. The
+    /// "5M"), or "auto": as many as `max_angle = "auto"` would leave of the cubes of
+    /// `side = "auto"` with a quarter of their side as `min_spacing`, by samples, a third at most. The
     /// angle is found again for what `side` and `min_spacing` come to then.
     pub keep: Option<Keep>,
     /// Cells of so many positions or fewer are not divided (the paper's β).
