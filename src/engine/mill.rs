@@ -1,7 +1,6 @@
 //! The mill: decode into the tile store, then pass after pass over the tiles, in canonical order into
 //! the sinks.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,16 +17,17 @@ use super::forecast::{forecast, samples_capacity};
 use super::grind::{Field, Milled, PassOutputs, grind};
 use super::job::Job;
 use super::pass::{Call, Op, Pass};
-use super::shares::{BATCH, Demands, Shares};
+use super::placed::{BATCH, Placed};
+use super::shares::{Demands, Shares};
 use super::survey::survey;
 use super::tagger::NOT_FINITE;
-use crate::budget::Lease;
+use crate::budget::{Bytes, Holders, Lease};
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::host::lock;
-use crate::point::{Bounds, PointBatch, Position};
+use crate::point::{Bounds, PointBatch};
 use crate::report::{Baseline, BaselineFigures, Decision, Grouped, PassFigures, Short, Tally};
 use crate::stage::{Gathered, ScanFacts, Sink, SinkSummary};
-use crate::store::{Intake, SealedTiles, SpillArea, Tag, TileStore, seal};
+use crate::store::{Intake, SealedTiles, SpillArea, TileStore, seal};
 use crate::tile::Sieve;
 use crate::{Error, Result};
 
@@ -43,7 +43,9 @@ pub(crate) fn mill(
     clock: &mut Clock<'_>,
 ) -> Result<Finished> {
     clock.phase("decode", Some(job.source.points()));
+    let working = job.budget.lease_all(&demands.decode(shares.run_records as u64), "decoding")?;
     let (store, starts, mut tally) = decode(job, lattice, shares, area)?;
+    drop(working);
     job.check_headers()?;
     job.tell_left_out(&tally);
     tally.work("runs", store.runs() as u64);
@@ -64,10 +66,10 @@ pub(crate) fn mill(
         sinks,
     };
     let cuts = cut_all(job, lattice, shares, demands, &tiles)?;
-    let milling = |cut: &Arc<Cut>| demands.mill_bytes(cut.millers, cut.capacity as u64);
-    let looking = demands.mill_bytes(job.threads, samples_capacity(shares) as u64);
-    let most = cuts.iter().map(milling).max().unwrap_or(0).max(looking);
-    let mut working = job.budget.lease(most, "mill")?;
+    let milling = |cut: &Arc<Cut>| demands.mill(cut.millers, cut.capacity as u64);
+    let looking = demands.mill(job.threads, samples_capacity(shares) as u64);
+    let most = cuts.iter().map(milling).fold(looking, Holders::larger);
+    let mut working = job.budget.lease_all(&most, "mill")?;
     for (pass, cut) in std::mem::take(&mut job.passes).iter().zip(&cuts) {
         let place = (pass, cut, &mut working);
         course.run(job, place, &field, (shares, demands), &mut tally, clock)?;
@@ -125,7 +127,7 @@ impl Course {
     fn run(
         &mut self,
         job: &mut Job<'_>,
-        (pass, cut, working): (&Pass, &Arc<Cut>, &mut Lease),
+        (pass, cut, working): (&Pass, &Arc<Cut>, &mut Vec<Lease>),
         field: &Field<'_>,
         (shares, demands): (&Shares, &Demands),
         tally: &mut Tally,
@@ -153,9 +155,13 @@ impl Course {
         if !chosen.is_empty() {
             job.watch.chose(&chosen);
         }
-        let held = working.bytes();
+        let held = working.iter().map(Lease::bytes).sum();
         let cut = cut_again(job, pass, field.lattice, (shares, demands), tiles, (cut, held))?;
-        working.resize(held.max(demands.mill_bytes(cut.millers, cut.capacity as u64)))?;
+        let milling = demands.mill(cut.millers, cut.capacity as u64);
+        if milling.sum() > Bytes(held) {
+            working.clear();
+            *working = job.budget.lease_all(&milling, "mill")?;
+        }
         clock.phase(
             if pass.gathers().is_some() { "gather" } else { "mill" },
             Some(tiles.positions()),
@@ -292,7 +298,6 @@ fn decode(
     shares: &Shares,
     area: &Arc<SpillArea>,
 ) -> Result<(TileStore, Starts, Tally)> {
-    let _working = job.budget.lease(shares.work, "decoding")?;
     let tagged = job.tagger.tags();
     let mut store = TileStore::new(area, &job.budget, job.source.schema().stride, tagged);
     let ranked = job.in_input_order.contains(&true);
@@ -328,19 +333,6 @@ fn decode(
     let tally = std::mem::take(&mut *lock(&total));
     let starts = Starts::of(&lock(&parts));
     Ok((store, starts, tally))
-}
-
-/// What of a batch goes to the intake; keeps its memory.
-#[derive(Default)]
-struct Placed {
-    positions: Vec<Position>,
-    tags: Vec<Tag>,
-    /// Place in the input of the batch's first record.
-    first: u64,
-    /// Indices of records that do not go there.
-    left_out: Vec<usize>,
-    /// How many of them the scan itself says are of no use, by reason.
-    useless: BTreeMap<&'static str, u64>,
 }
 
 /// Places a batch's records on the lattice and hands them to the intake.

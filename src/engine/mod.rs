@@ -18,6 +18,7 @@ pub(crate) mod job;
 mod mill;
 mod outlet;
 pub(crate) mod pass;
+mod placed;
 mod product;
 pub(crate) mod publish;
 mod room;

@@ -114,9 +114,8 @@ impl Graph {
         let removes = !(sorted.transforms.is_empty() && sorted.ops.is_empty());
         let ordered = if mills { in_input_order(&sinks, &*source)? } else { 0 };
         let demands = Demands {
-            lists: folders
-                .saturating_mul(lists_bytes(ranks.len()))
-                .saturating_add(ordered.saturating_mul(by_rank::lists_bytes(source.points()))),
+            lists: lists_bytes(ranks.len()) * folders
+                + by_rank::lists_bytes(source.points()) * ordered,
             ranked: ordered > 0,
             mills,
             passes: needs,
