@@ -103,6 +103,7 @@ impl Console {
                     let (stage, name, value) = (&decision.stage, &decision.name, &decision.value);
                     print::message(format_args!("decided  {stage}: {name} = {value}"));
                 }
+                print::message(format_args!("at peak  {}", done.report.run.memory_holders));
             }
             _ => {}
         }

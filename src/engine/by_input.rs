@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::product::Entry;
+use crate::budget::Bytes;
 use crate::stage::Input;
 use crate::store::{Spill, SpillArea, State, Stretch, Tag};
 use crate::{Error, Result};
@@ -28,9 +29,8 @@ pub fn ranks(inputs: &[Input]) -> Vec<u32> {
 }
 
 /// Bytes that sorting by so many inputs holds.
-pub fn lists_bytes(inputs: usize) -> u64 {
-    let each = (list_bytes(inputs) + size_of::<List>()) as u64;
-    (inputs as u64).saturating_mul(each)
+pub fn lists_bytes(inputs: usize) -> Bytes {
+    Bytes::of(inputs as u64, list_bytes(inputs) + size_of::<List>())
 }
 
 fn list_bytes(inputs: usize) -> usize {

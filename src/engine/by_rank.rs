@@ -10,6 +10,7 @@ use super::encoding::ChunkEncoders;
 use super::job::{Job, StopOnDrop};
 use super::outlet::{Hands, Outlet};
 use super::product::Entry;
+use crate::budget::Bytes;
 use crate::host::{lock, parallel};
 use crate::report::Tally;
 use crate::stage::{Sink, SinkSummary};
@@ -49,16 +50,15 @@ fn list_bytes(stretches: usize) -> usize {
 }
 
 /// Bytes that the lists of an input of so many records hold in memory.
-pub(crate) fn lists_bytes(records: u64) -> u64 {
+pub(crate) fn lists_bytes(records: u64) -> Bytes {
     let stretches = records.div_ceil(stretch_records(records));
-    let each = list_bytes(usize::try_from(stretches).unwrap_or(usize::MAX)) + size_of::<List>();
-    stretches.saturating_mul(each as u64)
+    Bytes::of(stretches, list_bytes(stretches as usize) + size_of::<List>())
 }
 
 /// Bytes that a thread holds while it orders stretches: one at work, and what waits for its turn.
-pub(crate) fn ordering_bytes(records: u64) -> u64 {
+pub(crate) fn ordering_bytes(records: u64) -> Bytes {
     let most = records.min(stretch_records(records));
-    most.saturating_mul((3 * size_of::<Ranked>() + ENTRY + NORMAL) as u64)
+    Bytes::of(most, 3 * size_of::<Ranked>() + ENTRY + NORMAL)
 }
 
 /// How many records of the input come before each part's: what a place is counted from.

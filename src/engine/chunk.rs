@@ -15,6 +15,9 @@ pub(crate) struct Chunk {
 }
 
 impl Chunk {
+    /// Bytes of a record at most: where none follows another, each is an entry of its own.
+    pub const BYTES_PER_RECORD: usize = size_of::<(u64, u32, State)>() + size_of::<[f32; 3]>();
+
     fn empty(sink: usize, wants_normals: bool) -> Self {
         Chunk { sink, records: Vec::new(), normals: wants_normals.then(Vec::new) }
     }

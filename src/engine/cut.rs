@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::job::Job;
 use super::pass::{Pass, StageOp};
 use super::shares::{Demands, MILL_SPARE, Shares};
-use crate::budget::{Lease, whole_mebibytes};
+use crate::budget::{Bytes, Lease, whole_mebibytes};
 use crate::geom::lattice::Lattice;
 use crate::store::{CutError, SealedTiles, TileKey};
 use crate::{Error, Result};
@@ -112,8 +112,8 @@ fn cut(
     held: u64,
 ) -> Result<Cut> {
     let wanted = job.tile_points.map_or(zone_of(shares.tile_positions), |points| points as u64);
-    let later = demands.gathered(shares).saturating_add(MILL_SPARE);
-    let free = job.budget.free().saturating_add(held).saturating_sub(later);
+    let later = demands.gathered(shares) + MILL_SPARE;
+    let free = (job.budget.free() + held).saturating_sub(later.0);
     let largest = demands.tile_positions(job.threads, free).max(shares.tile_positions);
     let (good, lowest) = (cells.level(CELLS_ACROSS), cells.level(1));
     let mut tries =
@@ -126,8 +126,8 @@ fn cut(
         let most = if all { tiles.positions() } else { zone_of(capacity) };
         let (key, positions) = match tiles.cut(wanted, most, cells.reach, (good, smallest)) {
             Ok(keys) => {
-                let bytes = keys.len().saturating_mul(size_of::<TileKey>()) as u64;
-                let _listed = job.budget.lease(bytes, "list of tiles")?;
+                let bytes = Bytes::of(keys.len() as u64, size_of::<TileKey>());
+                let _listed = job.budget.lease(bytes.0, "list of tiles")?;
                 return Ok(Cut { cells, keys, capacity, millers, _listed });
             }
             Err(CutError::Read(error)) => return Err(error),

@@ -6,6 +6,7 @@ use super::by_time::ByTime;
 use super::chunk::Chunk;
 use super::job::Job;
 use super::pass::Filter;
+use crate::budget::Bytes;
 use crate::point::{Edit, PointBatch};
 use crate::report::{KEY_POINTS, Tally};
 use crate::stage::{Encode, Encoded, Sink};
@@ -83,6 +84,13 @@ pub(crate) struct ChunkEncoder {
 }
 
 impl ChunkEncoder {
+    /// Bytes that it holds for chunks of `points` records of `stride` bytes: the records with their
+    /// numbers and normals, and what fetching them takes.
+    pub fn bytes(points: u64, stride: usize) -> Bytes {
+        let more = size_of::<u64>() + size_of::<[f32; 3]>();
+        Bytes::of(points, stride) + Bytes::of(points, more) + Fetch::bytes(points, stride)
+    }
+
     /// For chunks of up to `chunk_points` records.
     pub fn new(job: &Job<'_>, chunk_points: usize) -> Self {
         ChunkEncoder {

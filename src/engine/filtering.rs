@@ -12,6 +12,7 @@ use super::encoding::edit;
 use super::job::Job;
 use super::pass::Filter;
 use super::product::Product;
+use crate::budget::Bytes;
 use crate::point::PointBatch;
 use crate::report::Tally;
 use crate::store::{Fetch, SealedTiles, State};
@@ -46,9 +47,10 @@ impl<'a> Filtering<'a> {
     }
 
     /// Bytes that it holds for records of `stride` bytes.
-    pub fn bytes(stride: usize) -> u64 {
-        let each = (stride as u64).saturating_add(8 + 1 + 4);
-        (AT_ONCE as u64).saturating_mul(each).saturating_add(Fetch::bytes(AT_ONCE as u64, stride))
+    pub fn bytes(stride: usize) -> Bytes {
+        let numbers = size_of::<u64>() + size_of::<State>() + size_of::<u32>();
+        let records = Bytes::of(AT_ONCE as u64, stride) + Bytes::of(AT_ONCE as u64, numbers);
+        records + Fetch::bytes(AT_ONCE as u64, stride)
     }
 
     /// Enters into `product` which of its records the filters remove.

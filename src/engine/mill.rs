@@ -1,7 +1,7 @@
 //! The mill: decode into the tile store, then pass after pass over the tiles, in canonical order into
 //! the sinks.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,16 +18,17 @@ use super::forecast::{forecast, samples_capacity};
 use super::grind::{Field, Milled, PassOutputs, grind};
 use super::job::Job;
 use super::pass::{Branch, Call, Op, Pass};
-use super::shares::{BATCH, Demands, Shares};
+use super::placed::{BATCH, Placed};
+use super::shares::{Demands, Shares};
 use super::survey::survey;
 use super::tagger::NOT_FINITE;
-use crate::budget::Lease;
+use crate::budget::{Bytes, Holders, Lease};
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::host::lock;
-use crate::point::{Bounds, PointBatch, Position};
+use crate::point::{Bounds, PointBatch};
 use crate::report::{Baseline, BaselineFigures, Decision, Grouped, PassFigures, Short, Tally};
 use crate::stage::{Gathered, ScanFacts, Sink, SinkSummary};
-use crate::store::{Intake, SealedTiles, SpillArea, Tag, TileStore, seal};
+use crate::store::{Intake, SealedTiles, SpillArea, TileStore, seal};
 use crate::tile::Sieve;
 use crate::{Error, Result};
 
@@ -43,7 +44,9 @@ pub(crate) fn mill(
     clock: &mut Clock<'_>,
 ) -> Result<Finished> {
     clock.phase("decode", Some(job.source.points()));
+    let working = job.budget.lease_all(&demands.decode(shares.run_records as u64), "decoding")?;
     let (store, starts, mut tally) = decode(job, lattice, shares, area)?;
+    drop(working);
     job.check_headers()?;
     job.tell_left_out(&tally);
     tally.work("runs", store.runs() as u64);
@@ -126,9 +129,9 @@ impl Course {
     ) -> Result<Vec<FinishedBranch>> {
         let passes = std::mem::take(&mut job.passes);
         let cuts = cut_all(job, &passes, field.lattice, shares, demands, &field.tiles)?;
-        let milling = |cut: &Arc<Cut>| demands.mill_bytes(cut.millers, cut.capacity as u64);
-        let looking = demands.mill_bytes(job.threads, samples_capacity(shares) as u64);
-        let most = cuts.iter().map(milling).max().unwrap_or(0).max(looking);
+        let milling = |cut: &Arc<Cut>| demands.mill(cut.millers, cut.capacity as u64);
+        let looking = demands.mill(job.threads, samples_capacity(shares) as u64);
+        let most = cuts.iter().map(milling).fold(looking, Holders::larger);
         self.tally.merge(&decoded.tally);
         // What the decode left comes first, then what each pass leaves.
         let mut left: Vec<Option<Standing>> = vec![Some(decoded)];
@@ -141,7 +144,7 @@ impl Course {
             let before = before.ok_or_else(|| Error::internal("a pass goes on from nothing"))?;
             let mut held = match working.take() {
                 Some(held) => held,
-                None => job.budget.lease(most, "mill")?,
+                None => job.budget.lease_all(&most, "mill")?,
             };
             let place = (pass, &cut, &mut held);
             let after = self.run(job, place, before, field, (shares, demands), clock)?;
@@ -191,7 +194,7 @@ impl Course {
     fn run(
         &mut self,
         job: &mut Job<'_>,
-        (pass, cut, working): (&Pass, &Arc<Cut>, &mut Lease),
+        (pass, cut, working): (&Pass, &Arc<Cut>, &mut Vec<Lease>),
         before: Standing,
         field: &Field<'_>,
         (shares, demands): (&Shares, &Demands),
@@ -200,9 +203,13 @@ impl Course {
         let tiles = &field.tiles;
         let sieve = pass.sieve(&before.sieve);
         self.foresee(job, pass, field, &sieve, shares)?;
-        let held = working.bytes();
+        let held = working.iter().map(Lease::bytes).sum();
         let cut = cut_again(job, pass, field.lattice, (shares, demands), tiles, (cut, held))?;
-        working.resize(held.max(demands.mill_bytes(cut.millers, cut.capacity as u64)))?;
+        let milling = demands.mill(cut.millers, cut.capacity as u64);
+        if milling.sum() > Bytes(held) {
+            working.clear();
+            *working = job.budget.lease_all(&milling, "mill")?;
+        }
         let phase = if pass.gathers().is_some() { "gather" } else { "mill" };
         clock.phase(phase, Some(tiles.positions()));
         let mut tally = Tally::default();
@@ -366,7 +373,6 @@ fn decode(
     shares: &Shares,
     area: &Arc<SpillArea>,
 ) -> Result<(TileStore, Starts, Tally)> {
-    let _working = job.budget.lease(shares.work, "decoding")?;
     let tagged = job.tagger.tags();
     let mut store = TileStore::new(area, &job.budget, job.source.schema().stride, tagged);
     let ranked = job.in_input_order.contains(&true);
@@ -402,19 +408,6 @@ fn decode(
     let tally = std::mem::take(&mut *lock(&total));
     let starts = Starts::of(&lock(&parts));
     Ok((store, starts, tally))
-}
-
-/// What of a batch goes to the intake; keeps its memory.
-#[derive(Default)]
-struct Placed {
-    positions: Vec<Position>,
-    tags: Vec<Tag>,
-    /// Place in the input of the batch's first record.
-    first: u64,
-    /// Indices of records that do not go there.
-    left_out: Vec<usize>,
-    /// How many of them the scan itself says are of no use, by reason.
-    useless: BTreeMap<&'static str, u64>,
 }
 
 /// Places a batch's records on the lattice and hands them to the intake.

@@ -19,6 +19,7 @@ pub(crate) mod job;
 mod mill;
 mod outlet;
 pub(crate) mod pass;
+mod placed;
 mod product;
 pub(crate) mod publish;
 mod room;

@@ -15,6 +15,10 @@ use crate::host::lock;
 use crate::stage::{Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
+/// What each thread has in an outlet at most of every sort: of products, of chunks to encode and of
+/// encoded chunks, one that it is at and one that waits for its turn.
+pub const A_THREAD: u64 = 2;
+
 /// A product's place in the order: its tile or part, and which product of it.
 pub type Place = (u64, u64);
 
@@ -64,8 +68,8 @@ impl<R, P> Outlet<R, P> {
                 stopped: false,
             }),
             changed: Condvar::new(),
-            window: threads,
-            ahead: 2 * threads.max(1) as u64,
+            window: threads * (A_THREAD as usize - 1),
+            ahead: A_THREAD * threads.max(1) as u64,
         }
     }
 

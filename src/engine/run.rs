@@ -147,7 +147,7 @@ impl Task {
         let sinks = self.create_sinks(outputs)?;
         let shares = self.demands.divide()?;
         let budget = Budget::new(self.demands.limit);
-        let _base = budget.lease(shares.base, "program")?;
+        let _base = budget.lease_all(&self.demands.base(), "program")?;
         let spill = match (&self.settings.scratch, outputs.iter().flatten().next()) {
             (None, Some(first)) => first.scratch().clone(),
             (Some(folder), _) => Arc::new(Scratch::below(folder, trouble)),
@@ -171,7 +171,8 @@ impl Task {
             lattice => {
                 clock.phase("convert", Some(self.source.points()));
                 let sinks = sinks.into_iter().flatten().collect();
-                stream(&job, &shares, sinks, lattice.as_ref())?
+                let _working = budget.lease_all(&self.demands.stream(), "streaming")?;
+                stream(&job, sinks, lattice.as_ref())?
             }
         };
         let earlier = std::mem::take(&mut *lock(&job.warnings));
@@ -303,6 +304,7 @@ impl Task {
             threads: self.threads,
             memory_bytes: self.demands.limit,
             leased_bytes: budget.peak(),
+            memory_holders: budget.at_peak(),
             spill_bytes,
             warnings,
             ..RunFigures::default()

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::finished::{Finished, FinishedBranch};
 use super::job::{Job, StopOnDrop};
 use super::outlet::{Hands, Outlet};
-use super::shares::{BATCH, Shares};
+use super::placed::BATCH;
 use super::tagger::NOT_FINITE;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::host::{lock, parallel};
@@ -19,11 +19,9 @@ use crate::{Error, Result};
 /// are removed.
 pub(crate) fn stream(
     job: &Job<'_>,
-    shares: &Shares,
     sinks: Vec<Box<dyn Sink>>,
     lattice: Option<&Lattice>,
 ) -> Result<Finished> {
-    let _working = job.budget.lease(shares.work, "streaming")?;
     let schema = job.source.schema();
     let encoders: Vec<_> = sinks.iter().map(|sink| sink.encoder()).collect();
     let empty = sinks.iter().map(|sink| PointBatch::new(schema.clone(), sink.chunk_points()));

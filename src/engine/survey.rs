@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::job::Job;
+use crate::budget::Bytes;
 use crate::geom::lattice::Lattice;
 use crate::host::lock;
 use crate::point::Position;
@@ -142,8 +143,8 @@ pub(crate) struct Measured {
 }
 
 /// Bytes that a thread of a survey holds.
-pub(crate) fn survey_bytes() -> u64 {
-    2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64) + Stretches::BYTES
+pub(crate) fn survey_bytes() -> Bytes {
+    Bytes(2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64) + Stretches::BYTES)
 }
 
 /// Measures, on all threads, the reduction of `tiles` whose positions have the stored fates and whose
@@ -164,8 +165,7 @@ pub(crate) fn survey(
         level,
     };
     let ranges = tiles.blocks().div_ceil(BLOCKS);
-    let all_threads = survey_bytes().saturating_mul(job.threads as u64);
-    let _working = job.budget.lease(all_threads, "survey")?;
+    let _working = job.budget.lease((survey_bytes() * job.threads as u64).0, "survey")?;
     let spill = Spill::new(area, "report");
     let all = Mutex::new((ScanSurvey::new(&tiles.bounds()), BTreeMap::new()));
     each_range(job, ranges, |range| {

@@ -70,7 +70,7 @@ impl Graph {
         let demands = demands(&sorted, &passes.passes, &*source, &order, &settings)?;
         let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
         let demands = Demands {
-            lists: demands.lists.saturating_add(folders.saturating_mul(lists_bytes(ranks.len()))),
+            lists: demands.lists + lists_bytes(ranks.len()) * folders,
             tagged: tagger.tags(),
             ..demands
         };
@@ -164,7 +164,7 @@ fn demands(
     let ranked =
         order.in_input_order.iter().filter(|ranked| **ranked && order.mills).count() as u64;
     Ok(Demands {
-        lists: ranked.saturating_mul(by_rank::lists_bytes(source.points())),
+        lists: by_rank::lists_bytes(source.points()) * ranked,
         ranked: ranked > 0,
         mills: order.mills,
         filters: !sorted.filters.is_empty(),

@@ -26,6 +26,9 @@ pub struct Block {
 }
 
 impl Block {
+    /// Bytes that a position takes at most where it is packed, the number of its copies included.
+    pub const BYTES_PER_POSITION: usize = size_of::<Position>() + size_of::<u32>();
+
     /// How many positions it has: at least one.
     #[expect(clippy::len_without_is_empty, reason = "no block is empty")]
     pub fn len(&self) -> usize {

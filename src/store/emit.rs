@@ -2,9 +2,9 @@
 
 use super::Levels;
 use super::block::{BLOCK, Block};
-use super::fetch::ref_bytes;
 use super::key::split_level;
 use super::pieces::{PIECE, Pieces};
+use super::record::ref_bytes;
 use super::spill::Spill;
 use crate::point::Position;
 use crate::{Error, Result};
@@ -42,7 +42,8 @@ pub(crate) struct Emitter<'a> {
 
 impl<'a> Emitter<'a> {
     /// Bytes that an emitter holds.
-    pub const BYTES: usize = BLOCKS_AT_ONCE * BLOCK * 28 + PIECE * 12 + 2 * BLOCK * 28;
+    pub const BYTES: usize =
+        (BLOCKS_AT_ONCE + 2) * BLOCK * Block::BYTES_PER_POSITION + PIECE * ref_bytes(true);
 
     /// An emitter of at most `most_records` records.
     pub fn new(out: &'a Output, most_records: u64) -> Result<Self> {
@@ -57,7 +58,7 @@ impl<'a> Emitter<'a> {
             },
             positions: Vec::with_capacity(BLOCK),
             copies: Vec::with_capacity(BLOCK),
-            packed: Vec::with_capacity(BLOCKS_AT_ONCE * BLOCK * 28),
+            packed: Vec::with_capacity(BLOCKS_AT_ONCE * BLOCK * Block::BYTES_PER_POSITION),
             unplaced: Vec::with_capacity(BLOCKS_AT_ONCE),
             refs: Vec::with_capacity(PIECE * ref_bytes(out.tagged)),
             first_ref,

@@ -11,12 +11,10 @@ use super::pieces::{PIECE, Pieces};
 use super::record::Tag;
 use super::spill::{Spill, SpillArea};
 use crate::Result;
-use crate::budget::{Budget, Lease};
+use crate::budget::{Budget, Bytes, Lease};
 use crate::host::threads::lock;
 use crate::point::Position;
 
-/// Bytes of index that a run keeps in memory for each of its blocks.
-const INDEX_BYTES: u64 = size_of::<Block>() as u64;
 /// Packed positions and records are handed to the spill in stretches of about this size.
 const STRETCH: usize = 1 << 20;
 
@@ -39,7 +37,7 @@ pub struct TileStore {
     /// The place in the input of each record, by the same numbers, if an output asks for it.
     pub(crate) places: Option<Pieces>,
     pub(crate) runs: Mutex<Vec<Run>>,
-    index: Mutex<Vec<Lease>>,
+    index: Mutex<Lease>,
 }
 
 impl TileStore {
@@ -54,7 +52,7 @@ impl TileStore {
             records: Pieces::new(area, "records", stride),
             places: None,
             runs: Mutex::default(),
-            index: Mutex::default(),
+            index: Mutex::new(budget.open("index of the sorted runs")),
         }
     }
 
@@ -71,8 +69,7 @@ impl TileStore {
     }
 
     fn add(&self, run: Run) -> Result<()> {
-        let bytes = run.blocks.len() as u64 * INDEX_BYTES;
-        lock(&self.index).push(self.budget.lease(bytes, "index of the sorted runs")?);
+        lock(&self.index).grow(Bytes::of(run.blocks.len() as u64, size_of::<Block>()).0)?;
         lock(&self.runs).push(run);
         Ok(())
     }
@@ -94,15 +91,15 @@ pub struct Intake<'a> {
 
 impl<'a> Intake<'a> {
     /// Bytes that an intake holds for each record of `stride` bytes.
-    pub fn bytes_per_record(stride: usize, tagged: bool, placed: bool) -> u64 {
+    pub fn bytes_per_record(stride: usize, tagged: bool, placed: bool) -> Bytes {
         let tag = if tagged { size_of::<Tag>() } else { 0 };
-        let more = tag + if placed { size_of::<u64>() } else { 0 };
-        (stride as u64).saturating_add((size_of::<Position>() + Order::BYTES + more) as u64)
+        let place = if placed { size_of::<u64>() } else { 0 };
+        Bytes::from(stride) + Bytes::from(size_of::<Position>() + Order::BYTES + tag + place)
     }
 
     /// Bytes that an intake holds whatever its capacity.
-    pub fn fixed_bytes(stride: usize) -> u64 {
-        (2 * PIECE as u64).saturating_mul(stride as u64).saturating_add(2 * STRETCH as u64)
+    pub fn fixed_bytes(stride: usize) -> Bytes {
+        Bytes::of(2 * PIECE as u64, stride) + Bytes::of(2, STRETCH)
     }
 
     /// An intake for runs of up to `capacity` records.
@@ -116,7 +113,7 @@ impl<'a> Intake<'a> {
             places: Vec::with_capacity(if store.places.is_some() { capacity } else { 0 }),
             next_place: 0,
             order: Order::with_capacity(capacity),
-            packed: Vec::with_capacity(STRETCH + 2 * BLOCK * 28),
+            packed: Vec::with_capacity(STRETCH + 2 * BLOCK * Block::BYTES_PER_POSITION),
         }
     }
 

@@ -11,14 +11,15 @@ use std::sync::atomic::{AtomicUsize, Ordering as Atomic};
 
 use super::block::{BLOCK, Block};
 use super::emit::{Emitter, Merged, Output};
-use super::fetch::ref_bytes;
 use super::intake::{Run, TileStore};
 use super::key::{first_of_prefix, morton_cmp, morton_prefix, split_level};
 use super::pieces::Pieces;
+use super::record::ref_bytes;
 use super::sealed::{SealedTiles, Sequence};
 use super::spill::Spill;
 use super::tournament::Tournament;
 use crate::Result;
+use crate::budget::Bytes;
 use crate::host::parallel;
 use crate::host::threads::lock;
 use crate::point::{Bounds, Position};
@@ -29,10 +30,8 @@ const RANGE_BLOCKS: usize = 256;
 /// run are read for a part of them.
 const RANGE_BLOCKS_EACH: usize = 4;
 /// Bytes that a thread holds while it merges `runs` runs of records of `stride` bytes.
-pub fn merge_bytes(runs: u64, stride: usize) -> u64 {
-    let fixed = BLOCK * (size_of::<Position>() + 4) + 256;
-    let cursor = (fixed as u64).saturating_add(stride as u64);
-    runs.saturating_mul(cursor).saturating_add(Emitter::BYTES as u64)
+pub fn merge_bytes(runs: u64, stride: usize) -> Bytes {
+    Cursor::bytes(stride) * runs + Bytes::from(Emitter::BYTES)
 }
 
 /// Merges the runs of `store` on `threads` threads; `advance` is told of records merged and says
@@ -43,14 +42,13 @@ pub fn seal(
     advance: &(dyn Fn(u64) -> Result<()> + Sync),
 ) -> Result<SealedTiles> {
     let runs = std::mem::take(&mut *lock(&store.runs));
-    let each = merge_bytes(runs.len() as u64, store.stride);
-    let _working =
-        store.budget.lease(each.saturating_mul(threads as u64), "merging of sorted runs")?;
+    let working = merge_bytes(runs.len() as u64, store.stride) * threads as u64;
+    let _working = store.budget.lease(working.0, "merging of sorted runs")?;
     let ranges = ranges(&runs);
     // The merge leaves no more blocks than the runs have, but for one that is not full in each range.
     let blocks = runs.iter().map(|run| run.blocks.len()).sum::<usize>() + ranges.len();
-    let each = size_of::<Block>() as u64 + 8;
-    let mut lease = store.budget.lease(blocks as u64 * each, "index of the tiles")?;
+    let index = |blocks: usize| Bytes::of(blocks as u64, SealedTiles::BYTES_PER_BLOCK);
+    let mut lease = store.budget.lease(index(blocks).0, "index of the scan")?;
     let out = Output {
         positions: Spill::new(&store.area, "positions"),
         refs: Pieces::new(&store.area, "order", ref_bytes(store.tagged)),
@@ -76,7 +74,7 @@ pub fn seal(
     drop(runs);
     let ranges = merged.into_iter().filter_map(|slot| slot.into_inner().ok().flatten());
     let sequence = join(ranges, blocks);
-    lease.resize(sequence.blocks.len() as u64 * each)?;
+    lease.shrink_to(index(sequence.blocks.len()).0);
     let refs = (out.refs, out.tagged);
     Ok(SealedTiles::new(sequence, out.positions, refs, (store.records, store.places), lease))
 }
@@ -265,6 +263,11 @@ struct Cursor<'a> {
 }
 
 impl<'a> Cursor<'a> {
+    /// Bytes that it holds: a block, the record at its head, and itself.
+    fn bytes(stride: usize) -> Bytes {
+        Bytes::from(BLOCK * Block::BYTES_PER_POSITION + 256) + Bytes::from(stride)
+    }
+
     fn new(store: &'a TileStore, run: &'a Run, range: &'a Range) -> Self {
         let (positions, tags, spare) = (Vec::new(), Vec::new(), Vec::new());
         Cursor { store, run, range, block: 0, at: 0, positions, tags, spare }

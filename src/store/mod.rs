@@ -28,7 +28,7 @@ pub use merge::{merge_bytes, seal};
 pub use pieces::{PIECE, Pieces};
 pub use record::{
     ASIDE, CLASSED_INPUTS, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, SELECTIONS, State,
-    TAGGED_INPUTS, Tag,
+    TAGGED_INPUTS, Tag, ref_bytes,
 };
-pub use sealed::{Reader, SealedTiles, index_bytes};
+pub use sealed::{Reader, SealedTiles};
 pub use spill::{Address, Checksum, Folder, Spill, SpillArea, Stretch};

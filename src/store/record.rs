@@ -95,6 +95,12 @@ impl State {
     }
 }
 
+/// Bytes of a record's entry in the canonical order: its number in the store and, if records have
+/// them, its tag.
+pub const fn ref_bytes(tagged: bool) -> usize {
+    size_of::<u64>() + if tagged { size_of::<Tag>() } else { 0 }
+}
+
 /// Bytes of a stored fate; see the survey.
 pub const FATE_BYTES: usize = size_of::<f32>();
 /// Bytes of a stored normal.

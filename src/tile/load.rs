@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::sieve::{MoreRuns, Run, Runs, Sieve};
 use super::{Fate, Tile};
 use crate::Result;
-use crate::point::Bounds;
+use crate::point::{Bounds, Position};
 use crate::store::Pieces;
 use crate::store::TileKey;
 use crate::store::{FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES};
@@ -86,7 +86,11 @@ impl Core {
 
 impl Loader {
     /// Bytes that a loader holds for each position of its capacity, columns included.
-    pub const BYTES_PER_POINT: usize = 24 + 4 + 12 + size_of::<Fate>() + 8;
+    pub const BYTES_PER_POINT: usize = size_of::<Position>()
+        + size_of::<u32>() // copies
+        + size_of::<[f32; 3]>() // normal
+        + size_of::<Fate>()
+        + size_of::<u64>(); // first record
     /// Bytes more where a sieve may hold records back, or columns are stored.
     pub const SIEVE_BYTES_PER_POINT: usize = size_of::<Run>() + FATE_BYTES + FIGURE_BYTES + 2;
 

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::Result;
-use crate::budget::Lease;
+use crate::budget::{Bytes, Lease};
 use crate::store::{ASIDE, Pieces, SealedTiles, State, Tag};
 
 /// What a pass sees of the scan, and what earlier passes stored.
@@ -74,7 +74,7 @@ pub(super) struct MoreRuns(Option<Lease>);
 
 impl MoreRuns {
     /// A run, and what the mill makes of it.
-    const BYTES: u64 = 3 * size_of::<Run>() as u64;
+    const BYTES: usize = 3 * size_of::<Run>();
 
     /// Holds memory for `runs` in all, of which `planned` are reckoned with. Fails as
     /// [`Budget::lease`](crate::budget::Budget::lease) does for `most`, as many as there may be.
@@ -85,7 +85,7 @@ impl MoreRuns {
         planned: usize,
         most: u64,
     ) -> Result<()> {
-        let more = (runs.saturating_sub(planned) as u64).saturating_mul(Self::BYTES);
+        let more = Bytes::of(runs.saturating_sub(planned) as u64, Self::BYTES).0;
         if self.0.as_ref().map_or(0, Lease::bytes) >= more {
             return Ok(());
         }
@@ -93,7 +93,7 @@ impl MoreRuns {
         // What is held goes back first, so that a refusal counts it once.
         self.0 = None;
         self.0 = match tiles.budget().try_lease(more, what) {
-            None => Some(tiles.budget().lease(most.saturating_mul(Self::BYTES).max(more), what)?),
+            None => Some(tiles.budget().lease(Bytes::of(most, Self::BYTES).0.max(more), what)?),
             lease => lease,
         };
         Ok(())

@@ -151,6 +151,28 @@ fn verbose_says_what_was_decided_and_how_long_it_took() {
 }
 
 #[test]
+fn verbose_and_the_report_say_what_the_memory_was_for() {
+    let at = scans(&["a.laz"]);
+    for command in ["reduce a.laz -o o.laz -v", "convert a.laz -o o.las -v"] {
+        let arguments: Vec<&str> = command.split(' ').chain(["--report", "r.json"]).collect();
+        let (code, _, stderr) = pointmill(at.path(), &arguments);
+        assert_eq!(code, 0, "{stderr}");
+        let line = stderr.lines().find_map(|line| line.strip_prefix("at peak  ")).unwrap();
+        let report = std::fs::read(at.path().join("r.json")).unwrap();
+        let run = &serde_json::from_slice::<Value>(&report).unwrap()["run"];
+        let holders = run["memory_holders"].as_array().unwrap();
+        let bytes: Vec<u64> = holders.iter().map(|h| h["bytes"].as_u64().unwrap()).collect();
+        assert!((3..=8).contains(&bytes.len()) && bytes.is_sorted_by(|a, b| a >= b), "{run}");
+        let first = holders[0]["name"].as_str().unwrap();
+        assert!(line.split(',').next().unwrap().ends_with(&format!(" for the {first}")), "{line}");
+        assert!(holders.iter().any(|holder| holder["name"] == "program"), "{run}");
+        // Those that are not listed hold little.
+        let (sum, leased) = (bytes.iter().sum::<u64>(), run["leased_bytes"].as_u64().unwrap());
+        assert!(sum <= leased && sum > leased / 10 * 9, "{sum} of {leased}");
+    }
+}
+
+#[test]
 fn every_run_ends_with_a_summary() {
     let at = scans(&["a.laz", "b.laz"]);
     let lines = |arguments: &[&str]| -> Vec<String> {
