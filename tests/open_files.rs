@@ -2,15 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
 
-mod las_support;
-mod outdir_support;
+mod support;
 
 use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use las_support::{LAS, LAZ, write};
-use outdir_support::{assert_equal_files, write_each};
+use crate::support::folders::{assert_equal_files, write_each};
+use crate::support::las::{LAS, LAZ, write};
 use pointmill::io::las::{fresh, layout};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 

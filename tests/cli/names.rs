@@ -2,13 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says so")]
 
-use crate::scans_support;
-
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use scans_support::command::{done, pointmill, scans};
+use crate::support::command::{done, pointmill, scans};
 use serde_json::Value;
 
 fn points(at: &Path, file: &str) -> u64 {

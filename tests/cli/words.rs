@@ -3,13 +3,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says so")]
 
-use crate::scans_support;
-
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 
-use scans_support::command::{command, done, pointmill, scans};
+use crate::support::command::{command, done, pointmill, scans};
 
 /// What a command that fails with `code` prints on stderr.
 fn told(at: &Path, arguments: &[&str], code: i32) -> String {

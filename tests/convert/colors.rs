@@ -1,12 +1,11 @@
 //! Colours keep what they mean between LAS, where white is 65535, and PLY, where it is 255.
 #![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
 
-use crate::common;
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use common::{Scan, Settings, run};
+use crate::support::runs::{Settings, run};
+use crate::support::scan::Scan;
 use pointmill::io::las;
 use pointmill::point::{Scalar, Value};
 

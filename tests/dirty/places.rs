@@ -3,23 +3,21 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
 
-use crate::run_support;
-use crate::scans_support;
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::support::assert_holds;
+use crate::support::case::{Case, REDUCE, execute};
+use crate::support::command::{done, fails};
+use crate::support::records::read;
 use pointmill::ErrorKind;
 use pointmill::{Overrides, Quiet, Watch};
-use run_support::{Case, REDUCE, execute};
-use scans_support::command::{done, fails};
-use scans_support::{assert_holds, read};
 
 /// A scan of a few thousand points called `in.laz` in a folder of its own.
 fn scan() -> tempfile::TempDir {
-    scans_support::command::scans(&["in.laz"])
+    crate::support::command::scans(&["in.laz"])
 }
 
 #[test]

@@ -5,7 +5,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says so")]
 
-mod docs_support;
+mod formats;
+mod keys;
+mod source;
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -13,9 +15,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use docs_support::formats::{agree, documented};
-use docs_support::keys::{self, Default, Key};
-use docs_support::{Enum, Field, enum_of, item_docs, struct_of};
+use formats::{agree, documented};
+use keys::{Default, Key};
 use pointmill::graph::{LimitKeys, RunSettings};
 use pointmill::io::ends::{Read, Write};
 use pointmill::ops::normals::Normals;
@@ -24,6 +25,7 @@ use pointmill::stage::StageKind;
 use pointmill::synth::Synth;
 use pointmill::{Graph, Overrides, Quiet, Registry};
 use serde_json::Value;
+use source::{Enum, Field, enum_of, item_docs, struct_of};
 
 const SAYS_SO: &str = "written by `POINTMILL_WRITE_DOCS=1 cargo test --test docs`; do not edit";
 

@@ -1,8 +1,5 @@
 //! Reads the doc comments of items, fields and variants from Rust source, formatted by rustfmt.
 
-pub mod formats;
-pub mod keys;
-
 /// A public field: its name, its type as written, its documentation.
 pub struct Field {
     pub name: String,

@@ -123,7 +123,7 @@ fn shim() -> PathBuf {
     let made = SHIM.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
         let library = folder.path().join("shim.so");
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults_support/shim.c");
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults/shim.c");
         let compiler = std::env::var_os("CC").unwrap_or_else(|| "cc".into());
         Command::new(compiler)
             .args(["-O1", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-o"])

@@ -2,15 +2,12 @@
 //! that comes back changed. Each test tries a few places of many; `POINTMILL_FAULTS=all` tries all.
 //!
 //! Whatever fails, outputs are old or complete, nothing is left behind that is not named, and the
-//! same run gives the right bytes once the machine is sound (`faults_support` looks after each
+//! same run gives the right bytes once the machine is sound (`machine.rs` looks after each
 //! fault).
-#![cfg(target_os = "linux")]
 
-mod faults_support;
+mod machine;
 
-use faults_support::{
-    Bench, Does, EACCES, EINTR, EIO, EMFILE, ENOLCK, ENOSPC, Fault, When, spread,
-};
+use machine::{Bench, Does, EACCES, EINTR, EIO, EMFILE, ENOLCK, ENOSPC, Fault, When, spread};
 
 /// Every n-th call of a kind fails once, each in a run of its own.
 fn each_fails(bench: &mut Bench, call: &'static str, error: u32, most: u64) {

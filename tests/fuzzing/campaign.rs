@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::Target;
 use super::harness::Harness;
 use super::judge::shape;
-use super::random::Random;
+use crate::support::random::Random;
 
 /// Longer inputs are cut.
 const LONGEST: usize = 128 << 10;

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::Target;
 use super::judge::Judgement;
-use super::{Target, memory};
+use crate::support::allocator;
 
 /// Bytes that any input may cost, and bytes for each of its own.
 const FREE_BYTES: usize = 64 << 20;
@@ -71,7 +72,7 @@ impl Harness {
         let judge =
             || panic::catch_unwind(AssertUnwindSafe(|| (self.target.judge)(&self.input, input)));
         LISTENS.set(true);
-        let (result, peak) = memory::peak_of(judge);
+        let (result, peak) = allocator::peak_of(judge);
         LISTENS.set(false);
         let time = start.elapsed();
         let judgement = match result {

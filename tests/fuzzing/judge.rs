@@ -6,7 +6,7 @@ use pointmill::point::{Layout, PointBatch};
 use pointmill::stage::Source;
 use pointmill::{Error, ErrorKind};
 
-use super::memory;
+use crate::support::allocator;
 
 /// What came of an input that broke no promise, or the promise that it broke.
 pub type Judgement = Result<Outcome, String>;
@@ -124,7 +124,7 @@ pub fn read_twice(source: &dyn Source, allowed: &[ErrorKind]) -> Result<Option<R
     let large = (BATCH_BYTES / stride).clamp(1, MOST_RECORDS);
     let large = if large.is_power_of_two() { large } else { large.next_power_of_two() / 2 };
     let one = read(source, large, &[], allowed)?;
-    let (two, peak) = memory::peak_of(|| read(source, (large / 32).max(1), &[], allowed));
+    let (two, peak) = allocator::peak_of(|| read(source, (large / 32).max(1), &[], allowed));
     let two = two?;
     if one.error.is_some() != two.error.is_some() || (one.error.is_none() && one != two) {
         return Err(format!("read twice, it differs: {one:?} and {two:?}"));

@@ -9,8 +9,8 @@ use pointmill::stage::Source;
 
 use super::judge::{self, Judgement, Outcome, Read, magnitude, shape};
 use super::las_seeds::{header_size, seeds};
-use super::random::Random;
 use super::{Target, mutate};
+use crate::support::random::Random;
 
 /// The target.
 pub const TARGET: Target =
@@ -167,7 +167,7 @@ const WORDS: [&[u8]; 10] = [
 pub fn change(random: &mut Random, data: &mut Vec<u8>, other: &[u8]) {
     match random.below(10) {
         0..3 => {
-            let &(at, width) = random.of(&FIELDS);
+            let (at, width) = random.one_of(&FIELDS);
             if width == 0 {
                 mutate::put_float(random, data, at);
             } else {
@@ -211,19 +211,21 @@ fn field_of_a_record(random: &mut Random, data: &mut [u8]) {
     let table = word::<8>(data, start) as usize;
     let evlr = word::<8>(data, 235) as usize;
     let (at, (field, width)) = match random.below(8) {
-        0 if !vlrs.is_empty() => (random.of(&vlrs).0, *random.of(&[(2, 8), (18, 2), (20, 2)])),
+        0 if !vlrs.is_empty() => {
+            (random.one_of(&vlrs).0, random.one_of(&[(2, 8), (18, 2), (20, 2)]))
+        }
         1..4 => {
             let named = |at: usize| data.get(at + 2..).is_some_and(|d| d.starts_with(b"laszip"));
             let Some(&(at, _)) = vlrs.iter().find(|(at, _)| named(*at)) else { return };
             const FIELDS: [(usize, usize); 8] =
                 [(0, 2), (2, 2), (8, 4), (12, 4), (16, 8), (24, 8), (32, 2), (34, 2)];
             let item = (34 + 2 * random.below(12), 2);
-            (at + 54, if random.one_in(2) { item } else { *random.of(&FIELDS) })
+            (at + 54, if random.one_in(2) { item } else { random.one_of(&FIELDS) })
         }
         4 => (start, (0, 8)),
-        5 => (table, *random.of(&[(0, 4), (4, 4), (8, 4), (12, 4), (9, 1), (11, 1)])),
-        6 if word::<1>(data, 25) >= 4 => (evlr, *random.of(&[(2, 8), (18, 2), (20, 8)])),
-        _ => (start, (random.below(200), *random.of(&[1, 2, 4]))),
+        5 => (table, random.one_of(&[(0, 4), (4, 4), (8, 4), (12, 4), (9, 1), (11, 1)])),
+        6 if word::<1>(data, 25) >= 4 => (evlr, random.one_of(&[(2, 8), (18, 2), (20, 8)])),
+        _ => (start, (random.below(200), random.one_of(&[1, 2, 4]))),
     };
     mutate::put_number(random, data, at.saturating_add(field), width);
 }
@@ -237,7 +239,7 @@ fn records(random: &mut Random, data: &mut Vec<u8>, other: &[u8]) {
     let count = word::<4>(data, 100);
     let start = word::<4>(data, 96);
     if random.one_in(3) && !ours.is_empty() {
-        let &(at, len) = random.of(&ours);
+        let (at, len) = random.one_of(&ours);
         data.drain(at..(at + len).min(data.len()));
         mend(data, start.wrapping_sub(len as u64), count.wrapping_sub(1));
         return;
@@ -246,7 +248,7 @@ fn records(random: &mut Random, data: &mut Vec<u8>, other: &[u8]) {
     if list.1.is_empty() {
         return;
     }
-    let Some(record) = copied(list.0, *random.of(&list.1)) else { return };
+    let Some(record) = copied(list.0, random.one_of(&list.1)) else { return };
     let times = if random.one_in(8) { 1 + random.below(300) } else { 1 };
     mutate::insert(data, at, &record.repeat(times));
     mend(data, start + (record.len() * times) as u64, count + times as u64);

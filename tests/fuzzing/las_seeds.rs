@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use laz::{LasZipCompressor, LazVlr, LazVlrBuilder};
 
-use super::random::Random;
+use crate::support::random::Random;
 
 /// Bytes of a record of each point format.
 pub const RECORD: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];

@@ -7,10 +7,10 @@ use pointmill::ErrorKind::{self, Data};
 use pointmill::io::las::open;
 
 use super::judge::{self, Judgement, Outcome, shape};
-use super::laz_support::points::{Kind, Maker};
-use super::laz_support::{Chunks, Recipe};
-use super::random::Random;
 use super::{Target, las, mutate};
+use crate::support::laz::points::{Kind, Maker};
+use crate::support::laz::{Chunks, Recipe};
+use crate::support::random::Random;
 
 /// The target.
 pub const TARGET: Target =
@@ -79,7 +79,7 @@ fn points_of_a_length(random: &mut Random, points: &mut [u8], other: &[u8]) {
     match random.below(6) {
         0 | 1 => mutate::fill(random, points),
         2 => {
-            let width = *random.of(&[1, 2, 4, 8]);
+            let width = random.one_of(&[1, 2, 4, 8]);
             mutate::put_number(random, points, at, width);
         }
         3 => points[at] = random.number() as u8,

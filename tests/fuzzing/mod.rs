@@ -10,19 +10,15 @@ pub mod judge;
 pub mod las;
 pub mod las_seeds;
 pub mod laz;
-#[path = "../laz_support/mod.rs"]
-pub mod laz_support;
-pub mod memory;
 pub mod mutate;
 pub mod pipeline;
 pub mod ply;
-pub mod random;
 pub mod text;
 pub mod vocabulary;
 
 use std::path::Path;
 
-use random::Random;
+use crate::support::random::Random;
 
 /// Something that takes bytes from outside.
 #[derive(Clone, Copy)]

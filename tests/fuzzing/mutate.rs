@@ -1,6 +1,6 @@
 //! Changes to bytes and to lines of words, whatever they mean.
 
-use super::random::Random;
+use crate::support::random::Random;
 
 /// Numbers that overflow, wrap, divide by zero or lie just beside what does.
 pub const NUMBERS: [u64; 22] = [
@@ -55,7 +55,7 @@ pub fn number(random: &mut Random, now: u64, len: usize) -> u64 {
         1 => now.wrapping_add(random.below(16) as u64 + 1),
         2 => now.wrapping_sub(random.below(16) as u64 + 1),
         3 => (len as u64).wrapping_add(random.below(9) as u64).wrapping_sub(4),
-        _ => *random.of(&NUMBERS),
+        _ => random.one_of(&NUMBERS),
     }
 }
 
@@ -75,7 +75,7 @@ pub fn put_number(random: &mut Random, data: &mut [u8], at: usize, width: usize)
 /// Puts another float at `at`.
 pub fn put_float(random: &mut Random, data: &mut [u8], at: usize) {
     if let Some(field) = data.get_mut(at..at + 8) {
-        let float = *random.of(&FLOATS);
+        let float = random.one_of(&FLOATS);
         field.copy_from_slice(&float.to_le_bytes());
     }
 }
@@ -98,7 +98,7 @@ pub fn bytes(random: &mut Random, data: &mut Vec<u8>, other: &[u8], words: &[&[u
             }
         }
         2 | 3 => {
-            let width = *random.of(&[1, 2, 4, 8]);
+            let width = random.one_of(&[1, 2, 4, 8]);
             put_number(random, data, at, width);
         }
         4 => put_float(random, data, at),
@@ -121,9 +121,9 @@ pub fn bytes(random: &mut Random, data: &mut Vec<u8>, other: &[u8], words: &[&[u
             let times = 1 + random.below(4096 / copy.len().max(1) + 1);
             insert(data, at, &copy.repeat(times));
         }
-        11 if !words.is_empty() => insert(data, at, random.word(words)),
+        11 if !words.is_empty() => insert(data, at, random.one_of(words)),
         13 | 14 => fill(random, data),
-        12 if !words.is_empty() => overwrite(data, at, random.word(words)),
+        12 if !words.is_empty() => overwrite(data, at, random.one_of(words)),
         _ => {
             // The beginning of one and the end of the other.
             data.truncate(at);
@@ -135,7 +135,7 @@ pub fn bytes(random: &mut Random, data: &mut Vec<u8>, other: &[u8], words: &[&[u
 /// Fills a stretch with one byte, as a hole in a sparse copy or a worn disk reads.
 pub fn fill(random: &mut Random, data: &mut [u8]) {
     let any = random.number() as u8;
-    let byte = *random.of(&[0x00, 0x00, 0xff, 0xff, any]);
+    let byte = random.one_of(&[0x00, 0x00, 0xff, 0xff, any]);
     let stretch = random.stretch(data.len());
     data[stretch].fill(byte);
 }
@@ -191,7 +191,7 @@ fn word(random: &mut Random, line: &mut Vec<u8>, words: &[&[u8]]) {
     let new = match random.below(4) {
         0 => number_text(random).into_bytes(),
         _ if words.is_empty() => Vec::new(),
-        _ => random.word(words).to_vec(),
+        _ => random.one_of(words).to_vec(),
     };
     match random.below(6) {
         0 if !runs.is_empty() => drop(runs.remove(at)),
@@ -208,11 +208,11 @@ fn word(random: &mut Random, line: &mut Vec<u8>, words: &[&[u8]]) {
 
 /// A number as text, in one of the ways that numbers are written.
 pub fn number_text(random: &mut Random) -> String {
-    let whole = *random.of(&NUMBERS);
+    let whole = random.one_of(&NUMBERS);
     match random.below(6) {
         0 => format!("{}", whole as i64),
-        1 => format!("{:e}", random.of(&FLOATS)),
-        2 => format!("{}", random.of(&FLOATS)),
+        1 => format!("{:e}", random.one_of(&FLOATS)),
+        2 => format!("{}", random.one_of(&FLOATS)),
         3 => format!("{whole:#x}"),
         4 => format!("{}", random.below(20)),
         _ => format!("{whole}"),

@@ -6,8 +6,8 @@ use pointmill::ErrorKind::{self, Data, Io, Memory, Pipeline as Wrong};
 use pointmill::{Graph, Overrides, Registry};
 
 use super::judge::{self, Judgement, Outcome, shape};
-use super::random::Random;
 use super::{Target, las_seeds, mutate, vocabulary};
+use crate::support::random::Random;
 
 /// The target.
 pub const TARGET: Target =
@@ -92,15 +92,15 @@ fn change(random: &mut Random, data: &mut Vec<u8>, other: &[u8]) {
         0..4 => mutate::lines(random, data, len, other, words),
         4 => {
             // A key of any stage, with a value of any kind.
-            let key = String::from_utf8_lossy(random.word(words)).into_owned();
+            let key = String::from_utf8_lossy(random.one_of(words)).into_owned();
             let value = if random.one_in(2) {
                 mutate::number_text(random)
             } else {
-                String::from_utf8_lossy(random.word(words)).into_owned()
+                String::from_utf8_lossy(random.one_of(words)).into_owned()
             };
             let at = data.iter().rposition(|b| *b == b'\n').map_or(len, |at| at + 1);
             let ends: Vec<usize> = (0..at).filter(|&i| data[i] == b'\n').map(|i| i + 1).collect();
-            let at = if ends.is_empty() { at } else { *random.of(&ends) };
+            let at = if ends.is_empty() { at } else { random.one_of(&ends) };
             mutate::insert(data, at, format!("{key} = {value}\n").as_bytes());
         }
         _ => mutate::bytes(random, data, other, words),

@@ -8,8 +8,8 @@ use pointmill::point::PointBatch;
 use pointmill::stage::Source;
 
 use super::judge::{self, Judgement, Outcome, magnitude, shape};
-use super::random::Random;
 use super::{Target, mutate};
+use crate::support::random::Random;
 
 /// The target.
 pub const TARGET: Target =

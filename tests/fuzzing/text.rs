@@ -7,8 +7,8 @@ use pointmill::{Graph, Registry, Set};
 
 use super::judge::{self, Judgement, Outcome, shape};
 use super::pipeline::{furnish, leaves_home};
-use super::random::Random;
 use super::{Target, mutate, vocabulary};
+use crate::support::random::Random;
 
 /// The target.
 pub const TARGET: Target =
@@ -80,7 +80,7 @@ fn change(random: &mut Random, data: &mut Vec<u8>, other: &[u8]) {
     if random.one_in(2) {
         mutate::lines(random, data, len, other, words);
     } else if random.one_in(3) {
-        let word = |random: &mut Random| String::from_utf8_lossy(random.word(words)).into_owned();
+        let word = |random: &mut Random| String::from_utf8_lossy(random.one_of(words)).into_owned();
         let (stage, key) = (word(random), word(random));
         let value = if random.one_in(2) { mutate::number_text(random) } else { word(random) };
         *data = format!("{stage}.{key}={value}").into_bytes();

@@ -3,12 +3,13 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
 
-use crate::scans_support;
-
 use std::path::Path;
 
-use scans_support::command::pointmill;
-use scans_support::{LasFile, Random, STRIDES, Setup, assert_holds, convert};
+use crate::support::assert_holds;
+use crate::support::command::pointmill;
+use crate::support::las_file::{LasFile, STRIDES};
+use crate::support::random::Random;
+use crate::support::setup::{Setup, convert};
 
 /// Points of a format with times, colours and all else that changes from one to the next.
 fn records(format: u8, points: i32) -> Vec<u8> {

@@ -3,12 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
-use crate::common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::Scan;
+use crate::support::scan::Scan;
 use pointmill::io::las::{self, Description};
 use pointmill::io::ply;
 use pointmill::point::GpsTime;

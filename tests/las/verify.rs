@@ -2,13 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
 
-use crate::las_support;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
 
-use las_support::{LAS, LAZ, Random, read, write};
+use crate::support::las::{LAS, LAZ, write};
+use crate::support::random::Random;
+use crate::support::records::read_source;
 use pointmill::io::las::{fresh, layout, open};
 use pointmill::point::Schema;
 
@@ -223,13 +223,13 @@ fn nothing_is_told_of_inputs_that_were_not_read_to_their_end() {
     let bad = scan(folder.path(), "bad.laz", 1, |bytes| put(bytes, MAX_Z, 50.8));
     let source = open(&[bad]).unwrap();
     assert!(source.parts() > 1);
-    read(&*source, 1000).unwrap();
+    read_source(&*source, 1000).unwrap();
     assert!(source.contradictions().is_empty());
-    read(&*source, usize::MAX / 4096).unwrap();
+    read_source(&*source, usize::MAX / 4096).unwrap();
     let told = source.contradictions();
     assert!(told.len() == 1 && told[0].is_damage, "{told:?}");
     // Read once more, they are no more points.
-    read(&*source, usize::MAX / 4096).unwrap();
+    read_source(&*source, usize::MAX / 4096).unwrap();
     assert_eq!(source.contradictions(), told);
 }
 
@@ -249,7 +249,7 @@ fn damage(folder: &Path, format: u8, flips: u64) -> (usize, usize) {
         bytes[at] ^= 1 << random.below(8);
         std::fs::write(&path, bytes).unwrap();
         let Ok(source) = open(std::slice::from_ref(&path)) else { continue };
-        match read(&*source, usize::MAX / 4096) {
+        match read_source(&*source, usize::MAX / 4096) {
             Ok(found) if found != right => {
                 others += 1;
                 let told = source.contradictions().iter().any(|told| told.is_damage);
@@ -293,7 +293,8 @@ fn points_that_the_header_does_not_count_are_told_and_left() {
         assert_eq!(code, 0, "{name}: {text}");
         assert_eq!(text.contains("warning: "), !told.is_empty(), "{name}: {text}");
         assert!(text.contains(told), "{name}: {text}");
-        let read = read(&*open(std::slice::from_ref(&out)).unwrap(), usize::MAX / 4096).unwrap();
+        let read =
+            read_source(&*open(std::slice::from_ref(&out)).unwrap(), usize::MAX / 4096).unwrap();
         let all = open(&[input]).unwrap();
         assert_eq!(read.len(), points * all.schema().stride, "{name}");
     }
@@ -323,7 +324,7 @@ fn real_scans_are_as_their_headers_say() {
             continue;
         }
         let Ok(source) = open(std::slice::from_ref(&path)) else { continue };
-        read(&*source, usize::MAX / 4096).unwrap_or_else(|e| panic!("{e}"));
+        read_source(&*source, usize::MAX / 4096).unwrap_or_else(|e| panic!("{e}"));
         files += 1;
         if source.contradictions().iter().any(|told| told.is_damage) {
             wrong.push(path.file_name().unwrap().to_string_lossy().into_owned());

@@ -3,13 +3,11 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
 
-use crate::laz_support;
-
 use std::path::Path;
 
-use laz_support::damage::{Harm, Tally, Victim};
-use laz_support::points::{Kind, Maker};
-use laz_support::{Chunks, Recipe, read_file};
+use crate::support::laz::damage::{Harm, Tally, Victim};
+use crate::support::laz::points::{Kind, Maker};
+use crate::support::laz::{Chunks, Recipe, read_file};
 
 /// Points of a file.
 const POINTS: usize = 30_000;

@@ -1,18 +1,15 @@
 //! Disks without room for an output: refused before any work where that can be known, else an error
 //! in the end; what was there stays, and nothing is half-written.
 
-#![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-mod scans_support;
 
 use std::fs::{self, File};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::process::Command;
 
-use scans_support::assert_holds;
-use scans_support::command::{done, fails};
+use crate::support::assert_holds;
+use crate::support::command::{done, fails};
 
 /// A small LAS file in `folder`, and the bytes of its records.
 fn scan(folder: &Path, points: &str) -> u64 {

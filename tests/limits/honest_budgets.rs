@@ -3,13 +3,12 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
 
-mod common;
-
 use std::path::Path;
 use std::time::Duration;
 
+use crate::support::random::Random;
+use crate::support::scan::Scan;
 use assert_cmd::Command;
-use common::{Random, Scan};
 use pointmill::synth::Scene;
 
 /// Runs pointmill in `folder` with a budget; gives its exit code and what it told on stderr.

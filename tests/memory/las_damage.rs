@@ -3,38 +3,18 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
 
-mod las_support;
-
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use las_support::{LAS, LAZ, Random, manifest, read, scans, write};
+use crate::support::allocator;
+use crate::support::las::{LAS, LAZ, manifest, write};
+use crate::support::random::Random;
+use crate::support::records::read_source;
+use crate::support::scans;
 use pointmill::ErrorKind;
 use pointmill::io::las::{fresh, layout, open};
 use pointmill::point::Scalar;
-
-/// Remembers the largest allocation.
-struct Watched;
-
-static LARGEST: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: hands everything to the system's allocator and only counts.
-unsafe impl GlobalAlloc for Watched {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        LARGEST.fetch_max(layout.size(), Ordering::Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(at, layout) }
-    }
-}
-
-#[global_allocator]
-static WATCHED: Watched = Watched;
 
 const MOST_BYTES: usize = 64 << 20;
 const MOST_TIME: Duration = Duration::from_secs(20);
@@ -46,10 +26,10 @@ fn survive(path: &Path, bytes: &[u8], what: &str) -> bool {
     let result = open(&[path.to_owned()]).and_then(|source| {
         assert!(source.part_bytes() < u64::MAX / 2);
         // A claim of billions of points in a small file may be true: it is not read to its end.
-        read(&*source, 200_000).map(|_| source.warnings().len())
+        read_source(&*source, 200_000).map(|_| source.warnings().len())
     });
     assert!(start.elapsed() < MOST_TIME, "{what}: {:?}", start.elapsed());
-    assert!(LARGEST.load(Ordering::Relaxed) < MOST_BYTES, "{what} made an allocation too large");
+    assert!(allocator::largest() < MOST_BYTES, "{what} made an allocation too large");
     if let Err(error) = &result {
         assert_eq!(error.kind(), ErrorKind::Data, "{what}: {error:?}");
         assert_eq!(error.path(), Some(path), "{what}: {error:?}");
@@ -85,6 +65,7 @@ fn damage(path: &Path, name: &str, whole: &[u8], rounds: usize, random: &mut Ran
 
 #[test]
 fn damaged_files_of_every_format_fail_or_read() {
+    let _alone = allocator::alone();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan");
     let mut random = Random(11);
@@ -115,6 +96,7 @@ fn damaged_files_of_every_format_fail_or_read() {
 
 #[test]
 fn every_byte_of_headers_and_chunk_tables_can_be_wrong() {
+    let _alone = allocator::alone();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan");
     for format in [1, 7] {
@@ -135,6 +117,7 @@ fn every_byte_of_headers_and_chunk_tables_can_be_wrong() {
 #[test]
 #[ignore = "needs the real scans: POINTMILL_SCANS"]
 fn damaged_real_scans_fail_or_read() {
+    let _alone = allocator::alone();
     let scans = scans();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scan");

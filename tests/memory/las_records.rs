@@ -3,54 +3,20 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod las_support;
-
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::{Cursor, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
-use las_support::{LAZ, read, write};
+use crate::support::allocator::{self, held};
+use crate::support::case::execute;
+use crate::support::las::{LAZ, write};
+use crate::support::records::read_source;
+use crate::support::runs::remedy;
 use laz::laszip::{ChunkTable, ChunkTableEntry};
 use laz::{LasZipCompressor, LazVlr, LazVlrBuilder};
 use pointmill::io::{describe, las};
 use pointmill::{Error, ErrorKind};
 use pointmill::{Graph, Overrides, Quiet, Registry};
-
-/// Counts what is held, and the most that was.
-struct Watched;
-
-static HELD: AtomicUsize = AtomicUsize::new(0);
-static MOST: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: hands everything to the system's allocator and only counts.
-unsafe impl GlobalAlloc for Watched {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let held = HELD.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
-        MOST.fetch_max(held, Ordering::Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        HELD.fetch_sub(layout.size(), Ordering::Relaxed);
-        unsafe { System.dealloc(at, layout) }
-    }
-}
-
-#[global_allocator]
-static WATCHED: Watched = Watched;
-
-/// What is counted is the process's: one test at a time.
-static ALONE: Mutex<()> = Mutex::new(());
-
-/// Bytes that `work` held at most, besides what was held before.
-fn held<T>(work: impl FnOnce() -> T) -> (T, usize) {
-    let before = HELD.load(Ordering::Relaxed);
-    MOST.store(before, Ordering::Relaxed);
-    let result = work();
-    (result, MOST.load(Ordering::Relaxed).saturating_sub(before))
-}
 
 /// A file of five points with `count` records, `payload` bytes each: variable length ones behind the
 /// header, or extended ones at the end.
@@ -87,21 +53,20 @@ fn file_of(user: &str, path: &Path, count: u32, payload: usize, extended: bool) 
     std::fs::write(path, bytes).unwrap();
 }
 
-fn convert(input: &Path, output: &Path) -> Result<(), Error> {
+/// Plans a conversion.
+fn plan(input: &Path) -> Result<(), Error> {
+    let output = input.with_file_name("out.las");
     let text = format!(
         "[[stage]]\nkind = \"read\"\npath = {input:?}\n\n[[stage]]\nkind = \"write\"\npath = {output:?}\n"
     );
-    let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin())?;
-    let plan = pipeline.plan(&Overrides::default())?;
-    drop(plan);
-    Ok(())
+    Graph::parse(&text, "test.toml", &Registry::builtin())?.plan(&Overrides::default()).map(drop)
 }
 
 const MIB: usize = 1 << 20;
 
 #[test]
 fn more_records_than_any_scan_has_are_refused_before_they_are_held() {
-    let _alone = ALONE.lock().unwrap();
+    let _alone = allocator::alone();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.las");
     for (user, count, payload, extended, told) in [
@@ -119,7 +84,7 @@ fn more_records_than_any_scan_has_are_refused_before_they_are_held() {
         for work in [
             (&|path: &Path| las::open(&[path.to_owned()]).map(drop)) as &dyn Fn(&Path) -> _,
             &|path: &Path| describe(path).map(drop),
-            &|path: &Path| convert(path, &path.with_file_name("out.las")),
+            &plan,
         ] {
             let (result, held) = held(|| work(&path));
             let error = result.unwrap_err();
@@ -133,7 +98,7 @@ fn more_records_than_any_scan_has_are_refused_before_they_are_held() {
 
 #[test]
 fn what_is_held_of_the_most_records_is_their_size() {
-    let _alone = ALONE.lock().unwrap();
+    let _alone = allocator::alone();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.las");
     file(&path, 8_000, 950, false);
@@ -147,7 +112,7 @@ fn what_is_held_of_the_most_records_is_their_size() {
 
 #[test]
 fn the_union_of_several_files_records_is_bounded_too() {
-    let _alone = ALONE.lock().unwrap();
+    let _alone = allocator::alone();
     let folder = tempfile::tempdir().unwrap();
     let paths: Vec<PathBuf> = (0..3)
         .map(|i| {
@@ -170,18 +135,23 @@ fn records(path: &Path) -> Vec<u8> {
 
 #[test]
 fn many_bytes_of_records_are_carried_and_not_held() {
-    let _alone = ALONE.lock().unwrap();
+    let _alone = allocator::alone();
     let folder = tempfile::tempdir().unwrap();
     let [input, second, output] =
         ["in.las", "second.las", "out.las"].map(|name| folder.path().join(name));
     file(&input, 1_000, 65_000, false);
     let run = |inputs: &[&Path]| {
         let text = format!(
-            "[run]\nmemory = \"64MiB\"\nthreads = 1\n[[stage]]\nkind = \"read\"\npath = {inputs:?}\n\
+            "[run]\nthreads = 1\n[[stage]]\nkind = \"read\"\npath = {inputs:?}\n\
              [[stage]]\nkind = \"write\"\npath = {output:?}\n"
         );
-        let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin()).unwrap();
-        let (done, held) = held(|| pipeline.plan(&Overrides::default())?.run(&Quiet));
+        let go = |memory| {
+            let overrides = Overrides { memory: Some(memory), ..Overrides::default() };
+            execute(&text, &overrides, &Quiet)
+        };
+        // What the process holds counts against the budget, so a refusal tells what would do.
+        let least = remedy(&go(1 << 20).map(drop).unwrap_err());
+        let (done, held) = held(|| go(least));
         done.unwrap();
         assert!(held < 40 * MIB, "{held} bytes");
     };
@@ -239,7 +209,7 @@ fn tiny_chunks(path: &Path, chunks: u64) {
 
 #[test]
 fn a_table_of_millions_of_chunks_is_held_in_little_memory() {
-    let _alone = ALONE.lock().unwrap();
+    let _alone = allocator::alone();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.laz");
     tiny_chunks(&path, 4_000_000);
@@ -270,7 +240,7 @@ fn a_table_of_millions_of_chunks_is_held_in_little_memory() {
 
 #[test]
 fn points_of_tiny_chunks_are_read_in_their_order() {
-    let _alone = ALONE.lock().unwrap();
+    let _alone = allocator::alone();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("in.laz");
     let mut records = vec![0; 120_000 * RECORD];
@@ -295,5 +265,5 @@ fn points_of_tiny_chunks_are_read_in_their_order() {
     std::fs::write(&path, compressor.into_inner().into_inner()).unwrap();
     let source = las::open(std::slice::from_ref(&path)).unwrap();
     assert!(chunks > 450 && source.parts() == 3, "{chunks} chunks, {} parts", source.parts());
-    assert!(read(&*source, usize::MAX / 4096).unwrap() == records);
+    assert!(read_source(&*source, usize::MAX / 4096).unwrap() == records);
 }

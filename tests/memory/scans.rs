@@ -3,58 +3,17 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
 
-#[path = "common/real.rs"]
-mod real;
-mod scans_support;
-
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::collections::{BTreeMap, VecDeque};
 use std::panic::catch_unwind;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 
+use crate::support::allocator;
+use crate::support::records::{accounted, assert_contained, open, read_some, sink, write};
+use crate::support::setup::{Setup, convert, reduce};
 use pointmill::io::ends::Format;
-use pointmill::io::{las, ply};
-use pointmill::point::PointBatch;
-use scans_support::{Setup, accounted, assert_contained, convert, open, read_some, reduce};
 use serde_json::json;
-
-/// The system's allocator, which remembers the largest request.
-struct Watched;
-
-static LARGEST: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: every call goes to the system's allocator as it came.
-#[allow(unsafe_code, reason = "the trait asks for it")]
-unsafe impl GlobalAlloc for Watched {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        LARGEST.fetch_max(layout.size(), Ordering::Relaxed);
-        // SAFETY: as the caller promises.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        LARGEST.fetch_max(layout.size(), Ordering::Relaxed);
-        // SAFETY: as the caller promises.
-        unsafe { System.alloc_zeroed(layout) }
-    }
-
-    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        LARGEST.fetch_max(size, Ordering::Relaxed);
-        // SAFETY: as the caller promises.
-        unsafe { System.realloc(at, layout, size) }
-    }
-
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        // SAFETY: as the caller promises.
-        unsafe { System.dealloc(at, layout) }
-    }
-}
-
-#[global_allocator]
-static WATCHED: Watched = Watched;
 
 /// The budget of every run, and more than any of its allocations. What the test itself holds of a scan
 /// counts in it.
@@ -109,7 +68,7 @@ struct Scan {
 
 /// The LAS, LAZ and PLY files in the folder of real scans.
 fn scans() -> Vec<Scan> {
-    let folder = real::scans();
+    let folder = crate::support::scans();
     let manifest = std::fs::read_to_string(folder.join("MANIFEST.tsv")).expect("a manifest");
     let mut rows = manifest.lines().map(|line| line.split('\t').collect::<Vec<_>>());
     let head = rows.next().unwrap();
@@ -191,22 +150,8 @@ fn cropped(scan: &Scan, folder: &Path) -> PathBuf {
     }
     let (schema, records) = read_some(&paths, MOST).unwrap_or_else(|e| panic!("{e:?}"));
     let path = folder.join("cropped").with_extension(scan.path.extension().unwrap());
-    let mut sink = if Format::of(&path) == Some(Format::Ply) {
-        ply::create(&path, &ply::PlyOptions::default(), &schema, source.metadata())
-    } else {
-        let compressed = Format::of(&path) == Some(Format::Laz);
-        let options = las::LasOptions { compressed, normals: false };
-        las::create(&path, &options, &schema, source.metadata())
-    }
-    .unwrap();
-    let (encoder, chunk) = (sink.encoder(), sink.chunk_points());
-    let mut batch = PointBatch::new(schema.clone(), chunk);
-    for records in records.chunks(chunk * schema.stride) {
-        batch.clear();
-        batch.extend(records);
-        sink.append(encoder.encode(&batch).unwrap()).unwrap();
-    }
-    assert_eq!(sink.finish().unwrap().points, MOST as u64);
+    let sink = sink(&path, &schema, source.metadata()).unwrap();
+    assert_eq!(write(sink, &schema, &records).unwrap().points, MOST as u64);
     path
 }
 
@@ -251,12 +196,13 @@ fn reduces_and_reads_back(scan: &Scan) -> String {
 #[test]
 #[ignore = "needs the real scans: POINTMILL_SCANS"]
 fn every_readable_scan_is_reduced_to_records_of_its_own() {
+    let _alone = allocator::alone();
     let scans = scans();
     let readable: Vec<Scan> =
         scans.into_iter().filter(|scan| !REFUSED.contains(&scan.name.as_str())).collect();
     assert!(readable.len() > 150, "only {} scans", readable.len());
     for_each(readable, reduces_and_reads_back).iter().for_each(|line| println!("{line}"));
-    let largest = LARGEST.load(Ordering::Relaxed);
+    let largest = allocator::largest();
     println!("the largest allocation: {largest} bytes");
 }
 
@@ -271,7 +217,7 @@ fn is_refused(scan: &Scan) -> String {
         let error = outcome.expect_err(&scan.name);
         assert_eq!(error.path(), Some(scan.path.as_path()), "{error:?}");
         assert_eq!(error.kind(), pointmill::ErrorKind::Data, "{error:?}");
-        scans_support::assert_holds(folder.path(), &[]);
+        crate::support::assert_holds(folder.path(), &[]);
         told.push(error.to_string());
     }
     told.remove(0)
@@ -280,18 +226,20 @@ fn is_refused(scan: &Scan) -> String {
 #[test]
 #[ignore = "needs the real scans: POINTMILL_SCANS"]
 fn every_broken_scan_is_refused_with_its_path() {
+    let _alone = allocator::alone();
     let scans = scans();
     let broken: Vec<Scan> =
         scans.into_iter().filter(|scan| REFUSED.contains(&scan.name.as_str())).collect();
     assert_eq!(broken.len(), REFUSED.len());
     for_each(broken, is_refused).iter().for_each(|line| println!("{line}"));
-    let largest = LARGEST.load(Ordering::Relaxed);
+    let largest = allocator::largest();
     assert!((largest as u64) < MEMORY, "an allocation of {largest} bytes");
 }
 
 #[test]
 #[ignore = "needs the real scans: POINTMILL_SCANS"]
 fn every_scan_of_mixed_units_is_refused_until_it_is_told_how_to_measure() {
+    let _alone = allocator::alone();
     let scans = scans();
     let mixed: Vec<Scan> =
         scans.into_iter().filter(|scan| MIXED.contains(&scan.name.as_str())).collect();
@@ -308,7 +256,7 @@ fn every_scan_of_mixed_units_is_refused_until_it_is_told_how_to_measure() {
         assert_eq!(error.path(), Some(scan.path.as_path()), "{error:?}");
         assert!(error.to_string().contains("x and y are in "), "{error:?}");
         assert!(error.remedy().unwrap().contains("z_scale"), "{error:?}");
-        scans_support::assert_holds(folder.path(), &[]);
+        crate::support::assert_holds(folder.path(), &[]);
         let auto = run(&[("run.z_scale", json!("auto"))]);
         assert_eq!(auto.is_ok(), error.to_string().contains("feet"), "{}: {auto:?}", scan.name);
         feet += usize::from(auto.is_ok());

@@ -1,11 +1,7 @@
 //! The stage `normals`.
 
-#[path = "../normals_support/mod.rs"]
-mod normals_support;
-#[path = "../stages_support/mod.rs"]
-mod stages_support;
-
 mod orient;
 mod plane;
+mod solvers;
 mod star;
 mod truth;

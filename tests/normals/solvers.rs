@@ -1,42 +1,7 @@
-//! What the tests of normals share: seeded numbers and solvers written another way.
-#![allow(dead_code, reason = "each test file uses its part")]
+//! What the tests of normals share: solvers written another way.
 #![allow(clippy::needless_range_loop, reason = "matrices read best by index")]
 
 pub type Vec3 = [f64; 3];
-
-/// Seeded pseudo-random numbers (splitmix64).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform in [0, 1).
-    pub fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Uniform in [-size, size).
-    pub fn signed(&mut self, size: f64) -> f64 {
-        (2.0 * self.unit() - 1.0) * size
-    }
-
-    /// A direction, uniform on the sphere.
-    pub fn direction(&mut self) -> Vec3 {
-        loop {
-            let v = [self.signed(1.0), self.signed(1.0), self.signed(1.0)];
-            let length = dot(v, v).sqrt();
-            if length > 0.1 && length < 1.0 {
-                return v.map(|c| c / length);
-            }
-        }
-    }
-}
 
 pub fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

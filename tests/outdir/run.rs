@@ -3,17 +3,15 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
 
-use crate::common;
-use crate::outdir_support;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::support::folders::{assert_equal_files, convert_one};
+use crate::support::random::Random;
+use crate::support::scan::Scan;
 use assert_cmd::Command;
-use common::{Random, Scan};
-use outdir_support::{assert_equal_files, convert_one};
 use pointmill::Result;
 use pointmill::report::result_bytes;
 use pointmill::synth::Scene;

@@ -1,8 +1,5 @@
 //! Runs of several passes.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod exact;
 mod lossless;
 mod same_bytes;

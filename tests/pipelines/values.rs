@@ -2,18 +2,16 @@
 //! that can be; never changed without a word.
 #![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
 
-use crate::run_support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
+use crate::support::case::REDUCE;
 use pointmill::Result;
 use pointmill::io::{las, ply};
 use pointmill::point::{PointBatch, Scalar, Schema};
 use pointmill::stage::Source;
 use pointmill::{Done, Graph, Overrides, Registry, Watch};
-use run_support::REDUCE;
 
 fn case(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name)

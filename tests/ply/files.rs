@@ -3,9 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
 
-use crate::ply_support;
-
-use ply_support::{file, read, records, write};
+use crate::support::ply::{file, read, records, write};
 use pointmill::io::ply::{self, Encoding, PlyOptions};
 use pointmill::point::{Endian, Metadata, Value};
 use proptest::prelude::*;

@@ -12,6 +12,8 @@ use pointmill::tile::Fate;
 use pointmill::{ErrorKind, Result};
 use proptest::prelude::*;
 
+use crate::support::random::Random;
+
 /// A position, its copies and what becomes of them.
 type Record = (Position, u32, Fate);
 
@@ -70,9 +72,7 @@ fn close(a: f64, b: f64, tolerance: f64) -> bool {
 
 /// Uniform in −1..1 and the same on every machine.
 fn noise(seed: u64) -> f64 {
-    let mut x = seed.wrapping_add(0x9e37_79b9_7f4a_7c15).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((x ^ (x >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    Random(seed).signed(1.0)
 }
 
 #[test]

@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
-use crate::run_support;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
@@ -14,7 +12,7 @@ use pointmill::{Error, ErrorKind};
 use pointmill::{Graph, Overrides, Quiet, Registry};
 use serde_json::Value;
 
-use run_support::{Case, REDUCE, execute};
+use crate::support::case::{Case, REDUCE, execute};
 
 #[test]
 fn scans_of_no_point_or_few_reduce_to_themselves() {

@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
 
-mod scans_support;
-
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
@@ -11,8 +9,8 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use scans_support::assert_holds;
-use scans_support::command::{command, done, scans};
+use crate::support::assert_holds;
+use crate::support::command::{command, done, scans};
 
 /// A run of minutes whose points do not fit in its memory.
 const LONG: &str = "[run]\nmemory = \"200MiB\"\nthreads = 2\nreport = \"report.json\"\n\

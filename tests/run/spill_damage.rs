@@ -3,8 +3,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
-mod run_support;
-
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::os::unix::fs::{FileExt, PermissionsExt};
@@ -15,7 +13,7 @@ use pointmill::ErrorKind;
 use pointmill::{Overrides, Quiet, Watch};
 use serde_json::Value;
 
-use run_support::{Case, execute};
+use crate::support::case::{Case, execute};
 
 /// What waits in scratch files, by the names of these; `found` waits only where no progress is reported.
 const STORES: [&str; 10] = [

@@ -3,13 +3,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
-use crate::common;
-
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use common::{Memory, Random, Scan, Settings, assert_same, run};
+use crate::support::assert_same;
+use crate::support::random::Random;
+use crate::support::runs::{Memory, Settings, run};
+use crate::support::scan::Scan;
 use pointmill::budget::Budget;
 use pointmill::host::parallel;
 use pointmill::point::{

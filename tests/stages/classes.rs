@@ -3,13 +3,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
-use crate::common;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Mutex;
 
-use common::{Memory, Ran, Random, Scan, Settings, assert_same, run_with};
+use crate::support::assert_same;
+use crate::support::random::Random;
+use crate::support::runs::{Memory, Ran, Settings, run_with};
+use crate::support::scan::Scan;
 use pointmill::report::Report;
 use pointmill::synth::Scene;
 use pointmill::{Graph, Overrides, Registry, Watch};

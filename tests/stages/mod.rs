@@ -1,14 +1,5 @@
 //! Stages against brute force and at their limits.
 
-#[path = "../common/mod.rs"]
-mod common;
-#[path = "../las_support/mod.rs"]
-mod las_support;
-#[path = "../run_support/mod.rs"]
-mod run_support;
-#[path = "../stages_support/mod.rs"]
-mod stages_support;
-
 mod bad_luck;
 mod classes;
 mod exact;
@@ -16,6 +7,8 @@ mod extremes;
 mod grid;
 mod orders;
 mod outliers;
+mod reduce_auto;
 mod run;
+mod same_bytes;
 mod tiles;
 mod unread;

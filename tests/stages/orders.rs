@@ -3,11 +3,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
 
-use crate::common;
-
 use std::path::Path;
 
-use common::{Memory, Random, Scan, Settings, assert_same, run};
+use crate::support::assert_same;
+use crate::support::random::Random;
+use crate::support::runs::{Memory, Settings, run};
+use crate::support::scan::Scan;
 use pointmill::point::names;
 use pointmill::synth::Scene;
 

@@ -3,11 +3,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says so")]
 
-mod common;
-
 use std::path::PathBuf;
 
-use common::*;
+use crate::support::assert_same;
+use crate::support::random::Random;
+use crate::support::runs::{Ran, Settings, run};
+use crate::support::scan::Scan;
 use pointmill::synth::Scene;
 use serde_json::Value;
 

@@ -3,12 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
-mod common;
-
-use common::{
-    Memory, Ran, Random, Scan, Settings, assert_not_empty, assert_same, instruction_sets, run,
-    scans,
-};
+use crate::support::random::Random;
+use crate::support::runs::{Memory, Ran, Settings, assert_not_empty, instruction_sets, run};
+use crate::support::scan::Scan;
+use crate::support::{assert_same, scans};
 use pointmill::store::morton_cmp;
 use pointmill::synth::Scene;
 

@@ -2,13 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
 
-use crate::las_support;
-
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
-use las_support::{LAS, LAZ, Random, read, write};
+use crate::support::las::{LAS, LAZ, write};
+use crate::support::random::Random;
+use crate::support::records::read_source;
 use pointmill::io::las::{fresh, layout, open};
 use pointmill::point::{PointBatch, Scalar, Schema, names};
 
@@ -67,7 +67,7 @@ fn layers_are_left_out_and_no_other_field_changes() {
     let folder = tempfile::tempdir().unwrap();
     let schema = scan(folder.path(), 8);
     let source = open(&[folder.path().join("scan.laz")]).unwrap();
-    let all = read(&*source, POINTS).unwrap();
+    let all = read_source(&*source, POINTS).unwrap();
     let unread = ["Intensity", "GpsTime", "Nir", "Red", "Green", "Amplitude", "Width"];
     let unread = unread.map(str::to_owned);
     let mut batch = PointBatch::new(source.schema().clone(), 50_000);

@@ -1,6 +1,4 @@
 //! What tests of whole runs share: a folder with an input, its pipeline, and what came out.
-#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
-#![allow(dead_code, reason = "each test file uses its part")]
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,6 +1,4 @@
 //! What the tests of one output per input share.
-#![allow(dead_code, reason = "each test file uses a part of it")]
-#![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
 
 use std::path::{Path, PathBuf};
 
@@ -8,6 +6,9 @@ use pointmill::Result;
 use pointmill::point::PointBatch;
 use pointmill::stage::{CreateSink, Role, Source};
 use pointmill::{Graph, Overrides, Quiet, Registry};
+
+use super::case::execute;
+use super::{assert_same, records};
 
 /// A pipeline that reads `inputs` and writes with `keys`.
 pub fn text(inputs: &[PathBuf], keys: &str) -> String {
@@ -41,7 +42,7 @@ pub fn write_each(
     keep: impl Fn(usize, u64) -> bool,
 ) -> Result<Vec<PathBuf>> {
     let (source, sink) = ends(inputs, keys)?;
-    let mut records = vec![Vec::new(); inputs.len()];
+    let mut kept = vec![Vec::new(); inputs.len()];
     let mut read = vec![0u64; inputs.len()];
     let mut batch = PointBatch::new(source.schema().clone(), 777);
     for i in 0..source.parts() {
@@ -54,7 +55,7 @@ pub fn write_each(
             let input = batch.source as usize;
             for record in batch.iter() {
                 if keep(input, read[input]) {
-                    records[input].extend_from_slice(record);
+                    kept[input].extend_from_slice(record);
                 }
                 read[input] += 1;
             }
@@ -64,44 +65,25 @@ pub fn write_each(
     let each = sink.each_input(&source.inputs())?.expect("one output for each input");
     let family = sink.chunk(source.schema(), source.metadata())?;
     let mut paths = Vec::new();
-    for (i, (sink, records)) in each.iter().zip(&records).enumerate() {
+    for (i, (sink, kept)) in each.iter().zip(&kept).enumerate() {
         let (path, metadata) = (sink.path().to_owned(), source.metadata_of(i)?);
-        let mut sink = sink.create(&path, source.schema(), &metadata, false)?;
+        let sink = sink.create(&path, source.schema(), &metadata, false)?;
         assert_eq!(sink.chunk_points(), family.points);
         assert!(sink.chunk_bytes() <= family.bytes, "{}", path.display());
-        write_all(&mut *sink, &*source, records)?;
-        sink.finish()?;
+        records::write(sink, source.schema(), kept)?;
         paths.push(path);
     }
     Ok(paths)
 }
 
-fn write_all(
-    sink: &mut dyn pointmill::stage::Sink,
-    source: &dyn Source,
-    records: &[u8],
-) -> Result<()> {
-    let (encoder, chunk) = (sink.encoder(), sink.chunk_points());
-    let mut batch = PointBatch::new(source.schema().clone(), chunk);
-    for records in records.chunks(chunk * source.schema().stride) {
-        batch.clear();
-        batch.extend(records);
-        sink.append(encoder.encode(&batch)?)?;
-    }
-    Ok(())
-}
-
 /// A run that converts `inputs` into one file.
 pub fn convert_one(inputs: &[PathBuf], output: &Path, keys: &str) {
     let text = text(inputs, &format!("path = '{}'\n{keys}", output.display()));
-    let pipeline = Graph::parse(&text, "one.toml", &Registry::builtin()).unwrap();
-    pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
+    execute(&text, &Overrides::default(), &Quiet).unwrap();
 }
 
-/// Fails without printing megabytes.
+/// Two files have the same bytes.
 pub fn assert_equal_files(a: &Path, b: &Path) {
     let (one, two) = (std::fs::read(a).unwrap(), std::fs::read(b).unwrap());
-    let differ = one.iter().zip(&two).position(|(a, b)| a != b);
-    let names = format!("{} ({} bytes), {} ({})", a.display(), one.len(), b.display(), two.len());
-    assert!(differ.is_none() && one.len() == two.len(), "{names} differ from byte {differ:?}");
+    assert_same(&one, &two, &format!("{} and {}", a.display(), b.display()));
 }

@@ -1,6 +1,4 @@
 //! What the PLY tests share: files from bytes, all records of a source, a sink run to its end.
-#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
-#![allow(dead_code, reason = "each test file uses its part")]
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,22 +15,9 @@ pub fn file(folder: &Path, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
     path
 }
 
-/// All records of a source, part after part.
+/// All records of a source, in batches of `capacity`.
 pub fn records(source: &dyn Source, capacity: usize) -> Result<Vec<u8>> {
-    let mut all = Vec::new();
-    let mut batch = PointBatch::new(source.schema().clone(), capacity);
-    for index in 0..source.parts() {
-        let mut part = source.part(index)?;
-        loop {
-            part.read(&mut batch)?;
-            if batch.is_empty() {
-                break;
-            }
-            assert!(batch.len() <= capacity);
-            all.extend_from_slice(batch.records());
-        }
-    }
-    Ok(all)
+    super::records::read_without(source, capacity, &[])
 }
 
 /// Opens a file and reads all of it: schema, metadata and records.

@@ -1,52 +1,15 @@
-//! What the tests of promises share: scans held as records, cut, shuffled and split into files, and
-//! pipelines run in this process with what they say of themselves.
-#![allow(dead_code, unused_imports, reason = "each test file uses a part of it")]
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
+//! A scan held as records: made up, read, cut, moved, shuffled, and split into files.
 
-#[allow(clippy::duplicate_mod, reason = "helpers are used apart, and by some together")]
-pub mod real;
-
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pointmill::geom::lattice::Lattice;
-use pointmill::geom::simd::Simd;
-use pointmill::io::las::{self, LasOptions};
-use pointmill::io::ply::{self, PlyOptions};
-use pointmill::point::{Layout, Metadata, PointBatch, Position, Schema, Value};
-use pointmill::report::{Report, result_bytes};
-use pointmill::stage::{OpenSource, Sink, Source};
+use pointmill::point::{Layout, Metadata, Position, Schema, Value};
+use pointmill::stage::{OpenSource, Source};
 use pointmill::synth::{Scene, Synthetic};
-use pointmill::{Error, ErrorKind, Result};
-use pointmill::{Graph, Overrides, Quiet, Registry};
-pub use real::scans;
 
-/// A small generator (splitmix64), so that a failing case is the same everywhere.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn number(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    pub fn below(&mut self, end: usize) -> usize {
-        (self.number() % end as u64) as usize
-    }
-
-    pub fn one_of<T: Copy>(&mut self, list: &[T]) -> T {
-        list[self.below(list.len())]
-    }
-
-    pub fn shuffle<T>(&mut self, list: &mut [T]) {
-        for i in (1..list.len()).rev() {
-            list.swap(i, self.below(i + 1));
-        }
-    }
-}
+use super::random::Random;
+use super::records;
 
 /// The records of a scan and what its file says besides.
 #[derive(Clone)]
@@ -82,28 +45,12 @@ impl Scan {
 
     /// At most the first `limit` records of a file.
     pub fn read(path: &Path, limit: usize) -> Scan {
-        let paths = [path.to_owned()];
-        let ply = path.extension().is_some_and(|e| e == "ply");
-        let source = if ply { ply::open(&paths) } else { las::open(&paths) };
-        Scan::of(&*source.unwrap(), limit)
+        Scan::of(&*records::open(&[path.to_owned()]).unwrap(), limit)
     }
 
     fn of(source: &dyn Source, limit: usize) -> Scan {
-        let schema = source.schema().clone();
-        let mut records = Vec::new();
-        let mut batch = PointBatch::new(schema.clone(), 8192);
-        for i in 0..source.parts() {
-            let mut part = source.part(i).unwrap();
-            while records.len() / schema.stride < limit {
-                part.read(&mut batch).unwrap();
-                if batch.is_empty() {
-                    break;
-                }
-                records.extend_from_slice(batch.records());
-            }
-        }
-        records.truncate(limit.saturating_mul(schema.stride));
-        Scan { schema, metadata: source.metadata().clone(), records }
+        let records = records::read_source(source, limit).unwrap();
+        Scan { schema: source.schema().clone(), metadata: source.metadata().clone(), records }
     }
 
     pub fn points(&self) -> usize {
@@ -222,22 +169,8 @@ impl Scan {
 
     /// Writes it as it is, in the format that the extension names.
     pub fn write(&self, path: &Path) {
-        let extension = path.extension().unwrap().to_str().unwrap();
-        let mut sink: Box<dyn Sink> = if extension == "ply" {
-            let options = PlyOptions::default();
-            ply::create(path, &options, &self.schema, &self.metadata).unwrap()
-        } else {
-            let options = LasOptions { compressed: extension == "laz", normals: false };
-            las::create(path, &options, &self.schema, &self.metadata).unwrap()
-        };
-        let (encoder, chunk) = (sink.encoder(), sink.chunk_points());
-        let mut batch = PointBatch::new(self.schema.clone(), chunk);
-        for records in self.records.chunks(chunk * self.schema.stride) {
-            batch.clear();
-            batch.extend(records);
-            sink.append(encoder.encode(&batch).unwrap()).unwrap();
-        }
-        sink.finish().unwrap();
+        let sink = records::sink(path, &self.schema, &self.metadata).unwrap();
+        records::write(sink, &self.schema, &self.records).unwrap();
     }
 
     /// Writes it into `files` files of `folder`, cut at random (some may be empty): LAS and LAZ by
@@ -256,164 +189,5 @@ impl Scan {
                 path
             })
             .collect()
-    }
-}
-
-/// How much memory a run is given.
-#[derive(Debug, Clone, Copy)]
-pub enum Memory {
-    /// What the refusal of less names, and so many mebibytes more.
-    Least(u64),
-    /// One gibibyte beyond that.
-    Ample,
-}
-
-/// The `[run]` settings that must not matter.
-#[derive(Debug, Clone, Copy)]
-pub struct Settings {
-    pub tile_points: Option<usize>,
-    pub memory: Memory,
-    pub threads: usize,
-    pub spill: &'static str,
-    pub simd: &'static str,
-}
-
-/// What `simd` under `[run]` can be on this processor.
-pub fn instruction_sets() -> Vec<&'static str> {
-    Simd::all().map(|simd| simd.level().name()).collect()
-}
-
-impl Settings {
-    /// Everything in memory, by one thread, in as few tiles as can be.
-    pub const PLAIN: Settings = Settings {
-        tile_points: None,
-        memory: Memory::Ample,
-        threads: 1,
-        spill: "auto",
-        simd: "auto",
-    };
-
-    fn text(&self, memory: u64, report: &Path) -> String {
-        let Settings { threads, spill, simd, .. } = self;
-        let tile_points =
-            self.tile_points.map_or(String::new(), |points| format!("tile_points = {points}\n"));
-        format!(
-            "[run]\nmemory = {memory}\nthreads = {threads}\nspill = {spill:?}\nsimd = {simd:?}\n\
-             report = {report:?}\n{tile_points}"
-        )
-    }
-}
-
-/// What a run left.
-pub struct Ran {
-    pub output: PathBuf,
-    /// The bytes of the report's `result`.
-    pub result: Vec<u8>,
-    /// Counts of how the work was cut up.
-    pub work: BTreeMap<String, u64>,
-    pub spilled: u64,
-    /// The whole report, but for its tiles.
-    pub report: Report,
-}
-
-impl Ran {
-    pub fn count(&self, what: &str) -> u64 {
-        self.work.get(what).copied().unwrap_or(0)
-    }
-
-    pub fn bytes(&self) -> Vec<u8> {
-        std::fs::read(&self.output).unwrap()
-    }
-}
-
-/// Runs `read` of `inputs`, then `stages`, then `write` of a file in `folder` with the extension and
-/// keys of `write` (as in `"laz"` or `"ply\nencoding = \"ascii\""`).
-pub fn run(
-    folder: &Path,
-    inputs: &[PathBuf],
-    stages: &str,
-    write: &str,
-    settings: Settings,
-) -> Result<Ran> {
-    run_with(folder, inputs, stages, write, settings, "")
-}
-
-/// The same with more keys under `[run]`; `{folder}` in `stages` becomes the folder.
-pub fn run_with(
-    folder: &Path,
-    inputs: &[PathBuf],
-    stages: &str,
-    write: &str,
-    settings: Settings,
-    keys_of_run: &str,
-) -> Result<Ran> {
-    let stages = stages.replace("{folder}", folder.to_str().unwrap());
-    let (extension, keys) = write.split_once('\n').unwrap_or((write, ""));
-    let output = folder.join(format!("out.{extension}"));
-    let report = folder.join("report.json");
-    let text = |memory| {
-        format!(
-            "{}\n{keys_of_run}\n[[stage]]\nkind = \"read\"\npath = {inputs:?}\n{stages}\n\
-             [[stage]]\nkind = \"write\"\npath = {output:?}\n{keys}\n",
-            settings.text(memory, &report)
-        )
-    };
-    let go = |memory| {
-        let pipeline = Graph::parse(&text(memory), "test.toml", &Registry::builtin())?;
-        pipeline.plan(&Overrides::default())?.run(&Quiet)
-    };
-    let more = match settings.memory {
-        Memory::Least(more) => more << 20,
-        Memory::Ample => 1 << 30,
-    };
-    // What this process holds already counts against the budget, and other tests change it.
-    let mut memory = 1 << 20;
-    let done = loop {
-        match go(memory) {
-            Err(error) if error.kind() == ErrorKind::Memory => {
-                let least = remedy(&error);
-                assert!(least + more > memory, "{error:?} does not do");
-                memory = least + more;
-            }
-            done => break done?,
-        }
-    };
-    let report = std::fs::read(&report).unwrap();
-    Ok(Ran {
-        output,
-        result: result_bytes(&report).unwrap().to_vec(),
-        work: done.report.run.work.clone(),
-        spilled: done.report.run.spill_bytes,
-        report: done.report,
-    })
-}
-
-/// The budget in bytes that a refusal names.
-pub fn remedy(error: &Error) -> u64 {
-    let help = error.remedy().unwrap_or_else(|| panic!("{error:?} names no remedy"));
-    let digits = help.find(|c: char| c.is_ascii_digit()).unwrap();
-    let (number, rest) =
-        help[digits..].split_at(help[digits..].find(|c: char| !c.is_ascii_digit()).unwrap());
-    assert!(rest.starts_with("MiB"), "{help}");
-    number.parse::<u64>().unwrap() << 20
-}
-
-/// A scan beside its reduction must have had this, or a test of it may pass empty.
-pub fn assert_not_empty(ran: &Ran, cells_cross: bool, what: &str) {
-    assert!(ran.count("tiles") >= 30, "{what}: {} tiles", ran.count("tiles"));
-    assert!(ran.count("tile_levels") >= 2, "{what}: {} levels", ran.count("tile_levels"));
-    assert!(ran.count("rim_positions") > 0, "{what}: no rim");
-    assert!(ran.count("unproven") > 0, "{what}: nobody unproven");
-    assert!(ran.count("tied") > 0, "{what}: no ties");
-    assert!(ran.count("runs") > 1, "{what}: {} runs", ran.count("runs"));
-    assert!(ran.spilled > 0, "{what}: nothing spilled");
-    assert!(!cells_cross || ran.count("crossing_cells") > 0, "{what}: no cell crosses a face");
-}
-
-/// Names where two files first differ.
-pub fn assert_same(a: &[u8], b: &[u8], what: &str) {
-    if a != b {
-        let at = a.iter().zip(b).position(|(x, y)| x != y).unwrap_or(a.len().min(b.len()));
-        panic!("{what}: {} and {} bytes differ at byte {at}", a.len(), b.len());
     }
 }

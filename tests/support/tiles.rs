@@ -1,5 +1,4 @@
 //! Tiles, lattices and tallies for tests that drive stages by hand.
-#![allow(dead_code, clippy::unwrap_used, reason = "each test uses its part; tests may panic")]
 
 use pointmill::geom::lattice::Lattice;
 use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
@@ -14,16 +13,6 @@ pub fn sorted(positions: impl IntoIterator<Item = Position>) -> Vec<Position> {
     sorted.sort_by(morton_cmp);
     sorted.dedup();
     sorted
-}
-
-/// Numbers that look random, below `below`.
-pub fn noise(seed: u64) -> impl FnMut(u64) -> i64 {
-    let mut state = seed.wrapping_mul(2).wrapping_add(1);
-    move |below| {
-        state =
-            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 33) % below) as i64
-    }
 }
 
 /// The occupied octree nodes of at most `most` positions, the largest such, in Morton order.

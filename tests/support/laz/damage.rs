@@ -10,7 +10,8 @@ use pointmill::io::las::open;
 use pointmill::point::PointBatch;
 use pointmill::{Error, ErrorKind, Result};
 
-use super::points::Random;
+use super::super::las_file::STRIDES;
+use super::super::random::Random;
 use super::read_file;
 
 /// Time that reading a file may take.
@@ -181,12 +182,11 @@ impl Victim {
         const FIELDS: [usize; 11] = [0, 0, 0, 0, 0, 0, 9, 10, 11, 10, 12];
         const NAMES: [&str; 9] =
             ["x, y", "z", "class", "flags", "intensity", "angle", "user", "source", "time"];
-        const RECORD: [usize; 11] = super::RECORD;
         let format = usize::from(self.format);
         if format < 6 {
             return near("the stream", self.end - self.start);
         }
-        let layers = FIELDS[format] + self.stride - RECORD[format];
+        let layers = FIELDS[format] + self.stride - STRIDES[format];
         let mut end = self.stride + 4 + 4 * layers;
         if at < end {
             return "the lengths of the layers".to_owned();

@@ -1,7 +1,5 @@
 //! What the tests of the LAZ decoder share: files of every format and kind of compression, written by the
 //! `laz` crate from made-up records, and that crate as the second opinion on any file.
-#![allow(dead_code, reason = "each test file uses a part of it")]
-#![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
 
 mod colors;
 pub mod damage;
@@ -15,11 +13,10 @@ use laz::record::{RecordCompressor, SequentialPointRecordCompressor};
 use laz::{LasZipCompressor, LasZipDecompressor, LazVlr};
 use pointmill::Result;
 use pointmill::io::las::open;
-use pointmill::point::PointBatch;
-use pointmill::stage::Source;
 
-/// Bytes of a record of each point format without extra bytes.
-pub const RECORD: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
+use super::las_file::STRIDES;
+use super::records::read_without;
+
 /// Bytes of the header of LAS 1.4.
 const HEADER: usize = 375;
 /// Step of stored coordinates.
@@ -54,7 +51,7 @@ fn put(data: &mut [u8], at: usize, bytes: &[u8]) {
 impl Recipe {
     /// Bytes of a record.
     pub fn stride(&self) -> usize {
-        RECORD[usize::from(self.format)] + self.extra
+        STRIDES[usize::from(self.format)] + self.extra
     }
 
     /// True if the crate reads no such file as LASzip does: colours of version 1.
@@ -217,26 +214,9 @@ impl Theirs {
     }
 }
 
-/// All records of a source, in batches of `capacity`, without the dimensions `unread`.
-pub fn read(source: &dyn Source, capacity: usize, unread: &[String]) -> Result<Vec<u8>> {
-    let mut batch = PointBatch::new(source.schema().clone(), capacity);
-    let mut records = Vec::new();
-    for index in 0..source.parts() {
-        let mut part = source.part_without(index, unread)?;
-        loop {
-            part.read(&mut batch)?;
-            if batch.is_empty() {
-                break;
-            }
-            records.extend_from_slice(batch.records());
-        }
-    }
-    Ok(records)
-}
-
 /// All records of a file.
 pub fn read_file(path: &Path, capacity: usize) -> Result<Vec<u8>> {
-    read(&*open(&[path.to_owned()])?, capacity, &[])
+    read_without(&*open(&[path.to_owned()])?, capacity, &[])
 }
 
 /// Where two runs of records first differ, in words.

@@ -1,35 +1,8 @@
 //! Made-up records: as scanners make them, as nobody makes them, and as an encoder has most trouble with.
 
-use super::{Chunks, RECORD, Recipe};
-
-/// Numbers for tests: splitmix64.
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn number(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    pub fn below(&mut self, end: usize) -> usize {
-        (self.number() % end.max(1) as u64) as usize
-    }
-
-    pub fn one_in(&mut self, n: usize) -> bool {
-        self.below(n) == 0
-    }
-
-    pub fn bytes(&mut self, len: usize) -> Vec<u8> {
-        (0..len).map(|_| self.number() as u8).collect()
-    }
-
-    fn of<T: Copy>(&mut self, list: &[T]) -> T {
-        list[self.below(list.len())]
-    }
-}
+use super::super::las_file::STRIDES;
+use super::super::random::Random;
+use super::{Chunks, Recipe};
 
 /// What records are like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,7 +33,7 @@ impl Places {
             _ => Some(20),
         };
         let beside = time.map_or(20, |at| at + 8);
-        Places { format, time, beside, end: RECORD[usize::from(format)] }
+        Places { format, time, beside, end: STRIDES[usize::from(format)] }
     }
 
     /// Kinds of place before the time: byte and width of numbers that change by steps.
@@ -137,7 +110,7 @@ impl Maker {
     fn walk(&mut self) {
         self.shift();
         if self.random.one_in(3) {
-            let (at, width) = self.random.of(self.places.numbers());
+            let (at, width) = self.random.one_of(self.places.numbers());
             let by = (self.random.below(9) as u64).wrapping_sub(4);
             let value = number(&self.record, at, width).wrapping_add(by);
             put_number(&mut self.record, at, width, value);
@@ -174,13 +147,13 @@ impl Maker {
         for &(at, width) in self.places.numbers() {
             const ENDS: [u64; 8] =
                 [0, 1, u64::MAX, 0x7f, 0x80, 0x7fff_8000, 0x7fff_ffff, 0x8000_0000];
-            let end = self.random.of(&ENDS);
+            let end = self.random.one_of(&ENDS);
             put_number(&mut self.record, at, width, end);
         }
         self.next_returns();
-        self.record[15] = self.random.of(&[0, 0xff, 0x30, 0xcf]);
+        self.record[15] = self.random.one_of(&[0, 0xff, 0x30, 0xcf]);
         self.next_time();
-        let fill = self.random.of(&[0, 1, 0x7f, 0x80, 0xff]);
+        let fill = self.random.one_of(&[0, 1, 0x7f, 0x80, 0xff]);
         self.record[self.places.beside..].fill(fill);
     }
 
@@ -226,7 +199,7 @@ impl Maker {
         }
         let mut bits = self.times[sequence].0 as u64;
         if self.random.one_in(30) {
-            bits = self.random.of(&ODD).to_bits() ^ self.random.below(2) as u64;
+            bits = self.random.one_of(&ODD).to_bits() ^ self.random.below(2) as u64;
         }
         put_number(&mut self.record, at, 8, bits);
         self.mend_time();
@@ -269,7 +242,7 @@ pub fn ways(format: u8, random: &mut Random, points: usize) -> Vec<Chunks> {
             _ => 1 + random.below(300),
         });
     }
-    let fixed = if points < 50 { 1 } else { random.of(&[7, 128, 129, 500]) };
+    let fixed = if points < 50 { 1 } else { random.one_of(&[7, 128, 129, 500]) };
     let mut all = vec![Chunks::Fixed(50_000), Chunks::Fixed(fixed), Chunks::Varying(sizes)];
     if format < 6 {
         all.push(Chunks::None);
