@@ -14,9 +14,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::support::las::{LAZ, write};
+use crate::support::las_file::STRIDES;
 use crate::support::laz::damage::{Harm, Tally, Victim};
 use crate::support::laz::points::{Kind, Maker};
-use crate::support::laz::{Chunks, RECORD, Recipe};
+use crate::support::laz::{Chunks, Recipe};
+use crate::support::records::read_source;
 use pointmill::io::las::{fresh, layout, open};
 use pointmill::point::{Layout, Metadata, Schema};
 
@@ -34,7 +36,7 @@ struct Scan {
 impl Scan {
     fn read(path: &Path) -> Scan {
         let source = open(&[path.to_owned()]).unwrap();
-        let records = crate::support::las::read(&*source, POINTS).unwrap();
+        let records = read_source(&*source, POINTS).unwrap();
         let name = path.file_stem().unwrap().to_string_lossy().into_owned();
         let (schema, metadata) = (source.schema().clone(), source.metadata().clone());
         Scan { name, schema, metadata, records }
@@ -61,7 +63,7 @@ impl Scan {
         let chunk = if format < 6 { "chunk" } else { "layers" };
         let mut all = vec![(chunk, Victim::new(&path))];
         if format < 6 {
-            let extra = self.schema.stride - RECORD[usize::from(format)];
+            let extra = self.schema.stride - STRIDES[usize::from(format)];
             let recipe = Recipe { format, extra, version: 2, chunks: Chunks::None };
             let path = folder.join("stream.laz");
             std::fs::write(&path, recipe.bake(&self.records)).unwrap();

@@ -1,5 +1,4 @@
 //! A number of records instead of an angle: met exactly, whatever the ties and the tiles.
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
 
 use super::scene::*;
 use pointmill::ops::{Cells, Keep, Measure, Side, Split};

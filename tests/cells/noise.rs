@@ -1,5 +1,4 @@
 //! What `cells` says before a run: how far normals scatter on planes, and how much will stay.
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
 
 use super::scene::*;
 use crate::support::random::Random;

@@ -1,5 +1,4 @@
 //! The partition into cells: against the plain version, and what the words of the method promise.
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
 
 use std::num::NonZeroUsize;
 

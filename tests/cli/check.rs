@@ -1,7 +1,5 @@
 //! `check` and `stages`: what a pipeline can have, and whether one is right.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,5 @@
 //! What a run says while it works: events for programs, more or less text for people.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;

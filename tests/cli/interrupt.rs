@@ -1,12 +1,12 @@
 //! Being asked to stop: exit code 130 and nothing left behind.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
+
+use crate::support::command::PROGRAM;
 
 /// A long run in an empty folder, a second after its start.
 fn long_run(at: &Path, before: &str) -> Child {
@@ -14,7 +14,7 @@ fn long_run(at: &Path, before: &str) -> Child {
     let child = Command::new("sh")
         .current_dir(at)
         .args(["-c", &run])
-        .arg(assert_cmd::cargo::cargo_bin("pointmill"))
+        .arg(PROGRAM)
         .stderr(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()

@@ -1,7 +1,5 @@
 //! `picture`: scans of every format side by side, in a PNG file that appears complete or not at all.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use std::fs;
 
 use crate::support::command::{done, fails, pointmill, scans};

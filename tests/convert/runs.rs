@@ -1,8 +1,6 @@
 //! The command as users run it: conversions into files and folders, what it refuses, names of all
 //! kinds, what `info` and `plan` tell.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::path::PathBuf;

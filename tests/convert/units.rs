@@ -1,8 +1,6 @@
 //! Lengths with units of their own: converted where the reference system says what the scan is in,
 //! refused with the value that would do where it does not.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use crate::support::case::{Case, execute};
 use pointmill::Quiet;
 use pointmill::point::{Horizontal, Units};

@@ -1,8 +1,6 @@
 //! LAS, LAZ and PLY files whose headers, records or counts lie: each is refused with path, byte and
 //! remedy and leaves nothing behind, or is read whole with a warning.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::path::{Path, PathBuf};
 
 use crate::support::assert_holds;

@@ -1,8 +1,6 @@
 //! Places that take no output, disks that are full, inputs that change while they are read: an error
 //! with path and remedy, the right exit code, and nothing left behind.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -10,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::support::assert_holds;
 use crate::support::case::{Case, REDUCE, execute};
-use crate::support::command::{done, fails};
+use crate::support::command::{PROGRAM, done, fails};
 use crate::support::records::read;
 use pointmill::ErrorKind;
 use pointmill::{Overrides, Quiet, Watch};
@@ -73,11 +71,10 @@ fn an_output_is_never_an_input_by_whatever_name() {
 
 /// Runs pointmill with files limited to so many half KiB, as a full disk or a quota would.
 fn limited(at: &Path, blocks: u32, arguments: &[&str]) -> (Option<i32>, String) {
-    let program = assert_cmd::cargo::cargo_bin("pointmill");
     let output = Command::new("sh")
         .current_dir(at)
         .args(["-c", &format!("ulimit -f {blocks}; exec \"$0\" \"$@\"")])
-        .arg(program)
+        .arg(PROGRAM)
         .args(arguments)
         .output()
         .unwrap();

@@ -1,7 +1,5 @@
 //! Points that cannot be placed, scans of no point, one, or one place, and units that do not match.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
 use std::fs;
 
 use crate::support::assert_holds;

@@ -1,9 +1,7 @@
 //! The pages of docs/ and the data of `pointmill stages` that the code generates are those in the repository, and the keys that
 //! docs/formats.md names are those that a real report and real descriptions have.
 //!
-//! `POINTMILL_WRITE_DOCS=1 cargo test --test docs` writes the generated pages again.
-
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
+//! `POINTMILL_WRITE_DOCS=1 cargo test --test repository` writes the generated pages again.
 
 mod formats;
 mod keys;
@@ -14,7 +12,6 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use assert_cmd::Command;
 use formats::{agree, documented};
 use keys::{Default, Key};
 use pointmill::graph::{LimitKeys, RunSettings};
@@ -23,11 +20,14 @@ use pointmill::ops::normals::Normals;
 use pointmill::ops::{Cells, Filter, Grid, Median, Outliers};
 use pointmill::stage::StageKind;
 use pointmill::synth::Synth;
-use pointmill::{Graph, Overrides, Quiet, Registry};
+use pointmill::{Overrides, Quiet, Registry};
 use serde_json::Value;
+
+use crate::support::case::execute;
+use crate::support::command::pointmill;
 use source::{Enum, Field, enum_of, item_docs, struct_of};
 
-const SAYS_SO: &str = "written by `POINTMILL_WRITE_DOCS=1 cargo test --test docs`; do not edit";
+const SAYS_SO: &str = "written by `POINTMILL_WRITE_DOCS=1 cargo test --test repository`; do not edit";
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -127,7 +127,7 @@ fn sort_of(subject: &str, field: &Field, files: &[String]) -> (String, Option<En
         (_, _, "Vec<String>") => "a list of texts",
         (_, _, name) => {
             let words = files.iter().find_map(|text| enum_of(text, name)).unwrap_or_else(|| {
-                panic!("{subject}.{}: say in tests/docs.rs what a {name} is", field.name)
+                panic!("{subject}.{}: say in tests/docs/mod.rs what a {name} is", field.name)
             });
             let list: Vec<String> =
                 words.words.iter().map(|(word, _)| format!("`\"{word}\"`")).collect();
@@ -284,10 +284,9 @@ fn the_command_knows_what_the_pages_say() {
 }
 
 fn help(command: Option<&str>) -> String {
-    let mut pointmill = Command::cargo_bin("pointmill").unwrap();
-    let output = pointmill.arg("help").args(command).output().unwrap();
-    assert!(output.status.success());
-    let text = String::from_utf8(output.stdout).unwrap();
+    let arguments: Vec<&str> = ["help"].into_iter().chain(command).collect();
+    let (code, text, _) = pointmill(root().as_path(), &arguments);
+    assert_eq!(code, 0);
     text.lines().map(str::trim_end).collect::<Vec<_>>().join("\n").trim_end().to_owned()
 }
 
@@ -322,8 +321,7 @@ fn reduce(folder: &Path, output: &str) -> Value {
         at("scan.laz"),
         at(output)
     );
-    let pipeline = Graph::parse(&text, "docs.toml", &Registry::builtin()).unwrap();
-    pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
+    execute(&text, &Overrides::default(), &Quiet).unwrap();
     serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap()
 }
 
@@ -336,8 +334,7 @@ fn the_formats_that_are_documented_are_those_that_are_written() {
          [[stage]]\nkind = 'write'\npath = '{}'\n",
         scan.display()
     );
-    let pipeline = Graph::parse(&text, "docs.toml", &Registry::builtin()).unwrap();
-    pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
+    execute(&text, &Overrides::default(), &Quiet).unwrap();
 
     let report = reduce(folder.path(), "reduced.laz");
     agree(&report, "report.json");

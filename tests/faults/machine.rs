@@ -1,6 +1,5 @@
 //! Runs of the program on a machine that fails in chosen ways (`shim.c`), and what must hold after
 //! each of them.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
 
 use std::fmt;
 use std::fs;
@@ -10,6 +9,8 @@ use std::time::Duration;
 
 use assert_cmd::Command;
 use pointmill::report::result_bytes;
+
+use crate::support::command::PROGRAM;
 
 /// Numbers of errors of Linux, the same on the processors that the shim knows.
 pub const EINTR: u32 = 4;
@@ -164,7 +165,7 @@ impl Bench {
     }
 
     fn program(&self, arguments: &str) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_pointmill"));
+        let mut command = Command::new(PROGRAM);
         command.current_dir(self.at()).args(arguments.split_whitespace());
         command.timeout(Duration::from_secs(60));
         command

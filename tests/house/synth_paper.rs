@@ -1,9 +1,7 @@
 //! The paper's experiment, done again: its tables beside ours in docs/paper.md, and what the uniform
 //! pattern does to neighbourhoods.
 //!
-//! `POINTMILL_WRITE_DOCS=1 cargo test --test synth_paper` writes the table again.
-
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
+//! `POINTMILL_WRITE_DOCS=1 cargo test --test repository` writes the table again.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -12,11 +10,13 @@ use std::path::{Path, PathBuf};
 use pointmill::point::{PointBatch, names};
 use pointmill::stage::OpenSource;
 use pointmill::synth::{Scene, Synthetic};
-use pointmill::{Graph, Overrides, Quiet, Registry};
+use pointmill::{Overrides, Quiet};
 use serde_json::Value;
 
+use crate::support::case::execute;
+
 const SAYS_SO: &str =
-    "written by `POINTMILL_WRITE_DOCS=1 cargo test --test synth_paper`; do not edit";
+    "written by `POINTMILL_WRITE_DOCS=1 cargo test --test repository`; do not edit";
 const END: &str = "<!-- end of the table -->";
 
 /// A row of the paper's tables I and III.
@@ -62,8 +62,7 @@ fn reduce(folder: &Path, scene: Scene, points: u64, noise: f64, neighbors: u64) 
         report.display(),
         folder.join("reduced.las").display()
     );
-    let pipeline = Graph::parse(&text, "paper.toml", &Registry::builtin()).unwrap();
-    pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
+    execute(&text, &Overrides::default(), &Quiet).unwrap();
     let report: Value = serde_json::from_slice(&fs::read(report).unwrap()).unwrap();
     let result = &report["result"];
     assert_eq!(result["ledger"]["read"], points);

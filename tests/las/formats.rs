@@ -1,7 +1,5 @@
 //! Every point format, plain and compressed, with and without extra bytes: what goes in comes out.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::sync::Arc;
 
 use crate::support::las::{LAS, LAZ, read_files, write};

@@ -1,7 +1,5 @@
 //! Several files as one scan: what they must share, what becomes of the rest, in any order.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

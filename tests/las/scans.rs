@@ -1,7 +1,5 @@
 //! Real files: all that can be read is read and survives LAS → LAZ → LAS; damage is told.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use crate::support::las::{BROKEN, LAS, LAZ, manifest, write};
 use crate::support::records::read_source;
 use crate::support::scans;

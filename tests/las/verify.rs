@@ -1,11 +1,10 @@
 //! Points are held against what their header says of them: its box, its counts by return, its count.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::Arc;
 
+use crate::support::case_file;
+use crate::support::command::pointmill;
 use crate::support::las::{LAS, LAZ, write};
 use crate::support::random::Random;
 use crate::support::records::read_source;
@@ -51,12 +50,9 @@ fn scan(folder: &Path, name: &str, format: u8, change: impl Fn(&mut [u8])) -> Pa
 
 /// Exit code and standard error of the program with these arguments, on two threads.
 fn program(arguments: &[&Path]) -> (i32, String) {
-    let done = Command::new(env!("CARGO_BIN_EXE_pointmill"))
-        .args(arguments)
-        .args(["--threads", "2"])
-        .output()
-        .unwrap();
-    (done.status.code().unwrap(), String::from_utf8(done.stderr).unwrap())
+    let threads = [Path::new("--threads"), Path::new("2")];
+    let (code, _, told) = pointmill(Path::new("."), &[arguments, &threads].concat());
+    (code, told)
 }
 
 /// Converts `input` to `out.las` beside it, with `more` arguments.
@@ -278,7 +274,6 @@ fn flipped_bits_of_layers_are_told_by_the_ends_of_their_streams() {
 
 #[test]
 fn points_that_the_header_does_not_count_are_told_and_left() {
-    let case = |name: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name);
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out.las");
     for (name, points, told) in [
@@ -288,7 +283,7 @@ fn points_that_the_header_does_not_count_are_told_and_left() {
         ("19c-14count5-legacy3.las", 5, "counts 5 points and, in the field for older readers, 3"),
         ("21-box-wrong.las", 5, "the header has no box of the points"),
     ] {
-        let input = case(name);
+        let input = case_file(name);
         let (code, text) = program(&[Path::new("convert"), &input, Path::new("-o"), &out]);
         assert_eq!(code, 0, "{name}: {text}");
         assert_eq!(text.contains("warning: "), !told.is_empty(), "{name}: {text}");
@@ -299,7 +294,7 @@ fn points_that_the_header_does_not_count_are_told_and_left() {
         assert_eq!(read.len(), points * all.schema().stride, "{name}");
     }
     // The same where the bytes behind are no points: that is damage.
-    let mut bytes = std::fs::read(case("80j-count-fewer.laz")).unwrap();
+    let mut bytes = std::fs::read(case_file("80j-count-fewer.laz")).unwrap();
     put(&mut bytes, MAX_Z - 32, 110.0);
     let path = folder.path().join("cut.laz");
     std::fs::write(&path, bytes).unwrap();

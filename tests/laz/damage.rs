@@ -1,8 +1,6 @@
 //! Compressed points with bits, bytes and stretches that are others: reading ends, and almost always says
 //! where the damage is. `benches/damage.rs` is the same by the ten thousand, and on real scans.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::path::Path;
 
 use crate::support::laz::damage::{Harm, Tally, Victim};

@@ -1,8 +1,6 @@
 //! The decoder of compressed points held against the `laz` crate: the same bytes, whatever is in the
 //! records, however they are compressed and in batches of any size.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::path::{Path, PathBuf};
 
 use crate::support::laz::points::{Kind, Maker, ways};

@@ -1,59 +1,44 @@
 //! The budget bounds the peak of resident memory, and what does not fit is refused with the number
 //! that would do. Each run is a process of its own, which reads its peak (VmHWM) itself.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::path::Path;
-use std::time::Duration;
 
-use assert_cmd::Command;
 use serde_json::Value;
+
+use crate::support::command::{mebibytes, pointmill_told};
 
 /// Bytes of a record of a synthetic scan.
 const RECORD: u64 = 30;
 const MIB: u64 = 1 << 20;
 
-/// Runs pointmill in `folder`; gives its exit code and what it told on stderr.
-fn pointmill(folder: &Path, arguments: &str) -> (i32, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_pointmill"))
-        .current_dir(folder)
-        .args(arguments.split_whitespace())
-        .timeout(Duration::from_secs(900))
-        .output()
-        .unwrap();
-    (output.status.code().expect("an exit code"), String::from_utf8(output.stderr).unwrap())
-}
-
 fn synth(folder: &Path, points: u64) {
-    let (code, told) = pointmill(folder, &format!("synth als -n {points} -o scan.las"));
+    let (code, told) = pointmill_told(folder, &format!("synth als -n {points} -o scan.las"));
     assert_eq!(code, 0, "{told}");
 }
 
 /// Runs a command with a budget; asserts that it was kept, and gives the report's `run`.
-fn bounded(folder: &Path, command: &str, mebibytes: u64) -> Value {
-    let arguments = format!("{command} --memory {mebibytes}MiB --report report.json");
-    let (code, told) = pointmill(folder, &arguments);
+fn bounded(folder: &Path, command: &str, budget: u64) -> Value {
+    let arguments = format!("{command} --memory {budget}MiB --report report.json");
+    let (code, told) = pointmill_told(folder, &arguments);
     assert_eq!(code, 0, "{arguments}: {told}");
     let text = std::fs::read(folder.join("report.json")).unwrap();
     let mut report: Value = serde_json::from_slice(&text).unwrap();
     let run = report["run"].take();
     let peak = run["peak_memory_bytes"].as_u64().expect("a peak");
     println!("{arguments}: {} MiB at most, {} s", peak / MIB, run["seconds"]);
-    assert_eq!(run["memory_bytes"], mebibytes * MIB);
-    assert!(peak <= mebibytes * MIB, "{arguments}: {peak} bytes at most");
+    assert_eq!(run["memory_bytes"], budget * MIB);
+    assert!(peak <= budget * MIB, "{arguments}: {peak} bytes at most");
     run
 }
 
 /// The least budget in mebibytes that a refusal names.
-fn refused(folder: &Path, command: &str, mebibytes: u64, parts: &[&str]) -> u64 {
+fn refused(folder: &Path, command: &str, budget: u64, parts: &[&str]) -> u64 {
     let before = entries(folder);
-    let (code, told) = pointmill(folder, &format!("{command} --memory {mebibytes}MiB"));
-    assert_eq!(code, 1, "{command} with {mebibytes} MiB: {told}");
+    let (code, told) = pointmill_told(folder, &format!("{command} --memory {budget}MiB"));
+    assert_eq!(code, 1, "{command} with {budget} MiB: {told}");
     parts.iter().for_each(|part| assert!(told.contains(part), "{part:?} is not in {told}"));
     assert_eq!(entries(folder), before, "a refusal leaves nothing behind");
-    let help = told.lines().rfind(|line| line.starts_with("help:"));
-    let before = help.and_then(|help| help.split_once("MiB")).unwrap_or_else(|| panic!("{told}")).0;
-    before.rsplit(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap()
+    mebibytes(&told)
 }
 
 fn entries(folder: &Path) -> Vec<std::ffi::OsString> {
@@ -64,13 +49,13 @@ fn entries(folder: &Path) -> Vec<std::ffi::OsString> {
 }
 
 /// Runs commands on a scan at least three times as large as the budget, into outputs of their own.
-fn three_times_larger(points: u64, mebibytes: u64, commands: &[&str]) {
-    assert!(points * RECORD >= 3 * mebibytes * MIB);
+fn three_times_larger(points: u64, budget: u64, commands: &[&str]) {
+    assert!(points * RECORD >= 3 * budget * MIB);
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     synth(at, points);
     for command in commands {
-        let run = bounded(at, command, mebibytes);
+        let run = bounded(at, command, budget);
         if command.starts_with("reduce") {
             assert!(run["spill_bytes"].as_u64().unwrap() > points * RECORD / 2, "{command}: {run}");
             assert!(run["work"]["tiles"].as_u64().unwrap() >= 30, "{command}: {run}");
@@ -156,7 +141,7 @@ fn a_budget_too_small_is_refused_before_any_work_with_the_number_that_does() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     synth(at, 400_000);
-    let (code, told) = pointmill(at, "convert scan.las -o scan.laz");
+    let (code, told) = pointmill_told(at, "convert scan.las -o scan.laz");
     assert_eq!(code, 0, "{told}");
     for command in [
         "reduce scan.las -o out.laz --threads 1",

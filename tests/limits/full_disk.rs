@@ -1,8 +1,6 @@
 //! Disks without room for an output: refused before any work where that can be known, else an error
 //! in the end; what was there stays, and nothing is half-written.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::fs::{self, File};
 use std::os::unix::fs::FileExt;
 use std::path::Path;

@@ -1,36 +1,16 @@
 //! The budget that a refusal names does when it is given, and much less does not: on scans that are
 //! spread evenly, on a line, in clusters and in copies, on one thread and on several.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::path::Path;
-use std::time::Duration;
 
+use crate::support::command::{mebibytes, pointmill_told};
 use crate::support::random::Random;
 use crate::support::scan::Scan;
-use assert_cmd::Command;
 use pointmill::synth::Scene;
 
 /// Runs pointmill in `folder` with a budget; gives its exit code and what it told on stderr.
-fn with(folder: &Path, command: &str, mebibytes: u64) -> (i32, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_pointmill"))
-        .current_dir(folder)
-        .args(command.split_whitespace())
-        .args(["--memory", &format!("{mebibytes}MiB")])
-        .timeout(Duration::from_secs(300))
-        .output()
-        .unwrap();
-    let told = String::from_utf8(output.stderr).unwrap();
-    (output.status.code().unwrap_or_else(|| panic!("{command}: {told}")), told)
-}
-
-/// The budget in mebibytes that a refusal's last line names.
-fn named(told: &str) -> u64 {
-    let help =
-        told.lines().rfind(|line| line.starts_with("help:")).unwrap_or_else(|| panic!("{told}"));
-    let end = help.find("MiB").unwrap_or_else(|| panic!("{told}"));
-    let begin = help[..end].rfind(|c: char| !c.is_ascii_digit()).unwrap() + 1;
-    help[begin..end].parse().unwrap()
+fn with(folder: &Path, command: &str, budget: u64) -> (i32, String) {
+    pointmill_told(folder, &format!("{command} --memory {budget}MiB"))
 }
 
 /// Scans that need very different tiles; the last has more points than tiles take in least memory.
@@ -67,7 +47,7 @@ fn the_budget_that_a_refusal_names_does_and_sixteen_mebibytes_less_do_not() {
                     break told;
                 }
                 assert_eq!(code, 1, "{what}: {command} in {budget} MiB: {told}");
-                let enough = named(&told);
+                let enough = mebibytes(&told);
                 assert!(!is_last && enough > budget, "{what}: {command} in {budget} MiB: {told}");
                 let (code, less) = with(at, &command, enough.saturating_sub(16).max(1));
                 assert_eq!(code, 1, "{what}: {command} does in 16 MiB less: {told}{less}");
@@ -103,11 +83,11 @@ fn a_side_that_samples_choose_is_refused_with_a_lower_bound_before_them_and_fits
         if code == 0 {
             break;
         }
-        assert!(code == 1 && named(&told) > budget && !was_last, "{told}");
+        assert!(code == 1 && mebibytes(&told) > budget && !was_last, "{told}");
         was_last = !told.contains("at least");
         refusals += 1;
         assert!(refusals < 5, "{told}");
-        budget = named(&told);
+        budget = mebibytes(&told);
     }
     assert!(refusals > 1, "{refusals}");
 }
@@ -134,11 +114,11 @@ fn copies_that_differ_in_class_are_refused_with_a_lower_bound_and_fit_in_the_end
             break;
         }
         assert!(code == 1 && told.contains("at least"), "{told}");
-        assert!(named(&told) > budget, "{told}");
+        assert!(mebibytes(&told) > budget, "{told}");
         of_copies += usize::from(told.contains("copies that differ in class or flags"));
         refusals += 1;
         assert!(refusals < 5, "{told}");
-        budget = named(&told);
+        budget = mebibytes(&told);
     }
     assert!(of_copies > 0, "the copies took no more than what is planned");
 }

@@ -1,7 +1,5 @@
 //! Nothing lost where there is next to nothing, all in one place, or a number beyond all bounds.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::path::{Path, PathBuf};
 
 use crate::support::assert_holds;

@@ -1,8 +1,6 @@
 //! Nothing lost: whole runs over every point format and over PLY, with what goes in and what comes
 //! out compared as bytes.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::path::{Path, PathBuf};
 
 use crate::support::las_file::{Beside, LasFile, STRIDES, extra_bytes};

@@ -1,8 +1,6 @@
 //! Cut and flipped files: an error or points, never a panic, a hang or memory for what is only
 //! claimed.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};

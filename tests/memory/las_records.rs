@@ -1,14 +1,13 @@
 //! What is held of a file's records and of its table of chunks is bounded, whatever it claims and however
 //! long it is.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::io::{Cursor, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::support::allocator::{self, held};
 use crate::support::case::execute;
+use crate::support::case_file;
 use crate::support::las::{LAZ, write};
 use crate::support::records::read_source;
 use crate::support::runs::remedy;
@@ -27,8 +26,7 @@ fn file(path: &Path, count: u32, payload: usize, extended: bool) {
 /// The same with records of this user.
 fn file_of(user: &str, path: &Path, count: u32, payload: usize, extended: bool) {
     let name = "19c-14count5-legacy3.las";
-    let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name);
-    let mut bytes = std::fs::read(case).unwrap();
+    let mut bytes = std::fs::read(case_file(name)).unwrap();
     let mut record = vec![0; if extended { 60 } else { 54 } + payload];
     record[2..2 + user.len()].copy_from_slice(user.as_bytes());
     record[20..22].copy_from_slice(&(payload as u16).to_le_bytes());

@@ -1,8 +1,6 @@
 //! Real scans through the whole pipeline: what can be read is reduced and read back, what is broken
 //! is told; nothing panics, hangs, or allocates by a number that a file claims.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::collections::{BTreeMap, VecDeque};
 use std::panic::catch_unwind;
 use std::path::{Path, PathBuf};

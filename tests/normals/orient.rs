@@ -1,7 +1,5 @@
 //! To which side normals point: up, towards a viewpoint, and on the borders of both.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use crate::support::tiles::*;
 use pointmill::ops::normals::{Normals, Orient};
 use pointmill::point::Position;

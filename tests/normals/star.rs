@@ -1,8 +1,6 @@
 //! The star of a point and the fit over it, against a library triangulation of the same
 //! neighbourhood and a least-squares fit in its rotated frame.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 use super::solvers::{
     Vec3, angle, around, covariance, cross, dot, frame, jacobi, normalised, rotated_fit,
 };

@@ -1,8 +1,6 @@
 //! One output for each input: its own header, records, offset and name, from inputs that are read as
 //! one scan.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,8 +1,6 @@
 //! Stages of two phases, selections and repeated passes against brute force over all of a small scan,
 //! in runs of many tiles.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::support::random::Random;

@@ -2,8 +2,6 @@
 //! record is one of the input, but for the one field that a mark writes, and every record is accounted
 //! for.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
 use std::collections::BTreeMap;
 use std::path::Path;
 

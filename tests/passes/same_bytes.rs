@@ -2,8 +2,6 @@
 //! and several sinks too: random configurations of one scan and pipeline give the same bytes of every
 //! output and of the report's `result`.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
 use std::collections::BTreeMap;
 use std::path::Path;
 

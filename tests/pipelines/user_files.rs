@@ -1,8 +1,6 @@
 //! Files that a command reads, or that its user wants to keep: it never writes over them, by
 //! whatever name.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::Path;

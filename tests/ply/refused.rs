@@ -1,5 +1,4 @@
 //! PLY files that must be refused, and what is said of them.
-#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
 
 use std::path::PathBuf;
 

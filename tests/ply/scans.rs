@@ -1,5 +1,4 @@
 //! PLY files of other programs, and what becomes of them when they are cut short or damaged.
-#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

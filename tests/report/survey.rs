@@ -1,7 +1,5 @@
 //! The survey: planes and deviations of tiles and scan, against geometry and in any order of merging.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails is to panic")]
-
 use pointmill::geom::lattice::Lattice;
 use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
 use pointmill::report::{

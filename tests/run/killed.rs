@@ -1,7 +1,5 @@
 //! Runs that are killed or asked to stop: no output under its name, and no scratch that stays.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
-
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
@@ -10,7 +8,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use crate::support::assert_holds;
-use crate::support::command::{command, done, scans};
+use crate::support::command::{PROGRAM, done, scans};
 
 /// A run of minutes whose points do not fit in its memory.
 const LONG: &str = "[run]\nmemory = \"200MiB\"\nthreads = 2\nreport = \"report.json\"\n\
@@ -22,10 +20,9 @@ const LONG: &str = "[run]\nmemory = \"200MiB\"\nthreads = 2\nreport = \"report.j
 fn long_run(at: &Path, bytes: u64) -> Child {
     fs::write(at.join("long.toml"), LONG).unwrap();
     // Signals that are ignored here, as under nohup, would be ignored by the program.
-    let program = command(at, &[]).get_program().to_owned();
     let mut child = Command::new("env")
         .arg("--default-signal=HUP,INT,TERM")
-        .arg(program)
+        .arg(PROGRAM)
         .args(["run", "long.toml"])
         .current_dir(at)
         .stdout(Stdio::piped())

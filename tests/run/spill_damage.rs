@@ -1,8 +1,6 @@
 //! Bits of scratch files that flip while they wait: every store, at any time of a run. A run either
 //! tells, and publishes nothing, or was not touched and writes what it always does.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::os::unix::fs::{FileExt, PermissionsExt};

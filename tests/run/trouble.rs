@@ -1,8 +1,6 @@
 //! Runs that cannot begin, fail, panic or are stopped: each ends with its error and leaves nothing
 //! behind.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,8 +1,6 @@
 //! Structured bad luck: all points in one place, on a line, on a lattice twice over, in clusters on
 //! both sides of the world, in degrees and in millimetres. What is right is known for each.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;

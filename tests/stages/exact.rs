@@ -1,8 +1,6 @@
 //! Neighbours and normals of a real scan are those of brute force over all of it, above all where
 //! tiles meet.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -1,7 +1,5 @@
 //! The grid against brute force, over whole scans however they are cut into tiles.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use std::collections::BTreeMap;
 
 use crate::support::tiles::*;

@@ -1,7 +1,5 @@
 //! Outliers against brute force, over whole scans however they are cut into tiles.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use crate::support::random::Random;
 use crate::support::tiles::*;
 use pointmill::Result;

@@ -1,8 +1,6 @@
 //! What a pipeline leaves to the scan ("auto", "spread"): a function of the points alone, told in the
 //! report, and the same bytes when it is given by hand. And the baseline of the report.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use std::path::PathBuf;
 
 use crate::support::assert_same;

@@ -1,8 +1,6 @@
 //! Whole runs of the stages that remove by distance, mark, and repeat: against brute force, and
 //! against the same done in several runs.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;

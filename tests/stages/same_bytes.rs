@@ -1,8 +1,6 @@
 //! The answer is a function of the points alone: random configurations of one scan and pipeline give
 //! the same bytes, in runs that had every chance to differ.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
 use crate::support::random::Random;
 use crate::support::runs::{Memory, Ran, Settings, assert_not_empty, instruction_sets, run};
 use crate::support::scan::Scan;

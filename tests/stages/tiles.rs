@@ -1,7 +1,5 @@
 //! The tile store against brute force: every position once, canonical order, exact neighbours.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -1,11 +1,9 @@
 //! Layers of LAZ that nobody looks at are not decoded, and no output tells.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
 use std::path::Path;
-use std::process::Command;
 use std::sync::Arc;
 
+use crate::support::command::done;
 use crate::support::las::{LAS, LAZ, write};
 use crate::support::random::Random;
 use crate::support::records::read_source;
@@ -37,10 +35,7 @@ fn scan(folder: &Path, format: u8) -> Schema {
 }
 
 fn converted(folder: &Path, input: &str, output: &str, drop: &str) -> Vec<u8> {
-    let program = env!("CARGO_BIN_EXE_pointmill");
-    let arguments = ["convert", input, "-o", output, "--drop", drop, "--quiet"];
-    let done = Command::new(program).current_dir(folder).args(arguments).output().unwrap();
-    assert!(done.status.success(), "{drop}: {}", String::from_utf8_lossy(&done.stderr));
+    done(folder, &["convert", input, "-o", output, "--drop", drop, "--quiet"]);
     std::fs::read(folder.join(output)).unwrap()
 }
 

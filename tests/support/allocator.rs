@@ -25,7 +25,6 @@ static MOST: AtomicUsize = AtomicUsize::new(0);
 static LARGEST: AtomicUsize = AtomicUsize::new(0);
 
 /// A turn at measuring what the process holds: tests run side by side, and it is one number.
-#[must_use]
 pub fn alone() -> MutexGuard<'static, ()> {
     static ALONE: Mutex<()> = Mutex::new(());
     let turn = ALONE.lock().unwrap_or_else(PoisonError::into_inner);

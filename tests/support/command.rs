@@ -1,20 +1,46 @@
 //! The program as a user starts it.
 
+use std::ffi::OsStr;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::time::Duration;
+
+/// The program.
+pub const PROGRAM: &str = env!("CARGO_BIN_EXE_pointmill");
+
+/// Time that a run may take: one that hangs is ended, and fails its test.
+const PATIENCE: Duration = Duration::from_secs(900);
 
 /// The program with `arguments` in the folder `at`.
-pub fn command(at: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("pointmill"));
+pub fn command<S: AsRef<OsStr>>(at: &Path, arguments: &[S]) -> Command {
+    let mut command = Command::new(PROGRAM);
     command.current_dir(at).args(arguments).stdin(Stdio::null());
     command
 }
 
 /// Exit code, stdout and stderr.
-pub fn pointmill(at: &Path, arguments: &[&str]) -> (i32, String, String) {
-    let output = command(at, arguments).output().unwrap();
+pub fn pointmill<S: AsRef<OsStr>>(at: &Path, arguments: &[S]) -> (i32, String, String) {
+    let output = ended(command(at, arguments), PATIENCE);
     let text = |bytes| String::from_utf8(bytes).unwrap();
     (output.status.code().expect("an exit code"), text(output.stdout), text(output.stderr))
+}
+
+/// What a command came to that must end within `limit`.
+pub fn ended(command: Command, limit: Duration) -> std::process::Output {
+    assert_cmd::Command::from_std(command).timeout(limit).output().unwrap()
+}
+
+/// The same arguments in one text; exit code and stderr.
+pub fn pointmill_told(at: &Path, arguments: &str) -> (i32, String) {
+    let (code, _, told) = pointmill(at, &arguments.split_whitespace().collect::<Vec<_>>());
+    (code, told)
+}
+
+/// The budget in mebibytes that a refusal's last line names.
+pub fn mebibytes(told: &str) -> u64 {
+    let help = told.lines().rfind(|line| line.starts_with("help:"));
+    let before = help.and_then(|help| help.split_once("MiB")).unwrap_or_else(|| panic!("{told}")).0;
+    before.rsplit(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap()
 }
 
 /// Runs a command that must succeed and say nothing, but what it chose for so few points; its stdout.
