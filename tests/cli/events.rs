@@ -1,14 +1,10 @@
 //! What a run says while it works: events for programs, more or less text for people.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
-use crate::scans_support;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use scans_support::command::{done, pointmill, scans};
+use crate::support::command::{done, pointmill, scans};
 use serde_json::Value;
 
 /// The events on stderr: every line is one, in order of time.

@@ -1,5 +1,4 @@
 //! LAS records as PLY vertices and back: every field, bit for bit.
-#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
 
 use pointmill::io::convert::{Projection, las_schema, ply_schema};
 use pointmill::point::{Dimension, Endian, Layout, Scalar, Schema, Value};

@@ -1,7 +1,5 @@
 //! Pipeline files: what is read, and how every mistake is told.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use std::path::Path;
 
 use pointmill::graph::{MixedUnits, Nonfinite, Simd, ZScale};

@@ -1,15 +1,14 @@
 //! Structured bad luck: all points in one place, on a line, on a lattice twice over, in clusters on
 //! both sides of the world, in degrees and in millimetres. What is right is known for each.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
-use crate::common;
-
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use common::{Memory, Random, Scan, Settings, assert_same, run};
+use crate::support::assert_same;
+use crate::support::random::Random;
+use crate::support::runs::{Memory, Settings, run};
+use crate::support::scan::Scan;
 use pointmill::budget::Budget;
 use pointmill::host::parallel;
 use pointmill::point::{

@@ -1,15 +1,14 @@
 //! Neighbours and normals of a real scan are those of brute force over all of it, above all where
 //! tiles meet.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
-use crate::common;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use common::{Memory, Random, Scan, Settings, run, scans};
+use crate::support::random::Random;
+use crate::support::runs::{Memory, Settings, run};
+use crate::support::scan::Scan;
+use crate::support::scans;
 use pointmill::budget::Budget;
 use pointmill::host::parallel;
 use pointmill::ops::normals::{Estimate, Estimator, Method};
@@ -160,7 +159,7 @@ fn normals_written_by_a_tiled_run_are_those_of_brute_force_to_the_bit() {
         let write = "laz\ndimensions = [\"NormalX\", \"NormalY\", \"NormalZ\"]";
         let ran = run(folder.path(), &files, &stage, write, settings).unwrap();
         assert_eq!(ran.count("tiles"), cubes.len() as u64, "the run cuts as the test does");
-        common::assert_not_empty(&ran, false, name);
+        crate::support::runs::assert_not_empty(&ran, false, name);
         let written = Scan::read(&ran.output, usize::MAX);
         assert_eq!(written.points(), scan.points());
         let normals = normals_of(&written);

@@ -1,0 +1,7 @@
+//! The repository itself: what imports what, what pages say, what it depends on.
+
+mod dependencies;
+mod drift;
+mod imports;
+mod modules;
+mod synth_paper;

@@ -1,0 +1,7 @@
+//! Pipeline files: their text, values, and the files that they name.
+
+mod inputs;
+mod text;
+mod user_files;
+mod values;
+mod words;
