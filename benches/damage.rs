@@ -20,7 +20,7 @@ use laz_support::damage::{Harm, Tally, Victim};
 use laz_support::points::{Kind, Maker};
 use laz_support::{Chunks, RECORD, Recipe};
 use pointmill::io::las::{fresh, layout, open};
-use pointmill::point::{Layout, Metadata, Schema};
+use pointmill::point::{Metadata, Schema};
 
 /// Points of a file: fewer than a chunk has, so that ten thousand are read in minutes.
 const POINTS: usize = 20_000;
@@ -51,7 +51,7 @@ impl Scan {
     }
 
     fn format(&self) -> u8 {
-        let Layout::Las { format } = self.schema.layout else { panic!("not a LAS file") };
+        let format = self.schema.layout.form.expect("a LAS file");
         format
     }
 

@@ -14,9 +14,13 @@ use std::sync::{Arc, Mutex};
 use las_support::{LAZ, read, write};
 use laz::laszip::{ChunkTable, ChunkTableEntry};
 use laz::{LasZipCompressor, LazVlr, LazVlrBuilder};
-use pointmill::io::{describe, las};
+use pointmill::io::las;
 use pointmill::{Error, ErrorKind};
 use pointmill::{Graph, Overrides, Quiet, Registry};
+
+fn describe(path: &Path) -> pointmill::Result<serde_json::Value> {
+    pointmill::io::describe(path, Registry::builtin().formats())
+}
 
 /// Counts what is held, and the most that was.
 struct Watched;

@@ -15,9 +15,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 
-use pointmill::io::ends::Format;
-use pointmill::io::{las, ply};
+use pointmill::Registry;
 use pointmill::point::PointBatch;
+use pointmill::stage::WriteKeys;
 use scans_support::{Setup, accounted, assert_contained, convert, open, read_some, reduce};
 use serde_json::json;
 
@@ -137,7 +137,7 @@ fn walk(folder: &Path, files: &mut Vec<PathBuf>) {
         let path = entry.unwrap().path();
         if path.is_dir() {
             walk(&path, files);
-        } else if Format::of(&path).is_some() {
+        } else if Registry::builtin().formats().of(&path).is_some() {
             files.push(path);
         }
     }
@@ -191,14 +191,9 @@ fn cropped(scan: &Scan, folder: &Path) -> PathBuf {
     }
     let (schema, records) = read_some(&paths, MOST).unwrap_or_else(|e| panic!("{e:?}"));
     let path = folder.join("cropped").with_extension(scan.path.extension().unwrap());
-    let mut sink = if Format::of(&path) == Some(Format::Ply) {
-        ply::create(&path, &ply::PlyOptions::default(), &schema, source.metadata())
-    } else {
-        let compressed = Format::of(&path) == Some(Format::Laz);
-        let options = las::LasOptions { compressed, normals: false };
-        las::create(&path, &options, &schema, source.metadata())
-    }
-    .unwrap();
+    let registry = Registry::builtin();
+    let (format, keys) = (registry.formats().of(&path).unwrap(), WriteKeys::default());
+    let mut sink = format.create(&path, &keys, &schema, source.metadata(), false).unwrap();
     let (encoder, chunk) = (sink.encoder(), sink.chunk_points());
     let mut batch = PointBatch::new(schema.clone(), chunk);
     for records in records.chunks(chunk * schema.stride) {

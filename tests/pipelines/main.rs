@@ -5,6 +5,7 @@ mod run_support;
 #[path = "../scans_support/mod.rs"]
 mod scans_support;
 
+mod formats;
 mod inputs;
 mod text;
 mod user_files;

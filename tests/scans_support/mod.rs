@@ -9,8 +9,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pointmill::Result;
-use pointmill::io::ends::Format;
-use pointmill::io::{las, ply};
 use pointmill::point::{PointBatch, Schema};
 use pointmill::stage::Source;
 use pointmill::{Done, Graph, Overrides, Quiet, Registry, Set};
@@ -90,7 +88,7 @@ pub fn convert(inputs: &[PathBuf], output: &Path, setup: &Setup) -> Result<Done>
 
 /// Opens files of one kind, by their extension.
 pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
-    if Format::of(&paths[0]) == Some(Format::Ply) { ply::open(paths) } else { las::open(paths) }
+    Registry::builtin().formats().of(&paths[0]).expect("a known extension").open(paths)
 }
 
 /// Schema and records of files, at most `limit` records.
