@@ -19,13 +19,12 @@ use crate::{Error, Result};
 
 impl Each<'_> {
     /// Writes every input's output, each thread one at a time; for each input, the records that its
-    /// output was given and what it said. `counted` if classes are counted by these records.
+    /// output was given and what it said.
     pub fn write(
         &self,
         job: &Job<'_>,
         tiles: &SealedTiles,
         records: &ByInput,
-        counted: bool,
     ) -> Result<(Vec<(u64, SinkSummary)>, Tally)> {
         let next = AtomicUsize::new(0);
         let done = Mutex::new((BTreeMap::new(), Tally::default()));
@@ -37,7 +36,7 @@ impl Each<'_> {
                     break;
                 }
                 job.advance(0)?;
-                let summary = self.write_one(job, tiles, records, input, &mut encoder, counted)?;
+                let summary = self.write_one(job, tiles, records, input, &mut encoder)?;
                 lock(&done).0.insert(input, summary);
             }
             lock(&done).1.merge(&encoder.tally);
@@ -54,16 +53,16 @@ impl Each<'_> {
         records: &ByInput,
         input: usize,
         encoder: &mut ChunkEncoder,
-        counted: bool,
     ) -> Result<(u64, SinkSummary)> {
         let missing = || Error::internal(format!("input {input} has no output"));
         let create = self.sinks.get(input).ok_or_else(missing)?;
         let staged = self.staged.get(input).ok_or_else(missing)?;
         let rank = *self.ranks.get(input).ok_or_else(missing)? as usize;
-        let pipeline = Some(job.pipeline.clone());
+        let pipeline = Some(job.pipelines[records.sink].clone());
         let metadata = Metadata { pipeline, ..job.source.metadata_of(input)? };
         let mut sink = create.create(staged.file(), job.source.schema(), &metadata, false)?;
-        let encoders = ChunkEncoders::of_one(job, tiles, &*sink, counted, create.likes_time());
+        let encoders =
+            ChunkEncoders::of_one(job, tiles, (records.sink, &*sink), create.likes_time());
         let mut open = Open::new(0, sink.chunk_points(), records.wants_normals, false);
         let (mut given, mut full) = (0, Vec::new());
         let mut append = |chunk: Chunk| {

@@ -11,6 +11,7 @@ mod clock;
 mod cut;
 mod each;
 mod encoding;
+mod filtering;
 mod finished;
 mod forecast;
 mod grind;

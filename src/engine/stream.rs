@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::finished::Finished;
+use super::finished::{Finished, FinishedBranch};
 use super::job::{Job, StopOnDrop};
 use super::outlet::{Hands, Outlet};
 use super::shares::{BATCH, Shares};
@@ -89,15 +89,20 @@ pub(crate) fn stream(
     let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
     let mut tally = std::mem::take(&mut *lock(&total));
     job.tell_idle(&tally);
-    Ok(Finished {
-        read: tally.work.remove("read").unwrap_or(0),
+    let read = tally.work.remove("read").unwrap_or(0);
+    let branch = FinishedBranch {
         kept,
-        written: written.into_iter().map(|summary| vec![(kept, summary)]).collect(),
         classes: tally.classes.take().map_or(Vec::new(), |classes| classes.figures()),
-        tally,
+        tally: tally.clone(),
         decisions: Vec::new(),
         passes: Vec::new(),
         measured: None,
+    };
+    Ok(Finished {
+        read,
+        written: written.into_iter().map(|summary| vec![(kept, summary)]).collect(),
+        tally,
+        branches: vec![branch],
     })
 }
 

@@ -50,7 +50,10 @@ fn a_format_from_outside_is_read_converted_and_written() {
     // To LAS and PLY, and back: what LAS has besides coordinates must be dropped by name.
     run(at, "a.toy'", "d.laz'\nscale = 0.25").unwrap();
     let lost = told(&run(at, "d.laz'", "e.toy'").unwrap_err());
-    assert!(lost.contains("e.toy: this TOY output cannot hold `Intensity`, `ReturnNumber`"), "{lost}");
+    assert!(
+        lost.contains("e.toy: this TOY output cannot hold `Intensity`, `ReturnNumber`"),
+        "{lost}"
+    );
     run(at, "a.toy'", "f.ply'").unwrap();
     run(at, "f.ply'", "e.toy'").unwrap();
     assert_eq!(text("e.toy"), POINTS);
