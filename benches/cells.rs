@@ -55,7 +55,7 @@ fn settled(side: i64, split: Split, tile: &Tile) -> Cells {
     (stage.side, stage.split) = (Side::Length(Length::of(side as f64).unwrap()), split);
     let axes = ["X", "Y", "Z"].iter().zip([0, 8, 16]);
     let schema = Schema {
-        layout: Layout::Ply,
+        layout: Layout::plain("PLY"),
         endian: Endian::Little,
         stride: 24,
         dimensions: axes.map(|(name, at)| Dimension::new(*name, Scalar::F64, at)).collect(),

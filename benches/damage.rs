@@ -20,7 +20,7 @@ use crate::support::laz::points::{Kind, Maker};
 use crate::support::laz::{Chunks, Recipe};
 use crate::support::records::read_source;
 use pointmill::io::las::{fresh, layout, open};
-use pointmill::point::{Layout, Metadata, Schema};
+use pointmill::point::{Metadata, Schema};
 
 /// Points of a file: fewer than a chunk has, so that ten thousand are read in minutes.
 const POINTS: usize = 20_000;
@@ -51,7 +51,7 @@ impl Scan {
     }
 
     fn format(&self) -> u8 {
-        let Layout::Las { format } = self.schema.layout else { panic!("not a LAS file") };
+        let format = self.schema.layout.form.expect("a LAS file");
         format
     }
 

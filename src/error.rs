@@ -58,6 +58,18 @@ fn too_many_open(cause: &std::io::Error) -> Option<&'static str> {
     }
 }
 
+/// Words as a sentence lists them, `last` before the last one: `las, laz or ply`.
+pub(crate) fn listed<S: AsRef<str>>(words: impl IntoIterator<Item = S>, last: &str) -> String {
+    let words: Vec<S> = words.into_iter().collect();
+    let join = |words: &[S]| words.iter().map(AsRef::as_ref).collect::<Vec<_>>().join(", ");
+    match &words[..] {
+        [first @ .., end] if !first.is_empty() => {
+            format!("{} {last} {}", join(first), end.as_ref())
+        }
+        all => join(all),
+    }
+}
+
 /// The valid word that a misspelt one was meant to be, if one is near: two letters in five wrong
 /// at most, neighbours that are swapped counting as one and case not at all; the first in the list
 /// among equals.
@@ -258,6 +270,14 @@ mod tests {
         assert_eq!(nearest("ORIENT", &valid), Some(&valid[2]));
         assert_eq!(nearest("colour", &valid), None);
         assert_eq!(nearest("", &valid), None);
+    }
+
+    #[test]
+    fn the_last_word_of_a_list_stands_behind_its_conjunction() {
+        assert_eq!(listed(["las", "laz", "ply"], "or"), "las, laz or ply");
+        assert_eq!(listed(["LAS", "LAZ"], "and"), "LAS and LAZ");
+        assert_eq!(listed(["ply"], "or"), "ply");
+        assert_eq!(listed([""; 0], "or"), "");
     }
 
     #[test]

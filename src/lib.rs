@@ -37,7 +37,8 @@
 //!     "#,
 //!     reduced.display()
 //! );
-//! let graph = Graph::parse(&text, "tour.toml", &Registry::builtin())?;
+//! let registry = Registry::builtin();
+//! let graph = Graph::parse(&text, "tour.toml", &registry)?;
 //! let report = graph.plan(&Overrides::default())?.run(&Quiet)?.report;
 //!
 //! // Every record is accounted for, and the file holds those that were kept.
@@ -45,7 +46,7 @@
 //! assert_eq!(ledger.read, 20_000);
 //! assert_eq!(ledger.read, ledger.kept + ledger.removed_records());
 //! assert_eq!(report.run.outputs[0].points, ledger.kept);
-//! assert_eq!(pointmill::io::describe(&reduced)?["points"], ledger.kept);
+//! assert_eq!(pointmill::io::describe(&reduced, registry.formats())?["points"], ledger.kept);
 //!
 //! // How far what was removed lies from the surface of what was kept, in the scan's unit.
 //! let totals = report.result.totals.ok_or("tiles were milled")?;

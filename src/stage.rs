@@ -1,6 +1,7 @@
 //! The roles a stage can play and what it tells the plan. Roles are closed, stages are open: an
 //! embedding program adds its own by implementing one of these traits.
 
+mod format;
 mod kind;
 
 use std::path::{Path, PathBuf};
@@ -13,6 +14,7 @@ use crate::report::Tally;
 use crate::store::Levels;
 use crate::tile::Tile;
 
+pub use format::{Colors, Format, FormatName, Formats, OutputEncoding, WriteKeys, foreign};
 pub use kind::{StageKind, StagePlace};
 
 /// Opens the inputs of a source: headers only, no point.
@@ -301,6 +303,14 @@ pub struct ChunkSize {
     pub points: usize,
     /// See [`Sink::chunk_bytes`].
     pub bytes: u64,
+}
+
+impl ChunkSize {
+    /// The same where the records of a chunk are held once more, each in `stride` bytes.
+    pub fn and_records(self, stride: usize) -> Self {
+        let records = (self.points as u64).saturating_mul(stride as u64);
+        ChunkSize { bytes: self.bytes.saturating_add(records), ..self }
+    }
 }
 
 /// Creates a sink once the source's schema is known.

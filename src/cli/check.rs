@@ -46,7 +46,10 @@ pub(super) fn check(
         }
         Err(error) => {
             let others = inputs.iter().filter(|input| error.path() != Some(input));
-            for other in others.filter_map(|input| io::describe(input).err().map(|e| e.at(input))) {
+            let wrong = |input: &PathBuf| {
+                io::describe(input, registry.formats()).err().map(|e| e.at(input))
+            };
+            for other in others.filter_map(wrong) {
                 console.error(&other);
             }
             Err(error)

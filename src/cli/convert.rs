@@ -12,14 +12,14 @@ use super::mistyped::marked;
 use super::run::{HIDDEN, mill, with_stages};
 use crate::budget::Bytes;
 use crate::engine::{Done, Watch, make_folder, refuse_existing};
-use crate::error::shown;
+use crate::error::{listed, shown};
 use crate::graph::Existing;
 use crate::graph::Graph;
 use crate::host::{Clash, Files, Use};
-use crate::io::ends::{Format, expand_any, unreadable};
-use crate::io::las;
+use crate::io::ends::{expand_any, unreadable};
 use crate::language::Registry;
 use crate::report::Grouped;
+use crate::stage::Formats;
 use crate::{Error, ErrorKind, Result};
 
 /// The pipeline of `convert`, which users copy.
@@ -32,13 +32,14 @@ pub(super) fn convert(
     registry: &Registry,
     console: &Console,
 ) -> Result<()> {
-    let folder = Path::new(&arguments.output);
+    let (folder, formats) = (Path::new(&arguments.output), registry.formats());
     if !(arguments.output.ends_with('/') || folder.is_dir()) {
         let one = pipeline(arguments, json!(arguments.inputs), json!(arguments.output), registry);
         return console.result(mill(one?, console)?);
     }
-    let (inputs, odd): (Vec<PathBuf>, Vec<PathBuf>) =
-        expand_any(&arguments.inputs)?.into_iter().partition(|input| input.to_str().is_some());
+    let (inputs, odd): (Vec<PathBuf>, Vec<PathBuf>) = expand_any(&arguments.inputs, formats)?
+        .into_iter()
+        .partition(|input| input.to_str().is_some());
     if let ([], [first, ..]) = (&inputs[..], &odd[..]) {
         return Err(unreadable(first));
     }
@@ -48,8 +49,8 @@ pub(super) fn convert(
         let note = "leave --report out, or convert the files one by one";
         return Err(Error::pipeline(marked(told, report, note)));
     }
-    let pairs = outputs(&inputs, folder, arguments.to.as_deref())?;
-    check_files(&pairs, arguments)?;
+    let pairs = outputs(&inputs, folder, arguments.to.as_deref(), formats)?;
+    check_files(&pairs, arguments, formats)?;
     // Every pipeline is checked before the first is run.
     let mut runs = Vec::new();
     for (input, output) in pairs {
@@ -71,9 +72,14 @@ pub(super) fn convert(
 
 /// No output of the whole batch may replace an input of it, be it one of another conversion that is
 /// reached through a link, nor another output.
-fn check_files(pairs: &[(PathBuf, PathBuf)], arguments: &ConvertArguments) -> Result<()> {
+fn check_files(
+    pairs: &[(PathBuf, PathBuf)],
+    arguments: &ConvertArguments,
+    formats: &Formats,
+) -> Result<()> {
     let mut files = Files::default();
-    let beside: Vec<_> = pairs.iter().map(|(input, _)| las::beside(input)).collect();
+    let beside = |input| formats.of(input).and_then(|format| format.beside(input));
+    let beside: Vec<_> = pairs.iter().map(|(input, _)| beside(input)).collect();
     pairs.iter().for_each(|(input, _)| files.read(input, Use::Input));
     beside.iter().flatten().for_each(|(file, _)| files.read(file, Use::Input));
     let existing = if arguments.common.no_clobber { Existing::Refuse } else { Existing::Replace };
@@ -86,8 +92,8 @@ fn check_files(pairs: &[(PathBuf, PathBuf)], arguments: &ConvertArguments) -> Re
         refuse_existing(output, existing)?;
     }
     for ((_, output), beside) in pairs.iter().zip(&beside) {
-        let is_las = Format::of(output) != Some(Format::Ply);
-        let Some((from, extension)) = beside.as_ref().filter(|_| is_las) else { continue };
+        let wanted = formats.of(output).is_none_or(|format| format.wants_beside());
+        let Some((from, extension)) = beside.as_ref().filter(|_| wanted) else { continue };
         let to = output.with_extension(extension);
         if files.copy(from, &to).map_err(|clash| refuse(clash, &to))? {
             refuse_existing(&to, existing)?;
@@ -182,16 +188,22 @@ fn pipeline(
 
 /// The output in `folder` of every input: its name, with the extension of the format that is asked
 /// for, or its own; without `.copc`, which outputs are not. No two may be the same.
-fn outputs(inputs: &[PathBuf], folder: &Path, to: Option<&str>) -> Result<Vec<(PathBuf, PathBuf)>> {
+fn outputs(
+    inputs: &[PathBuf],
+    folder: &Path,
+    to: Option<&str>,
+    formats: &Formats,
+) -> Result<Vec<(PathBuf, PathBuf)>> {
     let mut taken: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     let mut all = Vec::new();
     for input in inputs {
-        let own = || Format::of(input).map(Format::extension);
-        let plain = Format::without_copc(input);
-        let name = plain.as_deref().unwrap_or(input).file_name().map(Path::new);
+        let own = || formats.of(input).map(|format| format.name());
+        let plain = formats.plain(input);
+        let name = plain.file_name().map(Path::new);
         let (Some(name), Some(extension)) = (name, to.or_else(own)) else {
             let told = format!("{}: its name says no format", shown(input));
-            return Err(Error::pipeline(told).help("add --to las, laz or ply"));
+            let known = listed(formats.names(), "or");
+            return Err(Error::pipeline(told).help(format!("add --to {known}")));
         };
         let output = folder.join(name.with_extension(extension));
         if let Some(other) = taken.insert(output.clone(), input) {
@@ -209,7 +221,7 @@ mod tests {
 
     fn of(inputs: &[&str], to: Option<&str>) -> Result<Vec<String>> {
         let inputs: Vec<PathBuf> = inputs.iter().map(PathBuf::from).collect();
-        let outputs = outputs(&inputs, Path::new("out"), to)?;
+        let outputs = outputs(&inputs, Path::new("out"), to, Registry::builtin().formats())?;
         Ok(outputs.into_iter().map(|(_, output)| output.display().to_string()).collect())
     }
 

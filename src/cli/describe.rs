@@ -8,16 +8,17 @@ use super::{print, table};
 use crate::error::shown;
 use crate::io::ends::expand;
 use crate::report::Coordinate;
+use crate::stage::Formats;
 use crate::{Error, Result, io};
 
 /// Prints what the headers of files say. A file that cannot be read is told, the others are shown.
-pub(super) fn info(arguments: &InfoArguments, console: &Console) -> Result<()> {
-    let files = expand(&arguments.files)?;
+pub(super) fn info(arguments: &InfoArguments, formats: &Formats, console: &Console) -> Result<()> {
+    let files = expand(&arguments.files, formats)?;
     let total = files.len();
     let mut described = Vec::new();
     let mut failures = Vec::new();
     for file in files {
-        match io::describe(&file) {
+        match io::describe(&file, formats) {
             Ok(facts) => described.push((file, facts)),
             Err(error) => failures.push(error.at(file)),
         }

@@ -8,7 +8,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, Command};
 
 use crate::error::nearest;
-use crate::io::ends::Format;
+use crate::stage::Formats;
 
 /// The arguments of the process with every value that begins with a minus and a digit tied to its
 /// option (`--max-side=-2m`): it is a value, which the option may refuse, and no option of its own.
@@ -54,7 +54,12 @@ fn takes_value(command: &Command, option: &str) -> bool {
 
 /// The message for what clap found in the arguments `typed`; None if it is told best by clap: help,
 /// and what has no place.
-pub(super) fn told(error: &clap::Error, all: &Command, typed: &[OsString]) -> Option<String> {
+pub(super) fn told(
+    error: &clap::Error,
+    all: &Command,
+    typed: &[OsString],
+    formats: &Formats,
+) -> Option<String> {
     let command = subcommand(all, typed).unwrap_or(all);
     let argument = context(error, ContextKind::InvalidArg);
     let name = argument.split_whitespace().next().unwrap_or_default();
@@ -94,7 +99,7 @@ pub(super) fn told(error: &clap::Error, all: &Command, typed: &[OsString]) -> Op
         ErrorKind::MissingRequiredArgument => {
             let lacking = lacking(command, &contexts(error, ContextKind::InvalidArg));
             let told = format!("error: `{}` needs {lacking}", command.get_name());
-            let help = output(typed).filter(|_| lacking.contains("--output"));
+            let help = output(typed, formats).filter(|_| lacking.contains("--output"));
             told + &help.map_or(String::new(), |help| format!("\nhelp: {help}"))
         }
         ErrorKind::ArgumentConflict => {
@@ -174,10 +179,10 @@ fn like(command: &Command, option: &str) -> Vec<String> {
 }
 
 /// What helps where no output is named: the last argument may be meant for it.
-fn output(typed: &[OsString]) -> Option<String> {
+fn output(typed: &[OsString], formats: &Formats) -> Option<String> {
     let last = typed.iter().skip(3).next_back()?.to_str()?;
     let path = std::path::Path::new(last);
-    let is_output = !last.starts_with('-') && Format::of(path).is_some();
+    let is_output = !last.starts_with('-') && formats.of(path).is_some();
     let is_new = fs::symlink_metadata(path).is_err() && !last.contains(['*', '?', '[']);
     (is_output && is_new).then(|| format!("if `{last}` is the output, write `-o {last}`"))
 }

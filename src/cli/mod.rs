@@ -42,15 +42,22 @@ use exit::exit_number;
 const UNREADABLE: &str = "\
     help: rename the file: pipelines and reports could not say its name";
 
-/// Runs the command that the process was started with; pipelines may name the kinds of `registry`.
+/// Runs the command that the process was started with; pipelines may name the kinds and formats of
+/// `registry`.
 pub fn main(registry: &Registry) -> ExitCode {
-    if let Some(odd) = std::env::args_os().skip(1).find(|argument| argument.to_str().is_none()) {
+    ExitCode::from(run_with(std::env::args_os().collect(), registry))
+}
+
+/// Runs the command that `arguments` are, the first of which is the program's name, as [`main`] does;
+/// returns the exit code. It prints as the process would.
+pub fn run_with(arguments: Vec<OsString>, registry: &Registry) -> u8 {
+    if let Some(odd) = arguments.iter().skip(1).find(|argument| argument.to_str().is_none()) {
         let odd = shown(odd.as_ref());
         print::message(format_args!("error: the argument `{odd}` is not UTF-8 text\n{UNREADABLE}"));
-        return ExitCode::from(2);
+        return 2;
     }
     let known = help::command();
-    let given = mistyped::tied(&known, std::env::args_os().collect());
+    let given = mistyped::tied(&known, arguments);
     let typed = known.clone().try_get_matches_from(&given);
     let arguments = match typed.and_then(|typed| Arguments::from_arg_matches(&typed)) {
         Ok(arguments) => arguments,
@@ -58,19 +65,19 @@ pub fn main(registry: &Registry) -> ExitCode {
             let given: Vec<OsString> =
                 given.iter().map(|argument| shown(argument.as_ref()).to_string().into()).collect();
             let told = as_shown(told, &known, &given);
-            match mistyped::told(&told, &known, &given) {
+            match mistyped::told(&told, &known, &given, registry.formats()) {
                 Some(told) => print::message(told),
                 None => print::usage(&told),
             }
-            return ExitCode::from(if told.use_stderr() { 2 } else { 0 });
+            return if told.use_stderr() { 2 } else { 0 };
         }
     };
     let console = Console::new(&arguments.command);
     match execute(&arguments.command, registry, &console) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(error) => {
             console.error(&error);
-            ExitCode::from(exit_number(&error))
+            exit_number(&error)
         }
     }
 }
@@ -89,8 +96,8 @@ fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<
         Command::Plan(arguments) => check::plan(arguments, registry, console),
         Command::Check(arguments) => check::check(arguments, registry, console),
         Command::Stages(arguments) => stages::stages(arguments, registry),
-        Command::Info(arguments) => describe::info(arguments, console),
-        Command::Picture(arguments) => picture::picture(arguments),
+        Command::Info(arguments) => describe::info(arguments, registry.formats(), console),
+        Command::Picture(arguments) => picture::picture(arguments, registry.formats()),
         Command::Completions(arguments) => help::completions(arguments),
         Command::Man(arguments) => help::man(arguments),
     }

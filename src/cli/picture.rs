@@ -9,17 +9,17 @@ use super::mistyped::marked;
 use super::print;
 use crate::budget::Bytes;
 use crate::engine::{Trouble, publish_bytes};
-use crate::error::shown;
+use crate::error::{listed, shown};
 use crate::host::lock;
 use crate::host::{Files, Use};
 use crate::io::ends::Read;
 use crate::picture::{ColorBy, Picture, Settings};
 use crate::report::{Grouped, Short};
-use crate::stage::Source;
+use crate::stage::{Formats, Source};
 use crate::{Error, Result};
 
 /// Draws the inputs and prints what the picture shows.
-pub(super) fn picture(arguments: &PictureArguments) -> Result<()> {
+pub(super) fn picture(arguments: &PictureArguments, formats: &Formats) -> Result<()> {
     let path = &arguments.output;
     if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("png")) {
         let told = "-o: a picture is a PNG file, whose name ends in .png";
@@ -29,7 +29,8 @@ pub(super) fn picture(arguments: &PictureArguments) -> Result<()> {
     }
     let (mut sources, mut files): (Vec<Box<dyn Source>>, Vec<PathBuf>) = Default::default();
     for input in &arguments.inputs {
-        let open = Read { path: vec![input.clone()], format: None }.source().map_err(renamed)?;
+        let open =
+            Read { path: vec![input.clone()], format: None }.source(formats).map_err(renamed)?;
         files.extend(open.paths());
         sources.push(open.open().map_err(renamed)?);
     }
@@ -74,10 +75,7 @@ fn others(sources: &[&dyn Source]) -> String {
     let can = |by: &&ColorBy| sources.iter().all(|source| by.is_in(source.schema()));
     let word = |by: &ColorBy| by.to_possible_value().map(|value| value.get_name().to_owned());
     let can = ColorBy::value_variants().iter().filter(can).filter_map(word);
-    let mut flags: Vec<String> = can.map(|word| format!("`--by {word}`")).collect();
-    let last = flags.pop().unwrap_or_default();
-    let before = if flags.is_empty() { "" } else { " or " };
-    format!("use {}{before}{last}", flags.join(", "))
+    format!("use {}", listed(can.map(|word| format!("`--by {word}`")), "or"))
 }
 
 /// What is told of a scan with points that are not on the picture.

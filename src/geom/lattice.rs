@@ -1,7 +1,7 @@
 //! The lattice: where points are, as integers, so that every decision is exact.
 
 use super::decimal::{decimal_step, multiple};
-use crate::point::{Bounds, Endian, Layout, Position, Scalar, Schema};
+use crate::point::{Bounds, Endian, Position, Scalar, Schema};
 use crate::{Error, Result};
 
 /// Steps of the binary lattice per world unit where nothing decimal fits: 2^30.
@@ -67,8 +67,7 @@ impl Lattice {
             }
             return Ok(Lattice::binary(step, 1.0 / step, z_scale));
         }
-        let stored_whole = matches!(schema.layout, Layout::Las { .. })
-            && axes.iter().all(|d| d.scalar == Scalar::I32);
+        let stored_whole = schema.layout.steps && axes.iter().all(|d| d.scalar == Scalar::I32);
         let decimal = || decimal(axes.map(|d| d.scale), axes.map(|d| d.origin), z_scale);
         let decimal = stored_whole.then(decimal).flatten();
         Ok(decimal.unwrap_or_else(|| Lattice::binary(1.0 / BINARY, BINARY, z_scale)))
@@ -243,6 +242,7 @@ fn decimal(mut scale: [f64; 3], mut origin: [f64; 3], z_scale: f64) -> Option<La
 mod tests {
     use super::*;
     use crate::point::Dimension;
+    use crate::point::Layout;
 
     #[test]
     fn scales_of_one_decimal_step_are_whole_multiples() {
@@ -322,7 +322,7 @@ mod tests {
     fn las(scale: f64, origin: f64) -> Schema {
         let axis = |name: &str, at| Dimension::new(name, Scalar::I32, at).scaled(scale, origin);
         Schema {
-            layout: Layout::Las { format: 0 },
+            layout: Layout { steps: true, ..Layout::plain("made") },
             endian: Endian::Little,
             stride: 12,
             dimensions: vec![axis("X", 0), axis("Y", 4), axis("Z", 8)],

@@ -2,10 +2,7 @@
 //! target cannot hold is told, never changed. Knows no files.
 
 mod columns;
-mod layouts;
 mod step;
-
-pub use layouts::{las_schema, ply_schema};
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,7 +10,7 @@ use columns::{BLOCK, ColumnStep, RecordBytes, TargetBytes};
 use step::{Move, push, step};
 
 use crate::point::names::{BLUE, GREEN, NIR, RED, XYZ};
-use crate::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
+use crate::point::{Dimension, Endian, Scalar, Schema, Value};
 use crate::report::Short;
 use crate::{Error, ErrorKind, Result};
 
@@ -53,9 +50,10 @@ impl Projection {
             .filter(|name| !held.contains(name) && !drop.iter().any(|d| d == name))
             .collect();
         if !lost.is_empty() {
-            let format = match to.layout {
-                Layout::Las { format } => format!("LAS point format {format}"),
-                Layout::Ply => "this PLY output".to_owned(),
+            let family = to.layout.family;
+            let format = match to.layout.form {
+                Some(form) => format!("{family} point format {form}"),
+                None => format!("this {family} output"),
             };
             return Err(Error::pipeline(format!("{format} cannot hold {}", quoted(&lost)))
                 .help(format!("`write.drop = {lost:?}` leaves them out")));
@@ -358,11 +356,12 @@ fn room(to: &Dimension) -> String {
     }
 }
 
-fn quoted(names: &[impl std::fmt::Display]) -> String {
+pub(super) fn quoted(names: &[impl std::fmt::Display]) -> String {
     names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
-fn check_drop(from: &Schema, drop: &[String]) -> Result<()> {
+/// Refuses names that cannot be left out of records of `from`.
+pub(super) fn check_drop(from: &Schema, drop: &[String]) -> Result<()> {
     for name in drop {
         if XYZ.contains(&name.as_str()) {
             return Err(Error::pipeline(format!("`write.drop` names `{name}`: coordinates stay")));
@@ -379,11 +378,10 @@ fn check_drop(from: &Schema, drop: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// True if `target` holds 257 times the `source`: colours, of which 255 is the most in a vertex with 8
-/// bits and 65535 in LAS (LAS 1.4 R15, table 9).
+/// True if `target` holds 257 times the `source`: colours, of which 255 is the most in 8 bits, as in
+/// PLY, and 65535 in 16, as in LAS (LAS 1.4 R15, table 9).
 fn widens(from: &Schema, source: &Dimension, to: &Schema, target: &Dimension) -> bool {
-    from.layout == Layout::Ply
-        && matches!(to.layout, Layout::Las { .. })
+    from.layout.family != to.layout.family
         && [RED, GREEN, BLUE, NIR].contains(&target.name.as_str())
         && (source.scalar, target.scalar) == (Scalar::U8, Scalar::U16)
 }

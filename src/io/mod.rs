@@ -15,4 +15,3 @@ mod wkt;
 pub use describe::describe;
 pub use origin::open_plain;
 pub use project::Projected;
-pub use sniff::of_extension;

@@ -1,19 +1,20 @@
-//! What a file is that is not what its name says, told from its first bytes. Reads no format.
+//! What a file is that is not what its name says, told from its first bytes: one of a registered
+//! format, or of one that is known by name alone.
 
+use std::io::Read;
 use std::path::Path;
 
-use crate::Error;
+use super::origin::open_plain;
+use crate::error::listed;
+use crate::stage::{Format, Formats, foreign};
+use crate::{Error, Result};
 
 /// First bytes that are looked at.
 pub const BYTES: usize = 512;
 
-/// What a file is.
+/// What a file is that is of no registered format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Found {
-    /// LAS or LAZ.
-    Las,
-    /// PLY.
-    Ply,
     /// Nothing is in it.
     Empty,
     /// A Git LFS pointer.
@@ -29,10 +30,7 @@ enum Found {
 }
 
 /// First bytes of formats, each as their own specification has them.
-const MAGIC: [(&[u8], Found); 32] = [
-    (b"LASF", Found::Las),
-    (b"ply\n", Found::Ply),
-    (b"ply\r", Found::Ply),
+const MAGIC: [(&[u8], Found); 29] = [
     (b"version https://git-lfs", Found::Pointer),
     (b"~V", Found::Other("a well log (CWLS LAS, which shares the extension)")),
     (b"~v", Found::Other("a well log (CWLS LAS, which shares the extension)")),
@@ -93,30 +91,27 @@ impl Found {
 
     fn name(self) -> &'static str {
         match self {
-            Found::Las => "a LAS or LAZ file",
-            Found::Ply => "a PLY file",
             Found::Empty => "an empty file",
             Found::Pointer => "a Git LFS pointer, a short text in the place of the file",
             Found::Other(name) | Found::Packed(name) => name,
             Found::Numbers => "a text of numbers",
-            Found::Unknown => "none of the formats known here",
+            Found::Unknown => "of no format that is known here",
         }
     }
 
-    fn remedy(self) -> &'static str {
+    fn remedy(self, formats: &Formats) -> String {
+        let read = || listed(upper(formats), "and") + " are read";
         match self {
-            Found::Las => "name it .las or .laz, or give `read.format = \"las\"`",
-            Found::Ply => "name it .ply, or give `read.format = \"ply\"`",
-            Found::Empty => "what should have written it failed: make or copy it again",
-            Found::Pointer => "fetch the file itself with `git lfs pull`",
-            Found::Packed(_) => "unpack it first",
+            Found::Empty => "what should have written it failed: make or copy it again".to_owned(),
+            Found::Pointer => "fetch the file itself with `git lfs pull`".to_owned(),
+            Found::Packed(_) => "unpack it first".to_owned(),
             Found::Other("a web page" | "JSON text" | "an XML document") => {
-                "a server sent this instead of the file: fetch it again"
+                "a server sent this instead of the file: fetch it again".to_owned()
             }
             Found::Other(_) | Found::Numbers => {
-                "LAS, LAZ and PLY are read: convert it to one of them with another program first"
+                read() + ": convert it to one of them with another program first"
             }
-            Found::Unknown => "LAS, LAZ and PLY are read; the file may be damaged",
+            Found::Unknown => read() + "; the file may be damaged",
         }
     }
 }
@@ -141,25 +136,52 @@ fn is_numbers(line: &str) -> bool {
     words().count() >= 3 && words().all(|word| word.parse::<f64>().is_ok())
 }
 
-/// True if `first`, the first bytes of a file, are those of LAS or LAZ.
-pub fn is_las(first: &[u8]) -> bool {
-    Found::of(first) == Found::Las
-}
-
-/// True if they are those of PLY.
-pub fn is_ply(first: &[u8]) -> bool {
-    // Damaged line ends are for the PLY header to tell.
-    first.starts_with(b"ply")
+/// The first bytes of a file, as many as tell what it is.
+pub fn first_bytes(path: &Path) -> Result<Vec<u8>> {
+    let mut first = Vec::new();
+    let (file, _) = open_plain(path)?;
+    file.take(BYTES as u64).read_to_end(&mut first).map_err(|e| Error::io(path, "read it", e))?;
+    Ok(first)
 }
 
 /// The error of the file at `path`, which begins with `first` and was to be `wanted`.
-pub fn not(wanted: &str, path: &Path, first: &[u8]) -> Error {
-    let found = Found::of(first);
-    let told = match found {
-        Found::Unknown => format!("this is not {wanted}, by its first bytes"),
-        _ => format!("this is {}, not {wanted}", found.name()),
-    };
-    Error::data(path, told).at_byte(0).help(found.remedy())
+pub fn not(wanted: &str, path: &Path, first: &[u8], formats: &Formats) -> Error {
+    let registered = formats.sniffed(first).filter(|format| format.called() != wanted);
+    match (registered, Found::of(first)) {
+        (Some(format), _) => {
+            Error::data(path, format!("this is {}, not {wanted}", format.called()))
+                .at_byte(0)
+                .help(name_it(&**format, formats))
+        }
+        (None, Found::Unknown) => foreign(path, wanted).help(Found::Unknown.remedy(formats)),
+        (None, found) => Error::data(path, format!("this is {}, not {wanted}", found.name()))
+            .at_byte(0)
+            .help(found.remedy(formats)),
+    }
+}
+
+/// How a file is named so that it is read as one of the family of `format`.
+fn name_it(format: &dyn Format, formats: &Formats) -> String {
+    let names: Vec<&str> = formats.of_family(format.family()).map(|f| f.name()).collect();
+    let dotted = listed(names.iter().map(|name| format!(".{name}")), "or");
+    format!("name it {dotted}, or give `read.format = \"{}\"`", names[0])
+}
+
+/// The error of files that could not be opened as those of `format`: of one that does not begin as
+/// such, what it is.
+pub fn told(error: Error, format: &dyn Format, formats: &Formats) -> Error {
+    let called = format.called();
+    let is_foreign = |path: &&Path| error.to_string() == foreign(path, called).to_string();
+    let first = error.path().filter(is_foreign).and_then(|path| first_bytes(path).ok());
+    match (first, error.path()) {
+        (Some(first), Some(path)) => not(called, path, &first, formats),
+        _ => error,
+    }
+}
+
+/// The names of the formats in capitals.
+pub fn upper(formats: &Formats) -> impl Iterator<Item = String> {
+    formats.names().into_iter().map(str::to_uppercase)
 }
 
 /// What files with this extension are, in lower case, if it is a format of points or meshes that is
@@ -187,11 +209,14 @@ pub fn of_extension(extension: &str) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::las::{LAS, LAZ};
+    use crate::io::ply::PLY;
 
     #[test]
     fn files_are_called_what_they_are() {
+        let formats = Formats::default().with(LAS).with(LAZ).with(PLY);
         let told = |first: &[u8]| {
-            let error = not("a LAS or LAZ file", Path::new("x"), first);
+            let error = not("a LAS or LAZ file", Path::new("x"), first, &formats);
             format!("{error}; {}", error.remedy().unwrap())
         };
         for (first, what, remedy) in [
@@ -212,7 +237,8 @@ mod tests {
             let told = told(first);
             assert!(told.contains(what) && told.contains(remedy), "{told}");
         }
-        assert!(not("a PLY file", Path::new("x"), b"LASF\0").to_string().contains("a LAS or LAZ"));
+        let las = not("a PLY file", Path::new("x"), b"LASF\0", &formats);
+        assert!(las.to_string().contains("a LAS or LAZ"));
     }
 
     #[test]

@@ -1,13 +1,15 @@
-//! The stage kinds that pointmill has.
+//! The stage kinds and formats that pointmill has.
 
 use super::registry::Registry;
 use crate::io::ends::{Read, Write};
+use crate::io::las::{LAS, LAZ};
+use crate::io::ply::PLY;
 use crate::ops::normals::Normals;
 use crate::ops::{Cells, Filter, Grid, Median, Outliers};
 use crate::synth::Synth;
 
 impl Registry {
-    /// The stage kinds that pointmill has.
+    /// The stage kinds and formats that pointmill has.
     pub fn builtin() -> Self {
         Registry::empty()
             .with::<Read>()
@@ -19,5 +21,8 @@ impl Registry {
             .with::<Cells>()
             .with::<Median>()
             .with::<Grid>()
+            .with_format(LAS)
+            .with_format(LAZ)
+            .with_format(PLY)
     }
 }

@@ -15,14 +15,18 @@ use crate::error::nearest;
 use crate::quantity::{Figure, parse_count};
 
 /// Reads the table `keys` as a `T`, or tells every key that `subject` (a stage kind, `[run]`) does
-/// not have and every value that does not fit.
-pub(crate) fn read<T: DeserializeOwned>(subject: &str, keys: &Node) -> Result<T, Vec<Mistake>> {
+/// not have and every value that does not fit. `formats` are the names of those that are registered.
+pub(crate) fn read<T: DeserializeOwned>(
+    subject: &str,
+    keys: &Node,
+    formats: &[&'static str],
+) -> Result<T, Vec<Mistake>> {
     let mut rest = keys.clone();
     let mut mistakes = Vec::new();
     let mut dropped: Vec<String> = Vec::new();
     loop {
         let unknown = RefCell::new(Vec::new());
-        let outcome = T::deserialize(Reader { node: &rest, unknown: &unknown });
+        let outcome = T::deserialize(Reader { node: &rest, unknown: &unknown, formats });
         let fault = match outcome {
             Ok(read) if mistakes.is_empty() && unknown.borrow().is_empty() => return Ok(read),
             Ok(_) => None,
@@ -196,11 +200,16 @@ fn found_words(found: Unexpected<'_>) -> String {
     }
 }
 
+/// The name of [`FormatName`](crate::stage::FormatName) as serde has it: a word of those that are
+/// registered, which the type cannot know.
+const FORMAT: &str = "FormatName";
+
 /// A node on its way into a struct.
 #[derive(Clone, Copy)]
 struct Reader<'a> {
     node: &'a Node,
     unknown: &'a RefCell<Vec<Fault>>,
+    formats: &'a [&'static str],
 }
 
 /// Below it floats hold all whole numbers.
@@ -218,6 +227,14 @@ impl<'de> Reader<'de> {
         }
     }
 
+    /// The value, which is to be one of `valid` words.
+    fn word(self, valid: &[&'static str]) -> Result<&'de str, Fault> {
+        match &self.node.value {
+            Value::Text(word) => Ok(word),
+            _ => Err(de::Error::custom(format!("takes one of {}", valid.join(", ")))),
+        }
+    }
+
     fn table<V: Visitor<'de>>(
         self,
         entries: &'de [Entry],
@@ -231,7 +248,7 @@ impl<'de> Reader<'de> {
             self.unknown.borrow_mut().push(Fault::new(problem).at(&entry.at));
         }
         let entries = entries.iter().filter(known).collect::<Vec<_>>().into_iter();
-        visitor.visit_map(Entries { entries, next: None, unknown: self.unknown })
+        visitor.visit_map(Entries { entries, next: None, reader: self })
     }
 }
 
@@ -251,7 +268,7 @@ impl<'de> Deserializer<'de> for Reader<'de> {
                 _ => Err(de::Error::custom("the whole number is too large")),
             },
             Value::List(list) => {
-                let mut items = Items { items: list.iter(), unknown: self.unknown };
+                let mut items = Items { items: list.iter(), reader: self };
                 let read = visitor.visit_seq(&mut items)?;
                 match items.items.len() {
                     0 => Ok(read),
@@ -269,10 +286,20 @@ impl<'de> Deserializer<'de> for Reader<'de> {
 
     fn deserialize_newtype_struct<V: Visitor<'de>>(
         self,
-        _name: &'static str,
+        name: &'static str,
         visitor: V,
     ) -> Result<V::Value, Fault> {
-        visitor.visit_newtype_struct(self).map_err(|fault: Fault| fault.at(&self.node.place))
+        let known = match name {
+            FORMAT => self.word(self.formats).and_then(|word| {
+                let problem = || Problem::UnknownWord(word.to_owned(), self.formats.to_vec());
+                let is_known = self.formats.contains(&word);
+                is_known.then_some(()).ok_or_else(|| Fault::new(problem()))
+            }),
+            _ => Ok(()),
+        };
+        known
+            .and_then(|()| visitor.visit_newtype_struct(self))
+            .map_err(|fault: Fault| fault.at(&self.node.place))
     }
 
     fn deserialize_unit_struct<V: Visitor<'de>>(
@@ -307,11 +334,9 @@ impl<'de> Deserializer<'de> for Reader<'de> {
         variants: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Fault> {
-        match &self.node.value {
-            Value::Text(word) => visitor.visit_enum(word.as_str().into_deserializer()),
-            _ => Err(de::Error::custom(format!("takes one of {}", variants.join(", ")))),
-        }
-        .map_err(|fault: Fault| fault.at(&self.node.place))
+        self.word(variants)
+            .and_then(|word| visitor.visit_enum(word.into_deserializer()))
+            .map_err(|fault: Fault| fault.at(&self.node.place))
     }
 
     fn deserialize_u8<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
@@ -334,7 +359,7 @@ impl<'de> Deserializer<'de> for Reader<'de> {
 
 struct Items<'a> {
     items: std::slice::Iter<'a, Node>,
-    unknown: &'a RefCell<Vec<Fault>>,
+    reader: Reader<'a>,
 }
 
 impl<'de> de::SeqAccess<'de> for &mut Items<'de> {
@@ -345,7 +370,7 @@ impl<'de> de::SeqAccess<'de> for &mut Items<'de> {
         seed: T,
     ) -> Result<Option<T::Value>, Fault> {
         let Some(node) = self.items.next() else { return Ok(None) };
-        let item = seed.deserialize(Reader { node, unknown: self.unknown });
+        let item = seed.deserialize(Reader { node, ..self.reader });
         item.map(Some).map_err(|fault| fault.at(&node.place))
     }
 
@@ -357,7 +382,7 @@ impl<'de> de::SeqAccess<'de> for &mut Items<'de> {
 struct Entries<'a> {
     entries: std::vec::IntoIter<&'a Entry>,
     next: Option<&'a Entry>,
-    unknown: &'a RefCell<Vec<Fault>>,
+    reader: Reader<'a>,
 }
 
 impl<'de> de::MapAccess<'de> for Entries<'de> {
@@ -378,7 +403,7 @@ impl<'de> de::MapAccess<'de> for Entries<'de> {
         let Some(entry) = self.next.take() else {
             return Err(de::Error::custom("a value without a key"));
         };
-        let reader = Reader { node: &entry.node, unknown: self.unknown };
+        let reader = Reader { node: &entry.node, ..self.reader };
         seed.deserialize(reader).map_err(|fault| fault.at(&entry.node.place).under(&entry.key))
     }
 }

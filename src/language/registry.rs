@@ -1,17 +1,19 @@
-//! The stage kinds that a pipeline file may name: a value, so that a program can add its own.
+//! The stage kinds and formats that a pipeline file may name: a value, so that a program can add its
+//! own.
 
 use std::collections::BTreeMap;
 
 use super::keys;
 use super::mistake::Mistake;
 use super::node::Node;
-use crate::stage::{Role, StageKind, StagePlace};
+use crate::stage::{Format, Formats, Role, StageKind, StagePlace};
 use crate::{Error, Result};
 
-/// The stage kinds that a pipeline file may name.
+/// The stage kinds and formats that a pipeline file may name.
 #[derive(Clone, Default)]
 pub struct Registry {
     kinds: BTreeMap<&'static str, Kind>,
+    formats: Formats,
 }
 
 type Read = fn(&Node, &StagePlace) -> Result<(Role, serde_json::Value), Vec<Mistake>>;
@@ -24,7 +26,7 @@ struct Kind {
 }
 
 impl Registry {
-    /// No kinds.
+    /// No kinds and no formats.
     pub fn empty() -> Self {
         Registry::default()
     }
@@ -34,6 +36,18 @@ impl Registry {
     pub fn with<K: StageKind>(mut self) -> Self {
         self.kinds.insert(K::KIND, Kind { about: K::ABOUT, either: K::EITHER, read: read::<K> });
         self
+    }
+
+    /// The same and `format`, which takes the place of one of its name.
+    #[must_use]
+    pub fn with_format(mut self, format: impl Format + 'static) -> Self {
+        self.formats = self.formats.with(format);
+        self
+    }
+
+    /// The formats.
+    pub fn formats(&self) -> &Formats {
+        &self.formats
     }
 
     /// The kinds by name, each with what it does.
@@ -68,7 +82,7 @@ fn read<K: StageKind>(
     keys: &Node,
     at: &StagePlace,
 ) -> Result<(Role, serde_json::Value), Vec<Mistake>> {
-    let stage: K = keys::read(K::KIND, keys)?;
+    let stage: K = keys::read(K::KIND, keys, &at.formats().names())?;
     let wrong = |error: Error| vec![Mistake::of(keys.place.clone(), &error)];
     let canonical = canonical(&stage).map_err(wrong)?;
     stage.build(at).map(|role| (role, canonical)).map_err(|error| {

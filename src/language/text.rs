@@ -74,9 +74,9 @@ impl Graph {
         let failed = |e| Error::io(path, "read the pipeline", e);
         let mut bytes = Vec::new();
         file.by_ref().take(sniff::BYTES as u64).read_to_end(&mut bytes).map_err(failed)?;
-        if sniff::is_las(&bytes) || sniff::is_ply(&bytes) {
+        if registry.formats().sniffed(&bytes).is_some() {
             let name = shown(path);
-            return Err(sniff::not("a pipeline file", path, &bytes)
+            return Err(sniff::not("a pipeline file", path, &bytes, registry.formats())
                 .help(format!("a scan is reduced by `pointmill reduce {name} -o OUT`")));
         }
         if about.len() > LONGEST {
@@ -104,7 +104,7 @@ fn build(
 ) -> (Graph, Vec<Mistake>) {
     let origin = &sources[0].origin;
     let mut mistakes = std::mem::take(&mut draft.mistakes);
-    let settings = keys::read("[run]", &draft.run).unwrap_or_else(|wrong| {
+    let settings = keys::read("[run]", &draft.run, &[]).unwrap_or_else(|wrong| {
         mistakes.extend(wrong);
         RunSettings::default()
     });
@@ -143,7 +143,7 @@ fn place(
     let (kind, at) = &stage.kind;
     let SourceText { text, origin, .. } = &sources[0];
     let line = text.as_bytes()[..at.start.min(text.len())].iter().filter(|&&b| b == b'\n').count();
-    let place = StagePlace::new(origin.as_str(), line + 1);
+    let place = StagePlace::new(origin.as_str(), line + 1).knowing(registry.formats());
     let (limits, keys) = split_limits(&stage.keys);
     let Some(built) = registry.build(kind, &keys, &place) else {
         let kinds = registry.kinds().map(|(kind, _)| kind);
@@ -151,7 +151,7 @@ fn place(
         return Err(vec![Mistake::word(at.clone(), told, kind, "stages", kinds)]);
     };
     let given = limits.entries();
-    let read = keys::read::<LimitKeys>(kind, &limits);
+    let read = keys::read::<LimitKeys>(kind, &limits, &[]);
     let (role, mut canonical) = match (built, read.is_ok()) {
         (Ok(built), true) => built,
         (built, _) => {

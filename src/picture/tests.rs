@@ -58,7 +58,8 @@ fn points(places: &[([f64; 3], u8)]) -> Few {
     let mut dimensions: Vec<Dimension> =
         axes.map(|(name, at)| Dimension::new(*name, Scalar::F64, at)).collect();
     dimensions.push(Dimension::new(names::CLASSIFICATION, Scalar::U8, 24));
-    let schema = Schema { layout: Layout::Ply, endian: Endian::Little, stride: 25, dimensions };
+    let schema =
+        Schema { layout: Layout::plain("made"), endian: Endian::Little, stride: 25, dimensions };
     let record = |(place, class): &([f64; 3], u8)| {
         let mut record: Vec<u8> = place.iter().flat_map(|v| v.to_le_bytes()).collect();
         record.push(*class);

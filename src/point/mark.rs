@@ -153,7 +153,7 @@ mod tests {
             Dimension::new(names::WITHHELD, Scalar::U8, 1).bits(2, 1),
             Dimension::new(names::KEY_POINT, Scalar::U8, 1).bits(1, 1),
         ];
-        Schema { layout: Layout::Ply, endian: Endian::Little, stride: 2, dimensions }
+        Schema { layout: Layout::plain("made"), endian: Endian::Little, stride: 2, dimensions }
     }
 
     #[test]

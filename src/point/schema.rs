@@ -221,18 +221,26 @@ impl Dimension {
     }
 }
 
-/// Which family of formats a record's bytes come from; a sink of the same family and an equal
-/// schema copies records.
+/// Which family of formats a record's bytes come from, and what that means for them. A sink of the
+/// same family and an equal schema copies records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Layout {
-    /// A LAS point record of this point data record format (0 to 10), extra bytes behind it.
-    Las {
-        /// Point data record format.
-        format: u8,
-    },
-    /// A PLY vertex: the file's properties in their order, binary (ASCII values are held as
-    /// little-endian binary of the declared type).
-    Ply,
+pub struct Layout {
+    /// The family's name, such as "LAS" for LAS and LAZ.
+    pub family: &'static str,
+    /// Which of the family's forms of records, where it has several: the point format of LAS.
+    pub form: Option<u8>,
+    /// True if coordinates of whole numbers are steps of their scale from their origin, so that a
+    /// lattice may have the same steps; false if they are numbers of any size.
+    pub steps: bool,
+    /// The class that says overlap where records have no flag that does.
+    pub overlap_class: Option<u8>,
+}
+
+impl Layout {
+    /// Records of a family that has one form of them and whose coordinates are numbers of any size.
+    pub const fn plain(family: &'static str) -> Self {
+        Layout { family, form: None, steps: false, overlap_class: None }
+    }
 }
 
 /// What a record holds.

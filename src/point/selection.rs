@@ -5,10 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::names;
-use super::{Dimension, Endian, Layout, Scalar, Schema};
-
-/// The class of overlap points in point formats 0 to 5.
-const OVERLAP_CLASS: u8 = 12;
+use super::{Dimension, Endian, Scalar, Schema};
 
 /// One of the flags that LAS has for every record (LAS 1.4 R15, tables 8 and 16).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -45,14 +42,13 @@ impl Flag {
         }
     }
 
-    /// Where records of `schema` have it: in LAS point formats 0 to 5 overlap is the class 12 (LAS
-    /// 1.4 R15, table 9).
+    /// Where records of `schema` have it: a field, or a class where their layout has one for overlap.
     fn place(self, schema: &Schema) -> Option<FlagPlace> {
         let field = schema.find(self.dimension()).map(|field| FlagPlace::Field(Field::of(field)));
         let as_class = || {
-            let is_old_las = self == Flag::Overlap && matches!(schema.layout, Layout::Las { .. });
-            let class = schema.find(names::CLASSIFICATION).filter(|_| is_old_las)?;
-            Some(FlagPlace::Class(Field::of(class), OVERLAP_CLASS))
+            let overlap = schema.layout.overlap_class.filter(|_| self == Flag::Overlap)?;
+            let class = schema.find(names::CLASSIFICATION)?;
+            Some(FlagPlace::Class(Field::of(class), overlap))
         };
         field.or_else(as_class)
     }
@@ -231,7 +227,7 @@ mod tests {
             Dimension::new(names::WITHHELD, Scalar::U8, 1).bits(2, 1),
             Dimension::new(names::KEY_POINT, Scalar::U8, 1).bits(1, 1),
         ];
-        Schema { layout: Layout::Ply, endian: Endian::Little, stride: 2, dimensions }
+        Schema { layout: Layout::plain("made"), endian: Endian::Little, stride: 2, dimensions }
     }
 
     #[test]

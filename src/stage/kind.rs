@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::Role;
+use super::format::Formats;
 use crate::{Error, Result};
 
 /// What a `[[stage]]` of a pipeline file may be. The struct's fields are the stage's keys.
@@ -40,13 +41,26 @@ pub trait StageKind: DeserializeOwned + Serialize {
 pub struct StagePlace {
     file: String,
     line: usize,
+    formats: Formats,
     blamed: RefCell<Option<String>>,
 }
 
 impl StagePlace {
-    /// A stage at line `line` (from 1) of `file`.
+    /// A stage at line `line` (from 1) of `file`; no format is known there.
     pub fn new(file: impl Into<String>, line: usize) -> Self {
-        StagePlace { file: file.into(), line, blamed: RefCell::new(None) }
+        let (formats, blamed) = (Formats::default(), RefCell::new(None));
+        StagePlace { file: file.into(), line, formats, blamed }
+    }
+
+    /// The same, `formats` being the ones that it may name.
+    #[must_use]
+    pub fn knowing(self, formats: &Formats) -> Self {
+        StagePlace { formats: formats.clone(), ..self }
+    }
+
+    /// The formats that are registered.
+    pub fn formats(&self) -> &Formats {
+        &self.formats
     }
 
     /// The pipeline file, as the user named it.

@@ -76,7 +76,7 @@ pub fn cells(side: f64, max_angle: f64, split: Split) -> Cells {
 pub fn settle(mut stage: Cells, scan: &[Point]) -> Cells {
     let axes = ["X", "Y", "Z"].iter().zip([0, 8, 16]);
     let schema = Schema {
-        layout: Layout::Ply,
+        layout: Layout::plain("PLY"),
         endian: Endian::Little,
         stride: 24,
         dimensions: axes.map(|(name, at)| Dimension::new(*name, Scalar::F64, at)).collect(),

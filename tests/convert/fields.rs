@@ -1,6 +1,8 @@
 //! LAS records as PLY vertices and back: every field, bit for bit.
 
-use pointmill::io::convert::{Projection, las_schema, ply_schema};
+use pointmill::io::convert::Projection;
+use pointmill::io::las::{las_schema, records};
+use pointmill::io::ply::ply_schema;
 use pointmill::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
 use proptest::prelude::*;
 
@@ -83,7 +85,7 @@ fn las(format: u8, extra: &[(String, Scalar)], scale: [f64; 3], offset: [f64; 3]
         dimensions.push(Dimension::new(name, Scalar::U8, offset).bits(shift, width));
     }
     let endian = Endian::Little;
-    Schema { layout: Layout::Las { format }, endian, stride: at, dimensions }
+    Schema { layout: records(format), endian, stride: at, dimensions }
 }
 
 fn extras() -> Vec<(String, Scalar)> {
@@ -166,7 +168,7 @@ fn vertex(dimensions: &[(&str, Scalar)]) -> Schema {
             Dimension::new(name, scalar, stride - scalar.size())
         })
         .collect();
-    Schema { layout: Layout::Ply, endian: Endian::Big, stride, dimensions }
+    Schema { layout: Layout::plain("PLY"), endian: Endian::Big, stride, dimensions }
 }
 
 fn record(schema: &Schema, values: &[(&str, f64)]) -> Vec<u8> {

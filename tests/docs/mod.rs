@@ -11,6 +11,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use formats::{agree, documented};
 use keys::{Default, Key};
@@ -18,7 +19,7 @@ use pointmill::graph::{LimitKeys, RunSettings};
 use pointmill::io::ends::{Read, Write};
 use pointmill::ops::normals::Normals;
 use pointmill::ops::{Cells, Filter, Grid, Median, Outliers};
-use pointmill::stage::StageKind;
+use pointmill::stage::{Format, StageKind};
 use pointmill::synth::Synth;
 use pointmill::{Overrides, Quiet, Registry};
 use serde_json::Value;
@@ -27,7 +28,8 @@ use crate::support::case::execute;
 use crate::support::command::pointmill;
 use source::{Enum, Field, enum_of, item_docs, struct_of};
 
-const SAYS_SO: &str = "written by `POINTMILL_WRITE_DOCS=1 cargo test --test repository`; do not edit";
+const SAYS_SO: &str =
+    "written by `POINTMILL_WRITE_DOCS=1 cargo test --test repository`; do not edit";
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -95,7 +97,7 @@ fn pages() -> Vec<Page> {
         },
         page::<Median>("src/ops/median.rs", ""),
         page::<Grid>("src/ops/grid.rs", "side = 1.0"),
-        Page { words: &["src/io/ply/colors.rs"], ..page::<Write>(KINDS, "") },
+        Page { words: &["src/stage/format.rs"], ..page::<Write>(KINDS, "") },
     ]
 }
 
@@ -131,16 +133,25 @@ fn sort_of(subject: &str, field: &Field, files: &[String]) -> (String, Option<En
             "a list of `\"withheld\"`, `\"overlap\"`, `\"synthetic\"`, `\"key-point\"`"
         }
         (_, _, "Vec<String>") => "a list of texts",
+        (_, _, "FormatName") => {
+            let registry = Registry::builtin();
+            let word = |f: &Arc<dyn Format>| (f.name().to_owned(), f.about().to_owned());
+            let words = registry.formats().iter().map(word).collect();
+            return in_words(Enum { words, default: None });
+        }
         (_, _, name) => {
             let words = files.iter().find_map(|text| enum_of(text, name)).unwrap_or_else(|| {
                 panic!("{subject}.{}: say in tests/docs/mod.rs what a {name} is", field.name)
             });
-            let list: Vec<String> =
-                words.words.iter().map(|(word, _)| format!("`\"{word}\"`")).collect();
-            return (list.join(", "), Some(words));
+            return in_words(words);
         }
     };
     (said.to_owned(), None)
+}
+
+fn in_words(words: Enum) -> (String, Option<Enum>) {
+    let list: Vec<String> = words.words.iter().map(|(word, _)| format!("`\"{word}\"`")).collect();
+    (list.join(", "), Some(words))
 }
 
 /// What is said of every field.
@@ -334,7 +345,7 @@ fn reduce(folder: &Path, output: &str) -> Value {
 #[test]
 fn the_formats_that_are_documented_are_those_that_are_written() {
     let folder = tempfile::tempdir().unwrap();
-    let scan = folder.path().join("scan.laz");
+    let (scan, registry) = (folder.path().join("scan.laz"), Registry::builtin());
     let text = format!(
         "[[stage]]\nkind = 'synth'\nscene = 'als'\npoints = 20000\n\
          [[stage]]\nkind = 'write'\npath = '{}'\n",
@@ -354,11 +365,14 @@ fn the_formats_that_are_documented_are_those_that_are_written() {
         assert!(must.collect::<BTreeSet<_>>().is_subset(&there), "{section}: {there:?}");
     }
     agree(
-        &pointmill::io::describe(&folder.path().join("reduced.laz")).unwrap(),
+        &pointmill::io::describe(&folder.path().join("reduced.laz"), registry.formats()).unwrap(),
         "info: LAS and LAZ",
     );
     reduce(folder.path(), "reduced.ply");
-    agree(&pointmill::io::describe(&folder.path().join("reduced.ply")).unwrap(), "info: PLY");
+    agree(
+        &pointmill::io::describe(&folder.path().join("reduced.ply"), registry.formats()).unwrap(),
+        "info: PLY",
+    );
 }
 
 /// Where the links of a page lead, anchors and web addresses left out.

@@ -2,7 +2,7 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-use pointmill::point::{Layout, PointBatch};
+use pointmill::point::PointBatch;
 use pointmill::stage::Source;
 use pointmill::{Error, ErrorKind};
 
@@ -191,7 +191,7 @@ fn read_part(
             return Ok((records, true));
         }
         assert!(batch.len() <= batch.capacity(), "a batch has more than its capacity");
-        let layered = matches!(batch.schema().layout, Layout::Las { format } if format >= 6);
+        let layered = batch.schema().layout.form.is_some_and(|format| format >= 6);
         batch.iter().for_each(|record| hash(record, layered, hasher));
         records += batch.len();
     }

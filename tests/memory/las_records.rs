@@ -13,9 +13,13 @@ use crate::support::records::read_source;
 use crate::support::runs::remedy;
 use laz::laszip::{ChunkTable, ChunkTableEntry};
 use laz::{LasZipCompressor, LazVlr, LazVlrBuilder};
-use pointmill::io::{describe, las};
+use pointmill::io::las;
 use pointmill::{Error, ErrorKind};
 use pointmill::{Graph, Overrides, Quiet, Registry};
+
+fn describe(path: &Path) -> pointmill::Result<serde_json::Value> {
+    pointmill::io::describe(path, Registry::builtin().formats())
+}
 
 /// A file of five points with `count` records, `payload` bytes each: variable length ones behind the
 /// header, or extended ones at the end.

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use crate::support::allocator;
 use crate::support::records::{accounted, assert_contained, open, read_some, sink, write};
 use crate::support::setup::{Setup, convert, reduce};
-use pointmill::io::ends::Format;
+use pointmill::Registry;
 use serde_json::json;
 
 /// The budget of every run, and more than any of its allocations. What the test itself holds of a scan
@@ -94,7 +94,7 @@ fn walk(folder: &Path, files: &mut Vec<PathBuf>) {
         let path = entry.unwrap().path();
         if path.is_dir() {
             walk(&path, files);
-        } else if Format::of(&path).is_some() {
+        } else if Registry::builtin().formats().of(&path).is_some() {
             files.push(path);
         }
     }

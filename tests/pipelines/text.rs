@@ -4,6 +4,8 @@ use std::path::Path;
 
 use pointmill::graph::{MixedUnits, Nonfinite, Simd, ZScale};
 use pointmill::io::ends::Write;
+use pointmill::io::las::{LAS, LAZ};
+use pointmill::io::ply::PLY;
 use pointmill::report::Tally;
 use pointmill::stage::{Needs, Role, TileOp};
 use pointmill::stage::{StageKind, StagePlace};
@@ -61,7 +63,8 @@ impl TileOp for Nothing {
 
 /// `synth`, `thin` and `write`.
 fn registry() -> Registry {
-    Registry::empty().with::<Synth>().with::<Thin>().with::<Write>()
+    let registry = Registry::empty().with::<Synth>().with::<Thin>().with::<Write>();
+    registry.with_format(LAS).with_format(LAZ).with_format(PLY)
 }
 
 const GOOD: &str = "\

@@ -18,7 +18,8 @@ type Record = (Position, u32, Fate);
 fn lattice(step: f64) -> Lattice {
     let axis = |i: usize| Dimension::new(["X", "Y", "Z"][i], Scalar::F64, 8 * i);
     let dimensions = (0..3).map(axis).collect();
-    let schema = Schema { layout: Layout::Ply, endian: Endian::Little, stride: 24, dimensions };
+    let schema =
+        Schema { layout: Layout::plain("PLY"), endian: Endian::Little, stride: 24, dimensions };
     Lattice::of(&schema, Some(step)).unwrap()
 }
 

@@ -41,7 +41,8 @@ fn ply(points: impl Iterator<Item = [f64; 3]>) -> Scan {
         p.iter().for_each(|v| records.extend(v.to_le_bytes()));
         records.extend(tag.to_le_bytes());
     }
-    let schema = Schema { layout: Layout::Ply, endian: Endian::Little, stride: 28, dimensions };
+    let schema =
+        Schema { layout: Layout::plain("PLY"), endian: Endian::Little, stride: 28, dimensions };
     Scan { schema: Arc::new(schema), metadata: Metadata::default(), records }
 }
 

@@ -45,7 +45,7 @@ fn awkward_scan(n: usize, seed: u64) -> Vec<Position> {
 fn schema() -> Arc<Schema> {
     let [x, y, z] = names::XYZ;
     Arc::new(Schema {
-        layout: Layout::Ply,
+        layout: Layout::plain("PLY"),
         endian: Endian::Little,
         stride: 28,
         dimensions: vec![

@@ -3,20 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use pointmill::io::ends::Format;
-use pointmill::io::las::LasOptions;
-use pointmill::io::ply::PlyOptions;
-use pointmill::io::{las, ply};
 use pointmill::point::{Metadata, PointBatch, Schema};
-use pointmill::stage::{Sink, SinkSummary, Source};
-use pointmill::{Done, Result};
+use pointmill::stage::{Sink, SinkSummary, Source, WriteKeys};
+use pointmill::{Done, Registry, Result};
 
 /// Points of a batch: a prime, so that no chunk is a whole number of them.
 const BATCH: usize = 7_001;
 
 /// Opens files of one kind, by their extension.
 pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
-    if Format::of(&paths[0]) == Some(Format::Ply) { ply::open(paths) } else { las::open(paths) }
+    Registry::builtin().formats().of(&paths[0]).expect("a known extension").open(paths)
 }
 
 /// The first `limit` records of a source.
@@ -68,13 +64,9 @@ pub fn read(path: &Path) -> (Arc<Schema>, Vec<u8>) {
 
 /// A file of the format that its extension names.
 pub fn sink(path: &Path, schema: &Arc<Schema>, metadata: &Metadata) -> Result<Box<dyn Sink>> {
-    match Format::of(path) {
-        Some(Format::Ply) => ply::create(path, &PlyOptions::default(), schema, metadata),
-        format => {
-            let compressed = format == Some(Format::Laz);
-            las::create(path, &LasOptions { compressed, normals: false }, schema, metadata)
-        }
-    }
+    let registry = Registry::builtin();
+    let format = registry.formats().of(path).expect("a known extension");
+    format.create(path, &WriteKeys::default(), schema, metadata, false)
 }
 
 /// Writes records to their end.

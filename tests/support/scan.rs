@@ -180,7 +180,7 @@ impl Scan {
         cuts.extend([0, self.points()]);
         cuts.sort_unstable();
         let extensions =
-            if self.schema.layout == Layout::Ply { ["ply"; 2] } else { ["las", "laz"] };
+            if self.schema.layout == Layout::plain("PLY") { ["ply"; 2] } else { ["las", "laz"] };
         cuts.windows(2)
             .enumerate()
             .map(|(i, cut)| {

@@ -44,7 +44,7 @@ pub fn tile(scan: &[Position], cube: Bounds, reach: i64) -> Tile {
 pub fn settle(stage: &mut dyn TileOp, scan: &[Position], step: f64) {
     let axes = ["X", "Y", "Z"].iter().zip([0, 8, 16]);
     let schema = Schema {
-        layout: Layout::Ply,
+        layout: Layout::plain("PLY"),
         endian: Endian::Little,
         stride: 24,
         dimensions: axes.map(|(name, at)| Dimension::new(*name, Scalar::F64, at)).collect(),

@@ -1,5 +1,5 @@
 use super::*;
-use crate::point::Bits;
+use crate::point::{Bits, Layout};
 
 const SCALARS: [Scalar; 10] = [
     Scalar::U8,
@@ -37,7 +37,7 @@ fn numbers(mut seed: u64) -> impl FnMut() -> [u8; 8] {
 fn one_field(name: &str, field: Dimension, endian: Endian) -> Schema {
     let stride = 1 + field.scalar.size();
     let field = Dimension { name: name.to_owned(), offset: 1, ..field };
-    Schema { layout: Layout::Ply, endian, stride, dimensions: vec![field] }
+    Schema { layout: Layout::plain("made"), endian, stride, dimensions: vec![field] }
 }
 
 /// All roads of one pair of fields agree, block for block; returns how many blocks went field by field.

@@ -6,8 +6,8 @@ use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-use super::kinds::Format;
-use crate::error::{shown, whereabouts};
+use crate::error::{listed, shown, whereabouts};
+use crate::stage::Formats;
 use crate::{Error, ErrorKind, Result};
 
 /// The files that the paths mean, in their order. For each path:
@@ -24,8 +24,8 @@ use crate::{Error, ErrorKind, Result};
 ///
 /// Upper and lower case differ, and `*` and `?` do not match a dot at the beginning of a name, as in
 /// a shell. A file meant twice, by whatever names, is an error: its points would be read twice.
-pub fn expand<P: AsRef<str>>(paths: &[P]) -> Result<Vec<PathBuf>> {
-    let files = expand_any(paths)?;
+pub fn expand<P: AsRef<str>>(paths: &[P], formats: &Formats) -> Result<Vec<PathBuf>> {
+    let files = expand_any(paths, formats)?;
     match files.iter().find(|file| file.to_str().is_none()) {
         Some(odd) => Err(unreadable(odd)),
         None => Ok(files),
@@ -43,11 +43,11 @@ pub fn unreadable(file: &Path) -> Error {
 ///
 /// # Errors
 /// Those of [`expand`] but for such names.
-pub fn expand_any<P: AsRef<str>>(paths: &[P]) -> Result<Vec<PathBuf>> {
+pub fn expand_any<P: AsRef<str>>(paths: &[P], formats: &Formats) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = Vec::new();
     let mut named = BTreeSet::new();
     for path in paths.iter().map(AsRef::as_ref) {
-        for file in one(path)? {
+        for file in one(path, formats)? {
             if !named.insert(file.canonicalize().unwrap_or_else(|_| file.clone())) {
                 let twice = shown(&file);
                 let path = shown(Path::new(path));
@@ -63,10 +63,10 @@ pub fn expand_any<P: AsRef<str>>(paths: &[P]) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-fn one(path: &str) -> Result<Vec<PathBuf>> {
+fn one(path: &str, formats: &Formats) -> Result<Vec<PathBuf>> {
     let literal = Path::new(path);
     if literal.is_dir() {
-        return folder(literal);
+        return folder(literal, formats);
     }
     let pattern = path.contains(['*', '?', '[']);
     if !pattern || literal.exists() {
@@ -210,20 +210,21 @@ fn entries(folder: &Path) -> Result<Vec<OsString>> {
         .collect()
 }
 
-fn folder(path: &Path) -> Result<Vec<PathBuf>> {
+fn folder(path: &Path, formats: &Formats) -> Result<Vec<PathBuf>> {
     let failed = |e| Error::io(path, "list the folder", e);
     let mut files = Vec::new();
     for entry in fs::read_dir(path).map_err(failed)? {
         let entry = entry.map_err(failed)?;
         let hidden = entry.file_name().as_bytes().starts_with(b".");
         let file = entry.path();
-        if !hidden && Format::of(&file).is_some() && !file.is_dir() {
+        if !hidden && formats.of(&file).is_some() && !file.is_dir() {
             files.push(file);
         }
     }
     if files.is_empty() {
         let path = shown(path);
-        let told = format!("the folder `{path}` has no las, laz or ply file");
+        let known = listed(formats.names(), "or");
+        let told = format!("the folder `{path}` has no {known} file");
         return Err(Error::new(ErrorKind::Io, told));
     }
     sort(&mut files);
@@ -237,6 +238,12 @@ fn sort(files: &mut [PathBuf]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::las::{LAS, LAZ};
+    use crate::io::ply::PLY;
+
+    fn formats() -> Formats {
+        Formats::default().with(LAS).with(LAZ).with(PLY)
+    }
 
     fn folder_of(names: &[&str]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
@@ -250,7 +257,7 @@ mod tests {
         let paths: Vec<String> =
             paths.iter().map(|p| folder.join(p).to_str().unwrap().to_owned()).collect();
         let name = |p: PathBuf| p.file_name().unwrap().to_str().unwrap().to_owned();
-        expand(&paths).map(|files| files.into_iter().map(name).collect())
+        expand(&paths, &formats()).map(|files| files.into_iter().map(name).collect())
     }
 
     #[test]
@@ -273,7 +280,7 @@ mod tests {
         }
         std::os::unix::fs::symlink("..", at.path().join("x/up")).unwrap();
         let found = |pattern: &str| -> Vec<String> {
-            let files = expand(&[at.path().join(pattern).to_str().unwrap()]).unwrap();
+            let files = expand(&[at.path().join(pattern).to_str().unwrap()], &formats()).unwrap();
             let inner = |f: PathBuf| f.strip_prefix(at.path()).unwrap().display().to_string();
             files.into_iter().map(inner).collect()
         };
@@ -285,8 +292,11 @@ mod tests {
         assert_eq!(found("**/**/d.laz"), ["w/d.laz", "x/y/d.laz"]);
         assert_eq!(found("x/.*/d.*"), ["x/.z/d.laz"]);
         assert_eq!(found("[x]/../w/*"), ["x/../w/d.laz"]);
-        assert!(expand(&[at.path().join("x/**").to_str().unwrap()]).is_err(), "folders alone");
-        assert!(expand(&[at.path().join("none/*").to_str().unwrap()]).is_err());
+        assert!(
+            expand(&[at.path().join("x/**").to_str().unwrap()], &formats()).is_err(),
+            "folders alone"
+        );
+        assert!(expand(&[at.path().join("none/*").to_str().unwrap()], &formats()).is_err());
     }
 
     #[test]
@@ -295,7 +305,8 @@ mod tests {
         let name = std::ffi::OsStr::from_bytes(b"\xff.laz");
         fs::write(at.path().join(name), b"").unwrap();
         for path in ["", "*.laz", "?.laz", "**/*.laz"] {
-            let refused = expand(&[at.path().join(path).to_str().unwrap()]).unwrap_err();
+            let refused =
+                expand(&[at.path().join(path).to_str().unwrap()], &formats()).unwrap_err();
             assert_eq!(refused.path(), Some(at.path().join(name).as_path()), "{path}");
             assert!(refused.to_string().ends_with("not UTF-8 text"), "{refused}");
         }
@@ -332,7 +343,7 @@ mod tests {
         assert!(told(&["[.laz"]).contains("no pattern"));
         let empty = folder_of(&["a.txt"]);
         assert!(names(empty.path(), &[""]).unwrap_err().to_string().contains("has no las"));
-        assert!(expand::<&str>(&[]).is_err());
+        assert!(expand::<&str>(&[], &formats()).is_err());
         assert_eq!(names(at.path(), &["missing.laz"]).unwrap(), ["missing.laz"]);
     }
 }

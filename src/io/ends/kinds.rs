@@ -5,60 +5,11 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Deserializer, Serialize, de};
 
-use crate::error::shown;
-use crate::io::of_extension;
-use crate::io::ply::Colors;
+use crate::error::{listed, shown};
+use crate::io::sniff::{of_extension, upper};
 use crate::point::names;
-use crate::stage::Order;
+use crate::stage::{Colors, Format, FormatName, Formats, Order, OutputEncoding, WriteKeys};
 use crate::{Error, Result};
-
-/// A format of files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Format {
-    /// ASPRS LAS, uncompressed.
-    Las,
-    /// LAS compressed by LASzip.
-    Laz,
-    /// PLY with a vertex element.
-    Ply,
-}
-
-impl Format {
-    /// The format that the extension of `path` names, its case aside.
-    pub fn of(path: &Path) -> Option<Format> {
-        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
-        [Format::Las, Format::Laz, Format::Ply].into_iter().find(|f| f.extension() == extension)
-    }
-
-    /// The extension of its files, without the dot.
-    pub fn extension(self) -> &'static str {
-        match self {
-            Format::Las => "las",
-            Format::Laz => "laz",
-            Format::Ply => "ply",
-        }
-    }
-
-    /// The name of `path` without the part of its extension that says COPC, if it says that. COPC is
-    /// read as the LAZ that it is, and not written: readers of COPC refuse plain LAZ under its name.
-    pub fn without_copc(path: &Path) -> Option<PathBuf> {
-        let name = Path::new(path.file_name()?);
-        let stem = Path::new(name.file_stem()?);
-        let is_laz = Format::of(name) == Some(Format::Laz);
-        let is_copc = is_laz && stem.extension().is_some_and(|e| e.eq_ignore_ascii_case("copc"));
-        let plain = stem.file_stem().filter(|_| is_copc)?;
-        let mut plain = plain.to_owned();
-        plain.push(".");
-        plain.push(name.extension()?);
-        Some(path.with_file_name(plain))
-    }
-
-    /// True if the two share their records: LAZ is LAS.
-    pub fn same_records(self, other: Format) -> bool {
-        (self == Format::Ply) == (other == Format::Ply)
-    }
-}
 
 /// The source of most pipelines. Several files are one scan; all are LAS or LAZ, or all are PLY.
 ///
@@ -82,7 +33,7 @@ pub struct Read {
     pub path: Vec<String>,
     /// Format of all of them; none: as their extensions say.
     #[serde(default)]
-    pub format: Option<Format>,
+    pub format: Option<FormatName>,
 }
 
 /// The end of every pipeline. The file grows in a scratch folder beside its place and appears under
@@ -126,7 +77,7 @@ pub struct Write {
     /// The format; none: as the extension says, in a folder that of the input. A file whose extension
     /// says another is written, with a warning.
     #[serde(default)]
-    pub format: Option<Format>,
+    pub format: Option<FormatName>,
     /// Dimensions that the output need not hold.
     #[serde(default)]
     pub drop: Vec<String>,
@@ -145,7 +96,7 @@ pub struct Write {
     pub dimensions: Vec<String>,
     /// Encoding of a PLY file; none: the input's.
     #[serde(default)]
-    pub encoding: Option<Encoding>,
+    pub encoding: Option<OutputEncoding>,
     /// Bits of a colour in a PLY file of LAS points; none: `"auto"`.
     #[serde(default)]
     pub colors: Option<Colors>,
@@ -163,16 +114,6 @@ pub enum OutputOrder {
     Input,
 }
 
-/// Encoding of a PLY file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Encoding {
-    /// Numbers as text, shortest form that reads back equal.
-    Ascii,
-    /// Numbers as bytes.
-    Binary,
-}
-
 impl Write {
     /// The order as stages know it.
     pub fn stage_order(&self) -> Order {
@@ -185,42 +126,57 @@ impl Write {
 }
 
 impl Write {
-    /// Refuses keys that an output of `format` does not have; tells which.
-    pub(crate) fn check(&self, format: Format) -> Result<(), (&'static str, Error)> {
-        let only = |key: &'static str, formats: &str| {
-            let told =
-                format!("`write.{key}` is for {formats}, the output is {}", format.extension());
-            Err((key, Error::pipeline(told)))
-        };
-        match format {
-            Format::Ply if self.scale.is_some() => only("scale", "las and laz"),
-            Format::Ply if self.offset.is_some() => only("offset", "las and laz"),
-            Format::Las | Format::Laz if self.encoding.is_some() => only("encoding", "ply"),
-            Format::Las | Format::Laz if self.colors.is_some() => only("colors", "ply"),
-            _ if self.offset.is_some_and(|offset| offset.iter().any(|v| !v.is_finite())) => {
-                Err(("offset", Error::pipeline("an offset is three finite numbers")))
-            }
-            _ => Ok(()),
+    /// What formats know of it.
+    pub(super) fn keys(&self, path: PathBuf) -> WriteKeys {
+        WriteKeys {
+            path,
+            normals: !self.dimensions.is_empty(),
+            drop: self.drop.clone(),
+            scale: self.scale,
+            offset: self.offset,
+            encoding: self.encoding,
+            colors: self.colors,
         }
     }
 }
 
+/// Refuses keys that an output of `format` does not have; tells which.
+pub(super) fn check(
+    keys: &WriteKeys,
+    format: &dyn Format,
+    formats: &Formats,
+) -> Result<(), (&'static str, Error)> {
+    if let Some(key) = keys.given().find(|key| !format.keys().contains(key)) {
+        let having = formats.iter().filter(|format| format.keys().contains(&key));
+        let having = listed(having.map(|format| format.name()), "and");
+        let is = format.name();
+        let told = format!("`write.{key}` is for {having}, the output is {is}");
+        return Err((key, Error::pipeline(told)));
+    }
+    match keys.offset.is_some_and(|offset| offset.iter().any(|v| !v.is_finite())) {
+        true => Err(("offset", Error::pipeline("an offset is three finite numbers"))),
+        false => Ok(()),
+    }
+}
+
 /// The error of a file of which neither its extension nor `setting` says the format.
-pub(crate) fn unknown_extension(path: &Path, setting: &str) -> Error {
+pub(super) fn unknown_extension(path: &Path, setting: &str, formats: &Formats) -> Error {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let name = shown(path);
     let is_read = setting.starts_with("read");
     let can = if is_read { "read" } else { "written" };
+    let dotted = listed(formats.names().iter().map(|name| format!(".{name}")), "or");
     match of_extension(&extension) {
         Some(format) => {
             let told = format!("by its extension `{name}` is {format}, which is not {can}");
+            let known = listed(upper(formats), "or");
             Error::pipeline(told).help(match is_read {
-                true => "convert it to LAS, LAZ or PLY with another program first",
-                false => "name it .las, .laz or .ply",
+                true => format!("convert it to {known} with another program first"),
+                false => format!("name it {dotted}"),
             })
         }
         None => Error::pipeline(format!("the extension of `{name}` names no format"))
-            .help(format!("name it .las, .laz or .ply, or give `{setting}`")),
+            .help(format!("name it {dotted}, or give `{setting}`")),
     }
 }
 

@@ -8,4 +8,4 @@ mod outputs;
 mod roles;
 
 pub use inputs::{expand, expand_any, unreadable};
-pub use kinds::{Encoding, Format, OutputOrder, Read, Write};
+pub use kinds::{OutputOrder, Read, Write};

@@ -6,30 +6,34 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::connect::Output;
-use super::kinds::{Format, Write, unknown_extension};
+use super::kinds::{check, unknown_extension};
 use crate::error::shown;
-use crate::point::{Layout, Metadata, PointBatch, Schema};
-use crate::stage::{ChunkSize, CreateSink, Input, Order, Sink};
+use crate::point::{Metadata, PointBatch, Schema};
+use crate::stage::{ChunkSize, CreateSink, Format, Formats, Input, Order, Sink, WriteKeys};
 use crate::{Error, ErrorKind, Result};
 
 /// The sink that writes a file for each input.
 pub struct Outputs {
-    /// The keys.
-    pub write: Write,
-    /// Where the files are to be.
-    pub folder: PathBuf,
+    /// What each is to be; the path is that of the folder.
+    pub keys: WriteKeys,
+    /// The order of their records.
+    pub order: Order,
+    /// The format of all of them; None for those of the inputs.
+    pub format: Option<Arc<dyn Format>>,
+    /// All formats.
+    pub formats: Formats,
 }
 
 impl Outputs {
     /// Refuses a folder that is something else or cannot be made.
     fn check_folder(&self) -> Result<()> {
-        if self.folder.is_dir() {
+        if self.keys.path.is_dir() {
             return Ok(());
         }
-        if self.folder.symlink_metadata().is_ok() {
-            return Err(Error::pipeline("this is no folder for outputs").at(&self.folder));
+        if self.keys.path.symlink_metadata().is_ok() {
+            return Err(Error::pipeline("this is no folder for outputs").at(&self.keys.path));
         }
-        let parent = self.folder.parent().unwrap_or(Path::new(""));
+        let parent = self.keys.path.parent().unwrap_or(Path::new(""));
         if parent == Path::new("") || parent.is_dir() {
             return Ok(());
         }
@@ -38,44 +42,53 @@ impl Outputs {
         Err(told.at(parent).help("create it first"))
     }
 
-    /// One of the outputs, for what all have in common.
-    fn any(&self, schema: &Schema) -> Output {
-        // Compressing takes most: where inputs say their formats, some may be LAZ.
-        let format = self.write.format.unwrap_or(match schema.layout {
-            Layout::Ply => Format::Ply,
-            Layout::Las { .. } => Format::Laz,
-        });
-        let (write, path) = (self.write.clone(), self.folder.clone());
-        Output { write, path, format, of_one: true }
+    /// An output of `format` at `path`.
+    fn output(&self, path: PathBuf, format: &Arc<dyn Format>) -> Output {
+        let keys = WriteKeys { path, ..self.keys.clone() };
+        let (format, formats) = (format.clone(), self.formats.clone());
+        Output { keys, order: self.order, format, formats, of_one: true }
+    }
+
+    /// An output of each format that there may be, for records of `schema`.
+    fn possible(&self, schema: &Schema) -> Vec<Output> {
+        let formats: Vec<_> = match &self.format {
+            Some(format) => vec![format],
+            None => self.formats.of_family(schema.layout.family).collect(),
+        };
+        formats.into_iter().map(|format| self.output(self.keys.path.clone(), format)).collect()
+    }
+
+    /// One of these: what does not depend on it is alike in all formats of a family.
+    fn any(&self, schema: &Schema) -> Option<Output> {
+        self.possible(schema).pop()
     }
 
     /// The output of the input at `path`: its name, with the extension of the format that is asked
     /// for unless it says that already.
     fn of(&self, input: &Path) -> Result<Output> {
-        let path = &Format::without_copc(input).unwrap_or_else(|| input.to_owned());
-        let told = Format::of(path);
-        let format =
-            self.write.format.or(told).ok_or_else(|| unknown_extension(path, "write.format"))?;
+        let path = &*self.formats.plain(input);
+        let told = self.formats.of(path);
+        let unknown = || unknown_extension(path, "write.format", &self.formats);
+        let format = self.format.as_ref().or(told).ok_or_else(unknown)?;
         let Some(name) = path.file_name() else {
             return Err(Error::pipeline("the input has no name for its output").at(path));
         };
         let name = match told {
-            Some(told) if told == format => name.to_owned(),
-            Some(_) => Path::new(name).with_extension(format.extension()).into_os_string(),
+            Some(told) if told.name() == format.name() => name.to_owned(),
+            Some(_) => Path::new(name).with_extension(format.name()).into_os_string(),
             // Behind a dot that is part of the name, such as that of `tile.12`.
-            None => {
-                [name, ".".as_ref(), format.extension().as_ref()].into_iter().collect::<OsString>()
-            }
+            None => [name, ".".as_ref(), format.name().as_ref()].into_iter().collect::<OsString>(),
         };
-        let path = self.folder.join(name);
-        self.write.check(format).map_err(|(_, error)| error.at(&path))?;
-        Ok(Output { write: self.write.clone(), path, format, of_one: true })
+        let output = self.output(self.keys.path.join(name), format);
+        let checked = check(&output.keys, &**format, &self.formats);
+        checked.map_err(|(_, error)| error.at(&output.keys.path))?;
+        Ok(output)
     }
 }
 
 impl CreateSink for Outputs {
     fn path(&self) -> &Path {
-        &self.folder
+        &self.keys.path
     }
 
     fn is_folder(&self) -> bool {
@@ -86,17 +99,17 @@ impl CreateSink for Outputs {
         self.check_folder()?;
         if inputs.is_empty() {
             return Err(Error::pipeline("the points come from no file that an output could be of")
-                .at(&self.folder)
+                .at(&self.keys.path)
                 .help("write one file: give `write.path` instead of `write.folder`"));
         }
         let mut taken: BTreeMap<PathBuf, &Path> = BTreeMap::new();
         let mut all: Vec<Box<dyn CreateSink>> = Vec::with_capacity(inputs.len());
         for Input { path, .. } in inputs {
             let output = self.of(path)?;
-            if let Some(other) = taken.insert(output.path.clone(), path) {
+            if let Some(other) = taken.insert(output.keys.path.clone(), path) {
                 let told = format!("{} and {} would both become this", shown(other), shown(path));
                 return Err(Error::pipeline(told)
-                    .at(&output.path)
+                    .at(&output.keys.path)
                     .help("rename one of them, or run them one by one"));
             }
             all.push(Box::new(output));
@@ -105,31 +118,39 @@ impl CreateSink for Outputs {
     }
 
     fn order(&self) -> Order {
-        self.write.stage_order()
+        self.order
     }
 
     fn wants_normals(&self) -> bool {
-        !self.write.dimensions.is_empty()
+        self.keys.normals
     }
 
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize> {
-        self.any(schema).chunk(schema, metadata)
+        let mut largest = ChunkSize { points: 0, bytes: 0 };
+        for output in self.possible(schema) {
+            let chunk = output.chunk(schema, metadata)?;
+            largest.points = largest.points.max(chunk.points);
+            largest.bytes = largest.bytes.max(chunk.bytes);
+        }
+        Ok(largest)
     }
 
     fn disk_bytes(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<[u64; 2]> {
-        self.any(schema).disk_bytes(schema, metadata)
+        let possible = self.possible(schema);
+        let bytes = possible.iter().map(|output| output.disk_bytes(schema, metadata));
+        Ok(bytes.collect::<Result<Vec<_>>>()?.into_iter().min().unwrap_or_default())
     }
 
     fn warnings(&self, schema: &Schema, metadata: &Metadata) -> Vec<String> {
-        self.any(schema).warnings(schema, metadata)
+        self.any(schema).map_or(Vec::new(), |output| output.warnings(schema, metadata))
     }
 
     fn checks(&self, schema: &Schema) -> bool {
-        self.any(schema).checks(schema)
+        self.any(schema).is_some_and(|output| output.checks(schema))
     }
 
     fn check(&self, metadata: &Metadata, records: &PointBatch) -> Result<()> {
-        self.any(records.schema()).check(metadata, records)
+        self.any(records.schema()).map_or(Ok(()), |output| output.check(metadata, records))
     }
 
     fn create(
@@ -139,6 +160,6 @@ impl CreateSink for Outputs {
         _metadata: &Metadata,
         _whole: bool,
     ) -> Result<Box<dyn Sink>> {
-        Err(Error::internal("a folder is not written as one file").at(&self.folder))
+        Err(Error::internal("a folder is not written as one file").at(&self.keys.path))
     }
 }

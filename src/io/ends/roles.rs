@@ -3,41 +3,46 @@
 use std::os::unix::ffi::OsStrExt;
 use std::path::PathBuf;
 
-use super::kinds::{Format, Read, Write, unknown_extension};
+use super::kinds::{Read, Write, unknown_extension};
 use super::outputs::Outputs;
-use super::{connect, inputs};
+use super::{connect, inputs, kinds};
 use crate::error::shown;
-use crate::stage::{OpenSource, Role};
-use crate::stage::{StageKind, StagePlace};
+use crate::stage::{Format, Formats, OpenSource, Role, StageKind, StagePlace, WriteKeys};
 use crate::{Error, Result};
 
 impl Read {
-    /// The source of these files, none of which is opened yet.
+    /// The source of these files, each of one of `formats`; none of them is opened yet.
     ///
     /// # Errors
     ///
     /// A path that names no file, a file whose name tells no format, and files of which the records
     /// are not alike.
-    pub fn source(&self) -> Result<Box<dyn OpenSource>> {
-        let files = inputs::expand(&self.path)?;
-        let known = |file: &PathBuf| self.format.or(Format::of(file));
+    pub fn source(&self, formats: &Formats) -> Result<Box<dyn OpenSource>> {
+        let files = inputs::expand(&self.path, formats)?;
+        let asked = self.format.as_ref().map(|name| formats.named(name)).transpose()?;
+        let known = |file: &PathBuf| asked.or(formats.of(file));
         // A file that is not there is told when it is opened, whatever its name.
-        let missing = files.iter().find_map(known).unwrap_or(Format::Las);
-        let mut formats = Vec::new();
+        let missing = files.iter().find_map(known).or(formats.iter().next());
+        let mut all = Vec::new();
         for file in &files {
-            formats.push(match known(file) {
-                Some(format) => format,
-                None if std::fs::metadata(file).is_err() => missing,
-                None => return Err(unknown_extension(file, "read.format")),
-            });
+            let missing = || missing.filter(|_| std::fs::metadata(file).is_err());
+            let format = known(file).or_else(missing);
+            all.push(format.ok_or_else(|| unknown_extension(file, "read.format", formats))?);
         }
-        if let Some(i) = formats.iter().position(|f| !f.same_records(formats[0])) {
+        let families: Vec<&str> = all.iter().map(|format| format.family()).collect();
+        if let Some(i) = families.iter().position(|family| *family != families[0]) {
             let (a, b) = (shown(&files[0]), shown(&files[i]));
+            let mut both = [families[0], families[i]];
+            both.sort_unstable();
+            let told = format!(
+                "{a} and {b} cannot be read together: {} records differ",
+                both.join(" and ")
+            );
             let help = "read one of the two formats, or convert first";
-            let told = format!("{a} and {b} cannot be read together: LAS and PLY records differ");
             return Err(Error::pipeline(told).help(help));
         }
-        Ok(connect::read(files, &formats))
+        let format = all[0].clone();
+        Ok(Box::new(connect::Files { files, format, formats: formats.clone() }))
     }
 }
 
@@ -47,7 +52,7 @@ impl StageKind for Read {
     const PLACES: &'static [&'static str] = &["path", "format"];
 
     fn build(self, at: &StagePlace) -> Result<Role> {
-        Ok(Role::Source(self.source().map_err(|error| at.blame("path", error))?))
+        Ok(Role::Source(self.source(at.formats()).map_err(|error| at.blame("path", error))?))
     }
 }
 
@@ -58,7 +63,11 @@ impl StageKind for Write {
     const EITHER: &'static [&'static str] = &["path", "folder"];
 
     fn build(self, at: &StagePlace) -> Result<Role> {
-        let check = |format| self.check(format).map_err(|(key, error)| at.blame(key, error));
+        let formats = at.formats();
+        let check = |keys: &WriteKeys, format: &dyn Format| {
+            kinds::check(keys, format, formats).map_err(|(key, error)| at.blame(key, error))
+        };
+        let asked = self.format.as_ref().map(|name| formats.named(name)).transpose()?;
         match (self.path.clone(), self.folder.clone()) {
             (Some(_), Some(_)) => {
                 let told = "`write.path` makes one file and `write.folder` one for each input: give one of them";
@@ -76,21 +85,30 @@ impl StageKind for Write {
                 Err(at.blame("path", Error::pipeline(told).help(help)))
             }
             (Some(path), None) => {
-                let Some(format) = self.format.or(Format::of(&path)) else {
-                    return Err(at.blame("path", unknown_extension(&path, "write.format")));
+                let Some(format) = asked.or(formats.of(&path)) else {
+                    let unknown = unknown_extension(&path, "write.format", formats);
+                    return Err(at.blame("path", unknown));
                 };
-                if let Some(plain) = Format::without_copc(&path) {
-                    let told = format!("`{}` is named as COPC, which is not written", shown(&path));
-                    let help = format!("name it `{}`: it is plain LAZ", shown(&plain));
+                let named = formats.of(&path);
+                if let Some((what, plain)) = named.and_then(|named| named.promises(&path)) {
+                    let path = shown(&path);
+                    let told = format!("`{path}` is named as {what}, which is not written");
+                    let is = named.map_or("", |named| named.name()).to_uppercase();
+                    let help = format!("name it `{}`: it is plain {is}", shown(&plain));
                     return Err(at.blame("path", Error::pipeline(told).help(help)));
                 }
-                check(format)?;
-                let output = connect::Output { write: self, path, format, of_one: false };
+                let keys = self.keys(path);
+                check(&keys, &**format)?;
+                let (format, formats) = (format.clone(), formats.clone());
+                let order = self.stage_order();
+                let output = connect::Output { keys, order, format, formats, of_one: false };
                 Ok(Role::Sink(Box::new(output)))
             }
             (None, Some(folder)) => {
-                self.format.map_or(Ok(()), check)?;
-                Ok(Role::Sink(Box::new(Outputs { write: self, folder })))
+                let keys = self.keys(folder);
+                asked.map_or(Ok(()), |format| check(&keys, &**format))?;
+                let (order, format) = (self.stage_order(), asked.cloned());
+                Ok(Role::Sink(Box::new(Outputs { keys, order, format, formats: formats.clone() })))
             }
         }
     }

@@ -22,6 +22,22 @@ pub fn has_waveforms(format: u8) -> bool {
     matches!(format, 4 | 5 | 9 | 10)
 }
 
+/// The family of LAS records.
+pub const FAMILY: &str = "LAS";
+
+/// The class of overlap in point formats 0 to 5, which have no flag for it (LAS 1.4 R15, table 9).
+const OVERLAP_CLASS: u8 = 12;
+
+/// LAS point records of `format` (0 to 10), extra bytes behind them.
+pub const fn records(format: u8) -> Layout {
+    Layout { family: FAMILY, form: Some(format), steps: true, overlap_class: Some(OVERLAP_CLASS) }
+}
+
+/// The point format of records of `schema`; None for those of other families.
+pub fn format_of(schema: &Schema) -> Option<u8> {
+    schema.layout.form.filter(|_| schema.layout.family == FAMILY)
+}
+
 /// The schema of records of `format` (0 to 10) with extra dimensions in this order behind it.
 /// Coordinates are i32 with `scale` and `offset`.
 pub fn layout(format: u8, extra: &[(String, Scalar)], scale: [f64; 3], offset: [f64; 3]) -> Schema {
@@ -74,12 +90,7 @@ pub fn schema(
             if extra - at == 1 { "ExtraBytes".to_owned() } else { format!("ExtraBytes[{i}]") };
         add(Dimension::new(name, Scalar::U8, base + byte), &mut dimensions);
     }
-    Schema {
-        layout: Layout::Las { format },
-        endian: Endian::Little,
-        stride: base + extra,
-        dimensions,
-    }
+    Schema { layout: records(format), endian: Endian::Little, stride: base + extra, dimensions }
 }
 
 /// The layers of compressed records of `schema` that are to be decoded if nobody looks at the
@@ -93,7 +104,7 @@ pub fn selection(schema: &Schema, unread: &[String]) -> Layers {
         names::SCAN_DIRECTION_FLAG,
         names::EDGE_OF_FLIGHT_LINE,
     ];
-    let Layout::Las { format } = schema.layout else { return Layers::ALL };
+    let Some(format) = format_of(schema) else { return Layers::ALL };
     if unread.is_empty() {
         return Layers::ALL;
     }

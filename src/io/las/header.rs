@@ -5,9 +5,15 @@ use super::fields::{at, encoding};
 use super::file::InputFile;
 use super::format;
 use super::text::{split_at_room, text};
-use crate::io::sniff;
 use crate::point::GpsTime;
+use crate::stage::foreign;
 use crate::{Error, Result};
+
+/// What a file begins with.
+pub const SIGNATURE: &[u8] = b"LASF";
+
+/// What messages call such a file.
+pub const CALLED: &str = "a LAS or LAZ file";
 
 /// What is to be done about a header that cannot be.
 const DAMAGED: &str = "the file is cut off, or its header is damaged: get another copy";
@@ -35,7 +41,7 @@ impl Header {
     pub fn blank(minor: u8, format: u8, record_length: u16) -> Self {
         let size = Self::size_of(minor);
         let mut header = Header { bytes: vec![0; size] };
-        header.put(0, b"LASF");
+        header.put(0, SIGNATURE);
         header.put(at::VERSION, &[1, minor]);
         header.put(at::HEADER_SIZE, &(size as u16).to_le_bytes());
         header.put(at::FORMAT, &[format]);
@@ -46,9 +52,9 @@ impl Header {
     /// Reads the header of `file` and checks it against the file's length.
     pub fn read(file: &InputFile) -> Result<Self> {
         let smallest = Self::size_of(0);
-        let first = file.bytes(0, file.len().min(sniff::BYTES as u64) as usize)?;
-        if !sniff::is_las(&first) {
-            return Err(sniff::not("a LAS or LAZ file", file.path(), &first));
+        let first = file.bytes(0, file.len().min(Self::size_of(4) as u64) as usize)?;
+        if !first.starts_with(SIGNATURE) {
+            return Err(foreign(file.path(), CALLED));
         }
         if file.len() < smallest as u64 {
             return Err(file

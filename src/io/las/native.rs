@@ -7,14 +7,15 @@ use super::described::{Described, EXTRA_BYTES, describe};
 use super::extra::Descriptor;
 use super::fields::{at, encoding};
 use super::file::InputFile;
-use super::format::record_size;
+use super::format::{format_of, record_size};
 use super::header::Header;
 use super::input::{Input, extra_len, is_carried, is_carried_extended};
 use super::vlr::{Evlr, Vlr, read_evlrs, read_vlrs};
 use super::waveforms::Waveforms;
 use crate::Result;
+use crate::error::shown;
 use crate::io::wkt;
-use crate::point::{Layout, Metadata, Schema, names};
+use crate::point::{Metadata, Schema, names};
 
 /// Header and records of the input, without what describes how that file stored its points.
 #[derive(Debug, Clone)]
@@ -67,14 +68,14 @@ impl Native {
 
     /// True if it belongs to records of this schema.
     pub fn fits(&self, schema: &Schema) -> bool {
-        schema.layout == Layout::Las { format: self.header.format() }
+        format_of(schema) == Some(self.header.format())
             && schema.stride == usize::from(self.header.record_length())
     }
 
     /// A header for points that come from no LAS file: LAS 1.4, records in `schema`'s LAS layout,
     /// its extra dimensions described, `crs` carried if it is WKT or EPSG codes.
     pub fn fresh(schema: &Schema, crs: Option<&str>) -> Self {
-        let format = if let Layout::Las { format } = schema.layout { format } else { 0 };
+        let format = format_of(schema).unwrap_or(0);
         let length = u16::try_from(schema.stride).unwrap_or(u16::MAX);
         let mut header = Header::blank(4, format, length);
         header.put(at::SYSTEM, b"OTHER");
@@ -106,10 +107,13 @@ pub fn fresh(schema: &Schema, crs: Option<&str>) -> Metadata {
     }
 }
 
-/// Names of the variable length records of LAS inputs that say more than dimensions and the coordinate
-/// reference system: what an output of another format does not hold.
-pub fn records_beside(metadata: &Metadata) -> Vec<String> {
-    let native = metadata.native.clone().and_then(|native| native.downcast::<Native>().ok());
+/// So many lost records are named.
+const NAMED: usize = 8;
+
+/// What `metadata` of LAS inputs has and an output of another format does not hold: records that say
+/// more than dimensions and the coordinate reference system, and waveforms that are there.
+pub fn lost(metadata: &Metadata) -> Vec<String> {
+    let native = metadata.native.as_ref().and_then(|native| native.downcast_ref::<Native>());
     let Some(native) = native else { return Vec::new() };
     let name = |user: String, record: u16| {
         let crs = user == "LASF_Projection" && metadata.crs.is_some();
@@ -118,12 +122,19 @@ pub fn records_beside(metadata: &Metadata) -> Vec<String> {
     };
     let vlrs = native.vlrs.iter().filter_map(|vlr| name(vlr.user(), vlr.record()));
     let evlrs = native.evlrs.iter().filter_map(|evlr| name(evlr.user(), evlr.record()));
-    vlrs.chain(evlrs).collect()
-}
-
-/// The file that the records of a LAS input refer to for their waveforms, if it is there.
-pub fn waveforms_of(metadata: &Metadata) -> Option<PathBuf> {
-    metadata.native.as_ref()?.downcast_ref::<Native>()?.waveforms.clone()
+    let lost: Vec<String> = vlrs.chain(evlrs).collect();
+    let named = match &lost[..] {
+        all if all.len() > NAMED => {
+            format!("{} and {} more", all[..NAMED].join(", "), all.len() - NAMED)
+        }
+        all => all.join(", "),
+    };
+    let records = (!lost.is_empty())
+        .then(|| format!("variable length records of LAS; these are lost: {named}"));
+    let file = native.waveforms.as_deref();
+    let waveforms =
+        file.map(|file| format!("waveforms of LAS; these are lost: those in {}", shown(file)));
+    records.into_iter().chain(waveforms).collect()
 }
 
 /// The three dimensions that hold a normal already, if all are there.

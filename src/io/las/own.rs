@@ -58,12 +58,6 @@ impl Shifted {
         let encoder = ShiftingEncoder { path, shift, to, inner: inner.encoder() };
         Shifted { inner, encoder: Arc::new(encoder) }
     }
-
-    /// The chunks of such a sink around one of the chunks `inner`, for records of `schema`.
-    pub fn chunk(inner: ChunkSize, schema: &Schema) -> ChunkSize {
-        let records = (inner.points as u64).saturating_mul(schema.stride as u64);
-        ChunkSize { bytes: inner.bytes.saturating_add(records), ..inner }
-    }
 }
 
 impl ShiftingEncoder {
@@ -105,7 +99,7 @@ impl Sink for Shifted {
 
     fn chunk_bytes(&self) -> u64 {
         let (points, bytes) = (self.inner.chunk_points(), self.inner.chunk_bytes());
-        Shifted::chunk(ChunkSize { points, bytes }, &self.encoder.to).bytes
+        ChunkSize { points, bytes }.and_records(self.encoder.to.stride).bytes
     }
 
     fn encoder(&self) -> Arc<dyn Encode> {

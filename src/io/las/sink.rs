@@ -14,12 +14,12 @@ use super::described::{Described, describe};
 use super::encode::{LasEncoder, Normals};
 use super::extra::{DESCRIPTOR_BYTES, with_normals};
 use super::fields::{at, encoding};
-use super::format::record_size;
+use super::format::{format_of, record_size};
 use super::header::{COMPRESSED, Header};
 use super::laz::{CHUNK_POINTS, Compression};
 use super::native::Native;
 use super::vlr::Vlr;
-use crate::point::{Layout, Metadata, Schema};
+use crate::point::{Metadata, Schema};
 use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -56,7 +56,7 @@ pub fn create(
     schema: &Arc<Schema>,
     metadata: &Metadata,
 ) -> Result<Box<dyn Sink>> {
-    let format = format_of(schema)?;
+    let format = form(schema)?;
     let (encoder, laszip) = encoder(options, schema)?;
     let carried = metadata.native.as_ref().and_then(|n| n.downcast_ref::<Native>());
     let mut notes = Vec::new();
@@ -93,7 +93,7 @@ pub fn chunk(options: &LasOptions, schema: &Schema) -> Result<ChunkSize> {
 
 /// The encoder of records of `schema`, and the laszip record that tells how it compresses.
 fn encoder(options: &LasOptions, schema: &Schema) -> Result<(LasEncoder, Option<Vlr>)> {
-    let format = format_of(schema)?;
+    let format = form(schema)?;
     let normals = Normals::plan(schema, options.normals);
     let (mut compression, mut laszip) = (None, None);
     if options.compressed {
@@ -103,11 +103,9 @@ fn encoder(options: &LasOptions, schema: &Schema) -> Result<(LasEncoder, Option<
     Ok((LasEncoder::new(format, schema, normals, compression), laszip))
 }
 
-fn format_of(schema: &Schema) -> Result<u8> {
-    match schema.layout {
-        Layout::Las { format } => Ok(format),
-        Layout::Ply => Err(Error::internal("records are to be converted to a LAS layout first")),
-    }
+fn form(schema: &Schema) -> Result<u8> {
+    format_of(schema)
+        .ok_or_else(|| Error::internal("records are to be converted to a LAS layout first"))
 }
 
 /// Bytes of a record as written.

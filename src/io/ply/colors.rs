@@ -7,28 +7,13 @@
 //! multiples of 257 from those of 256, it is written with 8 bits again in the end. So the type in a
 //! finished file depends on the colours alone.
 
-use serde::{Deserialize, Serialize};
-
 use super::header::Encoding;
+use super::names::FAMILY;
 use super::text;
 use crate::point::names::{BLUE, GREEN, RED};
-use crate::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
+use crate::point::{Dimension, Endian, Scalar, Schema, Value};
+use crate::stage::Colors;
 use crate::{Error, Result};
-
-/// How many bits the colours of LAS records have in a PLY file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum Colors {
-    /// 8 where that loses nothing, else 16.
-    #[default]
-    #[serde(rename = "auto")]
-    Auto,
-    /// The upper 8 bits, as `uchar`.
-    #[serde(rename = "8bit")]
-    Eight,
-    /// All 16 bits, as `ushort`.
-    #[serde(rename = "16bit")]
-    Sixteen,
-}
 
 /// What the 16-bit colours of some points are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -137,8 +122,9 @@ fn is_color(dimension: &Dimension) -> bool {
 
 /// Byte offsets of the colours of LAS records of `schema`, but for those of `drop`; none in others.
 pub(super) fn fields(schema: &Schema, drop: &[String]) -> Vec<usize> {
-    let las = matches!(schema.layout, Layout::Las { .. }) && schema.endian == Endian::Little;
-    let held = schema.dimensions.iter().filter(|d| las && is_color(d) && !drop.contains(&d.name));
+    let others = schema.layout.family != FAMILY && schema.endian == Endian::Little;
+    let held =
+        schema.dimensions.iter().filter(|d| others && is_color(d) && !drop.contains(&d.name));
     held.map(|d| d.offset).collect()
 }
 

@@ -2,15 +2,35 @@
 
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use super::colors::{self, Colors, Depth, Recoloring, Written};
+use super::colors::{self, Depth, Recoloring, Written};
 use super::header::Encoding;
+use super::names::RECORDS;
 use super::source::Native;
-use super::{PlyOptions, text};
-use crate::io::convert::{Projection, ply_schema};
+use super::text;
+use super::vertex::ply_schema;
+use crate::io::convert::Projection;
 use crate::point::names::NORMAL;
-use crate::point::{Dimension, Layout, PointBatch, Scalar, Schema, Spare, Value};
-use crate::stage::{ChunkSize, Encode, Encoded};
+use crate::point::{Dimension, PointBatch, Scalar, Schema, Spare, Value};
+use crate::stage::{ChunkSize, Colors, Encode, Encoded};
 use crate::{Error, Result};
+
+/// How a PLY output is written.
+#[derive(Debug, Clone, Default)]
+pub struct PlyOptions {
+    /// Text or binary; that of the input where it is PLY, else little-endian, when not said.
+    pub encoding: Option<Encoding>,
+    /// Writes the normals of the batches as `nx`, `ny` and `nz`: in place where the input has them
+    /// as floating-point numbers, else as `float` behind the other properties.
+    pub normals: bool,
+    /// Dimensions that are left out.
+    pub drop: Vec<String>,
+    /// How many bits the colours of LAS records have; as for [`Colors::Auto`] when not said. From PLY
+    /// to PLY they stay as they are, and saying it is an error.
+    pub colors: Option<Colors>,
+    /// Carries the other elements (faces) of a single binary input whose encoding is kept. To be set
+    /// only where no vertex is removed, added or moved: it fails on a count that differs.
+    pub carry_rest: bool,
+}
 
 /// Records of one encoded chunk.
 pub(super) const CHUNK_POINTS: usize = 65_536;
@@ -136,11 +156,11 @@ impl Plan {
     pub fn new(options: &PlyOptions, schema: &Schema, native: Option<&Native>) -> Result<Plan> {
         let encoding = options.encoding.or(native.map(|n| n.encoding)).unwrap_or({
             match (schema.layout, schema.endian) {
-                (Layout::Ply, crate::point::Endian::Big) => Encoding::BinaryBigEndian,
+                (RECORDS, crate::point::Endian::Big) => Encoding::BinaryBigEndian,
                 _ => Encoding::BinaryLittleEndian,
             }
         });
-        if options.colors.is_some() && schema.layout == Layout::Ply {
+        if options.colors.is_some() && schema.layout == RECORDS {
             let told = "`write.colors` is for LAS inputs: from PLY to PLY colours stay as they are";
             return Err(Error::pipeline(told).help("leave it out"));
         }

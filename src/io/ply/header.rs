@@ -7,9 +7,12 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::io::sniff;
 use crate::point::{Endian, Scalar};
+use crate::stage::foreign;
 use crate::{Error, Result};
+
+/// What messages call a PLY file.
+pub(super) const CALLED: &str = "a PLY file";
 
 /// The longest header that is read, in bytes.
 const LONGEST: u64 = 1 << 20;
@@ -221,8 +224,7 @@ fn parse(bytes: &[u8], whole: bool, path: &Path) -> Result<Option<Header>> {
     let mut lines = Lines::new(bytes);
     // Asked of a line without an end too: what is no PLY is told as such, whatever its size.
     if lines.next().is_none_or(|(_, line, _)| line.trim_ascii() != b"ply") {
-        let first = &bytes[..bytes.len().min(sniff::BYTES)];
-        return Err(sniff::not("a PLY file", path, first));
+        return Err(foreign(path, CALLED));
     }
     let mut header = Partial { lines: 1, ..Partial::default() };
     while let Some((at, line, ended)) = lines.next() {

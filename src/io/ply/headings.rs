@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use super::comments::{CRS, CRS_MORE, GPS_TIME, GPS_TIMES, made};
 use super::header::{Element, Encoding, Kind, Property};
+use super::names;
 use super::source::{Native, Rest};
-use super::{CRS, CRS_MORE, GPS_TIME, GPS_TIMES, made, names};
 use crate::point::{Metadata, Schema, names as point_names};
 
 /// Bytes of one piece of a long text: some readers refuse header lines of 1,024 bytes.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::comments;
 use super::header::{Encoding, Header, Kind};
 use crate::Result;
 use crate::io::origin::Origin;
@@ -69,8 +70,8 @@ pub fn describe(path: &Path) -> Result<PlyInfo> {
                 .collect(),
         })
         .collect();
-    let told = |comment: String| match super::is_made(&comment, points) {
-        true => comment.contains(super::MADE).then(|| super::MADE.to_owned()),
+    let told = |comment: String| match comments::is_made(&comment, points) {
+        true => comment.contains(comments::MADE).then(|| comments::MADE.to_owned()),
         false => Some(comment),
     };
     let comments = header.comments.into_iter().filter_map(told).collect();

@@ -2,7 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::point::names as n;
+use crate::point::{Layout, names as n};
+
+/// The family of PLY records.
+pub(super) const FAMILY: &str = "PLY";
+
+/// Vertices: the file's properties in their order, binary (numbers of a text are held as
+/// little-endian binary of the declared types).
+pub const RECORDS: Layout = Layout::plain(FAMILY);
 
 /// Dimension, the property it is written as, and other spellings that are read as it. Known
 /// dimensions are written in this order.

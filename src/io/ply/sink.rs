@@ -7,21 +7,39 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::PlyOptions;
-use super::colors::{Colors, Depth, Recoloring, Written, note};
-use super::encode::{CHUNK_POINTS, FULL, Plan, WIDE};
+use super::colors::{Depth, Recoloring, Written, note};
+use super::encode::{CHUNK_POINTS, FULL, Plan, PlyOptions, WIDE};
 use super::header::Encoding;
 use super::headings::Headings;
+use super::names::RECORDS;
 use super::source::Native;
-use crate::point::{Layout, Metadata, Schema};
-use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
+use crate::point::{Metadata, Schema};
+use crate::stage::{Colors, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
 /// Bytes carried at once.
 const CARRY: usize = 1 << 18;
 
+/// Creates a PLY file at `staged` for records of `schema`. Records of another format are converted
+/// to the properties of [`super::ply_schema`]. Fails if a dimension cannot be written
+/// or `drop` names none, or if the file cannot be created.
+pub fn create(
+    staged: &Path,
+    options: &PlyOptions,
+    schema: &Schema,
+    metadata: &Metadata,
+) -> Result<Box<dyn Sink>> {
+    Ok(Box::new(PlySink::create(staged, options, schema, metadata)?))
+}
+
+/// How the records of the sink that [`create`] would open are written. Fails on what it would refuse
+/// of `schema` and `options`.
+pub(super) fn plan(options: &PlyOptions, schema: &Schema, metadata: &Metadata) -> Result<Plan> {
+    Plan::new(options, schema, native_of(schema, metadata).as_deref())
+}
+
 /// Writes a PLY file; the header has its final length from the beginning.
-pub(super) struct PlySink {
+struct PlySink {
     file: File,
     path: PathBuf,
     plan: Arc<Plan>,
@@ -39,7 +57,7 @@ pub(super) struct PlySink {
 }
 
 impl PlySink {
-    pub fn create(
+    fn create(
         staged: &Path,
         options: &PlyOptions,
         schema: &Schema,
@@ -77,22 +95,6 @@ impl PlySink {
             sink.carry(&rest, 0)?;
         }
         Ok(sink)
-    }
-
-    /// The chunks of the sink that `create` would open.
-    pub fn chunk(options: &PlyOptions, schema: &Schema, metadata: &Metadata) -> Result<ChunkSize> {
-        let native = native_of(schema, metadata);
-        Ok(Plan::new(options, schema, native.as_deref())?.chunk())
-    }
-
-    /// Bytes of a vertex on the disk; see [`super::disk_bytes`].
-    pub fn disk_bytes(
-        options: &PlyOptions,
-        schema: &Schema,
-        metadata: &Metadata,
-    ) -> Result<[u64; 2]> {
-        let native = native_of(schema, metadata);
-        Ok(Plan::new(options, schema, native.as_deref())?.disk_bytes())
     }
 
     /// Makes the colours of a chunk and those of the file so far have as many bits.
@@ -180,7 +182,7 @@ impl PlySink {
 
 /// What PLY inputs of such records say of themselves.
 fn native_of(schema: &Schema, metadata: &Metadata) -> Option<Arc<Native>> {
-    let native = metadata.native.clone().filter(|_| schema.layout == Layout::Ply)?;
+    let native = metadata.native.clone().filter(|_| schema.layout == RECORDS)?;
     native.downcast::<Native>().ok()
 }
 

@@ -7,12 +7,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::ascii::AsciiPart;
+use super::comments;
 use super::file::PlyFile;
 use super::header::{Element, Encoding, Kind, shown};
-use super::names;
+use super::names::{self, RECORDS};
 use crate::io::origin::Origin;
 use crate::point::names::{GPS_TIME, XYZ};
-use crate::point::{Dimension, GpsTime, Layout, Metadata, PointBatch, Scalar, Schema};
+use crate::point::{Dimension, GpsTime, Metadata, PointBatch, Scalar, Schema};
 use crate::stage::{Input, Part, Source};
 use crate::{Error, Result};
 
@@ -41,8 +42,15 @@ pub(super) struct Rest {
     pub points: u64,
 }
 
+/// Opens PLY files that agree in encoding, vertex properties and coordinate reference system: their
+/// headers, and what stands before the vertices. Fails on a file that is no PLY, has no vertices
+/// with `x`, `y` and `z`, has lists in them, or is too short for the count it claims.
+pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
+    Ok(Box::new(PlySource::open(paths)?))
+}
+
 /// The vertices of one or several PLY files.
-pub(super) struct PlySource {
+struct PlySource {
     schema: Arc<Schema>,
     metadata: Metadata,
     files: Vec<PlyFile>,
@@ -110,12 +118,12 @@ impl Texts {
         // Only pieces right behind the first belong to it: other comments are free to look alike.
         let mut more = false;
         for comment in &header.comments {
-            if let (Some(text), None) = (comment.strip_prefix(super::CRS), &crs) {
+            if let (Some(text), None) = (comment.strip_prefix(comments::CRS), &crs) {
                 crs = Some(text.to_owned());
                 more = true;
                 continue;
             }
-            if let (Some(text), true) = (comment.strip_prefix(super::CRS_MORE), more) {
+            if let (Some(text), true) = (comment.strip_prefix(comments::CRS_MORE), more) {
                 crs.get_or_insert_default().push_str(text);
                 continue;
             }
@@ -125,7 +133,7 @@ impl Texts {
                 continue;
             }
             let of_ours = names::property_told(comment).is_some_and(|p| properties.contains(p));
-            if !of_ours && !super::is_made(comment, file.points) {
+            if !of_ours && !comments::is_made(comment, file.points) {
                 comments.push(comment.clone());
             }
         }
@@ -135,8 +143,8 @@ impl Texts {
 
 /// What GPS times count, if `comment` is the one that says it.
 fn gps_time_told(comment: &str) -> Option<GpsTime> {
-    let text = comment.strip_prefix(super::GPS_TIME)?;
-    super::GPS_TIMES.iter().find(|(_, told)| *told == text).map(|(kind, _)| *kind)
+    let text = comment.strip_prefix(comments::GPS_TIME)?;
+    comments::GPS_TIMES.iter().find(|(_, told)| *told == text).map(|(kind, _)| *kind)
 }
 
 /// Refuses two files whose vertices differ but for the types of properties.
@@ -210,7 +218,7 @@ fn schema(file: &PlyFile, dimensions: &[String], wide: bool) -> Schema {
             Some(dimension)
         })
         .collect();
-    Schema { layout: Layout::Ply, endian: file.header.encoding.endian(), stride, dimensions }
+    Schema { layout: RECORDS, endian: file.header.encoding.endian(), stride, dimensions }
 }
 
 /// Texts equal in all files are carried as they are, else the union, sorted: the order of the

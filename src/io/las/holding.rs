@@ -1,40 +1,9 @@
-//! The layouts that hold what another layout holds.
+//! The LAS point format that holds what a record of another format holds.
 
-use super::{check_drop, quoted};
-use crate::io::ply;
+use crate::io::convert::{check_drop, quoted};
 use crate::point::names::{self as n, XYZ};
-use crate::point::{Dimension, Endian, Layout, Scalar, Schema};
+use crate::point::{Scalar, Schema};
 use crate::{Error, Result};
-
-/// The vertex that holds every dimension of `from`, little-endian: coordinates as `double`, exactly
-/// stored · scale + origin; bit fields each as `uchar`; other scaled dimensions (the scan angle of
-/// point formats 6 to 10, in degrees) as `double`; 64-bit integers, which PLY does not have, as
-/// `double` too, where a value that rounds is refused; all others in their own type. Known dimensions
-/// come first, in the order of their PLY names. That of a PLY record is the record's own.
-pub fn ply_schema(from: &Schema) -> Schema {
-    if from.layout == Layout::Ply {
-        return from.clone();
-    }
-    let mut sources: Vec<&Dimension> = from.dimensions.iter().collect();
-    sources.sort_by_key(|d| ply::rank(&d.name).unwrap_or(usize::MAX));
-    let mut stride = 0;
-    let dimensions = sources
-        .into_iter()
-        .map(|source| {
-            let scaled = source.scale != 1.0 || source.origin != 0.0;
-            let scalar = match source.scalar {
-                _ if XYZ.contains(&source.name.as_str()) || scaled => Scalar::F64,
-                Scalar::U64 | Scalar::I64 => Scalar::F64,
-                _ if source.bits.is_some_and(|bits| bits.width <= 8) => Scalar::U8,
-                own => own,
-            };
-            let dimension = Dimension::new(&source.name, scalar, stride);
-            stride += scalar.size();
-            dimension
-        })
-        .collect();
-    Schema { layout: Layout::Ply, endian: Endian::Little, stride, dimensions }
-}
 
 /// Dimensions beside X, Y and Z that all LAS point formats hold.
 const CORE: [&str; 12] = [

@@ -1,0 +1,102 @@
+//! PLY as a registered format: how `read` and `write` come to its files.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::encode::PlyOptions;
+use super::header::{CALLED, Encoding};
+use super::names::FAMILY;
+use super::{info, sink, source};
+use crate::Result;
+use crate::io::describe::json;
+use crate::point::{Metadata, Schema};
+use crate::stage::{ChunkSize, Format, OutputEncoding, Sink, Source, WriteKeys};
+
+/// The format of PLY files.
+#[derive(Debug, Clone, Copy)]
+pub struct PlyFormat;
+
+/// PLY.
+pub const PLY: PlyFormat = PlyFormat;
+
+impl Format for PlyFormat {
+    fn name(&self) -> &'static str {
+        "ply"
+    }
+
+    fn family(&self) -> &'static str {
+        FAMILY
+    }
+
+    fn about(&self) -> &'static str {
+        "PLY with a vertex element."
+    }
+
+    fn called(&self) -> &'static str {
+        CALLED
+    }
+
+    fn sniff(&self, first: &[u8]) -> bool {
+        // Damaged line ends are for the header to tell.
+        first.starts_with(b"ply")
+    }
+
+    fn open(&self, files: &[PathBuf]) -> Result<Box<dyn Source>> {
+        source::open(files)
+    }
+
+    fn describe(&self, path: &Path) -> Result<serde_json::Value> {
+        json(&info::describe(path)?)
+    }
+
+    fn keys(&self) -> &'static [&'static str] {
+        &["encoding", "colors"]
+    }
+
+    fn chunk(
+        &self,
+        keys: &WriteKeys,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+    ) -> Result<ChunkSize> {
+        Ok(sink::plan(&options(keys, false), schema, metadata)?.chunk())
+    }
+
+    fn create(
+        &self,
+        staged: &Path,
+        keys: &WriteKeys,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+        whole: bool,
+    ) -> Result<Box<dyn Sink>> {
+        sink::create(staged, &options(keys, whole), schema, metadata)
+    }
+
+    fn disk_bytes(
+        &self,
+        keys: &WriteKeys,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+    ) -> Result<[u64; 2]> {
+        Ok(sink::plan(&options(keys, false), schema, metadata)?.disk_bytes())
+    }
+
+    fn unread<'a>(&self, keys: &'a WriteKeys) -> &'a [String] {
+        &keys.drop
+    }
+}
+
+fn options(keys: &WriteKeys, whole: bool) -> PlyOptions {
+    let encoding = keys.encoding.map(|encoding| match encoding {
+        OutputEncoding::Ascii => Encoding::Ascii,
+        OutputEncoding::Binary => Encoding::BinaryLittleEndian,
+    });
+    PlyOptions {
+        encoding,
+        normals: keys.normals,
+        drop: keys.drop.clone(),
+        colors: keys.colors,
+        carry_rest: whole,
+    }
+}

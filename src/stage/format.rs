@@ -1,0 +1,273 @@
+//! What a format of files is: how its files are named and told from others, how they are read,
+//! described and written. Formats are open as stages are: an embedding program registers its own.
+//!
+//! What does not depend on the format (the path of an output, the order of its records, one output
+//! for each input, errors that name the file) is not a format's to do: `read` and `write` do it for
+//! all of them.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::{ChunkSize, Sink, Source};
+use crate::point::{Metadata, PointBatch, Schema};
+use crate::{Error, Result};
+
+/// A format of files that hold points.
+pub trait Format: Send + Sync {
+    /// Its name, which `read.format` and `write.format` take: the extension of its files, in lower case
+    /// and without the dot.
+    fn name(&self) -> &'static str;
+
+    /// The family of its records, as [`Layout::family`](crate::point::Layout::family) has it. Files
+    /// of formats of one family are read together, and records go from one to the other as they are.
+    fn family(&self) -> &'static str;
+
+    /// What it is, in a few words.
+    fn about(&self) -> &'static str;
+
+    /// What messages call a file of the family, with the article: "a LAS or LAZ file".
+    fn called(&self) -> &'static str;
+
+    /// True if a file that begins with these bytes (512, or all that it has) is of this family.
+    fn sniff(&self, first: &[u8]) -> bool;
+
+    /// Opens files of the family as one source, as [`OpenSource::open`](super::OpenSource::open) has
+    /// it.
+    ///
+    /// # Errors
+    ///
+    /// Files that cannot be read, that do not fit together, or whose headers their lengths refute. A
+    /// file that does not begin as one of the family is [`foreign`]: the caller tells what it is.
+    fn open(&self, files: &[PathBuf]) -> Result<Box<dyn Source>>;
+
+    /// What the header of a file says, as `info` shows it: a table with `format` and `points`.
+    fn describe(&self, path: &Path) -> Result<serde_json::Value>;
+
+    /// A file that the records of the input at `path` refer to, and the extension that a copy has
+    /// beside outputs ([`Input::beside`](super::Input::beside)).
+    fn beside(&self, _path: &Path) -> Option<(PathBuf, &'static str)> {
+        None
+    }
+
+    /// Where a file's name promises more than the format writes (`a.copc.laz`): what it promises, and
+    /// the name without that.
+    fn promises(&self, _path: &Path) -> Option<(&'static str, PathBuf)> {
+        None
+    }
+
+    /// What `metadata` of this format's inputs has and outputs of other families do not hold, each
+    /// said as what follows "PLY does not hold".
+    fn lost(&self, _metadata: &Metadata) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// The sink for the records that come from one of several inputs, whose own `metadata` this is,
+    /// where records of that input alone would be of another schema than `schema`: brings records
+    /// back to it before they go into what `create` makes for it.
+    fn of_one(
+        &self,
+        _staged: &Path,
+        schema: &Arc<Schema>,
+        _metadata: &Metadata,
+        create: &dyn Fn(&Arc<Schema>) -> Result<Box<dyn Sink>>,
+    ) -> Result<Box<dyn Sink>> {
+        create(schema)
+    }
+
+    /// The keys among `scale`, `offset`, `encoding` and `colors` that `write` takes for it.
+    fn keys(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// The chunks of what [`create`](Format::create) would open.
+    ///
+    /// # Errors
+    ///
+    /// What the format cannot hold of records of `schema` and the user did not drop, as `create`.
+    fn chunk(
+        &self,
+        keys: &WriteKeys,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+    ) -> Result<ChunkSize>;
+
+    /// Creates a file at `staged`, as [`CreateSink::create`](super::CreateSink::create) has it.
+    fn create(
+        &self,
+        staged: &Path,
+        keys: &WriteKeys,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+        whole: bool,
+    ) -> Result<Box<dyn Sink>>;
+
+    /// See [`CreateSink::disk_bytes`](super::CreateSink::disk_bytes).
+    fn disk_bytes(
+        &self,
+        _keys: &WriteKeys,
+        _schema: &Arc<Schema>,
+        _metadata: &Metadata,
+    ) -> Result<[u64; 2]> {
+        Ok([0; 2])
+    }
+
+    /// See [`CreateSink::likes_time`](super::CreateSink::likes_time).
+    fn likes_time(&self) -> bool {
+        false
+    }
+
+    /// See [`CreateSink::wants_beside`](super::CreateSink::wants_beside).
+    fn wants_beside(&self) -> bool {
+        false
+    }
+
+    /// See [`CreateSink::unread`](super::CreateSink::unread).
+    fn unread<'a>(&self, _keys: &'a WriteKeys) -> &'a [String] {
+        &[]
+    }
+
+    /// See [`CreateSink::checks`](super::CreateSink::checks).
+    fn checks(&self, _keys: &WriteKeys, _schema: &Schema) -> bool {
+        false
+    }
+
+    /// See [`CreateSink::check`](super::CreateSink::check).
+    fn check(&self, _keys: &WriteKeys, _metadata: &Metadata, _records: &PointBatch) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// The error of the file at `path`, which does not begin as `called` does.
+pub fn foreign(path: &Path, called: &str) -> Error {
+    Error::data(path, format!("this is not {called}, by its first bytes")).at_byte(0)
+}
+
+/// What an output is to be, as far as formats need to know: keys of `write`.
+#[derive(Debug, Clone, Default)]
+pub struct WriteKeys {
+    /// The final path, for messages.
+    pub path: PathBuf,
+    /// True if the normals that a stage computed are written.
+    pub normals: bool,
+    /// Dimensions that the output need not hold.
+    pub drop: Vec<String>,
+    /// Scale of stored coordinates.
+    pub scale: Option<[f64; 3]>,
+    /// Offset of stored coordinates.
+    pub offset: Option<[f64; 3]>,
+    /// Text or bytes.
+    pub encoding: Option<OutputEncoding>,
+    /// Bits of a colour.
+    pub colors: Option<Colors>,
+}
+
+impl WriteKeys {
+    /// The keys that are given and that not every format has.
+    pub fn given(&self) -> impl Iterator<Item = &'static str> {
+        let all = [
+            ("scale", self.scale.is_some()),
+            ("offset", self.offset.is_some()),
+            ("encoding", self.encoding.is_some()),
+            ("colors", self.colors.is_some()),
+        ];
+        all.into_iter().filter(|(_, is_given)| *is_given).map(|(key, _)| key)
+    }
+}
+
+/// Encoding of a PLY file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OutputEncoding {
+    /// Numbers as text, shortest form that reads back equal.
+    Ascii,
+    /// Numbers as bytes.
+    Binary,
+}
+
+/// How many bits the colours of LAS records have in a PLY file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Colors {
+    /// 8 where that loses nothing, else 16.
+    #[default]
+    #[serde(rename = "auto")]
+    Auto,
+    /// The upper 8 bits, as `uchar`.
+    #[serde(rename = "8bit")]
+    Eight,
+    /// All 16 bits, as `ushort`.
+    #[serde(rename = "16bit")]
+    Sixteen,
+}
+
+/// The name of a registered format, as a key of a stage takes it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FormatName(pub String);
+
+/// The formats that are registered, in the order in which they were. Cloning it copies no format.
+#[derive(Clone, Default)]
+pub struct Formats(Vec<Arc<dyn Format>>);
+
+impl Formats {
+    /// The same and `format`, which takes the place of one of its name.
+    #[must_use]
+    pub fn with(mut self, format: impl Format + 'static) -> Self {
+        self.0.retain(|other| other.name() != format.name());
+        self.0.push(Arc::new(format));
+        self
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl Iterator<Item = &Arc<dyn Format>> {
+        self.0.iter()
+    }
+
+    /// Their names.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.iter().map(|format| format.name()).collect()
+    }
+
+    /// The format of that name.
+    ///
+    /// # Errors
+    ///
+    /// If there is none.
+    pub fn named(&self, name: &FormatName) -> Result<&Arc<dyn Format>> {
+        self.iter().find(|format| format.name() == name.0).ok_or_else(|| {
+            let told = format!("there is no format `{}`", name.0);
+            Error::pipeline(told).help(format!("formats: {}", self.names().join(", ")))
+        })
+    }
+
+    /// The format that the extension of `path` names, its case aside.
+    pub fn of(&self, path: &Path) -> Option<&Arc<dyn Format>> {
+        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        self.iter().find(|format| format.name() == extension)
+    }
+
+    /// A format of the family whose files begin with these bytes.
+    pub fn sniffed(&self, first: &[u8]) -> Option<&Arc<dyn Format>> {
+        self.iter().find(|format| format.sniff(first))
+    }
+
+    /// The formats of a family.
+    pub fn of_family<'a>(&'a self, family: &'a str) -> impl Iterator<Item = &'a Arc<dyn Format>> {
+        self.iter().filter(move |format| format.family() == family)
+    }
+
+    /// `path` without what it promises beyond its format ([`Format::promises`]).
+    pub fn plain<'a>(&self, path: &'a Path) -> std::borrow::Cow<'a, Path> {
+        match self.of(path).and_then(|format| format.promises(path)) {
+            Some((_, plain)) => plain.into(),
+            None => path.into(),
+        }
+    }
+}
+
+impl fmt::Debug for Formats {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(self.names()).finish()
+    }
+}
