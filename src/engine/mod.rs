@@ -9,6 +9,7 @@ mod chunk;
 mod chunks;
 mod clock;
 mod cut;
+mod decode;
 mod each;
 mod encoding;
 mod finished;

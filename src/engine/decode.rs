@@ -1,0 +1,130 @@
+//! The decode: all parts of the source, read side by side, placed on the lattice and handed to the
+//! tile store.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+
+use super::by_rank::{Starts, place};
+use super::job::Job;
+use super::shares::{BATCH, Shares};
+use super::tagger::NOT_FINITE;
+use crate::Result;
+use crate::geom::lattice::{Lattice, Misplaced};
+use crate::host::lock;
+use crate::point::{PointBatch, Position};
+use crate::report::Tally;
+use crate::store::{Intake, SpillArea, Tag, TileStore};
+
+pub(crate) fn decode(
+    job: &Job<'_>,
+    lattice: &Lattice,
+    shares: &Shares,
+    area: &Arc<SpillArea>,
+) -> Result<(TileStore, Starts, Tally)> {
+    let _working = job.budget.lease(shares.work, "decoding")?;
+    let tagged = job.tagger.tags();
+    let mut store = TileStore::new(area, &job.budget, job.source.schema().stride, tagged);
+    let ranked = job.in_input_order.contains(&true);
+    if ranked {
+        store = store.with_places();
+    }
+    let parts = Mutex::new(vec![0; if ranked { job.source.parts() } else { 0 }]);
+    let total = Mutex::new(Tally::default());
+    let next = AtomicUsize::new(0);
+    job.parallel(|| {
+        let mut tally = Tally::default();
+        let mut intake = Intake::new(&store, shares.run_records);
+        let mut batch = PointBatch::new(job.source.schema().clone(), BATCH);
+        let mut placed = Placed::default();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            if index >= job.source.parts() {
+                break;
+            }
+            let mut part = job.source.part_without(index, &job.unread)?;
+            let mut read = 0;
+            while job.read(&mut *part, &mut batch, &mut tally)? {
+                placed.first = place(index, read);
+                take(job, lattice, &batch, &mut placed, &mut intake, &mut tally)?;
+                read += batch.len() as u64;
+            }
+            lock(&parts).get_mut(index).into_iter().for_each(|part| *part = read);
+        }
+        intake.flush()?;
+        lock(&total).merge(&tally);
+        Ok(())
+    })?;
+    let tally = std::mem::take(&mut *lock(&total));
+    let starts = Starts::of(&lock(&parts));
+    Ok((store, starts, tally))
+}
+
+/// What of a batch goes to the intake; keeps its memory.
+#[derive(Default)]
+struct Placed {
+    positions: Vec<Position>,
+    tags: Vec<Tag>,
+    /// Place in the input of the batch's first record.
+    first: u64,
+    /// Indices of records that do not go there.
+    left_out: Vec<usize>,
+    /// How many of them the scan itself says are of no use, by reason.
+    useless: BTreeMap<&'static str, u64>,
+}
+
+/// Places a batch's records on the lattice and hands them to the intake.
+fn take(
+    job: &Job<'_>,
+    lattice: &Lattice,
+    batch: &PointBatch,
+    placed: &mut Placed,
+    intake: &mut Intake<'_>,
+    tally: &mut Tally,
+) -> Result<()> {
+    let stride = batch.schema().stride;
+    let records = batch.records();
+    let Placed { positions, tags, left_out, useless, first } = placed;
+    positions.clear();
+    tags.clear();
+    left_out.clear();
+    useless.clear();
+    let mut misplaced = Vec::new();
+    let tagger = &job.tagger;
+    lattice.place(
+        batch.schema(),
+        records,
+        |i, position| match tagger.look(&records[i * stride..(i + 1) * stride], batch.source) {
+            Err(reason) => {
+                *useless.entry(reason).or_default() += 1;
+                left_out.push(i);
+            }
+            Ok(tag) => {
+                tally.selections |= tag.selections();
+                positions.push(position);
+                tags.push(tag);
+            }
+        },
+        |i, why| misplaced.push((i, why)),
+    );
+    for (i, why) in misplaced {
+        if why == Misplaced::NotFinite && job.drop_nonfinite {
+            tally.remove(&job.source_kind, NOT_FINITE, 1);
+            left_out.push(i);
+        } else {
+            return Err(job.misplaced(batch, i, why));
+        }
+    }
+    useless.iter().for_each(|(reason, &count)| tally.remove(&job.source_kind, reason, count));
+    tally.work("placed", positions.len() as u64);
+    left_out.sort_unstable();
+    let (mut begin, mut at) = (0, 0);
+    for end in left_out.iter().copied().chain([batch.len()]) {
+        let count = end - begin;
+        let (these, of_these) = (&positions[at..at + count], &tags[at..at + count]);
+        intake.place(*first + begin as u64);
+        intake.take(these, &records[begin * stride..end * stride], of_these)?;
+        (begin, at) = (end + 1, at + count);
+    }
+    Ok(())
+}
