@@ -2,8 +2,7 @@
 //! tile store.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use super::by_rank::{Starts, place};
 use super::job::Job;
@@ -11,7 +10,6 @@ use super::shares::{BATCH, Shares};
 use super::tagger::NOT_FINITE;
 use crate::Result;
 use crate::geom::lattice::{Lattice, Misplaced};
-use crate::host::lock;
 use crate::point::{PointBatch, Position};
 use crate::report::Tally;
 use crate::store::{Intake, SpillArea, Tag, TileStore};
@@ -29,35 +27,46 @@ pub(crate) fn decode(
     if ranked {
         store = store.with_places();
     }
-    let parts = Mutex::new(vec![0; if ranked { job.source.parts() } else { 0 }]);
-    let total = Mutex::new(Tally::default());
-    let next = AtomicUsize::new(0);
-    job.parallel(|| {
-        let mut tally = Tally::default();
-        let mut intake = Intake::new(&store, shares.run_records);
-        let mut batch = PointBatch::new(job.source.schema().clone(), BATCH);
-        let mut placed = Placed::default();
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            if index >= job.source.parts() {
-                break;
-            }
-            let mut part = job.source.part_without(index, &job.unread)?;
-            let mut read = 0;
-            while job.read(&mut *part, &mut batch, &mut tally)? {
-                placed.first = place(index, read);
-                take(job, lattice, &batch, &mut placed, &mut intake, &mut tally)?;
-                read += batch.len() as u64;
-            }
-            lock(&parts).get_mut(index).into_iter().for_each(|part| *part = read);
-        }
-        intake.flush()?;
-        lock(&total).merge(&tally);
-        Ok(())
-    })?;
-    let tally = std::mem::take(&mut *lock(&total));
-    let starts = Starts::of(&lock(&parts));
-    Ok((store, starts, tally))
+    let (mut records, mut total) = (Vec::new(), Tally::default());
+    job.items(job.source.parts()).run(
+        || Arena {
+            intake: Intake::new(&store, shares.run_records),
+            batch: PointBatch::new(job.source.schema().clone(), BATCH),
+            placed: Placed::default(),
+        },
+        |arena, index| decode_part(job, lattice, index, arena),
+        |(read, tally)| {
+            total.merge(&tally);
+            records.extend(ranked.then_some(read));
+        },
+        |mut arena| arena.intake.flush(),
+    )?;
+    Ok((store, Starts::of(&records), total))
+}
+
+/// What a thread works with: a run that fills, and a batch of a part.
+struct Arena<'a> {
+    intake: Intake<'a>,
+    batch: PointBatch,
+    placed: Placed,
+}
+
+/// Hands the records of a part to the intake; how many there were, and what is counted of them.
+fn decode_part(
+    job: &Job<'_>,
+    lattice: &Lattice,
+    index: usize,
+    arena: &mut Arena<'_>,
+) -> Result<(u64, Tally)> {
+    let Arena { intake, batch, placed } = arena;
+    let mut part = job.source.part_without(index, &job.unread)?;
+    let (mut read, mut tally) = (0, Tally::default());
+    while job.read(&mut *part, batch, &mut tally)? {
+        placed.first = place(index, read);
+        take(job, lattice, batch, placed, intake, &mut tally)?;
+        read += batch.len() as u64;
+    }
+    Ok((read, tally))
 }
 
 /// What of a batch goes to the intake; keeps its memory.

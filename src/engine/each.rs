@@ -1,16 +1,11 @@
 //! One output for each input: while tiles leave their products the records that an output gets are
 //! sorted by input, and behind the last tile each input's file is written, a file a thread.
 
-use std::collections::BTreeMap;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use super::by_input::ByInput;
 use super::chunk::{Chunk, Open};
 use super::encoding::{ChunkEncoder, ChunkEncoders};
 use super::job::{Each, Job};
 use super::product::Entry;
-use crate::host::lock;
 use crate::point::Metadata;
 use crate::report::Tally;
 use crate::stage::SinkSummary;
@@ -27,24 +22,21 @@ impl Each<'_> {
         records: &ByInput,
         counted: bool,
     ) -> Result<(Vec<(u64, SinkSummary)>, Tally)> {
-        let next = AtomicUsize::new(0);
-        let done = Mutex::new((BTreeMap::new(), Tally::default()));
-        job.parallel(|| {
-            let mut encoder = ChunkEncoder::new(job, self.chunk_points);
-            loop {
-                let input = next.fetch_add(1, Ordering::Relaxed);
-                if input >= self.sinks.len() {
-                    break;
-                }
+        let (mut written, mut total) = (Vec::new(), Tally::default());
+        job.items(self.sinks.len()).run(
+            || ChunkEncoder::new(job, self.chunk_points),
+            |encoder, input| {
                 job.advance(0)?;
-                let summary = self.write_one(job, tiles, records, input, &mut encoder, counted)?;
-                lock(&done).0.insert(input, summary);
-            }
-            lock(&done).1.merge(&encoder.tally);
-            Ok(())
-        })?;
-        let (written, tally) = std::mem::take(&mut *lock(&done));
-        Ok((written.into_values().collect(), tally))
+                let summary = self.write_one(job, tiles, records, input, encoder, counted)?;
+                Ok((summary, std::mem::take(&mut encoder.tally)))
+            },
+            |(summary, tally)| {
+                written.push(summary);
+                total.merge(&tally);
+            },
+            |_| Ok(()),
+        )?;
+        Ok((written, total))
     }
 
     fn write_one(

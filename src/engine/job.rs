@@ -13,7 +13,7 @@ use crate::error::shown;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::geom::simd::Simd;
 use crate::graph::Headers;
-use crate::host::{lock, parallel};
+use crate::host::{Items, Threads, lock};
 use crate::point::PointBatch;
 use crate::report::{Grouped, Tally};
 use crate::stage::{CreateSink, Part, Source, Transform};
@@ -35,7 +35,7 @@ pub(crate) struct Job<'a> {
     pub tagger: Tagger,
     pub classes: ClassOf,
     pub budget: Budget,
-    pub threads: usize,
+    pub threads: Threads<'a>,
     pub simd: Simd,
     pub drop_nonfinite: bool,
     pub headers: Headers,
@@ -148,14 +148,9 @@ impl Job<'_> {
         if stop { Err(Error::interrupted()) } else { Ok(()) }
     }
 
-    /// Runs `work` on all threads; once one has failed, [`advance`](Job::advance) stops the others.
-    pub fn parallel(&self, work: impl Fn() -> Result<()> + Sync) -> Result<()> {
-        parallel(self.threads, |_| {
-            let guard = StopOnDrop::new(|| self.failed.store(true, Ordering::Relaxed));
-            work()?;
-            guard.disarm();
-            Ok(())
-        })
+    /// The `count` items of a phase; once one has failed, [`advance`](Job::advance) stops the others.
+    pub fn items(&self, count: usize) -> Items<'_, impl Fn() + Sync> {
+        self.threads.items(count, || self.failed.store(true, Ordering::Relaxed))
     }
 
     /// The error of a record that has no place on the lattice.
@@ -188,28 +183,6 @@ impl Job<'_> {
         match self.source.inputs().get(batch.source as usize) {
             Some(input) => error.at(&input.path),
             None => error,
-        }
-    }
-}
-
-/// Calls its function when dropped, unless disarmed: what a thread does that leaves by an error or
-/// a panic.
-pub(crate) struct StopOnDrop<F: Fn()>(Option<F>);
-
-impl<F: Fn()> StopOnDrop<F> {
-    pub fn new(stop: F) -> Self {
-        StopOnDrop(Some(stop))
-    }
-
-    pub fn disarm(mut self) {
-        self.0 = None;
-    }
-}
-
-impl<F: Fn()> Drop for StopOnDrop<F> {
-    fn drop(&mut self) {
-        if let Some(stop) = &self.0 {
-            stop();
         }
     }
 }

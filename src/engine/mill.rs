@@ -61,7 +61,7 @@ pub(crate) fn mill(
     };
     let cuts = cut_all(job, lattice, shares, demands, &tiles)?;
     let milling = |cut: &Arc<Cut>| demands.mill_bytes(cut.millers, cut.capacity as u64);
-    let looking = demands.mill_bytes(job.threads, samples_capacity(shares) as u64);
+    let looking = demands.mill_bytes(job.threads.count(), samples_capacity(shares) as u64);
     let most = cuts.iter().map(milling).max().unwrap_or(0).max(looking);
     let mut working = job.budget.lease(most, "mill")?;
     for (pass, cut) in std::mem::take(&mut job.passes).iter().zip(&cuts) {

@@ -15,11 +15,18 @@ use crate::host::lock;
 use crate::stage::{Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
-/// A product's place in the order: its tile or part, and which product of it.
+/// A product's place in the order: its item (a tile, a part), and which product of it.
 pub type Place = (u64, u64);
 
+/// Cuts a product, in its turn, into complete chunks; called by one thread at a time.
+pub type Commit<'a, R, P> = dyn Fn(R) -> Result<Vec<P>> + Sync + 'a;
+
+/// Encodes a chunk and says for which of the sinks; each thread has its own.
+pub type EncodeChunk<'a, P> = dyn FnMut(P) -> Result<(usize, Encoded)> + 'a;
+
 /// What threads share while they deliver products `R`, which are cut into chunks `P`.
-pub struct Outlet<R, P> {
+pub struct Outlet<'a, R, P> {
+    commit: &'a Commit<'a, R, P>,
     state: Mutex<State<R, P>>,
     changed: Condvar,
     /// Products that may wait for their turn, and chunks that may wait to be encoded.
@@ -40,18 +47,11 @@ struct State<R, P> {
     stopped: bool,
 }
 
-/// The two things that a thread does with what it takes from an outlet.
-pub struct Hands<'a, R, P> {
-    /// Cuts a product, in its turn, into complete chunks; called by one thread at a time.
-    pub commit: &'a (dyn Fn(R) -> Result<Vec<P>> + Sync),
-    /// Encodes a chunk and says for which of the sinks.
-    pub encode: &'a mut dyn FnMut(P) -> Result<(usize, Encoded)>,
-}
-
-impl<R, P> Outlet<R, P> {
+impl<'a, R, P> Outlet<'a, R, P> {
     /// An outlet into `sinks` for `threads` threads.
-    pub fn new(sinks: Vec<Box<dyn Sink>>, threads: usize) -> Self {
+    pub fn new(sinks: Vec<Box<dyn Sink>>, threads: usize, commit: &'a Commit<'a, R, P>) -> Self {
         Outlet {
+            commit,
             state: Mutex::new(State {
                 turn: (0, 0),
                 waiting: BTreeMap::new(),
@@ -69,23 +69,23 @@ impl<R, P> Outlet<R, P> {
         }
     }
 
-    /// Delivers the product at `place`; `last` if none of the same tile or part follows.
+    /// Delivers the product at `place`; `last` if none of the same item follows.
     pub fn deliver(
         &self,
         place: Place,
         product: R,
         last: bool,
-        hands: &mut Hands<'_, R, P>,
+        encode: &mut EncodeChunk<'_, P>,
     ) -> Result<()> {
         let mut state = lock(&self.state);
         state.waiting.insert(place, (product, last));
         loop {
-            state = self.commit_waiting(state, hands)?;
+            state = self.commit_waiting(state)?;
             let is_early = place > state.turn && state.waiting.len() > self.window;
             if !is_early && state.chunks.len() <= self.window {
                 return Ok(());
             }
-            let (progress, next) = self.encode_one(state, hands)?;
+            let (progress, next) = self.encode_one(state, encode)?;
             state = next;
             if !progress {
                 state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
@@ -93,16 +93,17 @@ impl<R, P> Outlet<R, P> {
         }
     }
 
-    /// Encodes and appends until all that was delivered is written; each thread calls it when it
-    /// has nothing more to deliver.
-    pub fn drain(&self, hands: &mut Hands<'_, R, P>, done: impl Fn(Place) -> bool) -> Result<()> {
+    /// Encodes and appends until the products of all so many items are written; each thread calls it
+    /// when it has nothing more to deliver.
+    pub fn drain(&self, items: usize, encode: &mut EncodeChunk<'_, P>) -> Result<()> {
         let mut state = lock(&self.state);
         loop {
-            state = self.commit_waiting(state, hands)?;
-            let (progress, next) = self.encode_one(state, hands)?;
+            state = self.commit_waiting(state)?;
+            let (progress, next) = self.encode_one(state, encode)?;
             state = next;
-            let all =
-                done(state.turn) && state.chunks.is_empty() && state.appended == state.numbered;
+            let all = state.turn.0 >= items as u64
+                && state.chunks.is_empty()
+                && state.appended == state.numbered;
             if all && !state.committing {
                 self.changed.notify_all();
                 return Ok(());
@@ -114,11 +115,11 @@ impl<R, P> Outlet<R, P> {
     }
 
     /// Adds the chunks that are left when all products are committed.
-    pub fn close(&self, rest: Vec<P>, hands: &mut Hands<'_, R, P>) -> Result<Vec<SinkSummary>> {
+    pub fn close(&self, rest: Vec<P>, encode: &mut EncodeChunk<'_, P>) -> Result<Vec<SinkSummary>> {
         let mut state = lock(&self.state);
         state.queue(rest);
         loop {
-            let (progress, next) = self.encode_one(state, hands)?;
+            let (progress, next) = self.encode_one(state, encode)?;
             state = next;
             if !progress && state.appended == state.numbered {
                 break;
@@ -140,14 +141,13 @@ impl<R, P> Outlet<R, P> {
     fn commit_waiting<'s>(
         &'s self,
         mut state: MutexGuard<'s, State<R, P>>,
-        hands: &mut Hands<'_, R, P>,
     ) -> Result<MutexGuard<'s, State<R, P>>> {
         while !state.committing && !state.stopped {
             let turn = state.turn;
             let Some((product, last)) = state.waiting.remove(&turn) else { break };
             state.committing = true;
             drop(state);
-            let chunks = (hands.commit)(product);
+            let chunks = (self.commit)(product);
             state = lock(&self.state);
             state.committing = false;
             state.turn = if last { (turn.0 + 1, 0) } else { (turn.0, turn.1 + 1) };
@@ -165,7 +165,7 @@ impl<R, P> Outlet<R, P> {
     fn encode_one<'s>(
         &'s self,
         mut state: MutexGuard<'s, State<R, P>>,
-        hands: &mut Hands<'_, R, P>,
+        encode: &mut EncodeChunk<'_, P>,
     ) -> Result<(bool, MutexGuard<'s, State<R, P>>)> {
         let reach = state.appended + self.ahead;
         if state.chunks.front().is_none_or(|(number, _)| *number >= reach) {
@@ -173,7 +173,7 @@ impl<R, P> Outlet<R, P> {
         }
         let Some((number, chunk)) = state.chunks.pop_front() else { return Ok((false, state)) };
         drop(state);
-        let encoded = (hands.encode)(chunk);
+        let encoded = encode(chunk);
         state = lock(&self.state);
         match encoded {
             Ok(encoded) => state.encoded.insert(number, encoded),

@@ -1,15 +1,14 @@
 //! Pipelines without tile stages stream: parts are decoded side by side, written in input order.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::finished::Finished;
-use super::job::{Job, StopOnDrop};
-use super::outlet::{Hands, Outlet};
+use super::job::Job;
+use super::outlet::Outlet;
 use super::shares::{BATCH, Shares};
 use super::tagger::NOT_FINITE;
 use crate::geom::lattice::{Lattice, Misplaced};
-use crate::host::{lock, parallel};
+use crate::host::lock;
 use crate::point::{PointBatch, Spare};
 use crate::report::Tally;
 use crate::stage::{Encoded, Sink};
@@ -30,7 +29,6 @@ pub(crate) fn stream(
     let spare_batches: Spare<PointBatch> = Spare::default();
     let spare_chunks: Vec<Spare<PointBatch>> = sinks.iter().map(|_| Spare::default()).collect();
     let open = Mutex::new((empty.collect::<Vec<_>>(), 0u64));
-    let outlet: Outlet<PointBatch, (usize, PointBatch)> = Outlet::new(sinks, job.threads);
     let commit = |batch: PointBatch| -> Result<Vec<(usize, PointBatch)>> {
         let (chunks, kept) = &mut *lock(&open);
         *kept += batch.len() as u64;
@@ -47,20 +45,13 @@ pub(crate) fn stream(
         spare_chunks[sink].put(chunk);
         Ok((sink, encoded))
     };
-    let total = Mutex::new(Tally::default());
-    let next = AtomicUsize::new(0);
-    let parts = job.source.parts();
-    parallel(job.threads, |_| {
-        let guard = StopOnDrop::new(|| outlet.stop());
-        let mut encode = encode;
-        let mut hands = Hands { commit: &commit, encode: &mut encode };
-        let mut tally = Tally::default();
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            if index >= parts {
-                break;
-            }
+    let outlet = Outlet::new(sinks, job.threads.count(), &commit);
+    let (parts, mut tally) = (job.source.parts(), Tally::default());
+    job.threads.items(parts, || outlet.stop()).run(
+        || (),
+        |(), index| {
             let mut part = job.source.part_without(index, &job.unread)?;
+            let mut tally = Tally::default();
             for number in 0.. {
                 let mut batch = spare_batches.take(|| PointBatch::new(schema.clone(), BATCH));
                 let more = job.read(&mut *part, &mut batch, &mut tally)?;
@@ -68,26 +59,23 @@ pub(crate) fn stream(
                     drop_nonfinite(job, lattice, &mut batch, &mut tally)?;
                 }
                 job.classes.keep(&batch, &mut tally);
-                outlet.deliver((index as u64, number), batch, !more, &mut hands)?;
+                outlet.deliver((index as u64, number), batch, !more, &mut |chunk| encode(chunk))?;
                 if !more {
                     break;
                 }
             }
-        }
-        outlet.drain(&mut hands, |turn| turn.0 >= parts as u64)?;
-        lock(&total).merge(&tally);
-        guard.disarm();
-        Ok(())
-    })?;
+            Ok(tally)
+        },
+        |of_part| tally.merge(&of_part),
+        |()| outlet.drain(parts, &mut |chunk| encode(chunk)),
+    )?;
     job.check_headers()?;
     let (rest, kept) = {
         let (chunks, kept) = &mut *lock(&open);
         let rest = std::mem::take(chunks).into_iter().enumerate();
         (rest.filter(|(_, chunk)| !chunk.is_empty()).collect(), *kept)
     };
-    let mut encode = encode;
-    let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
-    let mut tally = std::mem::take(&mut *lock(&total));
+    let written = outlet.close(rest, &mut |chunk| encode(chunk))?;
     job.tell_idle(&tally);
     Ok(Finished {
         read: tally.work.remove("read").unwrap_or(0),

@@ -1,15 +1,12 @@
 //! The last walk over the decoded scan: what the reduction did to each report tile and to all.
 
-use std::collections::BTreeMap;
 use std::io::{self, BufRead, Read};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use super::job::Job;
 use crate::geom::lattice::Lattice;
-use crate::host::lock;
 use crate::point::Position;
-use crate::report::{Lot, ScanSurvey, TileFigures, Totals, report_tile_level};
+use crate::report::{FittedScan, Lot, ScanSurvey, TileFigures, Totals, report_tile_level};
 use crate::store::{
     BLOCK, FATE_BYTES, PIECE, Pieces, Reader, SealedTiles, Spill, SpillArea, State, Stretch,
     TileKey,
@@ -163,60 +160,14 @@ pub(crate) fn survey(
         states: sieve.states.as_ref().ok_or_else(missing)?,
         level,
     };
-    let ranges = tiles.blocks().div_ceil(BLOCKS);
-    let all_threads = survey_bytes().saturating_mul(job.threads as u64);
+    let all_threads = survey_bytes().saturating_mul(job.threads.count() as u64);
     let _working = job.budget.lease(all_threads, "survey")?;
     let spill = Spill::new(area, "report");
-    let all = Mutex::new((ScanSurvey::new(&tiles.bounds()), BTreeMap::new()));
-    each_range(job, ranges, |range| {
-        let mut scan = ScanSurvey::new(&tiles.bounds());
-        let mut lines = RangeLines { spill: &spill, open: Vec::new(), stretches: Vec::new() };
-        let positions = walk.tiles_from(range, lattice, &mut scan, &mut lines)?;
-        lines.store()?;
-        let mut all = lock(&all);
-        all.0.merge(&scan);
-        all.1.insert(range, lines.stretches);
-        Ok(positions)
-    })?;
-    let (scan, lines) =
-        std::mem::replace(&mut *lock(&all), (ScanSurvey::new(&tiles.bounds()), BTreeMap::new()));
-    let fitted = Mutex::new(scan.fit());
-    let empty = lock(&fitted).part();
-    each_range(job, ranges, |range| {
-        let mut part = empty.clone();
-        let mut positions = 0;
-        let mut stretches = Stretches::new(1);
-        for block in range * BLOCKS..((range + 1) * BLOCKS).min(tiles.blocks()) {
-            let (these, lots) = stretches.of(&walk, block)?;
-            part.measure_all(these, lots);
-            positions += these.len() as u64;
-        }
-        lock(&fitted).merge(&part);
-        Ok(positions)
-    })?;
-    let fitted = fitted.into_inner().map_err(|_| Error::internal("a survey thread panicked"))?;
+    let (scan, lines) = walk.tally(job, lattice, &spill)?;
     Ok(Measured {
         tile_side: (level as f64).exp2() * lattice.step,
-        totals: fitted.finish(lattice)?,
-        tiles: Lines { spill, stretches: lines.into_values().flatten().collect() },
-    })
-}
-
-/// Calls `work` for every range, on all threads; it returns how many positions it did.
-fn each_range(
-    job: &Job<'_>,
-    ranges: usize,
-    work: impl Fn(usize) -> Result<u64> + Sync,
-) -> Result<()> {
-    let next = AtomicUsize::new(0);
-    job.parallel(|| {
-        loop {
-            let range = next.fetch_add(1, Ordering::Relaxed);
-            if range >= ranges {
-                return Ok(());
-            }
-            job.advance(work(range)?)?;
-        }
+        totals: walk.measure(job, scan)?.finish(lattice)?,
+        tiles: Lines { spill, stretches: lines },
     })
 }
 
@@ -315,6 +266,58 @@ impl Stretches {
 }
 
 impl Walk<'_> {
+    /// Ranges of blocks, the items of both phases.
+    fn ranges(&self) -> usize {
+        self.tiles.blocks().div_ceil(BLOCKS)
+    }
+
+    /// The first phase: planes of the scan and of the report's tiles, whose lines go to the spill.
+    fn tally(
+        &self,
+        job: &Job<'_>,
+        lattice: &Lattice,
+        spill: &Spill,
+    ) -> Result<(ScanSurvey, Vec<Stretch>)> {
+        let mut stored = Vec::new();
+        let empty = || ScanSurvey::new(&self.tiles.bounds());
+        let scans = job.items(self.ranges()).run(
+            || (empty(), Stretches::new(KEPT_BLOCKS)),
+            |(scan, stretches), range| {
+                let mut lines = RangeLines { spill, open: Vec::new(), stretches: Vec::new() };
+                let positions = self.tiles_from(range, lattice, scan, stretches, &mut lines)?;
+                lines.store()?;
+                job.advance(positions)?;
+                Ok(lines.stretches)
+            },
+            |stretches| stored.extend(stretches),
+            |(scan, _)| Ok(scan),
+        )?;
+        let mut all = empty();
+        scans.iter().for_each(|scan| all.merge(scan));
+        Ok((all, stored))
+    }
+
+    /// The second phase: how far the points are from the planes that the first one fitted.
+    fn measure(&self, job: &Job<'_>, scan: ScanSurvey) -> Result<FittedScan> {
+        let mut fitted = scan.fit();
+        let parts = job.items(self.ranges()).run(
+            || (fitted.part(), Stretches::new(1)),
+            |(part, stretches), range| {
+                let mut positions = 0;
+                for block in range * BLOCKS..((range + 1) * BLOCKS).min(self.tiles.blocks()) {
+                    let (these, lots) = stretches.of(self, block)?;
+                    part.measure_all(these, lots);
+                    positions += these.len() as u64;
+                }
+                job.advance(positions)
+            },
+            |()| {},
+            |(part, _)| Ok(part),
+        )?;
+        parts.iter().for_each(|part| fitted.merge(part));
+        Ok(fitted)
+    }
+
     /// Surveys the report tiles that begin in a range of blocks; returns how many positions they
     /// have.
     fn tiles_from(
@@ -322,27 +325,27 @@ impl Walk<'_> {
         range: usize,
         lattice: &Lattice,
         scan: &mut ScanSurvey,
+        stretches: &mut Stretches,
         lines: &mut RangeLines<'_>,
     ) -> Result<u64> {
         let end = ((range + 1) * BLOCKS).min(self.tiles.blocks());
-        let mut stretches = Stretches::new(KEPT_BLOCKS);
         let mut at = (range * BLOCKS, 0);
         if let Some(before) = at.0.checked_sub(1)
             && let Some(&last) = stretches.of(self, before)?.0.last()
         {
             // The tile that reaches into this range belongs to the one before.
-            at = self.end_of(TileKey::around(last, self.level), at.0, &mut stretches)?;
+            at = self.end_of(TileKey::around(last, self.level), at.0, stretches)?;
         }
         let mut positions = 0;
         while at.0 < end {
             let key = TileKey::around(stretches.of(self, at.0)?.0[at.1], self.level);
             let mut tile = scan.tile(key);
-            let (next, seen) = self.visit(&mut stretches, at, key, |positions, lots| {
+            let (next, seen) = self.visit(stretches, at, key, |positions, lots| {
                 tile.add_all(positions, lots);
                 scan.add_all(positions, lots);
             })?;
             let mut fitted = tile.fit();
-            self.visit(&mut stretches, at, key, |positions, lots| {
+            self.visit(stretches, at, key, |positions, lots| {
                 fitted.measure_all(positions, lots);
             })?;
             lines.add(&fitted.finish(lattice, scan)?)?;

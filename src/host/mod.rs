@@ -7,4 +7,4 @@ pub mod process;
 pub(crate) mod threads;
 
 pub(crate) use files::{Clash, Files, Use};
-pub use threads::{lock, parallel};
+pub use threads::{Items, Threads, lock};

@@ -3,6 +3,8 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
+use rayon::ThreadPool;
+
 use super::look::{Unfit, look};
 use super::passes::{Tap, check_limits, number_selections, unroll};
 use super::stretch::Stretch;
@@ -20,7 +22,7 @@ use crate::geom::lattice::Lattice;
 use crate::graph::{Graph, GraphStage};
 use crate::graph::{MOST_THREADS, Nonfinite, Overrides, RunSettings};
 use crate::host::process::default_memory;
-use crate::host::{Clash, Files, Use};
+use crate::host::{Clash, Files, Threads, Use};
 use crate::point::{Schema, Units};
 use crate::quantity::Figure;
 use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Role, Source, Transform};
@@ -38,6 +40,16 @@ impl Plan {
     /// inputs, and the report gets its own behind them.
     pub fn run(self, watch: &dyn Watch) -> Result<Done> {
         self.0.run(watch)
+    }
+
+    /// Runs the plan as [`run`](Plan::run) does, on the threads of `pool`: on as many as were planned
+    /// for, or on all if it has fewer. The outputs are the same on any pool.
+    ///
+    /// A run takes the threads that it works on for itself until it is done, so that other work of the
+    /// pool waits.
+    pub fn run_in(self, pool: &ThreadPool, watch: &dyn Watch) -> Result<Done> {
+        let threads = Threads::of(pool, self.0.threads);
+        self.0.run_on(threads, watch)
     }
 }
 

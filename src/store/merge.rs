@@ -6,8 +6,6 @@
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 use std::collections::binary_heap::PeekMut;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering as Atomic};
 
 use super::block::{BLOCK, Block};
 use super::emit::{Emitter, Merged, Output};
@@ -18,8 +16,7 @@ use super::sealed::{SealedTiles, Sequence, ref_bytes};
 use super::spill::Spill;
 use super::tournament::Tournament;
 use crate::Result;
-use crate::host::parallel;
-use crate::host::threads::lock;
+use crate::host::{Threads, lock};
 use crate::point::{Bounds, Position};
 
 /// Blocks of all runs that one range has, about, at least.
@@ -34,17 +31,18 @@ pub fn merge_bytes(runs: u64, stride: usize) -> u64 {
     runs.saturating_mul(cursor).saturating_add(Emitter::BYTES as u64)
 }
 
-/// Merges the runs of `store` on `threads` threads; `advance` is told of records merged and says
+/// Merges the runs of `store`, a range an item; `advance` is told of records merged and says
 /// whether to go on.
 pub fn seal(
     store: TileStore,
-    threads: usize,
+    threads: Threads<'_>,
     advance: &(dyn Fn(u64) -> Result<()> + Sync),
 ) -> Result<SealedTiles> {
     let runs = std::mem::take(&mut *lock(&store.runs));
     let each = merge_bytes(runs.len() as u64, store.stride);
-    let _working =
-        store.budget.lease(each.saturating_mul(threads as u64), "merging of sorted runs")?;
+    let _working = store
+        .budget
+        .lease(each.saturating_mul(threads.count() as u64), "merging of sorted runs")?;
     let ranges = ranges(&runs);
     // The merge leaves no more blocks than the runs have, but for one that is not full in each range.
     let blocks = runs.iter().map(|run| run.blocks.len()).sum::<usize>() + ranges.len();
@@ -55,26 +53,19 @@ pub fn seal(
         refs: Pieces::new(&store.area, "order", ref_bytes(store.tagged)),
         tagged: store.tagged,
     };
-    let merged: Vec<Mutex<Option<Merged>>> = ranges.iter().map(|_| Mutex::default()).collect();
-    let next = AtomicUsize::new(0);
-    let merge = |range: &Range, slot: &Mutex<Option<Merged>>| -> Result<()> {
-        let merged = merge_range(&store, &runs, range, &out)?;
-        advance(merged.records)?;
-        *lock(slot) = Some(merged);
-        Ok(())
-    };
-    parallel(threads, |_| {
-        loop {
-            let number = next.fetch_add(1, Atomic::Relaxed);
-            let Some(range) = ranges.get(number) else { return Ok(()) };
-            // Whoever fails leaves the others no range.
-            merge(range, &merged[number])
-                .inspect_err(|_| next.store(ranges.len(), Atomic::Relaxed))?;
-        }
-    })?;
+    let mut merged = Vec::with_capacity(ranges.len());
+    threads.items(ranges.len(), || {}).run(
+        || (),
+        |(), number| {
+            let merged = merge_range(&store, &runs, &ranges[number], &out)?;
+            advance(merged.records)?;
+            Ok(merged)
+        },
+        |range| merged.push(range),
+        |()| Ok(()),
+    )?;
     drop(runs);
-    let ranges = merged.into_iter().filter_map(|slot| slot.into_inner().ok().flatten());
-    let sequence = join(ranges, blocks);
+    let sequence = join(merged, blocks);
     lease.resize(sequence.blocks.len() as u64 * each)?;
     let refs = (out.refs, out.tagged);
     Ok(SealedTiles::new(sequence, out.positions, refs, (store.records, store.places), lease))
@@ -112,7 +103,7 @@ fn ranges(runs: &[Run]) -> Vec<Range> {
         .collect()
 }
 
-fn join(ranges: impl Iterator<Item = Merged>, most_blocks: usize) -> Sequence {
+fn join(ranges: Vec<Merged>, most_blocks: usize) -> Sequence {
     let blocks = Vec::with_capacity(most_blocks);
     let mut all = Sequence { blocks, ..Sequence::default() };
     let mut last = None;

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use common::{Memory, Random, Scan, Settings, run, scans};
 use pointmill::budget::Budget;
-use pointmill::host::parallel;
+use pointmill::host::Threads;
 use pointmill::ops::normals::{Estimate, Estimator, Method};
 use pointmill::point::{Bounds, Position, distance2, names};
 use pointmill::store::{Folder, Intake, SealedTiles, SpillArea, Tag, TileStore, morton_cmp, seal};
@@ -42,16 +42,19 @@ fn sealed(scan: &Scan, positions: &[Position]) -> Arc<SealedTiles> {
     let folder = Box::new(Scratch(tempfile::tempdir().unwrap()));
     let area = SpillArea::new(budget.clone(), 0, folder);
     let store = TileStore::new(&area, &budget, scan.schema.stride, false);
-    parallel(3, |thread| {
+    let fill = |thread: usize| {
         let mut intake = Intake::new(&store, 1500);
         for (i, &p) in positions.iter().enumerate().skip(thread).step_by(3) {
             intake.push(p, scan.record(i), Tag::default())?;
         }
         intake.flush()
-    })
-    .unwrap();
-    assert!(store.runs() > 10);
-    let tiles = Arc::new(seal(store, 3, &|_| Ok(())).unwrap());
+    };
+    let tiles = Threads::start(3, |threads| {
+        threads.items(3, || {}).run(|| (), |(), n| fill(n), |()| {}, Ok)?;
+        assert!(store.runs() > 10);
+        seal(store, threads, &|_| Ok(()))
+    });
+    let tiles = Arc::new(tiles.unwrap());
     assert!(area.written() > scan.records.len() as u64, "all is spilled");
     tiles
 }
