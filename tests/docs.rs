@@ -78,13 +78,19 @@ fn pages() -> Vec<Page> {
     vec![
         Page { more: Some(expand), ..page::<Read>(KINDS, "path = 'scan.laz'") },
         Page {
-            words: &["src/synth/mod.rs"],
+            words: &["src/synth/scene.rs"],
             ..page::<Synth>(KINDS, "scene = 'als'\npoints = 1000")
         },
         Page { words: &["src/point/selection.rs"], ..page::<Filter>("src/ops/filter.rs", "") },
         page::<Outliers>("src/ops/outliers.rs", ""),
-        Page { words: &["src/ops/normals/orient.rs"], ..page::<Normals>("src/ops/normals.rs", "") },
-        Page { words: &["src/ops/cells/settings.rs"], ..page::<Cells>("src/ops/cells.rs", "") },
+        Page {
+            words: &["src/ops/normals/estimate.rs", "src/ops/normals/orient.rs"],
+            ..page::<Normals>("src/ops/normals.rs", "")
+        },
+        Page {
+            words: &["src/ops/cells/settings.rs"],
+            ..page::<Cells>("src/ops/cells/keys.rs", "")
+        },
         page::<Median>("src/ops/median.rs", ""),
         page::<Grid>("src/ops/grid.rs", "side = 1.0"),
         Page { words: &["src/io/ply/colors.rs"], ..page::<Write>(KINDS, "") },

@@ -1,28 +1,16 @@
 //! What can be typed.
 
-use std::fmt;
-use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 
+use super::classes::{Classes, parse_classes};
+use super::exit::EXIT_CODES;
 use super::preset::Preset;
-use super::run::whole_or_text;
-use super::words::{Flag, Given, flags};
-use crate::Result;
-use crate::error::nearest;
+use super::seen::{ColoredBy, SeenFrom};
 use crate::graph::MOST_THREADS;
 use crate::quantity::parse_count;
-
-const EXIT_CODES: &str = "\
-Exit codes:
-  0    done
-  1    the run failed: I/O, bad data, over budget
-  2    the command or the pipeline is wrong
-  130  interrupted
-
-Results go to stdout, progress and messages to stderr.";
 
 /// Reduces laser scans that do not fit in memory to the points that matter.
 #[derive(Debug, Parser)]
@@ -35,39 +23,39 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Run a pipeline file
-    Run(Run),
+    Run(RunArguments),
     /// Reduce scans to the points that matter
-    Reduce(Box<Reduce>),
+    Reduce(Box<ReduceArguments>),
     /// Convert between LAS, LAZ and PLY
-    Convert(Convert),
+    Convert(ConvertArguments),
     /// Show what files contain, from their headers
-    Info(Info),
+    Info(InfoArguments),
     /// Show how a pipeline would be run, without running it
-    Plan(Plan),
+    Plan(PlanArguments),
     /// Check a pipeline and tell every mistake; reads its inputs' headers, writes nothing
-    Check(Plan),
+    Check(PlanArguments),
     /// List the stages that a pipeline can have, with their keys
-    Stages(Stages),
+    Stages(StagesArguments),
     /// Draw scans side by side, from above or from a side
-    Picture(Picture),
+    Picture(PictureArguments),
     /// Make a synthetic scan
-    Synth(Synth),
+    Synth(SynthArguments),
     /// Print what a shell needs to complete commands and flags
-    Completions(Completions),
+    Completions(CompletionsArguments),
     /// Print the manual page, or write those of all commands into a folder
-    Man(Man),
+    Man(ManArguments),
 }
 
 impl Command {
     /// What commands that plan or run a pipeline have in common.
-    pub fn common(&self) -> Option<&Common> {
+    pub fn common(&self) -> Option<&CommonArguments> {
         match self {
             Command::Reduce(reduce) => Some(&reduce.common),
-            Command::Run(Run { common, .. })
-            | Command::Convert(Convert { common, .. })
-            | Command::Plan(Plan { common, .. })
-            | Command::Check(Plan { common, .. })
-            | Command::Synth(Synth { common, .. }) => Some(common),
+            Command::Run(RunArguments { common, .. })
+            | Command::Convert(ConvertArguments { common, .. })
+            | Command::Plan(PlanArguments { common, .. })
+            | Command::Check(PlanArguments { common, .. })
+            | Command::Synth(SynthArguments { common, .. }) => Some(common),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => None,
             Command::Completions(_) | Command::Man(_) => None,
         }
@@ -77,7 +65,7 @@ impl Command {
 /// Common to all commands that run a pipeline.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Run options")]
-pub(super) struct Common {
+pub(super) struct CommonArguments {
     /// Bound of the peak memory, such as 512MiB or 2GiB [default: half of what there is]
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,
@@ -104,20 +92,6 @@ pub(super) struct Common {
     pub no_clobber: bool,
 }
 
-impl Common {
-    /// The flags that stand for `[run]` settings.
-    pub fn flags(&self) -> Vec<Flag> {
-        let existing = self.no_clobber.then(|| Given::from("refuse"));
-        flags([
-            ("--memory", "run.memory", self.memory.clone().map(Given::from)),
-            ("--threads", "run.threads", self.threads.as_deref().map(whole_or_text)),
-            ("--scratch", "run.scratch", self.scratch.clone().map(Given::from)),
-            ("--report", "run.report", self.report.clone().map(Given::from)),
-            ("--no-clobber", "run.existing", existing),
-        ])
-    }
-}
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Progress {
     Auto,
@@ -135,64 +109,8 @@ fn parse_threads(text: &str) -> Result<usize, String> {
     within(text, 1, MOST_THREADS as u64).map(|threads| threads as usize)
 }
 
-/// Classes that have a name in the LAS specification (1.4 R15, table 17).
-const CLASSES: [(&str, u8); 10] = [
-    ("unclassified", 1),
-    ("ground", 2),
-    ("low-vegetation", 3),
-    ("medium-vegetation", 4),
-    ("high-vegetation", 5),
-    ("building", 6),
-    ("noise", 7),
-    ("water", 9),
-    ("rail", 10),
-    ("road", 11),
-];
-
-/// A class, or those from one to another.
-#[derive(Debug, Clone)]
-pub(super) struct Classes(RangeInclusive<u8>);
-
-impl Classes {
-    /// Every one of them.
-    pub fn each(&self) -> RangeInclusive<u8> {
-        self.0.clone()
-    }
-
-    /// True if `class` is one of them.
-    pub fn has(&self, class: u8) -> bool {
-        self.0.contains(&class)
-    }
-}
-
-/// As it is typed: `2`, `3-5`.
-impl fmt::Display for Classes {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (first, last) = (self.0.start(), self.0.end());
-        match first == last {
-            true => write!(f, "{first}"),
-            false => write!(f, "{first}-{last}"),
-        }
-    }
-}
-
-fn parse_classes(text: &str) -> Result<Classes, String> {
-    let (first, last) = text.split_once('-').unwrap_or((text, text));
-    match (first.trim().parse(), last.trim().parse()) {
-        (Ok(first), Ok(last)) if first <= last => return Ok(Classes(first..=last)),
-        (Ok(first), Ok::<u8, _>(last)) => {
-            return Err(format!("`{text}` is no range of classes: write {last}-{first}"));
-        }
-        _ => {}
-    }
-    let names = CLASSES.map(|(name, _)| name.to_owned());
-    let near = nearest(text, &names).and_then(|near| CLASSES.iter().find(|(n, _)| n == near));
-    let meant = near.map_or(String::new(), |(name, class)| format!("; {name} is {class}"));
-    Err(format!("classes are numbers from 0 to 255, or ranges such as 3-5{meant}"))
-}
-
 #[derive(Debug, Args)]
-pub(super) struct Run {
+pub(super) struct RunArguments {
     /// The pipeline file
     #[arg(value_name = "PIPELINE")]
     pub pipeline: PathBuf,
@@ -201,11 +119,11 @@ pub(super) struct Run {
     #[arg(long = "set", value_name = "STAGE.KEY=VALUE")]
     pub sets: Vec<String>,
     #[command(flatten)]
-    pub common: Common,
+    pub common: CommonArguments,
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Plan {
+pub(super) struct PlanArguments {
     /// The pipeline file
     #[arg(value_name = "PIPELINE")]
     pub pipeline: PathBuf,
@@ -213,11 +131,11 @@ pub(super) struct Plan {
     #[arg(long = "set", value_name = "STAGE.KEY=VALUE")]
     pub sets: Vec<String>,
     #[command(flatten)]
-    pub common: Common,
+    pub common: CommonArguments,
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Reduce {
+pub(super) struct ReduceArguments {
     /// LAS, LAZ or PLY files, patterns or folders
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
@@ -231,20 +149,21 @@ pub(super) struct Reduce {
     /// Format: las, laz or ply [default: by extension; in a folder, that of each input]
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
-    /// Settings for a kind of scan, or those of the published method (paper); other options take the
-    /// place of a preset's [default: by the noise and the spacing of the scan; the run says what it chose]
+    /// Settings for a kind of scan, or those of the published method (paper); other options take
+    /// the place of a preset's [default: by the noise and the spacing of the scan; the run says
+    /// what it chose]
     #[arg(long, value_name = "KIND")]
     pub preset: Option<Preset>,
-    /// Instead of a number of points: the largest range of normal angles in a cell, in radians, as 6deg,
-    /// or auto, by the noise
+    /// Instead of a number of points: the largest range of normal angles in a cell, in radians, as
+    /// 6deg, or auto, by the noise
     #[arg(long, value_name = "ANGLE")]
     pub max_angle: Option<String>,
     /// How many points are to stay: 10%, 250k, 1e6, or auto, as many as the noise asks for
     /// [default: auto]
     #[arg(long, value_name = "TARGET", conflicts_with = "max_angle")]
     pub keep: Option<String>,
-    /// Nearest other positions that a normal is computed from; auto takes 10 or, where there is noise,
-    /// 20 [default: auto]
+    /// Nearest other positions that a normal is computed from; auto takes 10 or, where there is
+    /// noise, 20 [default: auto]
     #[arg(long, value_name = "K")]
     pub neighbors: Option<String>,
     /// Side of the cells before any split: a length, auto, or spread evenly [default: spread]
@@ -257,11 +176,12 @@ pub(super) struct Reduce {
     /// none]
     #[arg(long, value_name = "LENGTH")]
     pub max_side: Option<String>,
-    /// No cell of this length or less is split: in the scan's unit, as 5cm, auto or none [default: auto]
+    /// No cell of this length or less is split: in the scan's unit, as 5cm, auto or none [default:
+    /// auto]
     #[arg(long, value_name = "LENGTH")]
     pub min_spacing: Option<String>,
-    /// What the angles of a cell are measured to: axis, one direction for all, or cone, the cell's own
-    /// [default: cone]
+    /// What the angles of a cell are measured to: axis, one direction for all, or cone, the cell's
+    /// own [default: cone]
     #[arg(long, value_name = "HOW")]
     pub measure: Option<String>,
     /// The direction of `--measure axis`: x, y, z or a vector such as 0,0,1 [default: x]
@@ -282,31 +202,31 @@ pub(super) struct Reduce {
     /// Mark the decision in the records and write them all: key-point, withheld, or class 7 or 18
     #[arg(long, value_name = "HOW")]
     pub mark: Option<String>,
-    /// Order of the records: canonical, a function of the points alone, or input, that of the inputs
-    /// [default: canonical]
+    /// Order of the records: canonical, a function of the points alone, or input, that of the
+    /// inputs [default: canonical]
     #[arg(long, value_name = "HOW", conflicts_with = "outdir")]
     pub order: Option<String>,
     /// Reduce the points of these classes alone, such as 2,6; all others stay, and are not seen as
     /// neighbours
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_classes)]
     pub classes: Vec<Classes>,
-    /// Points of classes 7 and 18, which are noise: drop them, keep them as points like all others, or
-    /// ignore them and write them as they are [default: drop; ignore with --mark; keep where --classes
-    /// or --keep-classes names one of them]
+    /// Points of classes 7 and 18, which are noise: drop them, keep them as points like all others,
+    /// or ignore them and write them as they are [default: drop; ignore with --mark; keep where
+    /// --classes or --keep-classes names one of them]
     #[arg(long, value_name = "HOW")]
     pub noise: Option<String>,
     #[command(flatten)]
-    pub filter: Filtered,
-    /// Points with the withheld flag: drop them, keep them as points like all others, or ignore them
-    /// and write them as they are [default: drop]
+    pub filter: FilterArguments,
+    /// Points with the withheld flag: drop them, keep them as points like all others, or ignore
+    /// them and write them as they are [default: drop]
     #[arg(long, value_name = "HOW")]
     pub withheld: Option<String>,
     /// Points whose coordinates are not finite: refuse the scan, or drop them [default: refuse]
     #[arg(long, value_name = "HOW")]
     pub nonfinite: Option<String>,
-    /// Length of a step of the lattice on which points are compared, in the scan's unit, for scans far
-    /// from their origin or finer than it. Sides that are chosen follow from it, and with them how many
-    /// points stay [default: what the coordinates are stored in, for floats 2^-30]
+    /// Length of a step of the lattice on which points are compared, in the scan's unit, for scans
+    /// far from their origin or finer than it. Sides that are chosen follow from it, and with them
+    /// how many points stay [default: what the coordinates are stored in, for floats 2^-30]
     #[arg(long, value_name = "NUMBER")]
     pub lattice: Option<String>,
     /// Scans whose points contradict their LAS header, as damaged ones do: refuse them, or warn
@@ -319,14 +239,14 @@ pub(super) struct Reduce {
     #[arg(long, value_name = "FACTOR")]
     pub z_scale: Option<String>,
     #[command(flatten)]
-    pub written: Written,
+    pub written: WrittenArguments,
     #[command(flatten)]
-    pub common: Common,
+    pub common: CommonArguments,
 }
 
 /// Which points are left out as they are read.
 #[derive(Debug, Args)]
-pub(super) struct Filtered {
+pub(super) struct FilterArguments {
     /// Keep the points of these classes alone, such as 2,6
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_classes)]
     pub keep_classes: Vec<Classes>,
@@ -337,8 +257,9 @@ pub(super) struct Filtered {
 
 /// How the output is written.
 #[derive(Debug, Args)]
-pub(super) struct Written {
-    /// Scale of LAS coordinates, or three for X, Y and Z [default: the input's; PLY to LAS must say it]
+pub(super) struct WrittenArguments {
+    /// Scale of LAS coordinates, or three for X, Y and Z [default: the input's; PLY to LAS must say
+    /// it]
     #[arg(long, value_name = "SCALE")]
     pub scale: Option<String>,
     /// Offset of LAS coordinates on each axis [default: the input's, or 0]
@@ -357,7 +278,7 @@ pub(super) struct Written {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Convert {
+pub(super) struct ConvertArguments {
     /// LAS, LAZ or PLY files, patterns or folders
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
@@ -377,15 +298,15 @@ pub(super) struct Convert {
     #[arg(long, value_name = "HOW")]
     pub headers: Option<String>,
     #[command(flatten)]
-    pub filter: Filtered,
+    pub filter: FilterArguments,
     #[command(flatten)]
-    pub written: Written,
+    pub written: WrittenArguments,
     #[command(flatten)]
-    pub common: Common,
+    pub common: CommonArguments,
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Info {
+pub(super) struct InfoArguments {
     /// LAS, LAZ or PLY files, patterns or folders
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<String>,
@@ -395,9 +316,9 @@ pub(super) struct Info {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Picture {
-    /// LAS, LAZ or PLY files, patterns or folders: a scan each, drawn side by side, 4 at most. Quote a
-    /// pattern, so that its files are one scan
+pub(super) struct PictureArguments {
+    /// LAS, LAZ or PLY files, patterns or folders: a scan each, drawn side by side, 4 at most.
+    /// Quote a pattern, so that its files are one scan
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
     /// The picture: a .png file
@@ -405,10 +326,10 @@ pub(super) struct Picture {
     pub output: PathBuf,
     /// From where the scans are seen
     #[arg(long, value_name = "WHERE", default_value = "above")]
-    pub from: From,
+    pub from: SeenFrom,
     /// What points are coloured by
     #[arg(long, value_name = "WHAT", default_value = "height")]
-    pub by: By,
+    pub by: ColoredBy,
     /// Pixels that the picture is wide, 64 to 4096
     #[arg(long, value_name = "PIXELS", default_value = "1600", value_parser = parse_width)]
     pub width: u32,
@@ -417,30 +338,12 @@ pub(super) struct Picture {
     pub threads: Option<usize>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum From {
-    Above,
-    South,
-    North,
-    East,
-    West,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum By {
-    Height,
-    Class,
-    #[value(alias = "colour")]
-    Color,
-    Intensity,
-}
-
 fn parse_width(text: &str) -> Result<u32, String> {
     within(text, 64, 4096).map(|width| width as u32)
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Stages {
+pub(super) struct StagesArguments {
     /// One stage, or `run` for the settings above all stages
     #[arg(value_name = "KIND")]
     pub kind: Option<String>,
@@ -450,21 +353,21 @@ pub(super) struct Stages {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Completions {
+pub(super) struct CompletionsArguments {
     /// The shell
     #[arg(value_name = "SHELL")]
     pub shell: Shell,
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Man {
+pub(super) struct ManArguments {
     /// The folder; it is made if it does not exist
     #[arg(value_name = "DIR")]
     pub folder: Option<String>,
 }
 
 #[derive(Debug, Args)]
-pub(super) struct Synth {
+pub(super) struct SynthArguments {
     /// What is scanned: plane, part, sphere, squares-random, squares-uniform or als
     #[arg(value_name = "KIND")]
     pub scene: String,
@@ -481,5 +384,5 @@ pub(super) struct Synth {
     #[arg(long, value_name = "NUMBER")]
     pub noise: Option<String>,
     #[command(flatten)]
-    pub common: Common,
+    pub common: CommonArguments,
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::arguments::Plan;
+use super::arguments::PlanArguments;
 use super::console::Console;
 use super::mistyped::marked;
 use super::print;
@@ -18,7 +18,11 @@ use crate::stage::Role;
 use crate::{Error, Result, io};
 
 /// Prints how a pipeline would be run.
-pub(super) fn plan(arguments: &Plan, registry: &Registry, console: &Console) -> Result<()> {
+pub(super) fn plan(
+    arguments: &PlanArguments,
+    registry: &Registry,
+    console: &Console,
+) -> Result<()> {
     let plan = read(arguments, registry)?.plan(&Overrides::default())?;
     plan.warnings().iter().for_each(|warning| console.warn(warning));
     print::result(plan)
@@ -26,7 +30,11 @@ pub(super) fn plan(arguments: &Plan, registry: &Registry, console: &Console) -> 
 
 /// Prints that a pipeline can be run, or fails as its run would before it reads a point; then the
 /// inputs that cannot be read are all told, and not the first alone.
-pub(super) fn check(arguments: &Plan, registry: &Registry, console: &Console) -> Result<()> {
+pub(super) fn check(
+    arguments: &PlanArguments,
+    registry: &Registry,
+    console: &Console,
+) -> Result<()> {
     let pipeline = read(arguments, registry)?;
     let inputs = inputs(&pipeline);
     let name = pipeline.origin.clone();
@@ -46,7 +54,7 @@ pub(super) fn check(arguments: &Plan, registry: &Registry, console: &Console) ->
     }
 }
 
-fn read(arguments: &Plan, registry: &Registry) -> Result<Graph> {
+fn read(arguments: &PlanArguments, registry: &Registry) -> Result<Graph> {
     let flags = [
         ("--report", arguments.common.report.is_some()),
         ("--no-clobber", arguments.common.no_clobber),

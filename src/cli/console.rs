@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::arguments::{Command, Progress};
 use super::events::Events;
 use super::progress::Bars;
-use super::words::Words;
+use super::words::{Told, Words};
 use super::{interrupt, print};
 use crate::engine::{Done, Watch};
 use crate::error::shown;
@@ -35,39 +35,14 @@ pub(super) struct Console {
     unit: Mutex<Option<&'static str>>,
 }
 
-/// An error in the words of a command.
-pub(super) struct Told<'a> {
-    /// Its kind, file and byte.
-    pub error: &'a Error,
-    /// Place and message.
-    pub message: String,
-    /// The causes beneath, from the first to the deepest.
-    pub causes: Vec<String>,
-    /// What the user can do.
-    pub help: Option<String>,
-}
-
-impl<'a> Told<'a> {
-    /// `error` in these words.
-    pub fn of(error: &'a Error, words: &Words) -> Self {
-        let first = std::error::Error::source(error);
-        let causes = std::iter::successors(first, |cause| cause.source());
-        Told {
-            error,
-            message: words.told(&error.to_string()),
-            causes: causes.map(|cause| words.told(&cause.to_string())).collect(),
-            help: error.remedy().map(|help| words.told(help)),
-        }
-    }
-}
-
 enum Voice {
     Text(Bars),
     Json(Events),
 }
 
 impl Console {
-    /// As the arguments of a command ask for, in its words; one that has none of these speaks plainly.
+    /// As the arguments of a command ask for, in its words; one that has none of these speaks
+    /// plainly.
     pub fn new(command: &Command) -> Self {
         let common = command.common();
         let progress = common.map_or(Progress::Never, |common| common.progress);

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::arguments::Convert;
+use super::arguments::ConvertArguments;
 use super::console::Console;
+use super::flags::{common_flags, convert_flags, given};
 use super::mistyped::marked;
-use super::run::{HIDDEN, filtered, given, mill, with_stages, written};
-use super::words::{self, Flag, Given};
+use super::run::{HIDDEN, mill, with_stages};
 use crate::budget::Bytes;
 use crate::engine::{Done, Watch, make_folder, refuse_existing};
 use crate::error::shown;
@@ -27,7 +27,11 @@ const CONVERT: &str = include_str!("../../pipelines/convert.toml");
 
 /// Converts all inputs into one file, or each into a file of its own in a folder; prints a closing
 /// table.
-pub(super) fn convert(arguments: &Convert, registry: &Registry, console: &Console) -> Result<()> {
+pub(super) fn convert(
+    arguments: &ConvertArguments,
+    registry: &Registry,
+    console: &Console,
+) -> Result<()> {
     let folder = Path::new(&arguments.output);
     if !(arguments.output.ends_with('/') || folder.is_dir()) {
         let one = pipeline(arguments, json!(arguments.inputs), json!(arguments.output), registry);
@@ -67,7 +71,7 @@ pub(super) fn convert(arguments: &Convert, registry: &Registry, console: &Consol
 
 /// No output of the whole batch may replace an input of it, be it one of another conversion that is
 /// reached through a link, nor another output.
-fn check_files(pairs: &[(PathBuf, PathBuf)], arguments: &Convert) -> Result<()> {
+fn check_files(pairs: &[(PathBuf, PathBuf)], arguments: &ConvertArguments) -> Result<()> {
     let mut files = Files::default();
     let beside: Vec<_> = pairs.iter().map(|(input, _)| las::beside(input)).collect();
     pairs.iter().for_each(|(input, _)| files.read(input, Use::Input));
@@ -129,8 +133,8 @@ impl Total {
 }
 
 /// Runs one pipeline after the other. One that fails is told at once and does not keep the others
-/// from running, as do `odd` names, of which there can be no pipeline; the error in the end is of the
-/// first failure's kind. Returned are those that are done and what became of all.
+/// from running, as do `odd` names, of which there can be no pipeline; the error in the end is of
+/// the first failure's kind. Returned are those that are done and what became of all.
 fn run_all(
     runs: Vec<(PathBuf, Graph)>,
     odd: Vec<PathBuf>,
@@ -162,31 +166,16 @@ fn run_all(
     (done, failures.first().map_or(Ok(()), |kind| Err(Error::new(*kind, told))))
 }
 
-/// The flags of `convert`, for a run that reads and writes these.
-pub(super) fn flags(
-    arguments: &Convert,
-    inputs: Option<Value>,
-    output: Option<Value>,
-) -> Vec<Flag> {
-    let mut all = words::flags([
-        ("IN", "read.path", inputs.map(Given::from)),
-        ("-o", "write.path", output.map(Given::from)),
-        ("--to", "write.format", arguments.to.clone().map(Given::from)),
-        ("--headers", "run.headers", arguments.headers.clone().map(Given::from)),
-        ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(Given::from)),
-    ]);
-    all.extend(filtered(&arguments.filter));
-    all.extend(written(&arguments.written));
-    all
-}
-
 fn pipeline(
-    arguments: &Convert,
+    arguments: &ConvertArguments,
     inputs: Value,
     output: Value,
     registry: &Registry,
 ) -> Result<Graph> {
-    let sets = given([flags(arguments, Some(inputs), Some(output)), arguments.common.flags()]);
+    let sets = given([
+        convert_flags(arguments, Some(inputs), Some(output)),
+        common_flags(&arguments.common),
+    ]);
     let filter = arguments.filter.is_given().then_some("filter");
     Graph::parse_with(&with_stages(CONVERT, filter.into_iter()), HIDDEN, registry, &sets)
 }

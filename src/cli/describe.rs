@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::arguments::Info;
+use super::arguments::InfoArguments;
 use super::console::Console;
 use super::{print, table};
 use crate::error::shown;
@@ -11,7 +11,7 @@ use crate::report::Coordinate;
 use crate::{Error, Result, io};
 
 /// Prints what the headers of files say. A file that cannot be read is told, the others are shown.
-pub(super) fn info(arguments: &Info, console: &Console) -> Result<()> {
+pub(super) fn info(arguments: &InfoArguments, console: &Console) -> Result<()> {
     let files = expand(&arguments.files)?;
     let total = files.len();
     let mut described = Vec::new();
@@ -45,8 +45,8 @@ pub(super) fn info(arguments: &Info, console: &Console) -> Result<()> {
     }
 }
 
-/// The facts of a file with the corners of its box in as many digits as its scale tells apart: headers
-/// hold what was computed of it.
+/// The facts of a file with the corners of its box in as many digits as its scale tells apart:
+/// headers hold what was computed of it.
 fn in_short(mut facts: Value) -> Value {
     let scale: Vec<f64> = numbers(&facts["scale"]);
     for corner in ["min", "max"] {

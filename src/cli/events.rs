@@ -1,5 +1,5 @@
-//! `--progress json`: what a run does as one JSON object a line on stderr. The events and their keys
-//! are documented in docs/formats.md.
+//! `--progress json`: what a run does as one JSON object a line on stderr. The events and their
+//! keys are documented in docs/formats.md.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use super::console::Told;
-use super::{exit_number, print};
+use super::exit::exit_number;
+use super::print;
+use super::words::Told;
 use crate::ErrorKind;
 use crate::engine::Done;
 use crate::plan::Outline;
@@ -20,11 +21,11 @@ const EVERY: Duration = Duration::from_millis(250);
 /// Prints events; called from several threads.
 pub(super) struct Events {
     start: Instant,
-    phase: Mutex<Option<Phase>>,
+    phase: Mutex<Option<OpenPhase>>,
     done: AtomicU64,
 }
 
-struct Phase {
+struct OpenPhase {
     name: &'static str,
     total: Option<u64>,
     told: Instant,
@@ -58,7 +59,7 @@ impl Events {
     pub fn phase(&self, name: &'static str, total: Option<u64>) {
         self.end_phase();
         self.done.store(0, Ordering::Relaxed);
-        *self.open() = Some(Phase { name, total, told: Instant::now() });
+        *self.open() = Some(OpenPhase { name, total, told: Instant::now() });
         self.tell("phase", json!({ "name": name, "total": total }));
     }
 
@@ -139,12 +140,12 @@ impl Events {
         }
     }
 
-    fn progress(&self, phase: &Phase, done: u64) {
-        let Phase { name, total, .. } = phase;
+    fn progress(&self, phase: &OpenPhase, done: u64) {
+        let OpenPhase { name, total, .. } = phase;
         self.tell("progress", json!({ "phase": name, "done": done, "total": total }));
     }
 
-    fn open(&self) -> std::sync::MutexGuard<'_, Option<Phase>> {
+    fn open(&self) -> std::sync::MutexGuard<'_, Option<OpenPhase>> {
         self.phase.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

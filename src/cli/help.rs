@@ -6,7 +6,7 @@ use std::path::Path;
 
 use clap::{Command, CommandFactory};
 
-use super::arguments::{Arguments, Completions, Man};
+use super::arguments::{Arguments, CompletionsArguments, ManArguments};
 use super::print;
 use crate::{Error, Result};
 
@@ -126,14 +126,14 @@ pub(super) fn command() -> Command {
 }
 
 /// Prints what a shell needs to complete commands and flags.
-pub(super) fn completions(arguments: &Completions) -> Result<()> {
+pub(super) fn completions(arguments: &CompletionsArguments) -> Result<()> {
     let mut text = Vec::new();
     clap_complete::generate(arguments.shell, &mut command(), "pointmill", &mut text);
     print::result(String::from_utf8_lossy(&text))
 }
 
 /// Prints the manual page of the program, or writes it and one for each command into a folder.
-pub(super) fn man(arguments: &Man) -> Result<()> {
+pub(super) fn man(arguments: &ManArguments) -> Result<()> {
     let Some(folder) = &arguments.folder else {
         let mut text = Vec::new();
         let failed = |e| Error::internal("the manual page could not be made").because(e);

@@ -9,9 +9,9 @@ use signal_hook::flag::{register, register_conditional_shutdown};
 
 /// A flag that is set once the user wants the run to stop.
 ///
-/// Ctrl-C, SIGTERM and SIGHUP set it; the second of them ends the process at once with 130. A signal
-/// that the process was started to ignore stays ignored: under `nohup` a run outlives its terminal,
-/// and still stops when it is asked to by SIGTERM.
+/// Ctrl-C, SIGTERM and SIGHUP set it; the second of them ends the process at once with 130. A
+/// signal that the process was started to ignore stays ignored: under `nohup` a run outlives its
+/// terminal, and still stops when it is asked to by SIGTERM.
 ///
 /// From then on a write beyond `ulimit -f` fails with an error of its own instead of a signal that
 /// ends the process.
@@ -20,8 +20,8 @@ pub(super) fn flag() -> Arc<AtomicBool> {
     let ignored = ignored_signals();
     for signal in [Signal::INT, Signal::TERM, Signal::HUP].map(Signal::as_raw) {
         if ignored & 1 << (signal - 1) == 0 {
-            // In this order: the first signal finds the flag unset. A system that has no handlers to
-            // give ends the process by the signal, as it would without.
+            // In this order: the first signal finds the flag unset. A system that has no handlers
+            // to give ends the process by the signal, as it would without.
             let _ = register_conditional_shutdown(signal, 130, Arc::clone(&flag))
                 .and_then(|_| register(signal, Arc::clone(&flag)));
         }

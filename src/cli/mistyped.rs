@@ -1,5 +1,5 @@
-//! Mistakes in arguments that clap finds, told as those that pipelines find: what is wrong with which
-//! argument, what was typed with a caret below it, and what to type instead.
+//! Mistakes in arguments that clap finds, told as those that pipelines find: what is wrong with
+//! which argument, what was typed with a caret below it, and what to type instead.
 
 use std::ffi::OsString;
 use std::fs;
@@ -157,8 +157,8 @@ fn meant<'a>(words: impl Iterator<Item = &'a String>) -> String {
     }
 }
 
-/// The options that a wrong one may mean: those that it is the beginning of, first what has a short name,
-/// else the nearest.
+/// The options that a wrong one may mean: those that it is the beginning of, first what has a short
+/// name, else the nearest.
 fn like(command: &Command, option: &str) -> Vec<String> {
     let shown = |argument: &Arg| !argument.is_hide_set();
     let mut known: Vec<&Arg> = command.get_arguments().filter(|argument| shown(argument)).collect();

@@ -5,10 +5,14 @@
 
 mod arguments;
 mod check;
+mod classes;
 mod console;
 mod convert;
 mod describe;
+mod described;
 mod events;
+mod exit;
+mod flags;
 mod help;
 mod interrupt;
 mod mistyped;
@@ -17,6 +21,7 @@ mod preset;
 mod print;
 mod progress;
 mod run;
+mod seen;
 mod stages;
 mod table;
 mod words;
@@ -26,11 +31,12 @@ use std::process::ExitCode;
 
 use clap::FromArgMatches;
 
+use crate::Result;
 use crate::error::shown;
 use crate::language::Registry;
-use crate::{Error, ErrorKind, Result};
 use arguments::{Arguments, Command};
 use console::Console;
+use exit::exit_number;
 
 /// What helps where an argument is no text.
 const UNREADABLE: &str = "\
@@ -87,14 +93,5 @@ fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<
         Command::Picture(arguments) => picture::picture(arguments),
         Command::Completions(arguments) => help::completions(arguments),
         Command::Man(arguments) => help::man(arguments),
-    }
-}
-
-/// The exit code that an error leads to.
-fn exit_number(error: &Error) -> u8 {
-    match error.kind() {
-        ErrorKind::Io | ErrorKind::Data | ErrorKind::Memory | ErrorKind::Internal => 1,
-        ErrorKind::Pipeline => 2,
-        ErrorKind::Interrupted => 130,
     }
 }

@@ -4,22 +4,23 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 
-use super::arguments::{self, From};
+use super::arguments::PictureArguments;
 use super::mistyped::marked;
 use super::print;
+use super::seen::ColoredBy;
 use crate::budget::Bytes;
 use crate::engine::{Trouble, publish_bytes};
 use crate::error::shown;
 use crate::host::lock;
 use crate::host::{Files, Use};
 use crate::io::ends::Read;
-use crate::picture::{By, Picture, Settings, View};
+use crate::picture::{Picture, Settings};
 use crate::report::{Grouped, Short};
 use crate::stage::Source;
 use crate::{Error, Result};
 
 /// Draws the inputs and prints what the picture shows.
-pub(super) fn picture(arguments: &arguments::Picture) -> Result<()> {
+pub(super) fn picture(arguments: &PictureArguments) -> Result<()> {
     let path = &arguments.output;
     if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("png")) {
         let told = "-o: a picture is a PNG file, whose name ends in .png";
@@ -36,7 +37,13 @@ pub(super) fn picture(arguments: &arguments::Picture) -> Result<()> {
     let mut all = Files::default();
     files.iter().for_each(|file| all.read(file, Use::Input));
     all.write(path).map_err(|clash| Error::pipeline(format!("this {clash}")).at(path))?;
-    let settings = settings(arguments);
+    let processors = || std::thread::available_parallelism().map_or(1, usize::from);
+    let settings = Settings {
+        view: arguments.from.view(),
+        by: arguments.by.shown(),
+        width: arguments.width,
+        threads: arguments.threads.unwrap_or_else(processors),
+    };
     let each: Vec<&dyn Source> = sources.iter().map(|source| &**source).collect();
     for (input, source) in arguments.inputs.iter().zip(&each) {
         let told = settings.by.dimensions(source.schema()).map(drop);
@@ -63,37 +70,11 @@ fn renamed(error: Error) -> Error {
     }
 }
 
-fn settings(arguments: &arguments::Picture) -> Settings {
-    let processors = || std::thread::available_parallelism().map_or(1, usize::from);
-    Settings {
-        view: match arguments.from {
-            From::Above => View::Above,
-            From::South => View::South,
-            From::North => View::North,
-            From::East => View::East,
-            From::West => View::West,
-        },
-        by: looked_at(arguments.by),
-        width: arguments.width,
-        threads: arguments.threads.unwrap_or_else(processors),
-    }
-}
-
-fn looked_at(by: arguments::By) -> By {
-    match by {
-        arguments::By::Height => By::Height,
-        arguments::By::Class => By::Class,
-        arguments::By::Color => By::Color,
-        arguments::By::Intensity => By::Intensity,
-    }
-}
-
 /// What all of the scans can be coloured by.
 fn others(sources: &[&dyn Source]) -> String {
-    let can =
-        |by: &&arguments::By| sources.iter().all(|source| looked_at(**by).is_in(source.schema()));
-    let word = |by: &arguments::By| by.to_possible_value().map(|value| value.get_name().to_owned());
-    let can = arguments::By::value_variants().iter().filter(can).filter_map(word);
+    let can = |by: &&ColoredBy| sources.iter().all(|source| by.shown().is_in(source.schema()));
+    let word = |by: &ColoredBy| by.to_possible_value().map(|value| value.get_name().to_owned());
+    let can = ColoredBy::value_variants().iter().filter(can).filter_map(word);
     let mut flags: Vec<String> = can.map(|word| format!("`--by {word}`")).collect();
     let last = flags.pop().unwrap_or_default();
     let before = if flags.is_empty() { "" } else { " or " };
@@ -107,8 +88,8 @@ fn nowhereness(input: &str, points: u64) -> String {
 }
 
 /// What is told of a scan that is black throughout.
-fn blackness(input: &str, by: arguments::By) -> String {
-    let what = if by == arguments::By::Intensity { "intensities" } else { "colours" };
+fn blackness(input: &str, by: ColoredBy) -> String {
+    let what = if by == ColoredBy::Intensity { "intensities" } else { "colours" };
     format!(
         "{input}: all {what} are 0, so that the scan is drawn black: use `--by height` or `--by class`"
     )
@@ -133,7 +114,7 @@ fn range([low, high]: [f64; 2]) -> String {
 }
 
 /// What the picture shows, as a few lines.
-fn told(picture: &Picture, arguments: &arguments::Picture, bytes: u64) -> String {
+fn told(picture: &Picture, arguments: &PictureArguments, bytes: u64) -> String {
     let mut told = String::new();
     for (input, (points, outside)) in arguments.inputs.iter().zip(&picture.panels) {
         told += &format!("scan       {input}, {} points", Grouped(*points));

@@ -3,12 +3,12 @@
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
 
-use super::console::Told;
+use super::words::Told;
 use crate::error::is_control;
 use crate::{Error, Result};
 
-/// Prints a result and one line's end on stdout. A reader who has gone (`| head`) wants no more: that
-/// is no error.
+/// Prints a result and one line's end on stdout. A reader who has gone (`| head`) wants no more:
+/// that is no error.
 pub(super) fn result(text: impl Display) -> Result<()> {
     let text = escaped(&text.to_string());
     let mut stdout = io::stdout().lock();

@@ -1,52 +1,21 @@
 //! `stages`: the kinds of stages with their keys, as text or JSON.
 
-use std::collections::BTreeSet;
-
-use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::arguments::Stages;
+use super::arguments::StagesArguments;
+use super::described::{Key, StageDescription, Word, described};
 use super::print;
 use crate::error::nearest;
 use crate::language::Registry;
 use crate::{Error, Result};
 
-/// The `[run]` table, then every built-in kind: written from the documentation of their keys by the
-/// test that writes the pages of docs/stages.
-const DESCRIBED: &str = include_str!("stages.json");
-
 /// Columns of a terminal that text is wrapped to.
 const COLUMNS: usize = 96;
 
-/// A kind of stage, or the `[run]` table.
-#[derive(Deserialize, Serialize)]
-struct Described {
-    kind: String,
-    about: String,
-    /// None for a kind that an embedding program brings: its keys are not known here.
-    keys: Option<Vec<Key>>,
-}
-
-#[derive(Deserialize, Serialize)]
-struct Key {
-    key: String,
-    value: String,
-    required: bool,
-    default: Value,
-    about: String,
-    words: Vec<Word>,
-}
-
-#[derive(Deserialize, Serialize)]
-struct Word {
-    word: String,
-    about: String,
-}
-
 /// Prints the `[run]` table and all kinds of stages, or one of them.
-pub(super) fn stages(arguments: &Stages, registry: &Registry) -> Result<()> {
+pub(super) fn stages(arguments: &StagesArguments, registry: &Registry) -> Result<()> {
     let all = described(registry)?;
-    let shown: Vec<&Described> = match &arguments.kind {
+    let shown: Vec<&StageDescription> = match &arguments.kind {
         None => all.iter().collect(),
         Some(kind) => vec![all.iter().find(|d| d.kind == *kind).ok_or_else(|| {
             let kinds: Vec<String> = all.iter().map(|d| d.kind.clone()).collect();
@@ -68,33 +37,7 @@ pub(super) fn stages(arguments: &Stages, registry: &Registry) -> Result<()> {
     print::result(text.join("\n"))
 }
 
-/// The addresses of all settings that are described, as `--set` takes them.
-pub(super) fn settings() -> BTreeSet<String> {
-    // The description is the program's own; a test reads it.
-    let known: Vec<Described> = serde_json::from_str(DESCRIBED).unwrap_or_default();
-    let keys = |d: Described| -> Vec<String> {
-        d.keys.iter().flatten().map(|key| format!("{}.{}", d.kind, key.key)).collect()
-    };
-    known.into_iter().flat_map(keys).collect()
-}
-
-/// The `[run]` table, then the kinds of the registry in their order.
-fn described(registry: &Registry) -> Result<Vec<Described>> {
-    let mut known: Vec<Described> = serde_json::from_str(DESCRIBED)
-        .map_err(|e| Error::internal("the built-in description of stages is wrong").because(e))?;
-    let mut all: Vec<Described> = known.extract_if(.., |d| d.kind == "run").collect();
-    for (kind, about) in registry.kinds() {
-        // A program's own kind may have the name of a built-in one.
-        let built_in = known.iter().position(|d| d.kind == kind && d.about == about);
-        all.push(match built_in {
-            Some(at) => known.swap_remove(at),
-            None => Described { kind: kind.to_owned(), about: about.to_owned(), keys: None },
-        });
-    }
-    Ok(all)
-}
-
-fn text(described: &Described) -> String {
+fn text(described: &StageDescription) -> String {
     let heading = match described.kind.as_str() {
         "run" => "[run]",
         kind => kind,
@@ -146,16 +89,6 @@ fn wrapped(text: &str, indent: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_built_in_kind_is_described() {
-        let registry = Registry::builtin();
-        let all = described(&registry).unwrap();
-        let kinds: Vec<&str> = all.iter().skip(1).map(|d| d.kind.as_str()).collect();
-        assert_eq!(kinds, registry.kinds().map(|(kind, _)| kind).collect::<Vec<&str>>());
-        assert!(all.iter().all(|d| d.keys.is_some()));
-        assert!(all[0].kind == "run" && all[0].keys.as_ref().unwrap().len() >= 8);
-    }
 
     #[test]
     fn lines_are_wrapped_between_words() {

@@ -47,8 +47,8 @@ fn fields(object: &Map<String, Value>, indent: usize, lines: &mut Vec<String>) {
     }
 }
 
-/// Columns are padded to no more characters than this: a file may hold longer ones, and a table that
-/// repeats the longest in every row could be larger than any memory.
+/// Columns are padded to no more characters than this: a file may hold longer ones, and a table
+/// that repeats the longest in every row could be larger than any memory.
 const WIDEST: usize = 60;
 
 /// True for what no row of a table can hold: an object with lists of objects in it.

@@ -1,64 +1,12 @@
-//! The words of what was typed: flags and the settings that they stand for, in one table a command.
-//! Pipelines take their values from it, and messages of the library, which name settings as a
-//! pipeline file has them, are put into the flags that the user of the command can type.
+//! The words of what was typed: messages of the library, which name settings as a pipeline file has
+//! them, are put into the flags that the user of the command can type.
 
 use std::collections::BTreeSet;
 
-use serde_json::Value;
-
 use super::arguments::Command;
-use super::{convert, run, stages};
-use crate::language::Set;
-
-/// A flag of a command, the setting that it stands for, and its value if it was given.
-pub(super) struct Flag {
-    /// As it is typed: `--keep`, or `IN` for an argument without dashes.
-    pub name: &'static str,
-    /// As `--set` takes it: `cells.keep`.
-    pub address: &'static str,
-    /// What was given.
-    pub given: Option<Given>,
-}
-
-/// The value of a flag.
-pub(super) struct Given {
-    value: Value,
-    /// What was typed, where the value may be written otherwise: `6`, a number, is 6.0.
-    typed: Option<String>,
-}
-
-impl Given {
-    /// The value that `text` was typed for.
-    pub fn of(text: &str, value: Value) -> Given {
-        Given { value, typed: Some(text.to_owned()) }
-    }
-}
-
-impl<T: Into<Value>> From<T> for Given {
-    fn from(value: T) -> Given {
-        Given { value: value.into(), typed: None }
-    }
-}
-
-/// Flags from `(name, address, what was given)`.
-pub(super) fn flags<const N: usize>(
-    rows: [(&'static str, &'static str, Option<Given>); N],
-) -> Vec<Flag> {
-    rows.into_iter().map(|(name, address, given)| Flag { name, address, given }).collect()
-}
-
-/// The values that were given, for a pipeline.
-pub(super) fn sets(flags: Vec<Flag>) -> Vec<Set> {
-    let set = |flag: Flag| {
-        let Given { value, typed } = flag.given?;
-        let set = Set::argument(flag.name, flag.address, value);
-        Some(match typed {
-            Some(typed) => set.typed(typed),
-            None => set,
-        })
-    };
-    flags.into_iter().filter_map(set).collect()
-}
+use super::described::settings;
+use super::flags::{common_flags, convert_flags, reduce_flags, synth_flags};
+use crate::Error;
 
 /// What the user of one command can type for the settings that messages name.
 pub(super) struct Words {
@@ -73,23 +21,23 @@ impl Words {
     pub fn of(command: &Command) -> Words {
         let flags = match command {
             Command::Run(_) | Command::Plan(_) | Command::Check(_) => Vec::new(),
-            Command::Reduce(reduce) => run::reduce_flags(reduce),
-            Command::Convert(convert) => convert::flags(convert, None, None),
-            Command::Synth(synth) => run::synth_flags(synth),
+            Command::Reduce(reduce) => reduce_flags(reduce),
+            Command::Convert(convert) => convert_flags(convert, None, None),
+            Command::Synth(synth) => synth_flags(synth),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => Vec::new(),
             Command::Completions(_) | Command::Man(_) => Vec::new(),
         };
-        let common = command.common().map(|common| common.flags()).unwrap_or_default();
+        let common = command.common().map(common_flags).unwrap_or_default();
         let flags = flags.into_iter().chain(common).map(|flag| (flag.address, flag.name));
         Words {
             flags: flags.collect(),
             has_file: matches!(command, Command::Run(_) | Command::Plan(_) | Command::Check(_)),
-            settings: stages::settings(),
+            settings: settings(),
         }
     }
 
-    /// `message` with every setting that it names (`` `write.drop = ["GpsTime"]` ``) put into what can
-    /// be typed (`` `--drop GpsTime` ``).
+    /// `message` with every setting that it names (`` `write.drop = ["GpsTime"]` ``) put into what
+    /// can be typed (`` `--drop GpsTime` ``).
     pub fn told(&self, message: &str) -> String {
         let mut out = String::with_capacity(message.len());
         let mut rest = message;
@@ -125,6 +73,32 @@ impl Words {
                 Some(format!("`{name} {}`", argument(value)))
             }
             (Some((_, name)), _) => Some(format!("`{name}`")),
+        }
+    }
+}
+
+/// An error in the words of a command.
+pub(super) struct Told<'a> {
+    /// Its kind, file and byte.
+    pub error: &'a Error,
+    /// Place and message.
+    pub message: String,
+    /// The causes beneath, from the first to the deepest.
+    pub causes: Vec<String>,
+    /// What the user can do.
+    pub help: Option<String>,
+}
+
+impl<'a> Told<'a> {
+    /// `error` in these words.
+    pub fn of(error: &'a Error, words: &Words) -> Self {
+        let first = std::error::Error::source(error);
+        let causes = std::iter::successors(first, |cause| cause.source());
+        Told {
+            error,
+            message: words.told(&error.to_string()),
+            causes: causes.map(|cause| words.told(&cause.to_string())).collect(),
+            help: error.remedy().map(|help| words.told(help)),
         }
     }
 }

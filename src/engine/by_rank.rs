@@ -188,16 +188,14 @@ impl ByRank {
         Ok(ranked)
     }
 
-    /// Writes all records into `sink` on all threads; what it said. `counted` if classes are counted
-    /// by these records.
+    /// Writes all records into `sink` on all threads; what it said.
     pub fn write(
         &self,
         job: &Job<'_>,
         tiles: &SealedTiles,
         sink: Box<dyn Sink>,
-        counted: bool,
     ) -> Result<(SinkSummary, Tally)> {
-        let encoders = ChunkEncoders::of_one(job, tiles, &*sink, counted, false).of_stored();
+        let encoders = ChunkEncoders::of_one(job, tiles, (self.sink, &*sink), false).of_stored();
         let open = Mutex::new(Open::new(0, sink.chunk_points(), self.wants_normals, false));
         let commit = |records: Vec<Ranked>| -> Result<Vec<Chunk>> {
             let (mut open, mut full) = (lock(&open), Vec::new());

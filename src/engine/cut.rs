@@ -63,6 +63,7 @@ impl Cells {
 /// nothing but its decode is lost.
 pub(crate) fn cut_all(
     job: &Job<'_>,
+    passes: &[Pass],
     lattice: &Lattice,
     shares: &Shares,
     demands: &Demands,
@@ -70,7 +71,7 @@ pub(crate) fn cut_all(
 ) -> Result<Vec<Arc<Cut>>> {
     let mut known: Vec<(Cells, Arc<Cut>)> = Vec::new();
     let mut cuts = Vec::new();
-    for pass in &job.passes {
+    for pass in passes {
         let cells = Cells::of(&job.ops, pass);
         let cut = match known.iter().find(|(same, _)| *same == cells) {
             Some((_, cut)) => cut.clone(),

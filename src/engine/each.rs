@@ -14,20 +14,19 @@ use crate::{Error, Result};
 
 impl Each<'_> {
     /// Writes every input's output, each thread one at a time; for each input, the records that its
-    /// output was given and what it said. `counted` if classes are counted by these records.
+    /// output was given and what it said.
     pub fn write(
         &self,
         job: &Job<'_>,
         tiles: &SealedTiles,
         records: &ByInput,
-        counted: bool,
     ) -> Result<(Vec<(u64, SinkSummary)>, Tally)> {
         let (mut written, mut total) = (Vec::new(), Tally::default());
         job.items(self.sinks.len()).run(
             || ChunkEncoder::new(job, self.chunk_points),
             |encoder, input| {
                 job.advance(0)?;
-                let summary = self.write_one(job, tiles, records, input, encoder, counted)?;
+                let summary = self.write_one(job, tiles, records, input, encoder)?;
                 Ok((summary, std::mem::take(&mut encoder.tally)))
             },
             |(summary, tally)| {
@@ -46,16 +45,16 @@ impl Each<'_> {
         records: &ByInput,
         input: usize,
         encoder: &mut ChunkEncoder,
-        counted: bool,
     ) -> Result<(u64, SinkSummary)> {
         let missing = || Error::internal(format!("input {input} has no output"));
         let create = self.sinks.get(input).ok_or_else(missing)?;
         let staged = self.staged.get(input).ok_or_else(missing)?;
         let rank = *self.ranks.get(input).ok_or_else(missing)? as usize;
-        let pipeline = Some(job.pipeline.clone());
+        let pipeline = Some(job.pipelines[records.sink].clone());
         let metadata = Metadata { pipeline, ..job.source.metadata_of(input)? };
         let mut sink = create.create(staged.file(), job.source.schema(), &metadata, false)?;
-        let encoders = ChunkEncoders::of_one(job, tiles, &*sink, counted, create.likes_time());
+        let encoders =
+            ChunkEncoders::of_one(job, tiles, (records.sink, &*sink), create.likes_time());
         let mut open = Open::new(0, sink.chunk_points(), records.wants_normals, false);
         let (mut given, mut full) = (0, Vec::new());
         let mut append = |chunk: Chunk| {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::by_time::ByTime;
 use super::chunk::Chunk;
 use super::job::Job;
+use super::pass::Filter;
 use crate::point::{Edit, PointBatch};
 use crate::report::{KEY_POINTS, Tally};
 use crate::stage::{Encode, Encoded, Sink};
@@ -18,8 +19,10 @@ pub(crate) struct ChunkEncoders<'a> {
     encoders: Vec<Arc<dyn Encode>>,
     /// For each, how the records of a chunk are ordered, if not as they come.
     by_time: Vec<Option<ByTime>>,
-    /// The sink by whose records classes are counted as kept: one of what all stages leave.
-    counted: Option<usize>,
+    /// For each, the stages that stream above it, behind the decode.
+    changed_by: Vec<&'a [usize]>,
+    /// For each, whether classes are counted as kept by its records: one of what all stages leave.
+    counted: Vec<bool>,
     /// True if chunks tell where records are stored instead of their rank.
     stored: bool,
     chunk_points: usize,
@@ -34,17 +37,17 @@ impl<'a> ChunkEncoders<'a> {
             encoders: sinks.iter().map(|(_, sink)| sink.encoder()).collect(),
             by_time: sinks.iter().map(|(n, _)| by_time(job, job.by_time[*n])).collect(),
             stored: false,
-            counted: sinks.iter().position(|(sink, _)| *sink == job.last_sink),
+            changed_by: sinks.iter().map(|(n, _)| &*job.changed_by[*n]).collect(),
+            counted: sinks.iter().map(|(sink, _)| job.is_last(*sink)).collect(),
             chunk_points: sinks.iter().map(|(_, sink)| sink.chunk_points()).max().unwrap_or(0),
         }
     }
 
-    /// For chunks of one output, by whose records classes are counted or not.
+    /// For chunks of one output, that of sink `number`.
     pub fn of_one(
         job: &'a Job<'a>,
         tiles: &'a SealedTiles,
-        sink: &dyn Sink,
-        counted: bool,
+        (number, sink): (usize, &dyn Sink),
         likes_time: bool,
     ) -> Self {
         ChunkEncoders {
@@ -52,7 +55,8 @@ impl<'a> ChunkEncoders<'a> {
             tiles,
             encoders: vec![sink.encoder()],
             by_time: vec![by_time(job, likes_time)],
-            counted: counted.then_some(0),
+            changed_by: vec![&job.changed_by[number]],
+            counted: vec![job.is_last(number)],
             stored: false,
             chunk_points: sink.chunk_points(),
         }
@@ -99,7 +103,7 @@ impl ChunkEncoder {
             false => all.tiles.fetch(&self.numbers, &mut self.fetch, &mut self.batch)?,
             true => all.tiles.fetch_stored(&self.numbers, &mut self.fetch, &mut self.batch)?,
         }
-        if all.counted == Some(chunk.sink) {
+        if all.counted.get(chunk.sink) == Some(&true) {
             all.job.classes.keep_by_state(&self.batch, &self.states, &mut self.tally);
             count_key_points(&self.states, &mut self.tally);
         }
@@ -108,6 +112,8 @@ impl ChunkEncoder {
             by_time.sort(&mut self.batch, &mut self.states, normals.as_deref_mut());
         }
         edit(&mut self.batch, &self.states)?;
+        let changed_by = all.changed_by.get(chunk.sink).copied().unwrap_or_default();
+        change(all.job, changed_by, &mut self.batch)?;
         self.batch.normals = normals;
         let encoder = all.encoders.get(chunk.sink);
         let encoder = encoder.ok_or_else(|| Error::internal("a chunk is for no sink"))?;
@@ -128,8 +134,22 @@ fn count_key_points(states: &[State], tally: &mut Tally) {
     }
 }
 
+/// Applies stages that stream to records that they keep.
+fn change(job: &Job<'_>, filters: &[usize], batch: &mut PointBatch) -> Result<()> {
+    let records = batch.len();
+    for &filter in filters {
+        let Filter { kind, transform } = &job.filters[filter];
+        transform.apply(batch)?;
+        if batch.len() != records {
+            let told = format!("the stage {kind} removes records that it kept before");
+            return Err(Error::internal(told));
+        }
+    }
+    Ok(())
+}
+
 /// Writes the edits of `states` into the records.
-fn edit(batch: &mut PointBatch, states: &[State]) -> Result<()> {
+pub(crate) fn edit(batch: &mut PointBatch, states: &[State]) -> Result<()> {
     let schema = batch.schema().clone();
     for (record, state) in batch.records_mut().chunks_exact_mut(schema.stride).zip(states) {
         for edit in Edit::of(state.edits()) {

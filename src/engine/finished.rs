@@ -7,9 +7,18 @@ use crate::stage::SinkSummary;
 /// What a stream or a mill came to.
 pub(crate) struct Finished {
     pub read: u64,
-    pub kept: u64,
     /// For each file of each sink, the records that it was given, and what it says.
     pub written: Vec<Vec<(u64, SinkSummary)>>,
+    /// Counts of all branches together.
+    pub tally: Tally,
+    /// What each branch came to.
+    pub branches: Vec<FinishedBranch>,
+}
+
+/// What a branch came to.
+pub(crate) struct FinishedBranch {
+    pub kept: u64,
+    /// What the decode and the passes on the branch counted.
     pub tally: Tally,
     pub decisions: Vec<Decision>,
     pub classes: Vec<ClassFigures>,

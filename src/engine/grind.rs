@@ -10,6 +10,7 @@ use super::chunk::{Chunk, Open};
 use super::chunks::{Counts, Cutter, Stored};
 use super::cut::{Cut, neighbors, reach};
 use super::encoding::ChunkEncoders;
+use super::filtering::Filtering;
 use super::job::Job;
 use super::outlet::Outlet;
 use super::pass::{Op, Pass};
@@ -171,6 +172,7 @@ pub(crate) struct Worker<'a> {
     /// Where positions are rounded, and unequal coordinates that share one are counted.
     rounded: Option<Rounded<'a>>,
     first: bool,
+    filtering: Option<Filtering<'a>>,
     sum: TileTally,
     /// Grids to compare the pass with, of the tiles so far.
     baseline: Option<Baseline>,
@@ -203,7 +205,10 @@ impl<'a> Worker<'a> {
             rounds.then(|| Rounded::new(&field.tiles, field.lattice, job.source.schema()));
         let reach = reach(&job.ops, pass);
         let ranks = pass.before.iter().chain(&pass.after).any(|sink| job.in_input_order[*sink]);
+        let filters = &pass.filters[..];
+        let filtering = (!filters.is_empty()).then(|| Filtering::new(job, &field.tiles, filters));
         Worker {
+            filtering,
             ranks,
             fetch: Fetch::default(),
             job,
@@ -272,6 +277,9 @@ impl<'a> Worker<'a> {
             if self.first {
                 self.sum.tally.merge(&counted);
             }
+        }
+        if let Some(filtering) = &mut self.filtering {
+            filtering.apply(&mut product, &mut self.sum.tally)?;
         }
         if self.ranks {
             product.find_places(self.loader.tiles(), &mut self.fetch)?;

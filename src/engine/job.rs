@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
-use super::pass::{Pass, StageOp};
+use super::pass::{Branch, Filter, Pass, StageOp};
 use super::publish::Staged;
 use super::tagger::{ClassOf, LEFT_OUT, Tagger};
 use crate::budget::Budget;
@@ -23,13 +23,18 @@ use crate::{Error, ErrorKind, Result};
 pub(crate) struct Job<'a> {
     pub source: &'a dyn Source,
     pub source_kind: String,
-    /// The stages as outputs name them.
-    pub pipeline: Arc<str>,
+    /// The stages on the branch of each sink, as outputs name them.
+    pub pipelines: Vec<Arc<str>>,
     pub transforms: Vec<(String, Box<dyn Transform>)>,
     /// Dimensions that nobody looks at.
     pub unread: Vec<String>,
     pub ops: Vec<StageOp>,
+    /// Stages that stream behind the decode.
+    pub filters: &'a [Filter],
+    /// For each sink, those of them that are above it.
+    pub changed_by: &'a [Vec<usize>],
     pub passes: Vec<Pass>,
+    pub branches: &'a [Branch],
     /// For each sink, where the outputs of the inputs go if each has its own.
     pub each: Vec<Option<Each<'a>>>,
     pub tagger: Tagger,
@@ -43,11 +48,9 @@ pub(crate) struct Job<'a> {
     /// For each sink, whether it writes normals.
     pub wants_normals: Vec<bool>,
     /// For each sink, whether it wants the order of the inputs.
-    pub in_input_order: Vec<bool>,
+    pub in_input_order: &'a [bool],
     /// For each sink, whether the records of a chunk are ordered by time.
     pub by_time: Vec<bool>,
-    /// A sink of what all stages leave.
-    pub last_sink: usize,
     pub watch: &'a dyn Watch,
     /// What the user was warned of before the end.
     pub warnings: Mutex<Vec<String>>,
@@ -83,10 +86,18 @@ impl Job<'_> {
         Ok(true)
     }
 
-    /// Warns of something now, and again in the report.
+    /// Warns of something now, and again in the report; once, if several branches give rise to it.
     pub fn warn(&self, message: String) {
-        self.watch.warn(&message);
-        lock(&self.warnings).push(message);
+        let mut warnings = lock(&self.warnings);
+        if !warnings.contains(&message) {
+            self.watch.warn(&message);
+            warnings.push(message);
+        }
+    }
+
+    /// True if a sink takes what the last stage of a branch leaves: classes are counted by its records.
+    pub fn is_last(&self, sink: usize) -> bool {
+        self.branches.iter().any(|branch| branch.last_sink == sink)
     }
 
     /// Says which transforms removed no point of all that were read.

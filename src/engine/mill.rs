@@ -1,6 +1,7 @@
 //! The mill: decode into the tile store, then pass after pass over the tiles, in canonical order into
 //! the sinks.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use serde_json::Value;
@@ -11,11 +12,11 @@ use super::chunks::Found;
 use super::clock::Clock;
 use super::cut::{Cut, cut_again, cut_all};
 use super::decode::decode;
-use super::finished::Finished;
+use super::finished::{Finished, FinishedBranch};
 use super::forecast::{forecast, samples_capacity};
 use super::grind::{Field, Milled, PassOutputs, grind};
 use super::job::Job;
-use super::pass::{Call, Op, Pass};
+use super::pass::{Branch, Call, Op, Pass};
 use super::shares::{Demands, Shares};
 use super::survey::survey;
 use crate::budget::Lease;
@@ -47,69 +48,42 @@ pub(crate) fn mill(
     let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
     tally.count("positions", tiles.positions());
     settle(job, lattice, &tiles)?;
-    let (bounds, starts) = (tiles.bounds(), Arc::new(starts));
-    let field = Field { lattice, area: area.clone(), tiles: tiles.clone(), starts };
+    let field =
+        Field { lattice, area: area.clone(), tiles: tiles.clone(), starts: Arc::new(starts) };
     let mut course = Course {
-        sieve: Sieve::default(),
-        alive: tiles.points(),
-        kept: tiles.points(),
-        passes: Vec::new(),
         forecasts: vec![None; job.ops.len()],
-        compared: None,
         written: sinks.iter().map(|_| None).collect(),
         sinks,
+        tally: Tally::default(),
     };
-    let cuts = cut_all(job, lattice, shares, demands, &tiles)?;
-    let milling = |cut: &Arc<Cut>| demands.mill_bytes(cut.millers, cut.capacity as u64);
-    let looking = demands.mill_bytes(job.threads.count(), samples_capacity(shares) as u64);
-    let most = cuts.iter().map(milling).max().unwrap_or(0).max(looking);
-    let mut working = job.budget.lease(most, "mill")?;
-    for (pass, cut) in std::mem::take(&mut job.passes).iter().zip(&cuts) {
-        let place = (pass, cut, &mut working);
-        course.run(job, place, &field, (shares, demands), &mut tally, clock)?;
-    }
-    drop((working, cuts));
-    clock.phase("survey", Some(2 * tiles.positions()));
-    let mut measured = survey(job, lattice, area, &tiles, &course.sieve)?;
-    measured.totals.baseline = course.baseline(lattice);
+    let decoded =
+        Standing { alive: tiles.points(), kept: tiles.points(), tally, ..Standing::default() };
+    let branches = course.go(job, decoded, &field, (shares, demands), clock)?;
     let unwritten = || Error::internal("an output was never written");
+    let written = course.written.into_iter().map(|w| w.ok_or_else(unwritten));
+    let mut tally = course.tally;
     Ok(Finished {
         read: tally.work.remove("read").unwrap_or(0),
-        kept: course.kept,
-        written: course
-            .written
-            .into_iter()
-            .map(|w| w.ok_or_else(unwritten))
-            .collect::<Result<_>>()?,
-        decisions: rounding(job, lattice, &bounds, &tally)
-            .into_iter()
-            .chain(decisions(job, course.forecasts))
-            .collect(),
-        classes: tally.classes.take().map_or(Vec::new(), |classes| classes.figures()),
-        passes: course.passes,
+        written: written.collect::<Result<_>>()?,
         tally,
-        measured: Some(measured),
+        branches,
     })
 }
 
-/// How far a mill has come.
-struct Course {
-    /// What the passes so far left.
+/// What a pass leaves, and those before it on its branch.
+#[derive(Clone, Default)]
+struct Standing {
     sieve: Sieve,
     /// Records that the next pass finds, and that are written if none follows.
     alive: u64,
     kept: u64,
     passes: Vec<PassFigures>,
-    /// For each stage, what it said is to be expected.
-    forecasts: Vec<Option<Vec<(String, Value)>>>,
     /// Grids to compare with, from the first pass that decided by normals.
-    compared: Option<Compared>,
-    sinks: Vec<Option<Box<dyn Sink>>>,
-    /// For each file of each sink, how many records it was given, and what it said in the end.
-    written: Vec<Option<Vec<(u64, SinkSummary)>>>,
+    compared: Option<Arc<Compared>>,
+    tally: Tally,
 }
 
-/// See [`Course::compared`].
+/// See [`Standing::compared`].
 struct Compared {
     baseline: Baseline,
     /// Records that the pass decided about, and that it found.
@@ -117,22 +91,171 @@ struct Compared {
     found: u64,
 }
 
+impl Standing {
+    /// What a grid would have done that leaves as many of the records that the passes decided about.
+    fn baseline(&self, lattice: &Lattice) -> Option<BaselineFigures> {
+        let Compared { baseline, decided, found } = self.compared.as_deref()?;
+        let removed = found.checked_sub(self.alive)?;
+        baseline.figures(decided.checked_sub(removed)?, *decided, lattice)
+    }
+}
+
+/// What a mill holds beside what its passes leave.
+struct Course {
+    /// For each stage, what it said is to be expected.
+    forecasts: Vec<Option<Vec<(String, Value)>>>,
+    sinks: Vec<Option<Box<dyn Sink>>>,
+    /// For each file of each sink, how many records it was given, and what it said in the end.
+    written: Vec<Option<Vec<(u64, SinkSummary)>>>,
+    /// Counts of all passes.
+    tally: Tally,
+}
+
 impl Course {
+    /// Runs all passes; what a branch comes to is measured as soon as its last one is done.
+    fn go(
+        &mut self,
+        job: &mut Job<'_>,
+        decoded: Standing,
+        field: &Field<'_>,
+        (shares, demands): (&Shares, &Demands),
+        clock: &mut Clock<'_>,
+    ) -> Result<Vec<FinishedBranch>> {
+        let passes = std::mem::take(&mut job.passes);
+        let cuts = cut_all(job, &passes, field.lattice, shares, demands, &field.tiles)?;
+        let milling = |cut: &Arc<Cut>| demands.mill_bytes(cut.millers, cut.capacity as u64);
+        let looking = demands.mill_bytes(job.threads.count(), samples_capacity(shares) as u64);
+        let most = cuts.iter().map(milling).max().unwrap_or(0).max(looking);
+        self.tally.merge(&decoded.tally);
+        // What the decode left comes first, then what each pass leaves.
+        let mut left: Vec<Option<Standing>> = vec![Some(decoded)];
+        let (mut finished, mut working) = (Vec::new(), None);
+        for (n, (pass, cut)) in passes.iter().zip(cuts).enumerate() {
+            let from = pass.behind.map_or(0, |behind| behind + 1);
+            let is_last = passes[n + 1..].iter().all(|later| later.behind != pass.behind);
+            let slot = left.get_mut(from);
+            let before = slot.and_then(|slot| if is_last { slot.take() } else { slot.clone() });
+            let before = before.ok_or_else(|| Error::internal("a pass goes on from nothing"))?;
+            let mut held = match working.take() {
+                Some(held) => held,
+                None => job.budget.lease(most, "mill")?,
+            };
+            let place = (pass, &cut, &mut held);
+            let after = self.run(job, place, before, field, (shares, demands), clock)?;
+            match job.branches.iter().find(|branch| branch.pass == n) {
+                None => {
+                    working = Some(held);
+                    left.push(Some(after));
+                }
+                Some(branch) => {
+                    drop((held, cut));
+                    left.push(None);
+                    finished.push(self.finish(job, branch, after, field, clock)?);
+                }
+            }
+        }
+        Ok(finished)
+    }
+
+    /// Measures what a branch came to.
+    fn finish(
+        &self,
+        job: &Job<'_>,
+        branch: &Branch,
+        after: Standing,
+        field: &Field<'_>,
+        clock: &mut Clock<'_>,
+    ) -> Result<FinishedBranch> {
+        let Field { lattice, area, tiles, .. } = field;
+        clock.phase("survey", Some(2 * tiles.positions()));
+        let mut measured = survey(job, lattice, area, tiles, &after.sieve)?;
+        measured.totals.baseline = after.baseline(lattice);
+        let mut tally = after.tally;
+        Ok(FinishedBranch {
+            kept: after.kept,
+            decisions: rounding(job, lattice, &tiles.bounds(), &tally)
+                .into_iter()
+                .chain(decisions(job, branch, &self.forecasts))
+                .collect(),
+            classes: tally.classes.take().map_or(Vec::new(), |classes| classes.figures()),
+            passes: after.passes,
+            tally,
+            measured: Some(measured),
+        })
+    }
+
+    /// Runs a pass over what those before it left.
     fn run(
         &mut self,
         job: &mut Job<'_>,
         (pass, cut, working): (&Pass, &Arc<Cut>, &mut Lease),
+        before: Standing,
         field: &Field<'_>,
         (shares, demands): (&Shares, &Demands),
-        tally: &mut Tally,
         clock: &mut Clock<'_>,
-    ) -> Result<()> {
+    ) -> Result<Standing> {
         let tiles = &field.tiles;
-        let sieve = pass.sieve(&self.sieve);
+        let sieve = pass.sieve(&before.sieve);
+        self.foresee(job, pass, field, &sieve, shares)?;
+        let held = working.bytes();
+        let cut = cut_again(job, pass, field.lattice, (shares, demands), tiles, (cut, held))?;
+        working.resize(held.max(demands.mill_bytes(cut.millers, cut.capacity as u64)))?;
+        let phase = if pass.gathers().is_some() { "gather" } else { "mill" };
+        clock.phase(phase, Some(tiles.positions()));
+        let mut tally = Tally::default();
+        tally.work("tiles", cut.keys.len() as u64);
+        let levels: BTreeSet<u32> = cut.keys.iter().map(|key| key.level).collect();
+        tally.work("tile_levels", levels.len() as u64);
+        let ((sinks, by_input, by_rank), ordered) = self.outputs(job, pass, field)?;
+        let which: Vec<usize> = sinks.iter().map(|(sink, _)| *sink).collect();
+        let milled = grind(job, (pass, &cut), field, &sieve, (sinks, by_input, by_rank))?;
+        drop(sieve);
+        tally.merge(&milled.tally);
+        self.write_lists(job, tiles, &milled, ordered, &mut tally, clock)?;
+        let outcomes = milled.counts.outputs.iter().copied().zip(milled.written);
+        for (sink, outcome) in which.into_iter().zip(outcomes) {
+            self.written[sink] = Some(vec![outcome]);
+        }
+        self.tally.merge(&tally);
+        let found = (milled.stored.found, milled.decided);
+        let mut after = before;
+        after.tally.merge(&tally);
+        let (decided, found_alive) = (milled.decided, after.alive);
+        if let (Some(baseline), None) = (milled.baseline, &after.compared) {
+            after.compared = Some(Arc::new(Compared { baseline, decided, found: found_alive }));
+        }
+        let called = pass.calls.iter().map(|call| job.ops[call.op].kind.clone());
+        let streamed = pass.filters.iter().map(|&filter| job.filters[filter].kind.clone());
+        let (before, alive) = (after.alive, milled.counts.alive);
+        let stages = called.chain(streamed).collect();
+        after.passes.push(PassFigures { stages, before, after: alive });
+        after.sieve.states = Some(milled.stored.states);
+        after.sieve.fates = Some(milled.stored.fates);
+        after.sieve.figures = milled.stored.figures;
+        if milled.stored.normals.is_some() {
+            after.sieve.oriented = milled.oriented;
+        }
+        after.sieve.normals = milled.stored.normals.or(after.sieve.normals.take());
+        (after.alive, after.kept) = (alive, milled.counts.written);
+        if let Some(op) = pass.gathers() {
+            conclude(job, op, found.0, found.1)?;
+        }
+        Ok(after)
+    }
+
+    /// Lets stages of a pass that want to look at samples do so, and tells what they chose.
+    fn foresee(
+        &mut self,
+        job: &mut Job<'_>,
+        pass: &Pass,
+        field: &Field<'_>,
+        sieve: &Sieve,
+        shares: &Shares,
+    ) -> Result<()> {
         let ahead = |call: &&Call| self.forecasts[call.op].is_none();
         let ops: Vec<usize> = pass.calls.iter().filter(ahead).map(|call| call.op).collect();
         let mut chosen = Vec::new();
-        for (op, foreseen) in forecast(job, pass, &ops, field, &sieve, samples_capacity(shares))? {
+        for (op, foreseen) in forecast(job, pass, &ops, field, sieve, samples_capacity(shares))? {
             if let Some(warning) = foreseen.warning {
                 job.warn(warning);
             }
@@ -149,53 +272,7 @@ impl Course {
         if !chosen.is_empty() {
             job.watch.chose(&chosen);
         }
-        let held = working.bytes();
-        let cut = cut_again(job, pass, field.lattice, (shares, demands), tiles, (cut, held))?;
-        working.resize(held.max(demands.mill_bytes(cut.millers, cut.capacity as u64)))?;
-        clock.phase(
-            if pass.gathers().is_some() { "gather" } else { "mill" },
-            Some(tiles.positions()),
-        );
-        tally.work("tiles", cut.keys.len() as u64);
-        let levels: std::collections::BTreeSet<u32> =
-            cut.keys.iter().map(|key| key.level).collect();
-        tally.work("tile_levels", levels.len() as u64);
-        let ((sinks, by_input, by_rank), ordered) = self.outputs(job, pass, field)?;
-        let which: Vec<usize> = sinks.iter().map(|(sink, _)| *sink).collect();
-        let milled = grind(job, (pass, &cut), field, &sieve, (sinks, by_input, by_rank))?;
-        tally.merge(&milled.tally);
-        self.write_lists(job, tiles, &milled, ordered, tally, clock)?;
-        for (sink, outcome) in
-            which.into_iter().zip(milled.counts.outputs.into_iter().zip(milled.written))
-        {
-            self.written[sink] = Some(vec![outcome]);
-        }
-        let (decided, found) = (milled.decided, self.alive);
-        if let (Some(baseline), None) = (milled.baseline, &self.compared) {
-            self.compared = Some(Compared { baseline, decided, found });
-        }
-        let stages = pass.calls.iter().map(|call| job.ops[call.op].kind.clone()).collect();
-        self.passes.push(PassFigures { stages, before: self.alive, after: milled.counts.alive });
-        let stored = milled.stored;
-        self.sieve.states = Some(stored.states);
-        self.sieve.fates = Some(stored.fates);
-        self.sieve.figures = stored.figures;
-        if stored.normals.is_some() {
-            self.sieve.oriented = milled.oriented;
-        }
-        self.sieve.normals = stored.normals.or(self.sieve.normals.take());
-        (self.alive, self.kept) = (milled.counts.alive, milled.counts.written);
-        match pass.gathers() {
-            Some(op) => conclude(job, op, stored.found, milled.decided),
-            None => Ok(()),
-        }
-    }
-
-    /// What a grid would have done that leaves as many of the records that the passes decided about.
-    fn baseline(&self, lattice: &Lattice) -> Option<BaselineFigures> {
-        let Compared { baseline, decided, found } = self.compared.as_ref()?;
-        let removed = found.checked_sub(self.alive)?;
-        baseline.figures(decided.checked_sub(removed)?, *decided, lattice)
+        Ok(())
     }
 
     /// The outputs of a pass: those that grow while it mills, lists of those that are written behind
@@ -241,15 +318,13 @@ impl Course {
             clock.phase("write", Some(lists.records()));
             let unknown = || Error::internal("an output has no inputs");
             let each = job.each[lists.sink].as_ref().ok_or_else(unknown)?;
-            let last = lists.sink == job.last_sink;
-            let (written, counted) = each.write(job, tiles, lists, last)?;
+            let (written, counted) = each.write(job, tiles, lists)?;
             tally.merge(&counted);
             self.written[lists.sink] = Some(written);
         }
         for (lists, sink) in milled.by_rank.iter().zip(ordered) {
             clock.phase("write", Some(lists.records));
-            let last = lists.sink == job.last_sink;
-            let (said, counted) = lists.write(job, tiles, sink, last)?;
+            let (said, counted) = lists.write(job, tiles, sink)?;
             tally.merge(&counted);
             self.written[lists.sink] = Some(vec![(lists.records, said)]);
         }
@@ -293,7 +368,7 @@ fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<(
     job.ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().settle(&facts))?;
     let warnings = job.ops.iter().flat_map(|stage| stage.op.tile().warnings(lattice));
     // Stages that are applied several times say it once.
-    let warnings: std::collections::BTreeSet<String> = warnings.collect();
+    let warnings: BTreeSet<String> = warnings.collect();
     warnings.into_iter().for_each(|warning| job.warn(warning));
     Ok(())
 }
@@ -321,9 +396,14 @@ fn rounding(job: &Job<'_>, lattice: &Lattice, bounds: &Bounds, tally: &Tally) ->
     Some(Decision { stage, name, value: apart.farthest.into() })
 }
 
-/// What the stages settled by themselves and what they expected, in their order.
-fn decisions(job: &Job<'_>, forecasts: Vec<Option<Vec<(String, Value)>>>) -> Vec<Decision> {
-    let each = job.ops.iter().zip(forecasts).flat_map(|(stage, expected)| {
+/// What the stages of a branch settled by themselves and what they expected, in their order.
+fn decisions(
+    job: &Job<'_>,
+    branch: &Branch,
+    forecasts: &[Option<Vec<(String, Value)>>],
+) -> Vec<Decision> {
+    let each = branch.ops.iter().flat_map(|&op| {
+        let (stage, expected) = (&job.ops[op], forecasts[op].clone());
         let mut settled = stage.op.tile().decisions();
         // What was chosen by samples may be among what is settled.
         let is_new = |(name, _): &(String, Value)| settled.iter().all(|(other, _)| other != name);

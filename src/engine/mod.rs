@@ -12,6 +12,7 @@ mod cut;
 mod decode;
 mod each;
 mod encoding;
+mod filtering;
 mod finished;
 mod forecast;
 mod grind;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::graph::{Limits, Written};
 use crate::point::Mark;
-use crate::stage::{Needs, ScanOp, TileOp};
+use crate::stage::{Needs, ScanOp, TileOp, Transform};
 use crate::tile::Sieve;
 
 /// A tile stage and where it stands.
@@ -40,6 +40,26 @@ impl Op {
     }
 }
 
+/// A stage that streams, behind stages that work on tiles or on one of several branches: what it
+/// removes is entered in a pass of its own, and what it changes is changed as records are written.
+pub(crate) struct Filter {
+    pub kind: String,
+    pub transform: Box<dyn Transform>,
+}
+
+/// A path through the graph, from the source to the last stage that works.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Branch {
+    /// The pass that ends it.
+    pub pass: usize,
+    /// A sink of what its last stage leaves.
+    pub last_sink: usize,
+    /// The tile stages on it.
+    pub ops: Vec<usize>,
+    /// Its stages as reports and outputs name them: as if it were the only one.
+    pub stages: serde_json::Value,
+}
+
 /// One of a pass's stages, in one of its phases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Call {
@@ -52,6 +72,10 @@ pub(crate) struct Call {
 /// Stages that run on each tile in turn.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Pass {
+    /// The pass whose outcome it goes on from; None for the scan as it was decoded.
+    pub behind: Option<usize>,
+    /// Stages that stream and are applied to what the calls leave.
+    pub filters: Vec<usize>,
     pub calls: Vec<Call>,
     /// How often the stages were applied before, where they are repeated.
     pub round: usize,
@@ -126,4 +150,13 @@ pub(crate) fn decides(needs: &Needs) -> bool {
 /// True if a stage that needs this decides, and reads normals.
 pub(crate) fn decides_by_normals(needs: &Needs) -> bool {
     decides(needs) && needs.reads.iter().any(|column| column == "Normal")
+}
+
+/// How many outcomes of passes are there at once at most: what a pass goes on from is dropped with the
+/// last that does, and the outcome of a branch's last pass when it is measured.
+pub(crate) fn standings(passes: &[Pass]) -> usize {
+    let goes_on = |from: usize| move |pass: &Pass| pass.behind == Some(from);
+    let is_held = |from: usize, now: usize| passes[now..].iter().any(goes_on(from));
+    let held = |now: usize| (0..now).filter(|&from| is_held(from, now)).count() + 1;
+    (0..passes.len()).map(held).max().unwrap_or(0).max(2)
 }

@@ -92,6 +92,42 @@ impl Product {
         Ok(product)
     }
 
+    /// The records that are written so far: the first of each stretch, how many, and their state.
+    pub fn written(&self) -> impl Iterator<Item = (u64, u64, State)> + '_ {
+        let written = self.entries.iter().filter(|entry| entry.now.is_written());
+        written.map(|entry| (entry.number, u64::from(entry.count), entry.now))
+    }
+
+    /// Removes those of the [written](Product::written) records that are not `kept`.
+    pub fn keep(&mut self, kept: &[bool]) {
+        if !kept.contains(&false) {
+            return;
+        }
+        let (mut entries, mut normals) = (Vec::with_capacity(self.entries.len()), Vec::new());
+        let mut kept = kept.iter();
+        for (n, entry) in self.entries.iter().enumerate() {
+            let begin = entries.len();
+            match entry.now.is_written() {
+                false => entries.push(*entry),
+                true => (0..entry.count).zip(&mut kept).for_each(|(i, &is_kept)| {
+                    let number = entry.number + u64::from(i);
+                    let now = if is_kept { entry.now } else { State::REMOVED };
+                    match entries.last_mut() {
+                        Some(Entry { count, now: before, .. }) if i > 0 && *before == now => {
+                            *count += 1;
+                        }
+                        _ => entries.push(Entry { number, count: 1, now, ..*entry }),
+                    }
+                }),
+            }
+            if let Some(of) = &self.entry_normals {
+                normals.resize(normals.len() + entries.len() - begin, of[n]);
+            }
+        }
+        self.entries = entries;
+        self.entry_normals = self.entry_normals.take().map(|_| normals);
+    }
+
     /// Looks up [`places`](Product::places).
     pub fn find_places(&mut self, tiles: &SealedTiles, fetch: &mut Fetch) -> Result<()> {
         let mut numbers = Vec::new();

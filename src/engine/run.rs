@@ -1,7 +1,7 @@
 //! Running a plan: begin, stream or mill, account, publish.
 
 use std::fs::{self, File};
-use std::io::BufWriter;
+use std::io::{BufRead, BufWriter};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
@@ -9,9 +9,10 @@ use std::sync::{Arc, Mutex};
 use super::Watch;
 use super::by_rank::LISTED;
 use super::clock::Clock;
-use super::finished::Finished;
+use super::finished::{Finished, FinishedBranch};
 use super::job::{Each, Job};
 use super::mill::mill;
+use super::pass::Branch;
 use super::publish::{Staged, make_folder, publish};
 use super::room;
 use super::room::Taken;
@@ -25,12 +26,12 @@ use crate::budget::Budget;
 use crate::graph::{Nonfinite, Spill};
 use crate::host::process::peak_memory;
 use crate::host::{Threads, lock};
-use crate::point::{Metadata, names};
+use crate::point::names;
 use crate::report::{
     Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome, Removed, Report,
     RunFigures, check_written,
 };
-use crate::stage::{CreateSink, Input, Order, Sink, SinkSummary, Source, Transform};
+use crate::stage::{CreateSink, Input, Sink, SinkSummary, Source};
 use crate::store::SpillArea;
 use crate::{Error, Result};
 
@@ -136,10 +137,10 @@ impl Task {
         let whole = !self.mills
             && self.transforms.is_empty()
             && self.settings.nonfinite == Nonfinite::Refuse;
-        let pipeline = (!whole).then(|| self.pipeline());
-        let metadata = Metadata { pipeline, ..self.source.metadata().clone() };
+        let mut metadata = self.source.metadata().clone();
         let mut sinks = Vec::new();
-        for (sink, staged) in self.sinks.iter().zip(outputs) {
+        for ((sink, staged), pipeline) in self.sinks.iter().zip(outputs).zip(self.pipelines()) {
+            metadata.pipeline = (!whole).then_some(pipeline);
             let file = staged.first().filter(|_| !sink.is_folder());
             let open = file.map(|file| sink.create(file.file(), schema, &metadata, whole));
             sinks.push(open.transpose()?);
@@ -188,7 +189,7 @@ impl Task {
             }
         };
         let earlier = std::mem::take(&mut *lock(&job.warnings));
-        let nothing_left = nothing_left(&finished, &job.transforms);
+        let nothing_left = nothing_left(&finished, &job);
         drop(job);
         let mut run = self.figures(&finished, &budget, area.written());
         run.warnings.extend(nothing_left);
@@ -212,7 +213,8 @@ impl Task {
             let bytes = spilled(&self.demands, kept_in_memory);
             all.push(Taken { folder: spill, spilled: true, bytes, again: 0 });
         }
-        let keeps = job.transforms.is_empty() && job.ops.is_empty() && !job.drop_nonfinite;
+        let streams = !job.transforms.is_empty() || !job.filters.is_empty();
+        let keeps = !streams && job.ops.is_empty() && !job.drop_nonfinite;
         for (sink, staged) in self.sinks.iter().zip(outputs).filter(|_| keeps) {
             let Some(staged) = staged.first() else { continue };
             let each = sink.disk_bytes(self.source.schema(), self.source.metadata())?;
@@ -222,9 +224,11 @@ impl Task {
         room::check(all.into_iter())
     }
 
-    /// The stages as outputs name them.
-    fn pipeline(&self) -> Arc<str> {
-        self.stages.to_string().into()
+    /// The stages on the branch of each sink, as outputs name them.
+    fn pipelines(&self) -> Vec<Arc<str>> {
+        let named: Vec<Arc<str>> =
+            self.branches.iter().map(|branch| branch.stages.to_string().into()).collect();
+        self.branch_of.iter().map(|&branch| named[branch].clone()).collect()
     }
 
     /// The dimensions that nobody looks at: no sink, and neither what counts classes and tells records
@@ -240,7 +244,8 @@ impl Task {
         let Some((first, others)) = self.sinks.split_first() else { return Vec::new() };
         let by_all = |name: &&String| others.iter().all(|sink| sink.unread().contains(*name));
         let mut unread: Vec<String> = first.unread().iter().filter(by_all).cloned().collect();
-        unread.retain(|name| !LOOKED_AT.contains(&name.as_str()) && self.transforms.is_empty());
+        let streams = !self.transforms.is_empty() || !self.filters.is_empty();
+        unread.retain(|name| !LOOKED_AT.contains(&name.as_str()) && !streams);
         unread
     }
 
@@ -262,11 +267,14 @@ impl Task {
         Job {
             source: &*self.source,
             source_kind: self.source_kind.clone(),
-            pipeline: self.pipeline(),
+            pipelines: self.pipelines(),
             transforms: Vec::new(),
             unread: Vec::new(),
             ops: Vec::new(),
+            filters: &self.filters,
+            changed_by: &self.changed_by,
             passes: Vec::new(),
+            branches: &self.branches,
             each: each.collect(),
             tagger: self.tagger.clone(),
             classes: ClassOf::new(self.source.schema()),
@@ -277,9 +285,8 @@ impl Task {
             headers: self.settings.headers,
             tile_points,
             wants_normals: self.sinks.iter().map(|sink| sink.wants_normals()).collect(),
-            in_input_order: self.sinks.iter().map(|sink| sink.order() == Order::Input).collect(),
+            in_input_order: &self.in_input_order,
             by_time: self.sinks.iter().map(|sink| sink.likes_time()).collect(),
-            last_sink: self.last_sink,
             watch,
             warnings: Mutex::default(),
             failed: AtomicBool::new(false),
@@ -317,21 +324,40 @@ impl Task {
         }
     }
 
-    /// The report of a finished run, once its ledger balances, and the lines of its tiles.
+    /// The report of a finished run, once its ledgers balance, and the lines of the tiles of each
+    /// branch.
     fn account(
         &self,
         finished: Finished,
         mut run: RunFigures,
         clock: Clock<'_>,
-    ) -> Result<(Report, Option<Lines>)> {
-        let ledger = Ledger::new(finished.read, finished.kept, &finished.tally);
-        ledger.check()?;
+    ) -> Result<(Report, Vec<Option<Lines>>)> {
         for (sink, (given, summary)) in self.written(&finished) {
             check_written(sink.path(), *given, summary.points)?;
         }
         (run.seconds, run.cpu_seconds, run.phases) = clock.finish();
         run.peak_memory_bytes = peak_memory();
         run.work = finished.tally.work.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect();
+        let (mut results, mut lines) = (Vec::new(), Vec::new());
+        for (branch, came_to) in self.branches.iter().zip(finished.branches) {
+            let (result, tiles) = self.outcome(branch, came_to, finished.read)?;
+            results.push(result);
+            lines.push(tiles);
+        }
+        let mut results = results.into_iter();
+        let result = results.next().ok_or_else(|| Error::internal("a run came to nothing"))?;
+        Ok((Report { result, further: results.collect(), run }, lines))
+    }
+
+    /// What a branch came to, of so many records that were read.
+    fn outcome(
+        &self,
+        branch: &Branch,
+        finished: FinishedBranch,
+        read: u64,
+    ) -> Result<(Outcome, Option<Lines>)> {
+        let ledger = Ledger::new(read, finished.kept, &finished.tally);
+        ledger.check()?;
         let (tile_side, totals, tiles) = match finished.measured {
             Some(measured) => {
                 (Some(measured.tile_side), Some(measured.totals), Some(measured.tiles))
@@ -344,8 +370,8 @@ impl Task {
             let (stage, name) = ("run".to_owned(), "z_scale".to_owned());
             decisions.insert(0, Decision { stage, name, value: lattice.z_scale().into() });
         }
-        let result = Outcome {
-            pipeline: self.stages.clone(),
+        let outcome = Outcome {
+            pipeline: branch.stages.clone(),
             lattice: lattice.map(|l| LatticeFigures { step: l.step, shift: l.shift }),
             ledger,
             decisions,
@@ -355,25 +381,21 @@ impl Task {
             totals,
             classes: finished.classes,
         };
-        Ok((Report { result, run }, tiles))
+        Ok((outcome, tiles))
     }
 }
 
-/// Says that an output is empty: that its input was so too, or what removed the points, by the settings
+/// Says that outputs are empty: that the input was so too, or what removed the points, by the settings
 /// that say so where there are any: the stages of commands are nothing that their users know.
-fn nothing_left(
-    finished: &Finished,
-    transforms: &[(String, Box<dyn Transform>)],
-) -> Option<String> {
-    let ledger = Ledger::new(finished.read, finished.kept, &finished.tally);
-    if ledger.read == 0 {
-        return Some("the inputs have no points: what is written has none either".to_owned());
+fn nothing_left(finished: &Finished, job: &Job<'_>) -> Vec<String> {
+    if finished.read == 0 {
+        return vec!["the inputs have no points: what is written has none either".to_owned()];
     }
-    if ledger.kept > 0 {
-        return None;
-    }
+    let behind = job.filters.iter().map(|filter| (&filter.kind, &filter.transform));
+    let streams: Vec<_> =
+        job.transforms.iter().map(|(kind, stage)| (kind, stage)).chain(behind).collect();
     let keys = |r: &Removed| -> Vec<&str> {
-        let ours = transforms.iter().filter(|(kind, _)| *kind == r.stage);
+        let ours = streams.iter().filter(|(kind, _)| **kind == r.stage);
         let run = LEFT_OUT.iter().filter(|(reason, ..)| *reason == r.reason);
         let nonfinite = (r.reason == NOT_FINITE).then_some("run.nonfinite");
         let of_run = run.map(|(_, setting, _)| *setting).chain(nonfinite);
@@ -384,18 +406,28 @@ fn nothing_left(
         let by = if keys.is_empty() { r.stage.clone() } else { keys.join(" and ") };
         format!("{} {} ({by})", Grouped(r.records), r.reason)
     };
-    let by: Vec<String> = ledger.removed.iter().map(by).collect();
-    Some(format!("no point is left of {}: {}", Grouped(ledger.read), by.join(", ")))
+    let empty = finished.branches.iter().filter(|branch| branch.kept == 0);
+    let ledgers = empty.map(|branch| Ledger::new(finished.read, branch.kept, &branch.tally));
+    let told = ledgers.map(|ledger| {
+        let by: Vec<String> = ledger.removed.iter().map(by).collect();
+        format!("no point is left of {}: {}", Grouped(ledger.read), by.join(", "))
+    });
+    told.collect()
+}
+
+/// The lines of a branch's report tiles; none if it has none.
+fn lines_of(tiles: &Option<Lines>) -> Box<dyn BufRead + '_> {
+    match tiles {
+        Some(lines) => Box::new(lines.reader()),
+        None => Box::new(std::io::empty()),
+    }
 }
 
 /// Writes the report to `staged` and brings it to disk.
-fn write_report(staged: &Path, report: &Report, tiles: &Option<Lines>) -> Result<()> {
+fn write_report(staged: &Path, report: &Report, tiles: &[Option<Lines>]) -> Result<()> {
     let write = || {
         let mut out = BufWriter::new(File::create(staged)?);
-        match tiles {
-            Some(lines) => report.write(&mut out, &mut lines.reader())?,
-            None => report.write(&mut out, &mut std::io::empty())?,
-        }
+        report.write_all(&mut out, tiles.iter().map(lines_of))?;
         out.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()
     };
     // Lines that the spill cannot give back are its error, about its file.

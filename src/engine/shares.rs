@@ -1,6 +1,7 @@
 //! How a run divides its memory: what it can tell before any work, as a pure function.
 
 use super::by_rank::ordering_bytes;
+use super::filtering::Filtering;
 use super::pass::decides_by_normals;
 use super::product::Product;
 use super::survey::survey_bytes;
@@ -62,6 +63,10 @@ pub struct Demands {
     pub ranked: bool,
     /// Records that a run has at most, if something other than the memory bounds it.
     pub run_most: Option<u64>,
+    /// True if stages stream behind stages that work on tiles.
+    pub filters: bool,
+    /// Outcomes of passes that are there at once: states and fates.
+    pub standings: usize,
     /// True if a stage decides by figures of the whole scan, which are kept until it does.
     pub gathers: bool,
     /// True if a stage decides about cells together: how many points those have only the decode
@@ -110,6 +115,8 @@ impl Demands {
             tagged: false,
             ranked: false,
             run_most: None,
+            standings: 2,
+            filters: false,
             gathers: false,
             has_cells: false,
             passes: Vec::new(),
@@ -168,7 +175,10 @@ impl Demands {
         let fetch = Fetch::bytes(points, self.stride);
         let by_normals = self.passes.iter().flatten().any(decides_by_normals);
         let baseline = if by_normals { Baseline::BYTES } else { 0 };
-        [baseline, chunks, open, batch, fetch].into_iter().fold(Remote::BYTES, u64::saturating_add)
+        let filters = if self.filters { Filtering::bytes(self.stride) } else { 0 };
+        [baseline, chunks, open, batch, fetch, filters]
+            .into_iter()
+            .fold(Remote::BYTES, u64::saturating_add)
     }
 
     /// Bytes that a thread of a stream holds: batches read and waiting for their turn, chunks filled,
@@ -207,7 +217,7 @@ impl Demands {
     /// Bytes of the tables of all that is stored by number; that of the order has gaps.
     fn tables(&self) -> u64 {
         let order = if self.tagged { 12 } else { 8 };
-        let states_and_fates = [1, 1, FATE_BYTES, FATE_BYTES];
+        let states_and_fates = [1, FATE_BYTES].repeat(self.standings);
         let places = self.ranked.then_some(size_of::<u64>());
         let stores = [self.stride, order, order, NORMAL_BYTES, FIGURE_BYTES];
         let all = stores.into_iter().chain(states_and_fates).chain(places);
@@ -280,6 +290,8 @@ impl Demands {
     fn free(&self, shares: &Shares) -> u64 {
         let each = (self.stride as u64).saturating_add(KEPT_BYTES);
         let each = each.saturating_add(if self.ranked { 8 } else { 0 });
+        let more = self.standings.saturating_sub(2) as u64;
+        let each = each.saturating_add(more.saturating_mul(STANDING_BYTES));
         let kept = shares.kept_in_memory.min(self.points.saturating_mul(each));
         let kept = kept.saturating_add(self.gathered(shares)).min(shares.kept_in_memory);
         let taken = shares.base.saturating_add(shares.index).saturating_add(kept);
@@ -355,6 +367,9 @@ const SPARE: (u64, u64) = (3, 4);
 /// Bytes that a record kept in memory takes at most besides its own: its place in the order, its
 /// position in a run and in the merged scan, its copies, its state, its fate; tags included.
 const KEPT_BYTES: u64 = 12 + 28 + 24 + 4 + 1 + 4;
+
+/// The same of the outcome of a pass that is kept beside two others: states, fates, columns.
+const STANDING_BYTES: u64 = (1 + FATE_BYTES + NORMAL_BYTES + FIGURE_BYTES) as u64;
 
 /// The same of what a first phase leaves: a normal, a figure, and two entries of what it found.
 const GATHERED_BYTES: u64 = (NORMAL_BYTES + FIGURE_BYTES + 2 * size_of::<[u64; 2]>()) as u64;

@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use super::finished::Finished;
+use super::finished::{Finished, FinishedBranch};
 use super::job::Job;
 use super::outlet::Outlet;
 use super::shares::{BATCH, Shares};
@@ -77,15 +77,20 @@ pub(crate) fn stream(
     };
     let written = outlet.close(rest, &mut |chunk| encode(chunk))?;
     job.tell_idle(&tally);
-    Ok(Finished {
-        read: tally.work.remove("read").unwrap_or(0),
+    let read = tally.work.remove("read").unwrap_or(0);
+    let branch = FinishedBranch {
         kept,
-        written: written.into_iter().map(|summary| vec![(kept, summary)]).collect(),
         classes: tally.classes.take().map_or(Vec::new(), |classes| classes.figures()),
-        tally,
+        tally: tally.clone(),
         decisions: Vec::new(),
         passes: Vec::new(),
         measured: None,
+    };
+    Ok(Finished {
+        read,
+        written: written.into_iter().map(|summary| vec![(kept, summary)]).collect(),
+        tally,
+        branches: vec![branch],
     })
 }
 

@@ -1,7 +1,7 @@
 //! What the engine runs: a pipeline whose stages fit each other, its inputs and the memory.
 
 use super::beside::Beside;
-use super::pass::{Pass, StageOp};
+use super::pass::{Branch, Filter, Pass, StageOp};
 use super::shares::Demands;
 use super::tagger::Tagger;
 use crate::geom::lattice::Lattice;
@@ -18,7 +18,10 @@ pub(crate) struct Task {
     pub source_kind: String,
     pub transforms: Vec<(String, Box<dyn Transform>)>,
     pub ops: Vec<StageOp>,
+    /// Stages that stream behind the decode.
+    pub filters: Vec<Filter>,
     pub passes: Vec<Pass>,
+    pub branches: Vec<Branch>,
     pub sinks: Vec<Box<dyn CreateSink>>,
     /// For each sink, those of the inputs if it is a folder; else none.
     pub each: Vec<Vec<Box<dyn CreateSink>>>,
@@ -26,15 +29,17 @@ pub(crate) struct Task {
     pub beside: Vec<Beside>,
     /// See [`ranks`].
     pub ranks: Vec<u32>,
-    /// A sink of what all stages leave.
-    pub last_sink: usize,
+    /// For each sink, the stages that stream above it, behind the decode.
+    pub changed_by: Vec<Vec<usize>>,
+    /// For each sink, the first branch that it is on.
+    pub branch_of: Vec<usize>,
+    /// For each sink, whether it gets the order of the inputs.
+    pub in_input_order: Vec<bool>,
     pub tagger: Tagger,
     /// True if the run needs tiles: for its stages, or to sort.
     pub mills: bool,
     /// Where points are; None for a stream that does not ask.
     pub lattice: Option<Lattice>,
-    /// The stages as the report names them.
-    pub stages: serde_json::Value,
     pub demands: Demands,
     /// What the user should know before the run.
     pub warnings: Vec<String>,

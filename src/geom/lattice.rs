@@ -1,5 +1,6 @@
 //! The lattice: where points are, as integers, so that every decision is exact.
 
+use super::decimal::{decimal_step, multiple};
 use crate::point::{Bounds, Endian, Layout, Position, Scalar, Schema};
 use crate::{Error, Result};
 
@@ -44,10 +45,11 @@ impl Lattice {
         Lattice::stretched(schema, step, 1.0)
     }
 
-    /// The lattice of records of `schema` whose z is multiplied by `z_scale`, for scans whose heights
-    /// have another unit than their x and y. Records stay as they are: only where their points are
-    /// for each other changes, and lengths are in the unit of x and y. It is exact where a decimal
-    /// step of 1e-9 or more divides the stretched scale too; else positions are rounded to 2^-30.
+    /// The lattice of records of `schema` whose z is multiplied by `z_scale`, for scans whose
+    /// heights have another unit than their x and y. Records stay as they are: only where their
+    /// points are for each other changes, and lengths are in the unit of x and y. It is exact where
+    /// a decimal step of 1e-9 or more divides the stretched scale too; else positions are rounded
+    /// to 2^-30.
     ///
     /// # Errors
     ///
@@ -86,8 +88,9 @@ impl Lattice {
         Lattice { step, shift: [0.0; 3], z_scale, placement: Placement::Float { per_unit } }
     }
 
-    /// World coordinates of a position, z as the records have it. Where a world unit is a whole number of steps they are
-    /// divided, which rounds to the decimal that one expects: 12.345 and not 12.345000000000001.
+    /// World coordinates of a position, z as the records have it. Where a world unit is a whole
+    /// number of steps they are divided, which rounds to the decimal that one expects: 12.345 and
+    /// not 12.345000000000001.
     pub fn world(&self, p: Position) -> [f64; 3] {
         let per_unit = (1.0 / self.step).round();
         let whole = 1.0 / per_unit == self.step;
@@ -115,8 +118,8 @@ impl Lattice {
         ((held - length).abs() > 1e-3 * length).then_some(held)
     }
 
-    /// A decimal step that tells points apart which are `apart` in one coordinate, and still reaches
-    /// the ends of `bounds`; None where that is no finer than the step of this lattice.
+    /// A decimal step that tells points apart which are `apart` in one coordinate, and still
+    /// reaches the ends of `bounds`; None where that is no finer than the step of this lattice.
     pub fn finer(&self, bounds: &Bounds, apart: f64) -> Option<f64> {
         let ends = bounds.lo.iter().chain(&bounds.hi);
         let farthest = ends.map(|end| end.unsigned_abs()).max()? as f64 * self.step;
@@ -171,19 +174,11 @@ impl Lattice {
     }
 }
 
-/// The largest power of ten that is at most `length`, which is above 0; 1e-300 at least.
-fn decimal_step(length: f64) -> f64 {
-    let power = |exponent: i32| format!("1e{exponent}").parse::<f64>().unwrap_or(f64::MAX);
-    // The logarithm may be off by a little, so the first of the larger ones that fits is taken.
-    let above = if length > 1e-300 { libm::ceil(libm::log10(length)) as i32 } else { -300 };
-    (0..3).map(|less| power(above - less)).find(|&step| step <= length).unwrap_or(1e-300)
-}
-
 /// 2^62: far enough from the ends of i64 that a box around a position can grow.
 const FARTHEST: f64 = (1u64 << 62) as f64;
 
-/// A height times `z_scale`. A finite one that overflows stays finite: it is too far, and not a point
-/// to be dropped as not finite.
+/// A height times `z_scale`. A finite one that overflows stays finite: it is too far, and not a
+/// point to be dropped as not finite.
 fn stretched(z: f64, z_scale: f64) -> f64 {
     let scaled = z * z_scale;
     if z.is_finite() { scaled.clamp(f64::MIN, f64::MAX) } else { z }
@@ -242,14 +237,6 @@ fn decimal(mut scale: [f64; 3], mut origin: [f64; 3], z_scale: f64) -> Option<La
     }
     shift[2] /= z_scale;
     Some(Lattice { step, shift, z_scale, placement: Placement::Integer { times, plus } })
-}
-
-/// How many steps a scale is, if it is a whole number of them within the rounding of decimals.
-fn multiple(scale: f64, step: f64) -> Option<i64> {
-    let ratio = scale / step;
-    let whole = ratio.round();
-    let whole_number = (1.0..1e15).contains(&whole) && (ratio - whole).abs() <= 1e-12 * whole;
-    whole_number.then_some(whole as i64)
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
-//! Geometry on plain slices: the lattice, nearest neighbours, the star of a point, planes and angles.
-//! Knows no tiles, no files.
+//! Geometry on plain slices: the lattice, nearest neighbours, the star of a point, planes and
+//! angles. Knows no tiles, no files.
 
 pub mod angle;
+mod decimal;
 pub mod lattice;
 pub mod nearest;
 pub mod plane;

@@ -190,8 +190,8 @@ pub fn collinear(offsets: &[[i64; 3]]) -> bool {
 ///
 /// The eigenvector errs by a few roundings times the matrix's norm over the gap to the next
 /// eigenvalue; where two are equal it is a vector of their common eigenspace. The value errs by a
-/// few roundings of the norm and may so be slightly negative for a singular matrix. A matrix that is
-/// a multiple of the identity, or not finite, has the z axis.
+/// few roundings of the norm and may so be slightly negative for a singular matrix. A matrix that
+/// is a multiple of the identity, or not finite, has the z axis.
 ///
 /// The root of the characteristic cubic that is farthest from the other two is well conditioned and
 /// comes first; what remains is a 2 × 2 problem in the plane across its eigenvector.
@@ -329,9 +329,9 @@ pub fn unit_or_nan<T: Real>(v: [T; 3]) -> [T; 3] {
     [v[0] / length, v[1] / length, v[2] / length]
 }
 
-/// Two unit vectors that make a right-handed frame with the unit vector `axis` as third; no root, no
-/// case but the sign of z (Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6, 2017). Axes
-/// of the coordinate system give axes.
+/// Two unit vectors that make a right-handed frame with the unit vector `axis` as third; no root,
+/// no case but the sign of z (Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6, 2017).
+/// Axes of the coordinate system give axes.
 #[inline(always)]
 pub fn across<T: Real>([x, y, z]: [T; 3]) -> ([T; 3], [T; 3]) {
     let (zero, one) = (z.of(0.0), z.of(1.0));

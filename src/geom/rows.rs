@@ -1,10 +1,5 @@
-//! Lists side by side: row i has the i-th number of each list, so that what is done to a row is done
-//! to all of them. Knows no tiles, no stages.
-
-use super::simd::LANES;
-
-/// One number of each of 16 lists.
-pub type Row = [f64; LANES];
+//! Sorting lists side by side: row i has the i-th number of each list, so that what is done to a
+//! row is done to all of them. Knows no tiles, no stages.
 
 /// Numbers of several lists side by side.
 pub trait Ordered: Copy {
@@ -22,7 +17,8 @@ impl Ordered for [f64; 2] {
     }
 }
 
-/// Orders pairs of rows, one after the other, without a loop: rows that are vectors stay in registers.
+/// Orders pairs of rows, one after the other, without a loop: rows that are vectors stay in
+/// registers.
 macro_rules! order {
     ($rows:ident: $($a:literal $b:literal),* $(,)?) => {
         $(($rows[$a], $rows[$b]) = $rows[$a].ordered($rows[$b]);)*
@@ -30,8 +26,8 @@ macro_rules! order {
 }
 
 /// Sorts lists of 16, smallest first, by comparisons that do not depend on the numbers: the 60 of
-/// Green's network (Knuth, The Art of Computer Programming 3, 5.3.4). A list with a NaN is left in no
-/// order.
+/// Green's network (Knuth, The Art of Computer Programming 3, 5.3.4). A list with a NaN is left in
+/// no order.
 #[inline(always)]
 pub fn sort<T: Ordered>(rows: &mut [T; 16]) {
     order!(rows: 0 1, 2 3, 4 5, 6 7, 8 9, 10 11, 12 13, 14 15);

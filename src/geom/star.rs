@@ -17,9 +17,9 @@ const PLACE: u64 = (1 << 18) - 1;
 /// Finds first estimates of normals from the triangles around a point; holds scratch memory only.
 ///
 /// With q the projections of the neighbours to the plane, relative to p, inversion s = q/|q|² turns
-/// circles through p into lines: an edge of the convex hull of 0 and all s is a triangle with p whose
-/// circumcircle is empty. Points are sorted by direction around p and scanned once (Graham), which
-/// ends with a polygon around p whatever the rounding does.
+/// circles through p into lines: an edge of the convex hull of 0 and all s is a triangle with p
+/// whose circumcircle is empty. Points are sorted by direction around p and scanned once (Graham),
+/// which ends with a polygon around p whatever the rounding does.
 #[derive(Debug, Default)]
 pub struct Star {
     /// In Morton order.
@@ -34,7 +34,7 @@ pub struct Star {
 
 /// A neighbour in the plane, relative to p; or several side by side.
 #[derive(Debug, Clone, Copy)]
-pub struct Projected<T> {
+pub struct ProjectedPoint<T> {
     /// The inverted projection; NaN if the neighbour is straight above or below p.
     pub x: T,
     /// Likewise.
@@ -43,15 +43,15 @@ pub struct Projected<T> {
     pub square: T,
 }
 
-impl<T: Real> Projected<T> {
+impl<T: Real> ProjectedPoint<T> {
     /// Projects a neighbour at `offset` to the plane of the unit vectors `u` and `v`.
     #[inline(always)]
-    pub fn of(offset: [T; 3], u: [T; 3], v: [T; 3]) -> Projected<T> {
+    pub fn of(offset: [T; 3], u: [T; 3], v: [T; 3]) -> ProjectedPoint<T> {
         let (x, y) = (dot(offset, u), dot(offset, v));
         let square = x * x + y * y;
         let clear = (x.of(ROUNDING * ROUNDING) * dot(offset, offset)).below(square);
         let inverse = T::choose(clear, x.of(1.0) / square, x.of(f64::NAN));
-        Projected { x: x * inverse, y: y * inverse, square }
+        ProjectedPoint { x: x * inverse, y: y * inverse, square }
     }
 }
 
@@ -86,10 +86,10 @@ impl Star {
     /// The mean of the unit normals of the Delaunay triangles around p, at length 1, on the side of
     /// `normal`, the unit normal of the plane to project to. None if there is no triangle.
     ///
-    /// `offsets` are the neighbours relative to p, in steps, in Morton order, none of them 0 and all
-    /// smaller than 2^63; no more than the first 2^18 count. Normals are summed counter-clockwise
-    /// from the vertex of smallest rank. Points cocircular with a triangle are left out, as are
-    /// triangles that the projection turns into lines.
+    /// `offsets` are the neighbours relative to p, in steps, in Morton order, none of them 0 and
+    /// all smaller than 2^63; no more than the first 2^18 count. Normals are summed
+    /// counter-clockwise from the vertex of smallest rank. Points cocircular with a triangle are
+    /// left out, as are triangles that the projection turns into lines.
     pub fn normal(&mut self, offsets: &[[i64; 3]], normal: [f64; 3]) -> Option<[f64; 3]> {
         let rounded = offsets.iter().map(|offset| offset.map(|c| c as f64));
         let closed = self.around(rounded, normal);
@@ -123,7 +123,7 @@ impl Star {
         self.projected.clear();
         self.keys.clear();
         for (rank, offset) in (0..=PLACE as u32).zip(offsets) {
-            let at = Projected::of(offset, u, v);
+            let at = ProjectedPoint::of(offset, u, v);
             if !at.x.is_nan() {
                 let place = self.projected.len() as u64;
                 self.keys.push(turn(at.x, at.y).to_bits() << 12 & !PLACE | place);
@@ -166,8 +166,8 @@ impl Star {
         (0..points.len()).fold(0, |best, i| if points[i].hides(&points[best]) { i } else { best })
     }
 
-    /// Finds the vertices of the hull of the points, sorted by direction, and 0. If 0 is inside, the
-    /// place of the `nearest` neighbour is told, which is a vertex whatever the others are.
+    /// Finds the vertices of the hull of the points, sorted by direction, and 0. If 0 is inside,
+    /// the place of the `nearest` neighbour is told, which is a vertex whatever the others are.
     /// Otherwise the first and last vertices are 0's neighbours on the hull.
     fn hull(&mut self, nearest: Option<usize>) {
         let Star { points, vertices, .. } = self;
@@ -187,8 +187,8 @@ impl Star {
         }
     }
 
-    /// Sums the unit normals of the triangles of p and two consecutive vertices, given their offsets
-    /// and how to multiply two of them.
+    /// Sums the unit normals of the triangles of p and two consecutive vertices, given their
+    /// offsets and how to multiply two of them.
     #[inline(always)]
     fn mean_normal<T: Copy>(
         &self,

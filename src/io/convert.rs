@@ -3,12 +3,14 @@
 
 mod columns;
 mod layouts;
+mod step;
 
 pub use layouts::{las_schema, ply_schema};
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use columns::{BLOCK, Column, Records, Targets};
+use columns::{BLOCK, ColumnStep, RecordBytes, TargetBytes};
+use step::{Move, push, step};
 
 use crate::point::names::{BLUE, GREEN, NIR, RED, XYZ};
 use crate::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
@@ -34,24 +36,7 @@ pub struct Projection {
     /// What a record holds before the steps: 0, and the numbers that [`Projection::preset`] set.
     blank: Vec<u8>,
     /// The same steps over columns, for those that have such a form.
-    columns: Vec<Option<Column>>,
-}
-
-/// One step of a projection.
-#[derive(Debug, Clone)]
-enum Move {
-    /// Bytes that mean the same in both.
-    Copy { from: usize, to: usize, length: usize },
-    /// A number in the other byte order.
-    Swap { from: usize, to: usize, size: usize },
-    /// A stored number in another type; scale and origin are equal.
-    Stored { from: Dimension, to: Dimension },
-    /// A stored number into some bits of a byte.
-    Narrow { from: Dimension, to: Dimension, shift: u8, mask: u8 },
-    /// A world value rounded to the target's steps (coordinates).
-    Rounded { from: Dimension, to: Dimension },
-    /// A world value that the target must hold.
-    Exact { from: Dimension, to: Dimension },
+    columns: Vec<Option<ColumnStep>>,
 }
 
 impl Projection {
@@ -90,7 +75,7 @@ impl Projection {
                 }
             }
         }
-        let over_columns = moves.iter().map(|step| Column::of(step, from.endian, to.endian));
+        let over_columns = moves.iter().map(|step| ColumnStep::of(step, from.endian, to.endian));
         let columns = over_columns.collect();
         let (to_endian, to_stride) = (to.endian, to.stride);
         let blank = vec![0; to_stride];
@@ -163,8 +148,8 @@ impl Projection {
     /// Projects up to [`BLOCK`] records field by field; False if a value may not fit.
     fn block(&self, records: &[u8], targets: &mut [u8], rounded: &mut [f64]) -> bool {
         self.clear(targets);
-        let from = Records { bytes: records, stride: self.from.stride.max(1) };
-        let mut to = Targets { bytes: targets, stride: self.to_stride.max(1) };
+        let from = RecordBytes { bytes: records, stride: self.from.stride.max(1) };
+        let mut to = TargetBytes { bytes: targets, stride: self.to_stride.max(1) };
         self.moves.iter().zip(&self.columns).all(|(step, column)| match column {
             Some(column) => column.apply(from, &mut to, rounded),
             None => {
@@ -207,7 +192,7 @@ impl Projection {
         step: &'a Move,
         record: &[u8],
         target: &mut [u8],
-    ) -> Result<f64, Unfit<'a>> {
+    ) -> Result<f64, UnfitValue<'a>> {
         let endian = self.from.endian;
         match step {
             Move::Copy { from, to, length } => {
@@ -223,12 +208,12 @@ impl Projection {
             Move::Stored { from, to } => {
                 let value = from.get(record, endian);
                 let held = to.put(target, self.to_endian, value);
-                if held { Ok(0.0) } else { Err(Unfit { to, value }) }
+                if held { Ok(0.0) } else { Err(UnfitValue { to, value }) }
             }
             Move::Narrow { from, to, shift, mask } => {
                 let value = from.get(record, endian);
                 let Some(bits) = small(value).filter(|bits| bits <= mask) else {
-                    return Err(Unfit { to, value });
+                    return Err(UnfitValue { to, value });
                 };
                 let byte = &mut target[to.offset];
                 *byte = *byte & !(mask << shift) | bits << shift;
@@ -244,7 +229,7 @@ impl Projection {
                     let told = rounded > 4.0 * f64::EPSILON * largest;
                     return Ok(if told { rounded } else { 0.0 });
                 }
-                Err(Unfit { to, value: Value::Double(world) })
+                Err(UnfitValue { to, value: Value::Double(world) })
             }
             Move::Exact { from, to } => {
                 let world = from.world(record, endian);
@@ -252,13 +237,13 @@ impl Projection {
                 if same(from, to, world, back) && to.put(target, self.to_endian, stored) {
                     return Ok(0.0);
                 }
-                Err(Unfit { to, value: Value::Double(world) })
+                Err(UnfitValue { to, value: Value::Double(world) })
             }
         }
     }
 
-    fn refuse(&self, unfit: Unfit, index: usize, record: &[u8]) -> Error {
-        let Unfit { to, value } = unfit;
+    fn refuse(&self, unfit: UnfitValue, index: usize, record: &[u8]) -> Error {
+        let UnfitValue { to, value } = unfit;
         let place = match self.from.coordinates() {
             Some(axes) => {
                 let [x, y, z] = axes.map(|axis| axis.world(record, self.from.endian));
@@ -292,7 +277,7 @@ impl Projection {
 }
 
 /// A value that its target cannot hold.
-struct Unfit<'a> {
+struct UnfitValue<'a> {
     to: &'a Dimension,
     value: Value,
 }
@@ -401,48 +386,6 @@ fn widens(from: &Schema, source: &Dimension, to: &Schema, target: &Dimension) ->
         && matches!(to.layout, Layout::Las { .. })
         && [RED, GREEN, BLUE, NIR].contains(&target.name.as_str())
         && (source.scalar, target.scalar) == (Scalar::U8, Scalar::U16)
-}
-
-fn step(from: &Dimension, from_endian: Endian, to: &Dimension, to_endian: Endian) -> Move {
-    let size = from.scalar.size();
-    if from.scale == to.scale && from.origin == to.origin {
-        let alike = from.scalar == to.scalar && from.bits.is_none() && to.bits.is_none();
-        return match alike {
-            true if size == 1 || from_endian == to_endian => {
-                Move::Copy { from: from.offset, to: to.offset, length: size }
-            }
-            true => Move::Swap { from: from.offset, to: to.offset, size },
-            false => stored(from, to),
-        };
-    }
-    if XYZ.contains(&to.name.as_str()) {
-        return Move::Rounded { from: from.clone(), to: to.clone() };
-    }
-    Move::Exact { from: from.clone(), to: to.clone() }
-}
-
-fn stored(from: &Dimension, to: &Dimension) -> Move {
-    let (from, to) = (from.clone(), to.clone());
-    match to.bits {
-        Some(bits) if to.scalar == Scalar::U8 && bits.shift + bits.width <= 8 && bits.width < 8 => {
-            Move::Narrow { from, to, shift: bits.shift, mask: (1 << bits.width) - 1 }
-        }
-        _ => Move::Stored { from, to },
-    }
-}
-
-/// Adds a step; bytes that follow those of the step before join it.
-fn push(moves: &mut Vec<Move>, step: Move) {
-    if let Move::Copy { from, to, length } = step
-        && let Some(Move::Copy { from: from_before, to: to_before, length: before }) =
-            moves.last_mut()
-        && *from_before + *before == from
-        && *to_before + *before == to
-    {
-        *before += length;
-        return;
-    }
-    moves.push(step);
 }
 
 #[cfg(test)]

@@ -12,13 +12,13 @@ use crate::{Error, Result};
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Origin {
     path: Arc<Path>,
-    was: State,
+    was: FileState,
 }
 
 /// What changes with a file's content. Times of modification can be set back, those of the last
 /// change of any kind cannot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct State {
+struct FileState {
     device: u64,
     inode: u64,
     length: u64,
@@ -26,9 +26,9 @@ struct State {
     changed: (i64, i64),
 }
 
-impl State {
-    fn of(about: &Metadata) -> State {
-        State {
+impl FileState {
+    fn of(about: &Metadata) -> FileState {
+        FileState {
             device: about.dev(),
             inode: about.ino(),
             length: about.len(),
@@ -42,7 +42,7 @@ impl Origin {
     /// Opens `path`, which must be a plain file: others cannot be read at positions.
     pub fn open(path: &Path) -> Result<(File, Origin)> {
         let (file, about) = open_plain(path)?;
-        Ok((file, Origin { path: path.into(), was: State::of(&about) }))
+        Ok((file, Origin { path: path.into(), was: FileState::of(&about) }))
     }
 
     /// Opens the file again, and fails if another one is there or it has changed.
@@ -65,7 +65,7 @@ impl Origin {
     pub fn unchanged(&self) -> Result<()> {
         let now =
             fs::metadata(&self.path).map_err(|e| Error::io(&self.path, "find it again", e))?;
-        self.compare(State::of(&now))
+        self.compare(FileState::of(&now))
     }
 
     /// What came of reading, `at_end` where all of a stretch was read: then, and where it failed, a
@@ -77,7 +77,7 @@ impl Origin {
         outcome
     }
 
-    fn compare(&self, now: State) -> Result<()> {
+    fn compare(&self, now: FileState) -> Result<()> {
         let was = self.was;
         if now == was {
             return Ok(());

@@ -42,7 +42,7 @@ pub fn codes(text: &str) -> Option<(u32, Option<u32>)> {
     }
 }
 
-fn codes_of_parts(trees: &[Node]) -> Option<(u32, Option<u32>)> {
+fn codes_of_parts(trees: &[WktNode]) -> Option<(u32, Option<u32>)> {
     let (mut across, mut up) = (None, None);
     for part in parts(trees) {
         let code = part.epsg()?;
@@ -55,7 +55,7 @@ fn codes_of_parts(trees: &[Node]) -> Option<(u32, Option<u32>)> {
 }
 
 /// The single systems of `trees`: those of compounds for each.
-fn parts(trees: &[Node]) -> Vec<&Node> {
+fn parts(trees: &[WktNode]) -> Vec<&WktNode> {
     let mut all = Vec::new();
     for tree in trees {
         match tree.is(&COMPOUND) {
@@ -77,26 +77,26 @@ pub fn alike(one: &str, two: &str) -> bool {
 /// True if `text` begins like WKT 1 or 2.
 pub fn is_wkt(text: &str) -> bool {
     let word = text.trim_start().split(['[', '(']).next().unwrap_or_default();
-    let named = Node { word: word.trim_end().to_owned(), ..Node::default() };
+    let named = WktNode { word: word.trim_end().to_owned(), ..WktNode::default() };
     let is_system = named.is(&COMPOUND) || SYSTEMS.iter().any(|words| named.is(words));
     is_system && word.len() < text.trim_start().len()
 }
 
 /// `WORD["text", number, WORD[…], …]`.
 #[derive(Debug, Default)]
-struct Node {
+struct WktNode {
     word: String,
     /// Texts and numbers inside, as written, quotes off.
     values: Vec<String>,
-    inner: Vec<Node>,
+    inner: Vec<WktNode>,
 }
 
-impl Node {
+impl WktNode {
     fn is(&self, words: &[&str]) -> bool {
         words.iter().any(|word| self.word.eq_ignore_ascii_case(word))
     }
 
-    fn find(&self, words: &[&str]) -> Option<&Node> {
+    fn find(&self, words: &[&str]) -> Option<&WktNode> {
         self.inner.iter().find(|node| node.is(words))
     }
 
@@ -108,7 +108,7 @@ impl Node {
         if authority.eq_ignore_ascii_case("EPSG") { code.parse().ok() } else { None }
     }
 
-    fn is_like(&self, other: &Node) -> bool {
+    fn is_like(&self, other: &WktNode) -> bool {
         let number = |text: &str| text.parse::<f64>().ok();
         let same = |(one, two): (&String, &String)| {
             one == two || number(one).is_some_and(|one| number(two) == Some(one))
@@ -122,8 +122,8 @@ impl Node {
 
 /// The outermost nodes of `text`, mostly one: some writers put the system of z behind that of x and
 /// y. None if a bracket is left open, or there is something outside of them.
-fn parse(text: &str) -> Option<Vec<Node>> {
-    let (mut trees, mut open) = (Vec::new(), Vec::<Node>::new());
+fn parse(text: &str) -> Option<Vec<WktNode>> {
+    let (mut trees, mut open) = (Vec::new(), Vec::<WktNode>::new());
     let mut word = String::new();
     let mut nodes = 0;
     let mut letters = text.chars().peekable();
@@ -135,7 +135,7 @@ fn parse(text: &str) -> Option<Vec<Node>> {
                     return None;
                 }
                 let word = std::mem::take(&mut word);
-                open.push(Node { word: word.trim().to_owned(), ..Node::default() });
+                open.push(WktNode { word: word.trim().to_owned(), ..WktNode::default() });
             }
             // Some writers close a compound before its second part, and once more behind it.
             ',' | ']' | ')' if open.is_empty() && word.trim().is_empty() => word.clear(),
@@ -179,7 +179,7 @@ const SYSTEMS: [&[&str]; 5] = [&VERTICAL, &PROJECTED, &GEODETIC, &LOCAL, &BOUND]
 const LENGTH: [&str; 2] = ["LENGTHUNIT", "UNIT"];
 
 /// The units of a system that is given in parts: what the first says that says something.
-fn of_parts<'a>(parts: impl IntoIterator<Item = &'a Node>) -> Units {
+fn of_parts<'a>(parts: impl IntoIterator<Item = &'a WktNode>) -> Units {
     parts.into_iter().map(of_system).fold(Units::default(), Units::or)
 }
 
@@ -188,7 +188,7 @@ fn of_vertical(metres: Option<f64>) -> Units {
 }
 
 /// The units of the system that `node` is.
-fn of_system(node: &Node) -> Units {
+fn of_system(node: &WktNode) -> Units {
     if node.is(&BOUND) {
         let source = node.find(&["SOURCECRS"]).map_or(&[][..], |source| &source.inner);
         return of_parts(parts(source));
@@ -207,7 +207,7 @@ fn of_system(node: &Node) -> Units {
 }
 
 /// The units of a system of x and y as it says them; where it says none, as its code does.
-fn of_horizontal(node: &Node) -> Units {
+fn of_horizontal(node: &WktNode) -> Units {
     let unknown = Units { horizontal_unknown: true, ..Units::default() };
     let of = |horizontal| Units { horizontal: Some(horizontal), ..Units::default() };
     let cartesian = node.find(&["CS"]).and_then(|cs| cs.values.first());
@@ -232,18 +232,18 @@ fn of_horizontal(node: &Node) -> Units {
 }
 
 /// The unit of length of `node`, or of its first axis.
-fn unit(node: &Node) -> Option<&Node> {
+fn unit(node: &WktNode) -> Option<&WktNode> {
     node.find(&LENGTH).or_else(|| node.find(&["AXIS"]).and_then(|axis| axis.find(&LENGTH)))
 }
 
 /// Metres in the unit of the third of three axes, where each has its own.
-fn third_axis(node: &Node) -> Option<f64> {
+fn third_axis(node: &WktNode) -> Option<f64> {
     let axis = node.inner.iter().filter(|inner| inner.is(&["AXIS"])).nth(2)?;
     factor(axis.find(&LENGTH)?)
 }
 
 /// Metres in a unit; None for what cannot be, such as a foot of one metre, which some writers name.
-fn factor(unit: &Node) -> Option<f64> {
+fn factor(unit: &WktNode) -> Option<f64> {
     let factor: f64 = unit.values.get(1)?.parse().ok()?;
     let name = unit.values.first()?.to_ascii_lowercase();
     let foot = ["foot", "feet", "ft"].iter().any(|word| name.contains(word));

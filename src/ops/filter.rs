@@ -9,13 +9,13 @@ use crate::{Error, Result};
 /// Keeps the records of some classes and flags, and removes all others as they are decoded.
 ///
 /// A record stays if its class is among `keep_classes` (where any are given) and not among
-/// `drop_classes`, and if it has all of `keep_flags` and none of `drop_flags`. A scan without classes
-/// has nothing of a class to drop, which the run says; to keep some of its classes is an error. Point formats 0 to 5 have no
-/// overlap flag: there the flag `overlap` is class 12.
+/// `drop_classes`, and if it has all of `keep_flags` and none of `drop_flags`. A scan without
+/// classes has nothing of a class to drop, which the run says; to keep some of its classes is an
+/// error. Point formats 0 to 5 have no overlap flag: there the flag `overlap` is class 12.
 ///
-/// It stands between the source and the stages that work on tiles, so they neither see nor count what
-/// it removes. To limit one stage to some records and let the others pass, give that stage `classes`,
-/// `with` or `without` instead.
+/// It stands between the source and the stages that work on tiles, so they neither see nor count
+/// what it removes. To limit one stage to some records and let the others pass, give that stage
+/// `classes`, `with` or `without` instead.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Filter {

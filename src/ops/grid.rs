@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::lengths::rounded;
-use super::removal::{Account, keep_once, remove, represent_by};
+use super::removal::{RemovalAccount, keep_once, remove, represent_by};
 use crate::geom::angle::is_known;
 use crate::geom::lattice::Lattice;
 use crate::geom::plane::{Covariance, smallest};
@@ -19,21 +19,21 @@ use crate::{Error, Result};
 
 /// Cubes of this side, anchored at world 0, are the octants of the lattice: no larger side differs.
 const LARGEST_SIDE: i64 = 1 << 62;
-/// Bytes a position: its key, its cube and its index, coordinates to take a median of, and an offset.
-/// All positions may share one key.
+/// Bytes a position: its key, its cube and its index, coordinates to take a median of, and an
+/// offset. All positions may share one key.
 const BYTES: usize =
-    size_of::<u64>() + size_of::<Entry>() + size_of::<i64>() + size_of::<[i64; 3]>();
+    size_of::<u64>() + size_of::<CubeMember>() + size_of::<i64>() + size_of::<[i64; 3]>();
 /// Positions of a cube from which on their least-squares plane says something of them: three are
 /// always on one.
 const FEWEST: usize = 4;
 
-/// The uniform grid of Martin et al., with which the paper compares; elsewhere called voxel thinning:
-/// of every occupied cube one record stays.
+/// The uniform grid of Martin et al., with which the paper compares; elsewhere called voxel
+/// thinning: of every occupied cube one record stays.
 ///
-/// The cubes are anchored at world 0 and have the side `side`, rounded to whole lattice steps, which
-/// the report names; a warning says if that is more than a thousandth off. It looks at nothing but
-/// positions, so no stage needs to come before it. Copies weigh as one position and are removed as
-/// coincident.
+/// The cubes are anchored at world 0 and have the side `side`, rounded to whole lattice steps,
+/// which the report names; a warning says if that is more than a thousandth off. It looks at
+/// nothing but positions, so no stage needs to come before it. Copies weigh as one position and are
+/// removed as coincident.
 ///
 /// The report says how far what was removed lies from the plane through the point that stays: after
 /// `normals` with the normal of that point; else with that of the least-squares plane of the cube's
@@ -48,7 +48,7 @@ pub struct Grid {
     #[serde(default)]
     pub pick: Pick,
     #[serde(skip)]
-    settled: Option<Settled>,
+    settled: Option<SettledSide>,
 }
 
 /// Which position of a cube stays.
@@ -66,7 +66,7 @@ pub enum Pick {
 
 /// The side once the lattice is known.
 #[derive(Debug, Clone, Copy)]
-struct Settled {
+struct SettledSide {
     /// Lattice steps.
     steps: i64,
     /// World units.
@@ -74,7 +74,7 @@ struct Settled {
 }
 
 /// Which cube along each axis, from world 0, and the index of a position in it.
-type Entry = ([i64; 3], u32);
+type CubeMember = ([i64; 3], u32);
 
 impl Grid {
     /// A grid of cubes of that side.
@@ -116,7 +116,7 @@ impl TileOp for Grid {
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
         let steps = scan.lattice.steps(self.side.value()).min(LARGEST_SIDE);
-        self.settled = Some(Settled { steps, length: steps as f64 * scan.lattice.step });
+        self.settled = Some(SettledSide { steps, length: steps as f64 * scan.lattice.step });
         Ok(())
     }
 
@@ -132,7 +132,7 @@ impl TileOp for Grid {
         if u32::try_from(tile.positions.len()).is_err() {
             return Err(Error::internal("a tile has more than 2^32 positions"));
         }
-        let mut counts = Counts::default();
+        let mut counts = CubeCounts::default();
         let (mut entries, mut axis) = (Vec::new(), Vec::new());
         for bucket in keyed(tile, side).chunk_by(|a, b| a >> u32::BITS == b >> u32::BITS) {
             entries.clear();
@@ -149,7 +149,7 @@ impl TileOp for Grid {
                 }
             }
         }
-        let account = Account { stage: "grid", marked: "grid_marked", mark: None };
+        let account = RemovalAccount { stage: "grid", marked: "grid_marked", mark: None };
         account.enter(tally, "coincident", counts.coincident);
         account.enter(tally, "represented", counts.represented);
         tally.count("grid_cubes", counts.cubes);
@@ -168,7 +168,7 @@ impl TileOp for Grid {
 
 /// What became of the positions of a tile's core.
 #[derive(Default)]
-struct Counts {
+struct CubeCounts {
     /// Cubes whose first position is in the core.
     cubes: u64,
     coincident: u64,
@@ -177,9 +177,9 @@ struct Counts {
     offsets: Vec<[i64; 3]>,
 }
 
-impl Counts {
+impl CubeCounts {
     /// Removes all positions of a cube but the one that is `kept`.
-    fn decide(&mut self, tile: &mut Tile, group: &[Entry], kept: usize) {
+    fn decide(&mut self, tile: &mut Tile, group: &[CubeMember], kept: usize) {
         let core = tile.core.clone();
         let members = || group.iter().map(|(_, i)| *i as usize);
         self.cubes += u64::from(members().next().is_some_and(|first| core.contains(&first)));
@@ -196,9 +196,9 @@ impl Counts {
         }
     }
 
-    /// The normal of the least-squares plane of a cube's positions; none where there are too few for
-    /// a plane to say anything of them, or all on one line.
-    fn plane(&mut self, tile: &Tile, group: &[Entry], kept: usize) -> Option<[f64; 3]> {
+    /// The normal of the least-squares plane of a cube's positions; none where there are too few
+    /// for a plane to say anything of them, or all on one line.
+    fn plane(&mut self, tile: &Tile, group: &[CubeMember], kept: usize) -> Option<[f64; 3]> {
         if group.len() < FEWEST {
             return None;
         }
@@ -219,9 +219,9 @@ fn cube(p: Position, side: i64) -> [i64; 3] {
     p.map(|v| v.div_euclid(side))
 }
 
-/// The positions that the stage decides about, as the lowest bits of their cubes above their indices:
-/// those of a cube one after the other, in Morton order, with those of cubes far away whose lowest
-/// bits are the same. Cubes that no position of the core is in may be missing.
+/// The positions that the stage decides about, as the lowest bits of their cubes above their
+/// indices: those of a cube one after the other, in Morton order, with those of cubes far away
+/// whose lowest bits are the same. Cubes that no position of the core is in may be missing.
 fn keyed(tile: &Tile, side: i64) -> Vec<u64> {
     let Range { start, end } = tile.core;
     let core = Bounds::of(tile.positions[start..end].iter().copied());
@@ -246,8 +246,14 @@ fn keyed(tile: &Tile, side: i64) -> Vec<u64> {
 
 impl Pick {
     /// The position of a cube that stays. `axis` is memory to work in.
-    fn of(self, tile: &Tile, group: &[Entry], side: i64, axis: &mut Vec<i64>) -> Option<usize> {
-        let at = |entry: &Entry| tile.positions[entry.1 as usize];
+    fn of(
+        self,
+        tile: &Tile,
+        group: &[CubeMember],
+        side: i64,
+        axis: &mut Vec<i64>,
+    ) -> Option<usize> {
+        let at = |entry: &CubeMember| tile.positions[entry.1 as usize];
         let (cube, first) = group.first()?;
         let nearest = |distance2: &dyn Fn(Position) -> u128| {
             let nearest = group.iter().min_by_key(|entry| (distance2(at(entry)), entry.1));
@@ -300,7 +306,7 @@ mod tests {
         for pick in [Pick::Center, Pick::Median, Pick::First] {
             let mut tile =
                 Tile::of(vec![[0, 0, 0], [1, 0, 0], [far, 0, 0], [far + 1, 0, 0], [0, far, 0]]);
-            let settled = Some(Settled { steps: 3, length: 3.0 });
+            let settled = Some(SettledSide { steps: 3, length: 3.0 });
             let keys = keyed(&tile, 3);
             assert!(keys.iter().all(|key| key >> 32 == keys[0] >> 32), "{keys:x?}");
             let mut tally = Tally::default();
@@ -321,7 +327,7 @@ mod tests {
                 let mut tile = Tile::of(vec![[-far; 3], [far; 3]]);
                 let length = 1.0;
                 let grid = Grid {
-                    settled: Some(Settled { steps: side, length }),
+                    settled: Some(SettledSide { steps: side, length }),
                     ..Grid::new(Length::of(1.0).unwrap(), pick)
                 };
                 grid.run(&mut tile, &mut Tally::default()).unwrap();

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::removal::{Account, keep_once, represent};
+use super::removal::{RemovalAccount, keep_once, represent};
 use crate::geom::angle::{cosine, dominant_axis, is_known, outer_sum, sine2};
 use crate::geom::wide::Wide;
 use crate::point::{Mark, Position};
@@ -22,18 +22,18 @@ pub const MAX_PASSES: usize = 16;
 /// Keeps one record of every cell (the paper's third step).
 ///
 /// A cell's positions are sorted by their angle θ to the partition's direction (to the cell's own
-/// dominant axis where `cells` has `measure = "cone"`); the lower median stays: of m positions that at
-/// index (m − 1) / 2. Among positions of exactly that angle it is the one nearest to the centre of mass
-/// of the cell's positions, then the first in Morton order. Copies weigh as one position and are removed
-/// as coincident. A position without a normal is in no cell and keeps one record.
+/// dominant axis where `cells` has `measure = "cone"`); the lower median stays: of m positions that
+/// at index (m − 1) / 2. Among positions of exactly that angle it is the one nearest to the centre
+/// of mass of the cell's positions, then the first in Morton order. Copies weigh as one position
+/// and are removed as coincident. A position without a normal is in no cell and keeps one record.
 ///
-/// With `passes` above 1, what one pass leaves is the scan of the next: normals, cells and selection
-/// again, with the same keys. A cell's side, once chosen, stays.
+/// With `passes` above 1, what one pass leaves is the scan of the next: normals, cells and
+/// selection again, with the same keys. A cell's side, once chosen, stays.
 ///
 /// With `mark`, every record is written and the decision is in the records: `"key-point"` sets the
-/// key-point flag of those that stay and clears it of the others, `"withheld"` sets the withheld flag
-/// of the others, 7 and 18 make that their class. The report counts the others as `median_marked`, and
-/// those that got the key-point flag as `key_points`.
+/// key-point flag of those that stay and clears it of the others, `"withheld"` sets the withheld
+/// flag of the others, 7 and 18 make that their class. The report counts the others as
+/// `median_marked`, and those that got the key-point flag as `key_points`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Median {
@@ -121,15 +121,15 @@ impl TileOp for Median {
                 }
             }
         }
-        let account = Account { stage: "median", marked: "median_marked", mark: self.mark };
+        let account = RemovalAccount { stage: "median", marked: "median_marked", mark: self.mark };
         account.enter(tally, "coincident", coincident);
         account.enter(tally, "represented", represented);
         Ok(())
     }
 }
 
-/// The position of `group` with the lower median angle among those that the stage decides about; none
-/// if there are none. `angles` is memory to work in.
+/// The position of `group` with the lower median angle among those that the stage decides about;
+/// none if there are none. `angles` is memory to work in.
 fn median(tile: &Tile, group: Range<usize>, angles: &mut Vec<(f64, u32)>) -> Option<usize> {
     let Partition { members, turned, reference, .. } = &tile.cells;
     angles.clear();

@@ -1,46 +1,46 @@
 //! The stage `outliers`: points far from all others are removed before anything is computed.
 
+mod neighbors;
 mod radius;
 mod statistical;
 
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::removal::Account;
 use crate::point::Mark;
 use crate::quantity::Length;
 use crate::stage::{Role, StageKind, StagePlace};
 use crate::{Error, Result};
 
+pub use neighbors::MAX_NEIGHBORS;
 pub use radius::RadiusOutliers;
 pub use statistical::StatisticalOutliers;
 
-/// Most neighbours that the stage takes.
-pub const MAX_NEIGHBORS: usize = 64;
 const NEIGHBORS: usize = 10;
 const MULTIPLIER: f64 = 2.0;
 
 /// What the paper does before its first step: "the farther noise point is removed".
 ///
-/// Positions count, not records: copies of a point are no neighbours of each other, weigh as one, and
-/// are removed together.
+/// Positions count, not records: copies of a point are no neighbours of each other, weigh as one,
+/// and are removed together.
 ///
-/// With `method = "statistical"` a point's figure is the mean distance to its `neighbors` nearest other
-/// positions, or to all there are where the scan has fewer. Removed is what exceeds mean + `multiplier`
-/// · σ, both taken over the figures of all positions that the stage decides about (σ of the population).
-/// Figures are rounded to 2^-16 lattice steps and summed exactly, so that the mean and σ of a scan do
-/// not depend on how it is cut into tiles. The report names mean, σ and threshold in the scan's unit.
-/// The scan is searched once: a first phase stores the figures, a second reads them.
+/// With `method = "statistical"` a point's figure is the mean distance to its `neighbors` nearest
+/// other positions, or to all there are where the scan has fewer. Removed is what exceeds mean +
+/// `multiplier` · σ, both taken over the figures of all positions that the stage decides about (σ
+/// of the population). Figures are rounded to 2^-16 lattice steps and summed exactly, so that the
+/// mean and σ of a scan do not depend on how it is cut into tiles. The report names mean, σ and
+/// threshold in the scan's unit. The scan is searched once: a first phase stores the figures, a
+/// second reads them.
 ///
 /// With `method = "radius"` removed is what has fewer than `min_neighbors` other positions within
-/// `radius`, those at exactly this distance included. Squared distances are whole numbers of lattice
-/// steps; they are compared with the square of the radius in steps, which is a whole number of steps
-/// where it differs from one by rounding alone (10⁻⁹ of it).
+/// `radius`, those at exactly this distance included. Squared distances are whole numbers of
+/// lattice steps; they are compared with the square of the radius in steps, which is a whole number
+/// of steps where it differs from one by rounding alone (10⁻⁹ of it).
 ///
 /// With `mark`, every record is written and the decision is in the records: `"withheld"` sets the
-/// withheld flag of outliers, 7 and 18 (low and high noise) make that their class, `"key-point"` sets
-/// the key-point flag of all others and clears that of outliers. The report counts the records as
-/// `outliers_marked`.
+/// withheld flag of outliers, 7 and 18 (low and high noise) make that their class, `"key-point"`
+/// sets the key-point flag of all others and clears that of outliers. The report counts the records
+/// as `outliers_marked`.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Outliers {
@@ -111,19 +111,6 @@ fn given<T>(key: &'static str, value: Option<T>) -> Result<T, (&'static str, Err
                 .help("for example `outliers.radius = 1.0` and `outliers.min_neighbors = 4`");
         ("method", error)
     })
-}
-
-/// Refuses a number of neighbours outside 1 to 64.
-fn checked(key: &'static str, neighbors: usize) -> Result<usize, (&'static str, Error)> {
-    if (1..=MAX_NEIGHBORS).contains(&neighbors) {
-        return Ok(neighbors);
-    }
-    let told = format!("`{key}` must be 1 to {MAX_NEIGHBORS}, not {neighbors}");
-    Err((key, Error::pipeline(told)))
-}
-
-fn account(mark: Option<Mark>) -> Account {
-    Account { stage: "outliers", marked: "outliers_marked", mark }
 }
 
 /// With the defaults that the method has, as the report names the stage.

@@ -50,7 +50,7 @@ fn records(tile: &Tile, i: usize) -> u64 {
 
 /// How a stage accounts for records that it removes, or only marks.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Account {
+pub(super) struct RemovalAccount {
     /// The stage's kind.
     pub(super) stage: &'static str,
     /// The count of marked records in the report.
@@ -59,7 +59,12 @@ pub(super) struct Account {
     pub(super) mark: Option<Mark>,
 }
 
-impl Account {
+impl RemovalAccount {
+    /// That of `outliers`.
+    pub(super) fn of_outliers(mark: Option<Mark>) -> RemovalAccount {
+        RemovalAccount { stage: "outliers", marked: "outliers_marked", mark }
+    }
+
     /// Enters `records` as removed for `reason`; marked ones are all still there, and only counted.
     pub(super) fn enter(&self, tally: &mut Tally, reason: &'static str, records: u64) {
         match self.mark {

@@ -1,49 +1,20 @@
-//! The first look at a scan: its points, its extent as seen from somewhere, and the range of what it
-//! is coloured by; and the frame that follows from it.
+//! The first look at a scan: its points, its extent as seen from somewhere, and the range of what
+//! it is coloured by; and the frame that follows from it.
 
-use super::{NARROWEST, Settings};
+use super::settings::{NARROWEST, Settings};
 use crate::host::Threads;
 use crate::point::{Dimension, PointBatch};
 use crate::stage::{Part, Source};
 use crate::{Error, ErrorKind, Result};
-
-/// From where a scan is seen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum View {
-    /// From above: x to the right, y up.
-    #[default]
-    Above,
-    /// From the south: x to the right, z up.
-    South,
-    /// From the north: −x to the right, z up.
-    North,
-    /// From the east: y to the right, z up.
-    East,
-    /// From the west: −y to the right, z up.
-    West,
-}
-
-impl View {
-    /// To the right, up, and towards the viewer.
-    pub(super) fn seen(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
-        match self {
-            View::Above => [x, y, z],
-            View::South => [x, z, -y],
-            View::North => [-x, z, y],
-            View::East => [y, z, x],
-            View::West => [-y, z, -x],
-        }
-    }
-}
 
 /// Points of which the middle range of figures is found, about.
 const SAMPLE: u64 = 100_000;
 /// Records read at once.
 const BATCH: usize = 8192;
 
-/// Calls `visit` with every point of `source` that is somewhere: its number in its part, the point as
-/// seen, and the values that it is coloured by; and `nowhere` for each of the others. Each thread has a
-/// state of its own; all are returned.
+/// Calls `visit` with every point of `source` that is somewhere: its number in its part, the point
+/// as seen, and the values that it is coloured by; and `nowhere` for each of the others. Each
+/// thread has a state of its own; all are returned.
 pub(super) fn each_point<S: Send>(
     source: &dyn Source,
     settings: &Settings,
@@ -170,8 +141,8 @@ pub(super) struct Frame {
 
 impl Frame {
     /// The frame of all that was looked at, in at most so many pixels, and in no fewer than
-    /// [`NARROWEST`] where there is room: what has no width, as a line of points, is in the middle. A few
-    /// points far from all others are left outside.
+    /// [`NARROWEST`] where there is room: what has no width, as a line of points, is in the middle.
+    /// A few points far from all others are left outside.
     pub fn of(looks: &[Look], most: [u32; 2]) -> Result<Frame> {
         if looks.iter().all(|look| look.points == 0) {
             let nowhere: u64 = looks.iter().map(|look| look.nowhere).sum();

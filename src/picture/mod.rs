@@ -3,42 +3,26 @@
 //!
 //! A scan is decoded twice: once for its extent and the range of what it is coloured by, since
 //! headers may be wrong about the first and silent about the second; once to draw. A pixel is one
-//! number, the nearness of its point above the point's colour, so that threads draw into one image by
-//! taking the larger number, and neither their number nor the order of points changes a pixel.
+//! number, the nearness of its point above the point's colour, so that threads draw into one image
+//! by taking the larger number, and neither their number nor the order of points changes a pixel.
 
 mod color;
 mod look;
 mod paint;
+mod settings;
 
 use crate::stage::Source;
 use crate::{Error, Result};
 
-pub use color::By;
-pub use look::View;
 use look::{Frame, Look};
 use paint::Canvas;
+use settings::NARROWEST;
+pub use settings::{ColorBy, Settings, View, WIDEST};
 
 /// Panels that are drawn side by side, at most.
 pub const MOST_PANELS: usize = 4;
-/// Pixels that a picture is wide and high, at most: its memory is 11 bytes a pixel.
-pub const WIDEST: u32 = 4096;
-/// Pixels that it is wide and high, at least.
-const NARROWEST: u32 = 64;
 /// Pixels between panels.
 const GAP: u32 = 8;
-
-/// How scans are drawn.
-#[derive(Debug, Clone, Copy)]
-pub struct Settings {
-    /// From where.
-    pub view: View,
-    /// Coloured by what.
-    pub by: By,
-    /// Pixels that the picture is wide, all panels together: 64 to [`WIDEST`].
-    pub width: u32,
-    /// Threads that decode and draw.
-    pub threads: usize,
-}
 
 /// Scans drawn side by side, in one frame and with one range of colours.
 #[derive(Debug)]
@@ -55,7 +39,8 @@ pub struct Picture {
     pub range: Option<[f64; 2]>,
     /// For each panel its points, and how many of them lie outside of the frame.
     pub panels: Vec<(u64, u64)>,
-    /// For each panel the points that are drawn nowhere, since a coordinate of theirs is not finite.
+    /// For each panel the points that are drawn nowhere, since a coordinate of theirs is not
+    /// finite.
     pub nowhere: Vec<u64>,
     /// For each panel if it is black, since all colours or intensities of its scan are 0.
     pub black: Vec<bool>,
@@ -66,8 +51,8 @@ impl Picture {
     ///
     /// # Errors
     ///
-    /// Those of the sources; a scan that does not have what it is to be coloured by; no point at all;
-    /// more than [`MOST_PANELS`] scans or a width out of bounds.
+    /// Those of the sources; a scan that does not have what it is to be coloured by; no point at
+    /// all; more than [`MOST_PANELS`] scans or a width out of bounds.
     pub fn draw(sources: &[&dyn Source], settings: &Settings) -> Result<Picture> {
         let panels = sources.len() as u32;
         if sources.is_empty() || sources.len() > MOST_PANELS {

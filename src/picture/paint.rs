@@ -2,16 +2,16 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::Settings;
-use super::color::Rgb;
+use super::color::Shade;
 use super::look::{Frame, each_point};
+use super::settings::Settings;
 use crate::Result;
 use crate::stage::Source;
 
 /// How dark the foot of a step is, by its height in pixels.
 const STEEPEST: f64 = 6.0;
 const DARKEST: f64 = 0.55;
-const PAPER: Rgb = [255; 3];
+const PAPER: Shade = [255; 3];
 
 /// A panel to draw on, from several threads at once.
 pub(super) struct Canvas {
@@ -61,7 +61,7 @@ impl Canvas {
     }
 
     /// Draws a square of the dot's size around a pixel.
-    fn dot(&self, [x, y]: [u32; 2], (near, [r, g, b]): (f32, Rgb)) {
+    fn dot(&self, [x, y]: [u32; 2], (near, [r, g, b]): (f32, Shade)) {
         let key = u64::from(ordered(near)) << 32 | u64::from(u32::from_be_bytes([0, r, g, b]));
         let span = |at: u32, end: u32| {
             let from = at.saturating_sub((self.dot - 1) / 2);
@@ -77,7 +77,7 @@ impl Canvas {
 
     /// The colour of a pixel, darker below its neighbours: that shows walls, trees and holes as a
     /// viewer sees them, for which colour alone is too flat.
-    pub fn shaded(&self, x: u32, y: u32) -> Rgb {
+    pub fn shaded(&self, x: u32, y: u32) -> Shade {
         let Some((near, color)) = self.cell(x, y) else { return PAPER };
         let reach = self.dot.max(1);
         let around = [
@@ -96,7 +96,7 @@ impl Canvas {
     }
 
     /// The nearness and the colour of a pixel, where there is a point.
-    fn cell(&self, x: u32, y: u32) -> Option<(f32, Rgb)> {
+    fn cell(&self, x: u32, y: u32) -> Option<(f32, Shade)> {
         let key =
             self.cells[y as usize * self.size[0] as usize + x as usize].load(Ordering::Relaxed);
         let [_, r, g, b] = (key as u32).to_be_bytes();

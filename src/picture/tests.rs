@@ -4,7 +4,7 @@ use crate::stage::{OpenSource, Part};
 use crate::synth::{Scene, Synthetic};
 use std::sync::Arc;
 
-fn settings(view: View, by: By, threads: usize) -> Settings {
+fn settings(view: View, by: ColorBy, threads: usize) -> Settings {
     Settings { view, by, width: 128, threads }
 }
 
@@ -79,25 +79,27 @@ fn hue(picture: &Picture, x: u32, y: u32) -> [u8; 3] {
 
 #[test]
 fn the_nearest_point_of_a_pixel_is_seen_from_every_side() {
-    // A corner each so that all views have one frame, and two points behind each other in the middle.
+    // A corner each so that all views have one frame, and two points behind each other in the
+    // middle.
     let corners = [[0.0; 3], [100.0; 3]].map(|at| (at, 0));
     let middle = [([50.0, 50.0, 60.0], 6), ([50.0, 50.0, 40.0], 2), ([50.0, 40.0, 50.0], 5)];
     let few = points(&[&corners[..], &middle[..]].concat());
     let seen = |view| {
-        let picture = Picture::draw(&[&few], &settings(view, By::Class, 1)).unwrap();
+        let picture = Picture::draw(&[&few], &settings(view, ColorBy::Class, 1)).unwrap();
         assert_eq!((picture.width, picture.height), (128, 128));
         hue(&picture, 63, 63)
     };
     // From above the roof hides the ground; from the south what is nearer hides nothing above it.
-    assert_eq!(seen(View::Above), By::Class.color(&[6.0], [0.0, 255.0]));
-    assert_eq!(seen(View::South), By::Class.color(&[5.0], [0.0, 255.0]));
+    assert_eq!(seen(View::Above), ColorBy::Class.color(&[6.0], [0.0, 255.0]));
+    assert_eq!(seen(View::South), ColorBy::Class.color(&[5.0], [0.0, 255.0]));
 }
 
 #[test]
 fn threads_and_parts_change_no_pixel() {
     let scan = landscape(30_000);
-    let draw =
-        |threads| Picture::draw(&[&*scan], &settings(View::West, By::Intensity, threads)).unwrap();
+    let draw = |threads| {
+        Picture::draw(&[&*scan], &settings(View::West, ColorBy::Intensity, threads)).unwrap()
+    };
     let (one, three) = (draw(1), draw(3));
     assert_eq!(one.pixels, three.pixels);
     assert_eq!((&one.panels, one.range), (&three.panels, three.range));
@@ -108,7 +110,8 @@ fn threads_and_parts_change_no_pixel() {
 #[test]
 fn panels_share_a_frame_and_a_range() {
     let (scan, part) = (landscape(20_000), landscape(2_000));
-    let both = Picture::draw(&[&*scan, &*part], &settings(View::Above, By::Height, 2)).unwrap();
+    let both =
+        Picture::draw(&[&*scan, &*part], &settings(View::Above, ColorBy::Height, 2)).unwrap();
     assert_eq!(both.panels, [(20_000, 0), (2_000, 0)]);
     assert!(both.width <= 128 && both.pixels.len() == 3 * (both.width * both.height) as usize);
     let [low, high] = both.range.unwrap();
@@ -124,7 +127,7 @@ fn a_far_point_does_not_shrink_the_rest() {
         (0..1000).map(|i| ([f64::from(i % 40), f64::from(i / 40), 0.0], 2)).collect();
     places.push(([1e9, 0.0, 0.0], 2));
     let picture =
-        Picture::draw(&[&points(&places)], &settings(View::Above, By::Height, 1)).unwrap();
+        Picture::draw(&[&points(&places)], &settings(View::Above, ColorBy::Height, 1)).unwrap();
     assert_eq!(picture.panels, [(1001, 1)]);
     assert!(picture.pixel < 1.0, "{}", picture.pixel);
 }
@@ -137,7 +140,7 @@ fn one_point_copies_and_points_that_are_nowhere_are_drawn() {
         vec![([5.0, 6.0, 7.0], 2), ([f64::NAN, 0.0, 0.0], 2), ([f64::INFINITY, 0.0, 0.0], 2)],
     ] {
         let few = points(&places);
-        let picture = Picture::draw(&[&few], &settings(View::East, By::Height, 2)).unwrap();
+        let picture = Picture::draw(&[&few], &settings(View::East, ColorBy::Height, 2)).unwrap();
         assert!(picture.pixels.chunks_exact(3).any(|pixel| *pixel != [255; 3]), "{places:?}");
         let nowhere = places.iter().filter(|(at, _)| !at.iter().all(|v| v.is_finite())).count();
         assert_eq!(picture.nowhere, [nowhere as u64]);
@@ -155,7 +158,7 @@ fn what_has_no_width_is_in_the_middle_of_a_picture_that_can_be_seen() {
         (vec![([5.0, 6.0, 7.0], 2)], [64, 64]),
     ] {
         let picture =
-            Picture::draw(&[&points(&places)], &settings(View::Above, By::Height, 1)).unwrap();
+            Picture::draw(&[&points(&places)], &settings(View::Above, ColorBy::Height, 1)).unwrap();
         assert_eq!([picture.width, picture.height], size);
         assert_eq!(picture.panels, [(places.len() as u64, 0)]);
         let drawn = |x: u32, y: u32| hue(&picture, x, y) != [255; 3];
@@ -172,9 +175,9 @@ fn a_scan_whose_colours_are_all_0_is_known_to_be_black() {
     let black = |by, scan: &dyn Source| {
         Picture::draw(&[scan], &settings(View::Above, by, 1)).unwrap().black
     };
-    assert_eq!(black(By::Intensity, &*scene(Scene::Als)), [false]);
-    assert_eq!(black(By::Height, &*scene(Scene::Plane)), [false]);
-    assert_eq!(black(By::Class, &points(&[([1.0; 3], 0)])), [false], "class 0 is grey");
+    assert_eq!(black(ColorBy::Intensity, &*scene(Scene::Als)), [false]);
+    assert_eq!(black(ColorBy::Height, &*scene(Scene::Plane)), [false]);
+    assert_eq!(black(ColorBy::Class, &points(&[([1.0; 3], 0)])), [false], "class 0 is grey");
 }
 
 #[test]
@@ -184,12 +187,13 @@ fn what_cannot_be_drawn_is_told() {
         let settings = Settings { view: View::Above, by, width, threads: 1 };
         Picture::draw(sources, &settings).unwrap_err().to_string()
     };
-    assert!(told(&[&few], By::Color, 128).contains("the scan has no colours"));
-    assert!(told(&[&few], By::Intensity, 128).contains("the scan has no intensities"));
+    assert!(told(&[&few], ColorBy::Color, 128).contains("the scan has no colours"));
+    assert!(told(&[&few], ColorBy::Intensity, 128).contains("the scan has no intensities"));
     assert!(
-        told(&[&few, &few, &few, &few, &few], By::Height, 128).contains("5 scans side by side")
+        told(&[&few, &few, &few, &few, &few], ColorBy::Height, 128)
+            .contains("5 scans side by side")
     );
-    assert!(told(&[&few], By::Height, 63).contains("a picture of 63 pixels"));
+    assert!(told(&[&few], ColorBy::Height, 63).contains("a picture of 63 pixels"));
     let nowhere = points(&[([f64::NAN; 3], 2)]);
-    assert!(told(&[&nowhere], By::Height, 128).contains("no point to draw: 1 have"));
+    assert!(told(&[&nowhere], ColorBy::Height, 128).contains("no point to draw: 1 have"));
 }

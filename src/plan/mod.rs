@@ -6,6 +6,7 @@ mod outline;
 mod passes;
 mod plan;
 mod shown;
+mod sorted;
 mod stretch;
 
 pub use outline::Outline;

@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use rayon::ThreadPool;
 
 use super::look::{Unfit, look};
-use super::passes::{Tap, check_limits, number_selections, unroll};
+use super::passes::{check_limits, number_selections, unroll};
+use super::sorted::Sorted;
 use super::stretch::Stretch;
 use crate::engine::beside::Beside;
 use crate::engine::by_input::{lists_bytes, ranks};
 use crate::engine::by_rank;
-use crate::engine::pass::{Op, StageOp};
+use crate::engine::pass::{Op, Pass, StageOp, standings};
 use crate::engine::publish::check_place;
 use crate::engine::shares::Demands;
 use crate::engine::tagger::Tagger;
@@ -19,13 +20,13 @@ use crate::engine::task::Task;
 use crate::engine::{Done, Watch};
 use crate::error::shown;
 use crate::geom::lattice::Lattice;
-use crate::graph::{Graph, GraphStage};
+use crate::graph::Graph;
 use crate::graph::{MOST_THREADS, Nonfinite, Overrides, RunSettings};
 use crate::host::process::default_memory;
 use crate::host::{Clash, Files, Threads, Use};
-use crate::point::{Schema, Units};
+use crate::point::{Schema, Selection, Units};
 use crate::quantity::Figure;
-use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Role, Source, Transform};
+use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Source};
 use crate::store::{CLASSED_INPUTS, TAGGED_INPUTS};
 use crate::{Error, ErrorKind, Result};
 
@@ -53,168 +54,169 @@ impl Plan {
     }
 }
 
-/// The stages of a pipeline by role.
-#[derive(Default)]
-struct Sorted {
-    source: Option<(String, Box<dyn OpenSource>)>,
-    transforms: Vec<(String, Box<dyn Transform>)>,
-    ops: Vec<StageOp>,
-    sinks: Vec<(Box<dyn CreateSink>, Tap)>,
-    /// For each stage of the graph, the tile stages down to it.
-    above: Vec<usize>,
-}
-
 impl Graph {
     /// Opens the inputs' headers and fits the stages to them and to the memory.
     ///
     /// Fails if the stages do not fit each other, the inputs disagree, an output is an input or
     /// cannot appear where it should, or the memory cannot do.
     pub fn plan(self, overrides: &Overrides) -> Result<Plan> {
-        let origin = self.origin;
-        let settings = self.settings.with(overrides);
-        let stages = self
-            .stages
-            .iter()
-            .map(|stage| serde_json::json!({ "kind": stage.kind, "keys": stage.keys }))
-            .collect();
+        let (origin, file) = (self.origin.clone(), self.file.clone());
+        let settings = self.settings.clone().with(overrides);
         let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
-        let mut sorted = sort(self.stages)?;
-        let (source_kind, open) =
-            sorted.source.ok_or_else(|| Error::pipeline("the pipeline reads nothing"))?;
-        let (sinks, taps): (Vec<_>, Vec<_>) = sorted.sinks.into_iter().unzip();
-        let last_sink = last_sink(&sorted.ops, &taps)?;
-        let pipeline = self.file.as_deref();
-        check_places(pipeline, &open.paths(), &sinks, &settings)?;
+        let mut sorted = Sorted::new(self)?;
+        let open = &*sorted.source.1;
+        check_places(file.as_deref(), &open.paths(), &sorted.sinks, &settings)?;
         let source = open.open()?;
-        let mut files = check_places(pipeline, &all_read(&*open, &*source), &sinks, &settings)?;
-        let (each, ranks) = each_input(&*source, &sinks, &settings, &mut files)?;
-        let beside = copies(&*source, &sinks, &each, &settings, &mut files)?;
+        let read = all_read(open, &*source);
+        let mut files = check_places(file.as_deref(), &read, &sorted.sinks, &settings)?;
+        let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;
+        let beside = copies(&*source, &sorted.sinks, &each, &settings, &mut files)?;
         let schema = source.schema();
-        check_transforms(&sorted.transforms, schema).map_err(in_file)?;
-        check_limits(&sorted.ops, schema)?;
-        convert_lengths(&mut sorted.ops, &source.metadata().units)?;
-        let selections = number_selections(&mut sorted.ops)?;
-        let passes = unroll(&sorted.ops, schema, &taps)?;
-        let classed = passes.iter().any(|pass| pass.reads_classes);
-        if classed && ranks.len() > CLASSED_INPUTS as usize {
-            let told = format!(
-                "more than {CLASSED_INPUTS} inputs cannot have an output each where a stage looks at classes"
-            );
-            return Err(Error::pipeline(told).help("run them in several parts"));
-        }
-        let mut tagger = Tagger::new(schema, &selections, classed, ranks.clone());
-        if !sorted.ops.is_empty() {
-            tagger.treat(schema, &settings);
-        }
-        let mills = mills(&sorted.ops, &sinks)?;
-        let Stretch { factor: z_scale, doubt } = stretch(&settings, &*source, &sorted.ops)?;
-        let lattice = match mills || settings.nonfinite == Nonfinite::Drop {
-            true => Some(Lattice::stretched(schema, settings.lattice, z_scale)?),
-            false => None,
-        };
-        if let Some(lattice) = &lattice {
-            check_lengths(&sorted.ops, lattice)?;
-        }
+        check_transforms(&sorted, schema).map_err(in_file)?;
+        let selections = fit(&mut sorted.ops, schema, &source.metadata().units)?;
+        let passes = unroll(&sorted, schema)?;
+        let tagger = tagger(&sorted.ops, &passes.passes, &selections, &ranks, &*source, &settings)?;
+        let order = Ordered::new(&sorted, &*source)?;
+        let (lattice, doubt) = lattice(&settings, &*source, &sorted.ops, order.mills)?;
         let simd = settings.simd.resolve().map_err(in_file)?;
-        let threads = threads(&settings)?;
-        let limit = settings.memory.unwrap_or_else(default_memory);
-        let chunks = chunks(&sinks, &*source)?;
-        let needs = passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect();
-        let gathers = sorted.ops.iter().any(|stage| matches!(stage.op, Op::Scan(_)));
-        let has_cells = sorted.ops.iter().any(|stage| stage.op.tile().needs().cells);
+        let demands = demands(&sorted, &passes.passes, &*source, &order, &settings)?;
         let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
-        let removes = !(sorted.transforms.is_empty() && sorted.ops.is_empty());
-        let ordered = if mills { in_input_order(&sinks, &*source)? } else { 0 };
         let demands = Demands {
-            lists: folders
-                .saturating_mul(lists_bytes(ranks.len()))
-                .saturating_add(ordered.saturating_mul(by_rank::lists_bytes(source.points()))),
-            ranked: ordered > 0,
-            mills,
-            passes: needs,
+            lists: demands.lists.saturating_add(folders.saturating_mul(lists_bytes(ranks.len()))),
             tagged: tagger.tags(),
-            run_most: settings.tile_points.map(|points| (points.get() as u64).saturating_mul(4)),
-            gathers,
-            has_cells,
-            ..Demands::of(&*source, &chunks, limit, threads)
+            ..demands
         };
         demands.divide()?;
-        let mut warnings = warnings(&*source, &sinks, removes, &settings)?;
-        let idle = sorted.transforms.iter().flat_map(|(_, stage)| stage.warnings(schema));
-        warnings.extend(idle);
+        let mut warnings = warnings(&*source, &sorted, &settings)?;
         warnings.extend(doubt);
         Ok(Plan(Task {
             warnings,
-            settings,
             simd,
-            threads,
+            threads: demands.threads,
+            settings,
             source,
-            source_kind,
+            source_kind: sorted.source.0,
             transforms: sorted.transforms,
             ops: sorted.ops,
-            passes,
-            sinks,
+            filters: sorted.filters,
+            passes: passes.passes,
+            branches: passes.branches,
+            sinks: sorted.sinks,
+            changed_by: passes.changed_by,
+            branch_of: passes.branch_of,
+            in_input_order: order.in_input_order,
             each,
             beside,
             ranks,
-            last_sink,
             tagger,
-            mills,
+            mills: order.mills,
             lattice,
-            stages,
             demands,
         }))
     }
 }
 
-fn sort(stages: Vec<GraphStage>) -> Result<Sorted> {
-    let mut sorted = Sorted::default();
-    for stage in stages {
-        let GraphStage { kind, from, written, limits, role, .. } = stage;
-        let misplaced =
-            |why: &str| Err(written.wrong(format!("`{kind}` cannot stand here: {why}")));
-        let tile_op =
-            |op| StageOp { kind: kind.clone(), written: written.clone(), op, limits, selection: 0 };
-        match role {
-            Role::Source(_) if sorted.source.is_some() => {
-                return misplaced("a pipeline has one source");
-            }
-            Role::Source(source) => sorted.source = Some((kind, source)),
-            _ if sorted.source.is_none() => return misplaced("the first stage is a source"),
-            Role::Sink(sink) => {
-                let above = from.first().and_then(|&from| sorted.above.get(from));
-                let ops = above.copied().unwrap_or(sorted.ops.len());
-                let tap = Tap { ops, wants_normals: sink.wants_normals() };
-                sorted.sinks.push((sink, tap));
-            }
-            Role::Transform(_) if !sorted.ops.is_empty() => {
-                return misplaced("stages that stream come before those that work on tiles");
-            }
-            Role::Transform(_) if !sorted.sinks.is_empty() => {
-                return misplaced("a stage that streams cannot follow a sink");
-            }
-            Role::Transform(transform) => sorted.transforms.push((kind, transform)),
-            Role::TileOp(op) => sorted.ops.push(tile_op(Op::Tile(op))),
-            Role::ScanOp(op) => sorted.ops.push(tile_op(Op::Scan(op))),
-        }
-        sorted.above.push(sorted.ops.len());
-    }
-    match sorted.sinks.is_empty() {
-        true => Err(Error::pipeline("the pipeline writes nothing")),
-        false => Ok(sorted),
-    }
+/// Fits tile stages to the records and the units of the scan: lengths with a unit of their own are
+/// converted. Returns what records the stages are limited to.
+fn fit(ops: &mut [StageOp], schema: &Schema, units: &Units) -> Result<Vec<Selection>> {
+    check_limits(ops, schema)?;
+    ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().convert(units))?;
+    number_selections(ops)
 }
 
-/// The first sink of what all stages leave; without one, the last stages would work for nothing.
-fn last_sink(ops: &[StageOp], taps: &[Tap]) -> Result<usize> {
-    let last = taps.iter().position(|tap| tap.ops == ops.len());
-    last.ok_or_else(|| match ops.last() {
-        Some(stage) => {
-            let told = format!("no output takes what `{}` leaves", stage.kind);
-            stage.written.wrong(told).help("add a `write` behind it that has no `from`")
-        }
-        None => Error::pipeline("the pipeline writes nothing"),
+/// What tells records apart as they are decoded.
+fn tagger(
+    ops: &[StageOp],
+    passes: &[Pass],
+    selections: &[Selection],
+    ranks: &[u32],
+    source: &dyn Source,
+    settings: &RunSettings,
+) -> Result<Tagger> {
+    let classed = passes.iter().any(|pass| pass.reads_classes);
+    if classed && ranks.len() > CLASSED_INPUTS as usize {
+        let told = format!(
+            "more than {CLASSED_INPUTS} inputs cannot have an output each where a stage looks at classes"
+        );
+        return Err(Error::pipeline(told).help("run them in several parts"));
+    }
+    let mut tagger = Tagger::new(source.schema(), selections, classed, ranks.to_vec());
+    if !ops.is_empty() {
+        tagger.treat(source.schema(), settings);
+    }
+    Ok(tagger)
+}
+
+/// Where points are, for a run that asks, and why z may be measured wrong.
+fn lattice(
+    settings: &RunSettings,
+    source: &dyn Source,
+    ops: &[StageOp],
+    mills: bool,
+) -> Result<(Option<Lattice>, Option<String>)> {
+    let Stretch { factor, doubt } = stretch(settings, source, ops)?;
+    if !mills && settings.nonfinite != Nonfinite::Drop {
+        return Ok((None, doubt));
+    }
+    let lattice = Lattice::stretched(source.schema(), settings.lattice, factor)?;
+    check_lengths(ops, &lattice)?;
+    Ok((Some(lattice), doubt))
+}
+
+/// What a run depends on in its memory, but the lists of outputs that are one for each input.
+fn demands(
+    sorted: &Sorted,
+    passes: &[Pass],
+    source: &dyn Source,
+    order: &Ordered,
+    settings: &RunSettings,
+) -> Result<Demands> {
+    let limit = settings.memory.unwrap_or_else(default_memory);
+    let chunks = chunks(&sorted.sinks, source)?;
+    let ranked =
+        order.in_input_order.iter().filter(|ranked| **ranked && order.mills).count() as u64;
+    Ok(Demands {
+        lists: ranked.saturating_mul(by_rank::lists_bytes(source.points())),
+        ranked: ranked > 0,
+        mills: order.mills,
+        filters: !sorted.filters.is_empty(),
+        standings: standings(passes),
+        passes: passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect(),
+        run_most: settings.tile_points.map(|points| (points.get() as u64).saturating_mul(4)),
+        gathers: sorted.ops.iter().any(|stage| matches!(stage.op, Op::Scan(_))),
+        has_cells: sorted.ops.iter().any(|stage| stage.op.tile().needs().cells),
+        ..Demands::of(source, &chunks, limit, threads(settings)?)
     })
+}
+
+/// In which order records are written.
+struct Ordered {
+    /// True if the run needs tiles: for its stages, or because an output is to be in canonical order.
+    mills: bool,
+    /// For each sink, whether it gets the order of the inputs.
+    in_input_order: Vec<bool>,
+}
+
+impl Ordered {
+    fn new(sorted: &Sorted, source: &dyn Source) -> Result<Ordered> {
+        let sinks = &sorted.sinks;
+        // Branches of stages that stream go by tiles, and keep the order that a stream has.
+        let (ops, streams) = (!sorted.ops.is_empty(), !sorted.filters.is_empty());
+        let sorts =
+            |sink: &Box<dyn CreateSink>| sink.is_folder() || sink.order() == Order::Canonical;
+        let mills = ops || streams || sinks.iter().any(sorts);
+        let keeps = |sink: &Box<dyn CreateSink>| match sink.order() {
+            Order::Input => true,
+            Order::Auto => streams && !ops && !sink.is_folder(),
+            Order::Canonical => false,
+        };
+        let in_input_order: Vec<bool> = sinks.iter().map(keeps).collect();
+        if mills && in_input_order.contains(&true) && source.parts() > by_rank::MOST_PARTS {
+            let told = "the inputs have too many parts for an output in their order";
+            return Err(Error::pipeline(told).help("leave `write.order` out"));
+        }
+        Ok(Ordered { mills, in_input_order })
+    }
 }
 
 /// Refuses outputs that would replace what is read or each other, or that cannot appear where they
@@ -309,11 +311,6 @@ fn each_input(
     Ok((each, if folders { ranks(&inputs) } else { Vec::new() }))
 }
 
-/// Converts lengths with a unit of their own to the unit of the scan.
-fn convert_lengths(ops: &mut [StageOp], units: &Units) -> Result<()> {
-    ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().convert(units))
-}
-
 /// Refuses lengths that are longer than the lattice.
 fn check_lengths(ops: &[StageOp], lattice: &Lattice) -> Result<()> {
     let longest = lattice.longest();
@@ -329,9 +326,11 @@ fn check_lengths(ops: &[StageOp], lattice: &Lattice) -> Result<()> {
     }
 }
 
-fn check_transforms(transforms: &[(String, Box<dyn Transform>)], schema: &Schema) -> Result<()> {
+fn check_transforms(sorted: &Sorted, schema: &Schema) -> Result<()> {
     let mut written: Vec<String> = Vec::new();
-    for (kind, transform) in transforms {
+    let decoded = sorted.transforms.iter().map(|(kind, transform)| (kind, transform));
+    let behind = sorted.filters.iter().map(|filter| (&filter.kind, &filter.transform));
+    for (kind, transform) in decoded.chain(behind) {
         let needs = transform.needs();
         let there = |name: &&String| schema.find(name).is_some() || written.contains(name);
         if let Some(missing) = needs.reads.iter().find(|name| !there(name)) {
@@ -345,26 +344,25 @@ fn check_transforms(transforms: &[(String, Box<dyn Transform>)], schema: &Schema
 }
 
 /// What outputs will not hold. Records that they cannot hold are an error where all are written, and
-/// a warning where a stage may remove them first (`removes`) and leave others.
-fn warnings(
-    source: &dyn Source,
-    sinks: &[Box<dyn CreateSink>],
-    removes: bool,
-    settings: &RunSettings,
-) -> Result<Vec<String>> {
-    let lost = sinks.iter().flat_map(|sink| sink.warnings(source.schema(), source.metadata()));
+/// a warning where a stage may remove them first and leave others. Then what stages have nothing to do
+/// of.
+fn warnings(source: &dyn Source, sorted: &Sorted, settings: &RunSettings) -> Result<Vec<String>> {
+    let Sorted { sinks, transforms, filters, ops, .. } = sorted;
+    let schema = source.schema();
+    let lost = sinks.iter().flat_map(|sink| sink.warnings(schema, source.metadata()));
     let mut warnings: Vec<String> = lost.collect();
-    let Some(Unfit { error, none_fits }) =
-        look(source, sinks, settings.nonfinite == Nonfinite::Drop)?
-    else {
-        return Ok(warnings);
-    };
-    // Where none fits there is nothing that stages could leave.
-    if !removes || none_fits {
-        return Err(error);
+    let unfit = look(source, sinks, settings.nonfinite == Nonfinite::Drop)?;
+    if let Some(Unfit { error, none_fits }) = unfit {
+        // Where none fits there is nothing that stages could leave.
+        if none_fits || transforms.is_empty() && filters.is_empty() && ops.is_empty() {
+            return Err(error);
+        }
+        let help = error.remedy().map_or(String::new(), |help| format!("; {help}"));
+        warnings.push(format!("{error}: the run fails if such a point is kept{help}"));
     }
-    let help = error.remedy().map_or(String::new(), |help| format!("; {help}"));
-    warnings.push(format!("{error}: the run fails if such a point is kept{help}"));
+    let decoded = transforms.iter().map(|(_, transform)| transform);
+    let all = decoded.chain(filters.iter().map(|filter| &filter.transform));
+    warnings.extend(all.flat_map(|transform| transform.warnings(schema)));
     Ok(warnings)
 }
 
@@ -381,16 +379,6 @@ fn threads(settings: &RunSettings) -> Result<usize> {
             Ok(processors.min(MOST_THREADS))
         }
     }
-}
-
-/// How many outputs want the order of the inputs, which has to be kept where the run needs tiles.
-fn in_input_order(sinks: &[Box<dyn CreateSink>], source: &dyn Source) -> Result<u64> {
-    let ordered = sinks.iter().filter(|sink| sink.order() == Order::Input).count();
-    if ordered > 0 && source.parts() > by_rank::MOST_PARTS {
-        let told = "the inputs have too many parts for an output in their order";
-        return Err(Error::pipeline(told).help("leave `write.order` out"));
-    }
-    Ok(ordered as u64)
 }
 
 /// The chunks of all outputs.
@@ -411,18 +399,5 @@ fn stretch(settings: &RunSettings, source: &dyn Source, ops: &[StageOp]) -> Resu
             Ok(Stretch { factor, doubt })
         }
         (stretch, None) => stretch,
-    }
-}
-
-/// True if the run needs tiles: for its stages, or because an output is to be in canonical order.
-fn mills(ops: &[StageOp], sinks: &[Box<dyn CreateSink>]) -> Result<bool> {
-    let canonical = sinks.iter().any(|sink| sink.order() == Order::Canonical);
-    match sinks.iter().find(|sink| sink.is_folder() && sink.order() == Order::Input) {
-        None => Ok(!ops.is_empty() || canonical || sinks.iter().any(|sink| sink.is_folder())),
-        Some(sink) => {
-            Err(Error::pipeline("`write.order = \"input\"` is for one file of all inputs")
-                .at(sink.path())
-                .help("give `write.path` instead of `write.folder`, or leave `write.order` out"))
-        }
     }
 }

@@ -20,7 +20,7 @@ impl fmt::Display for Plan {
         for (kind, _) in &self.0.transforms {
             writeln!(f, "streams  {kind}")?;
         }
-        match self.0.ops.is_empty() {
+        match self.0.ops.is_empty() && self.0.filters.is_empty() {
             true => self.0.sinks.iter().try_for_each(|sink| sink_line(f, sink.path()))?,
             false => self.passes_shown(f)?,
         }
@@ -66,9 +66,17 @@ impl Plan {
             };
             let label = format!("pass {}", n + 1);
             sinks(f, &pass.before)?;
+            if pass.behind != n.checked_sub(1) {
+                let from = pass.behind.map_or("the scan".into(), |n| format!("pass {}", n + 1));
+                writeln!(f, "         again from what {from} left")?;
+            }
             for (i, &call) in pass.calls.iter().enumerate() {
                 write!(f, "{:<8} ", if i == 0 { &label } else { "" })?;
                 self.call_shown(f, pass, call)?;
+            }
+            for &filter in &pass.filters {
+                let filter = &self.0.filters[filter];
+                writeln!(f, "{label:<8} {} of what is left", filter.kind)?;
             }
             sinks(f, &pass.after)?;
         }

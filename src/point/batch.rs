@@ -18,13 +18,15 @@ pub struct PointBatch {
     pub source: u32,
     /// Unit normals (one a record, NaN where there is none) when a stage computed them.
     pub normals: Option<Vec<[f32; 3]>>,
+    /// For each record its number when they were numbered, if somebody asks which are left.
+    numbers: Option<Vec<u32>>,
 }
 
 impl PointBatch {
     /// An empty batch that takes up to `capacity` records; allocates them at once.
     pub fn new(schema: Arc<Schema>, capacity: usize) -> Self {
         let records = Vec::with_capacity(capacity * schema.stride);
-        PointBatch { schema, records, capacity, source: 0, normals: None }
+        PointBatch { schema, records, capacity, source: 0, normals: None, numbers: None }
     }
 
     /// What the records hold.
@@ -66,6 +68,7 @@ impl PointBatch {
     pub fn clear(&mut self) {
         self.records.clear();
         self.normals = None;
+        self.numbers = None;
     }
 
     /// Makes the batch hold exactly `len ≤ capacity` records and returns their bytes for the
@@ -73,6 +76,7 @@ impl PointBatch {
     pub fn refill(&mut self, len: usize) -> &mut [u8] {
         assert!(len <= self.capacity, "a batch is refilled within its capacity");
         self.normals = None;
+        self.numbers = None;
         self.records.resize(len * self.schema.stride, 0);
         &mut self.records
     }
@@ -84,11 +88,24 @@ impl PointBatch {
         &mut self.records[len * self.schema.stride..]
     }
 
+    /// Numbers the records from 0: [`retain`](PointBatch::retain) then tells which are left.
+    pub(crate) fn number_records(&mut self) {
+        self.numbers = Some((0..self.len() as u32).collect());
+    }
+
+    /// The numbers of the records that are left.
+    pub(crate) fn numbers(&self) -> Option<&[u32]> {
+        self.numbers.as_deref()
+    }
+
     /// Shortens the batch to its first `len` records.
     pub fn truncate(&mut self, len: usize) {
         self.records.truncate(len * self.schema.stride);
         if let Some(normals) = &mut self.normals {
             normals.truncate(len);
+        }
+        if let Some(numbers) = &mut self.numbers {
+            numbers.truncate(len);
         }
     }
 
@@ -108,6 +125,9 @@ impl PointBatch {
                     self.records.copy_within(i * stride..(i + 1) * stride, kept * stride);
                     if let Some(normals) = &mut self.normals {
                         normals[kept] = normals[i];
+                    }
+                    if let Some(numbers) = &mut self.numbers {
+                        numbers[kept] = numbers[i];
                     }
                 }
                 kept += 1;

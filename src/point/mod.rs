@@ -2,6 +2,7 @@
 
 mod batch;
 mod bounds;
+mod mark;
 pub mod names;
 mod schema;
 mod selection;
@@ -10,7 +11,8 @@ mod units;
 
 pub use batch::PointBatch;
 pub use bounds::{Bounds, Position, distance2};
+pub use mark::{Edit, Mark};
 pub use schema::{Bits, Dimension, Endian, GpsTime, Layout, Metadata, Scalar, Schema, Value};
-pub use selection::{Chooser, Edit, Flag, Mark, Selection};
+pub use selection::{Chooser, Flag, Selection};
 pub use spare::Spare;
 pub use units::{Horizontal, Mismatch, Units};

@@ -3,8 +3,8 @@
 
 use std::sync::{Mutex, PoisonError};
 
-/// Buffers that nobody uses just now. It holds no more than were in use at one time, so that a plan of
-/// the memory counts those alone.
+/// Buffers that nobody uses just now. It holds no more than were in use at one time, so that a plan
+/// of the memory counts those alone.
 #[derive(Debug)]
 pub struct Spare<T>(Mutex<Vec<T>>);
 

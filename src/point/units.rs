@@ -1,5 +1,5 @@
-//! The units of a scan's coordinates, as far as its coordinate reference system tells them. Knows no
-//! formats.
+//! The units of a scan's coordinates, as far as its coordinate reference system tells them. Knows
+//! no formats.
 
 /// Units of x and y, and of z; none where nothing is said.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -68,10 +68,12 @@ impl Units {
         }
     }
 
-    /// What makes it doubtful that x, y and z have one unit, though nothing proves that they have not.
+    /// What makes it doubtful that x, y and z have one unit, though nothing proves that they have
+    /// not.
     ///
-    /// There is no doubt where no reference system is named at all, and none about heights without a
-    /// unit above metres, the most common scans of all. Above feet there is: both are common there.
+    /// There is no doubt where no reference system is named at all, and none about heights without
+    /// a unit above metres, the most common scans of all. Above feet there is: both are common
+    /// there.
     pub fn doubt(&self) -> Option<String> {
         match (self.horizontal, self.vertical) {
             (Some(Horizontal::Degrees), _) | (Some(_), Some(_)) => None,

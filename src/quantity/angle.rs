@@ -6,8 +6,8 @@ use std::fmt;
 use serde::de::{Deserializer, Error, Unexpected, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
 
-/// An angle from 0 to π that remembers whether it was given in degrees, so that it is shown as it was
-/// typed.
+/// An angle from 0 to π that remembers whether it was given in degrees, so that it is shown as it
+/// was typed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Angle {
     radians: f64,

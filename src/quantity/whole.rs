@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use super::parse_count;
 
-/// A whole number from `LEAST` to `MOST`, also read from a float that is whole and from a text such as
-/// `"1e1"`.
+/// A whole number from `LEAST` to `MOST`, also read from a float that is whole and from a text such
+/// as `"1e1"`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Whole<const LEAST: u64, const MOST: u64>(u64);
 

@@ -1,17 +1,15 @@
-//! What a voxel grid of as many points would have done: the deviation of a plain alternative, measured
-//! like that of the reduction, so that everyone sees what the method gave.
+//! What a voxel grid of as many points would have done: the deviation of a plain alternative,
+//! measured like that of the reduction, so that everyone sees what the method gave.
 //!
-//! The cubes of octree levels are grids of every second power of a side; the figures of a grid of any
-//! number of points lie between those of two levels. How many points a run keeps is known when it is
-//! over, so all levels that may be needed are measured on the way: in some of the cubes of the
-//! coarsest one, chosen by their corners alone, which is enough for figures of the whole scan.
+//! The cubes of octree levels are grids of every second power of a side; the figures of a grid of
+//! any number of points lie between those of two levels. How many points a run keeps is known when
+//! it is over, so all levels that may be needed are measured on the way: in some of the cubes of
+//! the coarsest one, chosen by their corners alone, which is enough for figures of the whole scan.
 
 use std::ops::Range;
 
-use serde::Serialize;
-
 use super::deviations::{Deviations, Histogram};
-use super::figures::world_length;
+use super::figures::{BaselineFigures, world_length};
 use crate::geom::angle::is_known;
 use crate::geom::lattice::Lattice;
 use crate::point::{Position, distance2};
@@ -22,19 +20,6 @@ use crate::tile::Tile;
 const LEVELS: usize = 6;
 /// Positions, and cubes of the coarsest level, that are enough for figures of the whole scan.
 const ENOUGH: (u64, u64) = (1 << 17, 1 << 12);
-
-/// The deviation of a voxel grid that keeps as many points, in world units.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct BaselineFigures {
-    /// Side of the cubes of a grid of that many points.
-    pub side: f64,
-    /// Removed records whose deviation was measured for it.
-    pub points: u64,
-    /// sqrt(Σd²/n), between those of two octree levels.
-    pub rms: f64,
-    /// 95 % deviate no more, likewise.
-    pub p95: f64,
-}
 
 /// Grids of several octree levels, of each cube the position nearest to the centre standing for the
 /// others. Merged in any order they are the same, however the scan is cut into tiles.
@@ -47,11 +32,11 @@ pub struct Baseline {
     /// Records in those.
     records: u64,
     /// From the coarsest on, each of half the side.
-    levels: Vec<Level>,
+    levels: Vec<GridLevel>,
 }
 
 #[derive(Debug, Clone, Default)]
-struct Level {
+struct GridLevel {
     cubes: u64,
     deviations: Deviations,
     histogram: Histogram,
@@ -59,11 +44,11 @@ struct Level {
 
 impl Baseline {
     /// Bytes that it holds at most.
-    pub const BYTES: u64 = LEVELS as u64 * (Histogram::BYTES + size_of::<Level>() as u64);
+    pub const BYTES: u64 = LEVELS as u64 * (Histogram::BYTES + size_of::<GridLevel>() as u64);
 
-    /// Measures levels down from the one whose cubes are twice as wide as the power of two that is at
-    /// least `side` steps: no grid of fewer points is asked for where one point stays of every cube of
-    /// that side. Ends where cubes hold hardly more than one position.
+    /// Measures levels down from the one whose cubes are twice as wide as the power of two that is
+    /// at least `side` steps: no grid of fewer points is asked for where one point stays of every
+    /// cube of that side. Ends where cubes hold hardly more than one position.
     pub fn new(side: i64, levels: &Levels) -> Self {
         let top = ((side.max(1) as u64).next_power_of_two().ilog2() + 1).min(62);
         let few = |level: &u32| levels.occupied(*level) <= levels.positions() / 4 * 3;
@@ -73,12 +58,12 @@ impl Baseline {
             top,
             thinned: spare.max(1).ilog2(),
             records: 0,
-            levels: vec![Level::default(); count],
+            levels: vec![GridLevel::default(); count],
         }
     }
 
-    /// Adds what stages decide about in the core of a tile that has normals. No cube of the coarsest
-    /// level may cross its faces.
+    /// Adds what stages decide about in the core of a tile that has normals. No cube of the
+    /// coarsest level may cross its faces.
     pub fn add(&mut self, tile: &Tile) {
         let Range { mut start, end } = tile.core;
         while start < end {
@@ -115,12 +100,12 @@ impl Baseline {
         }
     }
 
-    /// The figures of a grid that keeps `kept` of `decided` records; none where no two levels lie on
-    /// both sides of it, or nothing was measured.
+    /// The figures of a grid that keeps `kept` of `decided` records; none where no two levels lie
+    /// on both sides of it, or nothing was measured.
     pub fn figures(&self, kept: u64, decided: u64, lattice: &Lattice) -> Option<BaselineFigures> {
         let wanted = kept as f64 * (self.records as f64 / decided as f64);
         let fits =
-            |pair: &[Level]| pair[0].cubes as f64 <= wanted && wanted <= pair[1].cubes as f64;
+            |pair: &[GridLevel]| pair[0].cubes as f64 <= wanted && wanted <= pair[1].cubes as f64;
         let at = self.levels.windows(2).position(fits)?;
         let [coarse, fine] = [&self.levels[at], &self.levels[at + 1]];
         let log = |count: f64| libm::log(count);
@@ -131,7 +116,7 @@ impl Baseline {
             true => a * libm::pow(b / a, share),
             false => a + (b - a) * share,
         };
-        let p95 = |level: &Level| Some(world_length(level.histogram.percentile(95)?, lattice));
+        let p95 = |level: &GridLevel| Some(world_length(level.histogram.percentile(95)?, lattice));
         Some(BaselineFigures {
             side: libm::exp2(f64::from(self.top - at as u32) - share) * lattice.step,
             points: coarse.deviations.count().min(fine.deviations.count()),
@@ -141,7 +126,7 @@ impl Baseline {
     }
 }
 
-impl Level {
+impl GridLevel {
     /// Adds the cubes of side 2^`level` among positions that follow one another.
     fn add(&mut self, tile: &Tile, Range { mut start, end }: Range<usize>, level: u32) {
         while start < end {

@@ -2,8 +2,8 @@
 
 use std::cmp::Ordering;
 
+use super::lot::Lot;
 use super::sums::{FixedSum, OpenSum};
-use super::survey::Lot;
 use crate::point::Position;
 use crate::store::morton_cmp;
 
@@ -144,8 +144,8 @@ impl Histogram {
         self.zero + self.bins.iter().sum::<u64>()
     }
 
-    /// The upper edge, in lattice steps, of the bin in which the `percent`-th percentile is: at least
-    /// that share of the records is no larger. None without records.
+    /// The upper edge, in lattice steps, of the bin in which the `percent`-th percentile is: at
+    /// least that share of the records is no larger. None without records.
     pub fn percentile(&self, percent: u32) -> Option<f32> {
         let count = self.count();
         if count == 0 {

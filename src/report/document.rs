@@ -13,8 +13,11 @@ use super::machine::Machine;
 /// What a run says it did.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
-    /// The same for every configuration of the run.
+    /// The same for every configuration of the run; of a pipeline with several branches that of the
+    /// first.
     pub result: Outcome,
+    /// The same of each branch but the first: what a run of it alone would have come to.
+    pub further: Vec<Outcome>,
     /// What is free to differ.
     pub run: RunFigures,
 }
@@ -131,8 +134,28 @@ impl Report {
     /// Fails where `out` or `tiles` does, and with [`io::ErrorKind::InvalidData`] if there are not
     /// as many tiles as the totals say.
     pub fn write(&self, out: &mut impl Write, tiles: &mut impl BufRead) -> io::Result<()> {
+        self.write_all(out, [tiles])
+    }
+
+    /// Writes the report of several branches: `result` is that of the first, `further` a list of
+    /// those of the others; `tiles` has the lines of each, in order.
+    pub fn write_all<T: BufRead>(
+        &self,
+        out: &mut impl Write,
+        tiles: impl IntoIterator<Item = T>,
+    ) -> io::Result<()> {
+        let mut tiles = tiles.into_iter();
+        let missing = || io::Error::new(io::ErrorKind::InvalidData, "a branch without tiles");
+        let mut next = || tiles.next().ok_or_else(missing);
         out.write_all(b"{\n\"result\": ")?;
-        self.result.write(out, tiles)?;
+        self.result.write(out, &mut next()?)?;
+        for (n, result) in self.further.iter().enumerate() {
+            out.write_all(if n == 0 { b",\n\"further\": [\n" } else { b",\n" })?;
+            result.write(out, &mut next()?)?;
+        }
+        if !self.further.is_empty() {
+            out.write_all(b"\n]")?;
+        }
         out.write_all(b",\n\"run\": ")?;
         self.run.write(out)?;
         out.write_all(b"\n}\n")
@@ -174,10 +197,12 @@ impl Outcome {
 
 /// The bytes of `result` in a report written by [`Report::write`]; None if it is not one.
 pub fn result_bytes(report: &[u8]) -> Option<&[u8]> {
-    // JSON text holds no line break within a string, so the line that opens `run` is unmistakable.
-    const RUN: &[u8] = b",\n\"run\": ";
+    // JSON text holds no line break within a string, so the lines that open what follows are
+    // unmistakable.
+    const BEHIND: [&[u8]; 2] = [b",\n\"run\": ", b",\n\"further\": "];
     let rest = report.strip_prefix(b"{\n\"result\": ")?;
-    let end = rest.windows(RUN.len()).position(|window| window == RUN)?;
+    let ends = BEHIND.iter().filter_map(|key| rest.windows(key.len()).position(|w| w == *key));
+    let end = ends.min()?;
     rest.get(..end)
 }
 

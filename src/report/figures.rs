@@ -4,7 +4,6 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
-use super::baseline::BaselineFigures;
 use crate::geom::lattice::Lattice;
 use crate::point::Position;
 
@@ -78,6 +77,19 @@ impl TileFigures {
         serde_json::to_writer(&mut *out, self)?;
         out.write_all(b"\n")
     }
+}
+
+/// The deviation of a voxel grid that keeps as many points, in world units.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BaselineFigures {
+    /// Side of the cubes of a grid of that many points.
+    pub side: f64,
+    /// Removed records whose deviation was measured for it.
+    pub points: u64,
+    /// sqrt(Σd²/n), between those of two octree levels.
+    pub rms: f64,
+    /// 95 % deviate no more, likewise.
+    pub p95: f64,
 }
 
 /// The whole scan.

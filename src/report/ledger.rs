@@ -69,8 +69,8 @@ impl Ledger {
     }
 }
 
-/// Fails with [`ErrorKind::Internal`](crate::ErrorKind::Internal) if the sink of `output` wrote another
-/// number of records than the `given` ones.
+/// Fails with [`ErrorKind::Internal`](crate::ErrorKind::Internal) if the sink of `output` wrote
+/// another number of records than the `given` ones.
 pub fn check_written(output: &Path, given: u64, written: u64) -> Result<()> {
     if written == given {
         return Ok(());

@@ -6,6 +6,7 @@ mod deviations;
 mod document;
 mod figures;
 mod ledger;
+mod lot;
 mod machine;
 mod moments;
 mod sums;
@@ -13,7 +14,7 @@ mod survey;
 mod table;
 mod tally;
 
-pub use baseline::{Baseline, BaselineFigures};
+pub use baseline::Baseline;
 pub use classes::ClassCounts;
 pub use classes::class_name;
 pub use deviations::{Deviations, Histogram};
@@ -21,15 +22,16 @@ pub use document::{
     Decision, FileFigures, LatticeFigures, Outcome, Phase, Report, RunFigures, result_bytes,
 };
 pub use figures::{
-    ClassFigures, DeviationFigures, DeviationTotals, Pair, PassFigures, PlaneFigures, TileFigures,
-    Totals,
+    BaselineFigures, ClassFigures, DeviationFigures, DeviationTotals, Pair, PassFigures,
+    PlaneFigures, TileFigures, Totals,
 };
 pub use ledger::{Ledger, Removed, check_written};
+pub use lot::Lot;
 pub use machine::Machine;
 pub use moments::{Moments, Plane};
 pub use sums::{Distances, FixedSum};
 pub use survey::{
-    FittedScan, FittedTile, Lot, PlaneDistances, ScanSurvey, TileSurvey, report_tile_level,
+    FittedScan, FittedTile, PlaneDistances, ScanSurvey, TileSurvey, report_tile_level,
 };
 pub use table::{Coordinate, Grouped, Short, Table};
 pub use tally::{Apart, KEY_POINTS, Tally};

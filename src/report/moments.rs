@@ -11,8 +11,8 @@ const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 
 /// in any order and by any split they are the same.
 ///
 /// Coordinates are relative to the middle of a box that holds all positions. Where the box is 2^44
-/// steps or longer they are rounded to 2^`shift` steps first, so that they stay below 2^43. Exact for
-/// up to 2^40 records.
+/// steps or longer they are rounded to 2^`shift` steps first, so that they stay below 2^43. Exact
+/// for up to 2^40 records.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Moments {
     origin: Position,
@@ -247,7 +247,8 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Sweeps after which the rotations of a 3 × 3 matrix are below the rounding: six to eight reach it.
+/// Sweeps after which the rotations of a 3 × 3 matrix are below the rounding: six to eight reach
+/// it.
 const SWEEPS: usize = 10;
 
 /// Unit eigenvector of the smallest eigenvalue of a symmetric matrix, by cyclic Jacobi rotations

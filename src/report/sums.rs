@@ -105,8 +105,8 @@ impl OpenSum {
     }
 }
 
-/// Distances of records to a plane: their number, their sum and that of their squares. Each distance
-/// is rounded to 2^-32 of a step first, so that positions on the plane have none.
+/// Distances of records to a plane: their number, their sum and that of their squares. Each
+/// distance is rounded to 2^-32 of a step first, so that positions on the plane have none.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Distances {
     count: u64,

@@ -15,12 +15,12 @@ use super::figures::{
     DeviationFigures, DeviationTotals, Pair, PlaneFigures, TileFigures, Totals, world_length,
     world_point,
 };
+use super::lot::Lot;
 use super::moments::{Moments, Plane};
 use super::sums::Distances;
 use crate::geom::lattice::Lattice;
 use crate::point::{Bounds, Position};
 use crate::store::{Levels, TileKey};
-use crate::tile::Fate;
 use crate::{Error, Result};
 
 /// Positions that an occupied report tile holds on average, at least.
@@ -29,41 +29,13 @@ const POSITIONS_PER_TILE: u64 = 4096;
 /// Positions whose distances are summed together.
 const AT_ONCE: usize = 4096;
 
-/// Binary logarithm of the side of report tiles in lattice steps: the smallest for which an occupied
-/// one holds 4,096 positions on average. Where none does, the smallest for which they are fewest.
+/// Binary logarithm of the side of report tiles in lattice steps: the smallest for which an
+/// occupied one holds 4,096 positions on average. Where none does, the smallest for which they are
+/// fewest.
 pub fn report_tile_level(levels: &Levels) -> u32 {
     let level = levels.smallest_side(POSITIONS_PER_TILE);
     let fewest = levels.occupied(level);
     (0..level).find(|&j| levels.occupied(j) == fewest).unwrap_or(level)
-}
-
-/// What became of the records of a position.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lot {
-    /// Records.
-    pub copies: u32,
-    /// Those of them that are kept.
-    pub kept: u32,
-    /// How far the others are from the surface of what stands for them, in lattice steps; None where
-    /// nothing does.
-    pub deviation: Option<f32>,
-}
-
-impl Lot {
-    /// The lot of `copies` records that share a fate: copies of a kept position are on the surface.
-    pub fn of(copies: u32, fate: Fate) -> Lot {
-        let (kept, deviation) = match fate {
-            Fate::Kept => (copies, None),
-            Fate::KeptOnce => (copies.min(1), Some(0.0)),
-            Fate::Removed => (0, None),
-            Fate::Represented { deviation } => (0, Some(deviation)),
-        };
-        Lot { copies, kept, deviation }
-    }
-
-    pub(super) fn removed(self) -> u32 {
-        self.copies.saturating_sub(self.kept)
-    }
 }
 
 fn no_moments(bounds: &Bounds) -> Pair<Moments> {
@@ -162,8 +134,8 @@ impl FittedTile {
     }
 }
 
-/// What is summed over the whole scan in its first walk. Surveys of parts of the scan are merged, in
-/// any order.
+/// What is summed over the whole scan in its first walk. Surveys of parts of the scan are merged,
+/// in any order.
 #[derive(Debug, Clone)]
 pub struct ScanSurvey {
     bounds: Bounds,
@@ -224,8 +196,9 @@ impl ScanSurvey {
         }
     }
 
-    /// Exact moments of tiles are those of the scan but for the origin, which saves a sum per record.
-    /// Where the scan is so large that its moments are rounded, every position adds its own.
+    /// Exact moments of tiles are those of the scan but for the origin, which saves a sum per
+    /// record. Where the scan is so large that its moments are rounded, every position adds its
+    /// own.
     fn takes_moments_from_tiles(&self) -> bool {
         self.moments.before.is_exact()
     }
@@ -249,7 +222,8 @@ impl ScanSurvey {
     }
 }
 
-/// The scan after its first walk. The second is made in parts, one for each thread, that are merged.
+/// The scan after its first walk. The second is made in parts, one for each thread, that are
+/// merged.
 #[derive(Debug, Clone)]
 pub struct FittedScan {
     survey: ScanSurvey,
@@ -270,9 +244,9 @@ impl FittedScan {
 
     /// The totals in world units, but for the baseline, which a pass measures.
     ///
-    /// Fails with [`ErrorKind::Internal`](crate::ErrorKind::Internal) if the walks over the scan and
-    /// its tiles did not see the same number of records, or a stage reported a deviation that is no
-    /// number.
+    /// Fails with [`ErrorKind::Internal`](crate::ErrorKind::Internal) if the walks over the scan
+    /// and its tiles did not see the same number of records, or a stage reported a deviation that
+    /// is no number.
     pub fn finish(self, lattice: &Lattice) -> Result<Totals> {
         let FittedScan { survey, distances } = self;
         let points = counts(&survey.moments);

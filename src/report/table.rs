@@ -5,10 +5,9 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::baseline::BaselineFigures;
 use super::classes::class_name;
 use super::document::{Decision, Outcome, Report};
-use super::figures::{ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
+use super::figures::{BaselineFigures, ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
 use super::ledger::{Ledger, Removed};
 use super::tally::KEY_POINTS;
 use crate::budget::Bytes;
@@ -38,7 +37,35 @@ impl Report {
 
 impl fmt::Display for Table<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Report { result, run } = self.report;
+        let Report { result, further, run } = self.report;
+        self.result_lines(f, result)?;
+        for result in further {
+            writeln!(f)?;
+            self.result_lines(f, result)?;
+        }
+        if let Some(peak) = run.peak_memory_bytes {
+            write!(f, "\nmemory     {} at most, budget {}", Bytes(peak), Bytes(run.memory_bytes))?;
+        }
+        time_line(f, self.report)?;
+        if run.spill_bytes > 0 {
+            write!(f, "\nspill      {}", Bytes(run.spill_bytes))?;
+        }
+        for output in &run.outputs {
+            write!(f, "\noutput     {}", shown(Path::new(&output.path)))?;
+            if let Some(bytes) = output.bytes {
+                write!(f, ", {}", Bytes(bytes))?;
+            }
+        }
+        if let Some(path) = self.path {
+            write!(f, "\nreport     {}", shown(path))?;
+        }
+        writeln!(f)
+    }
+}
+
+impl Table<'_> {
+    /// What became of the points, on one branch of the pipeline.
+    fn result_lines(&self, f: &mut fmt::Formatter<'_>, result: &Outcome) -> fmt::Result {
         let (read, kept) = (result.ledger.read, result.ledger.kept);
         write!(f, "points     {} in, {} out{}", Grouped(read), Grouped(kept), Share(kept, read))?;
         removed_line(f, &result.ledger)?;
@@ -62,25 +89,9 @@ impl fmt::Display for Table<'_> {
             write!(f, "\nangle      {angle:.4} rad at most: what {told}")?;
         }
         if let Some(totals) = &result.totals {
-            self.totals_lines(f, totals)?;
+            self.totals_lines(f, result, totals)?;
         }
-        if let Some(peak) = run.peak_memory_bytes {
-            write!(f, "\nmemory     {} at most, budget {}", Bytes(peak), Bytes(run.memory_bytes))?;
-        }
-        time_line(f, self.report)?;
-        if run.spill_bytes > 0 {
-            write!(f, "\nspill      {}", Bytes(run.spill_bytes))?;
-        }
-        for output in &run.outputs {
-            write!(f, "\noutput     {}", shown(Path::new(&output.path)))?;
-            if let Some(bytes) = output.bytes {
-                write!(f, ", {}", Bytes(bytes))?;
-            }
-        }
-        if let Some(path) = self.path {
-            write!(f, "\nreport     {}", shown(path))?;
-        }
-        writeln!(f)
+        Ok(())
     }
 }
 
@@ -168,9 +179,14 @@ impl Table<'_> {
     }
 
     /// What the reduction did to the surface, then how flat the scan is.
-    fn totals_lines(&self, f: &mut fmt::Formatter<'_>, totals: &Totals) -> fmt::Result {
-        self.deviation_line(f, totals)?;
-        self.baseline_line(f, totals)?;
+    fn totals_lines(
+        &self,
+        f: &mut fmt::Formatter<'_>,
+        result: &Outcome,
+        totals: &Totals,
+    ) -> fmt::Result {
+        self.deviation_line(f, result, totals)?;
+        self.baseline_line(f, result, totals)?;
         let planes = [("in tiles", &totals.tile_plane), ("whole scan", &totals.scan_plane)];
         let (mut heading, mut rises) = ("plane RMS", false);
         for (name, plane) in planes {
@@ -193,14 +209,19 @@ impl Table<'_> {
     }
 
     /// How far removed records are from the surface, and of how many that is known.
-    fn deviation_line(&self, f: &mut fmt::Formatter<'_>, totals: &Totals) -> fmt::Result {
+    fn deviation_line(
+        &self,
+        f: &mut fmt::Formatter<'_>,
+        result: &Outcome,
+        totals: &Totals,
+    ) -> fmt::Result {
         let removed = totals.points.before.saturating_sub(totals.points.after);
         let Some(DeviationTotals { points, rms, p95, max, at, .. }) = totals.deviation else {
             let told = removed > 0;
             return if told { write!(f, "\ndeviation  not measured") } else { Ok(()) };
         };
         write!(f, "\ndeviation  RMS {}, 95 % ≤ {}", self.long(rms), self.long(p95))?;
-        let step = self.report.result.lattice.map_or(0.0, |lattice| lattice.step);
+        let step = result.lattice.map_or(0.0, |lattice| lattice.step);
         let [x, y, z] = at.map(|at| Coordinate { at, step });
         write!(f, ", max {} at ({x}, {y}, {z})", self.long(max))?;
         match points < removed {
@@ -209,10 +230,14 @@ impl Table<'_> {
         }
     }
 
-    /// What a voxel grid of as many points would have done, where points were reduced by their normals; or
-    /// why that is not known.
-    fn baseline_line(&self, f: &mut fmt::Formatter<'_>, totals: &Totals) -> fmt::Result {
-        let result = &self.report.result;
+    /// What a voxel grid of as many points would have done, where points were reduced by their
+    /// normals; or why that is not known.
+    fn baseline_line(
+        &self,
+        f: &mut fmt::Formatter<'_>,
+        result: &Outcome,
+        totals: &Totals,
+    ) -> fmt::Result {
         let Pair { before, after } = totals.points;
         match totals.baseline {
             Some(ref baseline) => {
@@ -275,8 +300,8 @@ pub struct Coordinate {
 }
 
 impl Coordinate {
-    /// The fewest decimals that are the coordinate but for what sums and products in f64 add to it; None
-    /// where all its digits are needed.
+    /// The fewest decimals that are the coordinate but for what sums and products in f64 add to it;
+    /// None where all its digits are needed.
     fn decimals(&self) -> Option<usize> {
         let rounding = 4.0 * f64::EPSILON * self.at.abs();
         let slack = (self.step * 1e-3).max(rounding).min(self.step / 2.0);

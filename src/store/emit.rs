@@ -2,9 +2,9 @@
 
 use super::Levels;
 use super::block::{BLOCK, Block};
+use super::fetch::ref_bytes;
 use super::key::split_level;
 use super::pieces::{PIECE, Pieces};
-use super::sealed::ref_bytes;
 use super::spill::Spill;
 use crate::point::Position;
 use crate::{Error, Result};

@@ -1,8 +1,13 @@
 //! Looking up where records are stored, and what is held to fetch them.
 
 use super::pieces::{PIECE, Pieces};
-use super::sealed::ref_bytes;
 use crate::Result;
+
+/// Bytes of a record's entry in the canonical order: its number in the store and, if records have
+/// them, its tag.
+pub(super) fn ref_bytes(tagged: bool) -> usize {
+    if tagged { 12 } else { 8 }
+}
 
 /// Stretches of sorted `sources` that are in one piece, each with its first and last number.
 pub(crate) fn groups(sources: &[(u64, u32)]) -> impl Iterator<Item = (&[(u64, u32)], (u64, u64))> {

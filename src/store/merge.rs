@@ -9,10 +9,11 @@ use std::collections::binary_heap::PeekMut;
 
 use super::block::{BLOCK, Block};
 use super::emit::{Emitter, Merged, Output};
+use super::fetch::ref_bytes;
 use super::intake::{Run, TileStore};
 use super::key::{first_of_prefix, morton_cmp, morton_prefix, split_level};
 use super::pieces::Pieces;
-use super::sealed::{SealedTiles, Sequence, ref_bytes};
+use super::sealed::{SealedTiles, Sequence};
 use super::spill::Spill;
 use super::tournament::Tournament;
 use crate::Result;

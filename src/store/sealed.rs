@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 
 use super::Levels;
 use super::block::{BLOCK, Block};
-use super::fetch::{Fetch, groups};
+use super::fetch::{Fetch, groups, ref_bytes};
 use super::key::morton_cmp;
 use super::pieces::Pieces;
 use super::spill::Spill;
@@ -41,12 +41,6 @@ pub struct SealedTiles {
     records: Pieces,
     places: Option<Pieces>,
     index: Lease,
-}
-
-/// Bytes of a record's entry in the canonical order: its number in the store and, if records have
-/// them, its tag.
-pub(crate) fn ref_bytes(tagged: bool) -> usize {
-    if tagged { 12 } else { 8 }
 }
 
 /// What reading blocks needs and keeps from call to call.

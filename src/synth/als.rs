@@ -1,9 +1,9 @@
 //! An airborne scan of a landscape: overlapping strips flown there and back, each swept in zig-zag
 //! lines, about 10 points a square metre, in the order of acquisition.
 
-use super::landscape::{Landscape, Seen, View};
+use super::landscape::{Landscape, LandscapeView, SeenSurface};
 use super::random::{Random, key};
-use super::record::{Record, STRIDE, nearest, stored};
+use super::record::{STRIDE, SceneRecord, nearest, stored};
 
 /// World units (metres) of a stored step.
 pub const SCALE: f64 = 0.001;
@@ -31,7 +31,7 @@ const HIGH_VEGETATION: u8 = 5;
 const BUILDING: u8 = 6;
 
 /// The flight and what is flown over.
-pub struct Als {
+pub struct AlsScene {
     key: u64,
     landscape: Landscape,
     noise: f64,
@@ -44,7 +44,7 @@ pub struct Als {
     per_line: u64,
 }
 
-impl Als {
+impl AlsScene {
     pub fn new(points: u64, seed: u64, noise: f64) -> Self {
         let side = (points as f64 / DENSITY).sqrt();
         let strips = (side / WIDEST).ceil().max(FEWEST);
@@ -54,7 +54,7 @@ impl Als {
         let share = if side > 0.0 { SWATH * between / side } else { 0.0 };
         let per_line = ((per_strip as f64 * share).sqrt().round() as u64).max(2);
         let landscape = Landscape::new(seed);
-        Als { key: key(seed, 0x75), landscape, noise, side, between, per_strip, per_line }
+        AlsScene { key: key(seed, 0x75), landscape, noise, side, between, per_strip, per_line }
     }
 
     /// Makes the points from number `first` on.
@@ -81,18 +81,18 @@ impl Als {
 
     /// The first return of pulse `index` and, where it met a crown and is the first of a pair, the
     /// second.
-    fn shoot(&self, index: u64, view: &mut View) -> (Record, Option<Record>) {
+    fn shoot(&self, index: u64, view: &mut LandscapeView) -> (SceneRecord, Option<SceneRecord>) {
         let mut random = Random::new(self.key, index);
         let (plan, pulse) = self.aim(index, &mut random);
         let seen = view.look(plan, random.unit());
         let [noise, other_noise] = random.gaussians();
-        let echoes = index.is_multiple_of(2) && matches!(seen, Seen::Crown { .. });
+        let echoes = index.is_multiple_of(2) && matches!(seen, SeenSurface::Crown { .. });
         let (class, height) = match seen {
-            Seen::Ground(height) => (GROUND, height),
-            Seen::Roof(height) => (BUILDING, height),
-            Seen::Crown { top, .. } => (HIGH_VEGETATION, top),
+            SeenSurface::Ground(height) => (GROUND, height),
+            SeenSurface::Roof(height) => (BUILDING, height),
+            SeenSurface::Crown { top, .. } => (HIGH_VEGETATION, top),
         };
-        let returned = |class, height, number, random: &mut Random| Record {
+        let returned = |class, height, number, random: &mut Random| SceneRecord {
             position: stored([plan[0], plan[1], height], PER_UNIT),
             classification: class,
             intensity: intensity(class, random),
@@ -102,7 +102,7 @@ impl Als {
         };
         let first = returned(class, height + self.noise * noise, 1, &mut random);
         let second = match seen {
-            Seen::Crown { top, ground } if echoes => {
+            SeenSurface::Crown { top, ground } if echoes => {
                 // Most second returns are from the ground, the others from below the crown.
                 let below = random.unit();
                 let (class, height) = match below < 0.7 {
@@ -117,7 +117,7 @@ impl Als {
     }
 
     /// Where pulse `index` goes, and a record of all that does not depend on what it meets.
-    fn aim(&self, index: u64, random: &mut Random) -> ([f64; 2], Record) {
+    fn aim(&self, index: u64, random: &mut Random) -> ([f64; 2], SceneRecord) {
         let (strip, in_strip) = (index / self.per_strip, index % self.per_strip);
         let (line, in_line) = (in_strip / self.per_line, in_strip % self.per_line);
         let swept = (in_line as f64 + 0.5) / self.per_line as f64;
@@ -131,12 +131,12 @@ impl Als {
             along * self.side + stray * (random.unit() - 0.5),
             (strip as f64 + 0.5 + SWATH * across) * self.between + stray * (random.unit() - 0.5),
         ];
-        let record = Record {
+        let record = SceneRecord {
             scan_direction: back,
             edge_of_flight_line: in_line == 0 || in_line == self.per_line - 1,
             scan_angle: nearest(across * OPENING) as i16,
             point_source_id: strip as u16 + 1,
-            ..Record::single([0; 3], START + strip as f64 * TURN + index as f64 * PULSE)
+            ..SceneRecord::single([0; 3], START + strip as f64 * TURN + index as f64 * PULSE)
         };
         (plan, record)
     }

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Deserializer, Serialize, de};
 
-use super::{Scene, Synthetic};
+use super::scene::Scene;
+use super::synthetic::Synthetic;
 use crate::Result;
 use crate::stage::{Role, StageKind, StagePlace};
 

@@ -21,13 +21,13 @@ const GROVE: f64 = 9.0;
 
 /// The landscape of a seed; plan coordinates in metres.
 pub struct Landscape {
-    waves: Waves,
+    waves: HeightWaves,
     buildings: u64,
     trees: u64,
 }
 
 /// Wave numbers along x and y in turns a metre, phases in turns, heights; side by side.
-struct Waves {
+struct HeightWaves {
     x: [f64; WAVES],
     y: [f64; WAVES],
     phase: [f64; WAVES],
@@ -58,7 +58,7 @@ struct Tree {
 
 /// What a laser pulse from above meets first.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Seen {
+pub enum SeenSurface {
     /// Bare ground at this height.
     Ground(f64),
     /// A roof at this height.
@@ -69,7 +69,7 @@ pub enum Seen {
 
 /// Looks at a landscape and remembers the last plot and grove, which the next pulse mostly shares.
 /// Memory saves time and changes no answer.
-pub struct View<'a> {
+pub struct LandscapeView<'a> {
     landscape: &'a Landscape,
     plot: Option<([i64; 2], Option<Building>)>,
     grove: Option<([i64; 2], Option<Tree>)>,
@@ -78,8 +78,12 @@ pub struct View<'a> {
 impl Landscape {
     /// The landscape of `seed`.
     pub fn new(seed: u64) -> Self {
-        let mut waves =
-            Waves { x: [0.0; WAVES], y: [0.0; WAVES], phase: [0.0; WAVES], height: [0.0; WAVES] };
+        let mut waves = HeightWaves {
+            x: [0.0; WAVES],
+            y: [0.0; WAVES],
+            phase: [0.0; WAVES],
+            height: [0.0; WAVES],
+        };
         let [short, long] = WAVELENGTHS.map(libm::log);
         for i in 0..WAVES {
             let mut random = Random::new(key(seed, 0x72), i as u64);
@@ -94,8 +98,8 @@ impl Landscape {
     }
 
     /// A view of it with nothing remembered.
-    pub fn view(&self) -> View<'_> {
-        View { landscape: self, plot: None, grove: None }
+    pub fn view(&self) -> LandscapeView<'_> {
+        LandscapeView { landscape: self, plot: None, grove: None }
     }
 
     /// Height of the bare ground.
@@ -140,24 +144,24 @@ impl Landscape {
     }
 }
 
-impl View<'_> {
+impl LandscapeView<'_> {
     /// What a pulse at `plan` meets first. `chance`, uniform in [0, 1), decides how deep it goes
     /// into a crown, and whether it passes.
-    pub fn look(&mut self, plan: [f64; 2], chance: f64) -> Seen {
+    pub fn look(&mut self, plan: [f64; 2], chance: f64) -> SeenSurface {
         let building = self.building(plan);
         if let Some(height) = building.and_then(|b| b.roof(plan)) {
-            return Seen::Roof(height);
+            return SeenSurface::Roof(height);
         }
         let ground = self.landscape.ground(plan);
         match self.tree(plan) {
             // A tree that would stand in the house was never planted.
             Some(tree) if building.is_none_or(|b| !b.stands_on(tree.center)) => {
                 match tree.crown(plan, chance) {
-                    Some(above) => Seen::Crown { top: ground + above, ground },
-                    None => Seen::Ground(ground),
+                    Some(above) => SeenSurface::Crown { top: ground + above, ground },
+                    None => SeenSurface::Ground(ground),
                 }
             }
-            _ => Seen::Ground(ground),
+            _ => SeenSurface::Ground(ground),
         }
     }
 
@@ -261,9 +265,9 @@ mod tests {
             let seen = view.look(plan, 0.5);
             assert_eq!(seen, landscape.view().look(plan, 0.5));
             match seen {
-                Seen::Ground(_) => kinds[0] += 1,
-                Seen::Roof(_) => kinds[1] += 1,
-                Seen::Crown { top, ground } => {
+                SeenSurface::Ground(_) => kinds[0] += 1,
+                SeenSurface::Roof(_) => kinds[1] += 1,
+                SeenSurface::Crown { top, ground } => {
                     assert!(top > ground);
                     kinds[2] += 1;
                 }

@@ -3,9 +3,9 @@
 
 use std::f64::consts::PI;
 
-use super::Truth;
 use super::random::{Random, key};
-use super::record::{Record, STRIDE, stored};
+use super::record::{STRIDE, SceneRecord, stored};
+use super::truth::Truth;
 
 /// World units of a stored step.
 pub const SCALE: f64 = 1e-5;
@@ -27,7 +27,7 @@ const DOME_CENTER: f64 = HEIGHT + DOME_HEIGHT - DOME_RADIUS;
 
 /// A face of the part; its place in [`FACES`] is the `UserData` of its points.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Face {
+enum PartFace {
     Bottom,
     Top,
     /// Perpendicular to an axis (0 or 1), on its negative or positive side.
@@ -36,35 +36,35 @@ enum Face {
     Hole(usize),
 }
 
-const FACES: [Face; 11] = [
-    Face::Bottom,
-    Face::Top,
-    Face::Side(0, -1.0),
-    Face::Side(0, 1.0),
-    Face::Side(1, -1.0),
-    Face::Side(1, 1.0),
-    Face::Dome,
-    Face::Hole(0),
-    Face::Hole(1),
-    Face::Hole(2),
-    Face::Hole(3),
+const FACES: [PartFace; 11] = [
+    PartFace::Bottom,
+    PartFace::Top,
+    PartFace::Side(0, -1.0),
+    PartFace::Side(0, 1.0),
+    PartFace::Side(1, -1.0),
+    PartFace::Side(1, 1.0),
+    PartFace::Dome,
+    PartFace::Hole(0),
+    PartFace::Hole(1),
+    PartFace::Hole(2),
+    PartFace::Hole(3),
 ];
 
-pub struct Part {
+pub struct PartScene {
     key: u64,
     noise: f64,
     /// Share of the surface up to and with each face.
     shares: [f64; FACES.len()],
 }
 
-impl Part {
+impl PartScene {
     pub fn new(seed: u64, noise: f64) -> Self {
         let mut sum = 0.0;
         let shares = FACES.map(|face| {
             sum += face.area();
             sum
         });
-        Part { key: key(seed, 0x71), noise, shares: shares.map(|s| s / sum) }
+        PartScene { key: key(seed, 0x71), noise, shares: shares.map(|s| s / sum) }
     }
 
     /// Makes the points from number `first` on; the noise is the same in every direction, so edges
@@ -78,52 +78,52 @@ impl Part {
             let ([a, b], [c, _]) = (random.gaussians(), random.gaussians());
             let off = [a, b, c];
             let position = std::array::from_fn(|axis| on[axis] + self.noise * off[axis]);
-            Record {
+            SceneRecord {
                 intensity: 1000,
                 user_data: number as u8,
-                ..Record::single(stored(position, PER_UNIT), index as f64 * 1e-6)
+                ..SceneRecord::single(stored(position, PER_UNIT), index as f64 * 1e-6)
             }
             .store(bytes);
         }
     }
 }
 
-impl Face {
+impl PartFace {
     fn area(self) -> f64 {
         let plan = 4.0 * HALF[0] * HALF[1] - 4.0 * PI * HOLE_RADIUS * HOLE_RADIUS;
         match self {
-            Face::Bottom => plan,
-            Face::Top => plan - PI * DOME_FOOT * DOME_FOOT,
-            Face::Side(axis, _) => 2.0 * HALF[1 - axis] * HEIGHT,
-            Face::Dome => 2.0 * PI * DOME_RADIUS * DOME_HEIGHT,
-            Face::Hole(_) => 2.0 * PI * HOLE_RADIUS * HEIGHT,
+            PartFace::Bottom => plan,
+            PartFace::Top => plan - PI * DOME_FOOT * DOME_FOOT,
+            PartFace::Side(axis, _) => 2.0 * HALF[1 - axis] * HEIGHT,
+            PartFace::Dome => 2.0 * PI * DOME_RADIUS * DOME_HEIGHT,
+            PartFace::Hole(_) => 2.0 * PI * HOLE_RADIUS * HEIGHT,
         }
     }
 
     /// A point uniform on the face.
     fn sample(self, random: &mut Random) -> [f64; 3] {
         match self {
-            Face::Bottom | Face::Top => loop {
+            PartFace::Bottom | PartFace::Top => loop {
                 let plan = HALF.map(|half| random.between(-half, half));
                 if self.has(plan) {
-                    let z = if self == Face::Top { HEIGHT } else { 0.0 };
+                    let z = if self == PartFace::Top { HEIGHT } else { 0.0 };
                     return [plan[0], plan[1], z];
                 }
             },
-            Face::Side(axis, sign) => {
+            PartFace::Side(axis, sign) => {
                 let mut p = [0.0, 0.0, random.between(0.0, HEIGHT)];
                 p[axis] = sign * HALF[axis];
                 p[1 - axis] = random.between(-HALF[1 - axis], HALF[1 - axis]);
                 p
             }
-            Face::Dome => {
+            PartFace::Dome => {
                 // Equal heights of a sphere have equal areas (Archimedes).
                 let up = random.between(DOME_RADIUS - DOME_HEIGHT, DOME_RADIUS);
                 let out = (DOME_RADIUS * DOME_RADIUS - up * up).sqrt();
                 let [cos, sin] = random.direction();
                 [out * cos, out * sin, DOME_CENTER + up]
             }
-            Face::Hole(hole) => {
+            PartFace::Hole(hole) => {
                 let [cos, sin] = random.direction();
                 let [x, y] = HOLES[hole];
                 [x + HOLE_RADIUS * cos, y + HOLE_RADIUS * sin, random.between(0.0, HEIGHT)]
@@ -134,7 +134,7 @@ impl Face {
     /// True if the flat face (top or bottom) is there at this place of the plan.
     fn has(self, plan: [f64; 2]) -> bool {
         let in_hole = HOLES.iter().any(|hole| from_axis(plan, *hole).1 < HOLE_RADIUS);
-        let under_dome = self == Face::Top && from_axis(plan, [0.0; 2]).1 < DOME_FOOT;
+        let under_dome = self == PartFace::Top && from_axis(plan, [0.0; 2]).1 < DOME_FOOT;
         !in_hole && !under_dome
     }
 
@@ -146,21 +146,21 @@ impl Face {
             _ => p[axis].clamp(-HALF[axis], HALF[axis]),
         });
         match self {
-            Face::Bottom | Face::Top => {
-                let up = self == Face::Top;
+            PartFace::Bottom | PartFace::Top => {
+                let up = self == PartFace::Top;
                 let foot = [inside[0], inside[1], if up { HEIGHT } else { 0.0 }];
                 let normal = [0.0, 0.0, if up { 1.0 } else { -1.0 }];
                 // Over a hole or the dome, the rim is nearest: it belongs to them too.
                 self.has([foot[0], foot[1]]).then(|| Truth { distance: length(p, foot), normal })
             }
-            Face::Side(axis, sign) => {
+            PartFace::Side(axis, sign) => {
                 let mut foot: [f64; 3] = inside;
                 foot[axis] = sign * HALF[axis];
                 let mut normal = [0.0; 3];
                 normal[axis] = sign;
                 Some(Truth { distance: length(p, foot), normal })
             }
-            Face::Dome => {
+            PartFace::Dome => {
                 let center = [0.0, 0.0, DOME_CENTER];
                 let from_center = length(p, center);
                 let ([cos, sin], out) = from_axis([p[0], p[1]], [0.0; 2]);
@@ -174,7 +174,7 @@ impl Face {
                 let normal = [rim[0], rim[1], HEIGHT - DOME_CENTER].map(|v| v / DOME_RADIUS);
                 Some(Truth { distance: length(p, rim), normal })
             }
-            Face::Hole(hole) => {
+            PartFace::Hole(hole) => {
                 let [x, y] = HOLES[hole];
                 let ([cos, sin], _) = from_axis([p[0], p[1]], [x, y]);
                 let foot = [x + HOLE_RADIUS * cos, y + HOLE_RADIUS * sin, inside[2]];

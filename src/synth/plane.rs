@@ -1,8 +1,8 @@
 //! A tilted plane, seen evenly in random order.
 
-use super::Truth;
 use super::random::{Random, key};
-use super::record::{Record, STRIDE, stored};
+use super::record::{STRIDE, SceneRecord, stored};
+use super::truth::Truth;
 
 /// World units of a stored step.
 pub const SCALE: f64 = 1e-4;
@@ -13,15 +13,15 @@ const DENSITY: f64 = 400.0;
 const SLOPE: [f64; 2] = [0.25, 0.125];
 
 /// z = x / 4 + y / 8 over a square from the origin, as large as the points fill.
-pub struct Plane {
+pub struct PlaneScene {
     key: u64,
     side: f64,
     noise: f64,
 }
 
-impl Plane {
+impl PlaneScene {
     pub fn new(points: u64, seed: u64, noise: f64) -> Self {
-        Plane { key: key(seed, 0x70), side: (points as f64 / DENSITY).sqrt(), noise }
+        PlaneScene { key: key(seed, 0x70), side: (points as f64 / DENSITY).sqrt(), noise }
     }
 
     /// Makes the points from number `first` on; the noise is their distance from the plane.
@@ -33,9 +33,9 @@ impl Plane {
             let off = self.noise * random.gaussians()[0];
             let on = [x, y, SLOPE[0] * x + SLOPE[1] * y];
             let position = std::array::from_fn(|axis| on[axis] + off * normal[axis]);
-            Record {
+            SceneRecord {
                 intensity: 1000,
-                ..Record::single(stored(position, PER_UNIT), index as f64 * 1e-6)
+                ..SceneRecord::single(stored(position, PER_UNIT), index as f64 * 1e-6)
             }
             .store(bytes);
         }

@@ -7,7 +7,7 @@ pub const STRIDE: usize = 30;
 
 /// The fields of a record that a scene sets; the others are 0.
 #[derive(Clone, Copy)]
-pub struct Record {
+pub struct SceneRecord {
     /// Stored X, Y, Z: world coordinates less the origin, in steps of the scale.
     pub position: [i32; 3],
     pub intensity: u16,
@@ -24,10 +24,10 @@ pub struct Record {
     pub gps_time: f64,
 }
 
-impl Record {
+impl SceneRecord {
     /// A single return at `position`, class 1 (unclassified), at `gps_time`.
     pub fn single(position: [i32; 3], gps_time: f64) -> Self {
-        Record {
+        SceneRecord {
             position,
             intensity: 0,
             return_number: 1,
@@ -59,8 +59,8 @@ impl Record {
 }
 
 /// The whole number nearest to `value`, ties to even, for |value| < 2^51. Adding and subtracting
-/// 1.5 · 2^52 leaves no room for a fraction; unlike a call of `round` it costs two additions on every
-/// machine.
+/// 1.5 · 2^52 leaves no room for a fraction; unlike a call of `round` it costs two additions on
+/// every machine.
 pub fn nearest(value: f64) -> f64 {
     const NO_FRACTION: f64 = 6_755_399_441_055_744.0;
     (value + NO_FRACTION) - NO_FRACTION
@@ -81,7 +81,7 @@ mod tests {
     fn a_stored_record_reads_back_by_the_names_of_its_fields() {
         let schema = las::layout(FORMAT, &[], [0.001; 3], [350_000.0, 0.0, -5.0]);
         assert_eq!(schema.stride, STRIDE);
-        let record = Record {
+        let record = SceneRecord {
             position: [-1, 2_000, i32::MAX],
             intensity: 65_535,
             return_number: 2,

@@ -2,14 +2,15 @@
 //! falls off, and a dome that meets the first plane at an angle. Nothing of it is hidden from the
 //! front, so every place of the plan has one height.
 
-use super::Truth;
+use super::truth::Truth;
 
 /// Width (along x) and length (along y) from world 0, in millimetres.
 pub const WIDTH: f64 = 120.0;
 pub const LENGTH: f64 = 160.0;
 /// The edge runs along y here; left of it the height is 0.
 const EDGE: f64 = 80.0;
-/// Fall of the second plane per millimetre of x: about 7°, more than the angle that a cell may span.
+/// Fall of the second plane per millimetre of x: about 7°, more than the angle that a cell may
+/// span.
 const FALL: f64 = 0.125;
 /// Axis of the dome, radius of its foot, its height, and the radius and the centre of its sphere
 /// (30² + 72² = 78²): it meets the plane at about 23°.

@@ -1,8 +1,8 @@
 //! A sphere, seen evenly from all sides in random order: the surface whose normals are known best.
 
-use super::Truth;
 use super::random::{Random, key};
-use super::record::{Record, STRIDE, stored};
+use super::record::{STRIDE, SceneRecord, stored};
+use super::truth::Truth;
 
 /// World units of a stored step.
 pub const SCALE: f64 = 1e-5;
@@ -10,14 +10,14 @@ const PER_UNIT: f64 = 1e5;
 /// The sphere is around world 0.
 const RADIUS: f64 = 50.0;
 
-pub struct Sphere {
+pub struct SphereScene {
     key: u64,
     noise: f64,
 }
 
-impl Sphere {
+impl SphereScene {
     pub fn new(seed: u64, noise: f64) -> Self {
-        Sphere { key: key(seed, 0x73), noise }
+        SphereScene { key: key(seed, 0x73), noise }
     }
 
     /// Makes the points from number `first` on; the noise is along the normal.
@@ -27,10 +27,13 @@ impl Sphere {
             let normal = normal(&mut random);
             let out = RADIUS + self.noise * random.gaussians()[0];
             let octant = (0..3).map(|axis| u8::from(normal[axis] < 0.0) << axis).sum();
-            Record {
+            SceneRecord {
                 intensity: 1000,
                 user_data: octant,
-                ..Record::single(stored(normal.map(|v| v * out), PER_UNIT), index as f64 * 1e-6)
+                ..SceneRecord::single(
+                    stored(normal.map(|v| v * out), PER_UNIT),
+                    index as f64 * 1e-6,
+                )
             }
             .store(bytes);
         }

@@ -1,9 +1,9 @@
 //! The experiment of the paper that the method comes from: squares projected on the front of a test
-//! object, one point for the centre of each. Of the object and the noise the paper says nothing; the
-//! object is [`relief`], a pixel a tenth of a millimetre, and the noise is in depth.
+//! object, one point for the centre of each. Of the object and the noise the paper says nothing;
+//! the object is [`relief`], a pixel a tenth of a millimetre, and the noise is in depth.
 
 use super::random::{Random, key};
-use super::record::{Record, STRIDE, stored};
+use super::record::{STRIDE, SceneRecord, stored};
 use super::relief;
 
 /// World units (millimetres) of a stored step, and of a pixel.
@@ -31,15 +31,15 @@ pub enum Pattern {
     Uniform,
 }
 
-pub struct Squares {
+pub struct SquaresScene {
     pattern: Pattern,
     key: u64,
     noise: f64,
 }
 
-impl Squares {
+impl SquaresScene {
     pub fn new(pattern: Pattern, seed: u64, noise: f64) -> Self {
-        Squares { pattern, key: key(seed, 0x72), noise }
+        SquaresScene { pattern, key: key(seed, 0x72), noise }
     }
 
     /// Makes the points from number `first` on.
@@ -53,11 +53,11 @@ impl Squares {
             let plan = pixels.map(|v| v * PIXEL);
             let (face, height) = relief::height(plan);
             let position = [plan[0], plan[1], height + self.noise * random.gaussians()[0]];
-            Record {
+            SceneRecord {
                 intensity: 1000,
                 user_data: face as u8,
                 point_source_id: run + 1,
-                ..Record::single(stored(position, PER_UNIT), index as f64 * 1e-6)
+                ..SceneRecord::single(stored(position, PER_UNIT), index as f64 * 1e-6)
             }
             .store(bytes);
         }

@@ -1,5 +1,8 @@
+use super::synthetic::{MOST_POINTS, PART_POINTS};
 use super::*;
-use crate::point::names;
+use crate::io::las;
+use crate::point::{PointBatch, names};
+use crate::stage::{OpenSource, Source};
 
 fn synthetic(scene: Scene, points: u64) -> Synthetic {
     Synthetic { scene, points, seed: 7, noise: None }

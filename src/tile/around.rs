@@ -5,11 +5,10 @@ use std::sync::Arc;
 
 use super::remote::Remote;
 use super::sieve::Sieve;
-use super::{Bounds, Position, Tile, chosen};
 use crate::Result;
 use crate::geom::nearest::Nearest;
 use crate::geom::simd::Simd;
-use crate::point::distance2;
+use crate::point::{Bounds, Position, distance2};
 use crate::store::SealedTiles;
 use crate::store::morton_cmp;
 
@@ -84,67 +83,60 @@ impl Around {
     pub fn take_unproven(&mut self) -> u64 {
         std::mem::take(&mut self.unproven)
     }
-}
 
-impl Tile {
-    /// Sets the instruction set that the tile's neighbours are searched by, and that its stages are
-    /// to compute by: that of the processor's best if nothing else is set. Drops what was reserved.
-    pub fn compute_by(&mut self, simd: Simd) {
-        self.around.search = Nearest::with(simd);
+    /// Searches by this instruction set from now on. Drops what was reserved.
+    pub(super) fn compute_by(&mut self, simd: Simd) {
+        self.search = Nearest::with(simd);
     }
 
-    /// The instruction set that stages are to compute by.
-    pub fn simd(&self) -> Simd {
-        self.around.search.simd()
+    /// The instruction set that neighbours are searched by.
+    pub(super) fn simd(&self) -> Simd {
+        self.search.simd()
     }
 
+    /// Everything in `loaded` is at hand; what is beyond is in `tiles`.
     pub(super) fn surround(&mut self, tiles: &Arc<SealedTiles>, sieve: &Sieve, loaded: Bounds) {
-        self.around.beyond = Beyond::new(tiles, sieve, loaded);
+        self.beyond = Beyond::new(tiles, sieve, loaded);
     }
 
-    /// Calls `visit` for every chosen position of the zone with its index in the tile and the `k`
-    /// nearest *other* positions of the whole scan: nearest by exact squared distance, ties by Morton
-    /// order. Fewer only if the scan has fewer.
-    pub fn each_neighborhood(
+    /// Calls `visit` for every one of `positions` that `is_asked` with its index and the `k` nearest
+    /// *other* positions of the whole scan.
+    pub(super) fn each_neighborhood(
         &mut self,
+        positions: &[Position],
         k: usize,
+        is_asked: impl Fn(usize) -> bool,
         mut visit: impl FnMut(usize, &Neighborhood<'_>),
     ) -> Result<()> {
-        let Tile { positions, zone, around, selections, limits, .. } = self;
-        let Around { search, remote, beyond, offsets, ranks, unproven, tied } = around;
+        let Around { search, remote, beyond, offsets, ranks, unproven, tied } = self;
         let mut outcome = Ok(());
         search.build(positions);
-        search.search(
-            positions,
-            k,
-            |i| zone.contains(positions[i]) && chosen(selections, *limits, i),
-            |i, neighbors, d2| {
-                if outcome.is_err() {
-                    return;
+        search.search(positions, k, is_asked, |i, neighbors, d2| {
+            if outcome.is_err() {
+                return;
+            }
+            let p = positions[i];
+            let enough = neighbors.len() == k;
+            offsets.clear();
+            if let Some(beyond) = beyond
+                && !(enough && beyond.proves(p, d2))
+            {
+                *unproven += 1;
+                let scan = (&*beyond.tiles, &beyond.sieve);
+                match remote.nearest(scan, p, k, enough.then_some(d2)) {
+                    Ok(found) => offsets.extend(found),
+                    Err(error) => return outcome = Err(error),
                 }
-                let p = positions[i];
-                let enough = neighbors.len() == k;
-                offsets.clear();
-                if let Some(beyond) = beyond
-                    && !(enough && beyond.proves(p, d2))
-                {
-                    *unproven += 1;
-                    let scan = (&*beyond.tiles, &beyond.sieve);
-                    match remote.nearest(scan, p, k, enough.then_some(d2)) {
-                        Ok(found) => offsets.extend(found),
-                        Err(error) => return outcome = Err(error),
-                    }
-                    rank(offsets, ranks);
-                    offsets.iter_mut().for_each(|q| *q = offset(p, *q));
-                    return visit(i, &Neighborhood::of_offsets(offsets, ranks));
-                }
-                if let [.., before, _] = *neighbors {
-                    *tied += u64::from(distance2(p, positions[before as usize]) == d2);
-                }
-                offsets.extend(neighbors.iter().map(|&rank| offset(p, positions[rank as usize])));
-                visit(i, &Neighborhood { offsets, ranks: neighbors, farthest2: d2 });
-            },
-        );
+                rank(offsets, ranks);
+                offsets.iter_mut().for_each(|q| *q = offset(p, *q));
+                return visit(i, &Neighborhood::of_offsets(offsets, ranks));
+            }
+            if let [.., before, _] = *neighbors {
+                *tied += u64::from(distance2(p, positions[before as usize]) == d2);
+            }
+            offsets.extend(neighbors.iter().map(|&rank| offset(p, positions[rank as usize])));
+            visit(i, &Neighborhood { offsets, ranks: neighbors, farthest2: d2 });
+        });
         outcome
     }
 }

@@ -138,7 +138,7 @@ impl Loader {
         normals.resize(positions.len(), [f32::NAN; 3]);
         figures.resize(if self.sieve.figures.is_some() { positions.len() } else { 0 }, f64::NAN);
         fates.resize(positions.len(), Fate::Kept);
-        self.tile.surround(&tiles, &self.sieve, loaded);
+        self.tile.around.surround(&tiles, &self.sieve, loaded);
         Ok(&mut self.tile)
     }
 

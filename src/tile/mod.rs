@@ -13,6 +13,8 @@ pub use sieve::{Run, Sieve};
 
 use std::ops::Range;
 
+use crate::Result;
+use crate::geom::simd::Simd;
 use crate::point::{Bounds, Position};
 
 /// The points of one cube, then a rim of its neighbours' points.
@@ -118,6 +120,30 @@ impl Tile {
     /// flags that the stage is limited to.
     pub fn is_chosen(&self, i: usize) -> bool {
         self.copies[i] > 0 && chosen(&self.selections, self.limits, i)
+    }
+
+    /// Sets the instruction set that the tile's neighbours are searched by, and that its stages are
+    /// to compute by: that of the processor's best if nothing else is set. Drops what was reserved.
+    pub fn compute_by(&mut self, simd: Simd) {
+        self.around.compute_by(simd);
+    }
+
+    /// The instruction set that stages are to compute by.
+    pub fn simd(&self) -> Simd {
+        self.around.simd()
+    }
+
+    /// Calls `visit` for every chosen position of the zone with its index in the tile and the `k`
+    /// nearest *other* positions of the whole scan: nearest by exact squared distance, ties by Morton
+    /// order. Fewer only if the scan has fewer.
+    pub fn each_neighborhood(
+        &mut self,
+        k: usize,
+        visit: impl FnMut(usize, &Neighborhood<'_>),
+    ) -> Result<()> {
+        let Tile { positions, zone, around, selections, limits, .. } = self;
+        let is_asked = |i: usize| zone.contains(positions[i]) && chosen(selections, *limits, i);
+        around.each_neighborhood(positions, k, is_asked, visit)
     }
 
     /// True if columns must be right for position `i`.

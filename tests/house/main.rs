@@ -3,3 +3,4 @@
 mod dependencies;
 mod drift;
 mod imports;
+mod modules;

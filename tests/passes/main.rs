@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod branches;
 mod exact;
 mod lossless;
 mod same_bytes;

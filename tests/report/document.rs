@@ -66,7 +66,7 @@ fn report(tiles: u64) -> Report {
             ClassFigures { class: 65, before: 1_000, after: 1_000 },
         ],
     };
-    Report { result, run: run_figures() }
+    Report { result, further: Vec::new(), run: run_figures() }
 }
 
 fn run_figures() -> RunFigures {

@@ -4,6 +4,8 @@ use super::*;
 
 fn demands(limit: u64) -> Demands {
     Demands {
+        standings: 2,
+        filters: false,
         limit,
         resident: 8 << 20,
         threads: 2,

@@ -1,7 +1,7 @@
 //! The search of one point in integers alone: slower, and right whatever floats could not tell.
 
 use super::kernel::Boxes;
-use super::tree::{Tree, above, below};
+use super::tree::{BoxTree, above, below};
 use super::walk::{WIDENED, Work, lanes, nearest};
 use crate::geom::simd::Simd;
 use crate::point::{Position, distance2};
@@ -12,7 +12,7 @@ pub(super) type Neighbor = (u128, u32);
 /// One point on its way through the tree, from the root.
 pub(super) struct ExactWalk<'a> {
     simd: Simd,
-    tree: &'a Tree,
+    tree: &'a BoxTree,
     positions: &'a [Position],
     work: &'a mut Work,
     /// The point that searches.
@@ -32,7 +32,7 @@ impl<'a> ExactWalk<'a> {
     /// the answer takes their place.
     pub fn new(
         simd: Simd,
-        tree: &'a Tree,
+        tree: &'a BoxTree,
         positions: &'a [Position],
         work: &'a mut Work,
         query: u32,

@@ -3,9 +3,9 @@
 //! Squared distances are ((dx·dx) + dy·dy) + dz·dz everywhere, boxes included: rounding is
 //! monotonic, so no point of a box gets a smaller float than its box does.
 
-use super::tree::{LANES, Leaf, Node};
-use crate::geom::rows::Row;
-use crate::geom::simd::{COLUMNS, Kernel, Lanes, joined, smaller};
+use super::refine::Leaf;
+use super::tree::BoxNode;
+use crate::geom::simd::{COLUMNS, Kernel, LANES, Lanes, Row, joined, smaller};
 
 /// What is farther than any point: no candidate yet.
 pub(super) const NONE: f64 = f64::from_bits((f32::MAX.to_bits() as u64) << 32 | u32::MAX as u64);
@@ -174,7 +174,7 @@ fn keys(distances: &[f32; LANES], rank: u32) -> Row {
 /// The points of a leaf meet the leaves of a run, nearest first.
 pub(super) struct Visit<'a> {
     pub batch: &'a mut Batch,
-    pub node: &'a Node,
+    pub node: &'a BoxNode,
     /// The children of the node.
     pub leaves: &'a [Leaf],
     /// Those to be met, a bit each.
@@ -244,7 +244,7 @@ fn lanes_near<L: Lanes>(
     lanes: L,
     batch: &Batch,
     at: [L::F32; 3],
-    node: &Node,
+    node: &BoxNode,
     child: usize,
 ) -> u32 {
     let x =
@@ -318,7 +318,7 @@ fn gap<L: Lanes>(lanes: L, lo: L::F32, hi: L::F32, from: L::F32, to: L::F32) -> 
 
 /// Squared distances between the 16 boxes of a node and the box `lo..hi`.
 #[inline(always)]
-fn box_distances<L: Lanes>(lanes: L, node: &Node, lo: [f32; 3], hi: [f32; 3]) -> L::F32 {
+fn box_distances<L: Lanes>(lanes: L, node: &BoxNode, lo: [f32; 3], hi: [f32; 3]) -> L::F32 {
     let (los, his) = (load(lanes, &node.lo), load(lanes, &node.hi));
     let x = gap(lanes, los[0], his[0], lanes.splat(lo[0]), lanes.splat(hi[0]));
     let y = gap(lanes, los[1], his[1], lanes.splat(lo[1]), lanes.splat(hi[1]));
@@ -326,10 +326,10 @@ fn box_distances<L: Lanes>(lanes: L, node: &Node, lo: [f32; 3], hi: [f32; 3]) ->
     norm(lanes, x, y, z)
 }
 
-/// Squared distances between the boxes of a node and the box `lo..hi`, and a bit for each that is not
-/// above `bound`.
+/// Squared distances between the boxes of a node and the box `lo..hi`, and a bit for each that is
+/// not above `bound`.
 pub(super) struct Boxes<'a> {
-    pub node: &'a Node,
+    pub node: &'a BoxNode,
     pub lo: [f32; 3],
     pub hi: [f32; 3],
     pub bound: f32,

@@ -27,11 +27,11 @@ mod walk;
 
 use exact::{ExactWalk, Neighbor};
 use kernel::{Batch, distance_of};
-use tree::{EXACT, LANES, Node, Tree};
-use walk::Walk;
+use tree::{BoxNode, BoxTree, EXACT};
+use walk::TreeWalk;
 pub use walk::Work;
 
-use crate::geom::simd::Simd;
+use crate::geom::simd::{LANES, Simd};
 use crate::point::{Position, distance2};
 
 /// The relative error of the root of a float distance, 2.5 · 2^-24, rounded up.
@@ -54,7 +54,7 @@ const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
 #[derive(Debug)]
 pub struct Nearest {
     simd: Simd,
-    tree: Tree,
+    tree: BoxTree,
     points: usize,
     batch: Batch,
     found: Vec<Neighbor>,
@@ -77,7 +77,9 @@ impl Nearest {
 
     /// Bytes that a search of `k` neighbours in a set of `points` holds, to the byte.
     pub fn bytes(points: usize, k: usize) -> usize {
-        Tree::bytes(points) + Batch::bytes(k + 1) + k * (size_of::<Neighbor>() + size_of::<u32>())
+        BoxTree::bytes(points)
+            + Batch::bytes(k + 1)
+            + k * (size_of::<Neighbor>() + size_of::<u32>())
     }
 
     /// A search that holds no set yet, by the best instruction set of the processor.
@@ -89,7 +91,7 @@ impl Nearest {
     pub fn with(simd: Simd) -> Self {
         Nearest {
             simd,
-            tree: Tree::default(),
+            tree: BoxTree::default(),
             points: 0,
             batch: Batch::new(),
             found: Vec::new(),
@@ -171,7 +173,7 @@ impl Nearest {
         let one_more = (k + 1).min(positions.len() - 1);
         let kept = if likely_exact(node, child, k) { k } else { one_more };
         let Nearest { simd, tree, batch, work, .. } = self;
-        let error = Walk::new(*simd, tree, batch, work, run, child).run(active, kept);
+        let error = TreeWalk::new(*simd, tree, batch, work, run, child).run(active, kept);
         for (lane, &rank) in ranks.iter().enumerate().filter(|(lane, _)| active >> lane & 1 == 1) {
             let distance2 = self.settle(positions, k, rank, lane, error);
             visit(rank as usize, &self.neighbors, distance2);
@@ -234,7 +236,7 @@ impl Nearest {
 
 /// True if the k nearest of a leaf's points will likely be exact in floats, so that none more is
 /// needed to prove them. A wrong guess costs a redo.
-fn likely_exact(node: &Node, child: usize, k: usize) -> bool {
+fn likely_exact(node: &BoxNode, child: usize, k: usize) -> bool {
     let diagonal2 = (0..3).fold(0.0, |sum, axis| {
         let side = node.hi[axis][child] - node.lo[axis][child];
         sum + side * side

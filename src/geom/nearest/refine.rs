@@ -1,14 +1,32 @@
 //! A run of 256 points in Morton order, cut into leaves of 16 by median splits of the longest side:
 //! tighter boxes than Morton order alone gives. The cuts decide speed, never an answer.
 
-use super::tree::{LANES, Leaf};
+use crate::geom::simd::LANES;
 use crate::point::Position;
 
 /// Points cut into leaves together: the children of one node.
 pub(super) const RUN: usize = LANES * LANES;
 
+/// Up to 16 points in the frame of their node; unused lanes are infinitely far.
+#[derive(Debug, Clone)]
+#[repr(align(64))]
+pub(super) struct Leaf {
+    /// x, y and z.
+    pub at: [[f32; LANES]; 3],
+    /// Index of each point in the positions.
+    pub rank: [u32; LANES],
+}
+
+impl Leaf {
+    /// One of the points.
+    #[inline(always)]
+    pub fn point(&self, lane: usize) -> [f32; 3] {
+        [self.at[0][lane], self.at[1][lane], self.at[2][lane]]
+    }
+}
+
 /// The points of a run side by side, and room to part them.
-pub(super) struct Run {
+pub(super) struct LeafRun {
     at: [[f32; RUN]; 3],
     rank: [u32; RUN],
     keys: [i32; RUN],
@@ -16,9 +34,9 @@ pub(super) struct Run {
     parted_rank: [u32; RUN],
 }
 
-impl Run {
-    pub fn new() -> Box<Run> {
-        Box::new(Run {
+impl LeafRun {
+    pub fn new() -> Box<LeafRun> {
+        Box::new(LeafRun {
             at: [[0.0; RUN]; 3],
             rank: [0; RUN],
             keys: [0; RUN],

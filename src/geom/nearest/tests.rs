@@ -306,17 +306,17 @@ fn ties_without_end_stay_linear() {
 fn building_again_within_the_reserve_allocates_nothing() {
     let mut nearest = Nearest::new();
     for points in [1, 16, 17, 256, 257, 4097, 70_000] {
-        let bytes = Tree::bytes(points);
+        let bytes = BoxTree::bytes(points);
         assert!(
             bytes <= points * Nearest::BYTES_PER_POINT + Nearest::FIXED_BYTES,
             "{points}: {bytes}"
         );
-        assert!(Tree::bytes(points - 1) <= bytes);
+        assert!(BoxTree::bytes(points - 1) <= bytes);
         for k in KS {
             assert!(Nearest::bytes(points, k) - bytes <= k * 256 + 1024);
         }
         nearest.reserve(points);
-        let sizes = [size_of::<tree::Leaf>(), size_of::<Node>(), 48];
+        let sizes = [size_of::<refine::Leaf>(), size_of::<BoxNode>(), 48];
         let allocated: usize =
             nearest.tree.capacity().iter().zip(sizes).map(|(n, size)| n * size).sum();
         assert_eq!(allocated, bytes, "what is promised is what is held");

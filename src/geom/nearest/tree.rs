@@ -4,38 +4,19 @@
 //! exact (or as fine as the node is small) wherever in the world it lies and however far away the
 //! farthest point of the set is.
 
-use super::refine::{RUN, Run};
+use super::refine::{Leaf, LeafRun, RUN};
+use crate::geom::simd::LANES;
 use crate::point::{Bounds, Position};
 
-/// Points in a leaf, boxes in a node.
-pub(super) const LANES: usize = crate::geom::simd::LANES;
 /// Integers up to here are exact in f32.
 pub(super) const EXACT: i64 = 1 << 24;
 /// Levels of a tree of 2^32 points at most.
 const MAX_LEVELS: usize = 8;
 
-/// Up to 16 points in the frame of their node; unused lanes are infinitely far.
-#[derive(Debug, Clone)]
-#[repr(align(64))]
-pub(super) struct Leaf {
-    /// x, y and z.
-    pub at: [[f32; LANES]; 3],
-    /// Index of each point in the positions.
-    pub rank: [u32; LANES],
-}
-
-impl Leaf {
-    /// One of the points.
-    #[inline(always)]
-    pub fn point(&self, lane: usize) -> [f32; 3] {
-        [self.at[0][lane], self.at[1][lane], self.at[2][lane]]
-    }
-}
-
 /// Up to 16 boxes in the node's frame. The children of level 0 are leaves.
 #[derive(Debug, Clone)]
 #[repr(align(64))]
-pub(super) struct Node {
+pub(super) struct BoxNode {
     /// Smallest x, y and z. In level 0 the extremes of the leaf's stored floats; above, rounded
     /// outward, so that the positions themselves are inside.
     pub lo: [[f32; LANES]; 3],
@@ -57,9 +38,9 @@ pub(super) struct Node {
 
 /// All leaves and nodes; the memory stays from build to build.
 #[derive(Debug, Default)]
-pub(super) struct Tree {
+pub(super) struct BoxTree {
     pub leaves: Vec<Leaf>,
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<BoxNode>,
     /// Where each level starts in `nodes`, and where the last one ends.
     starts: [usize; MAX_LEVELS + 1],
     pub levels: usize,
@@ -67,7 +48,7 @@ pub(super) struct Tree {
     boxes: Vec<Bounds>,
 }
 
-impl Tree {
+impl BoxTree {
     /// Leaves, nodes and boxes of a tree of `points`, at most.
     fn sizes(points: usize) -> (usize, usize, usize) {
         let cuts = most_cuts(points);
@@ -82,13 +63,13 @@ impl Tree {
 
     /// Bytes of a tree of `points`.
     pub fn bytes(points: usize) -> usize {
-        let (leaves, nodes, boxes) = Tree::sizes(points);
-        leaves * size_of::<Leaf>() + nodes * size_of::<Node>() + boxes * size_of::<Bounds>()
+        let (leaves, nodes, boxes) = BoxTree::sizes(points);
+        leaves * size_of::<Leaf>() + nodes * size_of::<BoxNode>() + boxes * size_of::<Bounds>()
     }
 
     /// Makes room for `points`, so that building with as many or fewer allocates nothing.
     pub fn reserve(&mut self, points: usize) {
-        let (leaves, nodes, boxes) = Tree::sizes(points);
+        let (leaves, nodes, boxes) = BoxTree::sizes(points);
         self.leaves.reserve_exact(leaves.saturating_sub(self.leaves.len()));
         self.nodes.reserve_exact(nodes.saturating_sub(self.nodes.len()));
         self.boxes.reserve_exact(boxes.saturating_sub(self.boxes.len()));
@@ -106,7 +87,7 @@ impl Tree {
         self.nodes.clear();
         self.boxes.clear();
         self.reserve(positions.len());
-        let mut run = Run::new();
+        let mut run = LeafRun::new();
         let (mut start, mut cuts) = (0, most_cuts(positions.len()));
         while start < positions.len() {
             let mut of_run = &positions[start..positions.len().min(start + RUN)];
@@ -132,9 +113,14 @@ impl Tree {
     }
 
     /// Leaves of one run, and the node above them.
-    fn add_run(&mut self, run: &mut Run, start: u32, positions: &[Position]) -> (Node, Bounds) {
+    fn add_run(
+        &mut self,
+        run: &mut LeafRun,
+        start: u32,
+        positions: &[Position],
+    ) -> (BoxNode, Bounds) {
         let bounds = Bounds::of(positions.iter().copied());
-        let mut node = Node::over(&bounds);
+        let mut node = BoxNode::over(&bounds);
         // Rounded to nearest, a float below 2^(m+1) is off by at most 2^(m-24).
         node.error = match node.reach {
             0..=EXACT => 0,
@@ -164,7 +150,7 @@ impl Tree {
             let first = parent * LANES;
             let children = &self.boxes[first..self.boxes.len().min(first + LANES)];
             let bounds = children.iter().fold(Bounds::EMPTY, |all, b| all.union(b));
-            let mut node = Node::over(&bounds);
+            let mut node = BoxNode::over(&bounds);
             node.first_child = first as u32;
             for (i, child) in children.iter().enumerate() {
                 for axis in 0..3 {
@@ -180,7 +166,7 @@ impl Tree {
     }
 
     /// Node `index` of `level`; its parent is node `index / 16` one level above.
-    pub fn node(&self, level: usize, index: usize) -> &Node {
+    pub fn node(&self, level: usize, index: usize) -> &BoxNode {
         &self.nodes[self.starts[level] + index]
     }
 
@@ -190,9 +176,9 @@ impl Tree {
     }
 }
 
-impl Node {
+impl BoxNode {
     /// A node over `bounds`, still without children.
-    fn over(bounds: &Bounds) -> Node {
+    fn over(bounds: &Bounds) -> BoxNode {
         let origin: Position =
             std::array::from_fn(|axis| i64::midpoint(bounds.lo[axis], bounds.hi[axis]));
         let reach = (0..3).fold(0, |reach: i64, axis| {
@@ -200,7 +186,7 @@ impl Node {
             let down = origin[axis].saturating_sub(bounds.lo[axis]);
             reach.max(up).max(down)
         });
-        Node {
+        BoxNode {
             lo: [[f32::INFINITY; LANES]; 3],
             hi: [[f32::NEG_INFINITY; LANES]; 3],
             first: [u32::MAX; LANES],
@@ -222,7 +208,7 @@ fn most_cuts(points: usize) -> usize {
 /// Where a run is best cut, if its frame rounds and its first points are near to each other but
 /// not to the next.
 fn far_apart(run: &[Position]) -> Option<usize> {
-    let reach = |run: &[Position]| Node::over(&Bounds::of(run.iter().copied())).reach;
+    let reach = |run: &[Position]| BoxNode::over(&Bounds::of(run.iter().copied())).reach;
     let whole = reach(run);
     if whole <= EXACT {
         return None;

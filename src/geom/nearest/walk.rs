@@ -2,13 +2,13 @@
 //! ancestor down into whatever is near enough to matter.
 
 use super::kernel::{Batch, Boxes, Home, Visit};
-use super::tree::{EXACT, LANES, Tree, above, below};
-use crate::geom::simd::Simd;
+use super::tree::{BoxTree, EXACT, above, below};
+use crate::geom::simd::{LANES, Simd};
 use crate::point::Position;
 
 /// Above level 0, boxes are measured against bounds this much larger. Their distances are those of
-/// true positions up to five roundings, (1 + 2^-24)^5, so that nothing as near as the bound is passed
-/// over, neither by float nor by integer distance.
+/// true positions up to five roundings, (1 + 2^-24)^5, so that nothing as near as the bound is
+/// passed over, neither by float nor by integer distance.
 pub(super) const WIDENED: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 
 /// What a search did, for tests and for tuning.
@@ -25,9 +25,9 @@ pub struct Work {
 }
 
 /// One leaf's points on their way.
-pub(super) struct Walk<'a> {
+pub(super) struct TreeWalk<'a> {
     simd: Simd,
-    tree: &'a Tree,
+    tree: &'a BoxTree,
     batch: &'a mut Batch,
     work: &'a mut Work,
     /// Level-0 node of the leaf.
@@ -44,11 +44,11 @@ pub(super) struct Walk<'a> {
     error: f64,
 }
 
-impl<'a> Walk<'a> {
+impl<'a> TreeWalk<'a> {
     /// The points of leaf `child` of the level-0 node `home`.
     pub fn new(
         simd: Simd,
-        tree: &'a Tree,
+        tree: &'a BoxTree,
         batch: &'a mut Batch,
         work: &'a mut Work,
         home: usize,
@@ -64,7 +64,7 @@ impl<'a> Walk<'a> {
             let stored = node.origin[axis].saturating_add(node.hi[axis][child] as i64);
             stored.saturating_add(node.error)
         });
-        Walk { simd, tree, batch, work, home, child, points, lo, hi, error: 0.0 }
+        TreeWalk { simd, tree, batch, work, home, child, points, lo, hi, error: 0.0 }
     }
 
     /// Fills the batch with the `kept` nearest by float distance of the lanes in `wanted`, and

@@ -2,12 +2,14 @@
 //! find in loops.
 
 use super::real::{EIGHT, Eight, Real};
-use crate::geom::rows::{self, Row};
+use crate::geom::rows;
 
 /// Numbers side by side.
 pub const LANES: usize = 16;
 /// Columns of a list that [`Lanes::insert`] inserts into.
 pub const COLUMNS: usize = 4;
+/// One number of each of 16 lists.
+pub type Row = [f64; LANES];
 
 /// Operations on 16 f32 at once, a value of an implementing type being the witness that the
 /// processor has them. Every implementation gives the bits of [`Portable`].
@@ -47,9 +49,9 @@ pub trait Lanes: Copy {
     /// Sorts lists side by side, row i being the i-th numbers of all: smallest first, none NaN.
     fn sort(self, rows: &mut [Row; LANES]);
     /// Merges numbers into an ascending list, of which the smallest stay: for each lane in `hits`
-    /// the one with the bits of `high` above those of `low`. All are positive and finite. The list goes
-    /// down the first column, then the second, and so on: the number before each is in the row above,
-    /// but for the first row.
+    /// the one with the bits of `high` above those of `low`. All are positive and finite. The list
+    /// goes down the first column, then the second, and so on: the number before each is in the row
+    /// above, but for the first row.
     fn insert<const ROWS: usize>(
         self,
         list: &mut [[f64; COLUMNS]; ROWS],
@@ -57,6 +59,18 @@ pub trait Lanes: Copy {
         low: &[u32; LANES],
         hits: u32,
     );
+}
+
+/// Code that is worth compiling for wider vectors.
+pub trait Kernel {
+    /// What it computes.
+    type Output;
+
+    /// Computes it. Implementations, and what they call in their inner loops, are `inline(always)`:
+    /// only what is inlined is compiled for the instruction set chosen, and closures around `lanes`
+    /// are not. Loops over arrays of numbers become vector instructions by themselves; `lanes` is
+    /// for what they do not.
+    fn run<L: Lanes>(self, lanes: L) -> Self::Output;
 }
 
 /// What every processor can do.
@@ -184,8 +198,9 @@ impl Lanes for Portable {
     }
 }
 
-/// The number with the bits of `high` above those of `low`. Positive floats sort like their bits, so
-/// that 64 bits can be compared as an f64, for which vector minimum and maximum exist everywhere.
+/// The number with the bits of `high` above those of `low`. Positive floats sort like their bits,
+/// so that 64 bits can be compared as an f64, for which vector minimum and maximum exist
+/// everywhere.
 #[inline(always)]
 pub fn joined(high: f32, low: u32) -> f64 {
     f64::from_bits(u64::from(high.to_bits()) << 32 | u64::from(low))

@@ -9,22 +9,10 @@ mod real;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub use lanes::{COLUMNS, LANES, Lanes, Portable, joined, smaller};
+pub use lanes::{COLUMNS, Kernel, LANES, Lanes, Portable, Row, joined, smaller};
 pub use real::{EIGHT, Eight, Mask, Real};
 #[cfg(target_arch = "x86_64")]
 use x86::{has_avx2, has_avx512};
-
-/// Code that is worth compiling for wider vectors.
-pub trait Kernel {
-    /// What it computes.
-    type Output;
-
-    /// Computes it. Implementations, and what they call in their inner loops, are `inline(always)`:
-    /// only what is inlined is compiled for the instruction set chosen, and closures around `lanes`
-    /// are not. Loops over arrays of
-    /// numbers become vector instructions by themselves; `lanes` is for what they do not.
-    fn run<L: Lanes>(self, lanes: L) -> Self::Output;
-}
 
 /// An instruction set that kernels are compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -97,39 +97,39 @@ pub struct Eight(pub(super) [f64; EIGHT]);
 
 /// Eight conditions, a bit each.
 #[derive(Debug, Clone, Copy)]
-pub struct Bits(u8);
+pub struct EightBits(u8);
 
-impl Mask for Bits {
+impl Mask for EightBits {
     #[inline(always)]
     fn bits(self) -> u32 {
         u32::from(self.0)
     }
 }
 
-impl BitAnd for Bits {
-    type Output = Bits;
+impl BitAnd for EightBits {
+    type Output = EightBits;
 
     #[inline(always)]
-    fn bitand(self, other: Bits) -> Bits {
-        Bits(self.0 & other.0)
+    fn bitand(self, other: EightBits) -> EightBits {
+        EightBits(self.0 & other.0)
     }
 }
 
-impl BitOr for Bits {
-    type Output = Bits;
+impl BitOr for EightBits {
+    type Output = EightBits;
 
     #[inline(always)]
-    fn bitor(self, other: Bits) -> Bits {
-        Bits(self.0 | other.0)
+    fn bitor(self, other: EightBits) -> EightBits {
+        EightBits(self.0 | other.0)
     }
 }
 
-impl Not for Bits {
-    type Output = Bits;
+impl Not for EightBits {
+    type Output = EightBits;
 
     #[inline(always)]
-    fn not(self) -> Bits {
-        Bits(!self.0)
+    fn not(self) -> EightBits {
+        EightBits(!self.0)
     }
 }
 
@@ -159,13 +159,13 @@ impl Eight {
     }
 
     #[inline(always)]
-    fn holds(self, other: Eight, holds: impl Fn(f64, f64) -> bool) -> Bits {
-        Bits((0..EIGHT).fold(0, |bits, i| bits | u8::from(holds(self.0[i], other.0[i])) << i))
+    fn holds(self, other: Eight, holds: impl Fn(f64, f64) -> bool) -> EightBits {
+        EightBits((0..EIGHT).fold(0, |bits, i| bits | u8::from(holds(self.0[i], other.0[i])) << i))
     }
 }
 
 impl Real for Eight {
-    type Mask = Bits;
+    type Mask = EightBits;
 
     #[inline(always)]
     fn of(self, v: f64) -> Eight {
@@ -193,17 +193,17 @@ impl Real for Eight {
     }
 
     #[inline(always)]
-    fn below(self, other: Eight) -> Bits {
+    fn below(self, other: Eight) -> EightBits {
         self.holds(other, |a, b| a < b)
     }
 
     #[inline(always)]
-    fn equals(self, other: Eight) -> Bits {
+    fn equals(self, other: Eight) -> EightBits {
         self.holds(other, |a, b| a == b)
     }
 
     #[inline(always)]
-    fn choose(mask: Bits, a: Eight, b: Eight) -> Eight {
+    fn choose(mask: EightBits, a: Eight, b: Eight) -> Eight {
         Eight(std::array::from_fn(|i| if mask.0 >> i & 1 == 1 { a.0[i] } else { b.0[i] }))
     }
 }

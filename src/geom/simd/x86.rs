@@ -3,7 +3,7 @@
 mod avx2;
 mod avx512;
 
-use super::Kernel;
+use super::lanes::Kernel;
 use avx2::Avx2;
 use avx512::Avx512;
 

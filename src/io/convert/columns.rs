@@ -1,7 +1,7 @@
 //! The steps of a projection over many records at once: field by field, each a loop of its own over
 //! strided loads and stores. What a step finds unfit it leaves to the road that goes record by record.
 
-use super::Move;
+use super::step::Move;
 use crate::point::{Dimension, Endian, Scalar};
 
 /// Records that the steps take at once: with their targets and a column of numbers they stay in the
@@ -13,7 +13,7 @@ const HALVES: f64 = (1u64 << 51) as f64;
 
 /// A step over a column.
 #[derive(Debug, Clone)]
-pub(super) enum Column {
+pub(super) enum ColumnStep {
     /// Bytes as they are, or in the other order.
     Bytes { from: usize, to: usize, size: usize, swapped: bool },
     /// Some bits of a byte as a byte.
@@ -31,11 +31,11 @@ pub(super) struct Number {
     from_endian: Endian,
     to: Dimension,
     to_endian: Endian,
-    rule: Rule,
+    rule: NumberRule,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Rule {
+enum NumberRule {
     Stored,
     Rounded,
     Exact,
@@ -43,48 +43,48 @@ enum Rule {
 
 /// Records and how long each is.
 #[derive(Clone, Copy)]
-pub(super) struct Records<'a> {
+pub(super) struct RecordBytes<'a> {
     pub bytes: &'a [u8],
     pub stride: usize,
 }
 
 /// Records to write and how long each is.
-pub(super) struct Targets<'a> {
+pub(super) struct TargetBytes<'a> {
     pub bytes: &'a mut [u8],
     pub stride: usize,
 }
 
-impl Column {
+impl ColumnStep {
     /// The form of `step` over columns; None for steps that f64 cannot carry exactly (64-bit
     /// integers) and for bits of more than a byte.
-    pub fn of(step: &Move, from_endian: Endian, to_endian: Endian) -> Option<Column> {
+    pub fn of(step: &Move, from_endian: Endian, to_endian: Endian) -> Option<ColumnStep> {
         let (from, to, rule) = match step {
             &Move::Copy { from, to, length } => {
-                return Some(Column::Bytes { from, to, size: length, swapped: false });
+                return Some(ColumnStep::Bytes { from, to, size: length, swapped: false });
             }
             &Move::Swap { from, to, size } => {
-                return Some(Column::Bytes { from, to, size, swapped: true });
+                return Some(ColumnStep::Bytes { from, to, size, swapped: true });
             }
-            Move::Stored { from, to } => (from, to, Rule::Stored),
+            Move::Stored { from, to } => (from, to, NumberRule::Stored),
             Move::Narrow { from, to, shift, mask } => {
                 let plain = from.scalar == Scalar::U8 && from.bits.is_none();
-                return plain.then_some(Column::IntoBits {
+                return plain.then_some(ColumnStep::IntoBits {
                     from: from.offset,
                     to: to.offset,
                     shift: *shift,
                     mask: *mask,
                 });
             }
-            Move::Rounded { from, to } => (from, to, Rule::Rounded),
-            Move::Exact { from, to } => (from, to, Rule::Exact),
+            Move::Rounded { from, to } => (from, to, NumberRule::Rounded),
+            Move::Exact { from, to } => (from, to, NumberRule::Exact),
         };
-        if let (Scalar::U8, Some(bits), Rule::Stored) = (from.scalar, from.bits, rule)
+        if let (Scalar::U8, Some(bits), NumberRule::Stored) = (from.scalar, from.bits, rule)
             && to.scalar == Scalar::U8
             && to.bits.is_none()
             && bits.width < 8
         {
             let mask = (1 << bits.width) - 1;
-            return Some(Column::Bits {
+            return Some(ColumnStep::Bits {
                 from: from.offset,
                 to: to.offset,
                 shift: bits.shift,
@@ -95,25 +95,30 @@ impl Column {
         let plain = from.bits.is_none() && to.bits.is_none();
         (plain && !wide(from) && !wide(to)).then(|| {
             let (from, to) = (from.clone(), to.clone());
-            Column::Number(Box::new(Number { from, from_endian, to, to_endian, rule }))
+            ColumnStep::Number(Box::new(Number { from, from_endian, to, to_endian, rule }))
         })
     }
 
     /// Applies the step to up to [`BLOCK`] records; `rounded` has for each by how much it was rounded.
     /// False if a value may not fit: the block then is for the other road.
-    pub fn apply(&self, from: Records<'_>, to: &mut Targets<'_>, rounded: &mut [f64]) -> bool {
+    pub fn apply(
+        &self,
+        from: RecordBytes<'_>,
+        to: &mut TargetBytes<'_>,
+        rounded: &mut [f64],
+    ) -> bool {
         match *self {
-            Column::Bytes { from: at, to: into, size, swapped } => {
+            ColumnStep::Bytes { from: at, to: into, size, swapped } => {
                 bytes(from, at, to, into, size, swapped);
                 true
             }
-            Column::Bits { from: at, to: into, shift, mask } => {
+            ColumnStep::Bits { from: at, to: into, shift, mask } => {
                 each(from, at, to, into, |&[byte]: &[u8; 1], target: &mut [u8; 1]| {
                     *target = [byte >> shift & mask];
                 });
                 true
             }
-            Column::IntoBits { from: at, to: into, shift, mask } => {
+            ColumnStep::IntoBits { from: at, to: into, shift, mask } => {
                 let (mut all, hole) = (0, !(mask << shift));
                 each(from, at, to, into, |&[byte]: &[u8; 1], target: &mut [u8; 1]| {
                     all |= byte;
@@ -121,7 +126,7 @@ impl Column {
                 });
                 all & !mask == 0
             }
-            Column::Number(ref number) => number.apply(from, to, rounded),
+            ColumnStep::Number(ref number) => number.apply(from, to, rounded),
         }
     }
 }
@@ -129,9 +134,9 @@ impl Column {
 /// Calls `step` with `N` bytes at `at` of each record and `M` at `into` of its target.
 #[inline(always)]
 fn each<const N: usize, const M: usize>(
-    from: Records<'_>,
+    from: RecordBytes<'_>,
     at: usize,
-    to: &mut Targets<'_>,
+    to: &mut TargetBytes<'_>,
     into: usize,
     mut step: impl FnMut(&[u8; N], &mut [u8; M]),
 ) {
@@ -146,9 +151,9 @@ fn each<const N: usize, const M: usize>(
 }
 
 fn bytes(
-    from: Records<'_>,
+    from: RecordBytes<'_>,
     at: usize,
-    to: &mut Targets<'_>,
+    to: &mut TargetBytes<'_>,
     into: usize,
     size: usize,
     swapped: bool,
@@ -180,12 +185,12 @@ fn bytes(
 }
 
 impl Number {
-    fn apply(&self, from: Records<'_>, to: &mut Targets<'_>, rounded: &mut [f64]) -> bool {
+    fn apply(&self, from: RecordBytes<'_>, to: &mut TargetBytes<'_>, rounded: &mut [f64]) -> bool {
         let mut column = [0.0; BLOCK];
         let values = &mut column[..rounded.len()];
         load(&self.from, self.from_endian, from, values);
         let fit = match (self.rule, self.to.scalar) {
-            (Rule::Stored, _) => true,
+            (NumberRule::Stored, _) => true,
             (rule, Scalar::F64) => self.rescale(rule, values, rounded, |steps| (steps, true)),
             (rule, Scalar::F32) => {
                 self.rescale(rule, values, rounded, |steps| (f64::from(steps as f32), true))
@@ -198,7 +203,7 @@ impl Number {
     #[inline(always)]
     fn rescale(
         &self,
-        rule: Rule,
+        rule: NumberRule,
         values: &mut [f64],
         rounded: &mut [f64],
         to_stored: impl Fn(f64) -> (f64, bool),
@@ -206,7 +211,7 @@ impl Number {
         let from = &self.from;
         let single = from.scalar == Scalar::F32 && from.scale == 1.0 && from.origin == 0.0;
         match (rule, single) {
-            (Rule::Rounded, _) => self.rounding(values, rounded, to_stored),
+            (NumberRule::Rounded, _) => self.rounding(values, rounded, to_stored),
             (_, true) => self.exactly::<true>(values, to_stored),
             (_, false) => self.exactly::<false>(values, to_stored),
         }
@@ -271,7 +276,7 @@ fn whole(steps: f64) -> (f64, bool) {
     ((steps + SHIFT) - SHIFT, steps.abs() < HALVES)
 }
 
-fn load(field: &Dimension, endian: Endian, from: Records<'_>, values: &mut [f64]) {
+fn load(field: &Dimension, endian: Endian, from: RecordBytes<'_>, values: &mut [f64]) {
     macro_rules! of {
         ($t:ty) => {{
             let take = |read: fn([u8; size_of::<$t>()]) -> $t| read;
@@ -296,7 +301,7 @@ fn load(field: &Dimension, endian: Endian, from: Records<'_>, values: &mut [f64]
 
 #[inline(always)]
 fn column<const N: usize, T: Into<f64>>(
-    from: Records<'_>,
+    from: RecordBytes<'_>,
     at: usize,
     values: &mut [f64],
     read: impl Fn([u8; N]) -> T,
@@ -309,7 +314,7 @@ fn column<const N: usize, T: Into<f64>>(
 }
 
 /// Stores the values; false if one does not fit.
-fn store(field: &Dimension, endian: Endian, values: &[f64], to: &mut Targets<'_>) -> bool {
+fn store(field: &Dimension, endian: Endian, values: &[f64], to: &mut TargetBytes<'_>) -> bool {
     macro_rules! of {
         ($t:ty) => {
             match endian {
@@ -344,7 +349,7 @@ fn store(field: &Dimension, endian: Endian, values: &[f64], to: &mut Targets<'_>
 #[inline(always)]
 fn fill<const N: usize>(
     values: &[f64],
-    to: &mut Targets<'_>,
+    to: &mut TargetBytes<'_>,
     at: usize,
     write: impl Fn(f64) -> ([u8; N], bool),
 ) -> bool {

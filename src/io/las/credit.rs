@@ -4,10 +4,12 @@
 use super::crs;
 use super::described::{Described, describe};
 use super::extra::Descriptor;
+use super::fields::{at, encoding};
 use super::format::{has_gps_time, record_size};
-use super::header::{Header, at, encoding};
+use super::header::Header;
 use super::native::Native;
-use super::vlr::{Vlr, split_at_room};
+use super::text::split_at_room;
+use super::vlr::Vlr;
 use crate::Result;
 use crate::io::wkt;
 use crate::point::{GpsTime, Metadata, Schema};

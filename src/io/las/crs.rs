@@ -2,9 +2,9 @@
 
 use super::header::Header;
 use super::vlr::{Evlr, Vlr};
-use crate::io::epsg;
+use crate::Result;
+use crate::io::{epsg, wkt};
 use crate::point::{Horizontal, Units};
-use crate::{Result, io};
 
 /// Who defined the records of systems.
 pub const USER: &str = "LASF_Projection";
@@ -40,7 +40,7 @@ const USER_DEFINED: u16 = 32767;
 
 /// A new record that names the system `text`, and why there is none.
 pub fn record(text: &str) -> std::result::Result<Vlr, String> {
-    if !io::wkt::is_wkt(text) {
+    if !wkt::is_wkt(text) {
         return keys_record(text);
     }
     let mut payload = text.as_bytes().to_vec();
@@ -53,8 +53,7 @@ pub fn record(text: &str) -> std::result::Result<Vlr, String> {
 
 /// GeoTIFF keys for `EPSG:code` or `EPSG:code+code`.
 fn keys_record(text: &str) -> std::result::Result<Vlr, String> {
-    let Some((across, up)) = text.starts_with("EPSG:").then(|| io::wkt::codes(text)).flatten()
-    else {
+    let Some((across, up)) = text.starts_with("EPSG:").then(|| wkt::codes(text)).flatten() else {
         return Err("LAS names a system by WKT or EPSG codes, and this is neither".to_owned());
     };
     let kind = match epsg::horizontal(across) {
@@ -112,7 +111,7 @@ pub fn text(vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<Option<String>> {
 /// The units of the coordinates: as the WKT says, where that is silent as the GeoTIFF keys do, and
 /// where those are as the WKT of libLAS does.
 pub fn units(vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<Units> {
-    let of = |text: Option<String>| text.map(|text| io::wkt::units(&text)).unwrap_or_default();
+    let of = |text: Option<String>| text.map(|text| wkt::units(&text)).unwrap_or_default();
     let keys = GeoKeys::of(vlrs).map(|keys| keys.units(vlrs)).unwrap_or_default();
     let liblas = of(first_text(vlrs, evlrs, LIBLAS.0, LIBLAS.1)?);
     Ok(of(wkt(vlrs, evlrs)?).or(keys).or(liblas))
@@ -127,7 +126,7 @@ fn wkt(vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<Option<String>> {
 
 /// The first text in records of this kind that is not empty.
 fn first_text(vlrs: &[Vlr], evlrs: &[Evlr], user: &str, record: u16) -> Result<Option<String>> {
-    let filled = |payload: &[u8]| Some(super::vlr::text(payload)).filter(|text| !text.is_empty());
+    let filled = |payload: &[u8]| Some(super::text::text(payload)).filter(|text| !text.is_empty());
     let mut plain = vlrs.iter().filter(|v| v.is(user, record));
     if let Some(text) = plain.find_map(|v| filled(v.payload())) {
         return Ok(Some(text));
@@ -226,7 +225,7 @@ fn geotiff(vlrs: &[Vlr]) -> Option<String> {
         let entry = keys.0.iter().find(|e| e[0] == *key && e[1] == GEO_ASCII)?;
         let start = usize::from(entry[3]);
         let bytes = ascii.get(start..start.checked_add(usize::from(entry[2]))?)?;
-        let citation = super::vlr::text(bytes).trim_end_matches('|').to_owned();
+        let citation = super::text::text(bytes).trim_end_matches('|').to_owned();
         (!citation.is_empty()).then_some(citation)
     })
 }
@@ -300,7 +299,7 @@ mod tests {
             let record = [keys_record(code).unwrap()];
             assert_eq!(geotiff(&record).as_deref(), Some(code));
             let read = units(&record, &[]).unwrap();
-            assert_eq!(read, io::wkt::units(code), "{code}");
+            assert_eq!(read, wkt::units(code), "{code}");
         }
         for (text, why) in [
             ("EPSG:1", "not known"),

@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::chunks::Chunks;
 use super::crs;
+use super::fields::at;
 use super::format::has_gps_time;
-use super::header::at;
 use super::input::{Input, Storage};
 use super::laz::Compressor;
 use crate::Result;

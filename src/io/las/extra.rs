@@ -1,7 +1,7 @@
 //! Extra-bytes descriptors (LAS 1.4 R15, table 24): what the bytes behind a record's standard
 //! fields mean.
 
-use super::vlr::split_at_room;
+use super::text::{split_at_room, text};
 use crate::point::{Dimension, Scalar, names};
 
 /// Bytes of one descriptor.
@@ -84,7 +84,7 @@ impl Descriptor {
 
     /// Name as written, without trailing zeros.
     pub fn name(&self) -> String {
-        super::vlr::text(&self.0[at::NAME..at::NAME + 32])
+        text(&self.0[at::NAME..at::NAME + 32])
     }
 
     /// Bytes of a record that it describes.

@@ -1,50 +1,13 @@
 //! The public header block (LAS 1.4 R15, section 2.4), kept as its bytes: what is not recomputed is
 //! carried exactly.
 
+use super::fields::{at, encoding};
 use super::file::InputFile;
 use super::format;
+use super::text::{split_at_room, text};
 use crate::io::sniff;
 use crate::point::GpsTime;
 use crate::{Error, Result};
-
-/// Byte offsets of the fields.
-pub mod at {
-    pub const SOURCE_ID: usize = 4;
-    pub const GLOBAL_ENCODING: usize = 6;
-    pub const GUID: usize = 8;
-    pub const VERSION: usize = 24;
-    pub const SYSTEM: usize = 26;
-    pub const SOFTWARE: usize = 58;
-    pub const DAY: usize = 90;
-    pub const YEAR: usize = 92;
-    pub const HEADER_SIZE: usize = 94;
-    pub const POINTS_START: usize = 96;
-    pub const VLRS: usize = 100;
-    pub const FORMAT: usize = 104;
-    pub const RECORD_LENGTH: usize = 105;
-    pub const LEGACY_POINTS: usize = 107;
-    pub const LEGACY_RETURNS: usize = 111;
-    pub const SCALE: usize = 131;
-    pub const OFFSET: usize = 155;
-    pub const BOX: usize = 179;
-    pub const WAVEFORM_START: usize = 227;
-    pub const EVLR_START: usize = 235;
-    pub const EVLRS: usize = 243;
-    pub const POINTS: usize = 247;
-    pub const RETURNS: usize = 255;
-}
-
-/// Bits of the global encoding field.
-pub mod encoding {
-    /// GPS times are standard time minus 1e9 rather than week time.
-    pub const GPS_STANDARD: u16 = 1;
-    /// Waveform packets are in this file.
-    pub const WAVEFORM_INTERNAL: u16 = 2;
-    /// Waveform packets are in a file beside this one.
-    pub const WAVEFORM_EXTERNAL: u16 = 4;
-    /// The CRS is WKT.
-    pub const WKT: u16 = 16;
-}
 
 /// What is to be done about a header that cannot be.
 const DAMAGED: &str = "the file is cut off, or its header is damaged: get another copy";
@@ -328,7 +291,7 @@ impl Header {
     /// Sets a text field of 32 bytes; what exceeds it is cut off.
     pub fn put_text(&mut self, at: usize, text: &str) {
         let mut field = [0; 32];
-        let (text, _) = super::vlr::split_at_room(text, field.len());
+        let (text, _) = split_at_room(text, field.len());
         field[..text.len()].copy_from_slice(text.as_bytes());
         self.put(at, &field);
     }
@@ -398,6 +361,6 @@ impl Header {
 
     /// A text field without its trailing zeros, bytes that are no UTF-8 replaced.
     pub fn text(&self, at: usize) -> String {
-        super::vlr::text(&self.get::<32>(at))
+        text(&self.get::<32>(at))
     }
 }

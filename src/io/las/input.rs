@@ -8,9 +8,10 @@ use super::chunks::Chunks;
 use super::crs;
 use super::described::Described;
 use super::extra::Descriptor;
+use super::fields::encoding;
 use super::file::InputFile;
 use super::format;
-use super::header::{Header, encoding};
+use super::header::Header;
 use super::laz::{Compression, LASZIP};
 use super::system::CrsRecords;
 use super::vlr::{Evlr, VLR_HEAD, Vlr, read_evlrs, read_vlrs};
@@ -213,7 +214,7 @@ fn storage(
     let Some(record) = record else {
         return Err(file
             .wrong(
-                super::header::at::FORMAT as u64,
+                super::fields::at::FORMAT as u64,
                 "the header says LAZ and there is no record that says how",
             )
             .help("the file is damaged: LASzip writes a record 'laszip encoded'"));
@@ -275,7 +276,7 @@ fn behind_points(file: &InputFile, header: &Header, evlrs_start: Option<u64>, en
 
 /// A writer that did not come to its end leaves a count of 0 in front of the points.
 fn uncounted(file: &InputFile, bytes: u64) -> Error {
-    let field = super::header::at::LEGACY_POINTS as u64;
+    let field = super::fields::at::LEGACY_POINTS as u64;
     file.wrong(field, format!("the header counts no points and {bytes} bytes of points follow it"))
         .help("what wrote the file did not finish it; repair the counts of its header first")
 }

@@ -1,8 +1,9 @@
 //! Several files as one: what they must share, and what becomes of what they do not. Nothing here
 //! depends on the order of the inputs.
 
+use super::fields::{at, encoding};
 use super::format::{has_gps_time, has_waveforms};
-use super::header::{Header, at, encoding};
+use super::header::Header;
 use super::input::Input;
 use super::native::Native;
 use super::read::Shift;
@@ -119,7 +120,7 @@ fn refuse(a: &Input, b: &Input, why: String) -> Error {
 }
 
 fn short(text: &str) -> String {
-    let (head, tail) = super::vlr::split_at_room(text, 60);
+    let (head, tail) = super::text::split_at_room(text, 60);
     if tail.is_empty() { head.to_owned() } else { format!("{head}…") }
 }
 

@@ -5,7 +5,8 @@ use std::cmp::Ordering;
 
 use super::crs::{WKT_LIMIT, has_wkt, is_record, text, units};
 use super::vlr::{Evlr, Vlr};
-use crate::{Result, io};
+use crate::Result;
+use crate::io::wkt;
 
 /// The records that say in which system a file's points are.
 #[derive(Clone)]
@@ -49,8 +50,8 @@ impl CrsRecords {
             return Ok(true);
         }
         let (Some(one), Some(two)) = (self.text()?, other.text()?) else { return Ok(false) };
-        let codes = io::wkt::codes(&one);
-        let same = io::wkt::alike(&one, &two) || (codes.is_some() && codes == io::wkt::codes(&two));
+        let codes = wkt::codes(&one);
+        let same = wkt::alike(&one, &two) || (codes.is_some() && codes == wkt::codes(&two));
         Ok(same && units(&self.vlrs, &self.evlrs)? == units(&other.vlrs, &other.evlrs)?)
     }
 

@@ -5,7 +5,8 @@
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use super::header::{Header, at};
+use super::fields::at;
+use super::header::Header;
 use crate::Result;
 use crate::host::lock;
 use crate::point::PointBatch;

@@ -6,8 +6,10 @@ use std::borrow::Cow;
 use std::cmp::Ordering;
 use std::sync::Arc;
 
+use super::fields::{at, encoding};
 use super::file::InputFile;
-use super::header::{Header, at, encoding};
+use super::header::Header;
+use super::text::{split_at_room, text};
 use crate::budget::Bytes;
 use crate::error::shown;
 use crate::io::origin::Origin;
@@ -30,18 +32,6 @@ const GAP_CARRIED: u64 = 64 << 10;
 fn is_read(user: &str, record: u16) -> bool {
     let users = ["LASF_Projection", "liblas", "laszip encoded"];
     users.contains(&user) || (user, record) == ("LASF_Spec", 4)
-}
-
-/// A text field: its bytes up to the first zero, those that are no UTF-8 replaced.
-pub fn text(bytes: &[u8]) -> String {
-    let end = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
-    String::from_utf8_lossy(&bytes[..end]).trim_end().to_owned()
-}
-
-/// `text` cut to at most `room` bytes at a character, and the rest.
-pub fn split_at_room(text: &str, room: usize) -> (&str, &str) {
-    let fits = |&end: &usize| text.is_char_boundary(end);
-    text.split_at((0..=room.min(text.len())).rev().find(fits).unwrap_or(0))
 }
 
 /// A variable length record.

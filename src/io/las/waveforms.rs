@@ -3,9 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
+use super::fields::encoding;
 use super::file::InputFile;
 use super::format::has_waveforms;
-use super::header::{Header, encoding};
+use super::header::Header;
 use crate::error::shown;
 
 /// The extension of such files.

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::Split;
 use super::limit::Limit;
+use super::settings::Split;
 use crate::geom::angle::{
     cone, cosine, direction, dominant_axis, is_turned, outer_sum, range, sine2,
 };
@@ -18,7 +18,7 @@ const SHORT_SIDE: i64 = 1 << 30;
 
 /// When and how a cell is divided.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rule {
+pub(super) struct DivisionRule {
     /// Direction N of the angles; none: each part's own dominant axis.
     pub(super) reference: Option<[f64; 3]>,
     pub(super) limit: Limit,
@@ -35,18 +35,18 @@ pub(super) struct Rule {
 
 /// Members `start..end` of a cell, cut off by `depth` divisions by angle, the narrowest of which
 /// was of the range `narrowest` (see [`range`]).
-struct Part {
+struct CellPart {
     start: usize,
     end: usize,
     depth: u32,
     narrowest: f64,
 }
 
-impl Part {
+impl CellPart {
     /// The part of its members `range`.
-    fn child(&self, range: Range<usize>, narrowest: f64, levels: u32) -> Part {
+    fn child(&self, range: Range<usize>, narrowest: f64, levels: u32) -> CellPart {
         let (start, end) = (self.start + range.start, self.start + range.end);
-        Part { start, end, depth: self.depth + levels, narrowest }
+        CellPart { start, end, depth: self.depth + levels, narrowest }
     }
 }
 
@@ -70,7 +70,7 @@ enum Verdict {
 
 /// What divisions were made; cells by whose core has their Morton-first member.
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Counts {
+pub(super) struct DivisionCounts {
     /// Initial cells.
     pub(super) initial: u64,
     /// Parts not divided further.
@@ -85,43 +85,44 @@ pub(super) struct Counts {
 
 /// Divides cells of one tile, one after the other, in memory that it keeps.
 pub(super) struct Division<'a> {
-    rule: Rule,
+    rule: DivisionRule,
     positions: &'a [Position],
     normals: &'a [[f32; 3]],
     core: Range<usize>,
-    counts: Counts,
-    stack: Vec<Part>,
+    counts: DivisionCounts,
+    stack: Vec<CellPart>,
     spare: Vec<u32>,
 }
 
 impl<'a> Division<'a> {
     /// Of a tile whose groups were taken out of it.
-    pub(super) fn new(rule: Rule, tile: &'a Tile) -> Self {
+    pub(super) fn new(rule: DivisionRule, tile: &'a Tile) -> Self {
         Division {
             rule,
             positions: &tile.positions,
             normals: &tile.normals,
             core: tile.core.clone(),
-            counts: Counts::default(),
+            counts: DivisionCounts::default(),
             stack: Vec::new(),
             spare: Vec::new(),
         }
     }
 
     /// What was done so far.
-    pub(super) fn counts(&self) -> Counts {
+    pub(super) fn counts(&self) -> DivisionCounts {
         self.counts
     }
 
-    /// True if the tile's core has the Morton-first of the members from `start` on: each cell counts
-    /// there, so that every cut into tiles counts alike.
+    /// True if the tile's core has the Morton-first of the members from `start` on: each cell
+    /// counts there, so that every cut into tiles counts alike.
     pub(super) fn owns(&self, cells: &Partition, start: usize) -> bool {
         self.core.contains(&(cells.members[start] as usize))
     }
 
-    /// Divides the initial cell `members[start..end]` of `cells`: reorders the members part by part,
-    /// each in Morton order, says which of their normals are turned, and adds the end of each part.
-    /// Tells `log` of every division by angle: of which range, and how many parts more it makes.
+    /// Divides the initial cell `members[start..end]` of `cells`: reorders the members part by
+    /// part, each in Morton order, says which of their normals are turned, and adds the end of each
+    /// part. Tells `log` of every division by angle: of which range, and how many parts more it
+    /// makes.
     pub(super) fn run(
         &mut self,
         Range { start, end }: Range<usize>,
@@ -133,12 +134,13 @@ impl<'a> Division<'a> {
         let deepest = DEEPEST + 2 * (end - start).max(1).ilog2();
         let mut ties = self.rule.limit.ties(self.positions[cells.members[start] as usize]);
         let mut cut_deep = false;
-        self.stack.push(Part { start, end, depth: 0, narrowest: f64::NEG_INFINITY });
+        self.stack.push(CellPart { start, end, depth: 0, narrowest: f64::NEG_INFINITY });
         while let Some(part) = self.stack.pop() {
             let whole = part.start..part.end;
             let (members, turned) = (&mut cells.members[whole.clone()], &mut cells.turned[whole]);
             if let &mut [only] = members {
-                // Half of all parts where cells are divided to the last; its own normal is the axis.
+                // Half of all parts where cells are divided to the last; its own normal is the
+                // axis.
                 turned[0] = is_turned([0.0; 3], self.normals[only as usize]);
                 self.close(cells, &part);
                 continue;
@@ -177,7 +179,7 @@ impl<'a> Division<'a> {
     }
 
     /// Ends a part that is not divided further.
-    fn close(&mut self, cells: &mut Partition, part: &Part) {
+    fn close(&mut self, cells: &mut Partition, part: &CellPart) {
         self.counts.cells += u64::from(self.owns(cells, part.start));
         cells.ends.push(part.end as u32);
     }
@@ -189,9 +191,10 @@ impl<'a> Division<'a> {
         }
     }
 
-    /// Decides about a part whose angles, and those of all parts above it, span `narrowest` or more.
+    /// Decides about a part whose angles, and those of all parts above it, span `narrowest` or
+    /// more.
     fn verdict(&mut self, part: &[u32], narrowest: f64, ties: u64) -> Verdict {
-        let Rule { limit, min_points, max_side, min_spacing, .. } = self.rule;
+        let DivisionRule { limit, min_points, max_side, min_spacing, .. } = self.rule;
         let is_wide = part.len() > min_points && limit.allows(narrowest, ties);
         let by_angle = if is_wide { Verdict::ByAngle } else { Verdict::Kept };
         if max_side == u64::MAX && (min_spacing == 0 || !is_wide) {
@@ -275,7 +278,7 @@ impl<'a> Division<'a> {
         part: &mut [u32],
         turned: &[bool],
         survey: &Survey,
-        child: impl Fn(Range<usize>) -> Part,
+        child: impl Fn(Range<usize>) -> CellPart,
     ) {
         let positions = self.positions;
         let nearest = match self.rule.reference {
@@ -284,7 +287,8 @@ impl<'a> Division<'a> {
         };
         let [nearest, farthest] = [nearest, survey.farthest].map(|i| positions[i as usize]);
         let cut = if self.rule.side <= SHORT_SIDE {
-            // |x − a|² ≤ |x − b|² as 2 (x − a)·(b − a) ≤ |b − a|², exact as every term is below 2^61.
+            // |x − a|² ≤ |x − b|² as 2 (x − a)·(b − a) ≤ |b − a|², exact as every term is below
+            // 2^61.
             let apart: [i64; 3] = std::array::from_fn(|axis| farthest[axis] - nearest[axis]);
             let apart2: i64 = apart.iter().map(|d| d * d).sum();
             self.part_in_two(part, |i| {
@@ -323,7 +327,7 @@ impl<'a> Division<'a> {
     }
 
     /// Parts the members by the octants of the smallest octant of the initial cell that holds them.
-    fn cut_in_eight(&mut self, part: &mut [u32], child: impl Fn(Range<usize>) -> Part) {
+    fn cut_in_eight(&mut self, part: &mut [u32], child: impl Fn(Range<usize>) -> CellPart) {
         let positions = self.positions;
         let tight = Bounds::of(part.iter().map(|&i| positions[i as usize]));
         let Some(middle) = middle(&tight, self.rule.origin, self.rule.side) else { return };

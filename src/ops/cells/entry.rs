@@ -1,8 +1,8 @@
 //! What the first phase stores: pairs of numbers.
 //!
 //! An initial cell that can be divided is two pairs, (x, CELL) and (y, z) of its Morton-first
-//! position; its divisions follow, each (range, parts more that it makes), every part's before those
-//! of its own parts. A tile ends with (records kept whatever is divided, KEPT).
+//! position; its divisions follow, each (range, parts more that it makes), every part's before
+//! those of its own parts. A tile ends with (records kept whatever is divided, KEPT).
 
 use crate::Result;
 use crate::point::Position;

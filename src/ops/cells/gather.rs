@@ -1,9 +1,10 @@
 //! The first phase of `cells` with `keep`: every division that could be made, and of which range.
 
 use super::division::Division;
+use super::entry;
+use super::keys::Cells;
 use super::limit::Limit;
 use super::threshold::Threshold;
-use super::{Cells, entry};
 use crate::geom::angle::{MaxAngle, is_known};
 use crate::report::Tally;
 use crate::stage::{Gathered, Needs, ScanOp, TileOp};

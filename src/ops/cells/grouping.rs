@@ -2,12 +2,32 @@
 
 use std::ops::Range;
 
+use super::keys::Cells;
+use super::settings::Reference;
 use crate::geom::angle::is_known;
 use crate::point::{Bounds, Position};
 use crate::tile::{Cells as Partition, Tile};
+use crate::{Error, Result};
 
 /// Cells along an axis that a packed key can tell apart.
 const PACKED_CELLS: i64 = 1 << 21;
+
+impl Cells {
+    /// The initial cells that have a position in the tile's core, in the memory of the tile's own,
+    /// and how many of them cross its faces.
+    pub(super) fn initial_cells(&self, tile: &mut Tile) -> Result<(Partition, u64)> {
+        let side = self.settled()?.steps;
+        if u32::try_from(tile.positions.len()).is_err() {
+            return Err(Error::internal("a tile has more than 2^32 positions"));
+        }
+        let mut cells = std::mem::take(&mut tile.cells);
+        cells.clear();
+        cells.reference = self.direction().and_then(Reference::direction);
+        let crossing = Grouping { tile, side, by_class: !self.by.is_empty() }.run(&mut cells);
+        cells.turned.resize(cells.members.len(), false);
+        Ok((cells, crossing))
+    }
+}
 
 /// A tile's positions, to be grouped by the cube of side `side` that they are in.
 pub(super) struct Grouping<'a> {
@@ -18,8 +38,9 @@ pub(super) struct Grouping<'a> {
 }
 
 impl Grouping<'_> {
-    /// Makes each cell with a core position a group of `cells`: the chosen positions of it that have a
-    /// normal, in Morton order. Returns how many groups have positions on both sides of a face of the tile.
+    /// Makes each cell with a core position a group of `cells`: the chosen positions of it that
+    /// have a normal, in Morton order. Returns how many groups have positions on both sides of a
+    /// face of the tile.
     pub(super) fn run(&self, cells: &mut Partition) -> u64 {
         if self.tile.core.is_empty() {
             return 0;
@@ -138,8 +159,8 @@ impl Grouping<'_> {
         mixed.chunk_by(|a, b| class(a) == class(b)).map(one).sum()
     }
 
-    /// Ends the group of the members from `start` on, or drops them if none is in the core. Returns 1
-    /// if only some are.
+    /// Ends the group of the members from `start` on, or drops them if none is in the core. Returns
+    /// 1 if only some are.
     fn close_one(&self, cells: &mut Partition, start: usize) -> u64 {
         let group = &cells.members[start..];
         let before = group.partition_point(|&i| (i as usize) < self.tile.core.start);

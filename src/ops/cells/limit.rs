@@ -1,4 +1,5 @@
-//! Which divisions are made: all of ranges wider than the largest allowed, and some of exactly that.
+//! Which divisions are made: all of ranges wider than the largest allowed, and some of exactly
+//! that.
 
 use std::cmp::Ordering;
 
@@ -26,7 +27,8 @@ pub(super) struct Ties {
 }
 
 impl Limit {
-    /// How many divisions of exactly the largest range the initial cell that begins with `first` has.
+    /// How many divisions of exactly the largest range the initial cell that begins with `first`
+    /// has.
     pub(super) fn ties(&self, first: Position) -> u64 {
         self.ties.map_or(0, |ties| match morton_cmp(&first, &ties.last) {
             Ordering::Less => u64::MAX,

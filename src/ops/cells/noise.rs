@@ -1,9 +1,10 @@
 //! How far normals scatter where the scan is planar, and what that means for the reduction.
 
-use super::division::{Division, Rule};
+use super::auto::{self, LADDER, Sampled};
+use super::division::{Division, DivisionRule};
+use super::keys::Cells;
 use super::limit::Limit;
-use super::outlook::{self, LADDER, Sampled};
-use super::{Cells, Keep};
+use super::target::Keep;
 use crate::Result;
 use crate::geom::angle::{MaxAngle, is_known};
 use crate::ops::scatter::{scatter, typical};
@@ -16,10 +17,10 @@ use crate::tile::{Cells as Partition, Tile};
 /// `min_spacing` of what samples are divided into, as a share of the side.
 const QUARTER: i64 = 4;
 
-/// What a sample says: the scatter of its normals in radians, NaN if it is not planar; how many of how
-/// many positions are expected to stay, 0 of 0 where a target or the scatter decides about that;
-/// how many of how many positions the stage decides about; and where the target is left to the scan, how
-/// many are expected to stay at each angle of [`LADDER`].
+/// What a sample says: the scatter of its normals in radians, NaN if it is not planar; how many of
+/// how many positions are expected to stay, 0 of 0 where a target or the scatter decides about
+/// that; how many of how many positions the stage decides about; and where the target is left to
+/// the scan, how many are expected to stay at each angle of [`LADDER`].
 pub(super) fn sample(cells: &Cells, tile: &mut Tile) -> Result<Vec<f64>> {
     let scatter = scatter(tile).unwrap_or(f64::NAN);
     let is_given = cells.keep.is_none() && !cells.max_angle.is_some_and(Setting::is_auto);
@@ -29,7 +30,7 @@ pub(super) fn sample(cells: &Cells, tile: &mut Tile) -> Result<Vec<f64>> {
     if cells.keep == Some(Keep::Auto) {
         for angle in LADDER {
             let min_spacing = given.min_spacing.max((given.side / QUARTER).unsigned_abs());
-            let rule = Rule { limit: limit(angle), min_spacing, ..given };
+            let rule = DivisionRule { limit: limit(angle), min_spacing, ..given };
             let (kept, positions) = divided(rule, tile);
             steps.push(kept as f64);
             of = positions;
@@ -44,10 +45,10 @@ fn limit(angle: f64) -> Limit {
     Limit { max_angle: MaxAngle::new(angle), ties: None }
 }
 
-/// Divides the initial cells that lie in the sample as the stage would: how many records of how many
-/// positions stay. Cells are anchored at the sample's corner, so that whole ones are in it.
-fn divided(rule: Rule, tile: &mut Tile) -> (usize, usize) {
-    let rule = Rule { origin: tile.cube.lo, ..rule };
+/// Divides the initial cells that lie in the sample as the stage would: how many records of how
+/// many positions stay. Cells are anchored at the sample's corner, so that whole ones are in it.
+fn divided(rule: DivisionRule, tile: &mut Tile) -> (usize, usize) {
+    let rule = DivisionRule { origin: tile.cube.lo, ..rule };
     let mut partition = Partition::default();
     let whole = |p: Position| initial_cell(&rule, tile.cube.hi, p);
     let mut placed: Vec<([i64; 3], u32)> = (tile.core.clone())
@@ -69,9 +70,9 @@ fn divided(rule: Rule, tile: &mut Tile) -> (usize, usize) {
     (partition.ends.len() + without_normal, positions)
 }
 
-/// Which initial cell `p` is in; none if it is not all within a cube that ends with `last`, unless it
-/// is larger than that.
-fn initial_cell(rule: &Rule, last: Position, p: Position) -> Option<[i64; 3]> {
+/// Which initial cell `p` is in; none if it is not all within a cube that ends with `last`, unless
+/// it is larger than that.
+fn initial_cell(rule: &DivisionRule, last: Position, p: Position) -> Option<[i64; 3]> {
     let mut cell = [0; 3];
     for axis in 0..3 {
         cell[axis] = (p[axis].checked_sub(rule.origin[axis])?) / rule.side;
@@ -92,14 +93,14 @@ pub(super) fn forecast(cells: &mut Cells, samples: &[Vec<f64>]) -> Forecast {
     let (decided, seen) = (column(3).sum::<f64>(), column(4).sum::<f64>());
     let chosen = if seen > 0.0 { decided / seen } else { 1.0 };
     let sampled = Sampled { scatter, chosen, shares: shares(samples) };
-    let chosen = outlook::choose(cells, &sampled);
+    let chosen = auto::choose(cells, &sampled);
     let decisions = scatter.map(|scatter| ("normal_scatter".into(), scatter.into()));
     let warning = few_asked_for(cells).or_else(|| noisy(cells, samples, scatter?));
     Forecast { decisions: decisions.into_iter().collect(), chosen, warning }
 }
 
-/// The share that stays at each angle of [`LADDER`]. Samples are drawn by rank: each stands for as many
-/// records, however many positions it has.
+/// The share that stays at each angle of [`LADDER`]. Samples are drawn by rank: each stands for as
+/// many records, however many positions it has.
 fn shares(samples: &[Vec<f64>]) -> Option<[f64; LADDER.len()]> {
     let each = samples.iter().filter_map(|sample| match sample[..] {
         [_, _, of, _, _, ref steps @ ..] if of > 0.0 && steps.len() == LADDER.len() => {

@@ -25,8 +25,8 @@ const WHOLE: f64 = 9_007_199_254_740_992.0;
 const ALL: u64 = 100_000_000;
 
 impl Keep {
-    /// How many of `records` are to stay: rounded to whole ones, halves upwards, at least one. All where
-    /// samples decide, until they do.
+    /// How many of `records` are to stay: rounded to whole ones, halves upwards, at least one. All
+    /// where samples decide, until they do.
     pub(super) fn of(self, records: u64) -> u64 {
         match self {
             Keep::Auto => records,

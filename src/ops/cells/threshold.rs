@@ -2,9 +2,9 @@
 
 use serde_json::Value;
 
-use super::Keep;
 use super::entry::{self, Entry};
 use super::limit::{Limit, Ties};
+use super::target::Keep;
 use crate::geom::angle::MaxAngle;
 use crate::stage::Gathered;
 use crate::{Error, Result};
@@ -26,8 +26,8 @@ pub(super) struct Threshold {
 
 impl Threshold {
     /// Of all divisions in order of their ranges, the widest first, and of equal ones in canonical
-    /// order, makes as many as leave no more records than `keep` says, or than `auto` where that is left
-    /// to the scan. Walks what was found five times.
+    /// order, makes as many as leave no more records than `keep` says, or than `auto` where that is
+    /// left to the scan. Walks what was found five times.
     pub(super) fn find(found: &dyn Gathered, keep: Keep, auto: Option<u64>) -> Result<Self> {
         let mut target = auto.unwrap_or_else(|| keep.of(found.records()));
         let (mut least, mut more) = (0, 0);

@@ -1,16 +1,13 @@
 //! Neighbourhoods estimated side by side: every lane does what
-//! [`Estimator::estimate`](super::Estimator::estimate) does, to
-//! the last bit.
+//! [`Estimator::estimate`](super::Estimator::estimate) does, to the last bit.
 
-use super::fan::Fan;
-use super::{Estimate, Fallback, Method, Outcome, alone, settled, varady};
+use super::estimate::{Estimate, Fallback, Method, Outcome, alone, settled, varady};
+use super::fan::{Fan, LaneRow, MOST, load};
 use crate::geom::plane::{self, Covariance};
 use crate::geom::simd::{EIGHT, Kernel, Lanes, Mask, Real, Simd};
 use crate::geom::star::Star;
 use crate::tile::Neighborhood;
 
-/// Most neighbours of a neighbourhood that is not estimated alone.
-pub(super) const MOST: usize = 64;
 /// Binary logarithm of positions times offset up to which all sums of products are exact in f64:
 /// their squares.
 const EXACT_BITS: u32 = 26;
@@ -29,9 +26,6 @@ pub(super) fn shift(offsets: &[[i64; 3]], farthest2: u128) -> Option<u32> {
     (shared >= excess).then_some(shared)
 }
 
-/// One number of each neighbourhood.
-pub(super) type Row = [f64; EIGHT];
-
 /// Up to eight neighbourhoods of equally many neighbours, nearest first.
 #[derive(Debug, Default)]
 pub(super) struct Bundle {
@@ -39,15 +33,15 @@ pub(super) struct Bundle {
     owners: Vec<usize>,
     neighbors: usize,
     /// The offsets, a row for each neighbour and axis.
-    at: Vec<[Row; 3]>,
+    at: Vec<[LaneRow; 3]>,
     /// For each neighbour what grows in Morton order, neighbourhood after neighbourhood.
     ranks: Vec<u32>,
     fan: Fan,
 }
 
 impl Bundle {
-    /// Takes the neighbourhood of `owner`, unless it has too few or too many neighbours, not as many
-    /// as the others, or needs more than f64 for exact moments.
+    /// Takes the neighbourhood of `owner`, unless it has too few or too many neighbours, not as
+    /// many as the others, or needs more than f64 for exact moments.
     pub fn take(&mut self, owner: usize, neighborhood: &Neighborhood<'_>) -> bool {
         let count = neighborhood.ranks().len();
         if self.owners.is_empty() {
@@ -75,8 +69,8 @@ impl Bundle {
         self.owners.len() == EIGHT
     }
 
-    /// Estimates all normals, calls `settle` with their owners, and is empty again. Where the fan of
-    /// triangles is in doubt, its normal is that of `star`.
+    /// Estimates all normals, calls `settle` with their owners, and is empty again. Where the fan
+    /// of triangles is in doubt, its normal is that of `star`.
     pub fn estimate(
         &mut self,
         method: Method,
@@ -95,11 +89,11 @@ impl Bundle {
                 in_morton_order(offsets, &ranks[lane * *neighbors..][..*neighbors])
             };
             let outcome = match estimates.of(lane) {
-                Found::Outcome(outcome) => outcome,
-                Found::NoFan { flat, adjugate } => {
+                LaneResult::Outcome(outcome) => outcome,
+                LaneResult::NoFan { flat, adjugate } => {
                     varady(&adjugate, flat, star.normal_of_short(&offsets(), flat))
                 }
-                Found::Nothing => {
+                LaneResult::Nothing => {
                     let whole = |offset: [f64; 3]| offset.map(|v| v as i64);
                     alone(method, star, &offsets().into_iter().map(whole).collect::<Vec<_>>())
                 }
@@ -122,10 +116,10 @@ pub(super) fn in_morton_order<T>(
 
 /// The estimate of each lane.
 struct Estimates {
-    normal: [Row; 3],
+    normal: [LaneRow; 3],
     /// The normals of the planes of regression.
-    flat: [Row; 3],
-    adjugate: [Row; 6],
+    flat: [LaneRow; 3],
+    adjugate: [LaneRow; 6],
     /// The lanes to be estimated alone: they have no single plane of regression.
     alone: u32,
     /// The lanes where the fan of triangles is in doubt.
@@ -138,7 +132,7 @@ struct Estimates {
 }
 
 /// What came of a lane.
-enum Found {
+enum LaneResult {
     Outcome(Outcome),
     /// All but the fan of triangles.
     NoFan {
@@ -149,26 +143,26 @@ enum Found {
 }
 
 impl Estimates {
-    fn of(&self, lane: usize) -> Found {
+    fn of(&self, lane: usize) -> LaneResult {
         let is_in = |mask: u32| mask >> lane & 1 == 1;
         if is_in(self.alone) {
-            return Found::Nothing;
+            return LaneResult::Nothing;
         }
         if is_in(self.lines) {
-            return Found::Outcome((Estimate::None, None));
+            return LaneResult::Outcome((Estimate::None, None));
         }
         if is_in(self.doubtful) {
             let (flat, adjugate) = (self.flat.map(|v| v[lane]), self.adjugate.map(|v| v[lane]));
-            return Found::NoFan { flat, adjugate };
+            return LaneResult::NoFan { flat, adjugate };
         }
         let normal = settled(self.normal.map(|v| v[lane]));
-        Found::Outcome((normal, is_in(self.perpendicular).then_some(Fallback::Perpendicular)))
+        LaneResult::Outcome((normal, is_in(self.perpendicular).then_some(Fallback::Perpendicular)))
     }
 }
 
 /// All lanes of a bundle; those that no neighbourhood is in have a result that nobody reads.
 struct Together<'a> {
-    at: &'a [[Row; 3]],
+    at: &'a [[LaneRow; 3]],
     /// Neighbourhood after neighbourhood.
     ranks: &'a [u32],
     fan: &'a mut Fan,
@@ -212,19 +206,13 @@ impl Kernel for Together<'_> {
 }
 
 #[inline(always)]
-fn store<L: Lanes>(lanes: L, rows: [L::F64; 3]) -> [Row; 3] {
+fn store<L: Lanes>(lanes: L, rows: [L::F64; 3]) -> [LaneRow; 3] {
     [lanes.store_eight(rows[0]), lanes.store_eight(rows[1]), lanes.store_eight(rows[2])]
-}
-
-/// Three rows.
-#[inline(always)]
-pub(super) fn load<L: Lanes>(lanes: L, rows: &[Row; 3]) -> [L::F64; 3] {
-    [lanes.load_eight(&rows[0]), lanes.load_eight(&rows[1]), lanes.load_eight(&rows[2])]
 }
 
 /// n·Σxy − Σx·Σy as in [`Covariance`].
 #[inline(always)]
-fn scatter<L: Lanes>(lanes: L, at: &[[Row; 3]]) -> [Row; 6] {
+fn scatter<L: Lanes>(lanes: L, at: &[[LaneRow; 3]]) -> [LaneRow; 6] {
     let zero = lanes.load_eight(&[0.0; EIGHT]);
     let (mut sum, mut product) = ([zero; 3], [zero; 6]);
     for at in at {
@@ -247,7 +235,7 @@ fn scatter<L: Lanes>(lanes: L, at: &[[Row; 3]]) -> [Row; 6] {
 /// The normals of the planes of regression of `count` positions each; NaN where there is no single
 /// one.
 #[inline(always)]
-fn flat<L: Lanes>(lanes: L, scatter: &[Row; 6], count: usize) -> [L::F64; 3] {
+fn flat<L: Lanes>(lanes: L, scatter: &[LaneRow; 6], count: usize) -> [L::F64; 3] {
     let unit = 1.0 / (count * count) as f64;
     let mut matrix = [lanes.load_eight(&[0.0; EIGHT]); 6];
     for entry in 0..6 {
@@ -257,10 +245,10 @@ fn flat<L: Lanes>(lanes: L, scatter: &[Row; 6], count: usize) -> [L::F64; 3] {
     plane::smallest_vector(matrix)
 }
 
-/// The lanes where the positions are certainly not on one line: two of the axes have variances whose
-/// product exceeds the square of their covariance, whatever rounding did.
+/// The lanes where the positions are certainly not on one line: two of the axes have variances
+/// whose product exceeds the square of their covariance, whatever rounding did.
 #[inline(always)]
-fn spread<L: Lanes>(lanes: L, scatter: &[Row; 6]) -> u32 {
+fn spread<L: Lanes>(lanes: L, scatter: &[LaneRow; 6]) -> u32 {
     // Two products are rounded, each by a factor within 1 ± 2^-53.
     const CERTAIN: f64 = 1.0 - 4.0 * f64::EPSILON;
     let mut entries = [lanes.load_eight(&scatter[0]); 6];
@@ -278,7 +266,7 @@ fn spread<L: Lanes>(lanes: L, scatter: &[Row; 6]) -> u32 {
 /// The adjugates of the covariances of `count` positions each, and the lanes where all are on one
 /// line.
 #[inline(always)]
-fn adjugate(scatter: &[Row; 6], count: usize) -> ([Row; 6], u32) {
+fn adjugate(scatter: &[LaneRow; 6], count: usize) -> ([LaneRow; 6], u32) {
     let (mut adjugate, mut lines) = ([[0.0; EIGHT]; 6], 0);
     for lane in 0..EIGHT {
         let mut entries = [0; 6];
@@ -297,7 +285,7 @@ fn adjugate(scatter: &[Row; 6], count: usize) -> ([Row; 6], u32) {
 
 /// The height function's normal where the first estimates are `first`, at length 1; NaN if it is 0.
 #[inline(always)]
-fn fitted<L: Lanes>(lanes: L, adjugate: &[Row; 6], first: [L::F64; 3]) -> [L::F64; 3] {
+fn fitted<L: Lanes>(lanes: L, adjugate: &[LaneRow; 6], first: [L::F64; 3]) -> [L::F64; 3] {
     let mut matrix = [first[0]; 6];
     for entry in 0..6 {
         matrix[entry] = lanes.load_eight(&adjugate[entry]);

@@ -4,26 +4,30 @@
 
 #![expect(clippy::needless_range_loop, reason = "one index walks several arrays of lanes")]
 
-use super::bundle::{MOST, Row, load};
 use crate::geom::plane::{across, choose, dot, unit_or_nan};
 use crate::geom::simd::{EIGHT, Lanes, Mask, Real};
-use crate::geom::star::{Projected, ROUNDING, cross};
+use crate::geom::star::{ProjectedPoint, ROUNDING, cross};
 
-/// Size of a turn that leaves no doubt, relative to the square of the largest inverted distance: far
-/// above what a star takes for none, so that every way around the hull meets the same corners.
+/// Most neighbours of a neighbourhood that is not estimated alone.
+pub(super) const MOST: usize = 64;
+/// Size of a turn that leaves no doubt, relative to the square of the largest inverted distance:
+/// far above what a star takes for none, so that every way around the hull meets the same corners.
 const CLEAR: f64 = 1.0 / (1u64 << 24) as f64;
 /// The nearest neighbour is in no doubt where no other is as near, up to this factor (of squares).
 const RIVAL: f64 = 1.0 + 1.0 / (1u64 << 36) as f64;
+
+/// One number of each neighbourhood.
+pub(super) type LaneRow = [f64; EIGHT];
 
 /// The neighbours of eight points in their planes, a row for each; memory that stays.
 #[derive(Debug, Default)]
 pub(super) struct Fan {
     /// The inverted projections.
-    inverted: Vec<[Row; 2]>,
+    inverted: Vec<[LaneRow; 2]>,
     /// Distances in the plane, squared.
-    squares: Vec<Row>,
+    squares: Vec<LaneRow>,
     /// The offsets of the corners of the hull, counter-clockwise, and of the first once more.
-    corners: Vec<[Row; 3]>,
+    corners: Vec<[LaneRow; 3]>,
 }
 
 /// For each lane the places of the neighbours at the corners of its hull, counter-clockwise.
@@ -43,7 +47,7 @@ impl Fan {
     pub fn mean_normals<L: Lanes>(
         &mut self,
         lanes: L,
-        at: &[[Row; 3]],
+        at: &[[LaneRow; 3]],
         ranks: &[u32],
         normals: [L::F64; 3],
     ) -> ([L::F64; 3], u32) {
@@ -56,14 +60,14 @@ impl Fan {
 
     /// Projects all neighbours to the planes with the given normals, and inverts them.
     #[inline(always)]
-    fn project<L: Lanes>(&mut self, lanes: L, at: &[[Row; 3]], normals: [L::F64; 3]) {
+    fn project<L: Lanes>(&mut self, lanes: L, at: &[[LaneRow; 3]], normals: [L::F64; 3]) {
         let Fan { inverted, squares, corners } = self;
         inverted.resize(at.len(), [[0.0; EIGHT]; 2]);
         squares.resize(at.len(), [0.0; EIGHT]);
         corners.resize(at.len() + 1, [[0.0; EIGHT]; 3]);
         let (u, v) = across(normals);
         for ((at, inverted), square) in at.iter().zip(inverted).zip(squares) {
-            let p = Projected::of(load(lanes, at), u, v);
+            let p = ProjectedPoint::of(load(lanes, at), u, v);
             *inverted = [lanes.store_eight(p.x), lanes.store_eight(p.y)];
             *square = lanes.store_eight(p.square);
         }
@@ -142,9 +146,9 @@ impl Fan {
     /// of the way there, and the point itself is not either. Where that is the point itself, the
     /// corner is the same once more, but left. Also the lanes where it is in no doubt.
     ///
-    /// Who is to the right of the way from `a` to the point comes first, and whoever is to the right
-    /// of the way to the one before takes its place; from the point on, who is to the right of
-    /// the way to the corner that was left. Turns up to `doubt` do not count.
+    /// Who is to the right of the way from `a` to the point comes first, and whoever is to the
+    /// right of the way to the one before takes its place; from the point on, who is to the right
+    /// of the way to the corner that was left. Turns up to `doubt` do not count.
     #[inline(always)]
     fn next<L: Lanes>(&self, lanes: L, a: Corner<L>, doubt: L::F64) -> (Corner<L>, u32) {
         let zero = doubt.of(0.0);
@@ -181,7 +185,7 @@ impl Fan {
     /// Lays out the offsets of the corners, from the Morton-first on, and tells where the gaps are
     /// then: the number of the triangle that is none, counted from 1.
     #[inline(always)]
-    fn gather(&mut self, at: &[[Row; 3]], ranks: &[u32], hulls: &Hulls) -> Row {
+    fn gather(&mut self, at: &[[LaneRow; 3]], ranks: &[u32], hulls: &Hulls) -> LaneRow {
         let mut gaps = [0.0; EIGHT];
         for (lane, ranks) in ranks.chunks_exact(at.len()).enumerate().take(EIGHT) {
             let count = hulls.counts[lane];
@@ -214,7 +218,7 @@ impl Fan {
         lanes: L,
         normals: [L::F64; 3],
         counts: &[usize; EIGHT],
-        gaps: &Row,
+        gaps: &LaneRow,
     ) -> [L::F64; 3] {
         let zero = normals[0].of(0.0);
         let gaps = lanes.load_eight(gaps);
@@ -240,6 +244,12 @@ impl Fan {
         }
         unit_or_nan(sum)
     }
+}
+
+/// Three rows.
+#[inline(always)]
+pub(super) fn load<L: Lanes>(lanes: L, rows: &[LaneRow; 3]) -> [L::F64; 3] {
+    [lanes.load_eight(&rows[0]), lanes.load_eight(&rows[1]), lanes.load_eight(&rows[2])]
 }
 
 /// A corner of each lane's hull, and where the walk around it has come to.

@@ -22,7 +22,7 @@ pub enum Orient {
 
 /// The rule by which signs are settled, on the lattice.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Side {
+pub(super) enum SignRule {
     /// Any.
     Any,
     /// Upwards.
@@ -31,9 +31,9 @@ pub(super) enum Side {
     Towards([i128; 3], [f64; 3]),
 }
 
-impl Side {
+impl SignRule {
     /// Towards `viewpoint`, in world units.
-    pub(super) fn towards(viewpoint: [f64; 3], lattice: &Lattice) -> Side {
+    pub(super) fn towards(viewpoint: [f64; 3], lattice: &Lattice) -> SignRule {
         let stretched = [1.0, 1.0, lattice.z_scale()];
         let steps: [f64; 3] = std::array::from_fn(|axis| {
             (viewpoint[axis] - lattice.shift[axis]) * stretched[axis] / lattice.step
@@ -41,20 +41,20 @@ impl Side {
         // 2^100 steps are beyond every lattice, and leave room for differences.
         let whole = steps.map(|v| v.round().clamp(-FARTHEST, FARTHEST));
         let rest = std::array::from_fn(|axis| (steps[axis] - whole[axis]).clamp(-0.5, 0.5));
-        Side::Towards(whole.map(|v| v as i128), rest)
+        SignRule::Towards(whole.map(|v| v as i128), rest)
     }
 
     /// `normal`, at position `p`, turned to the side. Comes with its canonical sign, which it keeps
     /// where it lies on the border.
     pub(super) fn settled(&self, normal: [f32; 3], p: Position) -> [f32; 3] {
         let turned = match self {
-            Side::Any => false,
-            Side::Up => {
+            SignRule::Any => false,
+            SignRule::Up => {
                 let [x, y, z] = normal;
                 let first = [z, y, x].into_iter().find(|c| *c != 0.0);
                 first.is_some_and(|c| c < 0.0)
             }
-            Side::Towards(whole, rest) => {
+            SignRule::Towards(whole, rest) => {
                 // Differences are exact before they are rounded, however far from world 0.
                 let sight: [f64; 3] = std::array::from_fn(|axis| {
                     (whole[axis] - i128::from(p[axis])) as f64 + rest[axis]

@@ -1,7 +1,7 @@
 //! Outliers with too few neighbours within a radius: a tile at a time.
 
-use super::super::removal::remove;
-use super::{account, checked};
+use super::super::removal::{RemovalAccount, remove};
+use super::neighbors::checked;
 use crate::point::{Mark, Units, distance2, names};
 use crate::quantity::Length;
 use crate::report::Tally;
@@ -9,8 +9,8 @@ use crate::stage::{Needs, ScanFacts, TileOp};
 use crate::tile::Tile;
 use crate::{Error, Result};
 
-/// A radius that differs from whole steps by less than this part of it is whole: decimals are seldom
-/// exact in binary, and who asks for 0.3 means three steps of 0.1.
+/// A radius that differs from whole steps by less than this part of it is whole: decimals are
+/// seldom exact in binary, and who asks for 0.3 means three steps of 0.1.
 const WHOLE: f64 = 1e-9;
 
 /// `outliers` by radius.
@@ -89,7 +89,7 @@ impl TileOp for RadiusOutliers {
                 records += remove(tile, i);
             }
         }
-        account(self.mark).enter(tally, "outlier", records);
+        RemovalAccount::of_outliers(self.mark).enter(tally, "outlier", records);
         Ok(())
     }
 }

@@ -3,8 +3,8 @@
 
 use serde_json::Value;
 
-use super::super::removal::remove;
-use super::{account, checked};
+use super::super::removal::{RemovalAccount, remove};
+use super::neighbors::checked;
 use crate::geom::wide::Wide;
 use crate::point::{Mark, Position, distance2, names};
 use crate::report::Tally;
@@ -12,8 +12,8 @@ use crate::stage::{Gathered, Needs, ScanFacts, ScanOp, TileOp};
 use crate::tile::Tile;
 use crate::{Error, Result};
 
-/// Units of a figure in a lattice step: 2^16. A figure below 2^63 steps and its square then stay whole
-/// numbers that are summed exactly.
+/// Units of a figure in a lattice step: 2^16. A figure below 2^63 steps and its square then stay
+/// whole numbers that are summed exactly.
 const UNITS: f64 = 65_536.0;
 
 /// `outliers` by statistics of the scan.
@@ -72,7 +72,7 @@ impl TileOp for StatisticalOutliers {
                 records += remove(tile, i);
             }
         }
-        account(self.mark).enter(tally, "outlier", records);
+        RemovalAccount::of_outliers(self.mark).enter(tally, "outlier", records);
         Ok(())
     }
 
@@ -141,7 +141,8 @@ impl ScanOp for StatisticalOutliers {
     }
 }
 
-/// Mean length of `offsets` in steps, rounded half to even to whole [`UNITS`]; NaN if there are none.
+/// Mean length of `offsets` in steps, rounded half to even to whole [`UNITS`]; NaN if there are
+/// none.
 fn figure(offsets: &[Position]) -> f64 {
     let sum = offsets.iter().fold(0.0, |sum, &o| sum + (distance2([0; 3], o) as f64).sqrt());
     (sum / offsets.len() as f64 * UNITS).round_ties_even() / UNITS
@@ -198,8 +199,8 @@ struct Conclusion {
 }
 
 impl Conclusion {
-    /// The mean is a whole number and a remainder, so that equal figures are never above it, however
-    /// large: only what is above the whole number is rounded.
+    /// The mean is a whole number and a remainder, so that equal figures are never above it,
+    /// however large: only what is above the whole number is rounded.
     fn of(sums: &Sums, multiplier: f64) -> Conclusion {
         let count = u128::from(sums.count.max(1));
         let (sum, n) = (sums.sum, count as f64);

@@ -3,13 +3,13 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
-use crate::geom::rows::{self, Ordered, Row};
-use crate::geom::simd::lanes::{COLUMNS, LANES, Lanes, joined};
+use crate::geom::rows::{self, Ordered};
+use crate::geom::simd::lanes::{COLUMNS, LANES, Lanes, Row, joined};
 use crate::geom::simd::real::{EIGHT, EXPONENT, Mask, Real};
 
-// SAFETY, of every block here: a value of a type of this module comes from `witness` alone, which is
-// called only in code that is compiled for the instructions and run where the processor has them;
-// and arrays that are read or written have the numbers that the instruction touches.
+// SAFETY, of every block here: a value of a type of this module comes from `witness` alone, which
+// is called only in code that is compiled for the instructions and run where the processor has
+// them; and arrays that are read or written have the numbers that the instruction touches.
 
 /// Two vectors of 256 bits.
 #[derive(Clone, Copy)]
@@ -24,7 +24,7 @@ impl Avx2 {
 
 impl Lanes for Avx2 {
     type F32 = [__m256; 2];
-    type F64 = Eight;
+    type F64 = EightAvx2;
 
     #[inline(always)]
     fn load(self, from: &[f32; LANES]) -> Self::F32 {
@@ -105,12 +105,14 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
-    fn load_eight(self, from: &[f64; EIGHT]) -> Eight {
-        unsafe { Eight([_mm256_loadu_pd(from.as_ptr()), _mm256_loadu_pd(from.as_ptr().add(4))]) }
+    fn load_eight(self, from: &[f64; EIGHT]) -> EightAvx2 {
+        unsafe {
+            EightAvx2([_mm256_loadu_pd(from.as_ptr()), _mm256_loadu_pd(from.as_ptr().add(4))])
+        }
     }
 
     #[inline(always)]
-    fn store_eight(self, v: Eight) -> [f64; EIGHT] {
+    fn store_eight(self, v: EightAvx2) -> [f64; EIGHT] {
         let mut to = [0.0; EIGHT];
         unsafe {
             _mm256_storeu_pd(to.as_mut_ptr(), v.0[0]);
@@ -221,11 +223,11 @@ impl Ordered for Four {
 
 /// Eight f64 in two vectors.
 #[derive(Clone, Copy)]
-pub struct Eight([__m256d; 2]);
+pub struct EightAvx2([__m256d; 2]);
 
 /// Where a condition holds: all bits of a lane, or none.
 #[derive(Clone, Copy)]
-pub struct Where([__m256d; 2]);
+pub struct WhereAvx2([__m256d; 2]);
 
 macro_rules! by_vector {
     ($($operator:ident $method:ident $intrinsic:ident $type:ident)*) => {
@@ -243,27 +245,27 @@ macro_rules! by_vector {
 }
 
 by_vector!(
-    Add add _mm256_add_pd Eight
-    Sub sub _mm256_sub_pd Eight
-    Mul mul _mm256_mul_pd Eight
-    Div div _mm256_div_pd Eight
-    BitAnd bitand _mm256_and_pd Where
-    BitOr bitor _mm256_or_pd Where
+    Add add _mm256_add_pd EightAvx2
+    Sub sub _mm256_sub_pd EightAvx2
+    Mul mul _mm256_mul_pd EightAvx2
+    Div div _mm256_div_pd EightAvx2
+    BitAnd bitand _mm256_and_pd WhereAvx2
+    BitOr bitor _mm256_or_pd WhereAvx2
 );
 
-impl Not for Where {
-    type Output = Where;
+impl Not for WhereAvx2 {
+    type Output = WhereAvx2;
 
     #[inline(always)]
-    fn not(self) -> Where {
+    fn not(self) -> WhereAvx2 {
         unsafe {
             let all = _mm256_castsi256_pd(_mm256_set1_epi64x(-1));
-            Where([_mm256_xor_pd(self.0[0], all), _mm256_xor_pd(self.0[1], all)])
+            WhereAvx2([_mm256_xor_pd(self.0[0], all), _mm256_xor_pd(self.0[1], all)])
         }
     }
 }
 
-impl Mask for Where {
+impl Mask for WhereAvx2 {
     #[inline(always)]
     fn bits(self) -> u32 {
         unsafe {
@@ -272,33 +274,33 @@ impl Mask for Where {
     }
 }
 
-impl Real for Eight {
-    type Mask = Where;
+impl Real for EightAvx2 {
+    type Mask = WhereAvx2;
 
     #[inline(always)]
-    fn of(self, v: f64) -> Eight {
-        unsafe { Eight([_mm256_set1_pd(v); 2]) }
+    fn of(self, v: f64) -> EightAvx2 {
+        unsafe { EightAvx2([_mm256_set1_pd(v); 2]) }
     }
 
     #[inline(always)]
-    fn root(self) -> Eight {
-        unsafe { Eight([_mm256_sqrt_pd(self.0[0]), _mm256_sqrt_pd(self.0[1])]) }
+    fn root(self) -> EightAvx2 {
+        unsafe { EightAvx2([_mm256_sqrt_pd(self.0[0]), _mm256_sqrt_pd(self.0[1])]) }
     }
 
     #[inline(always)]
-    fn size(self) -> Eight {
+    fn size(self) -> EightAvx2 {
         unsafe {
             let sign = _mm256_set1_pd(-0.0);
-            Eight([_mm256_andnot_pd(sign, self.0[0]), _mm256_andnot_pd(sign, self.0[1])])
+            EightAvx2([_mm256_andnot_pd(sign, self.0[0]), _mm256_andnot_pd(sign, self.0[1])])
         }
     }
 
     #[inline(always)]
-    fn signed(self, sign: Eight) -> Eight {
+    fn signed(self, sign: EightAvx2) -> EightAvx2 {
         unsafe {
             let bit = _mm256_set1_pd(-0.0);
             let size = self.size().0;
-            Eight([
+            EightAvx2([
                 _mm256_or_pd(size[0], _mm256_and_pd(bit, sign.0[0])),
                 _mm256_or_pd(size[1], _mm256_and_pd(bit, sign.0[1])),
             ])
@@ -306,17 +308,17 @@ impl Real for Eight {
     }
 
     #[inline(always)]
-    fn power(self) -> Eight {
+    fn power(self) -> EightAvx2 {
         unsafe {
             let bits = _mm256_set1_pd(f64::from_bits(EXPONENT));
-            Eight([_mm256_and_pd(bits, self.0[0]), _mm256_and_pd(bits, self.0[1])])
+            EightAvx2([_mm256_and_pd(bits, self.0[0]), _mm256_and_pd(bits, self.0[1])])
         }
     }
 
     #[inline(always)]
-    fn below(self, other: Eight) -> Where {
+    fn below(self, other: EightAvx2) -> WhereAvx2 {
         unsafe {
-            Where([
+            WhereAvx2([
                 _mm256_cmp_pd::<_CMP_LT_OQ>(self.0[0], other.0[0]),
                 _mm256_cmp_pd::<_CMP_LT_OQ>(self.0[1], other.0[1]),
             ])
@@ -324,9 +326,9 @@ impl Real for Eight {
     }
 
     #[inline(always)]
-    fn equals(self, other: Eight) -> Where {
+    fn equals(self, other: EightAvx2) -> WhereAvx2 {
         unsafe {
-            Where([
+            WhereAvx2([
                 _mm256_cmp_pd::<_CMP_EQ_OQ>(self.0[0], other.0[0]),
                 _mm256_cmp_pd::<_CMP_EQ_OQ>(self.0[1], other.0[1]),
             ])
@@ -334,9 +336,9 @@ impl Real for Eight {
     }
 
     #[inline(always)]
-    fn choose(mask: Where, a: Eight, b: Eight) -> Eight {
+    fn choose(mask: WhereAvx2, a: EightAvx2, b: EightAvx2) -> EightAvx2 {
         unsafe {
-            Eight([
+            EightAvx2([
                 _mm256_blendv_pd(b.0[0], a.0[0], mask.0[0]),
                 _mm256_blendv_pd(b.0[1], a.0[1], mask.0[1]),
             ])

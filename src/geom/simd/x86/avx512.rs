@@ -4,13 +4,13 @@ use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
 use super::avx2::insert;
-use crate::geom::rows::{self, Ordered, Row};
-use crate::geom::simd::lanes::{COLUMNS, LANES, Lanes};
+use crate::geom::rows::{self, Ordered};
+use crate::geom::simd::lanes::{COLUMNS, LANES, Lanes, Row};
 use crate::geom::simd::real::{EIGHT, EXPONENT, Mask, Real};
 
-// SAFETY, of every block here: a value of a type of this module comes from `witness` alone, which is
-// called only in code that is compiled for the instructions and run where the processor has them;
-// and arrays that are read or written have the numbers that the instruction touches.
+// SAFETY, of every block here: a value of a type of this module comes from `witness` alone, which
+// is called only in code that is compiled for the instructions and run where the processor has
+// them; and arrays that are read or written have the numbers that the instruction touches.
 
 /// One vector of 512 bits.
 #[derive(Clone, Copy)]
@@ -25,7 +25,7 @@ impl Avx512 {
 
 impl Lanes for Avx512 {
     type F32 = __m512;
-    type F64 = Eight;
+    type F64 = EightAvx512;
 
     #[inline(always)]
     fn load(self, from: &[f32; LANES]) -> Self::F32 {
@@ -96,12 +96,12 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    fn load_eight(self, from: &[f64; EIGHT]) -> Eight {
-        unsafe { Eight(_mm512_loadu_pd(from.as_ptr())) }
+    fn load_eight(self, from: &[f64; EIGHT]) -> EightAvx512 {
+        unsafe { EightAvx512(_mm512_loadu_pd(from.as_ptr())) }
     }
 
     #[inline(always)]
-    fn store_eight(self, v: Eight) -> [f64; EIGHT] {
+    fn store_eight(self, v: EightAvx512) -> [f64; EIGHT] {
         let mut to = [0.0; EIGHT];
         unsafe { _mm512_storeu_pd(to.as_mut_ptr(), v.0) };
         to
@@ -110,9 +110,9 @@ impl Lanes for Avx512 {
     #[inline(always)]
     fn sort(self, rows: &mut [Row; LANES]) {
         for first in (0..LANES).step_by(8) {
-            let mut lists = [Eight(unsafe { _mm512_setzero_pd() }); LANES];
+            let mut lists = [EightAvx512(unsafe { _mm512_setzero_pd() }); LANES];
             for i in 0..LANES {
-                lists[i] = Eight(unsafe { _mm512_loadu_pd(rows[i].as_ptr().add(first)) });
+                lists[i] = EightAvx512(unsafe { _mm512_loadu_pd(rows[i].as_ptr().add(first)) });
             }
             rows::sort(&mut lists);
             for i in 0..LANES {
@@ -135,28 +135,28 @@ impl Lanes for Avx512 {
 
 /// Eight f64.
 #[derive(Clone, Copy)]
-pub struct Eight(__m512d);
+pub struct EightAvx512(__m512d);
 
-impl Ordered for Eight {
+impl Ordered for EightAvx512 {
     #[inline(always)]
-    fn ordered(self, other: Eight) -> (Eight, Eight) {
+    fn ordered(self, other: EightAvx512) -> (EightAvx512, EightAvx512) {
         let (a, b) = (self.0, other.0);
-        unsafe { (Eight(_mm512_min_pd(a, b)), Eight(_mm512_max_pd(a, b))) }
+        unsafe { (EightAvx512(_mm512_min_pd(a, b)), EightAvx512(_mm512_max_pd(a, b))) }
     }
 }
 
 /// Where a condition holds.
 #[derive(Clone, Copy)]
-pub struct Where(__mmask8);
+pub struct WhereAvx512(__mmask8);
 
 macro_rules! by_vector {
     ($($operator:ident $method:ident $intrinsic:ident)*) => {
-        $(impl $operator for Eight {
-            type Output = Eight;
+        $(impl $operator for EightAvx512 {
+            type Output = EightAvx512;
 
             #[inline(always)]
-            fn $method(self, other: Eight) -> Eight {
-                unsafe { Eight($intrinsic(self.0, other.0)) }
+            fn $method(self, other: EightAvx512) -> EightAvx512 {
+                unsafe { EightAvx512($intrinsic(self.0, other.0)) }
             }
         })*
     };
@@ -169,83 +169,83 @@ by_vector!(
     Div div _mm512_div_pd
 );
 
-impl BitAnd for Where {
-    type Output = Where;
+impl BitAnd for WhereAvx512 {
+    type Output = WhereAvx512;
 
     #[inline(always)]
-    fn bitand(self, other: Where) -> Where {
-        Where(self.0 & other.0)
+    fn bitand(self, other: WhereAvx512) -> WhereAvx512 {
+        WhereAvx512(self.0 & other.0)
     }
 }
 
-impl BitOr for Where {
-    type Output = Where;
+impl BitOr for WhereAvx512 {
+    type Output = WhereAvx512;
 
     #[inline(always)]
-    fn bitor(self, other: Where) -> Where {
-        Where(self.0 | other.0)
+    fn bitor(self, other: WhereAvx512) -> WhereAvx512 {
+        WhereAvx512(self.0 | other.0)
     }
 }
 
-impl Not for Where {
-    type Output = Where;
+impl Not for WhereAvx512 {
+    type Output = WhereAvx512;
 
     #[inline(always)]
-    fn not(self) -> Where {
-        Where(!self.0)
+    fn not(self) -> WhereAvx512 {
+        WhereAvx512(!self.0)
     }
 }
 
-impl Mask for Where {
+impl Mask for WhereAvx512 {
     #[inline(always)]
     fn bits(self) -> u32 {
         u32::from(self.0)
     }
 }
 
-impl Real for Eight {
-    type Mask = Where;
+impl Real for EightAvx512 {
+    type Mask = WhereAvx512;
 
     #[inline(always)]
-    fn of(self, v: f64) -> Eight {
-        unsafe { Eight(_mm512_set1_pd(v)) }
+    fn of(self, v: f64) -> EightAvx512 {
+        unsafe { EightAvx512(_mm512_set1_pd(v)) }
     }
 
     #[inline(always)]
-    fn root(self) -> Eight {
-        unsafe { Eight(_mm512_sqrt_pd(self.0)) }
+    fn root(self) -> EightAvx512 {
+        unsafe { EightAvx512(_mm512_sqrt_pd(self.0)) }
     }
 
     #[inline(always)]
-    fn size(self) -> Eight {
-        unsafe { Eight(_mm512_abs_pd(self.0)) }
+    fn size(self) -> EightAvx512 {
+        unsafe { EightAvx512(_mm512_abs_pd(self.0)) }
     }
 
     #[inline(always)]
-    fn signed(self, sign: Eight) -> Eight {
+    fn signed(self, sign: EightAvx512) -> EightAvx512 {
         unsafe {
             let bit = _mm512_and_pd(_mm512_set1_pd(-0.0), sign.0);
-            Eight(_mm512_or_pd(_mm512_abs_pd(self.0), bit))
+            EightAvx512(_mm512_or_pd(_mm512_abs_pd(self.0), bit))
         }
     }
 
     #[inline(always)]
-    fn power(self) -> Eight {
-        unsafe { Eight(_mm512_and_pd(_mm512_set1_pd(f64::from_bits(EXPONENT)), self.0)) }
+    fn power(self) -> EightAvx512 {
+        unsafe { EightAvx512(_mm512_and_pd(_mm512_set1_pd(f64::from_bits(EXPONENT)), self.0)) }
     }
 
     #[inline(always)]
-    fn below(self, other: Eight) -> Where {
-        unsafe { Where(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0)) }
+    fn below(self, other: EightAvx512) -> WhereAvx512 {
+        unsafe { WhereAvx512(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0)) }
     }
 
     #[inline(always)]
-    fn equals(self, other: Eight) -> Where {
-        unsafe { Where(_mm512_cmp_pd_mask::<_CMP_EQ_OQ>(self.0, other.0)) }
+    fn equals(self, other: EightAvx512) -> WhereAvx512 {
+        unsafe { WhereAvx512(_mm512_cmp_pd_mask::<_CMP_EQ_OQ>(self.0, other.0)) }
     }
 
     #[inline(always)]
-    fn choose(mask: Where, a: Eight, b: Eight) -> Eight {
-        unsafe { Eight(_mm512_mask_blend_pd(mask.0, b.0, a.0)) }
+    fn choose(mask: WhereAvx512, a: EightAvx512, b: EightAvx512) -> EightAvx512 {
+        unsafe { EightAvx512(_mm512_mask_blend_pd(mask.0, b.0, a.0)) }
     }
 }

@@ -1,0 +1,240 @@
+//! Flags and the settings that they stand for, in one table a command. Pipelines take their values
+//! from it, and messages their words.
+
+use serde_json::{Value, json};
+
+use super::arguments::{
+    CommonArguments, ConvertArguments, FilterArguments, ReduceArguments, SynthArguments,
+    WrittenArguments,
+};
+use super::classes::Classes;
+use crate::language::Set;
+use crate::quantity::parse_count;
+
+/// A flag of a command, the setting that it stands for, and its value if it was given.
+pub(super) struct CommandFlag {
+    /// As it is typed: `--keep`, or `IN` for an argument without dashes.
+    pub name: &'static str,
+    /// As `--set` takes it: `cells.keep`.
+    pub address: &'static str,
+    /// What was given.
+    pub given: Option<FlagValue>,
+}
+
+/// The value of a flag.
+pub(super) struct FlagValue {
+    value: Value,
+    /// What was typed, where the value may be written otherwise: `6`, a number, is 6.0.
+    typed: Option<String>,
+}
+
+impl FlagValue {
+    /// The value that `text` was typed for.
+    pub fn of(text: &str, value: Value) -> FlagValue {
+        FlagValue { value, typed: Some(text.to_owned()) }
+    }
+}
+
+impl<T: Into<Value>> From<T> for FlagValue {
+    fn from(value: T) -> FlagValue {
+        FlagValue { value: value.into(), typed: None }
+    }
+}
+
+/// Flags from `(name, address, what was given)`.
+fn flags<const N: usize>(
+    rows: [(&'static str, &'static str, Option<FlagValue>); N],
+) -> Vec<CommandFlag> {
+    rows.into_iter().map(|(name, address, given)| CommandFlag { name, address, given }).collect()
+}
+
+/// The values that were given in several tables of flags, for a pipeline.
+pub(super) fn given<const N: usize>(tables: [Vec<CommandFlag>; N]) -> Vec<Set> {
+    let set = |flag: CommandFlag| {
+        let FlagValue { value, typed } = flag.given?;
+        let set = Set::argument(flag.name, flag.address, value);
+        Some(match typed {
+            Some(typed) => set.typed(typed),
+            None => set,
+        })
+    };
+    tables.into_iter().flatten().filter_map(set).collect()
+}
+
+/// The flags that stand for `[run]` settings.
+pub(super) fn common_flags(common: &CommonArguments) -> Vec<CommandFlag> {
+    let existing = common.no_clobber.then(|| FlagValue::from("refuse"));
+    flags([
+        ("--memory", "run.memory", common.memory.clone().map(FlagValue::from)),
+        ("--threads", "run.threads", common.threads.as_deref().map(whole_or_text)),
+        ("--scratch", "run.scratch", common.scratch.clone().map(FlagValue::from)),
+        ("--report", "run.report", common.report.clone().map(FlagValue::from)),
+        ("--no-clobber", "run.existing", existing),
+    ])
+}
+
+impl FilterArguments {
+    /// True if any points are to be left out.
+    pub fn is_given(&self) -> bool {
+        !self.keep_classes.is_empty() || !self.drop_classes.is_empty()
+    }
+}
+
+/// Which points are left out, as the keys of `filter`.
+fn filtered(arguments: &FilterArguments) -> Vec<CommandFlag> {
+    flags([
+        ("--keep-classes", "filter.keep_classes", classes(&arguments.keep_classes)),
+        ("--drop-classes", "filter.drop_classes", classes(&arguments.drop_classes)),
+    ])
+}
+
+/// What becomes of noise: left out, unless all points are to be written, or noise is asked for.
+fn noise(arguments: &ReduceArguments) -> &str {
+    let mut asked = arguments.classes.iter().chain(&arguments.filter.keep_classes);
+    match &arguments.noise {
+        Some(noise) => noise,
+        None if asked.any(|classes| classes.has(7) || classes.has(18)) => "keep",
+        None if arguments.mark.is_some() => "ignore",
+        None => "drop",
+    }
+}
+
+/// True if what is left is to be reduced again and nothing says by what: a number would be met at
+/// once.
+fn again(arguments: &ReduceArguments) -> bool {
+    let passes = arguments.passes.as_deref().and_then(|passes| parse_count(passes).ok());
+    let limit = arguments.keep.is_some() || arguments.max_angle.is_some();
+    passes.is_some_and(|passes| passes > 1) && !limit && arguments.preset.is_none()
+}
+
+/// The flags of `reduce`.
+pub(super) fn reduce_flags(arguments: &ReduceArguments) -> Vec<CommandFlag> {
+    let classes = || classes(&arguments.classes);
+    let mut all = flags([
+        ("IN", "read.path", Some(json!(arguments.inputs).into())),
+        ("-o", "write.path", arguments.output.clone().map(FlagValue::from)),
+        ("--outdir", "write.folder", arguments.outdir.clone().map(FlagValue::from)),
+        ("--to", "write.format", arguments.to.clone().map(FlagValue::from)),
+        ("--max-angle", "cells.max_angle", arguments.max_angle.as_deref().map(number_or_text)),
+        ("--keep", "cells.keep", arguments.keep.as_deref().map(whole_or_text)),
+        ("--max-side", "cells.max_side", arguments.max_side.as_deref().map(number_or_text)),
+        (
+            "--min-spacing",
+            "cells.min_spacing",
+            arguments.min_spacing.as_deref().map(number_or_text),
+        ),
+        ("--measure", "cells.measure", arguments.measure.clone().map(FlagValue::from)),
+        ("--reference", "cells.reference", arguments.reference.as_deref().map(numbers_or_text)),
+        ("--neighbors", "normals.neighbors", arguments.neighbors.as_deref().map(whole_or_text)),
+        ("--side", "cells.side", arguments.side.as_deref().map(number_or_text)),
+        ("--min-points", "cells.min_points", arguments.min_points.as_deref().map(whole_or_text)),
+        ("--split", "cells.split", arguments.split.clone().map(FlagValue::from)),
+        ("--method", "normals.method", arguments.method.clone().map(FlagValue::from)),
+        ("--passes", "median.passes", arguments.passes.as_deref().map(whole_or_text)),
+        ("--passes", "cells.max_angle", again(arguments).then(|| "auto".into())),
+        ("--order", "write.order", arguments.order.clone().map(FlagValue::from)),
+        ("--mark", "median.mark", arguments.mark.as_deref().map(whole_or_text)),
+        ("--classes", "outliers.classes", classes().filter(|_| arguments.outliers)),
+        ("--classes", "normals.classes", classes()),
+        ("--classes", "cells.classes", classes()),
+        ("--classes", "median.classes", classes()),
+        ("--withheld", "run.withheld", arguments.withheld.clone().map(FlagValue::from)),
+        ("--noise", "run.noise", Some(noise(arguments).into())),
+        ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(FlagValue::from)),
+        ("--lattice", "run.lattice", arguments.lattice.as_deref().map(number_or_text)),
+        ("--headers", "run.headers", arguments.headers.clone().map(FlagValue::from)),
+        ("--z-scale", "run.z_scale", arguments.z_scale.as_deref().map(number_or_text)),
+    ]);
+    all.extend(filtered(&arguments.filter));
+    all.extend(written(&arguments.written));
+    all
+}
+
+/// The flags of `convert`, for a run that reads and writes these.
+pub(super) fn convert_flags(
+    arguments: &ConvertArguments,
+    inputs: Option<Value>,
+    output: Option<Value>,
+) -> Vec<CommandFlag> {
+    let mut all = flags([
+        ("IN", "read.path", inputs.map(FlagValue::from)),
+        ("-o", "write.path", output.map(FlagValue::from)),
+        ("--to", "write.format", arguments.to.clone().map(FlagValue::from)),
+        ("--headers", "run.headers", arguments.headers.clone().map(FlagValue::from)),
+        ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(FlagValue::from)),
+    ]);
+    all.extend(filtered(&arguments.filter));
+    all.extend(written(&arguments.written));
+    all
+}
+
+/// The flags of `synth`.
+pub(super) fn synth_flags(arguments: &SynthArguments) -> Vec<CommandFlag> {
+    flags([
+        ("KIND", "synth.scene", Some(arguments.scene.clone().into())),
+        ("-n", "synth.points", Some(whole_or_text(&arguments.points))),
+        ("-o", "write.path", Some(arguments.output.clone().into())),
+        ("--seed", "synth.seed", arguments.seed.as_deref().map(whole_or_text)),
+        ("--noise", "synth.noise", arguments.noise.as_deref().map(number_or_text)),
+    ])
+}
+
+/// How the output is written, as the keys of `write`.
+fn written(arguments: &WrittenArguments) -> Vec<CommandFlag> {
+    let names = (!arguments.drop.is_empty()).then(|| json!(arguments.drop).into());
+    flags([
+        ("--scale", "write.scale", arguments.scale.as_deref().map(numbers_or_text)),
+        ("--offset", "write.offset", arguments.offset.as_deref().map(numbers_or_text)),
+        ("--drop", "write.drop", names),
+        ("--encoding", "write.encoding", arguments.encoding.clone().map(FlagValue::from)),
+        ("--colors", "write.colors", arguments.colors.clone().map(FlagValue::from)),
+    ])
+}
+
+/// All classes of several numbers and ranges.
+fn classes(given: &[Classes]) -> Option<FlagValue> {
+    let all: Vec<u8> = given.iter().flat_map(Classes::each).collect();
+    let typed: Vec<String> = given.iter().map(Classes::to_string).collect();
+    (!all.is_empty()).then(|| FlagValue::of(&typed.join(","), json!(all)))
+}
+
+/// A whole number where the text is one (`10k`, `1e1`), else a number or the text.
+fn whole_or_text(text: &str) -> FlagValue {
+    match parse_count(text) {
+        Ok(count) => FlagValue::of(text, count.into()),
+        // As a float it would be told in other digits than were typed.
+        Err(_) if is_too_large(text) => FlagValue::of(text, json!(text.trim())),
+        Err(_) => number_or_text(text),
+    }
+}
+
+/// True for a whole number that no integer holds.
+fn is_too_large(text: &str) -> bool {
+    let digits = text.trim().trim_start_matches(['-', '+']);
+    digits.len() > 15 && digits.chars().all(|c| c.is_ascii_digit())
+}
+
+/// A number where the text is one, else the text (`6deg`, `auto`).
+fn number_or_text(text: &str) -> FlagValue {
+    FlagValue::of(text, plain(text))
+}
+
+/// A list of numbers where the text has commas (what is no number there is told), else a number or
+/// the text (`x`).
+fn numbers_or_text(text: &str) -> FlagValue {
+    let list = || text.split(',').map(plain).collect();
+    FlagValue::of(text, if text.contains(',') { list() } else { plain(text) })
+}
+
+/// A number as a pipeline's value; one that JSON cannot hold is left for the stage to refuse.
+fn number(value: f64) -> Value {
+    serde_json::Number::from_f64(value).map_or_else(|| json!(value.to_string()), Value::from)
+}
+
+fn plain(text: &str) -> Value {
+    let text = text.trim();
+    match text.parse::<i64>() {
+        Ok(whole) => whole.into(),
+        Err(_) => text.parse().map_or_else(|_| json!(text), number),
+    }
+}

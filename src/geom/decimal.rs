@@ -1,0 +1,17 @@
+//! Decimal steps: powers of ten, and whole numbers of them within the rounding of decimals.
+
+/// The largest power of ten that is at most `length`, which is above 0; 1e-300 at least.
+pub(super) fn decimal_step(length: f64) -> f64 {
+    let power = |exponent: i32| format!("1e{exponent}").parse::<f64>().unwrap_or(f64::MAX);
+    // The logarithm may be off by a little, so the first of the larger ones that fits is taken.
+    let above = if length > 1e-300 { libm::ceil(libm::log10(length)) as i32 } else { -300 };
+    (0..3).map(|less| power(above - less)).find(|&step| step <= length).unwrap_or(1e-300)
+}
+
+/// How many steps a scale is, if it is a whole number of them within the rounding of decimals.
+pub(super) fn multiple(scale: f64, step: f64) -> Option<i64> {
+    let ratio = scale / step;
+    let whole = ratio.round();
+    let whole_number = (1.0..1e15).contains(&whole) && (ratio - whole).abs() <= 1e-12 * whole;
+    whole_number.then_some(whole as i64)
+}

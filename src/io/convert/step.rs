@@ -1,0 +1,69 @@
+//! The steps that records are projected by, and which of them a pair of dimensions needs.
+
+use crate::point::names::XYZ;
+use crate::point::{Dimension, Endian, Scalar};
+
+/// One step of a projection.
+#[derive(Debug, Clone)]
+pub(super) enum Move {
+    /// Bytes that mean the same in both.
+    Copy { from: usize, to: usize, length: usize },
+    /// A number in the other byte order.
+    Swap { from: usize, to: usize, size: usize },
+    /// A stored number in another type; scale and origin are equal.
+    Stored { from: Dimension, to: Dimension },
+    /// A stored number into some bits of a byte.
+    Narrow { from: Dimension, to: Dimension, shift: u8, mask: u8 },
+    /// A world value rounded to the target's steps (coordinates).
+    Rounded { from: Dimension, to: Dimension },
+    /// A world value that the target must hold.
+    Exact { from: Dimension, to: Dimension },
+}
+
+/// The step from one dimension to another.
+pub(super) fn step(
+    from: &Dimension,
+    from_endian: Endian,
+    to: &Dimension,
+    to_endian: Endian,
+) -> Move {
+    let size = from.scalar.size();
+    if from.scale == to.scale && from.origin == to.origin {
+        let alike = from.scalar == to.scalar && from.bits.is_none() && to.bits.is_none();
+        return match alike {
+            true if size == 1 || from_endian == to_endian => {
+                Move::Copy { from: from.offset, to: to.offset, length: size }
+            }
+            true => Move::Swap { from: from.offset, to: to.offset, size },
+            false => stored(from, to),
+        };
+    }
+    if XYZ.contains(&to.name.as_str()) {
+        return Move::Rounded { from: from.clone(), to: to.clone() };
+    }
+    Move::Exact { from: from.clone(), to: to.clone() }
+}
+
+fn stored(from: &Dimension, to: &Dimension) -> Move {
+    let (from, to) = (from.clone(), to.clone());
+    match to.bits {
+        Some(bits) if to.scalar == Scalar::U8 && bits.shift + bits.width <= 8 && bits.width < 8 => {
+            Move::Narrow { from, to, shift: bits.shift, mask: (1 << bits.width) - 1 }
+        }
+        _ => Move::Stored { from, to },
+    }
+}
+
+/// Adds a step; bytes that follow those of the step before join it.
+pub(super) fn push(moves: &mut Vec<Move>, step: Move) {
+    if let Move::Copy { from, to, length } = step
+        && let Some(Move::Copy { from: from_before, to: to_before, length: before }) =
+            moves.last_mut()
+        && *from_before + *before == from
+        && *to_before + *before == to
+    {
+        *before += length;
+        return;
+    }
+    moves.push(step);
+}

@@ -1,0 +1,129 @@
+//! The stages of a graph by role, and the tree that they are: what the decode does for all branches,
+//! and what stands behind it.
+
+use std::collections::BTreeSet;
+
+use crate::engine::pass::{Filter, Op, StageOp};
+use crate::graph::{Graph, GraphStage};
+use crate::stage::{CreateSink, OpenSource, Role, Transform};
+use crate::{Error, Result};
+
+/// What a stage behind the decode is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Work {
+    /// This tile stage.
+    Op(usize),
+    /// This stage that streams.
+    Filter(usize),
+    /// This sink.
+    Sink(usize),
+    /// A source, or a stage that streams and belongs to the decode.
+    Decode,
+}
+
+/// The stages of a graph by role.
+pub(super) struct Sorted {
+    pub source: (String, Box<dyn OpenSource>),
+    /// The stages that the decode applies to all records.
+    pub transforms: Vec<(String, Box<dyn Transform>)>,
+    pub ops: Vec<StageOp>,
+    pub filters: Vec<Filter>,
+    pub sinks: Vec<Box<dyn CreateSink>>,
+    /// What each stage of the graph is.
+    pub works: Vec<Work>,
+    /// For each stage of the graph, those that take from it, in order.
+    pub takers: Vec<Vec<usize>>,
+    /// The last stage of the decode.
+    pub root: usize,
+    /// For each stage of the graph, how reports and outputs name it.
+    names: Vec<serde_json::Value>,
+}
+
+impl Sorted {
+    /// Sorts a graph, or says the first thing that is wrong with it.
+    pub fn new(graph: Graph) -> Result<Sorted> {
+        let takers: Vec<Vec<usize>> =
+            (0..graph.stages.len()).map(|n| graph.takers(n).collect()).collect();
+        if let Some(wrong) = graph.mistakes().into_iter().next() {
+            let error = graph.stages[wrong.stage].written.wrong(wrong.told);
+            return Err(match wrong.help {
+                Some(help) => error.help(help),
+                None => error,
+            });
+        }
+        let (decoded, root) = decoded(&graph.stages, &takers)?;
+        let name =
+            |stage: &GraphStage| serde_json::json!({ "kind": stage.kind, "keys": stage.keys });
+        let names = graph.stages.iter().map(name).collect();
+        let (mut source, mut works) = (None, Vec::new());
+        let (mut transforms, mut filters) = (Vec::new(), Vec::new());
+        let (mut ops, mut sinks) = (Vec::new(), Vec::new());
+        for (n, stage) in graph.stages.into_iter().enumerate() {
+            let GraphStage { kind, written, limits, role, .. } = stage;
+            works.push(match &role {
+                Role::Source(_) => Work::Decode,
+                Role::Transform(_) if decoded.contains(&n) => Work::Decode,
+                Role::Transform(_) => Work::Filter(filters.len()),
+                Role::TileOp(_) | Role::ScanOp(_) => Work::Op(ops.len()),
+                Role::Sink(_) => Work::Sink(sinks.len()),
+            });
+            let tile = |kind, op| StageOp { kind, written, op, limits, selection: 0 };
+            match role {
+                Role::Source(open) => source = Some((kind, open)),
+                Role::Transform(one) if decoded.contains(&n) => transforms.push((kind, one)),
+                Role::Transform(transform) => filters.push(Filter { kind, transform }),
+                Role::TileOp(op) => ops.push(tile(kind, Op::Tile(op))),
+                Role::ScanOp(op) => ops.push(tile(kind, Op::Scan(op))),
+                Role::Sink(sink) => sinks.push(sink),
+            }
+        }
+        let source = source.ok_or_else(|| Error::pipeline("the pipeline reads nothing"))?;
+        if sinks.is_empty() {
+            return Err(Error::pipeline("the pipeline writes nothing"));
+        }
+        Ok(Sorted { source, transforms, ops, filters, sinks, works, takers, root, names })
+    }
+
+    /// The stages that take from stage `number` and work, and the sinks that take from it.
+    pub fn behind(&self, number: usize) -> (Vec<usize>, Vec<usize>) {
+        let takers = &self.takers[number];
+        let sink = |taker: &usize| match self.works[*taker] {
+            Work::Sink(sink) => Some(sink),
+            _ => None,
+        };
+        let working = takers.iter().copied().filter(|taker| sink(taker).is_none());
+        (working.collect(), takers.iter().filter_map(sink).collect())
+    }
+
+    /// The stages on a path, those of the decode and all sinks that take from one of these included,
+    /// as reports and outputs name them.
+    pub fn named(&self, path: &[usize]) -> serde_json::Value {
+        let on_path: BTreeSet<usize> = path.iter().copied().collect();
+        let is_decode = |n: &usize| self.works[*n] == Work::Decode;
+        let is_sink = |n: &usize| {
+            let takes = |from: &usize| self.takers[*from].contains(n);
+            let from = (0..*n).filter(takes).collect::<Vec<_>>();
+            matches!(self.works[*n], Work::Sink(_))
+                && from.iter().any(|from| on_path.contains(from) || is_decode(from))
+        };
+        let named = 0..self.names.len();
+        let named = named.filter(|n| on_path.contains(n) || is_decode(n) || is_sink(n));
+        named.map(|n| self.names[n].clone()).collect()
+    }
+}
+
+/// The stages that stream and that every record passes, and the last of them or the source.
+fn decoded(stages: &[GraphStage], takers: &[Vec<usize>]) -> Result<(BTreeSet<usize>, usize)> {
+    let (mut decoded, mut root) = (BTreeSet::new(), 0);
+    while let [one] = takers.get(root).map_or(&[][..], Vec::as_slice) {
+        if !matches!(stages[*one].role, Role::Transform(_)) {
+            break;
+        }
+        decoded.insert(*one);
+        root = *one;
+    }
+    match stages.is_empty() {
+        true => Err(Error::pipeline("the pipeline reads nothing")),
+        false => Ok((decoded, root)),
+    }
+}
