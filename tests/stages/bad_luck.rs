@@ -164,10 +164,8 @@ fn neighbors_are_exact(scan: &Scan) -> u64 {
         }
         intake.flush()
     };
-    let tiles = Threads::start(2, |threads| {
-        threads.items(2, || {}).run(|| (), |(), n| fill(n), |()| {}, Ok)?;
-        seal(store, threads, &|_| Ok(()))
-    });
+    Threads::start(2, |all| all.items(2, || {}).run(|| (), |(), n| fill(n), |()| {}, Ok)).unwrap();
+    let tiles = Threads::start(2, |threads| seal(store, threads, &|_| Ok(())));
     let tiles = Arc::new(tiles.unwrap());
     let mut all = positions;
     all.sort_unstable_by(morton_cmp);

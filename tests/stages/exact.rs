@@ -49,11 +49,9 @@ fn sealed(scan: &Scan, positions: &[Position]) -> Arc<SealedTiles> {
         }
         intake.flush()
     };
-    let tiles = Threads::start(3, |threads| {
-        threads.items(3, || {}).run(|| (), |(), n| fill(n), |()| {}, Ok)?;
-        assert!(store.runs() > 10);
-        seal(store, threads, &|_| Ok(()))
-    });
+    Threads::start(3, |all| all.items(3, || {}).run(|| (), |(), n| fill(n), |()| {}, Ok)).unwrap();
+    assert!(store.runs() > 10);
+    let tiles = Threads::start(3, |threads| seal(store, threads, &|_| Ok(())));
     let tiles = Arc::new(tiles.unwrap());
     assert!(area.written() > scan.records.len() as u64, "all is spilled");
     tiles

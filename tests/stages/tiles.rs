@@ -99,12 +99,12 @@ fn sealed(
         }
         intake.flush()
     };
-    let sealed = Threads::start(threads, |all| {
-        all.items(threads, || {}).run(|| (), |(), n| fill(n), |()| {}, Ok)?;
-        let runs = store.runs();
-        Ok((Arc::new(seal(store, all, &|_| Ok(()))?), area.written(), runs))
-    });
-    sealed.unwrap()
+    let each =
+        |all: Threads<'_>| all.items(threads, || {}).run(|| (), |(), n| fill(n), |()| {}, Ok);
+    Threads::start(threads, each).unwrap();
+    let runs = store.runs();
+    let tiles = Threads::start(threads, |all| seal(store, all, &|_| Ok(())));
+    (Arc::new(tiles.unwrap()), area.written(), runs)
 }
 
 fn distinct(scan: &[Position]) -> Vec<Position> {
