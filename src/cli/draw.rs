@@ -1,10 +1,11 @@
 //! One thread that draws what a run does, and the channel through which it is told.
 //!
-//! A run calls its watch from all of its threads. What they say goes through one bounded channel to the
-//! thread that owns bar and lines: nothing needs a lock, lines never mix, and all is drawn in the order in
-//! which it was said. How many points are done is not said, since every batch would be an event: the
-//! threads add to one counter, at which the drawing thread looks a few times a second. A terminal that
-//! takes nothing (Ctrl-S) therefore holds a run up only when the channel is full.
+//! A run calls its watch from all of its threads. What they say goes through one bounded channel to
+//! the thread that owns bar and lines: nothing needs a lock, lines never mix, and all is drawn in
+//! the order in which it was said. How many points are done is not said, since every batch would be
+//! an event: the threads add to one counter, at which the drawing thread looks a few times a
+//! second. A terminal that takes nothing (Ctrl-S) therefore holds a run up only when the channel is
+//! full.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
@@ -98,8 +99,8 @@ impl Watch for Telling<'_> {
     }
 }
 
-/// Calls `run` with a watch of which `draw` draws what it is told; all is drawn when this returns. The
-/// run hears from `cancelled` whether to stop.
+/// Calls `run` with a watch of which `draw` draws what it is told; all is drawn when this returns.
+/// The run hears from `cancelled` whether to stop.
 pub(super) fn watched<T>(
     draw: &mut dyn Draw,
     cancelled: &(dyn Fn() -> bool + Sync),

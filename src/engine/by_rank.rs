@@ -1,6 +1,10 @@
-//! Outputs in the order of the inputs: while tiles leave their products the records that such an output
-//! gets are sorted into stretches of the input, and behind the last tile each stretch is ordered in
-//! memory, and all are written one after the other.
+//! Outputs in the order of the inputs, of stages that work on tiles.
+//!
+//! The mill leaves records in canonical order. To sort them all back would be a second sort of the
+//! scan; but what their places are is known from the decode. So the input is cut into stretches:
+//! while tiles leave their products, each record that is written goes to the list of its stretch, a
+//! few kibibytes in memory and the rest in the spill. Behind the last tile a stretch is an item: it
+//! is ordered in memory, and the outlet writes one stretch after the other.
 
 use std::sync::{Arc, Mutex};
 

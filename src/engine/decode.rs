@@ -1,5 +1,11 @@
 //! The decode: all parts of the source, read side by side, placed on the lattice and handed to the
 //! tile store.
+//!
+//! A part is an item. Records become positions of the lattice as they are decoded, so that
+//! everything behind it decides on integers; and every record is decoded once, however many stages
+//! and passes follow. A thread's intake goes on filling from one part to the next, however short
+//! parts are, since the merge takes longer the more sorted runs there are. Where a run ends decides
+//! nothing: the merge orders records of one position by their bytes.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -63,7 +69,8 @@ fn decode_part(
     let (mut read, mut tally) = (0, Tally::default());
     while job.read(&mut *part, batch, &mut tally)? {
         placed.first = place(index, read);
-        take(job, lattice, batch, placed, intake, &mut tally)?;
+        placed.place(job, lattice, batch, &mut tally)?;
+        placed.hand_over(batch, intake)?;
         read += batch.len() as u64;
     }
     Ok((read, tally))
@@ -82,58 +89,64 @@ struct Placed {
     useless: BTreeMap<&'static str, u64>,
 }
 
-/// Places a batch's records on the lattice and hands them to the intake.
-fn take(
-    job: &Job<'_>,
-    lattice: &Lattice,
-    batch: &PointBatch,
-    placed: &mut Placed,
-    intake: &mut Intake<'_>,
-    tally: &mut Tally,
-) -> Result<()> {
-    let stride = batch.schema().stride;
-    let records = batch.records();
-    let Placed { positions, tags, left_out, useless, first } = placed;
-    positions.clear();
-    tags.clear();
-    left_out.clear();
-    useless.clear();
-    let mut misplaced = Vec::new();
-    let tagger = &job.tagger;
-    lattice.place(
-        batch.schema(),
-        records,
-        |i, position| match tagger.look(&records[i * stride..(i + 1) * stride], batch.source) {
-            Err(reason) => {
-                *useless.entry(reason).or_default() += 1;
+impl Placed {
+    /// Places a batch's records on the lattice, and says what becomes of those that have no place.
+    fn place(
+        &mut self,
+        job: &Job<'_>,
+        lattice: &Lattice,
+        batch: &PointBatch,
+        tally: &mut Tally,
+    ) -> Result<()> {
+        let (stride, records) = (batch.schema().stride, batch.records());
+        let Placed { positions, tags, left_out, useless, .. } = self;
+        positions.clear();
+        tags.clear();
+        left_out.clear();
+        useless.clear();
+        let mut misplaced = Vec::new();
+        let tagger = &job.tagger;
+        lattice.place(
+            batch.schema(),
+            records,
+            |i, position| match tagger.look(&records[i * stride..(i + 1) * stride], batch.source) {
+                Err(reason) => {
+                    *useless.entry(reason).or_default() += 1;
+                    left_out.push(i);
+                }
+                Ok(tag) => {
+                    tally.selections |= tag.selections();
+                    positions.push(position);
+                    tags.push(tag);
+                }
+            },
+            |i, why| misplaced.push((i, why)),
+        );
+        for (i, why) in misplaced {
+            if why == Misplaced::NotFinite && job.drop_nonfinite {
+                tally.remove(&job.source_kind, NOT_FINITE, 1);
                 left_out.push(i);
+            } else {
+                return Err(job.misplaced(batch, i, why));
             }
-            Ok(tag) => {
-                tally.selections |= tag.selections();
-                positions.push(position);
-                tags.push(tag);
-            }
-        },
-        |i, why| misplaced.push((i, why)),
-    );
-    for (i, why) in misplaced {
-        if why == Misplaced::NotFinite && job.drop_nonfinite {
-            tally.remove(&job.source_kind, NOT_FINITE, 1);
-            left_out.push(i);
-        } else {
-            return Err(job.misplaced(batch, i, why));
         }
+        useless.iter().for_each(|(reason, &count)| tally.remove(&job.source_kind, reason, count));
+        tally.work("placed", positions.len() as u64);
+        left_out.sort_unstable();
+        Ok(())
     }
-    useless.iter().for_each(|(reason, &count)| tally.remove(&job.source_kind, reason, count));
-    tally.work("placed", positions.len() as u64);
-    left_out.sort_unstable();
-    let (mut begin, mut at) = (0, 0);
-    for end in left_out.iter().copied().chain([batch.len()]) {
-        let count = end - begin;
-        let (these, of_these) = (&positions[at..at + count], &tags[at..at + count]);
-        intake.place(*first + begin as u64);
-        intake.take(these, &records[begin * stride..end * stride], of_these)?;
-        (begin, at) = (end + 1, at + count);
+
+    /// Hands the records that have a place to the intake, each stretch between two that have none.
+    fn hand_over(&self, batch: &PointBatch, intake: &mut Intake<'_>) -> Result<()> {
+        let (stride, records) = (batch.schema().stride, batch.records());
+        let (mut begin, mut at) = (0, 0);
+        for end in self.left_out.iter().copied().chain([batch.len()]) {
+            let count = end - begin;
+            let (these, tags) = (&self.positions[at..at + count], &self.tags[at..at + count]);
+            intake.place(self.first + begin as u64);
+            intake.take(these, &records[begin * stride..end * stride], tags)?;
+            (begin, at) = (end + 1, at + count);
+        }
+        Ok(())
     }
-    Ok(())
 }

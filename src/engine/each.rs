@@ -1,5 +1,9 @@
-//! One output for each input: while tiles leave their products the records that an output gets are
-//! sorted by input, and behind the last tile each input's file is written, a file a thread.
+//! One output for each input: a file is an item, which one thread writes from begin to end.
+//!
+//! While tiles leave their products, the records that such outputs get are sorted by input
+//! (`by_input.rs`). The files could grow from there, but of thousands of inputs that would be as
+//! many open files and half-filled chunks. Written behind the last tile, no more are open than
+//! there are threads.
 
 use super::by_input::ByInput;
 use super::chunk::{Chunk, Open};

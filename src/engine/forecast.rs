@@ -1,4 +1,9 @@
-//! A look at a sample of the scan before a pass: small cubes, spread evenly over its positions.
+//! A look at a sample of the scan before a pass, from which stages say what is to be expected and
+//! settle what the pipeline leaves to them.
+//!
+//! The sample is small cubes, spread evenly over the ranks of the positions, so that it is a
+//! function of the points alone: tiles would depend on the memory, and points at random would have
+//! no neighbours. The cubes are loaded like tiles, with a rim, and are items of a phase.
 
 use super::grind::{Field, Worker};
 use super::job::Job;

@@ -1,4 +1,14 @@
-//! One pass: tile after tile through the stages, and what they leave into stored columns and sinks.
+//! One pass: every tile goes through the stages, and what they leave goes into stored columns and
+//! sinks.
+//!
+//! A tile is an item: a thread loads it into its arena, runs all stages of the pass on it there,
+//! and hands a small product to the outlet, which commits products in the order of the tiles. So
+//! the large things, positions and neighbourhoods, never leave the thread that loaded them, and no
+//! stage is run over the whole scan before the next begins: between two stages nothing would have
+//! to be stored.
+//!
+//! What a tile leaves must not depend on where the tiles are cut. A stage may therefore look at the
+//! rim, but only what it decides about the core is kept.
 
 use std::sync::{Arc, Mutex};
 
@@ -57,7 +67,8 @@ pub(crate) type Numbered = (usize, Box<dyn Sink>);
 /// Outputs of a pass: sinks that grow while it mills, lists by input and by place in the input.
 pub(crate) type PassOutputs = (Vec<Numbered>, Vec<ByInput>, Vec<ByRank>);
 
-/// Runs `pass` over the tiles of `cut`, into the `sinks` with their numbers and into lists by input.
+/// Runs `pass` over the tiles of `cut`, into the `sinks` with their numbers and into lists by
+/// input.
 pub(crate) fn grind(
     job: &Job<'_>,
     (pass, cut): (&Pass, &Cut),

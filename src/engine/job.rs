@@ -1,4 +1,5 @@
-//! What every phase of a run shares: the source, the stages, the budget, and how it is told to stop.
+//! What every phase of a run shares: the source, the stages, the budget, and how it is told to
+//! stop.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,7 +14,7 @@ use crate::error::shown;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::geom::simd::Simd;
 use crate::graph::Headers;
-use crate::host::{Items, Threads, lock};
+use crate::host::{PhaseItems, Threads, lock};
 use crate::point::PointBatch;
 use crate::report::{Grouped, Tally};
 use crate::stage::{CreateSink, Part, Source, Transform};
@@ -95,7 +96,8 @@ impl Job<'_> {
         }
     }
 
-    /// True if a sink takes what the last stage of a branch leaves: classes are counted by its records.
+    /// True if a sink takes what the last stage of a branch leaves: classes are counted by its
+    /// records.
     pub fn is_last(&self, sink: usize) -> bool {
         self.branches.iter().any(|branch| branch.last_sink == sink)
     }
@@ -159,8 +161,9 @@ impl Job<'_> {
         if stop { Err(Error::interrupted()) } else { Ok(()) }
     }
 
-    /// The `count` items of a phase; once one has failed, [`advance`](Job::advance) stops the others.
-    pub fn items(&self, count: usize) -> Items<'_, impl Fn() + Sync> {
+    /// The `count` items of a phase; once one has failed, [`advance`](Job::advance) stops the
+    /// others.
+    pub fn items(&self, count: usize) -> PhaseItems<'_, impl Fn() + Sync> {
         self.threads.items(count, || self.failed.store(true, Ordering::Relaxed))
     }
 

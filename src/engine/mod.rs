@@ -17,6 +17,7 @@ mod finished;
 mod forecast;
 mod grind;
 pub(crate) mod job;
+mod lines;
 mod mill;
 mod outlet;
 pub(crate) mod pass;

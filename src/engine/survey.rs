@@ -1,12 +1,20 @@
 //! The last walk over the decoded scan: what the reduction did to each report tile and to all.
+//!
+//! Figures of a report must be the same for every memory and number of threads, so they are not
+//! gathered while the mill works on tiles of its own: states and fates are stored, and walked once
+//! more over report tiles that follow from the scan alone. Sums are the same in whatever order
+//! parts of the scan are merged, so each thread keeps one of all that it walked.
+//!
+//! The walk is made in two phases, since distances to a plane can be summed only when the plane is
+//! fitted. Their items are ranges of blocks; a report tile belongs to the range that it begins in.
 
-use std::io::{self, BufRead, Read};
 use std::sync::Arc;
 
 use super::job::Job;
+use super::lines::{LINES_AT_ONCE, Lines, RangeLines};
 use crate::geom::lattice::Lattice;
 use crate::point::Position;
-use crate::report::{FittedScan, Lot, ScanSurvey, TileFigures, Totals, report_tile_level};
+use crate::report::{FittedScan, Lot, ScanSurvey, Totals, report_tile_level};
 use crate::store::{
     BLOCK, FATE_BYTES, PIECE, Pieces, Reader, SealedTiles, Spill, SpillArea, State, Stretch,
     TileKey,
@@ -32,8 +40,8 @@ pub(crate) fn fate_code(fate: Fate) -> [u8; FATE_BYTES] {
 }
 
 /// The stored fate of a position whose records are up to `apart` steps from each other, because the
-/// lattice rounds: where one of them is kept, that is how far the others deviate. Stored as the negative
-/// of it, which is never one of the codes above.
+/// lattice rounds: where one of them is kept, that is how far the others deviate. Stored as the
+/// negative of it, which is never one of the codes above.
 pub(crate) fn apart_code(code: [u8; FATE_BYTES], apart: f64) -> [u8; FATE_BYTES] {
     if f32::from_le_bytes(code) != KEPT_ONCE {
         return code;
@@ -55,79 +63,6 @@ fn deviation_of(code: [u8; FATE_BYTES]) -> Option<f32> {
     }
 }
 
-/// Lines of the report's tiles, in order, wherever points are kept: there may be millions.
-pub(crate) struct Lines {
-    spill: Spill,
-    stretches: Vec<Stretch>,
-}
-
-impl Lines {
-    /// Reads the lines one stretch after the other.
-    pub fn reader(&self) -> LineReader<'_> {
-        LineReader { spill: &self.spill, left: self.stretches.iter(), open: Vec::new(), at: 0 }
-    }
-}
-
-/// See [`Lines::reader`]. Its errors hold the [`Error`] of the spill.
-pub(crate) struct LineReader<'a> {
-    spill: &'a Spill,
-    left: std::slice::Iter<'a, Stretch>,
-    open: Vec<u8>,
-    at: usize,
-}
-
-impl BufRead for LineReader<'_> {
-    fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        if self.at == self.open.len() {
-            self.open.clear();
-            self.at = 0;
-            if let Some(stretch) = self.left.next() {
-                self.spill.load(stretch, &mut self.open).map_err(io::Error::other)?;
-            }
-        }
-        Ok(&self.open[self.at..])
-    }
-
-    fn consume(&mut self, bytes: usize) {
-        self.at += bytes;
-    }
-}
-
-impl Read for LineReader<'_> {
-    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        let read = self.fill_buf()?.read(into)?;
-        self.consume(read);
-        Ok(read)
-    }
-}
-
-/// Lines are handed to the spill in stretches of about this size.
-const LINES_AT_ONCE: usize = 1 << 18;
-
-/// The lines of the tiles that begin in one range.
-struct RangeLines<'a> {
-    spill: &'a Spill,
-    open: Vec<u8>,
-    stretches: Vec<Stretch>,
-}
-
-impl RangeLines<'_> {
-    fn add(&mut self, figures: &TileFigures) -> Result<()> {
-        figures
-            .write_line(&mut self.open)
-            .map_err(|e| Error::internal("a report line could not be written").because(e))?;
-        if self.open.len() >= LINES_AT_ONCE { self.store() } else { Ok(()) }
-    }
-
-    fn store(&mut self) -> Result<()> {
-        if !self.open.is_empty() {
-            self.stretches.push(self.spill.store(&self.open)?);
-            self.open.clear();
-        }
-        Ok(())
-    }
-}
-
 /// What was measured.
 pub(crate) struct Measured {
     /// Side of the report tiles in world units.
@@ -143,8 +78,8 @@ pub(crate) fn survey_bytes() -> u64 {
     2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64) + Stretches::BYTES
 }
 
-/// Measures, on all threads, the reduction of `tiles` whose positions have the stored fates and whose
-/// records have the stored states of `sieve`.
+/// Measures, on all threads, the reduction of `tiles` whose positions have the stored fates and
+/// whose records have the stored states of `sieve`.
 pub(crate) fn survey(
     job: &Job<'_>,
     lattice: &Lattice,
@@ -167,7 +102,7 @@ pub(crate) fn survey(
     Ok(Measured {
         tile_side: (level as f64).exp2() * lattice.step,
         totals: walk.measure(job, scan)?.finish(lattice)?,
-        tiles: Lines { spill, stretches: lines },
+        tiles: Lines::new(spill, lines),
     })
 }
 
@@ -283,11 +218,10 @@ impl Walk<'_> {
         let scans = job.items(self.ranges()).run(
             || (empty(), Stretches::new(KEPT_BLOCKS)),
             |(scan, stretches), range| {
-                let mut lines = RangeLines { spill, open: Vec::new(), stretches: Vec::new() };
+                let mut lines = RangeLines::new(spill);
                 let positions = self.tiles_from(range, lattice, scan, stretches, &mut lines)?;
-                lines.store()?;
                 job.advance(positions)?;
-                Ok(lines.stretches)
+                lines.finish()
             },
             |stretches| stored.extend(stretches),
             |(scan, _)| Ok(scan),
@@ -355,8 +289,8 @@ impl Walk<'_> {
         Ok(positions)
     }
 
-    /// The first position behind the cube of `key`, which reaches to the beginning of block `from` or
-    /// into it.
+    /// The first position behind the cube of `key`, which reaches to the beginning of block `from`
+    /// or into it.
     fn end_of(
         &self,
         key: TileKey,
@@ -382,8 +316,8 @@ impl Walk<'_> {
         Ok(if whole { (inside, 0) } else { (inside - 1, end) })
     }
 
-    /// Visits the positions of the cube of `key` from block and index `at` on, block by block; returns
-    /// where they end and how many there were.
+    /// Visits the positions of the cube of `key` from block and index `at` on, block by block;
+    /// returns where they end and how many there were.
     fn visit(
         &self,
         stretches: &mut Stretches,

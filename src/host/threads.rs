@@ -1,22 +1,22 @@
 //! The threads of a run, and the one way in which they share the work of a phase.
 //!
-//! The work of a phase is numbered items that need nothing of each other: parts of the input, ranges
-//! of Morton order, tiles. Each thread makes its arena once (what it works with, of which memory is
-//! planned for as many as there are threads), takes the number that comes next, does that item and
-//! takes the next. What items came to is committed in the order of their numbers, so that nothing
-//! depends on which thread was faster.
+//! The work of a phase is numbered items that need nothing of each other: parts of the input,
+//! ranges of Morton order, tiles. Each thread makes its arena once (what it works with, of which
+//! memory is planned for as many as there are threads), takes the number that comes next, does that
+//! item and takes the next. What items came to is committed in the order of their numbers, so that
+//! nothing depends on which thread was faster.
 //!
-//! The threads are those of a `rayon` pool, but items are not handed out by its iterators: these halve
-//! a range ahead of time, so that threads work far apart from each other. Taken one after the other,
-//! items end about in their order, outputs grow while few results wait for their turn, and a thread
-//! never has more than one arena. Items are large, so that the one counter costs nothing.
+//! The threads are those of a `rayon` pool, but items are not handed out by its iterators: these
+//! halve a range ahead of time, so that threads work far apart from each other. Taken one after the
+//! other, items end about in their order, outputs grow while few results wait for their turn, and a
+//! thread never has more than one arena. Items are large, so that the one counter costs nothing.
 //!
-//! An item may wait until the items before it are done, as the outlet of the engine does. A broadcast
-//! calls its function on every thread of the pool, and whoever waits in it blocks its thread and takes
-//! up nothing else; items before it were taken before, so that other threads are at work on them.
-//! Nobody may wait for a thread that has no item yet: in a pool that a program lends, it may be busy
-//! with something else. For the same reason no item may itself call `rayon`, which would take up other
-//! work inside of the item and could wait for itself.
+//! An item may wait until the items before it are done, as the outlet of the engine does. A
+//! broadcast calls its function on every thread of the pool, and whoever waits in it blocks its
+//! thread and takes up nothing else; items before it were taken before, so that other threads are
+//! at work on them. Nobody may wait for a thread that has no item yet: in a pool that a program
+//! lends, it may be busy with something else. For the same reason no item may itself call `rayon`,
+//! which would take up other work inside of the item and could wait for itself.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -72,28 +72,28 @@ impl<'a> Threads<'a> {
 
     /// The `count` items of a phase. `stop` is called by each thread that fails or panics: it makes
     /// the other threads give up items that are long or that wait.
-    pub fn items<F: Fn() + Sync>(self, count: usize, stop: F) -> Items<'a, F> {
-        Items { threads: self, count, stop }
+    pub fn items<F: Fn() + Sync>(self, count: usize, stop: F) -> PhaseItems<'a, F> {
+        PhaseItems { threads: self, count, stop }
     }
 }
 
 /// Numbered items to be done, each once. See [`Threads::items`].
 #[derive(Debug)]
-pub struct Items<'a, F> {
+pub struct PhaseItems<'a, F> {
     threads: Threads<'a>,
     count: usize,
     stop: F,
 }
 
-impl<F: Fn() + Sync> Items<'_, F> {
-    /// Does all items. Every thread makes an `arena`, does each `item` that it takes with it, and in
-    /// the `end` says what is left in it; these are returned, one for each thread. What items came to
-    /// is given to `commit` in the order of the items.
+impl<F: Fn() + Sync> PhaseItems<'_, F> {
+    /// Does all items. Every thread makes an `arena`, does each `item` that it takes with it, and
+    /// in the `end` says what is left in it; these are returned, one for each thread. What items
+    /// came to is given to `commit` in the order of the items.
     ///
     /// # Errors
     ///
-    /// Once a thread fails or panics, no other takes another item. The first error is returned that is
-    /// not merely a thread giving up because another failed ([`ErrorKind::Interrupted`]).
+    /// Once a thread fails or panics, no other takes another item. The first error is returned that
+    /// is not merely a thread giving up because another failed ([`ErrorKind::Interrupted`]).
     pub fn run<A, T: Send, S: Send>(
         &self,
         arena: impl Fn() -> A + Sync,

@@ -9,8 +9,8 @@ use super::ClassCounts;
 /// The count of records that were written with the key-point flag that a stage set.
 pub const KEY_POINTS: &str = "key_points";
 
-/// Counts that an item of work reports, such as a tile or a part of the input; merged by addition, so
-/// that order does not matter.
+/// Counts that an item of work reports, such as a tile or a part of the input; merged by addition,
+/// so that order does not matter.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Tally {
     /// Counts that are the same for every configuration, by name; they go into `result`.

@@ -45,7 +45,8 @@ pub fn seal(
         .budget
         .lease(each.saturating_mul(threads.count() as u64), "merging of sorted runs")?;
     let ranges = ranges(&runs);
-    // The merge leaves no more blocks than the runs have, but for one that is not full in each range.
+    // The merge leaves no more blocks than the runs have, but for one that is not full in each
+    // range.
     let blocks = runs.iter().map(|run| run.blocks.len()).sum::<usize>() + ranges.len();
     let each = size_of::<Block>() as u64 + 8;
     let mut lease = store.budget.lease(blocks as u64 * each, "index of the tiles")?;
@@ -147,8 +148,8 @@ fn merge_range(store: &TileStore, runs: &[Run], range: &Range, out: &Output) -> 
             equals.emit(first.key, &mut tournament, &mut cursors, &mut emitter, &mut buffer)?;
             continue;
         }
-        // Up to the key with which another run goes on, nothing is to be compared. Several may go on
-        // with it: their first position is known when they are all asked.
+        // Up to the key with which another run goes on, nothing is to be compared. Several may go
+        // on with it: their first position is known when they are all asked.
         let until = second.and_then(|second| cursors[second.run].first_of_key());
         let cursor = &mut cursors[first.run];
         cursor.emit_until(until, &mut emitter, &mut buffer)?;
@@ -157,8 +158,8 @@ fn merge_range(store: &TileStore, runs: &[Run], range: &Range, out: &Output) -> 
     emitter.finish()
 }
 
-/// Orders what keys leave open: runs of which the heads have the same key, be the positions equal or
-/// not. Holds memory to work in.
+/// Orders what keys leave open: runs of which the heads have the same key, be the positions equal
+/// or not. Holds memory to work in.
 #[derive(Default)]
 struct Equals {
     runs: Vec<usize>,
@@ -268,7 +269,8 @@ impl<'a> Cursor<'a> {
             blocks.partition_point(|block| morton_cmp(&block.first, p) == Ordering::Less)
         };
         let end = self.range.until.as_ref().map_or(blocks.len(), before);
-        // Records equal to `from` may begin in the block before the first that begins at or behind it.
+        // Records equal to `from` may begin in the block before the first that begins at or behind
+        // it.
         self.block = self.range.from.as_ref().map_or(0, |p| before(p).saturating_sub(1));
         let most = (end.saturating_sub(self.block) * BLOCK) as u64;
         self.load(buffer)?;
@@ -285,8 +287,8 @@ impl<'a> Cursor<'a> {
         Ok(most)
     }
 
-    /// Reads the block that it is at, none if that begins behind the range; `buffer` is memory to work
-    /// in, which all cursors share.
+    /// Reads the block that it is at, none if that begins behind the range; `buffer` is memory to
+    /// work in, which all cursors share.
     fn load(&mut self, buffer: &mut Vec<u8>) -> Result<()> {
         self.at = 0;
         self.positions.clear();
@@ -314,7 +316,8 @@ impl<'a> Cursor<'a> {
         self.positions.get(self.at).map(|p| morton_prefix(*p, self.range.level))
     }
 
-    /// The first of all positions that have the key of [`head`](Cursor::head), be they there or not.
+    /// The first of all positions that have the key of [`head`](Cursor::head), be they there or
+    /// not.
     fn first_of_key(&self) -> Option<Position> {
         self.head().map(|p| first_of_prefix(p, self.range.level))
     }

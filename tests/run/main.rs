@@ -4,4 +4,5 @@
 mod run_support;
 
 mod edges;
+mod threads;
 mod trouble;
