@@ -1,17 +1,20 @@
-//! Outputs in the order of the inputs: while tiles leave their products the records that such an output
-//! gets are sorted into stretches of the input, and behind the last tile each stretch is ordered in
-//! memory, and all are written one after the other.
+//! Outputs in the order of the inputs, of stages that work on tiles.
+//!
+//! The mill leaves records in canonical order. To sort them all back would be a second sort of the
+//! scan; but what their places are is known from the decode. So the input is cut into stretches:
+//! while tiles leave their products, each record that is written goes to the list of its stretch, a
+//! few kibibytes in memory and the rest in the spill. Behind the last tile a stretch is an item: it
+//! is ordered in memory, and the outlet writes one stretch after the other.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::chunk::{Chunk, Open};
 use super::encoding::ChunkEncoders;
-use super::job::{Job, StopOnDrop};
-use super::outlet::{Hands, Outlet};
+use super::job::Job;
+use super::outlet::Outlet;
 use super::product::Entry;
 use crate::budget::Bytes;
-use crate::host::{lock, parallel};
+use crate::host::lock;
 use crate::report::Tally;
 use crate::stage::{Sink, SinkSummary};
 use crate::store::{SealedTiles, Spill, SpillArea, State, Stretch, Tag};
@@ -207,36 +210,30 @@ impl ByRank {
             }
             Ok(full)
         };
-        let outlet: Outlet<Vec<Ranked>, Chunk> = Outlet::new(vec![sink], job.threads);
-        let (next, total) = (AtomicUsize::new(0), Mutex::new(Tally::default()));
-        parallel(job.threads, |_| {
-            let guard = StopOnDrop::new(|| outlet.stop());
-            let mut encoder = encoders.one();
-            let mut encode = |chunk| encoder.encode(&encoders, &chunk);
-            let mut hands = Hands { commit: &commit, encode: &mut encode };
-            loop {
-                let number = next.fetch_add(1, Ordering::Relaxed);
-                if number >= self.lists.len() {
-                    break;
-                }
+        let outlet = Outlet::new(vec![sink], job.threads.count(), &commit);
+        let stretches = self.lists.len();
+        let tallies = job.threads.items(stretches, || outlet.stop()).run(
+            || encoders.one(),
+            |encoder, number| {
                 let records = self.ordered(number)?;
                 let count = records.len() as u64;
-                outlet.deliver((number as u64, 0), records, true, &mut hands)?;
-                job.advance(count)?;
-            }
-            outlet.drain(&mut hands, |turn| turn.0 >= self.lists.len() as u64)?;
-            lock(&total).merge(&encoder.tally);
-            guard.disarm();
-            Ok(())
-        })?;
+                let mut encode = |chunk| encoder.encode(&encoders, &chunk);
+                outlet.deliver((number as u64, 0), records, true, &mut encode)?;
+                job.advance(count)
+            },
+            |()| {},
+            |mut encoder| {
+                outlet.drain(stretches, &mut |chunk| encoder.encode(&encoders, &chunk))?;
+                Ok(encoder.tally)
+            },
+        )?;
         let rest = lock(&open).rest().into_iter().collect();
         let mut encoder = encoders.one();
-        let mut encode = |chunk| encoder.encode(&encoders, &chunk);
-        let said = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
-        let mut tally = std::mem::take(&mut *lock(&total));
-        tally.merge(&encoder.tally);
+        let said = outlet.close(rest, &mut |chunk| encoder.encode(&encoders, &chunk))?;
+        let mut total = encoder.tally;
+        tallies.iter().for_each(|tally| total.merge(tally));
         let summary = said.into_iter().next();
-        Ok((summary.ok_or_else(|| Error::internal("an output said nothing"))?, tally))
+        Ok((summary.ok_or_else(|| Error::internal("an output said nothing"))?, total))
     }
 }
 

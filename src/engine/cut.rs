@@ -114,11 +114,11 @@ fn cut(
     let wanted = job.tile_points.map_or(zone_of(shares.tile_positions), |points| points as u64);
     let later = demands.gathered(shares) + MILL_SPARE;
     let free = (job.budget.free() + held).saturating_sub(later.0);
-    let largest = demands.tile_positions(job.threads, free).max(shares.tile_positions);
+    let largest = demands.tile_positions(job.threads.count(), free).max(shares.tile_positions);
     let (good, lowest) = (cells.level(CELLS_ACROSS), cells.level(1));
     let mut tries =
         vec![(shares.tile_positions, good), (largest, good), (largest, lowest)].into_iter();
-    let mut millers = job.threads;
+    let mut millers = job.threads.count();
     let mut at = tries.next();
     while let Some((capacity, smallest)) = at {
         // Around all positions there is no rim.

@@ -3,32 +3,28 @@
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::Value;
 
 use super::by_input::ByInput;
-use super::by_rank::{ByRank, Starts, place};
+use super::by_rank::ByRank;
 use super::chunks::Found;
 use super::clock::Clock;
 use super::cut::{Cut, cut_again, cut_all};
+use super::decode::decode;
 use super::finished::{Finished, FinishedBranch};
 use super::forecast::{forecast, samples_capacity};
 use super::grind::{Field, Milled, PassOutputs, grind};
 use super::job::Job;
 use super::pass::{Branch, Call, Op, Pass};
-use super::placed::{BATCH, Placed};
 use super::shares::{Demands, Shares};
 use super::survey::survey;
-use super::tagger::NOT_FINITE;
 use crate::budget::{Bytes, Holders, Lease};
-use crate::geom::lattice::{Lattice, Misplaced};
-use crate::host::lock;
-use crate::point::{Bounds, PointBatch};
+use crate::geom::lattice::Lattice;
+use crate::point::Bounds;
 use crate::report::{Baseline, BaselineFigures, Decision, Grouped, PassFigures, Short, Tally};
 use crate::stage::{Gathered, ScanFacts, Sink, SinkSummary};
-use crate::store::{Intake, SealedTiles, SpillArea, TileStore, seal};
+use crate::store::{SealedTiles, SpillArea, seal};
 use crate::tile::Sieve;
 use crate::{Error, Result};
 
@@ -130,7 +126,7 @@ impl Course {
         let passes = std::mem::take(&mut job.passes);
         let cuts = cut_all(job, &passes, field.lattice, shares, demands, &field.tiles)?;
         let milling = |cut: &Arc<Cut>| demands.mill(cut.millers, cut.capacity as u64);
-        let looking = demands.mill(job.threads, samples_capacity(shares) as u64);
+        let looking = demands.mill(job.threads.count(), samples_capacity(shares) as u64);
         let most = cuts.iter().map(milling).fold(looking, Holders::larger);
         self.tally.merge(&decoded.tally);
         // What the decode left comes first, then what each pass leaves.
@@ -364,105 +360,6 @@ fn conclude(job: &mut Job<'_>, op: usize, found: Found, records: u64) -> Result<
         Op::Tile(_) => return Err(Error::internal("a stage gathered that has one phase")),
     };
     warning.into_iter().for_each(|warning| job.warn(warning));
-    Ok(())
-}
-
-fn decode(
-    job: &Job<'_>,
-    lattice: &Lattice,
-    shares: &Shares,
-    area: &Arc<SpillArea>,
-) -> Result<(TileStore, Starts, Tally)> {
-    let tagged = job.tagger.tags();
-    let mut store = TileStore::new(area, &job.budget, job.source.schema().stride, tagged);
-    let ranked = job.in_input_order.contains(&true);
-    if ranked {
-        store = store.with_places();
-    }
-    let parts = Mutex::new(vec![0; if ranked { job.source.parts() } else { 0 }]);
-    let total = Mutex::new(Tally::default());
-    let next = AtomicUsize::new(0);
-    job.parallel(|| {
-        let mut tally = Tally::default();
-        let mut intake = Intake::new(&store, shares.run_records);
-        let mut batch = PointBatch::new(job.source.schema().clone(), BATCH);
-        let mut placed = Placed::default();
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            if index >= job.source.parts() {
-                break;
-            }
-            let mut part = job.source.part_without(index, &job.unread)?;
-            let mut read = 0;
-            while job.read(&mut *part, &mut batch, &mut tally)? {
-                placed.first = place(index, read);
-                take(job, lattice, &batch, &mut placed, &mut intake, &mut tally)?;
-                read += batch.len() as u64;
-            }
-            lock(&parts).get_mut(index).into_iter().for_each(|part| *part = read);
-        }
-        intake.flush()?;
-        lock(&total).merge(&tally);
-        Ok(())
-    })?;
-    let tally = std::mem::take(&mut *lock(&total));
-    let starts = Starts::of(&lock(&parts));
-    Ok((store, starts, tally))
-}
-
-/// Places a batch's records on the lattice and hands them to the intake.
-fn take(
-    job: &Job<'_>,
-    lattice: &Lattice,
-    batch: &PointBatch,
-    placed: &mut Placed,
-    intake: &mut Intake<'_>,
-    tally: &mut Tally,
-) -> Result<()> {
-    let stride = batch.schema().stride;
-    let records = batch.records();
-    let Placed { positions, tags, left_out, useless, first } = placed;
-    positions.clear();
-    tags.clear();
-    left_out.clear();
-    useless.clear();
-    let mut misplaced = Vec::new();
-    let tagger = &job.tagger;
-    lattice.place(
-        batch.schema(),
-        records,
-        |i, position| match tagger.look(&records[i * stride..(i + 1) * stride], batch.source) {
-            Err(reason) => {
-                *useless.entry(reason).or_default() += 1;
-                left_out.push(i);
-            }
-            Ok(tag) => {
-                tally.selections |= tag.selections();
-                positions.push(position);
-                tags.push(tag);
-            }
-        },
-        |i, why| misplaced.push((i, why)),
-    );
-    for (i, why) in misplaced {
-        if why == Misplaced::NotFinite && job.drop_nonfinite {
-            tally.remove(&job.source_kind, NOT_FINITE, 1);
-            left_out.push(i);
-        } else {
-            return Err(job.misplaced(batch, i, why));
-        }
-    }
-    useless.iter().for_each(|(reason, &count)| tally.remove(&job.source_kind, reason, count));
-    tally.work("placed", positions.len() as u64);
-    left_out.sort_unstable();
-    let (mut begin, mut at) = (0, 0);
-    for end in left_out.iter().copied().chain([batch.len()]) {
-        let count = end - begin;
-        let (these, of_these) = (&positions[at..at + count], &tags[at..at + count]);
-        intake.place(*first + begin as u64);
-        intake.take(these, &records[begin * stride..end * stride], of_these)?;
-        (begin, at) = (end + 1, at + count);
-    }
     Ok(())
 }
 

@@ -11,6 +11,7 @@ use super::by_rank::LISTED;
 use super::clock::Clock;
 use super::finished::{Finished, FinishedBranch};
 use super::job::{Each, Job};
+use super::lines::Lines;
 use super::mill::mill;
 use super::pass::Branch;
 use super::publish::{Staged, make_folder, publish};
@@ -19,13 +20,12 @@ use super::room::Taken;
 use super::scratch::{Scratch, Trouble, memory_warning};
 use super::shares::Demands;
 use super::stream::stream;
-use super::survey::Lines;
 use super::tagger::{ClassOf, LEFT_OUT, NOT_FINITE};
 use super::task::Task;
 use crate::budget::Budget;
 use crate::graph::{Nonfinite, Spill};
-use crate::host::lock;
 use crate::host::process::peak_memory;
+use crate::host::{Threads, lock};
 use crate::point::names;
 use crate::report::{
     Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome, Removed, Report,
@@ -53,16 +53,27 @@ impl std::fmt::Display for Done {
 }
 
 impl Task {
-    /// Runs the task; outputs appear under their names when all of it is done.
+    /// Runs the task on threads of its own; outputs appear under their names when all of it is done.
     pub fn run(self, watch: &dyn Watch) -> Result<Done> {
+        Threads::start(self.threads, |threads| self.run_on(threads, watch))
+    }
+
+    /// Runs the task on these threads.
+    pub fn run_on(mut self, threads: Threads<'_>, watch: &dyn Watch) -> Result<Done> {
+        self.threads = threads.count();
         let trouble = Trouble::default();
-        let outcome = self.run_and_publish(watch, &trouble);
+        let outcome = self.run_and_publish(threads, watch, &trouble);
         // All scratch is gone by now, or will not go.
         lock(&trouble).iter().for_each(|told| watch.warn(told));
         outcome
     }
 
-    fn run_and_publish(mut self, watch: &dyn Watch, trouble: &Trouble) -> Result<Done> {
+    fn run_and_publish(
+        mut self,
+        threads: Threads<'_>,
+        watch: &dyn Watch,
+        trouble: &Trouble,
+    ) -> Result<Done> {
         let mut clock = Clock::new(watch);
         let outputs = self.stage(trouble)?;
         let nothing = || Error::pipeline("the pipeline writes nothing");
@@ -70,7 +81,8 @@ impl Task {
         let staged_report =
             self.settings.report.as_deref().map(|path| first.also(path, trouble)).transpose()?;
         let tell = |error| outputs.iter().flatten().fold(error, |error, output| output.tell(error));
-        let (finished, mut run) = self.work(&outputs, &mut clock, watch, trouble).map_err(tell)?;
+        let (finished, mut run) =
+            self.work(&outputs, threads, &mut clock, watch, trouble).map_err(tell)?;
         let beside: Vec<Staged> =
             self.beside.iter().map(|copy| copy.make(first, trouble)).collect::<Result<_>>()?;
         run.outputs.extend(beside.iter().zip(&self.beside).map(|(staged, copy)| {
@@ -140,6 +152,7 @@ impl Task {
     fn work(
         &mut self,
         outputs: &[Vec<Staged>],
+        threads: Threads<'_>,
         clock: &mut Clock<'_>,
         watch: &dyn Watch,
         trouble: &Trouble,
@@ -161,7 +174,8 @@ impl Task {
         let unread = self.unread();
         let transforms = std::mem::take(&mut self.transforms);
         let (ops, passes) = (std::mem::take(&mut self.ops), std::mem::take(&mut self.passes));
-        let mut job = Job { transforms, ops, passes, unread, ..self.job(outputs, &budget, watch) };
+        let mut job =
+            Job { transforms, ops, passes, unread, ..self.job(outputs, &budget, threads, watch) };
         let doubts = self.check_room(outputs, spill.parent(), kept_in_memory, &job)?;
         self.warnings.iter().cloned().chain(doubts).for_each(|warning| job.warn(warning));
         let finished = match &self.lattice {
@@ -241,6 +255,7 @@ impl Task {
         &'a self,
         outputs: &'a [Vec<Staged>],
         budget: &Budget,
+        threads: Threads<'a>,
         watch: &'a dyn Watch,
     ) -> Job<'a> {
         let each = self.each.iter().zip(&self.sinks).zip(outputs).map(|((each, sink), staged)| {
@@ -265,7 +280,7 @@ impl Task {
             tagger: self.tagger.clone(),
             classes: ClassOf::new(self.source.schema()),
             budget: budget.clone(),
-            threads: self.threads,
+            threads,
             simd: self.simd,
             drop_nonfinite: self.settings.nonfinite == Nonfinite::Drop,
             headers: self.settings.headers,

@@ -1,7 +1,10 @@
-//! A pipeline that fits: its source open, its lattice fixed, its stages in passes, its memory divided.
+//! A pipeline that fits: its source open, its lattice fixed, its stages in passes, its memory
+//! divided.
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+
+use rayon::ThreadPool;
 
 use super::look::{Unfit, look};
 use super::passes::{check_limits, number_selections, unroll};
@@ -21,7 +24,7 @@ use crate::geom::lattice::Lattice;
 use crate::graph::Graph;
 use crate::graph::{MOST_THREADS, Nonfinite, Overrides, RunSettings};
 use crate::host::process::default_memory;
-use crate::host::{Clash, Files, Use};
+use crate::host::{Clash, Files, Threads, Use};
 use crate::point::{Schema, Selection, Units};
 use crate::quantity::Figure;
 use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Source};
@@ -39,6 +42,16 @@ impl Plan {
     /// inputs, and the report gets its own behind them.
     pub fn run(self, watch: &dyn Watch) -> Result<Done> {
         self.0.run(watch)
+    }
+
+    /// Runs the plan as [`run`](Plan::run) does, on the threads of `pool`: on as many as were
+    /// planned for, or on all if it has fewer. The outputs are the same on any pool.
+    ///
+    /// A run takes the threads that it works on for itself until it is done, so that other work of
+    /// the pool waits.
+    pub fn run_in(self, pool: &ThreadPool, watch: &dyn Watch) -> Result<Done> {
+        let threads = Threads::of(pool, self.0.threads);
+        self.0.run_on(threads, watch)
     }
 }
 
@@ -179,7 +192,8 @@ fn demands(
 
 /// In which order records are written.
 struct Ordered {
-    /// True if the run needs tiles: for its stages, or because an output is to be in canonical order.
+    /// True if the run needs tiles: for its stages, or because an output is to be in canonical
+    /// order.
     mills: bool,
     /// For each sink, whether it gets the order of the inputs.
     in_input_order: Vec<bool>,
@@ -271,8 +285,8 @@ fn refuse(clash: &Clash, output: &Path) -> Error {
 /// Sinks of the inputs for each output that is a folder, and the ranks of the inputs if one is.
 type EachInput = (Vec<Vec<Box<dyn CreateSink>>>, Vec<u32>);
 
-/// Names the outputs of folders; refuses those that cannot appear there, or that would replace one of
-/// the other `files`.
+/// Names the outputs of folders; refuses those that cannot appear there, or that would replace one
+/// of the other `files`.
 fn each_input(
     source: &dyn Source,
     sinks: &[Box<dyn CreateSink>],
@@ -331,9 +345,9 @@ fn check_transforms(sorted: &Sorted, schema: &Schema) -> Result<()> {
     Ok(())
 }
 
-/// What outputs will not hold. Records that they cannot hold are an error where all are written, and
-/// a warning where a stage may remove them first and leave others. Then what stages have nothing to do
-/// of.
+/// What outputs will not hold. Records that they cannot hold are an error where all are written,
+/// and a warning where a stage may remove them first and leave others. Then what stages have
+/// nothing to do of.
 fn warnings(source: &dyn Source, sorted: &Sorted, settings: &RunSettings) -> Result<Vec<String>> {
     let Sorted { sinks, transforms, filters, ops, .. } = sorted;
     let schema = source.schema();

@@ -6,8 +6,6 @@
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 use std::collections::binary_heap::PeekMut;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering as Atomic};
 
 use super::block::{BLOCK, Block};
 use super::emit::{Emitter, Merged, Output};
@@ -20,8 +18,7 @@ use super::spill::Spill;
 use super::tournament::Tournament;
 use crate::Result;
 use crate::budget::Bytes;
-use crate::host::parallel;
-use crate::host::threads::lock;
+use crate::host::{Threads, lock};
 use crate::point::{Bounds, Position};
 
 /// Blocks of all runs that one range has, about, at least.
@@ -34,18 +31,19 @@ pub fn merge_bytes(runs: u64, stride: usize) -> Bytes {
     Cursor::bytes(stride) * runs + Bytes::from(Emitter::BYTES)
 }
 
-/// Merges the runs of `store` on `threads` threads; `advance` is told of records merged and says
+/// Merges the runs of `store`, a range an item; `advance` is told of records merged and says
 /// whether to go on.
 pub fn seal(
     store: TileStore,
-    threads: usize,
+    threads: Threads<'_>,
     advance: &(dyn Fn(u64) -> Result<()> + Sync),
 ) -> Result<SealedTiles> {
     let runs = std::mem::take(&mut *lock(&store.runs));
-    let working = merge_bytes(runs.len() as u64, store.stride) * threads as u64;
+    let working = merge_bytes(runs.len() as u64, store.stride) * threads.count() as u64;
     let _working = store.budget.lease(working.0, "merging of sorted runs")?;
     let ranges = ranges(&runs);
-    // The merge leaves no more blocks than the runs have, but for one that is not full in each range.
+    // The merge leaves no more blocks than the runs have, but for one that is not full in each
+    // range.
     let blocks = runs.iter().map(|run| run.blocks.len()).sum::<usize>() + ranges.len();
     let index = |blocks: usize| Bytes::of(blocks as u64, SealedTiles::BYTES_PER_BLOCK);
     let mut lease = store.budget.lease(index(blocks).0, "index of the scan")?;
@@ -54,26 +52,19 @@ pub fn seal(
         refs: Pieces::new(&store.area, "order", ref_bytes(store.tagged)),
         tagged: store.tagged,
     };
-    let merged: Vec<Mutex<Option<Merged>>> = ranges.iter().map(|_| Mutex::default()).collect();
-    let next = AtomicUsize::new(0);
-    let merge = |range: &Range, slot: &Mutex<Option<Merged>>| -> Result<()> {
-        let merged = merge_range(&store, &runs, range, &out)?;
-        advance(merged.records)?;
-        *lock(slot) = Some(merged);
-        Ok(())
-    };
-    parallel(threads, |_| {
-        loop {
-            let number = next.fetch_add(1, Atomic::Relaxed);
-            let Some(range) = ranges.get(number) else { return Ok(()) };
-            // Whoever fails leaves the others no range.
-            merge(range, &merged[number])
-                .inspect_err(|_| next.store(ranges.len(), Atomic::Relaxed))?;
-        }
-    })?;
+    let mut merged = Vec::with_capacity(ranges.len());
+    threads.items(ranges.len(), || {}).run(
+        || (),
+        |(), number| {
+            let merged = merge_range(&store, &runs, &ranges[number], &out)?;
+            advance(merged.records)?;
+            Ok(merged)
+        },
+        |range| merged.push(range),
+        |()| Ok(()),
+    )?;
     drop(runs);
-    let ranges = merged.into_iter().filter_map(|slot| slot.into_inner().ok().flatten());
-    let sequence = join(ranges, blocks);
+    let sequence = join(merged, blocks);
     lease.shrink_to(index(sequence.blocks.len()).0);
     let refs = (out.refs, out.tagged);
     Ok(SealedTiles::new(sequence, out.positions, refs, (store.records, store.places), lease))
@@ -111,7 +102,7 @@ fn ranges(runs: &[Run]) -> Vec<Range> {
         .collect()
 }
 
-fn join(ranges: impl Iterator<Item = Merged>, most_blocks: usize) -> Sequence {
+fn join(ranges: Vec<Merged>, most_blocks: usize) -> Sequence {
     let blocks = Vec::with_capacity(most_blocks);
     let mut all = Sequence { blocks, ..Sequence::default() };
     let mut last = None;
@@ -154,8 +145,8 @@ fn merge_range(store: &TileStore, runs: &[Run], range: &Range, out: &Output) -> 
             equals.emit(first.key, &mut tournament, &mut cursors, &mut emitter, &mut buffer)?;
             continue;
         }
-        // Up to the key with which another run goes on, nothing is to be compared. Several may go on
-        // with it: their first position is known when they are all asked.
+        // Up to the key with which another run goes on, nothing is to be compared. Several may go
+        // on with it: their first position is known when they are all asked.
         let until = second.and_then(|second| cursors[second.run].first_of_key());
         let cursor = &mut cursors[first.run];
         cursor.emit_until(until, &mut emitter, &mut buffer)?;
@@ -164,8 +155,8 @@ fn merge_range(store: &TileStore, runs: &[Run], range: &Range, out: &Output) -> 
     emitter.finish()
 }
 
-/// Orders what keys leave open: runs of which the heads have the same key, be the positions equal or
-/// not. Holds memory to work in.
+/// Orders what keys leave open: runs of which the heads have the same key, be the positions equal
+/// or not. Holds memory to work in.
 #[derive(Default)]
 struct Equals {
     runs: Vec<usize>,
@@ -280,7 +271,8 @@ impl<'a> Cursor<'a> {
             blocks.partition_point(|block| morton_cmp(&block.first, p) == Ordering::Less)
         };
         let end = self.range.until.as_ref().map_or(blocks.len(), before);
-        // Records equal to `from` may begin in the block before the first that begins at or behind it.
+        // Records equal to `from` may begin in the block before the first that begins at or behind
+        // it.
         self.block = self.range.from.as_ref().map_or(0, |p| before(p).saturating_sub(1));
         let most = (end.saturating_sub(self.block) * BLOCK) as u64;
         self.load(buffer)?;
@@ -297,8 +289,8 @@ impl<'a> Cursor<'a> {
         Ok(most)
     }
 
-    /// Reads the block that it is at, none if that begins behind the range; `buffer` is memory to work
-    /// in, which all cursors share.
+    /// Reads the block that it is at, none if that begins behind the range; `buffer` is memory to
+    /// work in, which all cursors share.
     fn load(&mut self, buffer: &mut Vec<u8>) -> Result<()> {
         self.at = 0;
         self.positions.clear();
@@ -326,7 +318,8 @@ impl<'a> Cursor<'a> {
         self.positions.get(self.at).map(|p| morton_prefix(*p, self.range.level))
     }
 
-    /// The first of all positions that have the key of [`head`](Cursor::head), be they there or not.
+    /// The first of all positions that have the key of [`head`](Cursor::head), be they there or
+    /// not.
     fn first_of_key(&self) -> Option<Position> {
         self.head().map(|p| first_of_prefix(p, self.range.level))
     }

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::modules::Modules;
+use super::modules::Modules;
 
 /// The modules from the bottom up. Those of one layer do not import each other.
 const LAYERS: [&[&str]; 15] = [

@@ -3,4 +3,5 @@
 mod edges;
 mod killed;
 mod spill_damage;
+mod threads;
 mod trouble;

@@ -10,7 +10,7 @@ use crate::support::runs::{Memory, Settings, run};
 use crate::support::scan::Scan;
 use crate::support::scans;
 use pointmill::budget::Budget;
-use pointmill::host::parallel;
+use pointmill::host::Threads;
 use pointmill::ops::normals::{Estimate, Estimator, Method};
 use pointmill::point::{Bounds, Position, distance2, names};
 use pointmill::store::{Folder, Intake, SealedTiles, SpillArea, Tag, TileStore, morton_cmp, seal};
@@ -41,16 +41,17 @@ fn sealed(scan: &Scan, positions: &[Position]) -> Arc<SealedTiles> {
     let folder = Box::new(Scratch(tempfile::tempdir().unwrap()));
     let area = SpillArea::new(budget.clone(), 0, folder);
     let store = TileStore::new(&area, &budget, scan.schema.stride, false);
-    parallel(3, |thread| {
+    let fill = |thread: usize| {
         let mut intake = Intake::new(&store, 1500);
         for (i, &p) in positions.iter().enumerate().skip(thread).step_by(3) {
             intake.push(p, scan.record(i), Tag::default())?;
         }
         intake.flush()
-    })
-    .unwrap();
+    };
+    Threads::start(3, |all| all.items(3, || {}).run(|| (), |(), n| fill(n), |()| {}, Ok)).unwrap();
     assert!(store.runs() > 10);
-    let tiles = Arc::new(seal(store, 3, &|_| Ok(())).unwrap());
+    let tiles = Threads::start(3, |threads| seal(store, threads, &|_| Ok(())));
+    let tiles = Arc::new(tiles.unwrap());
     assert!(area.written() > scan.records.len() as u64, "all is spilled");
     tiles
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use pointmill::budget::Budget;
 use pointmill::geom::lattice::Lattice;
-use pointmill::host::parallel;
+use pointmill::host::Threads;
 use pointmill::point::{
     Dimension, Endian, Layout, PointBatch, Position, Scalar, Schema, distance2, names,
 };
@@ -82,16 +82,19 @@ fn sealed(
     let folder = Box::new(Scratch(tempfile::tempdir().unwrap()));
     let area = SpillArea::new(budget.clone(), memory, folder);
     let store = TileStore::new(&area, &budget, schema().stride, false);
-    parallel(threads, |thread| {
+    let fill = |thread: usize| {
         let mut intake = Intake::new(&store, run);
         for (i, &p) in scan.iter().enumerate().skip(thread).step_by(threads) {
             intake.push(p, &record(p, (i % 3) as u32), Tag::default())?;
         }
         intake.flush()
-    })
-    .unwrap();
+    };
+    let each =
+        |all: Threads<'_>| all.items(threads, || {}).run(|| (), |(), n| fill(n), |()| {}, Ok);
+    Threads::start(threads, each).unwrap();
     let runs = store.runs();
-    (Arc::new(seal(store, threads, &|_| Ok(())).unwrap()), area.written(), runs)
+    let tiles = Threads::start(threads, |all| seal(store, all, &|_| Ok(())));
+    (Arc::new(tiles.unwrap()), area.written(), runs)
 }
 
 fn distinct(scan: &[Position]) -> Vec<Position> {
