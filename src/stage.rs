@@ -7,12 +7,12 @@ mod kind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::Result;
 use crate::geom::lattice::Lattice;
 use crate::point::{Bounds, Mark, Metadata, PointBatch, Schema, Units};
 use crate::report::Tally;
 use crate::store::Levels;
 use crate::tile::Tile;
+use crate::{Error, Result};
 
 pub use format::{Colors, Format, FormatName, Formats, OutputEncoding, WriteKeys, foreign};
 pub use kind::{StageKind, StagePlace};
@@ -25,6 +25,20 @@ pub trait OpenSource: Send + Sync {
     /// Files that it reads, so that no output is written over one of them.
     fn paths(&self) -> Vec<PathBuf> {
         Vec::new()
+    }
+
+    /// The family of formats of its files, if it is nothing but these files.
+    fn family(&self) -> Option<&str> {
+        None
+    }
+
+    /// This source and `other` as one, whose inputs come behind its own.
+    ///
+    /// # Errors
+    ///
+    /// If they cannot be read as one: as it is here, where nothing is known of the two.
+    fn merged(&self, _other: &dyn OpenSource) -> Result<Box<dyn OpenSource>> {
+        Err(Error::pipeline("this source cannot be merged with another"))
     }
 }
 
