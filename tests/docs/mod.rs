@@ -27,7 +27,8 @@ use crate::support::case::execute;
 use crate::support::command::pointmill;
 use source::{Enum, Field, enum_of, item_docs, struct_of};
 
-const SAYS_SO: &str = "written by `POINTMILL_WRITE_DOCS=1 cargo test --test repository`; do not edit";
+const SAYS_SO: &str =
+    "written by `POINTMILL_WRITE_DOCS=1 cargo test --test repository`; do not edit";
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
