@@ -4,7 +4,7 @@
 //! function of the points alone; neighbours in time differ least in all fields, which LAZ makes use of.
 
 use crate::point::{Dimension, PointBatch, Schema, names};
-use crate::store::State;
+use crate::store::RecordState;
 
 /// What records of a schema are ordered by.
 pub(crate) struct ByTime {
@@ -23,7 +23,7 @@ impl ByTime {
     pub fn sort(
         &self,
         batch: &mut PointBatch,
-        states: &mut [State],
+        states: &mut [RecordState],
         normals: Option<&mut [[f32; 3]]>,
     ) {
         let schema = batch.schema().clone();

@@ -28,7 +28,7 @@ const CELLS_ACROSS: u64 = 4;
 
 /// The tiles of a pass.
 pub(crate) struct Cut {
-    cells: Cells,
+    cells: CellWidths,
     pub keys: Vec<TileKey>,
     /// Positions that the arena of a thread takes.
     pub capacity: usize,
@@ -39,15 +39,15 @@ pub(crate) struct Cut {
 
 /// What the tiles of passes depend on; equal for all passes of most pipelines.
 #[derive(Clone, Copy, PartialEq, Eq)]
-struct Cells {
+struct CellWidths {
     side: u64,
     reach: i64,
 }
 
-impl Cells {
-    fn of(ops: &[StageOp], pass: &Pass) -> Cells {
+impl CellWidths {
+    fn of(ops: &[StageOp], pass: &Pass) -> CellWidths {
         let side = pass.needs(ops).map(|needs| needs.cell_side).max().unwrap_or(0);
-        Cells { side: u64::try_from(side).unwrap_or(0), reach: reach(ops, pass) }
+        CellWidths { side: u64::try_from(side).unwrap_or(0), reach: reach(ops, pass) }
     }
 
     /// The level of the smallest octree node that is `across` cells wide.
@@ -69,10 +69,10 @@ pub(crate) fn cut_all(
     demands: &Demands,
     tiles: &SealedTiles,
 ) -> Result<Vec<Arc<Cut>>> {
-    let mut known: Vec<(Cells, Arc<Cut>)> = Vec::new();
+    let mut known: Vec<(CellWidths, Arc<Cut>)> = Vec::new();
     let mut cuts = Vec::new();
     for pass in passes {
-        let cells = Cells::of(&job.ops, pass);
+        let cells = CellWidths::of(&job.ops, pass);
         let cut = match known.iter().find(|(same, _)| *same == cells) {
             Some((_, cut)) => cut.clone(),
             None => Arc::new(cut(job, cells, lattice, (shares, demands), tiles, 0)?),
@@ -93,7 +93,7 @@ pub(crate) fn cut_again(
     tiles: &SealedTiles,
     (made, held): (&Arc<Cut>, u64),
 ) -> Result<Arc<Cut>> {
-    let cells = Cells::of(&job.ops, pass);
+    let cells = CellWidths::of(&job.ops, pass);
     match cells == made.cells {
         true => Ok(made.clone()),
         false => cut(job, cells, lattice, (shares, demands), tiles, held).map(Arc::new),
@@ -105,7 +105,7 @@ pub(crate) fn cut_again(
 /// fewer threads.
 fn cut(
     job: &Job<'_>,
-    cells: Cells,
+    cells: CellWidths,
     lattice: &Lattice,
     (shares, demands): (&Shares, &Demands),
     tiles: &SealedTiles,

@@ -8,13 +8,13 @@ use serde_json::Value;
 
 use super::by_input::ByInput;
 use super::by_rank::ByRank;
-use super::chunks::Found;
+use super::chunks::FoundValues;
 use super::clock::Clock;
 use super::cut::{Cut, cut_again, cut_all};
 use super::decode::decode;
 use super::finished::{Finished, FinishedBranch};
 use super::forecast::{forecast, samples_capacity};
-use super::grind::{Field, Milled, PassOutputs, grind};
+use super::grind::{DecodedScan, Milled, PassOutputs, grind};
 use super::job::Job;
 use super::pass::{Branch, Call, Op, Pass};
 use super::shares::{Demands, Shares};
@@ -51,7 +51,7 @@ pub(crate) fn mill(
     tally.count("positions", tiles.positions());
     settle(job, lattice, &tiles)?;
     let field =
-        Field { lattice, area: area.clone(), tiles: tiles.clone(), starts: Arc::new(starts) };
+        DecodedScan { lattice, area: area.clone(), tiles: tiles.clone(), starts: Arc::new(starts) };
     let mut course = Course {
         forecasts: vec![None; job.ops.len()],
         written: sinks.iter().map(|_| None).collect(),
@@ -119,7 +119,7 @@ impl Course {
         &mut self,
         job: &mut Job<'_>,
         decoded: Standing,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
         (shares, demands): (&Shares, &Demands),
         clock: &mut Clock<'_>,
     ) -> Result<Vec<FinishedBranch>> {
@@ -165,10 +165,10 @@ impl Course {
         job: &Job<'_>,
         branch: &Branch,
         after: Standing,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
         clock: &mut Clock<'_>,
     ) -> Result<FinishedBranch> {
-        let Field { lattice, area, tiles, .. } = field;
+        let DecodedScan { lattice, area, tiles, .. } = field;
         clock.phase("survey", Some(2 * tiles.positions()));
         let mut measured = survey(job, lattice, area, tiles, &after.sieve)?;
         measured.totals.baseline = after.baseline(lattice);
@@ -192,7 +192,7 @@ impl Course {
         job: &mut Job<'_>,
         (pass, cut, working): (&Pass, &Arc<Cut>, &mut Vec<Lease>),
         before: Standing,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
         (shares, demands): (&Shares, &Demands),
         clock: &mut Clock<'_>,
     ) -> Result<Standing> {
@@ -254,7 +254,7 @@ impl Course {
         &mut self,
         job: &mut Job<'_>,
         pass: &Pass,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
         sieve: &Sieve,
         shares: &Shares,
     ) -> Result<()> {
@@ -287,7 +287,7 @@ impl Course {
         &mut self,
         job: &Job<'_>,
         pass: &Pass,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
     ) -> Result<(PassOutputs, Vec<Box<dyn Sink>>)> {
         let (mut sinks, mut by_input) = (Vec::new(), Vec::new());
         let (mut by_rank, mut ordered) = (Vec::new(), Vec::new());
@@ -339,12 +339,12 @@ impl Course {
 }
 
 /// What a first phase found, for its stage.
-struct Whole {
-    found: Found,
+struct GatheredValues {
+    found: FoundValues,
     records: u64,
 }
 
-impl Gathered for Whole {
+impl Gathered for GatheredValues {
     fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()> {
         self.found.each(visit)
     }
@@ -354,9 +354,9 @@ impl Gathered for Whole {
     }
 }
 
-fn conclude(job: &mut Job<'_>, op: usize, found: Found, records: u64) -> Result<()> {
+fn conclude(job: &mut Job<'_>, op: usize, found: FoundValues, records: u64) -> Result<()> {
     let warning = match &mut job.ops[op].op {
-        Op::Scan(op) => op.conclude(&Whole { found, records })?,
+        Op::Scan(op) => op.conclude(&GatheredValues { found, records })?,
         Op::Tile(_) => return Err(Error::internal("a stage gathered that has one phase")),
     };
     warning.into_iter().for_each(|warning| job.warn(warning));

@@ -42,7 +42,7 @@ impl Op {
 
 /// A stage that streams, behind stages that work on tiles or on one of several branches: what it
 /// removes is entered in a pass of its own, and what it changes is changed as records are written.
-pub(crate) struct Filter {
+pub(crate) struct PassFilter {
     pub kind: String,
     pub transform: Box<dyn Transform>,
 }

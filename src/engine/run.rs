@@ -11,7 +11,7 @@ use super::by_rank::LISTED;
 use super::clock::Clock;
 use super::finished::{Finished, FinishedBranch};
 use super::job::{Each, Job};
-use super::lines::Lines;
+use super::lines::TileLines;
 use super::mill::mill;
 use super::pass::Branch;
 use super::publish::{Staged, make_folder, publish};
@@ -23,7 +23,7 @@ use super::stream::stream;
 use super::tagger::{ClassOf, LEFT_OUT, NOT_FINITE};
 use super::task::Task;
 use crate::budget::Budget;
-use crate::graph::{Nonfinite, Spill};
+use crate::graph::{Nonfinite, SpillSetting};
 use crate::host::process::peak_memory;
 use crate::host::{Threads, lock};
 use crate::point::names;
@@ -167,8 +167,8 @@ impl Task {
             (None, None) => return Err(Error::pipeline("the pipeline writes nothing")),
         };
         let kept_in_memory = match self.settings.spill {
-            Spill::Auto => shares.kept_in_memory,
-            Spill::Always => 0,
+            SpillSetting::Auto => shares.kept_in_memory,
+            SpillSetting::Always => 0,
         };
         let area = SpillArea::new(budget.clone(), kept_in_memory, Box::new(spill.clone()));
         let unread = self.unread();
@@ -333,7 +333,7 @@ impl Task {
         finished: Finished,
         mut run: RunFigures,
         clock: Clock<'_>,
-    ) -> Result<(Report, Vec<Option<Lines>>)> {
+    ) -> Result<(Report, Vec<Option<TileLines>>)> {
         for (sink, (given, summary)) in self.written(&finished) {
             check_written(sink.path(), *given, summary.points)?;
         }
@@ -357,7 +357,7 @@ impl Task {
         branch: &Branch,
         finished: FinishedBranch,
         read: u64,
-    ) -> Result<(Outcome, Option<Lines>)> {
+    ) -> Result<(Outcome, Option<TileLines>)> {
         let ledger = Ledger::new(read, finished.kept, &finished.tally);
         ledger.check()?;
         let (tile_side, totals, tiles) = match finished.measured {
@@ -418,7 +418,7 @@ fn nothing_left(finished: &Finished, job: &Job<'_>) -> Vec<String> {
 }
 
 /// The lines of a branch's report tiles; none if it has none.
-fn lines_of(tiles: &Option<Lines>) -> Box<dyn BufRead + '_> {
+fn lines_of(tiles: &Option<TileLines>) -> Box<dyn BufRead + '_> {
     match tiles {
         Some(lines) => Box::new(lines.reader()),
         None => Box::new(std::io::empty()),
@@ -426,7 +426,7 @@ fn lines_of(tiles: &Option<Lines>) -> Box<dyn BufRead + '_> {
 }
 
 /// Writes the report to `staged` and brings it to disk.
-fn write_report(staged: &Path, report: &Report, tiles: &[Option<Lines>]) -> Result<()> {
+fn write_report(staged: &Path, report: &Report, tiles: &[Option<TileLines>]) -> Result<()> {
     let write = || {
         let mut out = BufWriter::new(File::create(staged)?);
         report.write_all(&mut out, tiles.iter().map(lines_of))?;

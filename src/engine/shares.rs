@@ -5,7 +5,7 @@
 //! that 64 bits do not hold is refused like any that is too large ([`Bytes`]).
 
 use super::by_rank::ordering_bytes;
-use super::chunk::Chunk;
+use super::chunk::OutputChunk;
 use super::encoding::ChunkEncoder;
 use super::filtering::Filtering;
 use super::outlet::A_THREAD;
@@ -18,8 +18,8 @@ use crate::geom::nearest::Nearest;
 use crate::report::{Baseline, Grouped};
 use crate::stage::{ChunkSize, Needs, Source};
 use crate::store::{
-    Block, FATE_BYTES, FIGURE_BYTES, Intake, NORMAL_BYTES, Pieces, SealedTiles, State, merge_bytes,
-    ref_bytes,
+    Block, FATE_BYTES, FIGURE_BYTES, Intake, NORMAL_BYTES, Pieces, RecordState, SealedTiles,
+    merge_bytes, ref_bytes,
 };
 use crate::tile::{Loader, Remote};
 use crate::{Error, Result};
@@ -155,7 +155,7 @@ impl Demands {
     /// Bytes of the tables of all that is stored by number; that of the order has gaps.
     fn tables(&self) -> Bytes {
         let order = ref_bytes(self.tagged);
-        let states_and_fates = [size_of::<State>(), FATE_BYTES].repeat(self.standings);
+        let states_and_fates = [size_of::<RecordState>(), FATE_BYTES].repeat(self.standings);
         let places = self.ranked.then_some(size_of::<u64>());
         let stores = [self.stride, order, order, NORMAL_BYTES, FIGURE_BYTES];
         let all = stores.into_iter().chain(states_and_fates).chain(places);
@@ -210,7 +210,7 @@ impl Demands {
     /// every sink, that of the first among those that wait.
     fn outputs(&self) -> Holders {
         let (points, encoded) = (self.chunk.points as u64, Bytes(self.chunk.bytes));
-        let chunk = Bytes::of(points, Chunk::BYTES_PER_RECORD);
+        let chunk = Bytes::of(points, OutputChunk::BYTES_PER_RECORD);
         let chunks = chunk * A_THREAD + chunk * self.other_sinks();
         let encoding = ChunkEncoder::bytes(points, self.stride) + encoded * A_THREAD;
         let by_normals = self.passes.iter().flatten().any(decides_by_normals);
@@ -394,10 +394,10 @@ const SPARE: (u64, u64) = (3, 4);
 /// Bytes that a record kept in memory takes at most besides its own: its place in the order, its
 /// position and its copies in a run and in the merged scan, its state, its fate; tags included.
 const KEPT_BYTES: usize =
-    ref_bytes(true) + 2 * Block::BYTES_PER_POSITION + size_of::<State>() + FATE_BYTES;
+    ref_bytes(true) + 2 * Block::BYTES_PER_POSITION + size_of::<RecordState>() + FATE_BYTES;
 
 /// The same of the outcome of a pass that is kept beside two others: states, fates, columns.
-const STANDING_BYTES: usize = size_of::<State>() + FATE_BYTES + NORMAL_BYTES + FIGURE_BYTES;
+const STANDING_BYTES: usize = size_of::<RecordState>() + FATE_BYTES + NORMAL_BYTES + FIGURE_BYTES;
 
 /// The same of what a first phase leaves: a normal, a figure, and two entries of what it found.
 const GATHERED_BYTES: usize = NORMAL_BYTES + FIGURE_BYTES + 2 * size_of::<[u64; 2]>();

@@ -6,7 +6,7 @@ use crate::point::{
     Chooser, Dimension, Endian, Flag, PointBatch, Scalar, Schema, Selection, Value, names,
 };
 use crate::report::{ClassCounts, Tally};
-use crate::store::{ASIDE, State, Tag};
+use crate::store::{ASIDE, RecordState, Tag};
 
 /// Tells records apart as stages and settings ask.
 #[derive(Debug, Clone)]
@@ -149,7 +149,7 @@ impl ClassOf {
     }
 
     /// Counts as kept those records of `batch` whose state is so.
-    pub fn keep_by_state(&self, batch: &PointBatch, states: &[State], tally: &mut Tally) {
+    pub fn keep_by_state(&self, batch: &PointBatch, states: &[RecordState], tally: &mut Tally) {
         self.each(batch, tally, |counts, i, class| {
             if states[i].is_kept() {
                 counts.keep(class);

@@ -1,7 +1,7 @@
 //! What the engine runs: a pipeline whose stages fit each other, its inputs and the memory.
 
 use super::beside::Beside;
-use super::pass::{Branch, Filter, Pass, StageOp};
+use super::pass::{Branch, Pass, PassFilter, StageOp};
 use super::shares::Demands;
 use super::tagger::Tagger;
 use crate::geom::lattice::Lattice;
@@ -19,7 +19,7 @@ pub(crate) struct Task {
     pub transforms: Vec<(String, Box<dyn Transform>)>,
     pub ops: Vec<StageOp>,
     /// Stages that stream behind the decode.
-    pub filters: Vec<Filter>,
+    pub filters: Vec<PassFilter>,
     pub passes: Vec<Pass>,
     pub branches: Vec<Branch>,
     pub sinks: Vec<Box<dyn CreateSink>>,

@@ -17,8 +17,8 @@ use crate::stage::{Order, Role};
 
 pub use limits::{LimitKeys, Limits, Sees};
 pub use settings::{
-    Existing, Headers, MOST_THREADS, MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill,
-    Treatment, ZScale, parse_bytes,
+    Existing, Headers, MOST_THREADS, MixedUnits, Nonfinite, Overrides, RunSettings, SimdSetting,
+    SpillSetting, Treatment, ZScale, parse_bytes,
 };
 pub use written::Written;
 
@@ -57,7 +57,7 @@ pub struct GraphStage {
 
 /// What is wrong with the way in which the stages of a graph hang together.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Misplaced {
+pub struct GraphMistake {
     /// The number of the stage.
     pub stage: usize,
     /// What is wrong.
@@ -95,10 +95,10 @@ impl Graph {
     }
 
     /// Everything that is wrong with how the stages hang together.
-    pub fn mistakes(&self) -> Vec<Misplaced> {
+    pub fn mistakes(&self) -> Vec<GraphMistake> {
         let mut wrong = Vec::new();
         let mut tell = |stage, told: &str, help| {
-            wrong.push(Misplaced { stage, told: told.to_owned(), help });
+            wrong.push(GraphMistake { stage, told: told.to_owned(), help });
         };
         let is_source = |n: &usize| matches!(self.stages[*n].role, Role::Source(_));
         let is_sink = |n: &usize| matches!(self.stages[*n].role, Role::Sink(_));

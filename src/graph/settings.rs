@@ -59,9 +59,9 @@ pub struct RunSettings {
     /// Most points a tile's cube holds, for tests; none: as the memory allows.
     pub tile_points: Option<NonZeroUsize>,
     /// Which of the equal code paths runs, for tests.
-    pub simd: Simd,
+    pub simd: SimdSetting,
     /// Whether points may stay in memory, for tests.
-    pub spill: Spill,
+    pub spill: SpillSetting,
 }
 
 /// What becomes of files that are already where an output or the report is to be.
@@ -136,7 +136,7 @@ pub enum Treatment {
 /// Where decoded points wait for the mill.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Spill {
+pub enum SpillSetting {
     /// In memory as far as it goes, on disk beyond.
     #[default]
     Auto,
@@ -147,7 +147,7 @@ pub enum Spill {
 /// Which of the equal code paths runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Simd {
+pub enum SimdSetting {
     /// The fastest that the processor has.
     #[default]
     Auto,
@@ -159,7 +159,7 @@ pub enum Simd {
     Portable,
 }
 
-impl Simd {
+impl SimdSetting {
     /// What kernels are to run by.
     ///
     /// # Errors
@@ -167,10 +167,10 @@ impl Simd {
     /// If this processor does not have it.
     pub(crate) fn resolve(self) -> Result<simd::Simd> {
         let level = match self {
-            Simd::Auto => return Ok(simd::Simd::best()),
-            Simd::Avx2 => Level::Avx2,
-            Simd::Avx512 => Level::Avx512,
-            Simd::Portable => Level::Portable,
+            SimdSetting::Auto => return Ok(simd::Simd::best()),
+            SimdSetting::Avx2 => Level::Avx2,
+            SimdSetting::Avx512 => Level::Avx512,
+            SimdSetting::Portable => Level::Portable,
         };
         simd::Simd::of(level).ok_or_else(|| {
             Error::pipeline(format!("this processor has no {}", level.name()))
@@ -337,8 +337,8 @@ fn some_threads<'de, D: Deserializer<'de>>(from: D) -> Result<Option<NonZeroUsiz
 }
 
 fn some_step<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
-    struct Step;
-    impl de::Visitor<'_> for Step {
+    struct StepVisitor;
+    impl de::Visitor<'_> for StepVisitor {
         type Value = f64;
 
         fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -360,7 +360,7 @@ fn some_step<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error
             self.visit_f64(step as f64)
         }
     }
-    from.deserialize_any(Step).map(Some)
+    from.deserialize_any(StepVisitor).map(Some)
 }
 
 #[cfg(test)]

@@ -9,8 +9,8 @@ use serde::de::{
 };
 
 use super::mistake::Mistake;
-use super::node::{Entry, Node, Value};
-use super::place::Place;
+use super::node::{KeyEntry, Node, NodeValue};
+use super::place::TextPlace;
 use crate::error::nearest;
 use crate::quantity::{Figure, parse_count};
 
@@ -26,7 +26,7 @@ pub(crate) fn read<T: DeserializeOwned>(
     let mut dropped: Vec<String> = Vec::new();
     loop {
         let unknown = RefCell::new(Vec::new());
-        let outcome = T::deserialize(Reader { node: &rest, unknown: &unknown, formats });
+        let outcome = T::deserialize(NodeReader { node: &rest, unknown: &unknown, formats });
         let fault = match outcome {
             Ok(read) if mistakes.is_empty() && unknown.borrow().is_empty() => return Ok(read),
             Ok(_) => None,
@@ -51,7 +51,7 @@ pub(crate) fn read<T: DeserializeOwned>(
 }
 
 fn remove(node: &mut Node, key: &str) -> bool {
-    let Value::Table(entries) = &mut node.value else { return false };
+    let NodeValue::Table(entries) = &mut node.value else { return false };
     let before = entries.len();
     entries.retain(|e| e.key != key);
     entries.len() < before
@@ -60,7 +60,7 @@ fn remove(node: &mut Node, key: &str) -> bool {
 /// A value that does not fit, as serde tells it.
 #[derive(Debug)]
 struct Fault {
-    place: Option<Place>,
+    place: Option<TextPlace>,
     key: Option<String>,
     problem: Problem,
 }
@@ -79,7 +79,7 @@ impl Fault {
         Fault { place: None, key: None, problem }
     }
 
-    fn at(mut self, place: &Place) -> Self {
+    fn at(mut self, place: &TextPlace) -> Self {
         self.place.get_or_insert_with(|| place.clone());
         self
     }
@@ -206,7 +206,7 @@ const FORMAT: &str = "FormatName";
 
 /// A node on its way into a struct.
 #[derive(Clone, Copy)]
-struct Reader<'a> {
+struct NodeReader<'a> {
     node: &'a Node,
     unknown: &'a RefCell<Vec<Fault>>,
     formats: &'a [&'static str],
@@ -215,10 +215,10 @@ struct Reader<'a> {
 /// Below it floats hold all whole numbers.
 const WHOLE: f64 = (1u64 << 53) as f64;
 
-impl<'de> Reader<'de> {
+impl<'de> NodeReader<'de> {
     /// A whole number, also one that is written as a count is: "10k".
     fn whole<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
-        let Value::Text(text) = &self.node.value else { return self.deserialize_any(visitor) };
+        let NodeValue::Text(text) = &self.node.value else { return self.deserialize_any(visitor) };
         match parse_count(text) {
             Ok(count) => {
                 visitor.visit_u64(count).map_err(|fault: Fault| fault.at(&self.node.place))
@@ -230,18 +230,18 @@ impl<'de> Reader<'de> {
     /// The value, which is to be one of `valid` words.
     fn word(self, valid: &[&'static str]) -> Result<&'de str, Fault> {
         match &self.node.value {
-            Value::Text(word) => Ok(word),
+            NodeValue::Text(word) => Ok(word),
             _ => Err(de::Error::custom(format!("takes one of {}", valid.join(", ")))),
         }
     }
 
     fn table<V: Visitor<'de>>(
         self,
-        entries: &'de [Entry],
+        entries: &'de [KeyEntry],
         fields: Option<&'static [&'static str]>,
         visitor: V,
     ) -> Result<V::Value, Fault> {
-        let known = |e: &&Entry| fields.is_none_or(|fields| fields.contains(&e.key.as_str()));
+        let known = |e: &&KeyEntry| fields.is_none_or(|fields| fields.contains(&e.key.as_str()));
         for entry in entries.iter().filter(|e| !known(e)) {
             let valid = fields.unwrap_or_default().to_vec();
             let problem = Problem::UnknownKey(entry.key.clone(), valid);
@@ -252,22 +252,24 @@ impl<'de> Reader<'de> {
     }
 }
 
-impl<'de> Deserializer<'de> for Reader<'de> {
+impl<'de> Deserializer<'de> for NodeReader<'de> {
     type Error = Fault;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
         match &self.node.value {
-            Value::Text(v) => visitor.visit_borrowed_str(v),
-            Value::Flag(v) => visitor.visit_bool(*v),
+            NodeValue::Text(v) => visitor.visit_borrowed_str(v),
+            NodeValue::Flag(v) => visitor.visit_bool(*v),
             // 1e1 is a float in TOML.
-            Value::Number(v) if v.fract() == 0.0 && v.abs() < WHOLE => visitor.visit_i64(*v as i64),
-            Value::Number(v) => visitor.visit_f64(*v),
-            Value::Whole(v) => match (i64::try_from(*v), u64::try_from(*v)) {
+            NodeValue::Number(v) if v.fract() == 0.0 && v.abs() < WHOLE => {
+                visitor.visit_i64(*v as i64)
+            }
+            NodeValue::Number(v) => visitor.visit_f64(*v),
+            NodeValue::Whole(v) => match (i64::try_from(*v), u64::try_from(*v)) {
                 (Ok(v), _) => visitor.visit_i64(v),
                 (_, Ok(v)) => visitor.visit_u64(v),
                 _ => Err(de::Error::custom("the whole number is too large")),
             },
-            Value::List(list) => {
+            NodeValue::List(list) => {
                 let mut items = Items { items: list.iter(), reader: self };
                 let read = visitor.visit_seq(&mut items)?;
                 match items.items.len() {
@@ -275,7 +277,7 @@ impl<'de> Deserializer<'de> for Reader<'de> {
                     over => Err(de::Error::custom(format!("has {over} values too many"))),
                 }
             }
-            Value::Table(entries) => self.table(entries, None, visitor),
+            NodeValue::Table(entries) => self.table(entries, None, visitor),
         }
         .map_err(|fault: Fault| fault.at(&self.node.place))
     }
@@ -308,8 +310,8 @@ impl<'de> Deserializer<'de> for Reader<'de> {
         visitor: V,
     ) -> Result<V::Value, Fault> {
         match &self.node.value {
-            Value::Table(entries) if entries.is_empty() => visitor.visit_unit(),
-            Value::Table(_) => self.deserialize_struct(name, &[], visitor),
+            NodeValue::Table(entries) if entries.is_empty() => visitor.visit_unit(),
+            NodeValue::Table(_) => self.deserialize_struct(name, &[], visitor),
             _ => self.deserialize_any(visitor),
         }
     }
@@ -321,7 +323,7 @@ impl<'de> Deserializer<'de> for Reader<'de> {
         visitor: V,
     ) -> Result<V::Value, Fault> {
         match &self.node.value {
-            Value::Table(entries) => self
+            NodeValue::Table(entries) => self
                 .table(entries, Some(fields), visitor)
                 .map_err(|fault| fault.at(&self.node.place)),
             _ => self.deserialize_any(visitor),
@@ -359,7 +361,7 @@ impl<'de> Deserializer<'de> for Reader<'de> {
 
 struct Items<'a> {
     items: std::slice::Iter<'a, Node>,
-    reader: Reader<'a>,
+    reader: NodeReader<'a>,
 }
 
 impl<'de> de::SeqAccess<'de> for &mut Items<'de> {
@@ -370,7 +372,7 @@ impl<'de> de::SeqAccess<'de> for &mut Items<'de> {
         seed: T,
     ) -> Result<Option<T::Value>, Fault> {
         let Some(node) = self.items.next() else { return Ok(None) };
-        let item = seed.deserialize(Reader { node, ..self.reader });
+        let item = seed.deserialize(NodeReader { node, ..self.reader });
         item.map(Some).map_err(|fault| fault.at(&node.place))
     }
 
@@ -380,9 +382,9 @@ impl<'de> de::SeqAccess<'de> for &mut Items<'de> {
 }
 
 struct Entries<'a> {
-    entries: std::vec::IntoIter<&'a Entry>,
-    next: Option<&'a Entry>,
-    reader: Reader<'a>,
+    entries: std::vec::IntoIter<&'a KeyEntry>,
+    next: Option<&'a KeyEntry>,
+    reader: NodeReader<'a>,
 }
 
 impl<'de> de::MapAccess<'de> for Entries<'de> {
@@ -403,7 +405,7 @@ impl<'de> de::MapAccess<'de> for Entries<'de> {
         let Some(entry) = self.next.take() else {
             return Err(de::Error::custom("a value without a key"));
         };
-        let reader = Reader { node: &entry.node, ..self.reader };
+        let reader = NodeReader { node: &entry.node, ..self.reader };
         seed.deserialize(reader).map_err(|fault| fault.at(&entry.node.place).under(&entry.key))
     }
 }

@@ -4,7 +4,7 @@ use super::mistake;
 use super::mistake::{Mistake, SourceText};
 use super::node;
 use super::node::Node;
-use super::place::Place;
+use super::place::TextPlace;
 use crate::Result;
 
 /// The argument whose texts [`Set::parse`] reads, as errors name it.
@@ -36,7 +36,7 @@ impl Set {
     /// that `write.path=out.laz` needs no quotes.
     pub fn parse(text: &str) -> Result<Set> {
         let Some((address, _)) = text.split_once('=') else {
-            let told = Mistake::new(Place::new(1, 0..text.len()), "there is no `=`")
+            let told = Mistake::new(TextPlace::new(1, 0..text.len()), "there is no `=`")
                 .note("write STAGE.KEY=VALUE, such as cells.max_angle=0.2 or run.threads=2");
             let none = || SourceText { origin: String::new(), text: String::new(), setting: None };
             let given = SourceText { origin: ARGUMENT.to_owned(), text: text.to_owned(), ..none() };
@@ -82,13 +82,13 @@ impl Set {
 
     /// Bytes `part` of the address in the argument's text (source `source`), or all of the text
     /// where the address is not in it.
-    pub(crate) fn place(&self, source: usize, part: &str) -> Place {
+    pub(crate) fn place(&self, source: usize, part: &str) -> TextPlace {
         let start = match self.value {
             Given::Text { .. } => self.text.find(part),
             Given::Json(_) => None,
         };
         let span = start.map_or(0..self.text.len(), |start| start..start + part.len());
-        Place::new(source, span)
+        TextPlace::new(source, span)
     }
 
     /// The value, its place in source `source`.
@@ -96,7 +96,7 @@ impl Set {
         match &self.value {
             Given::Text { from } => node::parse_value(self.text[*from..].trim(), source, *from),
             Given::Json(value) => {
-                Ok(node::from_json(value, &Place::new(source, 0..self.text.len())))
+                Ok(node::from_json(value, &TextPlace::new(source, 0..self.text.len())))
             }
         }
     }

@@ -18,7 +18,7 @@ use crate::stage::{Forecast, Needs, Role, ScanFacts, StageKind, StagePlace, Tile
 use crate::tile::Tile;
 use crate::{Error, Result};
 
-pub use estimate::{Estimate, Fallback, Method, Outcome};
+pub use estimate::{Estimate, EstimateOutcome, Fallback, Method};
 pub use estimator::Estimator;
 pub use orient::Orient;
 use orient::SignRule;
@@ -154,7 +154,7 @@ impl TileOp for Normals {
         let copies = std::mem::take(&mut tile.copies);
         let core = tile.core.clone();
         let (mut without, mut no_triangle, mut perpendicular) = (0, 0, 0);
-        let mut settle = |i: usize, (estimate, fallback): Outcome| {
+        let mut settle = |i: usize, (estimate, fallback): EstimateOutcome| {
             let counted = u64::from(core.contains(&i) && copies[i] > 0);
             match estimate {
                 Estimate::Normal(normal) => normals[i] = normal,

@@ -77,7 +77,7 @@ impl Graph {
         let selections = fit(&mut sorted.ops, schema, &source.metadata().units)?;
         let passes = unroll(&sorted, schema)?;
         let tagger = tagger(&sorted.ops, &passes.passes, &selections, &ranks, &*source, &settings)?;
-        let order = Ordered::new(&sorted, &*source)?;
+        let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, &*source, &sorted.ops, order.mills)?;
         let simd = settings.simd.resolve().map_err(in_file)?;
         let demands = demands(&sorted, &passes.passes, &*source, &order, &settings)?;
@@ -169,7 +169,7 @@ fn demands(
     sorted: &Sorted,
     passes: &[Pass],
     source: &dyn Source,
-    order: &Ordered,
+    order: &WriteOrder,
     settings: &RunSettings,
 ) -> Result<Demands> {
     let limit = settings.memory.unwrap_or_else(default_memory);
@@ -191,7 +191,7 @@ fn demands(
 }
 
 /// In which order records are written.
-struct Ordered {
+struct WriteOrder {
     /// True if the run needs tiles: for its stages, or because an output is to be in canonical
     /// order.
     mills: bool,
@@ -199,8 +199,8 @@ struct Ordered {
     in_input_order: Vec<bool>,
 }
 
-impl Ordered {
-    fn new(sorted: &Sorted, source: &dyn Source) -> Result<Ordered> {
+impl WriteOrder {
+    fn new(sorted: &Sorted, source: &dyn Source) -> Result<WriteOrder> {
         let sinks = &sorted.sinks;
         // Branches of stages that stream go by tiles, and keep the order that a stream has.
         let (ops, streams) = (!sorted.ops.is_empty(), !sorted.filters.is_empty());
@@ -217,7 +217,7 @@ impl Ordered {
             let told = "the inputs have too many parts for an output in their order";
             return Err(Error::pipeline(told).help("leave `write.order` out"));
         }
-        Ok(Ordered { mills, in_input_order })
+        Ok(WriteOrder { mills, in_input_order })
     }
 }
 

@@ -9,7 +9,7 @@ mod sieve;
 pub use around::{Around, Neighborhood};
 pub use load::{Core, Loader};
 pub use remote::Remote;
-pub use sieve::{Run, Sieve};
+pub use sieve::{RecordRun, Sieve};
 
 use std::ops::Range;
 
@@ -45,7 +45,7 @@ pub struct Tile {
     /// What a first phase found for each position of the core; NaN where it found nothing.
     pub figures: Vec<f64>,
     /// The partition into cells, once a stage made one.
-    pub cells: Cells,
+    pub cells: Partition,
     /// What becomes of each position (meaningful in the core). Kept unless a stage says otherwise.
     pub fates: Vec<Fate>,
     /// Where neighbours are found.
@@ -70,7 +70,7 @@ impl Tile {
             oriented: false,
             classes: Vec::new(),
             figures: Vec::new(),
-            cells: Cells::default(),
+            cells: Partition::default(),
             fates: Vec::with_capacity(capacity),
             around: Around::default(),
             selections: Vec::new(),
@@ -93,7 +93,7 @@ impl Tile {
             oriented: false,
             classes: Vec::new(),
             figures: vec![f64::NAN; n],
-            cells: Cells::default(),
+            cells: Partition::default(),
             fates: vec![Fate::Kept; n],
             around: Around::default(),
             selections: Vec::new(),
@@ -179,7 +179,7 @@ pub enum Fate {
 /// Group `g` is `members[ends[g - 1]..ends[g]]`, in Morton order; positions without a normal are in
 /// none.
 #[derive(Debug, Default)]
-pub struct Cells {
+pub struct Partition {
     /// Indices into the tile's positions, group after group.
     pub members: Vec<u32>,
     /// For each member, its normal's sign in the group: true if the normal is to be turned.
@@ -191,7 +191,7 @@ pub struct Cells {
     pub reference: Option<[f64; 3]>,
 }
 
-impl Cells {
+impl Partition {
     /// Forgets all groups, keeps the memory.
     pub fn clear(&mut self) {
         self.members.clear();

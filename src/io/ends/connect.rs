@@ -12,7 +12,7 @@ use crate::stage::{
 };
 
 /// Files that are read as one scan, all of one family of formats.
-pub struct Files {
+pub struct InputFiles {
     /// Where they are.
     pub files: Vec<PathBuf>,
     /// A format of the family.
@@ -21,7 +21,7 @@ pub struct Files {
     pub formats: Formats,
 }
 
-impl OpenSource for Files {
+impl OpenSource for InputFiles {
     fn open(&self) -> Result<Box<dyn Source>> {
         let told = |error| sniff::told(error, &*self.format, &self.formats);
         self.format.open(&self.files).map_err(told)
@@ -34,7 +34,7 @@ impl OpenSource for Files {
 
 /// The sink that writes a file of one format.
 #[derive(Clone)]
-pub struct Output {
+pub struct OutputFile {
     /// What it is to be.
     pub keys: WriteKeys,
     /// The order of its records.
@@ -47,7 +47,7 @@ pub struct Output {
     pub of_one: bool,
 }
 
-impl CreateSink for Output {
+impl CreateSink for OutputFile {
     fn path(&self) -> &Path {
         &self.keys.path
     }
@@ -119,7 +119,7 @@ impl CreateSink for Output {
     }
 }
 
-impl Output {
+impl OutputFile {
     /// A format of the files that records of `schema` come from.
     fn from(&self, schema: &Schema) -> Option<&Arc<dyn Format>> {
         self.formats.of_family(schema.layout.family).next()

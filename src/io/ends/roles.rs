@@ -42,7 +42,7 @@ impl Read {
             return Err(Error::pipeline(told).help(help));
         }
         let format = all[0].clone();
-        Ok(Box::new(connect::Files { files, format, formats: formats.clone() }))
+        Ok(Box::new(connect::InputFiles { files, format, formats: formats.clone() }))
     }
 }
 
@@ -101,7 +101,7 @@ impl StageKind for Write {
                 check(&keys, &**format)?;
                 let (format, formats) = (format.clone(), formats.clone());
                 let order = self.stage_order();
-                let output = connect::Output { keys, order, format, formats, of_one: false };
+                let output = connect::OutputFile { keys, order, format, formats, of_one: false };
                 Ok(Role::Sink(Box::new(output)))
             }
             (None, Some(folder)) => {

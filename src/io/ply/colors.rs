@@ -35,13 +35,13 @@ pub(super) enum Depth {
 
 /// What a chunk is written with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Written {
+pub(super) struct WrittenColors {
     pub depth: Depth,
     /// True if its colours have 16 bits.
     pub wide: bool,
 }
 
-impl Written {
+impl WrittenColors {
     const WIDE: u8 = 8;
 
     /// As a number that an encoded chunk carries, and back.
@@ -49,9 +49,9 @@ impl Written {
         self.depth as u8 | if self.wide { Self::WIDE } else { 0 }
     }
 
-    pub fn from_code(code: u8) -> Written {
+    pub fn from_code(code: u8) -> WrittenColors {
         let depth = Depth::ALL.get(usize::from(code & !Self::WIDE)).copied();
-        Written { depth: depth.unwrap_or(Depth::Full), wide: code & Self::WIDE != 0 }
+        WrittenColors { depth: depth.unwrap_or(Depth::Full), wide: code & Self::WIDE != 0 }
     }
 }
 
@@ -263,8 +263,8 @@ mod tests {
             }
         }
         for (depth, wide) in Depth::ALL.into_iter().flat_map(|d| [(d, false), (d, true)]) {
-            let written = Written { depth, wide };
-            assert_eq!(Written::from_code(written.code()), written);
+            let written = WrittenColors { depth, wide };
+            assert_eq!(WrittenColors::from_code(written.code()), written);
         }
     }
 

@@ -2,10 +2,10 @@
 
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use super::colors::{self, Depth, Recoloring, Written};
+use super::colors::{self, Depth, Recoloring, WrittenColors};
 use super::header::Encoding;
 use super::names::RECORDS;
-use super::source::Native;
+use super::source::PlyNative;
 use super::text;
 use super::vertex::ply_schema;
 use crate::io::convert::Projection;
@@ -39,7 +39,7 @@ pub(super) const WIDE: u8 = 1;
 pub(super) const FULL: u8 = 2;
 
 /// How a record becomes a vertex; shared by all threads.
-pub(super) struct Plan {
+pub(super) struct VertexPlan {
     pub encoding: Encoding,
     /// With colours as the records have them.
     pub full: Form,
@@ -152,8 +152,12 @@ impl Form {
     }
 }
 
-impl Plan {
-    pub fn new(options: &PlyOptions, schema: &Schema, native: Option<&Native>) -> Result<Plan> {
+impl VertexPlan {
+    pub fn new(
+        options: &PlyOptions,
+        schema: &Schema,
+        native: Option<&PlyNative>,
+    ) -> Result<VertexPlan> {
         let encoding = options.encoding.or(native.map(|n| n.encoding)).unwrap_or({
             match (schema.layout, schema.endian) {
                 (RECORDS, crate::point::Endian::Big) => Encoding::BinaryBigEndian,
@@ -164,7 +168,7 @@ impl Plan {
             let told = "`write.colors` is for LAS inputs: from PLY to PLY colours stay as they are";
             return Err(Error::pipeline(told).help("leave it out"));
         }
-        Ok(Plan {
+        Ok(VertexPlan {
             encoding,
             full: Form::new(options, schema, encoding)?,
             narrow: Narrow::of(options, schema, encoding)?,
@@ -227,8 +231,8 @@ impl Plan {
     }
 
     /// The form in which a chunk is written, and what its colours are; full where nobody asked.
-    fn form(&self, batch: &PointBatch) -> (&Form, Written) {
-        let full = |depth| (&self.full, Written { depth, wide: true });
+    fn form(&self, batch: &PointBatch) -> (&Form, WrittenColors) {
+        let full = |depth| (&self.full, WrittenColors { depth, wide: true });
         let Some(narrow) = &self.narrow else { return full(Depth::Full) };
         let widened = self.widened.load(Ordering::Relaxed);
         if widened == FULL {
@@ -236,7 +240,7 @@ impl Plan {
         }
         let depth = Depth::of(batch.records(), batch.schema().stride, &narrow.fields);
         match narrow.form(depth).filter(|_| widened != WIDE) {
-            Some(form) => (form, Written { depth, wide: false }),
+            Some(form) => (form, WrittenColors { depth, wide: false }),
             None => full(depth),
         }
     }
@@ -262,7 +266,7 @@ fn add_normals(vertex: &mut Schema) -> Result<[Dimension; 3]> {
     Ok([field(NORMAL[0])?, field(NORMAL[1])?, field(NORMAL[2])?])
 }
 
-impl Encode for Plan {
+impl Encode for VertexPlan {
     fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
         let mut rounded = None;
         let mut vertices = self.spare.take(Vec::new);

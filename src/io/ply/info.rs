@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::comments;
-use super::header::{Encoding, Header, Kind};
+use super::header::{Encoding, PlyHeader, PropertyKind};
 use crate::Result;
 use crate::io::origin::Origin;
 
@@ -54,9 +54,9 @@ pub struct PropertyInfo {
 pub fn describe(path: &Path) -> Result<PlyInfo> {
     let (file, origin) = Origin::open(path)?;
     let bytes = origin.length();
-    let header = Header::read(&file, path, bytes)?;
+    let header = PlyHeader::read(&file, path, bytes)?;
     let points = header.vertex().map_or(0, |vertex| header.elements[vertex].count);
-    let word = |kind: Kind| kind.word();
+    let word = |kind: PropertyKind| kind.word();
     let elements = header
         .elements
         .into_iter()

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::ascii::AsciiPart;
 use super::comments;
 use super::file::PlyFile;
-use super::header::{Element, Encoding, Kind, shown};
+use super::header::{Element, Encoding, PropertyKind, shown};
 use super::names::{self, RECORDS};
 use crate::io::origin::Origin;
 use crate::point::names::{GPS_TIME, XYZ};
@@ -22,7 +22,7 @@ const PART_POINTS: u64 = 1_000_000;
 
 /// What PLY outputs carry on besides points and text: how the input was written.
 #[derive(Debug)]
-pub(super) struct Native {
+pub(super) struct PlyNative {
     pub encoding: Encoding,
     /// Dimension and property names.
     pub properties: Vec<(String, String)>,
@@ -186,9 +186,10 @@ fn needs_double(files: &[PlyFile], texts: &Texts) -> Result<bool> {
     let kind = |file: &PlyFile, n: usize| file.properties()[n].kind;
     let long: Vec<usize> = (0..texts.dimensions.len())
         .filter(|&n| is_long(&texts.dimensions[n]))
-        .filter(|&n| files.iter().any(|file| kind(file, n) == Kind::Scalar(Scalar::F32)))
+        .filter(|&n| files.iter().any(|file| kind(file, n) == PropertyKind::Scalar(Scalar::F32)))
         .collect();
-    let double = |file: &PlyFile| long.iter().any(|&n| kind(file, n) == Kind::Scalar(Scalar::F64));
+    let double =
+        |file: &PlyFile| long.iter().any(|&n| kind(file, n) == PropertyKind::Scalar(Scalar::F64));
     if long.is_empty() || files.iter().any(double) {
         return Ok(!long.is_empty());
     }
@@ -210,7 +211,7 @@ fn schema(file: &PlyFile, dimensions: &[String], wide: bool) -> Schema {
         .iter()
         .zip(dimensions)
         .filter_map(|(property, name)| {
-            let Kind::Scalar(scalar) = property.kind else { return None };
+            let PropertyKind::Scalar(scalar) = property.kind else { return None };
             let widens = wide && scalar == Scalar::F32 && is_long(name);
             let scalar = if widens { Scalar::F64 } else { scalar };
             let dimension = Dimension::new(name, scalar, stride);
@@ -241,7 +242,7 @@ fn metadata(files: &[PlyFile], mut texts: Vec<Texts>) -> Metadata {
         .zip(&texts[0].dimensions)
         .map(|(property, dimension)| (dimension.clone(), property.name.clone()))
         .collect();
-    let native = Native {
+    let native = PlyNative {
         encoding: first.header.encoding,
         properties,
         obj_info: union(files.iter().map(|f| f.header.obj_info.clone()).collect()),

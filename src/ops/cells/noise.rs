@@ -12,7 +12,7 @@ use crate::point::Position;
 use crate::quantity::{Angle, Setting};
 use crate::report::Grouped;
 use crate::stage::Forecast;
-use crate::tile::{Cells as Partition, Tile};
+use crate::tile::{Partition, Tile};
 
 /// `min_spacing` of what samples are divided into, as a share of the side.
 const QUARTER: i64 = 4;
