@@ -1,4 +1,5 @@
-//! The records of outputs that are one for each input, sorted by input while tiles leave their products.
+//! The records of outputs that are one for each input, sorted by input while tiles leave their
+//! products.
 
 use std::sync::Arc;
 

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use super::demands::Demands;
 use super::job::Job;
 use super::pass::{Pass, StageOp};
-use super::shares::{Demands, MILL_SPARE, Shares};
+use super::shares::{MILL_SPARE, Shares};
 use crate::budget::{Bytes, Lease, whole_mebibytes};
 use crate::geom::lattice::Lattice;
 use crate::store::{CutError, SealedTiles, TileKey};
@@ -59,8 +60,8 @@ impl CellWidths {
     }
 }
 
-/// The tiles of every pass, before the first begins: a scan too heavy for the memory is refused when
-/// nothing but its decode is lost.
+/// The tiles of every pass, before the first begins: a scan too heavy for the memory is refused
+/// when nothing but its decode is lost.
 pub(crate) fn cut_all(
     job: &Job<'_>,
     passes: &[Pass],
@@ -83,8 +84,8 @@ pub(crate) fn cut_all(
     Ok(cuts)
 }
 
-/// The tiles of a pass whose stages may have chosen other cells since `cut` was made; the mill holds
-/// `held` bytes already.
+/// The tiles of a pass whose stages may have chosen other cells since `cut` was made; the mill
+/// holds `held` bytes already.
 pub(crate) fn cut_again(
     job: &Job<'_>,
     pass: &Pass,
@@ -146,8 +147,8 @@ fn cut(
             };
             let enough = whole_mebibytes(demands.limit_for_tile(millers, tile));
             job.warn(format!(
-                "{positions} points lie so close that their tile leaves memory for {fewer} of {millers} \
-                 threads; `run.memory = \"{enough}\"` does for all"
+                "{positions} points lie so close that their tile leaves memory for {fewer} of \
+                 {millers} threads; `run.memory = \"{enough}\"` does for all"
             ));
             (millers, at) = (fewer, Some((demands.tile_positions(fewer, free), lowest)));
         }
@@ -155,8 +156,8 @@ fn cut(
     Err(Error::internal("a tile fits and does not"))
 }
 
-/// The heaviest of the cubes that cannot be cut, of which one was found: a memory that does for that one
-/// does for all. Each try passes over all that are no heavier than the last.
+/// The heaviest of the cubes that cannot be cut, of which one was found: a memory that does for
+/// that one does for all. Each try passes over all that are no heavier than the last.
 fn heaviest(
     tiles: &SealedTiles,
     wanted: u64,

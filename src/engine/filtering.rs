@@ -1,10 +1,10 @@
 //! Stages that stream, behind stages that work on tiles: what they remove of what a tile leaves.
 //!
-//! Such a stage sees records and no neighbours, so nothing of its work depends on tiles. What it removes
-//! must be known when the next pass begins, though, and what it changes only as records are written. So
-//! it is applied twice: here, to learn which records it keeps, and again to those that are written
-//! (`encoding.rs`). It is a function of the record alone; the other way, to store changed records anew,
-//! would hold the scan twice.
+//! Such a stage sees records and no neighbours, so nothing of its work depends on tiles. What it
+//! removes must be known when the next pass begins, though, and what it changes only as records are
+//! written. So it is applied twice: here, to learn which records it keeps, and again to those that
+//! are written (`encoding.rs`). It is a function of the record alone; the other way, to store
+//! changed records anew, would hold the scan twice.
 
 use std::ops::Range;
 

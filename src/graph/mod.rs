@@ -1,12 +1,13 @@
-//! What a pipeline is, whoever wrote it: stages, and who takes from whom. Knows neither the language
-//! that it was written in, nor the inputs that it will be fitted to.
+//! What a pipeline is, whoever wrote it: stages, and who takes from whom. Knows neither the
+//! language that it was written in, nor the inputs that it will be fitted to.
 //!
-//! A [`Graph`] is a tree of stages below one or several sources. It is checked in one place, when it is
-//! whole ([`Graph::mistakes`]): the language tells what is found there with the places in its text, the
-//! plan as an error.
+//! A [`Graph`] is a tree of stages below one or several sources. It is checked in one place, when
+//! it is whole ([`Graph::mistakes`]): the language tells what is found there with the places in its
+//! text, the plan as an error.
 
 mod limits;
 mod settings;
+mod size;
 mod written;
 
 use std::fmt;
@@ -18,8 +19,9 @@ use crate::stage::{Order, Role};
 pub use limits::{LimitKeys, Limits, Sees};
 pub use settings::{
     Existing, Headers, MOST_THREADS, MixedUnits, Nonfinite, Overrides, RunSettings, SimdSetting,
-    SpillSetting, Treatment, ZScale, parse_bytes,
+    SpillSetting, Treatment, ZScale,
 };
+pub use size::parse_bytes;
 pub use written::Written;
 
 /// A pipeline: stages, each of which takes from stages before it.
@@ -140,7 +142,8 @@ impl Graph {
         wrong
     }
 
-    /// The graph as JSON: for each stage its kind, name, keys, and the numbers of those it takes from.
+    /// The graph as JSON: for each stage its kind, name, keys, and the numbers of those it takes
+    /// from.
     pub fn to_json(&self) -> serde_json::Value {
         let stage = |stage: &GraphStage| {
             serde_json::json!({

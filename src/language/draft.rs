@@ -128,8 +128,8 @@ impl Draft {
         }
     }
 
-    /// Takes the text `key` out of a stage's keys: none if it is not there, some none if it is not a
-    /// text, which is told.
+    /// Takes the text `key` out of a stage's keys: none if it is not there, some none if it is not
+    /// a text, which is told.
     fn take(
         &mut self,
         entries: &mut Vec<KeyEntry>,

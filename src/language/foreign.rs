@@ -5,8 +5,8 @@ use super::node;
 use super::node::KeyEntry;
 use super::place::TextPlace;
 
-/// Reads a pipeline file's text as TOML, or says every place where it is none, or the one thing that
-/// it is instead.
+/// Reads a pipeline file's text as TOML, or says every place where it is none, or the one thing
+/// that it is instead.
 pub(crate) fn parse(text: &str) -> Result<Vec<KeyEntry>, Vec<Mistake>> {
     node::parse(text, 0).map_err(|wrong| match json(text).or_else(|| single_brackets(text)) {
         Some(one) => vec![one],

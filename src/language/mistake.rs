@@ -19,8 +19,8 @@ pub(crate) struct SourceText {
     pub origin: String,
     /// What it says.
     pub text: String,
-    /// The setting that the argument stands for, where its name says it (`--keep`): messages at this
-    /// place need not name it again.
+    /// The setting that the argument stands for, where its name says it (`--keep`): messages at
+    /// this place need not name it again.
     pub setting: Option<String>,
 }
 

@@ -1,5 +1,5 @@
-//! The stage kinds and formats that a pipeline file may name: a value, so that a program can add its
-//! own.
+//! The stage kinds and formats that a pipeline file may name: a value, so that a program can add
+//! its own.
 
 use std::collections::BTreeMap;
 

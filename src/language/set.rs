@@ -12,8 +12,9 @@ const ARGUMENT: &str = "--set";
 
 /// One value put in the place of a pipeline file's.
 ///
-/// The address is `run.KEY` for a setting, else `STAGE.KEY`: the stage by its `name`, or by its kind
-/// where only one stage is of that kind, or as `KIND.N.KEY`, the N-th stage of that kind, from 1.
+/// The address is `run.KEY` for a setting, else `STAGE.KEY`: the stage by its `name`, or by its
+/// kind where only one stage is of that kind, or as `KIND.N.KEY`, the N-th stage of that kind, from
+/// 1.
 #[derive(Debug, Clone)]
 pub struct Set {
     argument: String,
@@ -32,8 +33,8 @@ enum Given {
 }
 
 impl Set {
-    /// Reads `stage.key=value`, as `--set` takes it. The value is TOML; what is no TOML is a text, so
-    /// that `write.path=out.laz` needs no quotes.
+    /// Reads `stage.key=value`, as `--set` takes it. The value is TOML; what is no TOML is a text,
+    /// so that `write.path=out.laz` needs no quotes.
     pub fn parse(text: &str) -> Result<Set> {
         let Some((address, _)) = text.split_once('=') else {
             let told = Mistake::new(TextPlace::new(1, 0..text.len()), "there is no `=`")

@@ -28,8 +28,8 @@ use crate::{Error, Result};
 const LONGEST: u64 = 16 << 20;
 
 impl Graph {
-    /// Reads a pipeline; `origin` is the name of its file for errors, empty for a text that the user
-    /// does not know: then errors name what is wrong without a place in it.
+    /// Reads a pipeline; `origin` is the name of its file for errors, empty for a text that the
+    /// user does not know: then errors name what is wrong without a place in it.
     ///
     /// The error tells every mistake of the text at once. Files that stages name are looked up, not
     /// opened.
@@ -37,7 +37,8 @@ impl Graph {
         Graph::parse_with(text, origin, registry, &[])
     }
 
-    /// Reads a pipeline in which the values of `sets`, in their order, take the place of the text's.
+    /// Reads a pipeline in which the values of `sets`, in their order, take the place of the
+    /// text's.
     pub fn parse_with(
         text: &str,
         origin: &str,
@@ -212,8 +213,8 @@ fn check_names(stages: &[StageDraft], registry: &Registry, mistakes: &mut Vec<Mi
 
 /// Fills in which stages each takes from: those that it names, or the last above that gives points.
 ///
-/// A `from` names an earlier stage that gives points. Only a sink may take from another than the one
-/// above.
+/// A `from` names an earlier stage that gives points. Only a sink may take from another than the
+/// one above.
 fn connect(drafts: &[StageDraft], stages: &mut [GraphStage], mistakes: &mut Vec<Mistake>) {
     let is_sink = |stage: &GraphStage| matches!(stage.role, Role::Sink(_));
     let mut above: Option<usize> = None;
@@ -246,7 +247,8 @@ fn connect(drafts: &[StageDraft], stages: &mut [GraphStage], mistakes: &mut Vec<
     }
 }
 
-/// No file is written twice, and none over an input or over the pipeline, which is read from `file`.
+/// No file is written twice, and none over an input or over the pipeline, which is read from
+/// `file`.
 fn check_files(
     file: Option<&Path>,
     draft: &Draft,

@@ -87,8 +87,10 @@ impl Normals {
         let (key, error) = match (self.orient, self.viewpoint) {
             (Orient::Viewpoint, None) => (
                 "orient",
-                Error::pipeline("`normals.orient = \"viewpoint\"` needs a `normals.viewpoint`").help(
-                    "give `normals.viewpoint = [x, y, z]`, where the scanner stood, in the scan's unit",
+                Error::pipeline("`normals.orient = \"viewpoint\"` needs a `normals.viewpoint`")
+.help(
+                    "give `normals.viewpoint = [x, y, z]`, where the scanner stood, in the scan's \
+                     unit",
                 ),
             ),
             (Orient::Viewpoint, Some(at)) if at.iter().all(|v| v.is_finite()) => return Ok(()),
@@ -97,8 +99,10 @@ impl Normals {
             }
             (Orient::None | Orient::Up, Some(_)) => (
                 "viewpoint",
-                Error::pipeline("`normals.viewpoint` does nothing without `normals.orient = \"viewpoint\"`")
-                    .help("give that too, or leave `normals.viewpoint` out"),
+                Error::pipeline(
+                    "`normals.viewpoint` does nothing without `normals.orient = \"viewpoint\"`",
+                )
+                .help("give that too, or leave `normals.viewpoint` out"),
             ),
             (Orient::None | Orient::Up, None) => return Ok(()),
         };

@@ -128,8 +128,8 @@ impl PassLayout<'_> {
         Ok(())
     }
 
-    /// Where each of several branches begins: behind the pass that they have in common; the first may
-    /// join that one where nothing is done in it.
+    /// Where each of several branches begins: behind the pass that they have in common; the first
+    /// may join that one where nothing is done in it.
     fn fork(&self, branches: usize) -> Vec<BranchCursor> {
         let Some(pass) = self.at.pass.filter(|_| branches > 1) else {
             return vec![self.at.clone(); branches];
@@ -176,7 +176,8 @@ impl PassLayout<'_> {
         Ok(())
     }
 
-    /// What streams behind tiles has a pass of its own, unless nothing but such stages is in the last.
+    /// What streams behind tiles has a pass of its own, unless nothing but such stages is in the
+    /// last.
     fn filter(&mut self, filter: usize) -> Result<()> {
         let at = self.pass();
         let pass = &self.out.passes[at];
@@ -339,8 +340,8 @@ impl PassLayout<'_> {
         true
     }
 
-    /// Attaches sinks to the pass that the branch is at: they take what is there before it, if its last
-    /// stage takes nothing away, else what it leaves.
+    /// Attaches sinks to the pass that the branch is at: they take what is there before it, if its
+    /// last stage takes nothing away, else what it leaves.
     fn tap(&mut self, sinks: &[usize]) -> Result<()> {
         for &sink in sinks {
             let at = self.pass();

@@ -1,5 +1,5 @@
-//! The stages of a graph by role, and the tree that they are: what the decode does for all branches,
-//! and what stands behind it.
+//! The stages of a graph by role, and the tree that they are: what the decode does for all
+//! branches, and what stands behind it.
 
 use std::collections::BTreeSet;
 
@@ -95,8 +95,8 @@ impl Sorted {
         (working.collect(), takers.iter().filter_map(sink).collect())
     }
 
-    /// The stages on a path, those of the decode and all sinks that take from one of these included,
-    /// as reports and outputs name them.
+    /// The stages on a path, those of the decode and all sinks that take from one of these
+    /// included, as reports and outputs name them.
     pub fn named(&self, path: &[usize]) -> serde_json::Value {
         let on_path: BTreeSet<usize> = path.iter().copied().collect();
         let is_decode = |n: &usize| self.works[*n] == StageWork::Decode;

@@ -67,8 +67,8 @@ impl<'a> Emitter<'a> {
         })
     }
 
-    /// Takes the next records, numbered from `first_record` on among all of the store: their positions,
-    /// and their tags if they have any.
+    /// Takes the next records, numbered from `first_record` on among all of the store: their
+    /// positions, and their tags if they have any.
     pub fn take(&mut self, positions: &[Position], first_record: u64, tags: &[u32]) -> Result<()> {
         let Some(&end) = positions.last() else { return Ok(()) };
         let mut new = positions;

@@ -127,7 +127,8 @@ impl<'a> Intake<'a> {
         self.take(&[position], record, &[tag])
     }
 
-    /// Takes records, one after the other, at their positions; their tags count if the store has tags.
+    /// Takes records, one after the other, at their positions; their tags count if the store has
+    /// tags.
     pub fn take(
         &mut self,
         mut positions: &[Position],

@@ -1,6 +1,6 @@
-//! The decoded scan: sorted runs as the decode leaves them, their merge, and what comes of it, sealed:
-//! distinct positions in Morton order with their records, in memory or on disk. Knows neither tiles,
-//! nor stages, nor formats.
+//! The decoded scan: sorted runs as the decode leaves them, their merge, and what comes of it,
+//! sealed: distinct positions in Morton order with their records, in memory or on disk. Knows
+//! neither tiles, nor stages, nor formats.
 
 mod block;
 mod cutting;

@@ -88,8 +88,8 @@ impl<E: Fn(usize, usize) -> Ordering> Sorter<'_, E> {
     }
 
     /// Sorts entries whatever their paths. Where a path leaves many undecided, as beside a stray
-    /// point far away, these are sorted by paths of their own: each time at least the level at which
-    /// their cube is divided is new, so that paths of ten levels and more end soon.
+    /// point far away, these are sorted by paths of their own: each time at least the level at
+    /// which their cube is divided is new, so that paths of ten levels and more end soon.
     fn sort(&self, entries: &mut [u64], spare: &mut [u64]) {
         if entries.len() <= FEW {
             return self.compare(entries);
@@ -128,9 +128,9 @@ impl<E: Fn(usize, usize) -> Ordering> Sorter<'_, E> {
     }
 }
 
-/// Sorts by the bits from `lowest` on; `spare` is as long. The upper [`DIGITS`] digits are sorted by,
-/// least significant first; what these leave equal, mostly one or two positions of a surface, is
-/// compared.
+/// Sorts by the bits from `lowest` on; `spare` is as long. The upper [`DIGITS`] digits are sorted
+/// by, least significant first; what these leave equal, mostly one or two positions of a surface,
+/// is compared.
 fn radix_sort(entries: &mut [u64], spare: &mut [u64], lowest: u32) {
     if entries.len() <= BUCKETS * 8 {
         return entries.sort_unstable();

@@ -224,7 +224,8 @@ mod tests {
         SpillArea::new(Budget::new(1 << 30), memory, Box::new(In(at.to_owned())))
     }
 
-    /// Two full pieces and a part of one, item `i` from byte `i` on of a sequence without a pattern.
+    /// Two full pieces and a part of one, item `i` from byte `i` on of a sequence without a
+    /// pattern.
     fn stored(area: &Arc<SpillArea>, stride: usize) -> (Pieces, Vec<u8>) {
         let pieces = Pieces::new(area, "items", stride);
         let items = 2 * PIECE + 1001;

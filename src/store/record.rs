@@ -7,8 +7,8 @@ pub const SELECTIONS: u32 = 7;
 /// Set in the selections of a record that takes no part in any pass and is written as it is.
 pub const ASIDE: u8 = 1 << SELECTIONS;
 
-/// What accompanies a record from the decode on: the selections that it is in, a bit each, its class
-/// where a stage reads it, and the number of its input.
+/// What accompanies a record from the decode on: the selections that it is in, a bit each, its
+/// class where a stage reads it, and the number of its input.
 ///
 /// From the lowest bit: 16 bits of the input's number, 8 bits of the class or, in runs that need no
 /// classes, more of the input's number, and 8 bits of selections.

@@ -1,7 +1,7 @@
-//! What a run sets down between its phases (points, their order, states, columns): in memory while the
-//! budget allows, in scratch files beyond. Reading is the same call for both; what comes from a file is
-//! compared with the checksum of what was written, so that a disk that damages data fails a run and
-//! changes no output.
+//! What a run sets down between its phases (points, their order, states, columns): in memory while
+//! the budget allows, in scratch files beyond. Reading is the same call for both; what comes from a
+//! file is compared with the checksum of what was written, so that a disk that damages data fails a
+//! run and changes no output.
 
 use std::fs::File;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};

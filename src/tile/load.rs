@@ -97,7 +97,8 @@ impl Loader {
     /// Bytes more where a sieve may hold records back, or columns are stored.
     pub const SIEVE_BYTES_PER_POINT: usize = size_of::<RecordRun>() + FATE_BYTES + FIGURE_BYTES + 2;
 
-    /// A loader for tiles of up to `capacity` positions, rim included, as `sieve` lets them be seen.
+    /// A loader for tiles of up to `capacity` positions, rim included, as `sieve` lets them be
+    /// seen.
     pub fn new(tiles: &Arc<SealedTiles>, sieve: &Sieve, capacity: usize) -> Self {
         Loader {
             tiles: tiles.clone(),
@@ -112,8 +113,8 @@ impl Loader {
         }
     }
 
-    /// Gives no tile a rim that makes it more than `positions`; what that leaves unproven is searched
-    /// for in the whole scan.
+    /// Gives no tile a rim that makes it more than `positions`; what that leaves unproven is
+    /// searched for in the whole scan.
     pub fn limit_rim(&mut self, positions: usize) {
         self.rim_limit = self.rim_limit.min(positions);
     }

@@ -1,5 +1,5 @@
-//! Tiles: the points of one cube with neighbourhoods that are exact beyond its faces, as a pass sees
-//! them. Knows no stage that works on them.
+//! Tiles: the points of one cube with neighbourhoods that are exact beyond its faces, as a pass
+//! sees them. Knows no stage that works on them.
 
 mod around;
 mod load;
@@ -19,8 +19,8 @@ use crate::point::{Bounds, Position};
 
 /// The points of one cube, then a rim of its neighbours' points.
 ///
-/// Positions are distinct and in Morton order, so those of the cube itself, the core, are one range.
-/// Columns have one entry a position.
+/// Positions are distinct and in Morton order, so those of the cube itself, the core, are one
+/// range. Columns have one entry a position.
 #[derive(Debug)]
 pub struct Tile {
     /// The cube whose points this tile decides.
@@ -39,8 +39,8 @@ pub struct Tile {
     /// True if the signs of normals mean something: a stage turned them to a side.
     pub oriented: bool,
     /// For each position the class of the first of its records that are decided about, in canonical
-    /// order (of those that are seen, where none is decided about); empty unless a stage of the pass
-    /// reads "Classification".
+    /// order (of those that are seen, where none is decided about); empty unless a stage of the
+    /// pass reads "Classification".
     pub classes: Vec<u8>,
     /// What a first phase found for each position of the core; NaN where it found nothing.
     pub figures: Vec<f64>,
@@ -50,8 +50,8 @@ pub struct Tile {
     pub fates: Vec<Fate>,
     /// Where neighbours are found.
     pub around: Around,
-    /// For each position, the selections that one of its records is in, a bit each; empty if no stage
-    /// is limited to some records.
+    /// For each position, the selections that one of its records is in, a bit each; empty if no
+    /// stage is limited to some records.
     pub(crate) selections: Vec<u8>,
     /// The selections that the stage at work is limited to.
     pub(crate) limits: u8,
@@ -116,8 +116,8 @@ impl Tile {
         self.limits = 0;
     }
 
-    /// True if the stage at work decides about position `i`: one of its records is of the classes and
-    /// flags that the stage is limited to.
+    /// True if the stage at work decides about position `i`: one of its records is of the classes
+    /// and flags that the stage is limited to.
     pub fn is_chosen(&self, i: usize) -> bool {
         self.copies[i] > 0 && chosen(&self.selections, self.limits, i)
     }
@@ -134,8 +134,8 @@ impl Tile {
     }
 
     /// Calls `visit` for every chosen position of the zone with its index in the tile and the `k`
-    /// nearest *other* positions of the whole scan: nearest by exact squared distance, ties by Morton
-    /// order. Fewer only if the scan has fewer.
+    /// nearest *other* positions of the whole scan: nearest by exact squared distance, ties by
+    /// Morton order. Fewer only if the scan has fewer.
     pub fn each_neighborhood(
         &mut self,
         k: usize,

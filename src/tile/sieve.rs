@@ -1,5 +1,5 @@
-//! What a pass sees of the scan: the records that earlier passes left, and those that its stages are
-//! limited to; and the columns that earlier passes computed.
+//! What a pass sees of the scan: the records that earlier passes left, and those that its stages
+//! are limited to; and the columns that earlier passes computed.
 
 use std::sync::Arc;
 

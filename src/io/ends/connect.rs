@@ -131,8 +131,8 @@ impl OutputFile {
         let named = named.filter(|named| !self.of_one && *named != self.format.name())?;
         let [named, is] = [named, self.format.name()].map(str::to_uppercase);
         Some(format!(
-            "{}: this is named as {named} and becomes {is}, as `write.format` says: programs that go by \
-             names will not read it",
+            "{}: this is named as {named} and becomes {is}, as `write.format` says: programs that \
+             go by names will not read it",
             shown(&self.keys.path)
         ))
     }

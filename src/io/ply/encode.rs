@@ -24,11 +24,11 @@ pub struct PlyOptions {
     pub normals: bool,
     /// Dimensions that are left out.
     pub drop: Vec<String>,
-    /// How many bits the colours of LAS records have; as for [`Colors::Auto`] when not said. From PLY
-    /// to PLY they stay as they are, and saying it is an error.
+    /// How many bits the colours of LAS records have; as for [`Colors::Auto`] when not said. From
+    /// PLY to PLY they stay as they are, and saying it is an error.
     pub colors: Option<Colors>,
-    /// Carries the other elements (faces) of a single binary input whose encoding is kept. To be set
-    /// only where no vertex is removed, added or moved: it fails on a count that differs.
+    /// Carries the other elements (faces) of a single binary input whose encoding is kept. To be
+    /// set only where no vertex is removed, added or moved: it fails on a count that differs.
     pub carry_rest: bool,
 }
 
@@ -45,8 +45,8 @@ pub(super) struct VertexPlan {
     pub full: Form,
     /// With colours of 8 bits, where the records are LAS and have colours.
     pub narrow: Option<Narrow>,
-    /// [`WIDE`] once the file has colours of 16 bits, so that no chunk needs to have 8, and [`FULL`]
-    /// once they are known to need them, so that nobody needs to look.
+    /// [`WIDE`] once the file has colours of 16 bits, so that no chunk needs to have 8, and
+    /// [`FULL`] once they are known to need them, so that nobody needs to look.
     pub widened: AtomicU8,
     /// For the vertices of chunks; whoever has written them puts them back.
     pub spare: Spare<Vec<u8>>,
@@ -182,7 +182,8 @@ impl VertexPlan {
         ChunkSize { points: CHUNK_POINTS, bytes }
     }
 
-    /// Bytes that encoding one record holds at most, those that an appended chunk is widened to included.
+    /// Bytes that encoding one record holds at most, those that an appended chunk is widened to
+    /// included.
     fn bytes_per_point(&self) -> usize {
         let text = if self.encoding == Encoding::Ascii { self.full.text_bytes() } else { 0 };
         let widened = match (&self.narrow, self.encoding) {

@@ -105,8 +105,8 @@ pub(super) fn type_name(scalar: Scalar) -> &'static str {
 }
 
 /// The types that [`scalar_of`] knows, for messages.
-const KINDS: &str = "char, uchar, short, ushort, int, uint, float and double, or int8 to int64, uint8 to \
-                     uint64, float32 and float64";
+const KINDS: &str = "char, uchar, short, ushort, int, uint, float and double, or int8 to int64, \
+                     uint8 to uint64, float32 and float64";
 
 fn scalar_of(word: &str) -> Option<Scalar> {
     Some(match word {
@@ -284,7 +284,8 @@ impl Partial {
             ("element", words) => self.element(words),
             ("property", words) => self.property(words),
             _ => Err(format!(
-                "`{}` is no header keyword (format, comment, obj_info, element, property, end_header)",
+                "`{}` is no header keyword (format, comment, obj_info, element, property, \
+                 end_header)",
                 shown(keyword)
             )),
         }

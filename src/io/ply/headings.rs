@@ -1,4 +1,5 @@
-//! The header that a PLY file is written with, and that is of one length whatever the count of vertices.
+//! The header that a PLY file is written with, and that is of one length whatever the count of
+//! vertices.
 
 use std::collections::BTreeMap;
 

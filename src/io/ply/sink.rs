@@ -32,8 +32,8 @@ pub fn create(
     Ok(Box::new(PlySink::create(staged, options, schema, metadata)?))
 }
 
-/// How the records of the sink that [`create`] would open are written. Fails on what it would refuse
-/// of `schema` and `options`.
+/// How the records of the sink that [`create`] would open are written. Fails on what it would
+/// refuse of `schema` and `options`.
 pub(super) fn plan(
     options: &PlyOptions,
     schema: &Schema,
@@ -48,7 +48,8 @@ struct PlySink {
     path: PathBuf,
     plan: Arc<VertexPlan>,
     header: Headings,
-    /// The header with colours of as many bits as the file does not have, where they can have 8 or 16.
+    /// The header with colours of as many bits as the file does not have, where they can have 8 or
+    /// 16.
     other: Option<Headings>,
     /// True if the file has colours of 16 bits.
     wide: bool,

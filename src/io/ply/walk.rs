@@ -11,8 +11,8 @@ use crate::{Error, Result};
 /// Bytes of the window through which lists are walked.
 const WINDOW: usize = 1 << 16;
 
-/// Byte behind `elements`, which begin at byte `start` of a file of `length` bytes. Lists are walked
-/// one by one, each from its count; everything else is stepped over.
+/// Byte behind `elements`, which begin at byte `start` of a file of `length` bytes. Lists are
+/// walked one by one, each from its count; everything else is stepped over.
 pub(super) fn past(
     file: &File,
     path: &Path,

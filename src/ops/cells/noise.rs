@@ -145,8 +145,9 @@ fn noisy(cells: &Cells, samples: &[Vec<f64>], scatter: f64) -> Option<String> {
     }
     let percent = (100.0 * sum / f64::from(count)).round();
     Some(format!(
-        "normals scatter {}, more than the largest angle of a cell, {}: expect about {percent} % of the points to \
-         stay; raise `normals.neighbors` or `cells.max_angle`, or give `cells.keep`",
+        "normals scatter {}, more than the largest angle of a cell, {}: expect about {percent} % \
+         of the points to stay; raise `normals.neighbors` or `cells.max_angle`, or give \
+         `cells.keep`",
         Angle::told_like(scatter, given),
         given.told(),
     ))
