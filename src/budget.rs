@@ -1,6 +1,6 @@
 //! The one place that counts bytes: memory is leased from the budget before it is allocated, each
-//! lease under a name, so that a refusal and the report can say who holds how much. Knows no points,
-//! and does not measure what a process really takes.
+//! lease under a name, so that a refusal and the report can say who holds how much. Knows no
+//! points, and does not measure what a process really takes.
 
 mod bytes;
 mod holders;
@@ -13,13 +13,13 @@ pub use holders::{Holder, Holders};
 use crate::host::lock;
 use crate::{Error, Result};
 
-/// A number of bytes that is shared by everything in a run that grows with its settings or its scan.
-/// Clones are the same budget.
+/// A number of bytes that is shared by everything in a run that grows with its settings or its
+/// scan. Clones are the same budget.
 ///
 /// What is leased: the work of the threads in the decode, the merge, the mill, the survey and a
-/// stream, each with its buffers; the indices of the runs and of the merged scan; points and columns
-/// that stay in memory; and what the program holds anyway: its code and statics, stacks of threads,
-/// the allocator's slack, headers and VLRs, and small values of fixed size.
+/// stream, each with its buffers; the indices of the runs and of the merged scan; points and
+/// columns that stay in memory; and what the program holds anyway: its code and statics, stacks of
+/// threads, the allocator's slack, headers and VLRs, and small values of fixed size.
 ///
 /// A lease never waits: one that does not fit is refused.
 #[derive(Debug, Clone)]
@@ -48,8 +48,8 @@ impl Budget {
 
     /// Leases `bytes` for `what` (a noun that completes "the … needs").
     ///
-    /// Fails with [`ErrorKind::Memory`](crate::ErrorKind::Memory) if less is free; the message names
-    /// what was asked for, what is free, who holds the rest, and the budget that would do.
+    /// Fails with [`ErrorKind::Memory`](crate::ErrorKind::Memory) if less is free; the message
+    /// names what was asked for, what is free, who holds the rest, and the budget that would do.
     pub fn lease(&self, bytes: u64, what: &'static str) -> Result<Lease> {
         let mut lease = self.open(what);
         lease.grow(bytes)?;

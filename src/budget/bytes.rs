@@ -11,7 +11,8 @@ const MIB: u64 = 1 << 20;
 /// A number of bytes, shown in the largest binary unit: `1.5 GiB`.
 ///
 /// A sum or a product that 64 bits do not hold is [`Bytes::BEYOND`], and so is all that is made of
-/// it. A formula therefore needs no checks on its way: its result fits in no memory, and is refused.
+/// it. A formula therefore needs no checks on its way: its result fits in no memory, and is
+/// refused.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Bytes(pub u64);
 
@@ -93,8 +94,8 @@ pub fn at_least_mebibytes(bytes: u64) -> String {
     format!("{} MiB", bytes.div_ceil(MIB).max(1))
 }
 
-/// What there is of something that is too small, rounded down: `137 MiB`, `269.9 MiB`. It differs from
-/// what [`whole_mebibytes`] says of more.
+/// What there is of something that is too small, rounded down: `137 MiB`, `269.9 MiB`. It differs
+/// from what [`whole_mebibytes`] says of more.
 pub fn at_most_mebibytes(bytes: u64) -> String {
     match (bytes / MIB, bytes % MIB * 10 / MIB) {
         (0, 0) => format!("{bytes} B"),

@@ -195,8 +195,9 @@ proptest! {
             prop_assert_eq!((budget.used(), budget.free()), (used, limit - used));
             let leased = leases.iter().map(|(_, lease)| lease.bytes()).sum::<u64>();
             prop_assert_eq!((budget.peak(), leased), (peak, used));
+            let largest = budget.at_peak().largest(3);
             let told: BTreeMap<_, _> =
-                budget.at_peak().largest(3).iter().map(|holder| (holder.name, holder.bytes.0)).collect();
+                largest.iter().map(|holder| (holder.name, holder.bytes.0)).collect();
             let known = NAMES.into_iter().zip(at_peak).filter(|(_, bytes)| *bytes > 0);
             prop_assert_eq!(told, known.collect::<BTreeMap<_, _>>());
         }

@@ -8,16 +8,16 @@
 
 use std::sync::{Arc, Mutex};
 
-use super::chunk::{Chunk, Open};
+use super::chunk::{Open, OutputChunk};
 use super::encoding::ChunkEncoders;
 use super::job::Job;
 use super::outlet::Outlet;
-use super::product::Entry;
+use super::product::RecordEntry;
 use crate::budget::Bytes;
 use crate::host::lock;
 use crate::report::Tally;
 use crate::stage::{Sink, SinkSummary};
-use crate::store::{SealedTiles, Spill, SpillArea, State, Stretch, Tag};
+use crate::store::{RecordState, SealedTiles, Spill, SpillArea, StoredStretch, Tag};
 use crate::{Error, Result};
 
 /// Bits of a place in the input that number the records of a part; above them is the part's number.
@@ -55,7 +55,7 @@ fn list_bytes(stretches: usize) -> usize {
 /// Bytes that the lists of an input of so many records hold in memory.
 pub(crate) fn lists_bytes(records: u64) -> Bytes {
     let stretches = records.div_ceil(stretch_records(records));
-    Bytes::of(stretches, list_bytes(stretches as usize) + size_of::<List>())
+    Bytes::of(stretches, list_bytes(stretches as usize) + size_of::<StretchList>())
 }
 
 /// Bytes that a thread holds while it orders stretches: one at work, and what waits for its turn.
@@ -94,15 +94,15 @@ impl Starts {
 struct Ranked {
     rank: u64,
     stored: u64,
-    state: State,
+    state: RecordState,
     normal: [f32; 3],
 }
 
 /// The records of one stretch that were not yet stored, and where the others are.
 #[derive(Debug, Default)]
-struct List {
+struct StretchList {
     open: Vec<u8>,
-    stretches: Vec<Stretch>,
+    stretches: Vec<StoredStretch>,
 }
 
 /// The records that an output gets, by stretches of the input.
@@ -115,7 +115,7 @@ pub(crate) struct ByRank {
     starts: Arc<Starts>,
     stretch: u64,
     spill: Spill,
-    lists: Vec<List>,
+    lists: Vec<StretchList>,
     list_bytes: usize,
     /// Records of all stretches.
     pub records: u64,
@@ -132,7 +132,7 @@ impl ByRank {
     ) -> Self {
         let stretch = stretch_records(starts.records);
         let mut lists = Vec::new();
-        lists.resize_with(starts.records.div_ceil(stretch) as usize, List::default);
+        lists.resize_with(starts.records.div_ceil(stretch) as usize, StretchList::default);
         ByRank {
             sink,
             wants_normals,
@@ -149,7 +149,7 @@ impl ByRank {
     /// Takes what becomes of an entry, whose records are stored and were read at `places`.
     pub fn take(
         &mut self,
-        entry: &Entry,
+        entry: &RecordEntry,
         places: &[(u64, u64)],
         normal: Option<[f32; 3]>,
     ) -> Result<()> {
@@ -201,11 +201,11 @@ impl ByRank {
     ) -> Result<(SinkSummary, Tally)> {
         let encoders = ChunkEncoders::of_one(job, tiles, (self.sink, &*sink), false).of_stored();
         let open = Mutex::new(Open::new(0, sink.chunk_points(), self.wants_normals, false));
-        let commit = |records: Vec<Ranked>| -> Result<Vec<Chunk>> {
+        let commit = |records: Vec<Ranked>| -> Result<Vec<OutputChunk>> {
             let (mut open, mut full) = (lock(&open), Vec::new());
             for Ranked { stored, state, normal, .. } in records {
                 let (was, now) = (state, state);
-                let entry = Entry { number: stored, count: 1, tag: Tag::default(), was, now };
+                let entry = RecordEntry { number: stored, count: 1, tag: Tag::default(), was, now };
                 open.take(&entry, Some(normal), &mut full);
             }
             Ok(full)
@@ -252,5 +252,5 @@ fn unpack(item: &[u8]) -> Ranked {
         }),
         false => [f32::NAN; 3],
     };
-    Ranked { rank: word(0), stored: word(8), state: State(item[16]), normal }
+    Ranked { rank: word(0), stored: word(8), state: RecordState(item[16]), normal }
 }

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use super::demands::Demands;
 use super::job::Job;
 use super::pass::{Pass, StageOp};
-use super::shares::{Demands, MILL_SPARE, Shares};
+use super::shares::{MILL_SPARE, Shares};
 use crate::budget::{Bytes, Lease, whole_mebibytes};
 use crate::geom::lattice::Lattice;
 use crate::store::{CutError, SealedTiles, TileKey};
@@ -28,7 +29,7 @@ const CELLS_ACROSS: u64 = 4;
 
 /// The tiles of a pass.
 pub(crate) struct Cut {
-    cells: Cells,
+    cells: CellWidths,
     pub keys: Vec<TileKey>,
     /// Positions that the arena of a thread takes.
     pub capacity: usize,
@@ -39,15 +40,15 @@ pub(crate) struct Cut {
 
 /// What the tiles of passes depend on; equal for all passes of most pipelines.
 #[derive(Clone, Copy, PartialEq, Eq)]
-struct Cells {
+struct CellWidths {
     side: u64,
     reach: i64,
 }
 
-impl Cells {
-    fn of(ops: &[StageOp], pass: &Pass) -> Cells {
+impl CellWidths {
+    fn of(ops: &[StageOp], pass: &Pass) -> CellWidths {
         let side = pass.needs(ops).map(|needs| needs.cell_side).max().unwrap_or(0);
-        Cells { side: u64::try_from(side).unwrap_or(0), reach: reach(ops, pass) }
+        CellWidths { side: u64::try_from(side).unwrap_or(0), reach: reach(ops, pass) }
     }
 
     /// The level of the smallest octree node that is `across` cells wide.
@@ -59,8 +60,8 @@ impl Cells {
     }
 }
 
-/// The tiles of every pass, before the first begins: a scan too heavy for the memory is refused when
-/// nothing but its decode is lost.
+/// The tiles of every pass, before the first begins: a scan too heavy for the memory is refused
+/// when nothing but its decode is lost.
 pub(crate) fn cut_all(
     job: &Job<'_>,
     passes: &[Pass],
@@ -69,10 +70,10 @@ pub(crate) fn cut_all(
     demands: &Demands,
     tiles: &SealedTiles,
 ) -> Result<Vec<Arc<Cut>>> {
-    let mut known: Vec<(Cells, Arc<Cut>)> = Vec::new();
+    let mut known: Vec<(CellWidths, Arc<Cut>)> = Vec::new();
     let mut cuts = Vec::new();
     for pass in passes {
-        let cells = Cells::of(&job.ops, pass);
+        let cells = CellWidths::of(&job.ops, pass);
         let cut = match known.iter().find(|(same, _)| *same == cells) {
             Some((_, cut)) => cut.clone(),
             None => Arc::new(cut(job, cells, lattice, (shares, demands), tiles, 0)?),
@@ -83,8 +84,8 @@ pub(crate) fn cut_all(
     Ok(cuts)
 }
 
-/// The tiles of a pass whose stages may have chosen other cells since `cut` was made; the mill holds
-/// `held` bytes already.
+/// The tiles of a pass whose stages may have chosen other cells since `cut` was made; the mill
+/// holds `held` bytes already.
 pub(crate) fn cut_again(
     job: &Job<'_>,
     pass: &Pass,
@@ -93,7 +94,7 @@ pub(crate) fn cut_again(
     tiles: &SealedTiles,
     (made, held): (&Arc<Cut>, u64),
 ) -> Result<Arc<Cut>> {
-    let cells = Cells::of(&job.ops, pass);
+    let cells = CellWidths::of(&job.ops, pass);
     match cells == made.cells {
         true => Ok(made.clone()),
         false => cut(job, cells, lattice, (shares, demands), tiles, held).map(Arc::new),
@@ -105,7 +106,7 @@ pub(crate) fn cut_again(
 /// fewer threads.
 fn cut(
     job: &Job<'_>,
-    cells: Cells,
+    cells: CellWidths,
     lattice: &Lattice,
     (shares, demands): (&Shares, &Demands),
     tiles: &SealedTiles,
@@ -146,8 +147,8 @@ fn cut(
             };
             let enough = whole_mebibytes(demands.limit_for_tile(millers, tile));
             job.warn(format!(
-                "{positions} points lie so close that their tile leaves memory for {fewer} of {millers} \
-                 threads; `run.memory = \"{enough}\"` does for all"
+                "{positions} points lie so close that their tile leaves memory for {fewer} of \
+                 {millers} threads; `run.memory = \"{enough}\"` does for all"
             ));
             (millers, at) = (fewer, Some((demands.tile_positions(fewer, free), lowest)));
         }
@@ -155,8 +156,8 @@ fn cut(
     Err(Error::internal("a tile fits and does not"))
 }
 
-/// The heaviest of the cubes that cannot be cut, of which one was found: a memory that does for that one
-/// does for all. Each try passes over all that are no heavier than the last.
+/// The heaviest of the cubes that cannot be cut, of which one was found: a memory that does for
+/// that one does for all. Each try passes over all that are no heavier than the last.
 fn heaviest(
     tiles: &SealedTiles,
     wanted: u64,

@@ -6,10 +6,10 @@
 //! there are threads.
 
 use super::by_input::ByInput;
-use super::chunk::{Chunk, Open};
+use super::chunk::{Open, OutputChunk};
 use super::encoding::{ChunkEncoder, ChunkEncoders};
 use super::job::{Each, Job};
-use super::product::Entry;
+use super::product::RecordEntry;
 use crate::point::Metadata;
 use crate::report::Tally;
 use crate::stage::SinkSummary;
@@ -61,12 +61,12 @@ impl Each<'_> {
             ChunkEncoders::of_one(job, tiles, (records.sink, &*sink), create.likes_time());
         let mut open = Open::new(0, sink.chunk_points(), records.wants_normals, false);
         let (mut given, mut full) = (0, Vec::new());
-        let mut append = |chunk: Chunk| {
+        let mut append = |chunk: OutputChunk| {
             let (_, encoded) = encoder.encode(&encoders, &chunk)?;
             sink.append(encoded)?;
             job.advance(0)
         };
-        records.each(rank, |entry: &Entry, normal| {
+        records.each(rank, |entry: &RecordEntry, normal| {
             given += u64::from(entry.count);
             open.take(entry, normal, &mut full);
             full.drain(..).try_for_each(&mut append)

@@ -5,7 +5,7 @@
 //! function of the points alone: tiles would depend on the memory, and points at random would have
 //! no neighbours. The cubes are loaded like tiles, with a rim, and are items of a phase.
 
-use super::grind::{Field, Worker};
+use super::grind::{DecodedScan, Worker};
 use super::job::Job;
 use super::pass::Pass;
 use super::shares::Shares;
@@ -40,7 +40,7 @@ pub(crate) fn forecast(
     job: &mut Job<'_>,
     pass: &Pass,
     ops: &[usize],
-    field: &Field<'_>,
+    field: &DecodedScan<'_>,
     sieve: &Sieve,
     capacity: usize,
 ) -> Result<Vec<(usize, Forecast)>> {
@@ -60,7 +60,7 @@ fn samples(
     job: &Job<'_>,
     pass: &Pass,
     op: usize,
-    field: &Field<'_>,
+    field: &DecodedScan<'_>,
     sieve: &Sieve,
     capacity: usize,
     keys: &[TileKey],

@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use super::by_input::ByInput;
 use super::by_rank::{ByRank, Starts};
-use super::chunk::{Chunk, Open};
+use super::chunk::{Open, OutputChunk};
 use super::chunks::{Counts, Cutter, Stored};
 use super::cut::{Cut, neighbors, reach};
 use super::encoding::ChunkEncoders;
@@ -31,11 +31,11 @@ use crate::host::{Threads, lock};
 use crate::report::{Baseline, Tally};
 use crate::stage::{Sink, SinkSummary};
 use crate::store::{Fetch, SealedTiles, SpillArea, TileKey};
-use crate::tile::{Loader, Run, Sieve, Tile};
+use crate::tile::{Loader, RecordRun, Sieve, Tile};
 use crate::{Error, Result};
 
 /// What all passes go over.
-pub(crate) struct Field<'a> {
+pub(crate) struct DecodedScan<'a> {
     pub lattice: &'a Lattice,
     pub area: Arc<SpillArea>,
     pub tiles: Arc<SealedTiles>,
@@ -72,7 +72,7 @@ pub(crate) type PassOutputs = (Vec<Numbered>, Vec<ByInput>, Vec<ByRank>);
 pub(crate) fn grind(
     job: &Job<'_>,
     (pass, cut): (&Pass, &Cut),
-    field: &Field<'_>,
+    field: &DecodedScan<'_>,
     sieve: &Sieve,
     (sinks, by_input, by_rank): PassOutputs,
 ) -> Result<Milled> {
@@ -121,7 +121,7 @@ fn mill_tiles<'a>(
     keys: &[TileKey],
     worker: impl Fn() -> Worker<'a> + Sync,
     encoders: &ChunkEncoders<'_>,
-    outlet: &Outlet<'_, Product, Chunk>,
+    outlet: &Outlet<'_, Product, OutputChunk>,
 ) -> Result<(TileTally, Option<Baseline>)> {
     let mut sum = TileTally::default();
     let left = threads.items(keys.len(), || outlet.stop()).run(
@@ -193,7 +193,7 @@ impl<'a> Worker<'a> {
     pub fn new(
         job: &'a Job<'a>,
         pass: &'a Pass,
-        field: &'a Field<'_>,
+        field: &'a DecodedScan<'_>,
         sieve: &Sieve,
         capacity: usize,
         wants_normals: bool,
@@ -280,7 +280,7 @@ impl<'a> Worker<'a> {
             let mut positions = Vec::new();
             core.each(tile, |runs, _| {
                 let count = runs.iter().map(|run| run.count).sum::<u32>();
-                positions.extend(runs.first().map(|run: &Run| (run.number, count)));
+                positions.extend(runs.first().map(|run: &RecordRun| (run.number, count)));
                 Ok(())
             })?;
             let mut counted = Tally::default();

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
-use super::pass::{Branch, Filter, Pass, StageOp};
+use super::pass::{Branch, Pass, PassFilter, StageOp};
 use super::publish::Staged;
 use super::tagger::{ClassOf, LEFT_OUT, Tagger};
 use crate::budget::Budget;
@@ -31,7 +31,7 @@ pub(crate) struct Job<'a> {
     pub unread: Vec<String>,
     pub ops: Vec<StageOp>,
     /// Stages that stream behind the decode.
-    pub filters: &'a [Filter],
+    pub filters: &'a [PassFilter],
     /// For each sink, those of them that are above it.
     pub changed_by: &'a [Vec<usize>],
     pub passes: Vec<Pass>,

@@ -7,19 +7,19 @@
 use std::io::{self, BufRead, Read};
 
 use crate::report::TileFigures;
-use crate::store::{Spill, Stretch};
+use crate::store::{Spill, StoredStretch};
 use crate::{Error, Result};
 
 /// Lines of the report's tiles, in order, wherever points are kept: there may be millions.
-pub(crate) struct Lines {
+pub(crate) struct TileLines {
     spill: Spill,
-    stretches: Vec<Stretch>,
+    stretches: Vec<StoredStretch>,
 }
 
-impl Lines {
+impl TileLines {
     /// Of the stretches of all ranges, in order.
-    pub fn new(spill: Spill, stretches: Vec<Stretch>) -> Self {
-        Lines { spill, stretches }
+    pub fn new(spill: Spill, stretches: Vec<StoredStretch>) -> Self {
+        TileLines { spill, stretches }
     }
 
     /// Reads the lines one stretch after the other.
@@ -28,10 +28,10 @@ impl Lines {
     }
 }
 
-/// See [`Lines::reader`]. Its errors hold the [`Error`] of the spill.
+/// See [`TileLines::reader`]. Its errors hold the [`Error`] of the spill.
 pub(crate) struct LineReader<'a> {
     spill: &'a Spill,
-    left: std::slice::Iter<'a, Stretch>,
+    left: std::slice::Iter<'a, StoredStretch>,
     open: Vec<u8>,
     at: usize,
 }
@@ -68,7 +68,7 @@ pub(crate) const LINES_AT_ONCE: usize = 1 << 18;
 pub(crate) struct RangeLines<'a> {
     spill: &'a Spill,
     open: Vec<u8>,
-    stretches: Vec<Stretch>,
+    stretches: Vec<StoredStretch>,
 }
 
 impl<'a> RangeLines<'a> {
@@ -94,7 +94,7 @@ impl<'a> RangeLines<'a> {
     }
 
     /// Where all lines of the range are.
-    pub fn finish(mut self) -> Result<Vec<Stretch>> {
+    pub fn finish(mut self) -> Result<Vec<StoredStretch>> {
         self.store()?;
         Ok(self.stretches)
     }

@@ -1,5 +1,5 @@
-//! The mill: decode into the tile store, then pass after pass over the tiles, in canonical order into
-//! the sinks.
+//! The mill: decode into the tile store, then pass after pass over the tiles, in canonical order
+//! into the sinks.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -8,28 +8,29 @@ use serde_json::Value;
 
 use super::by_input::ByInput;
 use super::by_rank::ByRank;
-use super::chunks::Found;
+use super::chunks::FoundValues;
 use super::clock::Clock;
 use super::cut::{Cut, cut_again, cut_all};
 use super::decode::decode;
+use super::demands::Demands;
 use super::finished::{Finished, FinishedBranch};
 use super::forecast::{forecast, samples_capacity};
-use super::grind::{Field, Milled, PassOutputs, grind};
+use super::grind::{DecodedScan, Milled, PassOutputs, grind};
 use super::job::Job;
-use super::pass::{Branch, Call, Op, Pass};
-use super::shares::{Demands, Shares};
+use super::pass::{Branch, Call, Pass};
+use super::settled::{conclude, decisions, rounding, settle};
+use super::shares::Shares;
 use super::survey::survey;
 use crate::budget::{Bytes, Holders, Lease};
 use crate::geom::lattice::Lattice;
-use crate::point::Bounds;
-use crate::report::{Baseline, BaselineFigures, Decision, Grouped, PassFigures, Short, Tally};
-use crate::stage::{Gathered, ScanFacts, Sink, SinkSummary};
+use crate::report::{Baseline, BaselineFigures, Decision, PassFigures, Tally};
+use crate::stage::{Sink, SinkSummary};
 use crate::store::{SealedTiles, SpillArea, seal};
 use crate::tile::Sieve;
 use crate::{Error, Result};
 
-/// Runs a pipeline with tile stages (or one that only sorts) into `sinks`; none where each input has
-/// an output of its own.
+/// Runs a pipeline with tile stages (or one that only sorts) into `sinks`; none where each input
+/// has an output of its own.
 pub(crate) fn mill(
     job: &mut Job<'_>,
     lattice: &Lattice,
@@ -51,7 +52,7 @@ pub(crate) fn mill(
     tally.count("positions", tiles.positions());
     settle(job, lattice, &tiles)?;
     let field =
-        Field { lattice, area: area.clone(), tiles: tiles.clone(), starts: Arc::new(starts) };
+        DecodedScan { lattice, area: area.clone(), tiles: tiles.clone(), starts: Arc::new(starts) };
     let mut course = Course {
         forecasts: vec![None; job.ops.len()],
         written: sinks.iter().map(|_| None).collect(),
@@ -94,11 +95,41 @@ struct Compared {
 }
 
 impl Standing {
-    /// What a grid would have done that leaves as many of the records that the passes decided about.
+    /// What a grid would have done that leaves as many of the records that the passes decided
+    /// about.
     fn baseline(&self, lattice: &Lattice) -> Option<BaselineFigures> {
         let Compared { baseline, decided, found } = self.compared.as_deref()?;
         let removed = found.checked_sub(self.alive)?;
         baseline.figures(decided.checked_sub(removed)?, *decided, lattice)
+    }
+
+    /// The same behind another pass, which came to `milled` and counted `tally`; and what a first
+    /// phase found in it.
+    fn behind(
+        mut self,
+        job: &Job<'_>,
+        pass: &Pass,
+        milled: Milled,
+        tally: &Tally,
+    ) -> (Standing, FoundValues) {
+        self.tally.merge(tally);
+        if let (Some(baseline), None) = (milled.baseline, &self.compared) {
+            let (decided, found) = (milled.decided, self.alive);
+            self.compared = Some(Arc::new(Compared { baseline, decided, found }));
+        }
+        let called = pass.calls.iter().map(|call| job.ops[call.op].kind.clone());
+        let streamed = pass.filters.iter().map(|&filter| job.filters[filter].kind.clone());
+        let (stages, after) = (called.chain(streamed).collect(), milled.counts.alive);
+        self.passes.push(PassFigures { stages, before: self.alive, after });
+        self.sieve.states = Some(milled.stored.states);
+        self.sieve.fates = Some(milled.stored.fates);
+        self.sieve.figures = milled.stored.figures;
+        if milled.stored.normals.is_some() {
+            self.sieve.oriented = milled.oriented;
+        }
+        self.sieve.normals = milled.stored.normals.or(self.sieve.normals.take());
+        (self.alive, self.kept) = (after, milled.counts.written);
+        (self, milled.stored.found)
     }
 }
 
@@ -119,7 +150,7 @@ impl Course {
         &mut self,
         job: &mut Job<'_>,
         decoded: Standing,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
         (shares, demands): (&Shares, &Demands),
         clock: &mut Clock<'_>,
     ) -> Result<Vec<FinishedBranch>> {
@@ -165,10 +196,10 @@ impl Course {
         job: &Job<'_>,
         branch: &Branch,
         after: Standing,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
         clock: &mut Clock<'_>,
     ) -> Result<FinishedBranch> {
-        let Field { lattice, area, tiles, .. } = field;
+        let DecodedScan { lattice, area, tiles, .. } = field;
         clock.phase("survey", Some(2 * tiles.positions()));
         let mut measured = survey(job, lattice, area, tiles, &after.sieve)?;
         measured.totals.baseline = after.baseline(lattice);
@@ -192,7 +223,7 @@ impl Course {
         job: &mut Job<'_>,
         (pass, cut, working): (&Pass, &Arc<Cut>, &mut Vec<Lease>),
         before: Standing,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
         (shares, demands): (&Shares, &Demands),
         clock: &mut Clock<'_>,
     ) -> Result<Standing> {
@@ -214,37 +245,20 @@ impl Course {
         tally.work("tile_levels", levels.len() as u64);
         let ((sinks, by_input, by_rank), ordered) = self.outputs(job, pass, field)?;
         let which: Vec<usize> = sinks.iter().map(|(sink, _)| *sink).collect();
-        let milled = grind(job, (pass, &cut), field, &sieve, (sinks, by_input, by_rank))?;
+        let mut milled = grind(job, (pass, &cut), field, &sieve, (sinks, by_input, by_rank))?;
         drop(sieve);
         tally.merge(&milled.tally);
         self.write_lists(job, tiles, &milled, ordered, &mut tally, clock)?;
-        let outcomes = milled.counts.outputs.iter().copied().zip(milled.written);
+        let said = std::mem::take(&mut milled.written);
+        let outcomes = milled.counts.outputs.iter().copied().zip(said);
         for (sink, outcome) in which.into_iter().zip(outcomes) {
             self.written[sink] = Some(vec![outcome]);
         }
         self.tally.merge(&tally);
-        let found = (milled.stored.found, milled.decided);
-        let mut after = before;
-        after.tally.merge(&tally);
-        let (decided, found_alive) = (milled.decided, after.alive);
-        if let (Some(baseline), None) = (milled.baseline, &after.compared) {
-            after.compared = Some(Arc::new(Compared { baseline, decided, found: found_alive }));
-        }
-        let called = pass.calls.iter().map(|call| job.ops[call.op].kind.clone());
-        let streamed = pass.filters.iter().map(|&filter| job.filters[filter].kind.clone());
-        let (before, alive) = (after.alive, milled.counts.alive);
-        let stages = called.chain(streamed).collect();
-        after.passes.push(PassFigures { stages, before, after: alive });
-        after.sieve.states = Some(milled.stored.states);
-        after.sieve.fates = Some(milled.stored.fates);
-        after.sieve.figures = milled.stored.figures;
-        if milled.stored.normals.is_some() {
-            after.sieve.oriented = milled.oriented;
-        }
-        after.sieve.normals = milled.stored.normals.or(after.sieve.normals.take());
-        (after.alive, after.kept) = (alive, milled.counts.written);
+        let decided = milled.decided;
+        let (after, found) = before.behind(job, pass, milled, &tally);
         if let Some(op) = pass.gathers() {
-            conclude(job, op, found.0, found.1)?;
+            conclude(job, op, found, decided)?;
         }
         Ok(after)
     }
@@ -254,7 +268,7 @@ impl Course {
         &mut self,
         job: &mut Job<'_>,
         pass: &Pass,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
         sieve: &Sieve,
         shares: &Shares,
     ) -> Result<()> {
@@ -281,13 +295,13 @@ impl Course {
         Ok(())
     }
 
-    /// The outputs of a pass: those that grow while it mills, lists of those that are written behind
-    /// it, and the sinks that are then written in the order of the inputs.
+    /// The outputs of a pass: those that grow while it mills, lists of those that are written
+    /// behind it, and the sinks that are then written in the order of the inputs.
     fn outputs(
         &mut self,
         job: &Job<'_>,
         pass: &Pass,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
     ) -> Result<(PassOutputs, Vec<Box<dyn Sink>>)> {
         let (mut sinks, mut by_input) = (Vec::new(), Vec::new());
         let (mut by_rank, mut ordered) = (Vec::new(), Vec::new());
@@ -336,86 +350,4 @@ impl Course {
         }
         Ok(())
     }
-}
-
-/// What a first phase found, for its stage.
-struct Whole {
-    found: Found,
-    records: u64,
-}
-
-impl Gathered for Whole {
-    fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()> {
-        self.found.each(visit)
-    }
-
-    fn records(&self) -> u64 {
-        self.records
-    }
-}
-
-fn conclude(job: &mut Job<'_>, op: usize, found: Found, records: u64) -> Result<()> {
-    let warning = match &mut job.ops[op].op {
-        Op::Scan(op) => op.conclude(&Whole { found, records })?,
-        Op::Tile(_) => return Err(Error::internal("a stage gathered that has one phase")),
-    };
-    warning.into_iter().for_each(|warning| job.warn(warning));
-    Ok(())
-}
-
-fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<()> {
-    let facts = ScanFacts {
-        points: tiles.points(),
-        positions: tiles.positions(),
-        bounds: tiles.bounds(),
-        lattice,
-        levels: tiles.levels(),
-    };
-    job.ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().settle(&facts))?;
-    let warnings = job.ops.iter().flat_map(|stage| stage.op.tile().warnings(lattice));
-    // Stages that are applied several times say it once.
-    let warnings: BTreeSet<String> = warnings.collect();
-    warnings.into_iter().for_each(|warning| job.warn(warning));
-    Ok(())
-}
-
-/// What the lattice rounded, as a decision of the report; a warning where it rounded much.
-fn rounding(job: &Job<'_>, lattice: &Lattice, bounds: &Bounds, tally: &Tally) -> Option<Decision> {
-    let apart = tally.apart?;
-    let count = |name| tally.counts.get(name).copied().unwrap_or(0);
-    let (unequal, positions) = (count("unequal_coordinates"), count("positions"));
-    if unequal > positions / 1000 {
-        let finer = match lattice.finer(bounds, apart.nearest) {
-            Some(step) => format!("`run.lattice = {step:e}` tells them apart"),
-            None => "no step that is finer reaches the scan from its origin".to_owned(),
-        };
-        job.warn(format!(
-            "{} of {} positions hold points of unequal coordinates, up to {} from each other: \
-             the lattice has steps of {}; {finer}",
-            Grouped(unequal),
-            Grouped(positions),
-            Short(apart.farthest),
-            Short(lattice.step)
-        ));
-    }
-    let (stage, name) = ("run".to_owned(), "unequal_coordinates_apart".to_owned());
-    Some(Decision { stage, name, value: apart.farthest.into() })
-}
-
-/// What the stages of a branch settled by themselves and what they expected, in their order.
-fn decisions(
-    job: &Job<'_>,
-    branch: &Branch,
-    forecasts: &[Option<Vec<(String, Value)>>],
-) -> Vec<Decision> {
-    let each = branch.ops.iter().flat_map(|&op| {
-        let (stage, expected) = (&job.ops[op], forecasts[op].clone());
-        let mut settled = stage.op.tile().decisions();
-        // What was chosen by samples may be among what is settled.
-        let is_new = |(name, _): &(String, Value)| settled.iter().all(|(other, _)| other != name);
-        let expected: Vec<_> = expected.into_iter().flatten().filter(is_new).collect();
-        settled.extend(expected);
-        settled.into_iter().map(|(name, value)| Decision { stage: stage.kind.clone(), name, value })
-    });
-    each.collect()
 }

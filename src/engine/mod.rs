@@ -1,6 +1,7 @@
-//! From a plan to a report: the phases of a run over the store, on threads; outputs that appear when
-//! they are complete. Knows no format, and no stage by name.
+//! From a plan to a report: the phases of a run over the store, on threads; outputs that appear
+//! when they are complete. Knows no format, and no stage by name.
 
+mod account;
 pub(crate) mod beside;
 pub(crate) mod by_input;
 pub(crate) mod by_rank;
@@ -10,6 +11,7 @@ mod chunks;
 mod clock;
 mod cut;
 mod decode;
+pub(crate) mod demands;
 mod each;
 mod encoding;
 mod filtering;
@@ -28,6 +30,7 @@ mod room;
 mod rounded;
 mod run;
 pub(crate) mod scratch;
+mod settled;
 pub(crate) mod shares;
 mod stream;
 mod survey;

@@ -28,7 +28,7 @@ use crate::{Error, Result};
 pub const A_THREAD: u64 = 2;
 
 /// A product's place in the order: its item (a tile, a part), and which product of it.
-pub type Place = (u64, u64);
+pub type ProductPlace = (u64, u64);
 
 /// Cuts a product, in its turn, into complete chunks; called by one thread at a time.
 pub type Commit<'a, R, P> = dyn Fn(R) -> Result<Vec<P>> + Sync + 'a;
@@ -39,7 +39,7 @@ pub type EncodeChunk<'a, P> = dyn FnMut(P) -> Result<(usize, Encoded)> + 'a;
 /// What threads share while they deliver products `R`, which are cut into chunks `P`.
 pub struct Outlet<'a, R, P> {
     commit: &'a Commit<'a, R, P>,
-    state: Mutex<State<R, P>>,
+    state: Mutex<OutletState<R, P>>,
     changed: Condvar,
     /// Products that may wait for their turn, and chunks that may wait to be encoded.
     window: usize,
@@ -47,9 +47,9 @@ pub struct Outlet<'a, R, P> {
     ahead: u64,
 }
 
-struct State<R, P> {
-    turn: Place,
-    waiting: BTreeMap<Place, (R, bool)>,
+struct OutletState<R, P> {
+    turn: ProductPlace,
+    waiting: BTreeMap<ProductPlace, (R, bool)>,
     committing: bool,
     chunks: VecDeque<(u64, P)>,
     numbered: u64,
@@ -64,7 +64,7 @@ impl<'a, R, P> Outlet<'a, R, P> {
     pub fn new(sinks: Vec<Box<dyn Sink>>, threads: usize, commit: &'a Commit<'a, R, P>) -> Self {
         Outlet {
             commit,
-            state: Mutex::new(State {
+            state: Mutex::new(OutletState {
                 turn: (0, 0),
                 waiting: BTreeMap::new(),
                 committing: false,
@@ -84,7 +84,7 @@ impl<'a, R, P> Outlet<'a, R, P> {
     /// Delivers the product at `place`; `last` if none of the same item follows.
     pub fn deliver(
         &self,
-        place: Place,
+        place: ProductPlace,
         product: R,
         last: bool,
         encode: &mut EncodeChunk<'_, P>,
@@ -152,8 +152,8 @@ impl<'a, R, P> Outlet<'a, R, P> {
     /// Commits the products whose turn it is, unless another thread is at it.
     fn commit_waiting<'s>(
         &'s self,
-        mut state: MutexGuard<'s, State<R, P>>,
-    ) -> Result<MutexGuard<'s, State<R, P>>> {
+        mut state: MutexGuard<'s, OutletState<R, P>>,
+    ) -> Result<MutexGuard<'s, OutletState<R, P>>> {
         while !state.committing && !state.stopped {
             let turn = state.turn;
             let Some((product, last)) = state.waiting.remove(&turn) else { break };
@@ -176,9 +176,9 @@ impl<'a, R, P> Outlet<'a, R, P> {
     /// did. One beyond reach means that another thread is at the chunk that is appended next.
     fn encode_one<'s>(
         &'s self,
-        mut state: MutexGuard<'s, State<R, P>>,
+        mut state: MutexGuard<'s, OutletState<R, P>>,
         encode: &mut EncodeChunk<'_, P>,
-    ) -> Result<(bool, MutexGuard<'s, State<R, P>>)> {
+    ) -> Result<(bool, MutexGuard<'s, OutletState<R, P>>)> {
         let reach = state.appended + self.ahead;
         if state.chunks.front().is_none_or(|(number, _)| *number >= reach) {
             return Ok((false, state));
@@ -216,7 +216,7 @@ impl<'a, R, P> Outlet<'a, R, P> {
         Ok((true, state))
     }
 
-    fn fail(&self, mut state: MutexGuard<'_, State<R, P>>, error: Error) -> Error {
+    fn fail(&self, mut state: MutexGuard<'_, OutletState<R, P>>, error: Error) -> Error {
         state.stopped = true;
         drop(state);
         self.changed.notify_all();
@@ -224,7 +224,7 @@ impl<'a, R, P> Outlet<'a, R, P> {
     }
 }
 
-impl<R, P> State<R, P> {
+impl<R, P> OutletState<R, P> {
     fn queue(&mut self, chunks: Vec<P>) {
         for chunk in chunks {
             self.chunks.push_back((self.numbered, chunk));

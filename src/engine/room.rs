@@ -73,8 +73,9 @@ impl Disk {
         let most = needed.saturating_add(*again);
         Ok((*free < most).then(|| {
             format!(
-                "{}: only {} are free here; an output that is written anew because its colours turn \
-                 out to have more or fewer bits makes it {} in all: `write.colors` says how many",
+                "{}: only {} are free here; an output that is written anew because its colours \
+                 turn out to have more or fewer bits makes it {} in all: `write.colors` says how \
+                 many",
                 shown(folder),
                 Bytes(*free),
                 Bytes(most)

@@ -26,9 +26,9 @@ impl<'a> Rounded<'a> {
         Rounded { tiles, fetch: Fetch::default(), batch, lattice }
     }
 
-    /// Enters how far records of unequal coordinates are from each other into `fates`, which are those
-    /// of the positions given by their first record and number of records: where one of them is kept,
-    /// the others are not on it. Counts such positions in `tally`.
+    /// Enters how far records of unequal coordinates are from each other into `fates`, which are
+    /// those of the positions given by their first record and number of records: where one of them
+    /// is kept, the others are not on it. Counts such positions in `tally`.
     pub fn enter(
         &mut self,
         positions: &[(u64, u32)],

@@ -25,7 +25,7 @@ pub(crate) fn stream(
     sinks: Vec<Box<dyn Sink>>,
     lattice: Option<&Lattice>,
 ) -> Result<Finished> {
-    let chunks = Chunks::new(job.source.schema(), &sinks);
+    let chunks = SinkChunks::new(job.source.schema(), &sinks);
     let (commit, encode) = (|batch| Ok(chunks.commit(batch)), |chunk| chunks.encode(chunk));
     let outlet = Outlet::new(sinks, job.threads.count(), &commit);
     let (parts, mut tally) = (job.source.parts(), Tally::default());
@@ -61,7 +61,7 @@ fn stream_part(
     job: &Job<'_>,
     lattice: Option<&Lattice>,
     index: usize,
-    chunks: &Chunks,
+    chunks: &SinkChunks,
     outlet: &Outlet<'_, PointBatch, SinkChunk>,
 ) -> Result<Tally> {
     let mut part = job.source.part_without(index, &job.unread)?;
@@ -86,7 +86,7 @@ fn stream_part(
 type SinkChunk = (usize, PointBatch);
 
 /// The chunks of all sinks, which all threads fill. Batches and chunks are used again.
-struct Chunks {
+struct SinkChunks {
     encoders: Vec<Arc<dyn Encode>>,
     spare_batches: Spare<PointBatch>,
     spare_chunks: Vec<Spare<PointBatch>>,
@@ -94,10 +94,10 @@ struct Chunks {
     open: Mutex<(Vec<PointBatch>, u64)>,
 }
 
-impl Chunks {
+impl SinkChunks {
     fn new(schema: &Arc<Schema>, sinks: &[Box<dyn Sink>]) -> Self {
         let empty = sinks.iter().map(|sink| PointBatch::new(schema.clone(), sink.chunk_points()));
-        Chunks {
+        SinkChunks {
             encoders: sinks.iter().map(|sink| sink.encoder()).collect(),
             spare_batches: Spare::default(),
             spare_chunks: sinks.iter().map(|_| Spare::default()).collect(),

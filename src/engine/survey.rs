@@ -11,14 +11,14 @@
 use std::sync::Arc;
 
 use super::job::Job;
-use super::lines::{LINES_AT_ONCE, Lines, RangeLines};
+use super::lines::{LINES_AT_ONCE, RangeLines, TileLines};
 use crate::budget::Bytes;
 use crate::geom::lattice::Lattice;
 use crate::point::Position;
 use crate::report::{FittedScan, Lot, ScanSurvey, Totals, report_tile_level};
 use crate::store::{
-    BLOCK, FATE_BYTES, PIECE, Pieces, Reader, SealedTiles, Spill, SpillArea, State, Stretch,
-    TileKey,
+    BLOCK, FATE_BYTES, PIECE, Pieces, Reader, RecordState, SealedTiles, Spill, SpillArea,
+    StoredStretch, TileKey,
 };
 use crate::tile::{Fate, Sieve};
 use crate::{Error, Result};
@@ -71,12 +71,12 @@ pub(crate) struct Measured {
     /// Figures of the scan.
     pub totals: Totals,
     /// Lines of the report's tiles, in order.
-    pub tiles: Lines,
+    pub tiles: TileLines,
 }
 
 /// Bytes that a thread of a survey holds.
 pub(crate) fn survey_bytes() -> Bytes {
-    Bytes(2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64) + Stretches::BYTES)
+    Bytes(2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64) + KeptBlocks::BYTES)
 }
 
 /// Measures, on all threads, the reduction of `tiles` whose positions have the stored fates and
@@ -90,7 +90,7 @@ pub(crate) fn survey(
 ) -> Result<Measured> {
     let level = report_tile_level(tiles.levels());
     let missing = || Error::internal("a scan is surveyed that no pass went over");
-    let walk = Walk {
+    let walk = ScanWalk {
         tiles,
         fates: sieve.fates.as_ref().ok_or_else(missing)?,
         states: sieve.states.as_ref().ok_or_else(missing)?,
@@ -103,11 +103,11 @@ pub(crate) fn survey(
     Ok(Measured {
         tile_side: (level as f64).exp2() * lattice.step,
         totals: walk.measure(job, scan)?.finish(lattice)?,
-        tiles: Lines::new(spill, lines),
+        tiles: TileLines::new(spill, lines),
     })
 }
 
-struct Walk<'a> {
+struct ScanWalk<'a> {
     tiles: &'a SealedTiles,
     fates: &'a Pieces,
     states: &'a Pieces,
@@ -123,7 +123,7 @@ struct Seen {
 }
 
 impl Seen {
-    fn load(&mut self, walk: &Walk<'_>, block: usize, columns: &mut Columns) -> Result<()> {
+    fn load(&mut self, walk: &ScanWalk<'_>, block: usize, columns: &mut Columns) -> Result<()> {
         self.block = None;
         let (positions, copies) = walk.tiles.read(block, &mut self.reader)?;
         let records = copies.iter().map(|&n| u64::from(n)).sum::<u64>();
@@ -136,7 +136,7 @@ impl Seen {
         if records == positions.len() as u64 {
             walk.states.collect(rank, records, buffer, states)?;
             self.lots.extend(fates.zip(&*states).map(|(deviation, &state)| {
-                let kept = State(state).is_alive().into();
+                let kept = RecordState(state).is_alive().into();
                 Lot { copies: 1, kept, deviation }
             }));
         } else {
@@ -151,7 +151,7 @@ impl Seen {
                     }
                     left += 1;
                     if let Some(lot) = &mut lot {
-                        lot.kept += u32::from(State(state).is_alive());
+                        lot.kept += u32::from(RecordState(state).is_alive());
                     }
                 }
                 Ok(())
@@ -174,12 +174,12 @@ struct Columns {
 const KEPT_BLOCKS: usize = 64;
 
 /// The blocks last seen.
-struct Stretches {
+struct KeptBlocks {
     kept: Vec<Seen>,
     columns: Columns,
 }
 
-impl Stretches {
+impl KeptBlocks {
     /// Bytes that they hold.
     const BYTES: u64 = (KEPT_BLOCKS * BLOCK * (2 * size_of::<Position>() + size_of::<Lot>() + 4)
         + 3 * PIECE
@@ -187,11 +187,11 @@ impl Stretches {
 
     fn new(blocks: usize) -> Self {
         let kept = (0..blocks).map(|_| Seen::default()).collect();
-        Stretches { kept, columns: Columns::default() }
+        KeptBlocks { kept, columns: Columns::default() }
     }
 
     /// The positions of a block and their lots.
-    fn of(&mut self, walk: &Walk<'_>, block: usize) -> Result<(&[Position], &[Lot])> {
+    fn of(&mut self, walk: &ScanWalk<'_>, block: usize) -> Result<(&[Position], &[Lot])> {
         let slot = block % self.kept.len();
         let stretch = &mut self.kept[slot];
         if stretch.block != Some(block) {
@@ -201,7 +201,7 @@ impl Stretches {
     }
 }
 
-impl Walk<'_> {
+impl ScanWalk<'_> {
     /// Ranges of blocks, the items of both phases.
     fn ranges(&self) -> usize {
         self.tiles.blocks().div_ceil(BLOCKS)
@@ -213,11 +213,11 @@ impl Walk<'_> {
         job: &Job<'_>,
         lattice: &Lattice,
         spill: &Spill,
-    ) -> Result<(ScanSurvey, Vec<Stretch>)> {
+    ) -> Result<(ScanSurvey, Vec<StoredStretch>)> {
         let mut stored = Vec::new();
         let empty = || ScanSurvey::new(&self.tiles.bounds());
         let scans = job.items(self.ranges()).run(
-            || (empty(), Stretches::new(KEPT_BLOCKS)),
+            || (empty(), KeptBlocks::new(KEPT_BLOCKS)),
             |(scan, stretches), range| {
                 let mut lines = RangeLines::new(spill);
                 let positions = self.tiles_from(range, lattice, scan, stretches, &mut lines)?;
@@ -236,7 +236,7 @@ impl Walk<'_> {
     fn measure(&self, job: &Job<'_>, scan: ScanSurvey) -> Result<FittedScan> {
         let mut fitted = scan.fit();
         let parts = job.items(self.ranges()).run(
-            || (fitted.part(), Stretches::new(1)),
+            || (fitted.part(), KeptBlocks::new(1)),
             |(part, stretches), range| {
                 let mut positions = 0;
                 for block in range * BLOCKS..((range + 1) * BLOCKS).min(self.tiles.blocks()) {
@@ -260,7 +260,7 @@ impl Walk<'_> {
         range: usize,
         lattice: &Lattice,
         scan: &mut ScanSurvey,
-        stretches: &mut Stretches,
+        stretches: &mut KeptBlocks,
         lines: &mut RangeLines<'_>,
     ) -> Result<u64> {
         let end = ((range + 1) * BLOCKS).min(self.tiles.blocks());
@@ -296,7 +296,7 @@ impl Walk<'_> {
         &self,
         key: TileKey,
         from: usize,
-        stretches: &mut Stretches,
+        stretches: &mut KeptBlocks,
     ) -> Result<(usize, usize)> {
         let cube = key.cube();
         let (mut inside, mut behind) = (from, self.tiles.blocks());
@@ -321,7 +321,7 @@ impl Walk<'_> {
     /// returns where they end and how many there were.
     fn visit(
         &self,
-        stretches: &mut Stretches,
+        stretches: &mut KeptBlocks,
         mut at: (usize, usize),
         key: TileKey,
         mut visit: impl FnMut(&[Position], &[Lot]),

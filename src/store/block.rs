@@ -1,4 +1,5 @@
-//! Blocks: up to 256 positions that follow each other in Morton order, packed relative to their box.
+//! Blocks: up to 256 positions that follow each other in Morton order, packed relative to their
+//! box.
 
 use super::spill::{Address, Checksum, Spill};
 use crate::Result;
@@ -16,7 +17,8 @@ pub struct Block {
     pub first: Position,
     /// Number of the first position among all of the scan.
     pub first_position: u64,
-    /// Number of the first position's first record among all (see [`SealedTiles`](super::SealedTiles)).
+    /// Number of the first position's first record among all (see
+    /// [`SealedTiles`](super::SealedTiles)).
     pub first_record: u64,
     address: Address,
     checksum: Checksum,
@@ -39,8 +41,8 @@ impl Block {
         self.len() * (3 * usize::from(self.width) + if self.has_copies { 4 } else { 0 })
     }
 
-    /// Packs positions in Morton order onto `out`, each with its copies; no `copies` are one each. The
-    /// address is that of the stretch which `out` will become, once [`placed`](Block::placed).
+    /// Packs positions in Morton order onto `out`, each with its copies; no `copies` are one each.
+    /// The address is that of the stretch which `out` will become, once [`placed`](Block::placed).
     pub fn pack(positions: &[Position], copies: &[u32], out: &mut Vec<u8>) -> (Block, usize) {
         let bounds = Bounds::of(positions.iter().copied());
         let extent = bounds.extent().into_iter().max().unwrap_or(0);

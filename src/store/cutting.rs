@@ -6,8 +6,9 @@ use crate::Error;
 
 impl SealedTiles {
     /// Cuts the scan into octree nodes, in Morton order, none without a position: nodes whose cube
-    /// grown by `reach` has at most `wanted` positions; or at most `most`, where the side is 2^`good`
-    /// or less, so that smaller nodes would be mostly zone. None has a side below 2^`lowest`.
+    /// grown by `reach` has at most `wanted` positions; or at most `most`, where the side is
+    /// 2^`good` or less, so that smaller nodes would be mostly zone. None has a side below
+    /// 2^`lowest`.
     ///
     /// If nodes of that side have more, the error names the one that has most and its count.
     pub fn cut(

@@ -12,7 +12,7 @@ use crate::{Error, Result};
 /// Blocks packed before they are handed to the spill.
 const BLOCKS_AT_ONCE: usize = 64;
 
-pub(crate) struct Output {
+pub(crate) struct MergeOutput {
     pub positions: Spill,
     pub refs: Pieces,
     pub tagged: bool,
@@ -28,7 +28,7 @@ pub(crate) struct Merged {
 
 /// Packs what comes out of the merge into blocks and pieces.
 pub(crate) struct Emitter<'a> {
-    out: &'a Output,
+    out: &'a MergeOutput,
     merged: Merged,
     positions: Vec<Position>,
     copies: Vec<u32>,
@@ -46,7 +46,7 @@ impl<'a> Emitter<'a> {
         (BLOCKS_AT_ONCE + 2) * BLOCK * Block::BYTES_PER_POSITION + PIECE * ref_bytes(true);
 
     /// An emitter of at most `most_records` records.
-    pub fn new(out: &'a Output, most_records: u64) -> Result<Self> {
+    pub fn new(out: &'a MergeOutput, most_records: u64) -> Result<Self> {
         let first_ref = out.refs.reserve(most_records)?;
         Ok(Emitter {
             out,
@@ -67,8 +67,8 @@ impl<'a> Emitter<'a> {
         })
     }
 
-    /// Takes the next records, numbered from `first_record` on among all of the store: their positions,
-    /// and their tags if they have any.
+    /// Takes the next records, numbered from `first_record` on among all of the store: their
+    /// positions, and their tags if they have any.
     pub fn take(&mut self, positions: &[Position], first_record: u64, tags: &[u32]) -> Result<()> {
         let Some(&end) = positions.last() else { return Ok(()) };
         let mut new = positions;

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 
 use super::block::{BLOCK, Block};
 use super::gather::gather;
-use super::order::{Order, Sorted};
+use super::order::{RunOrder, SortedIndices};
 use super::pieces::{PIECE, Pieces};
 use super::record::Tag;
 use super::spill::{Spill, SpillArea};
@@ -20,7 +20,7 @@ const STRETCH: usize = 1 << 20;
 
 /// A sorted run: its blocks, and the number of its first record among all records.
 #[derive(Debug)]
-pub(crate) struct Run {
+pub(crate) struct SortedRun {
     pub blocks: Vec<Block>,
     pub first_record: u64,
 }
@@ -36,7 +36,7 @@ pub struct TileStore {
     pub(crate) records: Pieces,
     /// The place in the input of each record, by the same numbers, if an output asks for it.
     pub(crate) places: Option<Pieces>,
-    pub(crate) runs: Mutex<Vec<Run>>,
+    pub(crate) runs: Mutex<Vec<SortedRun>>,
     index: Mutex<Lease>,
 }
 
@@ -68,7 +68,7 @@ impl TileStore {
         lock(&self.runs).len()
     }
 
-    fn add(&self, run: Run) -> Result<()> {
+    fn add(&self, run: SortedRun) -> Result<()> {
         lock(&self.index).grow(Bytes::of(run.blocks.len() as u64, size_of::<Block>()).0)?;
         lock(&self.runs).push(run);
         Ok(())
@@ -85,7 +85,7 @@ pub struct Intake<'a> {
     tags: Vec<u32>,
     places: Vec<u64>,
     next_place: u64,
-    order: Order,
+    order: RunOrder,
     packed: Vec<u8>,
 }
 
@@ -94,7 +94,7 @@ impl<'a> Intake<'a> {
     pub fn bytes_per_record(stride: usize, tagged: bool, placed: bool) -> Bytes {
         let tag = if tagged { size_of::<Tag>() } else { 0 };
         let place = if placed { size_of::<u64>() } else { 0 };
-        Bytes::from(stride) + Bytes::from(size_of::<Position>() + Order::BYTES + tag + place)
+        Bytes::from(stride) + Bytes::from(size_of::<Position>() + RunOrder::BYTES + tag + place)
     }
 
     /// Bytes that an intake holds whatever its capacity.
@@ -112,7 +112,7 @@ impl<'a> Intake<'a> {
             tags: Vec::with_capacity(if store.tagged { capacity } else { 0 }),
             places: Vec::with_capacity(if store.places.is_some() { capacity } else { 0 }),
             next_place: 0,
-            order: Order::with_capacity(capacity),
+            order: RunOrder::with_capacity(capacity),
             packed: Vec::with_capacity(STRETCH + 2 * BLOCK * Block::BYTES_PER_POSITION),
         }
     }
@@ -127,7 +127,8 @@ impl<'a> Intake<'a> {
         self.take(&[position], record, &[tag])
     }
 
-    /// Takes records, one after the other, at their positions; their tags count if the store has tags.
+    /// Takes records, one after the other, at their positions; their tags count if the store has
+    /// tags.
     pub fn take(
         &mut self,
         mut positions: &[Position],
@@ -182,12 +183,17 @@ impl<'a> Intake<'a> {
         self.records.clear();
         self.positions.clear();
         self.tags.clear();
-        store.add(Run { blocks, first_record })
+        store.add(SortedRun { blocks, first_record })
     }
 }
 
 /// Stores `records` in `order`, numbered from `first` on.
-fn store_records(store: &TileStore, order: Sorted<'_>, records: &[u8], first: u64) -> Result<()> {
+fn store_records(
+    store: &TileStore,
+    order: SortedIndices<'_>,
+    records: &[u8],
+    first: u64,
+) -> Result<()> {
     let mut piece = Vec::with_capacity(PIECE * store.stride);
     let numbers = (first..).step_by(PIECE);
     for (number, slots) in numbers.zip(order.chunks(PIECE)) {
@@ -199,7 +205,12 @@ fn store_records(store: &TileStore, order: Sorted<'_>, records: &[u8], first: u6
 }
 
 /// Stores `places` in `order`, numbered from `first` on.
-fn store_places(stored: &Pieces, order: Sorted<'_>, places: &[u64], first: u64) -> Result<()> {
+fn store_places(
+    stored: &Pieces,
+    order: SortedIndices<'_>,
+    places: &[u64],
+    first: u64,
+) -> Result<()> {
     stored.reserve_below(first + order.len() as u64)?;
     let mut piece = Vec::with_capacity(PIECE * size_of::<u64>());
     for (number, slots) in (first..).step_by(PIECE).zip(order.chunks(PIECE)) {
@@ -214,7 +225,7 @@ fn store_places(stored: &Pieces, order: Sorted<'_>, places: &[u64], first: u64) 
 /// positions have copies, those of a run have tags.
 fn store_positions(
     store: &TileStore,
-    order: Sorted<'_>,
+    order: SortedIndices<'_>,
     positions: &[Position],
     tags: &[u32],
     packed: &mut Vec<u8>,

@@ -58,8 +58,8 @@ impl Levels {
         u64::from(self.first) + self.splits[j.min(63) as usize..].iter().sum::<u64>()
     }
 
-    /// The smallest j for which positions ÷ occupied cubes of side 2^j ≥ `mean`; where a scan is too
-    /// small for that, the smallest j from which on larger cubes hold no more.
+    /// The smallest j for which positions ÷ occupied cubes of side 2^j ≥ `mean`; where a scan is
+    /// too small for that, the smallest j from which on larger cubes hold no more.
     pub fn smallest_side(&self, mean: u64) -> u32 {
         let fewest = self.occupied(62);
         (0..62)

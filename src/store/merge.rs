@@ -8,8 +8,8 @@ use std::collections::BinaryHeap;
 use std::collections::binary_heap::PeekMut;
 
 use super::block::{BLOCK, Block};
-use super::emit::{Emitter, Merged, Output};
-use super::intake::{Run, TileStore};
+use super::emit::{Emitter, MergeOutput, Merged};
+use super::intake::{SortedRun, TileStore};
 use super::key::{first_of_prefix, morton_cmp, morton_prefix, split_level};
 use super::pieces::Pieces;
 use super::record::ref_bytes;
@@ -28,7 +28,7 @@ const RANGE_BLOCKS: usize = 256;
 const RANGE_BLOCKS_EACH: usize = 4;
 /// Bytes that a thread holds while it merges `runs` runs of records of `stride` bytes.
 pub fn merge_bytes(runs: u64, stride: usize) -> Bytes {
-    Cursor::bytes(stride) * runs + Bytes::from(Emitter::BYTES)
+    RunCursor::bytes(stride) * runs + Bytes::from(Emitter::BYTES)
 }
 
 /// Merges the runs of `store`, a range an item; `advance` is told of records merged and says
@@ -47,7 +47,7 @@ pub fn seal(
     let blocks = runs.iter().map(|run| run.blocks.len()).sum::<usize>() + ranges.len();
     let index = |blocks: usize| Bytes::of(blocks as u64, SealedTiles::BYTES_PER_BLOCK);
     let mut lease = store.budget.lease(index(blocks).0, "index of the scan")?;
-    let out = Output {
+    let out = MergeOutput {
         positions: Spill::new(&store.area, "positions"),
         refs: Pieces::new(&store.area, "order", ref_bytes(store.tagged)),
         tagged: store.tagged,
@@ -81,7 +81,7 @@ struct Range {
 }
 
 /// The scan in ranges, which end at every so many blocks' first positions.
-fn ranges(runs: &[Run]) -> Vec<Range> {
+fn ranges(runs: &[SortedRun]) -> Vec<Range> {
     let blocks = || runs.iter().flat_map(|run| &run.blocks);
     let mut firsts: Vec<Position> = blocks().map(|block| block.first).collect();
     firsts.sort_unstable_by(morton_cmp);
@@ -126,13 +126,18 @@ fn join(ranges: Vec<Merged>, most_blocks: usize) -> Sequence {
     all
 }
 
-fn merge_range(store: &TileStore, runs: &[Run], range: &Range, out: &Output) -> Result<Merged> {
+fn merge_range(
+    store: &TileStore,
+    runs: &[SortedRun],
+    range: &Range,
+    out: &MergeOutput,
+) -> Result<Merged> {
     let mut cursors = Vec::with_capacity(runs.len());
     let mut tournament = Tournament::new(runs.len());
     let mut buffer = Vec::new();
     let mut most = 0;
     for (number, run) in runs.iter().enumerate() {
-        let mut cursor = Cursor::new(store, run, range);
+        let mut cursor = RunCursor::new(store, run, range);
         most += cursor.seek(&mut buffer)?;
         tournament.set(number, cursor.key());
         cursors.push(cursor);
@@ -169,7 +174,7 @@ impl Equals {
         &mut self,
         key: u64,
         tournament: &mut Tournament,
-        cursors: &mut [Cursor<'_>],
+        cursors: &mut [RunCursor<'_>],
         emitter: &mut Emitter<'_>,
         buffer: &mut Vec<u8>,
     ) -> Result<()> {
@@ -196,7 +201,7 @@ impl Equals {
 /// Emits the records of one position from the runs that have it, smallest record first; `records`
 /// is an empty heap to work in, with the record at the head of each run.
 fn emit_equal(
-    cursors: &mut [Cursor<'_>],
+    cursors: &mut [RunCursor<'_>],
     runs: &[usize],
     position: Position,
     emitter: &mut Emitter<'_>,
@@ -239,9 +244,9 @@ fn emit_equal(
 }
 
 /// A walk along a range of a run.
-struct Cursor<'a> {
+struct RunCursor<'a> {
     store: &'a TileStore,
-    run: &'a Run,
+    run: &'a SortedRun,
     range: &'a Range,
     block: usize,
     at: usize,
@@ -253,15 +258,15 @@ struct Cursor<'a> {
     spare: Vec<u8>,
 }
 
-impl<'a> Cursor<'a> {
+impl<'a> RunCursor<'a> {
     /// Bytes that it holds: a block, the record at its head, and itself.
     fn bytes(stride: usize) -> Bytes {
         Bytes::from(BLOCK * Block::BYTES_PER_POSITION + 256) + Bytes::from(stride)
     }
 
-    fn new(store: &'a TileStore, run: &'a Run, range: &'a Range) -> Self {
+    fn new(store: &'a TileStore, run: &'a SortedRun, range: &'a Range) -> Self {
         let (positions, tags, spare) = (Vec::new(), Vec::new(), Vec::new());
-        Cursor { store, run, range, block: 0, at: 0, positions, tags, spare }
+        RunCursor { store, run, range, block: 0, at: 0, positions, tags, spare }
     }
 
     /// Goes to the first record of the range; returns how many it has at most.

@@ -1,6 +1,6 @@
-//! The decoded scan: sorted runs as the decode leaves them, their merge, and what comes of it, sealed:
-//! distinct positions in Morton order with their records, in memory or on disk. Knows neither tiles,
-//! nor stages, nor formats.
+//! The decoded scan: sorted runs as the decode leaves them, their merge, and what comes of it,
+//! sealed: distinct positions in Morton order with their records, in memory or on disk. Knows
+//! neither tiles, nor stages, nor formats.
 
 mod block;
 mod cutting;
@@ -27,8 +27,8 @@ pub use levels::Levels;
 pub use merge::{merge_bytes, seal};
 pub use pieces::{PIECE, Pieces};
 pub use record::{
-    ASIDE, CLASSED_INPUTS, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, SELECTIONS, State,
+    ASIDE, CLASSED_INPUTS, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, RecordState, SELECTIONS,
     TAGGED_INPUTS, Tag, ref_bytes,
 };
 pub use sealed::{Reader, SealedTiles};
-pub use spill::{Address, Checksum, Folder, Spill, SpillArea, Stretch};
+pub use spill::{Address, Checksum, Folder, Spill, SpillArea, StoredStretch};

@@ -14,7 +14,7 @@ use crate::{Error, Result};
 pub struct Pieces {
     spill: Spill,
     stride: usize,
-    table: RwLock<Table>,
+    table: RwLock<PieceTable>,
 }
 
 /// Items in a piece.
@@ -25,8 +25,8 @@ const UNIT_BYTES: usize = 4096;
 
 /// Where the pieces are.
 #[derive(Debug)]
-struct Table {
-    places: Vec<Place>,
+struct PieceTable {
+    places: Vec<PiecePlace>,
     /// Those of the units of each piece; none as long as all pieces are in memory.
     checksums: Vec<Checksum>,
     lease: Lease,
@@ -34,15 +34,15 @@ struct Table {
 
 /// Where a piece is, and how many items it has: none until it is stored.
 #[derive(Debug, Clone, Copy, Default)]
-struct Place {
+struct PiecePlace {
     address: Address,
     items: u32,
 }
 
-impl Table {
+impl PieceTable {
     /// Leases memory for `pieces` more places.
     fn reserve(&mut self, pieces: u64) -> Result<()> {
-        self.lease.grow(Bytes::of(pieces, size_of::<Place>()).0)
+        self.lease.grow(Bytes::of(pieces, size_of::<PiecePlace>()).0)
     }
 }
 
@@ -55,14 +55,14 @@ impl Pieces {
     /// No items yet, each `stride` bytes.
     pub fn new(area: &Arc<SpillArea>, name: &'static str, stride: usize) -> Self {
         let lease = area.budget().open("table of stored pieces");
-        let table = Table { places: Vec::new(), checksums: Vec::new(), lease };
+        let table = PieceTable { places: Vec::new(), checksums: Vec::new(), lease };
         Pieces { spill: Spill::new(area, name), stride, table: RwLock::new(table) }
     }
 
     /// Bytes of memory that the table of `items` items of `stride` bytes takes, for a plan.
     pub fn table_bytes(items: u64, stride: usize) -> Bytes {
         let checksums = PIECE / unit_of(stride) * size_of::<Checksum>();
-        Bytes::of(items.div_ceil(PIECE as u64), size_of::<Place>() + checksums)
+        Bytes::of(items.div_ceil(PIECE as u64), size_of::<PiecePlace>() + checksums)
     }
 
     /// Reserves `items` numbers and returns the first; fails if there is no memory for their table.
@@ -71,7 +71,7 @@ impl Pieces {
         let first = table.places.len();
         let pieces = items.div_ceil(PIECE as u64);
         table.reserve(pieces)?;
-        table.places.resize(first + pieces as usize, Place::default());
+        table.places.resize(first + pieces as usize, PiecePlace::default());
         Ok((first * PIECE) as u64)
     }
 
@@ -81,7 +81,7 @@ impl Pieces {
         let pieces = end.div_ceil(PIECE as u64) as usize;
         if let Some(more) = pieces.checked_sub(table.places.len()).filter(|&more| more > 0) {
             table.reserve(more as u64)?;
-            table.places.resize(pieces, Place::default());
+            table.places.resize(pieces, PiecePlace::default());
         }
         Ok(())
     }
@@ -116,7 +116,7 @@ impl Pieces {
             .places
             .get_mut(piece)
             .ok_or_else(|| Error::internal("a piece was stored that nobody reserved"))?;
-        *place = Place { address, items: (bytes.len() / self.stride.max(1)) as u32 };
+        *place = PiecePlace { address, items: (bytes.len() / self.stride.max(1)) as u32 };
         Ok(())
     }
 
@@ -192,11 +192,11 @@ impl Pieces {
         Ok(())
     }
 
-    fn table(&self) -> RwLockReadGuard<'_, Table> {
+    fn table(&self) -> RwLockReadGuard<'_, PieceTable> {
         self.table.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn change(&self) -> RwLockWriteGuard<'_, Table> {
+    fn change(&self) -> RwLockWriteGuard<'_, PieceTable> {
         self.table.write().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -224,7 +224,8 @@ mod tests {
         SpillArea::new(Budget::new(1 << 30), memory, Box::new(In(at.to_owned())))
     }
 
-    /// Two full pieces and a part of one, item `i` from byte `i` on of a sequence without a pattern.
+    /// Two full pieces and a part of one, item `i` from byte `i` on of a sequence without a
+    /// pattern.
     fn stored(area: &Arc<SpillArea>, stride: usize) -> (Pieces, Vec<u8>) {
         let pieces = Pieces::new(area, "items", stride);
         let items = 2 * PIECE + 1001;

@@ -54,8 +54,8 @@ impl Tournament {
         self.firsts.get(1).copied().filter(|head| *head != Head::END)
     }
 
-    /// The head with the least key of all runs but that of [`first`](Tournament::first): of the same
-    /// key if two have it; None if the others have ended.
+    /// The head with the least key of all runs but that of [`first`](Tournament::first): of the
+    /// same key if two have it; None if the others have ended.
     pub fn second(&self) -> Option<Head> {
         let mut node = self.firsts.len() / 2 + self.first()?.run;
         let mut second = Head::END;

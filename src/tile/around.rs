@@ -22,7 +22,8 @@ pub struct Around {
     /// The offsets of a position's neighbours, and the ranks of what was found beyond the tile.
     offsets: Vec<Position>,
     ranks: Vec<u32>,
-    /// Neighbourhoods that what was loaded could not prove, since the last [`Around::take_unproven`].
+    /// Neighbourhoods that what was loaded could not prove, since the last
+    /// [`Around::take_unproven`].
     unproven: u64,
     /// Neighbourhoods whose two farthest are equally far, likewise.
     tied: u64,
@@ -54,9 +55,9 @@ impl Beyond {
         (!loaded.holds(&scan)).then(beyond)
     }
 
-    /// True if no position that is not loaded can be among the nearest of `p`, of which the farthest
-    /// found is at squared distance `d2`: on the first plane not loaded, one at exactly the same
-    /// distance might win the tie.
+    /// True if no position that is not loaded can be among the nearest of `p`, of which the
+    /// farthest found is at squared distance `d2`: on the first plane not loaded, one at exactly
+    /// the same distance might win the tie.
     fn proves(&self, p: Position, d2: u128) -> bool {
         let Bounds { lo, hi } = self.loaded;
         let gap = (0..3).fold(u64::MAX, |gap, axis| {
@@ -99,8 +100,8 @@ impl Around {
         self.beyond = Beyond::new(tiles, sieve, loaded);
     }
 
-    /// Calls `visit` for every one of `positions` that `is_asked` with its index and the `k` nearest
-    /// *other* positions of the whole scan.
+    /// Calls `visit` for every one of `positions` that `is_asked` with its index and the `k`
+    /// nearest *other* positions of the whole scan.
     pub(super) fn each_neighborhood(
         &mut self,
         positions: &[Position],

@@ -39,9 +39,9 @@ impl Remote {
     pub const BYTES: u64 =
         ((CACHED + 2) * crate::store::BLOCK * size_of::<Position>()) as u64 + (64 << 10);
 
-    /// The `k` positions nearest to `p` other than itself, by exact squared distance, ties by Morton
-    /// order, of those that `sieve` lets be seen; fewer if there are fewer. `bound` is a squared distance within which `k` others are
-    /// known to lie, if one is known.
+    /// The `k` positions nearest to `p` other than itself, by exact squared distance, ties by
+    /// Morton order, of those that `sieve` lets be seen; fewer if there are fewer. `bound` is a
+    /// squared distance within which `k` others are known to lie, if one is known.
     pub fn nearest(
         &mut self,
         (tiles, sieve): (&SealedTiles, &Sieve),

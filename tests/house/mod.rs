@@ -4,4 +4,5 @@ mod dependencies;
 mod drift;
 mod imports;
 mod modules;
+mod readable;
 mod synth_paper;

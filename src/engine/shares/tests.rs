@@ -1,6 +1,8 @@
 //! The division of memory.
 
 use super::*;
+use crate::engine::demands::FEWEST;
+use crate::stage::{ChunkSize, Needs};
 
 fn demands(limit: u64) -> Demands {
     Demands {
@@ -142,9 +144,9 @@ fn different() -> Vec<Demands> {
     ]
 }
 
-/// Base, work, index, kept in memory, records of a run and positions of a tile; then the limit for a
-/// tile of three million positions, what the mill holds for one of 70,000, and the positions of each
-/// of two tiles in 500 MiB.
+/// Base, work, index, kept in memory, records of a run and positions of a tile; then the limit for
+/// a tile of three million positions, what the mill holds for one of 70,000, and the positions of
+/// each of two tiles in 500 MiB.
 type Divided = ([u64; 6], [u64; 3]);
 
 #[rustfmt::skip]
@@ -157,7 +159,10 @@ const DIVIDED: [Divided; 13] = [
     ([20971520, 224149492, 9668304, 59783484, 524288, 344864], [1917845504, 54963376, 894568]),
     ([39845888, 465534004, 9785520, 113980188, 524288, 256120], [1318060032, 103563440, 738552]),
     ([20971520, 391944748, 9785520, 114169124, 524288, 532479], [2707423232, 56643376, 728834]),
-    ([216006656, 12884901888, 6767578360, 23081186056, 2819920, 786382], [11104419840, 1074158032, 0]),
+    (
+        [216006656, 12884901888, 6767578360, 23081186056, 2819920, 786382],
+        [11104419840, 1074158032, 0],
+    ),
     ([20971520, 151456004, 386960, 36900716, 4000, 251920], [803209216, 49503376, 1045180]),
     ([20971520, 189600556, 9668304, 48195076, 524288, 236118], [2084569088, 57264656, 744761]),
     ([17825792, 31265176, 9668304, 8349592, 390471, 130371], [1765801984, 17077834, 1114170]),

@@ -13,7 +13,7 @@ use crate::stage::{
 use crate::{Error, Result};
 
 /// Files that are read as one scan, all of one family of formats.
-pub struct Files {
+pub struct InputFiles {
     /// Where they are.
     pub files: Vec<PathBuf>,
     /// A format of the family.
@@ -22,7 +22,7 @@ pub struct Files {
     pub formats: Formats,
 }
 
-impl OpenSource for Files {
+impl OpenSource for InputFiles {
     fn open(&self) -> Result<Box<dyn Source>> {
         let told = |error| sniff::told(error, &*self.format, &self.formats);
         self.format.open(&self.files).map_err(told)
@@ -49,13 +49,13 @@ impl OpenSource for Files {
         }
         files.extend(more);
         let (format, formats) = (self.format.clone(), self.formats.clone());
-        Ok(Box::new(Files { files, format, formats }))
+        Ok(Box::new(InputFiles { files, format, formats }))
     }
 }
 
 /// The sink that writes a file of one format.
 #[derive(Clone)]
-pub struct Output {
+pub struct OutputFile {
     /// What it is to be.
     pub keys: WriteKeys,
     /// The order of its records.
@@ -68,7 +68,7 @@ pub struct Output {
     pub of_one: bool,
 }
 
-impl CreateSink for Output {
+impl CreateSink for OutputFile {
     fn path(&self) -> &Path {
         &self.keys.path
     }
@@ -140,7 +140,7 @@ impl CreateSink for Output {
     }
 }
 
-impl Output {
+impl OutputFile {
     /// A format of the files that records of `schema` come from.
     fn from(&self, schema: &Schema) -> Option<&Arc<dyn Format>> {
         self.formats.of_family(schema.layout.family).next()
@@ -152,8 +152,8 @@ impl Output {
         let named = named.filter(|named| !self.of_one && *named != self.format.name())?;
         let [named, is] = [named, self.format.name()].map(str::to_uppercase);
         Some(format!(
-            "{}: this is named as {named} and becomes {is}, as `write.format` says: programs that go by \
-             names will not read it",
+            "{}: this is named as {named} and becomes {is}, as `write.format` says: programs that \
+             go by names will not read it",
             shown(&self.keys.path)
         ))
     }
