@@ -281,7 +281,7 @@ fn run_page() -> (String, Value) {
     let out = format!(
         "# The `[run]` table\n\n<!-- {SAYS_SO} -->\n\n{docs}\n\n{}\n## Sizes\n\n{}\n",
         keys::markdown(&said),
-        item_docs(&text, "fn", "parse_bytes")
+        item_docs(&source("src/graph/size.rs"), "fn", "parse_bytes")
     );
     let (first, _) = docs.split_once(". ").unwrap();
     (out, keys::described("run", &format!("{first}."), &said))
