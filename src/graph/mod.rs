@@ -104,6 +104,7 @@ impl Graph {
         };
         let is_source = |n: &usize| matches!(self.stages[*n].role, Role::Source(_));
         let is_sink = |n: &usize| matches!(self.stages[*n].role, Role::Sink(_));
+        let sources: Vec<usize> = (0..self.stages.len()).filter(is_source).collect();
         for (n, stage) in self.stages.iter().enumerate() {
             if stage.from.iter().any(|from| *from >= n) {
                 tell(n, "a stage takes from stages before it", None);
@@ -117,6 +118,9 @@ impl Graph {
                 }
                 (false, [_, _, ..]) if !stage.from.iter().all(is_source) => {
                     tell(n, "only sources can be merged", None);
+                }
+                (false, from) if from.iter().any(is_source) && from != sources => {
+                    tell(n, "the sources of a pipeline are one scan: take from all of them", None);
                 }
                 _ => {}
             }

@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 use crate::engine::pass::{Op, PassFilter, StageOp};
-use crate::graph::{Graph, GraphStage};
+use crate::graph::{Graph, GraphStage, Written};
 use crate::stage::{CreateSink, OpenSource, Role, Transform};
 use crate::{Error, Result};
 
@@ -55,7 +55,8 @@ impl Sorted {
         let name =
             |stage: &GraphStage| serde_json::json!({ "kind": stage.kind, "keys": stage.keys });
         let names = graph.stages.iter().map(name).collect();
-        let (mut source, mut works) = (None, Vec::new());
+        let mut source: Option<(String, Box<dyn OpenSource>)> = None;
+        let mut works = Vec::new();
         let (mut transforms, mut filters) = (Vec::new(), Vec::new());
         let (mut ops, mut sinks) = (Vec::new(), Vec::new());
         for (n, stage) in graph.stages.into_iter().enumerate() {
@@ -67,9 +68,18 @@ impl Sorted {
                 Role::TileOp(_) | Role::ScanOp(_) => StageWork::Op(ops.len()),
                 Role::Sink(_) => StageWork::Sink(sinks.len()),
             });
+            let blamed = written.clone();
             let tile = |kind, op| StageOp { kind, written, op, limits, selection: 0 };
             match role {
-                Role::Source(open) => source = Some((kind, open)),
+                Role::Source(open) => {
+                    source = Some(match source {
+                        None => (kind, open),
+                        Some((first, all)) => {
+                            let merged = all.merged(&*open);
+                            (first, merged.map_err(|error| blame(&*blamed, error))?)
+                        }
+                    });
+                }
                 Role::Transform(one) if decoded.contains(&n) => transforms.push((kind, one)),
                 Role::Transform(transform) => filters.push(PassFilter { kind, transform }),
                 Role::TileOp(op) => ops.push(tile(kind, Op::Tile(op))),
@@ -109,6 +119,15 @@ impl Sorted {
         let named = 0..self.names.len();
         let named = named.filter(|n| on_path.contains(n) || is_decode(n) || is_sink(n));
         named.map(|n| self.names[n].clone()).collect()
+    }
+}
+
+/// What is wrong with a stage, told where it is written.
+fn blame(written: &dyn Written, error: Error) -> Error {
+    let told = written.wrong(error.to_string());
+    match error.remedy() {
+        Some(help) => told.help(help.to_owned()),
+        None => told,
     }
 }
 

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::Result;
 use crate::point::{Metadata, PointBatch, Schema};
+use crate::{Error, Result};
 
 /// Opens the inputs of a source: headers only, no point.
 pub trait OpenSource: Send + Sync {
@@ -15,6 +15,20 @@ pub trait OpenSource: Send + Sync {
     /// Files that it reads, so that no output is written over one of them.
     fn paths(&self) -> Vec<PathBuf> {
         Vec::new()
+    }
+
+    /// The family of formats of its files, if it is nothing but these files.
+    fn family(&self) -> Option<&str> {
+        None
+    }
+
+    /// This source and `other` as one, whose inputs come behind its own.
+    ///
+    /// # Errors
+    ///
+    /// If they cannot be read as one: as it is here, where nothing is known of the two.
+    fn merged(&self, _other: &dyn OpenSource) -> Result<Box<dyn OpenSource>> {
+        Err(Error::pipeline("this source cannot be merged with another"))
     }
 }
 

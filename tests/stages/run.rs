@@ -13,8 +13,8 @@ use pointmill::store::morton_cmp;
 use pointmill::{Graph, Overrides, Quiet, Registry, Set};
 use serde_json::Value;
 
-/// Small tiles on a lattice of whole numbers, nothing kept in memory.
-const TILES: &str = "lattice = 1.0\ntile_points = 40\nthreads = 2\nmemory = '256MiB'";
+/// Small tiles on a lattice of whole numbers.
+const TILES: &str = "lattice = 1.0\ntile_points = 40\nthreads = 2";
 
 /// A rough sheet of 2,500 positions, and some far above and below it.
 fn scene() -> Vec<Position> {
@@ -178,7 +178,7 @@ fn las(folder: &Path, stages: &str, from: &str, out: &str) -> Value {
     }
     let report = folder.join("report.json");
     let text = format!(
-        "[run]\nreport = '{}'\ntile_points = 100\nthreads = 2\nmemory = '256MiB'\n\
+        "[run]\nreport = '{}'\ntile_points = 100\nthreads = 2\n\
          [[stage]]\nkind = 'read'\npath = '{}'\n{stages}[[stage]]\nkind = 'write'\npath = '{}'\n",
         report.display(),
         input.display(),

@@ -18,9 +18,9 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Two threads, half a GiB.
+    /// Two threads, a GiB.
     pub fn new(sets: &[(&'static str, Value)]) -> Setup {
-        Setup { sets: sets.to_vec(), threads: 2, memory: 512 << 20 }
+        Setup { sets: sets.to_vec(), threads: 2, memory: 1 << 30 }
     }
 
     pub fn threads(self, threads: usize) -> Setup {

@@ -1,15 +1,16 @@
 //! From checked keys to sources and sinks of registered formats: what is alike for all of them.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::Result;
 use crate::error::shown;
 use crate::io::sniff;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{
     ChunkSize, CreateSink, Format, Formats, OpenSource, Order, Sink, Source, WriteKeys,
 };
+use crate::{Error, Result};
 
 /// Files that are read as one scan, all of one family of formats.
 pub struct InputFiles {
@@ -29,6 +30,26 @@ impl OpenSource for InputFiles {
 
     fn paths(&self) -> Vec<PathBuf> {
         self.files.clone()
+    }
+
+    fn family(&self) -> Option<&str> {
+        Some(self.format.family())
+    }
+
+    fn merged(&self, other: &dyn OpenSource) -> Result<Box<dyn OpenSource>> {
+        if other.family() != self.family() {
+            let told = "sources are merged where all read files, and of one family of formats";
+            return Err(Error::pipeline(told).help("convert some of them first"));
+        }
+        let (mut files, more) = (self.files.clone(), other.paths());
+        let real = |file: &PathBuf| file.canonicalize().unwrap_or_else(|_| file.clone());
+        let known: BTreeSet<PathBuf> = files.iter().map(real).collect();
+        if let Some(twice) = more.iter().find(|file| known.contains(&real(file))) {
+            return Err(Error::pipeline("another source reads this file, too").at(twice));
+        }
+        files.extend(more);
+        let (format, formats) = (self.format.clone(), self.formats.clone());
+        Ok(Box::new(InputFiles { files, format, formats }))
     }
 }
 
