@@ -1,5 +1,9 @@
 //! What a run tells of itself when its work is done: the figures of its report, once its ledgers
 //! balance, and why outputs are empty if they are.
+//!
+//! Records are counted in places that know nothing of each other: as they are read, as stages
+//! remove them, as chunks are cut, and as sinks write them. No count is computed from the others,
+//! so a record that is lost or written twice fails the run instead of being hidden in a difference.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufWriter};

@@ -1,5 +1,9 @@
 //! Files that the records of outputs refer to, such as waveforms: copied beside the outputs, under
 //! their names.
+//!
+//! A record tells a place in such a file by its byte. A copy of the whole file keeps all of these
+//! true, whichever records are left; a file of what they still refer to would be smaller, and every
+//! record would have to be changed.
 
 use std::fs::File;
 use std::io;

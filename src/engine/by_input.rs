@@ -1,5 +1,10 @@
 //! The records of outputs that are one for each input, sorted by input while tiles leave their
 //! products.
+//!
+//! All inputs are one scan, so that neighbours are found across them, and a tile has records of
+//! several. Each entry goes to the list of its input: a few kibibytes are in memory and the rest is
+//! in the spill, so that thousands of inputs cost no more than a few. What is listed is where a
+//! record is stored and not the record, which is fetched once, when its output is written.
 
 use std::sync::Arc;
 

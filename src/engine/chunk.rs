@@ -1,4 +1,8 @@
 //! Chunks of an output: stretches of its records, cut by rank and encoded at once.
+//!
+//! A chunk is cut by the rank of its records in the output and never by the tile that they come
+//! from, since tiles depend on the memory and outputs must not. It holds numbers of records and not
+//! the records: what is removed is never fetched, and what waits to be encoded is small.
 
 use super::product::RecordEntry;
 use crate::store::RecordState;

@@ -1,4 +1,9 @@
 //! What tiles leave behind becomes chunks of the outputs, cut by rank, and stored columns.
+//!
+//! Products arrive in the order of the tiles, which is that of the positions. So a column that is
+//! stored for later passes is only appended to, item after item, and is found by the rank of a
+//! position afterwards; no pass needs an index of its own. One thread at a time does this work,
+//! which is copying: what takes long, fetching and encoding, is left to all threads.
 
 use std::sync::Arc;
 

@@ -1,4 +1,12 @@
 //! Cutting the decoded scan into tiles that fit the memory, wide enough for the stages' cells.
+//!
+//! A tile is the smallest octree node that is not too heavy, found by counts of the decoded scan.
+//! Tiles of one size would be chosen for the densest place and be nearly empty elsewhere; a density
+//! guessed from headers would be wrong exactly where memory is short. A node much smaller than the
+//! cells would be loaded mostly for its neighbours, so nodes are not cut below four cells unless
+//! they do not fit otherwise.
+//!
+//! Where tiles are cut decides about speed alone, never about what stages compute.
 
 use std::sync::Arc;
 

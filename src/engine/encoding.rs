@@ -1,4 +1,9 @@
 //! From chunks to bytes: records are fetched, put in order, edited and encoded, by any thread.
+//!
+//! Encoding takes as long as all that the stages compute, so it must not wait for one thread. A
+//! chunk depends on nothing but its own records; only appending its bytes has an order. Records are
+//! copied from where the decode left them: what no stage changed is written with the bytes that it
+//! was read with.
 
 use std::sync::Arc;
 

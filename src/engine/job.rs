@@ -1,5 +1,9 @@
 //! What every phase of a run shares: the source, the stages, the budget, and how it is told to
 //! stop.
+//!
+//! Phases change none of it while their threads work, so threads share it without locks but for
+//! warnings. What belongs to one phase alone is not in it: that goes from the phase that makes it
+//! to the one that needs it, and is dropped there.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};

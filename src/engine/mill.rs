@@ -1,5 +1,10 @@
 //! The mill: decode into the tile store, then pass after pass over the tiles, in canonical order
 //! into the sinks.
+//!
+//! Everything goes through one sealed scan: passes read it and leave states, fates and columns
+//! beside it, so nothing is merged or sorted a second time, and branches share what is stored. What
+//! a pass left is kept until the last pass that goes on from it is done. A scan that fits in memory
+//! takes the same road as one that does not; only the spill then stays in memory.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

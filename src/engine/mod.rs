@@ -1,5 +1,9 @@
 //! From a plan to a report: the phases of a run over the store, on threads; outputs that appear
 //! when they are complete. Knows no format, and no stage by name.
+//!
+//! A phase is a list of items that read only what earlier phases have sealed and write pieces of
+//! their own. So any thread may take any item, no item waits for another, and what comes out is put
+//! together in the order of the items and not in that of the threads.
 
 mod account;
 pub(crate) mod beside;

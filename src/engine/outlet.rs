@@ -1,20 +1,21 @@
 //! From products that come in any order to files in one order: what several threads deliver is
-//! committed in turn, cut into chunks, encoded by whoever has time, and appended in turn again.
+//! committed in turn, cut into chunks, encoded by any thread that has time, and appended in turn
+//! again.
 //!
 //! Encoding takes as long as milling, and neither tiles nor chunks take equally long. A thread for
 //! each of the two would therefore idle while the other works. Here every thread does what is next:
 //! it mills until too much waits, and then encodes.
 //!
-//! What waits is bounded: products and chunks by the number of threads, and nobody encodes further
-//! ahead of what is appended than twice that, however slow the disk or another thread is.
+//! What waits is bounded: products and chunks by the number of threads, and encoding goes no
+//! further ahead of what is appended than twice that, however slow the disk or another thread is.
 //!
-//! The threads cannot wait for each other: whoever is to deliver next never waits for its turn, and
-//! whoever encodes or appends the chunk that comes next waits for nothing. Waiting blocks the
+//! The threads cannot wait for each other: the thread that is to deliver next never waits for its
+//! turn, and the one that encodes or appends the next chunk waits for nothing. Waiting blocks the
 //! thread, which is right in the items of a phase (`host/threads.rs` says why). A thread that
 //! leaves early must call [`Outlet::stop`], or the others would wait for what it owes.
 //!
 //! One mutex guards all of it. A queue without locks would not do: products and chunks are taken by
-//! number and not as they come, and who waits does so for any of three things to change.
+//! number and not as they come, and a thread that waits does so for any of three things to change.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};

@@ -1,5 +1,11 @@
 //! Passes over the scan: which tile stages run on each tile in turn, what they see, and what is
 //! stored.
+//!
+//! Stages that follow each other run on a tile while it is in memory, so that nothing is stored
+//! between them. That ends where a stage removes or marks records, as those behind it must not see
+//! them in the rim either, and where a stage decides by figures of the whole scan, which are known
+//! when all tiles were seen. A pass says whose outcome it goes on from, which makes chains and
+//! branches one case.
 
 use std::sync::Arc;
 

@@ -1,4 +1,8 @@
 //! The records of a batch on their way from the decode to the store, with their positions.
+//!
+//! A whole batch is placed before any of its records is handed on. So records go to the intake in
+//! stretches that end only where one is left out, and not one by one. Batches are refilled, and a
+//! thread holds one, whatever the size of the scan.
 
 use std::collections::BTreeMap;
 

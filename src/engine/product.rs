@@ -1,5 +1,10 @@
 //! What a tile leaves behind: what becomes of each record of its core, and the columns that later
 //! passes read.
+//!
+//! A product is small against the tile that it comes from, so a thread can go on with its next tile
+//! while products wait for their turn. Records of one position that share what becomes of them are
+//! one entry, since a position may have millions of copies. The rim is not in it: another tile
+//! decides about that.
 
 use super::pass::Pass;
 use super::survey::fate_code;

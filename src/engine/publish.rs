@@ -1,5 +1,10 @@
 //! Outputs appear under their names when they are complete: they grow in a scratch folder beside
 //! their place, are brought to disk, and get their names by a rename.
+//!
+//! A rename is the one change that a file system makes at once: a reader of an output sees the old
+//! file or the whole new one, also after a crash. The folder is beside the place, since a rename
+//! cannot cross file systems. The report gets its name last, so that the outputs which it speaks of
+//! are there.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
@@ -78,7 +83,7 @@ impl Staged {
         }
     }
 
-    /// Whoever may read and write the file that is replaced may do so with the new one.
+    /// Users that may read and write the file that is replaced may do so with the new one.
     fn keep_mode(&self) -> io::Result<()> {
         let Ok(old) = fs::symlink_metadata(&self.path) else { return Ok(()) };
         let (file, mode) = (OpenOptions::new().write(true).open(&self.file)?, old.permissions());
@@ -90,8 +95,8 @@ impl Staged {
     }
 }
 
-/// Gives the outputs their names, one after the other, and then the report; whoever wrote them has
-/// brought them to disk. The names of the outputs are on disk before the report appears.
+/// Gives the outputs their names, one after the other, and then the report; all of them are
+/// on disk already. The names of the outputs are on disk before the report appears.
 ///
 /// # Errors
 ///

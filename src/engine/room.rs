@@ -1,4 +1,9 @@
 //! Whether the disks have room for what a run writes, asked before its work.
+//!
+//! A run of hours should not end at a full disk that could have been seen at its beginning. What is
+//! known to be written is refused where it does not fit, and what may be written is a warning: how
+//! far outputs are compressed, and how many points are left, only the work tells. Folders on one
+//! disk are added up.
 
 use std::collections::BTreeMap;
 use std::os::unix::fs::MetadataExt;

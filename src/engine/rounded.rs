@@ -1,4 +1,9 @@
 //! What a lattice of rounded positions hides: coordinates that differ and share a position.
+//!
+//! Decisions are made on integers, so points closer than a step are one position to every stage.
+//! That is right for scans whose format has such steps, and a loss for those with numbers of any
+//! size. It is measured and told, instead of being avoided by a finer lattice for all, which would
+//! not reach far enough from the origin.
 
 use std::sync::Arc;
 

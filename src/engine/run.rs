@@ -1,4 +1,8 @@
 //! Running a plan: begin, stream or mill, account, publish.
+//!
+//! Everything that can be refused is refused first: places for outputs are made, sinks are opened,
+//! memory is divided and disks are asked before the first point is read. Nothing gets its name
+//! before the ledgers balance, so a run that fails leaves what was there as it was.
 
 use std::fs;
 use std::path::{Path, PathBuf};

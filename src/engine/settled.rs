@@ -1,5 +1,9 @@
 //! What stages are told of the whole scan, and what they settle by it: before the first tile,
 //! behind a first phase, and for the report.
+//!
+//! A stage settles by figures of the scan and not by those of the first tile that it meets, so that
+//! it does the same to every tile, however tiles are cut. What it settled by itself is in the
+//! report, so that the same can be asked for by hand.
 
 use std::collections::BTreeSet;
 

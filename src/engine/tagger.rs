@@ -1,5 +1,9 @@
 //! Looks at every record once, as it is decoded: the selections that it is in, whether it is
 //! withheld, and its class.
+//!
+//! Later passes ask this of a record each time that they load it, and records are stored in bytes
+//! of their format, in another order than positions. A tag of four bytes beside the reference to a
+//! record answers without fetching it, and is not stored where no stage asks.
 
 use crate::graph::{RunSettings, Treatment};
 use crate::point::{

@@ -1,4 +1,8 @@
 //! What the engine runs: a pipeline whose stages fit each other, its inputs and the memory.
+//!
+//! It is made by the plan and says everything that a run depends on, so the engine asks neither the
+//! pipeline's text nor its graph. A run consumes it: stages settle, and could not be run twice from
+//! their beginning.
 
 use super::beside::Beside;
 use super::demands::Demands;

@@ -1,5 +1,5 @@
-//! What a pipeline is, whoever wrote it: stages, and who takes from whom. Knows neither the
-//! language that it was written in, nor the inputs that it will be fitted to.
+//! What a pipeline is, however it was written: stages, and which takes from which. Knows neither
+//! the language that it was written in, nor the inputs that it will be fitted to.
 //!
 //! A [`Graph`] is a tree of stages below one or several sources. It is checked in one place, when
 //! it is whole ([`Graph::mistakes`]): the language tells what is found there with the places in its

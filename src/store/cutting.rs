@@ -1,4 +1,9 @@
 //! The scan as octree nodes that fit.
+//!
+//! Nodes are found from above, by halving those that are too heavy. How many positions a box holds
+//! is answered by the index of the sealed scan, which knows the counts of whole blocks, so only
+//! blocks at the faces of a box are unpacked. Counting while the scan is decoded would need the
+//! sizes of tiles before the memory for them is known.
 
 use super::TileKey;
 use super::sealed::{Reader, SealedTiles};

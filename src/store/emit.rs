@@ -1,4 +1,8 @@
 //! What comes out of the merge of a range: blocks of distinct positions, and the order of records.
+//!
+//! Records are not moved: 8 bytes say where each one, in canonical order, lies among the runs.
+//! Records are long, 20 to 70 bytes and more, and most of them are removed in the end, so moving
+//! them would read and write all of them for the sake of few.
 
 use super::Levels;
 use super::block::{BLOCK, Block};

@@ -1,4 +1,9 @@
 //! Looking up where records are stored, and what is held to fetch them.
+//!
+//! Records lie in the order in which runs were sorted and are asked for in canonical order, so
+//! those of one chunk are spread over many runs. They are sorted by where they are stored, read in
+//! stretches that are in one piece, and put to their slots: a read for each record would be a
+//! system call for each.
 
 use super::pieces::{PIECE, Pieces};
 use super::record::ref_bytes;

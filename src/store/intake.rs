@@ -1,5 +1,9 @@
 //! The decode's end: records become sorted runs. A run is what one thread holds before it spills:
 //! its positions, packed, and its records, both in canonical order.
+//!
+//! Every thread fills and sorts a run of its own, so the decode needs no order among threads and no
+//! lock but for a list. Where a run begins and ends depends on threads and memory, and decides
+//! nothing: the merge orders records of one position by their bytes.
 
 use std::sync::Arc;
 use std::sync::Mutex;

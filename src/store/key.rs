@@ -1,4 +1,9 @@
 //! Morton order of lattice positions, and octree nodes as cubes of it.
+//!
+//! In Morton order every octree node is one stretch of the sequence, so one sorted sequence serves
+//! tiles, cells, boxes of the index and counts of every cube size. Other curves keep neighbours
+//! closer, but their nodes have to be computed along the way from the root, where here a comparison
+//! of two positions takes a few operations on their bits.
 
 use std::cmp::Ordering;
 

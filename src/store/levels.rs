@@ -1,4 +1,9 @@
 //! Occupied cubes of every power-of-two side, exactly, from one walk in Morton order.
+//!
+//! A stage chooses the side of its cells by how many positions a cell would hold. Two positions
+//! that follow each other in Morton order say by their highest different bit at which sides they
+//! are in different cubes, so a counter for each bit is enough, and the merge passes over all
+//! positions anyway. An estimate from samples would be wrong for scans whose density varies.
 
 use super::key::split_level;
 use crate::point::Position;

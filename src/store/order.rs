@@ -1,5 +1,10 @@
 //! Canonical order of what a run holds: radix sorts by the upper levels of the octree, and exact
 //! comparison where these do not decide. Knows no records but through a comparison.
+//!
+//! A sort by comparison would compare each position some twenty times, with outcomes that look
+//! random to the processor. A path through the upper levels of the octree fits one word with an
+//! index beside it, and a radix sort moves these words a few times without a comparison. The few
+//! that are equal by then are compared exactly.
 
 use std::cmp::Ordering;
 

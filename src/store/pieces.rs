@@ -1,4 +1,8 @@
 //! Items of one size in a spill, found by number.
+//!
+//! An address for each item would take more memory than many of the items. With 4,096 of them to a
+//! piece the table is small, and an item is found by a division. Pieces may be stored in any order,
+//! so all threads write at once.
 
 use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
@@ -19,8 +23,8 @@ pub struct Pieces {
 
 /// Items in a piece.
 pub const PIECE: usize = 4096;
-/// Bytes that are verified together, at least, where a piece is in a file: whoever wants one item
-/// reads so much, and a checksum of four bytes is held for it.
+/// Bytes that are verified together, at least, where a piece is in a file: so much is read
+/// for one item, and a checksum of four bytes is held for it.
 const UNIT_BYTES: usize = 4096;
 
 /// Where the pieces are.

@@ -1,4 +1,8 @@
 //! What the store keeps beside each record, and the sizes of what it keeps for each position.
+//!
+//! What passes decide is kept beside records, in a byte each, and never in them: a record that is
+//! kept is written with the bytes that it was read with, and passes and branches can hold different
+//! opinions of it at the same time.
 
 use crate::point::Edit;
 

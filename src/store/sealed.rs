@@ -1,5 +1,11 @@
 //! The decoded scan: distinct positions in Morton order, an index of tight boxes over them, and the
 //! records behind each.
+//!
+//! It answers three questions: which blocks meet a box, what is nearest to a point, and which bytes
+//! the records of these numbers have. Once sealed it does not change, so all threads and all passes
+//! read it without locks, and positions, records and columns have one numbering to the end of the
+//! run. The index is one tight box a block and boxes of 16 boxes above them, in memory, where half
+//! a byte a position buys that no block is read in vain.
 
 use std::cmp::Ordering;
 

@@ -1,5 +1,11 @@
 //! Exact neighbourhoods of a tile's positions: found among what is loaded, proven against what is
 //! not, searched for in the whole scan where the proof fails.
+//!
+//! A set of neighbours is right if its farthest is nearer than the first plane of positions that
+//! are not loaded; at equal distance a position beyond might win the tie. Faces beyond which the
+//! scan has nothing do not count. So the width of the rim decides about speed and never about an
+//! answer. No width has to be guessed that would do for every place of every scan, and a rim that
+//! does not fit the memory is made narrower without harm.
 
 use std::sync::Arc;
 

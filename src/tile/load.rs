@@ -1,4 +1,9 @@
 //! Filling a tile: its core, its zone, and a rim wide enough to prove most neighbourhoods.
+//!
+//! All three lie in one box, which is asked for once, since most blocks of the rim reach into the
+//! core. The width of the rim follows from the density of the core, about the square root of the
+//! number of neighbours in spacings of the points: a wider one loads positions in vain, a narrower
+//! one leaves more of them to be searched for one by one.
 
 use std::sync::Arc;
 

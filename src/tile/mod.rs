@@ -1,5 +1,10 @@
 //! Tiles: the points of one cube with neighbourhoods that are exact beyond its faces, as a pass
 //! sees them. Knows no stage that works on them.
+//!
+//! A stage sees plain slices in memory and none of how a scan is stored. What it computes for the
+//! core of a tile is what it would compute of the whole scan, since neighbourhoods are proven to be
+//! complete or searched for until they are. So a stage is written once, and no cut into tiles shows
+//! in a result.
 
 mod around;
 mod load;

@@ -1,4 +1,9 @@
 //! The nearest positions of one point anywhere in the scan: best-first search over the index.
+//!
+//! It is for the few positions whose neighbourhoods a tile cannot prove. Loading a wider rim for
+//! all would cost more than these searches, and where a scan is empty around a point no width would
+//! do. Boxes are visited by their distance, so no block is read that cannot hold a neighbour, and
+//! the blocks last read are kept, as such positions lie side by side.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -1,6 +1,10 @@
-//! Removing scratch folders: one's own at the end, and those of killed runs. All of it goes through
-//! descriptors that follow no link, so that nobody can put another folder in the place of one that
-//! is being removed.
+//! Removing scratch folders: one's own at the end, and those of killed runs.
+//!
+//! All of it goes through descriptors that follow no link, so that another folder cannot be put in
+//! the place of one that is being removed. A folder is removed only if it is known to be left over:
+//! it is the same user's, its marker is a regular file that no process has locked, and it was made
+//! on this machine. Folders of other machines stay, since a network's file system may not show
+//! their locks.
 
 use std::ffi::CStr;
 use std::fs::File;

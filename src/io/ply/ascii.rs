@@ -153,7 +153,7 @@ impl Part for AsciiPart<'_> {
 
 impl AsciiPart<'_> {
     /// True if a number of one of the properties `columns` has more digits than a `float` holds.
-    /// What is wrong with a line is left to whoever reads it.
+    /// What is wrong with a line is told when it is read.
     pub fn outgrows_float(mut self, columns: &[usize]) -> Result<bool> {
         self.skip()?;
         for _ in 0..self.points {

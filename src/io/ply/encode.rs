@@ -48,7 +48,7 @@ pub(super) struct VertexPlan {
     /// [`WIDE`] once the file has colours of 16 bits, so that no chunk needs to have 8, and
     /// [`FULL`] once they are known to need them, so that nobody needs to look.
     pub widened: AtomicU8,
-    /// For the vertices of chunks; whoever has written them puts them back.
+    /// For the vertices of chunks; the thread that has written them puts them back.
     pub spare: Spare<Vec<u8>>,
 }
 
