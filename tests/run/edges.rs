@@ -94,7 +94,7 @@ fn a_position_with_very_many_records_keeps_them_all_in_order() {
         (0..n).map(|i| ([1.0, 2.0, 3.0], i.wrapping_mul(2_654_435_761))).collect();
     points.extend((0..500).map(|i| ([f64::from(i), -1.0, 0.0], i)));
     case.ply(&points);
-    case.run("threads = 2\nmemory = '96MiB'\ntile_points = 5000", "", "order = 'canonical'")
+    case.run("threads = 2\nmemory = '512MiB'\ntile_points = 5000", "", "order = 'canonical'")
         .unwrap();
     let written = case.written();
     assert_eq!(written.len(), points.len());
@@ -133,13 +133,13 @@ fn the_memory_that_a_heavy_cell_is_said_to_need_does() {
 fn a_stream_of_any_length_needs_no_memory_for_an_index() {
     let at = tempfile::tempdir().unwrap();
     let text = format!(
-        "[run]\nthreads = 2\nmemory = '128MiB'\n[[stage]]\nkind = 'synth'\nscene = 'als'\n\
+        "[run]\nthreads = 2\nmemory = '512MiB'\n[[stage]]\nkind = 'synth'\nscene = 'als'\n\
          points = 4000000000\n[[stage]]\nkind = 'write'\npath = '{}'\n",
         at.path().join("out.laz").display()
     );
     let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin()).unwrap();
     let plan = pipeline.plan(&Overrides::default()).unwrap();
-    assert!(plan.to_string().contains("memory   128 MiB"));
+    assert!(plan.to_string().contains("memory   512 MiB"));
 }
 
 #[test]
