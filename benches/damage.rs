@@ -51,8 +51,7 @@ impl Scan {
     }
 
     fn format(&self) -> u8 {
-        let format = self.schema.layout.form.expect("a LAS file");
-        format
+        self.schema.layout.form.expect("a LAS file")
     }
 
     /// The same, compressed in every way that its format has.

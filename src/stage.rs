@@ -13,7 +13,9 @@ use crate::report::Tally;
 use crate::store::Levels;
 use crate::tile::Tile;
 
-pub use format::{Colors, Format, FormatName, Formats, OutputEncoding, WriteKeys, foreign};
+pub use format::{
+    Colors, CreateFor, Format, FormatName, Formats, OutputEncoding, WriteKeys, foreign,
+};
 pub use kind::{StageKind, StagePlace};
 pub use sink::{ChunkSize, CreateSink, Encode, Encoded, Order, Sink, SinkSummary};
 pub use source::{Contradiction, Input, OpenSource, Part, Source};

@@ -2,15 +2,15 @@
 //! other, the inputs and the memory? Knows no stage by name, and reads no point but a few that it
 //! looks at.
 
+mod fitted;
 mod look;
 mod outline;
 mod passes;
 mod places;
-mod plan;
 mod shown;
 mod sorted;
 mod stretch;
 
+pub use fitted::Plan;
 pub use outline::Outline;
-pub use plan::Plan;
 pub use stretch::Stretch;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::plan::Plan;
+use super::fitted::Plan;
 
 /// What a plan reads, writes and uses.
 #[derive(Debug, Clone, PartialEq, Eq)]

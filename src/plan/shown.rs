@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::plan::Plan;
+use super::fitted::Plan;
 use crate::budget::Bytes;
 use crate::engine::pass::{Call, Pass, needs};
 use crate::error::shown;

@@ -16,6 +16,9 @@ use super::source::Source;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::{Error, Result};
 
+/// Creates a sink for records of a schema.
+pub type CreateFor<'a> = dyn Fn(&Arc<Schema>) -> Result<Box<dyn Sink>> + 'a;
+
 /// A format of files that hold points.
 pub trait Format: Send + Sync {
     /// Its name, which `read.format` and `write.format` take: the extension of its files, in lower
@@ -74,7 +77,7 @@ pub trait Format: Send + Sync {
         _staged: &Path,
         schema: &Arc<Schema>,
         _metadata: &Metadata,
-        create: &dyn Fn(&Arc<Schema>) -> Result<Box<dyn Sink>>,
+        create: &CreateFor<'_>,
     ) -> Result<Box<dyn Sink>> {
         create(schema)
     }

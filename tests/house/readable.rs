@@ -115,7 +115,7 @@ fn functions(text: &str) -> impl Iterator<Item = (&str, usize)> {
         };
         let is_function = before.split_whitespace().all(qualifies);
         let name = signature.split(|c: char| !(c.is_alphanumeric() || c == '_')).next()?;
-        let ends = |line: &&str| {
+        let ends = |line: &str| {
             let rest = line.strip_prefix(indent);
             rest.is_some_and(|rest| rest == "}" || (!rest.starts_with(' ') && rest.ends_with(';')))
         };

@@ -203,15 +203,15 @@ impl WriteOrder {
         let sinks = &sorted.sinks;
         // Branches of stages that stream go by tiles, and keep the order that a stream has.
         let (ops, streams) = (!sorted.ops.is_empty(), !sorted.filters.is_empty());
-        let sorts =
-            |sink: &Box<dyn CreateSink>| sink.is_folder() || sink.order() == Order::Canonical;
-        let mills = ops || streams || sinks.iter().any(sorts);
-        let keeps = |sink: &Box<dyn CreateSink>| match sink.order() {
+        let each = || sinks.iter().map(|sink| &**sink);
+        let sorts = |sink: &dyn CreateSink| sink.is_folder() || sink.order() == Order::Canonical;
+        let mills = ops || streams || each().any(sorts);
+        let keeps = |sink: &dyn CreateSink| match sink.order() {
             Order::Input => true,
             Order::Auto => streams && !ops && !sink.is_folder(),
             Order::Canonical => false,
         };
-        let in_input_order: Vec<bool> = sinks.iter().map(keeps).collect();
+        let in_input_order: Vec<bool> = each().map(keeps).collect();
         if mills && in_input_order.contains(&true) && source.parts() > by_rank::MOST_PARTS {
             let told = "the inputs have too many parts for an output in their order";
             return Err(Error::pipeline(told).help("leave `write.order` out"));
