@@ -1,5 +1,5 @@
-//! What is held of a file's records and of its table of chunks is bounded, whatever it claims and however
-//! long it is.
+//! What is held of a file's records and of its table of chunks is bounded, whatever it claims and
+//! however long it is.
 
 use std::io::{Cursor, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -17,8 +17,8 @@ use pointmill::io::{describe, las};
 use pointmill::{Error, ErrorKind};
 use pointmill::{Graph, Overrides, Quiet, Registry};
 
-/// A file of five points with `count` records, `payload` bytes each: variable length ones behind the
-/// header, or extended ones at the end.
+/// A file of five points with `count` records, `payload` bytes each: variable length ones behind
+/// the header, or extended ones at the end.
 fn file(path: &Path, count: u32, payload: usize, extended: bool) {
     file_of("test", path, count, payload, extended);
 }
@@ -173,7 +173,8 @@ fn many_bytes_of_records_are_carried_and_not_held() {
 /// Bytes of a record of point format 1.
 const RECORD: usize = 28;
 
-/// Head of a LAZ file of `points` points in chunks of varying size, and what its record says of them.
+/// Head of a LAZ file of `points` points in chunks of varying size, and what its record says of
+/// them.
 fn chunked(path: &Path, points: u64) -> (Vec<u8>, LazVlr) {
     let schema = Arc::new(las::layout(1, &[], [0.01; 3], [0.0; 3]));
     write(path, LAZ, &schema, &las::fresh(&schema, None), &[0; RECORD]).unwrap();

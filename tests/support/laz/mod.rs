@@ -1,4 +1,5 @@
-//! What the tests of the LAZ decoder share: files of every format and kind of compression, written by the
+//! What the tests of the LAZ decoder share: files of every format and kind of compression, written
+//! by the
 //! `laz` crate from made-up records, and that crate as the second opinion on any file.
 
 mod colors;
