@@ -18,7 +18,8 @@ fn normal([x, y, z]: [f64; 3], seed: u64) -> [f32; 3] {
     [x, y, z].map(|v| (v / length) as f32)
 }
 
-/// Positions of a square of 32 × 32, 4 steps apart, with normals that are off by `roughness` at most.
+/// Positions of a square of 32 × 32, 4 steps apart, with normals that are off by `roughness` at
+/// most.
 fn surface(
     at: impl Fn(i64, i64) -> i64,
     slope: impl Fn(i64, i64) -> [f64; 2],
@@ -171,8 +172,8 @@ fn what_is_auto_follows_from_the_scatter_and_the_number_to_keep() {
         };
         (value("max_angle"), value("side"), value("min_spacing"), stage.needs().cell_side)
     };
-    // A square of 32 × 32 positions, 4 steps apart: 8 × 8 cubes of side 16 are 64, and those of 1.25
-    // sides are as wide as 20 steps.
+    // A square of 32 × 32 positions, 4 steps apart: 8 × 8 cubes of side 16 are 64, and those of
+    // 1.25 sides are as wide as 20 steps.
     let (angle, side, spacing, cell) = chosen(Some(Keep::Records(64)), 0.1, 1.0);
     assert_eq!((angle, side, spacing, cell), (None, Some(20.0.into()), Some(12.0.into()), 20));
     // Between two levels by powers: 128 cubes of 16 / √2.

@@ -25,7 +25,8 @@ fn any_measure() -> impl Strategy<Value = Measure> {
 }
 
 fn any_reference() -> impl Strategy<Value = Reference> {
-    // Their largest components are powers of two: scaled by them they are what the plain version has.
+    // Their largest components are powers of two: scaled by them they are what the plain version
+    // has.
     let [a, b] = [[0.0, 0.0, 2.0], [1.0, -1.0, 0.5]].map(Reference::Vector);
     prop::sample::select(vec![Reference::X, Reference::Y, Reference::Z, a, b])
 }

@@ -1,4 +1,5 @@
-//! `picture`: scans of every format side by side, in a PNG file that appears complete or not at all.
+//! `picture`: scans of every format side by side, in a PNG file that appears complete or not at
+//! all.
 
 use std::fs;
 

@@ -1,5 +1,5 @@
-//! Messages in the words of what was typed: flags for commands, keys for pipeline files, and what to
-//! type instead.
+//! Messages in the words of what was typed: flags for commands, keys for pipeline files, and what
+//! to type instead.
 
 use std::fs;
 use std::os::unix::ffi::OsStrExt;

@@ -117,8 +117,8 @@ fn refused(what: &str, name: &str, bytes: &[u8], byte: Option<usize>, says: &str
     }
 }
 
-/// Asserts that a file is read whole, that a warning says `says` (none where that is empty), and that
-/// what comes out is what comes out of `good`.
+/// Asserts that a file is read whole, that a warning says `says` (none where that is empty), and
+/// that what comes out is what comes out of `good`.
 fn reads_as(what: &str, name: &str, bytes: &[u8], good: &[u8], says: &str) {
     let outputs = [bytes, good].map(|bytes| {
         let (folder, path) = input(name, bytes);

@@ -1,5 +1,5 @@
-//! Places that take no output, disks that are full, inputs that change while they are read: an error
-//! with path and remedy, the right exit code, and nothing left behind.
+//! Places that take no output, disks that are full, inputs that change while they are read: an
+//! error with path and remedy, the right exit code, and nothing left behind.
 
 use std::fs;
 use std::path::Path;

@@ -43,7 +43,8 @@ pub fn struct_of(text: &str, name: &str) -> (String, Vec<Field>) {
     (docs, fields)
 }
 
-/// The words of an enum whose variants are written in kebab case, or as `serde` renames them; None if there is no such enum.
+/// The words of an enum whose variants are written in kebab case, or as `serde` renames them; None
+/// if there is no such enum.
 pub fn enum_of(text: &str, name: &str) -> Option<Enum> {
     let lines = body(text, "enum", name)?;
     let (mut words, mut default) = (Vec::new(), None);

@@ -323,8 +323,8 @@ impl Bench {
     }
 }
 
-/// At most `most` of the numbers 1 to `calls`, evenly spread, the first and the last among them; all
-/// if the environment asks for all faults.
+/// At most `most` of the numbers 1 to `calls`, evenly spread, the first and the last among them;
+/// all if the environment asks for all faults.
 pub fn spread(calls: u64, most: u64) -> Vec<u64> {
     let all = std::env::var("POINTMILL_FAULTS").is_ok_and(|which| which == "all");
     if all || calls <= most {

@@ -12,8 +12,8 @@ use crate::support::random::Random;
 const LONGEST: usize = 128 << 10;
 /// Inputs that are kept, at most.
 const MOST_KEPT: usize = 4096;
-/// Marks that begin with the same words (up to a colon) and count as new, at most: some hold parts of
-/// the input after all.
+/// Marks that begin with the same words (up to a colon) and count as new, at most: some hold parts
+/// of the input after all.
 const MOST_ALIKE: usize = 300;
 /// Tries to make a finding smaller.
 const TRIES: usize = 400;

@@ -41,8 +41,8 @@ pub fn proper(stage: &str, error: &Error, allowed: &[ErrorKind]) -> Result<Strin
     Ok(text)
 }
 
-/// A message without what differs from input to input: digits, and what stands in backticks, quotes or
-/// brackets.
+/// A message without what differs from input to input: digits, and what stands in backticks, quotes
+/// or brackets.
 pub fn shape(message: &str) -> String {
     let mut shape = String::new();
     let mut quoted = None;
@@ -98,8 +98,8 @@ pub struct Read {
 /// Bytes that a part of a source may hold for it to be worth trying.
 const MOST_BYTES: usize = 16 << 20;
 
-/// Reads a source without the dimensions `unread`; none if a part holds too much to be worth trying. The
-/// error is a broken promise.
+/// Reads a source without the dimensions `unread`; none if a part holds too much to be worth
+/// trying. The error is a broken promise.
 pub fn read_without(
     source: &dyn Source,
     unread: &[String],

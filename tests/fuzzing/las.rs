@@ -8,8 +8,9 @@ use pointmill::point::{PointBatch, Schema};
 use pointmill::stage::Source;
 
 use super::judge::{self, Judgement, Outcome, Read, magnitude, shape};
-use super::las_seeds::{header_size, seeds};
+use super::las_seeds::seeds;
 use super::{Target, mutate};
+use crate::support::las_file::header_size;
 use crate::support::random::Random;
 
 /// The target.

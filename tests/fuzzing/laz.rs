@@ -1,5 +1,5 @@
-//! Target `laz`: the compressed points of a LAZ file, of every format, version and kind of chunk. Files are
-//! small and are read alone, so that there are thousands of them in a second.
+//! Target `laz`: the compressed points of a LAZ file, of every format, version and kind of chunk.
+//! Files are small and are read alone, so that there are thousands of them in a second.
 
 use std::path::Path;
 
@@ -91,8 +91,8 @@ fn points_of_a_length(random: &mut Random, points: &mut [u8], other: &[u8]) {
     }
 }
 
-/// One file of each format, version and kind of chunks; wave packets, extra bytes and scanner channels are
-/// among their fields.
+/// One file of each format, version and kind of chunks; wave packets, extra bytes and scanner
+/// channels are among their fields.
 pub fn seeds() -> Vec<Vec<u8>> {
     let mut all = Vec::new();
     for format in 0..=10u8 {

@@ -1,5 +1,5 @@
-//! The words of pipeline files, as the registry tells them: kinds, keys and values, learned from the
-//! help that errors give.
+//! The words of pipeline files, as the registry tells them: kinds, keys and values, learned from
+//! the help that errors give.
 
 use std::collections::BTreeSet;
 use std::sync::OnceLock;

@@ -1,5 +1,5 @@
-//! docs/dependencies.md says what is known against each package: it is about those of Cargo.lock, and
-//! their licences let everyone use ours.
+//! docs/dependencies.md says what is known against each package: it is about those of Cargo.lock,
+//! and their licences let everyone use ours.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

@@ -128,7 +128,8 @@ fn the_tour_names_every_stage_that_works_on_tiles() {
 
 #[test]
 fn a_path_in_a_message_is_shown_and_not_displayed() {
-    /// Documents that say paths as they are, and whose writers escape them: the report and the events.
+    /// Documents that say paths as they are, and whose writers escape them: the report and the
+    /// events.
     const DOCUMENTS: [(&str, usize); 2] = [("src/report/document.rs", 1), ("src/cli/events.rs", 3)];
     let mut files = Vec::new();
     below(&root().join("src"), &mut files);

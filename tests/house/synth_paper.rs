@@ -1,5 +1,5 @@
-//! The paper's experiment, done again: its tables beside ours in docs/paper.md, and what the uniform
-//! pattern does to neighbourhoods.
+//! The paper's experiment, done again: its tables beside ours in docs/paper.md, and what the
+//! uniform pattern does to neighbourhoods.
 //!
 //! `POINTMILL_WRITE_DOCS=1 cargo test --test repository` writes the table again.
 

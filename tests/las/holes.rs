@@ -1,5 +1,5 @@
-//! Stretches of one byte where compressed points were, as sparse copies and bad disks leave them: the
-//! program tells or reads, and does not die of them.
+//! Stretches of one byte where compressed points were, as sparse copies and bad disks leave them:
+//! the program tells or reads, and does not die of them.
 
 use std::path::Path;
 
@@ -92,8 +92,8 @@ fn a_hole_of_equal_bytes_is_told() {
     }
 }
 
-/// A decoder that calls itself for every symbol that switches to another sequence of times overflows its
-/// stack by this file: six bytes of ones are read as thousands of those.
+/// A decoder that calls itself for every symbol that switches to another sequence of times
+/// overflows its stack by this file: six bytes of ones are read as thousands of those.
 #[test]
 fn times_that_switch_sequences_without_end_are_an_error() {
     let case = case_file("laz-recursion-1.laz");

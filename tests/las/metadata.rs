@@ -1,5 +1,6 @@
 //! What LAS files say besides points, in the words of many writers: read, carried, mended or told.
-//! The files of `tests/cases` are small ones of the kinds that public reports of other programs tell of.
+//! The files of `tests/cases` are small ones of the kinds that public reports of other programs
+//! tell of.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -34,8 +35,8 @@ impl Bench {
         self.0.path().join(name)
     }
 
-    /// Reads `inputs`, has `stages` work on them under `settings`, and writes `output` with more keys
-    /// behind its name.
+    /// Reads `inputs`, has `stages` work on them under `settings`, and writes `output` with more
+    /// keys behind its name.
     fn run(
         &self,
         inputs: &[PathBuf],

@@ -74,8 +74,8 @@ fn a_plain_file_written_again_keeps_all_but_recomputed_fields() {
         let start = u32::from_le_bytes(old[96..100].try_into().unwrap()) as usize;
         let size = usize::from(u16::from_le_bytes(old[94..96].try_into().unwrap()));
         // Counts (107 to 131, 247 to 375) and box (179 to 227) follow the points, the extended
-        // records (235 to 247) the end of the points. Bits of the encoding (6 to 8) may be mended, and
-        // the software (58 to 90) is ours.
+        // records (235 to 247) the end of the points. Bits of the encoding (6 to 8) may be mended,
+        // and the software (58 to 90) is ours.
         for (from, to) in [(0, 6), (8, 58), (90, 107)] {
             assert!(old[from..to] == new[from..to], "{}", scan.name);
         }

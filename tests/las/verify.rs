@@ -1,4 +1,5 @@
-//! Points are held against what their header says of them: its box, its counts by return, its count.
+//! Points are held against what their header says of them: its box, its counts by return, its
+//! count.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -229,8 +230,8 @@ fn nothing_is_told_of_inputs_that_were_not_read_to_their_end() {
     assert_eq!(source.contradictions(), told);
 }
 
-/// Flips bytes of compressed points: how many files then read without an error, to other points, and
-/// how many of these contradict no header.
+/// Flips bytes of compressed points: how many files then read without an error, to other points,
+/// and how many of these contradict no header.
 fn damage(folder: &Path, format: u8, flips: u64) -> (usize, usize) {
     let path = scan(folder, "a.laz", format, |_| ());
     let good = std::fs::read(&path).unwrap();

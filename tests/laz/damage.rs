@@ -1,5 +1,6 @@
-//! Compressed points with bits, bytes and stretches that are others: reading ends, and almost always says
-//! where the damage is. `benches/damage.rs` is the same by the ten thousand, and on real scans.
+//! Compressed points with bits, bytes and stretches that are others: reading ends, and almost
+//! always says where the damage is. `benches/damage.rs` is the same by the ten thousand, and on
+//! real scans.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
-//! The decoder of compressed points held against the `laz` crate: the same bytes, whatever is in the
-//! records, however they are compressed and in batches of any size.
+//! The decoder of compressed points held against the `laz` crate: the same bytes, whatever is in
+//! the records, however they are compressed and in batches of any size.
 
 use std::path::{Path, PathBuf};
 
@@ -200,7 +200,8 @@ fn compressed(folder: &Path, all: &mut Vec<PathBuf>) {
     }
 }
 
-/// Reads a file by both decoders, to its end: where they first differ, and how many records there are.
+/// Reads a file by both decoders, to its end: where they first differ, and how many records there
+/// are.
 fn compare(path: &Path) -> pointmill::Result<u64> {
     let source = open(&[path.to_owned()])?;
     let stride = source.schema().stride;

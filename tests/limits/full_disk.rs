@@ -124,7 +124,8 @@ fn a_disk_that_is_really_full_ends_a_run_with_an_error_and_nothing_half_written(
 #[ignore = "mounts a small file system in memory: needs root"]
 fn a_second_copy_for_other_colours_is_counted_before_the_work() {
     let at = tempfile::tempdir().unwrap();
-    // A vertex takes 54 bytes with colours of 8 bits and 57 with 16: the disk has room for one file.
+    // A vertex takes 54 bytes with colours of 8 bits and 57 with 16: the disk has room for one
+    // file.
     colored(at.path(), 150_000);
     let input = at.path().join("in.las");
     let Some(disk) = Disk::of(12 << 10) else { return };

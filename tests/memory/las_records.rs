@@ -1,5 +1,5 @@
-//! What is held of a file's records and of its table of chunks is bounded, whatever it claims and however
-//! long it is.
+//! What is held of a file's records and of its table of chunks is bounded, whatever it claims and
+//! however long it is.
 
 use std::io::{Cursor, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -177,7 +177,8 @@ fn many_bytes_of_records_are_carried_and_not_held() {
 /// Bytes of a record of point format 1.
 const RECORD: usize = 28;
 
-/// Head of a LAZ file of `points` points in chunks of varying size, and what its record says of them.
+/// Head of a LAZ file of `points` points in chunks of varying size, and what its record says of
+/// them.
 fn chunked(path: &Path, points: u64) -> (Vec<u8>, LazVlr) {
     let schema = Arc::new(las::layout(1, &[], [0.01; 3], [0.0; 3]));
     write(path, LAZ, &schema, &las::fresh(&schema, None), &[0; RECORD]).unwrap();

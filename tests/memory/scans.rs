@@ -13,8 +13,8 @@ use crate::support::setup::{Setup, convert, reduce};
 use pointmill::Registry;
 use serde_json::json;
 
-/// The budget of every run, and more than any of its allocations. What the test itself holds of a scan
-/// counts in it.
+/// The budget of every run, and more than any of its allocations. What the test itself holds of a
+/// scan counts in it.
 const MEMORY: u64 = 512 << 20;
 /// Scans above are cut to their first points.
 const MOST: usize = 300_000;
@@ -44,8 +44,8 @@ const REFUSED: [&str; 17] = [
     "trimesh/emptyIO/ply_empty_header.ply",
 ];
 
-/// Files whose x and y are degrees, or metres under heights in feet: stages that measure refuse them
-/// until they are told what to do.
+/// Files whose x and y are degrees, or metres under heights in feet: stages that measure refuse
+/// them until they are told what to do.
 const MIXED: [&str; 6] = [
     "laspy/simple.copc.laz",
     "laspy/simple1_4.las",

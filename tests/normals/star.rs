@@ -14,8 +14,8 @@ use spade::{DelaunayTriangulation, Point2, Triangulation};
 /// compared: there, rounding may decide.
 const NEAR_ZERO: f64 = 1e-9;
 
-/// The triangles of the library's triangulation that touch 0, as indices of `flat`, and whether 0 is
-/// on the border. None where a decision about them is too close.
+/// The triangles of the library's triangulation that touch 0, as indices of `flat`, and whether 0
+/// is on the border. None where a decision about them is too close.
 fn triangles(flat: &[[f64; 2]]) -> Option<(Vec<[usize; 2]>, bool)> {
     let largest = flat.iter().flatten().fold(0.0f64, |m, c| m.max(c.abs()));
     let flat: Vec<[f64; 2]> = flat.iter().map(|q| q.map(|c| c / largest)).collect();

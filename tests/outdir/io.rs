@@ -1,5 +1,5 @@
-//! One output for each input: its own header, records, offset and name, from inputs that are read as
-//! one scan.
+//! One output for each input: its own header, records, offset and name, from inputs that are read
+//! as one scan.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
-//! Stages of two phases, selections and repeated passes against brute force over all of a small scan,
-//! in runs of many tiles.
+//! Stages of two phases, selections and repeated passes against brute force over all of a small
+//! scan, in runs of many tiles.
 
 use std::collections::{BTreeMap, BTreeSet};
 

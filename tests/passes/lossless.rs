@@ -1,6 +1,6 @@
 //! Nothing lost where stages remove by class, mark, repeat or feed several outputs: every written
-//! record is one of the input, but for the one field that a mark writes, and every record is accounted
-//! for.
+//! record is one of the input, but for the one field that a mark writes, and every record is
+//! accounted for.
 
 use std::collections::BTreeMap;
 use std::path::Path;

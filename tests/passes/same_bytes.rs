@@ -1,6 +1,6 @@
-//! The answer is a function of the points alone, for stages of two phases, passes, selections, marks
-//! and several sinks too: random configurations of one scan and pipeline give the same bytes of every
-//! output and of the report's `result`.
+//! The answer is a function of the points alone, for stages of two phases, passes, selections,
+//! marks and several sinks too: random configurations of one scan and pipeline give the same bytes
+//! of every output and of the report's `result`.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! Values that one format or the lattice cannot hold as they are: kept, or told, before the work where
-//! that can be; never changed without a word.
+//! Values that one format or the lattice cannot hold as they are: kept, or told, before the work
+//! where that can be; never changed without a word.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -73,7 +73,8 @@ fn a_text_keeps_digits_that_a_float_has_no_room_for() {
         assert_eq!(values(&output, "Y"), [5600000.37, 5600000.12, 5600001.81]);
         assert_eq!(values(&output, "X"), [350000.12, 350000.34, 350001.56]);
     }
-    // One whose digits a float has is as it was, and so is one that its neighbour needs no more for.
+    // One whose digits a float has is as it was, and so is one that its neighbour needs no more
+    // for.
     let header = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
                   property float z\nproperty float q\nend_header\n";
     let short = folder.path().join("short.ply");

@@ -1,5 +1,5 @@
-//! PLY files that the tests write themselves: every type and encoding, headers as others write them,
-//! and what is carried.
+//! PLY files that the tests write themselves: every type and encoding, headers as others write
+//! them, and what is carried.
 
 use crate::support::ply::{file, read, records, write};
 use pointmill::io::ply::{self, Encoding, PlyOptions};

@@ -1,4 +1,5 @@
-//! The survey: planes and deviations of tiles and scan, against geometry and in any order of merging.
+//! The survey: planes and deviations of tiles and scan, against geometry and in any order of
+//! merging.
 
 use pointmill::geom::lattice::Lattice;
 use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
@@ -33,8 +34,8 @@ fn sorted(mut records: Vec<Record>) -> Vec<Record> {
     records
 }
 
-/// Surveys sorted records in tiles of side 2^`level`; tiles are dealt to `threads` surveys, which are
-/// merged last first, and the second walk is cut elsewhere.
+/// Surveys sorted records in tiles of side 2^`level`; tiles are dealt to `threads` surveys, which
+/// are merged last first, and the second walk is cut elsewhere.
 fn survey(records: &[Record], level: u32, threads: usize) -> Result<(Vec<TileFigures>, Totals)> {
     let lattice = lattice(0.5);
     let bounds = Bounds::of(records.iter().map(|r| r.0));

@@ -13,7 +13,8 @@ use serde_json::Value;
 
 use crate::support::case::{Case, execute};
 
-/// What waits in scratch files, by the names of these; `found` waits only where no progress is reported.
+/// What waits in scratch files, by the names of these; `found` waits only where no progress is
+/// reported.
 const STORES: [&str; 10] = [
     "runs",
     "records",

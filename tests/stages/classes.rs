@@ -1,5 +1,5 @@
-//! Which points take part, by class and flags: the stage `filter`, noise that is left out, cells that
-//! mix no classes, and what is said of all this.
+//! Which points take part, by class and flags: the stage `filter`, noise that is left out, cells
+//! that mix no classes, and what is said of all this.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
@@ -22,7 +22,8 @@ const TILED: Settings = Settings {
 };
 const REDUCE: &str = "[[stage]]\nkind = 'normals'\n[[stage]]\nkind = 'cells'\n\
                       [[stage]]\nkind = 'median'\n";
-/// Where a record has its flags and its class (LAS 1.4 R15, table 16), and the bit of the overlap flag.
+/// Where a record has its flags and its class (LAS 1.4 R15, table 16), and the bit of the overlap
+/// flag.
 const FLAGS: usize = 15;
 const CLASS: usize = 16;
 const OVERLAP: u8 = 8;

@@ -64,8 +64,9 @@ fn distinct(positions: &[Position]) -> Vec<Position> {
     all
 }
 
-/// The `k` nearest of `all` (distinct, in Morton order) to `p` other than itself, by exact distance,
-/// ties by Morton order; in Morton order. The bool is true if Morton order chose the last one.
+/// The `k` nearest of `all` (distinct, in Morton order) to `p` other than itself, by exact
+/// distance, ties by Morton order; in Morton order. The bool is true if Morton order chose the last
+/// one.
 fn nearest(all: &[Position], p: Position, k: usize) -> (Vec<Position>, bool) {
     let mut others: Vec<(u128, usize)> = all
         .iter()

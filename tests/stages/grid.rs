@@ -154,7 +154,8 @@ fn with_normals_the_deviation_is_from_the_plane_of_the_point_that_stays() {
 
 #[test]
 fn without_normals_the_deviation_is_from_the_least_squares_plane_of_the_cube() {
-    // On x + z = 7 but for one, which is above; the cube around 12 has too few, that around 20 a line.
+    // On x + z = 7 but for one, which is above; the cube around 12 has too few, that around 20 a
+    // line.
     let plane = [[0, 0, 7], [7, 0, 0], [0, 7, 7], [7, 7, 0], [3, 3, 4], [4, 4, 3]];
     let line = [[20, 20, 20], [21, 21, 21], [22, 22, 22], [23, 23, 23]];
     let few = [[12, 12, 12], [13, 12, 12], [12, 13, 12]];

@@ -1,5 +1,5 @@
-//! The order of an output's records: that of the inputs where it is asked for, whatever the tiles, and
-//! in the chunks of LAZ that of time.
+//! The order of an output's records: that of the inputs where it is asked for, whatever the tiles,
+//! and in the chunks of LAZ that of time.
 
 use std::path::Path;
 

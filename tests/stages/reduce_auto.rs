@@ -1,5 +1,5 @@
-//! What a pipeline leaves to the scan ("auto", "spread"): a function of the points alone, told in the
-//! report, and the same bytes when it is given by hand. And the baseline of the report.
+//! What a pipeline leaves to the scan ("auto", "spread"): a function of the points alone, told in
+//! the report, and the same bytes when it is given by hand. And the baseline of the report.
 
 use std::path::PathBuf;
 

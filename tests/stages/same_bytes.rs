@@ -1,5 +1,5 @@
-//! The answer is a function of the points alone: random configurations of one scan and pipeline give
-//! the same bytes, in runs that had every chance to differ.
+//! The answer is a function of the points alone: random configurations of one scan and pipeline
+//! give the same bytes, in runs that had every chance to differ.
 
 use crate::support::random::Random;
 use crate::support::runs::{Memory, Ran, Settings, assert_not_empty, instruction_sets, run};

@@ -6,8 +6,8 @@ use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Bytes that a thread may hold while it takes an input, beyond those before. What asks for more gets
-/// nothing, so that the machine stays usable; code that cannot do without ends the process.
+/// Bytes that a thread may hold while it takes an input, beyond those before. What asks for more
+/// gets nothing, so that the machine stays usable; code that cannot do without ends the process.
 const REFUSED: isize = 2 << 30;
 
 thread_local! {

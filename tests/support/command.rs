@@ -43,7 +43,8 @@ pub fn mebibytes(told: &str) -> u64 {
     before.rsplit(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap()
 }
 
-/// Runs a command that must succeed and say nothing, but what it chose for so few points; its stdout.
+/// Runs a command that must succeed and say nothing, but what it chose for so few points; its
+/// stdout.
 pub fn done(at: &Path, arguments: &[&str]) -> String {
     let (code, stdout, stderr) = pointmill(at, arguments);
     let noise = |line: &&str| {

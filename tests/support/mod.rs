@@ -1,5 +1,5 @@
-//! What the tests share, compiled once for each of the few programs: made-up and real scans, runs in
-//! this process and of the command, files laid out by hand, and what is asserted of all of them.
+//! What the tests share, compiled once for each of the few programs: made-up and real scans, runs
+//! in this process and of the command, files laid out by hand, and what is asserted of all of them.
 
 #![allow(dead_code, reason = "each program uses a part of it")]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
@@ -21,8 +21,9 @@ pub mod tiles;
 
 use std::path::{Path, PathBuf};
 
-/// The folder of real scans that the environment names. A test that asks for it is ignored unless it
-/// is run by name or with `--ignored`, and fails where there is no such folder: none passes empty.
+/// The folder of real scans that the environment names. A test that asks for it is ignored unless
+/// it is run by name or with `--ignored`, and fails where there is no such folder: none passes
+/// empty.
 pub fn scans() -> PathBuf {
     let folder = std::env::var_os("POINTMILL_SCANS").map(PathBuf::from);
     let folder = folder.expect("POINTMILL_SCANS names the folder of real scans");

@@ -76,8 +76,8 @@ impl Ran {
     }
 }
 
-/// Runs `read` of `inputs`, then `stages`, then `write` of a file in `folder` with the extension and
-/// keys of `write` (as in `"laz"` or `"ply\nencoding = \"ascii\""`).
+/// Runs `read` of `inputs`, then `stages`, then `write` of a file in `folder` with the extension
+/// and keys of `write` (as in `"laz"` or `"ply\nencoding = \"ascii\""`).
 pub fn run(
     folder: &Path,
     inputs: &[PathBuf],

@@ -26,8 +26,8 @@ impl Scan {
         Scan::of(&*source, usize::MAX)
     }
 
-    /// A copy whose records lie elsewhere in stored coordinates: `to` gets the number of each and where
-    /// it lies.
+    /// A copy whose records lie elsewhere in stored coordinates: `to` gets the number of each and
+    /// where it lies.
     pub fn moved(&self, mut to: impl FnMut(usize, [i32; 3]) -> [i32; 3]) -> Scan {
         let mut scan = self.clone();
         for (i, record) in scan.records.chunks_exact_mut(scan.schema.stride).enumerate() {

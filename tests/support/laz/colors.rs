@@ -1,6 +1,6 @@
-//! Colours of version 1, which the `laz` crate neither writes nor reads as LASzip does: it counts the upper
-//! byte of blue among those of green, and reads upper bytes into those that were there. The rest of the
-//! file is the crate's.
+//! Colours of version 1, which the `laz` crate neither writes nor reads as LASzip does: it counts
+//! the upper byte of blue among those of green, and reads upper bytes into those that were there.
+//! The rest of the file is the crate's.
 
 use std::io::{Cursor, Seek, SeekFrom, Write};
 

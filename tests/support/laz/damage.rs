@@ -114,7 +114,8 @@ impl Victim {
         self.records.len() / self.stride
     }
 
-    /// Harms it, reads it, and heals it. Panics if reading takes too long, or fails otherwise than it may.
+    /// Harms it, reads it, and heals it. Panics if reading takes too long, or fails otherwise than
+    /// it may.
     pub fn suffer(&self, harm: Harm, random: &mut Random) -> Outcome {
         let mut bytes = self.whole[self.start..self.end].to_vec();
         let (at, length) = harm.harm(random, &mut bytes);

@@ -1,4 +1,5 @@
-//! What the tests of the LAZ decoder share: files of every format and kind of compression, written by the
+//! What the tests of the LAZ decoder share: files of every format and kind of compression, written
+//! by the
 //! `laz` crate from made-up records, and that crate as the second opinion on any file.
 
 mod colors;
@@ -14,11 +15,9 @@ use laz::{LasZipCompressor, LasZipDecompressor, LazVlr};
 use pointmill::Result;
 use pointmill::io::las::open;
 
-use super::las_file::STRIDES;
+use super::las_file::{Beside, Header, STRIDES};
 use super::records::read_without;
 
-/// Bytes of the header of LAS 1.4.
-const HEADER: usize = 375;
 /// Step of stored coordinates.
 const SCALE: f64 = 0.01;
 
@@ -42,10 +41,6 @@ pub struct Recipe {
     /// Version of all items; 1 or 2 for formats 0 to 5, 3 or 4 for the others.
     pub version: u16,
     pub chunks: Chunks,
-}
-
-fn put(data: &mut [u8], at: usize, bytes: &[u8]) {
-    data[at..at + bytes.len()].copy_from_slice(bytes);
 }
 
 impl Recipe {
@@ -110,35 +105,17 @@ impl Recipe {
     /// A LAS 1.4 file of these records.
     pub fn bake(&self, records: &[u8]) -> Vec<u8> {
         let payload = self.laszip();
-        let points = (records.len() / self.stride()) as u32;
-        let mut file = vec![0; HEADER + 54];
-        put(&mut file, 0, b"LASF");
-        put(&mut file, 24, &[1, 4]);
-        put(&mut file, 94, &(HEADER as u16).to_le_bytes());
-        put(&mut file, 96, &((HEADER + 54 + payload.len()) as u32).to_le_bytes());
-        put(&mut file, 100, &1u32.to_le_bytes());
-        file[104] = self.format | 0x80;
-        put(&mut file, 105, &(self.stride() as u16).to_le_bytes());
-        if self.format < 6 {
-            put(&mut file, 107, &points.to_le_bytes());
-        } else {
-            file[6] = 16; // The coordinate reference system is WKT.
-        }
-        for axis in 0..3 {
-            put(&mut file, 131 + 8 * axis, &SCALE.to_le_bytes());
-            let stored = records.chunks(self.stride()).filter_map(|record| {
-                record[4 * axis..].first_chunk().map(|bytes| i32::from_le_bytes(*bytes))
-            });
-            let (lo, hi) = stored.fold((i32::MAX, i32::MIN), |(lo, hi), v| (lo.min(v), hi.max(v)));
-            put(&mut file, 179 + 16 * axis, &(f64::from(hi) * SCALE).to_le_bytes());
-            put(&mut file, 187 + 16 * axis, &(f64::from(lo) * SCALE).to_le_bytes());
-        }
-        put(&mut file, 247, &u64::from(points).to_le_bytes());
-        put(&mut file, HEADER + 2, b"laszip encoded");
-        put(&mut file, HEADER + 18, &22204u16.to_le_bytes());
-        put(&mut file, HEADER + 20, &(payload.len() as u16).to_le_bytes());
-        file.extend(&payload);
-        self.compress(file, LazVlr::from_buffer(&payload).unwrap(), records)
+        let header = Header {
+            minor: 4,
+            format: self.format,
+            is_compressed: true,
+            stride: self.stride(),
+            scale: [SCALE; 3],
+            offset: [0.0; 3],
+        };
+        let laszip = LazVlr::from_buffer(&payload).unwrap();
+        let vlr = Beside { user: "laszip encoded", record: LazVlr::RECORD_ID, payload };
+        self.compress(header.bytes(&[vlr], records), laszip, records)
     }
 
     fn compress(&self, file: Vec<u8>, laszip: LazVlr, records: &[u8]) -> Vec<u8> {

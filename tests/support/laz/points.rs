@@ -1,4 +1,5 @@
-//! Made-up records: as scanners make them, as nobody makes them, and as an encoder has most trouble with.
+//! Made-up records: as scanners make them, as nobody makes them, and as an encoder has most trouble
+//! with.
 
 use super::super::las_file::STRIDES;
 use super::super::random::Random;
