@@ -91,8 +91,9 @@ pub trait CreateSink: Send + Sync {
 
     /// The sinks of the `inputs`, in their order, if each input gets an output of its own: this one
     /// then is not created, and its [`chunk`](CreateSink::chunk) is as large as any of theirs. They
-    /// are created one after the other, each with [`Source::metadata_of`] its input, and an input
-    /// of which no record is kept gets its output too.
+    /// are created one after the other, each with
+    /// [`Source::metadata_of`](super::Source::metadata_of) its input, and an input of which no
+    /// record is kept gets its output too.
     ///
     /// Fails if two outputs would have one name; that none replaces an input is the plan's to
     /// check. Makes nothing: the folder is made by the run.

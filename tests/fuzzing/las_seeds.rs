@@ -128,7 +128,7 @@ fn unnamed(size: u8) -> Vec<u8> {
 
 /// A file whose records are as long as can be, of descriptors that all want the same names.
 pub fn same_names() -> Vec<u8> {
-    let same = besidebeside("LASF_Spec", 4, unnamed(192).repeat(341));
+    let same = beside("LASF_Spec", 4, unnamed(192).repeat(341));
     Recipe {
         minor: 4,
         format: 0,
