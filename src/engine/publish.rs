@@ -7,7 +7,7 @@
 //! are there.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write};
+use std::io;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -179,6 +179,8 @@ fn sync_folder(folder: &Path) -> Result<()> {
 /// is added to `trouble`.
 #[cfg(feature = "cli")]
 pub fn publish_bytes(path: &Path, bytes: &[u8], trouble: &Trouble) -> Result<()> {
+    use std::io::Write as _;
+
     let staged = Staged::beside(path, Existing::Replace, trouble)?;
     let write = || {
         let mut file = File::create(staged.file())?;
