@@ -20,7 +20,7 @@ use pointmill::host::Threads;
 use pointmill::host::process::cpu_seconds;
 use pointmill::io::{las, ply};
 use pointmill::ops::normals::{Method, Normals};
-use pointmill::point::{PointBatch, Position};
+use pointmill::point::{NORMAL, PointBatch, Position};
 use pointmill::quantity::Setting;
 use pointmill::report::Tally;
 use pointmill::stage::{OpenSource, Source, TileOp};
@@ -110,13 +110,15 @@ fn normals(positions: &[Position], stage: &Normals, simd: Simd) -> [f64; 4] {
     let tiles = sealed(positions);
     let merged = cpu_seconds().unwrap();
     let keys = tiles.cut(TILE, TILE, 0, (0, 0)).unwrap();
-    let mut loader = Loader::new(&tiles, &Sieve::default(), CAPACITY);
+    let sieve = Sieve { computed: stage.needs().writes, ..Sieve::default() };
+    let mut loader = Loader::new(&tiles, &sieve, CAPACITY);
     loader.tile().0.compute_by(simd);
     let mut count = 0;
     for key in keys {
         let tile = loader.load(key, 0, stage.needs().neighbors).unwrap();
         stage.run(tile, &mut Tally::default()).unwrap();
-        count += tile.normals[tile.core.clone()].iter().filter(|n| !n[0].is_nan()).count();
+        let normals = tile.columns.get(&NORMAL).unwrap();
+        count += normals[tile.core.clone()].iter().filter(|n| !n[0].is_nan()).count();
     }
     let end = cpu_seconds().unwrap();
     [merged - start, end - merged, wall.elapsed().as_secs_f64(), count as f64]

@@ -6,7 +6,7 @@
 
 #![allow(clippy::print_stdout, reason = "an example shows its results")]
 
-use pointmill::point::{PointBatch, names};
+use pointmill::point::{NORMAL, PointBatch, names};
 use pointmill::report::Tally;
 use pointmill::stage::{Needs, Role, TileOp, Transform};
 use pointmill::stage::{StageKind, StagePlace};
@@ -33,7 +33,7 @@ impl StageKind for Class {
 impl Transform for Class {
     // What a stage reads is checked before the run: an input without classes is refused there.
     fn needs(&self) -> Needs {
-        Needs { reads: vec![names::CLASSIFICATION.into()], removes: true, ..Needs::default() }
+        Needs::none().looks_at([names::CLASSIFICATION]).removes(None)
     }
 
     fn apply(&self, batch: &mut PointBatch) -> Result<()> {
@@ -62,13 +62,14 @@ impl StageKind for Lowest {
 
 impl TileOp for Lowest {
     fn needs(&self) -> Needs {
-        Needs { reads: vec!["Cell".into(), "Normal".into()], removes: true, ..Needs::default() }
+        Needs::none().reads(&NORMAL).takes_cells().removes(None)
     }
 
     // A cell may reach beyond the tile. All its members are there, whichever tile looks at it, so
     // every tile comes to the same choice; each says what becomes of the positions in its own core.
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
-        let Tile { cells, core, positions, normals, copies, fates, .. } = tile;
+        let Tile { cells, core, positions, columns, copies, fates, .. } = tile;
+        let normals = columns.get(&NORMAL)?;
         let mut removed = 0;
         for group in cells.groups() {
             let members = cells.members[group].iter().map(|&i| i as usize);

@@ -9,6 +9,7 @@
 use std::sync::Arc;
 
 use super::product::RecordEntry;
+use super::row::RowLayout;
 use crate::budget::Bytes;
 use crate::stage::Input;
 use crate::store::{RecordState, Spill, SpillArea, StoredStretch, Tag};
@@ -18,9 +19,8 @@ use crate::{Error, Result};
 pub const LISTS_BYTES: usize = 8 << 20;
 /// What the list of one input holds at least and at most.
 const LIST: (usize, usize) = (512, 64 << 10);
-/// Bytes of an entry of a list: number, count, state; a normal if there is one.
+/// Bytes of an entry of a list, its row aside: number, count, state.
 const ENTRY: usize = 8 + 4 + 1;
-const NORMAL: usize = 12;
 
 /// The rank of each input by its name: what tells equal records of two inputs apart, so that the
 /// order in which inputs are named decides nothing.
@@ -55,8 +55,8 @@ struct InputList {
 pub(crate) struct ByInput {
     /// Which output.
     pub sink: usize,
-    /// True if it writes normals.
-    pub wants_normals: bool,
+    /// The rows of its entries.
+    pub layout: RowLayout,
     /// True if it takes what was there before the pass.
     before: bool,
     spill: Spill,
@@ -70,17 +70,18 @@ impl ByInput {
         area: &Arc<SpillArea>,
         sink: usize,
         inputs: usize,
-        wants_normals: bool,
+        layout: &RowLayout,
         before: bool,
     ) -> Self {
+        let layout = layout.clone();
         let spill = Spill::new(area, "inputs");
         let mut lists = Vec::new();
         lists.resize_with(inputs, InputList::default);
-        ByInput { sink, wants_normals, before, spill, lists, list_bytes: list_bytes(inputs) }
+        ByInput { sink, layout, before, spill, lists, list_bytes: list_bytes(inputs) }
     }
 
-    /// Takes what becomes of an entry.
-    pub fn take(&mut self, entry: &RecordEntry, normal: Option<[f32; 3]>) -> Result<()> {
+    /// Takes what becomes of an entry with its row, if it has one.
+    pub fn take(&mut self, entry: &RecordEntry, row: &[u8]) -> Result<()> {
         let state = if self.before { entry.was } else { entry.now };
         if !state.is_written() {
             return Ok(());
@@ -92,31 +93,29 @@ impl ByInput {
         list.open.extend_from_slice(&entry.number.to_le_bytes());
         list.open.extend_from_slice(&entry.count.to_le_bytes());
         list.open.push(state.0);
-        if self.wants_normals {
-            let normal = normal.unwrap_or([f32::NAN; 3]);
-            normal.iter().for_each(|v| list.open.extend_from_slice(&v.to_le_bytes()));
+        if self.layout.bytes() > 0 {
+            list.open.extend_from_slice(row);
         }
         list.records += u64::from(entry.count);
-        if list.open.len() + ENTRY + NORMAL > self.list_bytes {
+        if list.open.len() + ENTRY + self.layout.bytes() > self.list_bytes {
             list.stretches.push(self.spill.store(&list.open)?);
             list.open.clear();
         }
         Ok(())
     }
 
-    /// Calls `visit` with the entries of the input of `rank`, in canonical order.
+    /// Calls `visit` with the entries of the input of `rank` and their rows, in canonical order.
     pub fn each(
         &self,
         rank: usize,
-        mut visit: impl FnMut(&RecordEntry, Option<[f32; 3]>) -> Result<()>,
+        mut visit: impl FnMut(&RecordEntry, &[u8]) -> Result<()>,
     ) -> Result<()> {
         let Some(list) = self.lists.get(rank) else { return Ok(()) };
         let mut bytes = Vec::new();
         let mut visit_all = |bytes: &[u8]| {
-            let size = if self.wants_normals { ENTRY + NORMAL } else { ENTRY };
-            bytes.chunks_exact(size).try_for_each(|item| {
-                let (entry, normal) = unpack(item);
-                visit(&entry, normal)
+            bytes.chunks_exact(ENTRY + self.layout.bytes()).try_for_each(|item| {
+                let (entry, row) = item.split_at(ENTRY);
+                visit(&unpack(entry), row)
             })
         };
         for stretch in &list.stretches {
@@ -132,18 +131,14 @@ impl ByInput {
     }
 }
 
-/// An entry as stored, and its normal if there is one.
-fn unpack(item: &[u8]) -> (RecordEntry, Option<[f32; 3]>) {
-    let field = |at: usize| {
+/// An entry as stored.
+fn unpack(item: &[u8]) -> RecordEntry {
+    let word = |at: usize| {
         let mut bytes = [0; 4];
         bytes.copy_from_slice(&item[at..at + 4]);
-        bytes
+        u32::from_le_bytes(bytes)
     };
-    let word = |at| u32::from_le_bytes(field(at));
     let state = RecordState(item[12]);
     let number = u64::from(word(0)) | u64::from(word(4)) << 32;
-    let entry = RecordEntry { number, count: word(8), tag: Tag::default(), was: state, now: state };
-    let normal =
-        (item.len() > ENTRY).then(|| [0, 4, 8].map(|at| f32::from_le_bytes(field(ENTRY + at))));
-    (entry, normal)
+    RecordEntry { number, count: word(8), tag: Tag::default(), was: state, now: state }
 }

@@ -13,6 +13,7 @@ use super::encoding::ChunkEncoders;
 use super::job::Job;
 use super::outlet::Outlet;
 use super::product::RecordEntry;
+use super::row::RowLayout;
 use crate::budget::Bytes;
 use crate::host::lock;
 use crate::report::Tally;
@@ -32,11 +33,13 @@ const LIST: (usize, usize) = (512, 64 << 10);
 /// Stretches that the input is cut into at most, and records that one has at least.
 const STRETCHES: u64 = 16_384;
 const STRETCH: u64 = 1 << 16;
-/// Bytes of an entry of a list: its place in the stretch, where it is stored, state, normal.
+/// Bytes of an entry of a list, its row aside: its rank, where it is stored, state.
 const ENTRY: usize = 8 + 8 + 1;
-const NORMAL: usize = 12;
-/// Bytes that a record has in the lists at most.
-pub const LISTED: u64 = (ENTRY + NORMAL) as u64;
+
+/// Bytes that a record has in the lists where entries have rows of so many.
+pub(crate) fn listed_bytes(row: usize) -> u64 {
+    (ENTRY + row) as u64
+}
 
 /// The place of record `index` of part `part` in the input.
 pub(crate) fn place(part: usize, index: u64) -> u64 {
@@ -58,10 +61,11 @@ pub(crate) fn lists_bytes(records: u64) -> Bytes {
     Bytes::of(stretches, list_bytes(stretches as usize) + size_of::<StretchList>())
 }
 
-/// Bytes that a thread holds while it orders stretches: one at work, and what waits for its turn.
-pub(crate) fn ordering_bytes(records: u64) -> Bytes {
+/// Bytes that a thread holds while it orders stretches whose entries have rows of so many bytes: one
+/// at work, and what waits for its turn.
+pub(crate) fn ordering_bytes(records: u64, row: usize) -> Bytes {
     let most = records.min(stretch_records(records));
-    Bytes::of(most, 3 * size_of::<Ranked>() + ENTRY + NORMAL)
+    Bytes::of(most, 3 * (size_of::<Ranked>() + row) + ENTRY + row)
 }
 
 /// How many records of the input come before each part's: what a place is counted from.
@@ -95,7 +99,14 @@ struct Ranked {
     rank: u64,
     stored: u64,
     state: RecordState,
-    normal: [f32; 3],
+    /// Which of the rows of its stretch is its own.
+    row: u32,
+}
+
+/// The records of a stretch in the order of the input, and their rows.
+struct OrderedStretch {
+    ranked: Vec<Ranked>,
+    rows: Vec<u8>,
 }
 
 /// The records of one stretch that were not yet stored, and where the others are.
@@ -109,7 +120,7 @@ struct StretchList {
 pub(crate) struct ByRank {
     /// Which output.
     pub sink: usize,
-    wants_normals: bool,
+    layout: RowLayout,
     /// True if it takes what was there before the pass.
     before: bool,
     starts: Arc<Starts>,
@@ -127,7 +138,7 @@ impl ByRank {
         area: &Arc<SpillArea>,
         sink: usize,
         starts: &Arc<Starts>,
-        wants_normals: bool,
+        layout: &RowLayout,
         before: bool,
     ) -> Self {
         let stretch = stretch_records(starts.records);
@@ -135,7 +146,7 @@ impl ByRank {
         lists.resize_with(starts.records.div_ceil(stretch) as usize, StretchList::default);
         ByRank {
             sink,
-            wants_normals,
+            layout: layout.clone(),
             before,
             starts: starts.clone(),
             stretch,
@@ -146,13 +157,9 @@ impl ByRank {
         }
     }
 
-    /// Takes what becomes of an entry, whose records are stored and were read at `places`.
-    pub fn take(
-        &mut self,
-        entry: &RecordEntry,
-        places: &[(u64, u64)],
-        normal: Option<[f32; 3]>,
-    ) -> Result<()> {
+    /// Takes what becomes of an entry with its row, if it has one; its records are stored and were
+    /// read at `places`.
+    pub fn take(&mut self, entry: &RecordEntry, places: &[(u64, u64)], row: &[u8]) -> Result<()> {
         let state = if self.before { entry.was } else { entry.now };
         if !state.is_written() {
             return Ok(());
@@ -165,11 +172,10 @@ impl ByRank {
             list.open.extend_from_slice(&rank.to_le_bytes());
             list.open.extend_from_slice(&stored.to_le_bytes());
             list.open.push(state.0);
-            if self.wants_normals {
-                let normal = normal.unwrap_or([f32::NAN; 3]);
-                normal.iter().for_each(|v| list.open.extend_from_slice(&v.to_le_bytes()));
+            if self.layout.bytes() > 0 {
+                list.open.extend_from_slice(row);
             }
-            if list.open.len() + ENTRY + NORMAL > self.list_bytes {
+            if list.open.len() + ENTRY + self.layout.bytes() > self.list_bytes {
                 list.stretches.push(self.spill.store(&list.open)?);
                 list.open.clear();
             }
@@ -179,17 +185,18 @@ impl ByRank {
     }
 
     /// The records of list `number` in the order of the input.
-    fn ordered(&self, number: usize) -> Result<Vec<Ranked>> {
-        let Some(list) = self.lists.get(number) else { return Ok(Vec::new()) };
-        let size = if self.wants_normals { ENTRY + NORMAL } else { ENTRY };
-        let (mut ranked, mut bytes) = (Vec::new(), Vec::new());
+    fn ordered(&self, number: usize) -> Result<OrderedStretch> {
+        let mut ordered = OrderedStretch { ranked: Vec::new(), rows: Vec::new() };
+        let Some(list) = self.lists.get(number) else { return Ok(ordered) };
+        let size = ENTRY + self.layout.bytes();
+        let mut bytes = Vec::new();
         for stretch in &list.stretches {
             self.spill.load(stretch, &mut bytes)?;
-            ranked.extend(bytes.chunks_exact(size).map(unpack));
+            bytes.chunks_exact(size).for_each(|item| ordered.push(item));
         }
-        ranked.extend(list.open.chunks_exact(size).map(unpack));
-        ranked.sort_unstable_by_key(|record: &Ranked| record.rank);
-        Ok(ranked)
+        list.open.chunks_exact(size).for_each(|item| ordered.push(item));
+        ordered.ranked.sort_unstable_by_key(|record| record.rank);
+        Ok(ordered)
     }
 
     /// Writes all records into `sink` on all threads; what it said.
@@ -200,13 +207,14 @@ impl ByRank {
         sink: Box<dyn Sink>,
     ) -> Result<(SinkSummary, Tally)> {
         let encoders = ChunkEncoders::of_one(job, tiles, (self.sink, &*sink), false).of_stored();
-        let open = Mutex::new(Open::new(0, sink.chunk_points(), self.wants_normals, false));
-        let commit = |records: Vec<Ranked>| -> Result<Vec<OutputChunk>> {
+        let open = Mutex::new(Open::new(0, sink.chunk_points(), &self.layout, false));
+        let commit = |stretch: OrderedStretch| -> Result<Vec<OutputChunk>> {
             let (mut open, mut full) = (lock(&open), Vec::new());
-            for Ranked { stored, state, normal, .. } in records {
+            let bytes = self.layout.bytes();
+            for Ranked { stored, state, row, .. } in stretch.ranked {
                 let (was, now) = (state, state);
                 let entry = RecordEntry { number: stored, count: 1, tag: Tag::default(), was, now };
-                open.take(&entry, Some(normal), &mut full);
+                open.take(&entry, &stretch.rows[row as usize * bytes..][..bytes], &mut full);
             }
             Ok(full)
         };
@@ -216,7 +224,7 @@ impl ByRank {
             || encoders.one(),
             |encoder, number| {
                 let records = self.ordered(number)?;
-                let count = records.len() as u64;
+                let count = records.ranked.len() as u64;
                 let mut encode = |chunk| encoder.encode(&encoders, &chunk);
                 outlet.deliver((number as u64, 0), records, true, &mut encode)?;
                 job.advance(count)
@@ -237,20 +245,17 @@ impl ByRank {
     }
 }
 
-/// An entry as stored.
-fn unpack(item: &[u8]) -> Ranked {
-    let word = |at: usize| {
-        let mut bytes = [0; 8];
-        bytes.copy_from_slice(&item[at..at + 8]);
-        u64::from_le_bytes(bytes)
-    };
-    let normal = match item.len() > ENTRY {
-        true => [0, 4, 8].map(|at| {
-            let mut bytes = [0; 4];
-            bytes.copy_from_slice(&item[ENTRY + at..ENTRY + at + 4]);
-            f32::from_le_bytes(bytes)
-        }),
-        false => [f32::NAN; 3],
-    };
-    Ranked { rank: word(0), stored: word(8), state: RecordState(item[16]), normal }
+impl OrderedStretch {
+    /// Appends an entry as stored, with its row.
+    fn push(&mut self, item: &[u8]) {
+        let word = |at: usize| {
+            let mut bytes = [0; 8];
+            bytes.copy_from_slice(&item[at..at + 8]);
+            u64::from_le_bytes(bytes)
+        };
+        let row = self.ranked.len() as u32;
+        let state = RecordState(item[16]);
+        self.ranked.push(Ranked { rank: word(0), stored: word(8), state, row });
+        self.rows.extend_from_slice(&item[ENTRY..]);
+    }
 }

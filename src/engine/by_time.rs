@@ -22,13 +22,8 @@ impl ByTime {
         Some(ByTime { time, return_number: schema.find(names::RETURN_NUMBER).cloned() })
     }
 
-    /// Orders records with their states and normals by time, then return number, then as they came.
-    pub fn sort(
-        &self,
-        batch: &mut PointBatch,
-        states: &mut [RecordState],
-        normals: Option<&mut [[f32; 3]]>,
-    ) {
+    /// Orders records with their states and columns by time, then return number, then as they came.
+    pub fn sort(&self, batch: &mut PointBatch, states: &mut [RecordState]) {
         let schema = batch.schema().clone();
         let (endian, stride) = (schema.endian, schema.stride);
         let key = |record: &[u8]| {
@@ -48,9 +43,7 @@ impl ByTime {
             left[a * stride..(a + 1) * stride].swap_with_slice(&mut right[..stride]);
         });
         put_in_order(&order, |a, b| states.swap(a, b));
-        if let Some(normals) = normals {
-            put_in_order(&order, |a, b| normals.swap(a, b));
-        }
+        put_in_order(&order, |a, b| batch.columns.swap(a, b));
     }
 }
 

@@ -5,6 +5,8 @@
 //! the records: what is removed is never fetched, and what waits to be encoded is small.
 
 use super::product::RecordEntry;
+use super::row::RowLayout;
+use crate::point::Columns;
 use crate::store::RecordState;
 
 /// Records that become one chunk of an output, as a product has them: a position with a million
@@ -14,17 +16,17 @@ pub(crate) struct OutputChunk {
     pub sink: usize,
     /// First record, number of records, and their state.
     pub records: Vec<(u64, u32, RecordState)>,
-    /// Normals of the entries, if the sink wants them.
-    normals: Option<Vec<[f32; 3]>>,
+    /// A row for each entry, and what rows are.
+    rows: Vec<u8>,
+    layout: RowLayout,
 }
 
 impl OutputChunk {
-    /// Bytes of a record at most: where none follows another, each is an entry of its own.
-    pub const BYTES_PER_RECORD: usize =
-        size_of::<(u64, u32, RecordState)>() + size_of::<[f32; 3]>();
+    /// Bytes of a record at most, its row aside: where none follows another, each is an entry.
+    pub const BYTES_PER_RECORD: usize = size_of::<(u64, u32, RecordState)>();
 
-    fn empty(sink: usize, wants_normals: bool) -> Self {
-        OutputChunk { sink, records: Vec::new(), normals: wants_normals.then(Vec::new) }
+    fn empty(sink: usize, layout: &RowLayout) -> Self {
+        OutputChunk { sink, records: Vec::new(), rows: Vec::new(), layout: layout.clone() }
     }
 
     /// Replaces `numbers` by the numbers of its records.
@@ -33,10 +35,9 @@ impl OutputChunk {
         self.records.iter().for_each(|&(first, n, _)| numbers.extend(first..first + u64::from(n)));
     }
 
-    /// The normal of each record.
-    pub fn spread_normals(&self) -> Option<Vec<[f32; 3]>> {
-        let each = self.records.iter().map(|&(_, n, _)| n as usize).zip(self.normals.as_ref()?);
-        Some(each.flat_map(|(n, &normal)| std::iter::repeat_n(normal, n)).collect())
+    /// The columns of its records.
+    pub fn columns(&self) -> Columns {
+        self.layout.spread(&self.rows, self.records.iter().map(|&(_, n, _)| n as usize))
     }
 
     /// Replaces `states` by the state of each record.
@@ -52,8 +53,8 @@ impl OutputChunk {
 pub(crate) struct Open {
     /// Records of a full chunk.
     pub chunk_points: usize,
-    /// True if it writes normals.
-    pub wants_normals: bool,
+    /// The rows of its entries.
+    pub layout: RowLayout,
     /// True if it takes what was there before the pass.
     pub before: bool,
     chunk: OutputChunk,
@@ -65,18 +66,15 @@ pub(crate) struct Open {
 
 impl Open {
     /// Output `sink` without a record.
-    pub fn new(sink: usize, chunk_points: usize, wants_normals: bool, before: bool) -> Self {
-        let chunk = OutputChunk::empty(sink, wants_normals);
-        Open { chunk_points, wants_normals, before, chunk, room: chunk_points, written: 0 }
+    pub fn new(sink: usize, chunk_points: usize, layout: &RowLayout, before: bool) -> Self {
+        let chunk = OutputChunk::empty(sink, layout);
+        let layout = layout.clone();
+        Open { chunk_points, layout, before, chunk, room: chunk_points, written: 0 }
     }
 
-    /// Takes what becomes of an entry; chunks that this completes go to `full`.
-    pub fn take(
-        &mut self,
-        entry: &RecordEntry,
-        normal: Option<[f32; 3]>,
-        full: &mut Vec<OutputChunk>,
-    ) {
+    /// Takes what becomes of an entry with its row, if it has one; chunks that this completes go to
+    /// `full`.
+    pub fn take(&mut self, entry: &RecordEntry, row: &[u8], full: &mut Vec<OutputChunk>) {
         let state = if self.before { entry.was } else { entry.now };
         if !state.is_written() {
             return;
@@ -86,8 +84,8 @@ impl Open {
         while left > 0 {
             let now = left.min(u32::try_from(self.room).unwrap_or(u32::MAX));
             self.chunk.records.push((first, now, state));
-            if let (Some(normals), Some(normal)) = (&mut self.chunk.normals, normal) {
-                normals.push(normal);
+            if self.layout.bytes() > 0 {
+                self.chunk.rows.extend_from_slice(row);
             }
             (first, left) = (first + u64::from(now), left - now);
             self.room -= now as usize;
@@ -104,7 +102,7 @@ impl Open {
 
     fn close(&mut self) -> OutputChunk {
         self.room = self.chunk_points;
-        let empty = OutputChunk::empty(self.chunk.sink, self.wants_normals);
+        let empty = OutputChunk::empty(self.chunk.sink, &self.layout);
         std::mem::replace(&mut self.chunk, empty)
     }
 }

@@ -11,22 +11,23 @@ use super::by_input::ByInput;
 use super::by_rank::ByRank;
 use super::chunk::{Open, OutputChunk};
 use super::product::Product;
-use crate::Result;
-use crate::store::{PIECE, Pieces, Spill, SpillArea, StoredStretch};
+use crate::point::ColumnKind;
+use crate::store::{FATE_BYTES, PIECE, Pieces, Spill, SpillArea, StoredStretch};
+use crate::{Error, Result};
 
 /// A stored column while it grows, item after item.
-struct Column {
+struct GrowingColumn {
     pieces: Arc<Pieces>,
     item: usize,
     open: Vec<u8>,
     stored: u64,
 }
 
-impl Column {
+impl GrowingColumn {
     fn new(area: &Arc<SpillArea>, name: &'static str, item: usize, items: u64) -> Result<Self> {
         let pieces = Arc::new(Pieces::new(area, name, item));
         pieces.reserve(items)?;
-        Ok(Column { pieces, item, open: Vec::with_capacity(PIECE * item), stored: 0 })
+        Ok(GrowingColumn { pieces, item, open: Vec::with_capacity(PIECE * item), stored: 0 })
     }
 
     fn add(&mut self, mut bytes: &[u8]) -> Result<()> {
@@ -74,31 +75,33 @@ pub(crate) struct Stored {
     /// See [`Sieve`](crate::tile::Sieve).
     pub states: Arc<Pieces>,
     pub fates: Arc<Pieces>,
-    pub normals: Option<Arc<Pieces>>,
-    pub figures: Option<Arc<Pieces>>,
-    pub found: FoundValues,
+    pub columns: Vec<(ColumnKind, Arc<Pieces>)>,
+    pub gathered: StoredGathered,
 }
 
-/// What a first phase found, in the order of the tiles.
-pub(crate) struct FoundValues {
+/// What a first phase gathered of each tile, in the order of the tiles.
+pub(crate) struct StoredGathered {
     spill: Spill,
     stretches: Vec<StoredStretch>,
+    /// Summaries, each behind its length.
     open: Vec<u8>,
 }
 
-/// Found entries are handed to the spill in stretches of about this size.
-const FOUND_AT_ONCE: usize = 1 << 18;
+/// Summaries are handed to the spill in stretches of about this size.
+const GATHERED_AT_ONCE: usize = 1 << 18;
+/// Bytes that say how long a summary is.
+const LENGTH: usize = size_of::<u64>();
 
-impl FoundValues {
-    fn add(&mut self, entries: &[[u64; 2]]) -> Result<()> {
-        for [a, b] in entries {
-            self.open.extend_from_slice(&a.to_le_bytes());
-            self.open.extend_from_slice(&b.to_le_bytes());
-            if self.open.len() >= FOUND_AT_ONCE {
-                self.flush()?;
-            }
-        }
-        Ok(())
+impl StoredGathered {
+    fn new(area: &Arc<SpillArea>) -> Self {
+        let spill = Spill::new(area, "gathered");
+        StoredGathered { spill, stretches: Vec::new(), open: Vec::new() }
+    }
+
+    fn add(&mut self, summary: &[u8]) -> Result<()> {
+        self.open.extend_from_slice(&(summary.len() as u64).to_le_bytes());
+        self.open.extend_from_slice(summary);
+        if self.open.len() >= GATHERED_AT_ONCE { self.flush() } else { Ok(()) }
     }
 
     fn flush(&mut self) -> Result<()> {
@@ -109,21 +112,19 @@ impl FoundValues {
         Ok(())
     }
 
-    /// Calls `visit` with all entries, stretch after stretch.
-    pub fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()> {
-        let (mut bytes, mut entries) = (Vec::new(), Vec::new());
+    /// Calls `visit` with every summary.
+    pub fn each(&self, visit: &mut dyn FnMut(&[u8]) -> Result<()>) -> Result<()> {
+        let mut bytes = Vec::new();
         for stretch in &self.stretches {
             self.spill.load(stretch, &mut bytes)?;
-            entries.clear();
-            entries.extend(bytes.chunks_exact(16).map(|pair| {
-                let (a, b) = pair.split_at(8);
-                [a, b].map(|half| {
-                    let mut word = [0; 8];
-                    word.copy_from_slice(half);
-                    u64::from_le_bytes(word)
-                })
-            }));
-            visit(&entries)?;
+            let mut rest = &bytes[..];
+            while let Some((length, behind)) = rest.split_first_chunk::<LENGTH>() {
+                let length = u64::from_le_bytes(*length) as usize;
+                let cut_off = || Error::internal("what a first phase gathered is cut off");
+                let (summary, later) = behind.split_at_checked(length).ok_or_else(cut_off)?;
+                visit(summary)?;
+                rest = later;
+            }
         }
         Ok(())
     }
@@ -131,11 +132,12 @@ impl FoundValues {
 
 /// Cuts records into chunks of the outputs by their rank, and stores columns.
 pub(crate) struct Cutter {
-    states: Column,
-    fates: Column,
-    normals: Option<Column>,
-    figures: Option<Column>,
-    found: FoundValues,
+    states: GrowingColumn,
+    fates: GrowingColumn,
+    columns: Vec<(ColumnKind, GrowingColumn)>,
+    gathered: StoredGathered,
+    /// Bytes of a row.
+    row: usize,
     outputs: Vec<Open>,
     by_input: Vec<ByInput>,
     by_rank: Vec<ByRank>,
@@ -158,26 +160,22 @@ pub(crate) struct Counts {
 
 impl Cutter {
     /// A cutter for a scan of so many positions and records, into `outputs`, `by_input` where each
-    /// input has its own, and `by_rank` where the input's order is wanted; the last two columns are
-    /// stored if they are wanted.
+    /// input has its own, and `by_rank` where the input's order is wanted. The columns `stores` are
+    /// stored; entries have rows of so many bytes.
     pub fn new(
         area: &Arc<SpillArea>,
         (positions, records): (u64, u64),
-        (normals, figures): (bool, bool),
+        (stores, row): (&[ColumnKind], usize),
         (outputs, by_input, by_rank): (Vec<Open>, Vec<ByInput>, Vec<ByRank>),
     ) -> Result<Self> {
-        use crate::store::{FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES};
-        let column = |name, item| Column::new(area, name, item, positions);
+        let column = |name, item| GrowingColumn::new(area, name, item, positions);
+        let columns = stores.iter().map(|kind| Ok((*kind, column("columns", kind.bytes())?)));
         Ok(Cutter {
-            states: Column::new(area, "states", 1, records)?,
+            states: GrowingColumn::new(area, "states", 1, records)?,
             fates: column("fates", FATE_BYTES)?,
-            normals: normals.then(|| column("normals", NORMAL_BYTES)).transpose()?,
-            figures: figures.then(|| column("figures", FIGURE_BYTES)).transpose()?,
-            found: FoundValues {
-                spill: Spill::new(area, "found"),
-                stretches: Vec::new(),
-                open: Vec::new(),
-            },
+            columns: columns.collect::<Result<_>>()?,
+            gathered: StoredGathered::new(area),
+            row,
             outputs,
             by_input,
             by_rank,
@@ -188,26 +186,23 @@ impl Cutter {
     /// The chunks that the next product completes.
     pub fn cut(&mut self, product: &Product) -> Result<Vec<OutputChunk>> {
         self.fates.add(&product.fates)?;
-        if let Some(normals) = &mut self.normals {
-            normals.add(&product.normals)?;
+        for ((_, column), bytes) in self.columns.iter_mut().zip(&product.columns) {
+            column.add(bytes)?;
         }
-        if let Some(figures) = &mut self.figures {
-            figures.add(&product.figures)?;
-        }
-        self.found.add(&product.found)?;
+        product.summary.iter().try_for_each(|summary| self.gathered.add(summary))?;
         let (mut full, mut places) = (Vec::new(), &product.places[..]);
         for (n, entry) in product.entries.iter().enumerate() {
             self.states.repeat(entry.now.0, entry.count)?;
             self.counts.alive += if entry.now.is_alive() { u64::from(entry.count) } else { 0 };
             self.counts.written += if entry.now.is_written() { u64::from(entry.count) } else { 0 };
-            let normal = product.entry_normals.as_ref().map(|normals| normals[n]);
+            let row = &product.rows[n * self.row..(n + 1) * self.row];
             for output in &mut self.outputs {
-                output.take(entry, normal, &mut full);
+                output.take(entry, row, &mut full);
             }
-            self.by_input.iter_mut().try_for_each(|lists| lists.take(entry, normal))?;
+            self.by_input.iter_mut().try_for_each(|lists| lists.take(entry, row))?;
             if entry.was.is_written() && !places.is_empty() {
                 let (now, later) = places.split_at(places.len().min(entry.count as usize));
-                self.by_rank.iter_mut().try_for_each(|lists| lists.take(entry, now, normal))?;
+                self.by_rank.iter_mut().try_for_each(|lists| lists.take(entry, now, row))?;
                 places = later;
             }
         }
@@ -216,18 +211,17 @@ impl Cutter {
 
     /// The last chunks, the columns, the lists by input, and what was counted.
     pub fn finish(mut self) -> Result<(Vec<OutputChunk>, Stored, Lists, Counts)> {
-        let columns = [Some(&mut self.states), Some(&mut self.fates)];
-        let more = [self.normals.as_mut(), self.figures.as_mut()];
-        columns.into_iter().chain(more).flatten().try_for_each(Column::flush)?;
-        self.found.flush()?;
+        let columns = self.columns.iter_mut().map(|(_, column)| column);
+        let all = [&mut self.states, &mut self.fates].into_iter().chain(columns);
+        all.into_iter().try_for_each(GrowingColumn::flush)?;
+        self.gathered.flush()?;
         let rest = self.outputs.iter_mut().filter_map(Open::rest).collect();
         self.counts.outputs = self.outputs.iter().map(|output| output.written).collect();
         let stored = Stored {
             states: self.states.pieces,
             fates: self.fates.pieces,
-            normals: self.normals.map(|column| column.pieces),
-            figures: self.figures.map(|column| column.pieces),
-            found: self.found,
+            columns: self.columns.into_iter().map(|(kind, c)| (kind, c.pieces)).collect(),
+            gathered: self.gathered,
         };
         Ok((rest, stored, (self.by_input, self.by_rank), self.counts))
     }

@@ -9,7 +9,7 @@ use super::chunk::OutputChunk;
 use super::encoding::ChunkEncoder;
 use super::filtering::Filtering;
 use super::outlet::A_THREAD;
-use super::pass::decides_by_normals;
+use super::pass::{ColumnBytes, decides_by_normals};
 use super::placed::{BATCH, Placed};
 use super::product::Product;
 use super::survey::survey_bytes;
@@ -17,10 +17,7 @@ use crate::budget::{Bytes, Holders};
 use crate::geom::nearest::Nearest;
 use crate::report::Baseline;
 use crate::stage::{ChunkSize, Needs, Source};
-use crate::store::{
-    FATE_BYTES, FIGURE_BYTES, Intake, NORMAL_BYTES, Pieces, RecordState, SealedTiles, merge_bytes,
-    ref_bytes,
-};
+use crate::store::{FATE_BYTES, Intake, Pieces, RecordState, SealedTiles, merge_bytes, ref_bytes};
 use crate::tile::{Loader, Remote};
 
 /// Positions or records that a thread must be able to hold: with fewer, rims outweigh tiles.
@@ -70,6 +67,8 @@ pub struct Demands {
     /// True if a stage decides about cells together: how many points those have only the decode
     /// tells.
     pub has_cells: bool,
+    /// Bytes that columns take for each position, at most.
+    pub columns: ColumnBytes,
     /// What the stages of each pass need.
     pub passes: Vec<Vec<Needs>>,
 }
@@ -100,6 +99,7 @@ impl Demands {
             filters: false,
             gathers: false,
             has_cells: false,
+            columns: ColumnBytes::default(),
             passes: Vec::new(),
         }
     }
@@ -132,7 +132,7 @@ impl Demands {
         let order = ref_bytes(self.tagged);
         let states_and_fates = [size_of::<RecordState>(), FATE_BYTES].repeat(self.standings);
         let places = self.ranked.then_some(size_of::<u64>());
-        let stores = [self.stride, order, order, NORMAL_BYTES, FIGURE_BYTES];
+        let stores = [self.stride, order, order, self.columns.stored];
         let all = stores.into_iter().chain(states_and_fates).chain(places);
         all.map(|stride| Pieces::table_bytes(self.points, stride)).sum()
     }
@@ -185,13 +185,18 @@ impl Demands {
     /// for every sink, that of the first among those that wait.
     fn outputs(&self) -> Holders {
         let (points, encoded) = (self.chunk.points as u64, Bytes(self.chunk.bytes));
-        let chunk = Bytes::of(points, OutputChunk::BYTES_PER_RECORD);
+        let chunk = Bytes::of(points, OutputChunk::BYTES_PER_RECORD + self.columns.row);
         let chunks = chunk * A_THREAD + chunk * self.other_sinks();
-        let encoding = ChunkEncoder::bytes(points, self.stride) + encoded * A_THREAD;
+        let encoding =
+            ChunkEncoder::bytes(points, self.stride, self.columns.row) + encoded * A_THREAD;
         let by_normals = self.passes.iter().flatten().any(decides_by_normals);
         let baseline = if by_normals { Baseline::BYTES } else { 0 };
         let filters = match self.filters {
             true => Filtering::bytes(self.stride),
+            false => Bytes(0),
+        };
+        let dimensions = match self.columns.of_records {
+            true => Loader::dimension_bytes(self.stride),
             false => Bytes(0),
         };
         Holders::of([
@@ -200,6 +205,7 @@ impl Demands {
             ("comparison with grids", self.by_threads(Bytes(baseline))),
             ("search beyond tiles", self.by_threads(Bytes(Remote::BYTES))),
             ("streaming behind tiles", self.by_threads(filters)),
+            ("reading of dimensions", self.by_threads(dimensions)),
         ])
     }
 
@@ -232,8 +238,10 @@ impl Demands {
         let stages = self.passes.iter().map(of).max().unwrap_or_default();
         let sieved = self.tagged || self.passes.len() > 1;
         let sieve = if sieved { Loader::SIEVE_BYTES_PER_POINT } else { 0 };
-        let product = Product::BYTES_PER_POINT + if self.ranked { Product::PLACE_BYTES } else { 0 };
-        Bytes::from(Loader::BYTES_PER_POINT + sieve) + Bytes::of(A_THREAD, product) + stages
+        let ColumnBytes { tile, stored, row, .. } = self.columns;
+        let places = if self.ranked { Product::PLACE_BYTES } else { 0 };
+        let product = Product::BYTES_PER_POINT + stored + row + places;
+        Bytes::from(Loader::BYTES_PER_POINT + sieve + tile) + Bytes::of(A_THREAD, product) + stages
     }
 
     /// What the mill holds where `millers` of the threads have tiles of `positions` positions, rim
@@ -253,7 +261,7 @@ impl Demands {
     /// The most that any phase holds.
     fn work(&self, run_records: u64, tile_positions: u64) -> Holders {
         let survey = Holders::of([("survey", self.by_threads(survey_bytes()))]);
-        let ordering = self.by_threads(ordering_bytes(self.points));
+        let ordering = self.by_threads(ordering_bytes(self.points, self.columns.row));
         let ordering = Holders::of([("ordering of records", ordering)]).with(&self.outputs());
         self.mill(self.threads, tile_positions)
             .larger(self.decode(run_records))

@@ -55,20 +55,21 @@ impl Each<'_> {
         let staged = self.staged.get(input).ok_or_else(missing)?;
         let rank = *self.ranks.get(input).ok_or_else(missing)? as usize;
         let pipeline = Some(job.pipelines[records.sink].clone());
-        let metadata = Metadata { pipeline, ..job.source.metadata_of(input)? };
+        let computed = job.computed[records.sink].clone();
+        let metadata = Metadata { pipeline, computed, ..job.source.metadata_of(input)? };
         let mut sink = create.create(staged.file(), job.source.schema(), &metadata, false)?;
         let encoders =
             ChunkEncoders::of_one(job, tiles, (records.sink, &*sink), create.likes_time());
-        let mut open = Open::new(0, sink.chunk_points(), records.wants_normals, false);
+        let mut open = Open::new(0, sink.chunk_points(), &records.layout, false);
         let (mut given, mut full) = (0, Vec::new());
         let mut append = |chunk: OutputChunk| {
             let (_, encoded) = encoder.encode(&encoders, &chunk)?;
             sink.append(encoded)?;
             job.advance(0)
         };
-        records.each(rank, |entry: &RecordEntry, normal| {
+        records.each(rank, |entry: &RecordEntry, row| {
             given += u64::from(entry.count);
-            open.take(entry, normal, &mut full);
+            open.take(entry, row, &mut full);
             full.drain(..).try_for_each(&mut append)
         })?;
         open.rest().map_or(Ok(()), append)?;

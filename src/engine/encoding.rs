@@ -90,9 +90,9 @@ pub(crate) struct ChunkEncoder {
 
 impl ChunkEncoder {
     /// Bytes that it holds for chunks of `points` records of `stride` bytes: the records with their
-    /// numbers and normals, and what fetching them takes.
-    pub fn bytes(points: u64, stride: usize) -> Bytes {
-        let more = size_of::<u64>() + size_of::<[f32; 3]>();
+    /// numbers and columns of `row` bytes, and what fetching them takes.
+    pub fn bytes(points: u64, stride: usize, row: usize) -> Bytes {
+        let more = size_of::<u64>() + row;
         Bytes::of(points, stride) + Bytes::of(points, more) + Fetch::bytes(points, stride)
     }
 
@@ -124,14 +124,13 @@ impl ChunkEncoder {
             all.job.classes.keep_by_state(&self.batch, &self.states, &mut self.tally);
             count_key_points(&self.states, &mut self.tally);
         }
-        let mut normals = chunk.spread_normals();
+        self.batch.columns = chunk.columns();
         if let Some(by_time) = all.by_time.get(chunk.sink).and_then(Option::as_ref) {
-            by_time.sort(&mut self.batch, &mut self.states, normals.as_deref_mut());
+            by_time.sort(&mut self.batch, &mut self.states);
         }
         edit(&mut self.batch, &self.states)?;
         let changed_by = all.changed_by.get(chunk.sink).copied().unwrap_or_default();
         change(all.job, changed_by, &mut self.batch)?;
-        self.batch.normals = normals;
         let encoder = all.encoders.get(chunk.sink);
         let encoder = encoder.ok_or_else(|| Error::internal("a chunk is for no sink"))?;
         Ok((chunk.sink, encoder.encode(&self.batch)?))

@@ -12,6 +12,7 @@ use super::encoding::edit;
 use super::job::Job;
 use super::pass::PassFilter;
 use super::product::Product;
+use super::row::RowLayout;
 use crate::budget::Bytes;
 use crate::point::PointBatch;
 use crate::report::Tally;
@@ -54,7 +55,12 @@ impl<'a> Filtering<'a> {
     }
 
     /// Enters into `product` which of its records the filters remove.
-    pub fn apply(&mut self, product: &mut Product, tally: &mut Tally) -> Result<()> {
+    pub fn apply(
+        &mut self,
+        product: &mut Product,
+        layout: &RowLayout,
+        tally: &mut Tally,
+    ) -> Result<()> {
         let mut kept = Vec::new();
         let written: u64 = product.written().map(|(_, n, _)| n).sum();
         let mut done = 0;
@@ -63,7 +69,7 @@ impl<'a> Filtering<'a> {
             self.look(product, done..end, &mut kept, tally)?;
             done = end;
         }
-        product.keep(&kept);
+        product.keep(&kept, layout);
         Ok(())
     }
 

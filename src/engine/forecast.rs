@@ -8,6 +8,7 @@
 use super::grind::{DecodedScan, Worker};
 use super::job::Job;
 use super::pass::Pass;
+use super::row::RowLayout;
 use super::shares::Shares;
 use crate::Result;
 use crate::stage::Forecast;
@@ -68,7 +69,7 @@ fn samples(
     let mut samples = Vec::new();
     job.items(keys.len()).run(
         || {
-            let mut worker = Worker::new(job, pass, field, sieve, capacity, false);
+            let mut worker = Worker::new(job, pass, field, sieve, capacity, &RowLayout::default());
             worker.limit_rim(RIM);
             (worker, Reader::default())
         },

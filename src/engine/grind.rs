@@ -26,6 +26,7 @@ use super::outlet::Outlet;
 use super::pass::{Op, Pass};
 use super::product::Product;
 use super::rounded::Rounded;
+use super::row::RowLayout;
 use crate::geom::lattice::Lattice;
 use crate::host::{Threads, lock};
 use crate::report::{Baseline, Tally};
@@ -77,17 +78,15 @@ pub(crate) fn grind(
     (sinks, by_input, by_rank): PassOutputs,
 ) -> Result<Milled> {
     let tiles = &field.tiles;
-    let numbers = sinks.iter().map(|(sink, _)| *sink).chain(by_input.iter().map(|by| by.sink));
-    let numbers = numbers.chain(by_rank.iter().map(|by| by.sink));
-    let wants_normals = numbers.into_iter().any(|sink| job.wants_normals[sink]);
+    let layout = pass.row(&job.computed);
     let outputs = sinks.iter().enumerate().map(|(n, (sink, open))| {
         let before = pass.before.contains(sink);
-        Open::new(n, open.chunk_points(), job.wants_normals[*sink], before)
+        Open::new(n, open.chunk_points(), &job.layout(*sink, &layout), before)
     });
     let cutter = Cutter::new(
         &field.area,
         (tiles.positions(), tiles.points()),
-        (pass.stores_normals, pass.stores_figures),
+        (&pass.stores, layout.bytes()),
         (outputs.collect(), by_input, by_rank),
     )?;
     let cutter = Mutex::new(Some(cutter));
@@ -102,7 +101,7 @@ pub(crate) fn grind(
     let side = pass.compares(&job.ops);
     let worker = || Worker {
         baseline: side.map(|side| Baseline::new(side, tiles.levels())),
-        ..Worker::new(job, pass, field, sieve, cut.capacity, wants_normals)
+        ..Worker::new(job, pass, field, sieve, cut.capacity, &layout)
     };
     let (sum, baseline) = mill_tiles(threads, &cut.keys, worker, &encoders, &outlet)?;
     let TileTally { mut tally, decided, oriented } = sum;
@@ -176,7 +175,7 @@ pub(crate) struct Worker<'a> {
     loader: Loader,
     reach: i64,
     neighbors: usize,
-    wants_normals: bool,
+    layout: RowLayout,
     /// True if records of the pass go to an output in the order of the inputs.
     ranks: bool,
     fetch: Fetch,
@@ -196,7 +195,7 @@ impl<'a> Worker<'a> {
         field: &'a DecodedScan<'_>,
         sieve: &Sieve,
         capacity: usize,
-        wants_normals: bool,
+        layout: &RowLayout,
     ) -> Self {
         let neighbors = neighbors(&job.ops, pass);
         let mut loader = Loader::new(&field.tiles, sieve, capacity);
@@ -227,7 +226,7 @@ impl<'a> Worker<'a> {
             loader,
             reach,
             neighbors,
-            wants_normals,
+            layout: layout.clone(),
             rounded,
             first,
             sum: TileTally::default(),
@@ -246,24 +245,27 @@ impl<'a> Worker<'a> {
         &mut self,
         key: TileKey,
         until: Option<usize>,
-    ) -> Result<(&mut Tile, Vec<[u64; 2]>)> {
+    ) -> Result<(&mut Tile, Option<Vec<u8>>)> {
         self.loader.load(key, if until.is_some() { 0 } else { self.reach }, self.neighbors)?;
         let (tile, _) = self.loader.tile();
-        let mut found = Vec::new();
+        let mut summary = None;
         for call in self.pass.calls.iter().take_while(|call| Some(call.op) != until) {
             let stage = &self.job.ops[call.op];
             tile.limits = stage.selection;
             match (&stage.op, call.gathers) {
-                (Op::Scan(op), true) => op.gather(tile, &mut found, &mut self.sum.tally)?,
+                (Op::Scan(op), true) => {
+                    let bytes = summary.insert(Vec::new());
+                    op.gather_into(tile, &mut self.sum.tally, bytes)?;
+                }
                 (op, _) => op.tile().run(tile, &mut self.sum.tally)?,
             }
         }
-        Ok((tile, found))
+        Ok((tile, summary))
     }
 
     /// What a tile leaves behind, and what it comes to.
     fn mill(&mut self, key: TileKey) -> Result<(Product, TileTally)> {
-        let (_, found) = self.run(key, None)?;
+        let (_, summary) = self.run(key, None)?;
         let (tile, core) = self.loader.tile();
         self.sum.decided +=
             tile.copies[tile.core.clone()].iter().map(|&n| u64::from(n)).sum::<u64>();
@@ -274,8 +276,8 @@ impl<'a> Worker<'a> {
         if let Some(baseline) = &mut self.baseline {
             baseline.add(tile);
         }
-        let mut product = Product::of(tile, core, self.pass, self.wants_normals)?;
-        product.found = found;
+        let mut product = Product::of(tile, core, self.pass, &self.layout)?;
+        product.summary = summary;
         if let Some(rounded) = &mut self.rounded {
             let mut positions = Vec::new();
             core.each(tile, |runs, _| {
@@ -290,7 +292,7 @@ impl<'a> Worker<'a> {
             }
         }
         if let Some(filtering) = &mut self.filtering {
-            filtering.apply(&mut product, &mut self.sum.tally)?;
+            filtering.apply(&mut product, &self.layout, &mut self.sum.tally)?;
         }
         if self.ranks {
             product.find_places(self.loader.tiles(), &mut self.fetch)?;

@@ -12,6 +12,7 @@ use std::sync::{Arc, Mutex};
 use super::Watch;
 use super::pass::{Branch, Pass, PassFilter, StageOp};
 use super::publish::Staged;
+use super::row::RowLayout;
 use super::tagger::{ClassOf, LEFT_OUT, Tagger};
 use crate::budget::Budget;
 use crate::error::shown;
@@ -19,7 +20,7 @@ use crate::geom::lattice::{Lattice, Misplaced};
 use crate::geom::simd::Simd;
 use crate::graph::Headers;
 use crate::host::{PhaseItems, Threads, lock};
-use crate::point::PointBatch;
+use crate::point::{ComputedDimension, PointBatch};
 use crate::report::{Grouped, Tally};
 use crate::stage::{CreateSink, Part, Source, Transform};
 use crate::{Error, ErrorKind, Result};
@@ -50,8 +51,8 @@ pub(crate) struct Job<'a> {
     pub drop_nonfinite: bool,
     pub headers: Headers,
     pub tile_points: Option<usize>,
-    /// For each sink, whether it writes normals.
-    pub wants_normals: Vec<bool>,
+    /// For each sink, the computed dimensions that it writes.
+    pub computed: &'a [Vec<ComputedDimension>],
     /// For each sink, whether it wants the order of the inputs.
     pub in_input_order: &'a [bool],
     /// For each sink, whether the records of a chunk are ordered by time.
@@ -98,6 +99,11 @@ impl Job<'_> {
             self.watch.warn(&message);
             warnings.push(message);
         }
+    }
+
+    /// The rows of a sink's entries, where those of its pass are `all`: none if it writes no column.
+    pub fn layout(&self, sink: usize, all: &RowLayout) -> RowLayout {
+        if self.computed[sink].is_empty() { RowLayout::default() } else { all.clone() }
     }
 
     /// True if a sink takes what the last stage of a branch leaves: classes are counted by its

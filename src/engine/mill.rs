@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use super::by_input::ByInput;
 use super::by_rank::ByRank;
-use super::chunks::FoundValues;
+use super::chunks::StoredGathered;
 use super::clock::Clock;
 use super::cut::{Cut, cut_again, cut_all};
 use super::decode::decode;
@@ -28,6 +28,7 @@ use super::shares::Shares;
 use super::survey::survey;
 use crate::budget::{Bytes, Holders, Lease};
 use crate::geom::lattice::Lattice;
+use crate::point::{ColumnKind, NORMAL};
 use crate::report::{Baseline, BaselineFigures, Decision, PassFigures, Tally};
 use crate::stage::{Sink, SinkSummary};
 use crate::store::{SealedTiles, SpillArea, seal};
@@ -109,14 +110,14 @@ impl Standing {
     }
 
     /// The same behind another pass, which came to `milled` and counted `tally`; and what a first
-    /// phase found in it.
+    /// phase gathered in it.
     fn behind(
         mut self,
         job: &Job<'_>,
         pass: &Pass,
         milled: Milled,
         tally: &Tally,
-    ) -> (Standing, FoundValues) {
+    ) -> (Standing, StoredGathered) {
         self.tally.merge(tally);
         if let (Some(baseline), None) = (milled.baseline, &self.compared) {
             let (decided, found) = (milled.decided, self.alive);
@@ -128,13 +129,14 @@ impl Standing {
         self.passes.push(PassFigures { stages, before: self.alive, after });
         self.sieve.states = Some(milled.stored.states);
         self.sieve.fates = Some(milled.stored.fates);
-        self.sieve.figures = milled.stored.figures;
-        if milled.stored.normals.is_some() {
+        let columns = milled.stored.columns;
+        if columns.iter().any(|(kind, _)| *kind == NORMAL.kind()) {
             self.sieve.oriented = milled.oriented;
         }
-        self.sieve.normals = milled.stored.normals.or(self.sieve.normals.take());
+        self.sieve.columns.retain(|(kind, _)| columns.iter().all(|(newer, _)| newer != kind));
+        self.sieve.columns.extend(columns);
         (self.alive, self.kept) = (after, milled.counts.written);
-        (self, milled.stored.found)
+        (self, milled.stored.gathered)
     }
 }
 
@@ -179,7 +181,10 @@ impl Course {
                 None => job.budget.lease_all(&most, "mill")?,
             };
             let place = (pass, &cut, &mut held);
-            let after = self.run(job, place, before, field, (shares, demands), clock)?;
+            let mut after = self.run(job, place, before, field, (shares, demands), clock)?;
+            let is_loaded =
+                |kind: &ColumnKind| passes[n + 1..].iter().any(|pass| pass.loads.contains(kind));
+            after.sieve.columns.retain(|(kind, _)| is_loaded(kind));
             match job.branches.iter().find(|branch| branch.pass == n) {
                 None => {
                     working = Some(held);
@@ -233,7 +238,7 @@ impl Course {
         clock: &mut Clock<'_>,
     ) -> Result<Standing> {
         let tiles = &field.tiles;
-        let sieve = pass.sieve(&before.sieve);
+        let sieve = pass.sieve(&before.sieve, job.source.schema());
         self.foresee(job, pass, field, &sieve, shares)?;
         let held = working.iter().map(Lease::bytes).sum();
         let cut = cut_again(job, pass, field.lattice, (shares, demands), tiles, (cut, held))?;
@@ -261,9 +266,9 @@ impl Course {
         }
         self.tally.merge(&tally);
         let decided = milled.decided;
-        let (after, found) = before.behind(job, pass, milled, &tally);
+        let (after, gathered) = before.behind(job, pass, milled, &tally);
         if let Some(op) = pass.gathers() {
-            conclude(job, op, found, decided)?;
+            conclude(job, op, gathered, decided)?;
         }
         Ok(after)
     }
@@ -310,17 +315,18 @@ impl Course {
     ) -> Result<(PassOutputs, Vec<Box<dyn Sink>>)> {
         let (mut sinks, mut by_input) = (Vec::new(), Vec::new());
         let (mut by_rank, mut ordered) = (Vec::new(), Vec::new());
+        let all = pass.row(&job.computed);
         for &sink in pass.before.iter().chain(&pass.after) {
-            let (normals, before) = (job.wants_normals[sink], pass.before.contains(&sink));
+            let (layout, before) = (job.layout(sink, &all), pass.before.contains(&sink));
             if let Some(Some(each)) = job.each.get(sink) {
                 let inputs = each.sinks.len();
-                by_input.push(ByInput::new(&field.area, sink, inputs, normals, before));
+                by_input.push(ByInput::new(&field.area, sink, inputs, &layout, before));
                 continue;
             }
             let open = self.sinks.get_mut(sink).and_then(Option::take);
             let open = open.ok_or_else(|| Error::internal("an output is written twice"))?;
             if job.in_input_order[sink] {
-                by_rank.push(ByRank::new(&field.area, sink, &field.starts, normals, before));
+                by_rank.push(ByRank::new(&field.area, sink, &field.starts, &layout, before));
                 ordered.push(open);
             } else {
                 sinks.push((sink, open));

@@ -32,6 +32,7 @@ mod product;
 pub(crate) mod publish;
 mod room;
 mod rounded;
+mod row;
 mod run;
 pub(crate) mod scratch;
 mod settled;

@@ -9,10 +9,11 @@
 
 use std::sync::Arc;
 
+use super::row::RowLayout;
 use crate::graph::{Limits, Written};
-use crate::point::Mark;
-use crate::stage::{Needs, ScanOp, TileOp, Transform};
-use crate::tile::Sieve;
+use crate::point::{ColumnKind, ComputedDimension, Mark, NORMAL, Schema};
+use crate::stage::{AnyScanOp, Needs, TileOp, Transform};
+use crate::tile::{Loader, ReadDimensions, Sieve};
 
 /// A tile stage and where it stands.
 pub(crate) struct StageOp {
@@ -28,7 +29,7 @@ pub(crate) struct StageOp {
 /// The role of a tile stage.
 pub(crate) enum Op {
     Tile(Box<dyn TileOp>),
-    Scan(Box<dyn ScanOp>),
+    Scan(Box<dyn AnyScanOp>),
 }
 
 impl Op {
@@ -93,18 +94,43 @@ pub(crate) struct Pass {
     pub decided: u8,
     pub removes: bool,
     pub mark: Option<Mark>,
-    /// Columns that an earlier pass stored and this one reads.
-    pub loads_normals: bool,
-    pub loads_figures: bool,
-    /// Columns that this pass stores.
-    pub stores_normals: bool,
-    pub stores_figures: bool,
+    /// Columns that its stages compute, those that it stores for later passes, and those that an
+    /// earlier pass stored and this one reads.
+    pub writes: Vec<ColumnKind>,
+    pub stores: Vec<ColumnKind>,
+    pub loads: Vec<ColumnKind>,
+    /// Columns that are dimensions of the records.
+    pub dimensions: Vec<ColumnKind>,
     /// Sinks of what is there before the pass removes anything, and of what it leaves.
     pub before: Vec<usize>,
     pub after: Vec<usize>,
-    pub writes_normals: bool,
-    pub writes_cells: bool,
+    pub makes_cells: bool,
     pub looks: bool,
+}
+
+/// Bytes that columns take for each position.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ColumnBytes {
+    /// In a tile.
+    pub tile: usize,
+    /// As they are stored for later passes.
+    pub stored: usize,
+    /// In an entry for outputs that write them.
+    pub row: usize,
+    /// True if some are dimensions of the records.
+    pub of_records: bool,
+}
+
+impl ColumnBytes {
+    /// What does for both.
+    pub fn larger(self, other: ColumnBytes) -> ColumnBytes {
+        ColumnBytes {
+            tile: self.tile.max(other.tile),
+            stored: self.stored.max(other.stored),
+            row: self.row.max(other.row),
+            of_records: self.of_records || other.of_records,
+        }
+    }
 }
 
 /// What a call needs.
@@ -134,18 +160,37 @@ impl Pass {
         self.calls.iter().find(|call| call.gathers).map(|call| call.op)
     }
 
-    /// What the pass sees, with what earlier passes stored.
-    pub fn sieve(&self, stored: &Sieve) -> Sieve {
-        let Pass { seen, decided, .. } = *self;
-        let classes = self.reads_classes;
-        let mut sieve = Sieve { classes, seen, decided, ..stored.clone() };
-        if !self.loads_normals {
-            sieve.normals = None;
-        }
-        if !self.loads_figures {
-            sieve.figures = None;
-        }
+    /// What the pass sees of records of `schema`, with what earlier passes stored.
+    pub fn sieve(&self, stored: &Sieve, schema: &Arc<Schema>) -> Sieve {
+        let Pass { seen, decided, reads_classes: classes, .. } = *self;
+        let computed = self.writes.clone();
+        let found = |kind: &ColumnKind| Some((*kind, schema.find(kind.name())?.clone()));
+        let dimensions: Vec<_> = self.dimensions.iter().filter_map(found).collect();
+        let read = ReadDimensions { schema: schema.clone(), dimensions };
+        let dimensions = (!read.dimensions.is_empty()).then(|| Arc::new(read));
+        let mut sieve = Sieve { classes, seen, decided, computed, dimensions, ..stored.clone() };
+        sieve.columns.retain(|(kind, _)| self.loads.contains(kind));
         sieve
+    }
+
+    /// Bytes that its columns take for each position: in a tile, as they are stored, and in entries
+    /// for outputs that write `computed` dimensions.
+    pub fn column_bytes(&self, computed: &[Vec<ComputedDimension>]) -> ColumnBytes {
+        let sum = |kinds: &[ColumnKind]| kinds.iter().map(ColumnKind::bytes).sum::<usize>();
+        let of_records = !self.dimensions.is_empty();
+        let numbers = if of_records { Loader::DIMENSION_BYTES_PER_POINT } else { 0 };
+        ColumnBytes {
+            tile: sum(&self.writes) + sum(&self.loads) + sum(&self.dimensions) + numbers,
+            stored: sum(&self.stores),
+            row: self.row(computed).bytes(),
+            of_records,
+        }
+    }
+
+    /// What entries have for the outputs of the pass.
+    pub fn row(&self, computed: &[Vec<ComputedDimension>]) -> RowLayout {
+        let sinks = self.before.iter().chain(&self.after);
+        RowLayout::of(sinks.filter_map(|sink| computed.get(*sink)).flatten())
     }
 }
 
@@ -156,7 +201,7 @@ pub(crate) fn decides(needs: &Needs) -> bool {
 
 /// True if a stage that needs this decides, and reads normals.
 pub(crate) fn decides_by_normals(needs: &Needs) -> bool {
-    decides(needs) && needs.reads.iter().any(|column| column == "Normal")
+    decides(needs) && needs.does_read(&NORMAL)
 }
 
 /// How many outcomes of passes are there at once at most: what a pass goes on from is dropped with

@@ -7,13 +7,12 @@
 //! decides about that.
 
 use super::pass::Pass;
+use super::row::RowLayout;
 use super::survey::fate_code;
-use crate::Result;
-use crate::point::Mark;
-use crate::store::{
-    ASIDE, FATE_BYTES, FIGURE_BYTES, Fetch, NORMAL_BYTES, RecordState, SealedTiles, Tag,
-};
+use crate::point::{ColumnKind, Mark};
+use crate::store::{ASIDE, FATE_BYTES, Fetch, RecordState, SealedTiles, Tag};
 use crate::tile::{Core, Fate, RecordRun, Tile};
+use crate::{Error, Result};
 
 /// Records of one position that follow one another and share what becomes of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,43 +33,46 @@ pub(crate) struct RecordEntry {
 pub(crate) struct Product {
     /// All records of the core, in canonical order.
     pub entries: Vec<RecordEntry>,
-    /// Normals of the entries, if a sink wants them.
-    pub entry_normals: Option<Vec<[f32; 3]>>,
-    /// Columns of the core's positions, as stored; the last two are empty if nobody reads them.
+    /// A row for each entry, where sinks write columns.
+    pub rows: Vec<u8>,
+    /// Fates of the core's positions, as stored, and the columns that the pass stores.
     pub fates: Vec<u8>,
-    pub normals: Vec<u8>,
-    pub figures: Vec<u8>,
+    pub columns: Vec<Vec<u8>>,
     /// Of every record that is written before or behind the pass, in order, where it is stored and
     /// its place in the input; empty if nobody asks for the input's order.
     pub places: Vec<(u64, u64)>,
-    /// What a first phase found.
-    pub found: Vec<[u64; 2]>,
+    /// What a first phase gathered.
+    pub summary: Option<Vec<u8>>,
 }
 
 impl Product {
-    /// Bytes of a product for each position of the core, what a first phase finds aside.
-    pub const BYTES_PER_POINT: usize =
-        size_of::<RecordEntry>() + FATE_BYTES + NORMAL_BYTES + size_of::<[f32; 3]>() + FIGURE_BYTES;
+    /// Bytes of a product for each position of the core, columns and what a first phase gathers
+    /// aside.
+    pub const BYTES_PER_POINT: usize = size_of::<RecordEntry>() + FATE_BYTES;
 
     /// Bytes more where places in the input are looked up.
     pub const PLACE_BYTES: usize = 2 * size_of::<(u64, u64)>();
 
-    /// What `tile` leaves behind, whose core has the records `core`.
-    pub fn of(tile: &Tile, core: &Core, pass: &Pass, wants_normals: bool) -> Result<Self> {
+    /// What `tile` leaves behind, whose core has the records `core`, where entries have the rows of
+    /// `layout`.
+    pub fn of(tile: &Tile, core: &Core, pass: &Pass, layout: &RowLayout) -> Result<Self> {
         let records = tile.core.len();
         let mut product = Product {
             entries: Vec::with_capacity(records),
-            entry_normals: wants_normals.then(|| Vec::with_capacity(records)),
+            rows: Vec::with_capacity(records * layout.bytes()),
             fates: Vec::with_capacity(records * FATE_BYTES),
             ..Product::default()
         };
-        let columns = pass.stores_normals || pass.stores_figures || wants_normals;
+        let columns = !pass.stores.is_empty() || layout.bytes() > 0;
         if let Some(first_records) = core.first_records()
             && !(columns || pass.decided != 0 || pass.mark.is_some())
         {
             product.enter_all(tile, first_records, pass.removes);
             return Ok(product);
         }
+        let stored_columns = StoredColumn::all(&pass.stores, tile)?;
+        let row_columns = StoredColumn::all(layout.kinds(), tile)?;
+        product.columns = stored_columns.iter().map(|column| column.capacity(records)).collect();
         core.each(tile, |runs, stored| {
             let slot = runs.first().map_or(RecordRun::UNSEEN, |run| run.slot);
             let fate = match slot {
@@ -82,17 +84,15 @@ impl Product {
                 (fate, _) => product.fates.extend_from_slice(&fate_code(fate)),
             }
             let at = (slot != RecordRun::UNSEEN).then_some(slot as usize);
-            let normal = at.map_or([f32::NAN; 3], |i| tile.normals[i]);
-            if pass.stores_normals {
-                normal.iter().for_each(|v| product.normals.extend_from_slice(&v.to_le_bytes()));
+            for (column, bytes) in stored_columns.iter().zip(&mut product.columns) {
+                bytes.extend_from_slice(column.value(at));
             }
-            if pass.stores_figures {
-                let figure = at.and_then(|i| tile.figures.get(i)).copied().unwrap_or(f64::NAN);
-                product.figures.extend_from_slice(&figure.to_le_bytes());
-            }
+            let entries = product.entries.len();
             product.enter(runs, fate, pass);
-            if let Some(normals) = &mut product.entry_normals {
-                normals.resize(product.entries.len(), normal);
+            for _ in entries..product.entries.len() {
+                row_columns.iter().for_each(|column| {
+                    product.rows.extend_from_slice(column.value(at));
+                });
             }
             Ok(())
         })?;
@@ -106,11 +106,11 @@ impl Product {
     }
 
     /// Removes those of the [written](Product::written) records that are not `kept`.
-    pub fn keep(&mut self, kept: &[bool]) {
+    pub fn keep(&mut self, kept: &[bool], layout: &RowLayout) {
         if !kept.contains(&false) {
             return;
         }
-        let (mut entries, mut normals) = (Vec::with_capacity(self.entries.len()), Vec::new());
+        let (mut entries, mut rows) = (Vec::with_capacity(self.entries.len()), Vec::new());
         let mut kept = kept.iter();
         for (n, entry) in self.entries.iter().enumerate() {
             let begin = entries.len();
@@ -127,12 +127,10 @@ impl Product {
                     }
                 }),
             }
-            if let Some(of) = &self.entry_normals {
-                normals.resize(normals.len() + entries.len() - begin, of[n]);
-            }
+            let row = &self.rows[n * layout.bytes()..(n + 1) * layout.bytes()];
+            (begin..entries.len()).for_each(|_| rows.extend_from_slice(row));
         }
-        self.entries = entries;
-        self.entry_normals = self.entry_normals.take().map(|_| normals);
+        (self.entries, self.rows) = (entries, rows);
     }
 
     /// Looks up [`places`](Product::places).
@@ -216,6 +214,33 @@ impl Product {
             push(kept, marked(pass.mark, true, was));
             push(count - kept, marked(pass.mark, false, was));
         }
+    }
+}
+
+/// The values of a column of a tile, as bytes.
+struct StoredColumn<'a> {
+    values: &'a [u8],
+    bytes: usize,
+    unknown: Vec<u8>,
+}
+
+impl<'a> StoredColumn<'a> {
+    fn all(kinds: &[ColumnKind], tile: &'a Tile) -> Result<Vec<Self>> {
+        let of = |kind: &ColumnKind| {
+            let missing = || Error::internal(format!("a tile has no column {}", kind.name()));
+            let values = tile.columns.bytes_of(*kind).ok_or_else(missing)?;
+            Ok(StoredColumn { values, bytes: kind.bytes(), unknown: kind.unknown() })
+        };
+        kinds.iter().map(of).collect()
+    }
+
+    /// The value of the position with an index; of one that is not seen if there is none.
+    fn value(&self, at: Option<usize>) -> &[u8] {
+        at.map_or(&self.unknown, |i| &self.values[i * self.bytes..(i + 1) * self.bytes])
+    }
+
+    fn capacity(&self, values: usize) -> Vec<u8> {
+        Vec::with_capacity(values * self.bytes)
     }
 }
 

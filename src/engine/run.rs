@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 
 use super::Watch;
 use super::account::{nothing_left, write_report};
-use super::by_rank::LISTED;
+use super::by_rank::listed_bytes;
 use super::clock::Clock;
 use super::demands::Demands;
 use super::finished::Finished;
@@ -128,10 +128,10 @@ impl Task {
         let whole = !self.mills
             && self.transforms.is_empty()
             && self.settings.nonfinite == Nonfinite::Refuse;
-        let mut metadata = self.source.metadata().clone();
         let mut sinks = Vec::new();
-        for ((sink, staged), pipeline) in self.sinks.iter().zip(outputs).zip(self.pipelines()) {
-            metadata.pipeline = (!whole).then_some(pipeline);
+        let each = self.sinks.iter().zip(outputs).zip(self.pipelines()).enumerate();
+        for (n, ((sink, staged), pipeline)) in each {
+            let metadata = self.metadata(n, (!whole).then_some(pipeline));
             let file = staged.first().filter(|_| !sink.is_folder());
             let open = file.map(|file| sink.create(file.file(), schema, &metadata, whole));
             sinks.push(open.transpose()?);
@@ -207,9 +207,9 @@ impl Task {
         }
         let streams = !job.transforms.is_empty() || !job.filters.is_empty();
         let keeps = !streams && job.ops.is_empty() && !job.drop_nonfinite;
-        for (sink, staged) in self.sinks.iter().zip(outputs).filter(|_| keeps) {
+        for (n, (sink, staged)) in self.sinks.iter().zip(outputs).enumerate().filter(|_| keeps) {
             let Some(staged) = staged.first() else { continue };
-            let each = sink.disk_bytes(self.source.schema(), self.source.metadata())?;
+            let each = sink.disk_bytes(self.source.schema(), &self.metadata(n, None))?;
             let [bytes, again] = each.map(|bytes| self.source.points().saturating_mul(bytes));
             all.push(Taken { folder: staged.scratch().parent(), spilled: false, bytes, again });
         }
@@ -237,7 +237,10 @@ impl Task {
         let by_all = |name: &&String| others.iter().all(|sink| sink.unread().contains(*name));
         let mut unread: Vec<String> = first.unread().iter().filter(by_all).cloned().collect();
         let streams = !self.transforms.is_empty() || !self.filters.is_empty();
-        unread.retain(|name| !LOOKED_AT.contains(&name.as_str()) && !streams);
+        let columns = || self.passes.iter().flat_map(|pass| &pass.dimensions);
+        let is_column = |name: &str| columns().any(|column| column.name() == name);
+        let is_read = |name: &str| streams || LOOKED_AT.contains(&name) || is_column(name);
+        unread.retain(|name| !is_read(name));
         unread
     }
 
@@ -249,8 +252,9 @@ impl Task {
         threads: Threads<'a>,
         watch: &'a dyn Watch,
     ) -> Job<'a> {
-        let each = self.each.iter().zip(&self.sinks).zip(outputs).map(|((each, sink), staged)| {
-            let chunk = sink.chunk(self.source.schema(), self.source.metadata());
+        let outputs = self.each.iter().zip(&self.sinks).zip(outputs).enumerate();
+        let each = outputs.map(|(n, ((each, sink), staged))| {
+            let chunk = sink.chunk(self.source.schema(), &self.metadata(n, None));
             let chunk_points = chunk.map_or(self.demands.chunk.points, |chunk| chunk.points);
             let ranks = &self.ranks;
             (!each.is_empty()).then_some(Each { sinks: each, staged, ranks, chunk_points })
@@ -276,7 +280,7 @@ impl Task {
             drop_nonfinite: self.settings.nonfinite == Nonfinite::Drop,
             headers: self.settings.headers,
             tile_points,
-            wants_normals: self.sinks.iter().map(|sink| sink.wants_normals()).collect(),
+            computed: &self.computed,
             in_input_order: &self.in_input_order,
             by_time: self.sinks.iter().map(|sink| sink.likes_time()).collect(),
             watch,
@@ -290,8 +294,9 @@ impl Task {
 /// states and fates twice (of the pass before and of the pass at work), and columns between passes.
 /// Ranks in the input, and the lists that are sorted by them.
 fn spilled(demands: &Demands, kept_in_memory: u64) -> u64 {
-    let order = if demands.tagged { 12 } else { 8 } + if demands.ranked { 8 + LISTED } else { 0 };
-    let columns = if demands.passes.len() > 1 { 1 + 4 + 12 + 8 } else { 0 };
+    let order = if demands.tagged { 12 } else { 8 }
+        + if demands.ranked { 8 + listed_bytes(demands.columns.row) } else { 0 };
+    let columns = demands.columns.stored as u64 + if demands.passes.len() > 1 { 1 + 4 } else { 0 };
     let each = demands.stride as u64 + order + 2 * 8 + 1 + 4 + columns;
     demands.points.saturating_mul(each).saturating_sub(kept_in_memory)
 }

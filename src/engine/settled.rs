@@ -9,25 +9,25 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
-use super::chunks::FoundValues;
+use super::chunks::StoredGathered;
 use super::job::Job;
 use super::pass::{Branch, Op};
 use crate::geom::lattice::Lattice;
 use crate::point::Bounds;
 use crate::report::{Decision, Grouped, Short, Tally};
-use crate::stage::{Gathered, ScanFacts};
+use crate::stage::{ScanFacts, StoredSummaries};
 use crate::store::SealedTiles;
 use crate::{Error, Result};
 
-/// What a first phase found, for its stage.
-struct GatheredValues {
-    found: FoundValues,
+/// What a first phase gathered, for its stage.
+struct GatheredSummaries {
+    gathered: StoredGathered,
     records: u64,
 }
 
-impl Gathered for GatheredValues {
-    fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()> {
-        self.found.each(visit)
+impl StoredSummaries for GatheredSummaries {
+    fn each(&self, visit: &mut dyn FnMut(&[u8]) -> Result<()>) -> Result<()> {
+        self.gathered.each(visit)
     }
 
     fn records(&self) -> u64 {
@@ -35,15 +35,15 @@ impl Gathered for GatheredValues {
     }
 }
 
-/// Lets the stage `op` conclude from what its first phase found, about so many records.
+/// Lets the stage `op` conclude from what its first phase gathered, about so many records.
 pub(crate) fn conclude(
     job: &mut Job<'_>,
     op: usize,
-    found: FoundValues,
+    gathered: StoredGathered,
     records: u64,
 ) -> Result<()> {
     let warning = match &mut job.ops[op].op {
-        Op::Scan(op) => op.conclude(&GatheredValues { found, records })?,
+        Op::Scan(op) => op.conclude_from(&GatheredSummaries { gathered, records })?,
         Op::Tile(_) => return Err(Error::internal("a stage gathered that has one phase")),
     };
     warning.into_iter().for_each(|warning| job.warn(warning));

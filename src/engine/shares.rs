@@ -7,7 +7,7 @@
 use super::demands::Demands;
 use crate::budget::{Bytes, Holders, at_least_mebibytes, at_most_mebibytes, whole_mebibytes};
 use crate::report::Grouped;
-use crate::store::{Block, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, RecordState, ref_bytes};
+use crate::store::{Block, FATE_BYTES, RecordState, ref_bytes};
 use crate::{Error, Result};
 
 /// Working memory that a thread makes use of; more goes to keeping the scan in memory.
@@ -55,7 +55,7 @@ impl Demands {
 
     /// Bytes of memory that first phases of stages leave at most, while the mill has its tiles.
     pub fn gathered(&self, shares: &Shares) -> Bytes {
-        let all = Bytes::of(self.points, GATHERED_BYTES);
+        let all = Bytes::of(self.points, GATHERED_BYTES + self.columns.stored);
         if self.gathers { all.min(Bytes(shares.kept_in_memory)) } else { Bytes(0) }
     }
 
@@ -65,7 +65,8 @@ impl Demands {
         // Two outcomes of passes are there in any run.
         let more = self.standings.saturating_sub(2) as u64;
         let each = Bytes::from(self.stride) + Bytes::from(KEPT_BYTES + place);
-        let each = each + Bytes::from(STANDING_BYTES) * more;
+        let standing = Bytes::from(STANDING_BYTES + self.columns.stored);
+        let each = each + standing * more;
         let kept = each * self.points + self.gathered(shares);
         let kept = kept.min(Bytes(shares.kept_in_memory));
         let taken = Bytes(shares.base) + Bytes(shares.index) + kept + MILL_SPARE;
@@ -138,11 +139,11 @@ const SPARE: (u64, u64) = (3, 4);
 const KEPT_BYTES: usize =
     ref_bytes(true) + 2 * Block::BYTES_PER_POSITION + size_of::<RecordState>() + FATE_BYTES;
 
-/// The same of the outcome of a pass that is kept beside two others: states, fates, columns.
-const STANDING_BYTES: usize = size_of::<RecordState>() + FATE_BYTES + NORMAL_BYTES + FIGURE_BYTES;
+/// The same of the outcome of a pass that is kept beside two others, columns aside: states, fates.
+const STANDING_BYTES: usize = size_of::<RecordState>() + FATE_BYTES;
 
-/// The same of what a first phase leaves: a normal, a figure, and two entries of what it found.
-const GATHERED_BYTES: usize = NORMAL_BYTES + FIGURE_BYTES + 2 * size_of::<[u64; 2]>();
+/// The same of what a first phase leaves beside columns: about two pairs of numbers.
+const GATHERED_BYTES: usize = 2 * size_of::<[u64; 2]>();
 
 #[cfg(test)]
 mod tests;

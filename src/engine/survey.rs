@@ -123,11 +123,11 @@ struct Seen {
 }
 
 impl Seen {
-    fn load(&mut self, walk: &ScanWalk<'_>, block: usize, columns: &mut Columns) -> Result<()> {
+    fn load(&mut self, walk: &ScanWalk<'_>, block: usize, columns: &mut StoredFates) -> Result<()> {
         self.block = None;
         let (positions, copies) = walk.tiles.read(block, &mut self.reader)?;
         let records = copies.iter().map(|&n| u64::from(n)).sum::<u64>();
-        let Columns { fates, states, buffer } = columns;
+        let StoredFates { fates, states, buffer } = columns;
         let first = walk.tiles.block(block).first_position;
         walk.fates.collect(first, positions.len() as u64, buffer, fates)?;
         let fates = fates.as_chunks().0.iter().copied().map(deviation_of);
@@ -164,7 +164,7 @@ impl Seen {
 
 /// Memory for what is stored of a block.
 #[derive(Default)]
-struct Columns {
+struct StoredFates {
     fates: Vec<u8>,
     states: Vec<u8>,
     buffer: Vec<u8>,
@@ -176,7 +176,7 @@ const KEPT_BLOCKS: usize = 64;
 /// The blocks last seen.
 struct KeptBlocks {
     kept: Vec<Seen>,
-    columns: Columns,
+    columns: StoredFates,
 }
 
 impl KeptBlocks {
@@ -187,7 +187,7 @@ impl KeptBlocks {
 
     fn new(blocks: usize) -> Self {
         let kept = (0..blocks).map(|_| Seen::default()).collect();
-        KeptBlocks { kept, columns: Columns::default() }
+        KeptBlocks { kept, columns: StoredFates::default() }
     }
 
     /// The positions of a block and their lots.

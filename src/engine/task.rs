@@ -4,6 +4,8 @@
 //! pipeline's text nor its graph. A run consumes it: stages settle, and could not be run twice from
 //! their beginning.
 
+use std::sync::Arc;
+
 use super::beside::Beside;
 use super::demands::Demands;
 use super::pass::{Branch, Pass, PassFilter, StageOp};
@@ -11,6 +13,7 @@ use super::tagger::Tagger;
 use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
 use crate::graph::RunSettings;
+use crate::point::{ComputedDimension, Metadata};
 use crate::stage::{CreateSink, Source, Transform};
 
 /// A run that can begin.
@@ -39,6 +42,8 @@ pub(crate) struct Task {
     pub branch_of: Vec<usize>,
     /// For each sink, whether it gets the order of the inputs.
     pub in_input_order: Vec<bool>,
+    /// For each sink, the computed dimensions that it writes.
+    pub computed: Vec<Vec<ComputedDimension>>,
     pub tagger: Tagger,
     /// True if the run needs tiles: for its stages, or to sort.
     pub mills: bool,
@@ -50,6 +55,12 @@ pub(crate) struct Task {
 }
 
 impl Task {
+    /// What the source says, for a sink whose records go through the stages `pipeline`.
+    pub fn metadata(&self, sink: usize, pipeline: Option<Arc<str>>) -> Metadata {
+        let computed = self.computed[sink].clone();
+        Metadata { pipeline, computed, ..self.source.metadata().clone() }
+    }
+
     /// The files of a sink, one for each input where it is a folder.
     pub fn files(&self, sink: usize) -> &[Box<dyn CreateSink>] {
         match self.each.get(sink) {

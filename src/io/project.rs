@@ -51,7 +51,7 @@ impl Encode for ProjectingEncoder {
         let records = projected.refill(batch.len());
         let rounding = self.projection.project_into(batch.records(), records);
         let rounding = rounding.map_err(|error| error.at(&self.path))?;
-        projected.normals = batch.normals.clone();
+        projected.columns.clone_from(&batch.columns);
         let mut encoded = self.inner.encode(&projected)?;
         encoded.rounded = Some((rounding.points, rounding.largest));
         self.spare.put(projected);

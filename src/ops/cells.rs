@@ -18,7 +18,7 @@ use serde_json::Value;
 use super::lengths::rounded;
 use crate::Result;
 use crate::geom::lattice::Lattice;
-use crate::point::{Units, names};
+use crate::point::{NORMAL, Units, names};
 use crate::quantity::{Length, Setting};
 use crate::report::Tally;
 use crate::stage::{Forecast, Needs, Role, ScanFacts, StageKind, StagePlace, TileOp};
@@ -58,15 +58,10 @@ impl TileOp for Cells {
             None => self.side == Side::Auto || self.side == Side::Spread && self.keep.is_none(),
         };
         let class = self.by.contains(&By::Classification).then_some(names::CLASSIFICATION);
-        Needs {
-            reads: std::iter::once("Normal").chain(class).map(str::to_owned).collect(),
-            writes: vec!["Cell".into()],
-            cells: true,
-            cell_side: self.settled.map_or(0, |settled| settled.steps),
-            cell_aligned: aligned,
-            bytes_per_point: if aligned { BYTES } else { BYTES + SORTING_BYTES },
-            ..Needs::default()
-        }
+        let side = self.settled.map_or(0, |settled| settled.steps);
+        let bytes = if aligned { BYTES } else { BYTES + SORTING_BYTES };
+        let needs = Needs::none().looks_at(class).reads(&NORMAL).makes_cells();
+        needs.cells(side, aligned).bytes_per_point(bytes)
     }
 
     fn convert(&mut self, units: &Units) -> Result<()> {
@@ -123,7 +118,7 @@ impl TileOp for Cells {
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let limit = self.limit()?;
         let (mut cells, crossing) = self.initial_cells(tile)?;
-        let mut division = Division::new(self.rule(limit)?, tile);
+        let mut division = Division::new(self.rule(limit)?, tile)?;
         let initial = std::mem::take(&mut cells.ends);
         cells.ends.reserve_exact(cells.members.len());
         let mut start = 0;

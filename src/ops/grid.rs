@@ -6,11 +6,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::lengths::rounded;
-use super::removal::{RemovalAccount, keep_once, remove, represent_by};
+use super::removal::{RemovalAccount, keep_once, remove, represent};
 use crate::geom::angle::is_known;
 use crate::geom::lattice::Lattice;
 use crate::geom::plane::{Covariance, smallest};
-use crate::point::{Bounds, Position, Units, distance2};
+use crate::point::{Bounds, NORMAL, Position, Units, distance2, names};
 use crate::quantity::Length;
 use crate::report::Tally;
 use crate::stage::{Needs, Role, ScanFacts, StageKind, StagePlace, TileOp};
@@ -94,15 +94,9 @@ impl StageKind for Grid {
 
 impl TileOp for Grid {
     fn needs(&self) -> Needs {
-        Needs {
-            reads: crate::point::names::XYZ.map(str::to_owned).to_vec(),
-            cells: true,
-            cell_side: self.settled.map_or(0, |settled| settled.steps),
-            cell_aligned: self.settled.is_some_and(|settled| settled.steps.count_ones() == 1),
-            bytes_per_point: BYTES,
-            removes: true,
-            ..Needs::default()
-        }
+        let side = self.settled.map_or(0, |settled| settled.steps);
+        let looks = Needs::none().looks_at(names::XYZ);
+        looks.cells(side, side.count_ones() == 1).bytes_per_point(BYTES).removes(None)
     }
 
     fn convert(&mut self, units: &Units) -> Result<()> {
@@ -183,13 +177,14 @@ impl CubeCounts {
         let core = tile.core.clone();
         let members = || group.iter().map(|(_, i)| *i as usize);
         self.cubes += u64::from(members().next().is_some_and(|first| core.contains(&first)));
-        let known = is_known(tile.normals[kept]).then(|| tile.normals[kept].map(f64::from));
+        let normal = tile.columns.find(&NORMAL).map(|normals| normals[kept]);
+        let known = normal.filter(|normal| is_known(*normal)).map(|normal| normal.map(f64::from));
         let normal = known.or_else(|| self.plane(tile, group, kept));
         for i in members().filter(|i| core.contains(i)) {
             if i == kept {
                 self.coincident += keep_once(tile, i);
             } else if let Some(normal) = normal {
-                self.represented += represent_by(tile, i, kept, normal);
+                self.represented += represent(tile, i, kept, normal);
             } else {
                 self.represented += remove(tile, i);
             }

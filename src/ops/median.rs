@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::removal::{RemovalAccount, keep_once, represent};
 use crate::geom::angle::{cosine, dominant_axis, is_known, outer_sum, sine2};
 use crate::geom::wide::Wide;
-use crate::point::{Mark, Position};
+use crate::point::{Mark, NORMAL, Position};
 use crate::quantity::Whole;
 use crate::report::Tally;
 use crate::stage::{Needs, Role, StageKind, StagePlace, TileOp};
@@ -83,21 +83,16 @@ impl StageKind for Median {
 
 impl TileOp for Median {
     fn needs(&self) -> Needs {
-        Needs {
-            reads: vec!["Cell".into(), "Normal".into()],
-            bytes_per_point: BYTES,
-            removes: self.mark.is_none(),
-            mark: self.mark,
-            passes: self.passes,
-            ..Needs::default()
-        }
+        let needs = Needs::none().reads(&NORMAL).takes_cells().bytes_per_point(BYTES);
+        Needs { repeats: Some((NORMAL.kind(), self.passes)), ..needs.removes(self.mark) }
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let core = tile.core.clone();
         let (mut coincident, mut represented) = (0, 0);
+        let normals = tile.columns.take(&NORMAL)?;
         for i in core.clone() {
-            if !is_known(tile.normals[i]) && tile.is_chosen(i) {
+            if !is_known(normals[i]) && tile.is_chosen(i) {
                 coincident += keep_once(tile, i);
             }
         }
@@ -109,7 +104,9 @@ impl TileOp for Median {
             if !tile.cells.members[group.clone()].iter().any(|&i| core.contains(&(i as usize))) {
                 continue;
             }
-            let Some(kept) = median(tile, group.clone(), &mut angles) else { continue };
+            let found = median(tile, &normals, group.clone(), &mut angles);
+            let Some(kept) = found else { continue };
+            let normal = normals[kept].map(f64::from);
             for at in group {
                 let i = tile.cells.members[at] as usize;
                 if !core.contains(&i) || !tile.is_chosen(i) {
@@ -117,10 +114,11 @@ impl TileOp for Median {
                 } else if i == kept {
                     coincident += keep_once(tile, i);
                 } else {
-                    represented += represent(tile, i, kept);
+                    represented += represent(tile, i, kept, normal);
                 }
             }
         }
+        tile.columns.put(normals);
         let account = RemovalAccount { stage: "median", marked: "median_marked", mark: self.mark };
         account.enter(tally, "coincident", coincident);
         account.enter(tally, "represented", represented);
@@ -130,10 +128,15 @@ impl TileOp for Median {
 
 /// The position of `group` with the lower median angle among those that the stage decides about;
 /// none if there are none. `angles` is memory to work in.
-fn median(tile: &Tile, group: Range<usize>, angles: &mut Vec<(f64, u32)>) -> Option<usize> {
+fn median(
+    tile: &Tile,
+    normals: &[[f32; 3]],
+    group: Range<usize>,
+    angles: &mut Vec<(f64, u32)>,
+) -> Option<usize> {
     let Partition { members, turned, reference, .. } = &tile.cells;
     angles.clear();
-    let normal = |i: u32| tile.normals[i as usize];
+    let normal = |i: u32| normals[i as usize];
     let decided = group.clone().filter(|&at| tile.is_chosen(members[at] as usize));
     match reference {
         Some(reference) => angles.extend(decided.map(|at| {
@@ -211,7 +214,8 @@ mod tests {
     #[test]
     fn passes_are_1_to_16() {
         assert_eq!(toml::from_str::<Median>("").unwrap(), Median { passes: 1, mark: None });
-        assert_eq!(toml::from_str::<Median>("passes = 16").unwrap().needs().passes, 16);
+        let stage: Median = toml::from_str("passes = 16").unwrap();
+        assert_eq!(stage.needs().repeats, Some((NORMAL.kind(), 16)));
         for wrong in ["passes = 0", "passes = 17", "passes = -1", "keep = 2", "mark = 6"] {
             assert!(toml::from_str::<Median>(wrong).is_err(), "{wrong}");
         }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::scatter::{scatter, typical};
 use crate::geom::angle::is_known;
-use crate::point::names;
+use crate::point::{NORMAL, names};
 use crate::quantity::{Setting, Whole};
 use crate::report::Tally;
 use crate::stage::{Forecast, Needs, Role, ScanFacts, StageKind, StagePlace, TileOp};
@@ -129,11 +129,8 @@ impl StageKind for Normals {
 impl TileOp for Normals {
     fn needs(&self) -> Needs {
         Needs {
-            reads: names::XYZ.map(str::to_owned).to_vec(),
-            writes: vec!["Normal".into()],
-            neighbors: self.count(),
             fewer_neighbors: self.neighbors.given().or(self.found).is_none(),
-            ..Needs::default()
+            ..Needs::none().looks_at(names::XYZ).writes(&NORMAL).neighbors(self.count())
         }
     }
 
@@ -154,7 +151,7 @@ impl TileOp for Normals {
             }
         };
         let mut estimator = Estimator::with(self.method, tile.simd());
-        let mut normals = std::mem::take(&mut tile.normals);
+        let mut normals = tile.columns.take(&NORMAL)?;
         let copies = std::mem::take(&mut tile.copies);
         let core = tile.core.clone();
         let (mut without, mut no_triangle, mut perpendicular) = (0, 0, 0);
@@ -174,13 +171,14 @@ impl TileOp for Normals {
             estimator.take(i, neighborhood, &mut settle);
         });
         estimator.finish(&mut settle);
-        (tile.normals, tile.copies) = (normals, copies);
         tile.oriented = side != SignRule::Any;
-        for i in 0..tile.positions.len() {
-            if tile.oriented && is_known(tile.normals[i]) {
-                tile.normals[i] = side.settled(tile.normals[i], tile.positions[i]);
+        for (normal, position) in normals.iter_mut().zip(&tile.positions) {
+            if tile.oriented && is_known(*normal) {
+                *normal = side.settled(*normal, *position);
             }
         }
+        tile.columns.put(normals);
+        tile.copies = copies;
         tally.count("no_normal", without);
         tally.count("fallback_no_triangle", no_triangle);
         tally.count("fallback_perpendicular", perpendicular);

@@ -22,13 +22,9 @@ pub(super) fn remove(tile: &mut Tile, i: usize) -> u64 {
     records
 }
 
-/// Lets `kept`, which has a normal, stand for position `i`; returns how many records that removes.
-pub(super) fn represent(tile: &mut Tile, i: usize, kept: usize) -> u64 {
-    represent_by(tile, i, kept, tile.normals[kept].map(f64::from))
-}
-
-/// The same, and the plane through `kept` has this unit normal.
-pub(super) fn represent_by(tile: &mut Tile, i: usize, kept: usize, normal: [f64; 3]) -> u64 {
+/// Lets `kept`, through which the plane of a unit normal goes, stand for position `i`; returns how
+/// many records that removes.
+pub(super) fn represent(tile: &mut Tile, i: usize, kept: usize, normal: [f64; 3]) -> u64 {
     let records = records(tile, i);
     if records > 0 {
         let (p, q) = (tile.positions[i], tile.positions[kept]);

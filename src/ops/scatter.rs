@@ -2,6 +2,7 @@
 
 use crate::geom::angle::is_known;
 use crate::geom::plane::{Covariance, across, dot, smallest};
+use crate::point::NORMAL;
 use crate::tile::Tile;
 
 /// Scatter in radians up to which there is no noise: normals disagree at edges alone.
@@ -17,7 +18,8 @@ const WIDE: f64 = 1.0 / 64.0;
 /// The root of the mean squared angle in radians between the normals of a sample and their linear
 /// trend over it, which is what a curved surface has; none if its positions are not planar.
 pub(super) fn scatter(tile: &Tile) -> Option<f64> {
-    let chosen = |i: &usize| tile.is_chosen(*i) && is_known(tile.normals[*i]);
+    let normals = tile.columns.find(&NORMAL)?;
+    let chosen = |i: &usize| tile.is_chosen(*i) && is_known(normals[*i]);
     let members: Vec<usize> = tile.core.clone().filter(chosen).collect();
     let first = tile.positions[*members.first()?];
     if members.len() < FEWEST {
@@ -37,7 +39,7 @@ pub(super) fn scatter(tile: &Tile) -> Option<f64> {
     let (u, v) = across(up);
     let placed = members.iter().zip(&offsets).map(|(&i, offset)| {
         let offset = offset.map(|steps| steps as f64);
-        let normal = tile.normals[i].map(f64::from);
+        let normal = normals[i].map(f64::from);
         let sign = if dot(up, normal) < 0.0 { -1.0 } else { 1.0 };
         let tilt = [sign * dot(u, normal), sign * dot(v, normal)];
         ([dot(u, offset), dot(v, offset)], tilt)

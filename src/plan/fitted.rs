@@ -6,14 +6,14 @@ use std::num::NonZeroUsize;
 use rayon::ThreadPool;
 
 use super::look::{Unfit, look};
-use super::passes::{check_limits, number_selections, unroll};
+use super::passes::{Passes, check_limits, number_selections, unroll};
 use super::places::{all_read, check_places, copies, each_input};
 use super::sorted::Sorted;
 use super::stretch::Stretch;
 use crate::engine::by_input::lists_bytes;
 use crate::engine::by_rank;
 use crate::engine::demands::Demands;
-use crate::engine::pass::{Op, Pass, StageOp, standings};
+use crate::engine::pass::{ColumnBytes, Op, Pass, StageOp, standings};
 use crate::engine::tagger::Tagger;
 use crate::engine::task::Task;
 use crate::engine::{Done, Watch};
@@ -23,7 +23,7 @@ use crate::graph::Graph;
 use crate::graph::{MOST_THREADS, Nonfinite, Overrides, RunSettings};
 use crate::host::Threads;
 use crate::host::process::default_memory;
-use crate::point::{Schema, Selection, Units};
+use crate::point::{ComputedDimension, Metadata, Schema, Selection, Units};
 use crate::quantity::Figure;
 use crate::stage::{ChunkSize, CreateSink, Order, Source};
 use crate::store::CLASSED_INPUTS;
@@ -78,7 +78,7 @@ impl Graph {
         let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, &*source, &sorted.ops, order.mills)?;
         let simd = settings.simd.resolve().map_err(in_file)?;
-        let demands = demands(&sorted, &passes.passes, &*source, &order, &settings)?;
+        let demands = demands(&sorted, &passes, &*source, &order, &settings)?;
         let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
         let demands = Demands {
             lists: demands.lists + lists_bytes(ranks.len()) * folders,
@@ -103,6 +103,7 @@ impl Graph {
             sinks: sorted.sinks,
             changed_by: passes.changed_by,
             branch_of: passes.branch_of,
+            computed: passes.computed,
             in_input_order: order.in_input_order,
             each,
             beside,
@@ -166,13 +167,14 @@ fn lattice(
 /// What a run depends on in its memory, but the lists of outputs that are one for each input.
 fn demands(
     sorted: &Sorted,
-    passes: &[Pass],
+    Passes { passes, computed, .. }: &Passes,
     source: &dyn Source,
     order: &WriteOrder,
     settings: &RunSettings,
 ) -> Result<Demands> {
     let limit = settings.memory.unwrap_or_else(default_memory);
-    let chunks = chunks(&sorted.sinks, source)?;
+    let chunks = chunks(&sorted.sinks, computed, source)?;
+    let columns = passes.iter().map(|pass| pass.column_bytes(computed));
     let ranked =
         order.in_input_order.iter().filter(|ranked| **ranked && order.mills).count() as u64;
     Ok(Demands {
@@ -181,6 +183,7 @@ fn demands(
         mills: order.mills,
         filters: !sorted.filters.is_empty(),
         standings: standings(passes),
+        columns: columns.fold(ColumnBytes::default(), ColumnBytes::larger),
         passes: passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect(),
         run_most: settings.tile_points.map(|points| (points.get() as u64).saturating_mul(4)),
         gathers: sorted.ops.iter().any(|stage| matches!(stage.op, Op::Scan(_))),
@@ -242,12 +245,12 @@ fn check_transforms(sorted: &Sorted, schema: &Schema) -> Result<()> {
     for (kind, transform) in decoded.chain(behind) {
         let needs = transform.needs();
         let there = |name: &&String| schema.find(name).is_some() || written.contains(name);
-        if let Some(missing) = needs.reads.iter().find(|name| !there(name)) {
+        if let Some(missing) = needs.dimensions.iter().find(|name| !there(name)) {
             let told = format!("`{kind}` needs {missing}, which nothing before it gives");
             return Err(Error::pipeline(told).help("the input has no such dimension"));
         }
         transform.check(schema)?;
-        written.extend(needs.writes);
+        written.extend(needs.changes);
     }
     Ok(())
 }
@@ -291,8 +294,16 @@ fn threads(settings: &RunSettings) -> Result<usize> {
 }
 
 /// The chunks of all outputs.
-fn chunks(sinks: &[Box<dyn CreateSink>], source: &dyn Source) -> Result<Vec<ChunkSize>> {
-    sinks.iter().map(|sink| sink.chunk(source.schema(), source.metadata())).collect()
+fn chunks(
+    sinks: &[Box<dyn CreateSink>],
+    computed: &[Vec<ComputedDimension>],
+    source: &dyn Source,
+) -> Result<Vec<ChunkSize>> {
+    let chunk = |(sink, computed): (&Box<dyn CreateSink>, &Vec<ComputedDimension>)| {
+        let metadata = Metadata { computed: computed.clone(), ..source.metadata().clone() };
+        sink.chunk(source.schema(), &metadata)
+    };
+    sinks.iter().zip(computed).map(chunk).collect()
 }
 
 /// What z is multiplied by where stages measure distances; else 1.

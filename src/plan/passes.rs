@@ -4,7 +4,8 @@
 use super::sorted::{Sorted, StageWork};
 use crate::engine::pass::{Branch, Call, Op, Pass, PassFilter, StageOp, decides, needs};
 use crate::graph::{Limits, Sees};
-use crate::point::{Schema, names};
+use crate::point::{ColumnKind, ComputedDimension, NORMAL, Scalar, Schema, names};
+use crate::stage::Needs;
 use crate::store::SELECTIONS;
 use crate::{Error, Result};
 
@@ -52,6 +53,8 @@ pub(super) struct Passes {
     pub changed_by: Vec<Vec<usize>>,
     /// For each sink the first branch that it is on.
     pub branch_of: Vec<usize>,
+    /// For each sink the computed dimensions that it writes.
+    pub computed: Vec<Vec<ComputedDimension>>,
 }
 
 /// Lays the stages out as passes.
@@ -62,6 +65,7 @@ pub(super) fn unroll(sorted: &Sorted, schema: &Schema) -> Result<Passes> {
     let out = Passes {
         changed_by: vec![Vec::new(); sinks],
         branch_of: vec![0; sinks],
+        computed: vec![Vec::new(); sinks],
         ..Passes::default()
     };
     let mut layout =
@@ -87,10 +91,8 @@ struct BranchCursor {
     behind: Option<usize>,
     /// False once the pass removes or gathers.
     is_open: bool,
-    /// The pass whose normals are the newest.
-    normals_from: Option<usize>,
-    /// True once a stage or a sink has read them.
-    normals_read: bool,
+    /// The newest values of each column that a stage computed.
+    columns: Vec<NewestColumn>,
     /// Stages of the graph so far, the decode's left out.
     path: Vec<usize>,
     /// The tile stages among them.
@@ -99,6 +101,16 @@ struct BranchCursor {
     filters: Vec<usize>,
     /// True if the last stage takes records away.
     decides: bool,
+}
+
+/// Where the newest values of a column come from.
+#[derive(Debug, Clone, Copy)]
+struct NewestColumn {
+    kind: ColumnKind,
+    /// The pass that computes them.
+    pass: usize,
+    /// True once a stage or a sink has read them.
+    is_read: bool,
 }
 
 impl PassLayout<'_> {
@@ -166,9 +178,9 @@ impl PassLayout<'_> {
         let above = self.at.ops.clone();
         self.at.ops.push(op);
         self.add(op, 1)?;
-        if needs.passes > 1 {
-            let repeated = self.repeated(op, &above)?;
-            for round in 2..=needs.passes {
+        if let Some((column, times)) = needs.repeats.filter(|(_, times)| *times > 1) {
+            let repeated = self.repeated(op, column, &above)?;
+            for round in 2..=times {
                 repeated.iter().try_for_each(|&op| self.add(op, round))?;
             }
         }
@@ -195,11 +207,16 @@ impl PassLayout<'_> {
     /// written.
     fn check_unchanged(&self, op: usize) -> Result<()> {
         let StageOp { kind, written, op, .. } = &self.ops[op];
-        let reads = op.tile().needs().reads;
-        let is_read = |name: &String| names::XYZ.contains(&name.as_str()) || reads.contains(name);
+        let needs = op.tile().needs();
+        let is_column = |name: &str| needs.reads.iter().any(|column| column.name() == name);
+        let is_read = |name: &String| {
+            names::XYZ.contains(&name.as_str())
+                || needs.dimensions.contains(name)
+                || is_column(name)
+        };
         for filter in &self.at.filters {
             let PassFilter { kind: above, transform } = &self.sorted.filters[*filter];
-            if let Some(name) = transform.needs().writes.iter().find(|name| is_read(name)) {
+            if let Some(name) = transform.needs().changes.iter().find(|name| is_read(name)) {
                 let told =
                     format!("`{kind}` works by {name} as it is read, and `{above}` changes it");
                 let help = format!(
@@ -211,23 +228,23 @@ impl PassLayout<'_> {
         Ok(())
     }
 
-    /// The stages that are repeated with `op`, from the last above that computes normals on.
-    fn repeated(&self, op: usize, above: &[usize]) -> Result<Vec<usize>> {
-        let written = &self.ops[op].written;
-        let writes = |at: &usize| {
-            self.ops[*at].op.tile().needs().writes.iter().any(|column| column == "Normal")
-        };
+    /// The stages that are repeated with `op`, from the last above that computes `column` on.
+    fn repeated(&self, op: usize, column: ColumnKind, above: &[usize]) -> Result<Vec<usize>> {
+        let StageOp { kind, written, .. } = &self.ops[op];
+        let writes = |at: &usize| self.ops[*at].op.tile().needs().writes.contains(&column);
         let first = above.iter().rposition(writes).ok_or_else(|| {
-            written.wrong(
-                "`median.passes` repeats the stages from `normals` on, and there is none".into(),
-            )
+            let name = column.name();
+            written.wrong(format!(
+                "`{kind}.passes` repeats the stages from the one that computes {name} on, and \
+                 there is none"
+            ))
         })?;
         let repeated: Vec<usize> = above[first..].iter().copied().chain([op]).collect();
         let scan = repeated.iter().find(|&&at| matches!(self.ops[at].op, Op::Scan(_)));
         if let Some(&at) = scan {
             let told =
                 format!("`{}` looks at the whole scan and cannot be repeated", self.ops[at].kind);
-            let help = "leave `median.passes` out, or run the pipeline twice";
+            let help = format!("leave `{kind}.passes` out, or run the pipeline twice");
             return Err(written.wrong(told).help(help));
         }
         Ok(repeated)
@@ -244,100 +261,142 @@ impl PassLayout<'_> {
     fn call(&mut self, call: Call, round: usize) -> Result<()> {
         let stage = &self.ops[call.op];
         let needs = needs(self.ops, call);
-        let reads = |column: &str| needs.reads.iter().any(|name| name == column);
-        let Limits { sees, .. } = stage.limits;
-        let seen = if sees == Sees::Selected { stage.selection } else { 0 };
-        let on_columns = reads("Normal") || reads("Cell");
-        let writes = |column: &str| needs.writes.iter().any(|name| name == column);
-        if writes("Normal") && self.at.normals_from.is_some() && !self.at.normals_read {
-            let told = "this `normals` would replace normals that nothing has read".to_owned();
-            return Err(stage.written.wrong(told).help("leave one of the two out"));
+        let at = self.place(stage, &needs)?;
+        self.look(at, stage, &needs)?;
+        for column in &needs.reads {
+            self.provide(at, *column, stage)?;
         }
-        let at = self.pass();
-        let last = &self.out.passes[at];
-        let rewrites = writes("Normal") && last.writes_normals;
-        let other_neighbors = needs.neighbors > 0 && last.looks && last.seen != seen;
-        let other_records = !on_columns && last.decided != stage.selection;
-        let begun = !last.calls.is_empty() || !last.filters.is_empty();
-        let at = match begun && (!self.at.is_open || rewrites || other_neighbors || other_records) {
-            true => self.begin(),
-            false => at,
-        };
-        for name in &needs.reads {
-            self.provide(at, name, stage)?;
+        if needs.takes_cells && !self.out.passes[at].makes_cells {
+            return Err(self.no_cells(stage));
         }
         let pass = &mut self.out.passes[at];
         pass.round = round;
         pass.calls.push(call);
         pass.decided |= stage.selection;
         if needs.neighbors > 0 {
-            (pass.seen, pass.looks) = (seen, true);
+            (pass.seen, pass.looks) = (seen_by(stage), true);
         }
-        pass.writes_cells |= writes("Cell");
-        pass.stores_figures |= writes("Figure");
+        pass.makes_cells |= needs.makes_cells;
+        for column in needs.writes.iter().copied() {
+            pass.loads.retain(|loaded| *loaded != column || needs.reads.contains(loaded));
+            pass.writes.push(column);
+            self.at.columns.retain(|newest| newest.kind != column);
+            self.at.columns.push(NewestColumn { kind: column, pass: at, is_read: false });
+        }
         if decides(&needs) {
             (pass.removes, pass.mark) = (true, needs.mark);
             self.at.is_open = false;
         }
-        if writes("Normal") {
-            (pass.writes_normals, pass.loads_normals) = (true, false);
-            (self.at.normals_from, self.at.normals_read) = (Some(at), false);
-        }
         Ok(())
     }
 
-    /// Sees to it that `name` is there for a stage of pass `at`.
-    fn provide(&mut self, at: usize, name: &str, stage: &StageOp) -> Result<()> {
-        let kind = &stage.kind;
-        let missing = |help: &str| {
-            let told = format!("`{kind}` needs {name}, which nothing before it gives");
-            Err(stage.written.wrong(told).help(help.to_owned()))
-        };
-        match name {
-            "Normal" => match self.bring_normals(at) {
-                true => {}
-                false => return missing("put a `normals` stage before it"),
-            },
-            "Cell" if self.out.passes[at].writes_cells => {}
-            "Cell" if self.out.passes.iter().any(|pass| pass.writes_cells) => {
-                return missing(
-                    "cells last until points are removed: put a `cells` stage right before it",
-                );
-            }
-            "Cell" => return missing("put a `cells` stage before it"),
-            "Figure" => match self.out.passes[at].behind {
-                Some(before) if self.out.passes[before].stores_figures => {
-                    self.out.passes[at].loads_figures = true;
-                }
-                _ => return missing("only the second phase of a stage reads it"),
-            },
-            _ if self.schema.find(name).is_none() => {
-                return missing("the input has no such dimension");
-            }
-            names::CLASSIFICATION => self.out.passes[at].reads_classes = true,
-            // What a tile has of its records are their positions and classes.
-            _ if !names::XYZ.contains(&name) => {
+    /// The pass of a stage that needs this: the one that the branch is at, or one that begins.
+    fn place(&mut self, stage: &StageOp, needs: &Needs) -> Result<usize> {
+        for newest in self.at.columns.iter().filter(|newest| !newest.is_read) {
+            if needs.writes.contains(&newest.kind) && !needs.reads.contains(&newest.kind) {
+                let (kind, name) = (&stage.kind, newest.kind.name());
                 let told =
-                    format!("`{kind}` needs {name}, which stages that work on tiles cannot read");
-                return Err(stage
-                    .written
-                    .wrong(told)
-                    .help("they read X, Y, Z, Classification, and what stages above computed"));
+                    format!("this `{kind}` would replace values of {name} that nothing reads");
+                return Err(stage.written.wrong(told).help("leave one of the two out"));
             }
-            _ => {}
+        }
+        let at = self.pass();
+        let last = &self.out.passes[at];
+        let is_new = |column: &ColumnKind| last.writes.contains(column);
+        // A column is there for the whole rim once all tiles have computed theirs.
+        let rewrites = needs.writes.iter().chain(&needs.of_neighbors).any(is_new);
+        let other_neighbors = needs.neighbors > 0 && last.looks && last.seen != seen_by(stage);
+        let is_computed =
+            |column: &ColumnKind| self.at.columns.iter().any(|newest| newest.kind == *column);
+        let on_columns = needs.takes_cells || needs.reads.iter().any(is_computed);
+        let other_records = !on_columns && last.decided != stage.selection;
+        let begun = !last.calls.is_empty() || !last.filters.is_empty();
+        match begun && (!self.at.is_open || rewrites || other_neighbors || other_records) {
+            true => Ok(self.begin()),
+            false => Ok(at),
+        }
+    }
+
+    /// Lets a stage of pass `at` look at the dimensions that it needs.
+    fn look(&mut self, at: usize, stage: &StageOp, needs: &Needs) -> Result<()> {
+        for name in &needs.dimensions {
+            if self.schema.find(name).is_none() {
+                return Err(missing(stage, name, "the input has no such dimension"));
+            }
+            match name.as_str() {
+                names::CLASSIFICATION => self.out.passes[at].reads_classes = true,
+                // What a tile has of its records are their positions and classes.
+                name if !names::XYZ.contains(&name) => {
+                    let kind = &stage.kind;
+                    let told = format!(
+                        "`{kind}` needs {name}, which stages that work on tiles cannot read"
+                    );
+                    return Err(stage.written.wrong(told).help(
+                        "they read X, Y, Z, Classification, and what they declare as columns",
+                    ));
+                }
+                _ => {}
+            }
         }
         Ok(())
     }
 
-    /// Brings the newest normals to pass `at`; false if there are none.
-    fn bring_normals(&mut self, at: usize) -> bool {
-        let Some(from) = self.at.normals_from else { return false };
-        self.at.normals_read = true;
+    /// Sees to it that `column` is there for a stage of pass `at`: as a stage above computed it, or
+    /// as the records have it.
+    fn provide(&mut self, at: usize, column: ColumnKind, stage: &StageOp) -> Result<()> {
+        if self.bring(at, column) {
+            return Ok(());
+        }
+        let name = column.name();
+        if self.at.columns.iter().any(|newest| newest.kind.name() == name) {
+            let told = format!("`{}` reads {name} as another type than it has", stage.kind);
+            return Err(Error::internal(told));
+        }
+        if self.schema.find(name).is_none() {
+            let help = giver(name).map_or_else(
+                || format!("put a stage that computes {name} before it"),
+                |stage| format!("put a `{stage}` stage before it"),
+            );
+            return Err(missing(stage, name, &help));
+        }
+        if column.scalar() != Scalar::F64 || column.parts().len() > 1 {
+            let told = format!("`{}` reads {name} as another type than f64", stage.kind);
+            return Err(Error::internal(told));
+        }
+        let dimensions = &mut self.out.passes[at].dimensions;
+        if !dimensions.contains(&column) {
+            dimensions.push(column);
+        }
+        Ok(())
+    }
+
+    /// Brings the newest values of a column to pass `at`; false if no stage computed any.
+    fn bring(&mut self, at: usize, column: ColumnKind) -> bool {
+        let newest = self.at.columns.iter_mut().find(|newest| newest.kind == column);
+        let Some(newest) = newest else { return false };
+        newest.is_read = true;
+        let from = newest.pass;
         if from != at {
-            self.out.passes[from].stores_normals = true;
-            self.out.passes[at].loads_normals = true;
+            let add = |columns: &mut Vec<ColumnKind>| {
+                if !columns.contains(&column) {
+                    columns.push(column);
+                }
+            };
+            add(&mut self.out.passes[from].stores);
+            add(&mut self.out.passes[at].loads);
         }
         true
+    }
+
+    fn no_cells(&self, stage: &StageOp) -> Error {
+        missing(
+            stage,
+            "Cell",
+            match self.out.passes.iter().any(|pass| pass.makes_cells) {
+                true => "cells last until points are removed: put a `cells` stage right before it",
+                false => "put a `cells` stage before it",
+            },
+        )
     }
 
     /// Attaches sinks to the pass that the branch is at: they take what is there before it, if its
@@ -345,11 +404,7 @@ impl PassLayout<'_> {
     fn tap(&mut self, sinks: &[usize]) -> Result<()> {
         for &sink in sinks {
             let at = self.pass();
-            if self.sorted.sinks[sink].wants_normals() && !self.bring_normals(at) {
-                let told = "the output wants normals, which no stage computes";
-                let help = "put a `normals` stage before it, or leave `write.dimensions` out";
-                return Err(Error::pipeline(told).help(help));
-            }
+            self.out.computed[sink] = self.computed(sink, at)?;
             let pass = &mut self.out.passes[at];
             if self.at.decides {
                 pass.after.push(sink)
@@ -361,4 +416,41 @@ impl PassLayout<'_> {
         }
         Ok(())
     }
+
+    /// The computed dimensions that a sink of what pass `at` finds or leaves writes.
+    fn computed(&mut self, sink: usize, at: usize) -> Result<Vec<ComputedDimension>> {
+        let mut computed = Vec::new();
+        for name in self.sorted.sinks[sink].computed() {
+            let newest = self.at.columns.iter().rev();
+            let found = newest.filter_map(|newest| newest.kind.part(name)).next();
+            let Some(dimension) = found else {
+                let told = format!("the output wants {name}, which no stage computes");
+                let before = giver(name)
+                    .map_or(String::new(), |stage| format!("put a `{stage}` stage before it, or "));
+                let help = format!("{before}leave {name} out of `write.dimensions`");
+                return Err(Error::pipeline(told).help(help));
+            };
+            self.bring(at, dimension.column);
+            computed.push(dimension);
+        }
+        Ok(computed)
+    }
+}
+
+/// The records that a stage sees as neighbours, by the selections that they are in.
+fn seen_by(stage: &StageOp) -> u8 {
+    let Limits { sees, .. } = stage.limits;
+    if sees == Sees::Selected { stage.selection } else { 0 }
+}
+
+/// The error of a stage that needs what is not there.
+fn missing(stage: &StageOp, name: &str, help: &str) -> Error {
+    let told = format!("`{}` needs {name}, which nothing before it gives", stage.kind);
+    stage.written.wrong(told).help(help.to_owned())
+}
+
+/// The stage that computes a column which has this name, or a number of that name.
+fn giver(name: &str) -> Option<&'static str> {
+    let known = NORMAL.kind();
+    (known.name() == name || known.part(name).is_some()).then_some("normals")
 }

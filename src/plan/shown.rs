@@ -92,9 +92,10 @@ impl Plan {
         if call.gathers {
             write!(f, " gathers over the whole scan")?;
         }
-        write!(f, ": reads {}", needs.reads.join(", "))?;
-        if !needs.writes.is_empty() {
-            write!(f, ", writes {}", needs.writes.join(", "))?;
+        write!(f, ": reads {}", needs.read_names().join(", "))?;
+        let written = needs.written_names().join(", ");
+        if !written.is_empty() {
+            write!(f, ", writes {written}")?;
         }
         if needs.neighbors > 0 {
             let most = if needs.fewer_neighbors { "up to " } else { "" };

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use super::Schema;
+use super::columns::Columns;
+use super::schema::Schema;
 
 /// Up to `capacity` records of one schema, refilled rather than rebuilt.
 ///
@@ -16,8 +17,8 @@ pub struct PointBatch {
     /// Number of the source (file, or scan within a file) that the records came from. No decision
     /// reads it.
     pub source: u32,
-    /// Unit normals (one a record, NaN where there is none) when a stage computed them.
-    pub normals: Option<Vec<[f32; 3]>>,
+    /// Columns that stages computed and the output writes: a value for each record.
+    pub columns: Columns,
     /// For each record its number when they were numbered, if somebody asks which are left.
     numbers: Option<Vec<u32>>,
 }
@@ -26,7 +27,8 @@ impl PointBatch {
     /// An empty batch that takes up to `capacity` records; allocates them at once.
     pub fn new(schema: Arc<Schema>, capacity: usize) -> Self {
         let records = Vec::with_capacity(capacity * schema.stride);
-        PointBatch { schema, records, capacity, source: 0, normals: None, numbers: None }
+        let columns = Columns::default();
+        PointBatch { schema, records, capacity, source: 0, columns, numbers: None }
     }
 
     /// What the records hold.
@@ -67,7 +69,7 @@ impl PointBatch {
     /// Forgets the records and what was computed for them; keeps the memory.
     pub fn clear(&mut self) {
         self.records.clear();
-        self.normals = None;
+        self.columns = Columns::default();
         self.numbers = None;
     }
 
@@ -75,7 +77,7 @@ impl PointBatch {
     /// caller to fill; what they hold until then is unspecified.
     pub fn refill(&mut self, len: usize) -> &mut [u8] {
         assert!(len <= self.capacity, "a batch is refilled within its capacity");
-        self.normals = None;
+        self.columns = Columns::default();
         self.numbers = None;
         self.records.resize(len * self.schema.stride, 0);
         &mut self.records
@@ -101,9 +103,7 @@ impl PointBatch {
     /// Shortens the batch to its first `len` records.
     pub fn truncate(&mut self, len: usize) {
         self.records.truncate(len * self.schema.stride);
-        if let Some(normals) = &mut self.normals {
-            normals.truncate(len);
-        }
+        self.columns.truncate(len);
         if let Some(numbers) = &mut self.numbers {
             numbers.truncate(len);
         }
@@ -123,9 +123,7 @@ impl PointBatch {
             if keep(i, &self.records[i * stride..(i + 1) * stride]) {
                 if kept < i {
                     self.records.copy_within(i * stride..(i + 1) * stride, kept * stride);
-                    if let Some(normals) = &mut self.normals {
-                        normals[kept] = normals[i];
-                    }
+                    self.columns.copy(i, kept);
                     if let Some(numbers) = &mut self.numbers {
                         numbers[kept] = numbers[i];
                     }

@@ -2,7 +2,10 @@
 
 mod batch;
 mod bounds;
+mod column;
+mod columns;
 mod mark;
+mod metadata;
 pub mod names;
 mod schema;
 mod selection;
@@ -11,8 +14,12 @@ mod units;
 
 pub use batch::PointBatch;
 pub use bounds::{Bounds, Position, distance2};
+pub use column::{Column, ColumnKind, ColumnValue, ComputedDimension, NORMAL};
+pub(crate) use columns::COLUMN_ENDIAN;
+pub use columns::{Columns, TakenColumn};
 pub use mark::{Edit, Mark};
-pub use schema::{Bits, Dimension, Endian, GpsTime, Layout, Metadata, Scalar, Schema, Value};
+pub use metadata::{GpsTime, Metadata};
+pub use schema::{Bits, Dimension, Endian, Layout, Scalar, Schema, Value};
 pub use selection::{Chooser, Flag, Selection};
 pub use spare::Spare;
 pub use units::{Horizontal, Mismatch, Units};

@@ -1,8 +1,5 @@
 //! What a record holds: typed fields at byte offsets, bit fields included.
 
-use std::any::Any;
-use std::sync::Arc;
-
 /// Type of a stored number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[expect(missing_docs, reason = "the names are the types")]
@@ -272,46 +269,6 @@ impl Schema {
     pub fn coordinates(&self) -> Option<[&Dimension; 3]> {
         let [x, y, z] = super::names::XYZ.map(|name| self.find(name));
         Some([x?, y?, z?])
-    }
-}
-
-/// What the values of `GpsTime` count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum GpsTime {
-    /// Seconds of the GPS week.
-    Week,
-    /// Seconds of GPS time minus 1e9, as LAS has it.
-    AdjustedStandard,
-}
-
-/// What a file says besides its points and that outputs carry on.
-#[derive(Clone, Default)]
-pub struct Metadata {
-    /// Coordinate reference system as text (WKT where the file has one).
-    pub crs: Option<String>,
-    /// Units of the coordinates, as far as that says them.
-    pub units: super::Units,
-    /// What GPS times count, where the source knows.
-    pub gps_time: Option<GpsTime>,
-    /// What the records went through, as outputs say it: the stages as one line of JSON. None where
-    /// every record comes as it is.
-    pub pipeline: Option<Arc<str>>,
-    /// Free text lines, such as the comments of a PLY header.
-    pub comments: Vec<String>,
-    /// The format's own header and records, known to sources and sinks of that format alone.
-    pub native: Option<Arc<dyn Any + Send + Sync>>,
-}
-
-impl std::fmt::Debug for Metadata {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Metadata")
-            .field("crs", &self.crs)
-            .field("units", &self.units)
-            .field("gps_time", &self.gps_time)
-            .field("pipeline", &self.pipeline)
-            .field("comments", &self.comments)
-            .field("native", &self.native.is_some())
-            .finish()
     }
 }
 

@@ -12,7 +12,7 @@ use super::deviations::{Deviations, Histogram};
 use super::figures::{BaselineFigures, world_length};
 use crate::geom::angle::is_known;
 use crate::geom::lattice::Lattice;
-use crate::point::{Position, distance2};
+use crate::point::{NORMAL, Position, distance2};
 use crate::store::{Levels, TileKey};
 use crate::tile::Tile;
 
@@ -65,6 +65,8 @@ impl Baseline {
     /// Adds what stages decide about in the core of a tile that has normals. No cube of the
     /// coarsest level may cross its faces.
     pub fn add(&mut self, tile: &Tile) {
+        let Some(normals) = tile.columns.find(&NORMAL) else { return };
+        let measured = MeasuredTile { tile, normals };
         let Range { mut start, end } = tile.core;
         while start < end {
             let first = tile.positions[start];
@@ -73,7 +75,7 @@ impl Baseline {
                 let chosen = (start..start + count).filter(|&i| tile.is_chosen(i));
                 self.records += chosen.map(|i| u64::from(tile.copies[i])).sum::<u64>();
                 for (level, side) in self.levels.iter_mut().zip((0..=self.top).rev()) {
-                    level.add(tile, start..start + count, side);
+                    level.add(&measured, start..start + count, side);
                 }
             }
             start += count;
@@ -126,17 +128,28 @@ impl Baseline {
     }
 }
 
+/// A tile with its normals.
+struct MeasuredTile<'a> {
+    tile: &'a Tile,
+    normals: &'a [[f32; 3]],
+}
+
 impl GridLevel {
     /// Adds the cubes of side 2^`level` among positions that follow one another.
-    fn add(&mut self, tile: &Tile, Range { mut start, end }: Range<usize>, level: u32) {
+    fn add(&mut self, tile: &MeasuredTile<'_>, Range { mut start, end }: Range<usize>, level: u32) {
         while start < end {
-            let count = run(&tile.positions[start..end], level);
+            let count = run(&tile.tile.positions[start..end], level);
             self.add_cube(tile, start..start + count, level);
             start += count;
         }
     }
 
-    fn add_cube(&mut self, tile: &Tile, cube: Range<usize>, level: u32) {
+    fn add_cube(
+        &mut self,
+        MeasuredTile { tile, normals }: &MeasuredTile<'_>,
+        cube: Range<usize>,
+        level: u32,
+    ) {
         let corner = TileKey::around(tile.positions[cube.start], level).corner;
         // In half steps from the corner, as in `grid`.
         let from_center = |i: usize| {
@@ -147,8 +160,8 @@ impl GridLevel {
         let Some(kept) = chosen().min_by_key(|&i| (from_center(i), i)) else { return };
         self.cubes += 1;
         self.measure(kept, 0.0, tile, tile.copies[kept].saturating_sub(1));
-        if is_known(tile.normals[kept]) {
-            let normal = tile.normals[kept].map(f64::from);
+        if is_known(normals[kept]) {
+            let normal = normals[kept].map(f64::from);
             let q = tile.positions[kept];
             for i in chosen().filter(|&i| i != kept) {
                 let p = tile.positions[i];

@@ -155,8 +155,9 @@ pub fn foreign(path: &Path, called: &str) -> Error {
 pub struct WriteKeys {
     /// The final path, for messages.
     pub path: PathBuf,
-    /// True if the normals that a stage computed are written.
-    pub normals: bool,
+    /// The computed dimensions that are written. What they are comes with
+    /// [`Metadata::computed`](crate::point::Metadata::computed).
+    pub computed: Vec<String>,
     /// Dimensions that the output need not hold.
     pub drop: Vec<String>,
     /// Scale of stored coordinates.

@@ -116,8 +116,11 @@ pub trait CreateSink: Send + Sync {
         false
     }
 
-    /// True if it writes the normals that a stage computed.
-    fn wants_normals(&self) -> bool;
+    /// The dimensions that it writes of those that stages compute, such as `NormalX`. What they are
+    /// comes with [`Metadata::computed`], and their values with [`PointBatch::columns`].
+    fn computed(&self) -> &[String] {
+        &[]
+    }
 
     /// The dimensions of its records that it does not look at.
     fn unread(&self) -> &[String] {

@@ -34,8 +34,7 @@ pub use levels::Levels;
 pub use merge::{merge_bytes, seal};
 pub use pieces::{PIECE, Pieces};
 pub use record::{
-    ASIDE, CLASSED_INPUTS, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, RecordState, SELECTIONS,
-    TAGGED_INPUTS, Tag, ref_bytes,
+    ASIDE, CLASSED_INPUTS, FATE_BYTES, RecordState, SELECTIONS, TAGGED_INPUTS, Tag, ref_bytes,
 };
 pub use sealed::{Reader, SealedTiles};
 pub use spill::{Address, Checksum, Folder, Spill, SpillArea, StoredStretch};

@@ -107,7 +107,3 @@ pub const fn ref_bytes(tagged: bool) -> usize {
 
 /// Bytes of a stored fate; see the survey.
 pub const FATE_BYTES: usize = size_of::<f32>();
-/// Bytes of a stored normal.
-pub const NORMAL_BYTES: usize = size_of::<[f32; 3]>();
-/// Bytes of a stored figure.
-pub const FIGURE_BYTES: usize = size_of::<f64>();

@@ -9,12 +9,13 @@
 
 use std::sync::Arc;
 
-use super::remote::Remote;
+use super::remote::{Found, Remote};
 use super::sieve::Sieve;
+use super::values::ValuesBeyond;
 use crate::Result;
 use crate::geom::nearest::Nearest;
 use crate::geom::simd::Simd;
-use crate::point::{Bounds, Position, distance2};
+use crate::point::{Bounds, ColumnKind, Position, distance2};
 use crate::store::SealedTiles;
 use crate::store::morton_cmp;
 
@@ -106,6 +107,12 @@ impl Around {
         self.beyond = Beyond::new(tiles, sieve, loaded);
     }
 
+    /// The values of a column at neighbours that are not loaded.
+    pub(super) fn values_beyond(&self, column: ColumnKind) -> ValuesBeyond {
+        let scan = self.beyond.as_ref().map(|beyond| (beyond.tiles.clone(), beyond.sieve.clone()));
+        ValuesBeyond::new(column, scan)
+    }
+
     /// Calls `visit` for every one of `positions` that `is_asked` with its index and the `k`
     /// nearest *other* positions of the whole scan.
     pub(super) fn each_neighborhood(
@@ -130,19 +137,21 @@ impl Around {
             {
                 *unproven += 1;
                 let scan = (&*beyond.tiles, &beyond.sieve);
-                match remote.nearest(scan, p, k, enough.then_some(d2)) {
-                    Ok(found) => offsets.extend(found),
+                let found = match remote.nearest(scan, p, k, enough.then_some(d2)) {
+                    Ok(found) => found,
                     Err(error) => return outcome = Err(error),
-                }
+                };
+                offsets.extend(found.iter().map(|found| found.position));
                 rank(offsets, ranks);
                 offsets.iter_mut().for_each(|q| *q = offset(p, *q));
-                return visit(i, &Neighborhood::of_offsets(offsets, ranks));
+                let neighborhood = Neighborhood::of_offsets(offsets, ranks);
+                return visit(i, &Neighborhood { found: Some(found), ..neighborhood });
             }
             if let [.., before, _] = *neighbors {
                 *tied += u64::from(distance2(p, positions[before as usize]) == d2);
             }
             offsets.extend(neighbors.iter().map(|&rank| offset(p, positions[rank as usize])));
-            visit(i, &Neighborhood { offsets, ranks: neighbors, farthest2: d2 });
+            visit(i, &Neighborhood { offsets, ranks: neighbors, farthest2: d2, found: None });
         });
         outcome
     }
@@ -159,6 +168,8 @@ pub struct Neighborhood<'a> {
     offsets: &'a [Position],
     ranks: &'a [u32],
     farthest2: u128,
+    /// Where the neighbours are in the scan, if they had to be searched for there.
+    found: Option<&'a [Found]>,
 }
 
 impl<'a> Neighborhood<'a> {
@@ -166,7 +177,7 @@ impl<'a> Neighborhood<'a> {
     /// Morton order of where they lead to.
     pub fn of_offsets(offsets: &'a [Position], ranks: &'a [u32]) -> Self {
         let farthest2 = offsets.last().map_or(0, |&o| distance2([0; 3], o));
-        Neighborhood { offsets, ranks, farthest2 }
+        Neighborhood { offsets, ranks, farthest2, found: None }
     }
 
     /// The offsets of the neighbours from the position, in lattice steps.
@@ -177,6 +188,12 @@ impl<'a> Neighborhood<'a> {
     /// For each neighbour a number that grows in Morton order.
     pub fn ranks(&self) -> &'a [u32] {
         self.ranks
+    }
+
+    /// Where the neighbours are in the scan, if they had to be searched for there; else their ranks
+    /// are their indices in the tile.
+    pub(super) fn found(&self) -> Option<&'a [Found]> {
+        self.found
     }
 
     /// Squared distance of the farthest neighbour in lattice steps; 0 if there is none.

@@ -8,12 +8,14 @@
 use std::sync::Arc;
 
 use super::sieve::{MoreRuns, RecordRun, Runs, Sieve};
+use super::values::DimensionColumns;
 use super::{Fate, Tile};
 use crate::Result;
-use crate::point::{Bounds, Position};
+use crate::budget::Bytes;
+use crate::point::{Bounds, ColumnKind, NORMAL, Position};
+use crate::store::FATE_BYTES;
 use crate::store::Pieces;
 use crate::store::TileKey;
-use crate::store::{FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES};
 use crate::store::{Reader, SealedTiles};
 
 /// Loads tiles into one arena that it reuses; one a thread.
@@ -30,6 +32,7 @@ pub struct Loader {
     rim_limit: usize,
     tile: Tile,
     core: Core,
+    dimensions: Option<DimensionColumns>,
 }
 
 /// The records of a tile's core, those that the pass does not see included: what the tile's stages
@@ -93,18 +96,32 @@ impl Core {
 }
 
 impl Loader {
-    /// Bytes that a loader holds for each position of its capacity, columns included.
+    /// Bytes that a loader holds for each position of its capacity, columns aside.
     pub const BYTES_PER_POINT: usize = size_of::<Position>()
         + size_of::<u32>() // copies
-        + size_of::<[f32; 3]>() // normal
         + size_of::<Fate>()
         + size_of::<u64>(); // first record
-    /// Bytes more where a sieve may hold records back, or columns are stored.
-    pub const SIEVE_BYTES_PER_POINT: usize = size_of::<RecordRun>() + FATE_BYTES + FIGURE_BYTES + 2;
+    /// Bytes more where a sieve may hold records back.
+    pub const SIEVE_BYTES_PER_POINT: usize = size_of::<RecordRun>() + FATE_BYTES + 2;
+    /// Bytes more where dimensions of records are columns.
+    pub const DIMENSION_BYTES_PER_POINT: usize = size_of::<u64>();
+
+    /// Bytes besides where dimensions of records of `stride` bytes are columns.
+    pub(crate) fn dimension_bytes(stride: usize) -> Bytes {
+        DimensionColumns::bytes(stride)
+    }
 
     /// A loader for tiles of up to `capacity` positions, rim included, as `sieve` lets them be
     /// seen.
     pub fn new(tiles: &Arc<SealedTiles>, sieve: &Sieve, capacity: usize) -> Self {
+        let dimensions = sieve.dimensions.as_ref().map(DimensionColumns::new);
+        let mut tile = Tile::with_capacity(capacity);
+        let stored: Vec<ColumnKind> = sieve.columns.iter().map(|(kind, _)| *kind).collect();
+        let read = dimensions.as_ref().map_or(Vec::new(), DimensionColumns::kinds);
+        tile.columns.declare(&stored);
+        tile.columns.declare(&sieve.computed);
+        tile.columns.declare(&read);
+        tile.columns.reserve(capacity);
         Loader {
             tiles: tiles.clone(),
             sieve: sieve.clone(),
@@ -113,8 +130,9 @@ impl Loader {
             stored: Vec::new(),
             capacity,
             rim_limit: capacity,
-            tile: Tile::with_capacity(capacity),
+            tile,
             core: Core::default(),
+            dimensions,
         }
     }
 
@@ -137,19 +155,25 @@ impl Loader {
         let loaded = self.rim(&zone, neighbors)?;
         self.tile.clear(cube, zone);
         self.core.clear();
-        self.tile.oriented = self.sieve.normals.is_some() && self.sieve.oriented;
+        if let Some(dimensions) = &mut self.dimensions {
+            dimensions.numbers.clear();
+        }
+        let loads = |column: ColumnKind| self.sieve.columns.iter().any(|(kind, _)| *kind == column);
+        self.tile.oriented = loads(NORMAL.kind()) && self.sieve.oriented;
         let tiles = self.tiles.clone();
         let is_fine = self.sieve.is_fine(&tiles);
         tiles.blocks_meeting(&loaded, |b| match is_fine {
             true => self.sift(b, &loaded),
             false => self.take(b, &loaded),
         })?;
-        let Tile { positions, normals, figures, fates, core, .. } = &mut self.tile;
+        let Tile { positions, columns, fates, core, .. } = &mut self.tile;
         if !is_fine {
             core.end = core.start + self.core.first_records.len();
         }
-        normals.resize(positions.len(), [f32::NAN; 3]);
-        figures.resize(if self.sieve.figures.is_some() { positions.len() } else { 0 }, f64::NAN);
+        if let Some(dimensions) = &mut self.dimensions {
+            dimensions.fill(&tiles, columns)?;
+        }
+        columns.resize(positions.len());
         fates.resize(positions.len(), Fate::Kept);
         self.tile.around.surround(&tiles, &self.sieve, loaded);
         Ok(&mut self.tile)
@@ -177,6 +201,13 @@ impl Loader {
             }
             tile.positions.extend_from_slice(positions);
             tile.copies.extend_from_slice(copies);
+            if let Some(dimensions) = &mut self.dimensions {
+                let mut record = block.first_record;
+                dimensions.numbers.extend(copies.iter().map(|&n| {
+                    record += u64::from(n);
+                    record - u64::from(n)
+                }));
+            }
             return Ok(());
         }
         for (j, (&p, &n)) in positions.iter().zip(copies).enumerate() {
@@ -191,6 +222,9 @@ impl Loader {
                 }
                 tile.positions.push(p);
                 tile.copies.push(n);
+                if let Some(dimensions) = &mut self.dimensions {
+                    dimensions.numbers.push(record);
+                }
             }
             record += u64::from(n);
         }
@@ -204,6 +238,7 @@ impl Loader {
         let (positions, copies) = self.tiles.read(b, &mut self.reader)?;
         self.runs.read(&self.tiles, &self.sieve, b, copies)?;
         let Sieve { seen, decided, classes, .. } = self.sieve;
+        let sieve = &self.sieve;
         let (tile, core) = (&mut self.tile, &mut self.core);
         let mut places = Vec::with_capacity(positions.len());
         let mut in_core = 0..0;
@@ -228,10 +263,12 @@ impl Loader {
                 tile.selections.push(alive.fold(0, |of, run| of | run.tag.selections()));
                 let decided = || runs.iter().filter(|run| run.is_in(decided));
                 tile.copies.push(decided().map(|run| run.count).sum());
+                let first = RecordRun::first_of(runs, sieve);
                 if classes {
-                    let seen = runs.iter().filter(|run| run.is_in(seen));
-                    let first = decided().chain(seen).next();
                     tile.classes.push(first.map_or(0, |run| run.tag.class()));
+                }
+                if let (Some(dimensions), Some(first)) = (&mut self.dimensions, first) {
+                    dimensions.numbers.push(first.number);
                 }
                 tile.positions.push(p);
                 tile.core.end += usize::from(is_core);
@@ -259,27 +296,11 @@ impl Loader {
         }
         let Some((&lowest, &highest)) = places.first().zip(places.last()) else { return Ok(()) };
         let span = (first + lowest as u64, (highest - lowest + 1) as u64);
-        if let Some(normals) = &sieve.normals {
-            read_column(normals, span, stored)?;
-            tile.normals.resize(begin, [f32::NAN; 3]);
-            tile.normals.extend(places.iter().map(|j| {
-                let at = (j - lowest) * NORMAL_BYTES;
-                std::array::from_fn(|axis| {
-                    let mut bytes = [0; 4];
-                    bytes.copy_from_slice(&stored[at + 4 * axis..at + 4 * axis + 4]);
-                    f32::from_le_bytes(bytes)
-                })
-            }));
-        }
-        if let Some(figures) = &sieve.figures {
-            read_column(figures, span, stored)?;
-            tile.figures.resize(begin, f64::NAN);
-            tile.figures.extend(places.iter().map(|j| {
-                let at = (j - lowest) * FIGURE_BYTES;
-                let mut bytes = [0; FIGURE_BYTES];
-                bytes.copy_from_slice(&stored[at..at + FIGURE_BYTES]);
-                f64::from_le_bytes(bytes)
-            }));
+        for (column, pieces) in &sieve.columns {
+            read_column(pieces, span, stored)?;
+            let size = column.bytes();
+            let value = |j: &usize| &stored[(j - lowest) * size..][..size];
+            tile.columns.append_each(*column, begin, places.iter().map(value));
         }
         Ok(())
     }

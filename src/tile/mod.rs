@@ -10,17 +10,18 @@ mod around;
 mod load;
 mod remote;
 mod sieve;
+mod values;
 
 pub use around::{Around, Neighborhood};
 pub use load::{Core, Loader};
 pub use remote::Remote;
-pub use sieve::{RecordRun, Sieve};
+pub use sieve::{ReadDimensions, RecordRun, Sieve};
 
 use std::ops::Range;
 
 use crate::Result;
 use crate::geom::simd::Simd;
-use crate::point::{Bounds, Position};
+use crate::point::{Bounds, Column, ColumnValue, Columns, Position};
 
 /// The points of one cube, then a rim of its neighbours' points.
 ///
@@ -39,16 +40,14 @@ pub struct Tile {
     pub copies: Vec<u32>,
     /// Those of `cube`.
     pub core: Range<usize>,
-    /// Unit normals; NaN where there is none or it was not asked for.
-    pub normals: Vec<[f32; 3]>,
+    /// Columns that the pass computes or reads.
+    pub columns: Columns,
     /// True if the signs of normals mean something: a stage turned them to a side.
     pub oriented: bool,
     /// For each position the class of the first of its records that are decided about, in canonical
     /// order (of those that are seen, where none is decided about); empty unless a stage of the
     /// pass reads "Classification".
     pub classes: Vec<u8>,
-    /// What a first phase found for each position of the core; NaN where it found nothing.
-    pub figures: Vec<f64>,
     /// The partition into cells, once a stage made one.
     pub cells: Partition,
     /// What becomes of each position (meaningful in the core). Kept unless a stage says otherwise.
@@ -71,10 +70,9 @@ impl Tile {
             positions: Vec::with_capacity(capacity),
             copies: Vec::with_capacity(capacity),
             core: 0..0,
-            normals: Vec::with_capacity(capacity),
+            columns: Columns::default(),
             oriented: false,
             classes: Vec::new(),
-            figures: Vec::new(),
             cells: Partition::default(),
             fates: Vec::with_capacity(capacity),
             around: Around::default(),
@@ -84,7 +82,7 @@ impl Tile {
     }
 
     /// A tile that is all of a small scan: `positions` distinct and in Morton order, one record
-    /// each.
+    /// each; without columns.
     pub fn of(positions: Vec<Position>) -> Self {
         let bounds = Bounds::of(positions.iter().copied());
         let n = positions.len();
@@ -94,10 +92,9 @@ impl Tile {
             positions,
             copies: vec![1; n],
             core: 0..n,
-            normals: vec![[f32::NAN; 3]; n],
+            columns: Columns::default(),
             oriented: false,
             classes: Vec::new(),
-            figures: vec![f64::NAN; n],
             cells: Partition::default(),
             fates: vec![Fate::Kept; n],
             around: Around::default(),
@@ -111,10 +108,9 @@ impl Tile {
         self.core = 0..0;
         self.positions.clear();
         self.copies.clear();
-        self.normals.clear();
+        self.columns.clear_values();
         self.oriented = false;
         self.classes.clear();
-        self.figures.clear();
         self.cells.clear();
         self.fates.clear();
         self.selections.clear();
@@ -149,6 +145,37 @@ impl Tile {
         let Tile { positions, zone, around, selections, limits, .. } = self;
         let is_asked = |i: usize| zone.contains(positions[i]) && chosen(selections, *limits, i);
         around.each_neighborhood(positions, k, is_asked, visit)
+    }
+
+    /// Does what [`each_neighborhood`](Tile::each_neighborhood) does, and calls `visit` with the
+    /// neighbours' values of `column` besides, in their order. The column is one that the stage
+    /// declared to read [of its neighbours](crate::stage::Needs::reads_of_neighbors).
+    ///
+    /// # Errors
+    ///
+    /// A column that was not declared, and what reading the scan fails with.
+    pub fn each_neighborhood_with<T: ColumnValue>(
+        &mut self,
+        k: usize,
+        column: &Column<T>,
+        mut visit: impl FnMut(usize, &Neighborhood<'_>, &[T]),
+    ) -> Result<()> {
+        let Tile { positions, zone, around, selections, limits, columns, .. } = self;
+        let is_asked = |i: usize| zone.contains(positions[i]) && chosen(selections, *limits, i);
+        let (loaded, mut beyond) = (columns.get(column)?, around.values_beyond(column.kind()));
+        let (mut values, mut outcome) = (Vec::with_capacity(k), Ok(()));
+        around.each_neighborhood(positions, k, is_asked, |i, neighborhood| {
+            values.clear();
+            match neighborhood.found() {
+                None => values.extend(neighborhood.ranks().iter().map(|&j| loaded[j as usize])),
+                Some(found) if outcome.is_ok() => outcome = beyond.read(found, &mut values),
+                Some(_) => {}
+            }
+            if outcome.is_ok() {
+                visit(i, neighborhood, &values);
+            }
+        })?;
+        outcome
     }
 
     /// True if columns must be right for position `i`.

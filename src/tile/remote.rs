@@ -8,7 +8,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::sieve::{Runs, Sieve};
+use super::sieve::{RecordRun, Runs, Sieve};
 use crate::Result;
 use crate::point::{Position, distance2};
 use crate::store::morton_cmp;
@@ -20,17 +20,35 @@ const CACHED: usize = 64;
 /// A best-first search with its cache of blocks; one a thread.
 #[derive(Debug)]
 pub struct Remote {
-    cache: Vec<(usize, Vec<Position>)>,
+    cache: Vec<Cached>,
     reader: Reader,
     runs: Runs,
     open: BinaryHeap<Reverse<(u128, usize, usize)>>,
-    found: Vec<(u128, Position)>,
+    found: Vec<Found>,
+}
+
+/// What a search keeps of a block: the positions that are seen, each with its place in the block.
+#[derive(Debug, Clone)]
+struct Cached {
+    block: usize,
+    positions: Vec<(Position, u32)>,
+}
+
+/// A position that a search found.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Found {
+    /// Its squared distance.
+    distance2: u128,
+    pub(super) position: Position,
+    /// Its block, and its place in it.
+    pub(super) block: usize,
+    pub(super) index: u32,
 }
 
 impl Default for Remote {
     fn default() -> Self {
         Remote {
-            cache: vec![(usize::MAX, Vec::new()); CACHED],
+            cache: vec![Cached { block: usize::MAX, positions: Vec::new() }; CACHED],
             reader: Reader::default(),
             runs: Runs::default(),
             open: BinaryHeap::new(),
@@ -42,18 +60,18 @@ impl Default for Remote {
 impl Remote {
     /// Bytes that it holds.
     pub const BYTES: u64 =
-        ((CACHED + 2) * crate::store::BLOCK * size_of::<Position>()) as u64 + (64 << 10);
+        ((CACHED + 2) * crate::store::BLOCK * size_of::<(Position, u32)>()) as u64 + (64 << 10);
 
     /// The `k` positions nearest to `p` other than itself, by exact squared distance, ties by
     /// Morton order, of those that `sieve` lets be seen; fewer if there are fewer. `bound` is a
     /// squared distance within which `k` others are known to lie, if one is known.
-    pub fn nearest(
+    pub(super) fn nearest(
         &mut self,
         (tiles, sieve): (&SealedTiles, &Sieve),
         p: Position,
         k: usize,
         bound: Option<u128>,
-    ) -> Result<impl Iterator<Item = Position> + '_> {
+    ) -> Result<&[Found]> {
         self.found.clear();
         self.open.clear();
         let root = tiles.root();
@@ -76,12 +94,12 @@ impl Remote {
                 }
             }
         }
-        Ok(self.found.iter().map(|found| found.1))
+        Ok(&self.found)
     }
 
     /// Squared distance beyond which nothing matters; what lies exactly there may still win a tie.
     fn farthest(&self, k: usize, bound: Option<u128>) -> u128 {
-        let kth = if self.found.len() < k { u128::MAX } else { self.found[k - 1].0 };
+        let kth = if self.found.len() < k { u128::MAX } else { self.found[k - 1].distance2 };
         kth.min(bound.unwrap_or(u128::MAX))
     }
 
@@ -93,37 +111,35 @@ impl Remote {
         k: usize,
         bound: Option<u128>,
     ) -> Result<()> {
-        let slot = block % CACHED;
-        if self.cache[slot].0 != block {
+        let cached = &mut self.cache[block % CACHED];
+        if cached.block != block {
             let (positions, copies) = tiles.read(block, &mut self.reader)?;
-            let cached = &mut self.cache[slot];
-            cached.0 = usize::MAX;
-            cached.1.clear();
-            cached.1.extend_from_slice(positions);
+            cached.block = usize::MAX;
+            cached.positions.clear();
+            cached.positions.extend(positions.iter().copied().zip(0..));
             if sieve.is_fine(tiles) {
                 let runs = &mut self.runs;
                 runs.read(tiles, sieve, block, copies)?;
-                let mut j = 0;
-                cached.1.retain(|_| {
-                    j += 1;
-                    runs.of(j - 1).iter().any(|run| run.is_in(sieve.seen))
-                });
+                let is_seen = |run: &RecordRun| run.is_in(sieve.seen);
+                cached.positions.retain(|&(_, j)| runs.of(j as usize).iter().any(is_seen));
             }
-            cached.0 = block;
+            cached.block = block;
         }
-        for i in 0..self.cache[slot].1.len() {
-            let q = self.cache[slot].1[i];
+        for i in 0..self.cache[block % CACHED].positions.len() {
+            let (q, index) = self.cache[block % CACHED].positions[i];
             let distance = distance2(p, q);
             if q == p || distance > self.farthest(k, bound) {
                 continue;
             }
-            let nearer = |found: &(u128, Position)| {
-                found.0.cmp(&distance).then_with(|| morton_cmp(&found.1, &q)).is_lt()
+            let nearer = |found: &Found| {
+                let other = &found.position;
+                found.distance2.cmp(&distance).then_with(|| morton_cmp(other, &q)).is_lt()
             };
             let place = self.found.partition_point(nearer);
             if place < k {
                 self.found.truncate(k - 1);
-                self.found.insert(place, (distance, q));
+                let found = Found { distance2: distance, position: q, block, index };
+                self.found.insert(place, found);
             }
         }
         Ok(())

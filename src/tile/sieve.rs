@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use crate::Result;
 use crate::budget::{Bytes, Lease};
+use crate::point::{ColumnKind, Dimension, Schema};
 use crate::store::{ASIDE, Pieces, RecordState, SealedTiles, Tag};
 
 /// What a pass sees of the scan, and what earlier passes stored.
@@ -20,12 +21,14 @@ pub struct Sieve {
     pub states: Option<Arc<Pieces>>,
     /// A stored fate for every position; none before the first pass.
     pub fates: Option<Arc<Pieces>>,
-    /// A normal for every position.
-    pub normals: Option<Arc<Pieces>>,
-    /// True if the signs of these normals mean something.
+    /// The columns that are stored: a value for every position.
+    pub columns: Vec<(ColumnKind, Arc<Pieces>)>,
+    /// True if the signs of the normals among them mean something.
     pub oriented: bool,
-    /// A figure for every position.
-    pub figures: Option<Arc<Pieces>>,
+    /// The dimensions of the records that stages read as columns.
+    pub dimensions: Option<Arc<ReadDimensions>>,
+    /// The columns that stages compute.
+    pub computed: Vec<ColumnKind>,
     /// True if stages look at the class of positions.
     pub classes: bool,
     /// Selections that a record must be in to be seen as a neighbour.
@@ -39,6 +42,15 @@ impl Sieve {
     pub fn is_fine(&self, tiles: &SealedTiles) -> bool {
         self.states.is_some() || tiles.is_tagged()
     }
+}
+
+/// Dimensions of the records that stages read as columns.
+#[derive(Debug)]
+pub struct ReadDimensions {
+    /// What the records hold.
+    pub schema: Arc<Schema>,
+    /// Each with the column that it is.
+    pub dimensions: Vec<(ColumnKind, Dimension)>,
 }
 
 /// Records of one position that follow one another and are alike to every stage.
@@ -59,6 +71,13 @@ pub struct RecordRun {
 }
 
 impl RecordRun {
+    /// The first of the `runs` of a position whose record stands for all in what stages look at:
+    /// one that is decided about, or seen where none is.
+    pub(super) fn first_of<'a>(runs: &'a [RecordRun], sieve: &Sieve) -> Option<&'a RecordRun> {
+        let decided = runs.iter().find(|run| run.is_in(sieve.decided));
+        decided.or_else(|| runs.iter().find(|run| run.is_in(sieve.seen)))
+    }
+
     /// The slot of a position that a pass does not see.
     pub const UNSEEN: u32 = u32::MAX;
 

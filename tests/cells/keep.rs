@@ -4,20 +4,19 @@ use super::scene::*;
 use pointmill::ops::{Cells, Keep, Measure, Side, Split};
 use pointmill::point::{Bounds, Position};
 use pointmill::report::Tally;
-use pointmill::stage::{Gathered, Role, ScanOp, TileOp};
-use pointmill::stage::{StageKind, StagePlace};
+use pointmill::stage::{Gathered, Role, ScanOp, StageKind, StagePlace, Summary, TileOp};
 use pointmill::{ErrorKind, Result};
 use proptest::prelude::*;
 
-/// What every tile found.
+/// What was gathered of every tile, as it is stored.
 struct Found {
-    tiles: Vec<Vec<[u64; 2]>>,
+    tiles: Vec<Vec<u8>>,
     records: u64,
 }
 
-impl Gathered for Found {
-    fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()> {
-        self.tiles.iter().try_for_each(|tile| visit(tile))
+impl<S: Summary> Gathered<S> for Found {
+    fn each(&self, visit: &mut dyn FnMut(S) -> Result<()>) -> Result<()> {
+        self.tiles.iter().try_for_each(|tile| visit(S::load(tile)?))
     }
 
     fn records(&self) -> u64 {
@@ -44,7 +43,8 @@ fn gather(stage: Cells, scan: &[Point], cubes: &[Bounds]) -> (Cells, Found) {
     let records = scan.iter().map(|p| u64::from(p.copies)).sum();
     let tiles = cubes.iter().map(|cube| {
         let mut found = Vec::new();
-        stage.gather(&mut tile(scan, *cube, side), &mut found, &mut Tally::default()).unwrap();
+        let gathered = stage.gather(&mut tile(scan, *cube, side), &mut Tally::default()).unwrap();
+        gathered.store(&mut found);
         found
     });
     let tiles = tiles.collect();
@@ -143,11 +143,19 @@ proptest! {
     ) {
         let stage = target(&stage, Keep::Records(1));
         let order = |cubes: &[Bounds]| {
-            // All but the last entry of a tile, which is a sum.
             let (_, found) = gather(stage.clone(), &scan, cubes);
-            let sum: u64 = found.tiles.iter().map(|tile| tile[tile.len() - 1][0]).sum();
-            let sequences = found.tiles.iter().map(|tile| &tile[..tile.len() - 1]);
-            (sequences.collect::<Vec<_>>().concat(), sum)
+            let words = |bytes: &[u8]| -> Vec<u64> {
+                bytes.as_chunks().0.iter().map(|word| u64::from_ne_bytes(*word)).collect()
+            };
+            // A sum, the number of cells, four words for each, then the divisions.
+            let (mut sum, mut cells, mut divisions) = (0, Vec::new(), Vec::new());
+            for tile in found.tiles.iter().map(|tile| words(tile)) {
+                let (own, rest) = tile[2..].split_at(4 * tile[1] as usize);
+                sum += tile[0];
+                cells.extend_from_slice(own);
+                divisions.extend_from_slice(rest);
+            }
+            (sum, cells, divisions)
         };
         prop_assert_eq!(order(&[whole(&scan).cube()]), order(&tiles(&scan, most)));
     }

@@ -7,7 +7,7 @@ use pointmill::geom::angle::{
 };
 use pointmill::geom::lattice::Lattice;
 use pointmill::ops::{Cells, Measure, Median, Reference, Side, Split};
-use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
+use pointmill::point::{Bounds, Dimension, Endian, Layout, NORMAL, Position, Scalar, Schema};
 use pointmill::quantity::{Angle, Length, Setting};
 use pointmill::report::Tally;
 use pointmill::stage::{ScanFacts, TileOp};
@@ -48,7 +48,7 @@ pub fn tile(scan: &[Point], cube: Bounds, side: i64) -> Tile {
     let mut tile = Tile::of(loaded.iter().map(|p| p.at).collect());
     (tile.cube, tile.zone, tile.core) = (cube, zone, start..start + count);
     tile.copies = loaded.iter().map(|p| p.copies).collect();
-    tile.normals = loaded.iter().map(|p| p.normal).collect();
+    tile.columns.set(&NORMAL, &loaded.iter().map(|p| p.normal).collect::<Vec<_>>());
     tile
 }
 

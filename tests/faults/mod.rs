@@ -110,15 +110,14 @@ fn a_kill_at_any_call_leaves_outputs_old_or_complete() {
 fn scratch_data_that_comes_back_changed_is_noticed() {
     let mut bench = Bench::new();
     for path in [
-        "-found-",
+        "-gathered-",
         "-records-",
         "-positions-",
         "-order-",
         "-runs-",
         "-states-",
         "-fates-",
-        "-normals-",
-        "-figures-",
+        "-columns-",
         "-report-",
     ] {
         let path = Some(path);

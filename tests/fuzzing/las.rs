@@ -75,7 +75,7 @@ fn written(
     compressed: bool,
 ) -> Result<Option<String>, String> {
     let copy = path.with_extension(if compressed { "laz" } else { "las" });
-    let options = LasOptions { compressed, normals: false };
+    let options = LasOptions { compressed, computed: Vec::new() };
     match copy_of(&copy, source, schema, options) {
         Ok(()) => {}
         Err(error) => {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::support::las::{LAS, LAZ, read_files, write};
+use crate::support::las::{LAS, LAZ, normals, read_files, write};
 use crate::support::random::Random;
 use pointmill::io::las::{LasOptions, fresh, layout};
 use pointmill::point::{GpsTime, Metadata, Scalar, Schema, names};
@@ -39,7 +39,7 @@ fn comes_back(format: u8, options: LasOptions, with_extra: bool) {
     let mut random = Random(u64::from(format) + 1);
     for points in [0, 1, 2, 50_001] {
         let written = records(&schema, points, &mut random);
-        let summary = write(&path, options, &schema, &metadata, &written).unwrap();
+        let summary = write(&path, options.clone(), &schema, &metadata, &written).unwrap();
         assert_eq!(summary.points, points as u64);
         assert_eq!(summary.bytes, std::fs::metadata(&path).unwrap().len());
         let (source, read) = read_files(std::slice::from_ref(&path)).unwrap();
@@ -123,7 +123,7 @@ fn normals_come_behind_undescribed_bytes_and_are_then_overwritten_in_place() {
     let (first, second) = (folder.path().join("1.laz"), folder.path().join("2.laz"));
     // No native header: the three bytes of the schema are described anew, the normals behind them.
     let schema = Arc::new(layout(6, &[("A".to_owned(), Scalar::U16)], [0.01; 3], [0.0; 3]));
-    let options = LasOptions { compressed: true, normals: true };
+    let options = LasOptions { compressed: true, computed: normals() };
     let records = vec![7u8; schema.stride * 5];
     write(&first, options, &schema, &Metadata::default(), &records).unwrap();
     let (source, with_normals) = read_files(std::slice::from_ref(&first)).unwrap();
@@ -148,7 +148,7 @@ fn normals_come_behind_undescribed_bytes_and_are_then_overwritten_in_place() {
 fn normals_that_nobody_computed_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let schema = Arc::new(layout(0, &[], [0.01; 3], [0.0; 3]));
-    let options = LasOptions { compressed: false, normals: true };
+    let options = LasOptions { compressed: false, computed: normals() };
     let sink = pointmill::io::las::create(
         &folder.path().join("x"),
         &options,

@@ -182,7 +182,7 @@ fn points_without_a_return_number_may_count_as_first_returns() {
         records.chunks_exact_mut(schema.stride).step_by(100).for_each(|record| record[14] = 0);
         let of = |change: &dyn Fn(&mut [u8])| {
             let path = folder.path().join(name);
-            write(&path, options, &schema, &fresh(&schema, None), &records).unwrap();
+            write(&path, options.clone(), &schema, &fresh(&schema, None), &records).unwrap();
             let mut bytes = std::fs::read(&path).unwrap();
             change(&mut bytes);
             std::fs::write(&path, bytes).unwrap();

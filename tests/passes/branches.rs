@@ -171,7 +171,7 @@ struct Reclass;
 
 impl Transform for Reclass {
     fn needs(&self) -> Needs {
-        Needs { writes: vec![names::CLASSIFICATION.to_owned()], ..Needs::default() }
+        Needs::none().changes([names::CLASSIFICATION])
     }
 
     fn apply(&self, batch: &mut PointBatch) -> Result<()> {

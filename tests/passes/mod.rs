@@ -1,6 +1,7 @@
 //! Runs of several passes.
 
 mod branches;
+mod columns;
 mod exact;
 mod lossless;
 mod same_bytes;

@@ -400,7 +400,7 @@ fn keys_of_write_fit_its_format() {
                  dimensions = [\"NormalX\", \"NormalY\", \"NormalZ\"]";
     let pipeline = parse(&GOOD.replace("path = \"out.laz\"", right)).unwrap();
     let Role::Sink(sink) = &pipeline.stages[2].role else { panic!("write is a sink") };
-    assert!(sink.wants_normals());
+    assert_eq!(sink.computed(), pointmill::point::names::NORMAL);
 }
 
 #[test]
@@ -535,7 +535,7 @@ macro_rules! removing {
 
         impl TileOp for $stage {
             fn needs(&self) -> Needs {
-                Needs { neighbors: $neighbors, removes: true, ..Needs::default() }
+                Needs::none().neighbors($neighbors).removes(None)
             }
 
             fn run(&self, _: &mut Tile, _: &mut Tally) -> Result<()> {
@@ -590,7 +590,7 @@ impl StageKind for Bright {
 
 impl TileOp for Bright {
     fn needs(&self) -> Needs {
-        Needs { reads: vec![self.dimension.clone()], ..Needs::default() }
+        Needs::none().looks_at([&*self.dimension])
     }
 
     fn run(&self, _: &mut Tile, _: &mut Tally) -> Result<()> {

@@ -255,7 +255,7 @@ fn comments_crs_and_names_are_carried() {
 fn normals_are_appended_or_overwritten_in_place() {
     let folder = tempfile::tempdir().unwrap();
     let normals = [[0.5f32, -0.25, 1.0], [f32::NAN, f32::NAN, f32::NAN]];
-    let options = PlyOptions { normals: true, ..PlyOptions::default() };
+    let options = PlyOptions { computed: crate::support::las::normals(), ..PlyOptions::default() };
     let bare = format!("ply\nformat ascii 1.0\nelement vertex 2\n{XYZ}end_header\n1 2 3\n4 5 6\n");
     let had = "ply\nformat ascii 1.0\nelement vertex 2\nproperty double nx\nproperty float ny\n\
                property float nz\nproperty float x\nproperty float y\nproperty float z\nend_header\n\

@@ -13,20 +13,10 @@ use serde_json::Value;
 
 use crate::support::case::{Case, execute};
 
-/// What waits in scratch files, by the names of these; `found` waits only where no progress is
+/// What waits in scratch files, by the names of these; `gathered` waits only where no progress is
 /// reported.
-const STORES: [&str; 10] = [
-    "runs",
-    "records",
-    "positions",
-    "order",
-    "states",
-    "fates",
-    "normals",
-    "figures",
-    "inputs",
-    "report",
-];
+const STORES: [&str; 9] =
+    ["runs", "records", "positions", "order", "states", "fates", "columns", "inputs", "report"];
 
 /// Flips a bit in every 100 bytes of a store's files when the run reports its n-th progress.
 struct Flipper<'a> {
@@ -133,7 +123,7 @@ fn no_flipped_bit_of_any_store_changes_an_output() {
     let mut told: BTreeMap<&str, u32> = BTreeMap::new();
     for store in STORES {
         // What is read in the last part of a run alone is met at moments that are closer.
-        let moments = if ["normals", "inputs", "report"].contains(&store) { 24 } else { 6 };
+        let moments = if ["columns", "inputs", "report"].contains(&store) { 24 } else { 6 };
         for nth in 1..=moments {
             let _ = fs::remove_dir_all(case.path("each"));
             for name in ["out.ply", "report.json"] {

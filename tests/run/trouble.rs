@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use pointmill::point::PointBatch;
+use pointmill::point::{Column, PointBatch};
 use pointmill::report::Tally;
 use pointmill::stage::{Gathered, Needs, Role, ScanOp, TileOp, Transform};
 use pointmill::stage::{StageKind, StagePlace};
@@ -125,6 +125,8 @@ struct ScanTrouble {
     calls: Arc<AtomicU64>,
 }
 
+const FOUND: Column<u8> = Column::new("Found", &[]);
+
 impl ScanTrouble {
     /// Fails in the third tile of its phase, or at once where there are none.
     fn meet(&self, phase: &str) -> Result<()> {
@@ -151,7 +153,7 @@ impl StageKind for ScanTrouble {
 
 impl TileOp for ScanTrouble {
     fn needs(&self) -> Needs {
-        Needs { reads: vec!["Figure".into()], ..Needs::default() }
+        Needs::none().reads(&FOUND)
     }
     fn run(&self, _tile: &mut Tile, _tally: &mut Tally) -> Result<()> {
         self.meet("run")
@@ -159,18 +161,20 @@ impl TileOp for ScanTrouble {
 }
 
 impl ScanOp for ScanTrouble {
+    type Summary = Vec<u64>;
+
     fn gather_needs(&self) -> Needs {
-        Needs { writes: vec!["Figure".into()], ..Needs::default() }
+        Needs::none().writes(&FOUND)
     }
-    fn gather(&self, tile: &mut Tile, found: &mut Vec<[u64; 2]>, _tally: &mut Tally) -> Result<()> {
-        tile.figures = vec![0.0; tile.positions.len()];
-        found.push([tile.core.len() as u64; 2]);
-        self.meet("gather")
+    fn gather(&self, tile: &mut Tile, _tally: &mut Tally) -> Result<Vec<u64>> {
+        tile.columns.get_mut(&FOUND)?.fill(1);
+        self.meet("gather")?;
+        Ok(vec![tile.core.len() as u64])
     }
-    fn conclude(&mut self, found: &dyn Gathered) -> Result<Option<String>> {
-        found.each(&mut |rows| match rows.is_empty() {
-            true => Err(Error::internal("an empty stretch")),
-            false => self.meet("conclude"),
+    fn conclude(&mut self, gathered: &dyn Gathered<Vec<u64>>) -> Result<Option<String>> {
+        gathered.each(&mut |tile| match tile[..] {
+            [_] => self.meet("conclude"),
+            _ => Err(Error::internal("a summary came back as another")),
         })?;
         Ok(None)
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::support::tiles::*;
 use pointmill::ops::{Grid, Pick};
-use pointmill::point::{Bounds, Position};
+use pointmill::point::{Bounds, NORMAL, Position};
 use pointmill::quantity::Length;
 use pointmill::report::Tally;
 use pointmill::stage::TileOp;
@@ -140,7 +140,7 @@ fn positions_that_are_only_seen_are_in_no_cube() {
 #[test]
 fn with_normals_the_deviation_is_from_the_plane_of_the_point_that_stays() {
     let scan = sorted([[2, 2, 2], [0, 0, 3], [3, 3, 1], [9, 9, 9]]);
-    let dress = |tile: &mut Tile| tile.normals = vec![[0.0, 0.0, -1.0]; 4];
+    let dress = |tile: &mut Tile| tile.columns.set(&NORMAL, &[[0.0, 0.0, -1.0]; 4]);
     let stage = settled(4.0, Pick::Center, &scan, 1.0);
     let (fates, _) = run(&stage, &scan, &cubes(&scan, 9), &dress);
     for (p, fate) in fates {

@@ -28,12 +28,12 @@ fn scene(planted: &[i64]) -> Vec<Position> {
     sorted(sheet.into_iter().chain(planted))
 }
 
-/// Hands rows out in stretches that end anywhere.
-struct Rows(Vec<[u64; 2]>);
+/// What was gathered of every tile.
+struct Summaries<S>(Vec<S>);
 
-impl Gathered for Rows {
-    fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()> {
-        self.0.chunks(3).try_for_each(visit)
+impl<S: Clone> Gathered<S> for Summaries<S> {
+    fn each(&self, visit: &mut dyn FnMut(S) -> Result<()>) -> Result<()> {
+        self.0.iter().try_for_each(|summary| visit(summary.clone()))
     }
 
     fn records(&self) -> u64 {
@@ -49,13 +49,14 @@ fn statistical(
     copies: &dyn Fn(Position) -> u32,
 ) -> (Vec<(Position, Fate)>, Tally, StatisticalOutliers) {
     settle(&mut stage, scan, 0.25);
-    let (mut found, mut tally) = (Vec::new(), Tally::default());
+    let (mut gathered, mut tally) = (Vec::new(), Tally::default());
     let mut tiles: Vec<_> = cubes.iter().map(|cube| tile(scan, *cube, 0)).collect();
     for tile in &mut tiles {
         tile.copies = tile.positions.iter().map(|&p| copies(p)).collect();
-        stage.gather(tile, &mut found, &mut tally).unwrap();
+        tile.columns.add(&stage.gather_needs().writes, tile.positions.len());
+        gathered.push(stage.gather(tile, &mut tally).unwrap());
     }
-    stage.conclude(&Rows(found)).unwrap();
+    stage.conclude(&Summaries(gathered)).unwrap();
     let mut all = Vec::new();
     for tile in &mut tiles {
         stage.run(tile, &mut tally).unwrap();

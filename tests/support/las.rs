@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use pointmill::Result;
 use pointmill::io::las::{LasOptions, create, open};
-use pointmill::point::{Metadata, Schema};
+use pointmill::point::{ComputedDimension, Metadata, NORMAL, Schema, names};
 use pointmill::stage::{SinkSummary, Source};
 
 use super::records;
@@ -27,12 +27,18 @@ pub fn write(
 ) -> Result<SinkSummary> {
     let sink = create(path, &options, schema, metadata)?;
     let normals = |i: usize| [i as f32, 0.5, f32::NAN];
-    let normals = options.normals.then_some(&normals as &dyn Fn(usize) -> [f32; 3]);
+    let are_asked = !options.computed.is_empty();
+    let normals = are_asked.then_some(&normals as &dyn Fn(usize) -> [f32; 3]);
     records::write_with(sink, schema, records, normals)
 }
 
-pub const LAS: LasOptions = LasOptions { compressed: false, normals: false };
-pub const LAZ: LasOptions = LasOptions { compressed: true, normals: false };
+pub const LAS: LasOptions = LasOptions { compressed: false, computed: Vec::new() };
+pub const LAZ: LasOptions = LasOptions { compressed: true, computed: Vec::new() };
+
+/// The three dimensions of a normal.
+pub fn normals() -> Vec<ComputedDimension> {
+    names::NORMAL.map(|name| NORMAL.kind().part(name).unwrap()).to_vec()
+}
 
 /// One line of the scans' manifest.
 pub struct Scan {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use pointmill::Result;
 use pointmill::io::ply::{self, PlyOptions};
-use pointmill::point::{Metadata, PointBatch, Schema};
+use pointmill::point::{Metadata, NORMAL, PointBatch, Schema};
 use pointmill::stage::{SinkSummary, Source};
 
 /// Writes a file into `folder`.
@@ -42,7 +42,9 @@ pub fn write(
     for (n, piece) in all.chunks(chunk * schema.stride).enumerate() {
         batch.clear();
         batch.extend(piece);
-        batch.normals = normals.map(|all| all[n * chunk..][..batch.len()].to_vec());
+        if let Some(all) = normals {
+            batch.columns.set(&NORMAL, &all[n * chunk..][..batch.len()]);
+        }
         sink.append(encoder.encode(&batch)?)?;
     }
     let summary = sink.finish()?;

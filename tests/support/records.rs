@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use pointmill::point::{Metadata, PointBatch, Schema};
+use pointmill::point::{Metadata, NORMAL, PointBatch, Schema};
 use pointmill::stage::{Sink, SinkSummary, Source, WriteKeys};
 use pointmill::{Done, Registry, Result};
 
@@ -87,7 +87,9 @@ pub fn write_with(
         batch.clear();
         batch.extend(records);
         let numbers = n * chunk..n * chunk + batch.len();
-        batch.normals = normals.map(|normal| numbers.map(normal).collect());
+        if let Some(normal) = normals {
+            batch.columns.set(&NORMAL, &numbers.map(normal).collect::<Vec<_>>());
+        }
         sink.append(encoder.encode(&batch)?)?;
     }
     sink.finish()

@@ -3,7 +3,8 @@
 use super::*;
 use crate::budget::Budget;
 use crate::engine::product::RecordEntry;
-use crate::point::Edit;
+use crate::engine::row::RowLayout;
+use crate::point::{Column, Edit};
 use crate::store::{FATE_BYTES, Folder, RecordState, Tag};
 
 #[derive(Debug)]
@@ -15,6 +16,8 @@ impl Folder for Nowhere {
     }
 }
 
+const NUMBER: Column<f64> = Column::new("Number", &[]);
+
 fn product(kept: &[(u64, u32)]) -> Product {
     let entry = |&(number, count): &(u64, u32)| RecordEntry {
         number,
@@ -25,7 +28,7 @@ fn product(kept: &[(u64, u32)]) -> Product {
     };
     Product {
         entries: kept.iter().map(entry).collect(),
-        entry_normals: Some(kept.iter().map(|&(first, _)| [first as f32; 3]).collect()),
+        rows: kept.iter().flat_map(|&(first, _)| (first as f64).to_ne_bytes()).collect(),
         fates: vec![0; kept.len() * FATE_BYTES],
         ..Product::default()
     }
@@ -34,11 +37,12 @@ fn product(kept: &[(u64, u32)]) -> Product {
 #[test]
 fn chunks_are_cut_by_rank_and_copies_are_one_entry() {
     let area = SpillArea::new(Budget::new(1 << 26), 1 << 26, Box::new(Nowhere));
-    let outputs = vec![Open::new(0, 1000, true, false)];
+    let row = RowLayout::of(&[NUMBER.kind().part("Number").unwrap()]);
+    let outputs = vec![Open::new(0, 1000, &row, false)];
     let copies = 10_000_000;
     let all = 8 + u64::from(copies);
     let outlets = (outputs, Vec::new(), Vec::new());
-    let mut cutter = Cutter::new(&area, (8, all), (false, false), outlets).unwrap();
+    let mut cutter = Cutter::new(&area, (8, all), (&[], row.bytes()), outlets).unwrap();
     let mut chunks = cutter.cut(&product(&[(0, 1), (1, 2), (7, copies)])).unwrap();
     assert_eq!(chunks.len(), 10_000);
     assert!(chunks.iter().all(|chunk| chunk.records.len() <= 3));
@@ -54,14 +58,15 @@ fn chunks_are_cut_by_rank_and_copies_are_one_entry() {
     for chunk in &chunks {
         chunk.number(&mut numbers);
         assert!(numbers.iter().all(|&number| expected.next() == Some(number)));
-        let normals = chunk.spread_normals().unwrap();
+        let columns = chunk.columns();
+        let values = columns.get(&NUMBER).unwrap();
         chunk.states(&mut states);
-        assert_eq!((normals.len(), states.len()), (numbers.len(), numbers.len()));
-        assert!(numbers.iter().zip(normals).all(|(&n, normal)| match n {
-            0 => normal[0] == 0.0,
-            1..3 => normal[0] == 1.0,
-            7..20_000_000 => normal[0] == 7.0,
-            _ => normal[0] == 2e7,
+        assert_eq!((values.len(), states.len()), (numbers.len(), numbers.len()));
+        assert!(numbers.iter().zip(values).all(|(&n, &value)| match n {
+            0 => value == 0.0,
+            1..3 => value == 1.0,
+            7..20_000_000 => value == 7.0,
+            _ => value == 2e7,
         }));
         ranks += numbers.len();
         assert!(ranks % 1000 == 0 || expected.peek().is_none());
@@ -72,10 +77,11 @@ fn chunks_are_cut_by_rank_and_copies_are_one_entry() {
 #[test]
 fn outputs_take_what_was_there_before_the_pass_or_what_it_leaves() {
     let area = SpillArea::new(Budget::new(1 << 20), 1 << 20, Box::new(Nowhere));
-    let outputs = vec![Open::new(3, 2, false, true), Open::new(5, 2, false, false)];
+    let none = RowLayout::default();
+    let outputs = vec![Open::new(3, 2, &none, true), Open::new(5, 2, &none, false)];
     let outlets = (outputs, Vec::new(), Vec::new());
-    let mut cutter = Cutter::new(&area, (3, 3), (false, false), outlets).unwrap();
-    let mut product = product(&[(0, 1), (1, 1), (2, 1)]);
+    let mut cutter = Cutter::new(&area, (3, 3), (&[], 0), outlets).unwrap();
+    let mut product = Product { rows: Vec::new(), ..product(&[(0, 1), (1, 1), (2, 1)]) };
     product.entries[1].now = RecordState::REMOVED;
     product.entries[2].now = RecordState::ASIDE.edited(Edit::SetWithheld);
     let mut chunks = cutter.cut(&product).unwrap();

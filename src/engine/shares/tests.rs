@@ -2,6 +2,8 @@
 
 use super::*;
 use crate::engine::demands::FEWEST;
+use crate::engine::pass::ColumnBytes;
+use crate::point::NORMAL;
 use crate::stage::{ChunkSize, Needs};
 
 fn demands(limit: u64) -> Demands {
@@ -23,6 +25,7 @@ fn demands(limit: u64) -> Demands {
         run_most: None,
         gathers: false,
         has_cells: true,
+        columns: ColumnBytes { tile: 12, stored: 20, row: 12, of_records: false },
         passes: vec![vec![Needs { neighbors: 10, bytes_per_point: 40, ..Needs::default() }]],
     }
 }
@@ -125,7 +128,7 @@ fn a_refusal_names_a_limit_that_does() {
 fn different() -> Vec<Demands> {
     let needs =
         |neighbors, bytes_per_point| Needs { neighbors, bytes_per_point, ..Needs::default() };
-    let deciding = Needs { reads: vec!["Normal".to_owned()], removes: true, ..needs(0, 17) };
+    let deciding = Needs { removes: true, ..needs(0, 17).reads(&NORMAL) };
     let passes = vec![vec![deciding], vec![needs(30, 80), needs(0, 16)]];
     vec![
         demands(128 << 20),

@@ -85,8 +85,8 @@ impl CreateSink for OutputFile {
         self.format.wants_beside()
     }
 
-    fn wants_normals(&self) -> bool {
-        self.keys.normals
+    fn computed(&self) -> &[String] {
+        &self.keys.computed
     }
 
     fn unread(&self) -> &[String] {

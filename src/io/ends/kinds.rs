@@ -7,7 +7,6 @@ use serde::{Deserialize, Deserializer, Serialize, de};
 
 use crate::error::{listed, shown};
 use crate::io::sniff::{of_extension, upper};
-use crate::point::names;
 use crate::stage::{Colors, Format, FormatName, Formats, Order, OutputEncoding, WriteKeys};
 use crate::{Error, Result};
 
@@ -91,8 +90,9 @@ pub struct Write {
     /// return number, which compresses better; or the input's where the pipeline streams.
     #[serde(default)]
     pub order: Option<OutputOrder>,
-    /// Computed dimensions that are written: none, or the three of the normal.
-    #[serde(default, deserialize_with = "all_or_none")]
+    /// Computed dimensions that are written besides those of the input: `NormalX`, `NormalY` and
+    /// `NormalZ`, or what another stage computes. One that the input has, too, takes its place.
+    #[serde(default, deserialize_with = "names_once")]
     pub dimensions: Vec<String>,
     /// Encoding of a PLY file; none: the input's.
     #[serde(default)]
@@ -130,7 +130,7 @@ impl Write {
     pub(super) fn keys(&self, path: PathBuf) -> WriteKeys {
         WriteKeys {
             path,
-            normals: !self.dimensions.is_empty(),
+            computed: self.dimensions.clone(),
             drop: self.drop.clone(),
             scale: self.scale,
             offset: self.offset,
@@ -260,11 +260,12 @@ impl<'de> Deserialize<'de> for Positive {
     }
 }
 
-fn all_or_none<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
-    let mut given: Vec<String> = Vec::deserialize(from)?;
-    given.sort();
-    if given.is_empty() || given == names::NORMAL {
-        return Ok(given);
+/// Names, each once.
+fn names_once<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+    let given: Vec<String> = Vec::deserialize(from)?;
+    let twice = given.iter().enumerate().find(|(n, name)| given[..*n].contains(name));
+    match twice {
+        None => Ok(given),
+        Some((_, name)) => Err(de::Error::custom(format!("has {name} twice"))),
     }
-    Err(de::Error::custom(format!("takes [] or all of {}", names::NORMAL.join(", "))))
 }

@@ -121,8 +121,8 @@ impl CreateSink for Outputs {
         self.order
     }
 
-    fn wants_normals(&self) -> bool {
-        self.keys.normals
+    fn computed(&self) -> &[String] {
+        &self.keys.computed
     }
 
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize> {

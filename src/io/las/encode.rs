@@ -1,40 +1,74 @@
-//! Encoding a chunk of records, on any thread: normals put in, counted, compressed.
+//! Encoding a chunk of records, on any thread: computed dimensions put in, counted, compressed.
 
 use std::borrow::Cow;
 
 use super::laz::{CHUNK_POINTS, Compression};
-use super::native::normals_of;
-use crate::point::{Dimension, Endian, PointBatch, Schema, Spare, Value};
+use crate::point::{
+    COLUMN_ENDIAN, ComputedDimension, Dimension, Endian, PointBatch, Scalar, Schema, Spare, Value,
+};
 use crate::stage::{Encode, Encoded};
 use crate::{Error, Result};
 
-/// Bytes of a normal behind a record: three f32.
-const NORMAL_BYTES: usize = 12;
-
-/// Where normals go.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Normals {
-    /// Nowhere.
-    Unwritten,
+/// Where computed dimensions go.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ComputedFields {
     /// Into dimensions that the record has.
-    InPlace(Box<[Dimension; 3]>),
-    /// Behind the record.
-    Appended,
+    in_place: Vec<(ComputedDimension, Dimension)>,
+    /// Behind the record, one after the other.
+    pub appended: Vec<ComputedDimension>,
 }
 
-impl Normals {
-    /// Where the normals of records of `schema` go if they are `asked` for.
-    pub fn plan(schema: &Schema, asked: bool) -> Self {
-        match (asked, normals_of(schema)) {
-            (false, _) => Normals::Unwritten,
-            (true, Some(dimensions)) => Normals::InPlace(Box::new(dimensions.map(Clone::clone))),
-            (true, None) => Normals::Appended,
+impl ComputedFields {
+    /// Where those of `computed` go in records of `schema`.
+    pub fn of(schema: &Schema, computed: &[ComputedDimension]) -> Self {
+        let mut fields = ComputedFields::default();
+        for dimension in computed {
+            match schema.find(dimension.name) {
+                Some(found) => fields.in_place.push((*dimension, found.clone())),
+                None => fields.appended.push(*dimension),
+            }
         }
+        fields
+    }
+
+    /// True if there are none.
+    fn is_empty(&self) -> bool {
+        self.in_place.is_empty() && self.appended.is_empty()
     }
 
     /// Bytes that they make a record longer.
     pub fn appended_bytes(&self) -> usize {
-        if *self == Normals::Appended { NORMAL_BYTES } else { 0 }
+        self.appended.iter().map(|dimension| dimension.scalar().size()).sum()
+    }
+
+    /// Puts the values of `batch` into `records`, which are its own, longer by
+    /// [`appended_bytes`](ComputedFields::appended_bytes).
+    fn put(&self, batch: &PointBatch, records: &mut [u8]) -> Result<()> {
+        let (points, own) = (batch.len(), batch.schema().stride);
+        let stride = own + self.appended_bytes();
+        let mut at = own;
+        for dimension in &self.appended {
+            let values = batch.columns.of_dimension(dimension, points)?;
+            let values = values.chunks_exact(dimension.column.bytes());
+            let field = at..at + dimension.scalar().size();
+            for (record, value) in records.chunks_exact_mut(stride).zip(values) {
+                let bytes = &mut record[field.clone()];
+                bytes.copy_from_slice(&value[dimension.range()]);
+                if COLUMN_ENDIAN == Endian::Big {
+                    bytes.reverse();
+                }
+            }
+            at = field.end;
+        }
+        for (dimension, target) in &self.in_place {
+            let (values, from) =
+                (batch.columns.of_dimension(dimension, points)?, dimension.field());
+            let values = values.chunks_exact(dimension.column.bytes());
+            for (record, value) in records.chunks_exact_mut(stride).zip(values) {
+                put_computed(target, record, from.get(value, COLUMN_ENDIAN))?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -44,8 +78,8 @@ pub struct LasEncoder {
     stride: usize,
     /// Bits of the byte at 14 that hold the return number.
     return_bits: u8,
-    /// Where normals go.
-    pub normals: Normals,
+    /// Where computed dimensions go.
+    pub computed: ComputedFields,
     /// How records are compressed, if they are.
     pub compression: Option<Compression>,
     /// For the bytes of chunks; whoever has written one puts them back.
@@ -57,21 +91,21 @@ impl LasEncoder {
     pub fn new(
         format: u8,
         schema: &Schema,
-        normals: Normals,
+        computed: ComputedFields,
         compression: Option<Compression>,
     ) -> Self {
         let return_bits = if format < 6 { 0b111 } else { 0b1111 };
         let (stride, spare) = (schema.stride, Spare::default());
-        LasEncoder { stride, return_bits, normals, compression, spare }
+        LasEncoder { stride, return_bits, computed, compression, spare }
     }
 
-    /// Upper estimate of what encoding one chunk holds: records with normals, the compressor's
-    /// layers, the output.
+    /// Upper estimate of what encoding one chunk holds: records with computed dimensions, the
+    /// compressor's layers, the output.
     pub fn chunk_bytes(&self) -> u64 {
-        let record = (self.stride + self.normals.appended_bytes()) as u64;
-        let copies = match (&self.normals, &self.compression) {
-            (Normals::Unwritten, None) => 1,
-            (_, None) => 2,
+        let record = (self.stride + self.computed.appended_bytes()) as u64;
+        let copies = match (self.computed.is_empty(), &self.compression) {
+            (true, None) => 1,
+            (false, None) => 2,
             // A chunk that does not compress grows by an eighth at most.
             (_, Some(_)) => 4,
         };
@@ -80,56 +114,48 @@ impl LasEncoder {
     }
 
     fn records<'a>(&self, batch: &'a PointBatch) -> Result<Cow<'a, [u8]>> {
-        if batch.is_empty() || self.normals == Normals::Unwritten {
+        if batch.is_empty() || self.computed.is_empty() {
             return Ok(Cow::Borrowed(batch.records()));
         }
-        let normals =
-            batch.normals.as_ref().filter(|normals| normals.len() == batch.len()).ok_or_else(
-                || {
-                    Error::pipeline("normals are to be written and no stage computes them").help(
-                        "put a stage 'normals' above, or do not ask for NormalX, NormalY, NormalZ",
-                    )
-                },
-            )?;
-        if let Normals::InPlace(dimensions) = &self.normals {
-            let mut records = batch.records().to_vec();
-            for (record, normal) in records.chunks_exact_mut(self.stride).zip(normals) {
-                for (dimension, &value) in dimensions.iter().zip(normal) {
-                    put_normal(dimension, record, value)?;
-                }
-            }
-            return Ok(Cow::Owned(records));
-        }
-        let mut records = Vec::with_capacity(batch.len() * (self.stride + NORMAL_BYTES));
-        for (record, normal) in batch.iter().zip(normals) {
+        let more = self.computed.appended_bytes();
+        let mut records = Vec::with_capacity(batch.len() * (self.stride + more));
+        for record in batch.iter() {
             records.extend_from_slice(record);
-            normal.iter().for_each(|value| records.extend(value.to_le_bytes()));
+            records.resize(records.len() + more, 0);
         }
+        self.computed.put(batch, &mut records)?;
         Ok(Cow::Owned(records))
     }
 }
 
-/// Stores one component of a normal, rounded to what the dimension can hold.
-fn put_normal(dimension: &Dimension, record: &mut [u8], value: f32) -> Result<()> {
-    let stored = (f64::from(value) - dimension.origin) / dimension.scale;
-    let value = if dimension.scalar.is_float() {
-        Value::Single(stored as f32)
-    } else if value.is_nan() {
-        Value::Signed(0)
-    } else {
-        Value::Double(stored.round())
+/// Stores a computed number, rounded to what the dimension can hold; where that holds whole
+/// numbers, 0 for one that is not known.
+fn put_computed(dimension: &Dimension, record: &mut [u8], value: Value) -> Result<()> {
+    let is_scaled = dimension.scale != 1.0 || dimension.origin != 0.0;
+    let value = match value {
+        Value::Unsigned(_) | Value::Signed(_) if !is_scaled => value,
+        _ => {
+            let stored = (value.as_f64() - dimension.origin) / dimension.scale;
+            match dimension.scalar {
+                Scalar::F32 => Value::Single(stored as f32),
+                Scalar::F64 => Value::Double(stored),
+                _ if stored.is_nan() => Value::Signed(0),
+                _ => Value::Double(stored.round()),
+            }
+        }
     };
     if dimension.put(record, Endian::Little, value) {
         return Ok(());
     }
-    Err(Error::pipeline(format!("the dimension {} cannot hold a normal", dimension.name))
-        .help("drop the input's normals before new ones are written"))
+    let name = &dimension.name;
+    Err(Error::pipeline(format!("the input's {name} cannot hold what is computed for it"))
+        .help("drop the input's before new values are written"))
 }
 
 impl Encode for LasEncoder {
     fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
         let records = self.records(batch)?;
-        let stride = self.stride + self.normals.appended_bytes();
+        let stride = self.stride + self.computed.appended_bytes();
         let mut encoded = Encoded { points: batch.len() as u64, ..Encoded::default() };
         let (mut lo, mut hi) = ([i32::MAX; 3], [i32::MIN; 3]);
         for record in records.chunks_exact(stride) {

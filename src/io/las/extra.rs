@@ -2,7 +2,7 @@
 //! fields mean.
 
 use super::text::{split_at_room, text};
-use crate::point::{Dimension, Scalar, names};
+use crate::point::{ComputedDimension, Dimension, Scalar};
 
 /// Bytes of one descriptor.
 pub const DESCRIPTOR_BYTES: usize = 192;
@@ -151,9 +151,13 @@ impl Descriptor {
     }
 }
 
-/// The descriptors that make `from` bytes of extra bytes reach the normals: unknown ones for bytes
-/// that `known` leave undescribed, then three of f32.
-pub fn with_normals(known: &[Descriptor], from: usize) -> Vec<Descriptor> {
+/// The descriptors that make `from` bytes of extra bytes reach the `computed` dimensions: unknown
+/// ones for bytes that `known` leave undescribed, then those of the dimensions.
+pub fn with_computed(
+    known: &[Descriptor],
+    from: usize,
+    computed: &[ComputedDimension],
+) -> Vec<Descriptor> {
     let mut all = Vec::new();
     let mut described = 0;
     for descriptor in known {
@@ -169,13 +173,14 @@ pub fn with_normals(known: &[Descriptor], from: usize) -> Vec<Descriptor> {
         all.push(Descriptor::unknown(bytes));
         left -= usize::from(bytes);
     }
-    all.extend(names::NORMAL.map(|name| Descriptor::plain(name, Scalar::F32)));
+    all.extend(computed.iter().map(|d| Descriptor::plain(d.name, d.scalar())));
     all
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::point::{NORMAL, names};
 
     #[test]
     fn triples_and_scales_become_dimensions() {
@@ -192,7 +197,8 @@ mod tests {
 
     #[test]
     fn normals_come_behind_bytes_nobody_described() {
-        let all = with_normals(&[Descriptor::plain("A", Scalar::U8)], 301);
+        let computed = names::NORMAL.map(|name| NORMAL.kind().part(name).unwrap());
+        let all = with_computed(&[Descriptor::plain("A", Scalar::U8)], 301, &computed);
         assert_eq!(all.iter().map(Descriptor::size).sum::<usize>(), 301 + 12);
         assert_eq!(all.len(), 1 + 2 + 3);
     }

@@ -15,7 +15,7 @@ use super::waveforms::Waveforms;
 use crate::Result;
 use crate::error::shown;
 use crate::io::wkt;
-use crate::point::{Metadata, Schema, names};
+use crate::point::{Metadata, Schema};
 
 /// Header and records of the input, without what describes how that file stored its points.
 #[derive(Debug, Clone)]
@@ -135,10 +135,4 @@ pub fn lost(metadata: &Metadata) -> Vec<String> {
     let waveforms =
         file.map(|file| format!("waveforms of LAS; these are lost: those in {}", shown(file)));
     records.into_iter().chain(waveforms).collect()
-}
-
-/// The three dimensions that hold a normal already, if all are there.
-pub fn normals_of(schema: &Schema) -> Option<[&crate::point::Dimension; 3]> {
-    let [x, y, z] = names::NORMAL.map(|name| schema.find(name));
-    Some([x?, y?, z?])
 }

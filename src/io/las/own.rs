@@ -84,7 +84,7 @@ impl Encode for ShiftingEncoder {
         let mut own = PointBatch::new(self.to.clone(), batch.len());
         own.extend(batch.records());
         own.source = batch.source;
-        own.normals.clone_from(&batch.normals);
+        own.columns.clone_from(&batch.columns);
         if !self.shift.apply(own.records_mut(), self.to.stride) {
             return Err(self.overflow(batch));
         }

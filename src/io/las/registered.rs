@@ -101,7 +101,7 @@ impl Format for LasFormat {
         metadata: &Metadata,
     ) -> Result<ChunkSize> {
         let target = Target::of(keys, schema, metadata)?;
-        let chunk = sink::chunk(&self.options(keys), &target.schema)?;
+        let chunk = sink::chunk(&self.options(metadata), &target.schema)?;
         Ok(match target.projection {
             Some(_) => Projected::chunk(chunk, &target.schema),
             None => chunk,
@@ -116,8 +116,9 @@ impl Format for LasFormat {
         metadata: &Metadata,
         _whole: bool,
     ) -> Result<Box<dyn Sink>> {
+        let options = self.options(metadata);
         let Target { schema, metadata, projection } = Target::of(keys, schema, metadata)?;
-        let sink = sink::create(staged, &self.options(keys), &schema, &metadata)?;
+        let sink = sink::create(staged, &options, &schema, &metadata)?;
         Ok(match projection {
             Some(projection) => Box::new(Projected::new(sink, projection, schema, &keys.path)),
             None => sink,
@@ -157,8 +158,8 @@ impl Format for LasFormat {
 }
 
 impl LasFormat {
-    fn options(&self, keys: &WriteKeys) -> LasOptions {
-        LasOptions { compressed: self.compressed, normals: keys.normals }
+    fn options(&self, metadata: &Metadata) -> LasOptions {
+        LasOptions { compressed: self.compressed, computed: metadata.computed.clone() }
     }
 }
 

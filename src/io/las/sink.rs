@@ -11,15 +11,15 @@ use laz::{LazVlr, LazVlrBuilder};
 
 use super::credit::{count_gps_time, credit, drop_ranges, name_system};
 use super::described::{Described, describe};
-use super::encode::{LasEncoder, Normals};
-use super::extra::{DESCRIPTOR_BYTES, with_normals};
+use super::encode::{ComputedFields, LasEncoder};
+use super::extra::{DESCRIPTOR_BYTES, with_computed};
 use super::fields::{at, encoding};
 use super::format::{format_of, record_size};
 use super::header::{COMPRESSED, Header};
 use super::laz::{CHUNK_POINTS, Compression};
 use super::native::Native;
 use super::vlr::Vlr;
-use crate::point::{Metadata, Schema};
+use crate::point::{ComputedDimension, Metadata, Schema};
 use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -27,14 +27,14 @@ use crate::{Error, Result};
 const HEAD_BYTES: usize = 64 << 10;
 
 /// What a LAS output is to be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LasOptions {
     /// LAZ rather than LAS.
     pub compressed: bool,
-    /// Write the normals that a stage computed: into the dimensions `NormalX`, `NormalY` and
-    /// `NormalZ` if the input has them, which overwrites them, else as three f32 extra bytes behind
-    /// the record. A position without a normal gets NaN (0 in integer dimensions).
-    pub normals: bool,
+    /// Write these dimensions that stages computed: into those of the input that have their names,
+    /// which overwrites them, else as extra bytes behind the record. A position that nothing was
+    /// computed for gets NaN (0 in integer dimensions).
+    pub computed: Vec<ComputedDimension>,
 }
 
 /// Opens a LAS or LAZ output at `staged` for records of `schema`, which is in a LAS layout.
@@ -42,7 +42,7 @@ pub struct LasOptions {
 /// Header and records come from `metadata` where it is that of LAS inputs, else they are made anew
 /// (see [`fresh`](super::fresh)). Recomputed are the counts of points, the box, the places of
 /// points, extended records and waveforms (where these are in the file), the LAZ bit and its record,
-/// the bit that says that the CRS is WKT, the generating software, with `normals` the record length and
+/// the bit that says that the CRS is WKT, the generating software, with `computed` the record length and
 /// the descriptors of extra bytes; and if the records went through stages (`metadata.pipeline`), the
 /// system identifier, the ranges of extra bytes, and a record that names the stages.
 ///
@@ -74,10 +74,10 @@ pub fn create(
         native.header.put_floats(at::SCALE, axes.map(|d| d.scale));
         native.header.put_floats(at::OFFSET, axes.map(|d| d.origin));
     }
-    if encoder.normals == Normals::Appended {
-        describe_normals(&mut native, format, schema)?;
+    if !encoder.computed.appended.is_empty() {
+        describe_computed(&mut native, format, schema, &encoder.computed.appended)?;
     }
-    let stride = record_length(schema, &encoder.normals)?;
+    let stride = record_length(schema, &encoder.computed)?;
     native.header.put(at::RECORD_LENGTH, &stride.to_le_bytes());
     let compressed = if laszip.is_some() { COMPRESSED } else { 0 };
     native.header.put(at::FORMAT, &[format | compressed]);
@@ -94,13 +94,13 @@ pub fn chunk(options: &LasOptions, schema: &Schema) -> Result<ChunkSize> {
 /// The encoder of records of `schema`, and the laszip record that tells how it compresses.
 fn encoder(options: &LasOptions, schema: &Schema) -> Result<(LasEncoder, Option<Vlr>)> {
     let format = form(schema)?;
-    let normals = Normals::plan(schema, options.normals);
+    let computed = ComputedFields::of(schema, &options.computed);
     let (mut compression, mut laszip) = (None, None);
     if options.compressed {
-        let (how, record) = Compression::write(format, record_length(schema, &normals)?)?;
+        let (how, record) = Compression::write(format, record_length(schema, &computed)?)?;
         (compression, laszip) = (Some(how), Some(record));
     }
-    Ok((LasEncoder::new(format, schema, normals, compression), laszip))
+    Ok((LasEncoder::new(format, schema, computed, compression), laszip))
 }
 
 fn form(schema: &Schema) -> Result<u8> {
@@ -109,8 +109,8 @@ fn form(schema: &Schema) -> Result<u8> {
 }
 
 /// Bytes of a record as written.
-fn record_length(schema: &Schema, normals: &Normals) -> Result<u16> {
-    u16::try_from(schema.stride + normals.appended_bytes())
+fn record_length(schema: &Schema, computed: &ComputedFields) -> Result<u16> {
+    u16::try_from(schema.stride + computed.appended_bytes())
         .map_err(|_| too_long("a record of point format ", format_of(schema).unwrap_or_default()))
 }
 
@@ -119,11 +119,16 @@ fn too_long(what: &str, format: u8) -> Error {
         .help("drop some extra dimensions")
 }
 
-/// Adds the descriptors of the normals behind those of all extra bytes before them.
-fn describe_normals(native: &mut Native, format: u8, schema: &Schema) -> Result<()> {
+/// Adds the descriptors of computed dimensions behind those of all extra bytes before them.
+fn describe_computed(
+    native: &mut Native,
+    format: u8,
+    schema: &Schema,
+    computed: &[ComputedDimension],
+) -> Result<()> {
     let extra = schema.stride - usize::from(record_size(format).unwrap_or(0));
     let known = Described::of(&native.vlrs, &native.evlrs, extra)?.descriptors;
-    let all = with_normals(&known, extra);
+    let all = with_computed(&known, extra, computed);
     if u16::try_from(all.len().saturating_mul(DESCRIPTOR_BYTES)).is_err() {
         return Err(too_long("the extra bytes' descriptors of point format ", format));
     }

@@ -9,8 +9,9 @@ use super::source::PlyNative;
 use super::text;
 use super::vertex::ply_schema;
 use crate::io::convert::Projection;
-use crate::point::names::NORMAL;
-use crate::point::{Dimension, PointBatch, Scalar, Schema, Spare, Value};
+use crate::point::{
+    COLUMN_ENDIAN, ComputedDimension, Dimension, PointBatch, Scalar, Schema, Spare, Value,
+};
 use crate::stage::{ChunkSize, Colors, Encode, Encoded};
 use crate::{Error, Result};
 
@@ -19,9 +20,9 @@ use crate::{Error, Result};
 pub struct PlyOptions {
     /// Text or binary; that of the input where it is PLY, else little-endian, when not said.
     pub encoding: Option<Encoding>,
-    /// Writes the normals of the batches as `nx`, `ny` and `nz`: in place where the input has them
-    /// as floating-point numbers, else as `float` behind the other properties.
-    pub normals: bool,
+    /// Writes these dimensions that stages computed, normals as `nx`, `ny` and `nz`: in place where
+    /// the input has them as floating-point numbers, else behind the other properties.
+    pub computed: Vec<ComputedDimension>,
     /// Dimensions that are left out.
     pub drop: Vec<String>,
     /// How many bits the colours of LAS records have; as for [`Colors::Auto`] when not said. From
@@ -58,8 +59,8 @@ pub(super) struct Form {
     pub vertex: Schema,
     /// From the records to the vertices, where they differ.
     projection: Option<Projection>,
-    /// The normals' fields, if they are written.
-    normals: Option<[Dimension; 3]>,
+    /// The fields of computed dimensions.
+    computed: Vec<(ComputedDimension, Dimension)>,
 }
 
 /// Vertices with colours of 8 bits.
@@ -108,24 +109,27 @@ impl Form {
             dimension.offset = vertex.stride;
             vertex.stride += dimension.scalar.size();
         }
-        // Made before the normals are added: the records need not have them.
+        // Made before computed dimensions are added: the records need not have them.
         let mut projection = Projection::new(schema, &vertex, &options.drop)?;
-        let mut normals = None;
-        if options.normals {
-            let added = add_normals(&mut vertex)?;
-            projection.widen(vertex.stride);
-            normals = Some(added);
-        }
+        let added = options.computed.iter().map(|d| Ok((*d, add_computed(&mut vertex, d)?)));
+        let computed: Vec<_> = added.collect::<Result<_>>()?;
+        projection.widen(vertex.stride);
         let projection = (!projection.is_copy()).then_some(projection);
-        Ok(Form { vertex, projection, normals })
+        Ok(Form { vertex, projection, computed })
     }
 
-    fn put_normals(&self, normals: &[[f32; 3]], vertices: &mut [u8]) -> Result<()> {
-        let Some(fields) = &self.normals else { return Ok(()) };
-        for (vertex, normal) in vertices.chunks_exact_mut(self.vertex.stride).zip(normals) {
-            for (field, value) in fields.iter().zip(normal) {
-                if !field.put(vertex, self.vertex.endian, Value::Single(*value)) {
-                    return Err(Error::internal("a floating-point field refused a normal"));
+    fn put_computed(&self, batch: &PointBatch, vertices: &mut [u8]) -> Result<()> {
+        for (dimension, target) in &self.computed {
+            let values = batch.columns.of_dimension(dimension, batch.len())?;
+            let (from, values) = (dimension.field(), values.chunks_exact(dimension.column.bytes()));
+            for (vertex, value) in vertices.chunks_exact_mut(self.vertex.stride).zip(values) {
+                let value = match from.get(value, COLUMN_ENDIAN) {
+                    Value::Double(v) if target.scalar == Scalar::F32 => Value::Single(v as f32),
+                    value => value,
+                };
+                if !target.put(vertex, self.vertex.endian, value) {
+                    let name = dimension.name;
+                    return Err(Error::pipeline(format!("the output's {name} cannot hold it")));
                 }
             }
         }
@@ -247,24 +251,27 @@ impl VertexPlan {
     }
 }
 
-/// Adds the normals' fields that are not there; fails on those that hold whole numbers.
-fn add_normals(vertex: &mut Schema) -> Result<[Dimension; 3]> {
-    let mut field = |name: &str| -> Result<Dimension> {
-        if let Some(found) = vertex.find(name) {
-            if found.scalar.is_float() {
-                return Ok(found.clone());
-            }
-            let message = format!("the input's {name} holds whole numbers: no normal fits");
-            return Err(
-                Error::pipeline(message).help(format!("`write.drop = [\"{name}\"]` leaves it out"))
-            );
+/// The field of a computed dimension, added if it is not there; fails on one that holds whole
+/// numbers and on numbers that PLY does not have.
+fn add_computed(vertex: &mut Schema, computed: &ComputedDimension) -> Result<Dimension> {
+    let (name, scalar) = (computed.name, computed.scalar());
+    if let Some(found) = vertex.find(name) {
+        if found.scalar.is_float() || found.scalar == scalar {
+            return Ok(found.clone());
         }
-        let added = Dimension::new(name, Scalar::F32, vertex.stride);
-        vertex.stride += added.scalar.size();
-        vertex.dimensions.push(added.clone());
-        Ok(added)
-    };
-    Ok([field(NORMAL[0])?, field(NORMAL[1])?, field(NORMAL[2])?])
+        let told = format!("the input's {name} holds whole numbers: what is computed does not fit");
+        return Err(
+            Error::pipeline(told).help(format!("`write.drop = [\"{name}\"]` leaves it out"))
+        );
+    }
+    if matches!(scalar, Scalar::U64 | Scalar::I64) {
+        let told = format!("{name} has whole numbers of 64 bits, which PLY does not hold");
+        return Err(Error::pipeline(told).help("write LAS, or leave it out"));
+    }
+    let added = Dimension::new(name, scalar, vertex.stride);
+    vertex.stride += scalar.size();
+    vertex.dimensions.push(added.clone());
+    Ok(added)
 }
 
 impl Encode for VertexPlan {
@@ -280,13 +287,7 @@ impl Encode for VertexPlan {
             vertices.clear();
             vertices.extend_from_slice(batch.records());
         }
-        if form.normals.is_some() {
-            let normals =
-                batch.normals.as_ref().filter(|normals| normals.len() == batch.len()).ok_or_else(
-                    || Error::internal("normals are to be written, none were computed"),
-                )?;
-            form.put_normals(normals, &mut vertices)?;
-        }
+        form.put_computed(batch, &mut vertices)?;
         let bytes = match self.encoding {
             Encoding::Ascii => {
                 let text = form.print(&vertices);

@@ -59,7 +59,7 @@ impl Format for PlyFormat {
         schema: &Arc<Schema>,
         metadata: &Metadata,
     ) -> Result<ChunkSize> {
-        Ok(sink::plan(&options(keys, false), schema, metadata)?.chunk())
+        Ok(sink::plan(&options(keys, metadata, false), schema, metadata)?.chunk())
     }
 
     fn create(
@@ -70,7 +70,7 @@ impl Format for PlyFormat {
         metadata: &Metadata,
         whole: bool,
     ) -> Result<Box<dyn Sink>> {
-        sink::create(staged, &options(keys, whole), schema, metadata)
+        sink::create(staged, &options(keys, metadata, whole), schema, metadata)
     }
 
     fn disk_bytes(
@@ -79,7 +79,7 @@ impl Format for PlyFormat {
         schema: &Arc<Schema>,
         metadata: &Metadata,
     ) -> Result<[u64; 2]> {
-        Ok(sink::plan(&options(keys, false), schema, metadata)?.disk_bytes())
+        Ok(sink::plan(&options(keys, metadata, false), schema, metadata)?.disk_bytes())
     }
 
     fn unread<'a>(&self, keys: &'a WriteKeys) -> &'a [String] {
@@ -87,14 +87,14 @@ impl Format for PlyFormat {
     }
 }
 
-fn options(keys: &WriteKeys, whole: bool) -> PlyOptions {
+fn options(keys: &WriteKeys, metadata: &Metadata, whole: bool) -> PlyOptions {
     let encoding = keys.encoding.map(|encoding| match encoding {
         OutputEncoding::Ascii => Encoding::Ascii,
         OutputEncoding::Binary => Encoding::BinaryLittleEndian,
     });
     PlyOptions {
         encoding,
-        normals: keys.normals,
+        computed: metadata.computed.clone(),
         drop: keys.drop.clone(),
         colors: keys.colors,
         carry_rest: whole,

@@ -256,6 +256,7 @@ fn metadata(files: &[PlyFile], mut texts: Vec<Texts>) -> Metadata {
         crs,
         gps_time: texts[0].gps_time,
         pipeline: None,
+        computed: Vec::new(),
         comments: union(texts.into_iter().map(|t| t.comments).collect()),
         native: Some(Arc::new(native)),
     }

@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use super::limit::Limit;
 use super::settings::Split;
+use crate::Result;
 use crate::geom::angle::{
     cone, cosine, direction, dominant_axis, is_turned, outer_sum, range, sine2,
 };
-use crate::point::{Bounds, Position, distance2};
+use crate::point::{Bounds, NORMAL, Position, distance2};
 use crate::tile::{Partition, Tile};
 
 /// Divisions by angle that a part may be deep, besides two for every doubling of the cell's
@@ -96,16 +97,16 @@ pub(super) struct Division<'a> {
 
 impl<'a> Division<'a> {
     /// Of a tile whose groups were taken out of it.
-    pub(super) fn new(rule: DivisionRule, tile: &'a Tile) -> Self {
-        Division {
+    pub(super) fn new(rule: DivisionRule, tile: &'a Tile) -> Result<Self> {
+        Ok(Division {
             rule,
             positions: &tile.positions,
-            normals: &tile.normals,
+            normals: tile.columns.get(&NORMAL)?,
             core: tile.core.clone(),
             counts: DivisionCounts::default(),
             stack: Vec::new(),
             spare: Vec::new(),
-        }
+        })
     }
 
     /// What was done so far.

@@ -1,34 +1,46 @@
-//! What the first phase stores: pairs of numbers.
+//! What the first phase leaves of a tile: every division that could be made.
 //!
-//! An initial cell that can be divided is two pairs, (x, CELL) and (y, z) of its Morton-first
-//! position; its divisions follow, each (range, parts more that it makes), every part's before
-//! those of its own parts. A tile ends with (records kept whatever is divided, KEPT).
+//! Their ranges of angles are kept as numbers that compare as the ranges do, so that the second
+//! phase finds a threshold among billions of divisions by counting, and never sorts them.
 
-use crate::Result;
+use bytemuck::{Pod, Zeroable};
+
 use crate::point::Position;
-use crate::stage::Gathered;
-
-/// A division has less than these in its second number.
-const CELL: u64 = 1 << 62;
-const KEPT: u64 = 2 << 62;
+use crate::stage::{Gathered, Summary};
+use crate::{Error, Result};
 
 /// The sign of an f64.
 const SIGN: u64 = 1 << 63;
 
-/// What was stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Entry {
+/// The divisions of a tile's cells.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TileDivisions {
     /// Records that are kept whatever is divided.
-    Kept(u64),
-    /// An initial cell that can be divided, by its Morton-first position.
-    Cell(Position),
-    /// A division of the last cell.
-    Division {
-        /// Its range of angles, the widest first: see [`key`].
-        key: u64,
-        /// How many parts more it makes.
-        parts: u64,
-    },
+    pub(super) kept: u64,
+    /// The initial cells that can be divided, in the order of their first positions.
+    pub(super) cells: Vec<DividedCell>,
+    /// Their divisions, cell after cell; every part's come before those of its own parts.
+    pub(super) divisions: Vec<PartDivision>,
+}
+
+/// An initial cell that can be divided.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct DividedCell {
+    /// Its Morton-first position.
+    pub(super) first: Position,
+    /// How many divisions it has.
+    pub(super) divisions: u64,
+}
+
+/// One division of a cell or a part of it.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct PartDivision {
+    /// Its range of angles, the widest first: see [`key`].
+    pub(super) key: u64,
+    /// How many parts more it makes.
+    pub(super) parts: u64,
 }
 
 /// Numbers that compare as the cosines do: ranges of angles from the widest to the narrowest.
@@ -42,33 +54,42 @@ pub(super) fn cosine(key: u64) -> f64 {
     f64::from_bits(if key & SIGN == 0 { !key } else { key & !SIGN })
 }
 
-/// See [`Entry::Division`].
-pub(super) fn division(cosine: f64, parts: u64) -> [u64; 2] {
-    [key(cosine), parts]
+impl TileDivisions {
+    /// The cells, each with its divisions.
+    pub(super) fn each(&self) -> impl Iterator<Item = (Position, &[PartDivision])> {
+        let mut rest = &self.divisions[..];
+        self.cells.iter().map(move |cell| {
+            let (own, later) = rest.split_at(rest.len().min(cell.divisions as usize));
+            rest = later;
+            (cell.first, own)
+        })
+    }
 }
 
-/// See [`Entry::Cell`].
-pub(super) fn cell([x, y, z]: Position) -> [[u64; 2]; 2] {
-    [[x as u64, CELL], [y as u64, z as u64]]
+impl Summary for TileDivisions {
+    fn store(&self, bytes: &mut Vec<u8>) {
+        bytes.extend_from_slice(bytemuck::bytes_of(&[self.kept, self.cells.len() as u64]));
+        self.cells.store(bytes);
+        self.divisions.store(bytes);
+    }
+
+    fn load(bytes: &[u8]) -> Result<Self> {
+        let cut_off = || Error::internal("the divisions of a tile are cut off");
+        let (head, rest) = bytes.split_at_checked(size_of::<[u64; 2]>()).ok_or_else(cut_off)?;
+        let [kept, cells]: [u64; 2] = bytemuck::pod_read_unaligned(head);
+        let cells = (cells as usize).checked_mul(size_of::<DividedCell>()).ok_or_else(cut_off)?;
+        let (cells, divisions) = rest.split_at_checked(cells).ok_or_else(cut_off)?;
+        Ok(TileDivisions { kept, cells: Vec::load(cells)?, divisions: Vec::load(divisions)? })
+    }
 }
 
-/// See [`Entry::Kept`].
-pub(super) fn kept(records: u64) -> [u64; 2] {
-    [records, KEPT]
-}
-
-/// Calls `visit` with all that was stored, in order.
-pub(super) fn each(found: &dyn Gathered, mut visit: impl FnMut(Entry)) -> Result<()> {
-    let mut begun = None;
-    found.each(&mut |stretch| {
-        for &[a, b] in stretch {
-            match (begun.take(), b) {
-                (Some(x), _) => visit(Entry::Cell([x, a as i64, b as i64])),
-                (None, CELL) => begun = Some(a as i64),
-                (None, KEPT) => visit(Entry::Kept(a)),
-                (None, parts) => visit(Entry::Division { key: a, parts }),
-            }
-        }
+/// Calls `visit` with every division of every tile, in order.
+pub(super) fn each(
+    gathered: &dyn Gathered<TileDivisions>,
+    mut visit: impl FnMut(&PartDivision),
+) -> Result<()> {
+    gathered.each(&mut |tile| {
+        tile.divisions.iter().for_each(&mut visit);
         Ok(())
     })
 }
@@ -86,41 +107,24 @@ mod tests {
         assert_eq!(key(-0.0), key(0.0));
     }
 
-    struct Stretches(Vec<Vec<[u64; 2]>>);
-
-    impl Gathered for Stretches {
-        fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()> {
-            self.0.iter().try_for_each(|stretch| visit(stretch))
-        }
-
-        fn records(&self) -> u64 {
-            0
-        }
-    }
-
     #[test]
-    fn what_is_stored_comes_back_however_it_is_cut() {
-        let entries = [
-            Entry::Cell([-1, i64::MIN, 1 << 62]),
-            Entry::Division { key: key(-0.25), parts: 7 },
-            Entry::Division { key: key(0.25), parts: 1 },
-            Entry::Kept(12),
-            Entry::Cell([1 << 62, -(2 << 61), i64::MAX]),
-            Entry::Kept(0),
-        ];
-        let mut stored = Vec::new();
-        for entry in entries {
-            match entry {
-                Entry::Kept(records) => stored.push(kept(records)),
-                Entry::Cell(position) => stored.extend(cell(position)),
-                Entry::Division { key, parts } => stored.push(division(cosine(key), parts)),
-            }
-        }
-        for length in 1..=stored.len() {
-            let stretches = Stretches(stored.chunks(length).map(<[_]>::to_vec).collect());
-            let mut back = Vec::new();
-            each(&stretches, |entry| back.push(entry)).unwrap();
-            assert_eq!(back, entries, "stretches of {length}");
+    fn what_is_stored_comes_back_and_is_refused_where_it_is_cut_off() {
+        let division = |cosine, parts| PartDivision { key: key(cosine), parts };
+        let tile = TileDivisions {
+            kept: 12,
+            cells: vec![
+                DividedCell { first: [-1, i64::MIN, 1 << 62], divisions: 2 },
+                DividedCell { first: [1 << 62, -(2 << 61), i64::MAX], divisions: 1 },
+            ],
+            divisions: vec![division(-0.25, 7), division(0.25, 1), division(1.0, 3)],
+        };
+        let mut bytes = Vec::new();
+        tile.store(&mut bytes);
+        assert_eq!(TileDivisions::load(&bytes).unwrap(), tile);
+        let each: Vec<_> = tile.each().map(|(first, own)| (first[0], own.len())).collect();
+        assert_eq!(each, [(-1, 2), (1 << 62, 1)]);
+        for len in [0, 15, 16 + 31, bytes.len() - 1] {
+            assert!(TileDivisions::load(&bytes[..len]).is_err(), "{len} bytes");
         }
     }
 }

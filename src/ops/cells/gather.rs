@@ -1,60 +1,64 @@
 //! The first phase of `cells` with `keep`: every division that could be made, and of which range.
 
 use super::division::Division;
-use super::entry;
+use super::entry::{DividedCell, PartDivision, TileDivisions, key};
 use super::keys::Cells;
 use super::limit::Limit;
 use super::threshold::Threshold;
 use crate::geom::angle::{MaxAngle, is_known};
+use crate::point::NORMAL;
 use crate::report::Tally;
 use crate::stage::{Gathered, Needs, ScanOp, TileOp};
 use crate::tile::{Partition, Tile};
 use crate::{Error, Result};
 
-/// Bytes a position: what is found, 16 for every division and 32 for every initial cell that is
-/// divided, and the order of the initial cells.
-const BYTES: usize = 16 + 16 + 12;
+/// Bytes a position: what is gathered, and the same as it is stored, 16 for every division and 32
+/// for every initial cell that is divided, which has two positions at least and a division fewer
+/// than positions; and the order of the initial cells.
+const BYTES: usize = 2 * (32 + 16) / 2 + 12;
 
 /// Every division of a range of angles that can be told from none.
 const ALL: Limit = Limit { max_angle: MaxAngle::NONE, ties: None };
 
 impl ScanOp for Cells {
+    type Summary = TileDivisions;
+
     fn gather_needs(&self) -> Needs {
         let needs = self.needs();
         Needs { bytes_per_point: needs.bytes_per_point + BYTES, ..needs }
     }
 
-    fn gather(&self, tile: &mut Tile, found: &mut Vec<[u64; 2]>, _: &mut Tally) -> Result<()> {
+    fn gather(&self, tile: &mut Tile, _: &mut Tally) -> Result<TileDivisions> {
         // What crosses a face is counted by the second phase.
         let (mut cells, _) = self.initial_cells(tile)?;
-        let mut division = Division::new(self.rule(ALL)?, tile);
+        let mut division = Division::new(self.rule(ALL)?, tile)?;
+        let normals = tile.columns.get(&NORMAL)?;
         let without_normal =
-            tile.core.clone().filter(|&i| tile.is_chosen(i) && !is_known(tile.normals[i])).count();
+            tile.core.clone().filter(|&i| tile.is_chosen(i) && !is_known(normals[i])).count();
         let initial = owned_in_order(&division, &mut cells);
-        // m positions of a cell have at most m − 1 divisions.
-        found.reserve_exact(cells.members.len() + initial.len() + 1);
+        let mut found = TileDivisions::default();
         let mut parts = 0;
         for (first, start, end) in initial {
             cells.ends.clear();
             let (mut divisions, mut more) = (0, 0);
             division.run(start as usize..end as usize, &mut cells, |range, parts| {
-                if divisions == 0 {
-                    found.extend(entry::cell(tile.positions[first as usize]));
-                }
-                found.push(entry::division(range, parts));
+                found.divisions.push(PartDivision { key: key(range), parts });
                 divisions += 1;
                 more += parts;
             });
+            if divisions > 0 {
+                found.cells.push(DividedCell { first: tile.positions[first as usize], divisions });
+            }
             parts += cells.ends.len() as u64 - more;
         }
-        found.push(entry::kept(parts + without_normal as u64));
+        found.kept = parts + without_normal as u64;
         // The members are in the order of a division that is not to be.
         cells.clear();
         tile.cells = cells;
-        Ok(())
+        Ok(found)
     }
 
-    fn conclude(&mut self, found: &dyn Gathered) -> Result<Option<String>> {
+    fn conclude(&mut self, found: &dyn Gathered<TileDivisions>) -> Result<Option<String>> {
         let keep = self.keep.ok_or_else(|| Error::internal("there is no target to reach"))?;
         let auto = self.settled()?.target;
         let threshold = Threshold::find(found, keep, auto)?;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::keys::Cells;
 use super::settings::Reference;
 use crate::geom::angle::is_known;
-use crate::point::{Bounds, Position};
+use crate::point::{Bounds, NORMAL, Position};
 use crate::tile::{Partition, Tile};
 use crate::{Error, Result};
 
@@ -23,7 +23,9 @@ impl Cells {
         let mut cells = std::mem::take(&mut tile.cells);
         cells.clear();
         cells.reference = self.direction().and_then(Reference::direction);
-        let crossing = Grouping { tile, side, by_class: !self.by.is_empty() }.run(&mut cells);
+        let normals = tile.columns.get(&NORMAL)?;
+        let crossing =
+            Grouping { tile, normals, side, by_class: !self.by.is_empty() }.run(&mut cells);
         cells.turned.resize(cells.members.len(), false);
         Ok((cells, crossing))
     }
@@ -32,6 +34,7 @@ impl Cells {
 /// A tile's positions, to be grouped by the cube of side `side` that they are in.
 pub(super) struct Grouping<'a> {
     pub(super) tile: &'a Tile,
+    pub(super) normals: &'a [[f32; 3]],
     pub(super) side: i64,
     /// True if positions of different classes are in different cells.
     pub(super) by_class: bool,
@@ -175,7 +178,7 @@ impl Grouping<'_> {
     }
 
     fn belongs(&self, i: usize) -> bool {
-        self.tile.is_chosen(i) && is_known(self.tile.normals[i])
+        self.tile.is_chosen(i) && is_known(self.normals[i])
     }
 }
 
@@ -187,11 +190,11 @@ mod tests {
     fn positions_that_are_not_chosen_are_in_no_cell() {
         for side in [8, 7] {
             let mut tile = Tile::of((0..6).map(|x| [x, 0, 0]).collect());
-            tile.normals.fill([0.0, 0.0, 1.0]);
-            tile.normals[5] = [f32::NAN; 3];
+            let mut normals = [[0.0, 0.0, 1.0]; 6];
+            normals[5] = [f32::NAN; 3];
             (tile.selections, tile.limits) = (vec![3, 1, 2, 0, 3, 3], 2);
             let mut cells = Partition::default();
-            Grouping { tile: &tile, side, by_class: false }.run(&mut cells);
+            Grouping { tile: &tile, normals: &normals, side, by_class: false }.run(&mut cells);
             assert_eq!((cells.members, cells.ends), (vec![0, 2, 4], vec![3]), "side {side}");
         }
     }

@@ -8,7 +8,7 @@ use super::target::Keep;
 use crate::Result;
 use crate::geom::angle::{MaxAngle, is_known};
 use crate::ops::scatter::{scatter, typical};
-use crate::point::Position;
+use crate::point::{NORMAL, Position};
 use crate::quantity::{Angle, Setting};
 use crate::report::Grouped;
 use crate::stage::Forecast;
@@ -25,13 +25,13 @@ pub(super) fn sample(cells: &Cells, tile: &mut Tile) -> Result<Vec<f64>> {
     let scatter = scatter(tile).unwrap_or(f64::NAN);
     let is_given = cells.keep.is_none() && !cells.max_angle.is_some_and(Setting::is_auto);
     let given = cells.rule(limit(cells.max_angle()))?;
-    let (kept, mut of) = if is_given { divided(given, tile) } else { (0, 0) };
+    let (kept, mut of) = if is_given { divided(given, tile)? } else { (0, 0) };
     let mut steps = Vec::new();
     if cells.keep == Some(Keep::Auto) {
         for angle in LADDER {
             let min_spacing = given.min_spacing.max((given.side / QUARTER).unsigned_abs());
             let rule = DivisionRule { limit: limit(angle), min_spacing, ..given };
-            let (kept, positions) = divided(rule, tile);
+            let (kept, positions) = divided(rule, tile)?;
             steps.push(kept as f64);
             of = positions;
         }
@@ -47,7 +47,7 @@ fn limit(angle: f64) -> Limit {
 
 /// Divides the initial cells that lie in the sample as the stage would: how many records of how
 /// many positions stay. Cells are anchored at the sample's corner, so that whole ones are in it.
-fn divided(rule: DivisionRule, tile: &mut Tile) -> (usize, usize) {
+fn divided(rule: DivisionRule, tile: &mut Tile) -> Result<(usize, usize)> {
     let rule = DivisionRule { origin: tile.cube.lo, ..rule };
     let mut partition = Partition::default();
     let whole = |p: Position| initial_cell(&rule, tile.cube.hi, p);
@@ -56,18 +56,19 @@ fn divided(rule: DivisionRule, tile: &mut Tile) -> (usize, usize) {
         .filter_map(|i| Some((whole(tile.positions[i])?, i as u32)))
         .collect();
     let positions = placed.len();
-    placed.retain(|&(_, i)| is_known(tile.normals[i as usize]));
+    let normals = tile.columns.get(&NORMAL)?;
+    placed.retain(|&(_, i)| is_known(normals[i as usize]));
     let without_normal = positions - placed.len();
     placed.sort_unstable();
     partition.members = placed.iter().map(|&(_, i)| i).collect();
     partition.turned = vec![false; placed.len()];
-    let mut division = Division::new(rule, tile);
+    let mut division = Division::new(rule, tile)?;
     let mut start = 0;
     for cell in placed.chunk_by(|a, b| a.0 == b.0) {
         division.run(start..start + cell.len(), &mut partition, |_, _| {});
         start += cell.len();
     }
-    (partition.ends.len() + without_normal, positions)
+    Ok((partition.ends.len() + without_normal, positions))
 }
 
 /// Which initial cell `p` is in; none if it is not all within a cube that ends with `last`, unless

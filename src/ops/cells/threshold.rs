@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::entry::{self, Entry};
+use super::entry::{self, TileDivisions};
 use super::limit::{Limit, Ties};
 use super::target::Keep;
 use crate::geom::angle::MaxAngle;
@@ -28,13 +28,17 @@ impl Threshold {
     /// Of all divisions in order of their ranges, the widest first, and of equal ones in canonical
     /// order, makes as many as leave no more records than `keep` says, or than `auto` where that is
     /// left to the scan. Walks what was found five times.
-    pub(super) fn find(found: &dyn Gathered, keep: Keep, auto: Option<u64>) -> Result<Self> {
+    pub(super) fn find(
+        found: &dyn Gathered<TileDivisions>,
+        keep: Keep,
+        auto: Option<u64>,
+    ) -> Result<Self> {
         let mut target = auto.unwrap_or_else(|| keep.of(found.records()));
         let (mut least, mut more) = (0, 0);
-        entry::each(found, |entry| match entry {
-            Entry::Kept(records) => least += records,
-            Entry::Cell(_) => {}
-            Entry::Division { parts, .. } => more += parts,
+        found.each(&mut |tile| {
+            least += tile.kept;
+            more += tile.divisions.iter().map(|division| division.parts).sum::<u64>();
+            Ok(())
         })?;
         if target < least && auto.is_none() {
             return Err(too_few(keep, target, least));
@@ -104,16 +108,14 @@ fn too_few(keep: Keep, target: u64, least: u64) -> Error {
 
 /// The widest range whose divisions cannot all be made if `left` records more are to be left; takes
 /// off those that the wider ones add. There is one.
-fn first_beyond(found: &dyn Gathered, left: &mut u64) -> Result<u64> {
+fn first_beyond(found: &dyn Gathered<TileDivisions>, left: &mut u64) -> Result<u64> {
     let mut prefix = 0;
     let mut bins = vec![0u64; 1 << BITS];
     for shift in (0..u64::BITS / BITS).rev().map(|digit| digit * BITS) {
         bins.fill(0);
-        entry::each(found, |entry| {
-            if let Entry::Division { key, parts } = entry
-                && (key >> shift) >> BITS == prefix
-            {
-                bins[(key >> shift) as usize & ((1 << BITS) - 1)] += parts;
+        entry::each(found, |division| {
+            if (division.key >> shift) >> BITS == prefix {
+                bins[(division.key >> shift) as usize & ((1 << BITS) - 1)] += division.parts;
             }
         })?;
         let mut digit = 0;
@@ -128,22 +130,21 @@ fn first_beyond(found: &dyn Gathered, left: &mut u64) -> Result<u64> {
 
 /// Where the divisions of the range `key` end if `left` records more are to be left, in the order
 /// they were found in; takes off those that they add. None if not even the first is made.
-fn ties(found: &dyn Gathered, key: u64, left: &mut u64) -> Result<Option<Ties>> {
+fn ties(found: &dyn Gathered<TileDivisions>, key: u64, left: &mut u64) -> Result<Option<Ties>> {
     let mut ties: Option<Ties> = None;
-    let mut cell = None;
     let mut is_over = false;
-    entry::each(found, |entry| match entry {
-        Entry::Kept(_) => {}
-        Entry::Cell(first) => cell = Some(first),
-        Entry::Division { key: k, parts } if k == key && !is_over => {
-            is_over = parts > *left;
-            if let (false, Some(last)) = (is_over, cell) {
-                *left -= parts;
-                let made = ties.filter(|ties| ties.last == last).map_or(0, |ties| ties.made);
-                ties = Some(Ties { last, made: made + 1 });
+    found.each(&mut |tile| {
+        for (last, divisions) in tile.each() {
+            for division in divisions.iter().filter(|division| division.key == key) {
+                is_over |= division.parts > *left;
+                if !is_over {
+                    *left -= division.parts;
+                    let made = ties.filter(|ties| ties.last == last).map_or(0, |ties| ties.made);
+                    ties = Some(Ties { last, made: made + 1 });
+                }
             }
         }
-        Entry::Division { .. } => {}
+        Ok(())
     })?;
     Ok(ties)
 }

@@ -49,14 +49,8 @@ fn square(steps: f64) -> u128 {
 
 impl TileOp for RadiusOutliers {
     fn needs(&self) -> Needs {
-        Needs {
-            reads: names::XYZ.map(str::to_owned).to_vec(),
-            neighbors: self.min_neighbors,
-            bytes_per_point: size_of::<bool>(),
-            removes: self.mark.is_none(),
-            mark: self.mark,
-            ..Needs::default()
-        }
+        let looks = Needs::none().looks_at(names::XYZ).neighbors(self.min_neighbors);
+        looks.bytes_per_point(size_of::<bool>()).removes(self.mark)
     }
 
     fn convert(&mut self, units: &Units) -> Result<()> {

@@ -6,15 +6,18 @@ use serde_json::Value;
 use super::super::removal::{RemovalAccount, remove};
 use super::neighbors::checked;
 use crate::geom::wide::Wide;
-use crate::point::{Mark, Position, distance2, names};
+use crate::point::{Column, Mark, Position, distance2, names};
 use crate::report::Tally;
-use crate::stage::{Gathered, Needs, ScanFacts, ScanOp, TileOp};
+use crate::stage::{Gathered, Needs, ScanFacts, ScanOp, Summary, TileOp};
 use crate::tile::Tile;
 use crate::{Error, Result};
 
 /// Units of a figure in a lattice step: 2^16. A figure below 2^63 steps and its square then stay
 /// whole numbers that are summed exactly.
 const UNITS: f64 = 65_536.0;
+
+/// Mean distance of a position to its neighbours in lattice steps; NaN where it has none.
+const MEAN_DISTANCE: Column<f64> = Column::new("MeanDistance", &[]);
 
 /// `outliers` by statistics of the scan.
 #[derive(Debug, Clone)]
@@ -46,12 +49,7 @@ impl StatisticalOutliers {
 
 impl TileOp for StatisticalOutliers {
     fn needs(&self) -> Needs {
-        Needs {
-            reads: vec!["Figure".into()],
-            removes: self.mark.is_none(),
-            mark: self.mark,
-            ..Needs::default()
-        }
+        Needs::none().reads(&MEAN_DISTANCE).removes(self.mark)
     }
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
@@ -63,15 +61,14 @@ impl TileOp for StatisticalOutliers {
         let concluded = self.concluded.ok_or_else(|| {
             Error::internal("the stage outliers ran before its threshold was known")
         })?;
-        if tile.figures.len() != tile.positions.len() {
-            return Err(Error::internal("the figures of a tile are not as many as its positions"));
-        }
         let mut records = 0;
+        let figures = tile.columns.take(&MEAN_DISTANCE)?;
         for i in tile.core.clone() {
-            if tile.is_chosen(i) && units(tile.figures[i]).is_some_and(|u| u > concluded.most) {
+            if tile.is_chosen(i) && units(figures[i]).is_some_and(|u| u > concluded.most) {
                 records += remove(tile, i);
             }
         }
+        tile.columns.put(figures);
         RemovalAccount::of_outliers(self.mark).enter(tally, "outlier", records);
         Ok(())
     }
@@ -89,53 +86,34 @@ impl TileOp for StatisticalOutliers {
 }
 
 impl ScanOp for StatisticalOutliers {
+    type Summary = Sums;
+
     fn gather_needs(&self) -> Needs {
-        Needs {
-            reads: names::XYZ.map(str::to_owned).to_vec(),
-            writes: vec!["Figure".into()],
-            neighbors: self.neighbors,
-            bytes_per_point: size_of::<f64>(),
-            ..Needs::default()
-        }
+        Needs::none().looks_at(names::XYZ).writes(&MEAN_DISTANCE).neighbors(self.neighbors)
     }
 
-    fn gather(&self, tile: &mut Tile, found: &mut Vec<[u64; 2]>, _: &mut Tally) -> Result<()> {
-        let mut figures = std::mem::take(&mut tile.figures);
-        figures.clear();
-        figures.resize(tile.positions.len(), f64::NAN);
-        let outcome = tile.each_neighborhood(self.neighbors, |i, neighbors| {
+    fn gather(&self, tile: &mut Tile, _: &mut Tally) -> Result<Sums> {
+        let mut figures = tile.columns.take(&MEAN_DISTANCE)?;
+        tile.each_neighborhood(self.neighbors, |i, neighbors| {
             figures[i] = figure(neighbors.offsets());
-        });
-        tile.figures = figures;
-        outcome?;
+        })?;
         let mut sums = Sums::default();
         for i in tile.core.clone() {
-            match units(tile.figures[i]) {
+            match units(figures[i]) {
                 Some(units) if tile.is_chosen(i) => sums.add(units),
-                _ => tile.figures[i] = f64::NAN,
+                _ => figures[i] = f64::NAN,
             }
         }
-        found.extend(sums.rows());
-        Ok(())
+        tile.columns.put(figures);
+        Ok(sums)
     }
 
-    fn conclude(&mut self, found: &dyn Gathered) -> Result<Option<String>> {
+    fn conclude(&mut self, gathered: &dyn Gathered<Sums>) -> Result<Option<String>> {
         let mut sums = Sums::default();
-        let (mut rows, mut filled) = ([[0; 2]; Sums::ROWS], 0);
-        found.each(&mut |stretch| {
-            for &row in stretch {
-                rows[filled] = row;
-                filled += 1;
-                if filled == Sums::ROWS {
-                    sums.merge(&Sums::of_rows(rows));
-                    filled = 0;
-                }
-            }
+        gathered.each(&mut |tile| {
+            sums.merge(&tile);
             Ok(())
         })?;
-        if filled > 0 {
-            return Err(Error::internal("the sums that outliers gathered are cut off"));
-        }
         self.concluded = Some(Conclusion::of(&sums, self.multiplier));
         Ok(None)
     }
@@ -155,16 +133,13 @@ fn units(figure: f64) -> Option<u128> {
 
 /// Number of figures, their sum and that of their squares, in [`UNITS`].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Sums {
+pub struct Sums {
     count: u64,
     sum: u128,
     squares: Wide,
 }
 
 impl Sums {
-    /// Rows that hold them.
-    const ROWS: usize = 4;
-
     fn add(&mut self, units: u128) {
         self.count += 1;
         self.sum = self.sum.saturating_add(units);
@@ -176,15 +151,21 @@ impl Sums {
         self.sum = self.sum.saturating_add(other.sum);
         self.squares = self.squares.plus(other.squares);
     }
+}
 
-    fn rows(&self) -> [[u64; 2]; Sums::ROWS] {
+impl Summary for Sums {
+    fn store(&self, bytes: &mut Vec<u8>) {
         let [a, b, c, d] = self.squares.words();
-        [[self.count, 0], [self.sum as u64, (self.sum >> 64) as u64], [a, b], [c, d]]
+        let words = [self.count, self.sum as u64, (self.sum >> 64) as u64, a, b, c, d];
+        bytes.extend_from_slice(bytemuck::bytes_of(&words));
     }
 
-    fn of_rows([[count, _], [low, high], [a, b], [c, d]]: [[u64; 2]; Sums::ROWS]) -> Sums {
+    fn load(bytes: &[u8]) -> Result<Sums> {
+        let words = bytemuck::try_pod_read_unaligned::<[u64; 7]>(bytes);
+        let cut_off = |_| Error::internal("the sums that outliers gathered are cut off");
+        let [count, low, high, a, b, c, d] = words.map_err(cut_off)?;
         let sum = u128::from(low) | u128::from(high) << 64;
-        Sums { count, sum, squares: Wide::of_words([a, b, c, d]) }
+        Ok(Sums { count, sum, squares: Wide::of_words([a, b, c, d]) })
     }
 }
 
@@ -264,13 +245,18 @@ mod tests {
 
     proptest::proptest! {
         #[test]
-        fn rows_hold_the_sums_however_they_are_split(
+        fn sums_come_back_however_they_are_split(
             figures in proptest::collection::vec(0u128..1 << 80, 0..40), cut in 0usize..40,
         ) {
             let whole = sums(&figures);
             let (a, b) = figures.split_at(cut.min(figures.len()));
-            let mut merged = Sums::of_rows(sums(b).rows());
-            merged.merge(&Sums::of_rows(sums(a).rows()));
+            let stored = |part: &[u128]| {
+                let mut bytes = Vec::new();
+                sums(part).store(&mut bytes);
+                Sums::load(&bytes).unwrap()
+            };
+            let mut merged = stored(b);
+            merged.merge(&stored(a));
             proptest::prop_assert_eq!(merged, whole);
         }
     }

@@ -1,0 +1,159 @@
+//! What a stage needs and gives, in the words of a plan.
+
+use crate::point::{Column, ColumnKind, ColumnValue, Mark};
+
+/// Everything a plan can check before a run.
+///
+/// ```
+/// use pointmill::point::{Column, NORMAL};
+/// use pointmill::stage::Needs;
+///
+/// const ROUGHNESS: Column<f32> = Column::new("Roughness", &[]);
+/// let needs = Needs::none().reads_of_neighbors(&NORMAL, 8).writes(&ROUGHNESS);
+/// assert_eq!((needs.neighbors, needs.removes), (8, false));
+/// ```
+#[derive(Debug, Clone, Default)]
+#[non_exhaustive]
+pub struct Needs {
+    /// Dimensions of the records that it looks at. Stages that work on tiles look at `X`, `Y`, `Z`
+    /// and `Classification` by this, and at any other as at a [column](Needs::reads).
+    pub dimensions: Vec<String>,
+    /// Dimensions of the records that it changes.
+    pub changes: Vec<String>,
+    /// Columns whose values it reads at the positions that it decides about, or computes for.
+    pub reads: Vec<ColumnKind>,
+    /// Those of [`reads`](Needs::reads) whose values it reads at their neighbours, too.
+    pub of_neighbors: Vec<ColumnKind>,
+    /// Columns that it computes.
+    pub writes: Vec<ColumnKind>,
+    /// True if it reads the tile's [partition](crate::tile::Tile::cells), which a stage above made.
+    pub takes_cells: bool,
+    /// True if it makes the tile's partition.
+    pub makes_cells: bool,
+    /// Nearest other positions that each position's result is computed from; 0 for none.
+    pub neighbors: usize,
+    /// True if it may come to take fewer, once the scan is known.
+    pub fewer_neighbors: bool,
+    /// Side in lattice steps of the cells whose points are decided together; 0 for none (or not
+    /// settled yet).
+    pub cell_side: i64,
+    /// True if it decides about the points of a cell together, also while their side is not
+    /// settled.
+    pub cells: bool,
+    /// True if cells of that side are octree nodes, so that no tile face cuts one.
+    pub cell_aligned: bool,
+    /// Working memory per position of the tile, rim included.
+    pub bytes_per_point: usize,
+    /// True if it removes points.
+    pub removes: bool,
+    /// How it marks records instead of removing any, if it does.
+    pub mark: Option<Mark>,
+    /// How often the stages from the last that computed a column to this one are applied, each time
+    /// to what the time before left, and which column; none is once.
+    pub repeats: Option<(ColumnKind, usize)>,
+}
+
+impl Needs {
+    /// Nothing: to be told from there.
+    pub fn none() -> Self {
+        Needs::default()
+    }
+
+    /// And it looks at these dimensions of the records.
+    #[must_use]
+    pub fn looks_at<'a>(mut self, names: impl IntoIterator<Item = &'a str>) -> Self {
+        self.dimensions.extend(names.into_iter().map(str::to_owned));
+        self
+    }
+
+    /// And it changes these dimensions of the records.
+    #[must_use]
+    pub fn changes<'a>(mut self, names: impl IntoIterator<Item = &'a str>) -> Self {
+        self.changes.extend(names.into_iter().map(str::to_owned));
+        self
+    }
+
+    /// And it reads a column.
+    #[must_use]
+    pub fn reads<T: ColumnValue>(mut self, column: &Column<T>) -> Self {
+        self.reads.push(column.kind());
+        self
+    }
+
+    /// And it reads a column of the `neighbors` nearest other positions, and of its own.
+    #[must_use]
+    pub fn reads_of_neighbors<T: ColumnValue>(self, column: &Column<T>, neighbors: usize) -> Self {
+        let mut needs = self.reads(column).neighbors(neighbors);
+        needs.of_neighbors.push(column.kind());
+        needs
+    }
+
+    /// And it computes a column.
+    #[must_use]
+    pub fn writes<T: ColumnValue>(mut self, column: &Column<T>) -> Self {
+        self.writes.push(column.kind());
+        self
+    }
+
+    /// And each result is computed from so many nearest other positions, at least.
+    #[must_use]
+    pub fn neighbors(mut self, neighbors: usize) -> Self {
+        self.neighbors = self.neighbors.max(neighbors);
+        self
+    }
+
+    /// And it works with so many bytes more for each position of the tile, rim included.
+    #[must_use]
+    pub fn bytes_per_point(mut self, bytes: usize) -> Self {
+        self.bytes_per_point += bytes;
+        self
+    }
+
+    /// And it decides about the points of cells together, of a side of so many lattice steps (0
+    /// while that is not settled); `aligned` if they are octree nodes.
+    #[must_use]
+    pub fn cells(mut self, side: i64, aligned: bool) -> Self {
+        (self.cells, self.cell_side, self.cell_aligned) = (true, side, aligned);
+        self
+    }
+
+    /// And it reads the tile's partition into cells.
+    #[must_use]
+    pub fn takes_cells(mut self) -> Self {
+        self.takes_cells = true;
+        self
+    }
+
+    /// And it makes the tile's partition into cells.
+    #[must_use]
+    pub fn makes_cells(mut self) -> Self {
+        self.makes_cells = true;
+        self
+    }
+
+    /// And it removes points, or marks them instead.
+    #[must_use]
+    pub fn removes(mut self, mark: Option<Mark>) -> Self {
+        (self.removes, self.mark) = (mark.is_none(), mark);
+        self
+    }
+
+    /// The names of all that it reads, for a plan that is shown.
+    pub(crate) fn read_names(&self) -> Vec<&str> {
+        let cells = self.takes_cells.then_some("Cell");
+        let columns = self.reads.iter().map(|column| column.name());
+        cells.into_iter().chain(columns).chain(self.dimensions.iter().map(String::as_str)).collect()
+    }
+
+    /// The names of all that it gives.
+    pub(crate) fn written_names(&self) -> Vec<&str> {
+        let cells = self.makes_cells.then_some("Cell");
+        let columns = self.writes.iter().map(|column| column.name());
+        cells.into_iter().chain(columns).chain(self.changes.iter().map(String::as_str)).collect()
+    }
+
+    /// True if it reads `column`.
+    pub fn does_read<T: ColumnValue>(&self, column: &Column<T>) -> bool {
+        self.reads.contains(&column.kind())
+    }
+}
