@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use pointmill::geom::lattice::Lattice;
 use pointmill::ops::{Cells, Median, Side, Split};
-use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
+use pointmill::point::{Bounds, Dimension, Endian, Layout, NORMAL, Position, Scalar, Schema};
 use pointmill::quantity::Length;
 use pointmill::report::Tally;
 use pointmill::stage::{ScanFacts, TileOp};
@@ -46,7 +46,8 @@ fn plane(roughness: f64) -> Tile {
         .collect();
     let cube = TileKey::holding(&Bounds::of(positions.iter().copied())).cube();
     let mut tile = Tile::of(positions);
-    (tile.cube, tile.zone, tile.normals) = (cube, cube, normals);
+    (tile.cube, tile.zone) = (cube, cube);
+    tile.columns.set(&NORMAL, &normals);
     tile
 }
 

@@ -125,7 +125,7 @@ fn normals_come_behind_undescribed_bytes_and_are_then_overwritten_in_place() {
     let schema = Arc::new(layout(6, &[("A".to_owned(), Scalar::U16)], [0.01; 3], [0.0; 3]));
     let options = LasOptions { compressed: true, computed: normals() };
     let records = vec![7u8; schema.stride * 5];
-    write(&first, options, &schema, &Metadata::default(), &records).unwrap();
+    write(&first, options.clone(), &schema, &Metadata::default(), &records).unwrap();
     let (source, with_normals) = read_files(std::slice::from_ref(&first)).unwrap();
     let schema = source.schema().clone();
     assert_eq!(schema.stride, 30 + 2 + 12);
