@@ -36,7 +36,7 @@ fn plane(roughness: f64) -> Tile {
         .collect();
     positions.sort_unstable_by(morton_cmp);
     positions.dedup();
-    let normals = (0..positions.len() as u64)
+    let normals: Vec<[f32; 3]> = (0..positions.len() as u64)
         .map(|i| {
             let (x, y) =
                 (roughness * noise(i * 3 + (1 << 40)), roughness * noise(i * 3 + (2 << 40)));

@@ -5,8 +5,9 @@ use std::num::NonZeroUsize;
 
 use rayon::ThreadPool;
 
+use super::limits::{check_limits, number_selections};
 use super::look::{Unfit, look};
-use super::passes::{Passes, check_limits, number_selections, unroll};
+use super::passes::{Passes, unroll};
 use super::places::{all_read, check_places, copies, each_input};
 use super::sorted::Sorted;
 use super::stretch::Stretch;

@@ -2,7 +2,9 @@
 //! other, the inputs and the memory? Knows no stage by name, and reads no point but a few that it
 //! looks at.
 
+mod columns;
 mod fitted;
+mod limits;
 mod look;
 mod outline;
 mod passes;
