@@ -101,7 +101,8 @@ impl Job<'_> {
         }
     }
 
-    /// The rows of a sink's entries, where those of its pass are `all`: none if it writes no column.
+    /// The rows of a sink's entries, where those of its pass are `all`: none if it writes no
+    /// column.
     pub fn layout(&self, sink: usize, all: &RowLayout) -> RowLayout {
         if self.computed[sink].is_empty() { RowLayout::default() } else { all.clone() }
     }

@@ -50,7 +50,7 @@ impl NewestColumns {
         };
         let Some(newest) = self.0.iter().find(lost) else { return Ok(()) };
         let (kind, name) = (&stage.kind, newest.kind.name());
-        let told = format!("this `{kind}` would replace values of {name} that nothing reads");
+        let told = format!("this `{kind}` would replace values of {name} that nothing has read");
         Err(stage.written.wrong(told).help("leave one of the two out"))
     }
 

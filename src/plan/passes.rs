@@ -219,11 +219,11 @@ impl PassLayout<'_> {
         let needs = needs(self.ops, call);
         let at = self.place(stage, &needs)?;
         self.look(at, stage, &needs)?;
-        for column in &needs.reads {
-            self.provide(at, *column, stage)?;
-        }
         if needs.takes_cells && !self.out.passes[at].makes_cells {
             return Err(self.no_cells(stage));
+        }
+        for column in &needs.reads {
+            self.provide(at, *column, stage)?;
         }
         let pass = &mut self.out.passes[at];
         pass.round = round;

@@ -159,7 +159,7 @@ fn normals_that_nobody_computed_are_refused() {
     let mut batch = pointmill::point::PointBatch::new(schema.clone(), 1);
     batch.extend(&[0; 20]);
     let error = sink.encoder().encode(&batch).unwrap_err();
-    assert!(error.to_string().contains("no stage computes them"), "{error}");
+    assert!(error.to_string().contains("NormalX is to be written and not computed"), "{error}");
 }
 
 #[test]

@@ -389,7 +389,10 @@ fn keys_of_write_fit_its_format() {
         ),
         ("path = \"a.laz\"\nscale = [1, 2, 3, 4]", "`scale`: has 1 values too many"),
         ("path = \"a.laz\"\nscale = [1, 0, 1]", "p.toml:13:13: `scale`: takes a number above 0"),
-        ("path = \"a.laz\"\ndimensions = [\"NormalX\"]", "p.toml:13:14: `dimensions`: takes [] or"),
+        (
+            "path = \"a.laz\"\ndimensions = [\"NormalX\", \"NormalX\"]",
+            "p.toml:13:14: `dimensions`: has NormalX twice",
+        ),
         ("path = \"a.laz\"\norder = \"random\"", "valid: canonical, input"),
         ("format = \"las\"", "p.toml:11:8: a `write` needs `write.path`"),
     ] {
