@@ -201,7 +201,9 @@ fn what_streams_behind_tiles_changes_what_is_written_and_nothing_else() {
     assert!(kept > 500, "{kept}");
     let removed = &done.report.result.ledger.removed;
     assert!(removed.iter().any(|r| r.stage == "reclass" && r.records > 0), "{removed:?}");
-    let written = pointmill::io::describe(&folder.path().join("a.las")).unwrap();
+    let written =
+        pointmill::io::describe(&folder.path().join("a.las"), Registry::builtin().formats())
+            .unwrap();
     assert_eq!(written["points"], kept);
     let source = pointmill::io::las::open(&[folder.path().join("a.las")]).unwrap();
     let mut batch = PointBatch::new(source.schema().clone(), kept as usize);
