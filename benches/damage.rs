@@ -6,19 +6,19 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints and may fail")]
 
-#[path = "../tests/las_support/mod.rs"]
-mod las_support;
-#[path = "../tests/laz_support/mod.rs"]
-mod laz_support;
+#[path = "../tests/support/mod.rs"]
+mod support;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use las_support::{LAZ, write};
-use laz_support::damage::{Harm, Tally, Victim};
-use laz_support::points::{Kind, Maker};
-use laz_support::{Chunks, RECORD, Recipe};
+use crate::support::las::{LAZ, write};
+use crate::support::las_file::STRIDES;
+use crate::support::laz::damage::{Harm, Tally, Victim};
+use crate::support::laz::points::{Kind, Maker};
+use crate::support::laz::{Chunks, Recipe};
+use crate::support::records::read_source;
 use pointmill::io::las::{fresh, layout, open};
 use pointmill::point::{Metadata, Schema};
 
@@ -36,7 +36,7 @@ struct Scan {
 impl Scan {
     fn read(path: &Path) -> Scan {
         let source = open(&[path.to_owned()]).unwrap();
-        let records = las_support::read(&*source, POINTS).unwrap();
+        let records = read_source(&*source, POINTS).unwrap();
         let name = path.file_stem().unwrap().to_string_lossy().into_owned();
         let (schema, metadata) = (source.schema().clone(), source.metadata().clone());
         Scan { name, schema, metadata, records }
@@ -63,7 +63,7 @@ impl Scan {
         let chunk = if format < 6 { "chunk" } else { "layers" };
         let mut all = vec![(chunk, Victim::new(&path))];
         if format < 6 {
-            let extra = self.schema.stride - RECORD[usize::from(format)];
+            let extra = self.schema.stride - STRIDES[usize::from(format)];
             let recipe = Recipe { format, extra, version: 2, chunks: Chunks::None };
             let path = folder.join("stream.laz");
             std::fs::write(&path, recipe.bake(&self.records)).unwrap();

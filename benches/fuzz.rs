@@ -7,8 +7,10 @@
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a harness may panic: not on inputs")]
 
-#[path = "../tests/fuzz_support/mod.rs"]
-mod fuzz_support;
+#[path = "../tests/fuzzing/mod.rs"]
+mod fuzzing;
+#[path = "../tests/support/mod.rs"]
+mod support;
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -17,9 +19,12 @@ use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 use std::{env, fs, thread};
 
-use fuzz_support::campaign::Campaign;
-use fuzz_support::judge::shape;
-use fuzz_support::{TARGETS, Target};
+use fuzzing::campaign::Campaign;
+use fuzzing::judge::shape;
+use fuzzing::{TARGETS, Target};
+
+#[global_allocator]
+static COUNTED: support::allocator::Counted = support::allocator::Counted;
 
 /// Time that one input may take.
 const MOST_TIME: Duration = Duration::from_secs(2);

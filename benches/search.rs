@@ -16,6 +16,7 @@ use std::time::Instant;
 use pointmill::budget::Budget;
 use pointmill::geom::lattice::Lattice;
 use pointmill::geom::simd::Simd;
+use pointmill::host::Threads;
 use pointmill::host::process::cpu_seconds;
 use pointmill::io::{las, ply};
 use pointmill::ops::normals::{Method, Normals};
@@ -143,7 +144,7 @@ fn sealed(positions: &[Position]) -> Arc<SealedTiles> {
     }
     intake.flush().unwrap();
     drop(intake);
-    Arc::new(seal(store, 1, &|_| Ok(())).unwrap())
+    Arc::new(Threads::start(1, |threads| seal(store, threads, &|_| Ok(()))).unwrap())
 }
 
 fn read(scan: Option<&Path>) -> Vec<Position> {

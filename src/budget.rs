@@ -1,20 +1,25 @@
-//! The one place that counts bytes: memory is leased from the budget before it is allocated.
+//! The one place that counts bytes: memory is leased from the budget before it is allocated, each
+//! lease under a name, so that a refusal and the report can say who holds how much. Knows no
+//! points, and does not measure what a process really takes.
 
-use std::fmt;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+mod bytes;
+mod holders;
 
+use std::sync::{Arc, Mutex};
+
+pub use bytes::{Bytes, at_least_mebibytes, at_most_mebibytes, whole_mebibytes};
+pub use holders::{Holder, Holders};
+
+use crate::host::lock;
 use crate::{Error, Result};
 
-const MIB: u64 = 1 << 20;
-
-/// A number of bytes that is shared by everything in a run that grows with its settings or its scan.
-/// Clones are the same budget.
+/// A number of bytes that is shared by everything in a run that grows with its settings or its
+/// scan. Clones are the same budget.
 ///
 /// What is leased: the work of the threads in the decode, the merge, the mill, the survey and a
-/// stream, each with its buffers; the indices of the runs and of the merged scan; points and columns
-/// that stay in memory; and, as one sum, what the program holds anyway: its code and statics, stacks
-/// of threads, the allocator's slack, headers and VLRs, and small values of fixed size.
+/// stream, each with its buffers; the indices of the runs and of the merged scan; points and
+/// columns that stay in memory; and what the program holds anyway: its code and statics, stacks of
+/// threads, the allocator's slack, headers and VLRs, and small values of fixed size.
 ///
 /// A lease never waits: one that does not fit is refused.
 #[derive(Debug, Clone)]
@@ -23,42 +28,75 @@ pub struct Budget(Arc<Account>);
 #[derive(Debug)]
 struct Account {
     limit: u64,
-    used: AtomicU64,
-    peak: AtomicU64,
+    held: Mutex<Held>,
+}
+
+/// Leases are few and large, so that one lock does for all, and what is used is the sum of the
+/// names: there is no second figure that could differ from it.
+#[derive(Debug, Default)]
+struct Held {
+    now: Holders,
+    /// When the most was held in all.
+    at_peak: Holders,
 }
 
 impl Budget {
     /// A budget of `limit` bytes.
     pub fn new(limit: u64) -> Self {
-        Budget(Arc::new(Account { limit, used: AtomicU64::new(0), peak: AtomicU64::new(0) }))
+        Budget(Arc::new(Account { limit, held: Mutex::default() }))
     }
 
     /// Leases `bytes` for `what` (a noun that completes "the … needs").
     ///
-    /// Fails with [`ErrorKind::Memory`](crate::ErrorKind::Memory) if less is free; the message names
-    /// what was asked for, what is free, and the budget that would do.
+    /// Fails with [`ErrorKind::Memory`](crate::ErrorKind::Memory) if less is free; the message
+    /// names what was asked for, what is free, who holds the rest, and the budget that would do.
     pub fn lease(&self, bytes: u64, what: &'static str) -> Result<Lease> {
-        self.try_lease(bytes, what).ok_or_else(|| self.refusal(bytes, what))
+        let mut lease = self.open(what);
+        lease.grow(bytes)?;
+        Ok(lease)
     }
 
     /// Leases `bytes` for `what`, or nothing if less is free.
     pub fn try_lease(&self, bytes: u64, what: &'static str) -> Option<Lease> {
-        self.take(bytes).then(|| Lease { budget: self.clone(), bytes, what })
+        let mut lease = self.open(what);
+        lease.try_grow(bytes).is_ok().then_some(lease)
+    }
+
+    /// Leases all of `parts`, each under its name, or none; fails as [`Budget::lease`] does for
+    /// `what`, which they are parts of.
+    pub fn lease_all(&self, parts: &Holders, what: &'static str) -> Result<Vec<Lease>> {
+        let taken = self.take(parts.each()).map_err(|held| {
+            let needed = parts.sum();
+            self.refusal(needed, what, &held)
+        });
+        taken?;
+        let lease = |part: &Holder| Lease { budget: self.clone(), part: *part };
+        Ok(parts.each().iter().map(lease).collect())
+    }
+
+    /// A lease of nothing yet, for `what`.
+    pub fn open(&self, what: &'static str) -> Lease {
+        Lease { budget: self.clone(), part: Holder { name: what, bytes: Bytes(0) } }
     }
 
     /// Bytes leased now.
     pub fn used(&self) -> u64 {
-        self.0.used.load(Ordering::Relaxed)
+        lock(&self.0.held).now.sum().0
     }
 
     /// Bytes not leased now.
     pub fn free(&self) -> u64 {
-        self.0.limit.saturating_sub(self.used())
+        self.0.limit - self.used()
     }
 
     /// The most bytes that were leased at once.
     pub fn peak(&self) -> u64 {
-        self.0.peak.load(Ordering::Relaxed)
+        self.at_peak().sum().0
+    }
+
+    /// Who held how much when the most was leased in all.
+    pub fn at_peak(&self) -> Holders {
+        lock(&self.0.held).at_peak.clone()
     }
 
     /// The limit in bytes.
@@ -66,42 +104,43 @@ impl Budget {
         self.0.limit
     }
 
-    fn take(&self, bytes: u64) -> bool {
-        let within = |used: u64| used.checked_add(bytes).filter(|&sum| sum <= self.0.limit);
-        // Only counters: no other memory is ordered by them.
-        match self.0.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, within) {
-            Ok(before) => {
-                self.0.peak.fetch_max(before + bytes, Ordering::Relaxed);
-                true
-            }
-            Err(_) => false,
+    /// Takes all of `parts`; or nothing, and gives who holds what.
+    fn take(&self, parts: &[Holder]) -> Result<(), Holders> {
+        let mut held = lock(&self.0.held);
+        let more: Bytes = parts.iter().map(|part| part.bytes).sum();
+        if !(held.now.sum() + more).fit(self.0.limit) {
+            return Err(held.now.clone());
         }
+        parts.iter().for_each(|part| *held.now.under(part.name) += part.bytes);
+        if held.now.sum() > held.at_peak.sum() {
+            held.at_peak = held.now.clone();
+        }
+        Ok(())
     }
 
-    fn give_back(&self, bytes: u64) {
-        self.0.used.fetch_sub(bytes, Ordering::Relaxed);
+    fn give_back(&self, Holder { name, bytes }: Holder) {
+        lock(&self.0.held).now.under(name).0 -= bytes.0;
     }
 
-    fn refusal(&self, bytes: u64, what: &str) -> Error {
-        let used = self.used();
-        let enough = used.saturating_add(bytes);
+    fn refusal(&self, needed: Bytes, what: &str, held: &Holders) -> Error {
+        let used = held.sum();
+        let taken = if used > Bytes(0) { format!(": {held} are taken") } else { String::new() };
         Error::memory(format!(
-            "the {what} needs {} of memory, but {} of the budget of {} is free",
-            at_least_mebibytes(bytes),
-            at_most_mebibytes(self.0.limit.saturating_sub(used)),
+            "the {what} needs {} of memory, but {} of the budget of {} is free{taken}",
+            at_least_mebibytes(needed.0),
+            at_most_mebibytes(self.0.limit - used.0),
             at_most_mebibytes(self.0.limit)
         ))
-        .help(format!("give at least `run.memory = \"{}\"`", whole_mebibytes(enough)))
+        .help(format!("give at least `run.memory = \"{}\"`", whole_mebibytes((used + needed).0)))
     }
 }
 
-/// Bytes held of a [`Budget`]; they go back when it is dropped.
+/// Bytes held of a [`Budget`] under a name; they go back when it is dropped.
 #[derive(Debug)]
 #[must_use = "the bytes go back as soon as the lease is dropped"]
 pub struct Lease {
     budget: Budget,
-    bytes: u64,
-    what: &'static str,
+    part: Holder,
 }
 
 impl Lease {
@@ -112,180 +151,34 @@ impl Lease {
 
     /// Bytes held.
     pub fn bytes(&self) -> u64 {
-        self.bytes
+        self.part.bytes.0
     }
 
     /// Leases `more` bytes; fails as [`Budget::lease`] does, and then holds what it held.
     pub fn grow(&mut self, more: u64) -> Result<()> {
-        if !self.budget.take(more) {
-            return Err(self.budget.refusal(more, self.what));
-        }
-        self.bytes += more;
+        let name = self.part.name;
+        self.try_grow(more).map_err(|held| self.budget.refusal(Bytes(more), name, &held))
+    }
+
+    /// Gives back what is held beyond `bytes`.
+    pub fn shrink_to(&mut self, bytes: u64) {
+        let less = Bytes(self.bytes().saturating_sub(bytes));
+        self.part.bytes.0 -= less.0;
+        self.budget.give_back(Holder { bytes: less, ..self.part });
+    }
+
+    fn try_grow(&mut self, more: u64) -> Result<(), Holders> {
+        self.budget.take(&[Holder { bytes: Bytes(more), ..self.part }])?;
+        self.part.bytes += Bytes(more);
         Ok(())
-    }
-
-    /// Gives `less` bytes back, at most what is held.
-    pub fn shrink(&mut self, less: u64) {
-        let less = less.min(self.bytes);
-        self.bytes -= less;
-        self.budget.give_back(less);
-    }
-
-    /// Grows or shrinks to `bytes`; fails as [`Lease::grow`] does.
-    pub fn resize(&mut self, bytes: u64) -> Result<()> {
-        match bytes.checked_sub(self.bytes) {
-            Some(more) => self.grow(more),
-            None => {
-                self.shrink(self.bytes - bytes);
-                Ok(())
-            }
-        }
     }
 }
 
 impl Drop for Lease {
     fn drop(&mut self) {
-        self.budget.give_back(self.bytes);
-    }
-}
-
-/// A number of bytes in the largest binary unit, to read: `1.5 GiB`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Bytes(pub u64);
-
-impl fmt::Display for Bytes {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let units = [(40, "TiB"), (30, "GiB"), (20, "MiB"), (10, "KiB")];
-        match units.into_iter().find(|&(bits, _)| self.0 >> bits > 0) {
-            None => write!(f, "{} B", self.0),
-            Some((bits, unit)) => {
-                let value = self.0 as f64 / (1u64 << bits) as f64;
-                let decimals = usize::from(value < 100.0 && value != value.trunc());
-                write!(f, "{value:.decimals$} {unit}")
-            }
-        }
-    }
-}
-
-/// A budget as it is typed, rounded up: `137MiB`.
-pub fn whole_mebibytes(bytes: u64) -> String {
-    format!("{}MiB", bytes.div_ceil(MIB).max(1))
-}
-
-/// The same in a sentence: `137 MiB`.
-pub fn at_least_mebibytes(bytes: u64) -> String {
-    format!("{} MiB", bytes.div_ceil(MIB).max(1))
-}
-
-/// What there is of something that is too small, rounded down: `137 MiB`, `269.9 MiB`. It differs from
-/// what [`whole_mebibytes`] says of more.
-pub fn at_most_mebibytes(bytes: u64) -> String {
-    match (bytes / MIB, bytes % MIB * 10 / MIB) {
-        (0, 0) => format!("{bytes} B"),
-        (whole, 0) => format!("{whole} MiB"),
-        (whole, tenth) => format!("{whole}.{tenth} MiB"),
+        self.budget.give_back(self.part);
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ErrorKind;
-
-    #[test]
-    fn a_lease_is_returned_on_drop() {
-        let budget = Budget::new(100);
-        let a = budget.lease(60, "tile").unwrap();
-        let b = budget.clone().lease(40, "index").unwrap();
-        assert_eq!((budget.used(), budget.free(), budget.limit()), (100, 0, 100));
-        drop(a);
-        assert_eq!((budget.used(), b.bytes()), (40, 40));
-        drop(b);
-        assert_eq!((budget.used(), budget.peak()), (0, 100));
-    }
-
-    #[test]
-    fn a_refusal_names_what_was_asked_what_is_free_and_what_would_do() {
-        let budget = Budget::new(128 * MIB);
-        let _held = budget.lease(100 * MIB, "index").unwrap();
-        let error = budget.lease(40 * MIB + 1, "tile").unwrap_err();
-        assert_eq!(error.kind(), ErrorKind::Memory);
-        assert_eq!(
-            error.to_string(),
-            "the tile needs 41 MiB of memory, but 28 MiB of the budget of 128 MiB is free"
-        );
-        assert_eq!(error.remedy(), Some("give at least `run.memory = \"141MiB\"`"));
-        assert_eq!(budget.used(), 100 * MIB);
-    }
-
-    #[test]
-    fn the_budget_that_a_refusal_names_would_do() {
-        let budget = Budget::new(10);
-        let error = budget.lease(3 * MIB, "tile").unwrap_err();
-        assert_eq!(error.remedy(), Some("give at least `run.memory = \"3MiB\"`"));
-        assert!(Budget::new(3 * MIB).lease(3 * MIB, "tile").is_ok());
-    }
-
-    #[test]
-    fn sums_beyond_u64_are_refused_and_do_not_wrap() {
-        let budget = Budget::new(u64::MAX);
-        let mut lease = budget.lease(u64::MAX - 1, "tile").unwrap();
-        assert!(budget.try_lease(2, "tile").is_none());
-        assert!(lease.grow(u64::MAX).is_err());
-        assert_eq!(lease.bytes(), u64::MAX - 1);
-    }
-
-    #[test]
-    fn a_lease_grows_and_shrinks_within_the_budget() {
-        let budget = Budget::new(100);
-        let mut lease = budget.lease(10, "cache").unwrap();
-        lease.grow(90).unwrap();
-        assert!(lease.grow(1).is_err());
-        lease.shrink(30);
-        assert_eq!((lease.bytes(), budget.used()), (70, 70));
-        lease.resize(20).unwrap();
-        lease.resize(25).unwrap();
-        assert_eq!((lease.bytes(), budget.used()), (25, 25));
-        lease.shrink(1000);
-        assert_eq!((lease.bytes(), budget.used()), (0, 0));
-    }
-
-    #[test]
-    fn threads_never_hold_more_than_the_limit() {
-        let budget = Budget::new(1000);
-        let refused = AtomicU64::new(0);
-        std::thread::scope(|scope| {
-            for _ in 0..4 {
-                scope.spawn(|| {
-                    for i in 0..10_000 {
-                        match budget.try_lease(300 + i % 7, "tile") {
-                            Some(lease) => drop(lease),
-                            None => _ = refused.fetch_add(1, Ordering::Relaxed),
-                        }
-                        assert!(budget.used() <= 1000);
-                    }
-                });
-            }
-        });
-        assert_eq!(budget.used(), 0);
-        assert!((300..=1000).contains(&budget.peak()));
-    }
-
-    #[test]
-    fn bytes_are_shown_in_the_largest_unit() {
-        let text =
-            [0, 1023, 1024, 1536, 200 * MIB + 300_000, 3 << 39].map(|n| Bytes(n).to_string());
-        assert_eq!(text, ["0 B", "1023 B", "1 KiB", "1.5 KiB", "200 MiB", "1.5 TiB"]);
-    }
-
-    #[test]
-    fn what_is_refused_never_reads_like_what_is_needed() {
-        for limit in [1, MIB - 1, MIB, 269 * MIB + 999_999, 270 * MIB - 1, u64::MAX - 1] {
-            let number = |text: &str| text.split([' ', 'M']).next().unwrap().to_owned();
-            let (less, enough) = (at_most_mebibytes(limit), whole_mebibytes(limit + 1));
-            assert!(less.ends_with(" B") || number(&less) != number(&enough), "{less} {enough}");
-        }
-        assert_eq!(at_most_mebibytes(270 * MIB - 1), "269.9 MiB");
-        assert_eq!(at_most_mebibytes(256 * MIB), "256 MiB");
-    }
-}
+mod tests;

@@ -50,8 +50,8 @@ fn too_many_open(cause: &std::io::Error) -> Option<&'static str> {
     use rustix::io::Errno;
     match Errno::from_io_error(cause)? {
         Errno::MFILE => Some(
-            "the shell allows a process no more open files (`ulimit -n` tells how many): raise the limit, \
-             such as by `ulimit -n 1024`, or give fewer inputs at once",
+            "the shell allows a process no more open files (`ulimit -n` tells how many): raise the \
+             limit, such as by `ulimit -n 1024`, or give fewer inputs at once",
         ),
         Errno::NFILE => Some("the whole system has too many files open: close other programs"),
         _ => None,
@@ -136,8 +136,8 @@ impl Error {
                 Some("free some disk space, or write elsewhere".to_owned())
             }
             FileTooLarge => Some(
-                "the file would be larger than the file system or a limit of the shell (`ulimit -f`) \
-                 allows: raise the limit, or write elsewhere"
+                "the file would be larger than the file system or a limit of the shell \
+                 (`ulimit -f`) allows: raise the limit, or write elsewhere"
                     .to_owned(),
             ),
             NotFound => whereabouts(path),

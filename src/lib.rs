@@ -1,8 +1,9 @@
-//! pointmill reduces laser scans that do not fit in memory to the points that matter, and proves what
-//! it did.
+//! pointmill reduces laser scans that do not fit in memory to the points that matter, and proves
+//! what it did.
 //!
-//! A run is a pipeline: a source, stages that work on its points, sinks. It is written as a text, planned (do
-//! the stages fit each other, the inputs and the memory?) and run; what comes back is a report.
+//! A run is a pipeline: a source, stages that work on its points, sinks. It is written as a text,
+//! planned (do the stages fit each other, the inputs and the memory?) and run; what comes back is a
+//! report.
 //!
 //! ```
 //! use pointmill::{Graph, Overrides, Quiet, Registry};
@@ -68,8 +69,8 @@
 //! - [`point`]: points side by side. A [`PointBatch`](point::PointBatch) holds records as their
 //!   file's own bytes; a [`Schema`](point::Schema) says where in them a dimension is.
 //! - [`quantity`]: counts, angles and lengths as people write them.
-//! - [`budget`]: the one place that counts bytes. Whoever allocates by the size of the input takes a
-//!   [`Lease`](budget::Lease) first.
+//! - [`budget`]: the one place that counts bytes. Whoever allocates by the size of the input takes
+//!   a [`Lease`](budget::Lease) first.
 //! - [`geom`]: geometry on plain slices. The [`lattice`](geom::lattice) makes coordinates integers,
 //!   so that every decision is exact; [`nearest`](geom::nearest) finds neighbours,
 //!   [`star`](geom::star), [`plane`](geom::plane) and [`angle`](geom::angle) make normals of them
@@ -96,6 +97,7 @@
 //! The programs in `examples/` go on from here, and `docs/architecture.md` tells why it is so.
 
 pub mod budget;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod engine;
 mod error;

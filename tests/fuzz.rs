@@ -4,15 +4,20 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says so")]
 
-mod fuzz_support;
+mod fuzzing;
+mod support;
 
 use std::path::Path;
 use std::time::Duration;
 
-use fuzz_support::campaign::Campaign;
-use fuzz_support::harness::Harness;
-use fuzz_support::judge::{Judgement, Outcome, refused};
-use fuzz_support::{TARGETS, Target, las, las_seeds, laz, memory, mutate, pipeline, ply, text};
+use fuzzing::campaign::Campaign;
+use fuzzing::harness::Harness;
+use fuzzing::judge::{Judgement, Outcome, refused};
+use fuzzing::{TARGETS, Target, las, las_seeds, laz, mutate, pipeline, ply, text};
+use support::allocator;
+
+#[global_allocator]
+static COUNTED: allocator::Counted = allocator::Counted;
 
 /// Time that one input may take.
 const MOST_TIME: Duration = Duration::from_secs(5);
@@ -169,9 +174,9 @@ fn memory_that_other_threads_give_back_does_not_count() {
         let large: Vec<u8> = Vec::with_capacity(64 << 20);
         std::thread::spawn(move || drop(large)).join().unwrap();
     }
-    let (bytes, peak) = memory::peak_of(|| std::hint::black_box(vec![1u8; 1 << 20]).len());
+    let (bytes, peak) = allocator::peak_of(|| std::hint::black_box(vec![1u8; 1 << 20]).len());
     assert_eq!(bytes, 1 << 20);
     assert!((1 << 20..2 << 20).contains(&peak), "{peak}");
-    let refused = memory::peak_of(|| Vec::<u8>::new().try_reserve_exact(3 << 30).is_err());
+    let refused = allocator::peak_of(|| Vec::<u8>::new().try_reserve_exact(3 << 30).is_err());
     assert!(refused.0, "so much is refused");
 }

@@ -8,8 +8,8 @@ use clap_complete::Shell;
 use super::classes::{Classes, parse_classes};
 use super::exit::EXIT_CODES;
 use super::preset::Preset;
-use super::seen::{ColoredBy, SeenFrom};
 use crate::graph::MOST_THREADS;
+use crate::picture::{ColorBy, View};
 use crate::quantity::parse_count;
 
 /// Reduces laser scans that do not fit in memory to the points that matter.
@@ -81,7 +81,8 @@ pub(super) struct CommonArguments {
     /// Print errors only
     #[arg(short, long, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Print what the plan and the stages decided, and how long each phase took
+    /// Print what the plan and the stages decided, how long each phase took, and what the memory was
+    /// for
     #[arg(short, long)]
     pub verbose: bool,
     /// Write the report to this file
@@ -326,10 +327,10 @@ pub(super) struct PictureArguments {
     pub output: PathBuf,
     /// From where the scans are seen
     #[arg(long, value_name = "WHERE", default_value = "above")]
-    pub from: SeenFrom,
+    pub from: View,
     /// What points are coloured by
     #[arg(long, value_name = "WHAT", default_value = "height")]
-    pub by: ColoredBy,
+    pub by: ColorBy,
     /// Pixels that the picture is wide, 64 to 4096
     #[arg(long, value_name = "PIXELS", default_value = "1600", value_parser = parse_width)]
     pub width: u32,

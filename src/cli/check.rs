@@ -7,7 +7,6 @@ use super::console::Console;
 use super::mistyped::marked;
 use super::print;
 use super::run::parse_sets;
-use crate::engine::Watch;
 use crate::error::shown;
 use crate::graph::Graph;
 use crate::graph::Overrides;

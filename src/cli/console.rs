@@ -2,41 +2,38 @@
 
 use std::fmt::Display;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, OnceLock};
-use std::time::Instant;
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 use serde_json::Value;
 
 use super::arguments::{Command, Progress};
-use super::events::Events;
+use super::draw::{Draw, Nothing, watched};
+use super::events::{Events, RunEvents};
 use super::progress::Bars;
 use super::words::{Told, Words};
 use super::{interrupt, print};
 use crate::engine::{Done, Watch};
 use crate::error::shown;
-use crate::host::lock;
 use crate::plan::Plan;
 use crate::report::{Decision, Short};
 use crate::{Error, Result};
 
-/// Where all that a command says goes through; called from several threads.
+/// Where all that a command says goes through.
 pub(super) struct Console {
     voice: Voice,
     words: Words,
     quiet: bool,
     verbose: bool,
-    /// The phase of which `verbose` tells the time when it ends.
-    phase: Mutex<Option<(&'static str, Instant)>>,
     /// Set by Ctrl-C, once a run listens to it.
     interrupted: OnceLock<Arc<AtomicBool>>,
     /// Said behind what a run chose by itself.
     hint: OnceLock<&'static str>,
-    /// The sign of the unit that lengths of the planned run are in.
-    unit: Mutex<Option<&'static str>>,
 }
 
 enum Voice {
-    Text(Bars),
+    /// With bars, if they are wanted.
+    Text(bool),
     Json(Events),
 }
 
@@ -50,17 +47,13 @@ impl Console {
         Console {
             voice: match progress {
                 Progress::Json => Voice::Json(Events::new()),
-                Progress::Auto | Progress::Never => {
-                    Voice::Text(Bars::new(progress == Progress::Auto && !quiet))
-                }
+                Progress::Auto | Progress::Never => Voice::Text(progress == Progress::Auto),
             },
             words: Words::of(command),
             quiet,
             verbose: common.is_some_and(|common| common.verbose),
-            phase: Mutex::new(None),
             interrupted: OnceLock::new(),
             hint: OnceLock::new(),
-            unit: Mutex::new(None),
         }
     }
 
@@ -82,7 +75,6 @@ impl Console {
     /// Tells what a plan decided.
     pub fn planned(&self, plan: &Plan) {
         let outline = plan.outline();
-        *lock(&self.unit) = plan.unit();
         match &self.voice {
             Voice::Json(events) if !self.quiet => events.planned(&outline, &plan.to_string()),
             Voice::Text(_) if self.verbose => {
@@ -93,9 +85,28 @@ impl Console {
         }
     }
 
-    /// A run is done.
-    pub fn done(&self, done: &Done) {
-        self.end();
+    /// Runs a plan and tells what it does, until it is told to stop.
+    pub fn run(&self, plan: Plan) -> Result<Done> {
+        self.planned(&plan);
+        let (unit, cancelled) = (plan.unit(), || self.cancelled());
+        let run = |watch: &dyn Watch| plan.run(watch);
+        let done = match &self.voice {
+            _ if self.quiet => watched(&mut Nothing, &cancelled, run),
+            Voice::Json(events) => {
+                watched(&mut RunEvents::new(events, &self.words), &cancelled, run)
+            }
+            Voice::Text(bars) => {
+                let bars = Bars::new(*bars, self.verbose);
+                let mut text = RunText { console: self, unit, bars };
+                let done = watched(&mut text, &cancelled, run);
+                text.bars.end();
+                done
+            }
+        };
+        done.inspect(|done| self.done(done))
+    }
+
+    fn done(&self, done: &Done) {
         match &self.voice {
             Voice::Json(events) if !self.quiet => events.done(done),
             Voice::Text(_) if self.verbose => {
@@ -103,30 +114,71 @@ impl Console {
                     let (stage, name, value) = (&decision.stage, &decision.name, &decision.value);
                     print::message(format_args!("decided  {stage}: {name} = {value}"));
                 }
+                print::message(format_args!("at peak  {}", done.report.run.memory_holders));
             }
             _ => {}
         }
     }
 
+    /// Tells something that the user should know, unless nothing is wanted.
+    pub fn warn(&self, message: &str) {
+        let message = &self.words.told(message);
+        match &self.voice {
+            _ if self.quiet => {}
+            Voice::Json(events) => events.warn(message),
+            Voice::Text(_) => print::warning(message),
+        }
+    }
+
+    /// True once the user wants the run to stop.
+    pub fn cancelled(&self) -> bool {
+        self.interrupted.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
+
     /// Tells an error, whatever is wanted.
     pub fn error(&self, error: &Error) {
-        self.end();
         let told = Told::of(error, &self.words);
         match &self.voice {
             Voice::Json(events) => events.error(&told),
             Voice::Text(_) => print::error(&told),
         }
     }
+}
 
-    /// No bar is left, and the time of the last phase is told.
-    pub fn end(&self) {
-        if let Voice::Text(bars) = &self.voice {
-            bars.clear();
-        }
-        let ended = lock(&self.phase).take();
-        if let Some((name, since)) = ended {
-            print::message(format_args!("{name:8} {:.1} s", since.elapsed().as_secs_f64()));
-        }
+/// Tells what a run does as text.
+struct RunText<'a> {
+    console: &'a Console,
+    /// The sign of the unit that lengths are in.
+    unit: Option<&'static str>,
+    bars: Bars,
+}
+
+impl Draw for RunText<'_> {
+    fn every(&self) -> Duration {
+        Bars::EVERY
+    }
+
+    fn begin(&mut self, name: &'static str, total: Option<u64>) {
+        self.bars.begin(name, total);
+    }
+
+    fn advance(&mut self, done: u64) {
+        self.bars.advance(done);
+    }
+
+    fn end(&mut self, _done: u64) {
+        self.bars.end();
+    }
+
+    fn warn(&mut self, message: &str) {
+        self.bars.beside(|| self.console.warn(message));
+    }
+
+    fn chose(&mut self, values: &[Decision]) {
+        let each = values.iter().map(|decision| in_words(decision, self.unit));
+        let all = each.chain(self.console.hint.get().map(|hint| (*hint).to_owned()));
+        let line = all.collect::<Vec<String>>().join(", ");
+        self.bars.beside(|| print::message(format_args!("chosen   {line}")));
     }
 }
 
@@ -148,58 +200,6 @@ fn in_short(value: &Value) -> String {
         (Value::String(text), _) => text.clone(),
         (Value::Number(written), Some(number)) if written.is_f64() => Short(number).to_string(),
         _ => value.to_string(),
-    }
-}
-
-impl Watch for Console {
-    fn phase(&self, name: &'static str, total: Option<u64>) {
-        self.end();
-        match &self.voice {
-            Voice::Json(events) if !self.quiet => events.phase(name, total),
-            Voice::Json(_) => {}
-            Voice::Text(bars) => {
-                if self.verbose {
-                    let mut phase = lock(&self.phase);
-                    *phase = Some((name, Instant::now()));
-                }
-                bars.phase(name, total);
-            }
-        }
-    }
-
-    fn advance(&self, points: u64) {
-        match &self.voice {
-            Voice::Json(events) if !self.quiet => events.advance(points),
-            Voice::Json(_) => {}
-            Voice::Text(bars) => bars.advance(points),
-        }
-    }
-
-    fn warn(&self, message: &str) {
-        let message = &self.words.told(message);
-        match &self.voice {
-            _ if self.quiet => {}
-            Voice::Json(events) => events.warn(message),
-            Voice::Text(bars) => bars.beside(|| print::warning(message)),
-        }
-    }
-
-    fn chose(&self, values: &[Decision]) {
-        match &self.voice {
-            _ if self.quiet => {}
-            Voice::Json(events) => events.chose(values),
-            Voice::Text(bars) => {
-                let unit = *lock(&self.unit);
-                let each = values.iter().map(|decision| in_words(decision, unit));
-                let all = each.chain(self.hint.get().map(|hint| (*hint).to_owned()));
-                let line = all.collect::<Vec<String>>().join(", ");
-                bars.beside(|| print::message(format_args!("chosen   {line}")));
-            }
-        }
-    }
-
-    fn cancelled(&self) -> bool {
-        self.interrupted.get().is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 }
 

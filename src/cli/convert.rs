@@ -11,7 +11,7 @@ use super::flags::{common_flags, convert_flags, given};
 use super::mistyped::marked;
 use super::run::{HIDDEN, mill, with_stages};
 use crate::budget::Bytes;
-use crate::engine::{Done, Watch, make_folder, refuse_existing};
+use crate::engine::{Done, make_folder, refuse_existing};
 use crate::error::{listed, shown};
 use crate::graph::Existing;
 use crate::graph::Graph;

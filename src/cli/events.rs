@@ -1,40 +1,31 @@
 //! `--progress json`: what a run does as one JSON object a line on stderr. The events and their
 //! keys are documented in docs/formats.md.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
+use super::draw::Draw;
 use super::exit::exit_number;
 use super::print;
-use super::words::Told;
+use super::words::{Told, Words};
 use crate::ErrorKind;
 use crate::engine::Done;
 use crate::plan::Outline;
 use crate::report::Decision;
 
-/// Least time between two events of progress.
+/// The time between two events of progress, at least.
 const EVERY: Duration = Duration::from_millis(250);
 
-/// Prints events; called from several threads.
+/// Prints events.
 pub(super) struct Events {
     start: Instant,
-    phase: Mutex<Option<OpenPhase>>,
-    done: AtomicU64,
-}
-
-struct OpenPhase {
-    name: &'static str,
-    total: Option<u64>,
-    told: Instant,
 }
 
 impl Events {
     /// Counts seconds from now.
     pub fn new() -> Self {
-        Events { start: Instant::now(), phase: Mutex::new(None), done: AtomicU64::new(0) }
+        Events { start: Instant::now() }
     }
 
     /// A run is planned and begins.
@@ -55,39 +46,13 @@ impl Events {
         );
     }
 
-    /// A phase begins, with `total` points to do.
-    pub fn phase(&self, name: &'static str, total: Option<u64>) {
-        self.end_phase();
-        self.done.store(0, Ordering::Relaxed);
-        *self.open() = Some(OpenPhase { name, total, told: Instant::now() });
-        self.tell("phase", json!({ "name": name, "total": total }));
-    }
-
-    /// `points` more are done.
-    pub fn advance(&self, points: u64) {
-        let done = self.done.fetch_add(points, Ordering::Relaxed).saturating_add(points);
-        // Whoever finds another thread at it leaves the telling to that one.
-        let Ok(mut phase) = self.phase.try_lock() else { return };
-        let Some(phase) = phase.as_mut().filter(|phase| phase.told.elapsed() >= EVERY) else {
-            return;
-        };
-        phase.told = Instant::now();
-        self.progress(phase, done);
-    }
-
     /// Something the user should know.
     pub fn warn(&self, message: &str) {
         self.tell("warning", json!({ "message": message }));
     }
 
-    /// Stages chose values of keys by what they saw of the scan.
-    pub fn chose(&self, values: &[Decision]) {
-        self.tell("chosen", json!({ "values": values }));
-    }
-
     /// A run is done and its outputs are in place.
     pub fn done(&self, done: &Done) {
-        self.end_phase();
         let (result, run) = (&done.report.result, &done.report.run);
         self.tell(
             "done",
@@ -133,22 +98,6 @@ impl Events {
         );
     }
 
-    /// The last event of the open phase, if there is one.
-    fn end_phase(&self) {
-        if let Some(phase) = self.open().take() {
-            self.progress(&phase, self.done.load(Ordering::Relaxed));
-        }
-    }
-
-    fn progress(&self, phase: &OpenPhase, done: u64) {
-        let OpenPhase { name, total, .. } = phase;
-        self.tell("progress", json!({ "phase": name, "done": done, "total": total }));
-    }
-
-    fn open(&self) -> std::sync::MutexGuard<'_, Option<OpenPhase>> {
-        self.phase.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Prints an event with its name and time before its own keys.
     fn tell(&self, event: &str, keys: Value) {
         let seconds = (self.start.elapsed().as_secs_f64() * 1000.0).round() / 1000.0;
@@ -159,5 +108,58 @@ impl Events {
             object.extend(keys);
         }
         print::event(&Value::Object(object));
+    }
+}
+
+/// Tells what a run does as events, in the words of a command.
+pub(super) struct RunEvents<'a> {
+    events: &'a Events,
+    words: &'a Words,
+    /// The phase that it is in, its points, and how many of them were told to be done.
+    phase: Option<(&'static str, Option<u64>, u64)>,
+}
+
+impl<'a> RunEvents<'a> {
+    /// Of a run that has no phase yet.
+    pub fn new(events: &'a Events, words: &'a Words) -> Self {
+        RunEvents { events, words, phase: None }
+    }
+
+    fn progress(&mut self, done: u64) {
+        if let Some((name, total, told)) = &mut self.phase {
+            *told = done;
+            let keys = json!({ "phase": name, "done": done, "total": total });
+            self.events.tell("progress", keys);
+        }
+    }
+}
+
+impl Draw for RunEvents<'_> {
+    fn every(&self) -> Duration {
+        EVERY
+    }
+
+    fn begin(&mut self, name: &'static str, total: Option<u64>) {
+        self.phase = Some((name, total, 0));
+        self.events.tell("phase", json!({ "name": name, "total": total }));
+    }
+
+    fn advance(&mut self, done: u64) {
+        if self.phase.is_some_and(|(.., told)| told != done) {
+            self.progress(done);
+        }
+    }
+
+    fn end(&mut self, done: u64) {
+        self.progress(done);
+        self.phase = None;
+    }
+
+    fn warn(&mut self, message: &str) {
+        self.events.warn(&self.words.told(message));
+    }
+
+    fn chose(&mut self, values: &[Decision]) {
+        self.events.tell("chosen", json!({ "values": values }));
     }
 }

@@ -10,6 +10,7 @@ mod console;
 mod convert;
 mod describe;
 mod described;
+mod draw;
 mod events;
 mod exit;
 mod flags;

@@ -7,14 +7,13 @@ use clap::ValueEnum;
 use super::arguments::PictureArguments;
 use super::mistyped::marked;
 use super::print;
-use super::seen::ColoredBy;
 use crate::budget::Bytes;
 use crate::engine::{Trouble, publish_bytes};
 use crate::error::{listed, shown};
 use crate::host::lock;
 use crate::host::{Files, Use};
 use crate::io::ends::Read;
-use crate::picture::{Picture, Settings};
+use crate::picture::{ColorBy, Picture, Settings};
 use crate::report::{Grouped, Short};
 use crate::stage::{Formats, Source};
 use crate::{Error, Result};
@@ -40,8 +39,8 @@ pub(super) fn picture(arguments: &PictureArguments, formats: &Formats) -> Result
     all.write(path).map_err(|clash| Error::pipeline(format!("this {clash}")).at(path))?;
     let processors = || std::thread::available_parallelism().map_or(1, usize::from);
     let settings = Settings {
-        view: arguments.from.view(),
-        by: arguments.by.shown(),
+        view: arguments.from,
+        by: arguments.by,
         width: arguments.width,
         threads: arguments.threads.unwrap_or_else(processors),
     };
@@ -73,9 +72,9 @@ fn renamed(error: Error) -> Error {
 
 /// What all of the scans can be coloured by.
 fn others(sources: &[&dyn Source]) -> String {
-    let can = |by: &&ColoredBy| sources.iter().all(|source| by.shown().is_in(source.schema()));
-    let word = |by: &ColoredBy| by.to_possible_value().map(|value| value.get_name().to_owned());
-    let can = ColoredBy::value_variants().iter().filter(can).filter_map(word);
+    let can = |by: &&ColorBy| sources.iter().all(|source| by.is_in(source.schema()));
+    let word = |by: &ColorBy| by.to_possible_value().map(|value| value.get_name().to_owned());
+    let can = ColorBy::value_variants().iter().filter(can).filter_map(word);
     format!("use {}", listed(can.map(|word| format!("`--by {word}`")), "or"))
 }
 
@@ -86,8 +85,8 @@ fn nowhereness(input: &str, points: u64) -> String {
 }
 
 /// What is told of a scan that is black throughout.
-fn blackness(input: &str, by: ColoredBy) -> String {
-    let what = if by == ColoredBy::Intensity { "intensities" } else { "colours" };
+fn blackness(input: &str, by: ColorBy) -> String {
+    let what = if by == ColorBy::Intensity { "intensities" } else { "colours" };
     format!(
         "{input}: all {what} are 0, so that the scan is drawn black: use `--by height` or `--by class`"
     )

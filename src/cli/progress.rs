@@ -1,10 +1,11 @@
-//! Progress bars on a terminal's stderr.
+//! Progress in text: a bar on a terminal's stderr, and how long each phase took.
 
 use std::io::IsTerminal;
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+
+use super::print;
 
 const KNOWN: &str =
     "{prefix:<10} {wide_bar} {pos_points} of {len_points} points, {rate}, {eta} left";
@@ -13,52 +14,54 @@ const UNKNOWN: &str = "{prefix:<10} {spinner} {pos_points} points, {rate}, {elap
 /// Draws one bar, of the phase that a run is in.
 pub(super) struct Bars {
     drawn: bool,
-    bar: Mutex<Option<ProgressBar>>,
+    verbose: bool,
+    open: Option<(&'static str, Instant, ProgressBar)>,
 }
 
 impl Bars {
-    /// Bars that are drawn if they are `wanted` and stderr is a terminal.
-    pub fn new(wanted: bool) -> Self {
-        Bars { drawn: wanted && std::io::stderr().is_terminal(), bar: Mutex::new(None) }
-    }
+    /// The time between two pictures of a bar.
+    pub const EVERY: Duration = Duration::from_millis(100);
 
-    /// Removes the bar, so that what is printed next stands alone.
-    pub fn clear(&self) {
-        if let Some(bar) = self.bar().take() {
-            bar.finish_and_clear();
-        }
+    /// Bars that are drawn if they are `wanted` and stderr is a terminal; if `verbose`, the time of
+    /// a phase is told when it is over.
+    pub fn new(wanted: bool, verbose: bool) -> Self {
+        Bars { drawn: wanted && std::io::stderr().is_terminal(), verbose, open: None }
     }
 
     /// A phase begins, with `total` points to do.
-    pub fn phase(&self, name: &'static str, total: Option<u64>) {
-        self.clear();
-        if !self.drawn {
-            return;
-        }
-        let target = ProgressDrawTarget::stderr_with_hz(10);
+    pub fn begin(&mut self, name: &'static str, total: Option<u64>) {
+        let target = match self.drawn {
+            true => ProgressDrawTarget::stderr(),
+            false => ProgressDrawTarget::hidden(),
+        };
         let bar = ProgressBar::with_draw_target(total, target).with_prefix(name);
         bar.set_style(style(total.is_some()));
-        bar.enable_steady_tick(Duration::from_millis(200));
-        *self.bar() = Some(bar);
+        self.open = Some((name, Instant::now(), bar));
     }
 
-    /// `points` more are done.
-    pub fn advance(&self, points: u64) {
-        if let Some(bar) = &*self.bar() {
-            bar.inc(points);
+    /// So many points of the phase are done.
+    pub fn advance(&self, done: u64) {
+        if let Some((.., bar)) = &self.open {
+            bar.set_position(done);
+            bar.tick();
+        }
+    }
+
+    /// The phase is over; what is printed next stands alone.
+    pub fn end(&mut self) {
+        let Some((name, since, bar)) = self.open.take() else { return };
+        bar.finish_and_clear();
+        if self.verbose {
+            print::message(format_args!("{name:8} {:.1} s", since.elapsed().as_secs_f64()));
         }
     }
 
     /// Calls `print` while no bar is in its way.
     pub fn beside(&self, print: impl FnOnce()) {
-        match &*self.bar() {
-            Some(bar) => bar.suspend(print),
+        match &self.open {
+            Some((.., bar)) => bar.suspend(print),
             None => print(),
         }
-    }
-
-    fn bar(&self) -> MutexGuard<'_, Option<ProgressBar>> {
-        self.bar.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -89,13 +92,12 @@ mod tests {
 
     #[test]
     fn a_bar_that_is_drawn_nowhere_counts() {
-        let bars = Bars { drawn: true, bar: Mutex::new(None) };
-        bars.phase("decode", Some(10));
-        bars.bar().as_ref().unwrap().set_draw_target(ProgressDrawTarget::hidden());
+        let mut bars = Bars { drawn: false, verbose: false, open: None };
+        bars.begin("decode", Some(10));
         bars.advance(4);
-        bars.advance(3);
-        assert_eq!(bars.bar().as_ref().unwrap().position(), 7);
-        bars.clear();
-        assert!(bars.bar().is_none());
+        bars.advance(7);
+        assert_eq!(bars.open.as_ref().unwrap().2.position(), 7);
+        bars.end();
+        assert!(bars.open.is_none());
     }
 }

@@ -67,11 +67,7 @@ pub(super) fn synth(
 /// Plans and runs a pipeline; Ctrl-C asks it to stop.
 pub(super) fn mill(pipeline: Graph, console: &Console) -> Result<Done> {
     console.hear_interrupts();
-    let plan = pipeline.plan(&Overrides::default())?;
-    console.planned(&plan);
-    let done = plan.run(console);
-    console.end();
-    done.inspect(|done| console.done(done))
+    console.run(pipeline.plan(&Overrides::default())?)
 }
 
 /// The values of `--set`, and those of other arguments.

@@ -1,50 +1,37 @@
-//! How pictures are asked for: from where scans are seen and what they are coloured by.
+//! How pictures are asked for: the words for where scans are seen from and what colours them.
 
 use clap::ValueEnum;
+use clap::builder::PossibleValue;
 
 use crate::picture::{ColorBy, View};
 
-/// From where scans are seen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum SeenFrom {
-    Above,
-    South,
-    North,
-    East,
-    West,
-}
+impl ValueEnum for View {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[View::Above, View::South, View::North, View::East, View::West]
+    }
 
-impl SeenFrom {
-    /// The same for the library.
-    pub fn view(self) -> View {
-        match self {
-            SeenFrom::Above => View::Above,
-            SeenFrom::South => View::South,
-            SeenFrom::North => View::North,
-            SeenFrom::East => View::East,
-            SeenFrom::West => View::West,
-        }
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(match self {
+            View::Above => "above",
+            View::South => "south",
+            View::North => "north",
+            View::East => "east",
+            View::West => "west",
+        }))
     }
 }
 
-/// What points are coloured by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum ColoredBy {
-    Height,
-    Class,
-    #[value(alias = "colour")]
-    Color,
-    Intensity,
-}
+impl ValueEnum for ColorBy {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[ColorBy::Height, ColorBy::Class, ColorBy::Color, ColorBy::Intensity]
+    }
 
-impl ColoredBy {
-    /// The same for the library.
-    pub fn shown(self) -> ColorBy {
-        match self {
-            ColoredBy::Height => ColorBy::Height,
-            ColoredBy::Class => ColorBy::Class,
-            ColoredBy::Color => ColorBy::Color,
-            ColoredBy::Intensity => ColorBy::Intensity,
-        }
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(match self {
+            ColorBy::Height => PossibleValue::new("height"),
+            ColorBy::Class => PossibleValue::new("class"),
+            ColorBy::Color => PossibleValue::new("color").alias("colour"),
+            ColorBy::Intensity => PossibleValue::new("intensity"),
+        })
     }
 }

@@ -1,5 +1,9 @@
-//! Files that the records of outputs refer to, such as waveforms: copied beside the outputs, under their
-//! names.
+//! Files that the records of outputs refer to, such as waveforms: copied beside the outputs, under
+//! their names.
+//!
+//! A record tells a place in such a file by its byte. A copy of the whole file keeps all of these
+//! true, whichever records are left; a file of what they still refer to would be smaller, and every
+//! record would have to be changed.
 
 use std::fs::File;
 use std::io;
@@ -20,8 +24,9 @@ pub(crate) struct Beside {
 }
 
 impl Beside {
-    /// The copy of what is beside `input` for the output of `sink`, if there is to be one: a file that is
-    /// there already, because an output is beside its input and has its name, is left alone.
+    /// The copy of what is beside `input` for the output of `sink`, if there is to be one: a file
+    /// that is there already, because an output is beside its input and has its name, is left
+    /// alone.
     ///
     /// # Errors
     ///

@@ -1,10 +1,17 @@
-//! The records of outputs that are one for each input, sorted by input while tiles leave their products.
+//! The records of outputs that are one for each input, sorted by input while tiles leave their
+//! products.
+//!
+//! All inputs are one scan, so that neighbours are found across them, and a tile has records of
+//! several. Each entry goes to the list of its input: a few kibibytes are in memory and the rest is
+//! in the spill, so that thousands of inputs cost no more than a few. What is listed is where a
+//! record is stored and not the record, which is fetched once, when its output is written.
 
 use std::sync::Arc;
 
-use super::product::Entry;
+use super::product::RecordEntry;
+use crate::budget::Bytes;
 use crate::stage::Input;
-use crate::store::{Spill, SpillArea, State, Stretch, Tag};
+use crate::store::{RecordState, Spill, SpillArea, StoredStretch, Tag};
 use crate::{Error, Result};
 
 /// Bytes that all lists of records hold in memory before they go to the spill.
@@ -28,9 +35,8 @@ pub fn ranks(inputs: &[Input]) -> Vec<u32> {
 }
 
 /// Bytes that sorting by so many inputs holds.
-pub fn lists_bytes(inputs: usize) -> u64 {
-    let each = (list_bytes(inputs) + size_of::<List>()) as u64;
-    (inputs as u64).saturating_mul(each)
+pub fn lists_bytes(inputs: usize) -> Bytes {
+    Bytes::of(inputs as u64, list_bytes(inputs) + size_of::<InputList>())
 }
 
 fn list_bytes(inputs: usize) -> usize {
@@ -39,9 +45,9 @@ fn list_bytes(inputs: usize) -> usize {
 
 /// The records of one input that were not yet stored, and where the others are.
 #[derive(Debug, Default)]
-struct List {
+struct InputList {
     open: Vec<u8>,
-    stretches: Vec<Stretch>,
+    stretches: Vec<StoredStretch>,
     records: u64,
 }
 
@@ -54,7 +60,7 @@ pub(crate) struct ByInput {
     /// True if it takes what was there before the pass.
     before: bool,
     spill: Spill,
-    lists: Vec<List>,
+    lists: Vec<InputList>,
     list_bytes: usize,
 }
 
@@ -69,12 +75,12 @@ impl ByInput {
     ) -> Self {
         let spill = Spill::new(area, "inputs");
         let mut lists = Vec::new();
-        lists.resize_with(inputs, List::default);
+        lists.resize_with(inputs, InputList::default);
         ByInput { sink, wants_normals, before, spill, lists, list_bytes: list_bytes(inputs) }
     }
 
     /// Takes what becomes of an entry.
-    pub fn take(&mut self, entry: &Entry, normal: Option<[f32; 3]>) -> Result<()> {
+    pub fn take(&mut self, entry: &RecordEntry, normal: Option<[f32; 3]>) -> Result<()> {
         let state = if self.before { entry.was } else { entry.now };
         if !state.is_written() {
             return Ok(());
@@ -102,7 +108,7 @@ impl ByInput {
     pub fn each(
         &self,
         rank: usize,
-        mut visit: impl FnMut(&Entry, Option<[f32; 3]>) -> Result<()>,
+        mut visit: impl FnMut(&RecordEntry, Option<[f32; 3]>) -> Result<()>,
     ) -> Result<()> {
         let Some(list) = self.lists.get(rank) else { return Ok(()) };
         let mut bytes = Vec::new();
@@ -127,16 +133,16 @@ impl ByInput {
 }
 
 /// An entry as stored, and its normal if there is one.
-fn unpack(item: &[u8]) -> (Entry, Option<[f32; 3]>) {
+fn unpack(item: &[u8]) -> (RecordEntry, Option<[f32; 3]>) {
     let field = |at: usize| {
         let mut bytes = [0; 4];
         bytes.copy_from_slice(&item[at..at + 4]);
         bytes
     };
     let word = |at| u32::from_le_bytes(field(at));
-    let state = State(item[12]);
+    let state = RecordState(item[12]);
     let number = u64::from(word(0)) | u64::from(word(4)) << 32;
-    let entry = Entry { number, count: word(8), tag: Tag::default(), was: state, now: state };
+    let entry = RecordEntry { number, count: word(8), tag: Tag::default(), was: state, now: state };
     let normal =
         (item.len() > ENTRY).then(|| [0, 4, 8].map(|at| f32::from_le_bytes(field(ENTRY + at))));
     (entry, normal)

@@ -1,19 +1,23 @@
-//! Outputs in the order of the inputs: while tiles leave their products the records that such an output
-//! gets are sorted into stretches of the input, and behind the last tile each stretch is ordered in
-//! memory, and all are written one after the other.
+//! Outputs in the order of the inputs, of stages that work on tiles.
+//!
+//! The mill leaves records in canonical order. To sort them all back would be a second sort of the
+//! scan; but what their places are is known from the decode. So the input is cut into stretches:
+//! while tiles leave their products, each record that is written goes to the list of its stretch, a
+//! few kibibytes in memory and the rest in the spill. Behind the last tile a stretch is an item: it
+//! is ordered in memory, and the outlet writes one stretch after the other.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use super::chunk::{Chunk, Open};
+use super::chunk::{Open, OutputChunk};
 use super::encoding::ChunkEncoders;
-use super::job::{Job, StopOnDrop};
-use super::outlet::{Hands, Outlet};
-use super::product::Entry;
-use crate::host::{lock, parallel};
+use super::job::Job;
+use super::outlet::Outlet;
+use super::product::RecordEntry;
+use crate::budget::Bytes;
+use crate::host::lock;
 use crate::report::Tally;
 use crate::stage::{Sink, SinkSummary};
-use crate::store::{SealedTiles, Spill, SpillArea, State, Stretch, Tag};
+use crate::store::{RecordState, SealedTiles, Spill, SpillArea, StoredStretch, Tag};
 use crate::{Error, Result};
 
 /// Bits of a place in the input that number the records of a part; above them is the part's number.
@@ -49,16 +53,15 @@ fn list_bytes(stretches: usize) -> usize {
 }
 
 /// Bytes that the lists of an input of so many records hold in memory.
-pub(crate) fn lists_bytes(records: u64) -> u64 {
+pub(crate) fn lists_bytes(records: u64) -> Bytes {
     let stretches = records.div_ceil(stretch_records(records));
-    let each = list_bytes(usize::try_from(stretches).unwrap_or(usize::MAX)) + size_of::<List>();
-    stretches.saturating_mul(each as u64)
+    Bytes::of(stretches, list_bytes(stretches as usize) + size_of::<StretchList>())
 }
 
 /// Bytes that a thread holds while it orders stretches: one at work, and what waits for its turn.
-pub(crate) fn ordering_bytes(records: u64) -> u64 {
+pub(crate) fn ordering_bytes(records: u64) -> Bytes {
     let most = records.min(stretch_records(records));
-    most.saturating_mul((3 * size_of::<Ranked>() + ENTRY + NORMAL) as u64)
+    Bytes::of(most, 3 * size_of::<Ranked>() + ENTRY + NORMAL)
 }
 
 /// How many records of the input come before each part's: what a place is counted from.
@@ -91,15 +94,15 @@ impl Starts {
 struct Ranked {
     rank: u64,
     stored: u64,
-    state: State,
+    state: RecordState,
     normal: [f32; 3],
 }
 
 /// The records of one stretch that were not yet stored, and where the others are.
 #[derive(Debug, Default)]
-struct List {
+struct StretchList {
     open: Vec<u8>,
-    stretches: Vec<Stretch>,
+    stretches: Vec<StoredStretch>,
 }
 
 /// The records that an output gets, by stretches of the input.
@@ -112,7 +115,7 @@ pub(crate) struct ByRank {
     starts: Arc<Starts>,
     stretch: u64,
     spill: Spill,
-    lists: Vec<List>,
+    lists: Vec<StretchList>,
     list_bytes: usize,
     /// Records of all stretches.
     pub records: u64,
@@ -129,7 +132,7 @@ impl ByRank {
     ) -> Self {
         let stretch = stretch_records(starts.records);
         let mut lists = Vec::new();
-        lists.resize_with(starts.records.div_ceil(stretch) as usize, List::default);
+        lists.resize_with(starts.records.div_ceil(stretch) as usize, StretchList::default);
         ByRank {
             sink,
             wants_normals,
@@ -146,7 +149,7 @@ impl ByRank {
     /// Takes what becomes of an entry, whose records are stored and were read at `places`.
     pub fn take(
         &mut self,
-        entry: &Entry,
+        entry: &RecordEntry,
         places: &[(u64, u64)],
         normal: Option<[f32; 3]>,
     ) -> Result<()> {
@@ -198,45 +201,39 @@ impl ByRank {
     ) -> Result<(SinkSummary, Tally)> {
         let encoders = ChunkEncoders::of_one(job, tiles, (self.sink, &*sink), false).of_stored();
         let open = Mutex::new(Open::new(0, sink.chunk_points(), self.wants_normals, false));
-        let commit = |records: Vec<Ranked>| -> Result<Vec<Chunk>> {
+        let commit = |records: Vec<Ranked>| -> Result<Vec<OutputChunk>> {
             let (mut open, mut full) = (lock(&open), Vec::new());
             for Ranked { stored, state, normal, .. } in records {
                 let (was, now) = (state, state);
-                let entry = Entry { number: stored, count: 1, tag: Tag::default(), was, now };
+                let entry = RecordEntry { number: stored, count: 1, tag: Tag::default(), was, now };
                 open.take(&entry, Some(normal), &mut full);
             }
             Ok(full)
         };
-        let outlet: Outlet<Vec<Ranked>, Chunk> = Outlet::new(vec![sink], job.threads);
-        let (next, total) = (AtomicUsize::new(0), Mutex::new(Tally::default()));
-        parallel(job.threads, |_| {
-            let guard = StopOnDrop::new(|| outlet.stop());
-            let mut encoder = encoders.one();
-            let mut encode = |chunk| encoder.encode(&encoders, &chunk);
-            let mut hands = Hands { commit: &commit, encode: &mut encode };
-            loop {
-                let number = next.fetch_add(1, Ordering::Relaxed);
-                if number >= self.lists.len() {
-                    break;
-                }
+        let outlet = Outlet::new(vec![sink], job.threads.count(), &commit);
+        let stretches = self.lists.len();
+        let tallies = job.threads.items(stretches, || outlet.stop()).run(
+            || encoders.one(),
+            |encoder, number| {
                 let records = self.ordered(number)?;
                 let count = records.len() as u64;
-                outlet.deliver((number as u64, 0), records, true, &mut hands)?;
-                job.advance(count)?;
-            }
-            outlet.drain(&mut hands, |turn| turn.0 >= self.lists.len() as u64)?;
-            lock(&total).merge(&encoder.tally);
-            guard.disarm();
-            Ok(())
-        })?;
+                let mut encode = |chunk| encoder.encode(&encoders, &chunk);
+                outlet.deliver((number as u64, 0), records, true, &mut encode)?;
+                job.advance(count)
+            },
+            |()| {},
+            |mut encoder| {
+                outlet.drain(stretches, &mut |chunk| encoder.encode(&encoders, &chunk))?;
+                Ok(encoder.tally)
+            },
+        )?;
         let rest = lock(&open).rest().into_iter().collect();
         let mut encoder = encoders.one();
-        let mut encode = |chunk| encoder.encode(&encoders, &chunk);
-        let said = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
-        let mut tally = std::mem::take(&mut *lock(&total));
-        tally.merge(&encoder.tally);
+        let said = outlet.close(rest, &mut |chunk| encoder.encode(&encoders, &chunk))?;
+        let mut total = encoder.tally;
+        tallies.iter().for_each(|tally| total.merge(tally));
         let summary = said.into_iter().next();
-        Ok((summary.ok_or_else(|| Error::internal("an output said nothing"))?, tally))
+        Ok((summary.ok_or_else(|| Error::internal("an output said nothing"))?, total))
     }
 }
 
@@ -255,5 +252,5 @@ fn unpack(item: &[u8]) -> Ranked {
         }),
         false => [f32::NAN; 3],
     };
-    Ranked { rank: word(0), stored: word(8), state: State(item[16]), normal }
+    Ranked { rank: word(0), stored: word(8), state: RecordState(item[16]), normal }
 }

@@ -1,13 +1,18 @@
 //! What tiles leave behind becomes chunks of the outputs, cut by rank, and stored columns.
+//!
+//! Products arrive in the order of the tiles, which is that of the positions. So a column that is
+//! stored for later passes is only appended to, item after item, and is found by the rank of a
+//! position afterwards; no pass needs an index of its own. One thread at a time does this work,
+//! which is copying: what takes long, fetching and encoding, is left to all threads.
 
 use std::sync::Arc;
 
 use super::by_input::ByInput;
 use super::by_rank::ByRank;
-use super::chunk::{Chunk, Open};
+use super::chunk::{Open, OutputChunk};
 use super::product::Product;
 use crate::Result;
-use crate::store::{PIECE, Pieces, Spill, SpillArea, Stretch};
+use crate::store::{PIECE, Pieces, Spill, SpillArea, StoredStretch};
 
 /// A stored column while it grows, item after item.
 struct Column {
@@ -71,20 +76,20 @@ pub(crate) struct Stored {
     pub fates: Arc<Pieces>,
     pub normals: Option<Arc<Pieces>>,
     pub figures: Option<Arc<Pieces>>,
-    pub found: Found,
+    pub found: FoundValues,
 }
 
 /// What a first phase found, in the order of the tiles.
-pub(crate) struct Found {
+pub(crate) struct FoundValues {
     spill: Spill,
-    stretches: Vec<Stretch>,
+    stretches: Vec<StoredStretch>,
     open: Vec<u8>,
 }
 
 /// Found entries are handed to the spill in stretches of about this size.
 const FOUND_AT_ONCE: usize = 1 << 18;
 
-impl Found {
+impl FoundValues {
     fn add(&mut self, entries: &[[u64; 2]]) -> Result<()> {
         for [a, b] in entries {
             self.open.extend_from_slice(&a.to_le_bytes());
@@ -130,7 +135,7 @@ pub(crate) struct Cutter {
     fates: Column,
     normals: Option<Column>,
     figures: Option<Column>,
-    found: Found,
+    found: FoundValues,
     outputs: Vec<Open>,
     by_input: Vec<ByInput>,
     by_rank: Vec<ByRank>,
@@ -168,7 +173,7 @@ impl Cutter {
             fates: column("fates", FATE_BYTES)?,
             normals: normals.then(|| column("normals", NORMAL_BYTES)).transpose()?,
             figures: figures.then(|| column("figures", FIGURE_BYTES)).transpose()?,
-            found: Found {
+            found: FoundValues {
                 spill: Spill::new(area, "found"),
                 stretches: Vec::new(),
                 open: Vec::new(),
@@ -181,7 +186,7 @@ impl Cutter {
     }
 
     /// The chunks that the next product completes.
-    pub fn cut(&mut self, product: &Product) -> Result<Vec<Chunk>> {
+    pub fn cut(&mut self, product: &Product) -> Result<Vec<OutputChunk>> {
         self.fates.add(&product.fates)?;
         if let Some(normals) = &mut self.normals {
             normals.add(&product.normals)?;
@@ -210,7 +215,7 @@ impl Cutter {
     }
 
     /// The last chunks, the columns, the lists by input, and what was counted.
-    pub fn finish(mut self) -> Result<(Vec<Chunk>, Stored, Lists, Counts)> {
+    pub fn finish(mut self) -> Result<(Vec<OutputChunk>, Stored, Lists, Counts)> {
         let columns = [Some(&mut self.states), Some(&mut self.fates)];
         let more = [self.normals.as_mut(), self.figures.as_mut()];
         columns.into_iter().chain(more).flatten().try_for_each(Column::flush)?;

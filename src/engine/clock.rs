@@ -1,4 +1,7 @@
 //! Times the phases of a run and tells the watcher of them.
+//!
+//! Phases follow each other, each ends where the next begins, so that their times add up to that of
+//! the run and nothing that a run does is in none of them.
 
 use std::time::Instant;
 

@@ -1,11 +1,20 @@
 //! Cutting the decoded scan into tiles that fit the memory, wide enough for the stages' cells.
+//!
+//! A tile is the smallest octree node that is not too heavy, found by counts of the decoded scan.
+//! Tiles of one size would be chosen for the densest place and be nearly empty elsewhere; a density
+//! guessed from headers would be wrong exactly where memory is short. A node much smaller than the
+//! cells would be loaded mostly for its neighbours, so nodes are not cut below four cells unless
+//! they do not fit otherwise.
+//!
+//! Where tiles are cut decides about speed alone, never about what stages compute.
 
 use std::sync::Arc;
 
+use super::demands::Demands;
 use super::job::Job;
 use super::pass::{Pass, StageOp};
-use super::shares::{Demands, MILL_SPARE, Shares};
-use crate::budget::{Lease, whole_mebibytes};
+use super::shares::{MILL_SPARE, Shares};
+use crate::budget::{Bytes, Lease, whole_mebibytes};
 use crate::geom::lattice::Lattice;
 use crate::store::{CutError, SealedTiles, TileKey};
 use crate::{Error, Result};
@@ -28,7 +37,7 @@ const CELLS_ACROSS: u64 = 4;
 
 /// The tiles of a pass.
 pub(crate) struct Cut {
-    cells: Cells,
+    cells: CellWidths,
     pub keys: Vec<TileKey>,
     /// Positions that the arena of a thread takes.
     pub capacity: usize,
@@ -39,15 +48,15 @@ pub(crate) struct Cut {
 
 /// What the tiles of passes depend on; equal for all passes of most pipelines.
 #[derive(Clone, Copy, PartialEq, Eq)]
-struct Cells {
+struct CellWidths {
     side: u64,
     reach: i64,
 }
 
-impl Cells {
-    fn of(ops: &[StageOp], pass: &Pass) -> Cells {
+impl CellWidths {
+    fn of(ops: &[StageOp], pass: &Pass) -> CellWidths {
         let side = pass.needs(ops).map(|needs| needs.cell_side).max().unwrap_or(0);
-        Cells { side: u64::try_from(side).unwrap_or(0), reach: reach(ops, pass) }
+        CellWidths { side: u64::try_from(side).unwrap_or(0), reach: reach(ops, pass) }
     }
 
     /// The level of the smallest octree node that is `across` cells wide.
@@ -59,8 +68,8 @@ impl Cells {
     }
 }
 
-/// The tiles of every pass, before the first begins: a scan too heavy for the memory is refused when
-/// nothing but its decode is lost.
+/// The tiles of every pass, before the first begins: a scan too heavy for the memory is refused
+/// when nothing but its decode is lost.
 pub(crate) fn cut_all(
     job: &Job<'_>,
     passes: &[Pass],
@@ -69,10 +78,10 @@ pub(crate) fn cut_all(
     demands: &Demands,
     tiles: &SealedTiles,
 ) -> Result<Vec<Arc<Cut>>> {
-    let mut known: Vec<(Cells, Arc<Cut>)> = Vec::new();
+    let mut known: Vec<(CellWidths, Arc<Cut>)> = Vec::new();
     let mut cuts = Vec::new();
     for pass in passes {
-        let cells = Cells::of(&job.ops, pass);
+        let cells = CellWidths::of(&job.ops, pass);
         let cut = match known.iter().find(|(same, _)| *same == cells) {
             Some((_, cut)) => cut.clone(),
             None => Arc::new(cut(job, cells, lattice, (shares, demands), tiles, 0)?),
@@ -83,8 +92,8 @@ pub(crate) fn cut_all(
     Ok(cuts)
 }
 
-/// The tiles of a pass whose stages may have chosen other cells since `cut` was made; the mill holds
-/// `held` bytes already.
+/// The tiles of a pass whose stages may have chosen other cells since `cut` was made; the mill
+/// holds `held` bytes already.
 pub(crate) fn cut_again(
     job: &Job<'_>,
     pass: &Pass,
@@ -93,7 +102,7 @@ pub(crate) fn cut_again(
     tiles: &SealedTiles,
     (made, held): (&Arc<Cut>, u64),
 ) -> Result<Arc<Cut>> {
-    let cells = Cells::of(&job.ops, pass);
+    let cells = CellWidths::of(&job.ops, pass);
     match cells == made.cells {
         true => Ok(made.clone()),
         false => cut(job, cells, lattice, (shares, demands), tiles, held).map(Arc::new),
@@ -105,20 +114,20 @@ pub(crate) fn cut_again(
 /// fewer threads.
 fn cut(
     job: &Job<'_>,
-    cells: Cells,
+    cells: CellWidths,
     lattice: &Lattice,
     (shares, demands): (&Shares, &Demands),
     tiles: &SealedTiles,
     held: u64,
 ) -> Result<Cut> {
     let wanted = job.tile_points.map_or(zone_of(shares.tile_positions), |points| points as u64);
-    let later = demands.gathered(shares).saturating_add(MILL_SPARE);
-    let free = job.budget.free().saturating_add(held).saturating_sub(later);
-    let largest = demands.tile_positions(job.threads, free).max(shares.tile_positions);
+    let later = demands.gathered(shares) + MILL_SPARE;
+    let free = (job.budget.free() + held).saturating_sub(later.0);
+    let largest = demands.tile_positions(job.threads.count(), free).max(shares.tile_positions);
     let (good, lowest) = (cells.level(CELLS_ACROSS), cells.level(1));
     let mut tries =
         vec![(shares.tile_positions, good), (largest, good), (largest, lowest)].into_iter();
-    let mut millers = job.threads;
+    let mut millers = job.threads.count();
     let mut at = tries.next();
     while let Some((capacity, smallest)) = at {
         // Around all positions there is no rim.
@@ -126,8 +135,8 @@ fn cut(
         let most = if all { tiles.positions() } else { zone_of(capacity) };
         let (key, positions) = match tiles.cut(wanted, most, cells.reach, (good, smallest)) {
             Ok(keys) => {
-                let bytes = keys.len().saturating_mul(size_of::<TileKey>()) as u64;
-                let _listed = job.budget.lease(bytes, "list of tiles")?;
+                let bytes = Bytes::of(keys.len() as u64, size_of::<TileKey>());
+                let _listed = job.budget.lease(bytes.0, "list of tiles")?;
                 return Ok(Cut { cells, keys, capacity, millers, _listed });
             }
             Err(CutError::Read(error)) => return Err(error),
@@ -146,8 +155,8 @@ fn cut(
             };
             let enough = whole_mebibytes(demands.limit_for_tile(millers, tile));
             job.warn(format!(
-                "{positions} points lie so close that their tile leaves memory for {fewer} of {millers} \
-                 threads; `run.memory = \"{enough}\"` does for all"
+                "{positions} points lie so close that their tile leaves memory for {fewer} of \
+                 {millers} threads; `run.memory = \"{enough}\"` does for all"
             ));
             (millers, at) = (fewer, Some((demands.tile_positions(fewer, free), lowest)));
         }
@@ -155,8 +164,8 @@ fn cut(
     Err(Error::internal("a tile fits and does not"))
 }
 
-/// The heaviest of the cubes that cannot be cut, of which one was found: a memory that does for that one
-/// does for all. Each try passes over all that are no heavier than the last.
+/// The heaviest of the cubes that cannot be cut, of which one was found: a memory that does for
+/// that one does for all. Each try passes over all that are no heavier than the last.
 fn heaviest(
     tiles: &SealedTiles,
     wanted: u64,

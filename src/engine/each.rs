@@ -1,16 +1,15 @@
-//! One output for each input: while tiles leave their products the records that an output gets are
-//! sorted by input, and behind the last tile each input's file is written, a file a thread.
-
-use std::collections::BTreeMap;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+//! One output for each input: a file is an item, which one thread writes from begin to end.
+//!
+//! While tiles leave their products, the records that such outputs get are sorted by input
+//! (`by_input.rs`). The files could grow from there, but of thousands of inputs that would be as
+//! many open files and half-filled chunks. Written behind the last tile, no more are open than
+//! there are threads.
 
 use super::by_input::ByInput;
-use super::chunk::{Chunk, Open};
+use super::chunk::{Open, OutputChunk};
 use super::encoding::{ChunkEncoder, ChunkEncoders};
 use super::job::{Each, Job};
-use super::product::Entry;
-use crate::host::lock;
+use super::product::RecordEntry;
 use crate::point::Metadata;
 use crate::report::Tally;
 use crate::stage::SinkSummary;
@@ -26,24 +25,21 @@ impl Each<'_> {
         tiles: &SealedTiles,
         records: &ByInput,
     ) -> Result<(Vec<(u64, SinkSummary)>, Tally)> {
-        let next = AtomicUsize::new(0);
-        let done = Mutex::new((BTreeMap::new(), Tally::default()));
-        job.parallel(|| {
-            let mut encoder = ChunkEncoder::new(job, self.chunk_points);
-            loop {
-                let input = next.fetch_add(1, Ordering::Relaxed);
-                if input >= self.sinks.len() {
-                    break;
-                }
+        let (mut written, mut total) = (Vec::new(), Tally::default());
+        job.items(self.sinks.len()).run(
+            || ChunkEncoder::new(job, self.chunk_points),
+            |encoder, input| {
                 job.advance(0)?;
-                let summary = self.write_one(job, tiles, records, input, &mut encoder)?;
-                lock(&done).0.insert(input, summary);
-            }
-            lock(&done).1.merge(&encoder.tally);
-            Ok(())
-        })?;
-        let (written, tally) = std::mem::take(&mut *lock(&done));
-        Ok((written.into_values().collect(), tally))
+                let summary = self.write_one(job, tiles, records, input, encoder)?;
+                Ok((summary, std::mem::take(&mut encoder.tally)))
+            },
+            |(summary, tally)| {
+                written.push(summary);
+                total.merge(&tally);
+            },
+            |_| Ok(()),
+        )?;
+        Ok((written, total))
     }
 
     fn write_one(
@@ -65,12 +61,12 @@ impl Each<'_> {
             ChunkEncoders::of_one(job, tiles, (records.sink, &*sink), create.likes_time());
         let mut open = Open::new(0, sink.chunk_points(), records.wants_normals, false);
         let (mut given, mut full) = (0, Vec::new());
-        let mut append = |chunk: Chunk| {
+        let mut append = |chunk: OutputChunk| {
             let (_, encoded) = encoder.encode(&encoders, &chunk)?;
             sink.append(encoded)?;
             job.advance(0)
         };
-        records.each(rank, |entry: &Entry, normal| {
+        records.each(rank, |entry: &RecordEntry, normal| {
             given += u64::from(entry.count);
             open.take(entry, normal, &mut full);
             full.drain(..).try_for_each(&mut append)

@@ -1,15 +1,21 @@
 //! From chunks to bytes: records are fetched, put in order, edited and encoded, by any thread.
+//!
+//! Encoding takes as long as all that the stages compute, so it must not wait for one thread. A
+//! chunk depends on nothing but its own records; only appending its bytes has an order. Records are
+//! copied from where the decode left them: what no stage changed is written with the bytes that it
+//! was read with.
 
 use std::sync::Arc;
 
 use super::by_time::ByTime;
-use super::chunk::Chunk;
+use super::chunk::OutputChunk;
 use super::job::Job;
-use super::pass::Filter;
+use super::pass::PassFilter;
+use crate::budget::Bytes;
 use crate::point::{Edit, PointBatch};
 use crate::report::{KEY_POINTS, Tally};
 use crate::stage::{Encode, Encoded, Sink};
-use crate::store::{Fetch, SealedTiles, State};
+use crate::store::{Fetch, RecordState, SealedTiles};
 use crate::{Error, Result};
 
 /// What threads need to encode chunks.
@@ -76,13 +82,20 @@ impl<'a> ChunkEncoders<'a> {
 /// What a thread holds to encode chunks.
 pub(crate) struct ChunkEncoder {
     numbers: Vec<u64>,
-    states: Vec<State>,
+    states: Vec<RecordState>,
     fetch: Fetch,
     batch: PointBatch,
     pub tally: Tally,
 }
 
 impl ChunkEncoder {
+    /// Bytes that it holds for chunks of `points` records of `stride` bytes: the records with their
+    /// numbers and normals, and what fetching them takes.
+    pub fn bytes(points: u64, stride: usize) -> Bytes {
+        let more = size_of::<u64>() + size_of::<[f32; 3]>();
+        Bytes::of(points, stride) + Bytes::of(points, more) + Fetch::bytes(points, stride)
+    }
+
     /// For chunks of up to `chunk_points` records.
     pub fn new(job: &Job<'_>, chunk_points: usize) -> Self {
         ChunkEncoder {
@@ -95,7 +108,11 @@ impl ChunkEncoder {
     }
 
     /// The chunk's records, encoded, and for which of the sinks.
-    pub fn encode(&mut self, all: &ChunkEncoders<'_>, chunk: &Chunk) -> Result<(usize, Encoded)> {
+    pub fn encode(
+        &mut self,
+        all: &ChunkEncoders<'_>,
+        chunk: &OutputChunk,
+    ) -> Result<(usize, Encoded)> {
         self.batch.clear();
         chunk.number(&mut self.numbers);
         chunk.states(&mut self.states);
@@ -126,8 +143,8 @@ fn by_time(job: &Job<'_>, likes_time: bool) -> Option<ByTime> {
 }
 
 /// Counts the records that are written with the key-point flag because they stay.
-fn count_key_points(states: &[State], tally: &mut Tally) {
-    let is_set = |state: &&State| state.edits() & Edit::SetKeyPoint as u8 != 0;
+fn count_key_points(states: &[RecordState], tally: &mut Tally) {
+    let is_set = |state: &&RecordState| state.edits() & Edit::SetKeyPoint as u8 != 0;
     match states.iter().filter(is_set).count() as u64 {
         0 => {}
         some => tally.count(KEY_POINTS, some),
@@ -138,7 +155,7 @@ fn count_key_points(states: &[State], tally: &mut Tally) {
 fn change(job: &Job<'_>, filters: &[usize], batch: &mut PointBatch) -> Result<()> {
     let records = batch.len();
     for &filter in filters {
-        let Filter { kind, transform } = &job.filters[filter];
+        let PassFilter { kind, transform } = &job.filters[filter];
         transform.apply(batch)?;
         if batch.len() != records {
             let told = format!("the stage {kind} removes records that it kept before");
@@ -149,7 +166,7 @@ fn change(job: &Job<'_>, filters: &[usize], batch: &mut PointBatch) -> Result<()
 }
 
 /// Writes the edits of `states` into the records.
-pub(crate) fn edit(batch: &mut PointBatch, states: &[State]) -> Result<()> {
+pub(crate) fn edit(batch: &mut PointBatch, states: &[RecordState]) -> Result<()> {
     let schema = batch.schema().clone();
     for (record, state) in batch.records_mut().chunks_exact_mut(schema.stride).zip(states) {
         for edit in Edit::of(state.edits()) {

@@ -1,20 +1,21 @@
 //! Stages that stream, behind stages that work on tiles: what they remove of what a tile leaves.
 //!
-//! Such a stage sees records and no neighbours, so nothing of its work depends on tiles. What it removes
-//! must be known when the next pass begins, though, and what it changes only as records are written. So
-//! it is applied twice: here, to learn which records it keeps, and again to those that are written
-//! (`encoding.rs`). It is a function of the record alone; the other way, to store changed records anew,
-//! would hold the scan twice.
+//! Such a stage sees records and no neighbours, so nothing of its work depends on tiles. What it
+//! removes must be known when the next pass begins, though, and what it changes only as records are
+//! written. So it is applied twice: here, to learn which records it keeps, and again to those that
+//! are written (`encoding.rs`). It is a function of the record alone; the other way, to store
+//! changed records anew, would hold the scan twice.
 
 use std::ops::Range;
 
 use super::encoding::edit;
 use super::job::Job;
-use super::pass::Filter;
+use super::pass::PassFilter;
 use super::product::Product;
+use crate::budget::Bytes;
 use crate::point::PointBatch;
 use crate::report::Tally;
-use crate::store::{Fetch, SealedTiles, State};
+use crate::store::{Fetch, RecordState, SealedTiles};
 use crate::{Error, Result};
 
 /// Records that are looked at together.
@@ -28,7 +29,7 @@ pub(crate) struct Filtering<'a> {
     fetch: Fetch,
     batch: PointBatch,
     numbers: Vec<u64>,
-    states: Vec<State>,
+    states: Vec<RecordState>,
 }
 
 impl<'a> Filtering<'a> {
@@ -46,9 +47,10 @@ impl<'a> Filtering<'a> {
     }
 
     /// Bytes that it holds for records of `stride` bytes.
-    pub fn bytes(stride: usize) -> u64 {
-        let each = (stride as u64).saturating_add(8 + 1 + 4);
-        (AT_ONCE as u64).saturating_mul(each).saturating_add(Fetch::bytes(AT_ONCE as u64, stride))
+    pub fn bytes(stride: usize) -> Bytes {
+        let numbers = size_of::<u64>() + size_of::<RecordState>() + size_of::<u32>();
+        let records = Bytes::of(AT_ONCE as u64, stride) + Bytes::of(AT_ONCE as u64, numbers);
+        records + Fetch::bytes(AT_ONCE as u64, stride)
     }
 
     /// Enters into `product` which of its records the filters remove.
@@ -88,7 +90,7 @@ impl<'a> Filtering<'a> {
         edit(&mut self.batch, &self.states)?;
         self.batch.number_records();
         for &filter in self.filters {
-            let Filter { kind, transform } = &self.job.filters[filter];
+            let PassFilter { kind, transform } = &self.job.filters[filter];
             let before = self.batch.len();
             transform.apply(&mut self.batch)?;
             let removed = before

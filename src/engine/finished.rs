@@ -1,4 +1,8 @@
 //! What the phases of a run come to, whichever there were.
+//!
+//! A stream and a mill end in the same figures, so that there is one way to account for a run and
+//! one kind of report. A run with several branches has counts for each, as if it had been the only
+//! one, and counts of all for what was done once.
 
 use super::survey::Measured;
 use crate::report::{ClassFigures, Decision, PassFigures, Tally};

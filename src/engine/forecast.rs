@@ -1,15 +1,15 @@
-//! A look at a sample of the scan before a pass: small cubes, spread evenly over its positions.
+//! A look at a sample of the scan before a pass, from which stages say what is to be expected and
+//! settle what the pipeline leaves to them.
+//!
+//! The sample is small cubes, spread evenly over the ranks of the positions, so that it is a
+//! function of the points alone: tiles would depend on the memory, and points at random would have
+//! no neighbours. The cubes are loaded like tiles, with a rim, and are items of a phase.
 
-use std::collections::BTreeMap;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-use super::grind::{Field, Worker};
+use super::grind::{DecodedScan, Worker};
 use super::job::Job;
 use super::pass::Pass;
 use super::shares::Shares;
 use crate::Result;
-use crate::host::lock;
 use crate::stage::Forecast;
 use crate::store::{Reader, SealedTiles, TileKey};
 use crate::tile::Sieve;
@@ -40,7 +40,7 @@ pub(crate) fn forecast(
     job: &mut Job<'_>,
     pass: &Pass,
     ops: &[usize],
-    field: &Field<'_>,
+    field: &DecodedScan<'_>,
     sieve: &Sieve,
     capacity: usize,
 ) -> Result<Vec<(usize, Forecast)>> {
@@ -60,32 +60,32 @@ fn samples(
     job: &Job<'_>,
     pass: &Pass,
     op: usize,
-    field: &Field<'_>,
+    field: &DecodedScan<'_>,
     sieve: &Sieve,
     capacity: usize,
     keys: &[TileKey],
 ) -> Result<Vec<Vec<f64>>> {
-    let samples = Mutex::new(BTreeMap::new());
-    let next = AtomicUsize::new(0);
-    job.parallel(|| {
-        let mut worker = Worker::new(job, pass, field, sieve, capacity, false);
-        worker.limit_rim(RIM);
-        let mut reader = Reader::default();
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(&key) = keys.get(index) else { return Ok(()) };
+    let mut samples = Vec::new();
+    job.items(keys.len()).run(
+        || {
+            let mut worker = Worker::new(job, pass, field, sieve, capacity, false);
+            worker.limit_rim(RIM);
+            (worker, Reader::default())
+        },
+        |(worker, reader), index| {
             job.advance(0)?;
-            if field.tiles.holds_more(&key.cube(), HEAVIEST, &mut reader)? {
-                continue;
+            let key = keys[index];
+            if field.tiles.holds_more(&key.cube(), HEAVIEST, reader)? {
+                return Ok(None);
             }
             let (tile, _) = worker.run(key, Some(op))?;
             tile.limits = job.ops[op].selection;
-            let sample = job.ops[op].op.tile().sample(tile)?;
-            lock(&samples).insert(index, sample);
-        }
-    })?;
-    let samples = std::mem::take(&mut *lock(&samples));
-    Ok(samples.into_values().collect())
+            job.ops[op].op.tile().sample(tile).map(Some)
+        },
+        |sample| samples.extend(sample),
+        |_| Ok(()),
+    )?;
+    Ok(samples)
 }
 
 /// The octree nodes, a few times `side` steps wide, that hold positions spread evenly

@@ -1,30 +1,41 @@
-//! One pass: tile after tile through the stages, and what they leave into stored columns and sinks.
+//! One pass: every tile goes through the stages, and what they leave goes into stored columns and
+//! sinks.
+//!
+//! A tile is an item: a thread loads it into its arena, runs all stages of the pass on it there,
+//! and hands a small product to the outlet, which commits products in the order of the tiles. So
+//! the large things, positions and neighbourhoods, never leave the thread that loaded them, and no
+//! stage is run over the whole scan before the next begins: between two stages nothing would have
+//! to be stored.
+//!
+//! What a tile leaves must not depend on where the tiles are cut. A stage may therefore look at the
+//! rim, but only what it decides about the core is kept.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
+
+use serde::Serialize;
 
 use super::by_input::ByInput;
 use super::by_rank::{ByRank, Starts};
-use super::chunk::{Chunk, Open};
+use super::chunk::{Open, OutputChunk};
 use super::chunks::{Counts, Cutter, Stored};
 use super::cut::{Cut, neighbors, reach};
 use super::encoding::ChunkEncoders;
 use super::filtering::Filtering;
-use super::job::{Job, StopOnDrop};
-use super::outlet::{Hands, Outlet};
+use super::job::Job;
+use super::outlet::Outlet;
 use super::pass::{Op, Pass};
 use super::product::Product;
 use super::rounded::Rounded;
 use crate::geom::lattice::Lattice;
-use crate::host::{lock, parallel};
+use crate::host::{Threads, lock};
 use crate::report::{Baseline, Tally};
 use crate::stage::{Sink, SinkSummary};
 use crate::store::{Fetch, SealedTiles, SpillArea, TileKey};
-use crate::tile::{Loader, Run, Sieve, Tile};
+use crate::tile::{Loader, RecordRun, Sieve, Tile};
 use crate::{Error, Result};
 
 /// What all passes go over.
-pub(crate) struct Field<'a> {
+pub(crate) struct DecodedScan<'a> {
     pub lattice: &'a Lattice,
     pub area: Arc<SpillArea>,
     pub tiles: Arc<SealedTiles>,
@@ -56,15 +67,16 @@ pub(crate) type Numbered = (usize, Box<dyn Sink>);
 /// Outputs of a pass: sinks that grow while it mills, lists by input and by place in the input.
 pub(crate) type PassOutputs = (Vec<Numbered>, Vec<ByInput>, Vec<ByRank>);
 
-/// Runs `pass` over the tiles of `cut`, into the `sinks` with their numbers and into lists by input.
+/// Runs `pass` over the tiles of `cut`, into the `sinks` with their numbers and into lists by
+/// input.
 pub(crate) fn grind(
     job: &Job<'_>,
     (pass, cut): (&Pass, &Cut),
-    field: &Field<'_>,
+    field: &DecodedScan<'_>,
     sieve: &Sieve,
     (sinks, by_input, by_rank): PassOutputs,
 ) -> Result<Milled> {
-    let (tiles, keys) = (&field.tiles, &cut.keys);
+    let tiles = &field.tiles;
     let numbers = sinks.iter().map(|(sink, _)| *sink).chain(by_input.iter().map(|by| by.sink));
     let numbers = numbers.chain(by_rank.iter().map(|by| by.sink));
     let wants_normals = numbers.into_iter().any(|sink| job.wants_normals[sink]);
@@ -84,61 +96,76 @@ pub(crate) fn grind(
         None => Err(Error::internal("a tile came behind the last")),
     };
     let encoders = ChunkEncoders::new(job, tiles, &sinks);
-    let outlet: Outlet<Product, Chunk> =
-        Outlet::new(sinks.into_iter().map(|(_, sink)| sink).collect(), cut.millers);
+    let sinks = sinks.into_iter().map(|(_, sink)| sink).collect();
+    let threads = job.threads.at_most(cut.millers);
+    let outlet = Outlet::new(sinks, threads.count(), &commit);
     let side = pass.compares(&job.ops);
-    let baseline = || side.map(|side| Baseline::new(side, tiles.levels()));
-    let total = Mutex::new(Sum { baseline: baseline(), ..Sum::default() });
-    let next = AtomicUsize::new(0);
-    parallel(cut.millers, |_| {
-        let guard = StopOnDrop::new(|| outlet.stop());
-        let mut encoder = encoders.one();
-        let mut encode = |chunk| encoder.encode(&encoders, &chunk);
-        let mut hands = Hands { commit: &commit, encode: &mut encode };
-        let mut worker = Worker::new(job, pass, field, sieve, cut.capacity, wants_normals);
-        worker.sum.baseline = baseline();
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(&key) = keys.get(index) else { break };
-            let product = worker.mill(key)?;
-            let positions = product.positions();
-            outlet.deliver((index as u64, 0), product, true, &mut hands)?;
-            job.advance(positions)?;
-        }
-        outlet.drain(&mut hands, |turn| turn.0 >= keys.len() as u64)?;
-        worker.sum.tally.merge(&encoder.tally);
-        lock(&total).merge(&worker.sum);
-        guard.disarm();
-        Ok(())
-    })?;
+    let worker = || Worker {
+        baseline: side.map(|side| Baseline::new(side, tiles.levels())),
+        ..Worker::new(job, pass, field, sieve, cut.capacity, wants_normals)
+    };
+    let (sum, baseline) = mill_tiles(threads, &cut.keys, worker, &encoders, &outlet)?;
+    let TileTally { mut tally, decided, oriented } = sum;
     let unfinished = || Error::internal("a pass was finished twice");
     let (rest, stored, (by_input, by_rank), counts) =
         lock(&cutter).take().ok_or_else(unfinished)?.finish()?;
     let mut encoder = encoders.one();
-    let mut encode = |chunk| encoder.encode(&encoders, &chunk);
-    let written = outlet.close(rest, &mut Hands { commit: &commit, encode: &mut encode })?;
-    let Sum { mut tally, decided, oriented, baseline } = std::mem::take(&mut *lock(&total));
+    let written = outlet.close(rest, &mut |chunk| encoder.encode(&encoders, &chunk))?;
     tally.merge(&encoder.tally);
     Ok(Milled { tally, stored, counts, written, by_input, by_rank, decided, oriented, baseline })
 }
 
-/// What tiles come to, whichever thread milled them.
-#[derive(Default)]
-struct Sum {
-    tally: Tally,
-    decided: u64,
-    oriented: bool,
-    baseline: Option<Baseline>,
+/// Mills the tiles `keys` into the outlet: what they come to in all, and the grids to compare with.
+fn mill_tiles<'a>(
+    threads: Threads<'_>,
+    keys: &[TileKey],
+    worker: impl Fn() -> Worker<'a> + Sync,
+    encoders: &ChunkEncoders<'_>,
+    outlet: &Outlet<'_, Product, OutputChunk>,
+) -> Result<(TileTally, Option<Baseline>)> {
+    let mut sum = TileTally::default();
+    let left = threads.items(keys.len(), || outlet.stop()).run(
+        || (worker(), encoders.one()),
+        |(worker, encoder), index| {
+            let (product, tally) = worker.mill(keys[index])?;
+            let positions = product.positions();
+            let mut encode = |chunk| encoder.encode(encoders, &chunk);
+            outlet.deliver((index as u64, 0), product, true, &mut encode)?;
+            worker.job.advance(positions)?;
+            Ok(tally)
+        },
+        |tally| sum.merge(&tally),
+        |(worker, mut encoder)| {
+            outlet.drain(keys.len(), &mut |chunk| encoder.encode(encoders, &chunk))?;
+            Ok((encoder.tally, worker.baseline))
+        },
+    )?;
+    let mut baseline: Option<Baseline> = None;
+    for (tally, part) in left {
+        sum.tally.merge(&tally);
+        match (&mut baseline, part) {
+            (Some(all), Some(part)) => all.merge(&part),
+            (_, part) => baseline = part,
+        }
+    }
+    Ok((sum, baseline))
 }
 
-impl Sum {
-    fn merge(&mut self, other: &Sum) {
+/// What a tile comes to, besides its product.
+#[derive(Debug, Default, Serialize)]
+struct TileTally {
+    tally: Tally,
+    /// Records that the pass's stages decide about.
+    decided: u64,
+    /// True if the pass oriented normals.
+    oriented: bool,
+}
+
+impl TileTally {
+    fn merge(&mut self, other: &TileTally) {
         self.tally.merge(&other.tally);
         self.decided += other.decided;
         self.oriented |= other.oriented;
-        if let (Some(mine), Some(theirs)) = (&mut self.baseline, &other.baseline) {
-            mine.merge(theirs);
-        }
     }
 }
 
@@ -157,14 +184,16 @@ pub(crate) struct Worker<'a> {
     rounded: Option<Rounded<'a>>,
     first: bool,
     filtering: Option<Filtering<'a>>,
-    sum: Sum,
+    sum: TileTally,
+    /// Grids to compare the pass with, of the tiles so far.
+    baseline: Option<Baseline>,
 }
 
 impl<'a> Worker<'a> {
     pub fn new(
         job: &'a Job<'a>,
         pass: &'a Pass,
-        field: &'a Field<'_>,
+        field: &'a DecodedScan<'_>,
         sieve: &Sieve,
         capacity: usize,
         wants_normals: bool,
@@ -201,7 +230,8 @@ impl<'a> Worker<'a> {
             wants_normals,
             rounded,
             first,
-            sum: Sum::default(),
+            sum: TileTally::default(),
+            baseline: None,
         }
     }
 
@@ -231,7 +261,8 @@ impl<'a> Worker<'a> {
         Ok((tile, found))
     }
 
-    fn mill(&mut self, key: TileKey) -> Result<Product> {
+    /// What a tile leaves behind, and what it comes to.
+    fn mill(&mut self, key: TileKey) -> Result<(Product, TileTally)> {
         let (_, found) = self.run(key, None)?;
         let (tile, core) = self.loader.tile();
         self.sum.decided +=
@@ -240,7 +271,7 @@ impl<'a> Worker<'a> {
         self.sum.tally.work("rim_positions", (tile.positions.len() - tile.core.len()) as u64);
         self.sum.tally.work("unproven", tile.around.take_unproven());
         self.sum.tally.work("tied", tile.around.take_tied());
-        if let Some(baseline) = &mut self.sum.baseline {
+        if let Some(baseline) = &mut self.baseline {
             baseline.add(tile);
         }
         let mut product = Product::of(tile, core, self.pass, self.wants_normals)?;
@@ -249,7 +280,7 @@ impl<'a> Worker<'a> {
             let mut positions = Vec::new();
             core.each(tile, |runs, _| {
                 let count = runs.iter().map(|run| run.count).sum::<u32>();
-                positions.extend(runs.first().map(|run: &Run| (run.number, count)));
+                positions.extend(runs.first().map(|run: &RecordRun| (run.number, count)));
                 Ok(())
             })?;
             let mut counted = Tally::default();
@@ -264,6 +295,6 @@ impl<'a> Worker<'a> {
         if self.ranks {
             product.find_places(self.loader.tiles(), &mut self.fetch)?;
         }
-        Ok(product)
+        Ok((product, std::mem::take(&mut self.sum)))
     }
 }

@@ -1,11 +1,16 @@
-//! What every phase of a run shares: the source, the stages, the budget, and how it is told to stop.
+//! What every phase of a run shares: the source, the stages, the budget, and how it is told to
+//! stop.
+//!
+//! Phases change none of it while their threads work, so threads share it without locks but for
+//! warnings. What belongs to one phase alone is not in it: that goes from the phase that makes it
+//! to the one that needs it, and is dropped there.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
-use super::pass::{Branch, Filter, Pass, StageOp};
+use super::pass::{Branch, Pass, PassFilter, StageOp};
 use super::publish::Staged;
 use super::tagger::{ClassOf, LEFT_OUT, Tagger};
 use crate::budget::Budget;
@@ -13,7 +18,7 @@ use crate::error::shown;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::geom::simd::Simd;
 use crate::graph::Headers;
-use crate::host::{lock, parallel};
+use crate::host::{PhaseItems, Threads, lock};
 use crate::point::PointBatch;
 use crate::report::{Grouped, Tally};
 use crate::stage::{CreateSink, Part, Source, Transform};
@@ -30,7 +35,7 @@ pub(crate) struct Job<'a> {
     pub unread: Vec<String>,
     pub ops: Vec<StageOp>,
     /// Stages that stream behind the decode.
-    pub filters: &'a [Filter],
+    pub filters: &'a [PassFilter],
     /// For each sink, those of them that are above it.
     pub changed_by: &'a [Vec<usize>],
     pub passes: Vec<Pass>,
@@ -40,7 +45,7 @@ pub(crate) struct Job<'a> {
     pub tagger: Tagger,
     pub classes: ClassOf,
     pub budget: Budget,
-    pub threads: usize,
+    pub threads: Threads<'a>,
     pub simd: Simd,
     pub drop_nonfinite: bool,
     pub headers: Headers,
@@ -95,7 +100,8 @@ impl Job<'_> {
         }
     }
 
-    /// True if a sink takes what the last stage of a branch leaves: classes are counted by its records.
+    /// True if a sink takes what the last stage of a branch leaves: classes are counted by its
+    /// records.
     pub fn is_last(&self, sink: usize) -> bool {
         self.branches.iter().any(|branch| branch.last_sink == sink)
     }
@@ -159,14 +165,10 @@ impl Job<'_> {
         if stop { Err(Error::interrupted()) } else { Ok(()) }
     }
 
-    /// Runs `work` on all threads; once one has failed, [`advance`](Job::advance) stops the others.
-    pub fn parallel(&self, work: impl Fn() -> Result<()> + Sync) -> Result<()> {
-        parallel(self.threads, |_| {
-            let guard = StopOnDrop::new(|| self.failed.store(true, Ordering::Relaxed));
-            work()?;
-            guard.disarm();
-            Ok(())
-        })
+    /// The `count` items of a phase; once one has failed, [`advance`](Job::advance) stops the
+    /// others.
+    pub fn items(&self, count: usize) -> PhaseItems<'_, impl Fn() + Sync> {
+        self.threads.items(count, || self.failed.store(true, Ordering::Relaxed))
     }
 
     /// The error of a record that has no place on the lattice.
@@ -199,28 +201,6 @@ impl Job<'_> {
         match self.source.inputs().get(batch.source as usize) {
             Some(input) => error.at(&input.path),
             None => error,
-        }
-    }
-}
-
-/// Calls its function when dropped, unless disarmed: what a thread does that leaves by an error or
-/// a panic.
-pub(crate) struct StopOnDrop<F: Fn()>(Option<F>);
-
-impl<F: Fn()> StopOnDrop<F> {
-    pub fn new(stop: F) -> Self {
-        StopOnDrop(Some(stop))
-    }
-
-    pub fn disarm(mut self) {
-        self.0 = None;
-    }
-}
-
-impl<F: Fn()> Drop for StopOnDrop<F> {
-    fn drop(&mut self) {
-        if let Some(stop) = &self.0 {
-            stop();
         }
     }
 }

@@ -1,38 +1,41 @@
-//! The mill: decode into the tile store, then pass after pass over the tiles, in canonical order into
-//! the sinks.
+//! The mill: decode into the tile store, then pass after pass over the tiles, in canonical order
+//! into the sinks.
+//!
+//! Everything goes through one sealed scan: passes read it and leave states, fates and columns
+//! beside it, so nothing is merged or sorted a second time, and branches share what is stored. What
+//! a pass left is kept until the last pass that goes on from it is done. A scan that fits in memory
+//! takes the same road as one that does not; only the spill then stays in memory.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::Value;
 
 use super::by_input::ByInput;
-use super::by_rank::{ByRank, Starts, place};
-use super::chunks::Found;
+use super::by_rank::ByRank;
+use super::chunks::FoundValues;
 use super::clock::Clock;
 use super::cut::{Cut, cut_again, cut_all};
+use super::decode::decode;
+use super::demands::Demands;
 use super::finished::{Finished, FinishedBranch};
 use super::forecast::{forecast, samples_capacity};
-use super::grind::{Field, Milled, PassOutputs, grind};
+use super::grind::{DecodedScan, Milled, PassOutputs, grind};
 use super::job::Job;
-use super::pass::{Branch, Call, Op, Pass};
-use super::shares::{BATCH, Demands, Shares};
+use super::pass::{Branch, Call, Pass};
+use super::settled::{conclude, decisions, rounding, settle};
+use super::shares::Shares;
 use super::survey::survey;
-use super::tagger::NOT_FINITE;
-use crate::budget::Lease;
-use crate::geom::lattice::{Lattice, Misplaced};
-use crate::host::lock;
-use crate::point::{Bounds, PointBatch, Position};
-use crate::report::{Baseline, BaselineFigures, Decision, Grouped, PassFigures, Short, Tally};
-use crate::stage::{Gathered, ScanFacts, Sink, SinkSummary};
-use crate::store::{Intake, SealedTiles, SpillArea, Tag, TileStore, seal};
+use crate::budget::{Bytes, Holders, Lease};
+use crate::geom::lattice::Lattice;
+use crate::report::{Baseline, BaselineFigures, Decision, PassFigures, Tally};
+use crate::stage::{Sink, SinkSummary};
+use crate::store::{SealedTiles, SpillArea, seal};
 use crate::tile::Sieve;
 use crate::{Error, Result};
 
-/// Runs a pipeline with tile stages (or one that only sorts) into `sinks`; none where each input has
-/// an output of its own.
+/// Runs a pipeline with tile stages (or one that only sorts) into `sinks`; none where each input
+/// has an output of its own.
 pub(crate) fn mill(
     job: &mut Job<'_>,
     lattice: &Lattice,
@@ -43,7 +46,9 @@ pub(crate) fn mill(
     clock: &mut Clock<'_>,
 ) -> Result<Finished> {
     clock.phase("decode", Some(job.source.points()));
+    let working = job.budget.lease_all(&demands.decode(shares.run_records as u64), "decoding")?;
     let (store, starts, mut tally) = decode(job, lattice, shares, area)?;
+    drop(working);
     job.check_headers()?;
     job.tell_left_out(&tally);
     tally.work("runs", store.runs() as u64);
@@ -52,7 +57,7 @@ pub(crate) fn mill(
     tally.count("positions", tiles.positions());
     settle(job, lattice, &tiles)?;
     let field =
-        Field { lattice, area: area.clone(), tiles: tiles.clone(), starts: Arc::new(starts) };
+        DecodedScan { lattice, area: area.clone(), tiles: tiles.clone(), starts: Arc::new(starts) };
     let mut course = Course {
         forecasts: vec![None; job.ops.len()],
         written: sinks.iter().map(|_| None).collect(),
@@ -95,11 +100,41 @@ struct Compared {
 }
 
 impl Standing {
-    /// What a grid would have done that leaves as many of the records that the passes decided about.
+    /// What a grid would have done that leaves as many of the records that the passes decided
+    /// about.
     fn baseline(&self, lattice: &Lattice) -> Option<BaselineFigures> {
         let Compared { baseline, decided, found } = self.compared.as_deref()?;
         let removed = found.checked_sub(self.alive)?;
         baseline.figures(decided.checked_sub(removed)?, *decided, lattice)
+    }
+
+    /// The same behind another pass, which came to `milled` and counted `tally`; and what a first
+    /// phase found in it.
+    fn behind(
+        mut self,
+        job: &Job<'_>,
+        pass: &Pass,
+        milled: Milled,
+        tally: &Tally,
+    ) -> (Standing, FoundValues) {
+        self.tally.merge(tally);
+        if let (Some(baseline), None) = (milled.baseline, &self.compared) {
+            let (decided, found) = (milled.decided, self.alive);
+            self.compared = Some(Arc::new(Compared { baseline, decided, found }));
+        }
+        let called = pass.calls.iter().map(|call| job.ops[call.op].kind.clone());
+        let streamed = pass.filters.iter().map(|&filter| job.filters[filter].kind.clone());
+        let (stages, after) = (called.chain(streamed).collect(), milled.counts.alive);
+        self.passes.push(PassFigures { stages, before: self.alive, after });
+        self.sieve.states = Some(milled.stored.states);
+        self.sieve.fates = Some(milled.stored.fates);
+        self.sieve.figures = milled.stored.figures;
+        if milled.stored.normals.is_some() {
+            self.sieve.oriented = milled.oriented;
+        }
+        self.sieve.normals = milled.stored.normals.or(self.sieve.normals.take());
+        (self.alive, self.kept) = (after, milled.counts.written);
+        (self, milled.stored.found)
     }
 }
 
@@ -120,15 +155,15 @@ impl Course {
         &mut self,
         job: &mut Job<'_>,
         decoded: Standing,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
         (shares, demands): (&Shares, &Demands),
         clock: &mut Clock<'_>,
     ) -> Result<Vec<FinishedBranch>> {
         let passes = std::mem::take(&mut job.passes);
         let cuts = cut_all(job, &passes, field.lattice, shares, demands, &field.tiles)?;
-        let milling = |cut: &Arc<Cut>| demands.mill_bytes(cut.millers, cut.capacity as u64);
-        let looking = demands.mill_bytes(job.threads, samples_capacity(shares) as u64);
-        let most = cuts.iter().map(milling).max().unwrap_or(0).max(looking);
+        let milling = |cut: &Arc<Cut>| demands.mill(cut.millers, cut.capacity as u64);
+        let looking = demands.mill(job.threads.count(), samples_capacity(shares) as u64);
+        let most = cuts.iter().map(milling).fold(looking, Holders::larger);
         self.tally.merge(&decoded.tally);
         // What the decode left comes first, then what each pass leaves.
         let mut left: Vec<Option<Standing>> = vec![Some(decoded)];
@@ -141,7 +176,7 @@ impl Course {
             let before = before.ok_or_else(|| Error::internal("a pass goes on from nothing"))?;
             let mut held = match working.take() {
                 Some(held) => held,
-                None => job.budget.lease(most, "mill")?,
+                None => job.budget.lease_all(&most, "mill")?,
             };
             let place = (pass, &cut, &mut held);
             let after = self.run(job, place, before, field, (shares, demands), clock)?;
@@ -166,10 +201,10 @@ impl Course {
         job: &Job<'_>,
         branch: &Branch,
         after: Standing,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
         clock: &mut Clock<'_>,
     ) -> Result<FinishedBranch> {
-        let Field { lattice, area, tiles, .. } = field;
+        let DecodedScan { lattice, area, tiles, .. } = field;
         clock.phase("survey", Some(2 * tiles.positions()));
         let mut measured = survey(job, lattice, area, tiles, &after.sieve)?;
         measured.totals.baseline = after.baseline(lattice);
@@ -191,18 +226,22 @@ impl Course {
     fn run(
         &mut self,
         job: &mut Job<'_>,
-        (pass, cut, working): (&Pass, &Arc<Cut>, &mut Lease),
+        (pass, cut, working): (&Pass, &Arc<Cut>, &mut Vec<Lease>),
         before: Standing,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
         (shares, demands): (&Shares, &Demands),
         clock: &mut Clock<'_>,
     ) -> Result<Standing> {
         let tiles = &field.tiles;
         let sieve = pass.sieve(&before.sieve);
         self.foresee(job, pass, field, &sieve, shares)?;
-        let held = working.bytes();
+        let held = working.iter().map(Lease::bytes).sum();
         let cut = cut_again(job, pass, field.lattice, (shares, demands), tiles, (cut, held))?;
-        working.resize(held.max(demands.mill_bytes(cut.millers, cut.capacity as u64)))?;
+        let milling = demands.mill(cut.millers, cut.capacity as u64);
+        if milling.sum() > Bytes(held) {
+            working.clear();
+            *working = job.budget.lease_all(&milling, "mill")?;
+        }
         let phase = if pass.gathers().is_some() { "gather" } else { "mill" };
         clock.phase(phase, Some(tiles.positions()));
         let mut tally = Tally::default();
@@ -211,37 +250,20 @@ impl Course {
         tally.work("tile_levels", levels.len() as u64);
         let ((sinks, by_input, by_rank), ordered) = self.outputs(job, pass, field)?;
         let which: Vec<usize> = sinks.iter().map(|(sink, _)| *sink).collect();
-        let milled = grind(job, (pass, &cut), field, &sieve, (sinks, by_input, by_rank))?;
+        let mut milled = grind(job, (pass, &cut), field, &sieve, (sinks, by_input, by_rank))?;
         drop(sieve);
         tally.merge(&milled.tally);
         self.write_lists(job, tiles, &milled, ordered, &mut tally, clock)?;
-        let outcomes = milled.counts.outputs.iter().copied().zip(milled.written);
+        let said = std::mem::take(&mut milled.written);
+        let outcomes = milled.counts.outputs.iter().copied().zip(said);
         for (sink, outcome) in which.into_iter().zip(outcomes) {
             self.written[sink] = Some(vec![outcome]);
         }
         self.tally.merge(&tally);
-        let found = (milled.stored.found, milled.decided);
-        let mut after = before;
-        after.tally.merge(&tally);
-        let (decided, found_alive) = (milled.decided, after.alive);
-        if let (Some(baseline), None) = (milled.baseline, &after.compared) {
-            after.compared = Some(Arc::new(Compared { baseline, decided, found: found_alive }));
-        }
-        let called = pass.calls.iter().map(|call| job.ops[call.op].kind.clone());
-        let streamed = pass.filters.iter().map(|&filter| job.filters[filter].kind.clone());
-        let (before, alive) = (after.alive, milled.counts.alive);
-        let stages = called.chain(streamed).collect();
-        after.passes.push(PassFigures { stages, before, after: alive });
-        after.sieve.states = Some(milled.stored.states);
-        after.sieve.fates = Some(milled.stored.fates);
-        after.sieve.figures = milled.stored.figures;
-        if milled.stored.normals.is_some() {
-            after.sieve.oriented = milled.oriented;
-        }
-        after.sieve.normals = milled.stored.normals.or(after.sieve.normals.take());
-        (after.alive, after.kept) = (alive, milled.counts.written);
+        let decided = milled.decided;
+        let (after, found) = before.behind(job, pass, milled, &tally);
         if let Some(op) = pass.gathers() {
-            conclude(job, op, found.0, found.1)?;
+            conclude(job, op, found, decided)?;
         }
         Ok(after)
     }
@@ -251,7 +273,7 @@ impl Course {
         &mut self,
         job: &mut Job<'_>,
         pass: &Pass,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
         sieve: &Sieve,
         shares: &Shares,
     ) -> Result<()> {
@@ -278,13 +300,13 @@ impl Course {
         Ok(())
     }
 
-    /// The outputs of a pass: those that grow while it mills, lists of those that are written behind
-    /// it, and the sinks that are then written in the order of the inputs.
+    /// The outputs of a pass: those that grow while it mills, lists of those that are written
+    /// behind it, and the sinks that are then written in the order of the inputs.
     fn outputs(
         &mut self,
         job: &Job<'_>,
         pass: &Pass,
-        field: &Field<'_>,
+        field: &DecodedScan<'_>,
     ) -> Result<(PassOutputs, Vec<Box<dyn Sink>>)> {
         let (mut sinks, mut by_input) = (Vec::new(), Vec::new());
         let (mut by_rank, mut ordered) = (Vec::new(), Vec::new());
@@ -333,199 +355,4 @@ impl Course {
         }
         Ok(())
     }
-}
-
-/// What a first phase found, for its stage.
-struct Whole {
-    found: Found,
-    records: u64,
-}
-
-impl Gathered for Whole {
-    fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()> {
-        self.found.each(visit)
-    }
-
-    fn records(&self) -> u64 {
-        self.records
-    }
-}
-
-fn conclude(job: &mut Job<'_>, op: usize, found: Found, records: u64) -> Result<()> {
-    let warning = match &mut job.ops[op].op {
-        Op::Scan(op) => op.conclude(&Whole { found, records })?,
-        Op::Tile(_) => return Err(Error::internal("a stage gathered that has one phase")),
-    };
-    warning.into_iter().for_each(|warning| job.warn(warning));
-    Ok(())
-}
-
-fn decode(
-    job: &Job<'_>,
-    lattice: &Lattice,
-    shares: &Shares,
-    area: &Arc<SpillArea>,
-) -> Result<(TileStore, Starts, Tally)> {
-    let _working = job.budget.lease(shares.work, "decoding")?;
-    let tagged = job.tagger.tags();
-    let mut store = TileStore::new(area, &job.budget, job.source.schema().stride, tagged);
-    let ranked = job.in_input_order.contains(&true);
-    if ranked {
-        store = store.with_places();
-    }
-    let parts = Mutex::new(vec![0; if ranked { job.source.parts() } else { 0 }]);
-    let total = Mutex::new(Tally::default());
-    let next = AtomicUsize::new(0);
-    job.parallel(|| {
-        let mut tally = Tally::default();
-        let mut intake = Intake::new(&store, shares.run_records);
-        let mut batch = PointBatch::new(job.source.schema().clone(), BATCH);
-        let mut placed = Placed::default();
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            if index >= job.source.parts() {
-                break;
-            }
-            let mut part = job.source.part_without(index, &job.unread)?;
-            let mut read = 0;
-            while job.read(&mut *part, &mut batch, &mut tally)? {
-                placed.first = place(index, read);
-                take(job, lattice, &batch, &mut placed, &mut intake, &mut tally)?;
-                read += batch.len() as u64;
-            }
-            lock(&parts).get_mut(index).into_iter().for_each(|part| *part = read);
-        }
-        intake.flush()?;
-        lock(&total).merge(&tally);
-        Ok(())
-    })?;
-    let tally = std::mem::take(&mut *lock(&total));
-    let starts = Starts::of(&lock(&parts));
-    Ok((store, starts, tally))
-}
-
-/// What of a batch goes to the intake; keeps its memory.
-#[derive(Default)]
-struct Placed {
-    positions: Vec<Position>,
-    tags: Vec<Tag>,
-    /// Place in the input of the batch's first record.
-    first: u64,
-    /// Indices of records that do not go there.
-    left_out: Vec<usize>,
-    /// How many of them the scan itself says are of no use, by reason.
-    useless: BTreeMap<&'static str, u64>,
-}
-
-/// Places a batch's records on the lattice and hands them to the intake.
-fn take(
-    job: &Job<'_>,
-    lattice: &Lattice,
-    batch: &PointBatch,
-    placed: &mut Placed,
-    intake: &mut Intake<'_>,
-    tally: &mut Tally,
-) -> Result<()> {
-    let stride = batch.schema().stride;
-    let records = batch.records();
-    let Placed { positions, tags, left_out, useless, first } = placed;
-    positions.clear();
-    tags.clear();
-    left_out.clear();
-    useless.clear();
-    let mut misplaced = Vec::new();
-    let tagger = &job.tagger;
-    lattice.place(
-        batch.schema(),
-        records,
-        |i, position| match tagger.look(&records[i * stride..(i + 1) * stride], batch.source) {
-            Err(reason) => {
-                *useless.entry(reason).or_default() += 1;
-                left_out.push(i);
-            }
-            Ok(tag) => {
-                tally.selections |= tag.selections();
-                positions.push(position);
-                tags.push(tag);
-            }
-        },
-        |i, why| misplaced.push((i, why)),
-    );
-    for (i, why) in misplaced {
-        if why == Misplaced::NotFinite && job.drop_nonfinite {
-            tally.remove(&job.source_kind, NOT_FINITE, 1);
-            left_out.push(i);
-        } else {
-            return Err(job.misplaced(batch, i, why));
-        }
-    }
-    useless.iter().for_each(|(reason, &count)| tally.remove(&job.source_kind, reason, count));
-    tally.work("placed", positions.len() as u64);
-    left_out.sort_unstable();
-    let (mut begin, mut at) = (0, 0);
-    for end in left_out.iter().copied().chain([batch.len()]) {
-        let count = end - begin;
-        let (these, of_these) = (&positions[at..at + count], &tags[at..at + count]);
-        intake.place(*first + begin as u64);
-        intake.take(these, &records[begin * stride..end * stride], of_these)?;
-        (begin, at) = (end + 1, at + count);
-    }
-    Ok(())
-}
-
-fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<()> {
-    let facts = ScanFacts {
-        points: tiles.points(),
-        positions: tiles.positions(),
-        bounds: tiles.bounds(),
-        lattice,
-        levels: tiles.levels(),
-    };
-    job.ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().settle(&facts))?;
-    let warnings = job.ops.iter().flat_map(|stage| stage.op.tile().warnings(lattice));
-    // Stages that are applied several times say it once.
-    let warnings: BTreeSet<String> = warnings.collect();
-    warnings.into_iter().for_each(|warning| job.warn(warning));
-    Ok(())
-}
-
-/// What the lattice rounded, as a decision of the report; a warning where it rounded much.
-fn rounding(job: &Job<'_>, lattice: &Lattice, bounds: &Bounds, tally: &Tally) -> Option<Decision> {
-    let apart = tally.apart?;
-    let count = |name| tally.counts.get(name).copied().unwrap_or(0);
-    let (unequal, positions) = (count("unequal_coordinates"), count("positions"));
-    if unequal > positions / 1000 {
-        let finer = match lattice.finer(bounds, apart.nearest) {
-            Some(step) => format!("`run.lattice = {step:e}` tells them apart"),
-            None => "no step that is finer reaches the scan from its origin".to_owned(),
-        };
-        job.warn(format!(
-            "{} of {} positions hold points of unequal coordinates, up to {} from each other: \
-             the lattice has steps of {}; {finer}",
-            Grouped(unequal),
-            Grouped(positions),
-            Short(apart.farthest),
-            Short(lattice.step)
-        ));
-    }
-    let (stage, name) = ("run".to_owned(), "unequal_coordinates_apart".to_owned());
-    Some(Decision { stage, name, value: apart.farthest.into() })
-}
-
-/// What the stages of a branch settled by themselves and what they expected, in their order.
-fn decisions(
-    job: &Job<'_>,
-    branch: &Branch,
-    forecasts: &[Option<Vec<(String, Value)>>],
-) -> Vec<Decision> {
-    let each = branch.ops.iter().flat_map(|&op| {
-        let (stage, expected) = (&job.ops[op], forecasts[op].clone());
-        let mut settled = stage.op.tile().decisions();
-        // What was chosen by samples may be among what is settled.
-        let is_new = |(name, _): &(String, Value)| settled.iter().all(|(other, _)| other != name);
-        let expected: Vec<_> = expected.into_iter().flatten().filter(is_new).collect();
-        settled.extend(expected);
-        settled.into_iter().map(|(name, value)| Decision { stage: stage.kind.clone(), name, value })
-    });
-    each.collect()
 }

@@ -1,6 +1,11 @@
-//! From a plan to a report: the phases of a run over the store, on threads; outputs that appear when
-//! they are complete. Knows no format, and no stage by name.
+//! From a plan to a report: the phases of a run over the store, on threads; outputs that appear
+//! when they are complete. Knows no format, and no stage by name.
+//!
+//! A phase is a list of items that read only what earlier phases have sealed and write pieces of
+//! their own. So any thread may take any item, no item waits for another, and what comes out is put
+//! together in the order of the items and not in that of the threads.
 
+mod account;
 pub(crate) mod beside;
 pub(crate) mod by_input;
 pub(crate) mod by_rank;
@@ -9,6 +14,8 @@ mod chunk;
 mod chunks;
 mod clock;
 mod cut;
+mod decode;
+pub(crate) mod demands;
 mod each;
 mod encoding;
 mod filtering;
@@ -16,15 +23,18 @@ mod finished;
 mod forecast;
 mod grind;
 pub(crate) mod job;
+mod lines;
 mod mill;
 mod outlet;
 pub(crate) mod pass;
+mod placed;
 mod product;
 pub(crate) mod publish;
 mod room;
 mod rounded;
 mod run;
 pub(crate) mod scratch;
+mod settled;
 pub(crate) mod shares;
 mod stream;
 mod survey;
@@ -32,7 +42,9 @@ pub(crate) mod tagger;
 pub(crate) mod task;
 mod watch;
 
+#[cfg(feature = "cli")]
 pub(crate) use publish::{make_folder, publish_bytes, refuse_existing};
 pub use run::Done;
+#[cfg(feature = "cli")]
 pub(crate) use scratch::Trouble;
 pub use watch::{Quiet, Watch};

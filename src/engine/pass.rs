@@ -1,4 +1,11 @@
-//! Passes over the scan: which tile stages run on each tile in turn, what they see, and what is stored.
+//! Passes over the scan: which tile stages run on each tile in turn, what they see, and what is
+//! stored.
+//!
+//! Stages that follow each other run on a tile while it is in memory, so that nothing is stored
+//! between them. That ends where a stage removes or marks records, as those behind it must not see
+//! them in the rim either, and where a stage decides by figures of the whole scan, which are known
+//! when all tiles were seen. A pass says whose outcome it goes on from, which makes chains and
+//! branches one case.
 
 use std::sync::Arc;
 
@@ -42,7 +49,7 @@ impl Op {
 
 /// A stage that streams, behind stages that work on tiles or on one of several branches: what it
 /// removes is entered in a pass of its own, and what it changes is changed as records are written.
-pub(crate) struct Filter {
+pub(crate) struct PassFilter {
     pub kind: String,
     pub transform: Box<dyn Transform>,
 }
@@ -114,8 +121,8 @@ impl Pass {
         self.calls.iter().map(|&call| needs(ops, call))
     }
 
-    /// The side of the cells that it decides in by normals, if it does: it is compared with grids of
-    /// such sides, whose cubes no face of a tile cuts.
+    /// The side of the cells that it decides in by normals, if it does: it is compared with grids
+    /// of such sides, whose cubes no face of a tile cuts.
     pub fn compares(&self, ops: &[StageOp]) -> Option<i64> {
         let by_normals = self.needs(ops).any(|needs| decides_by_normals(&needs));
         let side = self.needs(ops).map(|needs| needs.cell_side).max().filter(|side| *side > 0);
@@ -152,8 +159,8 @@ pub(crate) fn decides_by_normals(needs: &Needs) -> bool {
     decides(needs) && needs.reads.iter().any(|column| column == "Normal")
 }
 
-/// How many outcomes of passes are there at once at most: what a pass goes on from is dropped with the
-/// last that does, and the outcome of a branch's last pass when it is measured.
+/// How many outcomes of passes are there at once at most: what a pass goes on from is dropped with
+/// the last that does, and the outcome of a branch's last pass when it is measured.
 pub(crate) fn standings(passes: &[Pass]) -> usize {
     let goes_on = |from: usize| move |pass: &Pass| pass.behind == Some(from);
     let is_held = |from: usize, now: usize| passes[now..].iter().any(goes_on(from));

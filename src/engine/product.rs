@@ -1,16 +1,23 @@
 //! What a tile leaves behind: what becomes of each record of its core, and the columns that later
 //! passes read.
+//!
+//! A product is small against the tile that it comes from, so a thread can go on with its next tile
+//! while products wait for their turn. Records of one position that share what becomes of them are
+//! one entry, since a position may have millions of copies. The rim is not in it: another tile
+//! decides about that.
 
 use super::pass::Pass;
 use super::survey::fate_code;
 use crate::Result;
 use crate::point::Mark;
-use crate::store::{ASIDE, FATE_BYTES, FIGURE_BYTES, Fetch, NORMAL_BYTES, SealedTiles, State, Tag};
-use crate::tile::{Core, Fate, Run, Tile};
+use crate::store::{
+    ASIDE, FATE_BYTES, FIGURE_BYTES, Fetch, NORMAL_BYTES, RecordState, SealedTiles, Tag,
+};
+use crate::tile::{Core, Fate, RecordRun, Tile};
 
 /// Records of one position that follow one another and share what becomes of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Entry {
+pub(crate) struct RecordEntry {
     /// Number of the first.
     pub number: u64,
     /// How many.
@@ -18,15 +25,15 @@ pub(crate) struct Entry {
     /// What accompanies them.
     pub tag: Tag,
     /// Their state before the pass and behind it.
-    pub was: State,
-    pub now: State,
+    pub was: RecordState,
+    pub now: RecordState,
 }
 
 /// What a tile leaves behind.
 #[derive(Debug, Default)]
 pub(crate) struct Product {
     /// All records of the core, in canonical order.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<RecordEntry>,
     /// Normals of the entries, if a sink wants them.
     pub entry_normals: Option<Vec<[f32; 3]>>,
     /// Columns of the core's positions, as stored; the last two are empty if nobody reads them.
@@ -43,7 +50,7 @@ pub(crate) struct Product {
 impl Product {
     /// Bytes of a product for each position of the core, what a first phase finds aside.
     pub const BYTES_PER_POINT: usize =
-        size_of::<Entry>() + FATE_BYTES + NORMAL_BYTES + size_of::<[f32; 3]>() + FIGURE_BYTES;
+        size_of::<RecordEntry>() + FATE_BYTES + NORMAL_BYTES + size_of::<[f32; 3]>() + FIGURE_BYTES;
 
     /// Bytes more where places in the input are looked up.
     pub const PLACE_BYTES: usize = 2 * size_of::<(u64, u64)>();
@@ -65,16 +72,16 @@ impl Product {
             return Ok(product);
         }
         core.each(tile, |runs, stored| {
-            let slot = runs.first().map_or(Run::UNSEEN, |run| run.slot);
+            let slot = runs.first().map_or(RecordRun::UNSEEN, |run| run.slot);
             let fate = match slot {
-                Run::UNSEEN => Fate::Kept,
+                RecordRun::UNSEEN => Fate::Kept,
                 slot => tile.fates[slot as usize],
             };
             match (fate, stored) {
                 (Fate::Kept, Some(code)) => product.fates.extend_from_slice(&code),
                 (fate, _) => product.fates.extend_from_slice(&fate_code(fate)),
             }
-            let at = (slot != Run::UNSEEN).then_some(slot as usize);
+            let at = (slot != RecordRun::UNSEEN).then_some(slot as usize);
             let normal = at.map_or([f32::NAN; 3], |i| tile.normals[i]);
             if pass.stores_normals {
                 normal.iter().for_each(|v| product.normals.extend_from_slice(&v.to_le_bytes()));
@@ -93,7 +100,7 @@ impl Product {
     }
 
     /// The records that are written so far: the first of each stretch, how many, and their state.
-    pub fn written(&self) -> impl Iterator<Item = (u64, u64, State)> + '_ {
+    pub fn written(&self) -> impl Iterator<Item = (u64, u64, RecordState)> + '_ {
         let written = self.entries.iter().filter(|entry| entry.now.is_written());
         written.map(|entry| (entry.number, u64::from(entry.count), entry.now))
     }
@@ -111,12 +118,12 @@ impl Product {
                 false => entries.push(*entry),
                 true => (0..entry.count).zip(&mut kept).for_each(|(i, &is_kept)| {
                     let number = entry.number + u64::from(i);
-                    let now = if is_kept { entry.now } else { State::REMOVED };
+                    let now = if is_kept { entry.now } else { RecordState::REMOVED };
                     match entries.last_mut() {
-                        Some(Entry { count, now: before, .. }) if i > 0 && *before == now => {
+                        Some(RecordEntry { count, now: before, .. }) if i > 0 && *before == now => {
                             *count += 1;
                         }
-                        _ => entries.push(Entry { number, count: 1, now, ..*entry }),
+                        _ => entries.push(RecordEntry { number, count: 1, now, ..*entry }),
                     }
                 }),
             }
@@ -155,25 +162,30 @@ impl Product {
                 Fate::KeptOnce => count.min(1),
                 Fate::Removed | Fate::Represented { .. } => 0,
             };
-            let entry = Entry {
+            let entry = RecordEntry {
                 number,
                 count: kept,
                 tag: Tag::default(),
-                was: State::ALIVE,
-                now: State::ALIVE,
+                was: RecordState::ALIVE,
+                now: RecordState::ALIVE,
             };
             if kept > 0 {
                 self.entries.push(entry);
             }
             if count > kept {
                 let (number, count) = (number + u64::from(kept), count - kept);
-                self.entries.push(Entry { number, count, now: State::REMOVED, ..entry });
+                self.entries.push(RecordEntry {
+                    number,
+                    count,
+                    now: RecordState::REMOVED,
+                    ..entry
+                });
             }
         }
     }
 
     /// Enters the records of one position.
-    fn enter(&mut self, runs: &[Run], fate: Fate, pass: &Pass) {
+    fn enter(&mut self, runs: &[RecordRun], fate: Fate, pass: &Pass) {
         // How many of the records that the pass decides about are still to be kept.
         let mut keep = match fate {
             Fate::Kept => u32::MAX,
@@ -183,17 +195,17 @@ impl Product {
         for run in runs {
             let was = match run.tag.selections() & ASIDE {
                 0 => run.state,
-                _ if run.state.is_alive() => State::ASIDE,
+                _ if run.state.is_alive() => RecordState::ASIDE,
                 _ => run.state,
             };
-            let Run { mut number, count, tag, .. } = *run;
-            let mut push = |count: u32, now: State| {
+            let RecordRun { mut number, count, tag, .. } = *run;
+            let mut push = |count: u32, now: RecordState| {
                 if count > 0 {
-                    self.entries.push(Entry { number, count, tag, was, now });
+                    self.entries.push(RecordEntry { number, count, tag, was, now });
                     number += u64::from(count);
                 }
             };
-            if !pass.removes || run.slot == Run::UNSEEN || !run.is_in(pass.decided) {
+            if !pass.removes || run.slot == RecordRun::UNSEEN || !run.is_in(pass.decided) {
                 push(count, was);
                 continue;
             }
@@ -208,8 +220,8 @@ impl Product {
 }
 
 /// The state of a record that was in `state` and is kept, or would be removed.
-fn marked(mark: Option<Mark>, kept: bool, state: State) -> State {
-    let Some(mark) = mark else { return if kept { state } else { State::REMOVED } };
+fn marked(mark: Option<Mark>, kept: bool, state: RecordState) -> RecordState {
+    let Some(mark) = mark else { return if kept { state } else { RecordState::REMOVED } };
     let state = if kept { state } else { state.aside() };
     mark.edit(kept).map_or(state, |edit| state.edited(edit))
 }

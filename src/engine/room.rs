@@ -1,4 +1,9 @@
 //! Whether the disks have room for what a run writes, asked before its work.
+//!
+//! A run of hours should not end at a full disk that could have been seen at its beginning. What is
+//! known to be written is refused where it does not fit, and what may be written is a warning: how
+//! far outputs are compressed, and how many points are left, only the work tells. Folders on one
+//! disk are added up.
 
 use std::collections::BTreeMap;
 use std::os::unix::fs::MetadataExt;
@@ -73,8 +78,9 @@ impl Disk {
         let most = needed.saturating_add(*again);
         Ok((*free < most).then(|| {
             format!(
-                "{}: only {} are free here; an output that is written anew because its colours turn \
-                 out to have more or fewer bits makes it {} in all: `write.colors` says how many",
+                "{}: only {} are free here; an output that is written anew because its colours \
+                 turn out to have more or fewer bits makes it {} in all: `write.colors` says how \
+                 many",
                 shown(folder),
                 Bytes(*free),
                 Bytes(most)

@@ -1,4 +1,9 @@
 //! What a lattice of rounded positions hides: coordinates that differ and share a position.
+//!
+//! Decisions are made on integers, so points closer than a step are one position to every stage.
+//! That is right for scans whose format has such steps, and a loss for those with numbers of any
+//! size. It is measured and told, instead of being avoided by a finer lattice for all, which would
+//! not reach far enough from the origin.
 
 use std::sync::Arc;
 
@@ -26,9 +31,9 @@ impl<'a> Rounded<'a> {
         Rounded { tiles, fetch: Fetch::default(), batch, lattice }
     }
 
-    /// Enters how far records of unequal coordinates are from each other into `fates`, which are those
-    /// of the positions given by their first record and number of records: where one of them is kept,
-    /// the others are not on it. Counts such positions in `tally`.
+    /// Enters how far records of unequal coordinates are from each other into `fates`, which are
+    /// those of the positions given by their first record and number of records: where one of them
+    /// is kept, the others are not on it. Counts such positions in `tally`.
     pub fn enter(
         &mut self,
         positions: &[(u64, u32)],

@@ -1,37 +1,35 @@
 //! Running a plan: begin, stream or mill, account, publish.
+//!
+//! Everything that can be refused is refused first: places for outputs are made, sinks are opened,
+//! memory is divided and disks are asked before the first point is read. Nothing gets its name
+//! before the ledgers balance, so a run that fails leaves what was there as it was.
 
-use std::fs::{self, File};
-use std::io::{BufRead, BufWriter};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
+use super::account::{nothing_left, write_report};
 use super::by_rank::LISTED;
 use super::clock::Clock;
-use super::finished::{Finished, FinishedBranch};
+use super::demands::Demands;
+use super::finished::Finished;
 use super::job::{Each, Job};
 use super::mill::mill;
-use super::pass::Branch;
 use super::publish::{Staged, make_folder, publish};
 use super::room;
 use super::room::Taken;
 use super::scratch::{Scratch, Trouble, memory_warning};
-use super::shares::Demands;
 use super::stream::stream;
-use super::survey::Lines;
-use super::tagger::{ClassOf, LEFT_OUT, NOT_FINITE};
+use super::tagger::ClassOf;
 use super::task::Task;
 use crate::budget::Budget;
-use crate::graph::{Nonfinite, Spill};
-use crate::host::lock;
-use crate::host::process::peak_memory;
+use crate::graph::{Nonfinite, SpillSetting};
+use crate::host::{Threads, lock};
 use crate::point::names;
-use crate::report::{
-    Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome, Removed, Report,
-    RunFigures, check_written,
-};
-use crate::stage::{CreateSink, Input, Sink, SinkSummary, Source};
+use crate::report::{FileFigures, Report, RunFigures};
+use crate::stage::Sink;
 use crate::store::SpillArea;
 use crate::{Error, Result};
 
@@ -53,16 +51,28 @@ impl std::fmt::Display for Done {
 }
 
 impl Task {
-    /// Runs the task; outputs appear under their names when all of it is done.
+    /// Runs the task on threads of its own; outputs appear under their names when all of it is
+    /// done.
     pub fn run(self, watch: &dyn Watch) -> Result<Done> {
+        Threads::start(self.threads, |threads| self.run_on(threads, watch))
+    }
+
+    /// Runs the task on these threads.
+    pub fn run_on(mut self, threads: Threads<'_>, watch: &dyn Watch) -> Result<Done> {
+        self.threads = threads.count();
         let trouble = Trouble::default();
-        let outcome = self.run_and_publish(watch, &trouble);
+        let outcome = self.run_and_publish(threads, watch, &trouble);
         // All scratch is gone by now, or will not go.
         lock(&trouble).iter().for_each(|told| watch.warn(told));
         outcome
     }
 
-    fn run_and_publish(mut self, watch: &dyn Watch, trouble: &Trouble) -> Result<Done> {
+    fn run_and_publish(
+        mut self,
+        threads: Threads<'_>,
+        watch: &dyn Watch,
+        trouble: &Trouble,
+    ) -> Result<Done> {
         let mut clock = Clock::new(watch);
         let outputs = self.stage(trouble)?;
         let nothing = || Error::pipeline("the pipeline writes nothing");
@@ -70,7 +80,8 @@ impl Task {
         let staged_report =
             self.settings.report.as_deref().map(|path| first.also(path, trouble)).transpose()?;
         let tell = |error| outputs.iter().flatten().fold(error, |error, output| output.tell(error));
-        let (finished, mut run) = self.work(&outputs, &mut clock, watch, trouble).map_err(tell)?;
+        let (finished, mut run) =
+            self.work(&outputs, threads, &mut clock, watch, trouble).map_err(tell)?;
         let beside: Vec<Staged> =
             self.beside.iter().map(|copy| copy.make(first, trouble)).collect::<Result<_>>()?;
         run.outputs.extend(beside.iter().zip(&self.beside).map(|(staged, copy)| {
@@ -88,14 +99,6 @@ impl Task {
         publish(&outputs, staged_report.as_ref())?;
         let unit = self.source.metadata().units.sign();
         Ok(Done { report, report_path: self.settings.report, unit })
-    }
-
-    /// The files of a sink, one for each input where it is a folder.
-    fn files(&self, sink: usize) -> &[Box<dyn CreateSink>] {
-        match self.each.get(sink) {
-            Some(each) if !each.is_empty() => each,
-            _ => &self.sinks[sink..=sink],
-        }
     }
 
     /// Makes places for the files of all sinks.
@@ -118,8 +121,8 @@ impl Task {
         Ok(outputs)
     }
 
-    /// Opens the sinks but those of the inputs, which are created one by one, when their records are
-    /// known.
+    /// Opens the sinks but those of the inputs, which are created one by one, when their records
+    /// are known.
     fn create_sinks(&self, outputs: &[Vec<Staged>]) -> Result<Vec<Option<Box<dyn Sink>>>> {
         let schema = self.source.schema();
         let whole = !self.mills
@@ -140,6 +143,7 @@ impl Task {
     fn work(
         &mut self,
         outputs: &[Vec<Staged>],
+        threads: Threads<'_>,
         clock: &mut Clock<'_>,
         watch: &dyn Watch,
         trouble: &Trouble,
@@ -147,21 +151,22 @@ impl Task {
         let sinks = self.create_sinks(outputs)?;
         let shares = self.demands.divide()?;
         let budget = Budget::new(self.demands.limit);
-        let _base = budget.lease(shares.base, "program")?;
+        let _base = budget.lease_all(&self.demands.base(), "program")?;
         let spill = match (&self.settings.scratch, outputs.iter().flatten().next()) {
             (None, Some(first)) => first.scratch().clone(),
             (Some(folder), _) => Arc::new(Scratch::below(folder, trouble)),
             (None, None) => return Err(Error::pipeline("the pipeline writes nothing")),
         };
         let kept_in_memory = match self.settings.spill {
-            Spill::Auto => shares.kept_in_memory,
-            Spill::Always => 0,
+            SpillSetting::Auto => shares.kept_in_memory,
+            SpillSetting::Always => 0,
         };
         let area = SpillArea::new(budget.clone(), kept_in_memory, Box::new(spill.clone()));
         let unread = self.unread();
         let transforms = std::mem::take(&mut self.transforms);
         let (ops, passes) = (std::mem::take(&mut self.ops), std::mem::take(&mut self.passes));
-        let mut job = Job { transforms, ops, passes, unread, ..self.job(outputs, &budget, watch) };
+        let mut job =
+            Job { transforms, ops, passes, unread, ..self.job(outputs, &budget, threads, watch) };
         let doubts = self.check_room(outputs, spill.parent(), kept_in_memory, &job)?;
         self.warnings.iter().cloned().chain(doubts).for_each(|warning| job.warn(warning));
         let finished = match &self.lattice {
@@ -171,7 +176,8 @@ impl Task {
             lattice => {
                 clock.phase("convert", Some(self.source.points()));
                 let sinks = sinks.into_iter().flatten().collect();
-                stream(&job, &shares, sinks, lattice.as_ref())?
+                let _working = budget.lease_all(&self.demands.stream(), "streaming")?;
+                stream(&job, sinks, lattice.as_ref())?
             }
         };
         let earlier = std::mem::take(&mut *lock(&job.warnings));
@@ -185,8 +191,8 @@ impl Task {
         Ok((finished, run))
     }
 
-    /// Refuses disks that have no room for what is spilled and, where nothing is removed, for outputs;
-    /// a warning where a disk may be too small.
+    /// Refuses disks that have no room for what is spilled and, where nothing is removed, for
+    /// outputs; a warning where a disk may be too small.
     fn check_room(
         &self,
         outputs: &[Vec<Staged>],
@@ -217,8 +223,8 @@ impl Task {
         self.branch_of.iter().map(|&branch| named[branch].clone()).collect()
     }
 
-    /// The dimensions that nobody looks at: no sink, and neither what counts classes and tells records
-    /// apart by class and flags. What a transform looks at is not known for sure.
+    /// The dimensions that nobody looks at: no sink, and neither what counts classes and tells
+    /// records apart by class and flags. What a transform looks at is not known for sure.
     fn unread(&self) -> Vec<String> {
         const LOOKED_AT: [&str; 5] = [
             names::CLASSIFICATION,
@@ -240,6 +246,7 @@ impl Task {
         &'a self,
         outputs: &'a [Vec<Staged>],
         budget: &Budget,
+        threads: Threads<'a>,
         watch: &'a dyn Watch,
     ) -> Job<'a> {
         let each = self.each.iter().zip(&self.sinks).zip(outputs).map(|((each, sink), staged)| {
@@ -264,7 +271,7 @@ impl Task {
             tagger: self.tagger.clone(),
             classes: ClassOf::new(self.source.schema()),
             budget: budget.clone(),
-            threads: self.threads,
+            threads,
             simd: self.simd,
             drop_nonfinite: self.settings.nonfinite == Nonfinite::Drop,
             headers: self.settings.headers,
@@ -277,157 +284,6 @@ impl Task {
             failed: AtomicBool::new(false),
         }
     }
-
-    /// The files of all sinks, each with the records that it was given and what it said.
-    fn written<'a>(
-        &'a self,
-        finished: &'a Finished,
-    ) -> impl Iterator<Item = (&'a dyn CreateSink, &'a (u64, SinkSummary))> {
-        let files = (0..self.sinks.len()).flat_map(|sink| self.files(sink)).map(|file| &**file);
-        files.zip(finished.written.iter().flatten())
-    }
-
-    /// What is known of the run when its output is written.
-    fn figures(&self, finished: &Finished, budget: &Budget, spill_bytes: u64) -> RunFigures {
-        let mut warnings = self.source.warnings();
-        let all = finished.written.iter().flatten();
-        warnings.extend(all.flat_map(|(_, sink)| sink.notes.iter().cloned()));
-        let outputs = self.written(finished).map(|(sink, (_, summary))| {
-            FileFigures::of(sink.path(), summary.points, Some(summary.bytes))
-        });
-        RunFigures {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            inputs: input_figures(&*self.source),
-            outputs: outputs.collect(),
-            machine: Machine::this(),
-            threads: self.threads,
-            memory_bytes: self.demands.limit,
-            leased_bytes: budget.peak(),
-            spill_bytes,
-            warnings,
-            ..RunFigures::default()
-        }
-    }
-
-    /// The report of a finished run, once its ledgers balance, and the lines of the tiles of each
-    /// branch.
-    fn account(
-        &self,
-        finished: Finished,
-        mut run: RunFigures,
-        clock: Clock<'_>,
-    ) -> Result<(Report, Vec<Option<Lines>>)> {
-        for (sink, (given, summary)) in self.written(&finished) {
-            check_written(sink.path(), *given, summary.points)?;
-        }
-        (run.seconds, run.cpu_seconds, run.phases) = clock.finish();
-        run.peak_memory_bytes = peak_memory();
-        run.work = finished.tally.work.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect();
-        let (mut results, mut lines) = (Vec::new(), Vec::new());
-        for (branch, came_to) in self.branches.iter().zip(finished.branches) {
-            let (result, tiles) = self.outcome(branch, came_to, finished.read)?;
-            results.push(result);
-            lines.push(tiles);
-        }
-        let mut results = results.into_iter();
-        let result = results.next().ok_or_else(|| Error::internal("a run came to nothing"))?;
-        Ok((Report { result, further: results.collect(), run }, lines))
-    }
-
-    /// What a branch came to, of so many records that were read.
-    fn outcome(
-        &self,
-        branch: &Branch,
-        finished: FinishedBranch,
-        read: u64,
-    ) -> Result<(Outcome, Option<Lines>)> {
-        let ledger = Ledger::new(read, finished.kept, &finished.tally);
-        ledger.check()?;
-        let (tile_side, totals, tiles) = match finished.measured {
-            Some(measured) => {
-                (Some(measured.tile_side), Some(measured.totals), Some(measured.tiles))
-            }
-            None => (None, None, None),
-        };
-        let lattice = self.lattice.as_ref();
-        let mut decisions = finished.decisions;
-        if let Some(lattice) = lattice.filter(|lattice| lattice.z_scale() != 1.0) {
-            let (stage, name) = ("run".to_owned(), "z_scale".to_owned());
-            decisions.insert(0, Decision { stage, name, value: lattice.z_scale().into() });
-        }
-        let outcome = Outcome {
-            pipeline: branch.stages.clone(),
-            lattice: lattice.map(|l| LatticeFigures { step: l.step, shift: l.shift }),
-            ledger,
-            decisions,
-            counts: finished.tally.counts.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect(),
-            passes: finished.passes,
-            tile_side,
-            totals,
-            classes: finished.classes,
-        };
-        Ok((outcome, tiles))
-    }
-}
-
-/// Says that outputs are empty: that the input was so too, or what removed the points, by the settings
-/// that say so where there are any: the stages of commands are nothing that their users know.
-fn nothing_left(finished: &Finished, job: &Job<'_>) -> Vec<String> {
-    if finished.read == 0 {
-        return vec!["the inputs have no points: what is written has none either".to_owned()];
-    }
-    let behind = job.filters.iter().map(|filter| (&filter.kind, &filter.transform));
-    let streams: Vec<_> =
-        job.transforms.iter().map(|(kind, stage)| (kind, stage)).chain(behind).collect();
-    let keys = |r: &Removed| -> Vec<&str> {
-        let ours = streams.iter().filter(|(kind, _)| **kind == r.stage);
-        let run = LEFT_OUT.iter().filter(|(reason, ..)| *reason == r.reason);
-        let nonfinite = (r.reason == NOT_FINITE).then_some("run.nonfinite");
-        let of_run = run.map(|(_, setting, _)| *setting).chain(nonfinite);
-        ours.flat_map(|(_, stage)| stage.removes_by()).chain(of_run).collect()
-    };
-    let by = |r: &Removed| {
-        let keys: Vec<String> = keys(r).iter().map(|key| format!("`{key}`")).collect();
-        let by = if keys.is_empty() { r.stage.clone() } else { keys.join(" and ") };
-        format!("{} {} ({by})", Grouped(r.records), r.reason)
-    };
-    let empty = finished.branches.iter().filter(|branch| branch.kept == 0);
-    let ledgers = empty.map(|branch| Ledger::new(finished.read, branch.kept, &branch.tally));
-    let told = ledgers.map(|ledger| {
-        let by: Vec<String> = ledger.removed.iter().map(by).collect();
-        format!("no point is left of {}: {}", Grouped(ledger.read), by.join(", "))
-    });
-    told.collect()
-}
-
-/// The lines of a branch's report tiles; none if it has none.
-fn lines_of(tiles: &Option<Lines>) -> Box<dyn BufRead + '_> {
-    match tiles {
-        Some(lines) => Box::new(lines.reader()),
-        None => Box::new(std::io::empty()),
-    }
-}
-
-/// Writes the report to `staged` and brings it to disk.
-fn write_report(staged: &Path, report: &Report, tiles: &[Option<Lines>]) -> Result<()> {
-    let write = || {
-        let mut out = BufWriter::new(File::create(staged)?);
-        report.write_all(&mut out, tiles.iter().map(lines_of))?;
-        out.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()
-    };
-    // Lines that the spill cannot give back are its error, about its file.
-    write().map_err(|e| match e.downcast::<Error>() {
-        Ok(error) => error,
-        Err(e) => Error::io(staged, "write the report", e),
-    })
-}
-
-fn input_figures(source: &dyn Source) -> Vec<FileFigures> {
-    let figures = |input: Input| {
-        let bytes = fs::metadata(&input.path).ok().map(|about| about.len());
-        FileFigures::of(&input.path, input.points, bytes)
-    };
-    source.inputs().into_iter().map(figures).collect()
 }
 
 /// Bytes that a run spills: records, their order, packed positions twice (runs and merged scan),

@@ -152,13 +152,13 @@ fn mark(open: &OwnedFd, folder: &Path, host: &Host) -> io::Result<Option<File>> 
     Ok(Some(marker))
 }
 
-/// A warning if `folder` is on a file system that is memory itself: what spills there is not counted
-/// in the run's budget, and frees nothing. `spilled` is how much did.
+/// A warning if `folder` is on a file system that is memory itself: what spills there is not
+/// counted in the run's budget, and frees nothing. `spilled` is how much did.
 pub fn memory_warning(folder: &Path, spilled: u64) -> Option<String> {
     let name = disk::memory_itself(folder).filter(|_| spilled > 0)?;
     Some(format!(
-        "{}: {} were spilled to a file system in memory ({name}), beyond the budget of the run: name a \
-         folder on a disk with `run.scratch`",
+        "{}: {} were spilled to a file system in memory ({name}), beyond the budget of the run: \
+         name a folder on a disk with `run.scratch`",
         shown(folder),
         Bytes(spilled)
     ))

@@ -1,18 +1,24 @@
 //! The last walk over the decoded scan: what the reduction did to each report tile and to all.
+//!
+//! Figures of a report must be the same for every memory and number of threads, so they are not
+//! gathered while the mill works on tiles of its own: states and fates are stored, and walked once
+//! more over report tiles that follow from the scan alone. Sums are the same in whatever order
+//! parts of the scan are merged, so each thread keeps one of all that it walked.
+//!
+//! The walk is made in two phases, since distances to a plane can be summed only when the plane is
+//! fitted. Their items are ranges of blocks; a report tile belongs to the range that it begins in.
 
-use std::collections::BTreeMap;
-use std::io::{self, BufRead, Read};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use super::job::Job;
+use super::lines::{LINES_AT_ONCE, RangeLines, TileLines};
+use crate::budget::Bytes;
 use crate::geom::lattice::Lattice;
-use crate::host::lock;
 use crate::point::Position;
-use crate::report::{Lot, ScanSurvey, TileFigures, Totals, report_tile_level};
+use crate::report::{FittedScan, Lot, ScanSurvey, Totals, report_tile_level};
 use crate::store::{
-    BLOCK, FATE_BYTES, PIECE, Pieces, Reader, SealedTiles, Spill, SpillArea, State, Stretch,
-    TileKey,
+    BLOCK, FATE_BYTES, PIECE, Pieces, Reader, RecordState, SealedTiles, Spill, SpillArea,
+    StoredStretch, TileKey,
 };
 use crate::tile::{Fate, Sieve};
 use crate::{Error, Result};
@@ -35,8 +41,8 @@ pub(crate) fn fate_code(fate: Fate) -> [u8; FATE_BYTES] {
 }
 
 /// The stored fate of a position whose records are up to `apart` steps from each other, because the
-/// lattice rounds: where one of them is kept, that is how far the others deviate. Stored as the negative
-/// of it, which is never one of the codes above.
+/// lattice rounds: where one of them is kept, that is how far the others deviate. Stored as the
+/// negative of it, which is never one of the codes above.
 pub(crate) fn apart_code(code: [u8; FATE_BYTES], apart: f64) -> [u8; FATE_BYTES] {
     if f32::from_le_bytes(code) != KEPT_ONCE {
         return code;
@@ -58,79 +64,6 @@ fn deviation_of(code: [u8; FATE_BYTES]) -> Option<f32> {
     }
 }
 
-/// Lines of the report's tiles, in order, wherever points are kept: there may be millions.
-pub(crate) struct Lines {
-    spill: Spill,
-    stretches: Vec<Stretch>,
-}
-
-impl Lines {
-    /// Reads the lines one stretch after the other.
-    pub fn reader(&self) -> LineReader<'_> {
-        LineReader { spill: &self.spill, left: self.stretches.iter(), open: Vec::new(), at: 0 }
-    }
-}
-
-/// See [`Lines::reader`]. Its errors hold the [`Error`] of the spill.
-pub(crate) struct LineReader<'a> {
-    spill: &'a Spill,
-    left: std::slice::Iter<'a, Stretch>,
-    open: Vec<u8>,
-    at: usize,
-}
-
-impl BufRead for LineReader<'_> {
-    fn fill_buf(&mut self) -> io::Result<&[u8]> {
-        if self.at == self.open.len() {
-            self.open.clear();
-            self.at = 0;
-            if let Some(stretch) = self.left.next() {
-                self.spill.load(stretch, &mut self.open).map_err(io::Error::other)?;
-            }
-        }
-        Ok(&self.open[self.at..])
-    }
-
-    fn consume(&mut self, bytes: usize) {
-        self.at += bytes;
-    }
-}
-
-impl Read for LineReader<'_> {
-    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        let read = self.fill_buf()?.read(into)?;
-        self.consume(read);
-        Ok(read)
-    }
-}
-
-/// Lines are handed to the spill in stretches of about this size.
-const LINES_AT_ONCE: usize = 1 << 18;
-
-/// The lines of the tiles that begin in one range.
-struct RangeLines<'a> {
-    spill: &'a Spill,
-    open: Vec<u8>,
-    stretches: Vec<Stretch>,
-}
-
-impl RangeLines<'_> {
-    fn add(&mut self, figures: &TileFigures) -> Result<()> {
-        figures
-            .write_line(&mut self.open)
-            .map_err(|e| Error::internal("a report line could not be written").because(e))?;
-        if self.open.len() >= LINES_AT_ONCE { self.store() } else { Ok(()) }
-    }
-
-    fn store(&mut self) -> Result<()> {
-        if !self.open.is_empty() {
-            self.stretches.push(self.spill.store(&self.open)?);
-            self.open.clear();
-        }
-        Ok(())
-    }
-}
-
 /// What was measured.
 pub(crate) struct Measured {
     /// Side of the report tiles in world units.
@@ -138,16 +71,16 @@ pub(crate) struct Measured {
     /// Figures of the scan.
     pub totals: Totals,
     /// Lines of the report's tiles, in order.
-    pub tiles: Lines,
+    pub tiles: TileLines,
 }
 
 /// Bytes that a thread of a survey holds.
-pub(crate) fn survey_bytes() -> u64 {
-    2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64) + Stretches::BYTES
+pub(crate) fn survey_bytes() -> Bytes {
+    Bytes(2 * (ScanSurvey::BYTES + LINES_AT_ONCE as u64) + KeptBlocks::BYTES)
 }
 
-/// Measures, on all threads, the reduction of `tiles` whose positions have the stored fates and whose
-/// records have the stored states of `sieve`.
+/// Measures, on all threads, the reduction of `tiles` whose positions have the stored fates and
+/// whose records have the stored states of `sieve`.
 pub(crate) fn survey(
     job: &Job<'_>,
     lattice: &Lattice,
@@ -157,70 +90,24 @@ pub(crate) fn survey(
 ) -> Result<Measured> {
     let level = report_tile_level(tiles.levels());
     let missing = || Error::internal("a scan is surveyed that no pass went over");
-    let walk = Walk {
+    let walk = ScanWalk {
         tiles,
         fates: sieve.fates.as_ref().ok_or_else(missing)?,
         states: sieve.states.as_ref().ok_or_else(missing)?,
         level,
     };
-    let ranges = tiles.blocks().div_ceil(BLOCKS);
-    let all_threads = survey_bytes().saturating_mul(job.threads as u64);
-    let _working = job.budget.lease(all_threads, "survey")?;
+    let all_threads = survey_bytes() * job.threads.count() as u64;
+    let _working = job.budget.lease(all_threads.0, "survey")?;
     let spill = Spill::new(area, "report");
-    let all = Mutex::new((ScanSurvey::new(&tiles.bounds()), BTreeMap::new()));
-    each_range(job, ranges, |range| {
-        let mut scan = ScanSurvey::new(&tiles.bounds());
-        let mut lines = RangeLines { spill: &spill, open: Vec::new(), stretches: Vec::new() };
-        let positions = walk.tiles_from(range, lattice, &mut scan, &mut lines)?;
-        lines.store()?;
-        let mut all = lock(&all);
-        all.0.merge(&scan);
-        all.1.insert(range, lines.stretches);
-        Ok(positions)
-    })?;
-    let (scan, lines) =
-        std::mem::replace(&mut *lock(&all), (ScanSurvey::new(&tiles.bounds()), BTreeMap::new()));
-    let fitted = Mutex::new(scan.fit());
-    let empty = lock(&fitted).part();
-    each_range(job, ranges, |range| {
-        let mut part = empty.clone();
-        let mut positions = 0;
-        let mut stretches = Stretches::new(1);
-        for block in range * BLOCKS..((range + 1) * BLOCKS).min(tiles.blocks()) {
-            let (these, lots) = stretches.of(&walk, block)?;
-            part.measure_all(these, lots);
-            positions += these.len() as u64;
-        }
-        lock(&fitted).merge(&part);
-        Ok(positions)
-    })?;
-    let fitted = fitted.into_inner().map_err(|_| Error::internal("a survey thread panicked"))?;
+    let (scan, lines) = walk.tally(job, lattice, &spill)?;
     Ok(Measured {
         tile_side: (level as f64).exp2() * lattice.step,
-        totals: fitted.finish(lattice)?,
-        tiles: Lines { spill, stretches: lines.into_values().flatten().collect() },
+        totals: walk.measure(job, scan)?.finish(lattice)?,
+        tiles: TileLines::new(spill, lines),
     })
 }
 
-/// Calls `work` for every range, on all threads; it returns how many positions it did.
-fn each_range(
-    job: &Job<'_>,
-    ranges: usize,
-    work: impl Fn(usize) -> Result<u64> + Sync,
-) -> Result<()> {
-    let next = AtomicUsize::new(0);
-    job.parallel(|| {
-        loop {
-            let range = next.fetch_add(1, Ordering::Relaxed);
-            if range >= ranges {
-                return Ok(());
-            }
-            job.advance(work(range)?)?;
-        }
-    })
-}
-
-struct Walk<'a> {
+struct ScanWalk<'a> {
     tiles: &'a SealedTiles,
     fates: &'a Pieces,
     states: &'a Pieces,
@@ -236,7 +123,7 @@ struct Seen {
 }
 
 impl Seen {
-    fn load(&mut self, walk: &Walk<'_>, block: usize, columns: &mut Columns) -> Result<()> {
+    fn load(&mut self, walk: &ScanWalk<'_>, block: usize, columns: &mut Columns) -> Result<()> {
         self.block = None;
         let (positions, copies) = walk.tiles.read(block, &mut self.reader)?;
         let records = copies.iter().map(|&n| u64::from(n)).sum::<u64>();
@@ -249,7 +136,7 @@ impl Seen {
         if records == positions.len() as u64 {
             walk.states.collect(rank, records, buffer, states)?;
             self.lots.extend(fates.zip(&*states).map(|(deviation, &state)| {
-                let kept = State(state).is_alive().into();
+                let kept = RecordState(state).is_alive().into();
                 Lot { copies: 1, kept, deviation }
             }));
         } else {
@@ -264,7 +151,7 @@ impl Seen {
                     }
                     left += 1;
                     if let Some(lot) = &mut lot {
-                        lot.kept += u32::from(State(state).is_alive());
+                        lot.kept += u32::from(RecordState(state).is_alive());
                     }
                 }
                 Ok(())
@@ -287,12 +174,12 @@ struct Columns {
 const KEPT_BLOCKS: usize = 64;
 
 /// The blocks last seen.
-struct Stretches {
+struct KeptBlocks {
     kept: Vec<Seen>,
     columns: Columns,
 }
 
-impl Stretches {
+impl KeptBlocks {
     /// Bytes that they hold.
     const BYTES: u64 = (KEPT_BLOCKS * BLOCK * (2 * size_of::<Position>() + size_of::<Lot>() + 4)
         + 3 * PIECE
@@ -300,11 +187,11 @@ impl Stretches {
 
     fn new(blocks: usize) -> Self {
         let kept = (0..blocks).map(|_| Seen::default()).collect();
-        Stretches { kept, columns: Columns::default() }
+        KeptBlocks { kept, columns: Columns::default() }
     }
 
     /// The positions of a block and their lots.
-    fn of(&mut self, walk: &Walk<'_>, block: usize) -> Result<(&[Position], &[Lot])> {
+    fn of(&mut self, walk: &ScanWalk<'_>, block: usize) -> Result<(&[Position], &[Lot])> {
         let slot = block % self.kept.len();
         let stretch = &mut self.kept[slot];
         if stretch.block != Some(block) {
@@ -314,7 +201,58 @@ impl Stretches {
     }
 }
 
-impl Walk<'_> {
+impl ScanWalk<'_> {
+    /// Ranges of blocks, the items of both phases.
+    fn ranges(&self) -> usize {
+        self.tiles.blocks().div_ceil(BLOCKS)
+    }
+
+    /// The first phase: planes of the scan and of the report's tiles, whose lines go to the spill.
+    fn tally(
+        &self,
+        job: &Job<'_>,
+        lattice: &Lattice,
+        spill: &Spill,
+    ) -> Result<(ScanSurvey, Vec<StoredStretch>)> {
+        let mut stored = Vec::new();
+        let empty = || ScanSurvey::new(&self.tiles.bounds());
+        let scans = job.items(self.ranges()).run(
+            || (empty(), KeptBlocks::new(KEPT_BLOCKS)),
+            |(scan, stretches), range| {
+                let mut lines = RangeLines::new(spill);
+                let positions = self.tiles_from(range, lattice, scan, stretches, &mut lines)?;
+                job.advance(positions)?;
+                lines.finish()
+            },
+            |stretches| stored.extend(stretches),
+            |(scan, _)| Ok(scan),
+        )?;
+        let mut all = empty();
+        scans.iter().for_each(|scan| all.merge(scan));
+        Ok((all, stored))
+    }
+
+    /// The second phase: how far the points are from the planes that the first one fitted.
+    fn measure(&self, job: &Job<'_>, scan: ScanSurvey) -> Result<FittedScan> {
+        let mut fitted = scan.fit();
+        let parts = job.items(self.ranges()).run(
+            || (fitted.part(), KeptBlocks::new(1)),
+            |(part, stretches), range| {
+                let mut positions = 0;
+                for block in range * BLOCKS..((range + 1) * BLOCKS).min(self.tiles.blocks()) {
+                    let (these, lots) = stretches.of(self, block)?;
+                    part.measure_all(these, lots);
+                    positions += these.len() as u64;
+                }
+                job.advance(positions)
+            },
+            |()| {},
+            |(part, _)| Ok(part),
+        )?;
+        parts.iter().for_each(|part| fitted.merge(part));
+        Ok(fitted)
+    }
+
     /// Surveys the report tiles that begin in a range of blocks; returns how many positions they
     /// have.
     fn tiles_from(
@@ -322,27 +260,27 @@ impl Walk<'_> {
         range: usize,
         lattice: &Lattice,
         scan: &mut ScanSurvey,
+        stretches: &mut KeptBlocks,
         lines: &mut RangeLines<'_>,
     ) -> Result<u64> {
         let end = ((range + 1) * BLOCKS).min(self.tiles.blocks());
-        let mut stretches = Stretches::new(KEPT_BLOCKS);
         let mut at = (range * BLOCKS, 0);
         if let Some(before) = at.0.checked_sub(1)
             && let Some(&last) = stretches.of(self, before)?.0.last()
         {
             // The tile that reaches into this range belongs to the one before.
-            at = self.end_of(TileKey::around(last, self.level), at.0, &mut stretches)?;
+            at = self.end_of(TileKey::around(last, self.level), at.0, stretches)?;
         }
         let mut positions = 0;
         while at.0 < end {
             let key = TileKey::around(stretches.of(self, at.0)?.0[at.1], self.level);
             let mut tile = scan.tile(key);
-            let (next, seen) = self.visit(&mut stretches, at, key, |positions, lots| {
+            let (next, seen) = self.visit(stretches, at, key, |positions, lots| {
                 tile.add_all(positions, lots);
                 scan.add_all(positions, lots);
             })?;
             let mut fitted = tile.fit();
-            self.visit(&mut stretches, at, key, |positions, lots| {
+            self.visit(stretches, at, key, |positions, lots| {
                 fitted.measure_all(positions, lots);
             })?;
             lines.add(&fitted.finish(lattice, scan)?)?;
@@ -352,13 +290,13 @@ impl Walk<'_> {
         Ok(positions)
     }
 
-    /// The first position behind the cube of `key`, which reaches to the beginning of block `from` or
-    /// into it.
+    /// The first position behind the cube of `key`, which reaches to the beginning of block `from`
+    /// or into it.
     fn end_of(
         &self,
         key: TileKey,
         from: usize,
-        stretches: &mut Stretches,
+        stretches: &mut KeptBlocks,
     ) -> Result<(usize, usize)> {
         let cube = key.cube();
         let (mut inside, mut behind) = (from, self.tiles.blocks());
@@ -379,11 +317,11 @@ impl Walk<'_> {
         Ok(if whole { (inside, 0) } else { (inside - 1, end) })
     }
 
-    /// Visits the positions of the cube of `key` from block and index `at` on, block by block; returns
-    /// where they end and how many there were.
+    /// Visits the positions of the cube of `key` from block and index `at` on, block by block;
+    /// returns where they end and how many there were.
     fn visit(
         &self,
-        stretches: &mut Stretches,
+        stretches: &mut KeptBlocks,
         mut at: (usize, usize),
         key: TileKey,
         mut visit: impl FnMut(&[Position], &[Lot]),

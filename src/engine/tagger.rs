@@ -1,12 +1,16 @@
 //! Looks at every record once, as it is decoded: the selections that it is in, whether it is
 //! withheld, and its class.
+//!
+//! Later passes ask this of a record each time that they load it, and records are stored in bytes
+//! of their format, in another order than positions. A tag of four bytes beside the reference to a
+//! record answers without fetching it, and is not stored where no stage asks.
 
 use crate::graph::{RunSettings, Treatment};
 use crate::point::{
     Chooser, Dimension, Endian, Flag, PointBatch, Scalar, Schema, Selection, Value, names,
 };
 use crate::report::{ClassCounts, Tally};
-use crate::store::{ASIDE, State, Tag};
+use crate::store::{ASIDE, RecordState, Tag};
 
 /// Tells records apart as stages and settings ask.
 #[derive(Debug, Clone)]
@@ -31,8 +35,8 @@ struct Useless {
     reason: &'static str,
 }
 
-/// The reasons for which the ledger has records that the decode leaves out, the setting that decides
-/// it, and what they are.
+/// The reasons for which the ledger has records that the decode leaves out, the setting that
+/// decides it, and what they are.
 pub(crate) const LEFT_OUT: [(&str, &str, &str); 2] = [
     ("withheld", "run.withheld", "with the withheld flag"),
     ("noise", "run.noise", "of the classes 7 and 18 (noise)"),
@@ -42,9 +46,9 @@ pub(crate) const NOT_FINITE: &str = "not finite";
 const NOISE: [u8; 2] = [7, 18];
 
 impl Tagger {
-    /// A tagger for records of `schema`; `inputs` are the numbers that tags carry for the inputs, if
-    /// they are to, and `classes` says if they carry the class. A selection by what these do not have
-    /// selects nothing.
+    /// A tagger for records of `schema`; `inputs` are the numbers that tags carry for the inputs,
+    /// if they are to, and `classes` says if they carry the class. A selection by what these do not
+    /// have selects nothing.
     pub fn new(schema: &Schema, selections: &[Selection], classes: bool, inputs: Vec<u32>) -> Self {
         let mut idle: Vec<Flag> = selections.iter().flat_map(|s| s.idle(schema)).collect();
         idle.sort_unstable();
@@ -99,8 +103,8 @@ impl Tagger {
         Ok(self.class.as_ref().map_or(tag, |class| tag.of_class(class.of(record))))
     }
 
-    /// What the user should know when all records have been looked at; `met` are the selections that
-    /// one of them is in, a bit each.
+    /// What the user should know when all records have been looked at; `met` are the selections
+    /// that one of them is in, a bit each.
     pub fn warnings(&self, met: u8) -> Vec<String> {
         let nobody = |(n, (selection, _)): (usize, &(Selection, Chooser))| {
             (met >> n & 1 == 0).then(|| {
@@ -149,7 +153,7 @@ impl ClassOf {
     }
 
     /// Counts as kept those records of `batch` whose state is so.
-    pub fn keep_by_state(&self, batch: &PointBatch, states: &[State], tally: &mut Tally) {
+    pub fn keep_by_state(&self, batch: &PointBatch, states: &[RecordState], tally: &mut Tally) {
         self.each(batch, tally, |counts, i, class| {
             if states[i].is_kept() {
                 counts.keep(class);

@@ -1,8 +1,12 @@
 //! What the engine runs: a pipeline whose stages fit each other, its inputs and the memory.
+//!
+//! It is made by the plan and says everything that a run depends on, so the engine asks neither the
+//! pipeline's text nor its graph. A run consumes it: stages settle, and could not be run twice from
+//! their beginning.
 
 use super::beside::Beside;
-use super::pass::{Branch, Filter, Pass, StageOp};
-use super::shares::Demands;
+use super::demands::Demands;
+use super::pass::{Branch, Pass, PassFilter, StageOp};
 use super::tagger::Tagger;
 use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
@@ -19,7 +23,7 @@ pub(crate) struct Task {
     pub transforms: Vec<(String, Box<dyn Transform>)>,
     pub ops: Vec<StageOp>,
     /// Stages that stream behind the decode.
-    pub filters: Vec<Filter>,
+    pub filters: Vec<PassFilter>,
     pub passes: Vec<Pass>,
     pub branches: Vec<Branch>,
     pub sinks: Vec<Box<dyn CreateSink>>,
@@ -43,4 +47,14 @@ pub(crate) struct Task {
     pub demands: Demands,
     /// What the user should know before the run.
     pub warnings: Vec<String>,
+}
+
+impl Task {
+    /// The files of a sink, one for each input where it is a folder.
+    pub fn files(&self, sink: usize) -> &[Box<dyn CreateSink>] {
+        match self.each.get(sink) {
+            Some(each) if !each.is_empty() => each,
+            _ => &self.sinks[sink..=sink],
+        }
+    }
 }

@@ -1,4 +1,8 @@
 //! How a run tells its progress and hears that it should stop.
+//!
+//! The engine prints nothing and reads no signals: a program that uses the library has its own way
+//! to show progress. It is called as things happen, on the threads that work, so what it does
+//! should take little time.
 
 use crate::report::Decision;
 
@@ -13,7 +17,8 @@ pub trait Watch: Sync {
     /// Something the user should know, once.
     fn warn(&self, message: &str);
 
-    /// The stages chose values of keys by what they saw of the scan, before a pass that works by them.
+    /// The stages chose values of keys by what they saw of the scan, before a pass that works by
+    /// them.
     fn chose(&self, _values: &[Decision]) {}
 
     /// True if the run should stop; asked between batches and tiles.

@@ -209,7 +209,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_range_test_is_that_of_arc_cosines(a in unit(), b in unit(), n in unit(), delta in 0.0f64..3.2) {
+        fn the_range_test_is_that_of_arc_cosines(
+            a in unit(), b in unit(), n in unit(), delta in 0.0f64..3.2,
+        ) {
             let delta = delta.min(std::f64::consts::PI);
             let n = n.map(f64::from);
             let (a, b) = (cosine(n, a, false), cosine(n, b, false));
@@ -222,11 +224,14 @@ mod tests {
         fn a_turned_normal_has_the_cosine_of_its_opposite(n in unit(), reference in unit()) {
             let reference = reference.map(f64::from);
             let opposite = n.map(|v| -v);
-            prop_assert_eq!(cosine(reference, n, true).to_bits(), cosine(reference, opposite, false).to_bits());
+            let [turned, plain] = [cosine(reference, n, true), cosine(reference, opposite, false)];
+            prop_assert_eq!(turned.to_bits(), plain.to_bits());
         }
 
         #[test]
-        fn the_axis_is_an_eigenvector_of_the_largest_eigenvalue(normals in prop::collection::vec(unit(), 1..9)) {
+        fn the_axis_is_an_eigenvector_of_the_largest_eigenvalue(
+            normals in prop::collection::vec(unit(), 1..9),
+        ) {
             let m = outer_sum(normals.iter().copied());
             let axis = dominant_axis(m);
             let length2: f64 = axis.iter().map(|v| v * v).sum();
@@ -236,7 +241,8 @@ mod tests {
                 prop_assert!((image[i] - value * axis[i]).abs() < 1e-7 * value * length2.sqrt());
             }
             for n in normals {
-                let quotient = (0..3).map(|i| column(m, n.map(f64::from))[i] * f64::from(n[i])).sum::<f64>();
+                let product = column(m, n.map(f64::from));
+                let quotient = (0..3).map(|i| product[i] * f64::from(n[i])).sum::<f64>();
                 prop_assert!(quotient <= value * (1.0 + 1e-6));
             }
             prop_assert!(axis[largest(axis)] > 0.0);

@@ -113,7 +113,8 @@ mod tests {
     proptest::proptest! {
         #[test]
         fn products_and_sums_are_exact(
-            a: [u64; 2], b: [u64; 2], c in proptest::array::uniform3(proptest::num::u64::ANY), n: u64,
+            a: [u64; 2], b: [u64; 2], n: u64,
+            c in proptest::array::uniform3(proptest::num::u64::ANY),
         ) {
             let product = Wide::product(number(a), number(b));
             proptest::prop_assert_eq!(product.words(), plain(&digits(&a), &digits(&b)));

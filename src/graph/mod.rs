@@ -1,12 +1,13 @@
-//! What a pipeline is, whoever wrote it: stages, and who takes from whom. Knows neither the language
-//! that it was written in, nor the inputs that it will be fitted to.
+//! What a pipeline is, however it was written: stages, and which takes from which. Knows neither
+//! the language that it was written in, nor the inputs that it will be fitted to.
 //!
-//! A [`Graph`] is a tree of stages below one or several sources. It is checked in one place, when it is
-//! whole ([`Graph::mistakes`]): the language tells what is found there with the places in its text, the
-//! plan as an error.
+//! A [`Graph`] is a tree of stages below one or several sources. It is checked in one place, when
+//! it is whole ([`Graph::mistakes`]): the language tells what is found there with the places in its
+//! text, the plan as an error.
 
 mod limits;
 mod settings;
+mod size;
 mod written;
 
 use std::fmt;
@@ -17,9 +18,10 @@ use crate::stage::{Order, Role};
 
 pub use limits::{LimitKeys, Limits, Sees};
 pub use settings::{
-    Existing, Headers, MOST_THREADS, MixedUnits, Nonfinite, Overrides, RunSettings, Simd, Spill,
-    Treatment, ZScale, parse_bytes,
+    Existing, Headers, MOST_THREADS, MixedUnits, Nonfinite, Overrides, RunSettings, SimdSetting,
+    SpillSetting, Treatment, ZScale,
 };
+pub use size::parse_bytes;
 pub use written::Written;
 
 /// A pipeline: stages, each of which takes from stages before it.
@@ -57,7 +59,7 @@ pub struct GraphStage {
 
 /// What is wrong with the way in which the stages of a graph hang together.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Misplaced {
+pub struct GraphMistake {
     /// The number of the stage.
     pub stage: usize,
     /// What is wrong.
@@ -95,13 +97,14 @@ impl Graph {
     }
 
     /// Everything that is wrong with how the stages hang together.
-    pub fn mistakes(&self) -> Vec<Misplaced> {
+    pub fn mistakes(&self) -> Vec<GraphMistake> {
         let mut wrong = Vec::new();
         let mut tell = |stage, told: &str, help| {
-            wrong.push(Misplaced { stage, told: told.to_owned(), help });
+            wrong.push(GraphMistake { stage, told: told.to_owned(), help });
         };
         let is_source = |n: &usize| matches!(self.stages[*n].role, Role::Source(_));
         let is_sink = |n: &usize| matches!(self.stages[*n].role, Role::Sink(_));
+        let sources: Vec<usize> = (0..self.stages.len()).filter(is_source).collect();
         for (n, stage) in self.stages.iter().enumerate() {
             if stage.from.iter().any(|from| *from >= n) {
                 tell(n, "a stage takes from stages before it", None);
@@ -115,6 +118,9 @@ impl Graph {
                 }
                 (false, [_, _, ..]) if !stage.from.iter().all(is_source) => {
                     tell(n, "only sources can be merged", None);
+                }
+                (false, from) if from.iter().any(is_source) && from != sources => {
+                    tell(n, "the sources of a pipeline are one scan: take from all of them", None);
                 }
                 _ => {}
             }
@@ -140,7 +146,8 @@ impl Graph {
         wrong
     }
 
-    /// The graph as JSON: for each stage its kind, name, keys, and the numbers of those it takes from.
+    /// The graph as JSON: for each stage its kind, name, keys, and the numbers of those it takes
+    /// from.
     pub fn to_json(&self) -> serde_json::Value {
         let stage = |stage: &GraphStage| {
             serde_json::json!({

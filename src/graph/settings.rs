@@ -5,14 +5,15 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Deserializer, de};
 
+use super::size::some_bytes;
 use crate::geom::simd;
 use crate::geom::simd::Level;
 use crate::quantity::Whole;
 use crate::{Error, Result};
 
 /// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`,
-/// `withheld` and `noise` changes what is computed. All are optional; arguments of the same name take their
-/// place.
+/// `withheld` and `noise` changes what is computed. All are optional; arguments of the same name
+/// take their place.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RunSettings {
@@ -29,39 +30,42 @@ pub struct RunSettings {
     pub report: Option<PathBuf>,
     /// What becomes of files that are already where an output or the report is to be.
     pub existing: Existing,
-    /// Lattice step in world units; none: as the inputs' headers have it, or 2^-30 where coordinates
-    /// are floats. A run warns where that merges more than one position in a thousand whose points
-    /// have unequal coordinates, and says what step does not. Sides that are "auto" are powers of two of
-    /// steps: another step gives them other lengths, and other points are kept, also in number.
+    /// Lattice step in world units; none: as the inputs' headers have it, or 2^-30 where
+    /// coordinates are floats. A run warns where that merges more than one position in a thousand
+    /// whose points have unequal coordinates, and says what step does not. Sides that are "auto"
+    /// are powers of two of steps: another step gives them other lengths, and other points are
+    /// kept, also in number.
     #[serde(deserialize_with = "some_step")]
     pub lattice: Option<f64>,
-    /// What z is multiplied by wherever distances are measured, so that its unit is that of x and y;
-    /// the records keep their z. None: 1, where the units match or are not known; of units that give
-    /// reason for doubt (feet below heights of no unit, a reference system of no known unit) a run
-    /// warns, and of a scan without a reference system, or in metres without one for z, it does not.
+    /// What z is multiplied by wherever distances are measured, so that its unit is that of x and
+    /// y; the records keep their z. None: 1, where the units match or are not known; of units that
+    /// give reason for doubt (feet below heights of no unit, a reference system of no known unit) a
+    /// run warns, and of a scan without a reference system, or in metres without one for z, it does
+    /// not.
     pub z_scale: Option<ZScale>,
     /// What becomes of scans whose x, y and z have different units, where stages measure distances.
     pub units: MixedUnits,
     /// What becomes of points whose coordinates are not finite, where stages measure distances. A
     /// pipeline that streams copies them unless they are dropped: a conversion keeps its records.
     pub nonfinite: Nonfinite,
-    /// What becomes of scans whose points are not as their LAS header says, which damage looks like:
-    /// outside of its box, or counted otherwise by return. LAZ has no checksum; this is what stands in
-    /// for one. A box that holds none of a LAZ file's points (less than 99 in 100 of a LAS file's), or
-    /// that is not set, is told as a warning in any case; one wider than the points is right.
+    /// What becomes of scans whose points are not as their LAS header says, which damage looks
+    /// like: outside of its box, or counted otherwise by return. LAZ has no checksum; this is what
+    /// stands in for one. A box that holds none of a LAZ file's points (less than 99 in 100 of a
+    /// LAS file's), or that is not set, is told as a warning in any case; one wider than the points
+    /// is right.
     pub headers: Headers,
     /// What becomes of points with the withheld flag, in pipelines that work on tiles; others keep
     /// every point.
     pub withheld: Treatment,
-    /// What becomes of points of the classes 7 and 18, low and high noise, in pipelines that work on
-    /// tiles; none: they are points like all others. The command `reduce` leaves them out.
+    /// What becomes of points of the classes 7 and 18, low and high noise, in pipelines that work
+    /// on tiles; none: they are points like all others. The command `reduce` leaves them out.
     pub noise: Option<Treatment>,
     /// Most points a tile's cube holds, for tests; none: as the memory allows.
     pub tile_points: Option<NonZeroUsize>,
     /// Which of the equal code paths runs, for tests.
-    pub simd: Simd,
+    pub simd: SimdSetting,
     /// Whether points may stay in memory, for tests.
-    pub spill: Spill,
+    pub spill: SpillSetting,
 }
 
 /// What becomes of files that are already where an output or the report is to be.
@@ -114,7 +118,8 @@ pub enum MixedUnits {
 /// What z is multiplied by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ZScale {
-    /// What the units in the coordinate reference system ask for; refused where it does not tell both.
+    /// What the units in the coordinate reference system ask for; refused where it does not tell
+    /// both.
     Auto,
     /// This number, above 0.
     Factor(f64),
@@ -136,7 +141,7 @@ pub enum Treatment {
 /// Where decoded points wait for the mill.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Spill {
+pub enum SpillSetting {
     /// In memory as far as it goes, on disk beyond.
     #[default]
     Auto,
@@ -147,7 +152,7 @@ pub enum Spill {
 /// Which of the equal code paths runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Simd {
+pub enum SimdSetting {
     /// The fastest that the processor has.
     #[default]
     Auto,
@@ -159,7 +164,7 @@ pub enum Simd {
     Portable,
 }
 
-impl Simd {
+impl SimdSetting {
     /// What kernels are to run by.
     ///
     /// # Errors
@@ -167,10 +172,10 @@ impl Simd {
     /// If this processor does not have it.
     pub(crate) fn resolve(self) -> Result<simd::Simd> {
         let level = match self {
-            Simd::Auto => return Ok(simd::Simd::best()),
-            Simd::Avx2 => Level::Avx2,
-            Simd::Avx512 => Level::Avx512,
-            Simd::Portable => Level::Portable,
+            SimdSetting::Auto => return Ok(simd::Simd::best()),
+            SimdSetting::Avx2 => Level::Avx2,
+            SimdSetting::Avx512 => Level::Avx512,
+            SimdSetting::Portable => Level::Portable,
         };
         simd::Simd::of(level).ok_or_else(|| {
             Error::pipeline(format!("this processor has no {}", level.name()))
@@ -204,95 +209,6 @@ impl RunSettings {
             ..self
         }
     }
-}
-
-/// Bytes in a unit; the first of each is the one that messages use.
-const UNITS: [(&str, u64); 9] = [
-    ("B", 1),
-    ("KiB", 1 << 10),
-    ("MiB", 1 << 20),
-    ("GiB", 1 << 30),
-    ("TiB", 1 << 40),
-    ("kB", 1_000),
-    ("MB", 1_000_000),
-    ("GB", 1_000_000_000),
-    ("TB", 1_000_000_000_000),
-];
-
-/// Reads a size: `512MiB`, `1.5 GiB`, `2GB`, or bytes without a unit. A fraction of a byte is cut off.
-///
-/// The error says what a size looks like.
-///
-/// ```
-/// assert_eq!(pointmill::graph::parse_bytes("1.5GiB"), Ok(1_610_612_736));
-/// assert!(pointmill::graph::parse_bytes("2G").is_err());
-/// ```
-pub fn parse_bytes(text: &str) -> Result<u64, String> {
-    let refused = || {
-        let units: Vec<&str> = UNITS.iter().map(|(unit, _)| *unit).collect();
-        let short: String = text.chars().take(40).collect();
-        let meant = meant(text).map_or(String::new(), |meant| format!(": write {meant}"));
-        let units = units.join(", ");
-        format!("`{short}` is no size such as 512MiB or 2GiB{meant} (units: {units})")
-    };
-    let text = text.trim();
-    let split = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
-    let (number, unit) = (&text[..split], text[split..].trim_start());
-    let scale = match unit {
-        "" => 1,
-        _ => UNITS.iter().find(|(name, _)| *name == unit).ok_or_else(refused)?.1,
-    };
-    let (whole, fraction) = number.split_once('.').unwrap_or((number, "0"));
-    let fraction = &fraction[..fraction.len().min(9)];
-    let parse = |digits: &str| digits.parse::<u64>().map_err(|_| refused());
-    let part = u128::from(parse(fraction)?) * u128::from(scale) / 10u128.pow(fraction.len() as u32);
-    let bytes = u128::from(parse(whole)?) * u128::from(scale) + part;
-    match u64::try_from(bytes) {
-        Ok(0) => Err(format!("{}: a size is at least one byte", refused())),
-        Ok(bytes) => Ok(bytes),
-        Err(_) => Err(format!("{}: too large", refused())),
-    }
-}
-
-/// The size that was meant by a unit of other letters: `2GiB` for `2G` and `2gb`.
-fn meant(text: &str) -> Option<String> {
-    let text = text.trim();
-    let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic())?);
-    let of = |unit: &str| UNITS.iter().find(|(known, _)| known.eq_ignore_ascii_case(unit));
-    let (unit, _) = of(unit).or_else(|| of(&format!("{unit}iB")))?;
-    // What is written as it was typed is wrong for another reason.
-    Some(format!("{}{unit}", number.trim_end()))
-        .filter(|size| size != text && parse_bytes(size).is_ok())
-}
-
-fn some_bytes<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u64>, D::Error> {
-    struct Size;
-    impl de::Visitor<'_> for Size {
-        type Value = u64;
-
-        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-            f.write_str("a size such as \"2GiB\", or bytes")
-        }
-
-        fn visit_str<E: de::Error>(self, text: &str) -> Result<u64, E> {
-            parse_bytes(text).map_err(E::custom)
-        }
-
-        fn visit_u64<E: de::Error>(self, bytes: u64) -> Result<u64, E> {
-            match bytes {
-                0 => Err(E::invalid_value(de::Unexpected::Unsigned(0), &self)),
-                _ => Ok(bytes),
-            }
-        }
-
-        fn visit_i64<E: de::Error>(self, bytes: i64) -> Result<u64, E> {
-            match u64::try_from(bytes) {
-                Ok(bytes) => self.visit_u64(bytes),
-                Err(_) => Err(E::invalid_value(de::Unexpected::Signed(bytes), &self)),
-            }
-        }
-    }
-    from.deserialize_any(Size).map(Some)
 }
 
 impl<'de> Deserialize<'de> for ZScale {
@@ -337,8 +253,8 @@ fn some_threads<'de, D: Deserializer<'de>>(from: D) -> Result<Option<NonZeroUsiz
 }
 
 fn some_step<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
-    struct Step;
-    impl de::Visitor<'_> for Step {
+    struct StepVisitor;
+    impl de::Visitor<'_> for StepVisitor {
         type Value = f64;
 
         fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -360,42 +276,5 @@ fn some_step<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error
             self.visit_f64(step as f64)
         }
     }
-    from.deserialize_any(Step).map(Some)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sizes_have_binary_and_decimal_units() {
-        for (text, bytes) in [
-            ("1", 1),
-            ("1024", 1024),
-            ("1B", 1),
-            ("1KiB", 1 << 10),
-            ("512MiB", 512 << 20),
-            ("2GiB", 2 << 30),
-            (" 2 GiB ", 2 << 30),
-            ("1.5GiB", 3 << 29),
-            ("3TiB", 3 << 40),
-            ("1kB", 1000),
-            ("1MB", 1_000_000),
-            ("0.25GB", 250_000_000),
-            ("1TB", 1_000_000_000_000),
-            ("18446744073709551615", u64::MAX),
-        ] {
-            assert_eq!(parse_bytes(text), Ok(bytes), "{text}");
-        }
-    }
-
-    #[test]
-    fn what_is_no_size_is_refused() {
-        let wrong = ["", "GiB", "2G", "2gib", "-1", "1e3", "1.2.3GiB", "1,5GiB", "0", "0.1B", "１"];
-        for text in wrong {
-            assert!(parse_bytes(text).is_err(), "{text}");
-        }
-        assert!(parse_bytes("99999999TiB").unwrap_err().ends_with("too large"));
-        assert!(parse_bytes("18446744073709551616").is_err());
-    }
+    from.deserialize_any(StepVisitor).map(Some)
 }

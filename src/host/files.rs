@@ -1,5 +1,5 @@
-//! The files that a command reads and those that it writes, and that none of them is another: names,
-//! links and further names of one file are the same here. Knows no stages.
+//! The files that a command reads and those that it writes, and that none of them is another:
+//! names, links and further names of one file are the same here. Knows no stages.
 
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -70,8 +70,8 @@ impl Files {
         }
     }
 
-    /// Enters a file that becomes a copy of `from`; false if there is nothing to do, because it is that
-    /// file or becomes its copy already.
+    /// Enters a file that becomes a copy of `from`; false if there is nothing to do, because it is
+    /// that file or becomes its copy already.
     ///
     /// # Errors
     ///

@@ -1,5 +1,5 @@
-//! What differs from system to system, and what every room needs of it: the process's memory and its
-//! limits, disks, the identity of files, threads. Knows neither points nor runs.
+//! What differs from system to system, and what every room needs of it: the process's memory and
+//! its limits, disks, the identity of files, threads. Knows neither points nor runs.
 
 pub(crate) mod disk;
 pub(crate) mod files;
@@ -7,4 +7,4 @@ pub mod process;
 pub(crate) mod threads;
 
 pub(crate) use files::{Clash, Files, Use};
-pub use threads::{lock, parallel};
+pub use threads::{PhaseItems, Threads, lock};

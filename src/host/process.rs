@@ -6,14 +6,14 @@ use std::path::{Component, Path};
 /// What is taken for the machine's memory where the system does not tell.
 const ASSUMED_MEMORY: u64 = 4 << 30;
 
-/// The most memory that was resident in this process at once (VmHWM), in bytes; None where the system
-/// does not tell.
+/// The most memory that was resident in this process at once (VmHWM), in bytes; None where the
+/// system does not tell.
 pub fn peak_memory() -> Option<u64> {
     kibibytes(&fs::read_to_string("/proc/self/status").ok()?, "VmHWM")
 }
 
-/// The memory that is resident in this process now (VmRSS), in bytes; None where the system does not
-/// tell.
+/// The memory that is resident in this process now (VmRSS), in bytes; None where the system does
+/// not tell.
 pub fn resident_now() -> Option<u64> {
     kibibytes(&fs::read_to_string("/proc/self/status").ok()?, "VmRSS")
 }
@@ -64,8 +64,8 @@ fn total_memory(meminfo: &str) -> Option<u64> {
 }
 
 /// The smallest memory limit of the control groups that /proc/self/cgroup names (cgroups(7)) and of
-/// those around them, mounted at `root`. A line is `hierarchy:controllers:path`; version 2 has number
-/// 0 and no controllers.
+/// those around them, mounted at `root`. A line is `hierarchy:controllers:path`; version 2 has
+/// number 0 and no controllers.
 fn group_limit(root: &Path, groups: &str) -> Option<u64> {
     let mut smallest = None;
     for line in groups.lines() {
@@ -89,8 +89,8 @@ fn group_limit(root: &Path, groups: &str) -> Option<u64> {
     smallest
 }
 
-/// The smallest figure in `file` of the group at `path` and of every group around it. A group that is
-/// not visible in this mount (a container's) is passed over.
+/// The smallest figure in `file` of the group at `path` and of every group around it. A group that
+/// is not visible in this mount (a container's) is passed over.
 fn limit_along(mount: &Path, path: &str, file: &str) -> Option<u64> {
     let names = Path::new(path).components().filter_map(|part| match part {
         Component::Normal(name) => Some(name),

@@ -1,5 +1,5 @@
-//! Records of one format as records of another: every dimension goes where its name is, and what the
-//! target cannot hold is told, never changed. Knows no files.
+//! Records of one format as records of another: every dimension goes where its name is, and what
+//! the target cannot hold is told, never changed. Knows no files.
 
 mod columns;
 mod step;
@@ -37,9 +37,9 @@ pub struct Projection {
 }
 
 impl Projection {
-    /// The projection from one schema to another. A dimension of `to` that `from` lacks is 0; one of
-    /// `from` that `to` lacks is an error unless `drop` names it, and so is a name in `drop` that
-    /// `from` lacks. Coordinates cannot be dropped.
+    /// The projection from one schema to another. A dimension of `to` that `from` lacks is 0; one
+    /// of `from` that `to` lacks is an error unless `drop` names it, and so is a name in `drop`
+    /// that `from` lacks. Coordinates cannot be dropped.
     pub fn new(from: &Schema, to: &Schema, drop: &[String]) -> Result<Projection> {
         check_drop(from, drop)?;
         let held: BTreeSet<&str> = to.dimensions.iter().map(|d| d.name.as_str()).collect();
@@ -116,8 +116,8 @@ impl Projection {
         self.to_stride
     }
 
-    /// Appends the projections of `records` to `out`. Fails on the first point with a value that its
-    /// target cannot hold, naming dimension, value and point.
+    /// Appends the projections of `records` to `out`. Fails on the first point with a value that
+    /// its target cannot hold, naming dimension, value and point.
     pub fn project(&self, records: &[u8], out: &mut Vec<u8>) -> Result<Rounding> {
         let start = out.len();
         let points = records.len() / self.from.stride.max(1);
@@ -125,8 +125,8 @@ impl Projection {
         self.project_into(records, &mut out[start..])
     }
 
-    /// Replaces `out`, which has room for exactly as many, by the projections of `records`; fails as
-    /// [`project`](Self::project) does.
+    /// Replaces `out`, which has room for exactly as many, by the projections of `records`; fails
+    /// as [`project`](Self::project) does.
     pub fn project_into(&self, records: &[u8], out: &mut [u8]) -> Result<Rounding> {
         let (from, to) = (self.from.stride.max(1), self.to_stride.max(1));
         let mut rounding = Rounding::default();
@@ -280,12 +280,12 @@ struct UnfitValue<'a> {
     value: Value,
 }
 
-/// What helps where the coordinate `value` of the point at `world` does not fit `to`: an offset, if there
-/// is one that does, and a larger scale.
+/// What helps where the coordinate `value` of the point at `world` does not fit `to`: an offset, if
+/// there is one that does, and a larger scale.
 fn placed(world: Option<[f64; 3]>, to: &Dimension, value: f64) -> String {
     let reach = to.scale * f64::from(1 << 30) * 2.0;
-    // Whole thousands near the point: a scan around it fits, and its digits stay readable. Where these
-    // are out of reach, what is in reach; no scan is so small that less than 1 would do.
+    // Whole thousands near the point: a scan around it fits, and its digits stay readable. Where
+    // these are out of reach, what is in reach; no scan is so small that less than 1 would do.
     let unit = [1000.0, 100.0, 10.0, 1.0].into_iter().find(|unit| 2.0 * unit <= reach);
     let round = |at: f64| unit.map_or(at, |unit| (at / unit).round() * unit);
     match world.map(|world| world.map(round)) {
@@ -297,8 +297,8 @@ fn placed(world: Option<[f64; 3]>, to: &Dimension, value: f64) -> String {
              `write.scale`"
         ),
         _ => format!(
-            "give a larger `write.scale`: with this one coordinates reach {} from the offset, and no \
-             farther",
+            "give a larger `write.scale`: with this one coordinates reach {} from the offset, and \
+             no farther",
             Short(reach)
         ),
     }
@@ -378,8 +378,8 @@ pub(super) fn check_drop(from: &Schema, drop: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// True if `target` holds 257 times the `source`: colours, of which 255 is the most in 8 bits, as in
-/// PLY, and 65535 in 16, as in LAS (LAS 1.4 R15, table 9).
+/// True if `target` holds 257 times the `source`: colours, of which 255 is the most in 8 bits, as
+/// in PLY, and 65535 in 16, as in LAS (LAS 1.4 R15, table 9).
 fn widens(from: &Schema, source: &Dimension, to: &Schema, target: &Dimension) -> bool {
     from.layout.family != to.layout.family
         && [RED, GREEN, BLUE, NIR].contains(&target.name.as_str())

@@ -1,9 +1,10 @@
-//! The units of coordinate reference systems by their EPSG codes. The table has the kind and the unit
-//! of each and nothing else of them: where a system is, nobody here asks.
+//! The units of coordinate reference systems by their EPSG codes. The table has the kind and the
+//! unit of each and nothing else of them: where a system is, nobody here asks.
 
 use crate::point::{Horizontal, Units};
 
-/// A line holds a kind of system, metres in a unit of its lengths, and codes: single ones and ranges.
+/// A line holds a kind of system, metres in a unit of its lengths, and codes: single ones and
+/// ranges.
 const TABLE: &str = include_str!("epsg_units.txt");
 
 /// Metres in an international foot.

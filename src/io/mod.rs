@@ -1,5 +1,5 @@
-//! Formats: one folder each, plain sources and sinks of records; conversion between records; and the
-//! stages that name files. Knows nothing of tiles.
+//! Formats: one folder each, plain sources and sinks of records; conversion between records; and
+//! the stages that name files. Knows nothing of tiles.
 
 pub mod convert;
 mod describe;

@@ -1,5 +1,5 @@
-//! What a file was when a source opened it, so that one that is written to, cut, replaced or removed
-//! while it is read is told and not milled. Knows no formats.
+//! What a file was when a source opened it, so that one that is written to, cut, replaced or
+//! removed while it is read is told and not milled. Knows no formats.
 
 use std::fs::{self, File, FileType, Metadata, OpenOptions};
 use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
@@ -96,8 +96,9 @@ impl Origin {
     }
 }
 
-/// Opens the plain file at `path`. A pipe that nobody writes to would be waited for without end, and
-/// opening a device can set it to work: neither is opened, whatever the order in which things happen.
+/// Opens the plain file at `path`. A pipe that nobody writes to would be waited for without end,
+/// and opening a device can set it to work: neither is opened, whatever the order in which things
+/// happen.
 pub fn open_plain(path: &Path) -> Result<(File, Metadata)> {
     let opening = |e| Error::io(path, "open it", e);
     plain(path, fs::metadata(path).map_err(opening)?)?;

@@ -14,7 +14,7 @@ pub const BYTES: usize = 512;
 
 /// What a file is that is of no registered format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Found {
+enum Sniffed {
     /// Nothing is in it.
     Empty,
     /// A Git LFS pointer.
@@ -30,88 +30,90 @@ enum Found {
 }
 
 /// First bytes of formats, each as their own specification has them.
-const MAGIC: [(&[u8], Found); 29] = [
-    (b"version https://git-lfs", Found::Pointer),
-    (b"~V", Found::Other("a well log (CWLS LAS, which shares the extension)")),
-    (b"~v", Found::Other("a well log (CWLS LAS, which shares the extension)")),
-    (b"ASTM-E57", Found::Other("an E57 file")),
-    (b"# .PCD", Found::Other("a PCD file")),
-    (b"VERSION .7", Found::Other("a PCD file")),
-    (b"pnts", Found::Other("a 3D tile of points")),
-    (b"DRACO", Found::Other("a Draco file")),
-    (b"glTF", Found::Other("a glTF file")),
-    (b"OFF\n", Found::Other("an OFF file")),
-    (b"OFF\r", Found::Other("an OFF file")),
-    (b"solid ", Found::Other("an STL file")),
-    (b"\x89HDF\r\n", Found::Other("an HDF5 file")),
-    (b"PAR1", Found::Other("a Parquet file")),
-    (b"SQLite format 3", Found::Other("an SQLite database")),
-    (b"II*\0", Found::Other("a TIFF image")),
-    (b"MM\0*", Found::Other("a TIFF image")),
-    (b"\x89PNG", Found::Other("a PNG image")),
-    (b"\xff\xd8\xff", Found::Other("a JPEG image")),
-    (b"%PDF", Found::Other("a PDF document")),
-    (b"<?xml", Found::Other("an XML document")),
-    (b"PK\x03\x04", Found::Packed("a ZIP archive")),
-    (b"\x1f\x8b", Found::Packed("a gzip file")),
-    (b"BZh", Found::Packed("a bzip2 file")),
-    (b"\xfd7zXZ", Found::Packed("an xz file")),
-    (b"7z\xbc\xaf\x27\x1c", Found::Packed("a 7z archive")),
-    (b"\x28\xb5\x2f\xfd", Found::Packed("a Zstandard file")),
-    (b"Rar!", Found::Packed("a RAR archive")),
-    (b"\x04\x22\x4d\x18", Found::Packed("an LZ4 file")),
+const MAGIC: [(&[u8], Sniffed); 29] = [
+    (b"version https://git-lfs", Sniffed::Pointer),
+    (b"~V", Sniffed::Other("a well log (CWLS LAS, which shares the extension)")),
+    (b"~v", Sniffed::Other("a well log (CWLS LAS, which shares the extension)")),
+    (b"ASTM-E57", Sniffed::Other("an E57 file")),
+    (b"# .PCD", Sniffed::Other("a PCD file")),
+    (b"VERSION .7", Sniffed::Other("a PCD file")),
+    (b"pnts", Sniffed::Other("a 3D tile of points")),
+    (b"DRACO", Sniffed::Other("a Draco file")),
+    (b"glTF", Sniffed::Other("a glTF file")),
+    (b"OFF\n", Sniffed::Other("an OFF file")),
+    (b"OFF\r", Sniffed::Other("an OFF file")),
+    (b"solid ", Sniffed::Other("an STL file")),
+    (b"\x89HDF\r\n", Sniffed::Other("an HDF5 file")),
+    (b"PAR1", Sniffed::Other("a Parquet file")),
+    (b"SQLite format 3", Sniffed::Other("an SQLite database")),
+    (b"II*\0", Sniffed::Other("a TIFF image")),
+    (b"MM\0*", Sniffed::Other("a TIFF image")),
+    (b"\x89PNG", Sniffed::Other("a PNG image")),
+    (b"\xff\xd8\xff", Sniffed::Other("a JPEG image")),
+    (b"%PDF", Sniffed::Other("a PDF document")),
+    (b"<?xml", Sniffed::Other("an XML document")),
+    (b"PK\x03\x04", Sniffed::Packed("a ZIP archive")),
+    (b"\x1f\x8b", Sniffed::Packed("a gzip file")),
+    (b"BZh", Sniffed::Packed("a bzip2 file")),
+    (b"\xfd7zXZ", Sniffed::Packed("an xz file")),
+    (b"7z\xbc\xaf\x27\x1c", Sniffed::Packed("a 7z archive")),
+    (b"\x28\xb5\x2f\xfd", Sniffed::Packed("a Zstandard file")),
+    (b"Rar!", Sniffed::Packed("a RAR archive")),
+    (b"\x04\x22\x4d\x18", Sniffed::Packed("an LZ4 file")),
 ];
 
-impl Found {
-    fn of(first: &[u8]) -> Found {
+impl Sniffed {
+    fn of(first: &[u8]) -> Sniffed {
         if first.is_empty() {
-            return Found::Empty;
+            return Sniffed::Empty;
         }
         if let Some((_, found)) = MAGIC.iter().find(|(magic, _)| first.starts_with(magic)) {
             return *found;
         }
-        let Some(text) = text(first) else { return Found::Unknown };
+        let Some(text) = text(first) else { return Sniffed::Unknown };
         // Comments stand in front of a well log's first section.
         let is_comment = |line: &&str| line.starts_with('#') || line.trim().is_empty();
         let mut lines = text.lines().skip_while(is_comment);
         let line = lines.next().unwrap_or_default().trim_start_matches('\u{feff}').trim_start();
         let word = line.get(..9).unwrap_or(line).to_ascii_lowercase();
         if line.starts_with("~V") {
-            Found::Other("a well log (CWLS LAS, which shares the extension)")
+            Sniffed::Other("a well log (CWLS LAS, which shares the extension)")
         } else if word.starts_with("<!doctype") || word.starts_with("<html") {
-            Found::Other("a web page")
+            Sniffed::Other("a web page")
         } else if line.starts_with(['{', '[']) {
-            Found::Other("JSON text")
+            Sniffed::Other("JSON text")
         } else if is_numbers(line) {
-            Found::Numbers
+            Sniffed::Numbers
         } else {
-            Found::Unknown
+            Sniffed::Unknown
         }
     }
 
     fn name(self) -> &'static str {
         match self {
-            Found::Empty => "an empty file",
-            Found::Pointer => "a Git LFS pointer, a short text in the place of the file",
-            Found::Other(name) | Found::Packed(name) => name,
-            Found::Numbers => "a text of numbers",
-            Found::Unknown => "of no format that is known here",
+            Sniffed::Empty => "an empty file",
+            Sniffed::Pointer => "a Git LFS pointer, a short text in the place of the file",
+            Sniffed::Other(name) | Sniffed::Packed(name) => name,
+            Sniffed::Numbers => "a text of numbers",
+            Sniffed::Unknown => "of no format that is known here",
         }
     }
 
     fn remedy(self, formats: &Formats) -> String {
         let read = || listed(upper(formats), "and") + " are read";
         match self {
-            Found::Empty => "what should have written it failed: make or copy it again".to_owned(),
-            Found::Pointer => "fetch the file itself with `git lfs pull`".to_owned(),
-            Found::Packed(_) => "unpack it first".to_owned(),
-            Found::Other("a web page" | "JSON text" | "an XML document") => {
+            Sniffed::Empty => {
+                "what should have written it failed: make or copy it again".to_owned()
+            }
+            Sniffed::Pointer => "fetch the file itself with `git lfs pull`".to_owned(),
+            Sniffed::Packed(_) => "unpack it first".to_owned(),
+            Sniffed::Other("a web page" | "JSON text" | "an XML document") => {
                 "a server sent this instead of the file: fetch it again".to_owned()
             }
-            Found::Other(_) | Found::Numbers => {
+            Sniffed::Other(_) | Sniffed::Numbers => {
                 read() + ": convert it to one of them with another program first"
             }
-            Found::Unknown => read() + "; the file may be damaged",
+            Sniffed::Unknown => read() + "; the file may be damaged",
         }
     }
 }
@@ -147,13 +149,13 @@ pub fn first_bytes(path: &Path) -> Result<Vec<u8>> {
 /// The error of the file at `path`, which begins with `first` and was to be `wanted`.
 pub fn not(wanted: &str, path: &Path, first: &[u8], formats: &Formats) -> Error {
     let registered = formats.sniffed(first).filter(|format| format.called() != wanted);
-    match (registered, Found::of(first)) {
+    match (registered, Sniffed::of(first)) {
         (Some(format), _) => {
             Error::data(path, format!("this is {}, not {wanted}", format.called()))
                 .at_byte(0)
                 .help(name_it(&**format, formats))
         }
-        (None, Found::Unknown) => foreign(path, wanted).help(Found::Unknown.remedy(formats)),
+        (None, Sniffed::Unknown) => foreign(path, wanted).help(Sniffed::Unknown.remedy(formats)),
         (None, found) => Error::data(path, format!("this is {}, not {wanted}", found.name()))
             .at_byte(0)
             .help(found.remedy(formats)),
@@ -244,7 +246,7 @@ mod tests {
     #[test]
     fn a_character_cut_at_the_end_of_what_is_looked_at_leaves_the_text_a_text() {
         let numbers = "1 2 3\nä".as_bytes();
-        assert_eq!(Found::of(&numbers[..numbers.len() - 1]), Found::Numbers);
-        assert_eq!(Found::of(b"1 2 3\x80\x80\x80\x80\x80 4"), Found::Unknown);
+        assert_eq!(Sniffed::of(&numbers[..numbers.len() - 1]), Sniffed::Numbers);
+        assert_eq!(Sniffed::of(b"1 2 3\x80\x80\x80\x80\x80 4"), Sniffed::Unknown);
     }
 }

@@ -1,5 +1,5 @@
-//! The units that a coordinate reference system names, in well-known text (WKT 1: OGC 01-009; WKT 2:
-//! OGC 18-010) or by its EPSG code. Knows no files.
+//! The units that a coordinate reference system names, in well-known text (WKT 1: OGC 01-009; WKT
+//! 2: OGC 18-010) or by its EPSG code. Knows no files.
 
 use super::epsg;
 use crate::point::{Horizontal, Units};
@@ -297,8 +297,10 @@ mod tests {
     fn geographic_systems_are_degrees_and_geocentric_ones_are_not() {
         let degrees = Some(Horizontal::Degrees);
         assert_eq!(units("GEOGCS[\"WGS 84\",UNIT[\"degree\",0.017]]"), of(degrees, None));
-        let three = "GEOGCRS[\"WGS 84\",CS[ellipsoidal,3],AXIS[\"lat\",north,ANGLEUNIT[\"degree\",0.017]],\
-                     AXIS[\"lon\",east,ANGLEUNIT[\"degree\",0.017]],AXIS[\"h\",up,LENGTHUNIT[\"metre\",1]]]";
+        let three = "GEOGCRS[\"WGS 84\",CS[ellipsoidal,3],\
+                     AXIS[\"lat\",north,ANGLEUNIT[\"degree\",0.017]],\
+                     AXIS[\"lon\",east,ANGLEUNIT[\"degree\",0.017]],\
+                     AXIS[\"h\",up,LENGTHUNIT[\"metre\",1]]]";
         assert_eq!(units(three), of(degrees, Some(1.0)));
         for text in [
             "GEOCCS[\"x\",UNIT[\"metre\",1]]",

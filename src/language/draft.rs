@@ -2,8 +2,8 @@
 //! arguments put in their place.
 
 use super::mistake::{Mistake, advice};
-use super::node::{Entry, Node, Value};
-use super::place::Place;
+use super::node::{KeyEntry, Node, NodeValue};
+use super::place::TextPlace;
 use super::registry::Registry;
 use super::set::Set;
 
@@ -23,28 +23,28 @@ pub(crate) struct Draft {
 /// A `[[stage]]` table.
 pub(crate) struct StageDraft {
     /// Its kind and where it is written.
-    pub kind: (String, Place),
+    pub kind: (String, TextPlace),
     /// Its name, if it has one.
-    pub name: Option<(String, Place)>,
+    pub name: Option<(String, TextPlace)>,
     /// The stage that it takes from, if it says.
-    pub from: Option<(String, Place)>,
+    pub from: Option<(String, TextPlace)>,
     /// All other keys.
     pub keys: Node,
 }
 
 /// Sorts the tables of a file whose first text is `len` bytes long.
-pub(crate) fn read(entries: Vec<Entry>, len: usize, registry: &Registry) -> Draft {
-    let whole = Place::new(0, 0..0);
-    let run = Node { place: whole, value: Value::Table(Vec::new()) };
+pub(crate) fn read(entries: Vec<KeyEntry>, len: usize, registry: &Registry) -> Draft {
+    let whole = TextPlace::new(0, 0..0);
+    let run = Node { place: whole, value: NodeValue::Table(Vec::new()) };
     let mut draft = Draft { run, stages: Vec::new(), mistakes: Vec::new() };
     let mut any = false;
-    for Entry { key, at, node } in entries {
+    for KeyEntry { key, at, node } in entries {
         match (key.as_str(), node.value) {
-            ("run", Value::Table(table)) => {
-                draft.run = Node { place: at, value: Value::Table(table) };
+            ("run", NodeValue::Table(table)) => {
+                draft.run = Node { place: at, value: NodeValue::Table(table) };
             }
             ("run", _) => draft.mistakes.push(Mistake::new(at, "`run` is a table: write [run]")),
-            ("stage", Value::List(list)) => {
+            ("stage", NodeValue::List(list)) => {
                 any = true;
                 for (n, node) in list.into_iter().enumerate() {
                     if n == MOST_STAGES {
@@ -60,7 +60,7 @@ pub(crate) fn read(entries: Vec<Entry>, len: usize, registry: &Registry) -> Draf
                 let told = "a stage is one of several tables: write [[stage]]";
                 draft.mistakes.push(Mistake::new(at, told));
             }
-            ("stages", Value::List(list)) => {
+            ("stages", NodeValue::List(list)) => {
                 any = true;
                 let told = "a pipeline file has no `stages`: write [[stage]]";
                 draft.mistakes.push(Mistake::new(at, told));
@@ -78,7 +78,7 @@ pub(crate) fn read(entries: Vec<Entry>, len: usize, registry: &Registry) -> Draf
         }
     }
     if !any {
-        let told = Mistake::new(Place::new(0, len..len), "a pipeline needs stages")
+        let told = Mistake::new(TextPlace::new(0, len..len), "a pipeline needs stages")
             .note("begin with [[stage]] and kind = \"read\"");
         draft.mistakes.push(told);
     }
@@ -87,9 +87,9 @@ pub(crate) fn read(entries: Vec<Entry>, len: usize, registry: &Registry) -> Draf
 
 /// What a stage without a kind is told: the key that was meant to be it, if there is one.
 fn without_kind(
-    place: Place,
-    entries: &[Entry],
-    name: Option<(String, Place)>,
+    place: TextPlace,
+    entries: &[KeyEntry],
+    name: Option<(String, TextPlace)>,
     registry: &Registry,
 ) -> Mistake {
     if let Some((name, at)) = name.filter(|(name, _)| registry.has(name)) {
@@ -97,8 +97,8 @@ fn without_kind(
             .note("`name` is a word of your own, for the `from` of other stages");
     }
     let kinds = || registry.kinds().map(|(kind, _)| kind);
-    if let Some(Entry { at, node, .. }) = entries.iter().find(|e| e.key == "type") {
-        let word = if let Value::Text(word) = &node.value { word.as_str() } else { "" };
+    if let Some(KeyEntry { at, node, .. }) = entries.iter().find(|e| e.key == "type") {
+        let word = if let NodeValue::Text(word) = &node.value { word.as_str() } else { "" };
         let told = "a stage has no `type`: write `kind`";
         return Mistake::word(at.clone(), told, word, "kinds", kinds());
     }
@@ -107,7 +107,7 @@ fn without_kind(
 
 impl Draft {
     fn stage(&mut self, node: Node, registry: &Registry) {
-        let Value::Table(mut entries) = node.value else {
+        let NodeValue::Table(mut entries) = node.value else {
             self.mistakes.push(Mistake::new(node.place, "a stage is a table: write [[stage]]"));
             return;
         };
@@ -116,7 +116,7 @@ impl Draft {
         let from = self.take(&mut entries, "from");
         match kind {
             Some(Some(kind)) => {
-                let keys = Node { place: kind.1.clone(), value: Value::Table(entries) };
+                let keys = Node { place: kind.1.clone(), value: NodeValue::Table(entries) };
                 let (name, from) = (name.flatten(), from.flatten());
                 self.stages.push(StageDraft { kind, name, from, keys });
             }
@@ -128,12 +128,16 @@ impl Draft {
         }
     }
 
-    /// Takes the text `key` out of a stage's keys: none if it is not there, some none if it is not a
-    /// text, which is told.
-    fn take(&mut self, entries: &mut Vec<Entry>, key: &str) -> Option<Option<(String, Place)>> {
+    /// Takes the text `key` out of a stage's keys: none if it is not there, some none if it is not
+    /// a text, which is told.
+    fn take(
+        &mut self,
+        entries: &mut Vec<KeyEntry>,
+        key: &str,
+    ) -> Option<Option<(String, TextPlace)>> {
         let at = entries.iter().position(|e| e.key == key)?;
         let Node { place, value } = entries.remove(at).node;
-        if let Value::Text(text) = value {
+        if let NodeValue::Text(text) = value {
             return Some(Some((text, place)));
         }
         self.mistakes.push(Mistake::new(place, format!("`{key}` takes a text in quotes")));
@@ -173,9 +177,9 @@ impl Draft {
                 (&mut addressed.keys, addressed.kind.0.as_str())
             }
         };
-        let Value::Table(entries) = &mut table.value else { return Ok(()) };
+        let NodeValue::Table(entries) = &mut table.value else { return Ok(()) };
         entries.retain(|e| e.key != key && registry.others(kind, key).all(|other| e.key != other));
-        entries.push(Entry { key: key.to_owned(), at, node });
+        entries.push(KeyEntry { key: key.to_owned(), at, node });
         Ok(())
     }
 

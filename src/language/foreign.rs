@@ -2,12 +2,12 @@
 
 use super::mistake::Mistake;
 use super::node;
-use super::node::Entry;
-use super::place::Place;
+use super::node::KeyEntry;
+use super::place::TextPlace;
 
-/// Reads a pipeline file's text as TOML, or says every place where it is none, or the one thing that
-/// it is instead.
-pub(crate) fn parse(text: &str) -> Result<Vec<Entry>, Vec<Mistake>> {
+/// Reads a pipeline file's text as TOML, or says every place where it is none, or the one thing
+/// that it is instead.
+pub(crate) fn parse(text: &str) -> Result<Vec<KeyEntry>, Vec<Mistake>> {
     node::parse(text, 0).map_err(|wrong| match json(text).or_else(|| single_brackets(text)) {
         Some(one) => vec![one],
         None => wrong,
@@ -27,7 +27,7 @@ fn json(text: &str) -> Option<Mistake> {
         false => "this is JSON; a pipeline file is TOML",
     };
     let note = "write a table [[stage]] with kind = \"read\", and one for every further stage";
-    Some(Mistake::new(Place::new(0, begin..begin + 1), told).note(note))
+    Some(Mistake::new(TextPlace::new(0, begin..begin + 1), told).note(note))
 }
 
 /// What a text with `[stage]` for `[[stage]]` is told: once, though TOML refuses every table after
@@ -46,7 +46,7 @@ fn single_brackets(text: &str) -> Option<Mistake> {
     }
     let (&(_, start, end), others) = found.split_first()?;
     let mistake = Mistake::new(
-        Place::new(0, start..end),
+        TextPlace::new(0, start..end),
         "a stage is one of several tables: write [[stage]]",
     );
     let lines: Vec<String> = others.iter().map(|(line, ..)| line.to_string()).collect();

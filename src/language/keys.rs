@@ -2,20 +2,17 @@
 //! fit. Knows no stage.
 
 use std::cell::RefCell;
-use std::fmt;
 
-use serde::de::{
-    self, DeserializeOwned, Deserializer, Expected, IntoDeserializer, Unexpected, Visitor,
-};
+use serde::de::{self, DeserializeOwned, Deserializer, IntoDeserializer, Visitor};
 
+use super::fault::{Fault, Problem};
 use super::mistake::Mistake;
-use super::node::{Entry, Node, Value};
-use super::place::Place;
-use crate::error::nearest;
-use crate::quantity::{Figure, parse_count};
+use super::node::{KeyEntry, Node, NodeValue};
+use crate::quantity::parse_count;
 
 /// Reads the table `keys` as a `T`, or tells every key that `subject` (a stage kind, `[run]`) does
-/// not have and every value that does not fit. `formats` are the names of those that are registered.
+/// not have and every value that does not fit. `formats` are the names of those that are
+/// registered.
 pub(crate) fn read<T: DeserializeOwned>(
     subject: &str,
     keys: &Node,
@@ -26,7 +23,7 @@ pub(crate) fn read<T: DeserializeOwned>(
     let mut dropped: Vec<String> = Vec::new();
     loop {
         let unknown = RefCell::new(Vec::new());
-        let outcome = T::deserialize(Reader { node: &rest, unknown: &unknown, formats });
+        let outcome = T::deserialize(NodeReader { node: &rest, unknown: &unknown, formats });
         let fault = match outcome {
             Ok(read) if mistakes.is_empty() && unknown.borrow().is_empty() => return Ok(read),
             Ok(_) => None,
@@ -51,153 +48,10 @@ pub(crate) fn read<T: DeserializeOwned>(
 }
 
 fn remove(node: &mut Node, key: &str) -> bool {
-    let Value::Table(entries) = &mut node.value else { return false };
+    let NodeValue::Table(entries) = &mut node.value else { return false };
     let before = entries.len();
     entries.retain(|e| e.key != key);
     entries.len() < before
-}
-
-/// A value that does not fit, as serde tells it.
-#[derive(Debug)]
-struct Fault {
-    place: Option<Place>,
-    key: Option<String>,
-    problem: Problem,
-}
-
-#[derive(Debug)]
-enum Problem {
-    UnknownKey(String, Vec<&'static str>),
-    UnknownWord(String, Vec<&'static str>),
-    Missing(&'static str),
-    /// What is wrong, and a word that was meant, perhaps.
-    Wrong(String, Option<Box<str>>),
-}
-
-impl Fault {
-    fn new(problem: Problem) -> Self {
-        Fault { place: None, key: None, problem }
-    }
-
-    fn at(mut self, place: &Place) -> Self {
-        self.place.get_or_insert_with(|| place.clone());
-        self
-    }
-
-    fn under(mut self, key: &str) -> Self {
-        self.key = Some(key.to_owned()); // the outermost key wins: it is the stage's
-        self
-    }
-
-    fn mistake(&self, subject: &str, keys: &Node) -> Mistake {
-        let place = self.place.clone().unwrap_or_else(|| keys.place.clone());
-        let key = self.key.as_deref().unwrap_or(subject);
-        match &self.problem {
-            Problem::UnknownKey(word, valid) => Mistake::word(
-                place,
-                format!("`{subject}` has no key `{word}`"),
-                word,
-                "keys",
-                valid,
-            ),
-            Problem::UnknownWord(word, valid) => {
-                Mistake::word(place, format!("`{key}` cannot be `{word}`"), word, "valid", valid)
-            }
-            Problem::Missing(key) => Mistake::new(place, format!("`{subject}` needs `{key}`")),
-            Problem::Wrong(what, near) => {
-                let near = near.as_ref().map(|near| format!("did you mean `{near}`?"));
-                // A message may begin with the key that it is about.
-                let told = match what.strip_prefix(key).and_then(|rest| rest.strip_prefix(' ')) {
-                    Some(rest) => format!("`{key}`: {rest}"),
-                    None => format!("`{key}`: {what}"),
-                };
-                Mistake::new(place, told).note(near.unwrap_or_default())
-            }
-        }
-    }
-}
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:?}", self.problem)
-    }
-}
-
-impl std::error::Error for Fault {}
-
-impl de::Error for Fault {
-    fn custom<T: fmt::Display>(message: T) -> Self {
-        Fault::new(Problem::Wrong(message.to_string(), None))
-    }
-
-    fn invalid_type(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
-        let takes = plain(expected);
-        let told = format!("takes {takes}, not {}", found_words(found));
-        // What is expected quotes the words that it can be: a number above 0, or "auto".
-        // Its examples ("10%", "2m") are none that anyone meant.
-        let words = takes.split('"').skip(1).step_by(2);
-        let is_word = |word: &&str| !word.contains(|c: char| c.is_ascii_digit());
-        let words: Vec<String> = words.filter(is_word).map(str::to_owned).collect();
-        let near = match found {
-            Unexpected::Str(text) => nearest(text, &words).map(|near| near.as_str().into()),
-            _ => None,
-        };
-        Fault::new(Problem::Wrong(told, near))
-    }
-
-    fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
-        Fault::invalid_type(found, expected)
-    }
-
-    fn invalid_length(len: usize, expected: &dyn Expected) -> Self {
-        Fault::custom(format!("takes {}, not {len} values", plain(expected)))
-    }
-
-    fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
-        Fault::new(Problem::UnknownWord(variant.to_owned(), expected.to_vec()))
-    }
-
-    fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
-        Fault::new(Problem::UnknownKey(field.to_owned(), expected.to_vec()))
-    }
-
-    fn missing_field(field: &'static str) -> Self {
-        Fault::new(Problem::Missing(field))
-    }
-}
-
-/// Serde's name of what it expected, in plain words.
-fn plain(expected: &dyn Expected) -> String {
-    let name = expected.to_string();
-    match name.as_str() {
-        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number from 0",
-        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
-        "a nonzero u8" | "a nonzero u32" | "a nonzero u64" | "a nonzero usize" => {
-            "a whole number from 1"
-        }
-        "f32" | "f64" => "a number",
-        "a string" | "path string" => "a text in quotes",
-        "a boolean" => "true or false",
-        "a sequence" => "a list",
-        _ => match name.strip_prefix("an array of length ") {
-            Some(length) => return format!("a list of {length} values"),
-            None => &name,
-        },
-    }
-    .to_owned()
-}
-
-fn found_words(found: Unexpected<'_>) -> String {
-    match found {
-        Unexpected::Bool(v) => v.to_string(),
-        Unexpected::Unsigned(v) => v.to_string(),
-        Unexpected::Signed(v) => v.to_string(),
-        Unexpected::Float(v) => Figure(v).to_string(),
-        Unexpected::Str(v) => format!("the text \"{}\"", v.chars().take(60).collect::<String>()),
-        Unexpected::Seq => "a list".to_owned(),
-        Unexpected::Map => "a table".to_owned(),
-        other => other.to_string(),
-    }
 }
 
 /// The name of [`FormatName`](crate::stage::FormatName) as serde has it: a word of those that are
@@ -206,7 +60,7 @@ const FORMAT: &str = "FormatName";
 
 /// A node on its way into a struct.
 #[derive(Clone, Copy)]
-struct Reader<'a> {
+struct NodeReader<'a> {
     node: &'a Node,
     unknown: &'a RefCell<Vec<Fault>>,
     formats: &'a [&'static str],
@@ -215,10 +69,10 @@ struct Reader<'a> {
 /// Below it floats hold all whole numbers.
 const WHOLE: f64 = (1u64 << 53) as f64;
 
-impl<'de> Reader<'de> {
+impl<'de> NodeReader<'de> {
     /// A whole number, also one that is written as a count is: "10k".
     fn whole<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
-        let Value::Text(text) = &self.node.value else { return self.deserialize_any(visitor) };
+        let NodeValue::Text(text) = &self.node.value else { return self.deserialize_any(visitor) };
         match parse_count(text) {
             Ok(count) => {
                 visitor.visit_u64(count).map_err(|fault: Fault| fault.at(&self.node.place))
@@ -230,18 +84,18 @@ impl<'de> Reader<'de> {
     /// The value, which is to be one of `valid` words.
     fn word(self, valid: &[&'static str]) -> Result<&'de str, Fault> {
         match &self.node.value {
-            Value::Text(word) => Ok(word),
+            NodeValue::Text(word) => Ok(word),
             _ => Err(de::Error::custom(format!("takes one of {}", valid.join(", ")))),
         }
     }
 
     fn table<V: Visitor<'de>>(
         self,
-        entries: &'de [Entry],
+        entries: &'de [KeyEntry],
         fields: Option<&'static [&'static str]>,
         visitor: V,
     ) -> Result<V::Value, Fault> {
-        let known = |e: &&Entry| fields.is_none_or(|fields| fields.contains(&e.key.as_str()));
+        let known = |e: &&KeyEntry| fields.is_none_or(|fields| fields.contains(&e.key.as_str()));
         for entry in entries.iter().filter(|e| !known(e)) {
             let valid = fields.unwrap_or_default().to_vec();
             let problem = Problem::UnknownKey(entry.key.clone(), valid);
@@ -252,22 +106,24 @@ impl<'de> Reader<'de> {
     }
 }
 
-impl<'de> Deserializer<'de> for Reader<'de> {
+impl<'de> Deserializer<'de> for NodeReader<'de> {
     type Error = Fault;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
         match &self.node.value {
-            Value::Text(v) => visitor.visit_borrowed_str(v),
-            Value::Flag(v) => visitor.visit_bool(*v),
+            NodeValue::Text(v) => visitor.visit_borrowed_str(v),
+            NodeValue::Flag(v) => visitor.visit_bool(*v),
             // 1e1 is a float in TOML.
-            Value::Number(v) if v.fract() == 0.0 && v.abs() < WHOLE => visitor.visit_i64(*v as i64),
-            Value::Number(v) => visitor.visit_f64(*v),
-            Value::Whole(v) => match (i64::try_from(*v), u64::try_from(*v)) {
+            NodeValue::Number(v) if v.fract() == 0.0 && v.abs() < WHOLE => {
+                visitor.visit_i64(*v as i64)
+            }
+            NodeValue::Number(v) => visitor.visit_f64(*v),
+            NodeValue::Whole(v) => match (i64::try_from(*v), u64::try_from(*v)) {
                 (Ok(v), _) => visitor.visit_i64(v),
                 (_, Ok(v)) => visitor.visit_u64(v),
                 _ => Err(de::Error::custom("the whole number is too large")),
             },
-            Value::List(list) => {
+            NodeValue::List(list) => {
                 let mut items = Items { items: list.iter(), reader: self };
                 let read = visitor.visit_seq(&mut items)?;
                 match items.items.len() {
@@ -275,7 +131,7 @@ impl<'de> Deserializer<'de> for Reader<'de> {
                     over => Err(de::Error::custom(format!("has {over} values too many"))),
                 }
             }
-            Value::Table(entries) => self.table(entries, None, visitor),
+            NodeValue::Table(entries) => self.table(entries, None, visitor),
         }
         .map_err(|fault: Fault| fault.at(&self.node.place))
     }
@@ -308,8 +164,8 @@ impl<'de> Deserializer<'de> for Reader<'de> {
         visitor: V,
     ) -> Result<V::Value, Fault> {
         match &self.node.value {
-            Value::Table(entries) if entries.is_empty() => visitor.visit_unit(),
-            Value::Table(_) => self.deserialize_struct(name, &[], visitor),
+            NodeValue::Table(entries) if entries.is_empty() => visitor.visit_unit(),
+            NodeValue::Table(_) => self.deserialize_struct(name, &[], visitor),
             _ => self.deserialize_any(visitor),
         }
     }
@@ -321,7 +177,7 @@ impl<'de> Deserializer<'de> for Reader<'de> {
         visitor: V,
     ) -> Result<V::Value, Fault> {
         match &self.node.value {
-            Value::Table(entries) => self
+            NodeValue::Table(entries) => self
                 .table(entries, Some(fields), visitor)
                 .map_err(|fault| fault.at(&self.node.place)),
             _ => self.deserialize_any(visitor),
@@ -359,7 +215,7 @@ impl<'de> Deserializer<'de> for Reader<'de> {
 
 struct Items<'a> {
     items: std::slice::Iter<'a, Node>,
-    reader: Reader<'a>,
+    reader: NodeReader<'a>,
 }
 
 impl<'de> de::SeqAccess<'de> for &mut Items<'de> {
@@ -370,7 +226,7 @@ impl<'de> de::SeqAccess<'de> for &mut Items<'de> {
         seed: T,
     ) -> Result<Option<T::Value>, Fault> {
         let Some(node) = self.items.next() else { return Ok(None) };
-        let item = seed.deserialize(Reader { node, ..self.reader });
+        let item = seed.deserialize(NodeReader { node, ..self.reader });
         item.map(Some).map_err(|fault| fault.at(&node.place))
     }
 
@@ -380,9 +236,9 @@ impl<'de> de::SeqAccess<'de> for &mut Items<'de> {
 }
 
 struct Entries<'a> {
-    entries: std::vec::IntoIter<&'a Entry>,
-    next: Option<&'a Entry>,
-    reader: Reader<'a>,
+    entries: std::vec::IntoIter<&'a KeyEntry>,
+    next: Option<&'a KeyEntry>,
+    reader: NodeReader<'a>,
 }
 
 impl<'de> de::MapAccess<'de> for Entries<'de> {
@@ -403,7 +259,7 @@ impl<'de> de::MapAccess<'de> for Entries<'de> {
         let Some(entry) = self.next.take() else {
             return Err(de::Error::custom("a value without a key"));
         };
-        let reader = Reader { node: &entry.node, ..self.reader };
+        let reader = NodeReader { node: &entry.node, ..self.reader };
         seed.deserialize(reader).map_err(|fault| fault.at(&entry.node.place).under(&entry.key))
     }
 }

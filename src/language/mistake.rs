@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::place::Place;
+use super::place::TextPlace;
 use crate::error::{is_control, nearest};
 use crate::{Error, ErrorKind};
 
@@ -19,8 +19,8 @@ pub(crate) struct SourceText {
     pub origin: String,
     /// What it says.
     pub text: String,
-    /// The setting that the argument stands for, where its name says it (`--keep`): messages at this
-    /// place need not name it again.
+    /// The setting that the argument stands for, where its name says it (`--keep`): messages at
+    /// this place need not name it again.
     pub setting: Option<String>,
 }
 
@@ -43,7 +43,7 @@ impl SourceText {
 /// Something wrong at a place.
 #[derive(Debug, Clone)]
 pub(crate) struct Mistake {
-    place: Place,
+    place: TextPlace,
     message: String,
     note: String,
     kind: ErrorKind,
@@ -51,13 +51,13 @@ pub(crate) struct Mistake {
 
 impl Mistake {
     /// `message` at `place`.
-    pub fn new(place: Place, message: impl Into<String>) -> Self {
+    pub fn new(place: TextPlace, message: impl Into<String>) -> Self {
         Mistake { place, message: message.into(), note: String::new(), kind: ErrorKind::Pipeline }
     }
 
     /// A word that is none of the `valid` ones; `all` says what those are ("keys").
     pub fn word<S: AsRef<str>>(
-        place: Place,
+        place: TextPlace,
         message: impl Into<String>,
         word: &str,
         all: &str,
@@ -67,7 +67,7 @@ impl Mistake {
     }
 
     /// An error that a stage gave, at `place`.
-    pub fn of(place: Place, error: &Error) -> Self {
+    pub fn of(place: TextPlace, error: &Error) -> Self {
         let mut message = error.to_string();
         let mut cause = std::error::Error::source(error);
         while let Some(inner) = cause {
@@ -85,7 +85,7 @@ impl Mistake {
     }
 
     /// The same mistake elsewhere.
-    pub fn moved_to(self, place: Place) -> Self {
+    pub fn moved_to(self, place: TextPlace) -> Self {
         Mistake { place, ..self }
     }
 
@@ -186,7 +186,7 @@ mod tests {
     fn a_place_at_the_end_of_the_text_or_inside_a_letter_is_rendered() {
         let sources =
             [SourceText { origin: "p.toml".into(), text: "a = 'ö'\r\nb".into(), setting: None }];
-        let at = |span| Mistake::new(Place::new(0, span), "wrong").render(&sources);
+        let at = |span| Mistake::new(TextPlace::new(0, span), "wrong").render(&sources);
         assert_eq!(at(10..10), "p.toml:2:1: wrong\n  2 | b\n    | ^");
         assert_eq!(at(99..120), "p.toml:2:2: wrong\n  2 | b\n    |  ^");
         assert_eq!(at(6..8), "p.toml:1:6: wrong\n  1 | a = 'ö'\n    |      ^^");

@@ -3,6 +3,7 @@
 
 mod builtin;
 mod draft;
+mod fault;
 mod foreign;
 mod keys;
 mod mistake;

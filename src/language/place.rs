@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// A stretch of one of the texts that make up a pipeline: the file (0) or an argument (1, 2, …).
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Place {
+pub(crate) struct TextPlace {
     /// Which text.
     pub source: usize,
     /// First byte of the stretch.
@@ -13,9 +13,9 @@ pub(crate) struct Place {
     pub end: usize,
 }
 
-impl Place {
+impl TextPlace {
     /// The bytes `span` of text `source`.
     pub fn new(source: usize, span: Range<usize>) -> Self {
-        Place { source, start: span.start, end: span.end }
+        TextPlace { source, start: span.start, end: span.end }
     }
 }

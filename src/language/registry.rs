@@ -1,5 +1,5 @@
-//! The stage kinds and formats that a pipeline file may name: a value, so that a program can add its
-//! own.
+//! The stage kinds and formats that a pipeline file may name: a value, so that a program can add
+//! its own.
 
 use std::collections::BTreeMap;
 
@@ -12,17 +12,17 @@ use crate::{Error, Result};
 /// The stage kinds and formats that a pipeline file may name.
 #[derive(Clone, Default)]
 pub struct Registry {
-    kinds: BTreeMap<&'static str, Kind>,
+    kinds: BTreeMap<&'static str, RegisteredKind>,
     formats: Formats,
 }
 
-type Read = fn(&Node, &StagePlace) -> Result<(Role, serde_json::Value), Vec<Mistake>>;
+type ReadStage = fn(&Node, &StagePlace) -> Result<(Role, serde_json::Value), Vec<Mistake>>;
 
 #[derive(Clone, Copy)]
-struct Kind {
+struct RegisteredKind {
     about: &'static str,
     either: &'static [&'static str],
-    read: Read,
+    read: ReadStage,
 }
 
 impl Registry {
@@ -34,7 +34,10 @@ impl Registry {
     /// The same and `K`, which takes the place of a kind of that name.
     #[must_use]
     pub fn with<K: StageKind>(mut self) -> Self {
-        self.kinds.insert(K::KIND, Kind { about: K::ABOUT, either: K::EITHER, read: read::<K> });
+        self.kinds.insert(
+            K::KIND,
+            RegisteredKind { about: K::ABOUT, either: K::EITHER, read: read::<K> },
+        );
         self
     }
 

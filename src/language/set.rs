@@ -4,7 +4,7 @@ use super::mistake;
 use super::mistake::{Mistake, SourceText};
 use super::node;
 use super::node::Node;
-use super::place::Place;
+use super::place::TextPlace;
 use crate::Result;
 
 /// The argument whose texts [`Set::parse`] reads, as errors name it.
@@ -12,8 +12,9 @@ const ARGUMENT: &str = "--set";
 
 /// One value put in the place of a pipeline file's.
 ///
-/// The address is `run.KEY` for a setting, else `STAGE.KEY`: the stage by its `name`, or by its kind
-/// where only one stage is of that kind, or as `KIND.N.KEY`, the N-th stage of that kind, from 1.
+/// The address is `run.KEY` for a setting, else `STAGE.KEY`: the stage by its `name`, or by its
+/// kind where only one stage is of that kind, or as `KIND.N.KEY`, the N-th stage of that kind, from
+/// 1.
 #[derive(Debug, Clone)]
 pub struct Set {
     argument: String,
@@ -32,11 +33,11 @@ enum Given {
 }
 
 impl Set {
-    /// Reads `stage.key=value`, as `--set` takes it. The value is TOML; what is no TOML is a text, so
-    /// that `write.path=out.laz` needs no quotes.
+    /// Reads `stage.key=value`, as `--set` takes it. The value is TOML; what is no TOML is a text,
+    /// so that `write.path=out.laz` needs no quotes.
     pub fn parse(text: &str) -> Result<Set> {
         let Some((address, _)) = text.split_once('=') else {
-            let told = Mistake::new(Place::new(1, 0..text.len()), "there is no `=`")
+            let told = Mistake::new(TextPlace::new(1, 0..text.len()), "there is no `=`")
                 .note("write STAGE.KEY=VALUE, such as cells.max_angle=0.2 or run.threads=2");
             let none = || SourceText { origin: String::new(), text: String::new(), setting: None };
             let given = SourceText { origin: ARGUMENT.to_owned(), text: text.to_owned(), ..none() };
@@ -82,13 +83,13 @@ impl Set {
 
     /// Bytes `part` of the address in the argument's text (source `source`), or all of the text
     /// where the address is not in it.
-    pub(crate) fn place(&self, source: usize, part: &str) -> Place {
+    pub(crate) fn place(&self, source: usize, part: &str) -> TextPlace {
         let start = match self.value {
             Given::Text { .. } => self.text.find(part),
             Given::Json(_) => None,
         };
         let span = start.map_or(0..self.text.len(), |start| start..start + part.len());
-        Place::new(source, span)
+        TextPlace::new(source, span)
     }
 
     /// The value, its place in source `source`.
@@ -96,7 +97,7 @@ impl Set {
         match &self.value {
             Given::Text { from } => node::parse_value(self.text[*from..].trim(), source, *from),
             Given::Json(value) => {
-                Ok(node::from_json(value, &Place::new(source, 0..self.text.len())))
+                Ok(node::from_json(value, &TextPlace::new(source, 0..self.text.len())))
             }
         }
     }

@@ -10,14 +10,14 @@ use super::foreign;
 use super::keys;
 use super::mistake;
 use super::mistake::{Mistake, SourceText};
-use super::node::{Entry, Node, Value};
-use super::place::Place;
+use super::node::{KeyEntry, Node, NodeValue};
+use super::place::TextPlace;
 use super::registry::Registry;
 use super::set::Set;
 use super::written::WrittenText;
 use crate::error::shown;
 use crate::graph::RunSettings;
-use crate::graph::{Graph, GraphStage, LimitKeys, Misplaced};
+use crate::graph::{Graph, GraphMistake, GraphStage, LimitKeys};
 use crate::host::{Files, Use};
 use crate::io::{open_plain, sniff};
 use crate::stage::Role;
@@ -28,8 +28,8 @@ use crate::{Error, Result};
 const LONGEST: u64 = 16 << 20;
 
 impl Graph {
-    /// Reads a pipeline; `origin` is the name of its file for errors, empty for a text that the user
-    /// does not know: then errors name what is wrong without a place in it.
+    /// Reads a pipeline; `origin` is the name of its file for errors, empty for a text that the
+    /// user does not know: then errors name what is wrong without a place in it.
     ///
     /// The error tells every mistake of the text at once. Files that stages name are looked up, not
     /// opened.
@@ -37,7 +37,8 @@ impl Graph {
         Graph::parse_with(text, origin, registry, &[])
     }
 
-    /// Reads a pipeline in which the values of `sets`, in their order, take the place of the text's.
+    /// Reads a pipeline in which the values of `sets`, in their order, take the place of the
+    /// text's.
     pub fn parse_with(
         text: &str,
         origin: &str,
@@ -127,7 +128,7 @@ fn build(
     let file = file.map(Path::to_owned);
     let graph = Graph { origin: origin.clone(), settings, stages, file };
     if is_connected {
-        mistakes.extend(graph.mistakes().into_iter().map(|Misplaced { stage, told, help }| {
+        mistakes.extend(graph.mistakes().into_iter().map(|GraphMistake { stage, told, help }| {
             let place = draft.stages[stage].kind.1.clone();
             Mistake::new(place, told).note(help.unwrap_or_default())
         }));
@@ -160,7 +161,7 @@ fn place(
     };
     let limits = read?;
     if !matches!(role, Role::TileOp(_) | Role::ScanOp(_)) {
-        let told = |e: &Entry| format!("`{}` is for stages that work on tiles", e.key);
+        let told = |e: &KeyEntry| format!("`{}` is for stages that work on tiles", e.key);
         let wrong: Vec<_> = given.iter().map(|e| Mistake::new(e.at.clone(), told(e))).collect();
         if !wrong.is_empty() {
             return Err(wrong);
@@ -170,7 +171,7 @@ fn place(
         let told = serde_json::to_value(&limits).unwrap_or_default();
         keys.extend(told.as_object().cloned().unwrap_or_default());
     }
-    let text = |part: &Option<(String, Place)>| part.as_ref().map(|(text, _)| text.clone());
+    let text = |part: &Option<(String, TextPlace)>| part.as_ref().map(|(text, _)| text.clone());
     Ok(GraphStage {
         kind: kind.clone(),
         name: text(&stage.name),
@@ -187,7 +188,7 @@ fn place(
 fn split_limits(keys: &Node) -> (Node, Node) {
     let (limits, own) =
         keys.entries().iter().cloned().partition(|e| LimitKeys::KEYS.contains(&e.key.as_str()));
-    let table = |entries| Node { place: keys.place.clone(), value: Value::Table(entries) };
+    let table = |entries| Node { place: keys.place.clone(), value: NodeValue::Table(entries) };
     (table(limits), table(own))
 }
 
@@ -212,8 +213,8 @@ fn check_names(stages: &[StageDraft], registry: &Registry, mistakes: &mut Vec<Mi
 
 /// Fills in which stages each takes from: those that it names, or the last above that gives points.
 ///
-/// A `from` names an earlier stage that gives points. Only a sink may take from another than the one
-/// above.
+/// A `from` names an earlier stage that gives points. Only a sink may take from another than the
+/// one above.
 fn connect(drafts: &[StageDraft], stages: &mut [GraphStage], mistakes: &mut Vec<Mistake>) {
     let is_sink = |stage: &GraphStage| matches!(stage.role, Role::Sink(_));
     let mut above: Option<usize> = None;
@@ -246,7 +247,8 @@ fn connect(drafts: &[StageDraft], stages: &mut [GraphStage], mistakes: &mut Vec<
     }
 }
 
-/// No file is written twice, and none over an input or over the pipeline, which is read from `file`.
+/// No file is written twice, and none over an input or over the pipeline, which is read from
+/// `file`.
 fn check_files(
     file: Option<&Path>,
     draft: &Draft,
@@ -256,7 +258,7 @@ fn check_files(
 ) {
     let mut files = Files::default();
     file.iter().for_each(|path| files.read(path, Use::Pipeline));
-    let mut outputs: Vec<(&Path, &Place)> = Vec::new();
+    let mut outputs: Vec<(&Path, &TextPlace)> = Vec::new();
     for (draft, stage) in draft.stages.iter().zip(stages) {
         match &stage.role {
             Role::Source(source) => {

@@ -1,5 +1,5 @@
-//! How a stage is written: the texts of its pipeline and the places in them, for what turns out to be
-//! wrong once the inputs are known.
+//! How a stage is written: the texts of its pipeline and the places in them, for what turns out to
+//! be wrong once the inputs are known.
 
 use std::sync::Arc;
 

@@ -11,7 +11,7 @@ use crate::point::{Mark, Position};
 use crate::quantity::Whole;
 use crate::report::Tally;
 use crate::stage::{Needs, Role, StageKind, StagePlace, TileOp};
-use crate::tile::{Cells as Partition, Tile};
+use crate::tile::{Partition, Tile};
 use crate::{Error, Result};
 
 /// Bytes a position: an angle and an index.

@@ -18,7 +18,7 @@ use crate::stage::{Forecast, Needs, Role, ScanFacts, StageKind, StagePlace, Tile
 use crate::tile::Tile;
 use crate::{Error, Result};
 
-pub use estimate::{Estimate, Fallback, Method, Outcome};
+pub use estimate::{Estimate, EstimateOutcome, Fallback, Method};
 pub use estimator::Estimator;
 pub use orient::Orient;
 use orient::SignRule;
@@ -87,8 +87,10 @@ impl Normals {
         let (key, error) = match (self.orient, self.viewpoint) {
             (Orient::Viewpoint, None) => (
                 "orient",
-                Error::pipeline("`normals.orient = \"viewpoint\"` needs a `normals.viewpoint`").help(
-                    "give `normals.viewpoint = [x, y, z]`, where the scanner stood, in the scan's unit",
+                Error::pipeline("`normals.orient = \"viewpoint\"` needs a `normals.viewpoint`")
+.help(
+                    "give `normals.viewpoint = [x, y, z]`, where the scanner stood, in the scan's \
+                     unit",
                 ),
             ),
             (Orient::Viewpoint, Some(at)) if at.iter().all(|v| v.is_finite()) => return Ok(()),
@@ -97,8 +99,10 @@ impl Normals {
             }
             (Orient::None | Orient::Up, Some(_)) => (
                 "viewpoint",
-                Error::pipeline("`normals.viewpoint` does nothing without `normals.orient = \"viewpoint\"`")
-                    .help("give that too, or leave `normals.viewpoint` out"),
+                Error::pipeline(
+                    "`normals.viewpoint` does nothing without `normals.orient = \"viewpoint\"`",
+                )
+                .help("give that too, or leave `normals.viewpoint` out"),
             ),
             (Orient::None | Orient::Up, None) => return Ok(()),
         };
@@ -154,7 +158,7 @@ impl TileOp for Normals {
         let copies = std::mem::take(&mut tile.copies);
         let core = tile.core.clone();
         let (mut without, mut no_triangle, mut perpendicular) = (0, 0, 0);
-        let mut settle = |i: usize, (estimate, fallback): Outcome| {
+        let mut settle = |i: usize, (estimate, fallback): EstimateOutcome| {
             let counted = u64::from(core.contains(&i) && copies[i] > 0);
             match estimate {
                 Estimate::Normal(normal) => normals[i] = normal,

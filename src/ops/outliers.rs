@@ -45,7 +45,7 @@ const MULTIPLIER: f64 = 2.0;
 #[serde(default, deny_unknown_fields)]
 pub struct Outliers {
     /// What an outlier is.
-    pub method: Method,
+    pub method: OutlierMethod,
     /// Of statistical: how many nearest other positions the mean distance is taken to, 1 to 64.
     pub neighbors: Option<usize>,
     /// Of statistical: how many σ above the mean are still no outlier, 0 or more.
@@ -61,7 +61,7 @@ pub struct Outliers {
 /// What an outlier is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Method {
+pub enum OutlierMethod {
     /// What is farther from its neighbours than most points of the scan are from theirs.
     #[default]
     Statistical,
@@ -73,7 +73,7 @@ impl Outliers {
     /// The stage in the role that its method has, or the key to blame and why.
     pub fn role(self) -> Result<Role, (&'static str, Error)> {
         match self.method {
-            Method::Statistical => {
+            OutlierMethod::Statistical => {
                 let told = "belongs to `outliers.method = \"radius\"`";
                 absent("radius", self.radius.is_some(), told)?;
                 absent("min_neighbors", self.min_neighbors.is_some(), told)?;
@@ -82,7 +82,7 @@ impl Outliers {
                 let stage = StatisticalOutliers::new(neighbors, multiplier, self.mark)?;
                 Ok(Role::ScanOp(Box::new(stage)))
             }
-            Method::Radius => {
+            OutlierMethod::Radius => {
                 let told = "belongs to `outliers.method = \"statistical\"`";
                 absent("neighbors", self.neighbors.is_some(), told)?;
                 absent("multiplier", self.multiplier.is_some(), told)?;
@@ -116,7 +116,7 @@ fn given<T>(key: &'static str, value: Option<T>) -> Result<T, (&'static str, Err
 /// With the defaults that the method has, as the report names the stage.
 impl Serialize for Outliers {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        let statistical = self.method == Method::Statistical;
+        let statistical = self.method == OutlierMethod::Statistical;
         let mut keys = to.serialize_struct("Outliers", 6)?;
         keys.serialize_field("method", &self.method)?;
         keys.serialize_field("neighbors", &self.neighbors.or(statistical.then_some(NEIGHBORS)))?;

@@ -1,11 +1,8 @@
 //! The first look at a scan: its points, its extent as seen from somewhere, and the range of what
 //! it is coloured by; and the frame that follows from it.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use super::settings::{NARROWEST, Settings};
-use crate::host::{lock, parallel};
+use crate::host::Threads;
 use crate::point::{Dimension, PointBatch};
 use crate::stage::{Part, Source};
 use crate::{Error, ErrorKind, Result};
@@ -29,37 +26,29 @@ pub(super) fn each_point<S: Send>(
     let no_place = || Error::pipeline("the scan has no coordinates");
     let axes = schema.coordinates().ok_or_else(no_place)?;
     let fields: Vec<&Dimension> = settings.by.dimensions(schema)?;
-    let (next, states) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
-    parallel(settings.threads, |_| {
-        let mut state = begin();
-        let mut batch = PointBatch::new(schema.clone(), BATCH);
-        let mut values = vec![0.0; fields.len()];
-        loop {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            if index >= source.parts() {
-                break;
-            }
-            let mut part = source.part(index)?;
-            let mut number = 0;
-            while refill(&mut *part, &mut batch)? {
-                for record in batch.iter() {
-                    let seen = settings.view.seen(axes.map(|a| a.world(record, schema.endian)));
-                    if seen.iter().all(|v| v.is_finite()) {
-                        for (value, field) in values.iter_mut().zip(&fields) {
-                            *value = field.world(record, schema.endian);
-                        }
-                        visit(&mut state, number, seen, &values);
-                    } else {
-                        nowhere(&mut state);
+    let begin = || (begin(), PointBatch::new(schema.clone(), BATCH), vec![0.0; fields.len()]);
+    let draw = |(state, batch, values): &mut (S, PointBatch, Vec<f64>), index| {
+        let mut part = source.part(index)?;
+        let mut number = 0;
+        while refill(&mut *part, batch)? {
+            for record in batch.iter() {
+                let seen = settings.view.seen(axes.map(|a| a.world(record, schema.endian)));
+                if seen.iter().all(|v| v.is_finite()) {
+                    for (value, field) in values.iter_mut().zip(&fields) {
+                        *value = field.world(record, schema.endian);
                     }
-                    number += 1;
+                    visit(state, number, seen, values);
+                } else {
+                    nowhere(state);
                 }
+                number += 1;
             }
         }
-        lock(&states).push(state);
         Ok(())
-    })?;
-    Ok(std::mem::take(&mut *lock(&states)))
+    };
+    Threads::start(settings.threads, |threads| {
+        threads.items(source.parts(), || {}).run(begin, draw, |()| {}, |(state, ..)| Ok(state))
+    })
 }
 
 /// Reads the next batch; false at the end.

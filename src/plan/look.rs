@@ -1,5 +1,5 @@
-//! A look at some records before a run, so that values which an output cannot hold are told before the
-//! work and not in the middle of it. It finds what is common, and proves nothing.
+//! A look at some records before a run, so that values which an output cannot hold are told before
+//! the work and not in the middle of it. It finds what is common, and proves nothing.
 
 use crate::point::{PointBatch, Schema};
 use crate::stage::{CreateSink, Source};
@@ -22,8 +22,8 @@ pub(crate) struct Unfit {
     pub none_fits: bool,
 }
 
-/// Looks at some records for all `sinks`. Returns the first error that writing one of them would be;
-/// reading fails as a run would.
+/// Looks at some records for all `sinks`. Returns the first error that writing one of them would
+/// be; reading fails as a run would.
 pub(crate) fn look(
     source: &dyn Source,
     sinks: &[Box<dyn CreateSink>],

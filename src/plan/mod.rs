@@ -1,9 +1,11 @@
-//! From a graph, the headers of its inputs and the memory to a [`Plan`]: do the stages fit each other, the
-//! inputs and the memory? Knows no stage by name, and reads no point but a few that it looks at.
+//! From a graph, the headers of its inputs and the memory to a [`Plan`]: do the stages fit each
+//! other, the inputs and the memory? Knows no stage by name, and reads no point but a few that it
+//! looks at.
 
 mod look;
 mod outline;
 mod passes;
+mod places;
 mod plan;
 mod shown;
 mod sorted;

@@ -1,8 +1,8 @@
 //! The tile stages of a pipeline as passes over the scan: a pass ends where points are removed, or
 //! where a stage must have seen all tiles before it decides.
 
-use super::sorted::{Sorted, Work};
-use crate::engine::pass::{Branch, Call, Filter, Op, Pass, StageOp, decides, needs};
+use super::sorted::{Sorted, StageWork};
+use crate::engine::pass::{Branch, Call, Op, Pass, PassFilter, StageOp, decides, needs};
 use crate::graph::{Limits, Sees};
 use crate::point::{Schema, names};
 use crate::store::SELECTIONS;
@@ -64,22 +64,23 @@ pub(super) fn unroll(sorted: &Sorted, schema: &Schema) -> Result<Passes> {
         branch_of: vec![0; sinks],
         ..Passes::default()
     };
-    let mut layout = Layout { sorted, ops: &sorted.ops, schema, out, at: Cursor::default() };
+    let mut layout =
+        PassLayout { sorted, ops: &sorted.ops, schema, out, at: BranchCursor::default() };
     layout.branch(sorted.root)?;
     Ok(layout.out)
 }
 
-struct Layout<'a> {
+struct PassLayout<'a> {
     sorted: &'a Sorted,
     ops: &'a [StageOp],
     schema: &'a Schema,
     out: Passes,
-    at: Cursor,
+    at: BranchCursor,
 }
 
 /// How far a branch is laid out.
 #[derive(Debug, Clone, Default)]
-struct Cursor {
+struct BranchCursor {
     /// The pass that the next stage may join; None if it begins one.
     pass: Option<usize>,
     /// The pass that one which begins goes on from.
@@ -100,7 +101,7 @@ struct Cursor {
     decides: bool,
 }
 
-impl Layout<'_> {
+impl PassLayout<'_> {
     /// Lays out what is behind stage `number` of the graph.
     fn branch(&mut self, number: usize) -> Result<()> {
         let (working, sinks) = self.sorted.behind(number);
@@ -111,14 +112,14 @@ impl Layout<'_> {
             self.out.branches.push(branch);
             return Ok(());
         }
-        let begins: Vec<Cursor> = self.fork(working.len());
+        let begins: Vec<BranchCursor> = self.fork(working.len());
         for (stage, begin) in working.iter().zip(begins) {
             self.at = begin;
             self.at.path.push(*stage);
             match self.sorted.works[*stage] {
-                Work::Op(op) => self.op(op)?,
-                Work::Filter(filter) => self.filter(filter)?,
-                Work::Sink(_) | Work::Decode => {
+                StageWork::Op(op) => self.op(op)?,
+                StageWork::Filter(filter) => self.filter(filter)?,
+                StageWork::Sink(_) | StageWork::Decode => {
                     return Err(Error::internal("a stage does not work and is to be laid out"));
                 }
             }
@@ -127,9 +128,9 @@ impl Layout<'_> {
         Ok(())
     }
 
-    /// Where each of several branches begins: behind the pass that they have in common; the first may
-    /// join that one where nothing is done in it.
-    fn fork(&self, branches: usize) -> Vec<Cursor> {
+    /// Where each of several branches begins: behind the pass that they have in common; the first
+    /// may join that one where nothing is done in it.
+    fn fork(&self, branches: usize) -> Vec<BranchCursor> {
         let Some(pass) = self.at.pass.filter(|_| branches > 1) else {
             return vec![self.at.clone(); branches];
         };
@@ -138,7 +139,7 @@ impl Layout<'_> {
         let behind = if is_idle { shared.behind } else { Some(pass) };
         let of = |n: usize| match is_idle && n == 0 {
             true => self.at.clone(),
-            false => Cursor { pass: None, behind, ..self.at.clone() },
+            false => BranchCursor { pass: None, behind, ..self.at.clone() },
         };
         (0..branches).map(of).collect()
     }
@@ -175,7 +176,8 @@ impl Layout<'_> {
         Ok(())
     }
 
-    /// What streams behind tiles has a pass of its own, unless nothing but such stages is in the last.
+    /// What streams behind tiles has a pass of its own, unless nothing but such stages is in the
+    /// last.
     fn filter(&mut self, filter: usize) -> Result<()> {
         let at = self.pass();
         let pass = &self.out.passes[at];
@@ -196,7 +198,7 @@ impl Layout<'_> {
         let reads = op.tile().needs().reads;
         let is_read = |name: &String| names::XYZ.contains(&name.as_str()) || reads.contains(name);
         for filter in &self.at.filters {
-            let Filter { kind: above, transform } = &self.sorted.filters[*filter];
+            let PassFilter { kind: above, transform } = &self.sorted.filters[*filter];
             if let Some(name) = transform.needs().writes.iter().find(|name| is_read(name)) {
                 let told =
                     format!("`{kind}` works by {name} as it is read, and `{above}` changes it");
@@ -338,8 +340,8 @@ impl Layout<'_> {
         true
     }
 
-    /// Attaches sinks to the pass that the branch is at: they take what is there before it, if its last
-    /// stage takes nothing away, else what it leaves.
+    /// Attaches sinks to the pass that the branch is at: they take what is there before it, if its
+    /// last stage takes nothing away, else what it leaves.
     fn tap(&mut self, sinks: &[usize]) -> Result<()> {
         for &sink in sinks {
             let at = self.pass();

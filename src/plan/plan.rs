@@ -1,18 +1,19 @@
-//! A pipeline that fits: its source open, its lattice fixed, its stages in passes, its memory divided.
+//! A pipeline that fits: its source open, its lattice fixed, its stages in passes, its memory
+//! divided.
 
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+
+use rayon::ThreadPool;
 
 use super::look::{Unfit, look};
 use super::passes::{check_limits, number_selections, unroll};
+use super::places::{all_read, check_places, copies, each_input};
 use super::sorted::Sorted;
 use super::stretch::Stretch;
-use crate::engine::beside::Beside;
-use crate::engine::by_input::{lists_bytes, ranks};
+use crate::engine::by_input::lists_bytes;
 use crate::engine::by_rank;
+use crate::engine::demands::Demands;
 use crate::engine::pass::{Op, Pass, StageOp, standings};
-use crate::engine::publish::check_place;
-use crate::engine::shares::Demands;
 use crate::engine::tagger::Tagger;
 use crate::engine::task::Task;
 use crate::engine::{Done, Watch};
@@ -20,13 +21,13 @@ use crate::error::shown;
 use crate::geom::lattice::Lattice;
 use crate::graph::Graph;
 use crate::graph::{MOST_THREADS, Nonfinite, Overrides, RunSettings};
+use crate::host::Threads;
 use crate::host::process::default_memory;
-use crate::host::{Clash, Files, Use};
 use crate::point::{Schema, Selection, Units};
 use crate::quantity::Figure;
-use crate::stage::{ChunkSize, CreateSink, OpenSource, Order, Source};
-use crate::store::{CLASSED_INPUTS, TAGGED_INPUTS};
-use crate::{Error, ErrorKind, Result};
+use crate::stage::{ChunkSize, CreateSink, Order, Source};
+use crate::store::CLASSED_INPUTS;
+use crate::{Error, Result};
 
 /// A pipeline ready to run.
 pub struct Plan(pub(crate) Task);
@@ -39,6 +40,16 @@ impl Plan {
     /// inputs, and the report gets its own behind them.
     pub fn run(self, watch: &dyn Watch) -> Result<Done> {
         self.0.run(watch)
+    }
+
+    /// Runs the plan as [`run`](Plan::run) does, on the threads of `pool`: on as many as were
+    /// planned for, or on all if it has fewer. The outputs are the same on any pool.
+    ///
+    /// A run takes the threads that it works on for itself until it is done, so that other work of
+    /// the pool waits.
+    pub fn run_in(self, pool: &ThreadPool, watch: &dyn Watch) -> Result<Done> {
+        let threads = Threads::of(pool, self.0.threads);
+        self.0.run_on(threads, watch)
     }
 }
 
@@ -64,13 +75,13 @@ impl Graph {
         let selections = fit(&mut sorted.ops, schema, &source.metadata().units)?;
         let passes = unroll(&sorted, schema)?;
         let tagger = tagger(&sorted.ops, &passes.passes, &selections, &ranks, &*source, &settings)?;
-        let order = Ordered::new(&sorted, &*source)?;
+        let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, &*source, &sorted.ops, order.mills)?;
         let simd = settings.simd.resolve().map_err(in_file)?;
         let demands = demands(&sorted, &passes.passes, &*source, &order, &settings)?;
         let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
         let demands = Demands {
-            lists: demands.lists.saturating_add(folders.saturating_mul(lists_bytes(ranks.len()))),
+            lists: demands.lists + lists_bytes(ranks.len()) * folders,
             tagged: tagger.tags(),
             ..demands
         };
@@ -124,7 +135,8 @@ fn tagger(
     let classed = passes.iter().any(|pass| pass.reads_classes);
     if classed && ranks.len() > CLASSED_INPUTS as usize {
         let told = format!(
-            "more than {CLASSED_INPUTS} inputs cannot have an output each where a stage looks at classes"
+            "more than {CLASSED_INPUTS} inputs cannot have an output each where a stage looks at \
+             classes"
         );
         return Err(Error::pipeline(told).help("run them in several parts"));
     }
@@ -156,7 +168,7 @@ fn demands(
     sorted: &Sorted,
     passes: &[Pass],
     source: &dyn Source,
-    order: &Ordered,
+    order: &WriteOrder,
     settings: &RunSettings,
 ) -> Result<Demands> {
     let limit = settings.memory.unwrap_or_else(default_memory);
@@ -164,7 +176,7 @@ fn demands(
     let ranked =
         order.in_input_order.iter().filter(|ranked| **ranked && order.mills).count() as u64;
     Ok(Demands {
-        lists: ranked.saturating_mul(by_rank::lists_bytes(source.points())),
+        lists: by_rank::lists_bytes(source.points()) * ranked,
         ranked: ranked > 0,
         mills: order.mills,
         filters: !sorted.filters.is_empty(),
@@ -178,15 +190,16 @@ fn demands(
 }
 
 /// In which order records are written.
-struct Ordered {
-    /// True if the run needs tiles: for its stages, or because an output is to be in canonical order.
+struct WriteOrder {
+    /// True if the run needs tiles: for its stages, or because an output is to be in canonical
+    /// order.
     mills: bool,
     /// For each sink, whether it gets the order of the inputs.
     in_input_order: Vec<bool>,
 }
 
-impl Ordered {
-    fn new(sorted: &Sorted, source: &dyn Source) -> Result<Ordered> {
+impl WriteOrder {
+    fn new(sorted: &Sorted, source: &dyn Source) -> Result<WriteOrder> {
         let sinks = &sorted.sinks;
         // Branches of stages that stream go by tiles, and keep the order that a stream has.
         let (ops, streams) = (!sorted.ops.is_empty(), !sorted.filters.is_empty());
@@ -203,100 +216,8 @@ impl Ordered {
             let told = "the inputs have too many parts for an output in their order";
             return Err(Error::pipeline(told).help("leave `write.order` out"));
         }
-        Ok(Ordered { mills, in_input_order })
+        Ok(WriteOrder { mills, in_input_order })
     }
-}
-
-/// Refuses outputs that would replace what is read or each other, or that cannot appear where they
-/// should. The files of folders are not among them: [`each_input`] adds these to what is returned.
-fn check_places(
-    pipeline: Option<&Path>,
-    inputs: &[PathBuf],
-    sinks: &[Box<dyn CreateSink>],
-    settings: &RunSettings,
-) -> Result<Files> {
-    let mut files = Files::default();
-    pipeline.iter().for_each(|path| files.read(path, Use::Pipeline));
-    inputs.iter().for_each(|path| files.read(path, Use::Input));
-    let outputs = sinks.iter().map(|sink| (sink.path(), sink.is_folder()));
-    for (path, is_folder) in outputs.chain(settings.report.as_deref().map(|path| (path, false))) {
-        files.write(path).map_err(|clash| refuse(&clash, path))?;
-        if !is_folder {
-            check_place(path, settings.existing)?;
-        }
-    }
-    match settings.scratch.as_ref().filter(|folder| !folder.is_dir()) {
-        Some(folder) => Err(Error::new(ErrorKind::Io, "the folder for scratch does not exist")
-            .at(folder)
-            .help("create it first, or name another with `run.scratch`")),
-        None => Ok(files),
-    }
-}
-
-/// The inputs, and what their records refer to.
-fn all_read(open: &dyn OpenSource, source: &dyn Source) -> Vec<PathBuf> {
-    let beside = source.inputs().into_iter().filter_map(|input| input.beside);
-    open.paths().into_iter().chain(beside.map(|(path, _)| path)).collect()
-}
-
-/// What is to be copied beside outputs, none of which is one of the other `files`.
-fn copies(
-    source: &dyn Source,
-    sinks: &[Box<dyn CreateSink>],
-    each: &[Vec<Box<dyn CreateSink>>],
-    settings: &RunSettings,
-    files: &mut Files,
-) -> Result<Vec<Beside>> {
-    let mut copies = Vec::new();
-    for (n, input) in source.inputs().iter().enumerate() {
-        for (sink, own) in sinks.iter().zip(each) {
-            let sink = own.get(n).unwrap_or(sink);
-            let copy = Beside::of(input, &**sink, files);
-            if let Some(copy) = copy.map_err(|(to, clash)| refuse(&clash, &to))? {
-                // A folder that the run makes first has nothing in it.
-                if own.is_empty() || copy.to.parent().is_some_and(Path::is_dir) {
-                    check_place(&copy.to, settings.existing)?;
-                }
-                copies.push(copy);
-            }
-        }
-    }
-    Ok(copies)
-}
-
-fn refuse(clash: &Clash, output: &Path) -> Error {
-    Error::pipeline(format!("this {clash}")).at(output).help("write to another file")
-}
-
-/// Sinks of the inputs for each output that is a folder, and the ranks of the inputs if one is.
-type EachInput = (Vec<Vec<Box<dyn CreateSink>>>, Vec<u32>);
-
-/// Names the outputs of folders; refuses those that cannot appear there, or that would replace one of
-/// the other `files`.
-fn each_input(
-    source: &dyn Source,
-    sinks: &[Box<dyn CreateSink>],
-    settings: &RunSettings,
-    files: &mut Files,
-) -> Result<EachInput> {
-    let inputs = source.inputs();
-    if inputs.len() > TAGGED_INPUTS as usize && sinks.iter().any(|sink| sink.is_folder()) {
-        let told = format!("more than {TAGGED_INPUTS} inputs cannot have an output each");
-        return Err(Error::pipeline(told).help("run them in several parts"));
-    }
-    let mut each = Vec::new();
-    for sink in sinks {
-        let own = sink.each_input(&inputs)?.unwrap_or_default();
-        for path in own.iter().map(|sink| sink.path().to_owned()) {
-            files.write(&path).map_err(|clash| refuse(&clash, &path))?;
-            if sink.path().is_dir() {
-                check_place(&path, settings.existing)?;
-            }
-        }
-        each.push(own);
-    }
-    let folders = each.iter().any(|own| !own.is_empty());
-    Ok((each, if folders { ranks(&inputs) } else { Vec::new() }))
 }
 
 /// Refuses lengths that are longer than the lattice.
@@ -331,9 +252,9 @@ fn check_transforms(sorted: &Sorted, schema: &Schema) -> Result<()> {
     Ok(())
 }
 
-/// What outputs will not hold. Records that they cannot hold are an error where all are written, and
-/// a warning where a stage may remove them first and leave others. Then what stages have nothing to do
-/// of.
+/// What outputs will not hold. Records that they cannot hold are an error where all are written,
+/// and a warning where a stage may remove them first and leave others. Then what stages have
+/// nothing to do of.
 fn warnings(source: &dyn Source, sorted: &Sorted, settings: &RunSettings) -> Result<Vec<String>> {
     let Sorted { sinks, transforms, filters, ops, .. } = sorted;
     let schema = source.schema();

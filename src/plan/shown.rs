@@ -115,8 +115,8 @@ impl Plan {
         if self.0.mills {
             write!(
                 f,
-                ": {} for the program, {} for the index, {} for work, {} to keep points in\n         \
-                 runs of {} records, tiles of {} positions with their rims",
+                ": {} for the program, {} for the index, {} for work, {} to keep points \
+                 in\n         runs of {} records, tiles of {} positions with their rims",
                 Bytes(shares.base),
                 Bytes(shares.index),
                 Bytes(shares.work),

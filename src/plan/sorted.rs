@@ -1,16 +1,16 @@
-//! The stages of a graph by role, and the tree that they are: what the decode does for all branches,
-//! and what stands behind it.
+//! The stages of a graph by role, and the tree that they are: what the decode does for all
+//! branches, and what stands behind it.
 
 use std::collections::BTreeSet;
 
-use crate::engine::pass::{Filter, Op, StageOp};
-use crate::graph::{Graph, GraphStage};
+use crate::engine::pass::{Op, PassFilter, StageOp};
+use crate::graph::{Graph, GraphStage, Written};
 use crate::stage::{CreateSink, OpenSource, Role, Transform};
 use crate::{Error, Result};
 
 /// What a stage behind the decode is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Work {
+pub(super) enum StageWork {
     /// This tile stage.
     Op(usize),
     /// This stage that streams.
@@ -27,10 +27,10 @@ pub(super) struct Sorted {
     /// The stages that the decode applies to all records.
     pub transforms: Vec<(String, Box<dyn Transform>)>,
     pub ops: Vec<StageOp>,
-    pub filters: Vec<Filter>,
+    pub filters: Vec<PassFilter>,
     pub sinks: Vec<Box<dyn CreateSink>>,
     /// What each stage of the graph is.
-    pub works: Vec<Work>,
+    pub works: Vec<StageWork>,
     /// For each stage of the graph, those that take from it, in order.
     pub takers: Vec<Vec<usize>>,
     /// The last stage of the decode.
@@ -55,23 +55,33 @@ impl Sorted {
         let name =
             |stage: &GraphStage| serde_json::json!({ "kind": stage.kind, "keys": stage.keys });
         let names = graph.stages.iter().map(name).collect();
-        let (mut source, mut works) = (None, Vec::new());
+        let mut source: Option<(String, Box<dyn OpenSource>)> = None;
+        let mut works = Vec::new();
         let (mut transforms, mut filters) = (Vec::new(), Vec::new());
         let (mut ops, mut sinks) = (Vec::new(), Vec::new());
         for (n, stage) in graph.stages.into_iter().enumerate() {
             let GraphStage { kind, written, limits, role, .. } = stage;
             works.push(match &role {
-                Role::Source(_) => Work::Decode,
-                Role::Transform(_) if decoded.contains(&n) => Work::Decode,
-                Role::Transform(_) => Work::Filter(filters.len()),
-                Role::TileOp(_) | Role::ScanOp(_) => Work::Op(ops.len()),
-                Role::Sink(_) => Work::Sink(sinks.len()),
+                Role::Source(_) => StageWork::Decode,
+                Role::Transform(_) if decoded.contains(&n) => StageWork::Decode,
+                Role::Transform(_) => StageWork::Filter(filters.len()),
+                Role::TileOp(_) | Role::ScanOp(_) => StageWork::Op(ops.len()),
+                Role::Sink(_) => StageWork::Sink(sinks.len()),
             });
+            let blamed = written.clone();
             let tile = |kind, op| StageOp { kind, written, op, limits, selection: 0 };
             match role {
-                Role::Source(open) => source = Some((kind, open)),
+                Role::Source(open) => {
+                    source = Some(match source {
+                        None => (kind, open),
+                        Some((first, all)) => {
+                            let merged = all.merged(&*open);
+                            (first, merged.map_err(|error| blame(&*blamed, error))?)
+                        }
+                    });
+                }
                 Role::Transform(one) if decoded.contains(&n) => transforms.push((kind, one)),
-                Role::Transform(transform) => filters.push(Filter { kind, transform }),
+                Role::Transform(transform) => filters.push(PassFilter { kind, transform }),
                 Role::TileOp(op) => ops.push(tile(kind, Op::Tile(op))),
                 Role::ScanOp(op) => ops.push(tile(kind, Op::Scan(op))),
                 Role::Sink(sink) => sinks.push(sink),
@@ -88,27 +98,36 @@ impl Sorted {
     pub fn behind(&self, number: usize) -> (Vec<usize>, Vec<usize>) {
         let takers = &self.takers[number];
         let sink = |taker: &usize| match self.works[*taker] {
-            Work::Sink(sink) => Some(sink),
+            StageWork::Sink(sink) => Some(sink),
             _ => None,
         };
         let working = takers.iter().copied().filter(|taker| sink(taker).is_none());
         (working.collect(), takers.iter().filter_map(sink).collect())
     }
 
-    /// The stages on a path, those of the decode and all sinks that take from one of these included,
-    /// as reports and outputs name them.
+    /// The stages on a path, those of the decode and all sinks that take from one of these
+    /// included, as reports and outputs name them.
     pub fn named(&self, path: &[usize]) -> serde_json::Value {
         let on_path: BTreeSet<usize> = path.iter().copied().collect();
-        let is_decode = |n: &usize| self.works[*n] == Work::Decode;
+        let is_decode = |n: &usize| self.works[*n] == StageWork::Decode;
         let is_sink = |n: &usize| {
             let takes = |from: &usize| self.takers[*from].contains(n);
             let from = (0..*n).filter(takes).collect::<Vec<_>>();
-            matches!(self.works[*n], Work::Sink(_))
+            matches!(self.works[*n], StageWork::Sink(_))
                 && from.iter().any(|from| on_path.contains(from) || is_decode(from))
         };
         let named = 0..self.names.len();
         let named = named.filter(|n| on_path.contains(n) || is_decode(n) || is_sink(n));
         named.map(|n| self.names[n].clone()).collect()
+    }
+}
+
+/// What is wrong with a stage, told where it is written.
+fn blame(written: &dyn Written, error: Error) -> Error {
+    let told = written.wrong(error.to_string());
+    match error.remedy() {
+        Some(help) => told.help(help.to_owned()),
+        None => told,
     }
 }
 

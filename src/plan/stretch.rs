@@ -1,5 +1,5 @@
-//! What z is multiplied by so that distances mean something, from the units of a scan and the `[run]`
-//! settings.
+//! What z is multiplied by so that distances mean something, from the units of a scan and the
+//! `[run]` settings.
 
 use crate::graph::{MixedUnits, RunSettings, ZScale};
 use crate::point::{Mismatch, Units};
@@ -35,8 +35,8 @@ impl RunSettings {
             None => {
                 let doubt = units.doubt().map(|doubt| {
                     format!(
-                        "{doubt}; z is measured in the unit of x and y: give `run.z_scale = 1` if that \
-                         is right, or the factor that brings z there"
+                        "{doubt}; z is measured in the unit of x and y: give `run.z_scale = 1` if \
+                         that is right, or the factor that brings z there"
                     )
                 });
                 Ok(Stretch { factor: 1.0, doubt })
@@ -68,8 +68,8 @@ fn known(units: Units) -> Result<()> {
         units.words()
     );
     Err(Error::new(ErrorKind::Data, told).help(
-        "give `run.z_scale = 1` if z is in the unit of x and y, else the factor that brings it there, \
-         such as 0.3048 for feet above metres",
+        "give `run.z_scale = 1` if z is in the unit of x and y, else the factor that brings it \
+         there, such as 0.3048 for feet above metres",
     ))
 }
 

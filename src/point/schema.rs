@@ -64,6 +64,19 @@ impl Value {
             Value::Double(v) => v,
         }
     }
+
+    /// The whole number that it is, if it is one that a field of integers may hold.
+    fn whole(self) -> Option<i128> {
+        match self {
+            Value::Unsigned(v) => Some(i128::from(v)),
+            Value::Signed(v) => Some(i128::from(v)),
+            Value::Single(_) | Value::Double(_) => {
+                let v = self.as_f64();
+                // NaN and infinities have a NaN fraction.
+                (v.fract() == 0.0 && v.abs() < 1.8446744073709552e19).then_some(v as i128)
+            }
+        }
+    }
 }
 
 /// Some bits of a stored unsigned number.
@@ -174,30 +187,9 @@ impl Dimension {
                 _ => exact && (f64::from(v as f32) == v || v.is_nan()) && write!(v as f32),
             };
         }
-        let whole: i128 = match value {
-            Value::Unsigned(v) => i128::from(v),
-            Value::Signed(v) => i128::from(v),
-            Value::Single(_) | Value::Double(_) => {
-                let v = value.as_f64();
-                if v.fract() != 0.0 || v.abs() >= 1.8446744073709552e19 {
-                    return false; // NaN and infinities have a NaN fraction
-                }
-                v as i128
-            }
-        };
+        let Some(whole) = value.whole() else { return false };
         if let Some(bits) = self.bits {
-            let mask = ((1u128 << bits.width) - 1) as i128;
-            if whole < 0 || whole > mask {
-                return false;
-            }
-            let Value::Unsigned(old) =
-                (Dimension { bits: None, ..self.clone() }).get(record, endian)
-            else {
-                return false; // bits of a signed number: no format has them
-            };
-            let new = (i128::from(old) & !(mask << bits.shift)) | (whole << bits.shift);
-            let whole_field = Dimension { bits: None, ..self.clone() };
-            return whole_field.put(record, endian, Value::Unsigned(new as u64));
+            return self.put_bits(record, endian, bits, whole);
         }
         macro_rules! store {
             ($t:ty) => {
@@ -218,6 +210,20 @@ impl Dimension {
             Scalar::I64 => store!(i64),
             Scalar::F32 | Scalar::F64 => false, // handled above
         }
+    }
+
+    /// Stores `whole` in some bits of the field, the others of which stay as they are.
+    fn put_bits(&self, record: &mut [u8], endian: Endian, bits: Bits, whole: i128) -> bool {
+        let mask = ((1u128 << bits.width) - 1) as i128;
+        if whole < 0 || whole > mask {
+            return false;
+        }
+        let field = Dimension { bits: None, ..self.clone() };
+        let Value::Unsigned(old) = field.get(record, endian) else {
+            return false; // bits of a signed number: no format has them
+        };
+        let new = (i128::from(old) & !(mask << bits.shift)) | (whole << bits.shift);
+        field.put(record, endian, Value::Unsigned(new as u64))
     }
 }
 

@@ -42,7 +42,8 @@ impl Flag {
         }
     }
 
-    /// Where records of `schema` have it: a field, or a class where their layout has one for overlap.
+    /// Where records of `schema` have it: a field, or a class where their layout has one for
+    /// overlap.
     fn place(self, schema: &Schema) -> Option<FlagPlace> {
         let field = schema.find(self.dimension()).map(|field| FlagPlace::Field(Field::of(field)));
         let as_class = || {

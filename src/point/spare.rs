@@ -21,7 +21,7 @@ impl<T> Spare<T> {
         found.unwrap_or_else(make)
     }
 
-    /// Puts a buffer back; what it holds is unspecified to whoever takes it.
+    /// Puts a buffer back; what it holds is unspecified when it is taken again.
     pub fn put(&self, buffer: T) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(buffer);
     }

@@ -160,8 +160,8 @@ impl Visitor<'_> for LengthVisitor {
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(
-            "a length above 0 in the scan's unit, or with a unit such as \"2m\" or \"5cm\" (mm, cm, m, \
-             km, in, ft or us-ft)",
+            "a length above 0 in the scan's unit, or with a unit such as \"2m\" or \"5cm\" (mm, \
+             cm, m, km, in, ft or us-ft)",
         )?;
         f.write_str(if self.none { ", or \"none\"" } else { "" })
     }

@@ -1,5 +1,7 @@
 //! The names of classes, for people.
 
+use serde::{Serialize, Serializer};
+
 use super::figures::{ClassFigures, Pair};
 
 /// What a class means by LAS 1.4 R15; None for those that it leaves to the user or reserves.
@@ -51,6 +53,12 @@ mod tests {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ClassCounts {
     counts: Box<[Pair<u64>; 256]>,
+}
+
+impl Serialize for ClassCounts {
+    fn serialize<S: Serializer>(&self, into: S) -> Result<S::Ok, S::Error> {
+        self.counts.as_slice().serialize(into)
+    }
 }
 
 impl Default for ClassCounts {

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::figures::{ClassFigures, PassFigures, Totals};
 use super::ledger::Ledger;
 use super::machine::Machine;
+use crate::budget::Holders;
 
 /// What a run says it did.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,6 +84,8 @@ pub struct RunFigures {
     pub memory_bytes: u64,
     /// The most that was leased of it at once.
     pub leased_bytes: u64,
+    /// Who held it then.
+    pub memory_holders: Holders,
     /// Peak resident memory of the process (VmHWM); None where the system does not tell.
     pub peak_memory_bytes: Option<u64>,
     /// Bytes spilled to disk.
@@ -206,6 +209,9 @@ pub fn result_bytes(report: &[u8]) -> Option<&[u8]> {
     rest.get(..end)
 }
 
+/// Holders of memory that a report lists.
+const HOLDERS: usize = 8;
+
 impl RunFigures {
     fn write(&self, out: &mut impl Write) -> io::Result<()> {
         let mut object = Object::open(out)?;
@@ -216,6 +222,7 @@ impl RunFigures {
         object.entry("threads", &self.threads)?;
         object.entry("memory_bytes", &self.memory_bytes)?;
         object.entry("leased_bytes", &self.leased_bytes)?;
+        object.entry("memory_holders", &self.memory_holders.largest(HOLDERS))?;
         object.entry("peak_memory_bytes", &self.peak_memory_bytes)?;
         object.entry("spill_bytes", &self.spill_bytes)?;
         object.entry("seconds", &self.seconds)?;

@@ -3,6 +3,7 @@
 mod baseline;
 mod classes;
 mod deviations;
+mod digits;
 mod document;
 mod figures;
 mod ledger;
@@ -18,6 +19,7 @@ pub use baseline::Baseline;
 pub use classes::ClassCounts;
 pub use classes::class_name;
 pub use deviations::{Deviations, Histogram};
+pub use digits::{Coordinate, Grouped, Short};
 pub use document::{
     Decision, FileFigures, LatticeFigures, Outcome, Phase, Report, RunFigures, result_bytes,
 };
@@ -33,5 +35,5 @@ pub use sums::{Distances, FixedSum};
 pub use survey::{
     FittedScan, FittedTile, PlaneDistances, ScanSurvey, TileSurvey, report_tile_level,
 };
-pub use table::{Coordinate, Grouped, Short, Table};
+pub use table::Table;
 pub use tally::{Apart, KEY_POINTS, Tally};

@@ -349,7 +349,8 @@ mod tests {
     proptest::proptest! {
         #[test]
         fn the_least_axis_is_an_eigenvector_and_no_direction_is_less(
-            v in proptest::array::uniform9(-1e6f64..1e6), w in proptest::array::uniform3(-1f64..1.0),
+            v in proptest::array::uniform9(-1e6f64..1e6),
+            w in proptest::array::uniform3(-1f64..1.0),
         ) {
             let mut m = [[0.0; 3]; 3];
             for (a, b) in PAIRS {

@@ -275,7 +275,8 @@ mod tests {
 
         #[test]
         fn order_split_and_copies_change_no_bit(
-            figures in proptest::collection::vec((0f64..1e12, -30i32..60), 1..40), cut in 0usize..40,
+            figures in proptest::collection::vec((0f64..1e12, -30i32..60), 1..40),
+            cut in 0usize..40,
         ) {
             let figures: Vec<f64> = figures.iter().map(|(f, e)| f * 2f64.powi(*e)).collect();
             let whole = sum_of(&figures);

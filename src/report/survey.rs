@@ -309,8 +309,8 @@ fn check_walks(points: Pair<u64>, measured: &Pair<Distances>) -> Result<()> {
         return Ok(());
     }
     Err(Error::internal(format!(
-        "the walks of the survey differ: {} records before and {} after the reduction in the first, \
-         {} and {} in the second",
+        "the walks of the survey differ: {} records before and {} after the reduction in the \
+         first, {} and {} in the second",
         points.before, points.after, second.before, second.after
     )))
 }

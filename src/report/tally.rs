@@ -2,19 +2,23 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Serialize, Serializer};
+
 use super::ClassCounts;
 
 /// The count of records that were written with the key-point flag that a stage set.
 pub const KEY_POINTS: &str = "key_points";
 
-/// Counts that a tile or a stream reports; merged by addition, so that order does not matter.
-#[derive(Debug, Clone, Default, PartialEq)]
+/// Counts that an item of work reports, such as a tile or a part of the input; merged by addition,
+/// so that order does not matter.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Tally {
     /// Counts that are the same for every configuration, by name; they go into `result`.
     pub counts: BTreeMap<&'static str, u64>,
     /// Counts that depend on how the work was cut up, by name; they go into `run`.
     pub work: BTreeMap<&'static str, u64>,
     /// Records removed, by stage kind and reason.
+    #[serde(serialize_with = "as_list")]
     pub removed: BTreeMap<(String, &'static str), u64>,
     /// Selections that a record is in, a bit each.
     pub selections: u8,
@@ -26,12 +30,20 @@ pub struct Tally {
 
 /// How far apart points of unequal coordinates are that share a position of the lattice, in world
 /// units.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Apart {
     /// The least difference in one coordinate that was met.
     pub nearest: f64,
     /// The largest distance that there may be.
     pub farthest: f64,
+}
+
+/// Writes the entries of a map as a list: in JSON only texts can be keys.
+fn as_list<S: Serializer>(
+    removed: &BTreeMap<(String, &'static str), u64>,
+    into: S,
+) -> Result<S::Ok, S::Error> {
+    into.collect_seq(removed)
 }
 
 impl Apart {
@@ -79,5 +91,26 @@ impl Tally {
         if let Some(classes) = &other.classes {
             self.classes.get_or_insert_default().merge(classes);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn a_tally_can_be_written_down() {
+        let mut tally = Tally::default();
+        tally.count("cells", 3);
+        tally.remove("median", "not median", 4);
+        tally.apart = Some(Apart { nearest: 0.5, farthest: 2.0 });
+        tally.classes = Some(ClassCounts::default());
+        let written = serde_json::to_value(&tally).unwrap();
+        assert_eq!(written["counts"], json!({ "cells": 3 }));
+        assert_eq!(written["removed"], json!([[["median", "not median"], 4]]));
+        assert_eq!(written["apart"]["farthest"], 2.0);
+        assert_eq!(written["classes"].as_array().map(Vec::len), Some(256));
     }
 }

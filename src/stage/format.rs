@@ -11,18 +11,20 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::{ChunkSize, Sink, Source};
+use super::sink::{ChunkSize, Sink};
+use super::source::Source;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::{Error, Result};
 
 /// A format of files that hold points.
 pub trait Format: Send + Sync {
-    /// Its name, which `read.format` and `write.format` take: the extension of its files, in lower case
-    /// and without the dot.
+    /// Its name, which `read.format` and `write.format` take: the extension of its files, in lower
+    /// case and without the dot.
     fn name(&self) -> &'static str;
 
     /// The family of its records, as [`Layout::family`](crate::point::Layout::family) has it. Files
-    /// of formats of one family are read together, and records go from one to the other as they are.
+    /// of formats of one family are read together, and records go from one to the other as they
+    /// are.
     fn family(&self) -> &'static str;
 
     /// What it is, in a few words.
@@ -34,13 +36,13 @@ pub trait Format: Send + Sync {
     /// True if a file that begins with these bytes (512, or all that it has) is of this family.
     fn sniff(&self, first: &[u8]) -> bool;
 
-    /// Opens files of the family as one source, as [`OpenSource::open`](super::OpenSource::open) has
-    /// it.
+    /// Opens files of the family as one source, as [`OpenSource::open`](super::OpenSource::open)
+    /// has it.
     ///
     /// # Errors
     ///
-    /// Files that cannot be read, that do not fit together, or whose headers their lengths refute. A
-    /// file that does not begin as one of the family is [`foreign`]: the caller tells what it is.
+    /// Files that cannot be read, that do not fit together, or whose headers their lengths refute.
+    /// A file that does not begin as one of the family is [`foreign`]: the caller tells what it is.
     fn open(&self, files: &[PathBuf]) -> Result<Box<dyn Source>>;
 
     /// What the header of a file says, as `info` shows it: a table with `format` and `points`.
@@ -52,8 +54,8 @@ pub trait Format: Send + Sync {
         None
     }
 
-    /// Where a file's name promises more than the format writes (`a.copc.laz`): what it promises, and
-    /// the name without that.
+    /// Where a file's name promises more than the format writes (`a.copc.laz`): what it promises,
+    /// and the name without that.
     fn promises(&self, _path: &Path) -> Option<(&'static str, PathBuf)> {
         None
     }

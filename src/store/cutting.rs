@@ -1,4 +1,9 @@
 //! The scan as octree nodes that fit.
+//!
+//! Nodes are found from above, by halving those that are too heavy. How many positions a box holds
+//! is answered by the index of the sealed scan, which knows the counts of whole blocks, so only
+//! blocks at the faces of a box are unpacked. Counting while the scan is decoded would need the
+//! sizes of tiles before the memory for them is known.
 
 use super::TileKey;
 use super::sealed::{Reader, SealedTiles};
@@ -6,8 +11,9 @@ use crate::Error;
 
 impl SealedTiles {
     /// Cuts the scan into octree nodes, in Morton order, none without a position: nodes whose cube
-    /// grown by `reach` has at most `wanted` positions; or at most `most`, where the side is 2^`good`
-    /// or less, so that smaller nodes would be mostly zone. None has a side below 2^`lowest`.
+    /// grown by `reach` has at most `wanted` positions; or at most `most`, where the side is
+    /// 2^`good` or less, so that smaller nodes would be mostly zone. None has a side below
+    /// 2^`lowest`.
     ///
     /// If nodes of that side have more, the error names the one that has most and its count.
     pub fn cut(

@@ -1,10 +1,14 @@
 //! What comes out of the merge of a range: blocks of distinct positions, and the order of records.
+//!
+//! Records are not moved: 8 bytes say where each one, in canonical order, lies among the runs.
+//! Records are long, 20 to 70 bytes and more, and most of them are removed in the end, so moving
+//! them would read and write all of them for the sake of few.
 
 use super::Levels;
 use super::block::{BLOCK, Block};
-use super::fetch::ref_bytes;
 use super::key::split_level;
 use super::pieces::{PIECE, Pieces};
+use super::record::ref_bytes;
 use super::spill::Spill;
 use crate::point::Position;
 use crate::{Error, Result};
@@ -12,7 +16,7 @@ use crate::{Error, Result};
 /// Blocks packed before they are handed to the spill.
 const BLOCKS_AT_ONCE: usize = 64;
 
-pub(crate) struct Output {
+pub(crate) struct MergeOutput {
     pub positions: Spill,
     pub refs: Pieces,
     pub tagged: bool,
@@ -28,7 +32,7 @@ pub(crate) struct Merged {
 
 /// Packs what comes out of the merge into blocks and pieces.
 pub(crate) struct Emitter<'a> {
-    out: &'a Output,
+    out: &'a MergeOutput,
     merged: Merged,
     positions: Vec<Position>,
     copies: Vec<u32>,
@@ -42,10 +46,11 @@ pub(crate) struct Emitter<'a> {
 
 impl<'a> Emitter<'a> {
     /// Bytes that an emitter holds.
-    pub const BYTES: usize = BLOCKS_AT_ONCE * BLOCK * 28 + PIECE * 12 + 2 * BLOCK * 28;
+    pub const BYTES: usize =
+        (BLOCKS_AT_ONCE + 2) * BLOCK * Block::BYTES_PER_POSITION + PIECE * ref_bytes(true);
 
     /// An emitter of at most `most_records` records.
-    pub fn new(out: &'a Output, most_records: u64) -> Result<Self> {
+    pub fn new(out: &'a MergeOutput, most_records: u64) -> Result<Self> {
         let first_ref = out.refs.reserve(most_records)?;
         Ok(Emitter {
             out,
@@ -57,7 +62,7 @@ impl<'a> Emitter<'a> {
             },
             positions: Vec::with_capacity(BLOCK),
             copies: Vec::with_capacity(BLOCK),
-            packed: Vec::with_capacity(BLOCKS_AT_ONCE * BLOCK * 28),
+            packed: Vec::with_capacity(BLOCKS_AT_ONCE * BLOCK * Block::BYTES_PER_POSITION),
             unplaced: Vec::with_capacity(BLOCKS_AT_ONCE),
             refs: Vec::with_capacity(PIECE * ref_bytes(out.tagged)),
             first_ref,
@@ -66,8 +71,8 @@ impl<'a> Emitter<'a> {
         })
     }
 
-    /// Takes the next records, numbered from `first_record` on among all of the store: their positions,
-    /// and their tags if they have any.
+    /// Takes the next records, numbered from `first_record` on among all of the store: their
+    /// positions, and their tags if they have any.
     pub fn take(&mut self, positions: &[Position], first_record: u64, tags: &[u32]) -> Result<()> {
         let Some(&end) = positions.last() else { return Ok(()) };
         let mut new = positions;

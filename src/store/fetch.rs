@@ -1,13 +1,14 @@
 //! Looking up where records are stored, and what is held to fetch them.
+//!
+//! Records lie in the order in which runs were sorted and are asked for in canonical order, so
+//! those of one chunk are spread over many runs. They are sorted by where they are stored, read in
+//! stretches that are in one piece, and put to their slots: a read for each record would be a
+//! system call for each.
 
 use super::pieces::{PIECE, Pieces};
+use super::record::ref_bytes;
 use crate::Result;
-
-/// Bytes of a record's entry in the canonical order: its number in the store and, if records have
-/// them, its tag.
-pub(super) fn ref_bytes(tagged: bool) -> usize {
-    if tagged { 12 } else { 8 }
-}
+use crate::budget::Bytes;
 
 /// Stretches of sorted `sources` that are in one piece, each with its first and last number.
 pub(crate) fn groups(sources: &[(u64, u32)]) -> impl Iterator<Item = (&[(u64, u32)], (u64, u64))> {
@@ -30,10 +31,10 @@ pub struct Fetch {
 
 impl Fetch {
     /// Bytes that fetching `count` records of `stride` bytes holds.
-    pub fn bytes(count: u64, stride: usize) -> u64 {
+    pub fn bytes(count: u64, stride: usize) -> Bytes {
         let each = size_of::<(u64, u32)>() + size_of::<&mut [u8]>();
-        let piece = (PIECE as u64).saturating_mul((stride as u64).saturating_add(8));
-        count.saturating_mul(each as u64).saturating_add(piece)
+        let piece = Bytes::from(stride) + Bytes::from(ref_bytes(false));
+        Bytes::of(count, each) + piece * PIECE as u64
     }
 
     /// Where the record numbered `number` in canonical order is stored.

@@ -1,4 +1,8 @@
 //! Records from here and there, one after the other. Knows lengths alone.
+//!
+//! The sort orders indices and leaves records where they are, since a swap of long records would
+//! copy them many times. They are copied once, here, with lengths that the compiler knows for the
+//! usual formats.
 
 /// Appends to `out` the records of `stride` bytes that `indices` name among `records`.
 ///

@@ -1,28 +1,30 @@
 //! The decode's end: records become sorted runs. A run is what one thread holds before it spills:
 //! its positions, packed, and its records, both in canonical order.
+//!
+//! Every thread fills and sorts a run of its own, so the decode needs no order among threads and no
+//! lock but for a list. Where a run begins and ends depends on threads and memory, and decides
+//! nothing: the merge orders records of one position by their bytes.
 
 use std::sync::Arc;
 use std::sync::Mutex;
 
 use super::block::{BLOCK, Block};
 use super::gather::gather;
-use super::order::{Order, Sorted};
+use super::order::{RunOrder, SortedIndices};
 use super::pieces::{PIECE, Pieces};
 use super::record::Tag;
 use super::spill::{Spill, SpillArea};
 use crate::Result;
-use crate::budget::{Budget, Lease};
+use crate::budget::{Budget, Bytes, Lease};
 use crate::host::threads::lock;
 use crate::point::Position;
 
-/// Bytes of index that a run keeps in memory for each of its blocks.
-const INDEX_BYTES: u64 = size_of::<Block>() as u64;
 /// Packed positions and records are handed to the spill in stretches of about this size.
 const STRETCH: usize = 1 << 20;
 
 /// A sorted run: its blocks, and the number of its first record among all records.
 #[derive(Debug)]
-pub(crate) struct Run {
+pub(crate) struct SortedRun {
     pub blocks: Vec<Block>,
     pub first_record: u64,
 }
@@ -38,8 +40,8 @@ pub struct TileStore {
     pub(crate) records: Pieces,
     /// The place in the input of each record, by the same numbers, if an output asks for it.
     pub(crate) places: Option<Pieces>,
-    pub(crate) runs: Mutex<Vec<Run>>,
-    index: Mutex<Vec<Lease>>,
+    pub(crate) runs: Mutex<Vec<SortedRun>>,
+    index: Mutex<Lease>,
 }
 
 impl TileStore {
@@ -54,7 +56,7 @@ impl TileStore {
             records: Pieces::new(area, "records", stride),
             places: None,
             runs: Mutex::default(),
-            index: Mutex::default(),
+            index: Mutex::new(budget.open("index of the sorted runs")),
         }
     }
 
@@ -70,9 +72,8 @@ impl TileStore {
         lock(&self.runs).len()
     }
 
-    fn add(&self, run: Run) -> Result<()> {
-        let bytes = run.blocks.len() as u64 * INDEX_BYTES;
-        lock(&self.index).push(self.budget.lease(bytes, "index of the sorted runs")?);
+    fn add(&self, run: SortedRun) -> Result<()> {
+        lock(&self.index).grow(Bytes::of(run.blocks.len() as u64, size_of::<Block>()).0)?;
         lock(&self.runs).push(run);
         Ok(())
     }
@@ -88,21 +89,21 @@ pub struct Intake<'a> {
     tags: Vec<u32>,
     places: Vec<u64>,
     next_place: u64,
-    order: Order,
+    order: RunOrder,
     packed: Vec<u8>,
 }
 
 impl<'a> Intake<'a> {
     /// Bytes that an intake holds for each record of `stride` bytes.
-    pub fn bytes_per_record(stride: usize, tagged: bool, placed: bool) -> u64 {
+    pub fn bytes_per_record(stride: usize, tagged: bool, placed: bool) -> Bytes {
         let tag = if tagged { size_of::<Tag>() } else { 0 };
-        let more = tag + if placed { size_of::<u64>() } else { 0 };
-        (stride as u64).saturating_add((size_of::<Position>() + Order::BYTES + more) as u64)
+        let place = if placed { size_of::<u64>() } else { 0 };
+        Bytes::from(stride) + Bytes::from(size_of::<Position>() + RunOrder::BYTES + tag + place)
     }
 
     /// Bytes that an intake holds whatever its capacity.
-    pub fn fixed_bytes(stride: usize) -> u64 {
-        (2 * PIECE as u64).saturating_mul(stride as u64).saturating_add(2 * STRETCH as u64)
+    pub fn fixed_bytes(stride: usize) -> Bytes {
+        Bytes::of(2 * PIECE as u64, stride) + Bytes::of(2, STRETCH)
     }
 
     /// An intake for runs of up to `capacity` records.
@@ -115,8 +116,8 @@ impl<'a> Intake<'a> {
             tags: Vec::with_capacity(if store.tagged { capacity } else { 0 }),
             places: Vec::with_capacity(if store.places.is_some() { capacity } else { 0 }),
             next_place: 0,
-            order: Order::with_capacity(capacity),
-            packed: Vec::with_capacity(STRETCH + 2 * BLOCK * 28),
+            order: RunOrder::with_capacity(capacity),
+            packed: Vec::with_capacity(STRETCH + 2 * BLOCK * Block::BYTES_PER_POSITION),
         }
     }
 
@@ -130,7 +131,8 @@ impl<'a> Intake<'a> {
         self.take(&[position], record, &[tag])
     }
 
-    /// Takes records, one after the other, at their positions; their tags count if the store has tags.
+    /// Takes records, one after the other, at their positions; their tags count if the store has
+    /// tags.
     pub fn take(
         &mut self,
         mut positions: &[Position],
@@ -185,12 +187,17 @@ impl<'a> Intake<'a> {
         self.records.clear();
         self.positions.clear();
         self.tags.clear();
-        store.add(Run { blocks, first_record })
+        store.add(SortedRun { blocks, first_record })
     }
 }
 
 /// Stores `records` in `order`, numbered from `first` on.
-fn store_records(store: &TileStore, order: Sorted<'_>, records: &[u8], first: u64) -> Result<()> {
+fn store_records(
+    store: &TileStore,
+    order: SortedIndices<'_>,
+    records: &[u8],
+    first: u64,
+) -> Result<()> {
     let mut piece = Vec::with_capacity(PIECE * store.stride);
     let numbers = (first..).step_by(PIECE);
     for (number, slots) in numbers.zip(order.chunks(PIECE)) {
@@ -202,7 +209,12 @@ fn store_records(store: &TileStore, order: Sorted<'_>, records: &[u8], first: u6
 }
 
 /// Stores `places` in `order`, numbered from `first` on.
-fn store_places(stored: &Pieces, order: Sorted<'_>, places: &[u64], first: u64) -> Result<()> {
+fn store_places(
+    stored: &Pieces,
+    order: SortedIndices<'_>,
+    places: &[u64],
+    first: u64,
+) -> Result<()> {
     stored.reserve_below(first + order.len() as u64)?;
     let mut piece = Vec::with_capacity(PIECE * size_of::<u64>());
     for (number, slots) in (first..).step_by(PIECE).zip(order.chunks(PIECE)) {
@@ -217,7 +229,7 @@ fn store_places(stored: &Pieces, order: Sorted<'_>, places: &[u64], first: u64) 
 /// positions have copies, those of a run have tags.
 fn store_positions(
     store: &TileStore,
-    order: Sorted<'_>,
+    order: SortedIndices<'_>,
     positions: &[Position],
     tags: &[u32],
     packed: &mut Vec<u8>,

@@ -1,4 +1,9 @@
 //! Morton order of lattice positions, and octree nodes as cubes of it.
+//!
+//! In Morton order every octree node is one stretch of the sequence, so one sorted sequence serves
+//! tiles, cells, boxes of the index and counts of every cube size. Other curves keep neighbours
+//! closer, but their nodes have to be computed along the way from the root, where here a comparison
+//! of two positions takes a few operations on their bits.
 
 use std::cmp::Ordering;
 
@@ -69,7 +74,8 @@ fn spread(v: u64) -> u64 {
     (v | v << 2) & 0x1249_2492_4924_9249
 }
 
-/// An octree node: the cube of side 2^`level` that holds a position. Level 64 is all of the lattice.
+/// An octree node: the cube of side 2^`level` that holds a position. Level 64 is all of the
+/// lattice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TileKey {
     /// Smallest corner.
@@ -132,7 +138,8 @@ mod tests {
     proptest::proptest! {
         #[test]
         fn morton_order_is_that_of_interleaved_bits(
-            a in proptest::array::uniform3(-20i64..20), b in proptest::array::uniform3(proptest::num::i64::ANY),
+            a in proptest::array::uniform3(-20i64..20),
+            b in proptest::array::uniform3(proptest::num::i64::ANY),
             c in proptest::array::uniform3(-20i64..20),
         ) {
             for (p, q) in [(a, b), (a, c), (b, c), (a, a)] {
@@ -143,7 +150,8 @@ mod tests {
         #[test]
         fn prefixes_never_contradict_morton_order(
             corner in proptest::array::uniform3(proptest::num::i64::ANY), level in 0u32..=64,
-            a in proptest::array::uniform3(proptest::num::u64::ANY), b in proptest::array::uniform3(proptest::num::u64::ANY),
+            a in proptest::array::uniform3(proptest::num::u64::ANY),
+            b in proptest::array::uniform3(proptest::num::u64::ANY),
         ) {
             let cube = TileKey::around(corner, level).cube();
             let inside = |v: [u64; 3]| -> Position {
@@ -167,13 +175,17 @@ mod tests {
         }
 
         #[test]
-        fn a_cube_holds_what_it_was_made_around(p in proptest::array::uniform3(proptest::num::i64::ANY), level in 0u32..=64) {
+        fn a_cube_holds_what_it_was_made_around(
+            p in proptest::array::uniform3(proptest::num::i64::ANY), level in 0u32..=64,
+        ) {
             let key = TileKey::around(p, level);
             proptest::prop_assert!(key.cube().contains(p));
             if let Some(children) = key.children() {
-                proptest::prop_assert_eq!(children.iter().filter(|c| c.cube().contains(p)).count(), 1);
+                let holding = children.iter().filter(|c| c.cube().contains(p)).count();
+                proptest::prop_assert_eq!(holding, 1);
                 for pair in children.windows(2) {
-                    proptest::prop_assert_eq!(morton_cmp(&pair[0].corner, &pair[1].corner), Ordering::Less);
+                    let order = morton_cmp(&pair[0].corner, &pair[1].corner);
+                    proptest::prop_assert_eq!(order, Ordering::Less);
                 }
             }
         }

@@ -1,4 +1,9 @@
 //! Occupied cubes of every power-of-two side, exactly, from one walk in Morton order.
+//!
+//! A stage chooses the side of its cells by how many positions a cell would hold. Two positions
+//! that follow each other in Morton order say by their highest different bit at which sides they
+//! are in different cubes, so a counter for each bit is enough, and the merge passes over all
+//! positions anyway. An estimate from samples would be wrong for scans whose density varies.
 
 use super::key::split_level;
 use crate::point::Position;
@@ -58,8 +63,8 @@ impl Levels {
         u64::from(self.first) + self.splits[j.min(63) as usize..].iter().sum::<u64>()
     }
 
-    /// The smallest j for which positions ÷ occupied cubes of side 2^j ≥ `mean`; where a scan is too
-    /// small for that, the smallest j from which on larger cubes hold no more.
+    /// The smallest j for which positions ÷ occupied cubes of side 2^j ≥ `mean`; where a scan is
+    /// too small for that, the smallest j from which on larger cubes hold no more.
     pub fn smallest_side(&self, mean: u64) -> u32 {
         let fewest = self.occupied(62);
         (0..62)

@@ -1,8 +1,15 @@
-//! The decoded scan: sorted runs as the decode leaves them, their merge, and what comes of it, sealed:
-//! distinct positions in Morton order with their records, in memory or on disk. Knows neither tiles,
-//! nor stages, nor formats.
+//! The decoded scan: sorted runs as the decode leaves them, their merge, and what comes of it,
+//! sealed: distinct positions in Morton order with their records, in memory or on disk. Knows
+//! neither tiles, nor stages, nor formats.
+//!
+//! A scan is sorted once, by an external merge sort, and is only read from then on. Sorted, every
+//! cube is one stretch of positions, so tiles of any size, at any place, are read from front to
+//! back; and the order is a function of the points alone, on which everything that is decided can
+//! rest. Points in cells of a grid on disk would be found without a sort, but how fine the grid
+//! must be is known only when all points are.
 
 mod block;
+mod cursor;
 mod cutting;
 mod emit;
 mod fetch;
@@ -27,8 +34,8 @@ pub use levels::Levels;
 pub use merge::{merge_bytes, seal};
 pub use pieces::{PIECE, Pieces};
 pub use record::{
-    ASIDE, CLASSED_INPUTS, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, SELECTIONS, State,
-    TAGGED_INPUTS, Tag,
+    ASIDE, CLASSED_INPUTS, FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES, RecordState, SELECTIONS,
+    TAGGED_INPUTS, Tag, ref_bytes,
 };
-pub use sealed::{Reader, SealedTiles, index_bytes};
-pub use spill::{Address, Checksum, Folder, Spill, SpillArea, Stretch};
+pub use sealed::{Reader, SealedTiles};
+pub use spill::{Address, Checksum, Folder, Spill, SpillArea, StoredStretch};

@@ -1,5 +1,10 @@
 //! Canonical order of what a run holds: radix sorts by the upper levels of the octree, and exact
 //! comparison where these do not decide. Knows no records but through a comparison.
+//!
+//! A sort by comparison would compare each position some twenty times, with outcomes that look
+//! random to the processor. A path through the upper levels of the octree fits one word with an
+//! index beside it, and a radix sort moves these words a few times without a comparison. The few
+//! that are equal by then are compared exactly.
 
 use std::cmp::Ordering;
 
@@ -18,18 +23,18 @@ const DIGITS: usize = 4;
 /// The order of up to 2^32 positions. Entries are a path through the octree, as many of its upper
 /// levels as there is room for, above the index of a position.
 #[derive(Debug, Default)]
-pub(crate) struct Order {
+pub(crate) struct RunOrder {
     entries: Vec<u64>,
     spare: Vec<u64>,
 }
 
-impl Order {
+impl RunOrder {
     /// Bytes that it holds for each position.
     pub const BYTES: usize = 2 * size_of::<u64>();
 
     /// Memory for the order of `capacity` positions.
     pub fn with_capacity(capacity: usize) -> Self {
-        Order { entries: Vec::with_capacity(capacity), spare: Vec::with_capacity(capacity) }
+        RunOrder { entries: Vec::with_capacity(capacity), spare: Vec::with_capacity(capacity) }
     }
 
     /// Sorts the indices of `positions` by Morton order; `equal` compares those that share one.
@@ -37,28 +42,28 @@ impl Order {
         &mut self,
         positions: &[Position],
         equal: &impl Fn(usize, usize) -> Ordering,
-    ) -> Sorted<'_> {
+    ) -> SortedIndices<'_> {
         let index_bits = (positions.len().max(2) - 1).ilog2() + 1;
         self.entries.clear();
         self.entries.extend(0..positions.len() as u64);
         self.spare.resize(positions.len(), 0);
         let sorter = Sorter { positions, index_bits, equal };
         sorter.sort(&mut self.entries, &mut self.spare);
-        Sorted { entries: &self.entries, mask: sorter.mask() }
+        SortedIndices { entries: &self.entries, mask: sorter.mask() }
     }
 }
 
 /// Indices in order.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Sorted<'a> {
+pub(crate) struct SortedIndices<'a> {
     entries: &'a [u64],
     mask: u64,
 }
 
-impl<'a> Sorted<'a> {
+impl<'a> SortedIndices<'a> {
     /// Stretches of up to `count` indices, one after the other.
-    pub fn chunks(self, count: usize) -> impl Iterator<Item = Sorted<'a>> {
-        self.entries.chunks(count).map(move |entries| Sorted { entries, ..self })
+    pub fn chunks(self, count: usize) -> impl Iterator<Item = SortedIndices<'a>> {
+        self.entries.chunks(count).map(move |entries| SortedIndices { entries, ..self })
     }
 
     /// The indices.
@@ -88,8 +93,8 @@ impl<E: Fn(usize, usize) -> Ordering> Sorter<'_, E> {
     }
 
     /// Sorts entries whatever their paths. Where a path leaves many undecided, as beside a stray
-    /// point far away, these are sorted by paths of their own: each time at least the level at which
-    /// their cube is divided is new, so that paths of ten levels and more end soon.
+    /// point far away, these are sorted by paths of their own: each time at least the level at
+    /// which their cube is divided is new, so that paths of ten levels and more end soon.
     fn sort(&self, entries: &mut [u64], spare: &mut [u64]) {
         if entries.len() <= FEW {
             return self.compare(entries);
@@ -128,9 +133,9 @@ impl<E: Fn(usize, usize) -> Ordering> Sorter<'_, E> {
     }
 }
 
-/// Sorts by the bits from `lowest` on; `spare` is as long. The upper [`DIGITS`] digits are sorted by,
-/// least significant first; what these leave equal, mostly one or two positions of a surface, is
-/// compared.
+/// Sorts by the bits from `lowest` on; `spare` is as long. The upper [`DIGITS`] digits are sorted
+/// by, least significant first; what these leave equal, mostly one or two positions of a surface,
+/// is compared.
 fn radix_sort(entries: &mut [u64], spare: &mut [u64], lowest: u32) {
     if entries.len() <= BUCKETS * 8 {
         return entries.sort_unstable();
@@ -178,7 +183,7 @@ mod tests {
 
     fn check(positions: &[Position]) {
         let backwards = |a: usize, b: usize| b.cmp(&a);
-        let mut order = Order::default();
+        let mut order = RunOrder::default();
         let sorted: Vec<usize> = order.sort(positions, &backwards).indices().collect();
         let mut expected: Vec<usize> = (0..positions.len()).collect();
         expected.sort_by(|&a, &b| morton_cmp(&positions[a], &positions[b]).then(b.cmp(&a)));

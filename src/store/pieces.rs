@@ -1,9 +1,13 @@
 //! Items of one size in a spill, found by number.
+//!
+//! An address for each item would take more memory than many of the items. With 4,096 of them to a
+//! piece the table is small, and an item is found by a division. Pieces may be stored in any order,
+//! so all threads write at once.
 
 use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use super::spill::{Address, Checksum, Spill, SpillArea};
-use crate::budget::Lease;
+use crate::budget::{Bytes, Lease};
 use crate::{Error, Result};
 
 /// Items of one size, stored in pieces and found by number.
@@ -12,44 +16,37 @@ use crate::{Error, Result};
 /// order; numbers between two stretches name nothing.
 #[derive(Debug)]
 pub struct Pieces {
-    area: Arc<SpillArea>,
     spill: Spill,
     stride: usize,
-    table: RwLock<Table>,
+    table: RwLock<PieceTable>,
 }
 
 /// Items in a piece.
 pub const PIECE: usize = 4096;
-/// Bytes that are verified together, at least, where a piece is in a file: whoever wants one item
-/// reads so much, and a checksum of four bytes is held for it.
+/// Bytes that are verified together, at least, where a piece is in a file: so much is read
+/// for one item, and a checksum of four bytes is held for it.
 const UNIT_BYTES: usize = 4096;
 
 /// Where the pieces are.
-#[derive(Debug, Default)]
-struct Table {
-    places: Vec<Place>,
+#[derive(Debug)]
+struct PieceTable {
+    places: Vec<PiecePlace>,
     /// Those of the units of each piece; none as long as all pieces are in memory.
     checksums: Vec<Checksum>,
-    lease: Option<Lease>,
+    lease: Lease,
 }
 
 /// Where a piece is, and how many items it has: none until it is stored.
 #[derive(Debug, Clone, Copy, Default)]
-struct Place {
+struct PiecePlace {
     address: Address,
     items: u32,
 }
 
-impl Table {
-    fn hold(&mut self, area: &SpillArea, bytes: usize) -> Result<()> {
-        let bytes = bytes as u64;
-        match &mut self.lease {
-            Some(lease) => lease.grow(bytes),
-            None => {
-                self.lease = Some(area.budget().lease(bytes, "table of stored pieces")?);
-                Ok(())
-            }
-        }
+impl PieceTable {
+    /// Leases memory for `pieces` more places.
+    fn reserve(&mut self, pieces: u64) -> Result<()> {
+        self.lease.grow(Bytes::of(pieces, size_of::<PiecePlace>()).0)
     }
 }
 
@@ -61,23 +58,24 @@ fn unit_of(stride: usize) -> usize {
 impl Pieces {
     /// No items yet, each `stride` bytes.
     pub fn new(area: &Arc<SpillArea>, name: &'static str, stride: usize) -> Self {
-        let spill = Spill::new(area, name);
-        Pieces { area: area.clone(), spill, stride, table: RwLock::default() }
+        let lease = area.budget().open("table of stored pieces");
+        let table = PieceTable { places: Vec::new(), checksums: Vec::new(), lease };
+        Pieces { spill: Spill::new(area, name), stride, table: RwLock::new(table) }
     }
 
     /// Bytes of memory that the table of `items` items of `stride` bytes takes, for a plan.
-    pub fn table_bytes(items: u64, stride: usize) -> u64 {
+    pub fn table_bytes(items: u64, stride: usize) -> Bytes {
         let checksums = PIECE / unit_of(stride) * size_of::<Checksum>();
-        items.div_ceil(PIECE as u64).saturating_mul((size_of::<Place>() + checksums) as u64)
+        Bytes::of(items.div_ceil(PIECE as u64), size_of::<PiecePlace>() + checksums)
     }
 
     /// Reserves `items` numbers and returns the first; fails if there is no memory for their table.
     pub fn reserve(&self, items: u64) -> Result<u64> {
         let mut table = self.change();
         let first = table.places.len();
-        let pieces = items.div_ceil(PIECE as u64) as usize;
-        table.hold(&self.area, pieces.saturating_mul(size_of::<Place>()))?;
-        table.places.resize(first + pieces, Place::default());
+        let pieces = items.div_ceil(PIECE as u64);
+        table.reserve(pieces)?;
+        table.places.resize(first + pieces as usize, PiecePlace::default());
         Ok((first * PIECE) as u64)
     }
 
@@ -86,8 +84,8 @@ impl Pieces {
         let mut table = self.change();
         let pieces = end.div_ceil(PIECE as u64) as usize;
         if let Some(more) = pieces.checked_sub(table.places.len()).filter(|&more| more > 0) {
-            table.hold(&self.area, more.saturating_mul(size_of::<Place>()))?;
-            table.places.resize(pieces, Place::default());
+            table.reserve(more as u64)?;
+            table.places.resize(pieces, PiecePlace::default());
         }
         Ok(())
     }
@@ -111,8 +109,10 @@ impl Pieces {
         if !sums.is_empty() {
             let (there, units) = (table.checksums.len(), PIECE / unit);
             let all = table.places.len() * units;
-            table.hold(&self.area, all.saturating_sub(there) * size_of::<Checksum>())?;
-            table.checksums.resize(all.max(there), Checksum::default());
+            if let Some(more) = all.checked_sub(there) {
+                table.lease.grow(Bytes::of(more as u64, size_of::<Checksum>()).0)?;
+                table.checksums.resize(all, Checksum::default());
+            }
             let slots = table.checksums.iter_mut().skip(piece * units);
             slots.zip(sums).for_each(|(slot, sum)| *slot = sum);
         }
@@ -120,7 +120,7 @@ impl Pieces {
             .places
             .get_mut(piece)
             .ok_or_else(|| Error::internal("a piece was stored that nobody reserved"))?;
-        *place = Place { address, items: (bytes.len() / self.stride.max(1)) as u32 };
+        *place = PiecePlace { address, items: (bytes.len() / self.stride.max(1)) as u32 };
         Ok(())
     }
 
@@ -196,11 +196,11 @@ impl Pieces {
         Ok(())
     }
 
-    fn table(&self) -> RwLockReadGuard<'_, Table> {
+    fn table(&self) -> RwLockReadGuard<'_, PieceTable> {
         self.table.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn change(&self) -> RwLockWriteGuard<'_, Table> {
+    fn change(&self) -> RwLockWriteGuard<'_, PieceTable> {
         self.table.write().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -228,7 +228,8 @@ mod tests {
         SpillArea::new(Budget::new(1 << 30), memory, Box::new(In(at.to_owned())))
     }
 
-    /// Two full pieces and a part of one, item `i` from byte `i` on of a sequence without a pattern.
+    /// Two full pieces and a part of one, item `i` from byte `i` on of a sequence without a
+    /// pattern.
     fn stored(area: &Arc<SpillArea>, stride: usize) -> (Pieces, Vec<u8>) {
         let pieces = Pieces::new(area, "items", stride);
         let items = 2 * PIECE + 1001;
@@ -306,7 +307,7 @@ mod tests {
             let before = area.budget().used();
             let (pieces, _) = stored(&area, stride);
             let planned = Pieces::table_bytes(2 * PIECE as u64 + 1001, stride);
-            assert_eq!(area.budget().used() - before, planned, "{stride}");
+            assert_eq!(Bytes(area.budget().used() - before), planned, "{stride}");
             drop(pieces);
             assert_eq!(area.budget().used(), before);
         }

@@ -1,4 +1,8 @@
 //! What the store keeps beside each record, and the sizes of what it keeps for each position.
+//!
+//! What passes decide is kept beside records, in a byte each, and never in them: a record that is
+//! kept is written with the bytes that it was read with, and passes and branches can hold different
+//! opinions of it at the same time.
 
 use crate::point::Edit;
 
@@ -7,8 +11,8 @@ pub const SELECTIONS: u32 = 7;
 /// Set in the selections of a record that takes no part in any pass and is written as it is.
 pub const ASIDE: u8 = 1 << SELECTIONS;
 
-/// What accompanies a record from the decode on: the selections that it is in, a bit each, its class
-/// where a stage reads it, and the number of its input.
+/// What accompanies a record from the decode on: the selections that it is in, a bit each, its
+/// class where a stage reads it, and the number of its input.
 ///
 /// From the lowest bit: 16 bits of the input's number, 8 bits of the class or, in runs that need no
 /// classes, more of the input's number, and 8 bits of selections.
@@ -52,26 +56,26 @@ impl Tag {
 
 /// The state of a record between passes, as it is stored: a byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct State(pub u8);
+pub struct RecordState(pub u8);
 
-impl State {
+impl RecordState {
     /// In the scan.
-    pub const ALIVE: State = State(0);
+    pub const ALIVE: RecordState = RecordState(0);
     /// Removed.
-    pub const REMOVED: State = State(1);
+    pub const REMOVED: RecordState = RecordState(1);
     /// Written, but no longer looked at.
-    pub const ASIDE: State = State(2);
+    pub const ASIDE: RecordState = RecordState(2);
 
     /// The same state with an edit of the record more.
     #[must_use]
-    pub fn edited(self, edit: Edit) -> State {
-        State(self.0 & 3 | edit.added_to(self.edits()) << 2)
+    pub fn edited(self, edit: Edit) -> RecordState {
+        RecordState(self.0 & 3 | edit.added_to(self.edits()) << 2)
     }
 
     /// Set aside, with the edits that it has.
     #[must_use]
-    pub fn aside(self) -> State {
-        State(self.0 & !3 | State::ASIDE.0)
+    pub fn aside(self) -> RecordState {
+        RecordState(self.0 & !3 | RecordState::ASIDE.0)
     }
 
     /// True if later passes look at the record.
@@ -86,13 +90,19 @@ impl State {
 
     /// True if the record is in the output and no mark says that it would be removed.
     pub fn is_kept(self) -> bool {
-        self.is_alive() || self == State::ASIDE
+        self.is_alive() || self == RecordState::ASIDE
     }
 
     /// The set of edits that the record is written with: see [`Edit::of`].
     pub fn edits(self) -> u8 {
         self.0 >> 2
     }
+}
+
+/// Bytes of a record's entry in the canonical order: its number in the store and, if records have
+/// them, its tag.
+pub const fn ref_bytes(tagged: bool) -> usize {
+    size_of::<u64>() + if tagged { size_of::<Tag>() } else { 0 }
 }
 
 /// Bytes of a stored fate; see the survey.

@@ -1,15 +1,22 @@
 //! The decoded scan: distinct positions in Morton order, an index of tight boxes over them, and the
 //! records behind each.
+//!
+//! It answers three questions: which blocks meet a box, what is nearest to a point, and which bytes
+//! the records of these numbers have. Once sealed it does not change, so all threads and all passes
+//! read it without locks, and positions, records and columns have one numbering to the end of the
+//! run. The index is one tight box a block and boxes of 16 boxes above them, in memory, where half
+//! a byte a position buys that no block is read in vain.
 
 use std::cmp::Ordering;
 
 use super::Levels;
 use super::block::{BLOCK, Block};
-use super::fetch::{Fetch, groups, ref_bytes};
+use super::fetch::{Fetch, groups};
 use super::key::morton_cmp;
 use super::pieces::Pieces;
+use super::record::ref_bytes;
 use super::spill::Spill;
-use crate::budget::{Budget, Lease};
+use crate::budget::{Budget, Bytes, Lease};
 use crate::point::{Bounds, PointBatch, Position};
 use crate::{Error, Result};
 
@@ -59,6 +66,14 @@ impl Reader {
 }
 
 impl SealedTiles {
+    /// Bytes of the index for each block: its entry, and its part of the boxes above it.
+    pub(crate) const BYTES_PER_BLOCK: usize = size_of::<Block>() + 8;
+
+    /// Memory that the index of `positions` positions takes, for a plan.
+    pub fn index_bytes(positions: u64) -> Bytes {
+        Bytes::of(positions.div_ceil(BLOCK as u64), Self::BYTES_PER_BLOCK)
+    }
+
     pub(crate) fn new(
         sequence: Sequence,
         spill: Spill,
@@ -353,9 +368,4 @@ impl SealedTiles {
         }
         Ok(())
     }
-}
-
-/// Memory that the index of `positions` positions takes, for a plan.
-pub fn index_bytes(positions: u64) -> u64 {
-    positions.div_ceil(BLOCK as u64).saturating_mul(size_of::<Block>() as u64 + 8)
 }

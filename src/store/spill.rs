@@ -1,7 +1,10 @@
-//! What a run sets down between its phases (points, their order, states, columns): in memory while the
-//! budget allows, in scratch files beyond. Reading is the same call for both; what comes from a file is
-//! compared with the checksum of what was written, so that a disk that damages data fails a run and
-//! changes no output.
+//! What a run sets down between its phases (points, their order, states, columns): in memory while
+//! the budget allows, in scratch files beyond.
+//!
+//! Reading is the same call for both, so nothing else in a run asks whether a scan fits in memory.
+//! Files are read by calls and not mapped into memory: mapped pages count as the process's own, and
+//! the bound on memory could not be kept. What comes from a file is compared with the checksum of
+//! what was written, so that a disk that damages data fails a run and changes no output.
 
 use std::fs::File;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
@@ -117,7 +120,7 @@ pub struct Checksum(u32);
 
 /// An appended stretch that is always read whole.
 #[derive(Debug, Clone, Copy)]
-pub struct Stretch {
+pub struct StoredStretch {
     address: Address,
     length: u32,
     checksum: Checksum,
@@ -165,14 +168,14 @@ impl Spill {
     }
 
     /// Stores a stretch of less than 4 GiB that [`load`](Spill::load) reads again.
-    pub fn store(&self, bytes: &[u8]) -> Result<Stretch> {
+    pub fn store(&self, bytes: &[u8]) -> Result<StoredStretch> {
         let address = self.append(bytes)?;
         let checksum = address.checksum(bytes);
-        Ok(Stretch { address, length: bytes.len() as u32, checksum })
+        Ok(StoredStretch { address, length: bytes.len() as u32, checksum })
     }
 
     /// Replaces what is in `into` by a stored stretch.
-    pub fn load(&self, stretch: &Stretch, into: &mut Vec<u8>) -> Result<()> {
+    pub fn load(&self, stretch: &StoredStretch, into: &mut Vec<u8>) -> Result<()> {
         into.resize(stretch.length as usize, 0);
         self.read(stretch.address, stretch.checksum, into)
     }
@@ -204,7 +207,7 @@ impl Spill {
         })
     }
 
-    /// As [`read`](Spill::read), for whoever verifies what comes part by part.
+    /// As [`read`](Spill::read), for a caller that verifies what comes part by part.
     pub(crate) fn read_unverified(&self, at: Address, into: &mut [u8]) -> Result<()> {
         let lost = || Error::internal(format!("{}: read beyond a stretch", self.name));
         if !at.is_in_file() {

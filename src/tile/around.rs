@@ -1,5 +1,11 @@
 //! Exact neighbourhoods of a tile's positions: found among what is loaded, proven against what is
 //! not, searched for in the whole scan where the proof fails.
+//!
+//! A set of neighbours is right if its farthest is nearer than the first plane of positions that
+//! are not loaded; at equal distance a position beyond might win the tie. Faces beyond which the
+//! scan has nothing do not count. So the width of the rim decides about speed and never about an
+//! answer. No width has to be guessed that would do for every place of every scan, and a rim that
+//! does not fit the memory is made narrower without harm.
 
 use std::sync::Arc;
 
@@ -22,7 +28,8 @@ pub struct Around {
     /// The offsets of a position's neighbours, and the ranks of what was found beyond the tile.
     offsets: Vec<Position>,
     ranks: Vec<u32>,
-    /// Neighbourhoods that what was loaded could not prove, since the last [`Around::take_unproven`].
+    /// Neighbourhoods that what was loaded could not prove, since the last
+    /// [`Around::take_unproven`].
     unproven: u64,
     /// Neighbourhoods whose two farthest are equally far, likewise.
     tied: u64,
@@ -54,9 +61,9 @@ impl Beyond {
         (!loaded.holds(&scan)).then(beyond)
     }
 
-    /// True if no position that is not loaded can be among the nearest of `p`, of which the farthest
-    /// found is at squared distance `d2`: on the first plane not loaded, one at exactly the same
-    /// distance might win the tie.
+    /// True if no position that is not loaded can be among the nearest of `p`, of which the
+    /// farthest found is at squared distance `d2`: on the first plane not loaded, one at exactly
+    /// the same distance might win the tie.
     fn proves(&self, p: Position, d2: u128) -> bool {
         let Bounds { lo, hi } = self.loaded;
         let gap = (0..3).fold(u64::MAX, |gap, axis| {
@@ -99,8 +106,8 @@ impl Around {
         self.beyond = Beyond::new(tiles, sieve, loaded);
     }
 
-    /// Calls `visit` for every one of `positions` that `is_asked` with its index and the `k` nearest
-    /// *other* positions of the whole scan.
+    /// Calls `visit` for every one of `positions` that `is_asked` with its index and the `k`
+    /// nearest *other* positions of the whole scan.
     pub(super) fn each_neighborhood(
         &mut self,
         positions: &[Position],

@@ -1,11 +1,16 @@
 //! Filling a tile: its core, its zone, and a rim wide enough to prove most neighbourhoods.
+//!
+//! All three lie in one box, which is asked for once, since most blocks of the rim reach into the
+//! core. The width of the rim follows from the density of the core, about the square root of the
+//! number of neighbours in spacings of the points: a wider one loads positions in vain, a narrower
+//! one leaves more of them to be searched for one by one.
 
 use std::sync::Arc;
 
-use super::sieve::{MoreRuns, Run, Runs, Sieve};
+use super::sieve::{MoreRuns, RecordRun, Runs, Sieve};
 use super::{Fate, Tile};
 use crate::Result;
-use crate::point::Bounds;
+use crate::point::{Bounds, Position};
 use crate::store::Pieces;
 use crate::store::TileKey;
 use crate::store::{FATE_BYTES, FIGURE_BYTES, NORMAL_BYTES};
@@ -36,7 +41,7 @@ pub struct Core {
     /// Number of each position's first record: where every record is seen, and this tells all.
     first_records: Vec<u64>,
     /// The runs of its records, where a sieve may hold some back.
-    runs: Vec<Run>,
+    runs: Vec<RecordRun>,
     more: MoreRuns,
     /// Stored fates of its positions; none before the first pass.
     fates: Vec<u8>,
@@ -48,12 +53,15 @@ impl Core {
     pub fn each(
         &self,
         tile: &Tile,
-        mut visit: impl FnMut(&[Run], Option<[u8; FATE_BYTES]>) -> Result<()>,
+        mut visit: impl FnMut(&[RecordRun], Option<[u8; FATE_BYTES]>) -> Result<()>,
     ) -> Result<()> {
         let slots = tile.core.start as u32..;
         for (slot, &number) in slots.zip(&self.first_records) {
             let count = tile.copies[slot as usize];
-            visit(&[Run { number, count, slot, begins: true, ..Run::default() }], None)?;
+            visit(
+                &[RecordRun { number, count, slot, begins: true, ..RecordRun::default() }],
+                None,
+            )?;
         }
         let mut stored = self.fates.chunks_exact(FATE_BYTES);
         let mut rest = &self.runs[..];
@@ -86,11 +94,16 @@ impl Core {
 
 impl Loader {
     /// Bytes that a loader holds for each position of its capacity, columns included.
-    pub const BYTES_PER_POINT: usize = 24 + 4 + 12 + size_of::<Fate>() + 8;
+    pub const BYTES_PER_POINT: usize = size_of::<Position>()
+        + size_of::<u32>() // copies
+        + size_of::<[f32; 3]>() // normal
+        + size_of::<Fate>()
+        + size_of::<u64>(); // first record
     /// Bytes more where a sieve may hold records back, or columns are stored.
-    pub const SIEVE_BYTES_PER_POINT: usize = size_of::<Run>() + FATE_BYTES + FIGURE_BYTES + 2;
+    pub const SIEVE_BYTES_PER_POINT: usize = size_of::<RecordRun>() + FATE_BYTES + FIGURE_BYTES + 2;
 
-    /// A loader for tiles of up to `capacity` positions, rim included, as `sieve` lets them be seen.
+    /// A loader for tiles of up to `capacity` positions, rim included, as `sieve` lets them be
+    /// seen.
     pub fn new(tiles: &Arc<SealedTiles>, sieve: &Sieve, capacity: usize) -> Self {
         Loader {
             tiles: tiles.clone(),
@@ -105,8 +118,8 @@ impl Loader {
         }
     }
 
-    /// Gives no tile a rim that makes it more than `positions`; what that leaves unproven is searched
-    /// for in the whole scan.
+    /// Gives no tile a rim that makes it more than `positions`; what that leaves unproven is
+    /// searched for in the whole scan.
     pub fn limit_rim(&mut self, positions: usize) {
         self.rim_limit = self.rim_limit.min(positions);
     }
@@ -198,7 +211,7 @@ impl Loader {
             let runs = self.runs.of(j);
             let is_core = tile.cube.contains(p);
             let is_seen = runs.iter().any(|run| run.is_in(seen));
-            let slot = if is_seen { tile.positions.len() as u32 } else { Run::UNSEEN };
+            let slot = if is_seen { tile.positions.len() as u32 } else { RecordRun::UNSEEN };
             if is_core {
                 if core.runs.is_empty() {
                     core.first_position = first + j as u64;
@@ -208,7 +221,7 @@ impl Loader {
                     in_core = j as u64..j as u64;
                 }
                 in_core.end = j as u64 + 1;
-                core.runs.extend(runs.iter().map(|run| Run { slot, ..*run }));
+                core.runs.extend(runs.iter().map(|run| RecordRun { slot, ..*run }));
             }
             if is_seen {
                 let alive = runs.iter().filter(|run| run.is_alive());

@@ -1,5 +1,10 @@
-//! Tiles: the points of one cube with neighbourhoods that are exact beyond its faces, as a pass sees
-//! them. Knows no stage that works on them.
+//! Tiles: the points of one cube with neighbourhoods that are exact beyond its faces, as a pass
+//! sees them. Knows no stage that works on them.
+//!
+//! A stage sees plain slices in memory and none of how a scan is stored. What it computes for the
+//! core of a tile is what it would compute of the whole scan, since neighbourhoods are proven to be
+//! complete or searched for until they are. So a stage is written once, and no cut into tiles shows
+//! in a result.
 
 mod around;
 mod load;
@@ -9,7 +14,7 @@ mod sieve;
 pub use around::{Around, Neighborhood};
 pub use load::{Core, Loader};
 pub use remote::Remote;
-pub use sieve::{Run, Sieve};
+pub use sieve::{RecordRun, Sieve};
 
 use std::ops::Range;
 
@@ -19,8 +24,8 @@ use crate::point::{Bounds, Position};
 
 /// The points of one cube, then a rim of its neighbours' points.
 ///
-/// Positions are distinct and in Morton order, so those of the cube itself, the core, are one range.
-/// Columns have one entry a position.
+/// Positions are distinct and in Morton order, so those of the cube itself, the core, are one
+/// range. Columns have one entry a position.
 #[derive(Debug)]
 pub struct Tile {
     /// The cube whose points this tile decides.
@@ -39,19 +44,19 @@ pub struct Tile {
     /// True if the signs of normals mean something: a stage turned them to a side.
     pub oriented: bool,
     /// For each position the class of the first of its records that are decided about, in canonical
-    /// order (of those that are seen, where none is decided about); empty unless a stage of the pass
-    /// reads "Classification".
+    /// order (of those that are seen, where none is decided about); empty unless a stage of the
+    /// pass reads "Classification".
     pub classes: Vec<u8>,
     /// What a first phase found for each position of the core; NaN where it found nothing.
     pub figures: Vec<f64>,
     /// The partition into cells, once a stage made one.
-    pub cells: Cells,
+    pub cells: Partition,
     /// What becomes of each position (meaningful in the core). Kept unless a stage says otherwise.
     pub fates: Vec<Fate>,
     /// Where neighbours are found.
     pub around: Around,
-    /// For each position, the selections that one of its records is in, a bit each; empty if no stage
-    /// is limited to some records.
+    /// For each position, the selections that one of its records is in, a bit each; empty if no
+    /// stage is limited to some records.
     pub(crate) selections: Vec<u8>,
     /// The selections that the stage at work is limited to.
     pub(crate) limits: u8,
@@ -70,7 +75,7 @@ impl Tile {
             oriented: false,
             classes: Vec::new(),
             figures: Vec::new(),
-            cells: Cells::default(),
+            cells: Partition::default(),
             fates: Vec::with_capacity(capacity),
             around: Around::default(),
             selections: Vec::new(),
@@ -93,7 +98,7 @@ impl Tile {
             oriented: false,
             classes: Vec::new(),
             figures: vec![f64::NAN; n],
-            cells: Cells::default(),
+            cells: Partition::default(),
             fates: vec![Fate::Kept; n],
             around: Around::default(),
             selections: Vec::new(),
@@ -116,8 +121,8 @@ impl Tile {
         self.limits = 0;
     }
 
-    /// True if the stage at work decides about position `i`: one of its records is of the classes and
-    /// flags that the stage is limited to.
+    /// True if the stage at work decides about position `i`: one of its records is of the classes
+    /// and flags that the stage is limited to.
     pub fn is_chosen(&self, i: usize) -> bool {
         self.copies[i] > 0 && chosen(&self.selections, self.limits, i)
     }
@@ -134,8 +139,8 @@ impl Tile {
     }
 
     /// Calls `visit` for every chosen position of the zone with its index in the tile and the `k`
-    /// nearest *other* positions of the whole scan: nearest by exact squared distance, ties by Morton
-    /// order. Fewer only if the scan has fewer.
+    /// nearest *other* positions of the whole scan: nearest by exact squared distance, ties by
+    /// Morton order. Fewer only if the scan has fewer.
     pub fn each_neighborhood(
         &mut self,
         k: usize,
@@ -179,7 +184,7 @@ pub enum Fate {
 /// Group `g` is `members[ends[g - 1]..ends[g]]`, in Morton order; positions without a normal are in
 /// none.
 #[derive(Debug, Default)]
-pub struct Cells {
+pub struct Partition {
     /// Indices into the tile's positions, group after group.
     pub members: Vec<u32>,
     /// For each member, its normal's sign in the group: true if the normal is to be turned.
@@ -191,7 +196,7 @@ pub struct Cells {
     pub reference: Option<[f64; 3]>,
 }
 
-impl Cells {
+impl Partition {
     /// Forgets all groups, keeps the memory.
     pub fn clear(&mut self) {
         self.members.clear();

@@ -1,4 +1,9 @@
 //! The nearest positions of one point anywhere in the scan: best-first search over the index.
+//!
+//! It is for the few positions whose neighbourhoods a tile cannot prove. Loading a wider rim for
+//! all would cost more than these searches, and where a scan is empty around a point no width would
+//! do. Boxes are visited by their distance, so no block is read that cannot hold a neighbour, and
+//! the blocks last read are kept, as such positions lie side by side.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -39,9 +44,9 @@ impl Remote {
     pub const BYTES: u64 =
         ((CACHED + 2) * crate::store::BLOCK * size_of::<Position>()) as u64 + (64 << 10);
 
-    /// The `k` positions nearest to `p` other than itself, by exact squared distance, ties by Morton
-    /// order, of those that `sieve` lets be seen; fewer if there are fewer. `bound` is a squared distance within which `k` others are
-    /// known to lie, if one is known.
+    /// The `k` positions nearest to `p` other than itself, by exact squared distance, ties by
+    /// Morton order, of those that `sieve` lets be seen; fewer if there are fewer. `bound` is a
+    /// squared distance within which `k` others are known to lie, if one is known.
     pub fn nearest(
         &mut self,
         (tiles, sieve): (&SealedTiles, &Sieve),

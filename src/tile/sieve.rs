@@ -1,16 +1,22 @@
-//! What a pass sees of the scan: the records that earlier passes left, and those that its stages are
-//! limited to; and the columns that earlier passes computed.
+//! What a pass sees of the scan: the records that earlier passes left, and those that its stages
+//! are limited to; and the columns that earlier passes computed.
+//!
+//! A pass could seal anew what the one before it left. That would take another index, another copy
+//! of the positions and a map back to the records. A sieve takes a byte a record, keeps one
+//! numbering for records, positions and columns, and lets the survey and the outputs see what every
+//! pass did. A scan of which little is left is walked through for it: unpacking a position takes a
+//! hundredth of what its normal takes.
 
 use std::sync::Arc;
 
 use crate::Result;
-use crate::budget::Lease;
-use crate::store::{ASIDE, Pieces, SealedTiles, State, Tag};
+use crate::budget::{Bytes, Lease};
+use crate::store::{ASIDE, Pieces, RecordState, SealedTiles, Tag};
 
 /// What a pass sees of the scan, and what earlier passes stored.
 #[derive(Debug, Clone, Default)]
 pub struct Sieve {
-    /// A [`State`] for every record, by rank; none before the first pass.
+    /// A [`RecordState`] for every record, by rank; none before the first pass.
     pub states: Option<Arc<Pieces>>,
     /// A stored fate for every position; none before the first pass.
     pub fates: Option<Arc<Pieces>>,
@@ -37,22 +43,22 @@ impl Sieve {
 
 /// Records of one position that follow one another and are alike to every stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Run {
+pub struct RecordRun {
     /// Number of the first.
     pub number: u64,
     /// How many.
     pub count: u32,
-    /// Index of the position in its tile, or [`Run::UNSEEN`].
+    /// Index of the position in its tile, or [`RecordRun::UNSEEN`].
     pub slot: u32,
     /// What accompanies them.
     pub tag: Tag,
     /// What earlier passes left them in.
-    pub state: State,
+    pub state: RecordState,
     /// True for the first of its position.
     pub begins: bool,
 }
 
-impl Run {
+impl RecordRun {
     /// The slot of a position that a pass does not see.
     pub const UNSEEN: u32 = u32::MAX;
 
@@ -74,7 +80,7 @@ pub(super) struct MoreRuns(Option<Lease>);
 
 impl MoreRuns {
     /// A run, and what the mill makes of it.
-    const BYTES: u64 = 3 * size_of::<Run>() as u64;
+    const BYTES: usize = 3 * size_of::<RecordRun>();
 
     /// Holds memory for `runs` in all, of which `planned` are reckoned with. Fails as
     /// [`Budget::lease`](crate::budget::Budget::lease) does for `most`, as many as there may be.
@@ -85,7 +91,7 @@ impl MoreRuns {
         planned: usize,
         most: u64,
     ) -> Result<()> {
-        let more = (runs.saturating_sub(planned) as u64).saturating_mul(Self::BYTES);
+        let more = Bytes::of(runs.saturating_sub(planned) as u64, Self::BYTES).0;
         if self.0.as_ref().map_or(0, Lease::bytes) >= more {
             return Ok(());
         }
@@ -93,14 +99,14 @@ impl MoreRuns {
         // What is held goes back first, so that a refusal counts it once.
         self.0 = None;
         self.0 = match tiles.budget().try_lease(more, what) {
-            None => Some(tiles.budget().lease(most.saturating_mul(Self::BYTES).max(more), what)?),
+            None => Some(tiles.budget().lease(Bytes::of(most, Self::BYTES).0.max(more), what)?),
             lease => lease,
         };
         Ok(())
     }
 
     /// Gives back what it holds, and with it the memory of `runs`.
-    pub(super) fn give_back(&mut self, runs: &mut Vec<Run>) {
+    pub(super) fn give_back(&mut self, runs: &mut Vec<RecordRun>) {
         runs.clear();
         if self.0.take().is_some() {
             *runs = Vec::new();
@@ -115,7 +121,7 @@ pub(super) struct Runs {
     buffer: Vec<u8>,
     states: Vec<u8>,
     tags: Vec<u8>,
-    runs: Vec<Run>,
+    runs: Vec<RecordRun>,
     ends: Vec<usize>,
 }
 
@@ -147,7 +153,7 @@ impl Runs {
                     self.fill(tiles, sieve, number, rank, (window.end - number) as usize)?;
                 }
                 let at = (number - window.start) as usize;
-                let state = State(self.states.get(at).copied().unwrap_or_default());
+                let state = RecordState(self.states.get(at).copied().unwrap_or_default());
                 let tag = match self.tags.get(4 * at..4 * at + 4) {
                     Some(&[a, b, c, d]) => Tag(u32::from_le_bytes([a, b, c, d])),
                     _ => Tag::default(),
@@ -162,12 +168,12 @@ impl Runs {
         Ok(())
     }
 
-    fn push(&mut self, begins: bool, number: u64, state: State, tag: Tag) {
+    fn push(&mut self, begins: bool, number: u64, state: RecordState, tag: Tag) {
         match self.runs.last_mut() {
             Some(run) if !begins && run.state == state && run.tag == tag => run.count += 1,
             _ => {
-                let slot = Run::UNSEEN;
-                self.runs.push(Run { number, count: 1, slot, tag, state, begins });
+                let slot = RecordRun::UNSEEN;
+                self.runs.push(RecordRun { number, count: 1, slot, tag, state, begins });
             }
         }
     }
@@ -188,7 +194,7 @@ impl Runs {
     }
 
     /// The runs of the `j`-th position of the block.
-    pub(super) fn of(&self, j: usize) -> &[Run] {
+    pub(super) fn of(&self, j: usize) -> &[RecordRun] {
         let start = if j == 0 { 0 } else { self.ends[j - 1] };
         &self.runs[start..self.ends[j]]
     }

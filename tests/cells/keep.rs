@@ -1,9 +1,6 @@
 //! A number of records instead of an angle: met exactly, whatever the ties and the tiles.
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
 
-use crate::cells_scene;
-
-use cells_scene::*;
+use super::scene::*;
 use pointmill::ops::{Cells, Keep, Measure, Side, Split};
 use pointmill::point::{Bounds, Position};
 use pointmill::report::Tally;

@@ -1,8 +1,6 @@
 //! The selection: which point of a cell stays, and what the ledger says of the others.
 
-use crate::cells_scene;
-
-use cells_scene::*;
+use super::scene::*;
 use pointmill::ops::{Cells, Median, Split};
 use pointmill::point::Position;
 use pointmill::report::Tally;

@@ -1,9 +1,7 @@
 //! What `cells` says before a run: how far normals scatter on planes, and how much will stay.
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
 
-use crate::cells_scene;
-
-use cells_scene::*;
+use super::scene::*;
+use crate::support::random::Random;
 use pointmill::ops::{Cells, Keep, Side, Split};
 use pointmill::point::Position;
 use pointmill::quantity::{Angle, Setting};
@@ -11,10 +9,7 @@ use pointmill::stage::TileOp;
 
 /// A number in [−1, 1) that looks random.
 fn noise(seed: u64) -> f64 {
-    let mut v = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    v = (v ^ (v >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    v = (v ^ (v >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((v ^ (v >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    Random(seed).signed(1.0)
 }
 
 /// The normal (x, y, z) at length 1, its sign at random.

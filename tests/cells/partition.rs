@@ -1,11 +1,8 @@
 //! The partition into cells: against the plain version, and what the words of the method promise.
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
-use crate::cells_scene;
 
 use std::num::NonZeroUsize;
 
-use cells_scene::*;
+use super::scene::*;
 use pointmill::ops::{Cells, Measure, Reference, Split};
 use pointmill::point::{Bounds, Position};
 use pointmill::report::Tally;

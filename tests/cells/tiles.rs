@@ -1,8 +1,6 @@
 //! Cells that cross the faces of tiles: every cut into tiles gives the same.
 
-use crate::cells_scene;
-
-use cells_scene::*;
+use super::scene::*;
 use pointmill::ops::{Cells, Measure, Split};
 use pointmill::tile::Fate;
 use proptest::prelude::*;

@@ -1,16 +1,12 @@
 //! `check` and `stages`: what a pipeline can have, and whether one is right.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
-use crate::scans_support;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::support::command::{done, fails, scans};
 use pointmill::Registry;
 use pointmill::graph::RunSettings;
-use scans_support::command::{done, fails, scans};
 use serde_json::Value;
 
 fn pipeline(at: &Path, input: &str) {

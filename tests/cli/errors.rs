@@ -1,11 +1,10 @@
 //! The command as users meet it: help, exit codes, and where mistakes are told.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
+use crate::support::command;
+use std::process::Stdio;
 
 /// What the command gave: exit code, stdout, stderr.
 struct Outcome {
@@ -15,18 +14,8 @@ struct Outcome {
 }
 
 fn pointmill(at: &Path, arguments: &[&str]) -> Outcome {
-    let output = Command::cargo_bin("pointmill")
-        .unwrap()
-        .current_dir(at)
-        .args(arguments)
-        .timeout(std::time::Duration::from_secs(60))
-        .output()
-        .unwrap();
-    Outcome {
-        code: output.status.code().expect("an exit code"),
-        stdout: String::from_utf8(output.stdout).unwrap(),
-        stderr: String::from_utf8(output.stderr).unwrap(),
-    }
+    let (code, stdout, stderr) = command::pointmill(at, arguments);
+    Outcome { code, stdout, stderr }
 }
 
 /// Asserts exit code 2, nothing on stdout, and each of `parts` on stderr.
@@ -283,12 +272,9 @@ fn messages_go_to_stderr_and_no_bar_is_drawn_off_a_terminal() {
 
 #[test]
 fn a_reader_who_has_gone_is_no_error() {
-    use std::process::{Command, Stdio};
     let at = here();
-    let program = assert_cmd::cargo::cargo_bin("pointmill");
-    let mut child = Command::new(program)
-        .current_dir(at.path())
-        .args(["plan", concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines/demo.toml")])
+    let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/pipelines/demo.toml");
+    let mut child = command::command(at.path(), &["plan", demo])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

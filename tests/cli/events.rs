@@ -1,14 +1,10 @@
 //! What a run says while it works: events for programs, more or less text for people.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
-use crate::scans_support;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use scans_support::command::{done, pointmill, scans};
+use crate::support::command::{done, pointmill, scans};
 use serde_json::Value;
 
 /// The events on stderr: every line is one, in order of time.
@@ -148,6 +144,28 @@ fn verbose_says_what_was_decided_and_how_long_it_took() {
     }
     assert!(!stderr.contains('\u{1b}'), "no bar is drawn: {stderr:?}");
     assert!(stdout.starts_with("points     3,000 in, "), "{stdout}");
+}
+
+#[test]
+fn verbose_and_the_report_say_what_the_memory_was_for() {
+    let at = scans(&["a.laz"]);
+    for command in ["reduce a.laz -o o.laz -v", "convert a.laz -o o.las -v"] {
+        let arguments: Vec<&str> = command.split(' ').chain(["--report", "r.json"]).collect();
+        let (code, _, stderr) = pointmill(at.path(), &arguments);
+        assert_eq!(code, 0, "{stderr}");
+        let line = stderr.lines().find_map(|line| line.strip_prefix("at peak  ")).unwrap();
+        let report = std::fs::read(at.path().join("r.json")).unwrap();
+        let run = &serde_json::from_slice::<Value>(&report).unwrap()["run"];
+        let holders = run["memory_holders"].as_array().unwrap();
+        let bytes: Vec<u64> = holders.iter().map(|h| h["bytes"].as_u64().unwrap()).collect();
+        assert!((3..=8).contains(&bytes.len()) && bytes.is_sorted_by(|a, b| a >= b), "{run}");
+        let first = holders[0]["name"].as_str().unwrap();
+        assert!(line.split(',').next().unwrap().ends_with(&format!(" for the {first}")), "{line}");
+        assert!(holders.iter().any(|holder| holder["name"] == "program"), "{run}");
+        // Those that are not listed hold little.
+        let (sum, leased) = (bytes.iter().sum::<u64>(), run["leased_bytes"].as_u64().unwrap());
+        assert!(sum <= leased && sum > leased / 10 * 9, "{sum} of {leased}");
+    }
 }
 
 #[test]

@@ -1,14 +1,10 @@
 //! Inputs as people name them: blanks, Unicode, dashes, folders, patterns, and many of them.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
-use crate::scans_support;
-
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use scans_support::command::{done, pointmill, scans};
+use crate::support::command::{PROGRAM, done, pointmill, scans};
 use serde_json::Value;
 
 fn points(at: &Path, file: &str) -> u64 {
@@ -87,10 +83,8 @@ fn more_inputs_than_a_process_may_open_files_are_read() {
         many(at.path(), 1_000, extension);
         for command in ["reduce", "convert"] {
             let output = format!("{command}.{extension}");
-            let program = assert_cmd::cargo::cargo_bin("pointmill");
             let limited = format!(
-                "ulimit -n 256 && exec '{}' {command} 'many/*' -o {output} --threads 4",
-                program.display()
+                "ulimit -n 256 && exec '{PROGRAM}' {command} 'many/*' -o {output} --threads 4"
             );
             let run = Command::new("sh")
                 .current_dir(at.path())

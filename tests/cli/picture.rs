@@ -1,12 +1,8 @@
 //! `picture`: scans of every format side by side, in a PNG file that appears complete or not at all.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
-use crate::scans_support;
-
 use std::fs;
 
-use scans_support::command::{done, fails, pointmill, scans};
+use crate::support::command::{done, fails, pointmill, scans};
 
 #[test]
 fn scans_of_all_formats_are_drawn_side_by_side() {

@@ -1,18 +1,14 @@
 //! Flags that say what becomes of values that a format or the lattice cannot hold.
-#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
 
-use std::path::{Path, PathBuf};
+use crate::support::case_file;
+use std::path::Path;
 
 use assert_cmd::Command;
-
-fn case(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name)
-}
 
 fn pointmill(arguments: &[&str], input: &str, output: &Path) -> assert_cmd::assert::Assert {
     let mut command = Command::cargo_bin("pointmill").unwrap();
     let [first, others @ ..] = arguments else { panic!("no command") };
-    command.arg(first).arg(case(input)).arg("-o").arg(output).args(others).assert()
+    command.arg(first).arg(case_file(input)).arg("-o").arg(output).args(others).assert()
 }
 
 #[test]

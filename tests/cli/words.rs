@@ -1,15 +1,12 @@
 //! Messages in the words of what was typed: flags for commands, keys for pipeline files, and what to
 //! type instead.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
-use crate::scans_support;
-
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 
-use scans_support::command::{command, done, pointmill, scans};
+use crate::support::case_file;
+use crate::support::command::{command, done, pointmill, scans};
 
 /// What a command that fails with `code` prints on stderr.
 fn told(at: &Path, arguments: &[&str], code: i32) -> String {
@@ -20,8 +17,7 @@ fn told(at: &Path, arguments: &[&str], code: i32) -> String {
 
 /// A file of `tests/cases`, copied beside the others.
 fn case(at: &Path, name: &str) {
-    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
-    fs::copy(cases.join(name), at.join(name)).unwrap();
+    fs::copy(case_file(name), at.join(name)).unwrap();
 }
 
 #[test]

@@ -1,12 +1,11 @@
 //! Colours keep what they mean between LAS, where white is 65535, and PLY, where it is 255.
-#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
-
-use crate::common;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use common::{Scan, Settings, run};
+use crate::support::case_file;
+use crate::support::runs::{Settings, run};
+use crate::support::scan::Scan;
 use pointmill::io::las;
 use pointmill::point::{Scalar, Value};
 
@@ -40,14 +39,10 @@ fn red(path: &Path) -> (Scalar, Vec<u64>) {
     (red.scalar, scan.records.chunks(scan.schema.stride).map(of).collect())
 }
 
-fn case(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name)
-}
-
 #[test]
 fn eight_bits_of_ply_are_257_times_as_much_in_las_and_come_back() {
     let folder = tempfile::tempdir().unwrap();
-    let input = case("50-rgb8.ply");
+    let input = case_file("50-rgb8.ply");
     let (las, _) = converted(folder.path(), &input, "las\nscale = 0.001");
     assert_eq!(red(&las), (Scalar::U16, vec![65_535, 257, 0]));
     let kept = folder.path().join("kept.las");
@@ -137,7 +132,7 @@ fn multiples_of_256_and_of_257_in_different_chunks_are_eight_bits_all_the_same()
 #[test]
 fn reduced_colors_have_the_type_that_all_kept_ones_ask_for() {
     let folder = tempfile::tempdir().unwrap();
-    let input = case("50e-las-rgb16.las");
+    let input = case_file("50e-las-rgb16.las");
     let (output, _) = converted(folder.path(), &input, "ply\norder = 'canonical'");
     let (of_input, values) = red(&input);
     let narrow: Vec<u64> = values.iter().map(|v| v >> 8).collect();
@@ -173,7 +168,7 @@ fn the_number_of_bits_can_be_asked_for_where_las_becomes_ply_and_nowhere_else() 
 #[test]
 fn points_without_returns_are_the_only_return_of_their_pulse() {
     let folder = tempfile::tempdir().unwrap();
-    let (las, _) = converted(folder.path(), &case("50-rgb8.ply"), "laz\nscale = 0.001");
+    let (las, _) = converted(folder.path(), &case_file("50-rgb8.ply"), "laz\nscale = 0.001");
     let scan = Scan::read(&las, usize::MAX);
     for name in ["ReturnNumber", "NumberOfReturns"] {
         let field = scan.schema.find(name).unwrap();

@@ -1,5 +1,4 @@
 //! LAS records as PLY vertices and back: every field, bit for bit.
-#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
 
 use pointmill::io::convert::Projection;
 use pointmill::io::las::{las_schema, records};

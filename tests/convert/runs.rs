@@ -1,16 +1,14 @@
 //! The command as users run it: conversions into files and folders, what it refuses, names of all
 //! kinds, what `info` and `plan` tell.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-use crate::scans_support;
-
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::path::PathBuf;
 
-use scans_support::command::{command, done, fails, pointmill, scans};
-use scans_support::{STRIDES, assert_contained, assert_holds, read};
+use crate::support::assert_holds;
+use crate::support::command::{command, done, fails, pointmill, scans};
+use crate::support::las_file::STRIDES;
+use crate::support::records::{assert_contained, read};
 use serde_json::Value;
 
 fn records(path: PathBuf) -> Vec<u8> {
@@ -154,7 +152,7 @@ fn outputs_that_cannot_be_are_told_before_any_work_and_leave_nothing() {
     let scratch = ["--scratch", "file", "--memory", "256MiB"];
     fs::write(at.join("p.toml"), "[run]\nspill = \"always\"\n").unwrap();
     let pipeline = fs::read_to_string(at.join("p.toml")).unwrap()
-        + scans_support::REDUCE.split_once("[run]").unwrap().1;
+        + crate::support::setup::REDUCE.split_once("[run]").unwrap().1;
     fs::write(at.join("p.toml"), pipeline).unwrap();
     let sets = ["--set", "read.path=a.las", "--set", "write.path=out.las"];
     fails(
@@ -283,8 +281,8 @@ fn info_is_json_with_the_same_keys_for_every_file_of_a_format() {
     let at = scans(&["a.las", "b.laz", "c.ply"]);
     let at = at.path();
     for (format, stride) in STRIDES.into_iter().enumerate() {
-        let (described, more) = scans_support::extra_bytes();
-        let file = scans_support::LasFile {
+        let (described, more) = crate::support::las_file::extra_bytes();
+        let file = crate::support::las_file::LasFile {
             format: format as u8,
             stride: stride + more,
             scale: [0.01; 3],
@@ -341,7 +339,7 @@ fn info_is_json_with_the_same_keys_for_every_file_of_a_format() {
 fn plan_tells_what_a_run_would_do_and_does_none_of_it() {
     let at = scans(&["a.las"]);
     let at = at.path();
-    fs::write(at.join("p.toml"), scans_support::REDUCE).unwrap();
+    fs::write(at.join("p.toml"), crate::support::setup::REDUCE).unwrap();
     let sets = ["--set", "read.path=a.las", "--set", "write.path=out.laz"];
     let plan = |more: &[&'static str]| [&["plan", "p.toml"], &sets[..], more].concat();
     let told = done(at, &plan(&["--memory", "300MiB", "--threads", "2"]));

@@ -1,8 +1,8 @@
 //! Lengths with units of their own: converted where the reference system says what the scan is in,
 //! refused with the value that would do where it does not.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
+use crate::support::case::{Case, execute};
+use pointmill::Quiet;
 use pointmill::point::{Horizontal, Units};
 use pointmill::quantity::{Angle, Length};
 
@@ -44,13 +44,9 @@ fn quantities_are_shown_as_they_were_given() {
     );
 }
 
-use crate::run_support;
-
-use pointmill::Quiet;
-
 #[test]
 fn a_pipeline_with_a_length_in_metres_is_refused_before_work_if_the_scan_does_not_tell_its_unit() {
-    let case = run_support::Case::new();
+    let case = Case::new();
     case.ply(&[([0.0; 3], 1), ([1.0; 3], 2)]);
     for (stage, key) in [
         ("kind = 'grid'\nside = '2m'", "`grid.side = \"2m\"`"),
@@ -60,7 +56,7 @@ fn a_pipeline_with_a_length_in_metres_is_refused_before_work_if_the_scan_does_no
         ),
     ] {
         let text = case.text("", &format!("[[stage]]\n{stage}\n"), "");
-        let error = run_support::execute(&text, &Default::default(), &Quiet).unwrap_err();
+        let error = execute(&text, &Default::default(), &Quiet).unwrap_err();
         assert!(error.to_string().contains(key), "{error}");
         assert!(error.remedy().unwrap().contains("= 2"), "{error}");
         assert_eq!(case.left(), ["in.ply"]);

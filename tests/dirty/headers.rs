@@ -1,15 +1,14 @@
 //! LAS, LAZ and PLY files whose headers, records or counts lie: each is refused with path, byte and
 //! remedy and leaves nothing behind, or is read whole with a warning.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-use crate::scans_support;
-
 use std::path::{Path, PathBuf};
 
+use crate::support::assert_holds;
+use crate::support::las_file::{Beside, LasFile, STRIDES};
+use crate::support::records::read;
+use crate::support::setup::{Setup, convert, reduce};
 use laz::{LasZipCompressor, LazVlr};
 use pointmill::ErrorKind;
-use scans_support::{Beside, LasFile, STRIDES, Setup, assert_holds, convert, read, reduce};
 
 const POINTS: usize = 400;
 
@@ -460,7 +459,7 @@ fn vertices_that_a_ply_header_does_not_count_are_told() {
 
 #[test]
 fn extra_bytes_may_be_described_behind_the_points() {
-    let (describing, bytes) = scans_support::extra_bytes();
+    let (describing, bytes) = crate::support::las_file::extra_bytes();
     let stride = STRIDES[6] + bytes;
     let records = records(stride);
     let folder = tempfile::tempdir().unwrap();

@@ -1,25 +1,21 @@
 //! Places that take no output, disks that are full, inputs that change while they are read: an error
 //! with path and remedy, the right exit code, and nothing left behind.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-use crate::run_support;
-use crate::scans_support;
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::support::assert_holds;
+use crate::support::case::{Case, REDUCE, execute};
+use crate::support::command::{PROGRAM, done, fails};
+use crate::support::records::read;
 use pointmill::ErrorKind;
 use pointmill::{Overrides, Quiet, Watch};
-use run_support::{Case, REDUCE, execute};
-use scans_support::command::{done, fails};
-use scans_support::{assert_holds, read};
 
 /// A scan of a few thousand points called `in.laz` in a folder of its own.
 fn scan() -> tempfile::TempDir {
-    scans_support::command::scans(&["in.laz"])
+    crate::support::command::scans(&["in.laz"])
 }
 
 #[test]
@@ -75,11 +71,10 @@ fn an_output_is_never_an_input_by_whatever_name() {
 
 /// Runs pointmill with files limited to so many half KiB, as a full disk or a quota would.
 fn limited(at: &Path, blocks: u32, arguments: &[&str]) -> (Option<i32>, String) {
-    let program = assert_cmd::cargo::cargo_bin("pointmill");
     let output = Command::new("sh")
         .current_dir(at)
         .args(["-c", &format!("ulimit -f {blocks}; exec \"$0\" \"$@\"")])
-        .arg(program)
+        .arg(PROGRAM)
         .args(arguments)
         .output()
         .unwrap();

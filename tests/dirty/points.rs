@@ -1,16 +1,14 @@
 //! Points that cannot be placed, scans of no point, one, or one place, and units that do not match.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
-use crate::run_support;
-use crate::scans_support;
-
 use std::fs;
 
+use crate::support::assert_holds;
+use crate::support::case::{Case, REDUCE, execute};
+use crate::support::las_file::{Beside, LasFile, STRIDES};
+use crate::support::records::read;
+use crate::support::setup::{Setup, reduce};
 use pointmill::ErrorKind;
 use pointmill::{Overrides, Quiet};
-use run_support::{Case, REDUCE, execute};
-use scans_support::{Beside, LasFile, STRIDES, Setup, assert_holds, read, reduce};
 use serde_json::json;
 
 const ODD: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];

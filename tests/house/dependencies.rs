@@ -1,8 +1,6 @@
 //! docs/dependencies.md says what is known against each package: it is about those of Cargo.lock, and
 //! their licences let everyone use ours.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::modules::Modules;
+use super::modules::Modules;
 
 /// The modules from the bottom up. Those of one layer do not import each other.
 const LAYERS: [&[&str]; 15] = [
@@ -55,7 +55,8 @@ fn check(imports: &Imports) -> (Vec<String>, BTreeMap<String, usize>) {
     (wrong, down)
 }
 
-fn files(folder: &Path) -> Vec<PathBuf> {
+/// The Rust files in a folder and those below it.
+pub fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let each = |path: PathBuf| if path.is_dir() { files(&path) } else { vec![path] };
     entries.flat_map(each).filter(|path| path.extension().is_some_and(|e| e == "rs")).collect()

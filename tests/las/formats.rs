@@ -1,12 +1,9 @@
 //! Every point format, plain and compressed, with and without extra bytes: what goes in comes out.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-use crate::las_support;
-
 use std::sync::Arc;
 
-use las_support::{LAS, LAZ, Random, read_files, write};
+use crate::support::las::{LAS, LAZ, read_files, write};
+use crate::support::random::Random;
 use pointmill::io::las::{LasOptions, fresh, layout};
 use pointmill::point::{GpsTime, Metadata, Scalar, Schema, names};
 

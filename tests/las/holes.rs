@@ -1,14 +1,14 @@
 //! Stretches of one byte where compressed points were, as sparse copies and bad disks leave them: the
 //! program tells or reads, and does not die of them.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-use crate::scans_support;
-
 use std::path::Path;
 
-use scans_support::command::pointmill;
-use scans_support::{LasFile, Random, STRIDES, Setup, assert_holds, convert};
+use crate::support::assert_holds;
+use crate::support::case_file;
+use crate::support::command::pointmill;
+use crate::support::las_file::{LasFile, STRIDES};
+use crate::support::random::Random;
+use crate::support::setup::{Setup, convert};
 
 /// Points of a format with times, colours and all else that changes from one to the next.
 fn records(format: u8, points: i32) -> Vec<u8> {
@@ -96,7 +96,7 @@ fn a_hole_of_equal_bytes_is_told() {
 /// stack by this file: six bytes of ones are read as thousands of those.
 #[test]
 fn times_that_switch_sequences_without_end_are_an_error() {
-    let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/laz-recursion-1.laz");
+    let case = case_file("laz-recursion-1.laz");
     let folder = tempfile::tempdir().unwrap();
     let file = std::fs::read(case).unwrap();
     assert_eq!(converted(folder.path(), &file, "laz-recursion-1.laz"), 1);

@@ -1,13 +1,11 @@
 //! Several files as one scan: what they must share, what becomes of the rest, in any order.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-use crate::las_support;
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use las_support::{LAS, LAZ, read, read_files, scans, write};
+use crate::support::las::{LAS, LAZ, read_files, write};
+use crate::support::records::read_source;
+use crate::support::scans;
 use pointmill::io::las::{fresh, layout, open};
 use pointmill::point::{Metadata, Scalar, Schema};
 
@@ -132,7 +130,7 @@ fn differing_header_fields_become_neutral_and_equal_ones_are_carried() {
     for order in [[0, 1], [1, 0]] {
         let source = open(&order.map(|i: usize| paths[i].clone())).unwrap();
         let out = folder.path().join("out.las");
-        let mut records = read(&*source, 100).unwrap();
+        let mut records = read_source(&*source, 100).unwrap();
         let stride = source.schema().stride;
         let mut sorted: Vec<&[u8]> = records.chunks_exact(stride).collect();
         sorted.sort();
@@ -182,7 +180,7 @@ fn a_scan_cut_into_files_is_the_scan() {
     let scans = scans();
     let folder = tempfile::tempdir().unwrap();
     let whole = open(&[scans.join("laspy/1_4_w_evlr.laz")]).unwrap();
-    let records = read(&*whole, usize::MAX / 4096).unwrap();
+    let records = read_source(&*whole, usize::MAX / 4096).unwrap();
     let stride = whole.schema().stride;
     let paths = ["1.laz", "2.las", "3.laz"].map(|name| folder.path().join(name));
     let cuts = [0, 1, 400, records.len() / stride];

@@ -1,20 +1,19 @@
 //! What LAS files say besides points, in the words of many writers: read, carried, mended or told.
 //! The files of `tests/cases` are small ones of the kinds that public reports of other programs tell of.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
-use crate::common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::Scan;
+use crate::support::case::execute;
+use crate::support::case_file;
+use crate::support::command::pointmill;
+use crate::support::scan::Scan;
 use pointmill::io::las::{self, Description};
 use pointmill::io::ply;
 use pointmill::point::GpsTime;
 use pointmill::report::Report;
 use pointmill::{ErrorKind, Result};
-use pointmill::{Graph, Overrides, Quiet, Registry};
+use pointmill::{Overrides, Quiet};
 use tempfile::TempDir;
 
 /// Removes next to nothing, but might.
@@ -22,10 +21,6 @@ const GRID: &str = "[[stage]]\nkind = \"grid\"\nside = 0.5\n";
 /// Bits of the header's encoding field.
 const WKT: u16 = 16;
 const ADJUSTED: u16 = 1;
-
-fn case(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name)
-}
 
 /// A folder for outputs and what is written there.
 struct Bench(TempDir);
@@ -54,13 +49,12 @@ impl Bench {
              path = {inputs:?}\n{stages}\n[[stage]]\nkind = \"write\"\npath = {:?}\n{keys}\n",
             self.path(name)
         );
-        let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin())?;
-        Ok(pipeline.plan(&Overrides::default())?.run(&Quiet)?.report)
+        Ok(execute(&text, &Overrides::default(), &Quiet)?.report)
     }
 
     /// The output of a conversion of one case, and what was warned of.
     fn convert(&self, name: &str) -> (Description, Vec<String>) {
-        let report = self.run(&[case(name)], "", "", "out.las").unwrap();
+        let report = self.run(&[case_file(name)], "", "", "out.las").unwrap();
         (las::describe(&self.path("out.las")).unwrap(), report.run.warnings)
     }
 
@@ -92,15 +86,19 @@ fn names(about: &Description) -> Vec<&str> {
 fn units_that_are_hidden_are_found_and_mixed_ones_refused() {
     for name in ["15f-esri-projcs-vertcs.las", "15c-geokeys-epsg-only-2277-5703.las"] {
         let bench = Bench::new();
-        let error = bench.run(&[case(name)], "", GRID, "out.las").unwrap_err();
-        assert_eq!((error.kind(), error.path()), (ErrorKind::Data, Some(&*case(name))), "{name}");
+        let error = bench.run(&[case_file(name)], "", GRID, "out.las").unwrap_err();
+        assert_eq!(
+            (error.kind(), error.path()),
+            (ErrorKind::Data, Some(&*case_file(name))),
+            "{name}"
+        );
         let message = error.to_string();
         assert!(message.contains("x and y are in US survey feet and z in metres"), "{message}");
-        let auto = bench.run(&[case(name)], "z_scale = \"auto\"", GRID, "out.las").unwrap();
+        let auto = bench.run(&[case_file(name)], "z_scale = \"auto\"", GRID, "out.las").unwrap();
         let factor = auto.result.decisions.iter().find(|d| d.name == "z_scale").unwrap();
         assert!((factor.value.as_f64().unwrap() - 3937.0 / 1200.0).abs() < 1e-9, "{name}");
     }
-    let about = las::describe(&case("12-wkt2-4224-liblas.las")).unwrap();
+    let about = las::describe(&case_file("12-wkt2-4224-liblas.las")).unwrap();
     assert!(about.crs.unwrap().starts_with("PROJCRS[\"ETRS89 / UTM zone 32N\""));
     assert_eq!(about.units, "x and y in metres, z in a unit that is not known");
 }
@@ -110,7 +108,7 @@ fn what_is_not_known_of_units_is_said_where_it_matters_and_auto_refuses() {
     let bench = Bench::new();
     let feet = bench.path("feet.las");
     // The vertical code of the case is made one that nobody has given out.
-    let bytes = fs::read(case("15c-geokeys-epsg-only-2277-5703.las")).unwrap();
+    let bytes = fs::read(case_file("15c-geokeys-epsg-only-2277-5703.las")).unwrap();
     let at = bytes.windows(2).rposition(|w| w == 5703u16.to_le_bytes()).unwrap();
     for (code, why) in
         [(5103u16, "the unit of its reference system is not known here"), (0, "nothing names it")]
@@ -133,9 +131,9 @@ fn what_is_not_known_of_units_is_said_where_it_matters_and_auto_refuses() {
     }
     // A scan in metres whose heights name no system, and one without any, are the usual ones.
     for name in ["100e-geokey.las", "100a-nocrs.las"] {
-        let report = bench.run(&[case(name)], "", GRID, "out.las").unwrap();
+        let report = bench.run(&[case_file(name)], "", GRID, "out.las").unwrap();
         assert!(report.run.warnings.is_empty(), "{:?}", report.run.warnings);
-        assert!(bench.run(&[case(name)], "z_scale = \"auto\"", GRID, "out.las").is_err());
+        assert!(bench.run(&[case_file(name)], "z_scale = \"auto\"", GRID, "out.las").is_err());
     }
 }
 
@@ -143,17 +141,17 @@ fn what_is_not_known_of_units_is_said_where_it_matters_and_auto_refuses() {
 fn descriptors_in_several_records_are_all_read_and_become_one_record() {
     let bench = Bench::new();
     let (about, warnings) = bench.convert("02-three-eb-vlrs.las");
-    let input = las::describe(&case("02-three-eb-vlrs.las")).unwrap();
+    let input = las::describe(&case_file("02-three-eb-vlrs.las")).unwrap();
     assert_eq!(records(&input, "LASF_Spec", 4), 3, "the case is what it is for");
     assert_eq!(names(&about), names(&input));
     assert!(names(&about).len() == 3 && !names(&about).iter().any(|n| n.starts_with("ExtraBytes")));
     assert_eq!((records(&about, "LASF_Spec", 4), warnings.len()), (1, 0));
     let same = |path: &Path| Scan::read(path, 100).records;
-    assert!(same(&bench.path("out.las")) == same(&case("02-three-eb-vlrs.las")));
+    assert!(same(&bench.path("out.las")) == same(&case_file("02-three-eb-vlrs.las")));
     // Behind them come normals, and their descriptors fill the longer record.
     let normals = "[[stage]]\nkind = \"normals\"\nneighbors = 4\n";
     let keys = "out.las\ndimensions = [\"NormalX\", \"NormalY\", \"NormalZ\"]";
-    bench.run(&[case("02-three-eb-vlrs.las")], "", normals, keys).unwrap();
+    bench.run(&[case_file("02-three-eb-vlrs.las")], "", normals, keys).unwrap();
     let about = las::describe(&bench.path("out.las")).unwrap();
     assert_eq!(names(&about)[3..], ["NormalX", "NormalY", "NormalZ"]);
     let record = about.vlrs.iter().find(|v| v.user_id == "LASF_Spec").unwrap();
@@ -178,12 +176,12 @@ fn ranges_of_extra_bytes_stay_with_all_points_and_go_with_some() {
         let at = bytes.windows(9).position(|w| w == b"LASF_Spec").unwrap() + 52;
         (bytes[at + 3], bytes[at + 64..at + 112].to_vec())
     };
-    let input = ranges(&case("92-ebminmax.las"));
+    let input = ranges(&case_file("92-ebminmax.las"));
     assert!(input.0 & 6 == 6 && input.1.iter().any(|b| *b != 0), "the case has a range");
     let bench = Bench::new();
     bench.convert("92-ebminmax.las");
     assert_eq!(ranges(&bench.path("out.las")), input);
-    bench.run(&[case("92-ebminmax.las")], "", GRID, "out.las").unwrap();
+    bench.run(&[case_file("92-ebminmax.las")], "", GRID, "out.las").unwrap();
     assert_eq!(ranges(&bench.path("out.las")), (input.0 & !6, vec![0; 48]));
 }
 
@@ -207,7 +205,7 @@ fn one_system_in_other_bytes_or_words_is_read_as_one_in_any_order() {
     let bench = Bench::new();
     for files in [&wkt[..], &["100b-wkt.las", "100e-geokey.las"]] {
         let mut outputs = Vec::new();
-        let mut paths: Vec<PathBuf> = files.iter().map(|name| case(name)).collect();
+        let mut paths: Vec<PathBuf> = files.iter().map(|name| case_file(name)).collect();
         for _ in 0..2 {
             bench.run(&paths, "", "", "out.las\norder = \"canonical\"").unwrap();
             let about = las::describe(&bench.path("out.las")).unwrap();
@@ -223,13 +221,14 @@ fn one_system_in_other_bytes_or_words_is_read_as_one_in_any_order() {
     }
     // Systems that differ behind the first words are shown where they do.
     let other = bench.path("other.las");
-    let mut bytes = fs::read(case("100b-wkt.las")).unwrap();
+    let mut bytes = fs::read(case_file("100b-wkt.las")).unwrap();
     let at = bytes.windows(5).rposition(|w| w == b"25832").unwrap();
     bytes[at + 4] = b'3';
     fs::write(&other, bytes).unwrap();
-    let error = bench.run(&[case("100b-wkt.las"), other], "", "", "out.las").unwrap_err();
+    let error = bench.run(&[case_file("100b-wkt.las"), other], "", "", "out.las").unwrap_err();
     assert!(error.to_string().contains("25832") && error.to_string().contains("25833"), "{error}");
-    let error = bench.run(&[case("100a-nocrs.las"), case("100b-wkt.las")], "", "", "out.las");
+    let error =
+        bench.run(&[case_file("100a-nocrs.las"), case_file("100b-wkt.las")], "", "", "out.las");
     assert!(error.unwrap_err().to_string().contains("their CRS differ: none and PROJCS"));
 }
 
@@ -238,7 +237,7 @@ fn outputs_name_the_program_and_what_it_did_to_the_points() {
     let bench = Bench::new();
     let software = format!("pointmill {}", env!("CARGO_PKG_VERSION"));
     let input = bench.path("in.las");
-    let mut bytes = fs::read(case("92-ebminmax.las")).unwrap();
+    let mut bytes = fs::read(case_file("92-ebminmax.las")).unwrap();
     bytes[26..32].copy_from_slice(b"SENSOR");
     bytes[58..64].copy_from_slice(b"WRITER");
     fs::write(&input, bytes).unwrap();
@@ -286,7 +285,7 @@ fn what_gps_times_count_survives_ply() {
         ("90-gps-adjusted.las", GpsTime::AdjustedStandard, ADJUSTED),
         ("121-geokey.las", GpsTime::Week, 0),
     ] {
-        bench.run(&[case(name)], "", "", "out.ply").unwrap();
+        bench.run(&[case_file(name)], "", "", "out.ply").unwrap();
         let comments = ply::describe(&bench.path("out.ply")).unwrap().comments;
         assert!(told(&comments, "gps_time: seconds of"), "{comments:?}");
         let source = ply::open(&[bench.path("out.ply")]).unwrap();
@@ -313,13 +312,13 @@ fn what_gps_times_count_survives_ply() {
 #[test]
 fn epsg_codes_come_back_from_ply() {
     let bench = Bench::new();
-    bench.run(&[case("121-geokey.las")], "", "", "out.ply").unwrap();
+    bench.run(&[case_file("121-geokey.las")], "", "", "out.ply").unwrap();
     let report = bench.run(&[bench.path("out.ply")], "", "", "back.las\nscale = 0.01").unwrap();
     let about = las::describe(&bench.path("back.las")).unwrap();
     assert_eq!((about.crs.as_deref(), about.point_format), (Some("EPSG:25832+7837"), 1));
     assert_eq!((records(&about, "LASF_Projection", 34735), report.run.warnings.len()), (1, 0));
     // Point formats that ask for WKT get the keys and a word about it.
-    bench.run(&[case("100e-geokey.las")], "", "", "out.ply").unwrap();
+    bench.run(&[case_file("100e-geokey.las")], "", "", "out.ply").unwrap();
     let report = bench.run(&[bench.path("out.ply")], "", "", "back.las\nscale = 0.01").unwrap();
     let about = las::describe(&bench.path("back.las")).unwrap();
     assert_eq!((about.crs.as_deref(), about.point_format), (Some("EPSG:25832"), 6));
@@ -330,7 +329,7 @@ fn epsg_codes_come_back_from_ply() {
 #[test]
 fn a_system_that_las_cannot_name_is_told_for_its_own_reason() {
     let bench = Bench::new();
-    bench.run(&[case("121-geokey.las")], "", "", "out.ply").unwrap();
+    bench.run(&[case_file("121-geokey.las")], "", "", "out.ply").unwrap();
     let text = fs::read(bench.path("out.ply")).unwrap();
     let at = text.windows(15).position(|w| w == b"EPSG:25832+7837").unwrap();
     let long = format!("PROJCS[\"{}\"]", "name ".repeat(14_000));
@@ -355,7 +354,7 @@ fn waveforms_in_a_file_of_their_own_are_beside_the_output() {
     let bench = Bench::new();
     let name = "22-ext-waveform.las";
     for (file, of) in [("22-ext-waveform.wdp", "from.wdp"), (name, "from.las")] {
-        fs::copy(case(file), bench.path(of)).unwrap();
+        fs::copy(case_file(file), bench.path(of)).unwrap();
     }
     let modes = |mode: u32| {
         let mode = std::os::unix::fs::PermissionsExt::from_mode(mode);
@@ -365,7 +364,7 @@ fn waveforms_in_a_file_of_their_own_are_beside_the_output() {
     for stages in ["", GRID] {
         let report = bench.run(&[bench.path("from.las")], "", stages, "out.las").unwrap();
         let copied = fs::read(bench.path("out.wdp")).unwrap();
-        assert!(copied == fs::read(case("22-ext-waveform.wdp")).unwrap(), "{stages}");
+        assert!(copied == fs::read(case_file("22-ext-waveform.wdp")).unwrap(), "{stages}");
         let about = fs::metadata(bench.path("out.wdp")).unwrap();
         let mode = fs::metadata(bench.path("out.las")).unwrap().permissions();
         assert_eq!(about.permissions(), mode, "as other outputs, not as its source");
@@ -375,13 +374,13 @@ fn waveforms_in_a_file_of_their_own_are_beside_the_output() {
     }
     // An output beside its input, under its name, has them already.
     for file in [name, "22-ext-waveform.wdp"] {
-        fs::copy(case(file), bench.path(file)).unwrap();
+        fs::copy(case_file(file), bench.path(file)).unwrap();
     }
     let report = bench.run(&[bench.path(name)], "", "", "22-ext-waveform.laz").unwrap();
     assert!(report.run.warnings.is_empty());
     // Two files of waveforms are none that one output could refer to.
     let other = bench.path("other.las");
-    fs::copy(case(name), &other).unwrap();
+    fs::copy(case_file(name), &other).unwrap();
     let error = bench.run(&[bench.path(name), other.clone()], "", "", "two.las").unwrap_err();
     assert!(error.to_string().contains("their waveforms are in files of their own"), "{error}");
     let report = bench.run(&[other], "", "", "out.las").unwrap();
@@ -391,7 +390,7 @@ fn waveforms_in_a_file_of_their_own_are_beside_the_output() {
         report.run.warnings
     );
     assert!(!bench.path("out.wdp").exists());
-    bench.run(&[case("22b-int-waveform.las")], "", "", "out.las").unwrap();
+    bench.run(&[case_file("22b-int-waveform.las")], "", "", "out.las").unwrap();
     assert_eq!(records(&las::describe(&bench.path("out.las")).unwrap(), "LASF_Spec", 65535), 1);
 }
 
@@ -399,7 +398,7 @@ fn waveforms_in_a_file_of_their_own_are_beside_the_output() {
 fn no_input_and_no_output_is_replaced_by_a_copy_of_waveforms() {
     let bench = Bench::new();
     for (file, name) in [("22-ext-waveform.las", "in.las"), ("22-ext-waveform.wdp", "in.wdp")] {
-        fs::copy(case(file), bench.path(name)).unwrap();
+        fs::copy(case_file(file), bench.path(name)).unwrap();
     }
     let before = fs::read(bench.path("in.wdp")).unwrap();
     let run = |settings: &str, output: &str| {
@@ -436,13 +435,11 @@ fn waveforms_of_two_conversions_are_not_put_in_one_place() {
     let bench = Bench::new();
     for name in ["one/a.las", "two/a.laz"] {
         fs::create_dir_all(bench.path(name).parent().unwrap()).unwrap();
-        bench.run(&[case("22-ext-waveform.las")], "", "", name).unwrap();
+        bench.run(&[case_file("22-ext-waveform.las")], "", "", name).unwrap();
     }
     let convert = || {
-        let mut command = assert_cmd::Command::cargo_bin("pointmill").unwrap();
-        command.arg("convert").arg("-o").arg(bench.path("out/"));
-        let output = command.arg(bench.path("one/a.las")).arg(bench.path("two/a.laz")).output();
-        String::from_utf8(output.unwrap().stderr).unwrap()
+        let arguments = ["convert", "one/a.las", "two/a.laz", "-o", "out/"];
+        pointmill(&bench.path("."), &arguments).2
     };
     let told = convert();
     assert!(told.contains("out/a.wdp is written twice"), "{told}");
@@ -453,14 +450,14 @@ fn waveforms_of_two_conversions_are_not_put_in_one_place() {
 fn waveforms_that_ply_loses_are_told_once() {
     let bench = Bench::new();
     for stages in ["", GRID] {
-        let report = bench.run(&[case("22-ext-waveform.las")], "", stages, "out.ply").unwrap();
+        let report = bench.run(&[case_file("22-ext-waveform.las")], "", stages, "out.ply").unwrap();
         let told =
             |w: &&String| w.contains("out.ply: PLY does not hold waveforms of LAS; these are lost");
         let warnings = &report.run.warnings;
         assert_eq!(warnings.iter().filter(told).count(), 1, "{warnings:?}");
         assert!(!bench.path("out.wdp").exists());
     }
-    let report = bench.run(&[case("22b-int-waveform.las")], "", "", "out.ply").unwrap();
+    let report = bench.run(&[case_file("22b-int-waveform.las")], "", "", "out.ply").unwrap();
     assert!(told(&report.run.warnings, "LASF_Spec 65535"), "{:?}", report.run.warnings);
 }
 

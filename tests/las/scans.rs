@@ -1,14 +1,12 @@
 //! Real files: all that can be read is read and survives LAS → LAZ → LAS; damage is told.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-use crate::las_support;
-
 use std::fs::File;
 use std::io::{BufReader, Seek, SeekFrom};
 use std::path::Path;
 
-use las_support::{BROKEN, LAS, LAZ, manifest, read, scans, write};
+use crate::support::las::{BROKEN, LAS, LAZ, manifest, write};
+use crate::support::records::read_source;
+use crate::support::scans;
 use pointmill::io::las::{Description, Record, describe, open};
 use pointmill::stage::Source;
 
@@ -32,7 +30,7 @@ fn every_readable_scan_has_the_points_of_the_manifest_and_survives_a_round_trip(
         }
         let whole = source.points() <= PARTLY;
         let limit = if whole { usize::MAX / 4096 } else { PART };
-        let records = read(&*source, limit).unwrap_or_else(|e| panic!("{e:?}"));
+        let records = read_source(&*source, limit).unwrap_or_else(|e| panic!("{e:?}"));
         if whole {
             assert_eq!(records.len() as u64, source.points() * source.schema().stride as u64);
         }
@@ -53,7 +51,8 @@ fn round_trip(name: &str, source: &dyn Source, records: &[u8], folder: &std::pat
     assert_eq!(plain.schema(), source.schema(), "{name}");
     write(&two, LAZ, plain.schema(), plain.metadata(), records).unwrap();
     let packed = open(std::slice::from_ref(&two)).unwrap_or_else(|e| panic!("{name}: {e:?}"));
-    let unpacked = read(&*packed, usize::MAX / 4096).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+    let unpacked =
+        read_source(&*packed, usize::MAX / 4096).unwrap_or_else(|e| panic!("{name}: {e:?}"));
     assert!(unpacked == records, "{name}: records differ");
     write(&three, LAS, packed.schema(), packed.metadata(), &unpacked).unwrap();
     let bytes = [&one, &three].map(|path| std::fs::read(path).unwrap());
@@ -72,7 +71,7 @@ fn a_plain_file_written_again_keeps_all_but_recomputed_fields() {
             continue;
         }
         let source = open(std::slice::from_ref(&scan.path)).unwrap();
-        let records = read(&*source, usize::MAX / 4096).unwrap();
+        let records = read_source(&*source, usize::MAX / 4096).unwrap();
         let path = temporary.path().join("again.las");
         write(&path, LAS, source.schema(), source.metadata(), &records).unwrap();
         let (old, new) = (std::fs::read(&scan.path).unwrap(), std::fs::read(&path).unwrap());
@@ -97,7 +96,8 @@ fn broken_scans_fail_with_path_and_place() {
     let folder = scans();
     for name in BROKEN {
         let path = folder.join(name);
-        let result = open(std::slice::from_ref(&path)).and_then(|s| read(&*s, 1 << 22).map(drop));
+        let result =
+            open(std::slice::from_ref(&path)).and_then(|s| read_source(&*s, 1 << 22).map(drop));
         let error = result.expect_err(name);
         println!("{error:?}");
         assert_eq!(error.path(), Some(path.as_path()));
@@ -192,7 +192,7 @@ fn plain_and_compressed_files_of_the_same_points_decode_alike() {
     for name in pairs {
         let [plain, packed] = ["las", "laz"].map(|extension| {
             let path = folder.join(format!("{name}.{extension}"));
-            read(&*open(&[path]).unwrap(), usize::MAX / 4096).unwrap()
+            read_source(&*open(&[path]).unwrap(), usize::MAX / 4096).unwrap()
         });
         assert!(!plain.is_empty() && plain == packed, "{name}");
     }

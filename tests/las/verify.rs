@@ -1,14 +1,13 @@
 //! Points are held against what their header says of them: its box, its counts by return, its count.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-use crate::las_support;
-
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::Arc;
 
-use las_support::{LAS, LAZ, Random, read, write};
+use crate::support::case_file;
+use crate::support::command::pointmill;
+use crate::support::las::{LAS, LAZ, write};
+use crate::support::random::Random;
+use crate::support::records::read_source;
 use pointmill::io::las::{fresh, layout, open};
 use pointmill::point::Schema;
 
@@ -51,12 +50,9 @@ fn scan(folder: &Path, name: &str, format: u8, change: impl Fn(&mut [u8])) -> Pa
 
 /// Exit code and standard error of the program with these arguments, on two threads.
 fn program(arguments: &[&Path]) -> (i32, String) {
-    let done = Command::new(env!("CARGO_BIN_EXE_pointmill"))
-        .args(arguments)
-        .args(["--threads", "2"])
-        .output()
-        .unwrap();
-    (done.status.code().unwrap(), String::from_utf8(done.stderr).unwrap())
+    let threads = [Path::new("--threads"), Path::new("2")];
+    let (code, _, told) = pointmill(Path::new("."), &[arguments, &threads].concat());
+    (code, told)
 }
 
 /// Converts `input` to `out.las` beside it, with `more` arguments.
@@ -223,13 +219,13 @@ fn nothing_is_told_of_inputs_that_were_not_read_to_their_end() {
     let bad = scan(folder.path(), "bad.laz", 1, |bytes| put(bytes, MAX_Z, 50.8));
     let source = open(&[bad]).unwrap();
     assert!(source.parts() > 1);
-    read(&*source, 1000).unwrap();
+    read_source(&*source, 1000).unwrap();
     assert!(source.contradictions().is_empty());
-    read(&*source, usize::MAX / 4096).unwrap();
+    read_source(&*source, usize::MAX / 4096).unwrap();
     let told = source.contradictions();
     assert!(told.len() == 1 && told[0].is_damage, "{told:?}");
     // Read once more, they are no more points.
-    read(&*source, usize::MAX / 4096).unwrap();
+    read_source(&*source, usize::MAX / 4096).unwrap();
     assert_eq!(source.contradictions(), told);
 }
 
@@ -249,7 +245,7 @@ fn damage(folder: &Path, format: u8, flips: u64) -> (usize, usize) {
         bytes[at] ^= 1 << random.below(8);
         std::fs::write(&path, bytes).unwrap();
         let Ok(source) = open(std::slice::from_ref(&path)) else { continue };
-        match read(&*source, usize::MAX / 4096) {
+        match read_source(&*source, usize::MAX / 4096) {
             Ok(found) if found != right => {
                 others += 1;
                 let told = source.contradictions().iter().any(|told| told.is_damage);
@@ -278,7 +274,6 @@ fn flipped_bits_of_layers_are_told_by_the_ends_of_their_streams() {
 
 #[test]
 fn points_that_the_header_does_not_count_are_told_and_left() {
-    let case = |name: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name);
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out.las");
     for (name, points, told) in [
@@ -288,17 +283,18 @@ fn points_that_the_header_does_not_count_are_told_and_left() {
         ("19c-14count5-legacy3.las", 5, "counts 5 points and, in the field for older readers, 3"),
         ("21-box-wrong.las", 5, "the header has no box of the points"),
     ] {
-        let input = case(name);
+        let input = case_file(name);
         let (code, text) = program(&[Path::new("convert"), &input, Path::new("-o"), &out]);
         assert_eq!(code, 0, "{name}: {text}");
         assert_eq!(text.contains("warning: "), !told.is_empty(), "{name}: {text}");
         assert!(text.contains(told), "{name}: {text}");
-        let read = read(&*open(std::slice::from_ref(&out)).unwrap(), usize::MAX / 4096).unwrap();
+        let read =
+            read_source(&*open(std::slice::from_ref(&out)).unwrap(), usize::MAX / 4096).unwrap();
         let all = open(&[input]).unwrap();
         assert_eq!(read.len(), points * all.schema().stride, "{name}");
     }
     // The same where the bytes behind are no points: that is damage.
-    let mut bytes = std::fs::read(case("80j-count-fewer.laz")).unwrap();
+    let mut bytes = std::fs::read(case_file("80j-count-fewer.laz")).unwrap();
     put(&mut bytes, MAX_Z - 32, 110.0);
     let path = folder.path().join("cut.laz");
     std::fs::write(&path, bytes).unwrap();
@@ -323,7 +319,7 @@ fn real_scans_are_as_their_headers_say() {
             continue;
         }
         let Ok(source) = open(std::slice::from_ref(&path)) else { continue };
-        read(&*source, usize::MAX / 4096).unwrap_or_else(|e| panic!("{e}"));
+        read_source(&*source, usize::MAX / 4096).unwrap_or_else(|e| panic!("{e}"));
         files += 1;
         if source.contradictions().iter().any(|told| told.is_damage) {
             wrong.push(path.file_name().unwrap().to_string_lossy().into_owned());

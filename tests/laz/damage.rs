@@ -1,15 +1,11 @@
 //! Compressed points with bits, bytes and stretches that are others: reading ends, and almost always says
 //! where the damage is. `benches/damage.rs` is the same by the ten thousand, and on real scans.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-use crate::laz_support;
-
 use std::path::Path;
 
-use laz_support::damage::{Harm, Tally, Victim};
-use laz_support::points::{Kind, Maker};
-use laz_support::{Chunks, Recipe, read_file};
+use crate::support::laz::damage::{Harm, Tally, Victim};
+use crate::support::laz::points::{Kind, Maker};
+use crate::support::laz::{Chunks, Recipe, read_file};
 
 /// Points of a file.
 const POINTS: usize = 30_000;

@@ -1,19 +1,15 @@
 //! The decoder of compressed points held against the `laz` crate: the same bytes, whatever is in the
 //! records, however they are compressed and in batches of any size.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-use crate::laz_support;
-
-use crate::real;
-
 use std::path::{Path, PathBuf};
 
-use laz_support::points::{Kind, Maker, Random, ways};
-use laz_support::{Chunks, Recipe, Theirs, difference, read, read_file};
+use crate::support::laz::points::{Kind, Maker, ways};
+use crate::support::laz::{Chunks, Recipe, Theirs, difference, read_file};
+use crate::support::random::Random;
+use crate::support::records::read_without;
+use crate::support::scans;
 use pointmill::io::las::open;
 use pointmill::point::{PointBatch, Schema};
-use real::scans;
 
 /// Records of a batch.
 const CAPACITIES: [usize; 5] = [1, 7, 128, 129, 4096];
@@ -163,7 +159,7 @@ fn fields_that_are_read_do_not_depend_on_those_that_are_not() {
             for words in LAYERS.iter().copied().chain([&all[..], &[]]) {
                 let unread = named(schema, words);
                 left_out += unread.len();
-                let some = read(&*source, 129, &unread).unwrap();
+                let some = read_without(&*source, 129, &unread).unwrap();
                 assert_eq!(some.len(), records.len());
                 let read = schema.dimensions.iter().filter(|d| !unread.contains(&d.name));
                 for dimension in read {

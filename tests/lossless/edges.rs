@@ -1,15 +1,12 @@
 //! Nothing lost where there is next to nothing, all in one place, or a number beyond all bounds.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-use crate::scans_support;
-
 use std::path::{Path, PathBuf};
 
+use crate::support::assert_holds;
+use crate::support::random::Random;
+use crate::support::records::{accounted, assert_contained, read, read_some};
+use crate::support::setup::{Setup, convert, reduce};
 use pointmill::ErrorKind;
-use scans_support::{
-    Random, Setup, accounted, assert_contained, assert_holds, convert, read, read_some, reduce,
-};
 use serde_json::json;
 
 /// A text PLY of double coordinates and a number for each vertex.

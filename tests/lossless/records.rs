@@ -1,17 +1,13 @@
 //! Nothing lost: whole runs over every point format and over PLY, with what goes in and what comes
 //! out compared as bytes.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-use crate::scans_support;
-
 use std::path::{Path, PathBuf};
 
+use crate::support::las_file::{Beside, LasFile, STRIDES, extra_bytes};
+use crate::support::random::Random;
+use crate::support::records::{accounted, assert_contained, read};
+use crate::support::setup::{Setup, convert, reduce};
 use pointmill::point::{Endian, Schema};
-use scans_support::{
-    Beside, LasFile, Random, STRIDES, Setup, accounted, assert_contained, convert, extra_bytes,
-    read, reduce,
-};
 use serde_json::json;
 
 const SCALE: [f64; 3] = [0.01, 0.01, 0.001];

@@ -1,15 +1,11 @@
 //! To which side normals point: up, towards a viewpoint, and on the borders of both.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
-use crate::stages_support;
-
+use crate::support::tiles::*;
 use pointmill::ops::normals::{Normals, Orient};
 use pointmill::point::Position;
 use pointmill::report::Tally;
 use pointmill::stage::TileOp;
 use pointmill::tile::Tile;
-use stages_support::*;
 
 const STEP: f64 = 0.5;
 

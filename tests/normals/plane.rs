@@ -1,8 +1,7 @@
 //! Moments and eigenvectors against solvers written another way.
 
-use crate::normals_support;
-
-use normals_support::{Random, angle, covariance, dot, frame, jacobi};
+use super::solvers::{angle, covariance, dot, frame, jacobi};
+use crate::support::random::Random;
 use pointmill::geom::plane::{self, Covariance, Symmetric};
 
 fn full(m: Symmetric) -> [[f64; 3]; 3] {

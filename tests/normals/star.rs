@@ -1,12 +1,10 @@
 //! The star of a point and the fit over it, against a library triangulation of the same
 //! neighbourhood and a least-squares fit in its rotated frame.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-use crate::normals_support;
-
-use normals_support::{Random, Vec3, angle, around, covariance, cross, dot, frame, jacobi};
-use normals_support::{normalised, rotated_fit};
+use super::solvers::{
+    Vec3, angle, around, covariance, cross, dot, frame, jacobi, normalised, rotated_fit,
+};
+use crate::support::random::Random;
 use pointmill::geom::plane::{self, Covariance};
 use pointmill::geom::star::Star;
 use pointmill::ops::normals::{Estimate, Estimator, Method};

@@ -1,9 +1,7 @@
 //! Estimated normals against surfaces whose normals are known, and at the ends of what can come in.
 
-use crate::normals_support;
-
-use normals_support::normalised;
-use normals_support::{Random, Vec3, angle, around, covariance, cross, dot, frame, jacobi};
+use super::solvers::{Vec3, angle, around, covariance, cross, dot, frame, jacobi, normalised};
+use crate::support::random::Random;
 use pointmill::ops::normals::{Estimate, Estimator, Fallback, Method};
 
 const METHODS: [Method; 2] = [Method::Varady, Method::Pca];
@@ -191,7 +189,7 @@ fn the_order_of_neighbours_decides_nothing_but_ties() {
         let mut offsets = around(12, 1e5, axes, || disc(&mut random), |x, y| 2e-6 * x * y);
         let expected = METHODS.map(|method| normal(method, &offsets));
         for _ in 0..5 {
-            let (i, j) = (random.bits() as usize % 12, random.bits() as usize % 12);
+            let (i, j) = (random.number() as usize % 12, random.number() as usize % 12);
             offsets.swap(i, j);
             for (method, expected) in METHODS.into_iter().zip(expected) {
                 assert!(angle(normal(method, &offsets), expected) < SINGLE);
@@ -222,11 +220,11 @@ fn any_offsets_give_a_canonical_unit_normal_or_none() {
     let mut estimators = METHODS.map(Estimator::new);
     let mut normals = 0;
     for round in 0..20_000 {
-        let bits = 1 + random.bits() % 63;
-        let offsets: Vec<[i64; 3]> = (0..random.bits() % 70)
+        let bits = 1 + random.number() % 63;
+        let offsets: Vec<[i64; 3]> = (0..random.number() % 70)
             .map(|_| {
-                let fewer = if round % 3 == 0 { random.bits() % bits } else { 0 };
-                std::array::from_fn(|_| (random.bits() as i64 | 1) >> (64 - bits + fewer).min(63))
+                let fewer = if round % 3 == 0 { random.number() % bits } else { 0 };
+                std::array::from_fn(|_| (random.number() as i64 | 1) >> (64 - bits + fewer).min(63))
             })
             .collect();
         for estimator in &mut estimators {
@@ -258,9 +256,9 @@ fn bits_are_the_same_on_every_platform_and_build() {
         let mut estimator = Estimator::new(method);
         let mut hash = 0xcbf2_9ce4_8422_2325u64;
         for _ in 0..5000 {
-            let shift = 34 + random.bits() % 20;
-            let offsets: Vec<[i64; 3]> = (0..4 + random.bits() % 12)
-                .map(|_| std::array::from_fn(|_| random.bits() as i64 >> shift))
+            let shift = 34 + random.number() % 20;
+            let offsets: Vec<[i64; 3]> = (0..4 + random.number() % 12)
+                .map(|_| std::array::from_fn(|_| random.number() as i64 >> shift))
                 .collect();
             let (estimate, _) = estimator.estimate(&offsets);
             let Estimate::Normal(n) = estimate else { continue };

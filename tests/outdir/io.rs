@@ -1,18 +1,13 @@
 //! One output for each input: its own header, records, offset and name, from inputs that are read as
 //! one scan.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
-
-use crate::las_support;
-use crate::outdir_support;
-use crate::ply_support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use las_support::{LAS, LAZ, Random, write};
-use outdir_support::{assert_equal_files, convert_one, ends, named, write_each};
+use crate::support::folders::{assert_equal_files, convert_one, ends, named, write_each};
+use crate::support::las::{LAS, LAZ, write};
+use crate::support::random::Random;
 use pointmill::io::las::{fresh, layout, open};
 use pointmill::point::Scalar;
 use pointmill::{Graph, Overrides, Registry};
@@ -130,8 +125,8 @@ fn outputs_of_some_records_hold_them_byte_for_byte_under_their_own_header() {
     let keep = |input: usize, i: u64| input != 2 && i % 3 == 1;
     let outputs = write_each(&inputs, &keys(&folder, ""), keep).unwrap();
     for (n, (input, output)) in inputs.iter().zip(&outputs).enumerate() {
-        let (before, all) = las_support::read_files(std::slice::from_ref(input)).unwrap();
-        let (after, some) = las_support::read_files(std::slice::from_ref(output)).unwrap();
+        let (before, all) = crate::support::las::read_files(std::slice::from_ref(input)).unwrap();
+        let (after, some) = crate::support::las::read_files(std::slice::from_ref(output)).unwrap();
         assert_eq!(before.schema(), after.schema());
         let records = all.chunks_exact(before.schema().stride).zip(0u64..);
         let kept: Vec<u8> =
@@ -183,7 +178,7 @@ fn ply_outputs_have_their_own_comments() {
                  element vertex 2\nproperty double x\nproperty double y\nproperty double z\n\
                  property uchar tag\nend_header\n{n}.5 0 0 {n}\n{n}.25 1 2 {n}\n"
             );
-            ply_support::file(at.path(), &format!("{n}.ply"), text)
+            crate::support::ply::file(at.path(), &format!("{n}.ply"), text)
         })
         .collect();
     let folder = at.path().join("out");

@@ -1,23 +1,21 @@
 //! Runs with one output for each input: tiles of a survey reduce without seams, to the points that
 //! they reduce to as one file, whatever the order of the inputs and however the work is cut.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
-
-use crate::common;
-use crate::outdir_support;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::support::case::execute;
+use crate::support::command::PROGRAM;
+use crate::support::folders::{assert_equal_files, convert_one};
+use crate::support::random::Random;
+use crate::support::scan::Scan;
 use assert_cmd::Command;
-use common::{Random, Scan};
-use outdir_support::{assert_equal_files, convert_one};
 use pointmill::Result;
 use pointmill::report::result_bytes;
 use pointmill::synth::Scene;
-use pointmill::{Done, Graph, Overrides, Quiet, Registry};
+use pointmill::{Done, Overrides, Quiet};
 
 const STAGES: &str = "[[stage]]\nkind = 'normals'\n[[stage]]\nkind = 'cells'\n\
                       [[stage]]\nkind = 'median'\n";
@@ -98,12 +96,11 @@ const CUTS: [Cut; 3] = [
 fn run(inputs: &[PathBuf], write: &str, report: &Path, cut: Cut) -> Result<Done> {
     let Cut { threads, tile_points, spill } = cut;
     let text = format!(
-        "[run]\nmemory = '512MiB'\nthreads = {threads}\ntile_points = {tile_points}\n\
+        "[run]\nthreads = {threads}\ntile_points = {tile_points}\n\
          spill = {spill:?}\nreport = {report:?}\n\
          [[stage]]\nkind = 'read'\npath = {inputs:?}\n{STAGES}[[stage]]\nkind = 'write'\n{write}\n"
     );
-    let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin())?;
-    pipeline.plan(&Overrides::default())?.run(&Quiet)
+    execute(&text, &Overrides::default(), &Quiet)
 }
 
 fn count(records: &Scan) -> BTreeMap<Vec<u8>, usize> {
@@ -214,7 +211,6 @@ fn a_thousand_tiles_reduce_with_few_files_open() {
     let one = at.path().join("one.las");
     run(&[whole], &format!("path = {one:?}"), &at.path().join("r.json"), CUTS[0]).unwrap();
     // The shell bounds the open files of what it becomes.
-    let program = env!("CARGO_BIN_EXE_pointmill");
     let pattern = at.path().join("tile*");
     let folder = at.path().join("out");
     let ran = Command::new("sh")
@@ -222,7 +218,7 @@ fn a_thousand_tiles_reduce_with_few_files_open() {
         .arg(
             "ulimit -n 64 && exec \"$0\" reduce \"$1\" --outdir \"$2\" --preset paper --threads 3 --memory 256MiB",
         )
-        .args([program.as_ref(), pattern.as_os_str(), folder.as_os_str()])
+        .args([PROGRAM.as_ref(), pattern.as_os_str(), folder.as_os_str()])
         .output()
         .unwrap();
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));

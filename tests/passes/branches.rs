@@ -230,6 +230,42 @@ fn a_tile_stage_that_reads_what_a_stage_above_changes_is_refused() {
 }
 
 #[test]
+fn several_sources_are_one_scan() {
+    let at = tempfile::tempdir().unwrap();
+    let path = |name: &str| at.path().join(name).display().to_string();
+    let graph = chain(at.path(), "", "all.las");
+    run(graph).unwrap();
+    run(chain(at.path(), TREES, "a.las")).unwrap();
+    run(chain(at.path(), GROUND, "b.laz")).unwrap();
+    let parse = |text: &str| Graph::parse(text, "test.toml", &Registry::builtin()).unwrap();
+    let read = |name: &str| format!("[[stage]]\nkind = 'read'\npath = '{}'\n", path(name));
+    let write = |name: &str| format!("[[stage]]\nkind = 'write'\npath = '{}'\n", path(name));
+    let both =
+        format!("[[stage]]\nkind = 'read'\npath = ['{}', '{}']\n", path("a.las"), path("b.laz"));
+    run(parse(&format!("{both}{REDUCE}{}", write("one.ply")))).unwrap();
+    let merged = |first: &str, second: &str, output: &str| {
+        let mut graph = parse(&format!("{}{REDUCE}{}", read(first), write(output)));
+        let other = parse(&format!("{}{}", second, write("none.ply"))).stages.remove(0);
+        graph.stages.insert(1, other);
+        for stage in &mut graph.stages[2..] {
+            stage.from.iter_mut().for_each(|from| *from += 1);
+        }
+        graph.stages[2].from = vec![0, 1];
+        graph
+    };
+    run(merged("a.las", &read("b.laz"), "two.ply")).unwrap();
+    let bytes = |name: &str| std::fs::read(path(name)).unwrap();
+    assert!(bytes("one.ply") == bytes("two.ply"));
+    let told = |graph: Graph| run(graph).unwrap_err().to_string();
+    let synth = "[[stage]]\nkind = 'synth'\nscene = 'part'\npoints = 9\n";
+    assert!(told(merged("a.las", synth, "x.ply")).contains("all read files"));
+    assert!(told(merged("a.las", &read("a.las"), "x.ply")).contains("another source reads"));
+    let mut one = merged("a.las", &read("b.laz"), "x.ply");
+    one.stages[2].from = vec![0];
+    assert!(told(one).contains("take from all of them"));
+}
+
+#[test]
 fn graphs_that_hang_together_wrongly_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let told = |change: &dyn Fn(&mut Graph)| {

@@ -1,13 +1,11 @@
 //! Stages of two phases, selections and repeated passes against brute force over all of a small scan,
 //! in runs of many tiles.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
-use crate::common;
-
 use std::collections::{BTreeMap, BTreeSet};
 
-use common::{Memory, Ran, Random, Scan, Settings, run, run_with};
+use crate::support::random::Random;
+use crate::support::runs::{Memory, Ran, Settings, run, run_with};
+use crate::support::scan::Scan;
 use pointmill::ops::normals::{Estimate, Estimator, Method};
 use pointmill::point::{Position, distance2, names};
 use pointmill::store::morton_cmp;

@@ -2,14 +2,12 @@
 //! record is one of the input, but for the one field that a mark writes, and every record is accounted
 //! for.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
-use crate::common;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use common::{Memory, Ran, Random, Scan, Settings, run_with};
+use crate::support::random::Random;
+use crate::support::runs::{Memory, Ran, Settings, run_with};
+use crate::support::scan::Scan;
 use pointmill::synth::Scene;
 
 const TILED: Settings = Settings {

@@ -2,14 +2,13 @@
 //! and several sinks too: random configurations of one scan and pipeline give the same bytes of every
 //! output and of the report's `result`.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
-use crate::common;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use common::{Memory, Ran, Random, Scan, Settings, assert_same, instruction_sets, run_with};
+use crate::support::assert_same;
+use crate::support::random::Random;
+use crate::support::runs::{Memory, Ran, Settings, instruction_sets, run_with};
+use crate::support::scan::Scan;
 use pointmill::synth::Scene;
 
 /// A pipeline to run the scan through in many configurations.

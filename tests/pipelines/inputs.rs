@@ -1,35 +1,17 @@
 //! Inputs that are something else than their name says, or that cannot be read at positions, are
 //! called what they are, alike by every command.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use crate::support::case_file;
+use crate::support::command::{command, ended};
 
 /// Exit code and standard error of the program with `arguments`, within ten seconds.
 fn told<S: AsRef<std::ffi::OsStr>>(arguments: &[S]) -> (i32, String) {
-    let start = Instant::now();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_pointmill"))
-        .args(arguments)
-        .stdin(std::process::Stdio::null())
-        .stdout(std::process::Stdio::null())
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-    while child.try_wait().unwrap().is_none() {
-        if start.elapsed() > Duration::from_secs(10) {
-            child.kill().unwrap();
-            panic!("it hangs");
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    let done = child.wait_with_output().unwrap();
-    (done.status.code().unwrap(), String::from_utf8(done.stderr).unwrap())
-}
-
-fn case(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name)
+    let done = ended(command(Path::new("."), arguments), Duration::from_secs(10));
+    (done.status.code().expect("it hangs"), String::from_utf8(done.stderr).unwrap())
 }
 
 #[test]
@@ -45,7 +27,7 @@ fn other_formats_under_a_known_name_are_called_what_they_are() {
         ("118-vlrcount.las", "3 variable length records do not fit", "record count"),
         ("20a-count-too-many.las", "ends after 5 of the 9 points", "header's count"),
     ] {
-        let input = case(name);
+        let input = case_file(name);
         let convert = [Path::new("convert"), &input, Path::new("-o"), &out];
         for arguments in [&[Path::new("info"), &input][..], &convert] {
             let (code, text) = told(arguments);
@@ -55,7 +37,7 @@ fn other_formats_under_a_known_name_are_called_what_they_are() {
         assert!(!out.exists());
     }
     // `info` goes by the bytes, all others by the name.
-    let input = case("160-las-named.ply");
+    let input = case_file("160-las-named.ply");
     assert_eq!(told(&[Path::new("info"), &input]).0, 0);
     let (code, text) = told(&[Path::new("convert"), &input, Path::new("-o"), &out]);
     assert_eq!(code, 1);
@@ -118,7 +100,7 @@ fn copc_is_not_written_under_its_name() {
     let at = |name: &str| folder.path().join(name);
     for name in ["a.copc.laz", "a.COPC.LAZ"] {
         let out = at(name);
-        let scan = case("80j-count-fewer.laz");
+        let scan = case_file("80j-count-fewer.laz");
         let (code, text) = told(&[Path::new("convert"), &scan, Path::new("-o"), &out]);
         assert_eq!(code, 2, "{text}");
         assert!(text.contains("is named as COPC, which is not written"), "{text}");
@@ -126,7 +108,7 @@ fn copc_is_not_written_under_its_name() {
     }
     // Outputs that take the names of inputs leave the word out.
     std::fs::create_dir(at("in")).unwrap();
-    std::fs::copy(case("80j-count-fewer.laz"), at("in/tile.copc.laz")).unwrap();
+    std::fs::copy(case_file("80j-count-fewer.laz"), at("in/tile.copc.laz")).unwrap();
     let (input, [one, two]) = (at("in/tile.copc.laz"), [at("one"), at("two")]);
     std::fs::create_dir(&one).unwrap();
     let (code, text) = told(&[Path::new("convert"), &input, Path::new("-o"), &one]);
@@ -145,7 +127,7 @@ fn names_that_are_no_text_are_refused_alike() {
     use std::os::unix::ffi::OsStrExt;
     let folder = tempfile::tempdir().unwrap();
     let name = std::ffi::OsStr::from_bytes(b"\xff.las");
-    std::fs::copy(case("20b-count-too-few.las"), folder.path().join(name)).unwrap();
+    std::fs::copy(case_file("20b-count-too-few.las"), folder.path().join(name)).unwrap();
     let (pattern, out) = (folder.path().join("*.las"), folder.path().join("out.laz"));
     for command in ["info", "convert", "reduce"] {
         for input in [folder.path(), &pattern] {

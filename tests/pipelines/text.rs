@@ -1,10 +1,8 @@
 //! Pipeline files: what is read, and how every mistake is told.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use std::path::Path;
 
-use pointmill::graph::{MixedUnits, Nonfinite, Simd, ZScale};
+use pointmill::graph::{MixedUnits, Nonfinite, SimdSetting, ZScale};
 use pointmill::io::ends::Write;
 use pointmill::io::las::{LAS, LAZ};
 use pointmill::io::ply::PLY;
@@ -135,7 +133,7 @@ fn settings_are_read() {
     assert_eq!(settings.lattice, Some(0.001));
     assert_eq!(settings.nonfinite, Nonfinite::Drop);
     assert_eq!(settings.tile_points.unwrap().get(), 5000);
-    assert_eq!(settings.simd, Simd::Portable);
+    assert_eq!(settings.simd, SimdSetting::Portable);
     assert_eq!((settings.z_scale, settings.units), (Some(ZScale::Factor(0.5)), MixedUnits::Ignore));
     assert_eq!(
         parse(&format!("[run]\nmemory = 4096\n{GOOD}")).unwrap().settings.memory,

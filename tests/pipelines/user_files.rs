@@ -1,16 +1,12 @@
 //! Files that a command reads, or that its user wants to keep: it never writes over them, by
 //! whatever name.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
-use crate::scans_support;
-
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::Path;
 
-use scans_support::assert_holds;
-use scans_support::command::{done, fails, pointmill, scans};
+use crate::support::assert_holds;
+use crate::support::command::{done, fails, pointmill, scans};
 
 /// `p.toml`, which converts `a.las` to `out.laz`.
 fn pipeline(at: &Path, run: &str) {

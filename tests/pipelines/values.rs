@@ -1,23 +1,17 @@
 //! Values that one format or the lattice cannot hold as they are: kept, or told, before the work where
 //! that can be; never changed without a word.
-#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
-
-use crate::run_support;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
+use crate::support::case::REDUCE;
+use crate::support::case_file;
 use pointmill::Result;
 use pointmill::io::{las, ply};
 use pointmill::point::{PointBatch, Scalar, Schema};
 use pointmill::stage::Source;
 use pointmill::{Done, Graph, Overrides, Registry, Watch};
-use run_support::REDUCE;
-
-fn case(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name)
-}
 
 /// Hears what a run warns of.
 #[derive(Default)]
@@ -75,7 +69,7 @@ fn a_text_keeps_digits_that_a_float_has_no_room_for() {
     let output = folder.path().join("out.ply");
     for encoding in ["ascii", "binary"] {
         let keys = format!("encoding = {encoding:?}");
-        go(&text("", &[case("192-ascii-float-utm.ply")], "", &output, &keys)).unwrap();
+        go(&text("", &[case_file("192-ascii-float-utm.ply")], "", &output, &keys)).unwrap();
         assert_eq!(values(&output, "Y"), [5600000.37, 5600000.12, 5600001.81]);
         assert_eq!(values(&output, "X"), [350000.12, 350000.34, 350001.56]);
     }
@@ -103,7 +97,7 @@ fn a_text_keeps_digits_that_a_float_has_no_room_for() {
 fn texts_of_floats_and_of_doubles_are_one_scan() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.ply");
-    go(&text("", &[case("152a.ply"), case("152b.ply")], "", &output, "")).unwrap();
+    go(&text("", &[case_file("152a.ply"), case_file("152b.ply")], "", &output, "")).unwrap();
     assert_eq!(values(&output, "X"), [0.0, 1.0, 0.0, 1.0]);
     assert_eq!(read(&output).0.find("X").unwrap().scalar, Scalar::F64);
 }
@@ -113,7 +107,7 @@ fn a_text_that_ends_in_a_number_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.ply");
     let input = folder.path().join("in.ply");
-    let whole = fs::read_to_string(case("192-ascii-float-utm.ply")).unwrap();
+    let whole = fs::read_to_string(case_file("192-ascii-float-utm.ply")).unwrap();
     let told = |text_of_file: &str| {
         fs::write(&input, text_of_file).unwrap();
         let (_, told) = go(&text("", std::slice::from_ref(&input), "", &output, "")).unwrap();
@@ -128,7 +122,7 @@ fn a_text_that_ends_in_a_number_is_told() {
 fn scalar_fields_of_ply_are_the_fields_of_las() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.las");
-    go(&text("", &[case("51-scalar.ply")], "", &output, "scale = 0.001")).unwrap();
+    go(&text("", &[case_file("51-scalar.ply")], "", &output, "scale = 0.001")).unwrap();
     assert_eq!(values(&output, "Intensity"), [12.0, 40_000.0]);
     assert_eq!(values(&output, "Classification"), [2.0, 6.0]);
     assert_eq!(values(&output, "GpsTime"), [1.5, 2.5]);
@@ -139,7 +133,7 @@ fn scalar_fields_of_ply_are_the_fields_of_las() {
 fn names_keep_their_words_and_headers_hold_no_dots() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.ply");
-    go(&text("", &[case("53c-only-space.las")], "", &output, "encoding = 'ascii'")).unwrap();
+    go(&text("", &[case_file("53c-only-space.las")], "", &output, "encoding = 'ascii'")).unwrap();
     let written = fs::read_to_string(&output).unwrap();
     let header = written.split_once("end_header").unwrap().0;
     assert!(header.contains(" normal_x\n") && !header.contains("_2"), "{header}");
@@ -156,14 +150,14 @@ fn names_keep_their_words_and_headers_hold_no_dots() {
 fn records_that_ply_does_not_hold_are_named_before_the_run() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.ply");
-    let pipeline = text("", &[case("122-vlrs.las")], "", &output, "");
+    let pipeline = text("", &[case_file("122-vlrs.las")], "", &output, "");
     let plan = Graph::parse(&pipeline, "test.toml", &Registry::builtin()).unwrap();
     let plan = plan.plan(&Overrides::default()).unwrap();
     let [warning] = &plan.warnings()[..] else { panic!("{:?}", plan.warnings()) };
     assert!(warning.contains("these are lost: "), "{warning}");
     let (done, told) = go(&pipeline).unwrap();
     assert!(told.contains(warning) && done.report.run.warnings.contains(warning));
-    let copied = text("", &[case("122-vlrs.las")], "", &folder.path().join("out.las"), "");
+    let copied = text("", &[case_file("122-vlrs.las")], "", &folder.path().join("out.las"), "");
     assert!(go(&copied).unwrap().1.iter().all(|w| !w.contains("lost")));
 }
 
@@ -172,7 +166,7 @@ fn values_that_the_output_cannot_hold_are_told_before_the_work() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.las");
     let plan = |input: &str, stages: &str, keys: &str| {
-        let text = text("", &[case(input)], stages, &output, keys);
+        let text = text("", &[case_file(input)], stages, &output, keys);
         let pipeline = Graph::parse(&text, "test.toml", &Registry::builtin()).unwrap();
         pipeline.plan(&Overrides::default())
     };
@@ -203,7 +197,7 @@ fn values_that_the_output_cannot_hold_are_told_before_the_work() {
     let offset = "scale = 0.001\noffset = [346000.0, 5600000.0, 0.0]";
     assert!(plan("108-float-utm.ply", "", offset).is_ok());
     assert!(plan("190-float-intensity.ply", "", "scale = 0.001\ndrop = ['Intensity']").is_ok());
-    let dropped = text("nonfinite = 'drop'", &[case("37d-nan-inf.ply")], "", &output, keys);
+    let dropped = text("nonfinite = 'drop'", &[case_file("37d-nan-inf.ply")], "", &output, keys);
     assert_eq!(go(&dropped).unwrap().0.report.result.ledger.kept, 1);
 }
 
@@ -213,7 +207,7 @@ fn a_scan_finer_than_the_lattice_is_told_with_a_lattice_that_does() {
     let output = folder.path().join("out.ply");
     let grid = "[[stage]]\nkind = 'grid'\nside = 1.0\n";
     let reduce = |run: &str, stages: &str| {
-        go(&text(run, &[case("93-nano.ply")], stages, &output, "")).unwrap()
+        go(&text(run, &[case_file("93-nano.ply")], stages, &output, "")).unwrap()
     };
     for stages in [REDUCE, grid] {
         let (done, told) = reduce("", stages);
@@ -257,7 +251,7 @@ fn few_points_that_the_lattice_merges_are_counted_without_a_warning() {
 fn a_scan_beyond_the_lattice_is_refused_with_a_lattice_that_does() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.ply");
-    let reduce = |run: &str| go(&text(run, &[case("94-ecef-mm.ply")], REDUCE, &output, ""));
+    let reduce = |run: &str| go(&text(run, &[case_file("94-ecef-mm.ply")], REDUCE, &output, ""));
     let error = reduce("").unwrap_err();
     let help = error.remedy().unwrap();
     let step = help.split_once("`run.lattice = ").unwrap().1.split_once('`').unwrap().0;
@@ -270,7 +264,7 @@ fn lengths_that_the_lattice_rounds_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.las");
     let told = |stages: &str| {
-        let (_, told) = go(&text("", &[case("70d.las")], stages, &output, "")).unwrap();
+        let (_, told) = go(&text("", &[case_file("70d.las")], stages, &output, "")).unwrap();
         told.into_iter().filter(|w| w.contains("whole steps")).collect::<Vec<_>>()
     };
     let grid = |side: &str| told(&format!("[[stage]]\nkind = 'grid'\nside = {side}\n"));

@@ -1,8 +1,6 @@
 //! The words of messages: the library names settings as a pipeline file has them, and only settings
 //! that there are; flags are for the command line to tell.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,11 +1,7 @@
 //! PLY files that the tests write themselves: every type and encoding, headers as others write them,
 //! and what is carried.
 
-#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
-
-use crate::ply_support;
-
-use ply_support::{file, read, records, write};
+use crate::support::ply::{file, read, records, write};
 use pointmill::io::ply::{self, Encoding, PlyOptions};
 use pointmill::point::{Endian, Metadata, Value};
 use proptest::prelude::*;

@@ -1,11 +1,8 @@
 //! PLY files that must be refused, and what is said of them.
-#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
-
-use crate::ply_support;
 
 use std::path::PathBuf;
 
-use ply_support::{file, read};
+use crate::support::ply::{file, read};
 use pointmill::io::ply;
 
 fn refusal(bytes: impl AsRef<[u8]>) -> pointmill::Error {

@@ -1,20 +1,16 @@
 //! PLY files of other programs, and what becomes of them when they are cut short or damaged.
-#![allow(clippy::unwrap_used, reason = "a failure to set up fails the test")]
-
-use crate::ply_support;
-use crate::real;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use ply_support::{file, read, write};
+use crate::support::ply::{file, read, write};
 use pointmill::ErrorKind;
 use pointmill::io::ply::{self, Encoding, PlyOptions};
 use proptest::prelude::*;
 
 /// The PLY files of the folder of real scans and their numbers of points as its manifest has them.
 fn scans() -> BTreeMap<PathBuf, u64> {
-    let folder = real::scans();
+    let folder = crate::support::scans();
     let manifest = std::fs::read_to_string(folder.join("MANIFEST.tsv")).unwrap();
     let mut lines = manifest.lines().map(|line| line.split('\t').collect::<Vec<_>>());
     let head = lines.next().unwrap();

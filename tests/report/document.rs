@@ -1,7 +1,6 @@
 //! The report as a file and as a table.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails is to panic")]
-
+use crate::support::case::execute;
 use std::collections::BTreeMap;
 use std::io::{BufReader, ErrorKind};
 use std::path::Path;
@@ -11,7 +10,7 @@ use pointmill::report::{
     LatticeFigures, Ledger, Machine, Outcome, Pair, Phase, PlaneFigures, Report, RunFigures, Tally,
     TileFigures, Totals, result_bytes,
 };
-use pointmill::{Graph, Overrides, Quiet, Registry};
+use pointmill::{Overrides, Quiet};
 use serde_json::{Value, json};
 
 fn plane(rms: f64) -> Pair<Option<PlaneFigures>> {
@@ -199,10 +198,7 @@ report     reduced.json
 fn a_report_says_how_many_records_each_input_had() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).display().to_string();
-    let run = |text: &str| {
-        let pipeline = Graph::parse(text, "test.toml", &Registry::builtin()).unwrap();
-        pipeline.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap().report.run
-    };
+    let run = |text: &str| execute(text, &Overrides::default(), &Quiet).unwrap().report.run;
     for (name, points) in [("a.las", 1000), ("b.las", 2500)] {
         let synth = format!("[[stage]]\nkind = 'synth'\nscene = 'plane'\npoints = {points}\n");
         run(&format!("{synth}[[stage]]\nkind = 'write'\npath = '{}'\n", at(name)));

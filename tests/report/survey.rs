@@ -1,7 +1,5 @@
 //! The survey: planes and deviations of tiles and scan, against geometry and in any order of merging.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails is to panic")]
-
 use pointmill::geom::lattice::Lattice;
 use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
 use pointmill::report::{
@@ -11,6 +9,8 @@ use pointmill::store::{Levels, TileKey, morton_cmp};
 use pointmill::tile::Fate;
 use pointmill::{ErrorKind, Result};
 use proptest::prelude::*;
+
+use crate::support::random::Random;
 
 /// A position, its copies and what becomes of them.
 type Record = (Position, u32, Fate);
@@ -71,9 +71,7 @@ fn close(a: f64, b: f64, tolerance: f64) -> bool {
 
 /// Uniform in −1..1 and the same on every machine.
 fn noise(seed: u64) -> f64 {
-    let mut x = seed.wrapping_add(0x9e37_79b9_7f4a_7c15).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((x ^ (x >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    Random(seed).signed(1.0)
 }
 
 #[test]

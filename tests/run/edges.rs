@@ -1,20 +1,16 @@
 //! Runs at the edge of what can be: nothing to do, far away, too heavy, one place, odd coordinates.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
-use crate::run_support;
-
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 use pointmill::io::las;
 use pointmill::{Error, ErrorKind};
 use pointmill::{Graph, Overrides, Quiet, Registry};
 use serde_json::Value;
 
-use run_support::{Case, REDUCE, execute};
+use crate::support::case::{Case, REDUCE, execute};
+use crate::support::command::{mebibytes, pointmill_told};
 
 #[test]
 fn scans_of_no_point_or_few_reduce_to_themselves() {
@@ -121,26 +117,15 @@ fn the_memory_that_a_heavy_cell_is_said_to_need_does() {
     );
     fs::write(&file, text).unwrap();
     // What is resident before the run counts: each run is a process of its own.
-    let with = |mebibytes: u64| {
-        let run = Command::new(env!("CARGO_BIN_EXE_pointmill"))
-            .args([Path::new("run"), &file])
-            .args(["--memory", &format!("{mebibytes}MiB")])
-            .output()
-            .unwrap();
-        (run.status.code(), String::from_utf8(run.stderr).unwrap())
-    };
-    let named = |told: &str| -> u64 {
-        let help = told.lines().rfind(|line| line.starts_with("help:")).unwrap();
-        let before = help.split_once("MiB").unwrap_or_else(|| panic!("{told}")).0;
-        before.rsplit(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap()
-    };
+    let run = format!("run {}", file.display());
+    let with = |budget: u64| pointmill_told(at.path(), &format!("{run} --memory {budget}MiB"));
     let (_, small) = with(1);
-    let (code, heavy) = with(named(&small) + 2);
-    assert_eq!(code, Some(1), "{heavy}");
+    let (code, heavy) = with(mebibytes(&small) + 2);
+    assert_eq!(code, 1, "{heavy}");
     assert!(heavy.contains("the cube from"), "{heavy}");
     assert!(!out.exists());
-    let (code, told) = with(named(&heavy));
-    assert_eq!(code, Some(0), "{told}");
+    let (code, told) = with(mebibytes(&heavy));
+    assert_eq!(code, 0, "{told}");
     assert!(out.exists());
 }
 

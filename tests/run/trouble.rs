@@ -1,10 +1,6 @@
 //! Runs that cannot begin, fail, panic or are stopped: each ends with its error and leaves nothing
 //! behind.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
-use crate::run_support;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,7 +15,7 @@ use pointmill::{Error, ErrorKind, Result};
 use pointmill::{Overrides, Quiet, Registry, Watch};
 use serde::{Deserialize, Serialize};
 
-use run_support::{Case, REDUCE, execute, execute_with};
+use crate::support::case::{Case, REDUCE, execute, execute_with};
 
 #[test]
 fn what_cannot_be_written_is_refused_before_any_work() {

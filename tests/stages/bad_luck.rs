@@ -1,17 +1,16 @@
 //! Structured bad luck: all points in one place, on a line, on a lattice twice over, in clusters on
 //! both sides of the world, in degrees and in millimetres. What is right is known for each.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
-use crate::common;
-
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use common::{Memory, Random, Scan, Settings, assert_same, run};
+use crate::support::assert_same;
+use crate::support::random::Random;
+use crate::support::runs::{Memory, Settings, run};
+use crate::support::scan::Scan;
 use pointmill::budget::Budget;
-use pointmill::host::parallel;
+use pointmill::host::Threads;
 use pointmill::point::{
     Dimension, Endian, Layout, Metadata, Position, Scalar, Schema, distance2, names,
 };
@@ -158,15 +157,16 @@ fn neighbors_are_exact(scan: &Scan) -> u64 {
     let folder = Box::new(Scratch(tempfile::tempdir().unwrap()));
     let area = SpillArea::new(budget.clone(), 0, folder);
     let store = TileStore::new(&area, &budget, scan.schema.stride, false);
-    parallel(2, |thread| {
+    let fill = |thread: usize| {
         let mut intake = Intake::new(&store, 900);
         for (i, &p) in positions.iter().enumerate().skip(thread).step_by(2) {
             intake.push(p, scan.record(i), Tag::default())?;
         }
         intake.flush()
-    })
-    .unwrap();
-    let tiles = Arc::new(seal(store, 2, &|_| Ok(())).unwrap());
+    };
+    Threads::start(2, |all| all.items(2, || {}).run(|| (), |(), n| fill(n), |()| {}, Ok)).unwrap();
+    let tiles = Threads::start(2, |threads| seal(store, threads, &|_| Ok(())));
+    let tiles = Arc::new(tiles.unwrap());
     let mut all = positions;
     all.sort_unstable_by(morton_cmp);
     all.dedup();

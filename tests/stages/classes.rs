@@ -1,15 +1,14 @@
 //! Which points take part, by class and flags: the stage `filter`, noise that is left out, cells that
 //! mix no classes, and what is said of all this.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
-use crate::common;
-
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 use std::sync::Mutex;
 
-use common::{Memory, Ran, Random, Scan, Settings, assert_same, run_with};
+use crate::support::assert_same;
+use crate::support::case_file;
+use crate::support::random::Random;
+use crate::support::runs::{Memory, Ran, Settings, run_with};
+use crate::support::scan::Scan;
 use pointmill::report::Report;
 use pointmill::synth::Scene;
 use pointmill::{Graph, Overrides, Registry, Watch};
@@ -279,7 +278,7 @@ fn plain_ply() -> &'static str {
 /// Point formats 0 to 5 have no overlap flag; overlap is class 12 there.
 #[test]
 fn overlap_of_old_point_formats_is_class_12() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/97-class12.las");
+    let path = case_file("97-class12.las");
     let scan = Scan::read(&path, usize::MAX);
     let class = |i: usize| scan.record(i)[15] & 31;
     let overlap = (0..scan.points()).filter(|&i| class(i) == 12).count() as u64;

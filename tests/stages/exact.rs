@@ -1,17 +1,16 @@
 //! Neighbours and normals of a real scan are those of brute force over all of it, above all where
 //! tiles meet.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
-use crate::common;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use common::{Memory, Random, Scan, Settings, run, scans};
+use crate::support::random::Random;
+use crate::support::runs::{Memory, Settings, run};
+use crate::support::scan::Scan;
+use crate::support::scans;
 use pointmill::budget::Budget;
-use pointmill::host::parallel;
+use pointmill::host::Threads;
 use pointmill::ops::normals::{Estimate, Estimator, Method};
 use pointmill::point::{Bounds, Position, distance2, names};
 use pointmill::store::{Folder, Intake, SealedTiles, SpillArea, Tag, TileStore, morton_cmp, seal};
@@ -42,16 +41,17 @@ fn sealed(scan: &Scan, positions: &[Position]) -> Arc<SealedTiles> {
     let folder = Box::new(Scratch(tempfile::tempdir().unwrap()));
     let area = SpillArea::new(budget.clone(), 0, folder);
     let store = TileStore::new(&area, &budget, scan.schema.stride, false);
-    parallel(3, |thread| {
+    let fill = |thread: usize| {
         let mut intake = Intake::new(&store, 1500);
         for (i, &p) in positions.iter().enumerate().skip(thread).step_by(3) {
             intake.push(p, scan.record(i), Tag::default())?;
         }
         intake.flush()
-    })
-    .unwrap();
+    };
+    Threads::start(3, |all| all.items(3, || {}).run(|| (), |(), n| fill(n), |()| {}, Ok)).unwrap();
     assert!(store.runs() > 10);
-    let tiles = Arc::new(seal(store, 3, &|_| Ok(())).unwrap());
+    let tiles = Threads::start(3, |threads| seal(store, threads, &|_| Ok(())));
+    let tiles = Arc::new(tiles.unwrap());
     assert!(area.written() > scan.records.len() as u64, "all is spilled");
     tiles
 }
@@ -160,7 +160,7 @@ fn normals_written_by_a_tiled_run_are_those_of_brute_force_to_the_bit() {
         let write = "laz\ndimensions = [\"NormalX\", \"NormalY\", \"NormalZ\"]";
         let ran = run(folder.path(), &files, &stage, write, settings).unwrap();
         assert_eq!(ran.count("tiles"), cubes.len() as u64, "the run cuts as the test does");
-        common::assert_not_empty(&ran, false, name);
+        crate::support::runs::assert_not_empty(&ran, false, name);
         let written = Scan::read(&ran.output, usize::MAX);
         assert_eq!(written.points(), scan.points());
         let normals = normals_of(&written);

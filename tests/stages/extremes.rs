@@ -1,24 +1,19 @@
 //! Every number that an argument or a key can carry, at its extremes: it works or is refused with a
 //! message, and nothing panics, aborts, hangs or wraps.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
-
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use assert_cmd::Command;
 use pointmill::ErrorKind;
 use pointmill::{Graph, Overrides, Quiet, Registry};
 
+use crate::support::case::execute;
+use crate::support::command;
+
 /// Runs pointmill in `folder`; gives its exit code and what it told on stderr.
-fn pointmill(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_pointmill"))
-        .current_dir(folder)
-        .args(arguments)
-        .timeout(Duration::from_secs(120))
-        .output()
-        .unwrap();
-    (output.status.code(), String::from_utf8(output.stderr).unwrap())
+fn pointmill(folder: &Path, arguments: &[&str]) -> (i32, String) {
+    let (code, _, told) = command::pointmill(folder, arguments);
+    (code, told)
 }
 
 /// A pipeline of all stages that have numbers, with `value` for `key` of `stage`.
@@ -121,9 +116,7 @@ fn numbers_of_every_stage_work_or_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let text = pipeline(folder.path(), "600", stage, key, &value);
         let begun = Instant::now();
-        let outcome = Graph::parse(&text, "p.toml", &Registry::builtin())
-            .and_then(|p| p.plan(&Overrides::default()))
-            .and_then(|plan| plan.run(&Quiet));
+        let outcome = execute(&text, &Overrides::default(), &Quiet);
         match outcome {
             Ok(_) => worked += 1,
             Err(error) => {
@@ -163,12 +156,12 @@ fn threads_and_memory_beyond_reason_are_refused_in_a_message() {
             let argument = format!("--threads={threads}");
             let plan = ["plan", "p.toml", "--memory", memory, &argument];
             let (code, told) = pointmill(folder.path(), &plan);
-            assert_eq!(code, Some(2), "{threads}: {told}");
+            assert_eq!(code, 2, "{threads}: {told}");
             assert!(told.contains("1024") || told.contains("1 or more"), "{told}");
         }
         std::fs::write(&file, pipeline(folder.path(), "600", "run", "threads", threads)).unwrap();
         let (code, told) = pointmill(folder.path(), &["plan", "p.toml"]);
-        assert_eq!(code, Some(2), "{threads}: {told}");
+        assert_eq!(code, 2, "{threads}: {told}");
         assert!(told.contains("threads"), "{told}");
     }
     let plan =
@@ -181,11 +174,11 @@ fn threads_and_memory_beyond_reason_are_refused_in_a_message() {
     std::fs::write(&file, pipeline(folder.path(), "600", "", "", "")).unwrap();
     let plan = ["plan", "p.toml", "--threads", "1024", "--memory", "64MiB"];
     let (code, told) = pointmill(folder.path(), &plan);
-    assert_eq!(code, Some(1), "{told}");
+    assert_eq!(code, 1, "{told}");
     assert!(told.contains("64 MiB is too small: 1024 threads"), "{told}");
     for memory in ["1", "18446744073709551615", "16777215TiB"] {
         let (code, told) = pointmill(folder.path(), &["plan", "p.toml", "--memory", memory]);
-        assert_eq!(code, Some(if memory == "1" { 1 } else { 0 }), "{memory}: {told}");
+        assert_eq!(code, i32::from(memory == "1"), "{memory}: {told}");
     }
 }
 
@@ -199,7 +192,7 @@ fn more_stages_than_a_pipeline_has_are_refused_at_once() {
     std::fs::write(folder.path().join("p.toml"), text).unwrap();
     let begun = Instant::now();
     let (code, told) = pointmill(folder.path(), &["run", "p.toml"]);
-    assert_eq!(code, Some(2), "{told}");
+    assert_eq!(code, 2, "{told}");
     assert!(told.contains("a pipeline has at most 256 stages"), "{told}");
     assert!(begun.elapsed() < Duration::from_secs(10), "{:?}", begun.elapsed());
 }

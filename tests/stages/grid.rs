@@ -1,11 +1,8 @@
 //! The grid against brute force, over whole scans however they are cut into tiles.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
-use crate::stages_support;
-
 use std::collections::BTreeMap;
 
+use crate::support::tiles::*;
 use pointmill::ops::{Grid, Pick};
 use pointmill::point::{Bounds, Position};
 use pointmill::quantity::Length;
@@ -14,7 +11,6 @@ use pointmill::stage::TileOp;
 use pointmill::store::morton_cmp;
 use pointmill::tile::{Fate, Tile};
 use proptest::prelude::*;
-use stages_support::*;
 
 const PICKS: [Pick; 3] = [Pick::Center, Pick::Median, Pick::First];
 

@@ -1,13 +1,13 @@
 //! The order of an output's records: that of the inputs where it is asked for, whatever the tiles, and
 //! in the chunks of LAZ that of time.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic and tell why")]
-
-use crate::common;
-
 use std::path::Path;
 
-use common::{Memory, Random, Scan, Settings, assert_same, run};
+use crate::support::assert_same;
+use crate::support::case_file;
+use crate::support::random::Random;
+use crate::support::runs::{Memory, Settings, run};
+use crate::support::scan::Scan;
 use pointmill::point::names;
 use pointmill::synth::Scene;
 
@@ -174,7 +174,7 @@ fn chunks_of_laz_hold_what_their_rank_says_in_order_of_time() {
 
 #[test]
 fn where_no_point_goes_the_order_of_the_inputs_is_kept_as_it_is() {
-    let case = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/181-order.las");
+    let case = case_file("181-order.las");
     let scan = Scan::read(&case, usize::MAX);
     let folder = tempfile::tempdir().unwrap();
     let stages = "[[stage]]\nkind = \"outliers\"\nneighbors = 3\nmultiplier = 1e9\n";

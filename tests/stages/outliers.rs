@@ -1,9 +1,7 @@
 //! Outliers against brute force, over whole scans however they are cut into tiles.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
-use crate::stages_support;
-
+use crate::support::random::Random;
+use crate::support::tiles::*;
 use pointmill::Result;
 use pointmill::ops::outliers::{RadiusOutliers, StatisticalOutliers};
 use pointmill::point::{Bounds, Mark, Position};
@@ -13,13 +11,19 @@ use pointmill::stage::{Gathered, ScanOp, TileOp};
 use pointmill::store::morton_cmp;
 use pointmill::tile::Fate;
 use proptest::prelude::*;
-use stages_support::*;
 
 /// A rough sheet and positions far above and below it.
 fn scene(planted: &[i64]) -> Vec<Position> {
-    let mut random = noise(7);
-    let sheet: Vec<Position> =
-        (0..900).map(|i| [i % 30 * 10 + random(7), i / 30 * 10 + random(7), random(5)]).collect();
+    let mut random = Random(7);
+    let sheet: Vec<Position> = (0..900)
+        .map(|i| {
+            [
+                i % 30 * 10 + random.coordinate(7),
+                i / 30 * 10 + random.coordinate(7),
+                random.coordinate(5),
+            ]
+        })
+        .collect();
     let planted = planted.iter().enumerate().map(|(i, &z)| [i as i64 * 37 - 50, 150, z]);
     sorted(sheet.into_iter().chain(planted))
 }

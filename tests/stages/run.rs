@@ -1,30 +1,33 @@
 //! Whole runs of the stages that remove by distance, mark, and repeat: against brute force, and
 //! against the same done in several runs.
 
-#![allow(clippy::unwrap_used, reason = "a test that fails says so")]
-
-use crate::run_support;
-use crate::stages_support;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use crate::support::case::{Case, REDUCE, execute};
+use crate::support::random::Random;
+use crate::support::tiles::{far2, sorted};
 use pointmill::point::Position;
 use pointmill::store::morton_cmp;
 use pointmill::{Graph, Overrides, Quiet, Registry, Set};
-use run_support::{Case, REDUCE, execute};
 use serde_json::Value;
-use stages_support::{far2, noise, sorted};
 
-/// Small tiles on a lattice of whole numbers, nothing kept in memory.
-const TILES: &str = "lattice = 1.0\ntile_points = 40\nthreads = 2\nmemory = '256MiB'";
+/// Small tiles on a lattice of whole numbers.
+const TILES: &str = "lattice = 1.0\ntile_points = 40\nthreads = 2";
 
 /// A rough sheet of 2,500 positions, and some far above and below it.
 fn scene() -> Vec<Position> {
-    let mut random = noise(11);
-    let sheet: Vec<Position> =
-        (0..2500).map(|i| [i % 50 * 10 + random(9), i / 50 * 10 + random(9), random(6)]).collect();
+    let mut random = Random(11);
+    let sheet: Vec<Position> = (0..2500)
+        .map(|i| {
+            [
+                i % 50 * 10 + random.coordinate(9),
+                i / 50 * 10 + random.coordinate(9),
+                random.coordinate(6),
+            ]
+        })
+        .collect();
     let planted = [400, -300, 900, 60, 45, 38, -34].into_iter().enumerate();
     sorted(sheet.into_iter().chain(planted.map(|(i, z)| [i as i64 * 71 - 60, 255, z])))
 }
@@ -175,7 +178,7 @@ fn las(folder: &Path, stages: &str, from: &str, out: &str) -> Value {
     }
     let report = folder.join("report.json");
     let text = format!(
-        "[run]\nreport = '{}'\ntile_points = 100\nthreads = 2\nmemory = '256MiB'\n\
+        "[run]\nreport = '{}'\ntile_points = 100\nthreads = 2\n\
          [[stage]]\nkind = 'read'\npath = '{}'\n{stages}[[stage]]\nkind = 'write'\npath = '{}'\n",
         report.display(),
         input.display(),

@@ -1,13 +1,11 @@
 //! The tile store against brute force: every position once, canonical order, exact neighbours.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
-
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use pointmill::budget::Budget;
 use pointmill::geom::lattice::Lattice;
-use pointmill::host::parallel;
+use pointmill::host::Threads;
 use pointmill::point::{
     Dimension, Endian, Layout, PointBatch, Position, Scalar, Schema, distance2, names,
 };
@@ -16,21 +14,7 @@ use pointmill::store::{
 };
 use pointmill::tile::{Loader, Sieve};
 
-/// A small generator, so that a failing case is the same everywhere.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: u64) -> i64 {
-        (self.next() % n) as i64
-    }
-}
+use crate::support::random::Random;
 
 /// A surface on a coarse grid (ties), a dense clump, copies by the hundred, a sparse halo and one
 /// point far from all others.
@@ -38,14 +22,20 @@ fn awkward_scan(n: usize, seed: u64) -> Vec<Position> {
     let mut random = Random(seed);
     let mut scan: Vec<Position> = vec![[900_000_007, -5, 3], [-40, -40, -40]];
     while scan.len() < n {
-        let p = match random.below(10) {
-            0..=5 => {
-                [random.below(90) * 10 - 300, random.below(90) * 10 - 450, random.below(3) * 10]
-            }
-            6 => [random.below(40), random.below(40), random.below(40)],
-            7 => scan[random.below(scan.len() as u64) as usize],
+        let p = match random.coordinate(10) {
+            0..=5 => [
+                random.coordinate(90) * 10 - 300,
+                random.coordinate(90) * 10 - 450,
+                random.coordinate(3) * 10,
+            ],
+            6 => [random.coordinate(40), random.coordinate(40), random.coordinate(40)],
+            7 => scan[random.coordinate(scan.len() as u64) as usize],
             8 => [17, 17, 17],
-            _ => [random.below(20_000) - 9_000, random.below(20_000) - 9_000, random.below(900)],
+            _ => [
+                random.coordinate(20_000) - 9_000,
+                random.coordinate(20_000) - 9_000,
+                random.coordinate(900),
+            ],
         };
         scan.push(p);
     }
@@ -92,16 +82,19 @@ fn sealed(
     let folder = Box::new(Scratch(tempfile::tempdir().unwrap()));
     let area = SpillArea::new(budget.clone(), memory, folder);
     let store = TileStore::new(&area, &budget, schema().stride, false);
-    parallel(threads, |thread| {
+    let fill = |thread: usize| {
         let mut intake = Intake::new(&store, run);
         for (i, &p) in scan.iter().enumerate().skip(thread).step_by(threads) {
             intake.push(p, &record(p, (i % 3) as u32), Tag::default())?;
         }
         intake.flush()
-    })
-    .unwrap();
+    };
+    let each =
+        |all: Threads<'_>| all.items(threads, || {}).run(|| (), |(), n| fill(n), |()| {}, Ok);
+    Threads::start(threads, each).unwrap();
     let runs = store.runs();
-    (Arc::new(seal(store, threads, &|_| Ok(())).unwrap()), area.written(), runs)
+    let tiles = Threads::start(threads, |all| seal(store, all, &|_| Ok(())));
+    (Arc::new(tiles.unwrap()), area.written(), runs)
 }
 
 fn distinct(scan: &[Position]) -> Vec<Position> {

@@ -1,14 +1,12 @@
 //! Layers of LAZ that nobody looks at are not decoded, and no output tells.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
-
-use crate::las_support;
-
 use std::path::Path;
-use std::process::Command;
 use std::sync::Arc;
 
-use las_support::{LAS, LAZ, Random, read, write};
+use crate::support::command::done;
+use crate::support::las::{LAS, LAZ, write};
+use crate::support::random::Random;
+use crate::support::records::read_source;
 use pointmill::io::las::{fresh, layout, open};
 use pointmill::point::{PointBatch, Scalar, Schema, names};
 
@@ -37,10 +35,7 @@ fn scan(folder: &Path, format: u8) -> Schema {
 }
 
 fn converted(folder: &Path, input: &str, output: &str, drop: &str) -> Vec<u8> {
-    let program = env!("CARGO_BIN_EXE_pointmill");
-    let arguments = ["convert", input, "-o", output, "--drop", drop, "--quiet"];
-    let done = Command::new(program).current_dir(folder).args(arguments).output().unwrap();
-    assert!(done.status.success(), "{drop}: {}", String::from_utf8_lossy(&done.stderr));
+    done(folder, &["convert", input, "-o", output, "--drop", drop, "--quiet"]);
     std::fs::read(folder.join(output)).unwrap()
 }
 
@@ -67,7 +62,7 @@ fn layers_are_left_out_and_no_other_field_changes() {
     let folder = tempfile::tempdir().unwrap();
     let schema = scan(folder.path(), 8);
     let source = open(&[folder.path().join("scan.laz")]).unwrap();
-    let all = read(&*source, POINTS).unwrap();
+    let all = read_source(&*source, POINTS).unwrap();
     let unread = ["Intensity", "GpsTime", "Nir", "Red", "Green", "Amplitude", "Width"];
     let unread = unread.map(str::to_owned);
     let mut batch = PointBatch::new(source.schema().clone(), 50_000);

@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::budget::Budget;
-use crate::engine::product::Entry;
+use crate::engine::product::RecordEntry;
 use crate::point::Edit;
-use crate::store::{FATE_BYTES, Folder, State, Tag};
+use crate::store::{FATE_BYTES, Folder, RecordState, Tag};
 
 #[derive(Debug)]
 struct Nowhere;
@@ -16,12 +16,12 @@ impl Folder for Nowhere {
 }
 
 fn product(kept: &[(u64, u32)]) -> Product {
-    let entry = |&(number, count): &(u64, u32)| Entry {
+    let entry = |&(number, count): &(u64, u32)| RecordEntry {
         number,
         count,
         tag: Tag::default(),
-        was: State::ALIVE,
-        now: State::ALIVE,
+        was: RecordState::ALIVE,
+        now: RecordState::ALIVE,
     };
     Product {
         entries: kept.iter().map(entry).collect(),
@@ -47,7 +47,7 @@ fn chunks_are_cut_by_rank_and_copies_are_one_entry() {
     chunks.extend(rest);
     assert_eq!(counts, Counts { alive: all, written: all, outputs: vec![all] });
     let mut buffer = Vec::new();
-    assert_eq!(stored.states.get(all - 3, 3, &mut buffer).unwrap(), [State::ALIVE.0; 3]);
+    assert_eq!(stored.states.get(all - 3, 3, &mut buffer).unwrap(), [RecordState::ALIVE.0; 3]);
     let (mut numbers, mut states, mut ranks) = (Vec::new(), Vec::new(), 0);
     let expected = (0..3).chain(7..7 + u64::from(copies)).chain(20_000_000..20_000_005);
     let mut expected = expected.peekable();
@@ -76,8 +76,8 @@ fn outputs_take_what_was_there_before_the_pass_or_what_it_leaves() {
     let outlets = (outputs, Vec::new(), Vec::new());
     let mut cutter = Cutter::new(&area, (3, 3), (false, false), outlets).unwrap();
     let mut product = product(&[(0, 1), (1, 1), (2, 1)]);
-    product.entries[1].now = State::REMOVED;
-    product.entries[2].now = State::ASIDE.edited(Edit::SetWithheld);
+    product.entries[1].now = RecordState::REMOVED;
+    product.entries[2].now = RecordState::ASIDE.edited(Edit::SetWithheld);
     let mut chunks = cutter.cut(&product).unwrap();
     let (rest, _, _, counts) = cutter.finish().unwrap();
     chunks.extend(rest);
@@ -88,7 +88,7 @@ fn outputs_take_what_was_there_before_the_pass_or_what_it_leaves() {
             let (mut numbers, mut states) = (Vec::new(), Vec::new());
             chunk.number(&mut numbers);
             chunk.states(&mut states);
-            all.extend(numbers.into_iter().zip(states.into_iter().map(State::edits)));
+            all.extend(numbers.into_iter().zip(states.into_iter().map(RecordState::edits)));
         }
         all
     };

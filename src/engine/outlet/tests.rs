@@ -7,8 +7,7 @@ use std::time::Duration;
 
 use super::*;
 use crate::ErrorKind;
-use crate::engine::job::StopOnDrop;
-use crate::host::parallel;
+use crate::host::Threads;
 use crate::stage::Encode;
 
 /// Where something goes wrong, and after how many calls.
@@ -93,7 +92,6 @@ fn run(threads: usize, tiles: &[u8], each: usize, trouble: Trouble) -> Outcome {
     let (listed, held) = (Arc::new(Mutex::new(Vec::new())), Arc::new(AtomicUsize::new(0)));
     let most_held = AtomicUsize::new(0);
     let sink = Listing { trouble: trouble.clone(), listed: listed.clone(), held: held.clone() };
-    let outlet: Outlet<u8, u8> = Outlet::new(vec![Box::new(sink)], threads);
     let commit = |product: u8| {
         trouble.meet(1, |w| if let Wrong::Commit(n) = w { Some(n) } else { None })?;
         Ok(vec![product; each])
@@ -103,27 +101,25 @@ fn run(threads: usize, tiles: &[u8], each: usize, trouble: Trouble) -> Outcome {
         trouble.meet(2, |w| if let Wrong::Encode(n) = w { Some(n) } else { None })?;
         Ok((0, Encoded { bytes: vec![chunk], points: 1, ..Encoded::default() }))
     };
-    let next = AtomicUsize::new(0);
-    let result = parallel(threads, |_| {
-        let guard = StopOnDrop::new(|| outlet.stop());
-        let mut encode = encode;
-        let mut hands = Hands { commit: &commit, encode: &mut encode };
-        loop {
-            let tile = next.fetch_add(1, Ordering::Relaxed);
-            let Some(&products) = tiles.get(tile) else { break };
-            for n in 0..products {
-                trouble.meet(0, |w| if let Wrong::Work(n) = w { Some(n) } else { None })?;
-                let place = (tile as u64, u64::from(n));
-                outlet.deliver(place, tile as u8, n + 1 == products, &mut hands)?;
-            }
+    let outlet = Outlet::new(vec![Box::new(sink)], threads, &commit);
+    let deliver = |tile: usize| {
+        let products = tiles[tile];
+        for n in 0..products {
+            trouble.meet(0, |w| if let Wrong::Work(n) = w { Some(n) } else { None })?;
+            let place = (tile as u64, u64::from(n));
+            outlet.deliver(place, tile as u8, n + 1 == products, &mut |chunk| encode(chunk))?;
         }
-        outlet.drain(&mut hands, |turn| turn.0 >= tiles.len() as u64)?;
-        guard.disarm();
         Ok(())
+    };
+    let result = Threads::start(threads, |threads| {
+        threads.items(tiles.len(), || outlet.stop()).run(
+            || (),
+            |(), tile| deliver(tile),
+            |()| {},
+            |()| outlet.drain(tiles.len(), &mut |chunk| encode(chunk)),
+        )
     });
-    let mut encode = encode;
-    let mut hands = Hands { commit: &commit, encode: &mut encode };
-    let result = result.and_then(|()| outlet.close(vec![255], &mut hands));
+    let result = result.and_then(|_| outlet.close(vec![255], &mut |chunk| encode(chunk)));
     let listed = lock(&listed).clone();
     let result = result.map(|mut all| all.pop().unwrap_or_default());
     Outcome { result, listed, most_held: most_held.into_inner() }
@@ -226,23 +222,23 @@ fn chunks_do_not_pile_up_behind_a_slow_disk() {
     let held = Arc::new(AtomicUsize::new(0));
     let listed = Arc::default();
     let sink = Slow(Listing { trouble, listed, held: held.clone() });
-    let outlet: Outlet<u8, u8> = Outlet::new(vec![Box::new(sink)], 3);
+    let commit = |product: u8| Ok(vec![product]);
+    let outlet = Outlet::new(vec![Box::new(sink)], 3, &commit);
     let most = AtomicUsize::new(0);
-    let next = AtomicUsize::new(0);
-    parallel(3, |_| {
-        let mut encode = |chunk: u8| {
-            most.fetch_max(held.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
-            Ok((0, Encoded { bytes: vec![chunk], points: 1, ..Encoded::default() }))
-        };
-        let mut hands = Hands { commit: &|product| Ok(vec![product]), encode: &mut encode };
-        loop {
-            let tile = next.fetch_add(1, Ordering::Relaxed);
-            if tile >= 60 {
-                break;
-            }
-            outlet.deliver((tile as u64, 0), tile as u8, true, &mut hands)?;
-        }
-        outlet.drain(&mut hands, |turn| turn.0 >= 60)
+    let encode = |chunk: u8| {
+        most.fetch_max(held.fetch_add(1, Ordering::SeqCst) + 1, Ordering::SeqCst);
+        Ok((0, Encoded { bytes: vec![chunk], points: 1, ..Encoded::default() }))
+    };
+    let deliver = |tile: usize| {
+        outlet.deliver((tile as u64, 0), tile as u8, true, &mut |chunk| encode(chunk))
+    };
+    Threads::start(3, |threads| {
+        threads.items(60, || outlet.stop()).run(
+            || (),
+            |(), tile| deliver(tile),
+            |()| {},
+            |()| outlet.drain(60, &mut |chunk| encode(chunk)),
+        )
     })
     .unwrap();
     assert!((2..=6).contains(&most.into_inner()));

@@ -1,6 +1,10 @@
-//! Removing scratch folders: one's own at the end, and those of killed runs. All of it goes through
-//! descriptors that follow no link, so that nobody can put another folder in the place of one that is
-//! being removed.
+//! Removing scratch folders: one's own at the end, and those of killed runs.
+//!
+//! All of it goes through descriptors that follow no link, so that another folder cannot be put in
+//! the place of one that is being removed. A folder is removed only if it is known to be left over:
+//! it is the same user's, its marker is a regular file that no process has locked, and it was made
+//! on this machine. Folders of other machines stay, since a network's file system may not show
+//! their locks.
 
 use std::ffi::CStr;
 use std::fs::File;
@@ -43,8 +47,8 @@ impl Host {
     }
 
     /// True if a run that marked the folder called `name` by `about` would hold a lock that is seen
-    /// here, or must have ended when this machine was started. Locks of other machines may not be seen:
-    /// their folders are theirs to remove.
+    /// here, or must have ended when this machine was started. Locks of other machines may not be
+    /// seen: their folders are theirs to remove.
     fn knows(&self, name: &CStr, about: &str) -> bool {
         let about: serde_json::Value = serde_json::from_str(about).unwrap_or_default();
         let (Some(host), Some(boot)) = (about["host"].as_str(), about["boot"].as_str()) else {
@@ -86,8 +90,8 @@ pub(crate) fn remove_stale(parent: &Path) -> Vec<String> {
     told
 }
 
-/// Removes the folder if it is scratch of a run of `user` that is gone. Spared is whatever is not sure to be:
-/// what another user made, or another machine, and what has no proper marker.
+/// Removes the folder if it is scratch of a run of `user` that is gone. Spared is whatever is not
+/// sure to be: what another user made, or another machine, and what has no proper marker.
 fn remove_if_dead(at: &OwnedFd, name: &CStr, host: &Host, user: u32) -> io::Result<()> {
     // A file, a link, gone by now, or not ours to look at.
     let Ok(folder) = open_folder(at, name) else { return Ok(()) };
@@ -111,8 +115,8 @@ fn remove_if_dead(at: &OwnedFd, name: &CStr, host: &Host, user: u32) -> io::Resu
     }
     let mut text = String::new();
     let _ = (&mut marker).take(4096).read_to_string(&mut text);
-    // The lock is held until the folder is gone: a run that has just made it waits for that. A marker
-    // that is no longer there was that of an earlier folder of the same name.
+    // The lock is held until the folder is gone: a run that has just made it waits for that. A
+    // marker that is no longer there was that of an earlier folder of the same name.
     let path = [name.to_bytes(), b"/", MARKER.as_bytes()].concat();
     if host.knows(name, &text) && marker.try_lock().is_ok() && is_at(&marker, at, path.as_slice()) {
         remove(at, name, &folder)?;
@@ -128,8 +132,8 @@ pub(crate) fn is_at(file: &File, at: impl AsFd, path: impl Arg) -> bool {
     }
 }
 
-/// Removes a scratch folder, open as `folder` and called `name`, its marker last. What was put in its
-/// place meanwhile is spared, unless it is an empty folder.
+/// Removes a scratch folder, open as `folder` and called `name`, its marker last. What was put in
+/// its place meanwhile is spared, unless it is an empty folder.
 pub(crate) fn remove(at: impl AsFd, name: impl Arg, folder: &OwnedFd) -> io::Result<()> {
     let unlink = |file: &CStr| match unlinkat(folder, file, AtFlags::empty()) {
         Err(Errno::NOENT) => Ok(()),

@@ -1,6 +1,8 @@
 //! The division of memory.
 
 use super::*;
+use crate::engine::demands::FEWEST;
+use crate::stage::{ChunkSize, Needs};
 
 fn demands(limit: u64) -> Demands {
     Demands {
@@ -14,7 +16,7 @@ fn demands(limit: u64) -> Demands {
         part_bytes: 1 << 20,
         chunk: ChunkSize { points: 50_000, bytes: 4_500_000 },
         sinks: 1,
-        lists: 0,
+        lists: Bytes(0),
         mills: true,
         tagged: false,
         ranked: false,
@@ -46,7 +48,7 @@ fn the_limit_for_a_heavy_tile_leaves_that_tile_its_memory() {
             let there = demands(limit);
             let shares = there.divide().unwrap();
             // What is kept in memory is no more than the scan.
-            let kept = shares.kept_in_memory.min(there.points * (30 + KEPT_BYTES));
+            let kept = shares.kept_in_memory.min(there.points * (30 + KEPT_BYTES as u64));
             there.tile_positions(1, limit - shares.base - shares.index - kept) as u64
         };
         assert!(free(named) >= positions, "{positions}: {named}");
@@ -66,7 +68,7 @@ fn numbers_at_their_extremes_are_refused_and_never_wrap() {
             part_bytes: most as u64,
             chunk: ChunkSize { points: most, bytes: most as u64 },
             sinks: most,
-            lists: most as u64,
+            lists: Bytes::from(most),
             run_most: Some(0),
             passes: vec![vec![Needs { bytes_per_point: most, ..Needs::default() }; 3]],
             ..demands(most as u64)
@@ -90,7 +92,7 @@ fn runs_of_a_few_records_are_planned_with_the_memory_to_merge_them() {
     let few = Demands { run_most: Some(100), points: 1_000_000, ..demands(1 << 30) };
     let shares = few.divide().unwrap();
     assert_eq!(shares.run_records, 100);
-    assert!(shares.work >= 2 * few.merge(100), "{shares:?}");
+    assert!(few.merge(100).sum().fit(shares.work), "{shares:?}");
 }
 
 #[test]
@@ -115,5 +117,123 @@ fn a_refusal_names_a_limit_that_does() {
         .unwrap();
     assert!(demands(mebibytes << 20).divide().is_ok(), "{help}");
     assert!(demands((mebibytes - 3) << 20).divide().is_err(), "{help}");
-    assert!(error.to_string().ends_with(&format!("need at least {mebibytes} MiB")), "{error}");
+    let told = format!("need at least {mebibytes} MiB (");
+    assert!(error.to_string().contains(&told), "{error}");
+}
+
+/// Demands that differ in all that the division depends on.
+fn different() -> Vec<Demands> {
+    let needs =
+        |neighbors, bytes_per_point| Needs { neighbors, bytes_per_point, ..Needs::default() };
+    let deciding = Needs { reads: vec!["Normal".to_owned()], removes: true, ..needs(0, 17) };
+    let passes = vec![vec![deciding], vec![needs(30, 80), needs(0, 16)]];
+    vec![
+        demands(128 << 20),
+        demands(1 << 30),
+        demands(40 << 30),
+        Demands { mills: false, ..demands(64 << 20) },
+        Demands { mills: false, sinks: 3, threads: 8, stride: 67, ..demands(1 << 30) },
+        Demands { tagged: true, sinks: 2, has_cells: false, ..demands(300 << 20) },
+        Demands { ranked: true, lists: Bytes(9 << 20), threads: 5, ..demands(600 << 20) },
+        Demands { gathers: true, tagged: true, ranked: true, ..demands(512 << 20) },
+        Demands { points: 7_000_000_000, threads: 64, ..demands(40 << 30) },
+        Demands { run_most: Some(4000), points: 400_000, ..demands(200 << 20) },
+        Demands { passes, ..demands(1 << 28) },
+        Demands { chunk: ChunkSize { points: 7, bytes: 90 }, threads: 1, ..demands(64 << 20) },
+        Demands { points: 0, passes: vec![vec![]], ..demands(77 << 20) },
+    ]
+}
+
+/// Base, work, index, kept in memory, records of a run and positions of a tile; then the limit for
+/// a tile of three million positions, what the mill holds for one of 70,000, and the positions of
+/// each of two tiles in 500 MiB.
+type Divided = ([u64; 6], [u64; 3]);
+
+#[rustfmt::skip]
+const DIVIDED: [Divided; 13] = [
+    ([20971520, 87871892, 9668304, 15706012, 524288, 116635], [1801453568, 49503376, 1045180]),
+    ([20971520, 402653184, 9668304, 640448816, 524288, 786382], [1801453568, 49503376, 1045180]),
+    ([20971520, 402653184, 9668304, 42516379952, 524288, 786382], [1801453568, 49503376, 1045180]),
+    ([20971520, 30571712, 0, 0, 0, 0], [761266176, 49503376, 1045180]),
+    ([39845888, 227561344, 0, 0, 0, 0], [918552576, 187075920, 752472]),
+    ([20971520, 224149492, 9668304, 59783484, 524288, 344864], [1917845504, 54963376, 894568]),
+    ([39845888, 465534004, 9785520, 113980188, 524288, 256120], [1318060032, 103563440, 738552]),
+    ([20971520, 391944748, 9785520, 114169124, 524288, 532479], [2707423232, 56643376, 728834]),
+    (
+        [216006656, 12884901888, 6767578360, 23081186056, 2819920, 786382],
+        [11104419840, 1074158032, 0],
+    ),
+    ([20971520, 151456004, 386960, 36900716, 4000, 251920], [803209216, 49503376, 1045180]),
+    ([20971520, 189600556, 9668304, 48195076, 524288, 236118], [2084569088, 57264656, 744761]),
+    ([17825792, 31265176, 9668304, 8349592, 390471, 130371], [1765801984, 17077834, 1114170]),
+    ([20971520, 54531760, 0, 5237072, 333338, 61018], [585105408, 45373376, 1395552]),
+];
+
+#[test]
+fn equal_demands_are_divided_as_ever() {
+    // Shares decide how much is spilled and how fast a run is; who changes a formula means to.
+    for (there, (shares, others)) in different().iter().zip(DIVIDED) {
+        let divided = there.divide().unwrap();
+        let Shares { base, work, index, kept_in_memory, run_records, tile_positions } = divided;
+        let sizes = [base, work, index, kept_in_memory];
+        let all = sizes.into_iter().chain([run_records as u64, tile_positions as u64]);
+        assert_eq!(all.collect::<Vec<_>>(), shares, "{there:?}");
+        let limit = there.limit_for_tile(1, 3_000_000);
+        let positions = there.tile_positions(2, 500 << 20) as u64;
+        assert_eq!([limit, there.mill(1, 70_000).sum().0, positions], others, "{there:?}");
+    }
+}
+
+#[test]
+fn every_phase_of_a_run_fits_what_is_planned_for_it() {
+    let mut tried = 0;
+    for there in different() {
+        let shares = there.divide().unwrap();
+        let index = there.index().sum();
+        assert_eq!((there.base().sum(), index), (Bytes(shares.base), Bytes(shares.index)));
+        let phases = match there.mills {
+            true => vec![
+                there.decode(shares.run_records as u64),
+                there.merge(shares.run_records as u64),
+                there.mill(there.threads, shares.tile_positions as u64),
+            ],
+            false => vec![there.stream()],
+        };
+        for phase in phases {
+            assert!(phase.sum().fit(shares.work), "{phase:?} in {shares:?}");
+            assert!(phase.sum() > Bytes(0));
+            tried += 1;
+        }
+        let all = shares.base + shares.index + shares.work + shares.kept_in_memory;
+        assert!(all <= there.limit);
+        let fixed = there.limit - all;
+        assert!(!there.mills || fixed == 0, "{fixed} bytes of {shares:?} are for nothing");
+    }
+    assert!(tried > 30);
+}
+
+#[test]
+fn a_refusal_lists_the_parts_of_what_it_names_largest_first() {
+    for there in different() {
+        let error = Demands { limit: 1 << 20, ..there.clone() }.divide().unwrap_err().to_string();
+        let (told, parts) = error.strip_suffix(')').and_then(|told| told.split_once(" (")).unwrap();
+        let words = told.strip_suffix(" MiB").and_then(|told| told.rsplit(' ').next());
+        let whole: f64 = words.unwrap().parse().unwrap();
+        let size = |part: &str| {
+            let (size, unit) = part.split_once(" for the ").unwrap().0.split_once(' ').unwrap();
+            let units = [("GiB", 1024.0), ("MiB", 1.0), ("KiB", 1.0 / 1024.0)];
+            size.parse::<f64>().unwrap() * units.iter().find(|(name, _)| *name == unit).unwrap().1
+        };
+        let sizes: Vec<f64> = parts.split(", ").map(size).collect();
+        let named = sizes.len() - usize::from(parts.ends_with(" for the rest"));
+        assert!((2..=5).contains(&named), "{error}");
+        assert!(sizes[..named].is_sorted_by(|a, b| a >= b), "{error}");
+        // What is shown is rounded, the whole upwards to a mebibyte.
+        let sum: f64 = sizes.iter().sum();
+        assert!((whole - 1.3..whole + 0.3).contains(&sum) || whole > 100.0, "{error}");
+        assert!((0.98..1.02).contains(&(sum / whole)) || whole < 100.0, "{error}");
+        for name in ["program", "overhead of threads"] {
+            assert!(parts.contains(&format!("for the {name}")) || sizes.len() > 5, "{error}");
+        }
+    }
 }

@@ -161,7 +161,7 @@ impl Kernel for Home<'_> {
     }
 }
 
-/// The keys of one point as a candidate of others; whoever is infinitely far is none.
+/// The keys of one point as a candidate of others; one that is infinitely far is none.
 #[inline(always)]
 fn keys(distances: &[f32; LANES], rank: u32) -> Row {
     let mut keys = [0.0; LANES];

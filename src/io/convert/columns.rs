@@ -1,5 +1,6 @@
 //! The steps of a projection over many records at once: field by field, each a loop of its own over
-//! strided loads and stores. What a step finds unfit it leaves to the road that goes record by record.
+//! strided loads and stores. What a step finds unfit it leaves to the road that goes record by
+//! record.
 
 use super::step::Move;
 use crate::point::{Dimension, Endian, Scalar};
@@ -99,8 +100,8 @@ impl ColumnStep {
         })
     }
 
-    /// Applies the step to up to [`BLOCK`] records; `rounded` has for each by how much it was rounded.
-    /// False if a value may not fit: the block then is for the other road.
+    /// Applies the step to up to [`BLOCK`] records; `rounded` has for each by how much it was
+    /// rounded. False if a value may not fit: the block then is for the other road.
     pub fn apply(
         &self,
         from: RecordBytes<'_>,
@@ -218,8 +219,8 @@ impl Number {
     }
 
     /// Stored numbers of the source become those of the target that are nearest to the same world
-    /// value; `rounded` grows to how far that is off. The same operations in the same order as those
-    /// of the other road, without branches, so that several values go side by side.
+    /// value; `rounded` grows to how far that is off. The same operations in the same order as
+    /// those of the other road, without branches, so that several values go side by side.
     #[inline(always)]
     fn rounding(
         &self,

@@ -40,7 +40,8 @@ fn one_field(name: &str, field: Dimension, endian: Endian) -> Schema {
     Schema { layout: Layout::plain("made"), endian, stride, dimensions: vec![field] }
 }
 
-/// All roads of one pair of fields agree, block for block; returns how many blocks went field by field.
+/// All roads of one pair of fields agree, block for block; returns how many blocks went field by
+/// field.
 fn agree(from: &Schema, to: &Schema, seed: u64) -> usize {
     let projection = Projection::new(from, to, &[]).unwrap();
     let mut next = numbers(seed);

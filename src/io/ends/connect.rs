@@ -1,18 +1,19 @@
 //! From checked keys to sources and sinks of registered formats: what is alike for all of them.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::Result;
 use crate::error::shown;
 use crate::io::sniff;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{
     ChunkSize, CreateSink, Format, Formats, OpenSource, Order, Sink, Source, WriteKeys,
 };
+use crate::{Error, Result};
 
 /// Files that are read as one scan, all of one family of formats.
-pub struct Files {
+pub struct InputFiles {
     /// Where they are.
     pub files: Vec<PathBuf>,
     /// A format of the family.
@@ -21,7 +22,7 @@ pub struct Files {
     pub formats: Formats,
 }
 
-impl OpenSource for Files {
+impl OpenSource for InputFiles {
     fn open(&self) -> Result<Box<dyn Source>> {
         let told = |error| sniff::told(error, &*self.format, &self.formats);
         self.format.open(&self.files).map_err(told)
@@ -30,11 +31,31 @@ impl OpenSource for Files {
     fn paths(&self) -> Vec<PathBuf> {
         self.files.clone()
     }
+
+    fn family(&self) -> Option<&str> {
+        Some(self.format.family())
+    }
+
+    fn merged(&self, other: &dyn OpenSource) -> Result<Box<dyn OpenSource>> {
+        if other.family() != self.family() {
+            let told = "sources are merged where all read files, and of one family of formats";
+            return Err(Error::pipeline(told).help("convert some of them first"));
+        }
+        let (mut files, more) = (self.files.clone(), other.paths());
+        let real = |file: &PathBuf| file.canonicalize().unwrap_or_else(|_| file.clone());
+        let known: BTreeSet<PathBuf> = files.iter().map(real).collect();
+        if let Some(twice) = more.iter().find(|file| known.contains(&real(file))) {
+            return Err(Error::pipeline("another source reads this file, too").at(twice));
+        }
+        files.extend(more);
+        let (format, formats) = (self.format.clone(), self.formats.clone());
+        Ok(Box::new(InputFiles { files, format, formats }))
+    }
 }
 
 /// The sink that writes a file of one format.
 #[derive(Clone)]
-pub struct Output {
+pub struct OutputFile {
     /// What it is to be.
     pub keys: WriteKeys,
     /// The order of its records.
@@ -47,7 +68,7 @@ pub struct Output {
     pub of_one: bool,
 }
 
-impl CreateSink for Output {
+impl CreateSink for OutputFile {
     fn path(&self) -> &Path {
         &self.keys.path
     }
@@ -119,7 +140,7 @@ impl CreateSink for Output {
     }
 }
 
-impl Output {
+impl OutputFile {
     /// A format of the files that records of `schema` come from.
     fn from(&self, schema: &Schema) -> Option<&Arc<dyn Format>> {
         self.formats.of_family(schema.layout.family).next()
@@ -131,8 +152,8 @@ impl Output {
         let named = named.filter(|named| !self.of_one && *named != self.format.name())?;
         let [named, is] = [named, self.format.name()].map(str::to_uppercase);
         Some(format!(
-            "{}: this is named as {named} and becomes {is}, as `write.format` says: programs that go by \
-             names will not read it",
+            "{}: this is named as {named} and becomes {is}, as `write.format` says: programs that \
+             go by names will not read it",
             shown(&self.keys.path)
         ))
     }

@@ -19,11 +19,11 @@ use crate::{Error, ErrorKind, Result};
 ///   their paths; one that matches none is an error, like a file that is not there;
 /// - else it is a file that does not exist (yet): opening it will tell.
 ///
-/// Names that are not UTF-8 text are refused, however they are meant ([`unreadable`]). A pattern looks at
-/// a million names at most.
+/// Names that are not UTF-8 text are refused, however they are meant ([`unreadable`]). A pattern
+/// looks at a million names at most.
 ///
-/// Upper and lower case differ, and `*` and `?` do not match a dot at the beginning of a name, as in
-/// a shell. A file meant twice, by whatever names, is an error: its points would be read twice.
+/// Upper and lower case differ, and `*` and `?` do not match a dot at the beginning of a name, as
+/// in a shell. A file meant twice, by whatever names, is an error: its points would be read twice.
 pub fn expand<P: AsRef<str>>(paths: &[P], formats: &Formats) -> Result<Vec<PathBuf>> {
     let files = expand_any(paths, formats)?;
     match files.iter().find(|file| file.to_str().is_none()) {
@@ -154,7 +154,8 @@ impl Walk<'_> {
             Step::Name(name) => self.on(&at.join(name), rest),
             Step::Matching(pattern) => {
                 for name in self.entries(at, steps.len())? {
-                    // Bytes that are no text match `*` and `?` as the character that stands for such.
+                    // Bytes that are no text match `*` and `?` as the character that stands for
+                    // such.
                     let text = name.to_string_lossy();
                     let hidden = text.starts_with('.') && !pattern.as_str().starts_with('.');
                     if !hidden && pattern.matches(&text) {

@@ -16,15 +16,15 @@ use crate::{Error, Result};
 /// Headers are read, compared and held against the files' lengths before any point is. Files that
 /// do not fit together are refused by name: LAS inputs agree in point format, record length, extra
 /// bytes, scales, GPS time type and coordinate reference system, PLY inputs in encoding, vertex
-/// properties, GPS time type and coordinate reference system. LAS systems agree if they mean the same:
-/// in WKT of one wording, spaces and zeros aside, or by equal EPSG codes; the output has the WKT. LAS
-/// offsets may differ by whole steps; the output has the smallest.
+/// properties, GPS time type and coordinate reference system. LAS systems agree if they mean the
+/// same: in WKT of one wording, spaces and zeros aside, or by equal EPSG codes; the output has the
+/// WKT. LAS offsets may differ by whole steps; the output has the smallest.
 ///
-/// A number of a PLY text is held in the type that its header says, but coordinates and GPS times are
-/// held as `double` where one of them has more digits than the `float` of its header has room for: a
-/// text is looked through for such before it is read. `scalar_Intensity` and other scalar fields, as
-/// CloudCompare writes them, are the dimensions that they are named after. A text that ends within a
-/// line is told, since its last number may be cut short.
+/// A number of a PLY text is held in the type that its header says, but coordinates and GPS times
+/// are held as `double` where one of them has more digits than the `float` of its header has room
+/// for: a text is looked through for such before it is read. `scalar_Intensity` and other scalar
+/// fields, as CloudCompare writes them, are the dimensions that they are named after. A text that
+/// ends within a line is told, since its last number may be cut short.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Read {
@@ -39,32 +39,32 @@ pub struct Read {
 /// The end of every pipeline. The file grows in a scratch folder beside its place and appears under
 /// its name when it is complete; it never replaces an input.
 ///
-/// A record that is kept is the input's, byte for byte, wherever the format can hold it. From LAS to
-/// PLY or back every field keeps its name; one that cannot be held is an error unless `drop` names it.
-/// A point of which a PLY file tells no returns is return 1 of 1 in LAS. Variable length records that
-/// PLY does not hold are named in a warning.
+/// A record that is kept is the input's, byte for byte, wherever the format can hold it. From LAS
+/// to PLY or back every field keeps its name; one that cannot be held is an error unless `drop`
+/// names it. A point of which a PLY file tells no returns is return 1 of 1 in LAS. Variable length
+/// records that PLY does not hold are named in a warning.
 ///
 /// Colours keep their meaning: 255 of 8 bits in PLY is 65535 in LAS. From LAS to PLY they become
-/// `uchar` where that loses nothing: where each is a multiple of 257 or of 256, or all are below 256,
-/// as writers leave them that do not scale. Else they stay `ushort`, which many viewers do not read;
-/// a warning says so, and `colors` can ask for either. The type depends on all colours of the output,
-/// and on nothing else. From LAS to LAS and from PLY to PLY colours are not touched.
+/// `uchar` where that loses nothing: where each is a multiple of 257 or of 256, or all are below
+/// 256, as writers leave them that do not scale. Else they stay `ushort`, which many viewers do not
+/// read; a warning says so, and `colors` can ask for either. The type depends on all colours of the
+/// output, and on nothing else. From LAS to LAS and from PLY to PLY colours are not touched.
 ///
 /// LAS header fields that depend on the points are computed again. The generating software is
 /// pointmill and its version. Where records went through stages, the system identifier is
 /// `EXTRACTION`, a variable length record (`pointmill`, 1) names the stages as JSON in the place of
-/// what an earlier run said, and the ranges of extra bytes, which were those of all points, are left
-/// out; where only `scale` or `offset` moved them, the identifier is `TRANSFORMATION`. All else is
-/// carried, and what is wrong in it mended with a warning: the bit that says that the system is WKT,
-/// and descriptors of extra bytes that the records do not have or that stand in several variable
-/// length records. Waveforms in a `.wdp` file are copied beside the output, under its name. From PLY,
-/// EPSG codes become GeoTIFF keys. No date but those of the inputs is written.
+/// what an earlier run said, and the ranges of extra bytes, which were those of all points, are
+/// left out; where only `scale` or `offset` moved them, the identifier is `TRANSFORMATION`. All
+/// else is carried, and what is wrong in it mended with a warning: the bit that says that the
+/// system is WKT, and descriptors of extra bytes that the records do not have or that stand in
+/// several variable length records. Waveforms in a `.wdp` file are copied beside the output, under
+/// its name. From PLY, EPSG codes become GeoTIFF keys. No date but those of the inputs is written.
 ///
-/// With `path` all inputs become one file. With `folder` each input becomes a file of its own there:
-/// under its name (a `.copc` in it left out, for COPC is not written), with its header, its records and
-/// its offset, holding those of its points that are kept, even if that is none. The inputs are one scan
-/// all the same: neighbourhoods and cells go on from file to file, and the outputs together have the
-/// points that the one file would have.
+/// With `path` all inputs become one file. With `folder` each input becomes a file of its own
+/// there: under its name (a `.copc` in it left out, for COPC is not written), with its header, its
+/// records and its offset, holding those of its points that are kept, even if that is none. The
+/// inputs are one scan all the same: neighbourhoods and cells go on from file to file, and the
+/// outputs together have the points that the one file would have.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Write {
@@ -74,8 +74,8 @@ pub struct Write {
     /// The folder that gets a file for each input; it is made if it does not exist.
     #[serde(default)]
     pub folder: Option<PathBuf>,
-    /// The format; none: as the extension says, in a folder that of the input. A file whose extension
-    /// says another is written, with a warning.
+    /// The format; none: as the extension says, in a folder that of the input. A file whose
+    /// extension says another is written, with a warning.
     #[serde(default)]
     pub format: Option<FormatName>,
     /// Dimensions that the output need not hold.
@@ -108,9 +108,9 @@ pub struct Write {
 pub enum OutputOrder {
     /// Morton order of the lattice, then record bytes.
     Canonical,
-    /// The order of the inputs: by file, as they are given, then by record. So the output depends on
-    /// the order of the inputs; a scan that is marked has its records where the input has them. For
-    /// `path` alone.
+    /// The order of the inputs: by file, as they are given, then by record. So the output depends
+    /// on the order of the inputs; a scan that is marked has its records where the input has them.
+    /// For `path` alone.
     Input,
 }
 

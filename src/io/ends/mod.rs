@@ -1,5 +1,5 @@
-//! The stages at both ends of a pipeline that name files, `read` and `write`: from their keys to sources
-//! and sinks of formats.
+//! The stages at both ends of a pipeline that name files, `read` and `write`: from their keys to
+//! sources and sinks of formats.
 
 mod connect;
 mod inputs;

@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::connect::Output;
+use super::connect::OutputFile;
 use super::kinds::{check, unknown_extension};
 use crate::error::shown;
 use crate::point::{Metadata, PointBatch, Schema};
@@ -43,14 +43,14 @@ impl Outputs {
     }
 
     /// An output of `format` at `path`.
-    fn output(&self, path: PathBuf, format: &Arc<dyn Format>) -> Output {
+    fn output(&self, path: PathBuf, format: &Arc<dyn Format>) -> OutputFile {
         let keys = WriteKeys { path, ..self.keys.clone() };
         let (format, formats) = (format.clone(), self.formats.clone());
-        Output { keys, order: self.order, format, formats, of_one: true }
+        OutputFile { keys, order: self.order, format, formats, of_one: true }
     }
 
     /// An output of each format that there may be, for records of `schema`.
-    fn possible(&self, schema: &Schema) -> Vec<Output> {
+    fn possible(&self, schema: &Schema) -> Vec<OutputFile> {
         let formats: Vec<_> = match &self.format {
             Some(format) => vec![format],
             None => self.formats.of_family(schema.layout.family).collect(),
@@ -59,13 +59,13 @@ impl Outputs {
     }
 
     /// One of these: what does not depend on it is alike in all formats of a family.
-    fn any(&self, schema: &Schema) -> Option<Output> {
+    fn any(&self, schema: &Schema) -> Option<OutputFile> {
         self.possible(schema).pop()
     }
 
     /// The output of the input at `path`: its name, with the extension of the format that is asked
     /// for unless it says that already.
-    fn of(&self, input: &Path) -> Result<Output> {
+    fn of(&self, input: &Path) -> Result<OutputFile> {
         let path = &*self.formats.plain(input);
         let told = self.formats.of(path);
         let unknown = || unknown_extension(path, "write.format", &self.formats);

@@ -42,7 +42,7 @@ impl Read {
             return Err(Error::pipeline(told).help(help));
         }
         let format = all[0].clone();
-        Ok(Box::new(connect::Files { files, format, formats: formats.clone() }))
+        Ok(Box::new(connect::InputFiles { files, format, formats: formats.clone() }))
     }
 }
 
@@ -70,7 +70,8 @@ impl StageKind for Write {
         let asked = self.format.as_ref().map(|name| formats.named(name)).transpose()?;
         match (self.path.clone(), self.folder.clone()) {
             (Some(_), Some(_)) => {
-                let told = "`write.path` makes one file and `write.folder` one for each input: give one of them";
+                let told = "`write.path` makes one file and `write.folder` one for each input: \
+                            give one of them";
                 Err(at.blame("folder", Error::pipeline(told)))
             }
             (None, None) => Err(Error::pipeline("a `write` needs `write.path` or `write.folder`")
@@ -78,8 +79,8 @@ impl StageKind for Write {
             (Some(path), None) if path.as_os_str().as_bytes().ends_with(b"/") || path.is_dir() => {
                 let told = format!("`{}` is a folder, not a file to write", shown(&path));
                 let help = format!(
-                    "name a file in it, such as `{}`, or give the folder as `write.folder`, which gets \
-                     a file for each input",
+                    "name a file in it, such as `{}`, or give the folder as `write.folder`, which \
+                     gets a file for each input",
                     shown(&path.join("out.laz"))
                 );
                 Err(at.blame("path", Error::pipeline(told).help(help)))
@@ -101,7 +102,7 @@ impl StageKind for Write {
                 check(&keys, &**format)?;
                 let (format, formats) = (format.clone(), formats.clone());
                 let order = self.stage_order();
-                let output = connect::Output { keys, order, format, formats, of_one: false };
+                let output = connect::OutputFile { keys, order, format, formats, of_one: false };
                 Ok(Role::Sink(Box::new(output)))
             }
             (None, Some(folder)) => {

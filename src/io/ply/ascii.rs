@@ -20,7 +20,8 @@ fn longest_line(schema: &Schema) -> usize {
     4096 + 512 * schema.dimensions.len()
 }
 
-/// The vertices of a text file, in one part: where a line begins is known only from the lines before.
+/// The vertices of a text file, in one part: where a line begins is known only from the lines
+/// before.
 pub(super) struct AsciiPart<'a> {
     path: &'a Path,
     file: &'a PlyFile,
@@ -100,7 +101,10 @@ impl<'a> AsciiPart<'a> {
         let fail = |place: usize, message: String| {
             Error::data(self.path, format!("line {}: {message}", self.lines.line))
                 .at_byte(self.lines.from + place as u64)
-                .help("correct the line, or write the file again: each line has the values of its vertex")
+                .help(
+                    "correct the line, or write the file again: each line has the values of its \
+                     vertex",
+                )
         };
         let mut place = 0;
         for (n, (name, scalar, offset)) in self.fields.iter().enumerate() {
@@ -148,8 +152,8 @@ impl Part for AsciiPart<'_> {
 }
 
 impl AsciiPart<'_> {
-    /// True if a number of one of the properties `columns` has more digits than a `float` holds. What is
-    /// wrong with a line is left to whoever reads it.
+    /// True if a number of one of the properties `columns` has more digits than a `float` holds.
+    /// What is wrong with a line is told when it is read.
     pub fn outgrows_float(mut self, columns: &[usize]) -> Result<bool> {
         self.skip()?;
         for _ in 0..self.points {

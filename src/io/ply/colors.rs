@@ -1,11 +1,11 @@
 //! Colours of LAS records, which have 16 bits, as the 8 bits that readers of PLY expect.
 //!
-//! Nothing is lost by 8 bits where 16 of them hold no more: where each colour is a multiple of 257 or
-//! of 256, or all are below 256, as three kinds of writers leave them. Whether they are only all points
-//! together say, long after the first are written; so vertices are written with 8 bits until a colour
-//! needs more, and the file is written anew when one does. Where it was needed for no more than telling
-//! multiples of 257 from those of 256, it is written with 8 bits again in the end. So the type in a
-//! finished file depends on the colours alone.
+//! Nothing is lost by 8 bits where 16 of them hold no more: where each colour is a multiple of 257
+//! or of 256, or all are below 256, as three kinds of writers leave them. Whether they are only all
+//! points together say, long after the first are written; so vertices are written with 8 bits until
+//! a colour needs more, and the file is written anew when one does. Where it was needed for no more
+//! than telling multiples of 257 from those of 256, it is written with 8 bits again in the end. So
+//! the type in a finished file depends on the colours alone.
 
 use super::header::Encoding;
 use super::names::FAMILY;
@@ -21,7 +21,8 @@ pub(super) enum Depth {
     /// Nothing but 0, which all the others have too.
     #[default]
     Black,
-    /// 8 bits times 257, so that 255 is 65535, as the specification wants it (LAS 1.4 R15, table 9).
+    /// 8 bits times 257, so that 255 is 65535, as the specification wants it (LAS 1.4 R15, table
+    /// 9).
     Times257,
     /// 8 bits times 256.
     Times256,
@@ -35,13 +36,13 @@ pub(super) enum Depth {
 
 /// What a chunk is written with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Written {
+pub(super) struct WrittenColors {
     pub depth: Depth,
     /// True if its colours have 16 bits.
     pub wide: bool,
 }
 
-impl Written {
+impl WrittenColors {
     const WIDE: u8 = 8;
 
     /// As a number that an encoded chunk carries, and back.
@@ -49,9 +50,9 @@ impl Written {
         self.depth as u8 | if self.wide { Self::WIDE } else { 0 }
     }
 
-    pub fn from_code(code: u8) -> Written {
+    pub fn from_code(code: u8) -> WrittenColors {
         let depth = Depth::ALL.get(usize::from(code & !Self::WIDE)).copied();
-        Written { depth: depth.unwrap_or(Depth::Full), wide: code & Self::WIDE != 0 }
+        WrittenColors { depth: depth.unwrap_or(Depth::Full), wide: code & Self::WIDE != 0 }
     }
 }
 
@@ -128,8 +129,8 @@ pub(super) fn fields(schema: &Schema, drop: &[String]) -> Vec<usize> {
     held.map(|d| d.offset).collect()
 }
 
-/// The same records, their colours being the byte at `place` of each: 0 for the lower, 1 for the upper
-/// one.
+/// The same records, their colours being the byte at `place` of each: 0 for the lower, 1 for the
+/// upper one.
 pub(super) fn bytes_of(schema: &Schema, place: usize) -> Schema {
     let mut narrow = schema.clone();
     for dimension in narrow.dimensions.iter_mut().filter(|d| is_color(d)) {
@@ -263,8 +264,8 @@ mod tests {
             }
         }
         for (depth, wide) in Depth::ALL.into_iter().flat_map(|d| [(d, false), (d, true)]) {
-            let written = Written { depth, wide };
-            assert_eq!(Written::from_code(written.code()), written);
+            let written = WrittenColors { depth, wide };
+            assert_eq!(WrittenColors::from_code(written.code()), written);
         }
     }
 

@@ -1,5 +1,5 @@
-//! Comments of a PLY header that say more than a comment does: the coordinate reference system, what GPS
-//! times count, who wrote the file.
+//! Comments of a PLY header that say more than a comment does: the coordinate reference system,
+//! what GPS times count, who wrote the file.
 
 use crate::point::GpsTime;
 
@@ -14,8 +14,8 @@ pub const GPS_TIMES: [(GpsTime, &str); 2] = [
     (GpsTime::AdjustedStandard, "seconds of GPS time minus 1e9"),
 ];
 
-/// What says who wrote a file, and with blanks behind it brings every header of one file to one length,
-/// whatever its count of vertices.
+/// What says who wrote a file, and with blanks behind it brings every header of one file to one
+/// length, whatever its count of vertices.
 pub const MADE: &str = "made by pointmill";
 
 pub fn made(points: u64) -> String {

@@ -2,10 +2,10 @@
 
 use std::sync::atomic::{AtomicU8, Ordering};
 
-use super::colors::{self, Depth, Recoloring, Written};
+use super::colors::{self, Depth, Recoloring, WrittenColors};
 use super::header::Encoding;
 use super::names::RECORDS;
-use super::source::Native;
+use super::source::PlyNative;
 use super::text;
 use super::vertex::ply_schema;
 use crate::io::convert::Projection;
@@ -24,11 +24,11 @@ pub struct PlyOptions {
     pub normals: bool,
     /// Dimensions that are left out.
     pub drop: Vec<String>,
-    /// How many bits the colours of LAS records have; as for [`Colors::Auto`] when not said. From PLY
-    /// to PLY they stay as they are, and saying it is an error.
+    /// How many bits the colours of LAS records have; as for [`Colors::Auto`] when not said. From
+    /// PLY to PLY they stay as they are, and saying it is an error.
     pub colors: Option<Colors>,
-    /// Carries the other elements (faces) of a single binary input whose encoding is kept. To be set
-    /// only where no vertex is removed, added or moved: it fails on a count that differs.
+    /// Carries the other elements (faces) of a single binary input whose encoding is kept. To be
+    /// set only where no vertex is removed, added or moved: it fails on a count that differs.
     pub carry_rest: bool,
 }
 
@@ -39,16 +39,16 @@ pub(super) const WIDE: u8 = 1;
 pub(super) const FULL: u8 = 2;
 
 /// How a record becomes a vertex; shared by all threads.
-pub(super) struct Plan {
+pub(super) struct VertexPlan {
     pub encoding: Encoding,
     /// With colours as the records have them.
     pub full: Form,
     /// With colours of 8 bits, where the records are LAS and have colours.
     pub narrow: Option<Narrow>,
-    /// [`WIDE`] once the file has colours of 16 bits, so that no chunk needs to have 8, and [`FULL`]
-    /// once they are known to need them, so that nobody needs to look.
+    /// [`WIDE`] once the file has colours of 16 bits, so that no chunk needs to have 8, and
+    /// [`FULL`] once they are known to need them, so that nobody needs to look.
     pub widened: AtomicU8,
-    /// For the vertices of chunks; whoever has written them puts them back.
+    /// For the vertices of chunks; the thread that has written them puts them back.
     pub spare: Spare<Vec<u8>>,
 }
 
@@ -152,8 +152,12 @@ impl Form {
     }
 }
 
-impl Plan {
-    pub fn new(options: &PlyOptions, schema: &Schema, native: Option<&Native>) -> Result<Plan> {
+impl VertexPlan {
+    pub fn new(
+        options: &PlyOptions,
+        schema: &Schema,
+        native: Option<&PlyNative>,
+    ) -> Result<VertexPlan> {
         let encoding = options.encoding.or(native.map(|n| n.encoding)).unwrap_or({
             match (schema.layout, schema.endian) {
                 (RECORDS, crate::point::Endian::Big) => Encoding::BinaryBigEndian,
@@ -164,7 +168,7 @@ impl Plan {
             let told = "`write.colors` is for LAS inputs: from PLY to PLY colours stay as they are";
             return Err(Error::pipeline(told).help("leave it out"));
         }
-        Ok(Plan {
+        Ok(VertexPlan {
             encoding,
             full: Form::new(options, schema, encoding)?,
             narrow: Narrow::of(options, schema, encoding)?,
@@ -178,7 +182,8 @@ impl Plan {
         ChunkSize { points: CHUNK_POINTS, bytes }
     }
 
-    /// Bytes that encoding one record holds at most, those that an appended chunk is widened to included.
+    /// Bytes that encoding one record holds at most, those that an appended chunk is widened to
+    /// included.
     fn bytes_per_point(&self) -> usize {
         let text = if self.encoding == Encoding::Ascii { self.full.text_bytes() } else { 0 };
         let widened = match (&self.narrow, self.encoding) {
@@ -227,8 +232,8 @@ impl Plan {
     }
 
     /// The form in which a chunk is written, and what its colours are; full where nobody asked.
-    fn form(&self, batch: &PointBatch) -> (&Form, Written) {
-        let full = |depth| (&self.full, Written { depth, wide: true });
+    fn form(&self, batch: &PointBatch) -> (&Form, WrittenColors) {
+        let full = |depth| (&self.full, WrittenColors { depth, wide: true });
         let Some(narrow) = &self.narrow else { return full(Depth::Full) };
         let widened = self.widened.load(Ordering::Relaxed);
         if widened == FULL {
@@ -236,7 +241,7 @@ impl Plan {
         }
         let depth = Depth::of(batch.records(), batch.schema().stride, &narrow.fields);
         match narrow.form(depth).filter(|_| widened != WIDE) {
-            Some(form) => (form, Written { depth, wide: false }),
+            Some(form) => (form, WrittenColors { depth, wide: false }),
             None => full(depth),
         }
     }
@@ -262,7 +267,7 @@ fn add_normals(vertex: &mut Schema) -> Result<[Dimension; 3]> {
     Ok([field(NORMAL[0])?, field(NORMAL[1])?, field(NORMAL[2])?])
 }
 
-impl Encode for Plan {
+impl Encode for VertexPlan {
     fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
         let mut rounded = None;
         let mut vertices = self.spare.take(Vec::new);

@@ -5,7 +5,7 @@ use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use super::header::{Element, Encoding, Header, Kind, Property, shown};
+use super::header::{Element, Encoding, PlyHeader, Property, PropertyKind, shown};
 use super::{names, walk};
 use crate::io::origin::Origin;
 use crate::{Error, Result};
@@ -14,7 +14,7 @@ use crate::{Error, Result};
 pub(super) struct PlyFile {
     pub path: PathBuf,
     pub origin: Origin,
-    pub header: Header,
+    pub header: PlyHeader,
     pub points: u64,
     pub length: u64,
     /// Byte of the first vertex in a binary file, of the first element in a text file.
@@ -37,7 +37,7 @@ impl PlyFile {
     pub fn open(path: &Path) -> Result<PlyFile> {
         let (file, origin) = Origin::open(path)?;
         let length = origin.length();
-        let header = Header::read(&file, path, length)?;
+        let header = PlyHeader::read(&file, path, length)?;
         let Some(vertex) = header.vertex() else {
             let elements: Vec<String> =
                 header.elements.iter().map(|e| format!("`{}`", shown(&e.name))).collect();
@@ -158,7 +158,9 @@ fn text_lines(elements: &[Element]) -> u64 {
 
 /// Refuses a vertex element that has lists or lacks a coordinate.
 fn check(path: &Path, vertex: &Element) -> Result<()> {
-    if let Some(list) = vertex.properties.iter().find(|p| matches!(p.kind, Kind::List { .. })) {
+    if let Some(list) =
+        vertex.properties.iter().find(|p| matches!(p.kind, PropertyKind::List { .. }))
+    {
         return Err(Error::data(
             path,
             format!(

@@ -56,7 +56,7 @@ impl Encoding {
 
 /// What a header says.
 #[derive(Debug, Clone)]
-pub(super) struct Header {
+pub(super) struct PlyHeader {
     pub encoding: Encoding,
     pub elements: Vec<Element>,
     pub comments: Vec<String>,
@@ -79,11 +79,11 @@ pub(super) struct Element {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Property {
     pub name: String,
-    pub kind: Kind,
+    pub kind: PropertyKind,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Kind {
+pub(super) enum PropertyKind {
     Scalar(Scalar),
     List { count: Scalar, item: Scalar },
 }
@@ -105,8 +105,8 @@ pub(super) fn type_name(scalar: Scalar) -> &'static str {
 }
 
 /// The types that [`scalar_of`] knows, for messages.
-const KINDS: &str = "char, uchar, short, ushort, int, uint, float and double, or int8 to int64, uint8 to \
-                     uint64, float32 and float64";
+const KINDS: &str = "char, uchar, short, ushort, int, uint, float and double, or int8 to int64, \
+                     uint8 to uint64, float32 and float64";
 
 fn scalar_of(word: &str) -> Option<Scalar> {
     Some(match word {
@@ -124,12 +124,12 @@ fn scalar_of(word: &str) -> Option<Scalar> {
     })
 }
 
-impl Kind {
+impl PropertyKind {
     /// The type as a header words it.
     pub fn word(self) -> String {
         match self {
-            Kind::Scalar(scalar) => type_name(scalar).to_owned(),
-            Kind::List { count, item } => {
+            PropertyKind::Scalar(scalar) => type_name(scalar).to_owned(),
+            PropertyKind::List { count, item } => {
                 format!("list {} {}", type_name(count), type_name(item))
             }
         }
@@ -151,17 +151,17 @@ impl Element {
         self.properties
             .iter()
             .map(|p| match p.kind {
-                Kind::Scalar(scalar) => Some(scalar.size() as u64),
-                Kind::List { .. } => None,
+                PropertyKind::Scalar(scalar) => Some(scalar.size() as u64),
+                PropertyKind::List { .. } => None,
             })
             .sum()
     }
 }
 
-impl Header {
+impl PlyHeader {
     /// Reads the header of `file`, which is `length` bytes long. Errors name the byte where the
     /// offending line begins.
-    pub fn read(file: &File, path: &Path, length: u64) -> Result<Header> {
+    pub fn read(file: &File, path: &Path, length: u64) -> Result<PlyHeader> {
         for limit in [1 << 16, LONGEST] {
             let held = limit.min(length);
             let mut bytes = vec![0; held as usize];
@@ -187,21 +187,21 @@ impl Header {
 /// The lines of a header. A file whose first line ends in a lone carriage return ends all header
 /// lines so; every other one ends them with a line feed, a carriage return before it being dropped.
 /// (The first line decides, because a binary body may begin with the byte of a line feed.)
-struct Lines<'a> {
+struct HeaderLines<'a> {
     bytes: &'a [u8],
     at: usize,
     end: u8,
 }
 
-impl<'a> Lines<'a> {
+impl<'a> HeaderLines<'a> {
     fn new(bytes: &'a [u8]) -> Self {
         let first = bytes.iter().position(|b| matches!(b, b'\r' | b'\n'));
         let lone = first.is_some_and(|i| bytes[i] == b'\r' && bytes.get(i + 1) != Some(&b'\n'));
-        Lines { bytes, at: 0, end: if lone { b'\r' } else { b'\n' } }
+        HeaderLines { bytes, at: 0, end: if lone { b'\r' } else { b'\n' } }
     }
 }
 
-impl<'a> Iterator for Lines<'a> {
+impl<'a> Iterator for HeaderLines<'a> {
     /// Where the line begins, the line, and whether it has its end.
     type Item = (usize, &'a [u8], bool);
 
@@ -219,9 +219,9 @@ impl<'a> Iterator for Lines<'a> {
 
 /// Parses a header that `bytes` begin with; None if they hold no end of it. `whole` says that they
 /// are the whole file, whose last line needs no end.
-fn parse(bytes: &[u8], whole: bool, path: &Path) -> Result<Option<Header>> {
+fn parse(bytes: &[u8], whole: bool, path: &Path) -> Result<Option<PlyHeader>> {
     let fail = |at: usize, message: String| Error::data(path, message).at_byte(at as u64);
-    let mut lines = Lines::new(bytes);
+    let mut lines = HeaderLines::new(bytes);
     // Asked of a line without an end too: what is no PLY is told as such, whatever its size.
     if lines.next().is_none_or(|(_, line, _)| line.trim_ascii() != b"ply") {
         return Err(foreign(path, CALLED));
@@ -236,7 +236,7 @@ fn parse(bytes: &[u8], whole: bool, path: &Path) -> Result<Option<Header>> {
             let encoding = header
                 .encoding
                 .ok_or_else(|| fail(at, "the header has no `format` line".into()))?;
-            return Ok(Some(Header {
+            return Ok(Some(PlyHeader {
                 encoding,
                 elements: header.elements,
                 comments: header.comments,
@@ -284,7 +284,8 @@ impl Partial {
             ("element", words) => self.element(words),
             ("property", words) => self.property(words),
             _ => Err(format!(
-                "`{}` is no header keyword (format, comment, obj_info, element, property, end_header)",
+                "`{}` is no header keyword (format, comment, obj_info, element, property, \
+                 end_header)",
                 shown(keyword)
             )),
         }
@@ -337,9 +338,9 @@ impl Partial {
                 if count.is_float() {
                     return Err(format!("list `{}` has a count that is no integer", shown(name)));
                 }
-                (name, Kind::List { count, item })
+                (name, PropertyKind::List { count, item })
             }
-            [kind, name] => (name, Kind::Scalar(scalar(kind)?)),
+            [kind, name] => (name, PropertyKind::Scalar(scalar(kind)?)),
             _ => {
                 return Err("a `property` line is `property TYPE NAME` or \
                             `property list COUNT_TYPE TYPE NAME`"

@@ -1,11 +1,12 @@
-//! The header that a PLY file is written with, and that is of one length whatever the count of vertices.
+//! The header that a PLY file is written with, and that is of one length whatever the count of
+//! vertices.
 
 use std::collections::BTreeMap;
 
 use super::comments::{CRS, CRS_MORE, GPS_TIME, GPS_TIMES, made};
-use super::header::{Element, Encoding, Kind, Property};
+use super::header::{Element, Encoding, Property, PropertyKind};
 use super::names;
-use super::source::{Native, Rest};
+use super::source::{PlyNative, Rest};
 use crate::point::{Metadata, Schema, names as point_names};
 
 /// Bytes of one piece of a long text: some readers refuse header lines of 1,024 bytes.
@@ -30,8 +31,8 @@ impl Headings {
         vertex: &Schema,
         encoding: Encoding,
         metadata: &Metadata,
-        native: Option<&Native>,
-        rest: Option<&Native>,
+        native: Option<&PlyNative>,
+        rest: Option<&PlyNative>,
     ) -> Headings {
         let dimensions: Vec<&str> = vertex.dimensions.iter().map(|d| d.name.as_str()).collect();
         let kept = native.iter().flat_map(|native| &native.properties);
@@ -61,7 +62,7 @@ impl Headings {
         let properties = properties
             .into_iter()
             .zip(&vertex.dimensions)
-            .map(|(name, d)| Property { name, kind: Kind::Scalar(d.scalar) })
+            .map(|(name, d)| Property { name, kind: PropertyKind::Scalar(d.scalar) })
             .collect();
         Headings {
             before: rest.map(|r| lines(&r.before)).unwrap_or_default(),

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::comments;
-use super::header::{Encoding, Header, Kind};
+use super::header::{Encoding, PlyHeader, PropertyKind};
 use crate::Result;
 use crate::io::origin::Origin;
 
@@ -49,14 +49,14 @@ pub struct PropertyInfo {
     pub kind: String,
 }
 
-/// Reads the header of the PLY file at `path`. Fails if it cannot be read or is no PLY header; counts
-/// are told as claimed.
+/// Reads the header of the PLY file at `path`. Fails if it cannot be read or is no PLY header;
+/// counts are told as claimed.
 pub fn describe(path: &Path) -> Result<PlyInfo> {
     let (file, origin) = Origin::open(path)?;
     let bytes = origin.length();
-    let header = Header::read(&file, path, bytes)?;
+    let header = PlyHeader::read(&file, path, bytes)?;
     let points = header.vertex().map_or(0, |vertex| header.elements[vertex].count);
-    let word = |kind: Kind| kind.word();
+    let word = |kind: PropertyKind| kind.word();
     let elements = header
         .elements
         .into_iter()

@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::colors::{Depth, Recoloring, Written, note};
-use super::encode::{CHUNK_POINTS, FULL, Plan, PlyOptions, WIDE};
+use super::colors::{Depth, Recoloring, WrittenColors, note};
+use super::encode::{CHUNK_POINTS, FULL, PlyOptions, VertexPlan, WIDE};
 use super::header::Encoding;
 use super::headings::Headings;
 use super::names::RECORDS;
-use super::source::Native;
+use super::source::PlyNative;
 use crate::point::{Metadata, Schema};
 use crate::stage::{Colors, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
@@ -32,25 +32,30 @@ pub fn create(
     Ok(Box::new(PlySink::create(staged, options, schema, metadata)?))
 }
 
-/// How the records of the sink that [`create`] would open are written. Fails on what it would refuse
-/// of `schema` and `options`.
-pub(super) fn plan(options: &PlyOptions, schema: &Schema, metadata: &Metadata) -> Result<Plan> {
-    Plan::new(options, schema, native_of(schema, metadata).as_deref())
+/// How the records of the sink that [`create`] would open are written. Fails on what it would
+/// refuse of `schema` and `options`.
+pub(super) fn plan(
+    options: &PlyOptions,
+    schema: &Schema,
+    metadata: &Metadata,
+) -> Result<VertexPlan> {
+    VertexPlan::new(options, schema, native_of(schema, metadata).as_deref())
 }
 
 /// Writes a PLY file; the header has its final length from the beginning.
 struct PlySink {
     file: File,
     path: PathBuf,
-    plan: Arc<Plan>,
+    plan: Arc<VertexPlan>,
     header: Headings,
-    /// The header with colours of as many bits as the file does not have, where they can have 8 or 16.
+    /// The header with colours of as many bits as the file does not have, where they can have 8 or
+    /// 16.
     other: Option<Headings>,
     /// True if the file has colours of 16 bits.
     wide: bool,
     /// What the appended colours are.
     depth: Depth,
-    rest: Option<Arc<Native>>,
+    rest: Option<Arc<PlyNative>>,
     notes: Vec<String>,
     points: u64,
     bytes: u64,
@@ -64,7 +69,7 @@ impl PlySink {
         metadata: &Metadata,
     ) -> Result<PlySink> {
         let native = native_of(schema, metadata);
-        let plan = Plan::new(options, schema, native.as_deref())?;
+        let plan = VertexPlan::new(options, schema, native.as_deref())?;
         let (rest, notes) = carried(options, &plan, native.as_ref());
         let headings = |vertex: &Schema| {
             Headings::of(vertex, plan.encoding, metadata, native.as_deref(), rest.as_deref())
@@ -101,7 +106,7 @@ impl PlySink {
     fn fit_colors(&mut self, chunk: &mut Encoded) -> Result<()> {
         let plan = self.plan.clone();
         let Some(narrow) = &plan.narrow else { return Ok(()) };
-        let Written { depth, wide } = Written::from_code(chunk.form);
+        let WrittenColors { depth, wide } = WrittenColors::from_code(chunk.form);
         let before = self.depth;
         self.depth = before.join(depth);
         if narrow.asked == Colors::Eight {
@@ -155,12 +160,12 @@ impl PlySink {
         Ok(())
     }
 
-    fn carries(&self) -> Option<Arc<Native>> {
+    fn carries(&self) -> Option<Arc<PlyNative>> {
         self.rest.clone().filter(|native| native.rest.is_some())
     }
 
     /// Copies the elements before (0) or behind (1) the vertices of the input.
-    fn carry(&mut self, native: &Native, which: usize) -> Result<()> {
+    fn carry(&mut self, native: &PlyNative, which: usize) -> Result<()> {
         let Some(rest) = &native.rest else { return Ok(()) };
         let (mut at, end) = (rest.cuts[2 * which], rest.cuts[2 * which + 1]);
         let from = rest.origin.reopen()?;
@@ -181,17 +186,17 @@ impl PlySink {
 }
 
 /// What PLY inputs of such records say of themselves.
-fn native_of(schema: &Schema, metadata: &Metadata) -> Option<Arc<Native>> {
+fn native_of(schema: &Schema, metadata: &Metadata) -> Option<Arc<PlyNative>> {
     let native = metadata.native.clone().filter(|_| schema.layout == RECORDS)?;
-    native.downcast::<Native>().ok()
+    native.downcast::<PlyNative>().ok()
 }
 
 /// The input's other elements, if they can be carried, or a note that they are not.
 fn carried(
     options: &PlyOptions,
-    plan: &Plan,
-    native: Option<&Arc<Native>>,
-) -> (Option<Arc<Native>>, Vec<String>) {
+    plan: &VertexPlan,
+    native: Option<&Arc<PlyNative>>,
+) -> (Option<Arc<PlyNative>>, Vec<String>) {
     let Some(native) = native.filter(|_| options.carry_rest) else { return (None, Vec::new()) };
     let Some(rest) = &native.rest else { return (None, Vec::new()) };
     let kept = native.encoding == plan.encoding;

@@ -1,19 +1,18 @@
 //! Reads the vertices of PLY files.
 
 use std::collections::BTreeSet;
-use std::fs::File;
-use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::ascii::AsciiPart;
+use super::binary::BinaryPart;
 use super::comments;
 use super::file::PlyFile;
-use super::header::{Element, Encoding, Kind, shown};
+use super::header::{Element, Encoding, PropertyKind, shown};
 use super::names::{self, RECORDS};
 use crate::io::origin::Origin;
 use crate::point::names::{GPS_TIME, XYZ};
-use crate::point::{Dimension, GpsTime, Metadata, PointBatch, Scalar, Schema};
+use crate::point::{Dimension, GpsTime, Metadata, Scalar, Schema};
 use crate::stage::{Input, Part, Source};
 use crate::{Error, Result};
 
@@ -22,7 +21,7 @@ const PART_POINTS: u64 = 1_000_000;
 
 /// What PLY outputs carry on besides points and text: how the input was written.
 #[derive(Debug)]
-pub(super) struct Native {
+pub(super) struct PlyNative {
     pub encoding: Encoding,
     /// Dimension and property names.
     pub properties: Vec<(String, String)>,
@@ -37,7 +36,8 @@ pub(super) struct Rest {
     pub origin: Origin,
     pub before: Vec<Element>,
     pub after: Vec<Element>,
-    /// Byte of the first element, of the first vertex, behind the last vertex, and of the file's end.
+    /// Byte of the first element, of the first vertex, behind the last vertex, and of the file's
+    /// end.
     pub cuts: [u64; 4],
     pub points: u64,
 }
@@ -170,8 +170,10 @@ fn agree((first, texts): (&PlyFile, &Texts), (other, of_other): (&PlyFile, &Text
 
 fn disagree(first: &PlyFile, other: &PlyFile, what: &str) -> Error {
     let told = format!("its {what} not the same as in {}", crate::error::shown(&first.path));
-    Error::data(&other.path, told)
-        .help("files that are read together agree in encoding, vertex properties and coordinate reference system; convert one of them first")
+    Error::data(&other.path, told).help(
+        "files that are read together agree in encoding, vertex properties and coordinate \
+         reference system; convert one of them first",
+    )
 }
 
 /// True for dimensions that many programs print with all digits into texts whose headers call them
@@ -186,9 +188,10 @@ fn needs_double(files: &[PlyFile], texts: &Texts) -> Result<bool> {
     let kind = |file: &PlyFile, n: usize| file.properties()[n].kind;
     let long: Vec<usize> = (0..texts.dimensions.len())
         .filter(|&n| is_long(&texts.dimensions[n]))
-        .filter(|&n| files.iter().any(|file| kind(file, n) == Kind::Scalar(Scalar::F32)))
+        .filter(|&n| files.iter().any(|file| kind(file, n) == PropertyKind::Scalar(Scalar::F32)))
         .collect();
-    let double = |file: &PlyFile| long.iter().any(|&n| kind(file, n) == Kind::Scalar(Scalar::F64));
+    let double =
+        |file: &PlyFile| long.iter().any(|&n| kind(file, n) == PropertyKind::Scalar(Scalar::F64));
     if long.is_empty() || files.iter().any(double) {
         return Ok(!long.is_empty());
     }
@@ -210,7 +213,7 @@ fn schema(file: &PlyFile, dimensions: &[String], wide: bool) -> Schema {
         .iter()
         .zip(dimensions)
         .filter_map(|(property, name)| {
-            let Kind::Scalar(scalar) = property.kind else { return None };
+            let PropertyKind::Scalar(scalar) = property.kind else { return None };
             let widens = wide && scalar == Scalar::F32 && is_long(name);
             let scalar = if widens { Scalar::F64 } else { scalar };
             let dimension = Dimension::new(name, scalar, stride);
@@ -241,7 +244,7 @@ fn metadata(files: &[PlyFile], mut texts: Vec<Texts>) -> Metadata {
         .zip(&texts[0].dimensions)
         .map(|(property, dimension)| (dimension.clone(), property.name.clone()))
         .collect();
-    let native = Native {
+    let native = PlyNative {
         encoding: first.header.encoding,
         properties,
         obj_info: union(files.iter().map(|f| f.header.obj_info.clone()).collect()),
@@ -365,35 +368,5 @@ impl Source for PlySource {
     fn warnings(&self) -> Vec<String> {
         let found = |file: &PlyFile| file.unread().into_iter().chain(file.rounded());
         self.warnings.iter().cloned().chain(self.files.iter().flat_map(found)).collect()
-    }
-}
-
-/// A range of the vertices of a binary file, read straight into the batch.
-struct BinaryPart<'a> {
-    file: File,
-    origin: &'a Origin,
-    at: u64,
-    left: u64,
-    source: u32,
-}
-
-impl Part for BinaryPart<'_> {
-    fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
-        let outcome = self.fill(batch);
-        self.origin.vouch(outcome, batch.is_empty())
-    }
-}
-
-impl BinaryPart<'_> {
-    fn fill(&mut self, batch: &mut PointBatch) -> Result<()> {
-        let points = self.left.min(batch.capacity() as u64);
-        batch.source = self.source;
-        let bytes = batch.refill(points as usize);
-        self.file.read_exact_at(bytes, self.at).map_err(|cause| {
-            Error::io(self.origin.path(), "read vertices", cause).at_byte(self.at)
-        })?;
-        self.at += bytes.len() as u64;
-        self.left -= points;
-        Ok(())
     }
 }

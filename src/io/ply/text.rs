@@ -20,8 +20,8 @@ pub(super) fn longest(scalar: Scalar) -> usize {
 }
 
 /// Parses one number of type `scalar` into the beginning of `record`, little-endian. False if it is
-/// none or beyond the type's range. A whole number may be written with a fraction or an exponent for
-/// an integer type; a `float` is rounded from its text to f32 at once.
+/// none or beyond the type's range. A whole number may be written with a fraction or an exponent
+/// for an integer type; a `float` is rounded from its text to f32 at once.
 pub(super) fn parse(token: &[u8], scalar: Scalar, record: &mut [u8]) -> bool {
     let Ok(text) = std::str::from_utf8(token) else { return false };
     macro_rules! whole {

@@ -7,8 +7,9 @@ use crate::point::{Dimension, Endian, Scalar, Schema};
 /// The vertex that holds every dimension of `from`, little-endian: coordinates as `double`, exactly
 /// stored · scale + origin; bit fields each as `uchar`; other scaled dimensions (the scan angle of
 /// point formats 6 to 10, in degrees) as `double`; 64-bit integers, which PLY does not have, as
-/// `double` too, where a value that rounds is refused; all others in their own type. Known dimensions
-/// come first, in the order of their PLY names. That of a PLY record is the record's own.
+/// `double` too, where a value that rounds is refused; all others in their own type. Known
+/// dimensions come first, in the order of their PLY names. That of a PLY record is the record's
+/// own.
 pub fn ply_schema(from: &Schema) -> Schema {
     if from.layout == RECORDS {
         return from.clone();

@@ -4,15 +4,15 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-use super::header::{Element, Encoding, Kind, shown};
+use super::header::{Element, Encoding, PropertyKind, shown};
 use crate::point::{Dimension, Endian, Scalar, Value};
 use crate::{Error, Result};
 
 /// Bytes of the window through which lists are walked.
 const WINDOW: usize = 1 << 16;
 
-/// Byte behind `elements`, which begin at byte `start` of a file of `length` bytes. Lists are walked
-/// one by one, each from its count; everything else is stepped over.
+/// Byte behind `elements`, which begin at byte `start` of a file of `length` bytes. Lists are
+/// walked one by one, each from its count; everything else is stepped over.
 pub(super) fn past(
     file: &File,
     path: &Path,
@@ -21,7 +21,7 @@ pub(super) fn past(
     length: u64,
     encoding: Encoding,
 ) -> Result<u64> {
-    let mut walk = Walk {
+    let mut walk = ElementWalk {
         file,
         path,
         length,
@@ -43,7 +43,7 @@ pub(super) fn past(
     Ok(walk.at)
 }
 
-struct Walk<'a> {
+struct ElementWalk<'a> {
     file: &'a File,
     path: &'a Path,
     length: u64,
@@ -54,12 +54,12 @@ struct Walk<'a> {
     from: u64,
 }
 
-impl Walk<'_> {
+impl ElementWalk<'_> {
     fn one(&mut self, element: &Element) -> Result<()> {
         for property in &element.properties {
             let bytes = match property.kind {
-                Kind::Scalar(scalar) => Some(scalar.size() as u64),
-                Kind::List { count, item } => {
+                PropertyKind::Scalar(scalar) => Some(scalar.size() as u64),
+                PropertyKind::List { count, item } => {
                     self.count(element, count)?.checked_mul(item.size() as u64)
                 }
             };

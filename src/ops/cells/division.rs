@@ -8,7 +8,7 @@ use crate::geom::angle::{
     cone, cosine, direction, dominant_axis, is_turned, outer_sum, range, sine2,
 };
 use crate::point::{Bounds, Position, distance2};
-use crate::tile::{Cells as Partition, Tile};
+use crate::tile::{Partition, Tile};
 
 /// Divisions by angle that a part may be deep, besides two for every doubling of the cell's
 /// positions, before it is cut in eight.

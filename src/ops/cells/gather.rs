@@ -8,7 +8,7 @@ use super::threshold::Threshold;
 use crate::geom::angle::{MaxAngle, is_known};
 use crate::report::Tally;
 use crate::stage::{Gathered, Needs, ScanOp, TileOp};
-use crate::tile::{Cells as Partition, Tile};
+use crate::tile::{Partition, Tile};
 use crate::{Error, Result};
 
 /// Bytes a position: what is found, 16 for every division and 32 for every initial cell that is

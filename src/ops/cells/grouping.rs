@@ -6,7 +6,7 @@ use super::keys::Cells;
 use super::settings::Reference;
 use crate::geom::angle::is_known;
 use crate::point::{Bounds, Position};
-use crate::tile::{Cells as Partition, Tile};
+use crate::tile::{Partition, Tile};
 use crate::{Error, Result};
 
 /// Cells along an axis that a packed key can tell apart.

@@ -47,11 +47,11 @@ pub(super) const LARGEST_SIDE: i64 = 1 << 62;
 /// on that angle, so all divisions are made once, those of the widest ranges count first, and of
 /// those of exactly the last range the first in canonical order (initial cells by their
 /// Morton-first position; each part before its own parts): as many as leave the number of records
-/// asked for. A position without a normal keeps a record and is among them. With `split =
-/// "voronoi"` the number is met exactly, as each division adds one record; a cut in eight adds up
-/// to seven, and the first in that order that would exceed the number ends it. If all divisions
-/// leave fewer, all are made. A division needs angles that differ: of a perfect plane no more can
-/// be kept than its initial cells.
+/// asked for. A position without a normal keeps a record and is among them. With
+/// `split = "voronoi"` the number is met exactly, as each division adds one record; a cut in eight
+/// adds up to seven, and the first in that order that would exceed the number ends it. If all
+/// divisions leave fewer, all are made. A division needs angles that differ: of a perfect plane no
+/// more can be kept than its initial cells.
 ///
 /// Before a run it looks at a sample of the scan: `normal_scatter` of the report is how far, in
 /// radians, normals are off their linear trend where the scan is planar (root of the mean square,
@@ -75,9 +75,9 @@ pub struct Cells {
     pub max_angle: Option<Setting<Angle>>,
     /// How many records are to stay, instead of `max_angle`: a share of those that the stage
     /// decides about ("10%", to six decimals, rounded to whole records), a number (500000, "250k",
-    /// "5M"), or "auto": as many as `max_angle = "auto"` would leave of the cubes of `side =
-    /// "auto"` with a quarter of their side as `min_spacing`, by samples, a third at most. The
-    /// angle is found again for what `side` and `min_spacing` come to then.
+    /// "5M"), or "auto": as many as `max_angle = "auto"` would leave of the cubes of
+    /// `side = "auto"` with a quarter of their side as `min_spacing`, by samples, a third at most.
+    /// The angle is found again for what `side` and `min_spacing` come to then.
     pub keep: Option<Keep>,
     /// Cells of so many positions or fewer are not divided (the paper's β).
     pub min_points: NonZeroUsize,
@@ -181,8 +181,8 @@ impl Cells {
         match (self.max_side, self.min_spacing) {
             (Some(most), Some(Setting::Given(least))) if most.is_less_than(least) => {
                 let told = format!(
-                    "`cells.max_side` is {most}, less than `cells.min_spacing`, {least}: cells between the two \
-                     would have to be divided and must not be"
+                    "`cells.max_side` is {most}, less than `cells.min_spacing`, {least}: cells \
+                     between the two would have to be divided and must not be"
                 );
                 Err(("max_side", Error::pipeline(told)))
             }
@@ -191,8 +191,8 @@ impl Cells {
             }
             _ if self.reference.is_some() && self.measure == Measure::Cone => {
                 let error = Error::pipeline(
-                    "`cells.reference` needs `cells.measure = \"axis\"`: the measure is \"cone\", which takes \
-                     angles to each cell's own axis",
+                    "`cells.reference` needs `cells.measure = \"axis\"`: the measure is \"cone\", \
+                     which takes angles to each cell's own axis",
                 );
                 let help = "add `cells.measure = \"axis\"`, or leave `cells.reference` out";
                 Err(("reference", error.help(help)))

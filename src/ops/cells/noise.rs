@@ -12,7 +12,7 @@ use crate::point::Position;
 use crate::quantity::{Angle, Setting};
 use crate::report::Grouped;
 use crate::stage::Forecast;
-use crate::tile::{Cells as Partition, Tile};
+use crate::tile::{Partition, Tile};
 
 /// `min_spacing` of what samples are divided into, as a share of the side.
 const QUARTER: i64 = 4;
@@ -145,8 +145,9 @@ fn noisy(cells: &Cells, samples: &[Vec<f64>], scatter: f64) -> Option<String> {
     }
     let percent = (100.0 * sum / f64::from(count)).round();
     Some(format!(
-        "normals scatter {}, more than the largest angle of a cell, {}: expect about {percent} % of the points to \
-         stay; raise `normals.neighbors` or `cells.max_angle`, or give `cells.keep`",
+        "normals scatter {}, more than the largest angle of a cell, {}: expect about {percent} % \
+         of the points to stay; raise `normals.neighbors` or `cells.max_angle`, or give \
+         `cells.keep`",
         Angle::told_like(scatter, given),
         given.told(),
     ))

@@ -85,7 +85,8 @@ impl Visitor<'_> for KeepVisitor {
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(
-            "a share of up to 100% such as \"10%\", a number of points from 1 such as 500000, \"250k\" or 1e6, or \"auto\"",
+            "a share of up to 100% such as \"10%\", a number of points from 1 such as 500000, \
+             \"250k\" or 1e6, or \"auto\"",
         )
     }
 

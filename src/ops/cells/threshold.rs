@@ -61,8 +61,9 @@ impl Threshold {
         let Threshold { target, kept, .. } = *self;
         self.is_all.then(|| {
             format!(
-                "{}, and {kept} stay however small the angle: cells whose normals are equal, or that are \
-                 no larger than `cells.min_spacing` and `cells.min_points` say, are not divided",
+                "{}, and {kept} stay however small the angle: cells whose normals are equal, or \
+                 that are no larger than `cells.min_spacing` and `cells.min_points` say, are not \
+                 divided",
                 asked(keep, target)
             )
         })

@@ -1,7 +1,7 @@
 //! Neighbourhoods estimated side by side: every lane does what
 //! [`Estimator::estimate`](super::Estimator::estimate) does, to the last bit.
 
-use super::estimate::{Estimate, Fallback, Method, Outcome, alone, settled, varady};
+use super::estimate::{Estimate, EstimateOutcome, Fallback, Method, alone, settled, varady};
 use super::fan::{Fan, LaneRow, MOST, load};
 use crate::geom::plane::{self, Covariance};
 use crate::geom::simd::{EIGHT, Kernel, Lanes, Mask, Real, Simd};
@@ -76,7 +76,7 @@ impl Bundle {
         method: Method,
         simd: Simd,
         star: &mut Star,
-        settle: &mut impl FnMut(usize, Outcome),
+        settle: &mut impl FnMut(usize, EstimateOutcome),
     ) {
         if self.owners.is_empty() {
             return;
@@ -133,7 +133,7 @@ struct Estimates {
 
 /// What came of a lane.
 enum LaneResult {
-    Outcome(Outcome),
+    Outcome(EstimateOutcome),
     /// All but the fan of triangles.
     NoFan {
         flat: [f64; 3],

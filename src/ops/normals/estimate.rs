@@ -36,10 +36,10 @@ pub enum Fallback {
 }
 
 /// What came of a neighbourhood.
-pub type Outcome = (Estimate, Option<Fallback>);
+pub type EstimateOutcome = (Estimate, Option<Fallback>);
 
 /// The normal at a position whose neighbours are at `offsets` from it.
-pub(super) fn alone(method: Method, star: &mut Star, offsets: &[[i64; 3]]) -> Outcome {
+pub(super) fn alone(method: Method, star: &mut Star, offsets: &[[i64; 3]]) -> EstimateOutcome {
     if offsets.len() < 2 || plane::collinear(offsets) {
         return (Estimate::None, None);
     }
@@ -53,7 +53,11 @@ pub(super) fn alone(method: Method, star: &mut Star, offsets: &[[i64; 3]]) -> Ou
 
 /// adj(C)·n_f, which is (−a, −b, 1) of the height function over the first estimate n_f, turned back
 /// from its frame; `flat`, the normal of the plane of regression, where that fails.
-pub(super) fn varady(adjugate: &[f64; 6], flat: [f64; 3], first: Option<[f64; 3]>) -> Outcome {
+pub(super) fn varady(
+    adjugate: &[f64; 6],
+    flat: [f64; 3],
+    first: Option<[f64; 3]>,
+) -> EstimateOutcome {
     let Some(first) = first else { return (settled(flat), Some(Fallback::NoTriangle)) };
     match plane::unit(plane::product(adjugate, first)) {
         Some(normal) => (settled(normal), None),

@@ -1,7 +1,7 @@
 //! Estimating the normals of many neighbourhoods: several side by side, the others alone.
 
 use super::bundle::{Bundle, in_morton_order};
-use super::estimate::{Method, Outcome, alone};
+use super::estimate::{EstimateOutcome, Method, alone};
 use crate::geom::simd::Simd;
 use crate::geom::star::Star;
 use crate::tile::Neighborhood;
@@ -30,7 +30,7 @@ impl Estimator {
     /// of them 0, all distinct, in Morton order, each smaller than 2^63.
     ///
     /// The result is a function of `offsets` alone, the same bits on every platform.
-    pub fn estimate(&mut self, offsets: &[[i64; 3]]) -> Outcome {
+    pub fn estimate(&mut self, offsets: &[[i64; 3]]) -> EstimateOutcome {
         alone(self.method, &mut self.star, offsets)
     }
 
@@ -40,7 +40,7 @@ impl Estimator {
         &mut self,
         owner: usize,
         neighborhood: &Neighborhood<'_>,
-        settle: &mut impl FnMut(usize, Outcome),
+        settle: &mut impl FnMut(usize, EstimateOutcome),
     ) {
         if !self.bundle.take(owner, neighborhood) {
             let offsets =
@@ -52,7 +52,7 @@ impl Estimator {
     }
 
     /// Calls `settle` for what was taken and is not settled yet.
-    pub fn finish(&mut self, settle: &mut impl FnMut(usize, Outcome)) {
+    pub fn finish(&mut self, settle: &mut impl FnMut(usize, EstimateOutcome)) {
         self.bundle.estimate(self.method, self.simd, &mut self.star, settle);
     }
 }

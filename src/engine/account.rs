@@ -1,0 +1,190 @@
+//! What a run tells of itself when its work is done: the figures of its report, once its ledgers
+//! balance, and why outputs are empty if they are.
+//!
+//! Records are counted in places that know nothing of each other: as they are read, as stages
+//! remove them, as chunks are cut, and as sinks write them. No count is computed from the others,
+//! so a record that is lost or written twice fails the run instead of being hidden in a difference.
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufWriter};
+use std::path::Path;
+
+use super::clock::Clock;
+use super::finished::{Finished, FinishedBranch};
+use super::job::Job;
+use super::lines::TileLines;
+use super::pass::Branch;
+use super::tagger::{LEFT_OUT, NOT_FINITE};
+use super::task::Task;
+use crate::budget::Budget;
+use crate::host::process::peak_memory;
+use crate::report::{
+    Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome, Removed, Report,
+    RunFigures, check_written,
+};
+use crate::stage::{CreateSink, Input, SinkSummary, Source};
+use crate::{Error, Result};
+
+impl Task {
+    /// The files of all sinks, each with the records that it was given and what it said.
+    fn written<'a>(
+        &'a self,
+        finished: &'a Finished,
+    ) -> impl Iterator<Item = (&'a dyn CreateSink, &'a (u64, SinkSummary))> {
+        let files = (0..self.sinks.len()).flat_map(|sink| self.files(sink)).map(|file| &**file);
+        files.zip(finished.written.iter().flatten())
+    }
+
+    /// What is known of the run when its output is written.
+    pub(super) fn figures(
+        &self,
+        finished: &Finished,
+        budget: &Budget,
+        spill_bytes: u64,
+    ) -> RunFigures {
+        let mut warnings = self.source.warnings();
+        let all = finished.written.iter().flatten();
+        warnings.extend(all.flat_map(|(_, sink)| sink.notes.iter().cloned()));
+        let outputs = self.written(finished).map(|(sink, (_, summary))| {
+            FileFigures::of(sink.path(), summary.points, Some(summary.bytes))
+        });
+        RunFigures {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            inputs: input_figures(&*self.source),
+            outputs: outputs.collect(),
+            machine: Machine::this(),
+            threads: self.threads,
+            memory_bytes: self.demands.limit,
+            leased_bytes: budget.peak(),
+            memory_holders: budget.at_peak(),
+            spill_bytes,
+            warnings,
+            ..RunFigures::default()
+        }
+    }
+
+    /// The report of a finished run, once its ledgers balance, and the lines of the tiles of each
+    /// branch.
+    pub(super) fn account(
+        &self,
+        finished: Finished,
+        mut run: RunFigures,
+        clock: Clock<'_>,
+    ) -> Result<(Report, Vec<Option<TileLines>>)> {
+        for (sink, (given, summary)) in self.written(&finished) {
+            check_written(sink.path(), *given, summary.points)?;
+        }
+        (run.seconds, run.cpu_seconds, run.phases) = clock.finish();
+        run.peak_memory_bytes = peak_memory();
+        run.work = finished.tally.work.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect();
+        let (mut results, mut lines) = (Vec::new(), Vec::new());
+        for (branch, came_to) in self.branches.iter().zip(finished.branches) {
+            let (result, tiles) = self.outcome(branch, came_to, finished.read)?;
+            results.push(result);
+            lines.push(tiles);
+        }
+        let mut results = results.into_iter();
+        let result = results.next().ok_or_else(|| Error::internal("a run came to nothing"))?;
+        Ok((Report { result, further: results.collect(), run }, lines))
+    }
+
+    /// What a branch came to, of so many records that were read.
+    fn outcome(
+        &self,
+        branch: &Branch,
+        finished: FinishedBranch,
+        read: u64,
+    ) -> Result<(Outcome, Option<TileLines>)> {
+        let ledger = Ledger::new(read, finished.kept, &finished.tally);
+        ledger.check()?;
+        let (tile_side, totals, tiles) = match finished.measured {
+            Some(measured) => {
+                (Some(measured.tile_side), Some(measured.totals), Some(measured.tiles))
+            }
+            None => (None, None, None),
+        };
+        let lattice = self.lattice.as_ref();
+        let mut decisions = finished.decisions;
+        if let Some(lattice) = lattice.filter(|lattice| lattice.z_scale() != 1.0) {
+            let (stage, name) = ("run".to_owned(), "z_scale".to_owned());
+            decisions.insert(0, Decision { stage, name, value: lattice.z_scale().into() });
+        }
+        let outcome = Outcome {
+            pipeline: branch.stages.clone(),
+            lattice: lattice.map(|l| LatticeFigures { step: l.step, shift: l.shift }),
+            ledger,
+            decisions,
+            counts: finished.tally.counts.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect(),
+            passes: finished.passes,
+            tile_side,
+            totals,
+            classes: finished.classes,
+        };
+        Ok((outcome, tiles))
+    }
+}
+
+/// Says that outputs are empty: that the input was so too, or what removed the points, by the
+/// settings that say so where there are any: the stages of commands are nothing that their users
+/// know.
+pub(super) fn nothing_left(finished: &Finished, job: &Job<'_>) -> Vec<String> {
+    if finished.read == 0 {
+        return vec!["the inputs have no points: what is written has none either".to_owned()];
+    }
+    let behind = job.filters.iter().map(|filter| (&filter.kind, &filter.transform));
+    let streams: Vec<_> =
+        job.transforms.iter().map(|(kind, stage)| (kind, stage)).chain(behind).collect();
+    let keys = |r: &Removed| -> Vec<&str> {
+        let ours = streams.iter().filter(|(kind, _)| **kind == r.stage);
+        let run = LEFT_OUT.iter().filter(|(reason, ..)| *reason == r.reason);
+        let nonfinite = (r.reason == NOT_FINITE).then_some("run.nonfinite");
+        let of_run = run.map(|(_, setting, _)| *setting).chain(nonfinite);
+        ours.flat_map(|(_, stage)| stage.removes_by()).chain(of_run).collect()
+    };
+    let by = |r: &Removed| {
+        let keys: Vec<String> = keys(r).iter().map(|key| format!("`{key}`")).collect();
+        let by = if keys.is_empty() { r.stage.clone() } else { keys.join(" and ") };
+        format!("{} {} ({by})", Grouped(r.records), r.reason)
+    };
+    let empty = finished.branches.iter().filter(|branch| branch.kept == 0);
+    let ledgers = empty.map(|branch| Ledger::new(finished.read, branch.kept, &branch.tally));
+    let told = ledgers.map(|ledger| {
+        let by: Vec<String> = ledger.removed.iter().map(by).collect();
+        format!("no point is left of {}: {}", Grouped(ledger.read), by.join(", "))
+    });
+    told.collect()
+}
+
+/// The lines of a branch's report tiles; none if it has none.
+fn lines_of(tiles: &Option<TileLines>) -> Box<dyn BufRead + '_> {
+    match tiles {
+        Some(lines) => Box::new(lines.reader()),
+        None => Box::new(std::io::empty()),
+    }
+}
+
+/// Writes the report to `staged` and brings it to disk.
+pub(super) fn write_report(
+    staged: &Path,
+    report: &Report,
+    tiles: &[Option<TileLines>],
+) -> Result<()> {
+    let write = || {
+        let mut out = BufWriter::new(File::create(staged)?);
+        report.write_all(&mut out, tiles.iter().map(lines_of))?;
+        out.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()
+    };
+    // Lines that the spill cannot give back are its error, about its file.
+    write().map_err(|e| match e.downcast::<Error>() {
+        Ok(error) => error,
+        Err(e) => Error::io(staged, "write the report", e),
+    })
+}
+
+fn input_figures(source: &dyn Source) -> Vec<FileFigures> {
+    let figures = |input: Input| {
+        let bytes = fs::metadata(&input.path).ok().map(|about| about.len());
+        FileFigures::of(&input.path, input.points, bytes)
+    };
+    source.inputs().into_iter().map(figures).collect()
+}

@@ -1,0 +1,271 @@
+//! What a run needs of the memory in each of its phases, from what is known before any work.
+//!
+//! What an allocation takes, the type that makes it says; here is who makes how many at once. So a
+//! formula stands beside its allocation, and the parts that are planned here have the names under
+//! which a run leases them and a refusal lists them.
+
+use super::by_rank::ordering_bytes;
+use super::chunk::OutputChunk;
+use super::encoding::ChunkEncoder;
+use super::filtering::Filtering;
+use super::outlet::A_THREAD;
+use super::pass::decides_by_normals;
+use super::placed::{BATCH, Placed};
+use super::product::Product;
+use super::survey::survey_bytes;
+use crate::budget::{Bytes, Holders};
+use crate::geom::nearest::Nearest;
+use crate::report::Baseline;
+use crate::stage::{ChunkSize, Needs, Source};
+use crate::store::{
+    FATE_BYTES, FIGURE_BYTES, Intake, NORMAL_BYTES, Pieces, RecordState, SealedTiles, merge_bytes,
+    ref_bytes,
+};
+use crate::tile::{Loader, Remote};
+
+/// Positions or records that a thread must be able to hold: with fewer, rims outweigh tiles.
+pub const FEWEST: usize = 16_384;
+/// Records that a run has at most, unless the scan then has more runs than a merge likes.
+const RUN_MOST: u64 = 1 << 19;
+const RUNS: u64 = 64;
+/// Stacks, allocator slack and decoder tables of a thread, and the same for the process.
+const THREAD_OVERHEAD: Bytes = Bytes(3 << 20);
+const PROCESS_OVERHEAD: Bytes = Bytes(6 << 20);
+
+/// What the division depends on.
+#[derive(Debug, Clone)]
+pub struct Demands {
+    /// Bound of the process's resident memory.
+    pub limit: u64,
+    /// Resident before the run.
+    pub resident: u64,
+    /// Worker threads.
+    pub threads: usize,
+    /// Bytes of a record.
+    pub stride: usize,
+    /// Points that the headers claim.
+    pub points: u64,
+    /// Bytes that reading a part holds.
+    pub part_bytes: u64,
+    /// What the largest chunk of a sink is.
+    pub chunk: ChunkSize,
+    /// Sinks that are written at once.
+    pub sinks: usize,
+    /// Bytes of the lists of records by input, where each input has an output of its own.
+    pub lists: Bytes,
+    /// True if the run needs tiles; else it streams.
+    pub mills: bool,
+    /// True if records have tags.
+    pub tagged: bool,
+    /// True if an output wants the order of the inputs.
+    pub ranked: bool,
+    /// Records that a run has at most, if something other than the memory bounds it.
+    pub run_most: Option<u64>,
+    /// True if stages stream behind stages that work on tiles.
+    pub filters: bool,
+    /// Outcomes of passes that are there at once: states and fates.
+    pub standings: usize,
+    /// True if a stage decides by figures of the whole scan, which are kept until it does.
+    pub gathers: bool,
+    /// True if a stage decides about cells together: how many points those have only the decode
+    /// tells.
+    pub has_cells: bool,
+    /// What the stages of each pass need.
+    pub passes: Vec<Vec<Needs>>,
+}
+
+impl Demands {
+    /// The demands of `source` into sinks with these chunks.
+    pub fn of(source: &dyn Source, chunks: &[ChunkSize], limit: u64, threads: usize) -> Self {
+        let largest = |of: fn(&ChunkSize) -> u64| chunks.iter().map(of).max().unwrap_or(0);
+        let chunk = ChunkSize {
+            points: largest(|chunk| chunk.points as u64) as usize,
+            bytes: largest(|chunk| chunk.bytes),
+        };
+        Demands {
+            limit,
+            resident: crate::host::process::resident_now().unwrap_or(8 << 20),
+            threads,
+            stride: source.schema().stride,
+            points: source.points(),
+            part_bytes: source.part_bytes(),
+            chunk,
+            sinks: chunks.len(),
+            lists: Bytes(0),
+            mills: false,
+            tagged: false,
+            ranked: false,
+            run_most: None,
+            standings: 2,
+            filters: false,
+            gathers: false,
+            has_cells: false,
+            passes: Vec::new(),
+        }
+    }
+
+    /// What the program holds whatever it does.
+    pub fn base(&self) -> Holders {
+        Holders::of([
+            ("program", Bytes(self.resident) + PROCESS_OVERHEAD),
+            ("overhead of threads", self.by_threads(THREAD_OVERHEAD)),
+            ("list of records by input", self.lists),
+        ])
+    }
+
+    /// What a run with tiles holds from the decode on, beside the points that it keeps in memory.
+    pub(super) fn index(&self) -> Holders {
+        // That of the runs and that of the merged scan exist side by side for a moment.
+        let index = SealedTiles::index_bytes(self.points);
+        match self.mills {
+            true => Holders::of([
+                ("index of the sorted runs", index),
+                ("index of the scan", index),
+                ("table of stored pieces", self.tables()),
+            ]),
+            false => Holders::default(),
+        }
+    }
+
+    /// Bytes of the tables of all that is stored by number; that of the order has gaps.
+    fn tables(&self) -> Bytes {
+        let order = ref_bytes(self.tagged);
+        let states_and_fates = [size_of::<RecordState>(), FATE_BYTES].repeat(self.standings);
+        let places = self.ranked.then_some(size_of::<u64>());
+        let stores = [self.stride, order, order, NORMAL_BYTES, FIGURE_BYTES];
+        let all = stores.into_iter().chain(states_and_fates).chain(places);
+        all.map(|stride| Pieces::table_bytes(self.points, stride)).sum()
+    }
+
+    /// What all threads hold where each holds `each`.
+    pub(super) fn by_threads(&self, each: Bytes) -> Bytes {
+        each * self.threads as u64
+    }
+
+    /// What the decode holds where each thread sorts runs of so many records.
+    pub fn decode(&self, run_records: u64) -> Holders {
+        let batch = Bytes::from(self.stride) + Bytes::from(Placed::BYTES_PER_RECORD);
+        let run = Intake::fixed_bytes(self.stride) + self.intake() * run_records;
+        Holders::of([
+            ("reading of parts", self.by_threads(Bytes(self.part_bytes))),
+            ("placing of records", self.by_threads(batch * BATCH as u64)),
+            ("sorting of records", self.by_threads(run)),
+        ])
+    }
+
+    /// What the merge of runs of so many records holds.
+    pub(super) fn merge(&self, run_records: u64) -> Holders {
+        // A thread leaves one run that is not full.
+        let runs = (self.points / run_records.max(1)).saturating_add(self.threads as u64);
+        let all = self.by_threads(merge_bytes(runs, self.stride));
+        Holders::of([("merging of sorted runs", all)])
+    }
+
+    /// Bytes that an intake holds for each record.
+    pub(super) fn intake(&self) -> Bytes {
+        Intake::bytes_per_record(self.stride, self.tagged, self.ranked)
+    }
+
+    /// Records of a run for which neither the decode, which holds one, nor the merge, which holds a
+    /// bit of each, takes more than they must.
+    fn fewest_records(&self) -> u64 {
+        let run = merge_bytes(1, self.stride).0 - merge_bytes(0, self.stride).0;
+        let all = u128::from(self.points) * u128::from(run);
+        let balanced = (all / u128::from(self.intake().0)).isqrt() as u64;
+        balanced.max(FEWEST as u64).min(self.most_records())
+    }
+
+    /// Records of a run beyond which a larger one gains nothing: it is sorted and gathered outside
+    /// of the caches, and its memory is written to for the first time.
+    pub(super) fn most_records(&self) -> u64 {
+        RUN_MOST.max(self.points / RUNS).min(self.run_most.unwrap_or(u64::MAX)).max(1)
+    }
+
+    /// What the mill holds besides its tiles. Chunks that are cut wait in the outlet; one is open
+    /// for every sink, that of the first among those that wait.
+    fn outputs(&self) -> Holders {
+        let (points, encoded) = (self.chunk.points as u64, Bytes(self.chunk.bytes));
+        let chunk = Bytes::of(points, OutputChunk::BYTES_PER_RECORD);
+        let chunks = chunk * A_THREAD + chunk * self.other_sinks();
+        let encoding = ChunkEncoder::bytes(points, self.stride) + encoded * A_THREAD;
+        let by_normals = self.passes.iter().flatten().any(decides_by_normals);
+        let baseline = if by_normals { Baseline::BYTES } else { 0 };
+        let filters = match self.filters {
+            true => Filtering::bytes(self.stride),
+            false => Bytes(0),
+        };
+        Holders::of([
+            ("queue of chunks", self.by_threads(chunks)),
+            ("encoding of chunks", self.by_threads(encoding)),
+            ("comparison with grids", self.by_threads(Bytes(baseline))),
+            ("search beyond tiles", self.by_threads(Bytes(Remote::BYTES))),
+            ("streaming behind tiles", self.by_threads(filters)),
+        ])
+    }
+
+    fn other_sinks(&self) -> u64 {
+        self.sinks.saturating_sub(1) as u64
+    }
+
+    /// What a stream holds. What waits is behind what is read and what is open, and one more of
+    /// each is spare.
+    pub fn stream(&self) -> Holders {
+        let chunk = Bytes::of(self.chunk.points as u64, self.stride);
+        let chunks = chunk * (A_THREAD + 1) + chunk * self.other_sinks();
+        let batches = Bytes::of(BATCH as u64, self.stride) * (A_THREAD + 1);
+        Holders::of([
+            ("reading of parts", self.by_threads(Bytes(self.part_bytes))),
+            ("queue of batches", self.by_threads(batches)),
+            ("queue of chunks", self.by_threads(chunks)),
+            ("encoding of chunks", self.by_threads(Bytes(self.chunk.bytes) * A_THREAD)),
+        ])
+    }
+
+    /// Bytes of a tile per position it holds, the product that it leaves behind included.
+    fn tile_bytes_per_point(&self) -> Bytes {
+        let of = |pass: &Vec<Needs>| {
+            let looks = pass.iter().any(|n| n.neighbors > 0);
+            let search = if looks { Nearest::BYTES_PER_POINT } else { 0 };
+            let stages = pass.iter().map(|n| Bytes::from(n.bytes_per_point));
+            stages.sum::<Bytes>() + Bytes::from(search)
+        };
+        let stages = self.passes.iter().map(of).max().unwrap_or_default();
+        let sieved = self.tagged || self.passes.len() > 1;
+        let sieve = if sieved { Loader::SIEVE_BYTES_PER_POINT } else { 0 };
+        let product = Product::BYTES_PER_POINT + if self.ranked { Product::PLACE_BYTES } else { 0 };
+        Bytes::from(Loader::BYTES_PER_POINT + sieve) + Bytes::of(A_THREAD, product) + stages
+    }
+
+    /// What the mill holds where `millers` of the threads have tiles of `positions` positions, rim
+    /// included.
+    pub fn mill(&self, millers: usize, positions: u64) -> Holders {
+        let tiles = self.tile_bytes_per_point() * positions * millers as u64;
+        self.outputs().with(&Holders::of([("milling of tiles", tiles)]))
+    }
+
+    /// Positions that the tile of each of `millers` threads may hold where the mill has `bytes`.
+    pub fn tile_positions(&self, millers: usize, bytes: u64) -> usize {
+        let tiles = bytes.saturating_sub(self.outputs().sum().0);
+        let share = tiles / (millers as u64).max(1) / self.tile_bytes_per_point().0;
+        usize::try_from(share).unwrap_or(usize::MAX)
+    }
+
+    /// The most that any phase holds.
+    fn work(&self, run_records: u64, tile_positions: u64) -> Holders {
+        let survey = Holders::of([("survey", self.by_threads(survey_bytes()))]);
+        let ordering = self.by_threads(ordering_bytes(self.points));
+        let ordering = Holders::of([("ordering of records", ordering)]).with(&self.outputs());
+        self.mill(self.threads, tile_positions)
+            .larger(self.decode(run_records))
+            .larger(self.merge(run_records))
+            .larger(survey)
+            .larger(if self.ranked { ordering } else { Holders::default() })
+    }
+
+    pub(super) fn least(&self) -> Holders {
+        match self.mills {
+            true => self.work(self.fewest_records(), FEWEST as u64),
+            false => self.stream(),
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! What stages are told of the whole scan, and what they settle by it: before the first tile,
+//! behind a first phase, and for the report.
+//!
+//! A stage settles by figures of the scan and not by those of the first tile that it meets, so that
+//! it does the same to every tile, however tiles are cut. What it settled by itself is in the
+//! report, so that the same can be asked for by hand.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use super::chunks::FoundValues;
+use super::job::Job;
+use super::pass::{Branch, Op};
+use crate::geom::lattice::Lattice;
+use crate::point::Bounds;
+use crate::report::{Decision, Grouped, Short, Tally};
+use crate::stage::{Gathered, ScanFacts};
+use crate::store::SealedTiles;
+use crate::{Error, Result};
+
+/// What a first phase found, for its stage.
+struct GatheredValues {
+    found: FoundValues,
+    records: u64,
+}
+
+impl Gathered for GatheredValues {
+    fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()> {
+        self.found.each(visit)
+    }
+
+    fn records(&self) -> u64 {
+        self.records
+    }
+}
+
+/// Lets the stage `op` conclude from what its first phase found, about so many records.
+pub(crate) fn conclude(
+    job: &mut Job<'_>,
+    op: usize,
+    found: FoundValues,
+    records: u64,
+) -> Result<()> {
+    let warning = match &mut job.ops[op].op {
+        Op::Scan(op) => op.conclude(&GatheredValues { found, records })?,
+        Op::Tile(_) => return Err(Error::internal("a stage gathered that has one phase")),
+    };
+    warning.into_iter().for_each(|warning| job.warn(warning));
+    Ok(())
+}
+
+/// Tells all stages what is known of the scan, before the first tile.
+pub(crate) fn settle(job: &mut Job<'_>, lattice: &Lattice, tiles: &SealedTiles) -> Result<()> {
+    let facts = ScanFacts {
+        points: tiles.points(),
+        positions: tiles.positions(),
+        bounds: tiles.bounds(),
+        lattice,
+        levels: tiles.levels(),
+    };
+    job.ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().settle(&facts))?;
+    let warnings = job.ops.iter().flat_map(|stage| stage.op.tile().warnings(lattice));
+    // Stages that are applied several times say it once.
+    let warnings: BTreeSet<String> = warnings.collect();
+    warnings.into_iter().for_each(|warning| job.warn(warning));
+    Ok(())
+}
+
+/// What the lattice rounded, as a decision of the report; a warning where it rounded much.
+pub(crate) fn rounding(
+    job: &Job<'_>,
+    lattice: &Lattice,
+    bounds: &Bounds,
+    tally: &Tally,
+) -> Option<Decision> {
+    let apart = tally.apart?;
+    let count = |name| tally.counts.get(name).copied().unwrap_or(0);
+    let (unequal, positions) = (count("unequal_coordinates"), count("positions"));
+    if unequal > positions / 1000 {
+        let finer = match lattice.finer(bounds, apart.nearest) {
+            Some(step) => format!("`run.lattice = {step:e}` tells them apart"),
+            None => "no step that is finer reaches the scan from its origin".to_owned(),
+        };
+        job.warn(format!(
+            "{} of {} positions hold points of unequal coordinates, up to {} from each other: \
+             the lattice has steps of {}; {finer}",
+            Grouped(unequal),
+            Grouped(positions),
+            Short(apart.farthest),
+            Short(lattice.step)
+        ));
+    }
+    let (stage, name) = ("run".to_owned(), "unequal_coordinates_apart".to_owned());
+    Some(Decision { stage, name, value: apart.farthest.into() })
+}
+
+/// What the stages of a branch settled by themselves and what they expected, in their order.
+pub(crate) fn decisions(
+    job: &Job<'_>,
+    branch: &Branch,
+    forecasts: &[Option<Vec<(String, Value)>>],
+) -> Vec<Decision> {
+    let each = branch.ops.iter().flat_map(|&op| {
+        let (stage, expected) = (&job.ops[op], forecasts[op].clone());
+        let mut settled = stage.op.tile().decisions();
+        // What was chosen by samples may be among what is settled.
+        let is_new = |(name, _): &(String, Value)| settled.iter().all(|(other, _)| other != name);
+        let expected: Vec<_> = expected.into_iter().flatten().filter(is_new).collect();
+        settled.extend(expected);
+        settled.into_iter().map(|(name, value)| Decision { stage: stage.kind.clone(), name, value })
+    });
+    each.collect()
+}

@@ -1,0 +1,105 @@
+//! Where outputs are to appear: none replaces what is read or another output, and each can appear
+//! where it should. Found out before any point is read.
+
+use std::path::{Path, PathBuf};
+
+use crate::engine::beside::Beside;
+use crate::engine::by_input::ranks;
+use crate::engine::publish::check_place;
+use crate::graph::RunSettings;
+use crate::host::{Clash, Files, Use};
+use crate::stage::{CreateSink, OpenSource, Source};
+use crate::store::TAGGED_INPUTS;
+use crate::{Error, ErrorKind, Result};
+
+/// Refuses outputs that would replace what is read or each other, or that cannot appear where they
+/// should. The files of folders are not among them: [`each_input`] adds these to what is returned.
+pub(super) fn check_places(
+    pipeline: Option<&Path>,
+    inputs: &[PathBuf],
+    sinks: &[Box<dyn CreateSink>],
+    settings: &RunSettings,
+) -> Result<Files> {
+    let mut files = Files::default();
+    pipeline.iter().for_each(|path| files.read(path, Use::Pipeline));
+    inputs.iter().for_each(|path| files.read(path, Use::Input));
+    let outputs = sinks.iter().map(|sink| (sink.path(), sink.is_folder()));
+    for (path, is_folder) in outputs.chain(settings.report.as_deref().map(|path| (path, false))) {
+        files.write(path).map_err(|clash| refuse(&clash, path))?;
+        if !is_folder {
+            check_place(path, settings.existing)?;
+        }
+    }
+    match settings.scratch.as_ref().filter(|folder| !folder.is_dir()) {
+        Some(folder) => Err(Error::new(ErrorKind::Io, "the folder for scratch does not exist")
+            .at(folder)
+            .help("create it first, or name another with `run.scratch`")),
+        None => Ok(files),
+    }
+}
+
+/// The inputs, and what their records refer to.
+pub(super) fn all_read(open: &dyn OpenSource, source: &dyn Source) -> Vec<PathBuf> {
+    let beside = source.inputs().into_iter().filter_map(|input| input.beside);
+    open.paths().into_iter().chain(beside.map(|(path, _)| path)).collect()
+}
+
+/// What is to be copied beside outputs, none of which is one of the other `files`.
+pub(super) fn copies(
+    source: &dyn Source,
+    sinks: &[Box<dyn CreateSink>],
+    each: &[Vec<Box<dyn CreateSink>>],
+    settings: &RunSettings,
+    files: &mut Files,
+) -> Result<Vec<Beside>> {
+    let mut copies = Vec::new();
+    for (n, input) in source.inputs().iter().enumerate() {
+        for (sink, own) in sinks.iter().zip(each) {
+            let sink = own.get(n).unwrap_or(sink);
+            let copy = Beside::of(input, &**sink, files);
+            if let Some(copy) = copy.map_err(|(to, clash)| refuse(&clash, &to))? {
+                // A folder that the run makes first has nothing in it.
+                if own.is_empty() || copy.to.parent().is_some_and(Path::is_dir) {
+                    check_place(&copy.to, settings.existing)?;
+                }
+                copies.push(copy);
+            }
+        }
+    }
+    Ok(copies)
+}
+
+fn refuse(clash: &Clash, output: &Path) -> Error {
+    Error::pipeline(format!("this {clash}")).at(output).help("write to another file")
+}
+
+/// Sinks of the inputs for each output that is a folder, and the ranks of the inputs if one is.
+pub(super) type EachInput = (Vec<Vec<Box<dyn CreateSink>>>, Vec<u32>);
+
+/// Names the outputs of folders; refuses those that cannot appear there, or that would replace one
+/// of the other `files`.
+pub(super) fn each_input(
+    source: &dyn Source,
+    sinks: &[Box<dyn CreateSink>],
+    settings: &RunSettings,
+    files: &mut Files,
+) -> Result<EachInput> {
+    let inputs = source.inputs();
+    if inputs.len() > TAGGED_INPUTS as usize && sinks.iter().any(|sink| sink.is_folder()) {
+        let told = format!("more than {TAGGED_INPUTS} inputs cannot have an output each");
+        return Err(Error::pipeline(told).help("run them in several parts"));
+    }
+    let mut each = Vec::new();
+    for sink in sinks {
+        let own = sink.each_input(&inputs)?.unwrap_or_default();
+        for path in own.iter().map(|sink| sink.path().to_owned()) {
+            files.write(&path).map_err(|clash| refuse(&clash, &path))?;
+            if sink.path().is_dir() {
+                check_place(&path, settings.existing)?;
+            }
+        }
+        each.push(own);
+    }
+    let folders = each.iter().any(|own| !own.is_empty());
+    Ok((each, if folders { ranks(&inputs) } else { Vec::new() }))
+}

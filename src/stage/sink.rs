@@ -1,0 +1,176 @@
+//! Where records go: what a stage says of its outputs, and how records are encoded and written.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::source::Input;
+use crate::Result;
+use crate::point::{Metadata, PointBatch, Schema};
+
+/// Where records go. A sink writes below the path it is given; the run puts the finished file in
+/// its final place.
+pub trait Sink: Send {
+    /// Records that one [`Encode::encode`] takes; only the last may have fewer.
+    fn chunk_points(&self) -> usize;
+
+    /// Bytes that encoding one chunk holds, output included.
+    fn chunk_bytes(&self) -> u64;
+
+    /// The encoder, shared by all threads.
+    fn encoder(&self) -> Arc<dyn Encode>;
+
+    /// Writes one chunk; called in canonical order, from one thread at a time.
+    fn append(&mut self, chunk: Encoded) -> Result<()>;
+
+    /// Writes what depends on all points (header counts, chunk table) and flushes to disk.
+    fn finish(self: Box<Self>) -> Result<SinkSummary>;
+}
+
+/// The part of a sink that runs on several threads at once.
+pub trait Encode: Send + Sync {
+    /// Encodes up to `chunk_points` records of the source's schema.
+    fn encode(&self, batch: &PointBatch) -> Result<Encoded>;
+}
+
+/// An encoded chunk and the figures that a header needs.
+#[derive(Debug, Clone, Default)]
+pub struct Encoded {
+    /// The bytes to append.
+    pub bytes: Vec<u8>,
+    /// Points in them.
+    pub points: u64,
+    /// Smallest stored X, Y, Z (formats with integer coordinates).
+    pub lo: [i64; 3],
+    /// Largest stored X, Y, Z.
+    pub hi: [i64; 3],
+    /// Points by return number, 1 to 15 (formats that count them).
+    pub returns: [u64; 15],
+    /// Points that a conversion rounded, and by how much at most, in world units.
+    pub rounded: Option<(u64, f64)>,
+    /// In which of its forms a format wrote the chunk; 0 where it has one.
+    pub form: u8,
+}
+
+/// What a sink says when it is done.
+#[derive(Debug, Clone, Default)]
+pub struct SinkSummary {
+    /// Points written.
+    pub points: u64,
+    /// Bytes of the finished file.
+    pub bytes: u64,
+    /// Things the user should know (rounding of a conversion, for example).
+    pub notes: Vec<String>,
+}
+
+/// How much a sink encodes at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ChunkSize {
+    /// See [`Sink::chunk_points`].
+    pub points: usize,
+    /// See [`Sink::chunk_bytes`].
+    pub bytes: u64,
+}
+
+impl ChunkSize {
+    /// The same where the records of a chunk are held once more, each in `stride` bytes.
+    pub fn and_records(self, stride: usize) -> Self {
+        let records = (self.points as u64).saturating_mul(stride as u64);
+        ChunkSize { bytes: self.bytes.saturating_add(records), ..self }
+    }
+}
+
+/// Creates a sink once the source's schema is known.
+pub trait CreateSink: Send + Sync {
+    /// The final path of the output; the folder where there is one output for each input.
+    fn path(&self) -> &Path;
+
+    /// True if each input gets an output of its own, in the folder [`path`](CreateSink::path).
+    fn is_folder(&self) -> bool {
+        false
+    }
+
+    /// The sinks of the `inputs`, in their order, if each input gets an output of its own: this one
+    /// then is not created, and its [`chunk`](CreateSink::chunk) is as large as any of theirs. They
+    /// are created one after the other, each with [`Source::metadata_of`] its input, and an input
+    /// of which no record is kept gets its output too.
+    ///
+    /// Fails if two outputs would have one name; that none replaces an input is the plan's to
+    /// check. Makes nothing: the folder is made by the run.
+    fn each_input(&self, _inputs: &[Input]) -> Result<Option<Vec<Box<dyn CreateSink>>>> {
+        Ok(None)
+    }
+
+    /// The order in which records are wanted.
+    fn order(&self) -> Order;
+
+    /// True if records that come in canonical order may be ordered by time within a chunk, because
+    /// the output is smaller then.
+    fn likes_time(&self) -> bool {
+        false
+    }
+
+    /// True if its records still refer to the file beside the input ([`Input::beside`]), so that a
+    /// copy is to be beside the output.
+    fn wants_beside(&self) -> bool {
+        false
+    }
+
+    /// True if it writes the normals that a stage computed.
+    fn wants_normals(&self) -> bool;
+
+    /// The dimensions of its records that it does not look at.
+    fn unread(&self) -> &[String] {
+        &[]
+    }
+
+    /// The chunks of the output that [`create`](CreateSink::create) would open, for a plan of the
+    /// memory. Fails where `create` would refuse the schema.
+    fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize>;
+
+    /// Bytes that each record takes on the disk at least while the output is written, and those
+    /// that it may take besides, where a format writes a file anew; 0 where only the encoded
+    /// records tell.
+    fn disk_bytes(&self, _schema: &Arc<Schema>, _metadata: &Metadata) -> Result<[u64; 2]> {
+        Ok([0; 2])
+    }
+
+    /// What the output will not hold though the input has it, and nobody was asked; for a plan.
+    fn warnings(&self, _schema: &Schema, _metadata: &Metadata) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Fails on a record that the output cannot hold, for a plan that looks at some before it
+    /// begins.
+    fn check(&self, _metadata: &Metadata, _records: &PointBatch) -> Result<()> {
+        Ok(())
+    }
+
+    /// True if [`check`](CreateSink::check) may fail for records of `schema`.
+    fn checks(&self, _schema: &Schema) -> bool {
+        false
+    }
+
+    /// Checks that the format holds every dimension (or that the user dropped it) and opens the
+    /// output at `staged`, a path beside the final one. With `whole`, every record of the source
+    /// will come, in its order: what refers to records by number stays true.
+    fn create(
+        &self,
+        staged: &Path,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+        whole: bool,
+    ) -> Result<Box<dyn Sink>>;
+}
+
+/// Order of an output's records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Order {
+    /// Canonical where the pipeline has tile stages, input order where it streams.
+    #[default]
+    Auto,
+    /// Morton order of the lattice, then record bytes.
+    Canonical,
+    /// The order of the inputs: by file, as they are given, then by record. For one output of all
+    /// inputs, or pipelines that stream.
+    Input,
+}

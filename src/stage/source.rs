@@ -1,0 +1,119 @@
+//! Where records come from: what a stage says of its inputs, and how their records are read.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::point::{Metadata, PointBatch, Schema};
+use crate::{Error, Result};
+
+/// Opens the inputs of a source: headers only, no point.
+pub trait OpenSource: Send + Sync {
+    /// Reads every header, checks that the inputs agree, and bounds what they claim by their
+    /// length.
+    fn open(&self) -> Result<Box<dyn Source>>;
+
+    /// Files that it reads, so that no output is written over one of them.
+    fn paths(&self) -> Vec<PathBuf> {
+        Vec::new()
+    }
+
+    /// The family of formats of its files, if it is nothing but these files.
+    fn family(&self) -> Option<&str> {
+        None
+    }
+
+    /// This source and `other` as one, whose inputs come behind its own.
+    ///
+    /// # Errors
+    ///
+    /// If they cannot be read as one: as it is here, where nothing is known of the two.
+    fn merged(&self, _other: &dyn OpenSource) -> Result<Box<dyn OpenSource>> {
+        Err(Error::pipeline("this source cannot be merged with another"))
+    }
+}
+
+/// Where records come from.
+pub trait Source: Send + Sync {
+    /// What every record holds.
+    fn schema(&self) -> &Arc<Schema>;
+
+    /// What outputs carry on besides points.
+    fn metadata(&self) -> &Metadata;
+
+    /// The files, in input order, as the report names them; empty when there are none.
+    fn inputs(&self) -> Vec<Input> {
+        Vec::new()
+    }
+
+    /// What the output of one of the [`inputs`](Source::inputs) alone carries on: its own header
+    /// and records, where [`metadata`](Source::metadata) is what all have in common. Read again
+    /// from the file, so that thousands of headers are not held; a file that changed since is an
+    /// error.
+    ///
+    /// The records of a batch still are in the source's schema: a sink that is created with this
+    /// brings them to what the input's own header says of them.
+    fn metadata_of(&self, _input: usize) -> Result<Metadata> {
+        Ok(self.metadata().clone())
+    }
+
+    /// How many points the headers claim, cut to what the files could hold at most.
+    fn points(&self) -> u64;
+
+    /// Bytes that reading one part holds besides the caller's batch (decoder state, read buffers).
+    fn part_bytes(&self) -> u64;
+
+    /// How many parts there are. Parts are independent and numbered in input order.
+    fn parts(&self) -> usize;
+
+    /// Opens part `index < parts()`.
+    fn part(&self, index: usize) -> Result<Box<dyn Part + '_>>;
+
+    /// Opens a part of which nobody will look at the dimensions `unread`: their fields may hold
+    /// anything, so that a source need not decode them. Coordinates are never among them.
+    fn part_without(&self, index: usize, _unread: &[String]) -> Result<Box<dyn Part + '_>> {
+        self.part(index)
+    }
+
+    /// Warnings for the user that opening or reading gave rise to (dropped faces, odd headers).
+    fn warnings(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// What headers say of points and is not so. Asked when every part was read to its end; of
+    /// inputs that were not, nothing is known.
+    fn contradictions(&self) -> Vec<Contradiction> {
+        Vec::new()
+    }
+}
+
+/// A file that a source reads.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Input {
+    /// Its path, as given.
+    pub path: PathBuf,
+    /// Its points; a source that does not find as many while it reads fails.
+    pub points: u64,
+    /// A file that its records refer to, such as waveforms, and that is to be beside outputs, under
+    /// their names with another extension: where it is, and that extension.
+    pub beside: Option<(PathBuf, &'static str)>,
+}
+
+/// Something that the header of an input says of its points and that is not so.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Contradiction {
+    /// The file.
+    pub path: PathBuf,
+    /// Byte of the header's field.
+    pub byte: u64,
+    /// What it says, and what was found.
+    pub message: String,
+    /// True if the points may be damaged, false if it must be the header that is wrong.
+    pub is_damage: bool,
+}
+
+/// A stretch of a source's records, in input order.
+pub trait Part: Send {
+    /// Refills `batch` with up to its capacity of the next records and sets its source number; an
+    /// empty batch is the end. After an error the part is not read again.
+    fn read(&mut self, batch: &mut PointBatch) -> Result<()>;
+}

@@ -1,0 +1,10 @@
+//! The command: its arguments, words and events.
+
+mod check;
+mod errors;
+mod events;
+mod interrupt;
+mod names;
+mod picture;
+mod values;
+mod words;

@@ -1,0 +1,6 @@
+//! The command `convert`, and what becomes of fields, colours and units.
+
+mod colors;
+mod fields;
+mod runs;
+mod units;

@@ -1,0 +1,5 @@
+//! Inputs that are wrong.
+
+mod headers;
+mod places;
+mod points;

@@ -1,0 +1,12 @@
+//! Files in and out: LAS, LAZ and PLY, conversion between them, outputs in folders, and that
+//! nothing is lost.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and tell why")]
+
+mod convert;
+mod las;
+mod laz;
+mod lossless;
+mod outdir;
+mod ply;
+mod support;

@@ -1,6 +1,0 @@
-//! The repository itself: what imports what, what pages say, what it depends on.
-
-mod dependencies;
-mod drift;
-mod imports;
-mod modules;

@@ -1,0 +1,8 @@
+//! The repository itself: what imports what, what pages say, what it depends on.
+
+mod dependencies;
+mod drift;
+mod imports;
+mod modules;
+mod readable;
+mod synth_paper;

@@ -1,0 +1,8 @@
+//! LAS and LAZ files.
+
+mod formats;
+mod holes;
+mod merge;
+mod metadata;
+mod scans;
+mod verify;

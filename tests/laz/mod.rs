@@ -1,0 +1,4 @@
+//! The decoder of compressed points.
+
+mod damage;
+mod oracle;

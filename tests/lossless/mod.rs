@@ -1,0 +1,4 @@
+//! Nothing is lost.
+
+mod edges;
+mod records;

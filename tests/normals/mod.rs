@@ -1,0 +1,7 @@
+//! The stage `normals`.
+
+mod orient;
+mod plane;
+mod solvers;
+mod star;
+mod truth;

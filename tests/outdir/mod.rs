@@ -1,0 +1,4 @@
+//! Outputs in folders, one for each input.
+
+mod io;
+mod run;

@@ -1,0 +1,6 @@
+//! Runs of several passes.
+
+mod branches;
+mod exact;
+mod lossless;
+mod same_bytes;

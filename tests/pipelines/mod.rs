@@ -1,0 +1,8 @@
+//! Pipeline files: their text, values, and the files that they name.
+
+mod formats;
+mod inputs;
+mod text;
+mod user_files;
+mod values;
+mod words;

@@ -1,0 +1,5 @@
+//! PLY files.
+
+mod files;
+mod refused;
+mod scans;

@@ -1,7 +1,0 @@
-//! Runs and what may go wrong in them.
-
-#[path = "../run_support/mod.rs"]
-mod run_support;
-
-mod edges;
-mod trouble;

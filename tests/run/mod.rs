@@ -1,0 +1,7 @@
+//! Runs and what may go wrong in them.
+
+mod edges;
+mod killed;
+mod spill_damage;
+mod threads;
+mod trouble;

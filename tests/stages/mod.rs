@@ -1,0 +1,14 @@
+//! Stages against brute force and at their limits.
+
+mod bad_luck;
+mod classes;
+mod exact;
+mod extremes;
+mod grid;
+mod orders;
+mod outliers;
+mod reduce_auto;
+mod run;
+mod same_bytes;
+mod tiles;
+mod unread;
