@@ -39,7 +39,7 @@ impl Chunks {
         end: u64,
     ) -> Result<(Self, Option<String>)> {
         let points = header.points();
-        let start = u64::from(header.points_start());
+        let start = u64::from(header.offset_to_point_data);
         if points == 0 {
             return Ok((Chunks::Known(Table::default()), None));
         }
@@ -103,7 +103,7 @@ pub fn uncounted(
     evlrs_start: Option<u64>,
     compression: &Compression,
 ) -> Result<Option<u64>> {
-    let start = u64::from(header.points_start());
+    let start = u64::from(header.offset_to_point_data);
     let first = start + TABLE_OFFSET_BYTES;
     if header.points() > 0 || first > file.len() {
         return Ok(None);

@@ -124,8 +124,8 @@ impl Opened {
         let (before, chunks, in_a_row): (u64, Vec<Chunk>, _) = match &self.input.storage {
             Storage::Plain => {
                 let header = &self.input.header;
-                let each = u64::from(header.record_length());
-                let at = u64::from(header.points_start()) + place.first * each;
+                let each = u64::from(header.point_data_record_length);
+                let at = u64::from(header.offset_to_point_data) + place.first * each;
                 return Ok(Box::new(PlainPart { file, source, at, left: place.count, shift }));
             }
             Storage::Laz(_, Chunks::InARow { all, chunk_points }) => {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::fields::{at, encoding};
 use super::file::InputFile;
 use super::header::Header;
-use super::text::{split_at_room, text};
+use super::text::{field, text};
 use crate::budget::Bytes;
 use crate::error::shown;
 use crate::io::origin::Origin;
@@ -54,10 +54,8 @@ impl Vlr {
     /// A new record; `payload` must be shorter than 64 KiB.
     pub fn new(user: &str, record: u16, description: &str, payload: Vec<u8>) -> Self {
         let mut head = [0; VLR_HEAD];
-        for (field, at, room) in [(user, 2, 16), (description, 22, 32)] {
-            let (field, _) = split_at_room(field, room);
-            head[at..at + field.len()].copy_from_slice(field.as_bytes());
-        }
+        head[2..18].copy_from_slice(&field::<16>(user));
+        head[22..].copy_from_slice(&field::<32>(description));
         head[18..20].copy_from_slice(&record.to_le_bytes());
         Vlr { head, payload: Payload::Held(Arc::default()) }.with_payload(payload)
     }
@@ -249,9 +247,9 @@ impl Evlr {
 /// The variable length records of a file and the bytes between them and the points (a point start
 /// signature in LAS 1.0). The second value is a warning, if there is one.
 pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>, Option<String>)> {
-    let start = header.bytes().len() as u64;
-    let end = u64::from(header.points_start());
-    let claimed = header.vlrs();
+    let start = u64::from(header.header_size);
+    let end = u64::from(header.offset_to_point_data);
+    let claimed = header.number_of_variable_length_records;
     if u64::from(claimed) > (end - start) / VLR_HEAD as u64 {
         return Err(file
             .wrong(
@@ -352,7 +350,7 @@ pub fn read_evlrs(file: &InputFile, header: &Header) -> Result<Vec<Evlr>> {
         return Ok(Vec::new());
     }
     let room = file.len().saturating_sub(at);
-    if u64::from(claimed) > room / EVLR_HEAD as u64 || at < header.bytes().len() as u64 {
+    if u64::from(claimed) > room / EVLR_HEAD as u64 || at < u64::from(header.header_size) {
         return Err(file
             .wrong(
                 field,
