@@ -1,5 +1,5 @@
-//! What an output says of itself and not of its points: in which system it is, what its times count,
-//! what made it of what.
+//! What an output says of itself and not of its points: in which system it is, what its times
+//! count, what made it of what.
 
 use super::crs;
 use super::described::{Described, describe};
@@ -39,8 +39,8 @@ pub fn name_system(
         }
         Ok(_) if native.made && native.header.format() >= 6 && !wkt::is_wkt(text) => {
             notes.push(format!(
-                "the CRS {text} is not WKT and is written as GeoTIFF keys: point format {} asks for \
-                 WKT, and some readers will see no CRS",
+                "the CRS {text} is not WKT and is written as GeoTIFF keys: point format {} asks \
+                 for WKT, and some readers will see no CRS",
                 native.header.format()
             ));
         }
@@ -66,8 +66,8 @@ pub fn count_gps_time(header: &mut Header, metadata: &Metadata, notes: &mut Vec<
 }
 
 /// Says what made the output: always the program, and of records that went through stages what was
-/// done (LAS 1.4 R15, section 2.4: the system identifier) and by which stages, in the place of what an
-/// earlier run said. Nothing of it depends on when or where.
+/// done (LAS 1.4 R15, section 2.4: the system identifier) and by which stages, in the place of what
+/// an earlier run said. Nothing of it depends on when or where.
 pub fn credit(native: &mut Native, schema: &Schema, metadata: &Metadata, notes: &mut Vec<String>) {
     let header = &mut native.header;
     header.generating_software = field(SOFTWARE);

@@ -266,7 +266,8 @@ fn plain(file: &InputFile, header: &Header, evlrs_start: Option<u64>) -> Result<
     }))
 }
 
-/// Where the next thing behind the points begins, which end at byte `end` or later, or the file ends.
+/// Where the next thing behind the points begins, which end at byte `end` or later, or the file
+/// ends.
 fn behind_points(file: &InputFile, header: &Header, evlrs_start: Option<u64>, end: u64) -> u64 {
     // Waveform packets that are not listed as a record stand behind the points too.
     let waveforms = Some(header.waveform_start()).filter(|&at| at > 0);

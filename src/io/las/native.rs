@@ -111,8 +111,8 @@ pub fn fresh(schema: &Schema, crs: Option<&str>) -> Metadata {
 /// So many lost records are named.
 const NAMED: usize = 8;
 
-/// What `metadata` of LAS inputs has and an output of another format does not hold: records that say
-/// more than dimensions and the coordinate reference system, and waveforms that are there.
+/// What `metadata` of LAS inputs has and an output of another format does not hold: records that
+/// say more than dimensions and the coordinate reference system, and waveforms that are there.
 pub fn lost(metadata: &Metadata) -> Vec<String> {
     let native = metadata.native.as_ref().and_then(|native| native.downcast_ref::<Native>());
     let Some(native) = native else { return Vec::new() };

@@ -42,10 +42,11 @@ pub struct LasOptions {
 ///
 /// Header and records come from `metadata` where it is that of LAS inputs, else they are made anew
 /// (see [`fresh`](super::fresh)). Recomputed are the counts of points, the box, the places of
-/// points, extended records and waveforms (where these are in the file), the LAZ bit and its record,
-/// the bit that says that the CRS is WKT, the generating software, with `normals` the record length and
-/// the descriptors of extra bytes; and if the records went through stages (`metadata.pipeline`), the
-/// system identifier, the ranges of extra bytes, and a record that names the stages.
+/// points, extended records and waveforms (where these are in the file), the LAZ bit and its
+/// record, the bit that says that the CRS is WKT, the generating software, with `normals` the
+/// record length and the descriptors of extra bytes; and if the records went through stages
+/// (`metadata.pipeline`), the system identifier, the ranges of extra bytes, and a record that names
+/// the stages.
 ///
 /// # Errors
 ///

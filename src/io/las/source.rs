@@ -112,7 +112,8 @@ impl Opened {
         list + compression.state_bytes()
     }
 
-    /// Opens a part, its points looked at. Coordinates and returns are in layers that are always decoded.
+    /// Opens a part, its points looked at. Coordinates and returns are in layers that are always
+    /// decoded.
     fn open(&self, place: &PartPlace, selection: Layers) -> Result<Box<dyn Part>> {
         let part = self.unwatched(place, selection)?;
         Ok(Box::new(Watched::new(part, self.evidence.clone(), place.number, self.shift.0)))
