@@ -7,12 +7,12 @@ mod sink;
 mod source;
 
 use crate::Result;
-use crate::geom::lattice::Lattice;
 use crate::point::{Bounds, Mark, PointBatch, Schema, Units};
 use crate::report::Tally;
-use crate::store::Levels;
 use crate::tile::Tile;
 
+pub use crate::geom::lattice::{Lattice, Misplaced};
+pub use crate::store::Levels;
 pub use format::{
     Colors, CreateFor, Format, FormatName, Formats, OutputEncoding, WriteKeys, foreign,
 };
@@ -21,11 +21,38 @@ pub use sink::{ChunkSize, CreateSink, Encode, Encoded, Order, Sink, SinkSummary}
 pub use source::{Contradiction, Input, OpenSource, Part, Source};
 
 /// Changes or removes points as they stream by; knows no neighbours.
+///
+/// ```
+/// use pointmill::Result;
+/// use pointmill::point::{PointBatch, names};
+/// use pointmill::stage::{Needs, Transform};
+///
+/// /// Leaves every second point of a batch out.
+/// struct Half;
+///
+/// impl Transform for Half {
+///     fn needs(&self) -> Needs {
+///         // That coordinates are there is checked before the run.
+///         let reads = names::XYZ.map(str::to_owned).to_vec();
+///         Needs { reads, removes: true, ..Needs::default() }
+///     }
+///
+///     fn apply(&self, batch: &mut PointBatch) -> Result<()> {
+///         batch.retain(|number, _record| number % 2 == 0);
+///         Ok(())
+///     }
+/// }
+/// # let _: Box<dyn Transform> = Box::new(Half);
+/// ```
 pub trait Transform: Send + Sync {
     /// What it reads and writes.
     fn needs(&self) -> Needs;
 
     /// Refuses records of a schema that it cannot work on; called once, before any of them is read.
+    ///
+    /// # Errors
+    ///
+    /// What it cannot work on, said with the dimension.
     fn check(&self, _schema: &Schema) -> Result<()> {
         Ok(())
     }
@@ -48,16 +75,58 @@ pub trait Transform: Send + Sync {
 
     /// Called for every batch, from several threads at once. Points that it removes are entered in
     /// the ledger by the caller.
+    ///
+    /// # Errors
+    ///
+    /// A record that it cannot make sense of; the run ends.
     fn apply(&self, batch: &mut PointBatch) -> Result<()>;
 }
 
 /// Computes on a tile and its neighbourhood; independent of other tiles and of any order.
+///
+/// ```
+/// use pointmill::Result;
+/// use pointmill::ops::removal;
+/// use pointmill::report::Tally;
+/// use pointmill::stage::{Needs, TileOp};
+/// use pointmill::tile::{Fate, Tile};
+///
+/// /// Removes what has no other position within 10 lattice steps.
+/// struct Lonely;
+///
+/// impl TileOp for Lonely {
+///     fn needs(&self) -> Needs {
+///         Needs { neighbors: 1, removes: true, ..Needs::default() }
+///     }
+///
+///     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
+///         let (mut lonely, core) = (Vec::new(), tile.core.clone());
+///         tile.each_neighborhood(1, |i, nearest| {
+///             if core.contains(&i) && nearest.farthest2() > 10 * 10 {
+///                 lonely.push(i);
+///             }
+///         })?;
+///         let removed = lonely.into_iter().map(|i| removal::remove(tile, i)).sum();
+///         tally.remove("lonely", "alone", removed);
+///         Ok(())
+///     }
+/// }
+///
+/// let mut tile = Tile::of(vec![[0, 0, 0], [3, 0, 0], [500, 0, 0]]);
+/// Lonely.run(&mut tile, &mut Tally::default())?;
+/// assert_eq!(tile.fates, [Fate::Kept, Fate::Kept, Fate::Removed]);
+/// # Ok::<(), pointmill::Error>(())
+/// ```
 pub trait TileOp: Send + Sync {
     /// What it needs; asked again after [`settle`](TileOp::settle).
     fn needs(&self) -> Needs;
 
     /// Called once, when the headers are read: lengths that were given with a unit of their own are
     /// converted to the scan's.
+    ///
+    /// # Errors
+    ///
+    /// A length with a unit, where the scan's is not known.
     fn convert(&mut self, _units: &Units) -> Result<()> {
         Ok(())
     }
@@ -70,6 +139,10 @@ pub trait TileOp: Send + Sync {
 
     /// Called once, after the decode and before the first tile, with what is known of the whole
     /// scan: the place to fix figures that depend on it.
+    ///
+    /// # Errors
+    ///
+    /// Figures that the scan does not allow.
     fn settle(&mut self, _scan: &ScanFacts) -> Result<()> {
         Ok(())
     }
@@ -84,6 +157,10 @@ pub trait TileOp: Send + Sync {
     ///
     /// It decides for the positions that [`Tile::is_chosen`] holds; keys that every stage takes may
     /// limit it to some classes or flags. Others are there to be seen, if at all.
+    ///
+    /// # Errors
+    ///
+    /// Those of the tile's neighbourhoods, and broken promises of the engine; the run ends.
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()>;
 
     /// What it decided by itself, for the report and for `plan`: name and value.
@@ -100,6 +177,10 @@ pub trait TileOp: Send + Sync {
     /// Called for each of a few hundred small cubes, spread evenly over the records, in order,
     /// after the stages above have run on it. What it returns goes to
     /// [`forecast`](TileOp::forecast).
+    ///
+    /// # Errors
+    ///
+    /// As [`run`](TileOp::run).
     fn sample(&self, _tile: &mut Tile) -> Result<Vec<f64>> {
         Ok(Vec::new())
     }
@@ -115,6 +196,7 @@ pub trait TileOp: Send + Sync {
 
 /// What a stage expects before it runs.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Forecast {
     /// Figures for the report: name and value.
     pub decisions: Vec<(String, serde_json::Value)>,
@@ -134,9 +216,17 @@ pub trait ScanOp: TileOp {
     /// The first phase, called for every tile, from several threads at once. What it appends to
     /// `found` is stored in the order of the tiles, which is that of their positions; the sequence
     /// over all tiles must not depend on how they are cut, or only sums of it may be used.
+    ///
+    /// # Errors
+    ///
+    /// As [`run`](TileOp::run).
     fn gather(&self, tile: &mut Tile, found: &mut Vec<[u64; 2]>, tally: &mut Tally) -> Result<()>;
 
     /// Called once, between the phases. Returns what the user is to be warned of.
+    ///
+    /// # Errors
+    ///
+    /// Those of reading what was found.
     fn conclude(&mut self, found: &dyn Gathered) -> Result<Option<String>>;
 }
 
@@ -144,6 +234,10 @@ pub trait ScanOp: TileOp {
 pub trait Gathered {
     /// Calls `visit` with all of it, stretch after stretch in the order of the tiles; as often as
     /// one likes.
+    ///
+    /// # Errors
+    ///
+    /// Those of reading it, and of `visit`.
     fn each(&self, visit: &mut dyn FnMut(&[[u64; 2]]) -> Result<()>) -> Result<()>;
 
     /// Records that the stage decides about.
@@ -195,6 +289,7 @@ pub struct Needs {
 }
 
 /// What is known of the whole scan after the decode.
+#[non_exhaustive]
 pub struct ScanFacts<'a> {
     /// Records.
     pub points: u64,
@@ -206,4 +301,12 @@ pub struct ScanFacts<'a> {
     pub lattice: &'a Lattice,
     /// Occupied cubes of every power-of-two side.
     pub levels: &'a Levels,
+}
+
+impl<'a> ScanFacts<'a> {
+    /// A scan of so many records whose distinct positions have the tight box `bounds` and are
+    /// counted by `levels`.
+    pub fn new(points: u64, bounds: Bounds, lattice: &'a Lattice, levels: &'a Levels) -> Self {
+        ScanFacts { points, positions: levels.positions(), bounds, lattice, levels }
+    }
 }

@@ -13,4 +13,3 @@ mod stretch;
 
 pub use fitted::Plan;
 pub use outline::Outline;
-pub use stretch::Stretch;

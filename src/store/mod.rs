@@ -38,4 +38,4 @@ pub use record::{
     TAGGED_INPUTS, Tag, ref_bytes,
 };
 pub use sealed::{Reader, SealedTiles};
-pub use spill::{Address, Checksum, Folder, Spill, SpillArea, StoredStretch};
+pub use spill::{Folder, Spill, SpillArea, StoredStretch};

@@ -4,8 +4,7 @@ use super::scene::*;
 use pointmill::ops::{Cells, Keep, Measure, Side, Split};
 use pointmill::point::{Bounds, Position};
 use pointmill::report::Tally;
-use pointmill::stage::{Gathered, Role, ScanOp, TileOp};
-use pointmill::stage::{StageKind, StagePlace};
+use pointmill::stage::{Gathered, Role, ScanOp, StageKind, StagePlace, TileOp};
 use pointmill::{ErrorKind, Result};
 use proptest::prelude::*;
 

@@ -3,7 +3,8 @@
 use crate::support::las::{BROKEN, LAS, LAZ, manifest, write};
 use crate::support::records::read_source;
 use crate::support::scans;
-use pointmill::io::las::{describe, open};
+use pointmill::internals::las::describe;
+use pointmill::io::las::open;
 use pointmill::stage::Source;
 
 /// Files above this are read in part.
