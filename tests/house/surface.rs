@@ -16,7 +16,7 @@ fn name(text: &str) -> &str {
 
 /// What a `pub use` of a module hands on, by the names that it has there; nothing if it only gives
 /// what is public below it a second name.
-fn handed_on<'a>(path: &'a str, is_public_child: impl Fn(&str) -> bool) -> Vec<&'a str> {
+fn handed_on(path: &str, is_public_child: impl Fn(&str) -> bool) -> Vec<&str> {
     let (from, what) = path.rsplit_once("::").unwrap_or(("", path));
     let (from, what) = path.split_once("::{").unwrap_or((from, what));
     if is_public_child(from) {
