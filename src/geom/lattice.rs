@@ -10,6 +10,22 @@ const BINARY: f64 = (1u64 << 30) as f64;
 const SMALLEST_STEP: f64 = 1e-9;
 
 /// An isotropic lattice of i64 positions anchored at world 0, fixed by headers alone.
+///
+/// ```
+/// use pointmill::point::{Dimension, Endian, Layout, Scalar, Schema};
+/// use pointmill::stage::Lattice;
+///
+/// let axis = |(i, name)| Dimension::new(name, Scalar::F64, 8 * i);
+/// let dimensions = ["X", "Y", "Z"].into_iter().enumerate().map(axis).collect();
+/// let layout = Layout::plain("TOY");
+/// let schema = Schema { layout, endian: Endian::Little, stride: 24, dimensions };
+///
+/// // Steps of a quarter of the scan's unit; by itself it would choose steps of 2^-30.
+/// let lattice = Lattice::of(&schema, Some(0.25))?;
+/// assert_eq!(lattice.world([4, 8, -2]), [1.0, 2.0, -0.5]);
+/// assert_eq!(lattice.steps(3.0), 12);
+/// # Ok::<(), pointmill::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lattice {
     /// World units of one step, along z after it was stretched.
@@ -41,6 +57,10 @@ pub enum Misplaced {
 
 impl Lattice {
     /// The lattice of records of `schema`. `step` overrides the step in world units.
+    ///
+    /// # Errors
+    ///
+    /// A step that is not above 0, and records without coordinates.
     pub fn of(schema: &Schema, step: Option<f64>) -> Result<Lattice> {
         Lattice::stretched(schema, step, 1.0)
     }
@@ -119,7 +139,7 @@ impl Lattice {
 
     /// A decimal step that tells points apart which are `apart` in one coordinate, and still
     /// reaches the ends of `bounds`; None where that is no finer than the step of this lattice.
-    pub fn finer(&self, bounds: &Bounds, apart: f64) -> Option<f64> {
+    pub(crate) fn finer(&self, bounds: &Bounds, apart: f64) -> Option<f64> {
         let ends = bounds.lo.iter().chain(&bounds.hi);
         let farthest = ends.map(|end| end.unsigned_abs()).max()? as f64 * self.step;
         let least = decimal_step(farthest / FARTHEST) * 10.0;
@@ -130,7 +150,7 @@ impl Lattice {
 
     /// A decimal step of a lattice that reaches a coordinate and is no coarser than the numbers
     /// around it are from one another.
-    pub fn reaching(coordinate: f64) -> f64 {
+    pub(crate) fn reaching(coordinate: f64) -> f64 {
         decimal_step(coordinate.abs() * f64::EPSILON)
     }
 

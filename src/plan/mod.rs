@@ -15,4 +15,3 @@ mod stretch;
 
 pub use fitted::Plan;
 pub use outline::Outline;
-pub use stretch::Stretch;

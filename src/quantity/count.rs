@@ -2,7 +2,9 @@
 
 /// Reads a count: `1500`, `1_500`, `10k`, `2.5M`, `1e6`, `3G`; a unit is a power of 1,000.
 ///
-/// The error says what a count looks like.
+/// # Errors
+///
+/// What is no whole count below 2^64; the text says what a count looks like.
 ///
 /// ```
 /// use pointmill::quantity::parse_count;

@@ -37,4 +37,4 @@ pub use record::{
     ASIDE, CLASSED_INPUTS, FATE_BYTES, RecordState, SELECTIONS, TAGGED_INPUTS, Tag, ref_bytes,
 };
 pub use sealed::{Reader, SealedTiles};
-pub use spill::{Address, Checksum, Folder, Spill, SpillArea, StoredStretch};
+pub use spill::{Folder, Spill, SpillArea, StoredStretch};

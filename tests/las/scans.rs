@@ -7,7 +7,8 @@ use std::path::Path;
 use crate::support::las::{BROKEN, LAS, LAZ, manifest, write};
 use crate::support::records::read_source;
 use crate::support::scans;
-use pointmill::io::las::{Description, Record, describe, open};
+use pointmill::internals::las::{Description, Record, describe};
+use pointmill::io::las::open;
 use pointmill::stage::Source;
 
 /// Files above this are read in part.

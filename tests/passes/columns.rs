@@ -6,10 +6,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use pointmill::internals::morton_cmp;
 use pointmill::point::{Column, Dimension, Position, distance2, names};
 use pointmill::report::Tally;
 use pointmill::stage::{Needs, Role, StageKind, StagePlace, TileOp};
-use pointmill::store::morton_cmp;
 use pointmill::synth::Scene;
 use pointmill::tile::Tile;
 use pointmill::{Done, Graph, Overrides, Quiet, Registry, Result};
