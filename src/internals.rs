@@ -2,9 +2,9 @@
 //! holds for it: anything here may change or go with any version.
 //!
 //! Most tests stand beside the code that they are about, or go through the surface that programs
-//! have. Here is what is left: chains of rooms (intake, merge, loader) that are measured without a
-//! run around them, writers of files with headers that no run would write, and kernels that tests of
-//! several rooms compare with an oracle.
+//! have. Here is what is left: chains of rooms (intake, merge, loader) that are looked at without a
+//! run around them, writers of files with headers that no run would write, and kernels that tests
+//! of several rooms compare with an oracle.
 
 use crate::tile::Tile;
 

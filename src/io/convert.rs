@@ -135,10 +135,6 @@ impl Projection {
 
     /// Replaces `out`, which has room for exactly as many, by the projections of `records`; fails
     /// as [`project`](Self::project) does.
-    ///
-    /// # Errors
-    ///
-    /// As [`project`](Projection::project).
     pub(crate) fn project_into(&self, records: &[u8], out: &mut [u8]) -> Result<Rounding> {
         let (from, to) = (self.from.stride.max(1), self.to_stride.max(1));
         let mut rounding = Rounding::default();

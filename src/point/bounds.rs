@@ -1,6 +1,6 @@
 //! Boxes of lattice positions.
 
-/// A position on the lattice, in lattice steps from world 0 (see [`Lattice`](crate::stage::Lattice)).
+/// A position on the [`Lattice`](crate::stage::Lattice), in steps from world 0.
 pub type Position = [i64; 3];
 
 /// Exact squared distance of two positions, in lattice steps squared; saturates where the

@@ -250,11 +250,11 @@ impl Layout {
 /// What a record holds.
 ///
 /// ```
-/// use pointmill::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
+/// use pointmill::point::{Dimension, Endian, Layout, Scalar, Schema, Value, names};
 ///
 /// // Three coordinates in millimetres, then a byte that has a flag in its highest bit.
 /// let axis = |(i, name)| Dimension::new(name, Scalar::I32, 4 * i).scaled(0.001, 0.0);
-/// let mut dimensions: Vec<Dimension> = ["X", "Y", "Z"].into_iter().enumerate().map(axis).collect();
+/// let mut dimensions: Vec<Dimension> = names::XYZ.into_iter().enumerate().map(axis).collect();
 /// dimensions.push(Dimension::new("Withheld", Scalar::U8, 12).bits(7, 1));
 /// let layout = Layout::plain("TOY");
 /// let schema = Schema { layout, endian: Endian::Little, stride: 13, dimensions };
