@@ -39,8 +39,10 @@ pub fn remove(tile: &mut Tile, i: usize) -> u64 {
     records
 }
 
-/// Lets position `kept` stand for position `i`; returns how many records that removes. The deviation
-/// is measured in lattice steps along `normal`, the unit normal of the plane through `kept`.
+/// Lets position `kept` stand for position `i`; returns how many records that removes.
+///
+/// The deviation is measured in lattice steps along `normal`, the unit normal of the plane through
+/// `kept`.
 pub fn represent(tile: &mut Tile, i: usize, kept: usize, normal: [f64; 3]) -> u64 {
     let records = records(tile, i);
     if records > 0 {

@@ -1,8 +1,8 @@
 //! LAS 1.0 to 1.4 and LAZ, every point format: records byte for byte, headers and variable length
 //! records carried. Knows no tiles and no stages but the two roles it plays.
 //!
-//! [`open`] reads one or several files as a source; [`LAS`] and [`LAZ`] are the formats as a registry
-//! takes them. A COPC file is read as the LAZ it is.
+//! [`open`] reads one or several files as a source; [`LAS`] and [`LAZ`] are the formats as a
+//! registry takes them. A COPC file is read as the LAZ it is.
 
 mod chunks;
 mod credit;
