@@ -16,7 +16,6 @@ use super::lines::TileLines;
 use super::pass::Branch;
 use super::tagger::{LEFT_OUT, NOT_FINITE};
 use super::task::Task;
-use crate::budget::Budget;
 use crate::host::process::peak_memory;
 use crate::report::{
     Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome, Removed, Report,
@@ -36,12 +35,7 @@ impl Task {
     }
 
     /// What is known of the run when its output is written.
-    pub(super) fn figures(
-        &self,
-        finished: &Finished,
-        budget: &Budget,
-        spill_bytes: u64,
-    ) -> RunFigures {
+    pub(super) fn figures(&self, finished: &Finished, job: &Job<'_>) -> RunFigures {
         let mut warnings = self.source.warnings();
         let all = finished.written.iter().flatten();
         warnings.extend(all.flat_map(|(_, sink)| sink.notes.iter().cloned()));
@@ -53,11 +47,11 @@ impl Task {
             inputs: input_figures(&*self.source),
             outputs: outputs.collect(),
             machine: Machine::this(),
-            threads: self.threads,
+            threads: job.threads.count(),
             memory_bytes: self.demands.limit,
-            leased_bytes: budget.peak(),
-            memory_holders: budget.at_peak(),
-            spill_bytes,
+            leased_bytes: job.budget.peak(),
+            memory_holders: job.budget.at_peak(),
+            spill_bytes: job.area.written(),
             warnings,
             ..RunFigures::default()
         }
@@ -131,9 +125,9 @@ pub(super) fn nothing_left(finished: &Finished, job: &Job<'_>) -> Vec<String> {
     if finished.read == 0 {
         return vec!["the inputs have no points: what is written has none either".to_owned()];
     }
-    let behind = job.filters.iter().map(|filter| (&filter.kind, &filter.transform));
+    let behind = job.task.filters.iter().map(|filter| (&filter.kind, &filter.transform));
     let streams: Vec<_> =
-        job.transforms.iter().map(|(kind, stage)| (kind, stage)).chain(behind).collect();
+        job.task.transforms.iter().map(|(kind, stage)| (kind, stage)).chain(behind).collect();
     let keys = |r: &Removed| -> Vec<&str> {
         let ours = streams.iter().filter(|(kind, _)| **kind == r.stage);
         let run = LEFT_OUT.iter().filter(|(reason, ..)| *reason == r.reason);

@@ -43,14 +43,13 @@ pub(crate) fn forecast(
     ops: &[usize],
     field: &DecodedScan<'_>,
     sieve: &Sieve,
-    capacity: usize,
 ) -> Result<Vec<(usize, Forecast)>> {
     let mut forecasts = Vec::new();
     for &op in ops {
         let Some(side) = job.ops[op].op.tile().sample_side() else { continue };
         let side = side.max(1);
         let keys = cubes(&field.tiles, side)?;
-        let samples = samples(job, pass, op, field, sieve, capacity, &keys)?;
+        let samples = samples(job, pass, op, field, sieve, &keys)?;
         forecasts.push((op, job.ops[op].op.tile_mut().forecast(&samples)));
     }
     Ok(forecasts)
@@ -63,9 +62,9 @@ fn samples(
     op: usize,
     field: &DecodedScan<'_>,
     sieve: &Sieve,
-    capacity: usize,
     keys: &[TileKey],
 ) -> Result<Vec<Vec<f64>>> {
+    let capacity = samples_capacity(&job.shares);
     let mut samples = Vec::new();
     job.items(keys.len()).run(
         || {

@@ -30,7 +30,11 @@ use crate::store::CLASSED_INPUTS;
 use crate::{Error, Result};
 
 /// A pipeline ready to run.
-pub struct Plan(pub(crate) Task);
+pub struct Plan {
+    pub(crate) task: Task,
+    /// The tile stages; a run consumes them, since they settle and could not begin a second time.
+    pub(crate) ops: Vec<StageOp>,
+}
 
 impl Plan {
     /// Runs the plan. Outputs appear under their names when all of it is done; an error or a stop
@@ -39,7 +43,7 @@ impl Plan {
     /// Outputs get their names one after the other, in the order of the pipeline's sinks and of the
     /// inputs, and the report gets its own behind them.
     pub fn run(self, watch: &dyn Watch) -> Result<Done> {
-        self.0.run(watch)
+        self.task.run(self.ops, watch)
     }
 
     /// Runs the plan as [`run`](Plan::run) does, on the threads of `pool`: on as many as were
@@ -48,8 +52,8 @@ impl Plan {
     /// A run takes the threads that it works on for itself until it is done, so that other work of
     /// the pool waits.
     pub fn run_in(self, pool: &ThreadPool, watch: &dyn Watch) -> Result<Done> {
-        let threads = Threads::of(pool, self.0.threads);
-        self.0.run_on(threads, watch)
+        let threads = Threads::of(pool, self.task.threads);
+        self.task.run_on(self.ops, threads, watch)
     }
 }
 
@@ -88,7 +92,7 @@ impl Graph {
         demands.divide()?;
         let mut warnings = warnings(&*source, &sorted, &settings)?;
         warnings.extend(doubt);
-        Ok(Plan(Task {
+        let task = Task {
             warnings,
             simd,
             threads: demands.threads,
@@ -96,7 +100,6 @@ impl Graph {
             source,
             source_kind: sorted.source.0,
             transforms: sorted.transforms,
-            ops: sorted.ops,
             filters: sorted.filters,
             passes: passes.passes,
             branches: passes.branches,
@@ -112,7 +115,8 @@ impl Graph {
             mills: order.mills,
             lattice,
             demands,
-        }))
+        };
+        Ok(Plan { task, ops: sorted.ops })
     }
 }
 

@@ -11,6 +11,7 @@ use std::cmp::Ordering;
 
 use super::Levels;
 use super::block::{BLOCK, Block};
+use super::emit::MergeOutput;
 use super::fetch::{Fetch, groups};
 use super::key::morton_cmp;
 use super::pieces::Pieces;
@@ -76,9 +77,9 @@ impl SealedTiles {
 
     pub(crate) fn new(
         sequence: Sequence,
-        spill: Spill,
-        (refs, tagged): (Pieces, bool),
-        (records, places): (Pieces, Option<Pieces>),
+        MergeOutput { positions: spill, refs, tagged }: MergeOutput,
+        records: Pieces,
+        places: Option<Pieces>,
         index: Lease,
     ) -> Self {
         let mut boxes: Vec<Vec<Bounds>> = Vec::new();
