@@ -5,6 +5,7 @@
 //! remove them, as chunks are cut, and as sinks write them. No count is computed from the others,
 //! so a record that is lost or written twice fails the run instead of being hidden in a difference.
 
+use std::borrow::Cow;
 use std::fs::{self, File};
 use std::io::{BufRead, BufWriter};
 use std::path::Path;
@@ -70,7 +71,7 @@ impl Task {
         }
         (run.seconds, run.cpu_seconds, run.phases) = clock.finish();
         run.peak_memory_bytes = peak_memory();
-        run.work = finished.tally.work.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect();
+        run.work = finished.tally.work.iter().map(named).collect();
         let (mut results, mut lines) = (Vec::new(), Vec::new());
         for (branch, came_to) in self.branches.iter().zip(finished.branches) {
             let (result, tiles) = self.outcome(branch, came_to, finished.read)?;
@@ -108,7 +109,7 @@ impl Task {
             lattice: lattice.map(|l| LatticeFigures { step: l.step, shift: l.shift }),
             ledger,
             decisions,
-            counts: finished.tally.counts.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect(),
+            counts: finished.tally.counts.iter().map(named).collect(),
             passes: finished.passes,
             tile_side,
             totals,
@@ -147,6 +148,10 @@ pub(super) fn nothing_left(finished: &Finished, job: &Job<'_>) -> Vec<String> {
         format!("no point is left of {}: {}", Grouped(ledger.read), by.join(", "))
     });
     told.collect()
+}
+
+fn named((name, count): (&Cow<'static, str>, &u64)) -> (String, u64) {
+    (name.clone().into_owned(), *count)
 }
 
 /// The lines of a branch's report tiles; none if it has none.

@@ -80,9 +80,13 @@ fn samples(
             }
             let (tile, _) = worker.run(key, Some(op))?;
             tile.limits = job.ops[op].selection;
-            job.ops[op].op.tile().sample(tile).map(Some)
+            let figures = job.ops[op].op.tile().sample(tile)?;
+            Ok(Some(figures.into_iter().map(f64::to_bits).collect::<Vec<_>>()))
         },
-        |sample| samples.extend(sample),
+        // A figure may be no number, which not every form of text can hold: bits are always kept.
+        |sample: Option<Vec<u64>>| {
+            samples.extend(sample.map(|bits| bits.into_iter().map(f64::from_bits).collect()));
+        },
         |_| Ok(()),
     )?;
     Ok(samples)

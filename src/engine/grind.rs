@@ -12,7 +12,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::by_rank::Starts;
 use super::chunk::{Open, OutputChunk};
@@ -140,7 +140,7 @@ fn mill_tiles<'a>(
 }
 
 /// What a tile comes to, besides its product.
-#[derive(Debug, Default, Serialize)]
+#[derive(Debug, Default, Serialize, PartialEq, Deserialize)]
 struct TileTally {
     tally: Tally,
     /// Records that the pass's stages decide about.

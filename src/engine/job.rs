@@ -155,7 +155,7 @@ impl<'a> Job<'a> {
     pub fn tell_left_out(&self, tally: &Tally) {
         self.tell_idle(tally);
         for (reason, setting, which) in LEFT_OUT {
-            let key = (self.task.source_kind.clone(), reason);
+            let key = (self.task.source_kind.clone(), reason.into());
             if let Some(&points) = tally.removed.get(&key) {
                 let points = Grouped(points);
                 self.warn(format!(

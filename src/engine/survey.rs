@@ -244,7 +244,7 @@ impl ScanWalk<'_> {
                 job.advance(positions)
             },
             |()| {},
-            |(part, _)| Ok(part),
+            |(part, _)| Ok(*part.sums()),
         )?;
         parts.iter().for_each(|part| fitted.merge(part));
         Ok(fitted)

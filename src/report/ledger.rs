@@ -37,7 +37,7 @@ impl Ledger {
     pub fn new(read: u64, kept: u64, tally: &Tally) -> Self {
         let removed = tally.removed.iter().map(|((stage, reason), &records)| Removed {
             stage: stage.clone(),
-            reason: (*reason).to_owned(),
+            reason: reason.clone().into_owned(),
             records,
         });
         Ledger { read, kept, removed: removed.collect() }

@@ -1,5 +1,7 @@
 //! Where records go: what a stage says of its outputs, and how records are encoded and written.
 
+use serde::{Deserialize, Serialize};
+
 use std::path::Path;
 use std::sync::Arc;
 
@@ -52,7 +54,7 @@ pub struct Encoded {
 }
 
 /// What a sink says when it is done.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SinkSummary {
     /// Points written.
     pub points: u64,

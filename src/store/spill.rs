@@ -6,6 +6,8 @@
 //! the bound on memory could not be kept. What comes from a file is compared with the checksum of
 //! what was written, so that a disk that damages data fails a run and changes no output.
 
+use serde::{Deserialize, Serialize};
+
 use std::fs::File;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::PathBuf;
@@ -66,7 +68,7 @@ impl SpillArea {
 }
 
 /// Where an appended stretch begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Address(u64);
 
 /// Set in addresses that lie in a scratch file. Below it are the number of the segment or the file
@@ -115,11 +117,11 @@ impl Address {
 
 /// What was stored from an address on, as a number that a read compares with what comes: see
 /// [`Address::checksum`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Checksum(u32);
 
 /// An appended stretch that is always read whole.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredStretch {
     address: Address,
     length: u32,
