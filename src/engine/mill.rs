@@ -21,7 +21,8 @@ use super::finished::{Finished, FinishedBranch};
 use super::forecast::{forecast, samples_capacity};
 use super::grind::{DecodedScan, Milled, Numbered, grind};
 use super::job::Job;
-use super::pass::{Branch, Call, Pass};
+use super::pass::{Call, Pass};
+use super::phase::RunPhase;
 use super::settled::{conclude, decisions, rounding, settle};
 use super::survey::survey;
 use super::task::Task;
@@ -42,7 +43,7 @@ pub(crate) fn mill(
     sinks: Vec<Option<Box<dyn Sink>>>,
     clock: &mut Clock<'_>,
 ) -> Result<Finished> {
-    clock.phase("decode", Some(job.task.source.points()));
+    clock.begin(RunPhase::Decode, Some(job.task.source.points()))?;
     let decoding = job.task.demands.decode(job.shares.run_records as u64);
     let working = job.budget.lease_all(&decoding, "decoding")?;
     let (store, starts, mut tally) = decode(job, lattice)?;
@@ -50,7 +51,7 @@ pub(crate) fn mill(
     job.check_headers()?;
     job.tell_left_out(&tally);
     tally.work("runs", store.runs() as u64);
-    clock.phase("merge", Some(tally.work.get("placed").copied().unwrap_or(0)));
+    clock.begin(RunPhase::Merge, Some(tally.work.get("placed").copied().unwrap_or(0)))?;
     let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
     tally.count("positions", tiles.positions());
     settle(job, lattice, &tiles)?;
@@ -185,11 +186,11 @@ impl Course<'_, '_> {
                 Some(held) => held,
                 None => job.budget.lease_all(&most, "mill")?,
             };
-            let mut after = self.run(job, pass, &cut, &mut held, before, field)?;
+            let mut after = self.run(job, n, &cut, &mut held, before, field)?;
             let is_loaded =
                 |kind: &ColumnKind| passes[n + 1..].iter().any(|pass| pass.loads.contains(kind));
             after.sieve.columns.retain(|(kind, _)| is_loaded(kind));
-            match branches.iter().find(|branch| branch.pass == n) {
+            match branches.iter().position(|branch| branch.pass == n) {
                 None => {
                     working = Some(held);
                     left.push(Some(after));
@@ -204,16 +205,16 @@ impl Course<'_, '_> {
         Ok(finished)
     }
 
-    /// Measures what a branch came to.
+    /// Measures what branch `number` came to.
     fn finish(
         &mut self,
         job: &Job<'_>,
-        branch: &Branch,
+        number: usize,
         after: Standing,
         field: &DecodedScan<'_>,
     ) -> Result<FinishedBranch> {
         let DecodedScan { lattice, tiles, .. } = field;
-        self.clock.phase("survey", Some(2 * tiles.positions()));
+        self.clock.begin(RunPhase::Survey(number), Some(2 * tiles.positions()))?;
         let mut measured = survey(job, lattice, tiles, &after.sieve)?;
         measured.totals.baseline = after.baseline(lattice);
         let mut tally = after.tally;
@@ -221,7 +222,7 @@ impl Course<'_, '_> {
             kept: after.kept,
             decisions: rounding(job, lattice, &tiles.bounds(), &tally)
                 .into_iter()
-                .chain(decisions(job, branch, &self.forecasts))
+                .chain(decisions(job, &job.task.branches[number], &self.forecasts))
                 .collect(),
             classes: tally.classes.take().map_or(Vec::new(), |classes| classes.figures()),
             passes: after.passes,
@@ -230,18 +231,19 @@ impl Course<'_, '_> {
         })
     }
 
-    /// Runs a pass over what those before it left.
+    /// Runs pass `number` over what those before it left.
     fn run(
         &mut self,
         job: &mut Job<'_>,
-        pass: &Pass,
+        number: usize,
         cut: &Arc<Cut>,
         working: &mut Vec<Lease>,
         before: Standing,
         field: &DecodedScan<'_>,
     ) -> Result<Standing> {
-        let tiles = &field.tiles;
+        let (tiles, pass) = (&field.tiles, &job.task.passes[number]);
         let sieve = pass.sieve(&before.sieve, job.task.source.schema());
+        self.clock.begin(RunPhase::Look(number), None)?;
         self.foresee(job, pass, field, &sieve)?;
         let held = working.iter().map(Lease::bytes).sum();
         let cut = cut_again(job, pass, field.lattice, tiles, cut, held)?;
@@ -250,8 +252,8 @@ impl Course<'_, '_> {
             working.clear();
             *working = job.budget.lease_all(&milling, "mill")?;
         }
-        let phase = if pass.gathers().is_some() { "gather" } else { "mill" };
-        self.clock.phase(phase, Some(tiles.positions()));
+        let phase = if pass.gathers().is_some() { RunPhase::Gather } else { RunPhase::Mill };
+        self.clock.begin(phase(number), Some(tiles.positions()))?;
         let mut tally = Tally::default();
         tally.work("tiles", cut.keys.len() as u64);
         let levels: BTreeSet<u32> = cut.keys.iter().map(|key| key.level).collect();
@@ -346,13 +348,13 @@ impl Course<'_, '_> {
         tally: &mut Tally,
     ) -> Result<()> {
         for lists in by_input {
-            self.clock.phase("write", Some(lists.records()));
+            self.clock.begin(RunPhase::Write(lists.sink), Some(lists.records()))?;
             let (written, counted) = lists.write(job, tiles)?;
             tally.merge(&counted);
             self.written[lists.sink] = Some(written);
         }
         for (lists, sink) in by_rank.iter().zip(ordered) {
-            self.clock.phase("write", Some(lists.records));
+            self.clock.begin(RunPhase::Write(lists.sink), Some(lists.records))?;
             let (said, counted) = lists.write(job, tiles, sink)?;
             tally.merge(&counted);
             self.written[lists.sink] = Some(vec![(lists.records, said)]);

@@ -17,6 +17,7 @@ use super::finished::Finished;
 use super::job::Job;
 use super::mill::mill;
 use super::pass::StageOp;
+use super::phase::RunPhase;
 use super::publish::{Staged, make_folder, publish};
 use super::room;
 use super::room::Taken;
@@ -73,7 +74,7 @@ impl Task {
         watch: &dyn Watch,
         trouble: &Trouble,
     ) -> Result<Done> {
-        let mut clock = Clock::new(watch);
+        let mut clock = Clock::new(watch, self.phases());
         let outputs = self.stage(trouble)?;
         let nothing = || Error::pipeline("the pipeline writes nothing");
         let first = outputs.iter().flatten().next().ok_or_else(nothing)?;
@@ -93,6 +94,7 @@ impl Task {
             let bytes = fs::metadata(staged.file()).ok().map(|about| about.len());
             FileFigures::of(&copy.to, 0, bytes)
         }));
+        clock.begin(RunPhase::Publish, None)?;
         let (report, tiles) = self.account(finished, run, clock)?;
         if let Some(staged) = &staged_report {
             write_report(staged.file(), &report, &tiles).map_err(|error| staged.tell(error))?;
@@ -159,7 +161,7 @@ impl Task {
         let finished = match &self.lattice {
             Some(lattice) if self.mills => mill(&mut job, lattice, sinks, clock)?,
             lattice => {
-                clock.phase("convert", Some(self.source.points()));
+                clock.begin(RunPhase::Convert, Some(self.source.points()))?;
                 let sinks = sinks.into_iter().flatten().collect();
                 let _working = job.budget.lease_all(&self.demands.stream(), "streaming")?;
                 stream(&job, sinks, lattice.as_ref())?
