@@ -49,6 +49,11 @@ impl Block {
         self.len() * (3 * usize::from(self.width) + if self.has_copies { 4 } else { 0 })
     }
 
+    /// Where it is, the checksum of what is there, and how many bytes that is.
+    pub(super) fn stored(&self) -> (Address, Checksum, u64) {
+        (self.address, self.checksum, self.bytes() as u64)
+    }
+
     /// Packs positions in Morton order onto `out`, each with its copies; no `copies` are one each.
     /// The address is that of the stretch which `out` will become, once [`placed`](Block::placed).
     pub fn pack(positions: &[Position], copies: &[u32], out: &mut Vec<u8>) -> (Block, usize) {

@@ -17,6 +17,7 @@ mod gather;
 mod intake;
 mod key;
 mod levels;
+mod manifest;
 mod merge;
 mod order;
 pub(crate) mod pieces;
@@ -31,6 +32,7 @@ pub use fetch::Fetch;
 pub use intake::{Intake, TileStore};
 pub use key::{TileKey, morton_cmp};
 pub use levels::Levels;
+pub use manifest::{ListedPiece, ListedPlace, ListedStore, StoreManifest};
 pub use merge::{merge_bytes, seal};
 pub use pieces::{PIECE, Pieces};
 pub use record::{

@@ -43,11 +43,11 @@ pub struct SealedTiles {
     sequence: Sequence,
     /// Boxes of 16 blocks, of 16 of those, and so on up to one.
     boxes: Vec<Vec<Bounds>>,
-    spill: Spill,
-    refs: Pieces,
+    pub(super) spill: Spill,
+    pub(super) refs: Pieces,
     tagged: bool,
-    records: Pieces,
-    places: Option<Pieces>,
+    pub(super) records: Pieces,
+    pub(super) places: Option<Pieces>,
     index: Lease,
 }
 
