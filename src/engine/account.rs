@@ -5,6 +5,7 @@
 //! remove them, as chunks are cut, and as sinks write them. No count is computed from the others,
 //! so a record that is lost or written twice fails the run instead of being hidden in a difference.
 
+use std::borrow::Cow;
 use std::fs::{self, File};
 use std::io::{BufRead, BufWriter};
 use std::path::Path;
@@ -16,7 +17,6 @@ use super::lines::TileLines;
 use super::pass::Branch;
 use super::tagger::{LEFT_OUT, NOT_FINITE};
 use super::task::Task;
-use crate::budget::Budget;
 use crate::host::process::peak_memory;
 use crate::report::{
     Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome, Removed, Report,
@@ -36,12 +36,7 @@ impl Task {
     }
 
     /// What is known of the run when its output is written.
-    pub(super) fn figures(
-        &self,
-        finished: &Finished,
-        budget: &Budget,
-        spill_bytes: u64,
-    ) -> RunFigures {
+    pub(super) fn figures(&self, finished: &Finished, job: &Job<'_>) -> RunFigures {
         let mut warnings = self.source.warnings();
         let all = finished.written.iter().flatten();
         warnings.extend(all.flat_map(|(_, sink)| sink.notes.iter().cloned()));
@@ -53,11 +48,11 @@ impl Task {
             inputs: input_figures(&*self.source),
             outputs: outputs.collect(),
             machine: Machine::this(),
-            threads: self.threads,
+            threads: job.threads.count(),
             memory_bytes: self.demands.limit,
-            leased_bytes: budget.peak(),
-            memory_holders: budget.at_peak(),
-            spill_bytes,
+            leased_bytes: job.budget.peak(),
+            memory_holders: job.budget.at_peak(),
+            spill_bytes: job.area.written(),
             warnings,
             ..RunFigures::default()
         }
@@ -76,7 +71,7 @@ impl Task {
         }
         (run.seconds, run.cpu_seconds, run.phases) = clock.finish();
         run.peak_memory_bytes = peak_memory();
-        run.work = finished.tally.work.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect();
+        run.work = finished.tally.work.iter().map(named).collect();
         let (mut results, mut lines) = (Vec::new(), Vec::new());
         for (branch, came_to) in self.branches.iter().zip(finished.branches) {
             let (result, tiles) = self.outcome(branch, came_to, finished.read)?;
@@ -114,7 +109,7 @@ impl Task {
             lattice: lattice.map(|l| LatticeFigures { step: l.step, shift: l.shift }),
             ledger,
             decisions,
-            counts: finished.tally.counts.iter().map(|(k, v)| ((*k).to_owned(), *v)).collect(),
+            counts: finished.tally.counts.iter().map(named).collect(),
             passes: finished.passes,
             tile_side,
             totals,
@@ -131,9 +126,9 @@ pub(super) fn nothing_left(finished: &Finished, job: &Job<'_>) -> Vec<String> {
     if finished.read == 0 {
         return vec!["the inputs have no points: what is written has none either".to_owned()];
     }
-    let behind = job.filters.iter().map(|filter| (&filter.kind, &filter.transform));
+    let behind = job.task.filters.iter().map(|filter| (&filter.kind, &filter.transform));
     let streams: Vec<_> =
-        job.transforms.iter().map(|(kind, stage)| (kind, stage)).chain(behind).collect();
+        job.task.transforms.iter().map(|(kind, stage)| (kind, stage)).chain(behind).collect();
     let keys = |r: &Removed| -> Vec<&str> {
         let ours = streams.iter().filter(|(kind, _)| **kind == r.stage);
         let run = LEFT_OUT.iter().filter(|(reason, ..)| *reason == r.reason);
@@ -153,6 +148,10 @@ pub(super) fn nothing_left(finished: &Finished, job: &Job<'_>) -> Vec<String> {
         format!("no point is left of {}: {}", Grouped(ledger.read), by.join(", "))
     });
     told.collect()
+}
+
+fn named((name, count): (&Cow<'static, str>, &u64)) -> (String, u64) {
+    (name.clone().into_owned(), *count)
 }
 
 /// The lines of a branch's report tiles; none if it has none.

@@ -206,7 +206,7 @@ impl ByRank {
         tiles: &SealedTiles,
         sink: Box<dyn Sink>,
     ) -> Result<(SinkSummary, Tally)> {
-        let encoders = ChunkEncoders::of_one(job, tiles, (self.sink, &*sink), false).of_stored();
+        let encoders = ChunkEncoders::of_one(job, tiles, self.sink, &*sink, false).of_stored();
         let open = Mutex::new(Open::new(0, sink.chunk_points(), &self.layout, false));
         let commit = |stretch: OrderedStretch| -> Result<Vec<OutputChunk>> {
             let (mut open, mut full) = (lock(&open), Vec::new());

@@ -130,22 +130,74 @@ impl StoredGathered {
     }
 }
 
-/// Cuts records into chunks of the outputs by their rank, and stores columns.
-pub(crate) struct Cutter {
+/// What a pass stores, while it grows.
+pub(crate) struct GrowingOutcome {
     states: GrowingColumn,
     fates: GrowingColumn,
     columns: Vec<(ColumnKind, GrowingColumn)>,
     gathered: StoredGathered,
+}
+
+impl GrowingOutcome {
+    /// Nothing yet, of a scan of so many positions and records: the columns `stores`, and what is
+    /// stored in every pass.
+    pub fn new(
+        area: &Arc<SpillArea>,
+        positions: u64,
+        records: u64,
+        stores: &[ColumnKind],
+    ) -> Result<Self> {
+        let column = |name, item| GrowingColumn::new(area, name, item, positions);
+        let columns = stores.iter().map(|kind| Ok((*kind, column("columns", kind.bytes())?)));
+        Ok(GrowingOutcome {
+            states: GrowingColumn::new(area, "states", 1, records)?,
+            fates: column("fates", FATE_BYTES)?,
+            columns: columns.collect::<Result<_>>()?,
+            gathered: StoredGathered::new(area),
+        })
+    }
+
+    /// Adds what a product has for every position.
+    fn add(&mut self, product: &Product) -> Result<()> {
+        self.fates.add(&product.fates)?;
+        for ((_, column), bytes) in self.columns.iter_mut().zip(&product.columns) {
+            column.add(bytes)?;
+        }
+        product.summary.iter().try_for_each(|summary| self.gathered.add(summary))
+    }
+
+    fn finish(mut self) -> Result<Stored> {
+        let columns = self.columns.iter_mut().map(|(_, column)| column);
+        let all = [&mut self.states, &mut self.fates].into_iter().chain(columns);
+        all.into_iter().try_for_each(GrowingColumn::flush)?;
+        self.gathered.flush()?;
+        Ok(Stored {
+            states: self.states.pieces,
+            fates: self.fates.pieces,
+            columns: self.columns.into_iter().map(|(kind, c)| (kind, c.pieces)).collect(),
+            gathered: self.gathered,
+        })
+    }
+}
+
+/// Cuts records into chunks of the outputs by their rank, and stores columns.
+pub(crate) struct Cutter {
+    growing: GrowingOutcome,
     /// Bytes of a row.
     row: usize,
     outputs: Vec<Open>,
-    by_input: Vec<ByInput>,
-    by_rank: Vec<ByRank>,
+    lists: Lists,
     counts: Counts,
 }
 
-/// What is written behind the last tile: by input, and in the order of the inputs.
-pub(crate) type Lists = (Vec<ByInput>, Vec<ByRank>);
+/// What goes to outputs that are written behind the last tile.
+#[derive(Default)]
+pub(crate) struct Lists {
+    /// Those that are one for each input.
+    pub by_input: Vec<ByInput>,
+    /// Those in the order of the inputs.
+    pub by_rank: Vec<ByRank>,
+}
 
 /// Records behind a pass.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -159,71 +211,39 @@ pub(crate) struct Counts {
 }
 
 impl Cutter {
-    /// A cutter for a scan of so many positions and records, into `outputs`, `by_input` where each
-    /// input has its own, and `by_rank` where the input's order is wanted. The columns `stores` are
-    /// stored; entries have rows of so many bytes.
-    pub fn new(
-        area: &Arc<SpillArea>,
-        (positions, records): (u64, u64),
-        (stores, row): (&[ColumnKind], usize),
-        (outputs, by_input, by_rank): (Vec<Open>, Vec<ByInput>, Vec<ByRank>),
-    ) -> Result<Self> {
-        let column = |name, item| GrowingColumn::new(area, name, item, positions);
-        let columns = stores.iter().map(|kind| Ok((*kind, column("columns", kind.bytes())?)));
-        Ok(Cutter {
-            states: GrowingColumn::new(area, "states", 1, records)?,
-            fates: column("fates", FATE_BYTES)?,
-            columns: columns.collect::<Result<_>>()?,
-            gathered: StoredGathered::new(area),
-            row,
-            outputs,
-            by_input,
-            by_rank,
-            counts: Counts::default(),
-        })
+    /// A cutter into `growing`, `outputs` and `lists`, of entries that have rows of so many bytes.
+    pub fn new(growing: GrowingOutcome, row: usize, outputs: Vec<Open>, lists: Lists) -> Self {
+        Cutter { growing, row, outputs, lists, counts: Counts::default() }
     }
 
     /// The chunks that the next product completes.
     pub fn cut(&mut self, product: &Product) -> Result<Vec<OutputChunk>> {
-        self.fates.add(&product.fates)?;
-        for ((_, column), bytes) in self.columns.iter_mut().zip(&product.columns) {
-            column.add(bytes)?;
-        }
-        product.summary.iter().try_for_each(|summary| self.gathered.add(summary))?;
+        self.growing.add(product)?;
+        let Lists { by_input, by_rank } = &mut self.lists;
         let (mut full, mut places) = (Vec::new(), &product.places[..]);
         for (n, entry) in product.entries.iter().enumerate() {
-            self.states.repeat(entry.now.0, entry.count)?;
+            self.growing.states.repeat(entry.now.0, entry.count)?;
             self.counts.alive += if entry.now.is_alive() { u64::from(entry.count) } else { 0 };
             self.counts.written += if entry.now.is_written() { u64::from(entry.count) } else { 0 };
             let row = &product.rows[n * self.row..(n + 1) * self.row];
             for output in &mut self.outputs {
                 output.take(entry, row, &mut full);
             }
-            self.by_input.iter_mut().try_for_each(|lists| lists.take(entry, row))?;
+            by_input.iter_mut().try_for_each(|lists| lists.take(entry, row))?;
             if entry.was.is_written() && !places.is_empty() {
                 let (now, later) = places.split_at(places.len().min(entry.count as usize));
-                self.by_rank.iter_mut().try_for_each(|lists| lists.take(entry, now, row))?;
+                by_rank.iter_mut().try_for_each(|lists| lists.take(entry, now, row))?;
                 places = later;
             }
         }
         Ok(full)
     }
 
-    /// The last chunks, the columns, the lists by input, and what was counted.
+    /// The last chunks, the columns, the lists, and what was counted.
     pub fn finish(mut self) -> Result<(Vec<OutputChunk>, Stored, Lists, Counts)> {
-        let columns = self.columns.iter_mut().map(|(_, column)| column);
-        let all = [&mut self.states, &mut self.fates].into_iter().chain(columns);
-        all.into_iter().try_for_each(GrowingColumn::flush)?;
-        self.gathered.flush()?;
         let rest = self.outputs.iter_mut().filter_map(Open::rest).collect();
         self.counts.outputs = self.outputs.iter().map(|output| output.written).collect();
-        let stored = Stored {
-            states: self.states.pieces,
-            fates: self.fates.pieces,
-            columns: self.columns.into_iter().map(|(kind, c)| (kind, c.pieces)).collect(),
-            gathered: self.gathered,
-        };
-        Ok((rest, stored, (self.by_input, self.by_rank), self.counts))
+        Ok((rest, self.growing.finish()?, self.lists, self.counts))
     }
 }
 

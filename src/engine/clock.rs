@@ -1,17 +1,22 @@
-//! Times the phases of a run and tells the watcher of them.
+//! Times the phases of a run, tells the watcher of them, and holds the run to their order.
 //!
 //! Phases follow each other, each ends where the next begins, so that their times add up to that of
 //! the run and nothing that a run does is in none of them.
 
 use std::time::Instant;
+use std::vec::IntoIter;
 
 use super::Watch;
+use super::phase::RunPhase;
 use crate::host::process::cpu_seconds;
 use crate::report::Phase;
+use crate::{Error, Result};
 
 /// Wall-clock times of phases, one after the other.
 pub(crate) struct Clock<'a> {
     watch: &'a dyn Watch,
+    /// Those that are still to come.
+    later: IntoIter<RunPhase>,
     start: Instant,
     cpu_before: Option<f64>,
     open: Option<(&'static str, Instant)>,
@@ -19,9 +24,11 @@ pub(crate) struct Clock<'a> {
 }
 
 impl<'a> Clock<'a> {
-    pub fn new(watch: &'a dyn Watch) -> Self {
+    /// Of a run of these phases.
+    pub fn new(watch: &'a dyn Watch, phases: Vec<RunPhase>) -> Self {
         Clock {
             watch,
+            later: phases.into_iter(),
             start: Instant::now(),
             cpu_before: cpu_seconds(),
             open: None,
@@ -29,11 +36,22 @@ impl<'a> Clock<'a> {
         }
     }
 
-    /// Ends the phase that runs and begins `name`, which has `total` points to do.
-    pub fn phase(&mut self, name: &'static str, total: Option<u64>) {
-        self.end();
-        self.open = Some((name, Instant::now()));
-        self.watch.phase(name, total);
+    /// Ends the phase that runs and begins `phase`, which has `total` points to do.
+    ///
+    /// # Errors
+    ///
+    /// If another one is next.
+    pub fn begin(&mut self, phase: RunPhase, total: Option<u64>) -> Result<()> {
+        let next = self.later.next();
+        if next != Some(phase) {
+            return Err(Error::internal(format!("the next phase is {next:?}, not {phase:?}")));
+        }
+        if let Some(name) = phase.name() {
+            self.end();
+            self.open = Some((name, Instant::now()));
+            self.watch.phase(name, total);
+        }
+        Ok(())
     }
 
     fn end(&mut self) {
@@ -48,5 +66,28 @@ impl<'a> Clock<'a> {
         self.end();
         let cpu = self.cpu_before.and_then(|before| Some(cpu_seconds()? - before));
         (self.start.elapsed().as_secs_f64(), cpu, self.phases)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::Quiet;
+
+    #[test]
+    fn a_phase_out_of_its_turn_is_refused() {
+        let all = || vec![RunPhase::Decode, RunPhase::Look(0), RunPhase::Mill(0)];
+        let mut clock = Clock::new(&Quiet, all());
+        all().into_iter().for_each(|phase| clock.begin(phase, None).unwrap());
+        assert!(clock.begin(RunPhase::Publish, None).is_err(), "there is none left");
+        let told: Vec<_> = clock.finish().2.into_iter().map(|phase| phase.name).collect();
+        assert_eq!(told, ["decode", "mill"]);
+        for (before, phase) in
+            [(0, RunPhase::Merge), (1, RunPhase::Mill(0)), (2, RunPhase::Mill(1))]
+        {
+            let mut clock = Clock::new(&Quiet, all());
+            all().into_iter().take(before).for_each(|phase| clock.begin(phase, None).unwrap());
+            assert!(clock.begin(phase, None).unwrap_err().to_string().contains("the next phase"));
+        }
     }
 }

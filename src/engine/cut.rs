@@ -10,10 +10,9 @@
 
 use std::sync::Arc;
 
-use super::demands::Demands;
 use super::job::Job;
 use super::pass::{Pass, StageOp};
-use super::shares::{MILL_SPARE, Shares};
+use super::shares::MILL_SPARE;
 use crate::budget::{Bytes, Lease, whole_mebibytes};
 use crate::geom::lattice::Lattice;
 use crate::store::{CutError, SealedTiles, TileKey};
@@ -72,19 +71,16 @@ impl CellWidths {
 /// when nothing but its decode is lost.
 pub(crate) fn cut_all(
     job: &Job<'_>,
-    passes: &[Pass],
     lattice: &Lattice,
-    shares: &Shares,
-    demands: &Demands,
     tiles: &SealedTiles,
 ) -> Result<Vec<Arc<Cut>>> {
     let mut known: Vec<(CellWidths, Arc<Cut>)> = Vec::new();
     let mut cuts = Vec::new();
-    for pass in passes {
+    for pass in &job.task.passes {
         let cells = CellWidths::of(&job.ops, pass);
         let cut = match known.iter().find(|(same, _)| *same == cells) {
             Some((_, cut)) => cut.clone(),
-            None => Arc::new(cut(job, cells, lattice, (shares, demands), tiles, 0)?),
+            None => Arc::new(cut(job, cells, lattice, tiles, 0)?),
         };
         known.push((cells, cut.clone()));
         cuts.push(cut);
@@ -92,20 +88,20 @@ pub(crate) fn cut_all(
     Ok(cuts)
 }
 
-/// The tiles of a pass whose stages may have chosen other cells since `cut` was made; the mill
+/// The tiles of a pass whose stages may have chosen other cells since `made` was cut; the mill
 /// holds `held` bytes already.
 pub(crate) fn cut_again(
     job: &Job<'_>,
     pass: &Pass,
     lattice: &Lattice,
-    (shares, demands): (&Shares, &Demands),
     tiles: &SealedTiles,
-    (made, held): (&Arc<Cut>, u64),
+    made: &Arc<Cut>,
+    held: u64,
 ) -> Result<Arc<Cut>> {
     let cells = CellWidths::of(&job.ops, pass);
     match cells == made.cells {
         true => Ok(made.clone()),
-        false => cut(job, cells, lattice, (shares, demands), tiles, held).map(Arc::new),
+        false => cut(job, cells, lattice, tiles, held).map(Arc::new),
     }
 }
 
@@ -116,11 +112,12 @@ fn cut(
     job: &Job<'_>,
     cells: CellWidths,
     lattice: &Lattice,
-    (shares, demands): (&Shares, &Demands),
     tiles: &SealedTiles,
     held: u64,
 ) -> Result<Cut> {
-    let wanted = job.tile_points.map_or(zone_of(shares.tile_positions), |points| points as u64);
+    let (shares, demands) = (&job.shares, &job.task.demands);
+    let wanted =
+        job.task.tile_points().map_or(zone_of(shares.tile_positions), |points| points as u64);
     let later = demands.gathered(shares) + MILL_SPARE;
     let free = (job.budget.free() + held).saturating_sub(later.0);
     let largest = demands.tile_positions(job.threads.count(), free).max(shares.tile_positions);
@@ -150,7 +147,7 @@ fn cut(
             let fits = |millers: &usize| demands.tile_positions(*millers, free) as u64 >= tile;
             let Some(fewer) = (1..millers).rev().find(fits) else {
                 let limit = demands.limit_for_tile(1, tile);
-                let error = too_heavy(lattice, key, (positions, most));
+                let error = too_heavy(lattice, key, positions, most);
                 return Err(error.help(remedy(limit, held == 0 && is_sampled(job))));
             };
             let enough = whole_mebibytes(demands.limit_for_tile(millers, tile));
@@ -188,7 +185,7 @@ fn zone_of(tile_positions: usize) -> u64 {
 }
 
 /// The error of a cube that cannot be cut and holds more positions than the most that fit.
-fn too_heavy(lattice: &Lattice, key: TileKey, (positions, most): (u64, u64)) -> Error {
+fn too_heavy(lattice: &Lattice, key: TileKey, positions: u64, most: u64) -> Error {
     let (lo, hi) = (lattice.world(key.cube().lo), lattice.world(key.cube().hi));
     Error::memory(format!(
         "the cube from {lo:?} to {hi:?} and the cells around it hold {positions} positions, more \

@@ -7,36 +7,29 @@
 //! parts are, since the merge takes longer the more sorted runs there are. Where a run ends decides
 //! nothing: the merge orders records of one position by their bytes.
 
-use std::sync::Arc;
-
 use super::by_rank::{Starts, place};
 use super::job::Job;
 use super::placed::{BATCH, Placed};
-use super::shares::Shares;
 use super::tagger::NOT_FINITE;
+use super::task::Task;
 use crate::Result;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::PointBatch;
 use crate::report::Tally;
-use crate::store::{Intake, SpillArea, TileStore};
+use crate::store::{Intake, TileStore};
 
-pub(crate) fn decode(
-    job: &Job<'_>,
-    lattice: &Lattice,
-    shares: &Shares,
-    area: &Arc<SpillArea>,
-) -> Result<(TileStore, Starts, Tally)> {
-    let tagged = job.tagger.tags();
-    let mut store = TileStore::new(area, &job.budget, job.source.schema().stride, tagged);
-    let ranked = job.in_input_order.contains(&true);
+pub(crate) fn decode(job: &Job<'_>, lattice: &Lattice) -> Result<(TileStore, Starts, Tally)> {
+    let Task { source, tagger, in_input_order, .. } = job.task;
+    let mut store = TileStore::new(&job.area, &job.budget, source.schema().stride, tagger.tags());
+    let ranked = in_input_order.contains(&true);
     if ranked {
         store = store.with_places();
     }
     let (mut records, mut total) = (Vec::new(), Tally::default());
-    job.items(job.source.parts()).run(
+    job.items(source.parts()).run(
         || Arena {
-            intake: Intake::new(&store, shares.run_records),
-            batch: PointBatch::new(job.source.schema().clone(), BATCH),
+            intake: Intake::new(&store, job.shares.run_records),
+            batch: PointBatch::new(source.schema().clone(), BATCH),
             placed: Placed::default(),
         },
         |arena, index| decode_part(job, lattice, index, arena),
@@ -64,7 +57,7 @@ fn decode_part(
     arena: &mut Arena<'_>,
 ) -> Result<(u64, Tally)> {
     let Arena { intake, batch, placed } = arena;
-    let mut part = job.source.part_without(index, &job.unread)?;
+    let mut part = job.task.source.part_without(index, &job.unread)?;
     let (mut read, mut tally) = (0, Tally::default());
     while job.read(&mut *part, batch, &mut tally)? {
         placed.first = place(index, read);
@@ -91,7 +84,7 @@ impl Placed {
         left_out.clear();
         useless.clear();
         let mut misplaced = Vec::new();
-        let tagger = &job.tagger;
+        let tagger = &job.task.tagger;
         lattice.place(
             batch.schema(),
             records,
@@ -109,14 +102,16 @@ impl Placed {
             |i, why| misplaced.push((i, why)),
         );
         for (i, why) in misplaced {
-            if why == Misplaced::NotFinite && job.drop_nonfinite {
-                tally.remove(&job.source_kind, NOT_FINITE, 1);
+            if why == Misplaced::NotFinite && job.task.drops_nonfinite() {
+                tally.remove(&job.task.source_kind, NOT_FINITE, 1);
                 left_out.push(i);
             } else {
                 return Err(job.misplaced(batch, i, why));
             }
         }
-        useless.iter().for_each(|(reason, &count)| tally.remove(&job.source_kind, reason, count));
+        useless
+            .iter()
+            .for_each(|(reason, &count)| tally.remove(&job.task.source_kind, reason, count));
         tally.work("placed", positions.len() as u64);
         left_out.sort_unstable();
         Ok(())

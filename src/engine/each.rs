@@ -8,29 +8,32 @@
 use super::by_input::ByInput;
 use super::chunk::{Open, OutputChunk};
 use super::encoding::{ChunkEncoder, ChunkEncoders};
-use super::job::{Each, Job};
+use super::job::Job;
 use super::product::RecordEntry;
+use super::task::Task;
 use crate::point::Metadata;
 use crate::report::Tally;
 use crate::stage::SinkSummary;
 use crate::store::SealedTiles;
 use crate::{Error, Result};
 
-impl Each<'_> {
+impl ByInput {
     /// Writes every input's output, each thread one at a time; for each input, the records that its
     /// output was given and what it said.
     pub fn write(
         &self,
         job: &Job<'_>,
         tiles: &SealedTiles,
-        records: &ByInput,
     ) -> Result<(Vec<(u64, SinkSummary)>, Tally)> {
+        let Task { source, sinks, demands, .. } = job.task;
+        let chunk = sinks[self.sink].chunk(source.schema(), &job.task.metadata(self.sink, None));
+        let chunk_points = chunk.map_or(demands.chunk.points, |chunk| chunk.points);
         let (mut written, mut total) = (Vec::new(), Tally::default());
-        job.items(self.sinks.len()).run(
-            || ChunkEncoder::new(job, self.chunk_points),
+        job.items(job.task.files(self.sink).len()).run(
+            || ChunkEncoder::new(job, chunk_points),
             |encoder, input| {
                 job.advance(0)?;
-                let summary = self.write_one(job, tiles, records, input, encoder)?;
+                let summary = self.write_one(job, tiles, input, encoder)?;
                 Ok((summary, std::mem::take(&mut encoder.tally)))
             },
             |(summary, tally)| {
@@ -46,28 +49,27 @@ impl Each<'_> {
         &self,
         job: &Job<'_>,
         tiles: &SealedTiles,
-        records: &ByInput,
         input: usize,
         encoder: &mut ChunkEncoder,
     ) -> Result<(u64, SinkSummary)> {
+        let (task, number) = (job.task, self.sink);
         let missing = || Error::internal(format!("input {input} has no output"));
-        let create = self.sinks.get(input).ok_or_else(missing)?;
-        let staged = self.staged.get(input).ok_or_else(missing)?;
-        let rank = *self.ranks.get(input).ok_or_else(missing)? as usize;
-        let pipeline = Some(job.pipelines[records.sink].clone());
-        let computed = job.computed[records.sink].clone();
-        let metadata = Metadata { pipeline, computed, ..job.source.metadata_of(input)? };
-        let mut sink = create.create(staged.file(), job.source.schema(), &metadata, false)?;
-        let encoders =
-            ChunkEncoders::of_one(job, tiles, (records.sink, &*sink), create.likes_time());
-        let mut open = Open::new(0, sink.chunk_points(), &records.layout, false);
+        let create = task.files(number).get(input).ok_or_else(missing)?;
+        let staged = job.outputs[number].get(input).ok_or_else(missing)?;
+        let rank = *task.ranks.get(input).ok_or_else(missing)? as usize;
+        let pipeline = Some(task.pipeline(number));
+        let computed = task.computed[number].clone();
+        let metadata = Metadata { pipeline, computed, ..task.source.metadata_of(input)? };
+        let mut sink = create.create(staged.file(), task.source.schema(), &metadata, false)?;
+        let encoders = ChunkEncoders::of_one(job, tiles, number, &*sink, create.likes_time());
+        let mut open = Open::new(0, sink.chunk_points(), &self.layout, false);
         let (mut given, mut full) = (0, Vec::new());
         let mut append = |chunk: OutputChunk| {
             let (_, encoded) = encoder.encode(&encoders, &chunk)?;
             sink.append(encoded)?;
             job.advance(0)
         };
-        records.each(rank, |entry: &RecordEntry, row| {
+        self.each(rank, |entry: &RecordEntry, row| {
             given += u64::from(entry.count);
             open.take(entry, row, &mut full);
             full.drain(..).try_for_each(&mut append)

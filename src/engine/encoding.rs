@@ -41,9 +41,12 @@ impl<'a> ChunkEncoders<'a> {
             job,
             tiles,
             encoders: sinks.iter().map(|(_, sink)| sink.encoder()).collect(),
-            by_time: sinks.iter().map(|(n, _)| by_time(job, job.by_time[*n])).collect(),
+            by_time: sinks
+                .iter()
+                .map(|(n, _)| by_time(job, job.task.sinks[*n].likes_time()))
+                .collect(),
             stored: false,
-            changed_by: sinks.iter().map(|(n, _)| &*job.changed_by[*n]).collect(),
+            changed_by: sinks.iter().map(|(n, _)| &*job.task.changed_by[*n]).collect(),
             counted: sinks.iter().map(|(sink, _)| job.is_last(*sink)).collect(),
             chunk_points: sinks.iter().map(|(_, sink)| sink.chunk_points()).max().unwrap_or(0),
         }
@@ -53,7 +56,8 @@ impl<'a> ChunkEncoders<'a> {
     pub fn of_one(
         job: &'a Job<'a>,
         tiles: &'a SealedTiles,
-        (number, sink): (usize, &dyn Sink),
+        number: usize,
+        sink: &dyn Sink,
         likes_time: bool,
     ) -> Self {
         ChunkEncoders {
@@ -61,7 +65,7 @@ impl<'a> ChunkEncoders<'a> {
             tiles,
             encoders: vec![sink.encoder()],
             by_time: vec![by_time(job, likes_time)],
-            changed_by: vec![&job.changed_by[number]],
+            changed_by: vec![&job.task.changed_by[number]],
             counted: vec![job.is_last(number)],
             stored: false,
             chunk_points: sink.chunk_points(),
@@ -102,7 +106,7 @@ impl ChunkEncoder {
             numbers: Vec::with_capacity(chunk_points),
             states: Vec::with_capacity(chunk_points),
             fetch: Fetch::default(),
-            batch: PointBatch::new(job.source.schema().clone(), chunk_points),
+            batch: PointBatch::new(job.task.source.schema().clone(), chunk_points),
             tally: Tally::default(),
         }
     }
@@ -138,7 +142,7 @@ impl ChunkEncoder {
 }
 
 fn by_time(job: &Job<'_>, likes_time: bool) -> Option<ByTime> {
-    likes_time.then(|| ByTime::of(job.source.schema())).flatten()
+    likes_time.then(|| ByTime::of(job.task.source.schema())).flatten()
 }
 
 /// Counts the records that are written with the key-point flag because they stay.
@@ -154,7 +158,7 @@ fn count_key_points(states: &[RecordState], tally: &mut Tally) {
 fn change(job: &Job<'_>, filters: &[usize], batch: &mut PointBatch) -> Result<()> {
     let records = batch.len();
     for &filter in filters {
-        let PassFilter { kind, transform } = &job.filters[filter];
+        let PassFilter { kind, transform } = &job.task.filters[filter];
         transform.apply(batch)?;
         if batch.len() != records {
             let told = format!("the stage {kind} removes records that it kept before");

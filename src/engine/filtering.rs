@@ -41,7 +41,7 @@ impl<'a> Filtering<'a> {
             tiles,
             filters,
             fetch: Fetch::default(),
-            batch: PointBatch::new(job.source.schema().clone(), AT_ONCE),
+            batch: PointBatch::new(job.task.source.schema().clone(), AT_ONCE),
             numbers: Vec::with_capacity(AT_ONCE),
             states: Vec::with_capacity(AT_ONCE),
         }
@@ -96,7 +96,7 @@ impl<'a> Filtering<'a> {
         edit(&mut self.batch, &self.states)?;
         self.batch.number_records();
         for &filter in self.filters {
-            let PassFilter { kind, transform } = &self.job.filters[filter];
+            let PassFilter { kind, transform } = &self.job.task.filters[filter];
             let before = self.batch.len();
             transform.apply(&mut self.batch)?;
             let removed = before

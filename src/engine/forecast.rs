@@ -43,14 +43,13 @@ pub(crate) fn forecast(
     ops: &[usize],
     field: &DecodedScan<'_>,
     sieve: &Sieve,
-    capacity: usize,
 ) -> Result<Vec<(usize, Forecast)>> {
     let mut forecasts = Vec::new();
     for &op in ops {
         let Some(side) = job.ops[op].op.tile().sample_side() else { continue };
         let side = side.max(1);
         let keys = cubes(&field.tiles, side)?;
-        let samples = samples(job, pass, op, field, sieve, capacity, &keys)?;
+        let samples = samples(job, pass, op, field, sieve, &keys)?;
         forecasts.push((op, job.ops[op].op.tile_mut().forecast(&samples)));
     }
     Ok(forecasts)
@@ -63,9 +62,9 @@ fn samples(
     op: usize,
     field: &DecodedScan<'_>,
     sieve: &Sieve,
-    capacity: usize,
     keys: &[TileKey],
 ) -> Result<Vec<Vec<f64>>> {
+    let capacity = samples_capacity(&job.shares);
     let mut samples = Vec::new();
     job.items(keys.len()).run(
         || {
@@ -81,9 +80,13 @@ fn samples(
             }
             let (tile, _) = worker.run(key, Some(op))?;
             tile.limits = job.ops[op].selection;
-            job.ops[op].op.tile().sample(tile).map(Some)
+            let figures = job.ops[op].op.tile().sample(tile)?;
+            Ok(Some(figures.into_iter().map(f64::to_bits).collect::<Vec<_>>()))
         },
-        |sample| samples.extend(sample),
+        // A figure may be no number, which not every form of text can hold: bits are always kept.
+        |sample: Option<Vec<u64>>| {
+            samples.extend(sample.map(|bits| bits.into_iter().map(f64::from_bits).collect()));
+        },
         |_| Ok(()),
     )?;
     Ok(samples)

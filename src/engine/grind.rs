@@ -12,12 +12,11 @@
 
 use std::sync::{Arc, Mutex};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::by_input::ByInput;
-use super::by_rank::{ByRank, Starts};
+use super::by_rank::Starts;
 use super::chunk::{Open, OutputChunk};
-use super::chunks::{Counts, Cutter, Stored};
+use super::chunks::{Counts, Cutter, GrowingOutcome, Lists, Stored};
 use super::cut::{Cut, neighbors, reach};
 use super::encoding::ChunkEncoders;
 use super::filtering::Filtering;
@@ -31,14 +30,13 @@ use crate::geom::lattice::Lattice;
 use crate::host::{Threads, lock};
 use crate::report::{Baseline, Tally};
 use crate::stage::{Sink, SinkSummary};
-use crate::store::{Fetch, SealedTiles, SpillArea, TileKey};
+use crate::store::{Fetch, SealedTiles, TileKey};
 use crate::tile::{Loader, RecordRun, Sieve, Tile};
 use crate::{Error, Result};
 
 /// What all passes go over.
 pub(crate) struct DecodedScan<'a> {
     pub lattice: &'a Lattice,
-    pub area: Arc<SpillArea>,
     pub tiles: Arc<SealedTiles>,
     /// Where the parts of the input begin, if an output asks for its order.
     pub starts: Arc<Starts>,
@@ -51,9 +49,7 @@ pub(crate) struct Milled {
     pub counts: Counts,
     /// For each sink of the pass, what it said.
     pub written: Vec<SinkSummary>,
-    /// What goes to outputs that are one for each input, and to those in the order of the inputs.
-    pub by_input: Vec<ByInput>,
-    pub by_rank: Vec<ByRank>,
+    pub lists: Lists,
     /// Records that the pass's stages decide about.
     pub decided: u64,
     /// True if the pass oriented normals.
@@ -65,30 +61,24 @@ pub(crate) struct Milled {
 /// A sink with its number.
 pub(crate) type Numbered = (usize, Box<dyn Sink>);
 
-/// Outputs of a pass: sinks that grow while it mills, lists by input and by place in the input.
-pub(crate) type PassOutputs = (Vec<Numbered>, Vec<ByInput>, Vec<ByRank>);
-
-/// Runs `pass` over the tiles of `cut`, into the `sinks` with their numbers and into lists by
-/// input.
+/// Runs `pass` over the tiles of `cut`, into the `sinks` with their numbers and into `lists`.
 pub(crate) fn grind(
     job: &Job<'_>,
-    (pass, cut): (&Pass, &Cut),
+    pass: &Pass,
+    cut: &Cut,
     field: &DecodedScan<'_>,
     sieve: &Sieve,
-    (sinks, by_input, by_rank): PassOutputs,
+    sinks: Vec<Numbered>,
+    lists: Lists,
 ) -> Result<Milled> {
     let tiles = &field.tiles;
-    let layout = pass.row(&job.computed);
+    let layout = pass.row(&job.task.computed);
     let outputs = sinks.iter().enumerate().map(|(n, (sink, open))| {
         let before = pass.before.contains(sink);
         Open::new(n, open.chunk_points(), &job.layout(*sink, &layout), before)
     });
-    let cutter = Cutter::new(
-        &field.area,
-        (tiles.positions(), tiles.points()),
-        (&pass.stores, layout.bytes()),
-        (outputs.collect(), by_input, by_rank),
-    )?;
+    let growing = GrowingOutcome::new(&job.area, tiles.positions(), tiles.points(), &pass.stores)?;
+    let cutter = Cutter::new(growing, layout.bytes(), outputs.collect(), lists);
     let cutter = Mutex::new(Some(cutter));
     let commit = |product: Product| match &mut *lock(&cutter) {
         Some(cutter) => cutter.cut(&product),
@@ -106,12 +96,11 @@ pub(crate) fn grind(
     let (sum, baseline) = mill_tiles(threads, &cut.keys, worker, &encoders, &outlet)?;
     let TileTally { mut tally, decided, oriented } = sum;
     let unfinished = || Error::internal("a pass was finished twice");
-    let (rest, stored, (by_input, by_rank), counts) =
-        lock(&cutter).take().ok_or_else(unfinished)?.finish()?;
+    let (rest, stored, lists, counts) = lock(&cutter).take().ok_or_else(unfinished)?.finish()?;
     let mut encoder = encoders.one();
     let written = outlet.close(rest, &mut |chunk| encoder.encode(&encoders, &chunk))?;
     tally.merge(&encoder.tally);
-    Ok(Milled { tally, stored, counts, written, by_input, by_rank, decided, oriented, baseline })
+    Ok(Milled { tally, stored, counts, written, lists, decided, oriented, baseline })
 }
 
 /// Mills the tiles `keys` into the outlet: what they come to in all, and the grids to compare with.
@@ -151,7 +140,7 @@ fn mill_tiles<'a>(
 }
 
 /// What a tile comes to, besides its product.
-#[derive(Debug, Default, Serialize)]
+#[derive(Debug, Default, Serialize, PartialEq, Deserialize)]
 struct TileTally {
     tally: Tally,
     /// Records that the pass's stages decide about.
@@ -199,12 +188,12 @@ impl<'a> Worker<'a> {
     ) -> Self {
         let neighbors = neighbors(&job.ops, pass);
         let mut loader = Loader::new(&field.tiles, sieve, capacity);
-        if let Some(points) = job.tile_points {
+        if let Some(points) = job.task.tile_points() {
             // Half for the zone, half for the rim, as where memory decides.
             loader.limit_rim(points.saturating_mul(2));
         }
         let tile = loader.tile().0;
-        tile.compute_by(job.simd);
+        tile.compute_by(job.task.simd);
         if neighbors > 0 {
             tile.around.reserve(capacity);
         }
@@ -212,9 +201,10 @@ impl<'a> Worker<'a> {
         let first = sieve.states.is_none();
         let rounds = field.lattice.rounds() && (first || pass.removes);
         let rounded =
-            rounds.then(|| Rounded::new(&field.tiles, field.lattice, job.source.schema()));
+            rounds.then(|| Rounded::new(&field.tiles, field.lattice, job.task.source.schema()));
         let reach = reach(&job.ops, pass);
-        let ranks = pass.before.iter().chain(&pass.after).any(|sink| job.in_input_order[*sink]);
+        let ranks =
+            pass.before.iter().chain(&pass.after).any(|sink| job.task.in_input_order[*sink]);
         let filters = &pass.filters[..];
         let filtering = (!filters.is_empty()).then(|| Filtering::new(job, &field.tiles, filters));
         Worker {

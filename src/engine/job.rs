@@ -1,70 +1,93 @@
-//! What every phase of a run shares: the source, the stages, the budget, and how it is told to
-//! stop.
+//! What every phase of a run shares: the task, the stages as they settled, the memory, and how it is
+//! told to stop.
 //!
 //! Phases change none of it while their threads work, so threads share it without locks but for
-//! warnings. What belongs to one phase alone is not in it: that goes from the phase that makes it
-//! to the one that needs it, and is dropped there.
+//! warnings. Between phases stages settle by what is known of the scan by then; all else stays as
+//! the plan made it. What belongs to one phase alone is not in it: that goes from the phase that
+//! makes it to the one that needs it, and is dropped there.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
-use super::pass::{Branch, Pass, PassFilter, StageOp};
+use super::pass::StageOp;
 use super::publish::Staged;
 use super::row::RowLayout;
-use super::tagger::{ClassOf, LEFT_OUT, Tagger};
-use crate::budget::Budget;
+use super::scratch::Scratch;
+use super::shares::Shares;
+use super::tagger::{ClassOf, LEFT_OUT};
+use super::task::Task;
+use crate::budget::{Budget, Lease};
 use crate::error::shown;
 use crate::geom::lattice::{Lattice, Misplaced};
-use crate::geom::simd::Simd;
 use crate::graph::Headers;
 use crate::host::{PhaseItems, Threads, lock};
-use crate::point::{ComputedDimension, PointBatch};
+use crate::point::PointBatch;
 use crate::report::{Grouped, Tally};
-use crate::stage::{CreateSink, Part, Source, Transform};
+use crate::stage::Part;
+use crate::store::SpillArea;
 use crate::{Error, ErrorKind, Result};
 
 /// What every phase of a run needs.
 pub(crate) struct Job<'a> {
-    pub source: &'a dyn Source,
-    pub source_kind: String,
-    /// The stages on the branch of each sink, as outputs name them.
-    pub pipelines: Vec<Arc<str>>,
-    pub transforms: Vec<(String, Box<dyn Transform>)>,
+    pub task: &'a Task,
+    /// The tile stages, which settle as the scan becomes known.
+    pub ops: Vec<StageOp>,
+    /// For each sink, where its files grow.
+    pub outputs: &'a [Vec<Staged>],
     /// Dimensions that nobody looks at.
     pub unread: Vec<String>,
-    pub ops: Vec<StageOp>,
-    /// Stages that stream behind the decode.
-    pub filters: &'a [PassFilter],
-    /// For each sink, those of them that are above it.
-    pub changed_by: &'a [Vec<usize>],
-    pub passes: Vec<Pass>,
-    pub branches: &'a [Branch],
-    /// For each sink, where the outputs of the inputs go if each has its own.
-    pub each: Vec<Option<Each<'a>>>,
-    pub tagger: Tagger,
     pub classes: ClassOf,
+    pub shares: Shares,
     pub budget: Budget,
+    /// What is set down between phases.
+    pub area: Arc<SpillArea>,
     pub threads: Threads<'a>,
-    pub simd: Simd,
-    pub drop_nonfinite: bool,
-    pub headers: Headers,
-    pub tile_points: Option<usize>,
-    /// For each sink, the computed dimensions that it writes.
-    pub computed: &'a [Vec<ComputedDimension>],
-    /// For each sink, whether it wants the order of the inputs.
-    pub in_input_order: &'a [bool],
-    /// For each sink, whether the records of a chunk are ordered by time.
-    pub by_time: Vec<bool>,
     pub watch: &'a dyn Watch,
     /// What the user was warned of before the end.
-    pub warnings: Mutex<Vec<String>>,
+    warnings: Mutex<Vec<String>>,
     /// Set once a thread has failed.
-    pub failed: AtomicBool,
+    failed: AtomicBool,
+    _base: Vec<Lease>,
 }
 
-impl Job<'_> {
+impl<'a> Job<'a> {
+    /// The job of `task` with its tile stages, into files that grow at `outputs`; what does not fit
+    /// in memory goes to `scratch`.
+    ///
+    /// # Errors
+    ///
+    /// A memory that does not do for the program and what it must hold.
+    pub fn new(
+        task: &'a Task,
+        ops: Vec<StageOp>,
+        outputs: &'a [Vec<Staged>],
+        scratch: &Arc<Scratch>,
+        threads: Threads<'a>,
+        watch: &'a dyn Watch,
+    ) -> Result<Self> {
+        let shares = task.demands.divide()?;
+        let budget = Budget::new(task.demands.limit);
+        let base = budget.lease_all(&task.demands.base(), "program")?;
+        let kept = task.kept_in_memory(&shares);
+        Ok(Job {
+            task,
+            ops,
+            outputs,
+            unread: task.unread(),
+            classes: ClassOf::new(task.source.schema()),
+            shares,
+            area: SpillArea::new(budget.clone(), kept, Box::new(scratch.clone())),
+            budget,
+            threads,
+            watch,
+            warnings: Mutex::default(),
+            failed: AtomicBool::new(false),
+            _base: base,
+        })
+    }
+
     /// Reads the next batch of a part through the transforms; false at its end.
     pub fn read(
         &self,
@@ -80,7 +103,7 @@ impl Job<'_> {
         }
         tally.work("read", read);
         self.classes.read(batch, tally);
-        for (kind, transform) in &self.transforms {
+        for (kind, transform) in &self.task.transforms {
             let before = batch.len();
             transform.apply(batch)?;
             let removed = before
@@ -101,16 +124,21 @@ impl Job<'_> {
         }
     }
 
+    /// What the user was warned of so far.
+    pub fn warned(&self) -> Vec<String> {
+        lock(&self.warnings).clone()
+    }
+
     /// The rows of a sink's entries, where those of its pass are `all`: none if it writes no
     /// column.
     pub fn layout(&self, sink: usize, all: &RowLayout) -> RowLayout {
-        if self.computed[sink].is_empty() { RowLayout::default() } else { all.clone() }
+        if self.task.computed[sink].is_empty() { RowLayout::default() } else { all.clone() }
     }
 
     /// True if a sink takes what the last stage of a branch leaves: classes are counted by its
     /// records.
     pub fn is_last(&self, sink: usize) -> bool {
-        self.branches.iter().any(|branch| branch.last_sink == sink)
+        self.task.branches.iter().any(|branch| branch.last_sink == sink)
     }
 
     /// Says which transforms removed no point of all that were read.
@@ -119,8 +147,8 @@ impl Job<'_> {
         if tally.work.get("read").is_none_or(|&read| read == 0) {
             return;
         }
-        let idle = self.transforms.iter().filter(|(kind, _)| !removed(kind));
-        let told = idle.flat_map(|(_, transform)| transform.idle(self.source.schema()));
+        let idle = self.task.transforms.iter().filter(|(kind, _)| !removed(kind));
+        let told = idle.flat_map(|(_, transform)| transform.idle(self.task.source.schema()));
         told.for_each(|told| self.warn(told));
     }
 
@@ -128,7 +156,7 @@ impl Job<'_> {
     pub fn tell_left_out(&self, tally: &Tally) {
         self.tell_idle(tally);
         for (reason, setting, which) in LEFT_OUT {
-            let key = (self.source_kind.clone(), reason);
+            let key = (self.task.source_kind.clone(), reason.into());
             if let Some(&points) = tally.removed.get(&key) {
                 let points = Grouped(points);
                 self.warn(format!(
@@ -138,14 +166,18 @@ impl Job<'_> {
             }
         }
         if tally.work.get("placed").is_some_and(|&placed| placed > 0) {
-            self.tagger.warnings(tally.selections).into_iter().for_each(|told| self.warn(told));
+            self.task
+                .tagger
+                .warnings(tally.selections)
+                .into_iter()
+                .for_each(|told| self.warn(told));
         }
     }
 
     /// Once all points are read: fails where they contradict their headers, or warns of it.
     pub fn check_headers(&self) -> Result<()> {
-        let refuse = self.headers == Headers::Refuse;
-        let all = self.source.contradictions();
+        let refuse = self.task.settings.headers == Headers::Refuse;
+        let all = self.task.source.contradictions();
         let (wrong, odd): (Vec<_>, Vec<_>) =
             all.into_iter().partition(|told| told.is_damage && refuse);
         for told in odd {
@@ -205,18 +237,9 @@ impl Job<'_> {
             format!("the point {:?} {what}", point.unwrap_or_default()),
         )
         .help(help);
-        match self.source.inputs().get(batch.source as usize) {
+        match self.task.source.inputs().get(batch.source as usize) {
             Some(input) => error.at(&input.path),
             None => error,
         }
     }
-}
-
-/// The outputs of all inputs, in the order of these, and where they grow.
-pub(crate) struct Each<'a> {
-    pub sinks: &'a [Box<dyn CreateSink>],
-    pub staged: &'a [Staged],
-    pub ranks: &'a [u32],
-    /// Records of a chunk.
-    pub chunk_points: usize,
 }

@@ -13,25 +13,25 @@ use serde_json::Value;
 
 use super::by_input::ByInput;
 use super::by_rank::ByRank;
-use super::chunks::StoredGathered;
+use super::chunks::{Lists, StoredGathered};
 use super::clock::Clock;
 use super::cut::{Cut, cut_again, cut_all};
 use super::decode::decode;
-use super::demands::Demands;
 use super::finished::{Finished, FinishedBranch};
 use super::forecast::{forecast, samples_capacity};
-use super::grind::{DecodedScan, Milled, PassOutputs, grind};
+use super::grind::{DecodedScan, Milled, Numbered, grind};
 use super::job::Job;
-use super::pass::{Branch, Call, Pass};
+use super::pass::{Call, Pass};
+use super::phase::RunPhase;
 use super::settled::{conclude, decisions, rounding, settle};
-use super::shares::Shares;
 use super::survey::survey;
+use super::task::Task;
 use crate::budget::{Bytes, Holders, Lease};
 use crate::geom::lattice::Lattice;
 use crate::point::{ColumnKind, NORMAL};
 use crate::report::{Baseline, BaselineFigures, Decision, PassFigures, Tally};
 use crate::stage::{Sink, SinkSummary};
-use crate::store::{SealedTiles, SpillArea, seal};
+use crate::store::{SealedTiles, seal};
 use crate::tile::Sieve;
 use crate::{Error, Result};
 
@@ -40,26 +40,24 @@ use crate::{Error, Result};
 pub(crate) fn mill(
     job: &mut Job<'_>,
     lattice: &Lattice,
-    shares: &Shares,
-    demands: &Demands,
-    area: &Arc<SpillArea>,
     sinks: Vec<Option<Box<dyn Sink>>>,
     clock: &mut Clock<'_>,
 ) -> Result<Finished> {
-    clock.phase("decode", Some(job.source.points()));
-    let working = job.budget.lease_all(&demands.decode(shares.run_records as u64), "decoding")?;
-    let (store, starts, mut tally) = decode(job, lattice, shares, area)?;
+    clock.begin(RunPhase::Decode, Some(job.task.source.points()))?;
+    let decoding = job.task.demands.decode(job.shares.run_records as u64);
+    let working = job.budget.lease_all(&decoding, "decoding")?;
+    let (store, starts, mut tally) = decode(job, lattice)?;
     drop(working);
     job.check_headers()?;
     job.tell_left_out(&tally);
     tally.work("runs", store.runs() as u64);
-    clock.phase("merge", Some(tally.work.get("placed").copied().unwrap_or(0)));
+    clock.begin(RunPhase::Merge, Some(tally.work.get("placed").copied().unwrap_or(0)))?;
     let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
     tally.count("positions", tiles.positions());
     settle(job, lattice, &tiles)?;
-    let field =
-        DecodedScan { lattice, area: area.clone(), tiles: tiles.clone(), starts: Arc::new(starts) };
+    let field = DecodedScan { lattice, tiles: tiles.clone(), starts: Arc::new(starts) };
     let mut course = Course {
+        clock,
         forecasts: vec![None; job.ops.len()],
         written: sinks.iter().map(|_| None).collect(),
         sinks,
@@ -67,7 +65,7 @@ pub(crate) fn mill(
     };
     let decoded =
         Standing { alive: tiles.points(), kept: tiles.points(), tally, ..Standing::default() };
-    let branches = course.go(job, decoded, &field, (shares, demands), clock)?;
+    let branches = course.go(job, decoded, &field)?;
     let unwritten = || Error::internal("an output was never written");
     let written = course.written.into_iter().map(|w| w.ok_or_else(unwritten));
     let mut tally = course.tally;
@@ -124,7 +122,7 @@ impl Standing {
             self.compared = Some(Arc::new(Compared { baseline, decided, found }));
         }
         let called = pass.calls.iter().map(|call| job.ops[call.op].kind.clone());
-        let streamed = pass.filters.iter().map(|&filter| job.filters[filter].kind.clone());
+        let streamed = pass.filters.iter().map(|&filter| job.task.filters[filter].kind.clone());
         let (stages, after) = (called.chain(streamed).collect(), milled.counts.alive);
         self.passes.push(PassFigures { stages, before: self.alive, after });
         self.sieve.states = Some(milled.stored.states);
@@ -141,7 +139,8 @@ impl Standing {
 }
 
 /// What a mill holds beside what its passes leave.
-struct Course {
+struct Course<'c, 'w> {
+    clock: &'c mut Clock<'w>,
     /// For each stage, what it said is to be expected.
     forecasts: Vec<Option<Vec<(String, Value)>>>,
     sinks: Vec<Option<Box<dyn Sink>>>,
@@ -151,20 +150,27 @@ struct Course {
     tally: Tally,
 }
 
-impl Course {
+/// The outputs of a pass.
+struct PassOutputs {
+    /// Those that grow while it mills.
+    growing: Vec<Numbered>,
+    lists: Lists,
+    /// Those that are written by rank behind it, in the order of these lists.
+    ordered: Vec<Box<dyn Sink>>,
+}
+
+impl Course<'_, '_> {
     /// Runs all passes; what a branch comes to is measured as soon as its last one is done.
     fn go(
         &mut self,
         job: &mut Job<'_>,
         decoded: Standing,
         field: &DecodedScan<'_>,
-        (shares, demands): (&Shares, &Demands),
-        clock: &mut Clock<'_>,
     ) -> Result<Vec<FinishedBranch>> {
-        let passes = std::mem::take(&mut job.passes);
-        let cuts = cut_all(job, &passes, field.lattice, shares, demands, &field.tiles)?;
+        let Task { passes, branches, demands, .. } = job.task;
+        let cuts = cut_all(job, field.lattice, &field.tiles)?;
         let milling = |cut: &Arc<Cut>| demands.mill(cut.millers, cut.capacity as u64);
-        let looking = demands.mill(job.threads.count(), samples_capacity(shares) as u64);
+        let looking = demands.mill(job.threads.count(), samples_capacity(&job.shares) as u64);
         let most = cuts.iter().map(milling).fold(looking, Holders::larger);
         self.tally.merge(&decoded.tally);
         // What the decode left comes first, then what each pass leaves.
@@ -180,12 +186,11 @@ impl Course {
                 Some(held) => held,
                 None => job.budget.lease_all(&most, "mill")?,
             };
-            let place = (pass, &cut, &mut held);
-            let mut after = self.run(job, place, before, field, (shares, demands), clock)?;
+            let mut after = self.run(job, n, &cut, &mut held, before, field)?;
             let is_loaded =
                 |kind: &ColumnKind| passes[n + 1..].iter().any(|pass| pass.loads.contains(kind));
             after.sieve.columns.retain(|(kind, _)| is_loaded(kind));
-            match job.branches.iter().find(|branch| branch.pass == n) {
+            match branches.iter().position(|branch| branch.pass == n) {
                 None => {
                     working = Some(held);
                     left.push(Some(after));
@@ -193,32 +198,31 @@ impl Course {
                 Some(branch) => {
                     drop((held, cut));
                     left.push(None);
-                    finished.push(self.finish(job, branch, after, field, clock)?);
+                    finished.push(self.finish(job, branch, after, field)?);
                 }
             }
         }
         Ok(finished)
     }
 
-    /// Measures what a branch came to.
+    /// Measures what branch `number` came to.
     fn finish(
-        &self,
+        &mut self,
         job: &Job<'_>,
-        branch: &Branch,
+        number: usize,
         after: Standing,
         field: &DecodedScan<'_>,
-        clock: &mut Clock<'_>,
     ) -> Result<FinishedBranch> {
-        let DecodedScan { lattice, area, tiles, .. } = field;
-        clock.phase("survey", Some(2 * tiles.positions()));
-        let mut measured = survey(job, lattice, area, tiles, &after.sieve)?;
+        let DecodedScan { lattice, tiles, .. } = field;
+        self.clock.begin(RunPhase::Survey(number), Some(2 * tiles.positions()))?;
+        let mut measured = survey(job, lattice, tiles, &after.sieve)?;
         measured.totals.baseline = after.baseline(lattice);
         let mut tally = after.tally;
         Ok(FinishedBranch {
             kept: after.kept,
             decisions: rounding(job, lattice, &tiles.bounds(), &tally)
                 .into_iter()
-                .chain(decisions(job, branch, &self.forecasts))
+                .chain(decisions(job, &job.task.branches[number], &self.forecasts))
                 .collect(),
             classes: tally.classes.take().map_or(Vec::new(), |classes| classes.figures()),
             passes: after.passes,
@@ -227,38 +231,39 @@ impl Course {
         })
     }
 
-    /// Runs a pass over what those before it left.
+    /// Runs pass `number` over what those before it left.
     fn run(
         &mut self,
         job: &mut Job<'_>,
-        (pass, cut, working): (&Pass, &Arc<Cut>, &mut Vec<Lease>),
+        number: usize,
+        cut: &Arc<Cut>,
+        working: &mut Vec<Lease>,
         before: Standing,
         field: &DecodedScan<'_>,
-        (shares, demands): (&Shares, &Demands),
-        clock: &mut Clock<'_>,
     ) -> Result<Standing> {
-        let tiles = &field.tiles;
-        let sieve = pass.sieve(&before.sieve, job.source.schema());
-        self.foresee(job, pass, field, &sieve, shares)?;
+        let (tiles, pass) = (&field.tiles, &job.task.passes[number]);
+        let sieve = pass.sieve(&before.sieve, job.task.source.schema());
+        self.clock.begin(RunPhase::Look(number), None)?;
+        self.foresee(job, pass, field, &sieve)?;
         let held = working.iter().map(Lease::bytes).sum();
-        let cut = cut_again(job, pass, field.lattice, (shares, demands), tiles, (cut, held))?;
-        let milling = demands.mill(cut.millers, cut.capacity as u64);
+        let cut = cut_again(job, pass, field.lattice, tiles, cut, held)?;
+        let milling = job.task.demands.mill(cut.millers, cut.capacity as u64);
         if milling.sum() > Bytes(held) {
             working.clear();
             *working = job.budget.lease_all(&milling, "mill")?;
         }
-        let phase = if pass.gathers().is_some() { "gather" } else { "mill" };
-        clock.phase(phase, Some(tiles.positions()));
+        let phase = if pass.gathers().is_some() { RunPhase::Gather } else { RunPhase::Mill };
+        self.clock.begin(phase(number), Some(tiles.positions()))?;
         let mut tally = Tally::default();
         tally.work("tiles", cut.keys.len() as u64);
         let levels: BTreeSet<u32> = cut.keys.iter().map(|key| key.level).collect();
         tally.work("tile_levels", levels.len() as u64);
-        let ((sinks, by_input, by_rank), ordered) = self.outputs(job, pass, field)?;
-        let which: Vec<usize> = sinks.iter().map(|(sink, _)| *sink).collect();
-        let mut milled = grind(job, (pass, &cut), field, &sieve, (sinks, by_input, by_rank))?;
+        let PassOutputs { growing, lists, ordered } = self.outputs(job, pass, field)?;
+        let which: Vec<usize> = growing.iter().map(|(sink, _)| *sink).collect();
+        let mut milled = grind(job, pass, &cut, field, &sieve, growing, lists)?;
         drop(sieve);
         tally.merge(&milled.tally);
-        self.write_lists(job, tiles, &milled, ordered, &mut tally, clock)?;
+        self.write_lists(job, tiles, &milled.lists, ordered, &mut tally)?;
         let said = std::mem::take(&mut milled.written);
         let outcomes = milled.counts.outputs.iter().copied().zip(said);
         for (sink, outcome) in which.into_iter().zip(outcomes) {
@@ -280,12 +285,11 @@ impl Course {
         pass: &Pass,
         field: &DecodedScan<'_>,
         sieve: &Sieve,
-        shares: &Shares,
     ) -> Result<()> {
         let ahead = |call: &&Call| self.forecasts[call.op].is_none();
         let ops: Vec<usize> = pass.calls.iter().filter(ahead).map(|call| call.op).collect();
         let mut chosen = Vec::new();
-        for (op, foreseen) in forecast(job, pass, &ops, field, sieve, samples_capacity(shares))? {
+        for (op, foreseen) in forecast(job, pass, &ops, field, sieve)? {
             if let Some(warning) = foreseen.warning {
                 job.warn(warning);
             }
@@ -305,34 +309,33 @@ impl Course {
         Ok(())
     }
 
-    /// The outputs of a pass: those that grow while it mills, lists of those that are written
-    /// behind it, and the sinks that are then written in the order of the inputs.
+    /// The outputs of a pass.
     fn outputs(
         &mut self,
         job: &Job<'_>,
         pass: &Pass,
         field: &DecodedScan<'_>,
-    ) -> Result<(PassOutputs, Vec<Box<dyn Sink>>)> {
-        let (mut sinks, mut by_input) = (Vec::new(), Vec::new());
-        let (mut by_rank, mut ordered) = (Vec::new(), Vec::new());
-        let all = pass.row(&job.computed);
+    ) -> Result<PassOutputs> {
+        let (mut growing, mut lists, mut ordered) = (Vec::new(), Lists::default(), Vec::new());
+        let all = pass.row(&job.task.computed);
         for &sink in pass.before.iter().chain(&pass.after) {
             let (layout, before) = (job.layout(sink, &all), pass.before.contains(&sink));
-            if let Some(Some(each)) = job.each.get(sink) {
-                let inputs = each.sinks.len();
-                by_input.push(ByInput::new(&field.area, sink, inputs, &layout, before));
+            if job.task.sinks[sink].is_folder() {
+                let inputs = job.task.files(sink).len();
+                lists.by_input.push(ByInput::new(&job.area, sink, inputs, &layout, before));
                 continue;
             }
             let open = self.sinks.get_mut(sink).and_then(Option::take);
             let open = open.ok_or_else(|| Error::internal("an output is written twice"))?;
-            if job.in_input_order[sink] {
-                by_rank.push(ByRank::new(&field.area, sink, &field.starts, &layout, before));
+            if job.task.in_input_order[sink] {
+                let list = ByRank::new(&job.area, sink, &field.starts, &layout, before);
+                lists.by_rank.push(list);
                 ordered.push(open);
             } else {
-                sinks.push((sink, open));
+                growing.push((sink, open));
             }
         }
-        Ok(((sinks, by_input, by_rank), ordered))
+        Ok(PassOutputs { growing, lists, ordered })
     }
 
     /// Writes the outputs that are written behind a pass's last tile.
@@ -340,21 +343,18 @@ impl Course {
         &mut self,
         job: &Job<'_>,
         tiles: &SealedTiles,
-        milled: &Milled,
+        Lists { by_input, by_rank }: &Lists,
         ordered: Vec<Box<dyn Sink>>,
         tally: &mut Tally,
-        clock: &mut Clock<'_>,
     ) -> Result<()> {
-        for lists in &milled.by_input {
-            clock.phase("write", Some(lists.records()));
-            let unknown = || Error::internal("an output has no inputs");
-            let each = job.each[lists.sink].as_ref().ok_or_else(unknown)?;
-            let (written, counted) = each.write(job, tiles, lists)?;
+        for lists in by_input {
+            self.clock.begin(RunPhase::Write(lists.sink), Some(lists.records()))?;
+            let (written, counted) = lists.write(job, tiles)?;
             tally.merge(&counted);
             self.written[lists.sink] = Some(written);
         }
-        for (lists, sink) in milled.by_rank.iter().zip(ordered) {
-            clock.phase("write", Some(lists.records));
+        for (lists, sink) in by_rank.iter().zip(ordered) {
+            self.clock.begin(RunPhase::Write(lists.sink), Some(lists.records))?;
             let (said, counted) = lists.write(job, tiles, sink)?;
             tally.merge(&counted);
             self.written[lists.sink] = Some(vec![(lists.records, said)]);

@@ -27,6 +27,7 @@ mod lines;
 mod mill;
 mod outlet;
 pub(crate) mod pass;
+mod phase;
 mod placed;
 mod product;
 pub(crate) mod publish;

@@ -25,10 +25,10 @@ pub(crate) fn stream(
     sinks: Vec<Box<dyn Sink>>,
     lattice: Option<&Lattice>,
 ) -> Result<Finished> {
-    let chunks = SinkChunks::new(job.source.schema(), &sinks);
+    let chunks = SinkChunks::new(job.task.source.schema(), &sinks);
     let (commit, encode) = (|batch| Ok(chunks.commit(batch)), |chunk| chunks.encode(chunk));
     let outlet = Outlet::new(sinks, job.threads.count(), &commit);
-    let (parts, mut tally) = (job.source.parts(), Tally::default());
+    let (parts, mut tally) = (job.task.source.parts(), Tally::default());
     job.threads.items(parts, || outlet.stop()).run(
         || (),
         |(), index| stream_part(job, lattice, index, &chunks, &outlet),
@@ -64,8 +64,8 @@ fn stream_part(
     chunks: &SinkChunks,
     outlet: &Outlet<'_, PointBatch, SinkChunk>,
 ) -> Result<Tally> {
-    let mut part = job.source.part_without(index, &job.unread)?;
-    let (schema, mut tally) = (job.source.schema(), Tally::default());
+    let mut part = job.task.source.part_without(index, &job.unread)?;
+    let (schema, mut tally) = (job.task.source.schema(), Tally::default());
     for number in 0.. {
         let mut batch = chunks.spare_batches.take(|| PointBatch::new(schema.clone(), BATCH));
         let more = job.read(&mut *part, &mut batch, &mut tally)?;
@@ -172,7 +172,7 @@ fn drop_nonfinite(
             }
         },
     );
-    tally.remove(&job.source_kind, NOT_FINITE, misplaced.len() as u64);
+    tally.remove(&job.task.source_kind, NOT_FINITE, misplaced.len() as u64);
     if !misplaced.is_empty() {
         batch.retain(|i, _| misplaced.binary_search(&i).is_err());
     }

@@ -8,8 +8,6 @@
 //! The walk is made in two phases, since distances to a plane can be summed only when the plane is
 //! fitted. Their items are ranges of blocks; a report tile belongs to the range that it begins in.
 
-use std::sync::Arc;
-
 use super::job::Job;
 use super::lines::{LINES_AT_ONCE, RangeLines, TileLines};
 use crate::budget::Bytes;
@@ -17,8 +15,8 @@ use crate::geom::lattice::Lattice;
 use crate::point::Position;
 use crate::report::{FittedScan, Lot, ScanSurvey, Totals, report_tile_level};
 use crate::store::{
-    BLOCK, FATE_BYTES, PIECE, Pieces, Reader, RecordState, SealedTiles, Spill, SpillArea,
-    StoredStretch, TileKey,
+    BLOCK, FATE_BYTES, PIECE, Pieces, Reader, RecordState, SealedTiles, Spill, StoredStretch,
+    TileKey,
 };
 use crate::tile::{Fate, Sieve};
 use crate::{Error, Result};
@@ -84,7 +82,6 @@ pub(crate) fn survey_bytes() -> Bytes {
 pub(crate) fn survey(
     job: &Job<'_>,
     lattice: &Lattice,
-    area: &Arc<SpillArea>,
     tiles: &SealedTiles,
     sieve: &Sieve,
 ) -> Result<Measured> {
@@ -98,7 +95,7 @@ pub(crate) fn survey(
     };
     let all_threads = survey_bytes() * job.threads.count() as u64;
     let _working = job.budget.lease(all_threads.0, "survey")?;
-    let spill = Spill::new(area, "report");
+    let spill = Spill::new(&job.area, "report");
     let (scan, lines) = walk.tally(job, lattice, &spill)?;
     Ok(Measured {
         tile_side: (level as f64).exp2() * lattice.step,
@@ -247,7 +244,7 @@ impl ScanWalk<'_> {
                 job.advance(positions)
             },
             |()| {},
-            |(part, _)| Ok(part),
+            |(part, _)| Ok(*part.sums()),
         )?;
         parts.iter().for_each(|part| fitted.merge(part));
         Ok(fitted)

@@ -1,19 +1,20 @@
 //! What the engine runs: a pipeline whose stages fit each other, its inputs and the memory.
 //!
 //! It is made by the plan and says everything that a run depends on, so the engine asks neither the
-//! pipeline's text nor its graph. A run consumes it: stages settle, and could not be run twice from
-//! their beginning.
+//! pipeline's text nor its graph. A run changes none of it. The tile stages are not in it, since they
+//! settle by what they see of the scan: those the run takes for itself.
 
 use std::sync::Arc;
 
 use super::beside::Beside;
 use super::demands::Demands;
-use super::pass::{Branch, Pass, PassFilter, StageOp};
+use super::pass::{Branch, Pass, PassFilter};
+use super::shares::Shares;
 use super::tagger::Tagger;
 use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
-use crate::graph::RunSettings;
-use crate::point::{ComputedDimension, Metadata};
+use crate::graph::{Nonfinite, RunSettings, SpillSetting};
+use crate::point::{ComputedDimension, Metadata, names};
 use crate::stage::{CreateSink, Source, Transform};
 
 /// A run that can begin.
@@ -24,7 +25,6 @@ pub(crate) struct Task {
     pub source: Box<dyn Source>,
     pub source_kind: String,
     pub transforms: Vec<(String, Box<dyn Transform>)>,
-    pub ops: Vec<StageOp>,
     /// Stages that stream behind the decode.
     pub filters: Vec<PassFilter>,
     pub passes: Vec<Pass>,
@@ -67,5 +67,53 @@ impl Task {
             Some(each) if !each.is_empty() => each,
             _ => &self.sinks[sink..=sink],
         }
+    }
+
+    /// The stages on the branch of a sink, as outputs name them.
+    pub fn pipeline(&self, sink: usize) -> Arc<str> {
+        self.branches[self.branch_of[sink]].stages.to_string().into()
+    }
+
+    /// True if points without a place because a coordinate is no number are removed.
+    pub fn drops_nonfinite(&self) -> bool {
+        self.settings.nonfinite == Nonfinite::Drop
+    }
+
+    /// Positions of a tile, if they are given.
+    pub fn tile_points(&self) -> Option<usize> {
+        self.settings.tile_points.map(usize::from)
+    }
+
+    /// Bytes of points that stay in memory.
+    pub fn kept_in_memory(&self, shares: &Shares) -> u64 {
+        match self.settings.spill {
+            SpillSetting::Auto => shares.kept_in_memory,
+            SpillSetting::Always => 0,
+        }
+    }
+
+    /// The dimensions that nobody looks at: no sink, and neither what counts classes and tells
+    /// records apart by class and flags. What a transform looks at is not known for sure.
+    pub fn unread(&self) -> Vec<String> {
+        const LOOKED_AT: [&str; 5] = [
+            names::CLASSIFICATION,
+            names::SYNTHETIC,
+            names::KEY_POINT,
+            names::WITHHELD,
+            names::OVERLAP,
+        ];
+        let Some((first, others)) = self.sinks.split_first() else { return Vec::new() };
+        let by_all = |name: &&String| others.iter().all(|sink| sink.unread().contains(*name));
+        let mut unread: Vec<String> = first.unread().iter().filter(by_all).cloned().collect();
+        let columns = || self.passes.iter().flat_map(|pass| &pass.dimensions);
+        let is_column = |name: &str| columns().any(|column| column.name() == name);
+        let is_read = |name: &str| self.streams() || LOOKED_AT.contains(&name) || is_column(name);
+        unread.retain(|name| !is_read(name));
+        unread
+    }
+
+    /// True if it has stages that stream.
+    pub fn streams(&self) -> bool {
+        !self.transforms.is_empty() || !self.filters.is_empty()
     }
 }

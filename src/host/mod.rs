@@ -4,7 +4,10 @@
 pub(crate) mod disk;
 pub(crate) mod files;
 pub mod process;
+mod tallies;
 pub(crate) mod threads;
 
 pub(crate) use files::{Clash, Files, Use};
+#[cfg(test)]
+pub(crate) use tallies::written;
 pub use threads::{PhaseItems, Threads, lock};

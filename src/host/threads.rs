@@ -25,6 +25,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rayon::{ThreadBuilder, ThreadPool, ThreadPoolBuilder};
 
+use super::tallies::{ItemTally, handed_over};
 use crate::{Error, ErrorKind, Result};
 
 /// Locks, also after a panic of another thread: what is guarded here is never left half-changed.
@@ -94,7 +95,7 @@ impl<F: Fn() + Sync> PhaseItems<'_, F> {
     ///
     /// Once a thread fails or panics, no other takes another item. The first error is returned that
     /// is not merely a thread giving up because another failed ([`ErrorKind::Interrupted`]).
-    pub fn run<A, T: Send, S: Send>(
+    pub fn run<A, T: ItemTally, S: ItemTally>(
         &self,
         arena: impl Fn() -> A + Sync,
         item: impl Fn(&mut A, usize) -> Result<T> + Sync,
@@ -108,10 +109,10 @@ impl<F: Fn() + Sync> PhaseItems<'_, F> {
             loop {
                 let number = next.fetch_add(1, Ordering::Relaxed);
                 if number >= self.count {
-                    return end(arena);
+                    return end(arena).map(handed_over);
                 }
                 let result = item(&mut arena, number)?;
-                lock(&done).take(number, result);
+                lock(&done).take(number, handed_over(result));
             }
         };
         let guarded = || {

@@ -1,8 +1,10 @@
 //! The first look at a scan: its points, its extent as seen from somewhere, and the range of what
 //! it is coloured by; and the frame that follows from it.
 
+use std::sync::{Mutex, PoisonError};
+
 use super::settings::{NARROWEST, Settings};
-use crate::host::Threads;
+use crate::host::{Threads, lock};
 use crate::point::{Dimension, PointBatch};
 use crate::stage::{Part, Source};
 use crate::{Error, ErrorKind, Result};
@@ -46,9 +48,15 @@ pub(super) fn each_point<S: Send>(
         }
         Ok(())
     };
+    let states = Mutex::new(Vec::new());
+    let end = |(state, ..): (S, _, _)| {
+        lock(&states).push(state);
+        Ok(())
+    };
     Threads::start(settings.threads, |threads| {
-        threads.items(source.parts(), || {}).run(begin, draw, |()| {}, |(state, ..)| Ok(state))
-    })
+        threads.items(source.parts(), || {}).run(begin, draw, |()| {}, end)
+    })?;
+    Ok(states.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
 /// Reads the next batch; false at the end.

@@ -49,7 +49,11 @@ use crate::{Error, Result};
 /// # Ok(())
 /// # }
 /// ```
-pub struct Plan(pub(crate) Task);
+pub struct Plan {
+    pub(crate) task: Task,
+    /// The tile stages; a run consumes them, since they settle and could not begin a second time.
+    pub(crate) ops: Vec<StageOp>,
+}
 
 impl Plan {
     /// Runs the plan. Outputs appear under their names when all of it is done; an error or a stop
@@ -64,7 +68,7 @@ impl Plan {
     /// that an output cannot hold, and [`ErrorKind::Interrupted`](crate::ErrorKind::Interrupted)
     /// where `watch` asked to stop.
     pub fn run(self, watch: &dyn Watch) -> Result<Done> {
-        self.0.run(watch)
+        self.task.run(self.ops, watch)
     }
 
     /// Runs the plan as [`run`](Plan::run) does, on the threads of `pool`: on as many as were
@@ -77,8 +81,8 @@ impl Plan {
     ///
     /// As [`run`](Plan::run).
     pub fn run_in(self, pool: &ThreadPool, watch: &dyn Watch) -> Result<Done> {
-        let threads = Threads::of(pool, self.0.threads);
-        self.0.run_on(threads, watch)
+        let threads = Threads::of(pool, self.task.threads);
+        self.task.run_on(self.ops, threads, watch)
     }
 }
 
@@ -119,7 +123,7 @@ impl Graph {
         demands.divide()?;
         let mut warnings = warnings(&*source, &sorted, &settings)?;
         warnings.extend(doubt);
-        Ok(Plan(Task {
+        let task = Task {
             warnings,
             simd,
             threads: demands.threads,
@@ -127,7 +131,6 @@ impl Graph {
             source,
             source_kind: sorted.source.0,
             transforms: sorted.transforms,
-            ops: sorted.ops,
             filters: sorted.filters,
             passes: passes.passes,
             branches: passes.branches,
@@ -143,7 +146,8 @@ impl Graph {
             mills: order.mills,
             lattice,
             demands,
-        }))
+        };
+        Ok(Plan { task, ops: sorted.ops })
     }
 }
 

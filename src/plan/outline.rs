@@ -27,27 +27,27 @@ pub struct Outline {
 impl Plan {
     /// What the user should know before the plan is run. A run tells it too.
     pub fn warnings(&self) -> Vec<String> {
-        self.0.source.warnings().into_iter().chain(self.0.warnings.clone()).collect()
+        self.task.source.warnings().into_iter().chain(self.task.warnings.clone()).collect()
     }
 
     /// The sign of the unit that lengths of the scan are in, where it says that.
     pub fn unit(&self) -> Option<&'static str> {
-        self.0.source.metadata().units.sign()
+        self.task.source.metadata().units.sign()
     }
 
     /// What the plan reads, writes and uses.
     pub fn outline(&self) -> Outline {
         let outputs: Vec<PathBuf> =
-            self.0.sinks.iter().map(|sink| sink.path().to_owned()).collect();
+            self.task.sinks.iter().map(|sink| sink.path().to_owned()).collect();
         let beside = outputs.first().and_then(|output| output.parent());
         let beside = beside.filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
         Outline {
-            inputs: self.0.source.inputs().len(),
-            points: self.0.source.points(),
-            report: self.0.settings.report.clone(),
-            threads: self.0.threads,
-            memory_bytes: self.0.demands.limit,
-            scratch: self.0.settings.scratch.clone().unwrap_or_else(|| beside.to_owned()),
+            inputs: self.task.source.inputs().len(),
+            points: self.task.source.points(),
+            report: self.task.settings.report.clone(),
+            threads: self.task.threads,
+            memory_bytes: self.task.demands.limit,
+            scratch: self.task.settings.scratch.clone().unwrap_or_else(|| beside.to_owned()),
             outputs,
         }
     }

@@ -13,21 +13,21 @@ impl fmt::Display for Plan {
         writeln!(
             f,
             "source   {} ({} files, {} points by their headers)",
-            self.0.source_kind,
-            self.0.source.inputs().len(),
-            self.0.source.points()
+            self.task.source_kind,
+            self.task.source.inputs().len(),
+            self.task.source.points()
         )?;
-        for (kind, _) in &self.0.transforms {
+        for (kind, _) in &self.task.transforms {
             writeln!(f, "streams  {kind}")?;
         }
-        match self.0.ops.is_empty() && self.0.filters.is_empty() {
-            true => self.0.sinks.iter().try_for_each(|sink| sink_line(f, sink.path()))?,
+        match self.ops.is_empty() && self.task.filters.is_empty() {
+            true => self.task.sinks.iter().try_for_each(|sink| sink_line(f, sink.path()))?,
             false => self.passes_shown(f)?,
         }
-        if !self.0.ops.is_empty() {
+        if !self.ops.is_empty() {
             self.units_shown(f)?;
         }
-        match &self.0.lattice {
+        match &self.task.lattice {
             Some(lattice) => {
                 write!(f, "lattice  step {} world units", lattice.step)?;
                 if lattice.z_scale() != 1.0 {
@@ -37,8 +37,8 @@ impl fmt::Display for Plan {
             }
             None => writeln!(f, "lattice  none: records stream by as they are")?,
         }
-        writeln!(f, "order    {}", if self.0.mills { "canonical" } else { "of the input" })?;
-        writeln!(f, "threads  {}", self.0.threads)?;
+        writeln!(f, "order    {}", if self.task.mills { "canonical" } else { "of the input" })?;
+        writeln!(f, "threads  {}", self.task.threads)?;
         self.memory(f)
     }
 }
@@ -49,7 +49,7 @@ fn sink_line(f: &mut fmt::Formatter<'_>, path: &std::path::Path) -> fmt::Result 
 
 impl Plan {
     fn units_shown(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let units = self.0.source.metadata().units;
+        let units = self.task.source.metadata().units;
         write!(f, "units    {}", units.words())?;
         match units.vertical {
             None if units.mismatch().is_none() => {
@@ -60,9 +60,9 @@ impl Plan {
     }
 
     fn passes_shown(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (n, pass) in self.0.passes.iter().enumerate() {
+        for (n, pass) in self.task.passes.iter().enumerate() {
             let sinks = |f: &mut fmt::Formatter<'_>, which: &[usize]| {
-                which.iter().try_for_each(|&sink| sink_line(f, self.0.sinks[sink].path()))
+                which.iter().try_for_each(|&sink| sink_line(f, self.task.sinks[sink].path()))
             };
             let label = format!("pass {}", n + 1);
             sinks(f, &pass.before)?;
@@ -75,7 +75,7 @@ impl Plan {
                 self.call_shown(f, pass, call)?;
             }
             for &filter in &pass.filters {
-                let filter = &self.0.filters[filter];
+                let filter = &self.task.filters[filter];
                 writeln!(f, "{label:<8} {} of what is left", filter.kind)?;
             }
             sinks(f, &pass.after)?;
@@ -84,7 +84,7 @@ impl Plan {
     }
 
     fn call_shown(&self, f: &mut fmt::Formatter<'_>, pass: &Pass, call: Call) -> fmt::Result {
-        let (stage, needs) = (&self.0.ops[call.op], needs(&self.0.ops, call));
+        let (stage, needs) = (&self.ops[call.op], needs(&self.ops, call));
         write!(f, "{}", stage.kind)?;
         if pass.round > 1 {
             write!(f, " (round {})", pass.round)?;
@@ -111,9 +111,9 @@ impl Plan {
     }
 
     fn memory(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let shares = self.0.demands.divide().map_err(|_| fmt::Error)?;
-        write!(f, "memory   {}", Bytes(self.0.demands.limit))?;
-        if self.0.mills {
+        let shares = self.task.demands.divide().map_err(|_| fmt::Error)?;
+        write!(f, "memory   {}", Bytes(self.task.demands.limit))?;
+        if self.task.mills {
             write!(
                 f,
                 ": {} for the program, {} for the index, {} for work, {} to keep points \

@@ -1,5 +1,7 @@
 //! Boxes of lattice positions.
 
+use serde::{Deserialize, Serialize};
+
 /// A position on the [`Lattice`](crate::stage::Lattice), in steps from world 0.
 pub type Position = [i64; 3];
 
@@ -16,7 +18,7 @@ pub fn distance2(a: Position, b: Position) -> u128 {
 }
 
 /// A box of lattice positions; both corners belong to it. Empty when `lo > hi` on any axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Bounds {
     /// Smallest coordinate on each axis.
     pub lo: Position,

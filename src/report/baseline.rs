@@ -6,6 +6,8 @@
 //! it is over, so all levels that may be needed are measured on the way: in some of the cubes of
 //! the coarsest one, chosen by their corners alone, which is enough for figures of the whole scan.
 
+use serde::{Deserialize, Serialize};
+
 use std::ops::Range;
 
 use super::deviations::{Deviations, Histogram};
@@ -23,7 +25,7 @@ const ENOUGH: (u64, u64) = (1 << 17, 1 << 12);
 
 /// Grids of several octree levels, of each cube the position nearest to the centre standing for the
 /// others. Merged in any order they are the same, however the scan is cut into tiles.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Baseline {
     /// Binary logarithm of the side of the coarsest level.
     top: u32,
@@ -35,7 +37,7 @@ pub struct Baseline {
     levels: Vec<GridLevel>,
 }
 
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 struct GridLevel {
     cubes: u64,
     deviations: Deviations,

@@ -1,6 +1,7 @@
 //! The names of classes, for people.
 
-use serde::{Serialize, Serializer};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::figures::{ClassFigures, Pair};
 
@@ -58,6 +59,14 @@ pub struct ClassCounts {
 impl Serialize for ClassCounts {
     fn serialize<S: Serializer>(&self, into: S) -> Result<S::Ok, S::Error> {
         self.counts.as_slice().serialize(into)
+    }
+}
+
+impl<'a> Deserialize<'a> for ClassCounts {
+    fn deserialize<D: Deserializer<'a>>(from: D) -> Result<Self, D::Error> {
+        let counts: Result<Box<_>, Vec<_>> = Vec::deserialize(from)?.try_into();
+        let told = |all: Vec<Pair<u64>>| D::Error::invalid_length(all.len(), &"256 classes");
+        Ok(ClassCounts { counts: counts.map_err(told)? })
     }
 }
 

@@ -1,5 +1,7 @@
 //! How far removed records are from the surface of the points that stand for them.
 
+use serde::{Deserialize, Serialize};
+
 use std::cmp::Ordering;
 
 use super::lot::Lot;
@@ -9,7 +11,7 @@ use crate::store::morton_cmp;
 
 /// Deviations of removed records, in lattice steps: number, sum of squares, the largest and where.
 /// Merged in any order and by any split they are the same.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Deviations {
     count: u64,
     squares: FixedSum,
@@ -101,7 +103,7 @@ const BINS: usize = 96 * 128 + 1;
 
 /// A histogram of deviations in bins at most 1 % wide (128 between a power of two and the next, by
 /// the leading bits of the figure), with a bin of its own for zero. A bin includes its upper edge.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Histogram {
     zero: u64,
     bins: Box<[u64]>,

@@ -39,7 +39,7 @@ impl Ledger {
     pub(crate) fn new(read: u64, kept: u64, tally: &Tally) -> Self {
         let removed = tally.removed.iter().map(|((stage, reason), &records)| Removed {
             stage: stage.clone(),
-            reason: (*reason).to_owned(),
+            reason: reason.clone().into_owned(),
             records,
         });
         Ledger { read, kept, removed: removed.collect() }

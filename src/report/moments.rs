@@ -1,5 +1,7 @@
 //! Exact moments of positions and the plane that fits them best. Knows no tiles, no files.
 
+use serde::{Deserialize, Serialize};
+
 use crate::point::{Bounds, Position};
 
 /// Bits that a coordinate relative to the origin may have, its sign apart.
@@ -13,7 +15,7 @@ const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 
 /// Coordinates are relative to the middle of a box that holds all positions. Where the box is 2^44
 /// steps or longer they are rounded to 2^`shift` steps first, so that they stay below 2^43. Exact
 /// for up to 2^40 records.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Moments {
     origin: Position,
     shift: u32,

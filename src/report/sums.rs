@@ -1,5 +1,7 @@
 //! Sums of floats that come out the same in any order. Knows no points.
 
+use serde::{Deserialize, Serialize};
+
 /// Bits behind the point of a [`FixedSum`].
 const FRACTION: i32 = 64;
 /// Binary exponent of the last bit of a normal f64 whose exponent field is 0.
@@ -9,7 +11,7 @@ const LAST_BIT: i32 = 1075;
 /// bits: any order and any split of the figures give the same sum.
 ///
 /// Holds 2^64 figures below 2^128, and then stays at its largest value.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FixedSum {
     high: u128,
     low: u128,
@@ -107,7 +109,7 @@ impl OpenSum {
 
 /// Distances of records to a plane: their number, their sum and that of their squares. Each
 /// distance is rounded to 2^-32 of a step first, so that positions on the plane have none.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Distances {
     count: u64,
     sum: FixedSum,

@@ -10,6 +10,8 @@
 //! ScanSurvey::fit ─ FittedScan ─ part ─ measure… ─ merge ─ finish ─ Totals
 //! ```
 
+use serde::{Deserialize, Serialize};
+
 use super::deviations::{Deviations, Histogram};
 use super::figures::{
     DeviationFigures, DeviationTotals, Pair, PlaneFigures, TileFigures, Totals, world_length,
@@ -136,7 +138,7 @@ impl FittedTile {
 
 /// What is summed over the whole scan in its first walk. Surveys of parts of the scan are merged,
 /// in any order.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScanSurvey {
     bounds: Bounds,
     moments: Pair<Moments>,
@@ -236,10 +238,10 @@ impl FittedScan {
         PlaneDistances { planes: self.distances.planes, sums: Pair::default() }
     }
 
-    /// Adds a part of the second walk.
-    pub fn merge(&mut self, part: &PlaneDistances) {
-        self.distances.sums.before.merge(&part.sums.before);
-        self.distances.sums.after.merge(&part.sums.after);
+    /// Adds the sums of a part of the second walk.
+    pub fn merge(&mut self, part: &Pair<Distances>) {
+        self.distances.sums.before.merge(&part.before);
+        self.distances.sums.after.merge(&part.after);
     }
 
     /// The totals in world units, but for the baseline, which a pass measures.
@@ -276,6 +278,11 @@ impl PlaneDistances {
         let planes =
             Pair { before: Plane::fit(&moments.before), after: Plane::fit(&moments.after) };
         PlaneDistances { planes, sums: Pair::default() }
+    }
+
+    /// What was measured.
+    pub fn sums(&self) -> &Pair<Distances> {
+        &self.sums
     }
 
     /// Adds the records at `position`, as in the first walk.

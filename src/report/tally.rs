@@ -1,25 +1,30 @@
 //! What stages count while they work.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::ClassCounts;
 
 /// The count of records that were written with the key-point flag that a stage set.
 pub const KEY_POINTS: &str = "key_points";
 
+/// The name of a count: of the program's own, or read again from where it was written.
+type Name = Cow<'static, str>;
+
 /// Counts that an item of work reports, such as a tile or a part of the input; merged by addition,
-/// so that order does not matter.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+/// so that order does not matter. Written down in any form of `serde` and read again, it is the
+/// same.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tally {
     /// Counts that are the same for every configuration, by name; they go into `result`.
-    pub counts: BTreeMap<&'static str, u64>,
+    pub counts: BTreeMap<Name, u64>,
     /// Counts that depend on how the work was cut up, by name; they go into `run`.
-    pub work: BTreeMap<&'static str, u64>,
+    pub work: BTreeMap<Name, u64>,
     /// Records removed, by stage kind and reason.
-    #[serde(serialize_with = "as_list")]
-    pub removed: BTreeMap<(String, &'static str), u64>,
+    #[serde(serialize_with = "as_list", deserialize_with = "from_list")]
+    pub removed: BTreeMap<(String, Name), u64>,
     /// Selections that a record is in, a bit each.
     pub(crate) selections: u8,
     /// Records by class; None where they have none.
@@ -29,8 +34,9 @@ pub struct Tally {
 }
 
 /// How far apart points of unequal coordinates are that share a position of the lattice, in world
-/// units.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+/// units. Written down as the bits of both figures, since decimals may lose the last.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(into = "[u64; 2]", from = "[u64; 2]")]
 pub struct Apart {
     /// The least difference in one coordinate that was met.
     pub nearest: f64,
@@ -40,10 +46,26 @@ pub struct Apart {
 
 /// Writes the entries of a map as a list: in JSON only texts can be keys.
 fn as_list<S: Serializer>(
-    removed: &BTreeMap<(String, &'static str), u64>,
+    removed: &BTreeMap<(String, Name), u64>,
     into: S,
 ) -> Result<S::Ok, S::Error> {
     into.collect_seq(removed)
+}
+
+fn from_list<'a, D: Deserializer<'a>>(from: D) -> Result<BTreeMap<(String, Name), u64>, D::Error> {
+    Ok(Vec::deserialize(from)?.into_iter().collect())
+}
+
+impl From<Apart> for [u64; 2] {
+    fn from(apart: Apart) -> Self {
+        [apart.nearest.to_bits(), apart.farthest.to_bits()]
+    }
+}
+
+impl From<[u64; 2]> for Apart {
+    fn from([nearest, farthest]: [u64; 2]) -> Self {
+        Apart { nearest: f64::from_bits(nearest), farthest: f64::from_bits(farthest) }
+    }
 }
 
 impl Apart {
@@ -59,28 +81,28 @@ impl Apart {
 impl Tally {
     /// Adds `n` to the count `name` of `result`. Count each position once: in the core of its tile.
     pub fn count(&mut self, name: &'static str, n: u64) {
-        *self.counts.entry(name).or_default() += n;
+        *self.counts.entry(name.into()).or_default() += n;
     }
 
     /// Adds `n` to the count `name` of `run`.
     pub fn work(&mut self, name: &'static str, n: u64) {
-        *self.work.entry(name).or_default() += n;
+        *self.work.entry(name.into()).or_default() += n;
     }
 
     /// Enters `n` records as removed by `stage` for `reason`.
     pub fn remove(&mut self, stage: &str, reason: &'static str, n: u64) {
         if n > 0 {
-            *self.removed.entry((stage.to_owned(), reason)).or_default() += n;
+            *self.removed.entry((stage.to_owned(), reason.into())).or_default() += n;
         }
     }
 
     /// Adds another tally.
     pub fn merge(&mut self, other: &Tally) {
         for (name, n) in &other.counts {
-            *self.counts.entry(name).or_default() += n;
+            *self.counts.entry(name.clone()).or_default() += n;
         }
         for (name, n) in &other.work {
-            *self.work.entry(name).or_default() += n;
+            *self.work.entry(name.clone()).or_default() += n;
         }
         for (key, n) in &other.removed {
             *self.removed.entry(key.clone()).or_default() += n;
@@ -101,16 +123,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tally_can_be_written_down() {
+    fn a_tally_can_be_written_down_and_read_again() {
         let mut tally = Tally::default();
         tally.count("cells", 3);
         tally.remove("median", "not median", 4);
-        tally.apart = Some(Apart { nearest: 0.5, farthest: 2.0 });
+        tally.apart = Some(Apart { nearest: 0.1 + 0.2, farthest: 1e22 / 3.0 });
         tally.classes = Some(ClassCounts::default());
         let written = serde_json::to_value(&tally).unwrap();
         assert_eq!(written["counts"], json!({ "cells": 3 }));
         assert_eq!(written["removed"], json!([[["median", "not median"], 4]]));
-        assert_eq!(written["apart"]["farthest"], 2.0);
         assert_eq!(written["classes"].as_array().map(Vec::len), Some(256));
+        assert_eq!(serde_json::from_str::<Tally>(&written.to_string()).unwrap(), tally);
     }
 }

@@ -1,5 +1,7 @@
 //! Where records go: what a stage says of its outputs, and how records are encoded and written.
 
+use serde::{Deserialize, Serialize};
+
 use std::path::Path;
 use std::sync::Arc;
 
@@ -72,7 +74,7 @@ impl Encoded {
 }
 
 /// What a sink says when it is done.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct SinkSummary {
     /// Points written.

@@ -7,6 +7,8 @@
 //! and large enough that its entry in the index is half a byte a position. Its box is tight, which
 //! makes the index prune well and costs nothing, as it is known when the block is packed.
 
+use serde::{Deserialize, Serialize};
+
 use super::spill::{Address, Checksum, Spill};
 use crate::Result;
 use crate::point::{Bounds, Position};
@@ -15,7 +17,7 @@ use crate::point::{Bounds, Position};
 pub const BLOCK: usize = 256;
 
 /// Where a block is and what it spans.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Block {
     /// Tight box of the positions.
     pub bounds: Bounds,
@@ -44,6 +46,11 @@ impl Block {
 
     fn bytes(&self) -> usize {
         self.len() * (3 * usize::from(self.width) + if self.has_copies { 4 } else { 0 })
+    }
+
+    /// Where it is, the checksum of what is there, and how many bytes that is.
+    pub(super) fn stored(&self) -> (Address, Checksum, u64) {
+        (self.address, self.checksum, self.bytes() as u64)
     }
 
     /// Packs positions in Morton order onto `out`, each with its copies; no `copies` are one each.

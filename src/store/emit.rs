@@ -4,6 +4,8 @@
 //! Records are long, 20 to 70 bytes and more, and most of them are removed in the end, so moving
 //! them would read and write all of them for the sake of few.
 
+use serde::{Deserialize, Serialize};
+
 use super::Levels;
 use super::block::{BLOCK, Block};
 use super::key::split_level;
@@ -23,6 +25,7 @@ pub(crate) struct MergeOutput {
 }
 
 /// What a range came to.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Merged {
     pub blocks: Vec<Block>,
     pub records: u64,

@@ -5,6 +5,8 @@
 //! are in different cubes, so a counter for each bit is enough, and the merge passes over all
 //! positions anyway. An estimate from samples would be wrong for scans whose density varies.
 
+use serde::{Deserialize, Serialize};
+
 use super::key::split_level;
 use crate::point::Position;
 
@@ -12,16 +14,17 @@ use crate::point::Position;
 ///
 /// Two positions that follow each other in Morton order are in different cubes of side 2^j exactly
 /// when the highest bit in which they differ is at or above j; so one count per bit is enough.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Levels {
     first: bool,
-    splits: [u64; 64],
+    /// For each bit, in halves: `serde` knows arrays of no more than 32.
+    splits: [[u64; 32]; 2],
     positions: u64,
 }
 
 impl Default for Levels {
     fn default() -> Self {
-        Levels { first: false, splits: [0; 64], positions: 0 }
+        Levels { first: false, splits: [[0; 32]; 2], positions: 0 }
     }
 }
 
@@ -41,14 +44,16 @@ impl Levels {
     /// Counts a position that first differs from the one before in bit `level`.
     pub(crate) fn split(&mut self, level: u32) {
         self.positions += 1;
-        self.splits[level as usize] += 1;
+        self.splits.as_flattened_mut()[level as usize] += 1;
     }
 
     /// Adds what another walk counted; exactly one of all walks began with `None`.
     pub fn merge(&mut self, other: &Levels) {
         self.first |= other.first;
         self.positions += other.positions;
-        for (mine, theirs) in self.splits.iter_mut().zip(other.splits) {
+        for (mine, theirs) in
+            self.splits.as_flattened_mut().iter_mut().zip(other.splits.as_flattened())
+        {
             *mine += theirs;
         }
     }
@@ -60,7 +65,7 @@ impl Levels {
 
     /// Occupied cubes of side 2^j.
     pub fn occupied(&self, j: u32) -> u64 {
-        u64::from(self.first) + self.splits[j.min(63) as usize..].iter().sum::<u64>()
+        u64::from(self.first) + self.splits.as_flattened()[j.min(63) as usize..].iter().sum::<u64>()
     }
 
     /// The smallest j for which positions ÷ occupied cubes of side 2^j ≥ `mean`; where a scan is

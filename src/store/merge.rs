@@ -71,8 +71,7 @@ pub fn seal(
     drop(runs);
     let sequence = join(merged, blocks);
     lease.shrink_to(index(sequence.blocks.len()).0);
-    let refs = (out.refs, out.tagged);
-    Ok(SealedTiles::new(sequence, out.positions, refs, (store.records, store.places), lease))
+    Ok(SealedTiles::new(sequence, out, store.records, store.places, lease))
 }
 
 /// The scan in ranges, which end at every so many blocks' first positions.

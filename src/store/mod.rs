@@ -17,6 +17,7 @@ mod gather;
 mod intake;
 mod key;
 mod levels;
+mod manifest;
 mod merge;
 mod order;
 pub(crate) mod pieces;

@@ -191,6 +191,39 @@ impl Pieces {
         Ok(())
     }
 
+    /// All that is stored, in parts that are verified together, or in whole pieces where they are
+    /// in memory: the number of the first item, how many there are, where they are, and their
+    /// checksum.
+    pub(super) fn units(&self) -> Vec<(u64, u64, Address, Checksum)> {
+        let (table, unit) = (self.table(), unit_of(self.stride));
+        let mut all = Vec::new();
+        for (piece, place) in table.places.iter().enumerate() {
+            let (first, items) = ((piece * PIECE) as u64, place.items as usize);
+            if !place.address.is_in_file() {
+                let whole = (first, items as u64, place.address, Checksum::default());
+                all.extend((items > 0).then_some(whole));
+                continue;
+            }
+            let sums = table.checksums.iter().skip(piece * (PIECE / unit));
+            for (start, sum) in (0..items).step_by(unit).zip(sums) {
+                let address = place.address.plus((start * self.stride) as u64);
+                let count = unit.min(items - start) as u64;
+                all.push((first + start as u64, count, address, *sum));
+            }
+        }
+        all
+    }
+
+    /// Where they are.
+    pub(super) fn spill(&self) -> &Spill {
+        &self.spill
+    }
+
+    /// Bytes of an item.
+    pub(super) fn stride(&self) -> usize {
+        self.stride
+    }
+
     fn table(&self) -> RwLockReadGuard<'_, PieceTable> {
         self.table.read().unwrap_or_else(PoisonError::into_inner)
     }

@@ -9,6 +9,7 @@
 
 use super::Levels;
 use super::block::{BLOCK, Block};
+use super::emit::MergeOutput;
 use super::fetch::{Fetch, groups};
 use super::pieces::Pieces;
 use super::record::ref_bytes;
@@ -39,11 +40,11 @@ pub struct SealedTiles {
     sequence: Sequence,
     /// Boxes of 16 blocks, of 16 of those, and so on up to one.
     boxes: Vec<Vec<Bounds>>,
-    spill: Spill,
-    refs: Pieces,
+    pub(super) spill: Spill,
+    pub(super) refs: Pieces,
     tagged: bool,
-    records: Pieces,
-    places: Option<Pieces>,
+    pub(super) records: Pieces,
+    pub(super) places: Option<Pieces>,
     index: Lease,
 }
 
@@ -73,9 +74,9 @@ impl SealedTiles {
 
     pub(crate) fn new(
         sequence: Sequence,
-        spill: Spill,
-        (refs, tagged): (Pieces, bool),
-        (records, places): (Pieces, Option<Pieces>),
+        MergeOutput { positions: spill, refs, tagged }: MergeOutput,
+        records: Pieces,
+        places: Option<Pieces>,
         index: Lease,
     ) -> Self {
         let mut boxes: Vec<Vec<Bounds>> = Vec::new();

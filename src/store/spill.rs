@@ -6,6 +6,8 @@
 //! the bound on memory could not be kept. What comes from a file is compared with the checksum of
 //! what was written, so that a disk that damages data fails a run and changes no output.
 
+use serde::{Deserialize, Serialize};
+
 use std::fs::File;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::PathBuf;
@@ -66,7 +68,7 @@ impl SpillArea {
 }
 
 /// Where an appended stretch begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Address(u64);
 
 /// Set in addresses that lie in a scratch file. Below it are the number of the segment or the file
@@ -107,19 +109,48 @@ impl Address {
         sum.finalize()
     }
 
-    fn file_and_byte(self) -> (usize, u64) {
+    /// Byte `byte` of scratch file `file`.
+    pub(super) fn in_file(file: usize, byte: u64) -> Address {
+        Address(IN_FILE | (file as u64) << FILE_BITS | byte)
+    }
+
+    /// The scratch file and the byte of it; None in memory.
+    pub(super) fn file_and_byte(self) -> Option<(usize, u64)> {
         let within = self.0 & !IN_FILE;
-        ((within >> FILE_BITS) as usize, within & ((1 << FILE_BITS) - 1))
+        let place = ((within >> FILE_BITS) as usize, within & ((1 << FILE_BITS) - 1));
+        self.is_in_file().then_some(place)
+    }
+
+    /// The stretch in memory and the byte of it.
+    pub(super) fn stretch_and_byte(self) -> (u64, u64) {
+        (self.0 >> SEGMENT_BITS, u64::from(self.0 as u32))
+    }
+
+    /// Compares `bytes`, read from here on, with the checksum of what was written here.
+    ///
+    /// # Errors
+    ///
+    /// Of kind [`ErrorKind::Io`], with the byte, if they are others.
+    pub(super) fn verify(self, checksum: Checksum, bytes: &[u8]) -> Result<()> {
+        let Some((_, byte)) = self.file_and_byte() else { return Ok(()) };
+        if self.sum(bytes) == checksum.0 {
+            return Ok(());
+        }
+        let told = "what was read of this scratch file is not what was written to it";
+        Err(Error::new(ErrorKind::Io, told).at_byte(byte).help(
+            "the disk or the memory damages data: check them, or name a folder on another disk as \
+             `run.scratch`",
+        ))
     }
 }
 
 /// What was stored from an address on, as a number that a read compares with what comes: see
 /// [`Address::checksum`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Checksum(u32);
 
 /// An appended stretch that is always read whole.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredStretch {
     address: Address,
     length: u32,
@@ -164,7 +195,7 @@ impl Spill {
         scratch.writers.fetch_sub(1, Ordering::Relaxed);
         outcome.map_err(|e| scratch.fail("write scratch data", e))?;
         self.area.written.fetch_add(bytes.len() as u64, Ordering::Relaxed);
-        Ok(Address(IN_FILE | (number as u64) << FILE_BITS | at))
+        Ok(Address::in_file(number, at))
     }
 
     /// Stores a stretch of less than 4 GiB that [`load`](Spill::load) reads again.
@@ -192,37 +223,41 @@ impl Spill {
 
     /// Compares `bytes`, read from `at` on, with the checksum of what was written there.
     pub(crate) fn verify(&self, at: Address, checksum: Checksum, bytes: &[u8]) -> Result<()> {
-        if !at.is_in_file() || at.sum(bytes) == checksum.0 {
-            return Ok(());
-        }
-        let (number, byte) = at.file_and_byte();
-        let told = "what was read of this scratch file is not what was written to it";
-        let error = Error::new(ErrorKind::Io, told).at_byte(byte).help(
-            "the disk or the memory damages data: check them, or name a folder on another disk as \
-             `run.scratch`",
-        );
-        Err(match self.files().get(number) {
-            Some(scratch) => error.at(&scratch.path),
-            None => error,
+        at.verify(checksum, bytes).map_err(|error| {
+            let files = self.files();
+            match at.file_and_byte().and_then(|(number, _)| files.get(number)) {
+                Some(scratch) => error.at(&scratch.path),
+                None => error,
+            }
         })
     }
 
     /// As [`read`](Spill::read), for a caller that verifies what comes part by part.
     pub(crate) fn read_unverified(&self, at: Address, into: &mut [u8]) -> Result<()> {
         let lost = || Error::internal(format!("{}: read beyond a stretch", self.name));
-        if !at.is_in_file() {
+        let Some((number, byte)) = at.file_and_byte() else {
             let segments = self.segments.read().unwrap_or_else(PoisonError::into_inner);
-            let from = at.0 as u32 as usize;
+            let (stretch, from) = at.stretch_and_byte();
+            let from = from as usize;
             let stored = segments
-                .get((at.0 >> SEGMENT_BITS) as usize)
+                .get(stretch as usize)
                 .and_then(|(bytes, _)| bytes.get(from..from + into.len()))
                 .ok_or_else(lost)?;
             into.copy_from_slice(stored);
             return Ok(());
-        }
-        let (number, byte) = at.file_and_byte();
+        };
         let scratch = self.files().get(number).cloned().ok_or_else(lost)?;
         scratch.file.read_exact_at(into, byte).map_err(|e| scratch.fail("read scratch data", e))
+    }
+
+    /// The name that its scratch files have.
+    pub(super) fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// The paths of its scratch files, by their numbers.
+    pub(super) fn paths(&self) -> Vec<PathBuf> {
+        self.files().iter().map(|scratch| scratch.path.clone()).collect()
     }
 
     fn files(&self) -> RwLockReadGuard<'_, Vec<Arc<ScratchFile>>> {

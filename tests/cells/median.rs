@@ -19,7 +19,7 @@ fn one_cell() -> Cells {
 }
 
 fn removed(outcome: &Outcome, reason: &'static str) -> u64 {
-    outcome.tally.removed.get(&("median".to_owned(), reason)).copied().unwrap_or(0)
+    outcome.tally.removed.get(&("median".to_owned(), reason.into())).copied().unwrap_or(0)
 }
 
 #[test]

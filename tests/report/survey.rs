@@ -57,7 +57,7 @@ fn survey(records: &[Record], level: u32, threads: usize) -> Result<(Vec<TileFig
     for stretch in records.chunks(records.len().div_ceil(threads)).rev() {
         let mut part = scan.part();
         stretch.iter().rev().for_each(|&(p, n, fate)| part.measure(p, Lot::of(n, fate)));
-        scan.merge(&part);
+        scan.merge(part.sums());
     }
     Ok((tiles, scan.finish(&lattice)?))
 }
@@ -206,7 +206,7 @@ fn a_scan_that_misses_what_its_tiles_saw_is_told() {
     let mut scan = scan.fit();
     let mut part = scan.part();
     part.measure(p, Lot::of(5, fate));
-    scan.merge(&part);
+    scan.merge(part.sums());
     let error = scan.finish(&lattice(1.0)).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Internal);
     assert!(

@@ -64,7 +64,7 @@ pub fn fates(tile: &Tile) -> Vec<(Position, Fate)> {
 }
 
 pub fn removed(tally: &Tally, stage: &str, reason: &'static str) -> u64 {
-    tally.removed.get(&(stage.to_owned(), reason)).copied().unwrap_or(0)
+    tally.removed.get(&(stage.to_owned(), reason.into())).copied().unwrap_or(0)
 }
 
 /// Exact squared distance of positions that are not far apart.

@@ -41,8 +41,8 @@ fn chunks_are_cut_by_rank_and_copies_are_one_entry() {
     let outputs = vec![Open::new(0, 1000, &row, false)];
     let copies = 10_000_000;
     let all = 8 + u64::from(copies);
-    let outlets = (outputs, Vec::new(), Vec::new());
-    let mut cutter = Cutter::new(&area, (8, all), (&[], row.bytes()), outlets).unwrap();
+    let growing = GrowingOutcome::new(&area, 8, all, &[]).unwrap();
+    let mut cutter = Cutter::new(growing, row.bytes(), outputs, Lists::default());
     let mut chunks = cutter.cut(&product(&[(0, 1), (1, 2), (7, copies)])).unwrap();
     assert_eq!(chunks.len(), 10_000);
     assert!(chunks.iter().all(|chunk| chunk.records.len() <= 3));
@@ -79,8 +79,8 @@ fn outputs_take_what_was_there_before_the_pass_or_what_it_leaves() {
     let area = SpillArea::new(Budget::new(1 << 20), 1 << 20, Box::new(Nowhere));
     let none = RowLayout::default();
     let outputs = vec![Open::new(3, 2, &none, true), Open::new(5, 2, &none, false)];
-    let outlets = (outputs, Vec::new(), Vec::new());
-    let mut cutter = Cutter::new(&area, (3, 3), (&[], 0), outlets).unwrap();
+    let growing = GrowingOutcome::new(&area, 3, 3, &[]).unwrap();
+    let mut cutter = Cutter::new(growing, 0, outputs, Lists::default());
     let mut product = Product { rows: Vec::new(), ..product(&[(0, 1), (1, 1), (2, 1)]) };
     product.entries[1].now = RecordState::REMOVED;
     product.entries[2].now = RecordState::ASIDE.edited(Edit::SetWithheld);

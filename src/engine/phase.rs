@@ -1,0 +1,76 @@
+//! The phases of a run, as one list: what is done, in which order, and what it is called.
+//!
+//! A run goes through the list in its order, which its clock holds it to; and the list follows from
+//! the task alone. So what a run will do is known before it begins, and a phase means the same to
+//! whoever tells of it and to whoever does it.
+
+use super::task::Task;
+
+/// A phase of a run. Its items read what the phases before it sealed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RunPhase {
+    /// Parts of the source, as they stream into the outputs.
+    Convert,
+    /// Parts of the source, sorted into runs.
+    Decode,
+    /// Ranges of Morton order, sealed.
+    Merge,
+    /// Samples before this pass, of which stages that ask for them settle what is left to them.
+    Look(usize),
+    /// Tiles in this pass, of which a stage gathers what it decides by.
+    Gather(usize),
+    /// Tiles in this pass.
+    Mill(usize),
+    /// Files of this sink, or stretches of it, which are written behind the tiles of a pass.
+    Write(usize),
+    /// Ranges of blocks, for the figures of this branch.
+    Survey(usize),
+    /// Ledgers balance, and files get their names one after the other.
+    Publish,
+}
+
+impl RunPhase {
+    /// As reports and progress name it. Looks and publishing are a part of what is before them
+    /// there.
+    pub fn name(self) -> Option<&'static str> {
+        match self {
+            RunPhase::Convert => Some("convert"),
+            RunPhase::Decode => Some("decode"),
+            RunPhase::Merge => Some("merge"),
+            RunPhase::Gather(_) => Some("gather"),
+            RunPhase::Mill(_) => Some("mill"),
+            RunPhase::Write(_) => Some("write"),
+            RunPhase::Survey(_) => Some("survey"),
+            RunPhase::Look(_) | RunPhase::Publish => None,
+        }
+    }
+}
+
+impl Task {
+    /// All phases of the run, in their order.
+    pub fn phases(&self) -> Vec<RunPhase> {
+        if !self.mills {
+            return vec![RunPhase::Convert, RunPhase::Publish];
+        }
+        let mut phases = vec![RunPhase::Decode, RunPhase::Merge];
+        for (n, pass) in self.passes.iter().enumerate() {
+            phases.push(RunPhase::Look(n));
+            phases.push(match pass.gathers() {
+                Some(_) => RunPhase::Gather(n),
+                None => RunPhase::Mill(n),
+            });
+            let sinks = || pass.before.iter().chain(&pass.after).copied();
+            let is_folder = |sink: &usize| self.sinks[*sink].is_folder();
+            phases.extend(sinks().filter(is_folder).map(RunPhase::Write));
+            let is_ranked = |sink: &usize| self.in_input_order[*sink] && !is_folder(sink);
+            phases.extend(sinks().filter(is_ranked).map(RunPhase::Write));
+            let branch = self.branches.iter().position(|branch| branch.pass == n);
+            phases.extend(branch.map(RunPhase::Survey));
+        }
+        phases.push(RunPhase::Publish);
+        phases
+    }
+}
+
+#[cfg(test)]
+mod tests;

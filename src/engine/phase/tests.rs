@@ -1,0 +1,144 @@
+//! Whole runs, of which the phases are compared with the list, and all that items came to with what
+//! text brings back of it.
+
+use std::path::Path;
+use std::sync::Mutex;
+
+use serde_json::{Value, json};
+
+use super::*;
+use crate::engine::Watch;
+use crate::graph::{Graph, Nonfinite, Overrides, RunSettings, SpillSetting};
+use crate::host::{lock, written};
+use crate::io::ends::{Read, Write};
+use crate::io::las::{LAS, LAZ};
+use crate::ops::normals::Normals;
+use crate::ops::{Cells, Filter, Grid, Median};
+use crate::stage::{Formats, Role, StageKind, StagePlace};
+use crate::synth::Synth;
+
+fn role<K: StageKind>(keys: Value) -> Role {
+    let at = StagePlace::new("test", 1);
+    let at = at.knowing(&Formats::default().with(LAS).with(LAZ));
+    serde_json::from_value::<K>(keys).unwrap().build(&at).unwrap()
+}
+
+/// Remembers the phases that it is told of.
+#[derive(Default)]
+struct Told(Mutex<Vec<&'static str>>);
+
+impl Watch for Told {
+    fn phase(&self, name: &'static str, _total: Option<u64>) {
+        lock(&self.0).push(name);
+    }
+    fn advance(&self, _points: u64) {}
+    fn warn(&self, _message: &str) {}
+}
+
+fn graph() -> Graph {
+    let mut settings = RunSettings::default();
+    settings.threads = std::num::NonZero::new(2);
+    settings.tile_points = std::num::NonZero::new(900);
+    settings.memory = Some(4 << 30);
+    settings.spill = SpillSetting::Always;
+    settings.nonfinite = Nonfinite::Drop;
+    Graph::new(settings)
+}
+
+fn scan(seed: u64) -> Role {
+    role::<Synth>(json!({ "scene": "als", "points": 9_000, "seed": seed }))
+}
+
+/// Runs the graph: its list of phases, and those that its report and its watcher have.
+fn phases(graph: Graph) -> (Vec<RunPhase>, Vec<String>) {
+    let plan = graph.plan(&Overrides::default()).unwrap();
+    let (listed, told) = (plan.task.phases(), Told::default());
+    let run = plan.run(&told).unwrap().report.run;
+    let names: Vec<String> = run.phases.into_iter().map(|phase| phase.name).collect();
+    assert_eq!(*lock(&told.0), names);
+    (listed, names)
+}
+
+/// Runs the graph and compares the report with the list, of which this is what is told.
+fn has(graph: Graph, expected: &[&str]) -> Vec<RunPhase> {
+    let (listed, names) = phases(graph);
+    assert_eq!(names, expected);
+    let told: Vec<&str> = listed.iter().filter_map(|phase| phase.name()).collect();
+    assert_eq!(told, expected, "{listed:?}");
+    assert_eq!(listed.last(), Some(&RunPhase::Publish));
+    listed
+}
+
+/// Two files of a scan in a folder.
+fn inputs(at: &Path) -> Role {
+    for seed in [1, 2] {
+        let mut graph = graph();
+        graph.add("synth", scan(seed), &[]);
+        let path = at.join(format!("{seed}.laz"));
+        graph.add("write", role::<Write>(json!({ "path": path })), &[0]);
+        has(graph, &["convert"]);
+    }
+    role::<Read>(json!({ "path": at }))
+}
+
+#[test]
+fn a_report_has_the_phases_of_the_list_and_items_come_to_what_text_can_hold() {
+    let at = tempfile::tempdir().unwrap();
+    let write = |keys: Value| role::<Write>(keys);
+    let file = |name: &str| write(json!({ "path": at.path().join("out").join(name) }));
+    let (read, scans) = (at.path().join("in"), tempfile::tempdir().unwrap());
+    std::fs::create_dir_all(at.path().join("out")).unwrap();
+    std::fs::create_dir_all(&read).unwrap();
+
+    // A chain into an output in canonical order, another in the input's, and a folder.
+    let mut chain = graph();
+    chain.add("read", inputs(&read), &[]);
+    chain.add("normals", role::<Normals>(json!({})), &[0]);
+    chain.add("cells", role::<Cells>(json!({ "max_angle": "8deg" })), &[1]);
+    chain.add("median", role::<Median>(json!({})), &[2]);
+    chain.add("write", file("a.las"), &[3]);
+    let ranked = json!({ "path": at.path().join("out/b.las"), "order": "input" });
+    chain.add("write", write(ranked), &[3]);
+    chain.add("write", write(json!({ "folder": scans.path() })), &[3]);
+    let listed = has(chain, &["decode", "merge", "mill", "write", "write", "survey"]);
+    assert_eq!(
+        listed[2..6],
+        [RunPhase::Look(0), RunPhase::Mill(0), RunPhase::Write(2), RunPhase::Write(1)]
+    );
+
+    // A stage of two phases on one branch, a stage that streams behind tiles on another.
+    let mut branches = graph();
+    branches.add("synth", scan(3), &[]);
+    branches.add("normals", role::<Normals>(json!({ "neighbors": "auto" })), &[0]);
+    branches.add("cells", role::<Cells>(json!({ "keep": "10%" })), &[1]);
+    branches.add("median", role::<Median>(json!({})), &[2]);
+    branches.add("write", file("c.las"), &[3]);
+    branches.add("grid", role::<Grid>(json!({ "side": 2.0 })), &[0]);
+    branches.add("filter", role::<Filter>(json!({ "keep_classes": [2, 5] })), &[5]);
+    branches.add("write", file("d.laz"), &[6]);
+    let listed = phases(branches);
+    let named: Vec<&str> = listed.0.iter().filter_map(|phase| phase.name()).collect();
+    assert_eq!(listed.1, named);
+    let count = |name: &str| named.iter().filter(|one| **one == name).count();
+    assert_eq!((count("decode"), count("gather"), count("survey")), (1, 1, 2), "{named:?}");
+
+    // Every tally of these runs was written down and read again on its way.
+    let longest = written::longest();
+    let went = |name: &str| {
+        let all = longest.iter().filter(|(of, _)| of.contains(name)).map(|(_, bytes)| *bytes);
+        all.max().unwrap_or(0)
+    };
+    for (name, least) in [
+        ("(u64, pointmill::report::tally::Tally)", 60),
+        ("Merged", 1_000),
+        ("Option<alloc::vec::Vec<u64>>", 20),
+        ("TileTally", 60),
+        ("SinkSummary", 20),
+        ("Option<pointmill::report::baseline::Baseline>", 1_000),
+        ("StoredStretch", 20),
+        ("ScanSurvey", 1_000),
+        ("Pair<pointmill::report::sums::Distances>", 60),
+    ] {
+        assert!(went(name) >= least, "{name}: {longest:?}");
+    }
+}
