@@ -4,13 +4,12 @@
 
 use std::time::Instant;
 
-use pointmill::geom::lattice::Lattice;
+use pointmill::internals::{TileKey, morton_cmp};
 use pointmill::ops::{Cells, Median, Side, Split};
 use pointmill::point::{Bounds, Dimension, Endian, Layout, NORMAL, Position, Scalar, Schema};
 use pointmill::quantity::Length;
 use pointmill::report::Tally;
-use pointmill::stage::{ScanFacts, TileOp};
-use pointmill::store::{Levels, TileKey, morton_cmp};
+use pointmill::stage::{Lattice, Levels, ScanFacts, TileOp};
 use pointmill::tile::{Fate, Tile};
 
 /// Positions a side of the plane.
@@ -36,7 +35,7 @@ fn plane(roughness: f64) -> Tile {
         .collect();
     positions.sort_unstable_by(morton_cmp);
     positions.dedup();
-    let normals = (0..positions.len() as u64)
+    let normals: Vec<[f32; 3]> = (0..positions.len() as u64)
         .map(|i| {
             let (x, y) =
                 (roughness * noise(i * 3 + (1 << 40)), roughness * noise(i * 3 + (2 << 40)));
@@ -61,13 +60,9 @@ fn settled(side: i64, split: Split, tile: &Tile) -> Cells {
         stride: 24,
         dimensions: axes.map(|(name, at)| Dimension::new(*name, Scalar::F64, at)).collect(),
     };
-    let facts = ScanFacts {
-        points: tile.positions.len() as u64,
-        positions: tile.positions.len() as u64,
-        bounds: tile.cube,
-        lattice: &Lattice::of(&schema, Some(1.0)).unwrap(),
-        levels: &Levels::default(),
-    };
+    let (lattice, levels) = (Lattice::of(&schema, Some(1.0)).unwrap(), Levels::default());
+    let mut facts = ScanFacts::new(tile.positions.len() as u64, tile.cube, &lattice, &levels);
+    facts.positions = facts.points;
     stage.settle(&facts).unwrap();
     stage
 }

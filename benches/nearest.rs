@@ -7,9 +7,8 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use pointmill::geom::nearest::Nearest;
+use pointmill::internals::{Nearest, morton_cmp};
 use pointmill::point::Position;
-use pointmill::store::morton_cmp;
 
 fn main() {
     let numbers: Vec<usize> = std::env::args().filter_map(|a| a.parse().ok()).collect();

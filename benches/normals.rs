@@ -5,7 +5,8 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use pointmill::ops::normals::{Estimator, Method};
+use pointmill::internals::Estimator;
+use pointmill::ops::normals::Method;
 use pointmill::point::distance2;
 use pointmill::tile::Neighborhood;
 

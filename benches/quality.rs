@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use pointmill::geom::plane::smallest;
+use pointmill::internals::plane::smallest;
 use pointmill::io::{las, ply};
 use pointmill::point::PointBatch;
 use serde_json::Value;

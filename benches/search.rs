@@ -13,20 +13,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use pointmill::budget::Budget;
-use pointmill::geom::lattice::Lattice;
-use pointmill::geom::simd::Simd;
-use pointmill::host::Threads;
-use pointmill::host::process::cpu_seconds;
+use pointmill::internals::{
+    Budget, Folder, Intake, Loader, SealedTiles, Sieve, Simd, SpillArea, Tag, Threads, TileStore,
+    compute_by, cpu_seconds, seal,
+};
 use pointmill::io::{las, ply};
 use pointmill::ops::normals::{Method, Normals};
 use pointmill::point::{NORMAL, PointBatch, Position};
 use pointmill::quantity::Setting;
 use pointmill::report::Tally;
-use pointmill::stage::{OpenSource, Source, TileOp};
-use pointmill::store::{Folder, Intake, SealedTiles, SpillArea, Tag, TileStore, seal};
+use pointmill::stage::{Lattice, OpenSource, Source, TileOp};
 use pointmill::synth::{Scene, Synthetic};
-use pointmill::tile::{Loader, Sieve};
 
 /// Records of a run, positions of a tile's cube, and of a tile with its rim, as a plan of ample memory
 /// has them.
@@ -112,7 +109,7 @@ fn normals(positions: &[Position], stage: &Normals, simd: Simd) -> [f64; 4] {
     let keys = tiles.cut(TILE, TILE, 0, (0, 0)).unwrap();
     let sieve = Sieve { computed: stage.needs().writes, ..Sieve::default() };
     let mut loader = Loader::new(&tiles, &sieve, CAPACITY);
-    loader.tile().0.compute_by(simd);
+    compute_by(loader.tile().0, simd);
     let mut count = 0;
     for key in keys {
         let tile = loader.load(key, 0, stage.needs().neighbors).unwrap();

@@ -6,11 +6,11 @@
 
 #![allow(clippy::print_stdout, reason = "an example shows its results")]
 
+use pointmill::ops::removal::represent;
 use pointmill::point::{NORMAL, PointBatch, names};
 use pointmill::report::Tally;
-use pointmill::stage::{Needs, Role, TileOp, Transform};
-use pointmill::stage::{StageKind, StagePlace};
-use pointmill::tile::{Fate, Tile};
+use pointmill::stage::{Needs, Role, StageKind, StagePlace, TileOp, Transform};
+use pointmill::tile::Tile;
 use pointmill::{Error, Result};
 use pointmill::{Graph, Overrides, Quiet, Registry};
 use serde::{Deserialize, Serialize};
@@ -62,30 +62,26 @@ impl StageKind for Lowest {
 
 impl TileOp for Lowest {
     fn needs(&self) -> Needs {
-        Needs::none().reads(&NORMAL).takes_cells().removes(None)
+        let needs = Needs::none().reads(&NORMAL).takes_cells().removes(None);
+        needs.bytes_per_point(size_of::<(usize, usize, [f64; 3])>()) // of `stands_for`
     }
 
     // A cell may reach beyond the tile. All its members are there, whichever tile looks at it, so
     // every tile comes to the same choice; each says what becomes of the positions in its own core.
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
-        let Tile { cells, core, positions, columns, copies, fates, .. } = tile;
-        let normals = columns.get(&NORMAL)?;
-        let mut removed = 0;
-        for group in cells.groups() {
-            let members = cells.members[group].iter().map(|&i| i as usize);
+        let normals = tile.columns.get(&NORMAL)?;
+        let mut stands_for = Vec::new();
+        for group in tile.cells.groups() {
+            let members = tile.cells.members[group].iter().map(|&i| i as usize);
             // Positions are distinct and indices follow Morton order, so this breaks all ties.
-            let Some(lowest) = members.clone().min_by_key(|&i| (positions[i][2], i)) else {
-                continue;
-            };
-            for i in members.filter(|i| core.contains(i) && *i != lowest) {
-                let along = |axis: usize| {
-                    (positions[i][axis] - positions[lowest][axis]) as f32 * normals[lowest][axis]
-                };
-                let deviation = (along(0) + along(1) + along(2)).abs();
-                fates[i] = Fate::Represented { deviation };
-                removed += u64::from(copies[i]);
-            }
+            let height = |&i: &usize| (tile.positions[i][2], i);
+            let Some(lowest) = members.clone().min_by_key(height) else { continue };
+            let others = members.filter(|i| tile.core.contains(i) && *i != lowest);
+            let normal = normals[lowest].map(f64::from);
+            stands_for.extend(others.map(|i| (i, lowest, normal)));
         }
+        let removed = stands_for.into_iter();
+        let removed = removed.map(|(i, kept, normal)| represent(tile, i, kept, normal)).sum();
         // The ledger must balance: what a stage removes, it enters.
         tally.remove(Lowest::KIND, "represented", removed);
         Ok(())

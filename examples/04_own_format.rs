@@ -12,8 +12,7 @@ use std::io::{BufRead, BufReader, Read, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use pointmill::io::Projected;
-use pointmill::io::convert::Projection;
+use pointmill::io::{Projected, Projection};
 use pointmill::point::{Dimension, Endian, Layout, Metadata, PointBatch, Scalar, Schema, names};
 use pointmill::stage::{
     ChunkSize, Encode, Encoded, Format, Input, Part, Sink, SinkSummary, Source, WriteKeys, foreign,
@@ -64,7 +63,7 @@ impl Format for Toy {
         let mut inputs = Vec::new();
         for path in files {
             let lines = lines(path)?.count();
-            inputs.push(Input { path: path.clone(), points: lines as u64, beside: None });
+            inputs.push(Input::new(path, lines as u64));
         }
         Ok(Box::new(Texts { schema: schema(), metadata: Metadata::default(), inputs }))
     }
@@ -91,7 +90,7 @@ impl Format for Toy {
         let failed = |e| Error::io(staged, "write", e);
         let mut file = File::create(staged).map_err(failed)?;
         file.write_all(FIRST.as_bytes()).map_err(failed)?;
-        let summary = SinkSummary { bytes: FIRST.len() as u64, ..SinkSummary::default() };
+        let summary = SinkSummary::new(0, FIRST.len() as u64);
         let sink = Box::new(Text { file, path: staged.to_owned(), summary });
         Ok(Box::new(Projected::new(sink, projection, schema(), &keys.path)))
     }
@@ -190,8 +189,7 @@ impl Encode for Numbers {
             let [x, y, z] = axes.map(|axis| axis.world(record, batch.schema().endian));
             let _ = writeln!(text, "{x} {y} {z}"); // into a String it cannot fail
         }
-        let (bytes, points) = (text.into_bytes(), batch.len() as u64);
-        Ok(Encoded { bytes, points, ..Encoded::default() })
+        Ok(Encoded::new(text.into_bytes(), batch.len() as u64))
     }
 }
 

@@ -84,6 +84,7 @@ pub(crate) fn nearest<'a>(word: &str, valid: &'a [String]) -> Option<&'a String>
 
 /// What kind of failure an [`Error`] is; the command line's exit code follows from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ErrorKind {
     /// The operating system refused to read, write or create something.
     Io,
@@ -103,6 +104,15 @@ pub enum ErrorKind {
 ///
 /// Displayed on one line as `place: message`; [`Error::help`] is the remedy and
 /// [`std::error::Error::source`] the cause beneath.
+///
+/// ```
+/// use pointmill::{Error, ErrorKind};
+///
+/// let error = Error::data("scan.toy", "a record ends early").at_byte(96).help("write it again");
+/// assert_eq!(error.kind(), ErrorKind::Data);
+/// assert_eq!(error.to_string(), "scan.toy: at byte 96: a record ends early");
+/// assert_eq!(error.remedy(), Some("write it again"));
+/// ```
 pub struct Error(Box<Inner>);
 
 struct Inner {
@@ -182,7 +192,7 @@ impl Error {
     }
 
     /// The same error about `to` if it is one about `from`, a file that the user never named.
-    pub fn readdress(mut self, from: &Path, to: &Path) -> Self {
+    pub(crate) fn readdress(mut self, from: &Path, to: &Path) -> Self {
         if self.path() == Some(from) {
             self.0.path = Some(to.to_owned());
         }

@@ -61,59 +61,60 @@
 //! # }
 //! ```
 //!
-//! The rooms of the house from the bottom up; each uses those before it:
+//! What is public, from the bottom up:
 //!
 //! - [`Error`] is the one error type: what went wrong, at which file and byte, and what would be
 //!   right. Its [`ErrorKind`] decides the exit code.
-//! - [`host`]: what differs from system to system: memory and its limits, disks, threads.
 //! - [`point`]: points side by side. A [`PointBatch`](point::PointBatch) holds records as their
 //!   file's own bytes; a [`Schema`](point::Schema) says where in them a dimension is.
-//! - [`quantity`]: counts, angles and lengths as people write them.
-//! - [`budget`]: the one place that counts bytes. Whoever allocates by the size of the input takes
-//!   a [`Lease`](budget::Lease) first.
-//! - [`geom`]: geometry on plain slices. The [`lattice`](geom::lattice) makes coordinates integers,
-//!   so that every decision is exact; [`nearest`](geom::nearest) finds neighbours,
-//!   [`star`](geom::star), [`plane`](geom::plane) and [`angle`](geom::angle) make normals of them
-//!   and compare these.
-//! - [`store`]: scans larger than memory. A [`TileStore`](store::TileStore) takes records in any
-//!   order, [`seal`](store::seal) merges them into one canonical sequence.
+//! - [`quantity`]: counts, angles and lengths as people write them, the types of stages' keys.
 //! - [`tile`]: a [`Tile`](tile::Tile) is the points of a cube with neighbourhoods that are exact
 //!   beyond its faces.
 //! - [`report`]: what a run counts and measures, merged so that no order and no cut changes a byte.
 //! - [`stage`]: the roles that a stage can play and what it tells the plan. Implement one to add a
-//!   stage of your own.
+//!   stage of your own, or [`Format`](stage::Format) to add a format.
 //! - [`io`]: LAS, LAZ and PLY, conversion between their records, and the stages `read` and `write`.
 //! - [`synth`]: synthetic scans, and the stage `synth`.
 //! - [`ops`]: the stages that compute or select: `filter`, `outliers`, `normals`, `cells`, `median`
 //!   and `grid`.
 //! - [`picture`]: scans drawn from above or from a side, side by side.
 //! - [`graph`]: what a pipeline is, whoever wrote it: a [`Graph`] of stages.
-//! - [`engine`]: from a plan to a report, in phases over the store, on threads.
-//! - [`plan`]: from a graph, headers and memory to a [`Plan`].
-//! - [`language`]: from a text to a graph, and the [`Registry`] of kinds that a text may name.
+//! - [`Registry`]: the kinds and formats that a text may name; [`Set`]: what is put in the place of
+//!   a text's values.
+//! - [`Plan`]: a graph that is fitted to headers and memory. It runs, and tells a [`Watch`] how it
+//!   goes; [`Done`] has the report.
 //! - [`cli`]: the command line. A program of yours with stages of its own calls [`cli::main`] with
 //!   its registry and has the same commands.
 //!
-//! The programs in `examples/` go on from here, and `docs/architecture.md` tells why it is so.
+//! Enums and structs that will grow are `#[non_exhaustive]`; those of them that a stage or a format
+//! makes have a constructor. Settings are written `Settings { key, ..Settings::default() }`, which
+//! holds when keys are added.
+//!
+//! The programs in `examples/` go on from here, and `docs/architecture.md` tells why it is so and
+//! has the rooms behind this surface, among them the store, geometry, plan and engine.
 
-pub mod budget;
+#[allow(clippy::missing_errors_doc, reason = "no program calls it: see `internals`")]
+mod budget;
 #[cfg(feature = "cli")]
 pub mod cli;
-pub mod engine;
+mod engine;
 mod error;
-pub mod geom;
+mod geom;
 pub mod graph;
-pub mod host;
+mod host;
+#[doc(hidden)]
+pub mod internals;
 pub mod io;
-pub mod language;
+mod language;
 pub mod ops;
 pub mod picture;
-pub mod plan;
+mod plan;
 pub mod point;
 pub mod quantity;
 pub mod report;
 pub mod stage;
-pub mod store;
+#[allow(clippy::missing_errors_doc, reason = "no program calls it: see `internals`")]
+mod store;
 pub mod synth;
 pub mod tile;
 

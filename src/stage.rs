@@ -12,6 +12,8 @@ mod tile_op;
 use crate::Result;
 use crate::point::{PointBatch, Schema};
 
+pub use crate::geom::lattice::{Lattice, Misplaced};
+pub use crate::store::Levels;
 pub use format::{
     Colors, CreateFor, Format, FormatName, Formats, OutputEncoding, WriteKeys, foreign,
 };
@@ -23,11 +25,37 @@ pub use source::{Contradiction, Input, OpenSource, Part, Source};
 pub use tile_op::{Forecast, ScanFacts, TileOp};
 
 /// Changes or removes points as they stream by; knows no neighbours.
+///
+/// ```
+/// use pointmill::Result;
+/// use pointmill::point::{PointBatch, names};
+/// use pointmill::stage::{Needs, Transform};
+///
+/// /// Leaves every second point of a batch out.
+/// struct Half;
+///
+/// impl Transform for Half {
+///     fn needs(&self) -> Needs {
+///         // That coordinates are there is checked before the run.
+///         Needs::none().looks_at(names::XYZ).removes(None)
+///     }
+///
+///     fn apply(&self, batch: &mut PointBatch) -> Result<()> {
+///         batch.retain(|number, _record| number % 2 == 0);
+///         Ok(())
+///     }
+/// }
+/// # let _: Box<dyn Transform> = Box::new(Half);
+/// ```
 pub trait Transform: Send + Sync {
     /// What it reads and writes.
     fn needs(&self) -> Needs;
 
     /// Refuses records of a schema that it cannot work on; called once, before any of them is read.
+    ///
+    /// # Errors
+    ///
+    /// What it cannot work on, said with the dimension.
     fn check(&self, _schema: &Schema) -> Result<()> {
         Ok(())
     }
@@ -50,6 +78,10 @@ pub trait Transform: Send + Sync {
 
     /// Called for every batch, from several threads at once. Points that it removes are entered in
     /// the ledger by the caller.
+    ///
+    /// # Errors
+    ///
+    /// A record that it cannot make sense of; the run ends.
     fn apply(&self, batch: &mut PointBatch) -> Result<()>;
 }
 

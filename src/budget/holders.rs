@@ -9,6 +9,7 @@ use super::bytes::Bytes;
 
 /// Memory that is held, or needed, under one name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Holder {
     /// What it is for.
     pub name: &'static str,

@@ -81,8 +81,8 @@ pub(super) struct CommonArguments {
     /// Print errors only
     #[arg(short, long, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Print what the plan and the stages decided, how long each phase took, and what the memory was
-    /// for
+    /// Print what the plan and the stages decided, how long each phase took, and what the memory
+    /// was for
     #[arg(short, long)]
     pub verbose: bool,
     /// Write the report to this file

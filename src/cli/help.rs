@@ -105,7 +105,8 @@ Examples:
     ("synth", "Example:\n  pointmill synth als -n 1M -o landscape.laz --seed 7"),
     (
         "completions",
-        "Example:\n  pointmill completions bash > ~/.local/share/bash-completion/completions/pointmill",
+        "Example:
+  pointmill completions bash > ~/.local/share/bash-completion/completions/pointmill",
     ),
     ("man", "Examples:\n  pointmill man | man -l -\n  pointmill man ~/.local/share/man/man1"),
 ];

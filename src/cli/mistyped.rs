@@ -89,12 +89,7 @@ pub(super) fn told(
         }
         ErrorKind::TooManyValues => message(&format!("{name}: takes no value"), &value, ""),
         ErrorKind::InvalidSubcommand => {
-            let word = context(error, ContextKind::InvalidSubcommand);
-            let names: Vec<String> =
-                all.get_subcommands().map(|command| command.get_name().to_owned()).collect();
-            let near = meant(nearest(&word, &names).into_iter());
-            let note = format!("{near}commands: {}", names.join(", "));
-            message(&format!("there is no command `{word}`"), &word, &note)
+            unknown_command(&context(error, ContextKind::InvalidSubcommand), all)
         }
         ErrorKind::MissingRequiredArgument => {
             let lacking = lacking(command, &contexts(error, ContextKind::InvalidArg));
@@ -102,20 +97,30 @@ pub(super) fn told(
             let help = output(typed, formats).filter(|_| lacking.contains("--output"));
             told + &help.map_or(String::new(), |help| format!("\nhelp: {help}"))
         }
-        ErrorKind::ArgumentConflict => {
-            let others = contexts(error, ContextKind::PriorArg);
-            let others: Vec<&str> =
-                others.iter().filter_map(|other| other.split_whitespace().next()).collect();
-            match others.contains(&name) {
-                true => message(&format!("{name} is given twice"), name, ""),
-                false => format!(
-                    "error: {name} and {} do not go together\nhelp: leave one of them out",
-                    others.join(", ")
-                ),
-            }
-        }
+        ErrorKind::ArgumentConflict => conflict(name, &contexts(error, ContextKind::PriorArg)),
         _ => return None,
     })
+}
+
+fn unknown_command(word: &str, all: &Command) -> String {
+    let names: Vec<String> =
+        all.get_subcommands().map(|command| command.get_name().to_owned()).collect();
+    let near = meant(nearest(word, &names).into_iter());
+    let note = format!("{near}commands: {}", names.join(", "));
+    message(&format!("there is no command `{word}`"), word, &note)
+}
+
+/// What is told of an argument that does not go with others, or with itself.
+fn conflict(name: &str, others: &[String]) -> String {
+    let others: Vec<&str> =
+        others.iter().filter_map(|other| other.split_whitespace().next()).collect();
+    match others.contains(&name) {
+        true => message(&format!("{name} is given twice"), name, ""),
+        false => format!(
+            "error: {name} and {} do not go together\nhelp: leave one of them out",
+            others.join(", ")
+        ),
+    }
 }
 
 /// What is needed, each with what can be given in its place.

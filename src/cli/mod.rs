@@ -49,8 +49,8 @@ pub fn main(registry: &Registry) -> ExitCode {
     ExitCode::from(run_with(std::env::args_os().collect(), registry))
 }
 
-/// Runs the command that `arguments` are, the first of which is the program's name, as [`main`] does;
-/// returns the exit code. It prints as the process would.
+/// Runs the command that `arguments` are, the first of which is the program's name, as [`main`]
+/// does; returns the exit code. It prints as the process would.
 pub fn run_with(arguments: Vec<OsString>, registry: &Registry) -> u8 {
     if let Some(odd) = arguments.iter().skip(1).find(|argument| argument.to_str().is_none()) {
         let odd = shown(odd.as_ref());

@@ -88,7 +88,8 @@ fn nowhereness(input: &str, points: u64) -> String {
 fn blackness(input: &str, by: ColorBy) -> String {
     let what = if by == ColorBy::Intensity { "intensities" } else { "colours" };
     format!(
-        "{input}: all {what} are 0, so that the scan is drawn black: use `--by height` or `--by class`"
+        "{input}: all {what} are 0, so that the scan is drawn black: use `--by height` or \
+         `--by class`"
     )
 }
 

@@ -170,7 +170,7 @@ pub(super) fn write_report(
 ) -> Result<()> {
     let write = || {
         let mut out = BufWriter::new(File::create(staged)?);
-        report.write_all(&mut out, tiles.iter().map(lines_of))?;
+        report.write(&mut out, tiles.iter().map(lines_of))?;
         out.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()
     };
     // Lines that the spill cannot give back are its error, about its file.

@@ -61,8 +61,8 @@ pub(crate) fn lists_bytes(records: u64) -> Bytes {
     Bytes::of(stretches, list_bytes(stretches as usize) + size_of::<StretchList>())
 }
 
-/// Bytes that a thread holds while it orders stretches whose entries have rows of so many bytes: one
-/// at work, and what waits for its turn.
+/// Bytes that a thread holds while it orders stretches whose entries have rows of so many bytes:
+/// one at work, and what waits for its turn.
 pub(crate) fn ordering_bytes(records: u64, row: usize) -> Bytes {
     let most = records.min(stretch_records(records));
     Bytes::of(most, 3 * (size_of::<Ranked>() + row) + ENTRY + row)

@@ -129,7 +129,8 @@ impl<'a> Job<'a> {
         lock(&self.warnings).clone()
     }
 
-    /// The rows of a sink's entries, where those of its pass are `all`: none if it writes no column.
+    /// The rows of a sink's entries, where those of its pass are `all`: none if it writes no
+    /// column.
     pub fn layout(&self, sink: usize, all: &RowLayout) -> RowLayout {
         if self.task.computed[sink].is_empty() { RowLayout::default() } else { all.clone() }
     }

@@ -31,6 +31,7 @@ use crate::{Error, Result};
 
 /// A run that is done. Displayed as a few lines for the terminal.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Done {
     /// What it says it did; its tiles are in the file alone.
     pub report: Report,

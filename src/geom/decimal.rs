@@ -15,3 +15,17 @@ pub(super) fn multiple(scale: f64, step: f64) -> Option<i64> {
     let whole_number = (1.0..1e15).contains(&whole) && (ratio - whole).abs() <= 1e-12 * whole;
     whole_number.then_some(whole as i64)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::decimal_step;
+
+    #[test]
+    fn decimal_steps_are_the_powers_of_ten_below() {
+        for (length, step) in
+            [(1.0, 1.0), (0.99, 0.1), (1e-12, 1e-12), (9.9e-12, 1e-12), (1e22, 1e22), (0.0, 1e-300)]
+        {
+            assert_eq!(decimal_step(length), step, "{length}");
+        }
+    }
+}

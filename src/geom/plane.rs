@@ -227,11 +227,6 @@ pub fn smallest_vector<T: Real>(matrix: [T; 6]) -> [T; 3] {
     choose(root.below(root.of(0.0)), far, vector)
 }
 
-/// The eigenvector of the largest eigenvalue, as [`smallest`] in every other respect.
-pub fn largest_eigenvector(matrix: Symmetric) -> [f64; 3] {
-    smallest(matrix.map(|v| -v)).1
-}
-
 /// A symmetric matrix as (mean·I + radius·M)·unit, with M of trace 0 and squared norm 6: its
 /// eigenvalues are the roots of t³ − 3t − det M.
 struct Traceless<T> {

@@ -5,7 +5,7 @@
 //! it is whole ([`Graph::mistakes`]): the language tells what is found there with the places in its
 //! text, the plan as an error.
 
-mod limits;
+pub(crate) mod limits;
 mod settings;
 mod size;
 mod written;
@@ -16,15 +16,39 @@ use std::sync::Arc;
 
 use crate::stage::{Order, Role};
 
-pub use limits::{LimitKeys, Limits, Sees};
+pub(crate) use limits::{LimitKeys, Limits, Sees};
+pub(crate) use settings::MOST_THREADS;
 pub use settings::{
-    Existing, Headers, MOST_THREADS, MixedUnits, Nonfinite, Overrides, RunSettings, SimdSetting,
-    SpillSetting, Treatment, ZScale,
+    Existing, Headers, MixedUnits, Nonfinite, Overrides, RunSettings, SimdSetting, SpillSetting,
+    Treatment, ZScale,
 };
 pub use size::parse_bytes;
-pub use written::Written;
+pub(crate) use written::Written;
 
 /// A pipeline: stages, each of which takes from stages before it.
+///
+/// A text becomes one by [`Graph::parse`]; a program may also put it together itself:
+///
+/// ```
+/// use pointmill::Graph;
+/// use pointmill::graph::RunSettings;
+/// use pointmill::ops::{Grid, Pick};
+/// use pointmill::quantity::Length;
+/// use pointmill::stage::Role;
+/// use pointmill::synth::{Scene, Synthetic};
+///
+/// let mut graph = Graph::new(RunSettings::default());
+/// let scan = Synthetic { scene: Scene::Plane, points: 1000, seed: 0, noise: None };
+/// let scan = graph.add("synth", Role::Source(Box::new(scan)), &[]);
+/// let side = Length::of(0.5).expect("a length above 0");
+/// let grid = Role::TileOp(Box::new(Grid::new(side, Pick::Center)));
+/// let grid = graph.add("grid", grid, &[scan]);
+///
+/// // It is checked when it is planned, or here: there is no sink yet.
+/// let mistakes = graph.mistakes();
+/// assert_eq!(mistakes[0].stage, grid);
+/// assert_eq!(mistakes[0].told, "nothing takes these points: end with `write`");
+/// ```
 #[derive(Default)]
 pub struct Graph {
     /// The file it came from, as the user named it; empty for a text that the user does not know.
@@ -59,6 +83,7 @@ pub struct GraphStage {
 
 /// What is wrong with the way in which the stages of a graph hang together.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct GraphMistake {
     /// The number of the stage.
     pub stage: usize,

@@ -71,6 +71,7 @@ pub struct RunSettings {
 /// What becomes of files that are already where an output or the report is to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Existing {
     /// They are replaced when the run is done, and keep their permissions.
     #[default]
@@ -85,6 +86,7 @@ pub const MOST_THREADS: usize = 1024;
 /// What becomes of points whose coordinates are not finite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Nonfinite {
     /// The run fails and names the first.
     #[default]
@@ -96,6 +98,7 @@ pub enum Nonfinite {
 /// What becomes of scans whose points contradict their header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Headers {
     /// The run fails and names what differs.
     #[default]
@@ -107,6 +110,7 @@ pub enum Headers {
 /// What becomes of scans whose x, y and z have different units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum MixedUnits {
     /// The run fails and names the units, unless `z_scale` is given.
     #[default]
@@ -117,6 +121,7 @@ pub enum MixedUnits {
 
 /// What z is multiplied by.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum ZScale {
     /// What the units in the coordinate reference system ask for; refused where it does not tell
     /// both.
@@ -128,6 +133,7 @@ pub enum ZScale {
 /// What becomes of points that the scan itself says are of no use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Treatment {
     /// They take no part and are removed, entered in the ledger as such.
     #[default]
@@ -141,6 +147,7 @@ pub enum Treatment {
 /// Where decoded points wait for the mill.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum SpillSetting {
     /// In memory as far as it goes, on disk beyond.
     #[default]
@@ -152,6 +159,7 @@ pub enum SpillSetting {
 /// Which of the equal code paths runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum SimdSetting {
     /// The fastest that the processor has.
     #[default]
@@ -185,6 +193,15 @@ impl SimdSetting {
 }
 
 /// What a command line or a program puts in the place of `[run]` settings.
+///
+/// ```
+/// use pointmill::Overrides;
+/// use pointmill::graph::RunSettings;
+///
+/// let settings = RunSettings { memory: Some(1 << 30), ..RunSettings::default() };
+/// let overrides = Overrides { memory: Some(256 << 20), ..Overrides::default() };
+/// assert_eq!(settings.with(&overrides).memory, Some(256 << 20));
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Overrides {
     /// For [`RunSettings::memory`], in bytes.

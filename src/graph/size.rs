@@ -18,12 +18,14 @@ const UNITS: [(&str, u64); 9] = [
 /// Reads a size: `512MiB`, `1.5 GiB`, `2GB`, or bytes without a unit. A fraction of a byte is cut
 /// off.
 ///
-/// The error says what a size looks like.
-///
 /// ```
 /// assert_eq!(pointmill::graph::parse_bytes("1.5GiB"), Ok(1_610_612_736));
 /// assert!(pointmill::graph::parse_bytes("2G").is_err());
 /// ```
+///
+/// # Errors
+///
+/// What is no size, or none of at least one byte; the text says what a size looks like.
 pub fn parse_bytes(text: &str) -> Result<u64, String> {
     let refused = || {
         let units: Vec<&str> = UNITS.iter().map(|(unit, _)| *unit).collect();

@@ -8,7 +8,6 @@ mod tallies;
 pub(crate) mod threads;
 
 pub(crate) use files::{Clash, Files, Use};
-pub use tallies::ItemTally;
 #[cfg(test)]
 pub(crate) use tallies::written;
 pub use threads::{PhaseItems, Threads, lock};

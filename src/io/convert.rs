@@ -16,6 +16,7 @@ use crate::{Error, ErrorKind, Result};
 
 /// What a conversion of coordinates rounded.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Rounding {
     /// Points of which a coordinate was rounded.
     pub points: u64,
@@ -38,8 +39,12 @@ pub struct Projection {
 
 impl Projection {
     /// The projection from one schema to another. A dimension of `to` that `from` lacks is 0; one
-    /// of `from` that `to` lacks is an error unless `drop` names it, and so is a name in `drop`
-    /// that `from` lacks. Coordinates cannot be dropped.
+    /// of `from` that `to` lacks must be named in `drop`.
+    ///
+    /// # Errors
+    ///
+    /// A dimension of `from` that `to` lacks and `drop` does not name, a name in `drop` that `from`
+    /// lacks, and coordinates, which cannot be dropped.
     pub fn new(from: &Schema, to: &Schema, drop: &[String]) -> Result<Projection> {
         check_drop(from, drop)?;
         let held: BTreeSet<&str> = to.dimensions.iter().map(|d| d.name.as_str()).collect();
@@ -81,7 +86,7 @@ impl Projection {
     }
 
     /// Leaves room behind each record: records become `stride` bytes long, the new ones 0.
-    pub fn widen(&mut self, stride: usize) {
+    pub(crate) fn widen(&mut self, stride: usize) {
         self.to_stride = self.to_stride.max(stride);
         self.blank.resize(self.to_stride, 0);
     }
@@ -89,7 +94,7 @@ impl Projection {
     /// Gives the dimension `to` of the target, which the source lacks, this number instead of 0.
     /// False if it cannot hold it.
     #[must_use]
-    pub fn preset(&mut self, to: &Dimension, number: u64) -> bool {
+    pub(crate) fn preset(&mut self, to: &Dimension, number: u64) -> bool {
         to.put(&mut self.blank, self.to_endian, Value::Unsigned(number))
     }
 
@@ -104,7 +109,7 @@ impl Projection {
     }
 
     /// True if every record stays as it is, byte for byte.
-    pub fn is_copy(&self) -> bool {
+    pub(crate) fn is_copy(&self) -> bool {
         let all = self.from.stride;
         let whole =
             matches!(self.moves[..], [Move::Copy { from: 0, to: 0, length }] if length == all);
@@ -116,8 +121,11 @@ impl Projection {
         self.to_stride
     }
 
-    /// Appends the projections of `records` to `out`. Fails on the first point with a value that
-    /// its target cannot hold, naming dimension, value and point.
+    /// Appends the projections of `records` to `out`.
+    ///
+    /// # Errors
+    ///
+    /// The first value that its target cannot hold, with its dimension and point.
     pub fn project(&self, records: &[u8], out: &mut Vec<u8>) -> Result<Rounding> {
         let start = out.len();
         let points = records.len() / self.from.stride.max(1);
@@ -127,7 +135,7 @@ impl Projection {
 
     /// Replaces `out`, which has room for exactly as many, by the projections of `records`; fails
     /// as [`project`](Self::project) does.
-    pub fn project_into(&self, records: &[u8], out: &mut [u8]) -> Result<Rounding> {
+    pub(crate) fn project_into(&self, records: &[u8], out: &mut [u8]) -> Result<Rounding> {
         let (from, to) = (self.from.stride.max(1), self.to_stride.max(1));
         let mut rounding = Rounding::default();
         let blocks = records.chunks(BLOCK * from).zip(out.chunks_mut(BLOCK * to));

@@ -10,7 +10,11 @@ use crate::stage::Formats;
 use crate::{Error, Result};
 
 /// What the header of the file at `path` says, as JSON; which of `formats` it is, its first bytes
-/// tell. Fails on other files and on headers that their format does not allow.
+/// tell.
+///
+/// # Errors
+///
+/// Files of no format among them, and headers that their format does not allow.
 pub fn describe(path: &Path, formats: &Formats) -> Result<serde_json::Value> {
     let first = sniff::first_bytes(path)?;
     match formats.sniffed(&first) {

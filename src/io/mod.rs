@@ -1,9 +1,9 @@
 //! Formats: one folder each, plain sources and sinks of records; conversion between records; and
 //! the stages that name files. Knows nothing of tiles.
 
-pub mod convert;
+pub(crate) mod convert;
 mod describe;
-pub mod ends;
+pub(crate) mod ends;
 mod epsg;
 pub mod las;
 mod origin;
@@ -12,6 +12,8 @@ mod project;
 pub(crate) mod sniff;
 mod wkt;
 
+pub use convert::{Projection, Rounding};
 pub use describe::describe;
-pub use origin::open_plain;
+pub use ends::{OutputOrder, Read, Write};
+pub(crate) use origin::open_plain;
 pub use project::Projected;

@@ -10,6 +10,18 @@ use crate::stage::{Format, Formats, Role, StageKind, StagePlace};
 use crate::{Error, Result};
 
 /// The stage kinds and formats that a pipeline file may name.
+///
+/// ```
+/// use pointmill::ops::{Grid, Median};
+/// use pointmill::{Graph, Registry};
+///
+/// // No more than is wanted; `Registry::builtin` has all that there is.
+/// let registry = Registry::empty().with::<Grid>().with::<Median>();
+/// assert!(registry.has("grid") && !registry.has("read"));
+///
+/// let refused = Graph::parse("stage = [{kind = 'gird', side = 1.0}]", "thin.toml", &registry);
+/// assert!(refused.unwrap_err().to_string().contains("grid"), "the nearest word");
+/// ```
 #[derive(Clone, Default)]
 pub struct Registry {
     kinds: BTreeMap<&'static str, RegisteredKind>,

@@ -35,6 +35,10 @@ enum Given {
 impl Set {
     /// Reads `stage.key=value`, as `--set` takes it. The value is TOML; what is no TOML is a text,
     /// so that `write.path=out.laz` needs no quotes.
+    ///
+    /// # Errors
+    ///
+    /// A text without `=`. Whether there is such a key is found where it is put into a text.
     pub fn parse(text: &str) -> Result<Set> {
         let Some((address, _)) = text.split_once('=') else {
             let told = Mistake::new(TextPlace::new(1, 0..text.len()), "there is no `=`")

@@ -31,14 +31,21 @@ impl Graph {
     /// Reads a pipeline; `origin` is the name of its file for errors, empty for a text that the
     /// user does not know: then errors name what is wrong without a place in it.
     ///
-    /// The error tells every mistake of the text at once. Files that stages name are looked up, not
-    /// opened.
+    /// Files that stages name are looked up, not opened.
+    ///
+    /// # Errors
+    ///
+    /// All mistakes of the text at once, each with its line and column.
     pub fn parse(text: &str, origin: &str, registry: &Registry) -> Result<Graph> {
         Graph::parse_with(text, origin, registry, &[])
     }
 
     /// Reads a pipeline in which the values of `sets`, in their order, take the place of the
     /// text's.
+    ///
+    /// # Errors
+    ///
+    /// As [`parse`](Graph::parse), those of `sets` included.
     pub fn parse_with(
         text: &str,
         origin: &str,
@@ -70,6 +77,10 @@ impl Graph {
     }
 
     /// Reads the pipeline file at `path`, as [`parse_with`](Graph::parse_with).
+    ///
+    /// # Errors
+    ///
+    /// As [`parse`](Graph::parse), and a file that cannot be read or that is no pipeline.
     pub fn read(path: &Path, registry: &Registry, sets: &[Set]) -> Result<Graph> {
         let (mut file, about) = open_plain(path)?;
         let failed = |e| Error::io(path, "read the pipeline", e);

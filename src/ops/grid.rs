@@ -54,6 +54,7 @@ pub struct Grid {
 /// Which position of a cube stays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Pick {
     /// The nearest to the cube's centre.
     #[default]

@@ -53,7 +53,7 @@ impl Default for Median {
 
 impl Median {
     /// Refuses passes outside 1 to 16; names the key to blame.
-    pub fn check(&self) -> Result<(), (&'static str, Error)> {
+    pub(crate) fn check(&self) -> Result<(), (&'static str, Error)> {
         let wrong = |told: String| ("passes", Error::pipeline(told));
         check_passes(self.passes as u64).map_err(wrong)
     }

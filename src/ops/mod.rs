@@ -6,12 +6,12 @@ mod grid;
 mod lengths;
 mod median;
 pub mod normals;
-pub mod outliers;
-mod removal;
+pub(crate) mod outliers;
+pub mod removal;
 mod scatter;
 
 pub use cells::{By, Cells, Keep, Measure, Reference, Side, Split};
 pub use filter::Filter;
 pub use grid::{Grid, Pick};
 pub use median::Median;
-pub use outliers::Outliers;
+pub use outliers::{OutlierMethod, Outliers};

@@ -1,8 +1,8 @@
 //! Surface normals from the nearest neighbours of every position: the first step of the reduction.
 
 mod bundle;
-mod estimate;
-mod estimator;
+pub(crate) mod estimate;
+pub(crate) mod estimator;
 mod fan;
 mod noise;
 mod orient;
@@ -18,15 +18,16 @@ use crate::stage::{Forecast, Needs, Role, ScanFacts, StageKind, StagePlace, Tile
 use crate::tile::Tile;
 use crate::{Error, Result};
 
-pub use estimate::{Estimate, EstimateOutcome, Fallback, Method};
-pub use estimator::Estimator;
+pub use estimate::Method;
+pub(crate) use estimate::{Estimate, EstimateOutcome, Fallback};
+pub(crate) use estimator::Estimator;
 pub use orient::Orient;
 use orient::SignRule;
 
 /// Fewest neighbours that the stage takes; two make a plane, but no estimate of a surface.
-pub const MIN_NEIGHBORS: usize = 3;
+const MIN_NEIGHBORS: usize = 3;
 /// Most neighbours that the stage takes.
-pub const MAX_NEIGHBORS: usize = 64;
+const MAX_NEIGHBORS: usize = 64;
 
 /// The stage `normals`: a unit normal for every position, from its k nearest other positions.
 ///
@@ -81,7 +82,7 @@ impl Default for Normals {
 impl Normals {
     /// Refuses a number of neighbours outside 3 to 64 (reading a pipeline file does the same), and
     /// a viewpoint that is missing, not asked for or not finite; names the key to blame.
-    pub fn check(&self) -> Result<(), (&'static str, Error)> {
+    pub(crate) fn check(&self) -> Result<(), (&'static str, Error)> {
         let given = self.neighbors.given().unwrap_or(MIN_NEIGHBORS);
         check_neighbors(given as u64).map_err(|told| ("neighbors", Error::pipeline(told)))?;
         let (key, error) = match (self.orient, self.viewpoint) {

@@ -12,7 +12,6 @@ use crate::quantity::Length;
 use crate::stage::{Role, StageKind, StagePlace};
 use crate::{Error, Result};
 
-pub use neighbors::MAX_NEIGHBORS;
 pub use radius::RadiusOutliers;
 pub use statistical::StatisticalOutliers;
 
@@ -61,6 +60,7 @@ pub struct Outliers {
 /// What an outlier is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum OutlierMethod {
     /// What is farther from its neighbours than most points of the scan are from theirs.
     #[default]
@@ -71,7 +71,7 @@ pub enum OutlierMethod {
 
 impl Outliers {
     /// The stage in the role that its method has, or the key to blame and why.
-    pub fn role(self) -> Result<Role, (&'static str, Error)> {
+    pub(crate) fn role(self) -> Result<Role, (&'static str, Error)> {
         match self.method {
             OutlierMethod::Statistical => {
                 let told = "belongs to `outliers.method = \"radius\"`";

@@ -1,11 +1,28 @@
 //! What stages do to the fates of positions, and how they account for it.
+//!
+//! A tile op that removes points goes through here, so that no record is removed twice and the
+//! ledger balances: each function says how many records it removed, and [`RemovalAccount::enter`]
+//! takes their sum.
+//!
+//! ```
+//! use pointmill::ops::removal;
+//! use pointmill::tile::{Fate, Tile};
+//!
+//! let mut tile = Tile::of(vec![[0, 0, 0], [1, 0, 3]]);
+//! tile.normals[0] = [0.0, 0.0, 1.0];
+//! // The second position is three lattice steps above the plane through the first.
+//! assert_eq!(removal::represent(&mut tile, 1, 0), 1);
+//! assert_eq!(tile.fates, [Fate::Kept, Fate::Represented { deviation: 3.0 }]);
+//! // Nothing of it is left to be removed.
+//! assert_eq!(removal::remove(&mut tile, 1), 0);
+//! ```
 
 use crate::point::Mark;
 use crate::report::Tally;
 use crate::tile::{Fate, Tile};
 
-/// Keeps one record of position `i`; returns how many copies that removes.
-pub(super) fn keep_once(tile: &mut Tile, i: usize) -> u64 {
+/// Keeps one record of position `i`, the canonical first; returns how many copies that removes.
+pub fn keep_once(tile: &mut Tile, i: usize) -> u64 {
     if tile.fates[i] == Fate::Kept && tile.copies[i] > 1 {
         tile.fates[i] = Fate::KeptOnce;
         return u64::from(tile.copies[i] - 1);
@@ -14,7 +31,7 @@ pub(super) fn keep_once(tile: &mut Tile, i: usize) -> u64 {
 }
 
 /// Removes position `i`; returns how many records that removes.
-pub(super) fn remove(tile: &mut Tile, i: usize) -> u64 {
+pub fn remove(tile: &mut Tile, i: usize) -> u64 {
     let records = records(tile, i);
     if records > 0 {
         tile.fates[i] = Fate::Removed;
@@ -22,9 +39,11 @@ pub(super) fn remove(tile: &mut Tile, i: usize) -> u64 {
     records
 }
 
-/// Lets `kept`, through which the plane of a unit normal goes, stand for position `i`; returns how
-/// many records that removes.
-pub(super) fn represent(tile: &mut Tile, i: usize, kept: usize, normal: [f64; 3]) -> u64 {
+/// Lets position `kept` stand for position `i`; returns how many records that removes.
+///
+/// The deviation is measured in lattice steps along `normal`, the unit normal of the plane through
+/// `kept`.
+pub fn represent(tile: &mut Tile, i: usize, kept: usize, normal: [f64; 3]) -> u64 {
     let records = records(tile, i);
     if records > 0 {
         let (p, q) = (tile.positions[i], tile.positions[kept]);
@@ -46,13 +65,13 @@ fn records(tile: &Tile, i: usize) -> u64 {
 
 /// How a stage accounts for records that it removes, or only marks.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct RemovalAccount {
+pub struct RemovalAccount {
     /// The stage's kind.
-    pub(super) stage: &'static str,
+    pub stage: &'static str,
     /// The count of marked records in the report.
-    pub(super) marked: &'static str,
+    pub marked: &'static str,
     /// How it marks instead of removing, if it does.
-    pub(super) mark: Option<Mark>,
+    pub mark: Option<Mark>,
 }
 
 impl RemovalAccount {
@@ -62,7 +81,7 @@ impl RemovalAccount {
     }
 
     /// Enters `records` as removed for `reason`; marked ones are all still there, and only counted.
-    pub(super) fn enter(&self, tally: &mut Tally, reason: &'static str, records: u64) {
+    pub fn enter(&self, tally: &mut Tally, reason: &'static str, records: u64) {
         match self.mark {
             Some(_) => tally.count(self.marked, records),
             None => tally.remove(self.stage, reason, records),

@@ -26,6 +26,7 @@ const GAP: u32 = 8;
 
 /// Scans drawn side by side, in one frame and with one range of colours.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Picture {
     /// Pixels.
     pub width: u32,

@@ -23,6 +23,7 @@ pub struct Settings {
 
 /// From where a scan is seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum View {
     /// From above: x to the right, y up.
     #[default]
@@ -52,6 +53,7 @@ impl View {
 
 /// What points are coloured by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum ColorBy {
     /// Their height: from dark blue through green and yellow to red.
     #[default]

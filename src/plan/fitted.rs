@@ -5,8 +5,9 @@ use std::num::NonZeroUsize;
 
 use rayon::ThreadPool;
 
+use super::limits::{check_limits, number_selections};
 use super::look::{Unfit, look};
-use super::passes::{Passes, check_limits, number_selections, unroll};
+use super::passes::{Passes, unroll};
 use super::places::{all_read, check_places, copies, each_input};
 use super::sorted::Sorted;
 use super::stretch::Stretch;
@@ -29,7 +30,25 @@ use crate::stage::{ChunkSize, CreateSink, Order, Source};
 use crate::store::CLASSED_INPUTS;
 use crate::{Error, Result};
 
-/// A pipeline ready to run.
+/// A pipeline ready to run: headers are read, no point is.
+///
+/// ```
+/// use pointmill::{Graph, Overrides, Registry};
+///
+/// # fn main() -> pointmill::Result<()> {
+/// let text = "stage = [
+///     {kind = 'synth', scene = 'plane', points = 1_000},
+///     {kind = 'grid', side = 0.5},
+///     {kind = 'write', path = 'plane.ply'},
+/// ]";
+/// let graph = Graph::parse(text, "thin.toml", &Registry::builtin())?;
+/// let plan = graph.plan(&Overrides::default())?;
+/// assert_eq!(plan.outline().points, 1_000);
+/// // What `pointmill plan` prints.
+/// assert!(plan.to_string().contains("order    canonical"));
+/// # Ok(())
+/// # }
+/// ```
 pub struct Plan {
     pub(crate) task: Task,
     /// The tile stages; a run consumes them, since they settle and could not begin a second time.
@@ -42,6 +61,12 @@ impl Plan {
     ///
     /// Outputs get their names one after the other, in the order of the pipeline's sinks and of the
     /// inputs, and the report gets its own behind them.
+    ///
+    /// # Errors
+    ///
+    /// What the system refuses, damage in the inputs, a budget that turns out too small, records
+    /// that an output cannot hold, and [`ErrorKind::Interrupted`](crate::ErrorKind::Interrupted)
+    /// where `watch` asked to stop.
     pub fn run(self, watch: &dyn Watch) -> Result<Done> {
         self.task.run(self.ops, watch)
     }
@@ -51,6 +76,10 @@ impl Plan {
     ///
     /// A run takes the threads that it works on for itself until it is done, so that other work of
     /// the pool waits.
+    ///
+    /// # Errors
+    ///
+    /// As [`run`](Plan::run).
     pub fn run_in(self, pool: &ThreadPool, watch: &dyn Watch) -> Result<Done> {
         let threads = Threads::of(pool, self.task.threads);
         self.task.run_on(self.ops, threads, watch)
@@ -60,8 +89,10 @@ impl Plan {
 impl Graph {
     /// Opens the inputs' headers and fits the stages to them and to the memory.
     ///
-    /// Fails if the stages do not fit each other, the inputs disagree, an output is an input or
-    /// cannot appear where it should, or the memory cannot do.
+    /// # Errors
+    ///
+    /// Stages that do not fit each other, inputs that disagree, an output that is an input or
+    /// cannot appear where it should, and a memory that cannot do, with the size that would.
     pub fn plan(self, overrides: &Overrides) -> Result<Plan> {
         let (origin, file) = (self.origin.clone(), self.file.clone());
         let settings = self.settings.clone().with(overrides);

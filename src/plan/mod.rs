@@ -2,7 +2,9 @@
 //! other, the inputs and the memory? Knows no stage by name, and reads no point but a few that it
 //! looks at.
 
+mod columns;
 mod fitted;
+mod limits;
 mod look;
 mod outline;
 mod passes;
@@ -13,4 +15,3 @@ mod stretch;
 
 pub use fitted::Plan;
 pub use outline::Outline;
-pub use stretch::Stretch;

@@ -6,6 +6,7 @@ use super::fitted::Plan;
 
 /// What a plan reads, writes and uses.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Outline {
     /// Files that are read.
     pub inputs: usize,

@@ -1,47 +1,13 @@
 //! The tile stages of a pipeline as passes over the scan: a pass ends where points are removed, or
 //! where a stage must have seen all tiles before it decides.
 
+use super::columns::{NewestColumns, giver, missing};
+use super::limits::seen_by;
 use super::sorted::{Sorted, StageWork};
 use crate::engine::pass::{Branch, Call, Op, Pass, PassFilter, StageOp, decides, needs};
-use crate::graph::{Limits, Sees};
-use crate::point::{ColumnKind, ComputedDimension, NORMAL, Scalar, Schema, names};
+use crate::point::{ColumnKind, ComputedDimension, Scalar, Schema, names};
 use crate::stage::Needs;
-use crate::store::SELECTIONS;
 use crate::{Error, Result};
-
-/// Refuses stages that are limited by a class or a flag that records of `schema` do not have.
-pub(crate) fn check_limits(ops: &[StageOp], schema: &Schema) -> Result<()> {
-    for StageOp { kind, written, limits, .. } in ops {
-        if let Some(name) = limits.selection.missing(schema) {
-            let key = if name == names::CLASSIFICATION { "classes" } else { "with" };
-            let told =
-                format!("`{kind}.{key}` selects points by {name}, which the input does not have");
-            return Err(written.wrong_key(key, told).help(format!("leave `{kind}.{key}` out")));
-        }
-    }
-    Ok(())
-}
-
-/// Gives stages that are limited to some records a bit each, equal limits the same.
-pub(crate) fn number_selections(ops: &mut [StageOp]) -> Result<Vec<crate::point::Selection>> {
-    let mut selections = Vec::new();
-    for op in ops.iter_mut().filter(|op| !op.limits.selection.is_all()) {
-        let same = selections.iter().position(|known| *known == op.limits.selection);
-        let number = same.unwrap_or_else(|| {
-            selections.push(op.limits.selection.clone());
-            selections.len() - 1
-        });
-        if number >= SELECTIONS as usize {
-            let told = format!("stages are limited in more than {SELECTIONS} different ways");
-            return Err(op
-                .written
-                .wrong(told)
-                .help("let some of them have equal classes and flags"));
-        }
-        op.selection = 1 << number;
-    }
-    Ok(selections)
-}
 
 /// The passes of a graph.
 #[derive(Debug, Default)]
@@ -92,7 +58,7 @@ struct BranchCursor {
     /// False once the pass removes or gathers.
     is_open: bool,
     /// The newest values of each column that a stage computed.
-    columns: Vec<NewestColumn>,
+    columns: NewestColumns,
     /// Stages of the graph so far, the decode's left out.
     path: Vec<usize>,
     /// The tile stages among them.
@@ -101,16 +67,6 @@ struct BranchCursor {
     filters: Vec<usize>,
     /// True if the last stage takes records away.
     decides: bool,
-}
-
-/// Where the newest values of a column come from.
-#[derive(Debug, Clone, Copy)]
-struct NewestColumn {
-    kind: ColumnKind,
-    /// The pass that computes them.
-    pass: usize,
-    /// True once a stage or a sink has read them.
-    is_read: bool,
 }
 
 impl PassLayout<'_> {
@@ -263,11 +219,11 @@ impl PassLayout<'_> {
         let needs = needs(self.ops, call);
         let at = self.place(stage, &needs)?;
         self.look(at, stage, &needs)?;
-        for column in &needs.reads {
-            self.provide(at, *column, stage)?;
-        }
         if needs.takes_cells && !self.out.passes[at].makes_cells {
             return Err(self.no_cells(stage));
+        }
+        for column in &needs.reads {
+            self.provide(at, *column, stage)?;
         }
         let pass = &mut self.out.passes[at];
         pass.round = round;
@@ -280,8 +236,7 @@ impl PassLayout<'_> {
         for column in needs.writes.iter().copied() {
             pass.loads.retain(|loaded| *loaded != column || needs.reads.contains(loaded));
             pass.writes.push(column);
-            self.at.columns.retain(|newest| newest.kind != column);
-            self.at.columns.push(NewestColumn { kind: column, pass: at, is_read: false });
+            self.at.columns.write(column, at);
         }
         if decides(&needs) {
             (pass.removes, pass.mark) = (true, needs.mark);
@@ -292,22 +247,14 @@ impl PassLayout<'_> {
 
     /// The pass of a stage that needs this: the one that the branch is at, or one that begins.
     fn place(&mut self, stage: &StageOp, needs: &Needs) -> Result<usize> {
-        for newest in self.at.columns.iter().filter(|newest| !newest.is_read) {
-            if needs.writes.contains(&newest.kind) && !needs.reads.contains(&newest.kind) {
-                let (kind, name) = (&stage.kind, newest.kind.name());
-                let told =
-                    format!("this `{kind}` would replace values of {name} that nothing reads");
-                return Err(stage.written.wrong(told).help("leave one of the two out"));
-            }
-        }
+        self.at.columns.check_read(stage, needs)?;
         let at = self.pass();
         let last = &self.out.passes[at];
         let is_new = |column: &ColumnKind| last.writes.contains(column);
         // A column is there for the whole rim once all tiles have computed theirs.
         let rewrites = needs.writes.iter().chain(&needs.of_neighbors).any(is_new);
         let other_neighbors = needs.neighbors > 0 && last.looks && last.seen != seen_by(stage);
-        let is_computed =
-            |column: &ColumnKind| self.at.columns.iter().any(|newest| newest.kind == *column);
+        let is_computed = |column: &ColumnKind| self.at.columns.have(column);
         let on_columns = needs.takes_cells || needs.reads.iter().any(is_computed);
         let other_records = !on_columns && last.decided != stage.selection;
         let begun = !last.calls.is_empty() || !last.filters.is_empty();
@@ -348,7 +295,7 @@ impl PassLayout<'_> {
             return Ok(());
         }
         let name = column.name();
-        if self.at.columns.iter().any(|newest| newest.kind.name() == name) {
+        if self.at.columns.have_named(name) {
             let told = format!("`{}` reads {name} as another type than it has", stage.kind);
             return Err(Error::internal(told));
         }
@@ -372,10 +319,7 @@ impl PassLayout<'_> {
 
     /// Brings the newest values of a column to pass `at`; false if no stage computed any.
     fn bring(&mut self, at: usize, column: ColumnKind) -> bool {
-        let newest = self.at.columns.iter_mut().find(|newest| newest.kind == column);
-        let Some(newest) = newest else { return false };
-        newest.is_read = true;
-        let from = newest.pass;
+        let Some(from) = self.at.columns.read(column) else { return false };
         if from != at {
             let add = |columns: &mut Vec<ColumnKind>| {
                 if !columns.contains(&column) {
@@ -421,36 +365,10 @@ impl PassLayout<'_> {
     fn computed(&mut self, sink: usize, at: usize) -> Result<Vec<ComputedDimension>> {
         let mut computed = Vec::new();
         for name in self.sorted.sinks[sink].computed() {
-            let newest = self.at.columns.iter().rev();
-            let found = newest.filter_map(|newest| newest.kind.part(name)).next();
-            let Some(dimension) = found else {
-                let told = format!("the output wants {name}, which no stage computes");
-                let before = giver(name)
-                    .map_or(String::new(), |stage| format!("put a `{stage}` stage before it, or "));
-                let help = format!("{before}leave {name} out of `write.dimensions`");
-                return Err(Error::pipeline(told).help(help));
-            };
+            let dimension = self.at.columns.dimension(name)?;
             self.bring(at, dimension.column);
             computed.push(dimension);
         }
         Ok(computed)
     }
-}
-
-/// The records that a stage sees as neighbours, by the selections that they are in.
-fn seen_by(stage: &StageOp) -> u8 {
-    let Limits { sees, .. } = stage.limits;
-    if sees == Sees::Selected { stage.selection } else { 0 }
-}
-
-/// The error of a stage that needs what is not there.
-fn missing(stage: &StageOp, name: &str, help: &str) -> Error {
-    let told = format!("`{}` needs {name}, which nothing before it gives", stage.kind);
-    stage.written.wrong(told).help(help.to_owned())
-}
-
-/// The stage that computes a column which has this name, or a number of that name.
-fn giver(name: &str) -> Option<&'static str> {
-    let known = NORMAL.kind();
-    (known.name() == name || known.part(name).is_some()).then_some("normals")
 }

@@ -22,7 +22,7 @@ impl RunSettings {
     ///
     /// Units that do not match and that neither a factor nor an override answers, and `auto` where
     /// no factor makes them match or not both units are known.
-    pub fn stretch(&self, units: Units) -> crate::Result<Stretch> {
+    pub(crate) fn stretch(&self, units: Units) -> crate::Result<Stretch> {
         let certain = |factor| Ok(Stretch { factor, doubt: None });
         let mismatch = match (self.z_scale, self.units) {
             (Some(ZScale::Factor(factor)), _) => return certain(factor),

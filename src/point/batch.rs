@@ -9,6 +9,22 @@ use super::schema::Schema;
 ///
 /// A record is the file's own bytes, `schema.stride` long. What the mill computed for a point and a
 /// writer may ask for travels beside the records.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use pointmill::point::{Dimension, Endian, Layout, PointBatch, Scalar, Schema};
+///
+/// let dimensions = vec![Dimension::new("Height", Scalar::F32, 0)];
+/// let layout = Layout::plain("TOY");
+/// let schema = Arc::new(Schema { layout, endian: Endian::Little, stride: 4, dimensions });
+/// let mut batch = PointBatch::new(schema.clone(), 100);
+/// batch.extend([1.5f32, 8.0, 2.5].map(f32::to_le_bytes).as_flattened());
+///
+/// let height = schema.find("Height").expect("it is there");
+/// batch.retain(|_, record| height.world(record, schema.endian) < 5.0);
+/// assert_eq!(batch.len(), 2);
+/// ```
 #[derive(Debug, Clone)]
 pub struct PointBatch {
     schema: Arc<Schema>,

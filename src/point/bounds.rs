@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A position on the lattice, in lattice steps from world 0 (see [`crate::geom::lattice`]).
+/// A position on the [`Lattice`](crate::stage::Lattice), in steps from world 0.
 pub type Position = [i64; 3];
 
 /// Exact squared distance of two positions, in lattice steps squared; saturates where the

@@ -125,8 +125,8 @@ impl Columns {
         }
     }
 
-    /// Adds columns of these kinds with `len` values each, which are unknown: NaN, or 0 where numbers
-    /// are whole.
+    /// Adds columns of these kinds with `len` values each, which are unknown: NaN, or 0 where
+    /// numbers are whole.
     pub fn add(&mut self, kinds: &[ColumnKind], len: usize) {
         self.declare(kinds);
         self.resize(len);

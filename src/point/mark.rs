@@ -7,6 +7,7 @@ use super::{Dimension, Schema, Value};
 
 /// How a stage marks its decision in the records, instead of removing any.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Mark {
     /// The key-point flag: set on what is kept, cleared on what would be removed.
     KeyPoint,
@@ -90,6 +91,7 @@ impl<'de> Deserialize<'de> for Mark {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 #[expect(missing_docs, reason = "the names say what they change")]
+#[non_exhaustive]
 pub enum Edit {
     SetKeyPoint = 1,
     ClearKeyPoint = 2,

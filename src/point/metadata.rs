@@ -8,6 +8,7 @@ use super::units::Units;
 
 /// What the values of `GpsTime` count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum GpsTime {
     /// Seconds of the GPS week.
     Week,
@@ -17,6 +18,7 @@ pub enum GpsTime {
 
 /// What a file says besides its points and that outputs carry on.
 #[derive(Clone, Default)]
+#[non_exhaustive]
 pub struct Metadata {
     /// Coordinate reference system as text (WKT where the file has one).
     pub crs: Option<String>,

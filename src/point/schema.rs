@@ -227,6 +227,7 @@ impl Dimension {
 /// Which family of formats a record's bytes come from, and what that means for them. A sink of the
 /// same family and an equal schema copies records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Layout {
     /// The family's name, such as "LAS" for LAS and LAZ.
     pub family: &'static str,
@@ -247,6 +248,25 @@ impl Layout {
 }
 
 /// What a record holds.
+///
+/// ```
+/// use pointmill::point::{Dimension, Endian, Layout, Scalar, Schema, Value, names};
+///
+/// // Three coordinates in millimetres, then a byte that has a flag in its highest bit.
+/// let axis = |(i, name)| Dimension::new(name, Scalar::I32, 4 * i).scaled(0.001, 0.0);
+/// let mut dimensions: Vec<Dimension> = names::XYZ.into_iter().enumerate().map(axis).collect();
+/// dimensions.push(Dimension::new("Withheld", Scalar::U8, 12).bits(7, 1));
+/// let layout = Layout::plain("TOY");
+/// let schema = Schema { layout, endian: Endian::Little, stride: 13, dimensions };
+///
+/// let mut record = [0; 13];
+/// let z = schema.find("Z").expect("it is there");
+/// assert!(z.put(&mut record, schema.endian, Value::Signed(1500)));
+/// assert_eq!(z.world(&record, schema.endian), 1.5);
+/// let withheld = schema.find("Withheld").expect("it is there");
+/// assert!(withheld.put(&mut record, schema.endian, Value::Unsigned(1)));
+/// assert_eq!(record[12], 0x80);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schema {
     /// Which family of formats the bytes come from.

@@ -10,6 +10,7 @@ use super::{Dimension, Endian, Scalar, Schema};
 /// One of the flags that LAS has for every record (LAS 1.4 R15, tables 8 and 16).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Flag {
     /// Not to be used in processing.
     Withheld,

@@ -16,6 +16,7 @@ pub struct Units {
 
 /// The unit of x and y.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Horizontal {
     /// An angle, degrees nearly always: x and y are longitude and latitude.
     Degrees,
@@ -25,6 +26,7 @@ pub enum Horizontal {
 
 /// Why distances between points mean nothing, and the factor for z that would mend it.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Mismatch {
     /// What the units are.
     pub message: String,

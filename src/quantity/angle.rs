@@ -32,7 +32,7 @@ impl Angle {
     }
 
     /// A figure in radians for a sentence, in the unit that `other` was given in.
-    pub fn told_like(radians: f64, other: Angle) -> String {
+    pub(crate) fn told_like(radians: f64, other: Angle) -> String {
         match other.degrees {
             Some(_) => format!("{:.1}deg", radians / PI * 180.0),
             None => format!("{radians:.2} rad"),
@@ -40,7 +40,7 @@ impl Angle {
     }
 
     /// For a sentence, with its unit.
-    pub fn told(self) -> String {
+    pub(crate) fn told(self) -> String {
         match self.degrees {
             Some(_) => self.to_string(),
             None => format!("{self} rad"),

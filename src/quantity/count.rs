@@ -2,8 +2,6 @@
 
 /// Reads a count: `1500`, `1_500`, `10k`, `2.5M`, `1e6`, `3G`; a unit is a power of 1,000.
 ///
-/// The error says what a count looks like.
-///
 /// ```
 /// use pointmill::quantity::parse_count;
 ///
@@ -11,6 +9,10 @@
 /// assert_eq!(parse_count("1e5"), Ok(100_000));
 /// assert!(parse_count("0.5").is_err());
 /// ```
+///
+/// # Errors
+///
+/// What is no whole count below 2^64; the text says what a count looks like.
 pub fn parse_count(text: &str) -> Result<u64, String> {
     let shown: String = text.chars().take(40).collect();
     let refused = || format!("`{shown}` is no count such as 1500, 10k, 5M or 1e6");

@@ -11,6 +11,7 @@ use crate::{Error, Result};
 
 /// A unit of length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Unit {
     /// `mm`
     Millimetre,

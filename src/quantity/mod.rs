@@ -10,7 +10,7 @@ mod whole;
 
 pub use angle::Angle;
 pub use count::parse_count;
-pub use figure::Figure;
-pub use length::{Length, Unit};
+pub(crate) use figure::Figure;
+pub use length::Length;
 pub use setting::Setting;
-pub use whole::Whole;
+pub(crate) use whole::Whole;

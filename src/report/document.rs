@@ -13,6 +13,7 @@ use crate::budget::Holders;
 
 /// What a run says it did.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
     /// The same for every configuration of the run; of a pipeline with several branches that of the
     /// first.
@@ -26,6 +27,7 @@ pub struct Report {
 /// What was decided, removed and measured: a function of the points and the pipeline alone. The
 /// report tiles belong to it, but are not held: there may be millions.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Outcome {
     /// The pipeline's stages with all their settings, defaults filled in.
     pub pipeline: serde_json::Value,
@@ -49,6 +51,7 @@ pub struct Outcome {
 
 /// The lattice of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct LatticeFigures {
     /// World units of one step.
     pub step: f64,
@@ -58,6 +61,7 @@ pub struct LatticeFigures {
 
 /// Something that a stage settled by itself.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Decision {
     /// Kind of the stage.
     pub stage: String,
@@ -69,6 +73,7 @@ pub struct Decision {
 
 /// How the run went.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
 pub struct RunFigures {
     /// Version of pointmill.
     pub version: String,
@@ -104,6 +109,7 @@ pub struct RunFigures {
 
 /// A file and the records in it.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct FileFigures {
     /// Path as given.
     pub path: String,
@@ -115,13 +121,14 @@ pub struct FileFigures {
 
 impl FileFigures {
     /// Those of a file: its path as it is, since the document's writer escapes it.
-    pub fn of(path: &Path, points: u64, bytes: Option<u64>) -> Self {
+    pub(crate) fn of(path: &Path, points: u64, bytes: Option<u64>) -> Self {
         FileFigures { path: path.display().to_string(), points, bytes }
     }
 }
 
 /// A phase of the run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Phase {
     /// What was done.
     pub name: String,
@@ -130,19 +137,16 @@ pub struct Phase {
 }
 
 impl Report {
-    /// Writes the report as one JSON object, `result` first. `tiles` are the lines of
-    /// [`TileFigures::write_line`](super::TileFigures::write_line) in Morton order; they are copied
-    /// through a small buffer, however many they are.
+    /// Writes the report as one JSON object, `result` first; with several branches `result` is that
+    /// of the first, and `further` a list of those of the others. `tiles` has the lines of
+    /// [`TileFigures::write_line`](super::TileFigures::write_line) of each branch, in order: of one
+    /// in Morton order. They are copied through a small buffer, however many they are.
     ///
-    /// Fails where `out` or `tiles` does, and with [`io::ErrorKind::InvalidData`] if there are not
-    /// as many tiles as the totals say.
-    pub fn write(&self, out: &mut impl Write, tiles: &mut impl BufRead) -> io::Result<()> {
-        self.write_all(out, [tiles])
-    }
-
-    /// Writes the report of several branches: `result` is that of the first, `further` a list of
-    /// those of the others; `tiles` has the lines of each, in order.
-    pub fn write_all<T: BufRead>(
+    /// # Errors
+    ///
+    /// Those of `out` and `tiles`, a branch without tiles, and [`io::ErrorKind::InvalidData`] if
+    /// there are not as many tiles as the totals say.
+    pub(crate) fn write<T: BufRead>(
         &self,
         out: &mut impl Write,
         tiles: impl IntoIterator<Item = T>,
@@ -167,7 +171,11 @@ impl Report {
 
 impl Outcome {
     /// Writes `result` alone, as in [`Report::write`].
-    pub fn write(&self, out: &mut impl Write, tiles: &mut impl BufRead) -> io::Result<()> {
+    ///
+    /// # Errors
+    ///
+    /// As [`Report::write`].
+    fn write(&self, out: &mut impl Write, tiles: &mut impl BufRead) -> io::Result<()> {
         let mut object = Object::open(out)?;
         object.entry("pipeline", &self.pipeline)?;
         object.entry("lattice", &self.lattice)?;
@@ -189,16 +197,9 @@ impl Outcome {
         }
         object.close()
     }
-
-    /// The canonical bytes of `result`, to compare runs by; holds all of `tiles`.
-    pub fn bytes(&self, tiles: &mut impl BufRead) -> io::Result<Vec<u8>> {
-        let mut bytes = Vec::new();
-        self.write(&mut bytes, tiles)?;
-        Ok(bytes)
-    }
 }
 
-/// The bytes of `result` in a report written by [`Report::write`]; None if it is not one.
+/// The bytes of `result` in the file of a report; None if it is not one.
 pub fn result_bytes(report: &[u8]) -> Option<&[u8]> {
     // JSON text holds no line break within a string, so the lines that open what follows are
     // unmistakable.
@@ -296,21 +297,4 @@ fn copy_lines(out: &mut impl Write, lines: &mut impl BufRead) -> io::Result<u64>
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::io::BufReader;
-
-    #[test]
-    fn lines_become_an_array_whatever_the_buffer() {
-        let lines = b"{\"a\":1}\n{\"b\":[2,3]}\n\n{}\n";
-        for capacity in 1..30 {
-            let mut out = Vec::new();
-            let n = copy_lines(&mut out, &mut BufReader::with_capacity(capacity, &lines[..]));
-            assert_eq!(n.unwrap(), 3);
-            assert_eq!(out, b"[\n{\"a\":1},\n{\"b\":[2,3]},\n{}\n]");
-        }
-        let mut out = Vec::new();
-        assert_eq!(copy_lines(&mut out, &mut &b""[..]).unwrap(), 0);
-        assert_eq!(out, b"[]");
-    }
-}
+mod tests;

@@ -18,6 +18,7 @@ pub struct Pair<T> {
 
 /// How far records are from the plane fitted to them, in world units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct PlaneFigures {
     /// sqrt(Σd²/n).
     pub rms: f64,
@@ -27,6 +28,7 @@ pub struct PlaneFigures {
 
 /// How far removed records are from the plane of the point that stands for them, in world units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct DeviationFigures {
     /// Removed records of which it was measured.
     pub points: u64,
@@ -40,6 +42,7 @@ pub struct DeviationFigures {
 
 /// [`DeviationFigures`] of the whole scan, with percentiles.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct DeviationTotals {
     /// Removed records of which it was measured.
     pub points: u64,
@@ -59,6 +62,7 @@ pub struct DeviationTotals {
 
 /// One report tile.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct TileFigures {
     /// World coordinates of the smallest corner of its cube.
     pub corner: [f64; 3],
@@ -73,7 +77,11 @@ pub struct TileFigures {
 impl TileFigures {
     /// Writes the tile as one line of JSON: what [`Report::write`](super::Report::write) reads.
     /// Tiles are written in Morton order.
-    pub fn write_line(&self, out: &mut impl Write) -> io::Result<()> {
+    ///
+    /// # Errors
+    ///
+    /// Those of `out`.
+    pub(crate) fn write_line(&self, out: &mut impl Write) -> io::Result<()> {
         serde_json::to_writer(&mut *out, self)?;
         out.write_all(b"\n")
     }
@@ -81,6 +89,7 @@ impl TileFigures {
 
 /// The deviation of a voxel grid that keeps as many points, in world units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct BaselineFigures {
     /// Side of the cubes of a grid of that many points.
     pub side: f64,
@@ -94,6 +103,7 @@ pub struct BaselineFigures {
 
 /// The whole scan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Totals {
     /// Occupied report tiles.
     pub tiles: u64,
@@ -111,6 +121,7 @@ pub struct Totals {
 
 /// What a pass over the scan left.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct PassFigures {
     /// Kinds of its stages, in order.
     pub stages: Vec<String>,
@@ -122,6 +133,7 @@ pub struct PassFigures {
 
 /// The records of one class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct ClassFigures {
     /// The class, as the records have it: LAS 1.4 R15, Tables 9 and 17.
     pub class: u8,

@@ -9,6 +9,7 @@ use crate::{Error, Result};
 
 /// Records that a stage removed for one reason.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Removed {
     /// Kind of the stage.
     pub stage: String,
@@ -23,6 +24,7 @@ pub struct Removed {
 /// `read` is what the source counted, `kept` what went to the sinks, `removed` what the stages
 /// entered: three counts made apart, or the balance would prove nothing.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Ledger {
     /// Records that the source yielded.
     pub read: u64,
@@ -34,7 +36,7 @@ pub struct Ledger {
 
 impl Ledger {
     /// The ledger of a run whose stages reported `tally`.
-    pub fn new(read: u64, kept: u64, tally: &Tally) -> Self {
+    pub(crate) fn new(read: u64, kept: u64, tally: &Tally) -> Self {
         let removed = tally.removed.iter().map(|((stage, reason), &records)| Removed {
             stage: stage.clone(),
             reason: reason.clone().into_owned(),
@@ -50,7 +52,7 @@ impl Ledger {
 
     /// Fails with [`ErrorKind::Internal`](crate::ErrorKind::Internal), naming every figure, if the
     /// ledger does not balance.
-    pub fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         if self.kept.checked_add(self.removed_records()) == Some(self.read) {
             return Ok(());
         }

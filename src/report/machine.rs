@@ -8,6 +8,7 @@ use crate::host::process::field;
 
 /// Where a run took place.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Machine {
     /// Operating system and processor architecture, as in `linux x86_64`.
     pub system: String,
@@ -19,7 +20,7 @@ pub struct Machine {
 
 impl Machine {
     /// This machine.
-    pub fn this() -> Self {
+    pub(crate) fn this() -> Self {
         let processor = fs::read_to_string("/proc/cpuinfo").ok();
         Machine {
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),

@@ -3,23 +3,24 @@
 mod baseline;
 mod classes;
 mod deviations;
-mod digits;
+pub(crate) mod digits;
 mod document;
 mod figures;
 mod ledger;
-mod lot;
+pub(crate) mod lot;
 mod machine;
-mod moments;
+pub(crate) mod moments;
 mod sums;
-mod survey;
+pub(crate) mod survey;
 mod table;
 mod tally;
 
-pub use baseline::Baseline;
-pub use classes::ClassCounts;
-pub use classes::class_name;
-pub use deviations::{Deviations, Histogram};
-pub use digits::{Coordinate, Grouped, Short};
+pub use crate::budget::{Bytes, Holder, Holders};
+pub(crate) use baseline::Baseline;
+pub(crate) use classes::ClassCounts;
+#[cfg(feature = "cli")]
+pub(crate) use digits::Coordinate;
+pub(crate) use digits::{Grouped, Short};
 pub use document::{
     Decision, FileFigures, LatticeFigures, Outcome, Phase, Report, RunFigures, result_bytes,
 };
@@ -27,13 +28,11 @@ pub use figures::{
     BaselineFigures, ClassFigures, DeviationFigures, DeviationTotals, Pair, PassFigures,
     PlaneFigures, TileFigures, Totals,
 };
-pub use ledger::{Ledger, Removed, check_written};
-pub use lot::Lot;
+pub(crate) use ledger::check_written;
+pub use ledger::{Ledger, Removed};
+pub(crate) use lot::Lot;
 pub use machine::Machine;
-pub use moments::{Moments, Plane};
-pub use sums::{Distances, FixedSum};
-pub use survey::{
-    FittedScan, FittedTile, PlaneDistances, ScanSurvey, TileSurvey, report_tile_level,
-};
+pub(crate) use survey::{FittedScan, ScanSurvey, report_tile_level};
 pub use table::Table;
-pub use tally::{Apart, KEY_POINTS, Tally};
+pub use tally::Tally;
+pub(crate) use tally::{Apart, KEY_POINTS};

@@ -26,11 +26,11 @@ pub struct Tally {
     #[serde(serialize_with = "as_list", deserialize_with = "from_list")]
     pub removed: BTreeMap<(String, Name), u64>,
     /// Selections that a record is in, a bit each.
-    pub selections: u8,
+    pub(crate) selections: u8,
     /// Records by class; None where they have none.
-    pub classes: Option<ClassCounts>,
+    pub(crate) classes: Option<ClassCounts>,
     /// How far apart unequal coordinates are that share a position; None where there are none.
-    pub apart: Option<Apart>,
+    pub(crate) apart: Option<Apart>,
 }
 
 /// How far apart points of unequal coordinates are that share a position of the lattice, in world

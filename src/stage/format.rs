@@ -19,7 +19,19 @@ use crate::{Error, Result};
 /// Creates a sink for records of a schema.
 pub type CreateFor<'a> = dyn Fn(&Arc<Schema>) -> Result<Box<dyn Sink>> + 'a;
 
-/// A format of files that hold points.
+/// A format of files that hold points. `examples/04_own_format.rs` has one of its own from end to
+/// end; those that are there are in a registry:
+///
+/// ```
+/// use std::path::Path;
+///
+/// use pointmill::Registry;
+///
+/// let registry = Registry::builtin();
+/// let format = registry.formats().of(Path::new("scan.LAZ")).expect("a registered extension");
+/// assert_eq!((format.name(), format.family()), ("laz", "LAS"));
+/// assert!(!format.sniff(b"ply\nformat ascii 1.0\n"));
+/// ```
 pub trait Format: Send + Sync {
     /// Its name, which `read.format` and `write.format` take: the extension of its files, in lower
     /// case and without the dot.
@@ -49,6 +61,11 @@ pub trait Format: Send + Sync {
     fn open(&self, files: &[PathBuf]) -> Result<Box<dyn Source>>;
 
     /// What the header of a file says, as `info` shows it: a table with `format` and `points`.
+    ///
+    /// # Errors
+    ///
+    /// What the header refutes, with its byte; a file that does not begin as one of the family is
+    /// [`foreign`].
     fn describe(&self, path: &Path) -> Result<serde_json::Value>;
 
     /// A file that the records of the input at `path` refer to, and the extension that a copy has
@@ -72,6 +89,10 @@ pub trait Format: Send + Sync {
     /// The sink for the records that come from one of several inputs, whose own `metadata` this is,
     /// where records of that input alone would be of another schema than `schema`: brings records
     /// back to it before they go into what `create` makes for it.
+    ///
+    /// # Errors
+    ///
+    /// Those of `create`, and a record type of the input that the schema does not hold.
     fn of_one(
         &self,
         _staged: &Path,
@@ -100,6 +121,11 @@ pub trait Format: Send + Sync {
     ) -> Result<ChunkSize>;
 
     /// Creates a file at `staged`, as [`CreateSink::create`](super::CreateSink::create) has it.
+    ///
+    /// # Errors
+    ///
+    /// Dimensions that the format cannot hold and the user did not drop, and an output that the
+    /// system refuses.
     fn create(
         &self,
         staged: &Path,
@@ -110,6 +136,10 @@ pub trait Format: Send + Sync {
     ) -> Result<Box<dyn Sink>>;
 
     /// See [`CreateSink::disk_bytes`](super::CreateSink::disk_bytes).
+    ///
+    /// # Errors
+    ///
+    /// As [`chunk`](Format::chunk).
     fn disk_bytes(
         &self,
         _keys: &WriteKeys,
@@ -140,6 +170,10 @@ pub trait Format: Send + Sync {
     }
 
     /// See [`CreateSink::check`](super::CreateSink::check).
+    ///
+    /// # Errors
+    ///
+    /// A record that the output cannot hold.
     fn check(&self, _keys: &WriteKeys, _metadata: &Metadata, _records: &PointBatch) -> Result<()> {
         Ok(())
     }
@@ -152,6 +186,7 @@ pub fn foreign(path: &Path, called: &str) -> Error {
 
 /// What an output is to be, as far as formats need to know: keys of `write`.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct WriteKeys {
     /// The final path, for messages.
     pub path: PathBuf,
@@ -186,6 +221,7 @@ impl WriteKeys {
 /// Encoding of a PLY file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum OutputEncoding {
     /// Numbers as text, shortest form that reads back equal.
     Ascii,
@@ -195,6 +231,7 @@ pub enum OutputEncoding {
 
 /// How many bits the colours of LAS records have in a PLY file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum Colors {
     /// 8 where that loses nothing, else 16.
     #[default]

@@ -30,6 +30,10 @@ pub trait StageKind: DeserializeOwned + Serialize {
 
     /// Puts the stage in its role. Called once every key fits its field; an error is told with the
     /// stage's place in the file, or that of a key if it went through [`StagePlace::blame`].
+    ///
+    /// # Errors
+    ///
+    /// Keys that do not go together, or values that no key of the kind can have.
     fn build(self, at: &StagePlace) -> Result<Role>;
 }
 

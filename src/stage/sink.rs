@@ -22,20 +22,33 @@ pub trait Sink: Send {
     fn encoder(&self) -> Arc<dyn Encode>;
 
     /// Writes one chunk; called in canonical order, from one thread at a time.
+    ///
+    /// # Errors
+    ///
+    /// What the system refuses to write; the output is given up then.
     fn append(&mut self, chunk: Encoded) -> Result<()>;
 
     /// Writes what depends on all points (header counts, chunk table) and flushes to disk.
+    ///
+    /// # Errors
+    ///
+    /// As [`append`](Sink::append), and counts that the format cannot hold.
     fn finish(self: Box<Self>) -> Result<SinkSummary>;
 }
 
 /// The part of a sink that runs on several threads at once.
 pub trait Encode: Send + Sync {
     /// Encodes up to `chunk_points` records of the source's schema.
+    ///
+    /// # Errors
+    ///
+    /// A record that the format cannot hold; no chunk behind it is written.
     fn encode(&self, batch: &PointBatch) -> Result<Encoded>;
 }
 
 /// An encoded chunk and the figures that a header needs.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Encoded {
     /// The bytes to append.
     pub bytes: Vec<u8>,
@@ -53,8 +66,16 @@ pub struct Encoded {
     pub form: u8,
 }
 
+impl Encoded {
+    /// A chunk of `points` records whose bytes these are; other figures are as if nobody asked.
+    pub fn new(bytes: Vec<u8>, points: u64) -> Self {
+        Encoded { bytes, points, ..Encoded::default() }
+    }
+}
+
 /// What a sink says when it is done.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SinkSummary {
     /// Points written.
     pub points: u64,
@@ -62,6 +83,13 @@ pub struct SinkSummary {
     pub bytes: u64,
     /// Things the user should know (rounding of a conversion, for example).
     pub notes: Vec<String>,
+}
+
+impl SinkSummary {
+    /// So many points in a file of so many bytes, and nothing to note.
+    pub fn new(points: u64, bytes: u64) -> Self {
+        SinkSummary { points, bytes, notes: Vec::new() }
+    }
 }
 
 /// How much a sink encodes at once.
@@ -97,8 +125,12 @@ pub trait CreateSink: Send + Sync {
     /// [`Source::metadata_of`](super::Source::metadata_of) its input, and an input of which no
     /// record is kept gets its output too.
     ///
-    /// Fails if two outputs would have one name; that none replaces an input is the plan's to
-    /// check. Makes nothing: the folder is made by the run.
+    /// That none replaces an input is the plan's to check. Makes nothing: the folder is made by the
+    /// run.
+    ///
+    /// # Errors
+    ///
+    /// Two outputs that would have one name.
     fn each_input(&self, _inputs: &[Input]) -> Result<Option<Vec<Box<dyn CreateSink>>>> {
         Ok(None)
     }
@@ -130,12 +162,20 @@ pub trait CreateSink: Send + Sync {
     }
 
     /// The chunks of the output that [`create`](CreateSink::create) would open, for a plan of the
-    /// memory. Fails where `create` would refuse the schema.
+    /// memory.
+    ///
+    /// # Errors
+    ///
+    /// Where [`create`](CreateSink::create) would refuse the schema.
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize>;
 
     /// Bytes that each record takes on the disk at least while the output is written, and those
     /// that it may take besides, where a format writes a file anew; 0 where only the encoded
     /// records tell.
+    ///
+    /// # Errors
+    ///
+    /// As [`chunk`](CreateSink::chunk).
     fn disk_bytes(&self, _schema: &Arc<Schema>, _metadata: &Metadata) -> Result<[u64; 2]> {
         Ok([0; 2])
     }
@@ -147,6 +187,10 @@ pub trait CreateSink: Send + Sync {
 
     /// Fails on a record that the output cannot hold, for a plan that looks at some before it
     /// begins.
+    ///
+    /// # Errors
+    ///
+    /// A record that the output cannot hold.
     fn check(&self, _metadata: &Metadata, _records: &PointBatch) -> Result<()> {
         Ok(())
     }
@@ -159,6 +203,11 @@ pub trait CreateSink: Send + Sync {
     /// Checks that the format holds every dimension (or that the user dropped it) and opens the
     /// output at `staged`, a path beside the final one. With `whole`, every record of the source
     /// will come, in its order: what refers to records by number stays true.
+    ///
+    /// # Errors
+    ///
+    /// Dimensions that the format cannot hold and the user did not drop, and an output that the
+    /// system refuses.
     fn create(
         &self,
         staged: &Path,
@@ -170,6 +219,7 @@ pub trait CreateSink: Send + Sync {
 
 /// Order of an output's records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Order {
     /// Canonical where the pipeline has tile stages, input order where it streams.
     #[default]

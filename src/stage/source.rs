@@ -10,6 +10,10 @@ use crate::{Error, Result};
 pub trait OpenSource: Send + Sync {
     /// Reads every header, checks that the inputs agree, and bounds what they claim by their
     /// length.
+    ///
+    /// # Errors
+    ///
+    /// Files that cannot be read, that do not agree, or whose headers their length refutes.
     fn open(&self) -> Result<Box<dyn Source>>;
 
     /// Files that it reads, so that no output is written over one of them.
@@ -33,6 +37,29 @@ pub trait OpenSource: Send + Sync {
 }
 
 /// Where records come from.
+///
+/// ```
+/// use pointmill::point::PointBatch;
+/// use pointmill::stage::OpenSource;
+/// use pointmill::synth::{Scene, Synthetic};
+///
+/// let scan = Synthetic { scene: Scene::Plane, points: 10_000, seed: 0, noise: None };
+/// let source = scan.open()?;
+/// let (mut batch, mut count) = (PointBatch::new(source.schema().clone(), 4096), 0);
+/// // Parts are independent of each other: threads may share them out.
+/// for index in 0..source.parts() {
+///     let mut part = source.part(index)?;
+///     loop {
+///         part.read(&mut batch)?;
+///         if batch.is_empty() {
+///             break;
+///         }
+///         count += batch.len();
+///     }
+/// }
+/// assert_eq!(count, 10_000);
+/// # Ok::<(), pointmill::Error>(())
+/// ```
 pub trait Source: Send + Sync {
     /// What every record holds.
     fn schema(&self) -> &Arc<Schema>;
@@ -52,6 +79,10 @@ pub trait Source: Send + Sync {
     ///
     /// The records of a batch still are in the source's schema: a sink that is created with this
     /// brings them to what the input's own header says of them.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read again or that changed.
     fn metadata_of(&self, _input: usize) -> Result<Metadata> {
         Ok(self.metadata().clone())
     }
@@ -66,10 +97,18 @@ pub trait Source: Send + Sync {
     fn parts(&self) -> usize;
 
     /// Opens part `index < parts()`.
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be read, or that changed since its header was read.
     fn part(&self, index: usize) -> Result<Box<dyn Part + '_>>;
 
     /// Opens a part of which nobody will look at the dimensions `unread`: their fields may hold
     /// anything, so that a source need not decode them. Coordinates are never among them.
+    ///
+    /// # Errors
+    ///
+    /// As [`part`](Source::part).
     fn part_without(&self, index: usize, _unread: &[String]) -> Result<Box<dyn Part + '_>> {
         self.part(index)
     }
@@ -88,6 +127,7 @@ pub trait Source: Send + Sync {
 
 /// A file that a source reads.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Input {
     /// Its path, as given.
     pub path: PathBuf,
@@ -98,8 +138,16 @@ pub struct Input {
     pub beside: Option<(PathBuf, &'static str)>,
 }
 
+impl Input {
+    /// A file of so many points that refers to no other.
+    pub fn new(path: impl Into<PathBuf>, points: u64) -> Self {
+        Input { path: path.into(), points, beside: None }
+    }
+}
+
 /// Something that the header of an input says of its points and that is not so.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Contradiction {
     /// The file.
     pub path: PathBuf,
@@ -111,9 +159,21 @@ pub struct Contradiction {
     pub is_damage: bool,
 }
 
+impl Contradiction {
+    /// What the header of the file at `path` says from `byte` on, and what was found instead; it is
+    /// the header that is wrong unless [`is_damage`](Contradiction::is_damage) is set.
+    pub fn new(path: impl Into<PathBuf>, byte: u64, message: impl Into<String>) -> Self {
+        Contradiction { path: path.into(), byte, message: message.into(), is_damage: false }
+    }
+}
+
 /// A stretch of a source's records, in input order.
 pub trait Part: Send {
     /// Refills `batch` with up to its capacity of the next records and sets its source number; an
     /// empty batch is the end. After an error the part is not read again.
+    ///
+    /// # Errors
+    ///
+    /// What the system refuses to read, and bytes that are no records, with their place.
     fn read(&mut self, batch: &mut PointBatch) -> Result<()>;
 }

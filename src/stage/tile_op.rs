@@ -9,12 +9,50 @@ use crate::store::Levels;
 use crate::tile::Tile;
 
 /// Computes on a tile and its neighbourhood; independent of other tiles and of any order.
+///
+/// ```
+/// use pointmill::Result;
+/// use pointmill::ops::removal;
+/// use pointmill::report::Tally;
+/// use pointmill::stage::{Needs, TileOp};
+/// use pointmill::tile::{Fate, Tile};
+///
+/// /// Removes what has no other position within 10 lattice steps.
+/// struct Lonely;
+///
+/// impl TileOp for Lonely {
+///     fn needs(&self) -> Needs {
+///         Needs::none().neighbors(1).removes(None)
+///     }
+///
+///     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
+///         let (mut lonely, core) = (Vec::new(), tile.core.clone());
+///         tile.each_neighborhood(1, |i, nearest| {
+///             if core.contains(&i) && nearest.farthest2() > 10 * 10 {
+///                 lonely.push(i);
+///             }
+///         })?;
+///         let removed = lonely.into_iter().map(|i| removal::remove(tile, i)).sum();
+///         tally.remove("lonely", "alone", removed);
+///         Ok(())
+///     }
+/// }
+///
+/// let mut tile = Tile::of(vec![[0, 0, 0], [3, 0, 0], [500, 0, 0]]);
+/// Lonely.run(&mut tile, &mut Tally::default())?;
+/// assert_eq!(tile.fates, [Fate::Kept, Fate::Kept, Fate::Removed]);
+/// # Ok::<(), pointmill::Error>(())
+/// ```
 pub trait TileOp: Send + Sync {
     /// What it needs; asked again after [`settle`](TileOp::settle).
     fn needs(&self) -> Needs;
 
     /// Called once, when the headers are read: lengths that were given with a unit of their own are
     /// converted to the scan's.
+    ///
+    /// # Errors
+    ///
+    /// A length with a unit, where the scan's is not known.
     fn convert(&mut self, _units: &Units) -> Result<()> {
         Ok(())
     }
@@ -27,6 +65,10 @@ pub trait TileOp: Send + Sync {
 
     /// Called once, after the decode and before the first tile, with what is known of the whole
     /// scan: the place to fix figures that depend on it.
+    ///
+    /// # Errors
+    ///
+    /// Figures that the scan does not allow.
     fn settle(&mut self, _scan: &ScanFacts) -> Result<()> {
         Ok(())
     }
@@ -41,6 +83,10 @@ pub trait TileOp: Send + Sync {
     ///
     /// It decides for the positions that [`Tile::is_chosen`] holds; keys that every stage takes may
     /// limit it to some classes or flags. Others are there to be seen, if at all.
+    ///
+    /// # Errors
+    ///
+    /// Those of the tile's neighbourhoods, and broken promises of the engine; the run ends.
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()>;
 
     /// What it decided by itself, for the report and for `plan`: name and value.
@@ -57,6 +103,10 @@ pub trait TileOp: Send + Sync {
     /// Called for each of a few hundred small cubes, spread evenly over the records, in order,
     /// after the stages above have run on it. What it returns goes to
     /// [`forecast`](TileOp::forecast).
+    ///
+    /// # Errors
+    ///
+    /// As [`run`](TileOp::run).
     fn sample(&self, _tile: &mut Tile) -> Result<Vec<f64>> {
         Ok(Vec::new())
     }
@@ -72,6 +122,7 @@ pub trait TileOp: Send + Sync {
 
 /// What a stage expects before it runs.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Forecast {
     /// Figures for the report: name and value.
     pub decisions: Vec<(String, serde_json::Value)>,
@@ -82,6 +133,7 @@ pub struct Forecast {
 }
 
 /// What is known of the whole scan after the decode.
+#[non_exhaustive]
 pub struct ScanFacts<'a> {
     /// Records.
     pub points: u64,
@@ -93,4 +145,12 @@ pub struct ScanFacts<'a> {
     pub lattice: &'a Lattice,
     /// Occupied cubes of every power-of-two side.
     pub levels: &'a Levels,
+}
+
+impl<'a> ScanFacts<'a> {
+    /// A scan of so many records whose distinct positions have the tight box `bounds` and are
+    /// counted by `levels`.
+    pub fn new(points: u64, bounds: Bounds, lattice: &'a Lattice, levels: &'a Levels) -> Self {
+        ScanFacts { points, positions: levels.positions(), bounds, lattice, levels }
+    }
 }

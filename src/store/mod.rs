@@ -32,11 +32,10 @@ pub use fetch::Fetch;
 pub use intake::{Intake, TileStore};
 pub use key::{TileKey, morton_cmp};
 pub use levels::Levels;
-pub use manifest::{ListedPiece, ListedPlace, ListedStore, StoreManifest};
 pub use merge::{merge_bytes, seal};
 pub use pieces::{PIECE, Pieces};
 pub use record::{
     ASIDE, CLASSED_INPUTS, FATE_BYTES, RecordState, SELECTIONS, TAGGED_INPUTS, Tag, ref_bytes,
 };
 pub use sealed::{Reader, SealedTiles};
-pub use spill::{Address, Checksum, Folder, Spill, SpillArea, StoredStretch};
+pub use spill::{Folder, Spill, SpillArea, StoredStretch};

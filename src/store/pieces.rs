@@ -90,11 +90,6 @@ impl Pieces {
         Ok(())
     }
 
-    /// How many numbers are reserved so far.
-    pub fn reserved(&self) -> u64 {
-        (self.table().places.len() * PIECE) as u64
-    }
-
     /// Stores the items from number `first` on, a multiple of [`PIECE`]: one piece, full or the
     /// last of its stretch.
     pub fn put(&self, first: u64, bytes: &[u8]) -> Result<()> {

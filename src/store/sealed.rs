@@ -7,13 +7,10 @@
 //! run. The index is one tight box a block and boxes of 16 boxes above them, in memory, where half
 //! a byte a position buys that no block is read in vain.
 
-use std::cmp::Ordering;
-
 use super::Levels;
 use super::block::{BLOCK, Block};
 use super::emit::MergeOutput;
 use super::fetch::{Fetch, groups};
-use super::key::morton_cmp;
 use super::pieces::Pieces;
 use super::record::ref_bytes;
 use super::spill::Spill;
@@ -285,14 +282,6 @@ impl SealedTiles {
     pub fn block_with(&self, position: u64) -> usize {
         let blocks = &self.sequence.blocks;
         blocks.partition_point(|block| block.first_position <= position).saturating_sub(1)
-    }
-
-    /// Number of the first block that can hold positions at or behind `p` in Morton order.
-    pub fn block_of(&self, p: &Position) -> usize {
-        self.sequence
-            .blocks
-            .partition_point(|block| morton_cmp(&block.first, p) != Ordering::Greater)
-            .saturating_sub(1)
     }
 
     /// Appends to `batch` the records with the given numbers (see [`Block::first_record`]), in the

@@ -12,6 +12,7 @@ use crate::{Error, Result};
 /// What is scanned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Scene {
     /// A tilted square plane, 400 points a square unit of its plan, in random order.
     Plane,

@@ -1,6 +1,7 @@
 use super::synthetic::{MOST_POINTS, PART_POINTS};
 use super::*;
 use crate::io::las;
+use crate::io::las::sink::{LasOptions, create};
 use crate::point::{PointBatch, names};
 use crate::stage::{OpenSource, Source};
 
@@ -353,8 +354,8 @@ fn a_written_scan_reads_back_byte_for_byte() {
         let scan = synthetic(scene, 12_345);
         let source = scan.open().unwrap();
         let path = folder.path().join(format!("{scene}.las"));
-        let options = las::LasOptions::default();
-        let mut sink = las::create(&path, &options, source.schema(), source.metadata()).unwrap();
+        let options = LasOptions::default();
+        let mut sink = create(&path, &options, source.schema(), source.metadata()).unwrap();
         let mut batch = PointBatch::new(source.schema().clone(), 12_345);
         source.part(0).unwrap().read(&mut batch).unwrap();
         sink.append(sink.encoder().encode(&batch).unwrap()).unwrap();

@@ -2,6 +2,7 @@
 
 /// The surface that a synthetic point was measured on.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Truth {
     /// Distance to the surface in world units.
     pub distance: f64,

@@ -9,7 +9,7 @@
 
 use std::sync::Arc;
 
-use super::remote::{Found, Remote};
+use super::remote::{FoundPosition, Remote};
 use super::sieve::Sieve;
 use super::values::ValuesBeyond;
 use crate::Result;
@@ -169,7 +169,7 @@ pub struct Neighborhood<'a> {
     ranks: &'a [u32],
     farthest2: u128,
     /// Where the neighbours are in the scan, if they had to be searched for there.
-    found: Option<&'a [Found]>,
+    found: Option<&'a [FoundPosition]>,
 }
 
 impl<'a> Neighborhood<'a> {
@@ -192,7 +192,7 @@ impl<'a> Neighborhood<'a> {
 
     /// Where the neighbours are in the scan, if they had to be searched for there; else their ranks
     /// are their indices in the tile.
-    pub(super) fn found(&self) -> Option<&'a [Found]> {
+    pub(super) fn found(&self) -> Option<&'a [FoundPosition]> {
         self.found
     }
 

@@ -149,6 +149,10 @@ impl Loader {
 
     /// Loads the positions of `key`'s cube, of the `reach` around it that later stages look at
     /// together with it, and a rim in which to find the `neighbors` nearest of those.
+    ///
+    /// # Errors
+    ///
+    /// Those of reading the store.
     pub fn load(&mut self, key: TileKey, reach: i64, neighbors: usize) -> Result<&mut Tile> {
         let cube = key.cube();
         let zone = cube.grown(reach);

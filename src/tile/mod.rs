@@ -7,15 +7,16 @@
 //! in a result.
 
 mod around;
-mod load;
+pub(crate) mod load;
 mod remote;
-mod sieve;
+pub(crate) mod sieve;
 mod values;
 
-pub use around::{Around, Neighborhood};
-pub use load::{Core, Loader};
-pub use remote::Remote;
-pub use sieve::{ReadDimensions, RecordRun, Sieve};
+pub(crate) use around::Around;
+pub use around::Neighborhood;
+pub(crate) use load::{Core, Loader};
+pub(crate) use remote::Remote;
+pub(crate) use sieve::{ReadDimensions, RecordRun, Sieve};
 
 use std::ops::Range;
 
@@ -53,7 +54,7 @@ pub struct Tile {
     /// What becomes of each position (meaningful in the core). Kept unless a stage says otherwise.
     pub fates: Vec<Fate>,
     /// Where neighbours are found.
-    pub around: Around,
+    pub(crate) around: Around,
     /// For each position, the selections that one of its records is in, a bit each; empty if no
     /// stage is limited to some records.
     pub(crate) selections: Vec<u8>,
@@ -125,18 +126,33 @@ impl Tile {
 
     /// Sets the instruction set that the tile's neighbours are searched by, and that its stages are
     /// to compute by: that of the processor's best if nothing else is set. Drops what was reserved.
-    pub fn compute_by(&mut self, simd: Simd) {
+    pub(crate) fn compute_by(&mut self, simd: Simd) {
         self.around.compute_by(simd);
     }
 
     /// The instruction set that stages are to compute by.
-    pub fn simd(&self) -> Simd {
+    pub(crate) fn simd(&self) -> Simd {
         self.around.simd()
     }
 
     /// Calls `visit` for every chosen position of the zone with its index in the tile and the `k`
     /// nearest *other* positions of the whole scan: nearest by exact squared distance, ties by
     /// Morton order. Fewer only if the scan has fewer.
+    ///
+    /// ```
+    /// use pointmill::tile::Tile;
+    ///
+    /// let mut tile = Tile::of(vec![[0, 0, 0], [1, 0, 0], [5, 0, 0], [7, 0, 0]]);
+    /// let mut nearest = Vec::new();
+    /// tile.each_neighborhood(2, |i, found| nearest.push((i, found.offsets().to_vec())))?;
+    /// // In lattice steps from the position, the nearest first.
+    /// assert_eq!(nearest[2], (2, vec![[2, 0, 0], [-4, 0, 0]]));
+    /// # Ok::<(), pointmill::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// Those of reading the store, where neighbours are not in the tile.
     pub fn each_neighborhood(
         &mut self,
         k: usize,

@@ -24,7 +24,7 @@ pub struct Remote {
     reader: Reader,
     runs: Runs,
     open: BinaryHeap<Reverse<(u128, usize, usize)>>,
-    found: Vec<Found>,
+    found: Vec<FoundPosition>,
 }
 
 /// What a search keeps of a block: the positions that are seen, each with its place in the block.
@@ -36,7 +36,7 @@ struct Cached {
 
 /// A position that a search found.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Found {
+pub(super) struct FoundPosition {
     /// Its squared distance.
     distance2: u128,
     pub(super) position: Position,
@@ -71,7 +71,7 @@ impl Remote {
         p: Position,
         k: usize,
         bound: Option<u128>,
-    ) -> Result<&[Found]> {
+    ) -> Result<&[FoundPosition]> {
         self.found.clear();
         self.open.clear();
         let root = tiles.root();
@@ -131,14 +131,14 @@ impl Remote {
             if q == p || distance > self.farthest(k, bound) {
                 continue;
             }
-            let nearer = |found: &Found| {
+            let nearer = |found: &FoundPosition| {
                 let other = &found.position;
                 found.distance2.cmp(&distance).then_with(|| morton_cmp(other, &q)).is_lt()
             };
             let place = self.found.partition_point(nearer);
             if place < k {
                 self.found.truncate(k - 1);
-                let found = Found { distance2: distance, position: q, block, index };
+                let found = FoundPosition { distance2: distance, position: q, block, index };
                 self.found.insert(place, found);
             }
         }

@@ -17,7 +17,7 @@ use crate::store::{ASIDE, Pieces, RecordState, SealedTiles, Tag};
 /// What a pass sees of the scan, and what earlier passes stored.
 #[derive(Debug, Clone, Default)]
 pub struct Sieve {
-    /// A [`RecordState`] for every record, by rank; none before the first pass.
+    /// A `RecordState` for every record, by rank; none before the first pass.
     pub states: Option<Arc<Pieces>>,
     /// A stored fate for every position; none before the first pass.
     pub fates: Option<Arc<Pieces>>,

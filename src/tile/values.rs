@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use bytemuck::pod_read_unaligned;
 
-use super::remote::Found;
+use super::remote::FoundPosition;
 use super::sieve::{ReadDimensions, RecordRun, Runs, Sieve};
 use crate::budget::Bytes;
 use crate::point::{ColumnKind, ColumnValue, Columns, PointBatch};
@@ -102,7 +102,7 @@ impl ValuesBeyond {
     /// Appends the value of each of `found` to `values`.
     pub(super) fn read<T: ColumnValue>(
         &mut self,
-        found: &[Found],
+        found: &[FoundPosition],
         values: &mut Vec<T>,
     ) -> Result<()> {
         let Some((tiles, sieve)) = self.scan.clone() else {
@@ -122,12 +122,22 @@ impl ValuesBeyond {
         Ok(())
     }
 
-    fn stored(&mut self, tiles: &SealedTiles, pieces: &Pieces, found: &Found) -> Result<()> {
+    fn stored(
+        &mut self,
+        tiles: &SealedTiles,
+        pieces: &Pieces,
+        found: &FoundPosition,
+    ) -> Result<()> {
         let number = tiles.block(found.block).first_position + u64::from(found.index);
         pieces.collect(number, 1, &mut self.buffer, &mut self.bytes)
     }
 
-    fn of_record(&mut self, tiles: &SealedTiles, sieve: &Sieve, found: &Found) -> Result<()> {
+    fn of_record(
+        &mut self,
+        tiles: &SealedTiles,
+        sieve: &Sieve,
+        found: &FoundPosition,
+    ) -> Result<()> {
         let undeclared = || Error::internal("a stage asks for a column that nobody stored");
         let read = sieve.dimensions.as_ref().ok_or_else(undeclared)?;
         let (_, copies) = tiles.read(found.block, &mut self.reader)?;

@@ -2,16 +2,14 @@
 //! be: recursive, on cloned lists, over the whole scan at once.
 #![allow(dead_code, clippy::unwrap_used, reason = "each test uses its part; tests may panic")]
 
-use pointmill::geom::angle::{
-    MaxAngle, cosine, direction, dominant_axis, is_turned, outer_sum, sine2,
+use pointmill::internals::{
+    MaxAngle, TileKey, cosine, direction, dominant_axis, is_turned, morton_cmp, outer_sum, sine2,
 };
-use pointmill::geom::lattice::Lattice;
 use pointmill::ops::{Cells, Measure, Median, Reference, Side, Split};
 use pointmill::point::{Bounds, Dimension, Endian, Layout, NORMAL, Position, Scalar, Schema};
 use pointmill::quantity::{Angle, Length, Setting};
 use pointmill::report::Tally;
-use pointmill::stage::{ScanFacts, TileOp};
-use pointmill::store::{Levels, TileKey, morton_cmp};
+use pointmill::stage::{Lattice, Levels, ScanFacts, TileOp};
 use pointmill::tile::{Fate, Tile};
 use proptest::prelude::*;
 
@@ -86,15 +84,9 @@ pub fn settle(mut stage: Cells, scan: &[Point]) -> Cells {
     for (i, p) in scan.iter().enumerate() {
         levels.add(i.checked_sub(1).map(|before| scan[before].at), p.at);
     }
-    stage
-        .settle(&ScanFacts {
-            points: scan.iter().map(|p| u64::from(p.copies)).sum(),
-            positions: scan.len() as u64,
-            bounds: Bounds::of(scan.iter().map(|p| p.at)),
-            lattice: &lattice,
-            levels: &levels,
-        })
-        .unwrap();
+    let points = scan.iter().map(|p| u64::from(p.copies)).sum();
+    let bounds = Bounds::of(scan.iter().map(|p| p.at));
+    stage.settle(&ScanFacts::new(points, bounds, &lattice, &levels)).unwrap();
     stage
 }
 

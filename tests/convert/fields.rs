@@ -1,8 +1,8 @@
 //! LAS records as PLY vertices and back: every field, bit for bit.
 
-use pointmill::io::convert::Projection;
-use pointmill::io::las::{las_schema, records};
-use pointmill::io::ply::ply_schema;
+use pointmill::internals::las::{las_schema, records};
+use pointmill::internals::ply::ply_schema;
+use pointmill::io::Projection;
 use pointmill::point::{Dimension, Endian, Layout, Scalar, Schema, Value};
 use proptest::prelude::*;
 

@@ -16,8 +16,9 @@ use std::sync::Arc;
 
 use formats::{agree, documented};
 use keys::{Default, Key};
-use pointmill::graph::{LimitKeys, RunSettings};
-use pointmill::io::ends::{Read, Write};
+use pointmill::graph::RunSettings;
+use pointmill::internals::LimitKeys;
+use pointmill::io::{Read, Write};
 use pointmill::ops::normals::Normals;
 use pointmill::ops::{Cells, Filter, Grid, Median, Outliers};
 use pointmill::stage::{Format, StageKind};
@@ -29,7 +30,7 @@ use crate::support::case::execute;
 use crate::support::command::pointmill;
 use source::{Enum, Field, enum_of, item_docs, struct_of};
 
-const SAYS_SO: &str =
+pub const SAYS_SO: &str =
     "written by `POINTMILL_WRITE_DOCS=1 cargo test --test repository`; do not edit";
 
 fn root() -> PathBuf {
@@ -41,7 +42,7 @@ fn source(file: &str) -> String {
 }
 
 /// Compares the file with the one in the repository, or writes it.
-fn keep(page: &str, text: &str) {
+pub fn keep(page: &str, text: &str) {
     let path = root().join(page);
     if std::env::var_os("POINTMILL_WRITE_DOCS").is_some() {
         fs::create_dir_all(path.parent().unwrap()).unwrap();

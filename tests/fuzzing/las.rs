@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use pointmill::ErrorKind::{self, Data, Pipeline};
-use pointmill::io::las::{LasOptions, create, describe, open};
+use pointmill::internals::las::{LasOptions, create, describe};
+use pointmill::io::las::open;
 use pointmill::point::{PointBatch, Schema};
 use pointmill::stage::Source;
 

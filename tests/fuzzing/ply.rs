@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use pointmill::ErrorKind::{self, Data, Pipeline};
-use pointmill::io::ply::{PlyOptions, create, describe, open};
+use pointmill::internals::ply::{PlyOptions, create, describe};
+use pointmill::io::ply::open;
 use pointmill::point::PointBatch;
 use pointmill::stage::Source;
 

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use super::modules::Modules;
 
 /// The modules from the bottom up. Those of one layer do not import each other.
-const LAYERS: [&[&str]; 15] = [
+const LAYERS: [&[&str]; 16] = [
     &["error"],
     &["host", "point"],
     &["geom", "quantity", "budget"],
@@ -26,6 +26,7 @@ const LAYERS: [&[&str]; 15] = [
     &["plan"],
     &["language"],
     &["cli"],
+    &["internals"],
 ];
 /// Imports from lower layers that every room but those of the lowest two has, at least.
 const FEWEST: usize = 1;
@@ -63,7 +64,7 @@ pub fn files(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// The modules of this crate with their texts.
-fn sources() -> Vec<(String, String)> {
+pub fn sources() -> Vec<(String, String)> {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let all = files(&src).into_iter().filter(|file| *file != src.join("main.rs"));
     let each = all.map(|file| {

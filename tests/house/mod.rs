@@ -5,4 +5,5 @@ mod drift;
 mod imports;
 mod modules;
 mod readable;
+mod surface;
 mod synth_paper;

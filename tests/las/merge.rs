@@ -166,7 +166,7 @@ fn unlike_records_are_united_in_one_order() {
         let source = open(&order.map(|i: usize| paths[i].clone())).unwrap();
         let out = folder.path().join("out.las");
         write(&out, LAS, source.schema(), source.metadata(), &[]).unwrap();
-        let about = pointmill::io::las::describe(&out).unwrap();
+        let about = pointmill::internals::las::describe(&out).unwrap();
         let users: Vec<_> = about.vlrs.iter().map(|v| v.user_id.clone()).collect();
         assert_eq!(users, ["AAStools", "LASF_Projection", "LAStools"]);
         heads.push(std::fs::read(out).unwrap());

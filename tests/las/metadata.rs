@@ -9,7 +9,8 @@ use crate::support::case::execute;
 use crate::support::case_file;
 use crate::support::command::pointmill;
 use crate::support::scan::Scan;
-use pointmill::io::las::{self, Description};
+use pointmill::internals;
+use pointmill::internals::las::Description;
 use pointmill::io::ply;
 use pointmill::point::GpsTime;
 use pointmill::report::Report;
@@ -56,7 +57,7 @@ impl Bench {
     /// The output of a conversion of one case, and what was warned of.
     fn convert(&self, name: &str) -> (Description, Vec<String>) {
         let report = self.run(&[case_file(name)], "", "", "out.las").unwrap();
-        (las::describe(&self.path("out.las")).unwrap(), report.run.warnings)
+        (internals::las::describe(&self.path("out.las")).unwrap(), report.run.warnings)
     }
 
     fn header(&self, name: &str) -> Vec<u8> {
@@ -99,7 +100,7 @@ fn units_that_are_hidden_are_found_and_mixed_ones_refused() {
         let factor = auto.result.decisions.iter().find(|d| d.name == "z_scale").unwrap();
         assert!((factor.value.as_f64().unwrap() - 3937.0 / 1200.0).abs() < 1e-9, "{name}");
     }
-    let about = las::describe(&case_file("12-wkt2-4224-liblas.las")).unwrap();
+    let about = internals::las::describe(&case_file("12-wkt2-4224-liblas.las")).unwrap();
     assert!(about.crs.unwrap().starts_with("PROJCRS[\"ETRS89 / UTM zone 32N\""));
     assert_eq!(about.units, "x and y in metres, z in a unit that is not known");
 }
@@ -142,7 +143,7 @@ fn what_is_not_known_of_units_is_said_where_it_matters_and_auto_refuses() {
 fn descriptors_in_several_records_are_all_read_and_become_one_record() {
     let bench = Bench::new();
     let (about, warnings) = bench.convert("02-three-eb-vlrs.las");
-    let input = las::describe(&case_file("02-three-eb-vlrs.las")).unwrap();
+    let input = internals::las::describe(&case_file("02-three-eb-vlrs.las")).unwrap();
     assert_eq!(records(&input, "LASF_Spec", 4), 3, "the case is what it is for");
     assert_eq!(names(&about), names(&input));
     assert!(names(&about).len() == 3 && !names(&about).iter().any(|n| n.starts_with("ExtraBytes")));
@@ -153,7 +154,7 @@ fn descriptors_in_several_records_are_all_read_and_become_one_record() {
     let normals = "[[stage]]\nkind = \"normals\"\nneighbors = 4\n";
     let keys = "out.las\ndimensions = [\"NormalX\", \"NormalY\", \"NormalZ\"]";
     bench.run(&[case_file("02-three-eb-vlrs.las")], "", normals, keys).unwrap();
-    let about = las::describe(&bench.path("out.las")).unwrap();
+    let about = internals::las::describe(&bench.path("out.las")).unwrap();
     assert_eq!(names(&about)[3..], ["NormalX", "NormalY", "NormalZ"]);
     let record = about.vlrs.iter().find(|v| v.user_id == "LASF_Spec").unwrap();
     assert_eq!((records(&about, "LASF_Spec", 4), record.length), (1, 6 * 192));
@@ -209,7 +210,7 @@ fn one_system_in_other_bytes_or_words_is_read_as_one_in_any_order() {
         let mut paths: Vec<PathBuf> = files.iter().map(|name| case_file(name)).collect();
         for _ in 0..2 {
             bench.run(&paths, "", "", "out.las\norder = \"canonical\"").unwrap();
-            let about = las::describe(&bench.path("out.las")).unwrap();
+            let about = internals::las::describe(&bench.path("out.las")).unwrap();
             assert!(about.crs.unwrap().starts_with("PROJCS[\"ETRS89 / UTM zone 32N\""));
             let systems = about.vlrs.iter().filter(|v| v.user_id == "LASF_Projection").count();
             assert_eq!(systems, 1, "{:?}", about.vlrs);
@@ -244,7 +245,8 @@ fn outputs_name_the_program_and_what_it_did_to_the_points() {
     fs::write(&input, bytes).unwrap();
     let written = |inputs: &[PathBuf], stages: &str, output: &str| {
         bench.run(inputs, "", stages, output).unwrap();
-        let about = las::describe(&bench.path(output.split('\n').next().unwrap())).unwrap();
+        let about =
+            internals::las::describe(&bench.path(output.split('\n').next().unwrap())).unwrap();
         assert_eq!(about.generating_software, software);
         about
     };
@@ -287,7 +289,7 @@ fn what_gps_times_count_survives_ply() {
         ("121-geokey.las", GpsTime::Week, 0),
     ] {
         bench.run(&[case_file(name)], "", "", "out.ply").unwrap();
-        let comments = ply::describe(&bench.path("out.ply")).unwrap().comments;
+        let comments = internals::ply::describe(&bench.path("out.ply")).unwrap().comments;
         assert!(told(&comments, "gps_time: seconds of"), "{comments:?}");
         let source = ply::open(&[bench.path("out.ply")]).unwrap();
         assert_eq!(source.metadata().gps_time, Some(kind));
@@ -315,13 +317,13 @@ fn epsg_codes_come_back_from_ply() {
     let bench = Bench::new();
     bench.run(&[case_file("121-geokey.las")], "", "", "out.ply").unwrap();
     let report = bench.run(&[bench.path("out.ply")], "", "", "back.las\nscale = 0.01").unwrap();
-    let about = las::describe(&bench.path("back.las")).unwrap();
+    let about = internals::las::describe(&bench.path("back.las")).unwrap();
     assert_eq!((about.crs.as_deref(), about.point_format), (Some("EPSG:25832+7837"), 1));
     assert_eq!((records(&about, "LASF_Projection", 34735), report.run.warnings.len()), (1, 0));
     // Point formats that ask for WKT get the keys and a word about it.
     bench.run(&[case_file("100e-geokey.las")], "", "", "out.ply").unwrap();
     let report = bench.run(&[bench.path("out.ply")], "", "", "back.las\nscale = 0.01").unwrap();
-    let about = las::describe(&bench.path("back.las")).unwrap();
+    let about = internals::las::describe(&bench.path("back.las")).unwrap();
     assert_eq!((about.crs.as_deref(), about.point_format), (Some("EPSG:25832"), 6));
     assert!(told(&report.run.warnings, "asks for WKT"), "{:?}", report.run.warnings);
     assert_eq!(bench.encoding("back.las") & WKT, WKT);
@@ -346,7 +348,7 @@ fn a_system_that_las_cannot_name_is_told_for_its_own_reason() {
         let report = bench.run(&[other], "", "", "back.las\nscale = 0.01").unwrap();
         assert!(told(&report.run.warnings, "the CRS is not carried"), "{crs:.20}");
         assert!(told(&report.run.warnings, why), "{:?}", report.run.warnings);
-        assert_eq!(las::describe(&bench.path("back.las")).unwrap().crs, None);
+        assert_eq!(internals::las::describe(&bench.path("back.las")).unwrap().crs, None);
     }
 }
 
@@ -392,7 +394,10 @@ fn waveforms_in_a_file_of_their_own_are_beside_the_output() {
     );
     assert!(!bench.path("out.wdp").exists());
     bench.run(&[case_file("22b-int-waveform.las")], "", "", "out.las").unwrap();
-    assert_eq!(records(&las::describe(&bench.path("out.las")).unwrap(), "LASF_Spec", 65535), 1);
+    assert_eq!(
+        records(&internals::las::describe(&bench.path("out.las")).unwrap(), "LASF_Spec", 65535),
+        1
+    );
 }
 
 #[test]

@@ -1,9 +1,14 @@
 //! Real files: all that can be read is read and survives LAS → LAZ → LAS; damage is told.
 
+use std::fs::File;
+use std::io::{BufReader, Seek, SeekFrom};
+use std::path::Path;
+
 use crate::support::las::{BROKEN, LAS, LAZ, manifest, write};
 use crate::support::records::read_source;
 use crate::support::scans;
-use pointmill::io::las::{describe, open};
+use pointmill::internals::las::{Description, Record, describe};
+use pointmill::io::las::open;
 use pointmill::stage::Source;
 
 /// Files above this are read in part.
@@ -101,10 +106,51 @@ fn broken_scans_fail_with_path_and_place() {
     }
 }
 
+/// Holds the variable length records of `about` against what the crate `las` reads of them, whose
+/// reader of records is not ours; returns how many there are.
+fn count_same_records(path: &Path, about: &Description) -> usize {
+    let mut file = BufReader::new(File::open(path).unwrap());
+    let header = las::raw::Header::read_from(&mut file).unwrap();
+    let text = |bytes: &[u8]| {
+        let text = bytes.split(|byte| *byte == 0).next().unwrap();
+        String::from_utf8_lossy(text).trim_end().to_owned()
+    };
+    let same = |file: &mut BufReader<File>, record: &Record, extended| {
+        let raw = las::raw::Vlr::read_from(file, extended).unwrap();
+        let length = u64::from(raw.record_length_after_header);
+        let found = (text(&raw.user_id), raw.record_id, length, text(&raw.description));
+        let Record { user_id, record_id, length, description } = record.clone();
+        assert_eq!(found, (user_id, record_id, length, description), "{path:?}");
+    };
+    about.vlrs.iter().for_each(|record| same(&mut file, record, false));
+    assert_eq!(header.number_of_variable_length_records as usize, about.vlrs.len(), "{path:?}");
+    if let Some(evlr) = header.evlr {
+        assert_eq!(evlr.number_of_evlrs as usize, about.evlrs.len(), "{path:?}");
+        file.seek(SeekFrom::Start(evlr.start_of_first_evlr)).unwrap();
+        about.evlrs.iter().for_each(|record| same(&mut file, record, true));
+    }
+    about.vlrs.len() + about.evlrs.len()
+}
+
+#[test]
+fn variable_length_records_are_those_that_another_reader_finds() {
+    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
+    let paths = std::fs::read_dir(cases).unwrap().map(|entry| entry.unwrap().path());
+    let (mut files, mut records) = (0, 0);
+    for path in paths.filter(|path| path.extension().is_some_and(|e| e == "las" || e == "laz")) {
+        if let Ok(about) = describe(&path) {
+            files += 1;
+            records += count_same_records(&path, &about);
+        }
+    }
+    assert!(files >= 30 && records >= 26, "{files} files, {records} records");
+}
+
 #[test]
 #[ignore = "needs the real scans: POINTMILL_SCANS"]
 fn every_scan_describes_itself() {
     let folder = scans();
+    let mut records = 0;
     for scan in manifest(&folder) {
         if BROKEN.contains(&scan.name.as_str()) {
             continue;
@@ -113,7 +159,9 @@ fn every_scan_describes_itself() {
         assert_eq!(about.kind == "LAZ", about.compressor != "none", "{}", scan.name);
         assert!(about.dimensions.len() >= 15);
         serde_json::to_string(&about).unwrap();
+        records += count_same_records(&scan.path, &about);
     }
+    assert!(records > 200, "{records} records");
     let copc = describe(&folder.join("laspy/simple.copc.laz")).unwrap();
     assert!(copc.warnings.iter().any(|w| w.contains("copc")));
     let wkt = describe(&folder.join("laspy/1_4_w_evlr.laz")).unwrap();

@@ -81,7 +81,7 @@ fn damaged_files_of_every_format_fail_or_read() {
                     record
                 })
                 .collect();
-            write(&path, options, &schema, &fresh(&schema, None), &records).unwrap();
+            write(&path, options.clone(), &schema, &fresh(&schema, None), &records).unwrap();
             let whole = std::fs::read(&path).unwrap();
             let name = format!("format {format} {options:?}");
             let failed = damage(&path, &name, &whole, 16, &mut random);

@@ -5,9 +5,9 @@ use super::solvers::{
     Vec3, angle, around, covariance, cross, dot, frame, jacobi, normalised, rotated_fit,
 };
 use crate::support::random::Random;
-use pointmill::geom::plane::{self, Covariance};
-use pointmill::geom::star::Star;
-use pointmill::ops::normals::{Estimate, Estimator, Method};
+use pointmill::internals::plane::{self, Covariance};
+use pointmill::internals::{Estimate, Estimator, Star};
+use pointmill::ops::normals::Method;
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 
 /// In-circle and orientation values (of vectors of length about 1) nearer to 0 than this are not

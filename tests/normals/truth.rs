@@ -2,7 +2,8 @@
 
 use super::solvers::{Vec3, angle, around, covariance, cross, dot, frame, jacobi, normalised};
 use crate::support::random::Random;
-use pointmill::ops::normals::{Estimate, Estimator, Fallback, Method};
+use pointmill::internals::{Estimate, Estimator, Fallback};
+use pointmill::ops::normals::Method;
 
 const METHODS: [Method; 2] = [Method::Varady, Method::Pca];
 /// What rounding to f32 may turn a normal by.

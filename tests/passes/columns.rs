@@ -6,10 +6,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use pointmill::internals::morton_cmp;
 use pointmill::point::{Column, Dimension, Position, distance2, names};
 use pointmill::report::Tally;
 use pointmill::stage::{Needs, Role, StageKind, StagePlace, TileOp};
-use pointmill::store::morton_cmp;
 use pointmill::synth::Scene;
 use pointmill::tile::Tile;
 use pointmill::{Done, Graph, Overrides, Quiet, Registry, Result};
@@ -91,8 +91,9 @@ fn registry() -> Registry {
     Registry::builtin().with::<Rise>().with::<Rises>().with::<Glow>()
 }
 
-const TILED: &str = "tile_points = 100\nspill = 'always'\nthreads = 2\nmemory = '400MiB'\n";
-const WHOLE: &str = "threads = 1\n";
+const TILED: &str =
+    "withheld = 'keep'\ntile_points = 100\nspill = 'always'\nthreads = 2\nmemory = '400MiB'\n";
+const WHOLE: &str = "withheld = 'keep'\nthreads = 1\n";
 
 fn run(folder: &Path, run: &str, stages: &str, write: &str, output: &str) -> Result<Done> {
     let text = format!(
@@ -208,7 +209,9 @@ fn stages_read_dimensions_of_records_at_neighbors_of_the_first_record_of_a_posit
     let scan = scene();
     scan.write(&folder.path().join("scan.las"));
     let glow = "[[stage]]\nkind = 'glow'\n";
-    for (stages, keeps) in [(glow.to_owned(), false), (format!("{glow}classes = [2]\n"), true)] {
+    for (stages, keeps) in
+        [(glow.to_owned(), false), (format!("{glow}classes = [2]\nsees = 'all'\n"), true)]
+    {
         let write = "dimensions = ['Glow']";
         let done = run(folder.path(), TILED, &stages, write, "out.las").unwrap();
         let work = &done.report.run.work;
@@ -236,7 +239,8 @@ fn stages_read_dimensions_of_records_at_neighbors_of_the_first_record_of_a_posit
                 continue;
             }
             let sum: u32 = neighbors[&p].iter().map(&intensity).sum();
-            assert_eq!(glow as u32, sum + 1_000_000 * u32::from(intensity(&p) > 9), "{p:?}");
+            let expected = sum + 1_000_000 * u32::from(intensity(&p) > 9);
+            assert_eq!(glow as u32, expected, "{p:?} {stages}");
             told += 1;
         }
         assert!(told > 300, "{told}");
@@ -259,6 +263,6 @@ fn what_no_stage_gives_is_refused_by_name() {
     assert!(told.contains("put a `normals` stage before it"), "{told}");
     let twice = format!("{RISE_STAGES}[[stage]]\nkind = 'rise'\n[[stage]]\nkind = 'rise'\n");
     let told = refused(&twice, "dimensions = ['Rise']");
-    assert!(told.contains("would replace values of Rise that nothing reads"), "{told}");
+    assert!(told.contains("would replace values of Rise that nothing has read"), "{told}");
     assert!(!folder.path().join("out.las").exists());
 }

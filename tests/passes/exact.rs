@@ -6,9 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::support::random::Random;
 use crate::support::runs::{Memory, Ran, Settings, run, run_with};
 use crate::support::scan::Scan;
-use pointmill::ops::normals::{Estimate, Estimator, Method};
+use pointmill::internals::{Estimate, Estimator, morton_cmp};
+use pointmill::ops::normals::Method;
 use pointmill::point::{Position, distance2, names};
-use pointmill::store::morton_cmp;
 use pointmill::synth::Scene;
 
 const TILED: Settings = Settings {

@@ -3,12 +3,11 @@
 use std::path::Path;
 
 use pointmill::graph::{MixedUnits, Nonfinite, SimdSetting, ZScale};
-use pointmill::io::ends::Write;
+use pointmill::io::Write;
 use pointmill::io::las::{LAS, LAZ};
 use pointmill::io::ply::PLY;
 use pointmill::report::Tally;
-use pointmill::stage::{Needs, Role, TileOp};
-use pointmill::stage::{StageKind, StagePlace};
+use pointmill::stage::{Needs, Role, StageKind, StagePlace, TileOp};
 use pointmill::synth::Synth;
 use pointmill::tile::Tile;
 use pointmill::{Error, ErrorKind, Result};
@@ -338,7 +337,7 @@ fn an_input_is_never_written_over() {
         scan = scan.display(),
         other = folder.path().join(".").join("scan.laz").display(),
     );
-    let registry = registry().with::<pointmill::io::ends::Read>();
+    let registry = registry().with::<pointmill::io::Read>();
     let told = Graph::parse(&text, "p.toml", &registry).unwrap_err().to_string();
     assert!(told.starts_with("p.toml:6:8: ") && told.contains("is an input"), "{told}");
 }
@@ -349,7 +348,7 @@ fn inputs_are_looked_up_and_their_formats_agree() {
     for name in ["b.laz", "a.las", "c.ply", "d.abc"] {
         std::fs::write(folder.path().join(name), b"").unwrap();
     }
-    let registry = registry().with::<pointmill::io::ends::Read>();
+    let registry = registry().with::<pointmill::io::Read>();
     let at = |name: &str| format!("\"{}\"", folder.path().join(name).display());
     let read = |path: &str| {
         let text = format!(
@@ -389,7 +388,10 @@ fn keys_of_write_fit_its_format() {
         ),
         ("path = \"a.laz\"\nscale = [1, 2, 3, 4]", "`scale`: has 1 values too many"),
         ("path = \"a.laz\"\nscale = [1, 0, 1]", "p.toml:13:13: `scale`: takes a number above 0"),
-        ("path = \"a.laz\"\ndimensions = [\"NormalX\"]", "p.toml:13:14: `dimensions`: takes [] or"),
+        (
+            "path = \"a.laz\"\ndimensions = [\"NormalX\", \"NormalX\"]",
+            "p.toml:13:14: `dimensions`: has NormalX twice",
+        ),
         ("path = \"a.laz\"\norder = \"random\"", "valid: canonical, input"),
         ("format = \"las\"", "p.toml:11:8: a `write` needs `write.path`"),
     ] {

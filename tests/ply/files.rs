@@ -2,7 +2,9 @@
 //! them, and what is carried.
 
 use crate::support::ply::{file, read, records, write};
-use pointmill::io::ply::{self, Encoding, PlyOptions};
+use pointmill::internals;
+use pointmill::internals::ply::{Encoding, PlyOptions};
+use pointmill::io::ply;
 use pointmill::point::{Endian, Metadata, Value};
 use proptest::prelude::*;
 
@@ -95,7 +97,7 @@ proptest! {
             let (schema, metadata, all) = read(&at, 64).unwrap();
             let next = folder.path().join(format!("{turn}.ply"));
             write(&next, &encoded(encoding), (&schema, &metadata, &all), None, 3).unwrap();
-            prop_assert_eq!(ply::describe(&next).unwrap().encoding, encoding);
+            prop_assert_eq!(internals::ply::describe(&next).unwrap().encoding, encoding);
             prop_assert_eq!(values(&next), expected.clone());
             at = next;
         }
@@ -239,7 +241,7 @@ fn comments_crs_and_names_are_carried() {
     assert_eq!(names(&schema_again), names(&schema));
     assert_eq!(again.comments, ["by hand"]);
     assert_eq!(again.crs.clone().unwrap(), crs.replace('\n', " "));
-    let info = ply::describe(&one).unwrap();
+    let info = internals::ply::describe(&one).unwrap();
     assert_eq!(info.obj_info, ["kept"]);
     let properties: Vec<&str> =
         info.elements[0].properties.iter().map(|p| p.name.as_str()).collect();
@@ -276,7 +278,8 @@ fn normals_are_appended_or_overwritten_in_place() {
     let whole = bare.replace("end_header", "property int nx\nend_header").replace("3\n", "3 0\n");
     let path = file(folder.path(), "whole.ply", whole.replace("6\n", "6 0\n"));
     let (schema, metadata, _) = read(&path, 2).unwrap();
-    let refused = ply::create(&folder.path().join("out.ply"), &options, &schema, &metadata);
+    let refused =
+        internals::ply::create(&folder.path().join("out.ply"), &options, &schema, &metadata);
     assert!(refused.err().unwrap().to_string().contains("NormalX"));
 }
 
@@ -296,16 +299,19 @@ fn faces_are_carried_only_by_an_unchanged_binary_conversion() {
     assert!(summary.notes[0].contains("carried"), "{:?}", summary.notes);
     let written = std::fs::read(&out).unwrap();
     assert!(written.ends_with(&bytes[bytes.len() - 11..]));
-    assert_eq!(ply::describe(&out).unwrap().elements, ply::describe(&path).unwrap().elements);
+    assert_eq!(
+        internals::ply::describe(&out).unwrap().elements,
+        internals::ply::describe(&path).unwrap().elements
+    );
     assert_eq!(read(&out, 2).unwrap().2, all);
 
     assert!(write(&out, &carry, (&schema, &metadata, &all[..3]), None, 1).is_err());
     let ascii = PlyOptions { encoding: Some(Encoding::Ascii), ..carry };
     let summary = write(&out, &ascii, (&schema, &metadata, &all), None, 1).unwrap();
     assert!(summary.notes[0].contains("dropped"), "{:?}", summary.notes);
-    assert_eq!(ply::describe(&out).unwrap().elements.len(), 1);
+    assert_eq!(internals::ply::describe(&out).unwrap().elements.len(), 1);
     write(&out, &PlyOptions::default(), (&schema, &metadata, &all), None, 1).unwrap();
-    assert_eq!(ply::describe(&out).unwrap().elements.len(), 1);
+    assert_eq!(internals::ply::describe(&out).unwrap().elements.len(), 1);
 }
 
 #[test]
@@ -320,7 +326,7 @@ fn dimensions_can_be_dropped_by_name() {
     write(&out, &without("quality"), (&schema, &metadata, &all), None, 1).unwrap();
     assert_eq!(read(&out, 1).unwrap().2, [1, 2, 3]);
     for name in ["qualty", "X"] {
-        let refused = ply::create(&out, &without(name), &schema, &Metadata::default());
+        let refused = internals::ply::create(&out, &without(name), &schema, &Metadata::default());
         assert!(refused.err().unwrap().to_string().contains(name));
     }
 }

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use crate::support::ply::{file, read, write};
 use pointmill::ErrorKind;
-use pointmill::io::ply::{self, Encoding, PlyOptions};
+use pointmill::internals;
+use pointmill::internals::ply::{Encoding, PlyOptions};
 use proptest::prelude::*;
 
 /// The PLY files of the folder of real scans and their numbers of points as its manifest has them.
@@ -65,7 +66,7 @@ fn every_scan_reads_with_all_its_points_or_says_what_it_lacks() {
                     let again = read(&out, 10_000).unwrap();
                     let back = folder.path().join("back.ply");
                     let options = PlyOptions {
-                        encoding: Some(ply::describe(path).unwrap().encoding),
+                        encoding: Some(internals::ply::describe(path).unwrap().encoding),
                         ..PlyOptions::default()
                     };
                     write(&back, &options, (&again.0, &again.1, &again.2), None, 999).unwrap();
@@ -151,7 +152,7 @@ proptest! {
         }
         let folder = tempfile::tempdir().unwrap();
         let path = file(folder.path(), "damaged.ply", &bytes);
-        let _ = ply::describe(&path);
+        let _ = internals::ply::describe(&path);
         match read(&path, 64) {
             Ok((schema, metadata, all)) => {
                 // What reads, writes and reads again.

@@ -1,12 +1,12 @@
 //! The survey: planes and deviations of tiles and scan, against geometry and in any order of
 //! merging.
 
-use pointmill::geom::lattice::Lattice;
-use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
-use pointmill::report::{
-    Lot, Moments, Pair, Plane, ScanSurvey, TileFigures, Totals, report_tile_level,
+use pointmill::internals::{
+    Lot, Moments, Plane, ScanSurvey, TileKey, morton_cmp, report_tile_level,
 };
-use pointmill::store::{Levels, TileKey, morton_cmp};
+use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
+use pointmill::report::{Pair, TileFigures, Totals};
+use pointmill::stage::{Lattice, Levels};
 use pointmill::tile::Fate;
 use pointmill::{ErrorKind, Result};
 use proptest::prelude::*;

@@ -8,8 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use pointmill::point::{Column, PointBatch};
 use pointmill::report::Tally;
-use pointmill::stage::{Gathered, Needs, Role, ScanOp, TileOp, Transform};
-use pointmill::stage::{StageKind, StagePlace};
+use pointmill::stage::{Gathered, Needs, Role, ScanOp, StageKind, StagePlace, TileOp, Transform};
 use pointmill::tile::Tile;
 use pointmill::{Error, ErrorKind, Result};
 use pointmill::{Overrides, Quiet, Registry, Watch};

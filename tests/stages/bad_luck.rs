@@ -9,14 +9,14 @@ use crate::support::assert_same;
 use crate::support::random::Random;
 use crate::support::runs::{Memory, Settings, run};
 use crate::support::scan::Scan;
-use pointmill::budget::Budget;
-use pointmill::host::Threads;
+use pointmill::internals::{
+    Budget, Folder, Intake, Loader, Sieve, SpillArea, Tag, Threads, TileStore, morton_cmp, seal,
+    take_unproven,
+};
 use pointmill::point::{
     Dimension, Endian, Layout, Metadata, Position, Scalar, Schema, distance2, names,
 };
-use pointmill::store::{Folder, Intake, SpillArea, Tag, TileStore, morton_cmp, seal};
 use pointmill::synth::Scene;
-use pointmill::tile::{Loader, Sieve};
 use serde_json::Value;
 
 /// A landscape's records, each moved to where `place` says.
@@ -203,7 +203,7 @@ fn neighbors_are_exact(scan: &Scan) -> u64 {
             assert_eq!(found, expected, "of {p:?}");
         })
         .unwrap();
-        unproven += tile.around.take_unproven();
+        unproven += take_unproven(tile);
     }
     assert_eq!(seen, all.len());
     assert!(checked >= 60, "{checked} checked");

@@ -202,7 +202,7 @@ fn what_is_left_out_without_being_asked_for_is_said() {
     assert_told(told, &["with the withheld flag are left out, ", "`run.withheld = \"keep\"`"]);
     let (report, told) = heard(&scan, "laz", REDUCE, "noise = 'drop'\nwithheld = 'keep'");
     let noise = report.result.ledger.removed.iter().find(|r| r.reason == "noise").unwrap().records;
-    let number = pointmill::report::Grouped(noise).to_string();
+    let number = pointmill::internals::Grouped(noise).to_string();
     let table = report.table(None).to_string();
     assert!(table.contains(&format!("left out   {number} noise (read)")), "{table}");
     assert_told((report, told), &["(noise) are left out, ", &number]);

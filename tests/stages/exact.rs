@@ -9,12 +9,12 @@ use crate::support::random::Random;
 use crate::support::runs::{Memory, Settings, run};
 use crate::support::scan::Scan;
 use crate::support::scans;
-use pointmill::budget::Budget;
-use pointmill::host::Threads;
-use pointmill::ops::normals::{Estimate, Estimator, Method};
+use pointmill::internals::{
+    Budget, Estimate, Estimator, Folder, Intake, Loader, SealedTiles, Sieve, SpillArea, Tag,
+    Threads, TileStore, morton_cmp, seal, take_unproven,
+};
+use pointmill::ops::normals::Method;
 use pointmill::point::{Bounds, Position, distance2, names};
-use pointmill::store::{Folder, Intake, SealedTiles, SpillArea, Tag, TileStore, morton_cmp, seal};
-use pointmill::tile::{Loader, Sieve};
 
 /// Tiles that both tests cut: small, and cut where the pipeline cuts them.
 const TILE_POINTS: usize = 400;
@@ -130,7 +130,7 @@ fn neighbors_at_the_faces_of_tiles_of_a_real_scan_are_those_of_all_of_it() {
             })
             .unwrap();
             assert_eq!(seen, positions.iter().filter(|p| zone.contains(**p)).count());
-            unproven += tile.around.take_unproven();
+            unproven += take_unproven(tile);
             cores.extend_from_slice(&tile.positions[core]);
         }
         assert!(cores == all, "the cores in their order are the scan");

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use crate::support::tiles::*;
+use pointmill::internals::morton_cmp;
 use pointmill::ops::{Grid, Pick};
 use pointmill::point::{Bounds, NORMAL, Position};
 use pointmill::quantity::Length;
 use pointmill::report::Tally;
 use pointmill::stage::TileOp;
-use pointmill::store::morton_cmp;
 use pointmill::tile::{Fate, Tile};
 use proptest::prelude::*;
 
@@ -54,6 +54,7 @@ fn plain(scan: &[Position], side: i64, pick: Pick) -> Vec<Position> {
             Pick::First => 0,
             Pick::Center => far2(p.map(|v| 2 * v), corner.map(|v| 2 * v + side)),
             Pick::Median => far2(*p, [0, 1, 2].map(|axis| median(of, axis))),
+            other => panic!("there is no oracle of {other:?}"),
         };
         *of.iter().min_by(|a, b| far(a).cmp(&far(b)).then(morton_cmp(a, b))).unwrap()
     });

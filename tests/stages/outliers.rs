@@ -3,12 +3,11 @@
 use crate::support::random::Random;
 use crate::support::tiles::*;
 use pointmill::Result;
-use pointmill::ops::outliers::{RadiusOutliers, StatisticalOutliers};
+use pointmill::internals::{RadiusOutliers, StatisticalOutliers, morton_cmp};
 use pointmill::point::{Bounds, Mark, Position};
 use pointmill::quantity::Length;
 use pointmill::report::Tally;
 use pointmill::stage::{Gathered, ScanOp, TileOp};
-use pointmill::store::morton_cmp;
 use pointmill::tile::Fate;
 use proptest::prelude::*;
 

@@ -8,8 +8,8 @@ use std::path::Path;
 use crate::support::case::{Case, REDUCE, execute};
 use crate::support::random::Random;
 use crate::support::tiles::{far2, sorted};
+use pointmill::internals::morton_cmp;
 use pointmill::point::Position;
-use pointmill::store::morton_cmp;
 use pointmill::{Graph, Overrides, Quiet, Registry, Set};
 use serde_json::Value;
 

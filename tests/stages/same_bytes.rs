@@ -5,7 +5,7 @@ use crate::support::random::Random;
 use crate::support::runs::{Memory, Ran, Settings, assert_not_empty, instruction_sets, run};
 use crate::support::scan::Scan;
 use crate::support::{assert_same, scans};
-use pointmill::store::morton_cmp;
+use pointmill::internals::morton_cmp;
 use pointmill::synth::Scene;
 
 /// `normals`, `cells` and `median` with the given keys.

@@ -3,16 +3,14 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use pointmill::budget::Budget;
-use pointmill::geom::lattice::Lattice;
-use pointmill::host::Threads;
+use pointmill::internals::{
+    Budget, Fetch, Folder, Intake, Loader, Reader, SealedTiles, Sieve, SpillArea, Tag, Threads,
+    TileStore, morton_cmp, seal, take_unproven,
+};
 use pointmill::point::{
     Dimension, Endian, Layout, PointBatch, Position, Scalar, Schema, distance2, names,
 };
-use pointmill::store::{
-    Fetch, Folder, Intake, Reader, SealedTiles, SpillArea, Tag, TileStore, morton_cmp, seal,
-};
-use pointmill::tile::{Loader, Sieve};
+use pointmill::stage::Lattice;
 
 use crate::support::random::Random;
 
@@ -191,7 +189,7 @@ fn tiles_share_the_scan_out_and_their_neighborhoods_are_those_of_the_whole_scan(
             })
             .unwrap();
             assert_eq!(seen, positions.iter().filter(|p| zone.contains(**p)).count());
-            unproven += tile.around.take_unproven();
+            unproven += take_unproven(tile);
         }
         assert_eq!(cores, all, "cores in tile order are the scan");
         assert!(checked >= 1_000 && unproven > 0 && ties > 100, "{checked} {unproven} {ties}");
@@ -203,7 +201,7 @@ fn a_cube_that_cannot_be_cut_is_named_with_its_count() {
     let scan: Vec<Position> = (0..4_000).map(|i| [i % 16, i / 16 % 16, i / 256]).collect();
     let (tiles, _, _) = sealed(&scan, 1, 1_000, 1 << 20);
     match tiles.cut(50, 100, 0, (4, 4)) {
-        Err(pointmill::store::CutError::TooHeavy { key, positions }) => {
+        Err(pointmill::internals::CutError::TooHeavy { key, positions }) => {
             assert_eq!((key.corner, key.level, positions), ([0; 3], 4, 4_000));
         }
         other => panic!("{other:?}"),
@@ -218,7 +216,7 @@ fn of_several_cubes_too_heavy_the_heaviest_is_named() {
     let scan: Vec<Position> = (0..4).flat_map(thin).chain(more).collect();
     let (tiles, _, _) = sealed(&scan, 1, 1_000, 1 << 20);
     match tiles.cut(50, 90, 0, (4, 4)) {
-        Err(pointmill::store::CutError::TooHeavy { key, positions }) => {
+        Err(pointmill::internals::CutError::TooHeavy { key, positions }) => {
             assert_eq!((key.corner, positions), ([32, 0, 0], 200));
         }
         other => panic!("{other:?}"),

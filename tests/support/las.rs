@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pointmill::Result;
-use pointmill::io::las::{LasOptions, create, open};
+use pointmill::internals::las::{LasOptions, create};
+use pointmill::io::las::open;
 use pointmill::point::{ComputedDimension, Metadata, NORMAL, Schema, names};
 use pointmill::stage::{SinkSummary, Source};
 

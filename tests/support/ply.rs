@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pointmill::Result;
-use pointmill::io::ply::{self, PlyOptions};
+use pointmill::internals;
+use pointmill::internals::ply::PlyOptions;
+use pointmill::io::ply;
 use pointmill::point::{Metadata, NORMAL, PointBatch, Schema};
 use pointmill::stage::{SinkSummary, Source};
 
@@ -36,7 +38,7 @@ pub fn write(
     normals: Option<&[[f32; 3]]>,
     chunk: usize,
 ) -> Result<SinkSummary> {
-    let mut sink = ply::create(path, options, schema, metadata)?;
+    let mut sink = internals::ply::create(path, options, schema, metadata)?;
     let encoder = sink.encoder();
     let mut batch = PointBatch::new(schema.clone(), chunk);
     for (n, piece) in all.chunks(chunk * schema.stride).enumerate() {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use pointmill::geom::simd::Simd;
+use pointmill::internals::Simd;
 use pointmill::report::{Report, result_bytes};
 use pointmill::{Error, ErrorKind, Overrides, Quiet, Result};
 

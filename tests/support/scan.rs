@@ -3,9 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use pointmill::geom::lattice::Lattice;
 use pointmill::point::{Layout, Metadata, Position, Schema, Value};
-use pointmill::stage::{OpenSource, Source};
+use pointmill::stage::{Lattice, OpenSource, Source};
 use pointmill::synth::{Scene, Synthetic};
 
 use super::random::Random;

@@ -1,10 +1,9 @@
 //! Tiles, lattices and tallies for tests that drive stages by hand.
 
-use pointmill::geom::lattice::Lattice;
+use pointmill::internals::{TileKey, morton_cmp};
 use pointmill::point::{Bounds, Dimension, Endian, Layout, Position, Scalar, Schema};
 use pointmill::report::Tally;
-use pointmill::stage::{ScanFacts, TileOp};
-use pointmill::store::{Levels, TileKey, morton_cmp};
+use pointmill::stage::{Lattice, Levels, ScanFacts, TileOp};
 use pointmill::tile::{Fate, Tile};
 
 /// Distinct positions in Morton order.
@@ -54,13 +53,8 @@ pub fn settle(stage: &mut dyn TileOp, scan: &[Position], step: f64) {
     for (i, p) in scan.iter().enumerate() {
         levels.add(i.checked_sub(1).map(|before| scan[before]), *p);
     }
-    let facts = ScanFacts {
-        points: scan.len() as u64,
-        positions: scan.len() as u64,
-        bounds: Bounds::of(scan.iter().copied()),
-        lattice: &lattice,
-        levels: &levels,
-    };
+    let bounds = Bounds::of(scan.iter().copied());
+    let facts = ScanFacts::new(scan.len() as u64, bounds, &lattice, &levels);
     stage.settle(&facts).unwrap();
 }
 

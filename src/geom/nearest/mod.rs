@@ -42,7 +42,7 @@ const ROUNDING: f64 = 1.0 / (1 << 22) as f64;
 /// The search of the k nearest neighbours within a set; its memory stays from set to set.
 ///
 /// ```
-/// use pointmill::geom::nearest::Nearest;
+/// use pointmill::internals::Nearest;
 ///
 /// let positions = [[0, 0, 0], [1, 0, 0], [5, 0, 0], [7, 0, 0]];
 /// let mut nearest = Nearest::new();

@@ -10,7 +10,7 @@ mod real;
 mod x86;
 
 pub use lanes::{COLUMNS, Kernel, LANES, Lanes, Portable, Row, joined, smaller};
-pub use real::{EIGHT, Eight, Mask, Real};
+pub use real::{EIGHT, Mask, Real};
 #[cfg(target_arch = "x86_64")]
 use x86::{has_avx2, has_avx512};
 

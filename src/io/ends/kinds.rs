@@ -105,6 +105,7 @@ pub struct Write {
 /// Order of the records of an output, as a file names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum OutputOrder {
     /// Morton order of the lattice, then record bytes.
     Canonical,
@@ -116,7 +117,7 @@ pub enum OutputOrder {
 
 impl Write {
     /// The order as stages know it.
-    pub fn stage_order(&self) -> Order {
+    pub(crate) fn stage_order(&self) -> Order {
         match self.order {
             None => Order::Auto,
             Some(OutputOrder::Canonical) => Order::Canonical,

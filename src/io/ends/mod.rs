@@ -7,5 +7,6 @@ mod kinds;
 mod outputs;
 mod roles;
 
-pub use inputs::{expand, expand_any, unreadable};
+#[cfg(feature = "cli")]
+pub(crate) use inputs::{expand, expand_any, unreadable};
 pub use kinds::{OutputOrder, Read, Write};

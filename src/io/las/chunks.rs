@@ -30,8 +30,8 @@ pub enum Chunks {
 }
 
 impl Chunks {
-    /// Finds the chunks of `file`, whose points end before byte `end`. The second value is a warning, if
-    /// there is one.
+    /// Finds the chunks of `file`, whose points end before byte `end`. The second value is a
+    /// warning, if there is one.
     pub fn read(
         file: &InputFile,
         header: &Header,
@@ -39,7 +39,7 @@ impl Chunks {
         end: u64,
     ) -> Result<(Self, Option<String>)> {
         let points = header.points();
-        let start = u64::from(header.points_start());
+        let start = u64::from(header.offset_to_point_data);
         if points == 0 {
             return Ok((Chunks::Known(Table::default()), None));
         }
@@ -96,14 +96,15 @@ fn plausible(file: &InputFile, all: Chunk) -> Result<()> {
         .help("the file is cut off, or its header's count is damaged"))
 }
 
-/// Bytes of compressed points where the header counts none; None if there are none, or it counts some.
+/// Bytes of compressed points where the header counts none; None if there are none, or it counts
+/// some.
 pub fn uncounted(
     file: &InputFile,
     header: &Header,
     evlrs_start: Option<u64>,
     compression: &Compression,
 ) -> Result<Option<u64>> {
-    let start = u64::from(header.points_start());
+    let start = u64::from(header.offset_to_point_data);
     let first = start + TABLE_OFFSET_BYTES;
     if header.points() > 0 || first > file.len() {
         return Ok(None);
@@ -134,7 +135,8 @@ fn too_many(file: &InputFile, chunks: &Table) -> Error {
     let told =
         format!("its first {chunks} chunks hold {points} points: that is a table too long to hold");
     Error::data(file.path(), told).help(
-        "write it anew with chunks of more points (50,000 are usual); LASzip and PDAL do that by themselves",
+        "write it anew with chunks of more points (50,000 are usual); LASzip and PDAL do that by \
+         themselves",
     )
 }
 
@@ -247,7 +249,8 @@ fn entries(
         }
         take(bytes, held)?;
     }
-    // Points of chunks of varying size cannot be found without the table: then it is taken as it is.
+    // Points of chunks of varying size cannot be found without the table: then it is taken as it
+    // is.
     let is_needed =
         compression.compressor != Compressor::Layered && compression.chunk_points.is_none();
     if used != room && !is_needed {

@@ -1,14 +1,14 @@
-//! What an output says of itself and not of its points: in which system it is, what its times count,
-//! what made it of what.
+//! What an output says of itself and not of its points: in which system it is, what its times
+//! count, what made it of what.
 
 use super::crs;
 use super::described::{Described, describe};
 use super::extra::Descriptor;
-use super::fields::{at, encoding};
+use super::fields::encoding;
 use super::format::{has_gps_time, record_size};
 use super::header::Header;
 use super::native::Native;
-use super::text::split_at_room;
+use super::text::{field, split_at_room};
 use super::vlr::Vlr;
 use crate::Result;
 use crate::io::wkt;
@@ -39,8 +39,8 @@ pub fn name_system(
         }
         Ok(_) if native.made && native.header.format() >= 6 && !wkt::is_wkt(text) => {
             notes.push(format!(
-                "the CRS {text} is not WKT and is written as GeoTIFF keys: point format {} asks for \
-                 WKT, and some readers will see no CRS",
+                "the CRS {text} is not WKT and is written as GeoTIFF keys: point format {} asks \
+                 for WKT, and some readers will see no CRS",
                 native.header.format()
             ));
         }
@@ -66,17 +66,17 @@ pub fn count_gps_time(header: &mut Header, metadata: &Metadata, notes: &mut Vec<
 }
 
 /// Says what made the output: always the program, and of records that went through stages what was
-/// done (LAS 1.4 R15, section 2.4: the system identifier) and by which stages, in the place of what an
-/// earlier run said. Nothing of it depends on when or where.
+/// done (LAS 1.4 R15, section 2.4: the system identifier) and by which stages, in the place of what
+/// an earlier run said. Nothing of it depends on when or where.
 pub fn credit(native: &mut Native, schema: &Schema, metadata: &Metadata, notes: &mut Vec<String>) {
     let header = &mut native.header;
-    header.put_text(at::SOFTWARE, SOFTWARE);
+    header.generating_software = field(SOFTWARE);
     let axes = schema.coordinates();
     let moved = axes.is_some_and(|axes| {
         axes.map(|d| d.scale) != header.scale() || axes.map(|d| d.origin) != header.offset()
     });
     if let Some(pipeline) = &metadata.pipeline {
-        header.put_text(at::SYSTEM, "EXTRACTION");
+        header.system_identifier = field("EXTRACTION");
         native.vlrs.retain(|v| !v.is(PIPELINE.0, PIPELINE.1));
         match u16::try_from(pipeline.len()) {
             Ok(_) => {
@@ -86,7 +86,7 @@ pub fn credit(native: &mut Native, schema: &Schema, metadata: &Metadata, notes: 
             Err(_) => notes.push("the pipeline is too long for a record that names it".to_owned()),
         }
     } else if moved {
-        header.put_text(at::SYSTEM, "TRANSFORMATION");
+        header.system_identifier = field("TRANSFORMATION");
     }
 }
 

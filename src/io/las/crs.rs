@@ -1,4 +1,5 @@
-//! The coordinate reference system of a file: WKT where it has one, else what its GeoTIFF keys name.
+//! The coordinate reference system of a file: WKT where it has one, else what its GeoTIFF keys
+//! name.
 
 use super::header::Header;
 use super::vlr::{Evlr, Vlr};
@@ -28,7 +29,8 @@ const PROJECTED: u16 = 3072;
 const GEODETIC: u16 = 2048;
 const VERTICAL: u16 = 4096;
 const CITATIONS: [u16; 3] = [1026, 3073, 2049];
-/// Keys that name units (sections 7.5 to 7.7), and the model type that means longitude and latitude.
+/// Keys that name units (sections 7.5 to 7.7), and the model type that means longitude and
+/// latitude.
 const MODEL_TYPE: u16 = 1024;
 const GEOGRAPHIC: u16 = 2;
 const GEOCENTRIC: u16 = 3;
@@ -91,9 +93,9 @@ pub fn has_wkt(vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<bool> {
     Ok(wkt(vlrs, evlrs)?.is_some())
 }
 
-/// True if the header of an output is to say that its system is WKT (LAS 1.4 R15, section 2.4): where
-/// it is, unless there are GeoTIFF keys too and a point format that may have them; and always in
-/// point formats 6 to 10, unless there are GeoTIFF keys alone, which it would belie.
+/// True if the header of an output is to say that its system is WKT (LAS 1.4 R15, section 2.4):
+/// where it is, unless there are GeoTIFF keys too and a point format that may have them; and always
+/// in point formats 6 to 10, unless there are GeoTIFF keys alone, which it would belie.
 pub fn wants_bit(header: &Header, vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<bool> {
     let keys = vlrs.iter().any(|v| v.is(USER, GEO_KEYS));
     let wkt = has_wkt(vlrs, evlrs)?;
@@ -165,8 +167,8 @@ impl GeoKeys {
         self.0.iter().any(|entry| entry[0] == key && (entry[1] != 0 || entry[3] != 0))
     }
 
-    /// The units of the coordinates (GeoTIFF 1.1, sections 7.5 to 7.7): as keys of units say, else as
-    /// the codes of the systems do.
+    /// The units of the coordinates (GeoTIFF 1.1, sections 7.5 to 7.7): as keys of units say, else
+    /// as the codes of the systems do.
     fn units(&self, vlrs: &[Vlr]) -> Units {
         let by_system = || epsg::vertical(self.code(VERTICAL)?.into());
         let vertical = self.value(VERTICAL_UNITS).and_then(epsg::unit).or_else(by_system);

@@ -6,10 +6,10 @@ use serde::Serialize;
 
 use super::chunks::Chunks;
 use super::crs;
-use super::fields::at;
 use super::format::has_gps_time;
 use super::input::{Input, Storage};
 use super::laz::Compressor;
+use super::text::text;
 use crate::Result;
 use crate::point::GpsTime;
 
@@ -103,12 +103,11 @@ pub fn describe(path: &Path) -> Result<Description> {
     let [min, max] = header.bounds();
     let (compressor, chunk_points, chunks) = storage(&input.storage);
     let first_extra = schema.stride - input.extra_len();
-    let word = |at| u16::from_le_bytes(header.get(at));
     Ok(Description {
         kind: if header.compressed() { "LAZ" } else { "LAS" },
         version: format!("1.{}", header.minor()),
         point_format: header.format(),
-        record_length: header.record_length(),
+        record_length: header.point_data_record_length,
         points: input.points(),
         scale: header.scale(),
         offset: header.offset(),
@@ -120,10 +119,10 @@ pub fn describe(path: &Path) -> Result<Description> {
             GpsTime::Week => "seconds of the GPS week",
             GpsTime::AdjustedStandard => "adjusted standard GPS time",
         }),
-        system_identifier: header.text(at::SYSTEM),
-        generating_software: header.text(at::SOFTWARE),
-        creation_day: word(at::DAY),
-        creation_year: word(at::YEAR),
+        system_identifier: text(&header.system_identifier),
+        generating_software: text(&header.generating_software),
+        creation_day: header.file_creation_day_of_year,
+        creation_year: header.file_creation_year,
         dimensions: schema.dimensions.iter().map(|d| d.name.clone()).collect(),
         extra_bytes: schema
             .dimensions

@@ -1,5 +1,5 @@
-//! The extra-bytes descriptors of a file: which of those that its records hold are true of its points,
-//! and the records that an output has them in.
+//! The extra-bytes descriptors of a file: which of those that its records hold are true of its
+//! points, and the records that an output has them in.
 
 use super::extra::{DESCRIPTOR_BYTES, Descriptor};
 use super::vlr::{Evlr, Vlr};
@@ -48,8 +48,8 @@ impl Described {
         let fitting = fits.count();
         let warning = match all.get(fitting) {
             Some(first) => Some(format!(
-                "{} of {} extra-bytes descriptors, from `{}` on, describe bytes that the records, which \
-                 have {extra} extra bytes, do not have: they are not carried on",
+                "{} of {} extra-bytes descriptors, from `{}` on, describe bytes that the records, \
+                 which have {extra} extra bytes, do not have: they are not carried on",
                 all.len() - fitting,
                 all.len(),
                 first.name()
@@ -65,8 +65,8 @@ impl Described {
         Ok(Described { descriptors, as_they_are, warning })
     }
 
-    /// The records of an output: `vlrs` and `evlrs` where they hold the descriptors, else with these
-    /// in one record in the place of all that there were.
+    /// The records of an output: `vlrs` and `evlrs` where they hold the descriptors, else with
+    /// these in one record in the place of all that there were.
     pub fn carried(&self, vlrs: &mut Vec<Vlr>, evlrs: &mut Vec<Evlr>) {
         if !self.as_they_are {
             describe(vlrs, evlrs, &self.descriptors);
@@ -74,8 +74,8 @@ impl Described {
     }
 }
 
-/// Has the extra bytes described by `descriptors` alone, in one record, or in several where one cannot
-/// hold them.
+/// Has the extra bytes described by `descriptors` alone, in one record, or in several where one
+/// cannot hold them.
 pub fn describe(vlrs: &mut Vec<Vlr>, evlrs: &mut Vec<Evlr>, descriptors: &[Descriptor]) {
     let is_ours = |v: &Vlr| v.is(EXTRA_BYTES.0, EXTRA_BYTES.1);
     let place = vlrs.iter().position(is_ours).unwrap_or(vlrs.len());

@@ -1,7 +1,7 @@
 //! Extra-bytes descriptors (LAS 1.4 R15, table 24): what the bytes behind a record's standard
 //! fields mean.
 
-use super::text::{split_at_room, text};
+use super::text::{field, split_at_room, text};
 use crate::point::{ComputedDimension, Dimension, Scalar};
 
 /// Bytes of one descriptor.
@@ -52,9 +52,8 @@ impl Descriptor {
         let kind = SCALARS.iter().position(|s| *s == scalar).map_or(1, |i| i as u8 + 1);
         bytes[at::KIND] = kind;
         let (head, tail) = split_at_room(name, 32);
-        let (tail, _) = split_at_room(tail, 32);
-        bytes[at::NAME..at::NAME + head.len()].copy_from_slice(head.as_bytes());
-        bytes[at::DESCRIPTION..at::DESCRIPTION + tail.len()].copy_from_slice(tail.as_bytes());
+        bytes[at::NAME..at::NAME + 32].copy_from_slice(&field::<32>(head));
+        bytes[at::DESCRIPTION..at::DESCRIPTION + 32].copy_from_slice(&field::<32>(tail));
         Descriptor(bytes)
     }
 

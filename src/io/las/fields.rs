@@ -1,15 +1,8 @@
 //! Where the fields of the public header block are (LAS 1.4 R15, section 2.4).
 
-/// Byte offsets of the fields.
+/// Byte offsets of the fields that messages name.
 pub mod at {
-    pub const SOURCE_ID: usize = 4;
-    pub const GLOBAL_ENCODING: usize = 6;
-    pub const GUID: usize = 8;
     pub const VERSION: usize = 24;
-    pub const SYSTEM: usize = 26;
-    pub const SOFTWARE: usize = 58;
-    pub const DAY: usize = 90;
-    pub const YEAR: usize = 92;
     pub const HEADER_SIZE: usize = 94;
     pub const POINTS_START: usize = 96;
     pub const VLRS: usize = 100;
@@ -18,12 +11,10 @@ pub mod at {
     pub const LEGACY_POINTS: usize = 107;
     pub const LEGACY_RETURNS: usize = 111;
     pub const SCALE: usize = 131;
-    pub const OFFSET: usize = 155;
     pub const BOX: usize = 179;
     pub const WAVEFORM_START: usize = 227;
     pub const EVLR_START: usize = 235;
     pub const EVLRS: usize = 243;
-    pub const POINTS: usize = 247;
     pub const RETURNS: usize = 255;
 }
 

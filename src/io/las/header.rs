@@ -1,10 +1,16 @@
-//! The public header block (LAS 1.4 R15, section 2.4), kept as its bytes: what is not recomputed is
-//! carried exactly.
+//! The public header block (LAS 1.4 R15, section 2.4): the fields as the crate `las` reads and
+//! writes them, behind checks against the length of the file, which its own reader does not make.
+//! What is not recomputed is carried exactly, fields without a meaning and odd numbers too.
+
+use std::array;
+use std::ops::{Deref, DerefMut};
+
+use las::raw::header::{Evlr, LargeFile};
+use las::{Version, raw};
 
 use super::fields::{at, encoding};
 use super::file::InputFile;
 use super::format;
-use super::text::{split_at_room, text};
 use crate::point::GpsTime;
 use crate::stage::foreign;
 use crate::{Error, Result};
@@ -21,32 +27,38 @@ const DAMAGED: &str = "the file is cut off, or its header is damaged: get anothe
 /// The bit of the format byte that says LAZ.
 pub const COMPRESSED: u8 = 0x80;
 
-/// The public header block of one file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Header {
-    bytes: Vec<u8>,
+/// The public header block of one file: all its fields, those behind the standard ones included.
+#[derive(Debug, Clone)]
+pub struct Header(raw::Header);
+
+impl Deref for Header {
+    type Target = raw::Header;
+
+    fn deref(&self) -> &raw::Header {
+        &self.0
+    }
+}
+
+impl DerefMut for Header {
+    fn deref_mut(&mut self) -> &mut raw::Header {
+        &mut self.0
+    }
 }
 
 impl Header {
     /// Bytes of the header of LAS 1.`minor`.
-    pub fn size_of(minor: u8) -> usize {
-        match minor {
-            0..=2 => 227,
-            3 => 235,
-            _ => 375,
-        }
+    fn size_of(minor: u8) -> usize {
+        usize::from(Version::new(1, minor).header_size())
     }
 
-    /// A header of zeros with signature, version, size, format and record length.
-    pub fn blank(minor: u8, format: u8, record_length: u16) -> Self {
-        let size = Self::size_of(minor);
-        let mut header = Header { bytes: vec![0; size] };
-        header.put(0, SIGNATURE);
-        header.put(at::VERSION, &[1, minor]);
-        header.put(at::HEADER_SIZE, &(size as u16).to_le_bytes());
-        header.put(at::FORMAT, &[format]);
-        header.put(at::RECORD_LENGTH, &record_length.to_le_bytes());
-        header
+    /// A header of LAS 1.4 of zeros but for signature, version, size, format and record length.
+    pub fn blank(format: u8, record_length: u16) -> Self {
+        let blank = raw::Header {
+            point_data_record_format: format,
+            point_data_record_length: record_length,
+            ..raw::Header::default()
+        };
+        Header(blank).resized(4, &[])
     }
 
     /// Reads the header of `file` and checks it against the file's length.
@@ -82,36 +94,44 @@ impl Header {
                 )
                 .help(DAMAGED));
         }
-        let header = Header { bytes: file.bytes(0, usize::from(size))? };
+        let bytes = file.bytes(0, usize::from(size))?;
+        let changed = |e| file.wrong(0, "the header changed while it was read").because(e);
+        let mut header = Header(raw::Header::read_from(&bytes[..]).map_err(changed)?);
+        // The crate leaves out a place without a count and a count without a place.
+        header.evlr = (minor >= 4).then(|| Evlr {
+            start_of_first_evlr: u64::from_le_bytes(array::from_fn(|i| bytes[at::EVLR_START + i])),
+            number_of_evlrs: u32::from_le_bytes(array::from_fn(|i| bytes[at::EVLRS + i])),
+        });
         header.check(file).map(|()| header)
     }
 
     /// What the rest of the reader relies on.
     fn check(&self, file: &InputFile) -> Result<()> {
-        let start = u64::from(self.points_start());
-        if start < self.bytes.len() as u64 || start > file.len() {
-            return Err(file.wrong(
-                at::POINTS_START as u64,
-                format!(
-                    "points cannot start at byte {start}: the header has {} bytes and the file {}",
-                    self.bytes.len(),
-                    file.len()
-                ),
-            )
-            .help(DAMAGED));
+        let (start, size) = (u64::from(self.offset_to_point_data), self.header_size);
+        if start < u64::from(size) || start > file.len() {
+            return Err(file
+                .wrong(
+                    at::POINTS_START as u64,
+                    format!(
+                        "points cannot start at byte {start}: the header has {size} bytes and the \
+                         file {}",
+                        file.len()
+                    ),
+                )
+                .help(DAMAGED));
         }
         let Some(least) = format::record_size(self.format()) else {
             return Err(file
                 .wrong(at::FORMAT as u64, format!("point format {} is not known", self.format()))
                 .help("point formats 0 to 10 are read"));
         };
-        if self.record_length() < least {
+        if self.point_data_record_length < least {
             return Err(file
                 .wrong(
                     at::RECORD_LENGTH as u64,
                     format!(
                         "records of {} bytes cannot hold point format {}, which needs {least}",
-                        self.record_length(),
+                        self.point_data_record_length,
                         self.format()
                     ),
                 )
@@ -154,103 +174,68 @@ impl Header {
         Some(format!("the scale {scale:?} is {why}"))
     }
 
-    /// All bytes, those a writer added behind the standard fields included.
-    pub fn bytes(&self) -> &[u8] {
-        &self.bytes
+    /// Its bytes, as in the file.
+    pub fn bytes(&self) -> Result<Vec<u8>> {
+        let mut bytes = Vec::with_capacity(usize::from(self.header_size));
+        let failed = |e| Error::internal("a header could not be written").because(e);
+        self.write_to(&mut bytes).map_err(failed)?;
+        Ok(bytes)
     }
 
-    /// Bytes behind the standard fields of the version.
-    pub fn custom(&self) -> &[u8] {
-        &self.bytes[Self::size_of(self.minor())..]
-    }
-
-    /// `N` bytes of a field.
-    pub fn get<const N: usize>(&self, at: usize) -> [u8; N] {
-        std::array::from_fn(|i| self.bytes[at + i])
-    }
-
-    /// Replaces a field's bytes.
-    pub fn put(&mut self, at: usize, bytes: &[u8]) {
-        self.bytes[at..at + bytes.len()].copy_from_slice(bytes);
-    }
-
-    /// Replaces the header by one of LAS 1.`minor` with the same fields and `custom` behind them.
+    /// The header of LAS 1.`minor`, no older, with the same fields and `custom` bytes behind them.
     pub fn resized(&self, minor: u8, custom: &[u8]) -> Self {
-        let size = Self::size_of(minor);
-        let mut bytes = self.bytes[..Self::size_of(self.minor()).min(size)].to_vec();
-        bytes.resize(size, 0);
-        bytes.extend_from_slice(custom);
-        let len = u16::try_from(bytes.len()).unwrap_or(u16::MAX);
-        bytes.truncate(usize::from(len));
-        let mut header = Header { bytes };
-        header.put(at::VERSION, &[1, minor]);
-        header.put(at::HEADER_SIZE, &len.to_le_bytes());
+        let mut header = self.clone();
+        let room = usize::from(u16::MAX) - Self::size_of(minor);
+        header.version = Version::new(1, minor);
+        header.padding = custom[..custom.len().min(room)].to_vec();
+        header.header_size = (Self::size_of(minor) + header.padding.len()) as u16;
+        if minor >= 4 {
+            header.evlr.get_or_insert_default();
+            header.large_file.get_or_insert_default();
+        }
         header
     }
 
     /// The minor version: LAS 1.`minor`.
     pub fn minor(&self) -> u8 {
-        self.bytes[at::VERSION + 1]
+        self.version.minor
     }
 
     /// Point data record format, without the bits that say LAZ.
     pub fn format(&self) -> u8 {
-        self.bytes[at::FORMAT] & 0x3f
+        self.point_data_record_format & 0x3f
     }
 
     /// True if the points are LAZ.
     pub fn compressed(&self) -> bool {
-        self.bytes[at::FORMAT] & COMPRESSED != 0
-    }
-
-    /// Bytes of a record.
-    pub fn record_length(&self) -> u16 {
-        u16::from_le_bytes(self.get(at::RECORD_LENGTH))
-    }
-
-    /// Where the points start.
-    pub fn points_start(&self) -> u32 {
-        u32::from_le_bytes(self.get(at::POINTS_START))
-    }
-
-    /// Variable length records claimed.
-    pub fn vlrs(&self) -> u32 {
-        u32::from_le_bytes(self.get(at::VLRS))
+        self.point_data_record_format & COMPRESSED != 0
     }
 
     /// Points claimed: the 64-bit count where the version has one. Some writers of LAS 1.4 set the
     /// legacy one alone.
     pub fn points(&self) -> u64 {
-        let legacy = u64::from(u32::from_le_bytes(self.get(at::LEGACY_POINTS)));
-        if self.minor() < 4 {
-            return legacy;
-        }
-        match u64::from_le_bytes(self.get(at::POINTS)) {
-            0 => legacy,
-            points => points,
-        }
+        let wide = self.large_file.map(|wide| wide.number_of_point_records);
+        wide.filter(|points| *points > 0).unwrap_or(u64::from(self.number_of_point_records))
     }
 
     /// Byte and width of the counts of points by return, and the counts: those of 64 bits where the
     /// version has them and they are set.
     pub fn returns(&self) -> (usize, usize, Vec<u64>) {
-        let wide = |i: usize| u64::from_le_bytes(self.get(at::RETURNS + 8 * i));
-        if self.minor() >= 4 && (0..15).any(|i| wide(i) > 0) {
-            return (at::RETURNS, 8, (0..15).map(wide).collect());
+        let wide = self.large_file.map(|wide| wide.number_of_points_by_return.to_vec());
+        match wide.filter(|counts| counts.iter().any(|count| *count > 0)) {
+            Some(counts) => (at::RETURNS, 8, counts),
+            None => {
+                let counts = self.number_of_points_by_return.map(u64::from);
+                (at::LEGACY_RETURNS, 4, counts.to_vec())
+            }
         }
-        let narrow = |i: usize| u64::from(u32::from_le_bytes(self.get(at::LEGACY_RETURNS + 4 * i)));
-        (at::LEGACY_RETURNS, 4, (0..5).map(narrow).collect())
     }
 
-    /// What is odd about two counts of points that disagree. Formats 6 to 10 are to leave the one for
-    /// older readers at 0, others may.
+    /// What is odd about two counts of points that disagree. Formats 6 to 10 are to leave the one
+    /// for older readers at 0, others may.
     pub fn odd_counts(&self) -> Option<String> {
-        if self.minor() < 4 {
-            return None;
-        }
-        let legacy = u64::from(u32::from_le_bytes(self.get(at::LEGACY_POINTS)));
-        let points = u64::from_le_bytes(self.get(at::POINTS));
-        let read = self.points();
+        let points = self.large_file?.number_of_point_records;
+        let (legacy, read) = (u64::from(self.number_of_point_records), self.points());
         (legacy != 0 && legacy != points).then(|| {
             format!(
                 "the header counts {points} points and, in the field for older readers, {legacy}: \
@@ -261,20 +246,17 @@ impl Header {
 
     /// Where the extended variable length records start and how many are claimed.
     pub fn evlrs(&self) -> (u64, u32) {
-        if self.minor() < 4 {
-            return (0, 0);
-        }
-        (u64::from_le_bytes(self.get(at::EVLR_START)), u32::from_le_bytes(self.get(at::EVLRS)))
+        self.evlr.map_or((0, 0), |evlr| (evlr.start_of_first_evlr, evlr.number_of_evlrs))
     }
 
     /// Where the record of waveform packets starts; 0 for none.
     pub fn waveform_start(&self) -> u64 {
-        if self.minor() < 3 { 0 } else { u64::from_le_bytes(self.get(at::WAVEFORM_START)) }
+        self.start_of_waveform_data_packet_record.unwrap_or(0)
     }
 
     /// The global encoding bits (see [`encoding`]); 0 for LAS 1.0 and 1.1, which have none.
     pub fn encoding(&self) -> u16 {
-        if self.minor() < 2 { 0 } else { u16::from_le_bytes(self.get(at::GLOBAL_ENCODING)) }
+        if self.minor() < 2 { 0 } else { self.global_encoding }
     }
 
     /// What GPS times count.
@@ -289,54 +271,39 @@ impl Header {
     pub fn put_encoding(&mut self, bit: u16, set: bool) {
         if self.minor() >= 2 {
             let others = self.encoding() & !bit;
-            let bits = if set { others | bit } else { others };
-            self.put(at::GLOBAL_ENCODING, &bits.to_le_bytes());
+            self.global_encoding = if set { others | bit } else { others };
         }
-    }
-
-    /// Sets a text field of 32 bytes; what exceeds it is cut off.
-    pub fn put_text(&mut self, at: usize, text: &str) {
-        let mut field = [0; 32];
-        let (text, _) = split_at_room(text, field.len());
-        field[..text.len()].copy_from_slice(text.as_bytes());
-        self.put(at, &field);
     }
 
     /// World units of one stored unit, per axis.
     pub fn scale(&self) -> [f64; 3] {
-        self.floats(at::SCALE)
+        [self.x_scale_factor, self.y_scale_factor, self.z_scale_factor]
     }
 
     /// World coordinates of stored 0.
     pub fn offset(&self) -> [f64; 3] {
-        self.floats(at::OFFSET)
+        [self.x_offset, self.y_offset, self.z_offset]
+    }
+
+    /// Sets the scales.
+    pub fn put_scale(&mut self, scale: [f64; 3]) {
+        [self.x_scale_factor, self.y_scale_factor, self.z_scale_factor] = scale;
+    }
+
+    /// Sets the offsets.
+    pub fn put_offset(&mut self, offset: [f64; 3]) {
+        [self.x_offset, self.y_offset, self.z_offset] = offset;
     }
 
     /// The claimed box: smallest corner, then largest. A hint that may lie.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
-        let pairs: [[f64; 2]; 3] = std::array::from_fn(|axis| {
-            [0, 8].map(|half| f64::from_le_bytes(self.get(at::BOX + 16 * axis + half)))
-        });
-        [pairs.map(|[_, lo]| lo), pairs.map(|[hi, _]| hi)]
+        [[self.min_x, self.min_y, self.min_z], [self.max_x, self.max_y, self.max_z]]
     }
 
     /// Sets the box.
     pub fn put_bounds(&mut self, lo: [f64; 3], hi: [f64; 3]) {
-        for axis in 0..3 {
-            self.put(at::BOX + 16 * axis, &hi[axis].to_le_bytes());
-            self.put(at::BOX + 16 * axis + 8, &lo[axis].to_le_bytes());
-        }
-    }
-
-    /// Sets three floats.
-    pub fn put_floats(&mut self, at: usize, values: [f64; 3]) {
-        for (axis, value) in values.iter().enumerate() {
-            self.put(at + 8 * axis, &value.to_le_bytes());
-        }
-    }
-
-    fn floats(&self, at: usize) -> [f64; 3] {
-        std::array::from_fn(|axis| f64::from_le_bytes(self.get(at + 8 * axis)))
+        [self.min_x, self.min_y, self.min_z] = lo;
+        [self.max_x, self.max_y, self.max_z] = hi;
     }
 
     /// Sets the counts of points, in all and by return: the legacy fields too, which LAS 1.4 wants
@@ -351,22 +318,57 @@ impl Header {
             .help("split the output, or start from inputs of LAS 1.4"));
         }
         let legacy = narrow.filter(|_| self.minor() < 4 || self.format() < 6);
-        self.put(at::LEGACY_POINTS, &legacy.unwrap_or(0).to_le_bytes());
-        for (i, &count) in returns.iter().take(5).enumerate() {
-            let count = if legacy.is_some() { count as u32 } else { 0 };
-            self.put(at::LEGACY_RETURNS + 4 * i, &count.to_le_bytes());
-        }
-        if self.minor() >= 4 {
-            self.put(at::POINTS, &points.to_le_bytes());
-            for (i, count) in returns.iter().enumerate() {
-                self.put(at::RETURNS + 8 * i, &count.to_le_bytes());
-            }
-        }
+        self.number_of_point_records = legacy.unwrap_or(0);
+        // Counts that a point total of 32 bits holds have 32 bits.
+        let narrow = |i: usize| if legacy.is_some() { returns[i] as u32 } else { 0 };
+        self.number_of_points_by_return = array::from_fn(narrow);
+        self.large_file = self.large_file.map(|_| LargeFile {
+            number_of_point_records: points,
+            number_of_points_by_return: *returns,
+        });
         Ok(())
     }
+}
 
-    /// A text field without its trailing zeros, bytes that are no UTF-8 replaced.
-    pub fn text(&self, at: usize) -> String {
-        text(&self.get::<32>(at))
+#[cfg(test)]
+mod tests {
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn a_header_of_any_bytes_is_written_as_it_was_read(
+            mut bytes in vec(any::<u8>(), 375 + 40), minor in 0..=4u8, custom in 0..40usize,
+            format in 0..=10u8, bits in 0..4u8, has_place: bool, has_count: bool,
+        ) {
+            // Half of what belongs together may be there.
+            if !has_place {
+                bytes[at::EVLR_START..at::EVLRS].fill(0);
+            }
+            if !has_count {
+                bytes[at::EVLRS..at::EVLRS + 4].fill(0);
+            }
+            // A signalling NaN must not become a quiet one.
+            bytes[at::BOX..at::BOX + 8].copy_from_slice(&0x7ff0_0000_0000_0001u64.to_le_bytes());
+            let size = Header::size_of(minor) + custom;
+            bytes.truncate(size);
+            let mut put = |at: usize, field: &[u8]| {
+                bytes[at..at + field.len()].copy_from_slice(field);
+            };
+            put(0, SIGNATURE);
+            put(at::VERSION, &[1, minor]);
+            put(at::HEADER_SIZE, &(size as u16).to_le_bytes());
+            put(at::POINTS_START, &(size as u32).to_le_bytes());
+            put(at::FORMAT, &[format | (bits << 6)]);
+            put(at::RECORD_LENGTH, &100u16.to_le_bytes());
+            let places = [0.01f64, -1.0, 1e-300, 0.0, -1e9, f64::MIN_POSITIVE];
+            put(at::SCALE, places.map(f64::to_le_bytes).as_flattened());
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), &bytes).unwrap();
+            let header = Header::read(&InputFile::open(file.path()).unwrap()).unwrap();
+            prop_assert_eq!(header.bytes().unwrap(), bytes);
+        }
     }
 }

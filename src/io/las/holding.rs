@@ -35,8 +35,12 @@ const WAVE: [&str; 7] = [
 /// bytes: name and type of every dimension that LAS does not know.
 ///
 /// It is the smallest of formats 6 to 10 (LAS 1.4 R15 §2.6), but one of formats 0 to 5 where the
-/// scan angle is an integer: whole degrees, which the 0.006° steps of the others would round. Fails on
-/// names that an extra-bytes descriptor cannot hold (32 bytes).
+/// scan angle is an integer: whole degrees, which the 0.006° steps of the others would round.
+///
+/// # Errors
+///
+/// Names that an extra-bytes descriptor cannot hold (32 bytes), and names in `drop` that `from`
+/// lacks.
 pub fn las_schema(from: &Schema, drop: &[String]) -> Result<(u8, Vec<(String, Scalar)>)> {
     check_drop(from, drop)?;
     let has = |name: &str| from.find(name).is_some() && !drop.iter().any(|d| d == name);

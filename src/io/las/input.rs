@@ -185,7 +185,7 @@ impl Input {
 /// Bytes behind the standard fields of a record.
 pub fn extra_len(header: &Header) -> usize {
     let least = format::record_size(header.format()).unwrap_or(0);
-    usize::from(header.record_length().saturating_sub(least))
+    usize::from(header.point_data_record_length.saturating_sub(least))
 }
 
 /// What is odd about a bit that says GeoTIFF keys where the system is WKT.
@@ -220,13 +220,13 @@ fn storage(
             .help("the file is damaged: LASzip writes a record 'laszip encoded'"));
     };
     let before: usize = vlrs[..record].iter().map(Vlr::len).sum();
-    let at = (header.bytes().len() + before + VLR_HEAD) as u64;
-    let (format, stride) = (header.format(), header.record_length());
+    let at = (usize::from(header.header_size) + before + VLR_HEAD) as u64;
+    let (format, stride) = (header.format(), header.point_data_record_length);
     let compression = Compression::read(file, &vlrs[record], at, format, stride)?;
     if let Some(bytes) = chunks::uncounted(file, header, evlrs_start, &compression)? {
         return Err(uncounted(file, bytes));
     }
-    let end = behind_points(file, header, evlrs_start, u64::from(header.points_start()));
+    let end = behind_points(file, header, evlrs_start, u64::from(header.offset_to_point_data));
     let (mut chunks, warning) = Chunks::read(file, header, &compression, end)?;
     warnings.extend(warning);
     check_last(file, &compression, &mut chunks, warnings)?;
@@ -235,8 +235,8 @@ fn storage(
 
 /// The bytes of plain points must be there; a warning if there are more.
 fn plain(file: &InputFile, header: &Header, evlrs_start: Option<u64>) -> Result<Option<String>> {
-    let start = u64::from(header.points_start());
-    let (points, each) = (header.points(), u64::from(header.record_length()));
+    let start = u64::from(header.offset_to_point_data);
+    let (points, each) = (header.points(), u64::from(header.point_data_record_length));
     let held = (file.len() - start) / each;
     if points > held {
         return Err(file
@@ -266,7 +266,8 @@ fn plain(file: &InputFile, header: &Header, evlrs_start: Option<u64>) -> Result<
     }))
 }
 
-/// Where the next thing behind the points begins, which end at byte `end` or later, or the file ends.
+/// Where the next thing behind the points begins, which end at byte `end` or later, or the file
+/// ends.
 fn behind_points(file: &InputFile, header: &Header, evlrs_start: Option<u64>, end: u64) -> u64 {
     // Waveform packets that are not listed as a record stand behind the points too.
     let waveforms = Some(header.waveform_start()).filter(|&at| at > 0);

@@ -1,12 +1,13 @@
 //! Several files as one: what they must share, and what becomes of what they do not. Nothing here
 //! depends on the order of the inputs.
 
-use super::fields::{at, encoding};
+use super::fields::encoding;
 use super::format::{has_gps_time, has_waveforms};
 use super::header::Header;
 use super::input::Input;
 use super::native::Native;
 use super::read::Shift;
+use super::text::{field, split_at_room};
 use super::union::{Records, described};
 use super::vlr::Evlr;
 use crate::error::shown;
@@ -47,7 +48,7 @@ impl Merge {
         waveforms(inputs, &evlrs)?;
         external(inputs)?;
         let mut header = header(inputs);
-        header.put_floats(at::OFFSET, offset);
+        header.put_offset(offset);
         let native = Native { header, vlrs, gap, evlrs, waveforms: None, made: false };
         Ok((native, shifts))
     }
@@ -57,7 +58,7 @@ impl Merge {
 fn agree(a: &Input, b: &Input) -> Result<()> {
     let (one, two) = (&a.header, &b.header);
     same(a, b, "point format", one.format(), two.format())?;
-    same(a, b, "record length", one.record_length(), two.record_length())?;
+    same(a, b, "record length", one.point_data_record_length, two.point_data_record_length)?;
     same(a, b, "scale", one.scale(), two.scale())?;
     if has_gps_time(one.format()) {
         let kind = |h: &Header| match h.encoding() & encoding::GPS_STANDARD {
@@ -120,7 +121,7 @@ fn refuse(a: &Input, b: &Input, why: String) -> Error {
 }
 
 fn short(text: &str) -> String {
-    let (head, tail) = super::text::split_at_room(text, 60);
+    let (head, tail) = split_at_room(text, 60);
     if tail.is_empty() { head.to_owned() } else { format!("{head}…") }
 }
 
@@ -172,36 +173,29 @@ fn header(inputs: &[Input]) -> Header {
     let headers = || inputs.iter().map(|i| &i.header);
     let first = &inputs[0].header;
     let minor = headers().map(Header::minor).max().unwrap_or(4);
-    let custom = first.custom();
-    let custom = if headers().all(|h| h.custom() == custom) { custom } else { &[] };
+    let custom = &first.padding[..];
+    let custom = if headers().all(|h| h.padding == custom) { custom } else { &[] };
     let mut merged = first.resized(minor, custom);
-    let common = |at: usize, len: usize| {
-        let field = &first.bytes()[at..at + len];
-        headers().all(|h| &h.bytes()[at..at + len] == field)
-    };
-    let mut neutral = |at: usize, len: usize, otherwise: &[u8]| {
-        if !common(at, len) {
-            let mut field = otherwise.to_vec();
-            field.resize(len, 0);
-            merged.put(at, &field);
-        }
-    };
-    neutral(at::SOURCE_ID, 2, &[]);
-    neutral(at::GUID, 16, &[]);
-    neutral(at::SYSTEM, 32, b"MERGE");
-    neutral(at::SOFTWARE, 32, &[]);
-    let encodings = headers().fold(0, |all, h| all | h.encoding());
-    merged.put(at::GLOBAL_ENCODING, &encodings.to_le_bytes());
-    let date = |h: &Header| (h.get::<2>(at::YEAR), h.get::<2>(at::DAY));
-    let latest =
-        headers().map(date).max_by_key(|(y, d)| (u16::from_le_bytes(*y), u16::from_le_bytes(*d)));
-    if let Some((year, day)) = latest {
-        merged.put(at::YEAR, &year);
-        merged.put(at::DAY, &day);
+    let alike = |same: fn(&Header, &Header) -> bool| headers().all(|h| same(h, first));
+    if !alike(|a, b| a.file_source_id == b.file_source_id) {
+        merged.file_source_id = 0;
     }
-    if minor >= 3 && headers().any(|h| h.waveform_start() != first.waveform_start()) {
-        merged.put(at::WAVEFORM_START, &[0; 8]);
+    if !alike(|a, b| a.guid == b.guid) {
+        merged.guid = [0; 16];
     }
+    if !alike(|a, b| a.system_identifier == b.system_identifier) {
+        merged.system_identifier = field("MERGE");
+    }
+    if !alike(|a, b| a.generating_software == b.generating_software) {
+        merged.generating_software = [0; 32];
+    }
+    if !alike(|a, b| a.waveform_start() == b.waveform_start()) {
+        merged.start_of_waveform_data_packet_record = None;
+    }
+    merged.global_encoding = headers().fold(0, |all, h| all | h.encoding());
+    let date = |h: &Header| (h.file_creation_year, h.file_creation_day_of_year);
+    let latest = headers().map(date).max();
+    (merged.file_creation_year, merged.file_creation_day_of_year) = latest.unwrap_or_default();
     merged
 }
 

@@ -1,22 +1,22 @@
 //! LAS 1.0 to 1.4 and LAZ, every point format: records byte for byte, headers and variable length
 //! records carried. Knows no tiles and no stages but the two roles it plays.
 //!
-//! [`open`] reads one or several files as a source, [`create`] writes a sink, [`describe`] tells
-//! what a file says of itself. A COPC file is read as the LAZ it is.
+//! [`open`] reads one or several files as a source; [`LAS`] and [`LAZ`] are the formats as a
+//! registry takes them. A COPC file is read as the LAZ it is.
 
 mod chunks;
 mod credit;
 mod crs;
-mod describe;
+pub(crate) mod describe;
 mod described;
 mod encode;
 mod extra;
 mod fields;
 mod file;
-mod format;
+pub(crate) mod format;
 mod guard;
 mod header;
-mod holding;
+pub(crate) mod holding;
 mod input;
 mod laz;
 mod merge;
@@ -24,7 +24,7 @@ mod native;
 mod own;
 mod read;
 mod registered;
-mod sink;
+pub(crate) mod sink;
 mod source;
 mod system;
 mod table;
@@ -34,10 +34,7 @@ mod verify;
 mod vlr;
 mod waveforms;
 
-pub use describe::{Description, ExtraBytes, Record, describe};
-pub use format::{layout, records};
-pub use holding::las_schema;
+pub use format::layout;
 pub use native::fresh;
 pub use registered::{LAS, LAZ, LasFormat};
-pub use sink::{LasOptions, create};
 pub use source::open;

@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use super::crs;
 use super::described::{Described, EXTRA_BYTES, describe};
 use super::extra::Descriptor;
-use super::fields::{at, encoding};
+use super::fields::encoding;
 use super::file::InputFile;
 use super::format::{format_of, record_size};
 use super::header::Header;
 use super::input::{Input, extra_len, is_carried, is_carried_extended};
+use super::text::field;
 use super::vlr::{Evlr, Vlr, read_evlrs, read_vlrs};
 use super::waveforms::Waveforms;
 use crate::Result;
@@ -53,7 +54,7 @@ impl Native {
     /// Fails if the file is another by now.
     pub fn again(file: &InputFile, header: &Header) -> Result<Self> {
         let now = Header::read(file)?;
-        if now != *header {
+        if now.bytes()? != header.bytes()? {
             return Err(file.wrong(0, "the header changed while the file was read"));
         }
         let (mut vlrs, gap, _) = read_vlrs(file, header)?;
@@ -69,7 +70,7 @@ impl Native {
     /// True if it belongs to records of this schema.
     pub fn fits(&self, schema: &Schema) -> bool {
         format_of(schema) == Some(self.header.format())
-            && schema.stride == usize::from(self.header.record_length())
+            && schema.stride == usize::from(self.header.point_data_record_length)
     }
 
     /// A header for points that come from no LAS file: LAS 1.4, records in `schema`'s LAS layout,
@@ -77,11 +78,11 @@ impl Native {
     pub fn fresh(schema: &Schema, crs: Option<&str>) -> Self {
         let format = format_of(schema).unwrap_or(0);
         let length = u16::try_from(schema.stride).unwrap_or(u16::MAX);
-        let mut header = Header::blank(4, format, length);
-        header.put(at::SYSTEM, b"OTHER");
+        let mut header = Header::blank(format, length);
+        header.system_identifier = field("OTHER");
         if let Some(axes) = schema.coordinates() {
-            header.put_floats(at::SCALE, axes.map(|d| d.scale));
-            header.put_floats(at::OFFSET, axes.map(|d| d.origin));
+            header.put_scale(axes.map(|d| d.scale));
+            header.put_offset(axes.map(|d| d.origin));
         }
         let record = crs.and_then(|text| crs::record(text).ok());
         if format >= 6 || crs.is_some_and(|text| record.is_some() && wkt::is_wkt(text)) {
@@ -110,8 +111,8 @@ pub fn fresh(schema: &Schema, crs: Option<&str>) -> Metadata {
 /// So many lost records are named.
 const NAMED: usize = 8;
 
-/// What `metadata` of LAS inputs has and an output of another format does not hold: records that say
-/// more than dimensions and the coordinate reference system, and waveforms that are there.
+/// What `metadata` of LAS inputs has and an output of another format does not hold: records that
+/// say more than dimensions and the coordinate reference system, and waveforms that are there.
 pub fn lost(metadata: &Metadata) -> Vec<String> {
     let native = metadata.native.as_ref().and_then(|native| native.downcast_ref::<Native>());
     let Some(native) = native else { return Vec::new() };

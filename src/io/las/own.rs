@@ -36,8 +36,8 @@ pub fn own_form(schema: &Schema, metadata: &Metadata) -> Result<Option<(Arc<Sche
     Ok((own != *schema).then(|| (Arc::new(own), shift)))
 }
 
-/// A sink of one file's records behind records of several: moves the stored coordinates of each back
-/// by whole steps, so that it is the input's byte for byte.
+/// A sink of one file's records behind records of several: moves the stored coordinates of each
+/// back by whole steps, so that it is the input's byte for byte.
 pub struct Shifted {
     inner: Box<dyn Sink>,
     encoder: Arc<ShiftingEncoder>,

@@ -101,8 +101,8 @@ pub struct LazPart {
 }
 
 impl LazPart {
-    /// Reads `chunks` one after the other, before which the file has `before`. With `in_a_row`, they
-    /// are one stretch of chunks of that many points.
+    /// Reads `chunks` one after the other, before which the file has `before`. With `in_a_row`,
+    /// they are one stretch of chunks of that many points.
     pub fn new(
         file: InputFile,
         (source, shift): (u32, Shift),
@@ -176,8 +176,8 @@ impl LazPart {
         Ok((chunk, left))
     }
 
-    /// A chunk ends where its decoder does. Points behind those that the header leaves for the last one
-    /// are told, if they are points.
+    /// A chunk ends where its decoder does. Points behind those that the header leaves for the last
+    /// one are told, if they are points.
     fn check_end(&mut self, chunk: Chunk) -> Result<()> {
         let ended = match self.in_a_row {
             Some(_) => self.decoder.pause(),
@@ -200,8 +200,8 @@ impl LazPart {
         Ok(())
     }
 
-    /// How many points follow in the chunk, whose points so far were read, up to its last byte; None
-    /// if what follows makes no points of this file.
+    /// How many points follow in the chunk, whose points so far were read, up to its last byte;
+    /// None if what follows makes no points of this file.
     fn uncounted(&mut self, chunk: Chunk) -> Result<Option<u64>> {
         let full = match self.compression.compressor {
             Compressor::PointWise => u64::MAX,

@@ -1,5 +1,5 @@
-//! LAS and LAZ as registered formats: how `read` and `write` come to their files, and how records of
-//! other formats become theirs.
+//! LAS and LAZ as registered formats: how `read` and `write` come to their files, and how records
+//! of other formats become theirs.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -62,8 +62,8 @@ impl Format for LasFormat {
         waveforms::beside(path)
     }
 
-    /// COPC is read as the LAZ that it is, and not written: readers of COPC refuse plain LAZ under its
-    /// name.
+    /// COPC is read as the LAZ that it is, and not written: readers of COPC refuse plain LAZ under
+    /// its name.
     fn promises(&self, path: &Path) -> Option<(&'static str, PathBuf)> {
         let stem = Path::new(path.file_stem()?);
         let is_copc = stem.extension().is_some_and(|e| e.eq_ignore_ascii_case("copc"));
@@ -229,8 +229,8 @@ impl Target {
     }
 }
 
-/// Points of which nothing is known of returns are the first and only one of their pulse: LAS has no
-/// return 0 of 0.
+/// Points of which nothing is known of returns are the first and only one of their pulse: LAS has
+/// no return 0 of 0.
 fn number_returns(
     from: &Schema,
     to: &Schema,

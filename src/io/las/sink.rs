@@ -6,6 +6,7 @@ use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use las::raw::header::Evlr;
 use laz::laszip::{ChunkTable, ChunkTableEntry};
 use laz::{LazVlr, LazVlrBuilder};
 
@@ -13,7 +14,7 @@ use super::credit::{count_gps_time, credit, drop_ranges, name_system};
 use super::described::{Described, describe};
 use super::encode::{ComputedFields, LasEncoder};
 use super::extra::{DESCRIPTOR_BYTES, with_computed};
-use super::fields::{at, encoding};
+use super::fields::encoding;
 use super::format::{format_of, record_size};
 use super::header::{COMPRESSED, Header};
 use super::laz::{CHUNK_POINTS, Compression};
@@ -41,10 +42,11 @@ pub struct LasOptions {
 ///
 /// Header and records come from `metadata` where it is that of LAS inputs, else they are made anew
 /// (see [`fresh`](super::fresh)). Recomputed are the counts of points, the box, the places of
-/// points, extended records and waveforms (where these are in the file), the LAZ bit and its record,
-/// the bit that says that the CRS is WKT, the generating software, with `computed` the record length and
-/// the descriptors of extra bytes; and if the records went through stages (`metadata.pipeline`), the
-/// system identifier, the ranges of extra bytes, and a record that names the stages.
+/// points, extended records and waveforms (where these are in the file), the LAZ bit and its
+/// record, the bit that says that the CRS is WKT, the generating software, with `computed` the
+/// record length and the descriptors of extra bytes; and if the records went through stages
+/// (`metadata.pipeline`), the system identifier, the ranges of extra bytes, and a record that names
+/// the stages.
 ///
 /// # Errors
 ///
@@ -71,16 +73,16 @@ pub fn create(
         drop_ranges(&mut native, schema)?;
     }
     if let Some(axes) = schema.coordinates() {
-        native.header.put_floats(at::SCALE, axes.map(|d| d.scale));
-        native.header.put_floats(at::OFFSET, axes.map(|d| d.origin));
+        native.header.put_scale(axes.map(|d| d.scale));
+        native.header.put_offset(axes.map(|d| d.origin));
     }
     if !encoder.computed.appended.is_empty() {
         describe_computed(&mut native, format, schema, &encoder.computed.appended)?;
     }
     let stride = record_length(schema, &encoder.computed)?;
-    native.header.put(at::RECORD_LENGTH, &stride.to_le_bytes());
+    native.header.point_data_record_length = stride;
     let compressed = if laszip.is_some() { COMPRESSED } else { 0 };
-    native.header.put(at::FORMAT, &[format | compressed]);
+    native.header.point_data_record_format = format | compressed;
     native.vlrs.extend(laszip);
     Ok(Box::new(LasSink::begin(staged, native, Arc::new(encoder), notes)?))
 }
@@ -161,12 +163,12 @@ impl LasSink {
         notes: Vec<String>,
     ) -> Result<Self> {
         let records: usize = native.vlrs.iter().map(Vlr::len).sum();
-        let start = native.header.bytes().len() + records + native.gap.len();
+        let start = usize::from(native.header.header_size) + records + native.gap.len();
         let (Ok(start), Ok(vlrs)) = (u32::try_from(start), u32::try_from(native.vlrs.len())) else {
             return Err(Error::pipeline("the variable length records exceed 4 GiB"));
         };
-        native.header.put(at::POINTS_START, &start.to_le_bytes());
-        native.header.put(at::VLRS, &vlrs.to_le_bytes());
+        native.header.offset_to_point_data = start;
+        native.header.number_of_variable_length_records = vlrs;
         let file = File::create(path).map_err(|e| Error::io(path, "create it", e))?;
         let mut sink = LasSink {
             path: path.to_owned(),
@@ -182,7 +184,7 @@ impl LasSink {
             hi: [i64::MIN; 3],
             notes,
         };
-        let mut head = sink.native.header.bytes().to_vec();
+        let mut head = sink.native.header.bytes()?;
         for i in 0..sink.native.vlrs.len() {
             sink.native.vlrs[i].append(&mut head)?;
             if head.len() > HEAD_BYTES {
@@ -213,7 +215,7 @@ impl LasSink {
 
     /// The chunk table at the end of the points, and its place in front of them.
     fn write_table(&mut self) -> Result<()> {
-        let start = u64::from(self.native.header.points_start());
+        let start = u64::from(self.native.header.offset_to_point_data);
         let place = self.at;
         let vlr: LazVlr = LazVlrBuilder::default()
             .with_point_format(0, 0)
@@ -246,14 +248,11 @@ impl LasSink {
             let is_waveforms = evlr.position() == waveforms || evlr.is("LASF_Spec", 65535);
             if internal && is_waveforms && self.native.header.minor() >= 3 {
                 let here = self.at;
-                self.native.header.put(at::WAVEFORM_START, &here.to_le_bytes());
+                self.native.header.start_of_waveform_data_packet_record = Some(here);
             }
             evlr.stream(|bytes| self.write(bytes))?;
         }
-        if self.native.header.minor() >= 4 {
-            self.native.header.put(at::EVLR_START, &start.to_le_bytes());
-            self.native.header.put(at::EVLRS, &count.to_le_bytes());
-        }
+        self.native.header.evlr = Some(Evlr { start_of_first_evlr: start, number_of_evlrs: count });
         Ok(())
     }
 
@@ -321,7 +320,7 @@ impl Sink for LasSink {
         }
         self.write_evlrs()?;
         self.settle_header()?;
-        let header = self.native.header.bytes().to_vec();
+        let header = self.native.header.bytes()?;
         self.rewrite(0, &header)?;
         self.file.sync_all().map_err(|e| Error::io(&self.path, "write it to disk", e))?;
         Ok(SinkSummary { points: self.points, bytes: self.at, notes: self.notes })

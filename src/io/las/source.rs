@@ -112,7 +112,8 @@ impl Opened {
         list + compression.state_bytes()
     }
 
-    /// Opens a part, its points looked at. Coordinates and returns are in layers that are always decoded.
+    /// Opens a part, its points looked at. Coordinates and returns are in layers that are always
+    /// decoded.
     fn open(&self, place: &PartPlace, selection: Layers) -> Result<Box<dyn Part>> {
         let part = self.unwatched(place, selection)?;
         Ok(Box::new(Watched::new(part, self.evidence.clone(), place.number, self.shift.0)))
@@ -124,8 +125,8 @@ impl Opened {
         let (before, chunks, in_a_row): (u64, Vec<Chunk>, _) = match &self.input.storage {
             Storage::Plain => {
                 let header = &self.input.header;
-                let each = u64::from(header.record_length());
-                let at = u64::from(header.points_start()) + place.first * each;
+                let each = u64::from(header.point_data_record_length);
+                let at = u64::from(header.offset_to_point_data) + place.first * each;
                 return Ok(Box::new(PlainPart { file, source, at, left: place.count, shift }));
             }
             Storage::Laz(_, Chunks::InARow { all, chunk_points }) => {

@@ -43,8 +43,8 @@ impl CrsRecords {
         self.vlrs == other.vlrs && self.payloads == other.payloads
     }
 
-    /// True if both say the same: the same bytes, WKT of one wording, or the same EPSG codes; in the
-    /// latter cases with the same units.
+    /// True if both say the same: the same bytes, WKT of one wording, or the same EPSG codes; in
+    /// the latter cases with the same units.
     pub fn same_system(&self, other: &Self) -> Result<bool> {
         if self.payloads == other.payloads {
             return Ok(true);

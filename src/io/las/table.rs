@@ -1,15 +1,15 @@
-//! The chunks of a LAZ file in little memory: a file may have millions of chunks of a point each. Knows
-//! not where its figures come from.
+//! The chunks of a LAZ file in little memory: a file may have millions of chunks of a point each.
+//! Knows not where its figures come from.
 
 /// Small chunks are read together until a part has this many points.
 const PART_POINTS: u64 = 50_000;
-/// Bytes that the sizes of all chunks take at most, besides one for so many points: a budget has room for
-/// them before it is known, and no writer needs as many for less than 8 million chunks.
+/// Bytes that the sizes of all chunks take at most, besides one for so many points: a budget has
+/// room for them before it is known, and no writer needs as many for less than 8 million chunks.
 const SIZES_MOST: u64 = 16 << 20;
 const POINTS_A_BYTE: u64 = 4096;
 
-/// Bytes of sizes that stand in one piece, or a part more: a list that grows would for a moment be held
-/// twice.
+/// Bytes of sizes that stand in one piece, or a part more: a list that grows would for a moment be
+/// held twice.
 const PIECE: usize = 64 << 10;
 
 /// One chunk: its stretch of the file and its points.

@@ -11,3 +11,11 @@ pub fn split_at_room(text: &str, room: usize) -> (&str, &str) {
     let fits = |&end: &usize| text.is_char_boundary(end);
     text.split_at((0..=room.min(text.len())).rev().find(fits).unwrap_or(0))
 }
+
+/// A field of `N` bytes that holds `text`, or as much of it as fits.
+pub fn field<const N: usize>(text: &str) -> [u8; N] {
+    let (text, _) = split_at_room(text, N);
+    let mut field = [0; N];
+    field[..text.len()].copy_from_slice(text.as_bytes());
+    field
+}

@@ -104,7 +104,8 @@ impl Item for Evlr {
     }
 }
 
-/// Equal lists as they are, else all that is in any of them, in the order of user, number and bytes.
+/// Equal lists as they are, else all that is in any of them, in the order of user, number and
+/// bytes.
 struct Union<T> {
     first: Vec<T>,
     /// Sorted, no two equal; empty while all lists are equal.

@@ -1,6 +1,6 @@
-//! The points of a file held against what its header says of them. LAZ has no checksum: damage inside
-//! a chunk decodes to other points, which the header's box and counts can tell. Knows what was found,
-//! not what a run does about it.
+//! The points of a file held against what its header says of them. LAZ has no checksum: damage
+//! inside a chunk decodes to other points, which the header's box and counts can tell. Knows what
+//! was found, not what a run does about it.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -129,8 +129,8 @@ impl Evidence {
         lock(&self.gathered).warnings.clone()
     }
 
-    /// True if `records`, which no header counts, can be points of this file: they are in its box and
-    /// no return number exceeds the number of returns. False where there is no box to tell.
+    /// True if `records`, which no header counts, can be points of this file: they are in its box
+    /// and no return number exceeds the number of returns. False where there is no box to tell.
     pub fn are_likely(&self, records: &[u8], stride: usize) -> bool {
         let (mask, shift) = self.return_bits;
         self.claimed.is_some_and(|claimed| {
@@ -201,11 +201,12 @@ impl Evidence {
         told.into_iter().flatten().map(contradiction).collect()
     }
 
-    /// Points outside of the box. A wider box than needed is that of a file that once had more points.
+    /// Points outside of the box. A wider box than needed is that of a file that once had more
+    /// points.
     ///
-    /// Behind damage, a compressed chunk is other points, while the first of each chunk is stored as it
-    /// is: a box that holds no point at all is its writer's mistake. In a plain file, single points
-    /// are damaged.
+    /// Behind damage, a compressed chunk is other points, while the first of each chunk is stored
+    /// as it is: a box that holds no point at all is its writer's mistake. In a plain file, single
+    /// points are damaged.
     fn of_box(&self, header: &Header, found: &Found) -> Option<(usize, String, bool)> {
         let claimed = self.claimed.filter(|_| found.outside > 0)?;
         let [lo, hi] = header.bounds();
@@ -218,7 +219,8 @@ impl Evidence {
             let digits = (0..9).find(steps).unwrap_or(9);
             let name = ["x", "y", "z"][i];
             format!(
-                "{name} from {} to {} there and from {one:.digits$} to {two:.digits$} in the points",
+                "{name} from {} to {} there and from {one:.digits$} to {two:.digits$} in the \
+                 points",
                 lo[i], hi[i]
             )
         };
@@ -239,8 +241,8 @@ impl Evidence {
     }
 
     /// Counts of points by return that are others than the header's. One that has none, or whose
-    /// counts exceed its points, was not kept up by its writer, and points without return numbers say
-    /// nothing: some writers count those among the first returns.
+    /// counts exceed its points, was not kept up by its writer, and points without return numbers
+    /// say nothing: some writers count those among the first returns.
     fn of_returns(&self, header: &Header, found: &Found) -> Option<(usize, String, bool)> {
         let (field, width, counts) = header.returns();
         let sum = counts.iter().fold(0u64, |sum, n| sum.saturating_add(*n));

@@ -1,6 +1,6 @@
 //! Variable length records (LAS 1.4 R15, sections 2.5 and 2.7), carried as their bytes. Extended
-//! ones stay in their file until they are written: one may hold gigabytes of waveforms. So do others
-//! where there are many bytes of them.
+//! ones stay in their file until they are written: one may hold gigabytes of waveforms. So do
+//! others where there are many bytes of them.
 
 use std::borrow::Cow;
 use std::cmp::Ordering;
@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::fields::{at, encoding};
 use super::file::InputFile;
 use super::header::Header;
-use super::text::{split_at_room, text};
+use super::text::{field, text};
 use crate::budget::Bytes;
 use crate::error::shown;
 use crate::io::origin::Origin;
@@ -19,16 +19,17 @@ use crate::{Error, ErrorKind, Result};
 pub const VLR_HEAD: usize = 54;
 /// Bytes of an extended record's head.
 pub const EVLR_HEAD: usize = 60;
-/// Bytes of variable length records that are held in memory, of one file or as the union of several: a
-/// budget has room for them before it is known. More of those that mean something here are refused, more
-/// of others are left in their files.
+/// Bytes of variable length records that are held in memory, of one file or as the union of
+/// several: a budget has room for them before it is known. More of those that mean something here
+/// are refused, more of others are left in their files.
 const BYTES_HELD: u64 = 8 << 20;
 /// Variable length records, and as many extended ones, whose heads are held in memory.
 const RECORDS_HELD: usize = 1 << 14;
 /// Bytes between the records and the points that are carried; more are dropped with a warning.
 const GAP_CARRIED: u64 = 64 << 10;
 
-/// True for records whose payload means something here: systems, extra bytes, how points are compressed.
+/// True for records whose payload means something here: systems, extra bytes, how points are
+/// compressed.
 fn is_read(user: &str, record: u16) -> bool {
     let users = ["LASF_Projection", "liblas", "laszip encoded"];
     users.contains(&user) || (user, record) == ("LASF_Spec", 4)
@@ -54,10 +55,8 @@ impl Vlr {
     /// A new record; `payload` must be shorter than 64 KiB.
     pub fn new(user: &str, record: u16, description: &str, payload: Vec<u8>) -> Self {
         let mut head = [0; VLR_HEAD];
-        for (field, at, room) in [(user, 2, 16), (description, 22, 32)] {
-            let (field, _) = split_at_room(field, room);
-            head[at..at + field.len()].copy_from_slice(field.as_bytes());
-        }
+        head[2..18].copy_from_slice(&field::<16>(user));
+        head[22..].copy_from_slice(&field::<32>(description));
         head[18..20].copy_from_slice(&record.to_le_bytes());
         Vlr { head, payload: Payload::Held(Arc::default()) }.with_payload(payload)
     }
@@ -249,9 +248,9 @@ impl Evlr {
 /// The variable length records of a file and the bytes between them and the points (a point start
 /// signature in LAS 1.0). The second value is a warning, if there is one.
 pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>, Option<String>)> {
-    let start = header.bytes().len() as u64;
-    let end = u64::from(header.points_start());
-    let claimed = header.vlrs();
+    let start = u64::from(header.header_size);
+    let end = u64::from(header.offset_to_point_data);
+    let claimed = header.number_of_variable_length_records;
     if u64::from(claimed) > (end - start) / VLR_HEAD as u64 {
         return Err(file
             .wrong(
@@ -270,24 +269,10 @@ pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>
     let (mut at, mut held) = (start, 0);
     let (origin, room) = (Arc::new(file.origin().clone()), end - start <= BYTES_HELD);
     for i in 0..claimed {
-        if end - at < VLR_HEAD as u64 {
-            return Err(file
-                .wrong(at, format!("record {i} of {claimed} begins behind the points"))
-                .help("the record count or the start of the points is damaged"));
-        }
-        let mut head = [0; VLR_HEAD];
-        file.read_at(&mut head, at)?;
-        let len = u16::from_le_bytes([head[20], head[21]]);
+        let head = read_head(file, at, end, i, claimed)?;
         at += VLR_HEAD as u64;
-        if u64::from(len) > end - at {
-            return Err(file
-                .wrong(
-                    at - VLR_HEAD as u64,
-                    format!("record {i} of {claimed} has {len} bytes and runs into the points"),
-                )
-                .help("the record count, this length or the start of the points is damaged"));
-        }
         let mut vlr = Vlr { head, payload: Payload::Left(origin.clone(), at) };
+        let len = vlr.payload_len();
         if room || is_read(&vlr.user(), vlr.record()) {
             vlr.payload = Payload::Held(file.bytes(at, usize::from(len))?.into());
             held += vlr.held();
@@ -311,6 +296,24 @@ pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>
         return Ok((vlrs, Vec::new(), Some(warning)));
     }
     Ok((vlrs, file.bytes(at, gap as usize)?, None))
+}
+
+/// The head of record `i` of `claimed`, which begins at byte `at` and has room up to byte `end`.
+fn read_head(file: &InputFile, at: u64, end: u64, i: u32, claimed: u32) -> Result<[u8; VLR_HEAD]> {
+    let Some(room) = (end - at).checked_sub(VLR_HEAD as u64) else {
+        return Err(file
+            .wrong(at, format!("record {i} of {claimed} begins behind the points"))
+            .help("the record count or the start of the points is damaged"));
+    };
+    let mut head = [0; VLR_HEAD];
+    file.read_at(&mut head, at)?;
+    let len = u16::from_le_bytes([head[20], head[21]]);
+    if u64::from(len) > room {
+        return Err(file
+            .wrong(at, format!("record {i} of {claimed} has {len} bytes and runs into the points"))
+            .help("the record count, this length or the start of the points is damaged"));
+    }
+    Ok(head)
 }
 
 /// What is to be done about records that are not held.
@@ -352,7 +355,7 @@ pub fn read_evlrs(file: &InputFile, header: &Header) -> Result<Vec<Evlr>> {
         return Ok(Vec::new());
     }
     let room = file.len().saturating_sub(at);
-    if u64::from(claimed) > room / EVLR_HEAD as u64 || at < header.bytes().len() as u64 {
+    if u64::from(claimed) > room / EVLR_HEAD as u64 || at < u64::from(header.header_size) {
         return Err(file
             .wrong(
                 field,

@@ -1,5 +1,5 @@
-//! Waveform packets in a file of their own (LAS 1.4 R15, section 2.4, bit 2 of the global encoding): it
-//! has the name of the LAS file and the extension `wdp`.
+//! Waveform packets in a file of their own (LAS 1.4 R15, section 2.4, bit 2 of the global
+//! encoding): it has the name of the LAS file and the extension `wdp`.
 
 use std::path::{Path, PathBuf};
 
@@ -31,8 +31,8 @@ impl Waveforms {
         let told = there.is_none() && bits & encoding::WAVEFORM_EXTERNAL != 0;
         let missing = told.then(|| {
             format!(
-                "its records refer to waveforms in {}, which is not there: those of outputs will refer \
-                 to nothing",
+                "its records refer to waveforms in {}, which is not there: those of outputs will \
+                 refer to nothing",
                 shown(&path.with_extension(EXTENSION))
             )
         });
@@ -46,8 +46,8 @@ fn named(path: &Path) -> Option<PathBuf> {
     names.into_iter().find(|path| path.is_file())
 }
 
-/// The file of waveforms that a LAS file refers to, and the extension that it has beside outputs; None as
-/// well for what is no LAS file, which whoever reads its points will be told.
+/// The file of waveforms that a LAS file refers to, and the extension that it has beside outputs;
+/// None as well for what is no LAS file, which whoever reads its points will be told.
 pub fn beside(path: &Path) -> Option<(PathBuf, &'static str)> {
     named(path)?;
     let header = Header::read(&InputFile::open(path).ok()?).ok()?;

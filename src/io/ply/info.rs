@@ -49,8 +49,11 @@ pub struct PropertyInfo {
     pub kind: String,
 }
 
-/// Reads the header of the PLY file at `path`. Fails if it cannot be read or is no PLY header;
-/// counts are told as claimed.
+/// Reads the header of the PLY file at `path`; counts are told as claimed.
+///
+/// # Errors
+///
+/// A file that cannot be read or has no PLY header.
 pub fn describe(path: &Path) -> Result<PlyInfo> {
     let (file, origin) = Origin::open(path)?;
     let bytes = origin.length();

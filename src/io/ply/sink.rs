@@ -21,8 +21,12 @@ use crate::{Error, Result};
 const CARRY: usize = 1 << 18;
 
 /// Creates a PLY file at `staged` for records of `schema`. Records of another format are converted
-/// to the properties of [`super::ply_schema`]. Fails if a dimension cannot be written
-/// or `drop` names none, or if the file cannot be created.
+/// to the properties of [`ply_schema`](super::vertex::ply_schema).
+///
+/// # Errors
+///
+/// A dimension that cannot be written, a name in `drop` that is none, and a file that cannot be
+/// created.
 pub fn create(
     staged: &Path,
     options: &PlyOptions,

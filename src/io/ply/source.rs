@@ -43,8 +43,12 @@ pub(super) struct Rest {
 }
 
 /// Opens PLY files that agree in encoding, vertex properties and coordinate reference system: their
-/// headers, and what stands before the vertices. Fails on a file that is no PLY, has no vertices
-/// with `x`, `y` and `z`, has lists in them, or is too short for the count it claims.
+/// headers, and what stands before the vertices.
+///
+/// # Errors
+///
+/// A file that is no PLY, has no vertices with `x`, `y` and `z`, has lists in them, or is too short
+/// for the count it claims; files that do not agree.
 pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
     Ok(Box::new(PlySource::open(paths)?))
 }
@@ -319,7 +323,7 @@ impl Source for PlySource {
     }
 
     fn inputs(&self) -> Vec<Input> {
-        let input = |f: &PlyFile| Input { path: f.path.clone(), points: f.points, beside: None };
+        let input = |f: &PlyFile| Input::new(&f.path, f.points);
         self.files.iter().map(input).collect()
     }
 

@@ -126,7 +126,7 @@ pub(super) struct SettledCells {
 }
 
 impl SettledCells {
-    pub fn is_aligned(self) -> bool {
+    pub(crate) fn is_aligned(self) -> bool {
         self.steps.count_ones() == 1
     }
 }

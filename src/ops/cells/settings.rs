@@ -10,6 +10,7 @@ use crate::quantity::Length;
 
 /// Side of the initial cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Side {
     /// The smallest power of two of lattice steps for which occupied cubes hold 32 positions on
     /// average.
@@ -33,6 +34,7 @@ pub enum Split {
 
 /// What the positions of a cell have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub enum By {
     /// Their class: no cell has positions of two, so that a reduction leaves points of each.
     Classification,

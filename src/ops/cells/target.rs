@@ -9,6 +9,7 @@ use crate::quantity::parse_count;
 
 /// How many records are to stay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Keep {
     /// A share of the records that the stage decides about, in millionths of a percent.
     Share(u64),

@@ -8,6 +8,7 @@ use crate::geom::star::Star;
 /// How a normal is estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Method {
     /// Least-squares height function z = ax + by + c over a first estimate: the mean normal of the
     /// Delaunay triangles around the point (the paper's Algorithm 1, after Várady).

@@ -9,6 +9,7 @@ use crate::point::Position;
 /// To which side normals point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Orient {
     /// No side: the sign means nothing, and the component of largest magnitude is positive. `cells`
     /// turns the normals of each cell to one side.

@@ -25,7 +25,10 @@ pub struct RadiusOutliers {
 
 impl RadiusOutliers {
     /// Outliers are what has fewer than `min_neighbors` (1 to 64) other positions within `radius`.
-    /// An error names the key to blame.
+    ///
+    /// # Errors
+    ///
+    /// A number out of bounds, with the key to blame.
     pub fn new(
         radius: Length,
         min_neighbors: usize,

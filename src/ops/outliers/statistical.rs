@@ -32,7 +32,11 @@ pub struct StatisticalOutliers {
 
 impl StatisticalOutliers {
     /// Outliers are what is farther from its `neighbors` (1 to 64) nearest than the scan's mean and
-    /// `multiplier` (0 or more) times its σ. An error names the key to blame.
+    /// `multiplier` (0 or more) times its σ.
+    ///
+    /// # Errors
+    ///
+    /// A number out of bounds, with the key to blame.
     pub fn new(
         neighbors: usize,
         multiplier: f64,

@@ -1,13 +1,13 @@
 //! The arithmetic decoder: symbols from a stream of bytes.
 //!
-//! It never fails in the middle: what no encoder can have written and bytes that are not there are kept
-//! in mind, and asked for after some points. No step depends on them for its safety: every symbol is one
-//! of its model, whatever the bytes are.
+//! It never fails in the middle: what no encoder can have written and bytes that are not there are
+//! kept in mind, and asked for after some points. No step depends on them for its safety: every
+//! symbol is one of its model, whatever the bytes are.
 //!
-//! Each symbol waits for the interval that the one before left: a shift, a division, a look into a table,
-//! two products. Nothing else is to stand in that way: the interval of a stream is held in a [`Cursor`],
-//! which the compiler can keep in registers, and what would be a branch that nothing can foresee is
-//! computed.
+//! Each symbol waits for the interval that the one before left: a shift, a division, a look into a
+//! table, two products. Nothing else is to stand in that way: the interval of a stream is held in a
+//! [`Cursor`], which the compiler can keep in registers, and what would be a branch that nothing
+//! can foresee is computed.
 //!
 //! Source: A. Said, HPL-2004-76, section 3, with the constants of the LAZ specification 1.4.
 
@@ -69,7 +69,8 @@ impl Coder {
         self.wrong
     }
 
-    /// True if an encoder can have ended here: its last bytes are determined by where its interval lies.
+    /// True if an encoder can have ended here: its last bytes are determined by where its interval
+    /// lies.
     pub fn is_end(&self) -> bool {
         if self.length > 2 * SHORTEST {
             (1..=SHORTEST).contains(&self.value)

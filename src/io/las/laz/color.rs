@@ -1,4 +1,5 @@
-//! Colours, byte by byte: red from the colour before, green and blue from how red and green changed.
+//! Colours, byte by byte: red from the colour before, green and blue from how red and green
+//! changed.
 //!
 //! Source: LAZ specification 1.4, sections of RGB12 (versions 1 and 2), RGB14 and RGBNIR14.
 

@@ -1,8 +1,8 @@
 //! What fields beside a point of formats 6 to 10 were in each scanner channel.
 //!
-//! The point tells the other fields its channel. Version 3 does so only where the channel changes, and
-//! takes the value before from the channel before unless the new one is new: faults of LASzip that its
-//! files hold, and that version 4 is without.
+//! The point tells the other fields its channel. Version 3 does so only where the channel changes,
+//! and takes the value before from the channel before unless the new one is new: faults of LASzip
+//! that its files hold, and that version 4 is without.
 
 /// The value before, and what is learned, of each of four scanner channels.
 pub struct Contexts<V, M> {

@@ -3,8 +3,8 @@
 use super::coder::Coder;
 use crate::Error;
 
-/// What is wrong with a stream of compressed points, and where that was seen. What is damaged may lie
-/// before it.
+/// What is wrong with a stream of compressed points, and where that was seen. What is damaged may
+/// lie before it.
 #[derive(Debug)]
 pub struct Damage {
     /// What is wrong.

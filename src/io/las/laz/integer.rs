@@ -1,5 +1,5 @@
-//! Whole numbers, as their difference from a prediction: how many bits the difference has, then where
-//! it lies among the numbers of so many bits.
+//! Whole numbers, as their difference from a prediction: how many bits the difference has, then
+//! where it lies among the numbers of so many bits.
 //!
 //! Source: LAZ specification 1.4, section "Integer compression".
 

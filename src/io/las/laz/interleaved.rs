@@ -1,5 +1,5 @@
-//! Chunks of formats 0 to 5, and files without chunks: the fields of each point after each other, in one
-//! stream.
+//! Chunks of formats 0 to 5, and files without chunks: the fields of each point after each other,
+//! in one stream.
 
 use super::coder::{Coder, Cursor};
 use super::color::{self, Rgb};

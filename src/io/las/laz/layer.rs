@@ -1,9 +1,10 @@
 //! One layer of points: its stream, and what is learned of each scanner channel.
 //!
-//! X, y and returns come first, for a block of points; what the other layers need to know of each point
-//! is noted. Then each other layer is read for the block by a loop of its own: a small loop, whose branches
-//! are learned and whose interval stays in registers. A loop point by point through all layers would
-//! read them at the same time, too, but every branch that was foreseen wrongly ends that.
+//! X, y and returns come first, for a block of points; what the other layers need to know of each
+//! point is noted. Then each other layer is read for the block by a loop of its own: a small loop,
+//! whose branches are learned and whose interval stays in registers. A loop point by point through
+//! all layers would read them at the same time, too, but every branch that was foreseen wrongly
+//! ends that.
 
 use super::coder::{Coder, Cursor};
 use super::stream::Bytes;
@@ -110,8 +111,8 @@ pub struct Block<'a> {
 }
 
 impl Block<'_> {
-    /// Reads two layers, point by point in one loop: each symbol of a layer waits for the one before, and
-    /// the two wait at the same time.
+    /// Reads two layers, point by point in one loop: each symbol of a layer waits for the one
+    /// before, and the two wait at the same time.
     #[inline(always)]
     pub fn read_both<A: Learned, B: Learned>(
         &mut self,

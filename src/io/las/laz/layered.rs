@@ -1,4 +1,5 @@
-//! Chunks of formats 6 to 10: a stream for each field, which needs no other but that of x, y and returns.
+//! Chunks of formats 6 to 10: a stream for each field, which needs no other but that of x, y and
+//! returns.
 
 use super::coder::{Coder, Cursor};
 use super::color::{self, Infrared, Rgb};
@@ -107,11 +108,9 @@ impl Fields {
 
     /// Reads those of a block, which begin at byte `at` of each record.
     fn read(&mut self, contexts: &[u8], records: &mut [u8], stride: usize, at: usize) {
-        let points = records.chunks_exact_mut(stride).zip(contexts);
-        let points = points
-            .filter_map(|(record, &context)| Some((usize::from(context), record.get_mut(at..)?)));
         match self {
             Fields::Color(all, layer) => {
+                let points = points_from(at, contexts, records, stride);
                 let new = || Box::new(color::Second::new());
                 layer.each(all, new, points, |models, last, cursor, out| {
                     if let Some(cursor) = cursor {
@@ -121,6 +120,7 @@ impl Fields {
                 });
             }
             Fields::Infrared(all, layer) => {
+                let points = points_from(at, contexts, records, stride);
                 let new = || Box::new(Infrared::new());
                 layer.each(all, new, points, |models, last, cursor, out| {
                     if let Some(cursor) = cursor {
@@ -132,6 +132,7 @@ impl Fields {
                 });
             }
             Fields::Wave(all, layer) => {
+                let points = points_from(at, contexts, records, stride);
                 let new = || Box::new(Waves::new());
                 layer.each(all, new, points, |models, last, cursor, out| {
                     if let Some(cursor) = cursor {
@@ -143,12 +144,8 @@ impl Fields {
                 });
             }
             Fields::Bytes(bytes) => {
-                drop(points);
                 for (i, (all, layer)) in bytes.iter_mut().enumerate() {
-                    let points = records.chunks_exact_mut(stride).zip(contexts);
-                    let points = points.filter_map(|(record, &context)| {
-                        Some((usize::from(context), record.get_mut(at + i..)?))
-                    });
+                    let points = points_from(at + i, contexts, records, stride);
                     let new = || Box::new(const { Model::new(256) });
                     layer.each(
                         all,
@@ -167,6 +164,17 @@ impl Fields {
             }
         }
     }
+}
+
+/// The scanner channel of each point of a block, and its record from byte `at` on.
+fn points_from<'a>(
+    at: usize,
+    contexts: &'a [u8],
+    records: &'a mut [u8],
+    stride: usize,
+) -> impl Iterator<Item = (usize, &'a mut [u8])> {
+    let points = records.chunks_exact_mut(stride).zip(contexts);
+    points.filter_map(move |(record, &context)| Some((usize::from(context), record.get_mut(at..)?)))
 }
 
 /// The decoder of layered chunks.
@@ -213,7 +221,8 @@ impl Layered {
         }
     }
 
-    /// Reads these layers alone; the fields of others stay what they are in the first point of a chunk.
+    /// Reads these layers alone; the fields of others stay what they are in the first point of a
+    /// chunk.
     pub fn select(&mut self, wanted: Layers) {
         self.wanted = wanted;
     }

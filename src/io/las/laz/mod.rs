@@ -1,29 +1,32 @@
 //! Compressed points (LAZ): a decoder that is safe by construction, tells damage and is quick.
 //!
-//! LAZ predicts each field of a point from the points before and stores what is left by an arithmetic
-//! coder, whose models follow the data. It has no checksum, and each symbol can only be read when the one
-//! before is known.
+//! LAZ predicts each field of a point from the points before and stores what is left by an
+//! arithmetic coder, whose models follow the data. It has no checksum, and each symbol can only be
+//! read when the one before is known.
 //!
-//! *Safe.* No step can fail or leave its buffers, whatever the bytes are: each symbol is one of its model,
-//! bytes behind the end of a stream are zeros, and streams are read by windows, so that no claimed size
-//! allocates anything. What cannot be right is kept in mind and asked for after some points.
+//! *Safe.* No step can fail or leave its buffers, whatever the bytes are: each symbol is one of its
+//! model, bytes behind the end of a stream are zeros, and streams are read by windows, so that no
+//! claimed size allocates anything. What cannot be right is kept in mind and asked for after some
+//! points.
 //!
-//! *Damage shows at the end of a stream.* The encoder's last bytes are determined by where its interval
-//! lies, and it pads them so that the decoder, which reads ahead, ends exactly with them. Points decoded
-//! from other bytes nearly never lead there. In layered chunks every layer has such an end.
+//! *Damage shows at the end of a stream.* The encoder's last bytes are determined by where its
+//! interval lies, and it pads them so that the decoder, which reads ahead, ends exactly with them.
+//! Points decoded from other bytes nearly never lead there. In layered chunks every layer has such
+//! an end.
 //!
 //! *Quick.* `coder` and `layer` say how.
 //!
 //! | module | holds |
 //! |---|---|
-//! | `stream`, `coder`, `model`, `integer` | bytes, symbols, what symbols are likely, whole numbers |
+//! | `stream`, `coder`, `model`, `integer` | bytes, symbols, how likely they are, whole numbers |
 //! | `predict` | what a point is predicted from |
 //! | `point10`, `time`, `color`, `wave` | fields of formats 0 to 5, two of them layers as well |
 //! | `layer`, `places`, `point14`, `context` | the layers of formats 6 to 10 |
 //! | `interleaved`, `layered` | chunks of the two |
 //! | `record` | the laszip record; encoding, by the `laz` crate |
 //!
-//! Source: LAZ specification 1.4, and LASzip 3.5 and the `laz` crate where it leaves something open.
+//! Source: LAZ specification 1.4, and LASzip 3.5 and the `laz` crate where it leaves something
+//! open.
 
 mod coder;
 mod color;

@@ -2,13 +2,14 @@
 //! alike from the symbols so far.
 //!
 //! The arithmetic is the format's own and has to be kept to the bit. How a symbol is looked up in a
-//! distribution is free, and that is where a decoder spends its time: a table from the upper bits of the
-//! code value gives a symbol that is right in most cases, and a scan upwards mends the others. LASzip
-//! has tables with four symbols an entry on average and searches by halving, whose branches nothing can
-//! foresee; entries for less than a symbol make most scans end where they begin.
+//! distribution is free, and that is where a decoder spends its time: a table from the upper bits
+//! of the code value gives a symbol that is right in most cases, and a scan upwards mends the
+//! others. LASzip has tables with four symbols an entry on average and searches by halving, whose
+//! branches nothing can foresee; entries for less than a symbol make most scans end where they
+//! begin.
 //!
-//! Source: A. Said, "Introduction to Arithmetic Coding – Theory and Practice", HPL-2004-76, section 3;
-//! the constants are those of the LAZ specification 1.4.
+//! Source: A. Said, "Introduction to Arithmetic Coding – Theory and Practice", HPL-2004-76, section
+//! 3; the constants are those of the LAZ specification 1.4.
 
 /// Bits of a probability.
 pub const BITS: u32 = 15;

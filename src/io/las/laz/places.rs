@@ -131,7 +131,8 @@ impl Places {
         self.now
     }
 
-    /// Reads a block of points into records that else are as `first`; notes what the layers need to know.
+    /// Reads a block of points into records that else are as `first`; notes what the layers need to
+    /// know.
     pub fn read(&mut self, first: &Record, notes: &mut Notes, records: &mut [u8], stride: usize) {
         let mut cursor = self.coder.enter(BLOCK * MOST);
         notes.run_count = 0;

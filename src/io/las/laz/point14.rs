@@ -148,8 +148,8 @@ impl Point14 {
         now
     }
 
-    /// Moves the layers to where they are: one after the other from byte `at`, of these lengths. The
-    /// byte behind the last.
+    /// Moves the layers to where they are: one after the other from byte `at`, of these lengths.
+    /// The byte behind the last.
     pub fn move_to(&mut self, mut at: u64, lengths: &[u64; LAYERS], wanted: Layers) -> u64 {
         for (i, ((coder, is_read), length)) in self.layers().into_iter().zip(lengths).enumerate() {
             *is_read = wanted.has_point(i) && (i == 0 || *length > 0);
@@ -192,6 +192,13 @@ impl Point14 {
     /// Reads the next points, [`BLOCK`] at most; the contexts that they give to the other fields.
     pub fn read(&mut self, records: &mut [u8], stride: usize) -> &[u8; BLOCK] {
         self.places.read(&self.first, &mut self.notes, records, stride);
+        self.read_all(records, stride);
+        self.read_changes(records, stride);
+        &self.notes.contexts
+    }
+
+    /// The layers that have a symbol for each point.
+    fn read_all(&mut self, records: &mut [u8], stride: usize) {
         let mut block = Block { notes: &self.notes, records, stride };
         block.read_both(
             &mut self.heights,
@@ -224,6 +231,16 @@ impl Point14 {
                 record[at::FLAGS] = (*last & 15) | ((channel as u8) << 4) | ((*last & 0x30) << 2);
             },
         );
+        block.read(&mut self.users, |models, last, cursor, _, _, record| {
+            let place = usize::from(*last >> 2);
+            *last = cursor.symbol(learned(&mut models.0[place], 256)) as u8;
+            record[at::USER] = *last;
+        });
+    }
+
+    /// The layers that have symbols only where x, y and returns said that the field changes.
+    fn read_changes(&mut self, records: &mut [u8], stride: usize) {
+        let mut block = Block { notes: &self.notes, records, stride };
         block.read_both(
             &mut self.angles,
             |models, last, cursor, note, _, record| {
@@ -241,17 +258,11 @@ impl Point14 {
                 put(record, at::TIME, last.to_le_bytes());
             },
         );
-        block.read(&mut self.users, |models, last, cursor, _, _, record| {
-            let place = usize::from(*last >> 2);
-            *last = cursor.symbol(learned(&mut models.0[place], 256)) as u8;
-            record[at::USER] = *last;
-        });
         block.read(&mut self.sources, |models, last, cursor, note, _, record| {
             if note.source_changed {
                 *last = models.read(cursor, i32::from(*last), 0) as u16;
             }
             put(record, at::SOURCE, last.to_le_bytes());
         });
-        &self.notes.contexts
     }
 }

@@ -1,4 +1,5 @@
-//! What the next point is predicted from: recent differences, and the place of a return in its pulse.
+//! What the next point is predicted from: recent differences, and the place of a return in its
+//! pulse.
 
 /// The median of about five recent values.
 #[derive(Clone, Copy)]
@@ -19,8 +20,8 @@ impl Median {
         self.values[2]
     }
 
-    /// Puts `value` in place of the largest or the smallest: of the other one next time if it lies on
-    /// that side of the median.
+    /// Puts `value` in place of the largest or the smallest: of the other one next time if it lies
+    /// on that side of the median.
     #[inline(always)]
     pub fn add(&mut self, value: i32) {
         let first = usize::from(!self.high);

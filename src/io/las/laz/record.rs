@@ -171,8 +171,9 @@ impl Compression {
         Ok(parsed.items().clone())
     }
 
-    /// Upper estimate of what a decoder or an encoder holds besides records: models of what was learned,
-    /// of four scanner channels, and a window of each stream. Each extra byte has models of its own.
+    /// Upper estimate of what a decoder or an encoder holds besides records: models of what was
+    /// learned, of four scanner channels, and a window of each stream. Each extra byte has models
+    /// of its own.
     pub fn state_bytes(&self) -> u64 {
         let of = |kinds: [u16; 2]| {
             let items = self.items.iter().filter(move |item| kinds.contains(&item.kind));
@@ -257,7 +258,8 @@ fn check_items(items: &[Item], format: u8, stride: u16) -> Result<(), String> {
     Ok(())
 }
 
-/// The items that we write. LASzip knows version 1 alone of the waveform packets of formats 4 and 5.
+/// The items that we write. LASzip knows version 1 alone of the waveform packets of formats 4 and
+/// 5.
 fn default_items(format: u8, stride: u16) -> Vec<Item> {
     let version = |kind| match kind {
         9 => 1,

@@ -8,8 +8,8 @@ pub const WINDOW: usize = 8 << 10;
 /// Bytes behind the window that may be looked at.
 const PAD: usize = 8;
 
-/// The bytes of a window. Places beyond it are places in it again, so that no read needs a check: what is
-/// read beyond the bytes of the file is found out later.
+/// The bytes of a window. Places beyond it are places in it again, so that no read needs a check:
+/// what is read beyond the bytes of the file is found out later.
 pub type Buffer = [u8; WINDOW + PAD];
 
 /// A stretch of a file. Behind its end are zeros.

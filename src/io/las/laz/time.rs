@@ -1,7 +1,8 @@
-//! GPS times: differences between their bits as whole numbers, as multiples of the difference before, in
-//! up to four sequences at once.
+//! GPS times: differences between their bits as whole numbers, as multiples of the difference
+//! before, in up to four sequences at once.
 //!
-//! Source: LAZ specification 1.4, sections of GPSTIME11 (versions 1 and 2) and of the GPS time layer.
+//! Source: LAZ specification 1.4, sections of GPSTIME11 (versions 1 and 2) and of the GPS time
+//! layer.
 
 use super::coder::Cursor;
 use super::integer::Integers;
@@ -77,7 +78,8 @@ impl Times {
     /// False if only the sequence was changed.
     #[inline(always)]
     fn step(&mut self, coder: &mut Cursor, kind: Kind) -> bool {
-        // The symbols of a layer are those of an item without the one for a time that did not change.
+        // The symbols of a layer are those of an item without the one for a time that did not
+        // change.
         let skipped = usize::from(kind == Kind::Layer);
         if self.differences[self.now] == 0 {
             match coder.symbol(&mut self.kinds) + skipped {
@@ -169,7 +171,8 @@ pub struct First {
 }
 
 impl First {
-    /// Multiplier of a time that is far, and of one that did not change, where there is a difference.
+    /// Multiplier of a time that is far, and of one that did not change, where there is a
+    /// difference.
     const FAR: usize = 510;
 
     /// Nothing is learned yet.
