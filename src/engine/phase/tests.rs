@@ -1,6 +1,7 @@
 //! Whole runs, of which the phases are compared with the list, and all that items came to with what
 //! text brings back of it.
 
+use std::num::NonZero;
 use std::path::Path;
 use std::sync::Mutex;
 
@@ -36,13 +37,14 @@ impl Watch for Told {
 }
 
 fn graph() -> Graph {
-    let mut settings = RunSettings::default();
-    settings.threads = std::num::NonZero::new(2);
-    settings.tile_points = std::num::NonZero::new(900);
-    settings.memory = Some(4 << 30);
-    settings.spill = SpillSetting::Always;
-    settings.nonfinite = Nonfinite::Drop;
-    Graph::new(settings)
+    Graph::new(RunSettings {
+        threads: NonZero::new(2),
+        tile_points: NonZero::new(900),
+        memory: Some(4 << 30),
+        spill: SpillSetting::Always,
+        nonfinite: Nonfinite::Drop,
+        ..RunSettings::default()
+    })
 }
 
 fn scan(seed: u64) -> Role {
