@@ -258,16 +258,21 @@ impl Demands {
         usize::try_from(share).unwrap_or(usize::MAX)
     }
 
+    /// What is held while records are brought into the order of the inputs, behind the tiles of a
+    /// pass.
+    pub fn ordering(&self) -> Holders {
+        let ordering = self.by_threads(ordering_bytes(self.points, self.columns.row));
+        Holders::of([("ordering of records", ordering)]).with(&self.outputs())
+    }
+
     /// The most that any phase holds.
     fn work(&self, run_records: u64, tile_positions: u64) -> Holders {
         let survey = Holders::of([("survey", self.by_threads(survey_bytes()))]);
-        let ordering = self.by_threads(ordering_bytes(self.points, self.columns.row));
-        let ordering = Holders::of([("ordering of records", ordering)]).with(&self.outputs());
         self.mill(self.threads, tile_positions)
             .larger(self.decode(run_records))
             .larger(self.merge(run_records))
             .larger(survey)
-            .larger(if self.ranked { ordering } else { Holders::default() })
+            .larger(if self.ranked { self.ordering() } else { Holders::default() })
     }
 
     pub(super) fn least(&self) -> Holders {

@@ -263,6 +263,11 @@ impl Course<'_, '_> {
         let mut milled = grind(job, pass, &cut, field, &sieve, growing, lists)?;
         drop(sieve);
         tally.merge(&milled.tally);
+        if !ordered.is_empty() {
+            // The arenas of the tiles are gone.
+            working.clear();
+            *working = job.budget.lease_all(&job.task.demands.ordering(), "ordering")?;
+        }
         self.write_lists(job, tiles, &milled.lists, ordered, &mut tally)?;
         let said = std::mem::take(&mut milled.written);
         let outcomes = milled.counts.outputs.iter().copied().zip(said);

@@ -12,6 +12,8 @@ use crate::{Error, Result};
 
 /// Working memory that a thread makes use of; more goes to keeping the scan in memory.
 const THREAD_MOST: Bytes = Bytes(192 << 20);
+/// Positions of a tile beyond which a larger one gains nothing: its rim is thin beside it.
+const TILE_MOST: u64 = 3 << 18;
 /// What tiles larger than planned leave for the list of all tiles.
 pub const MILL_SPARE: Bytes = Bytes(1 << 20);
 /// By how much what is resident before a run differs from process to process: a budget that is
@@ -92,7 +94,9 @@ impl Demands {
         if !self.mills {
             return Ok(shares);
         }
-        let most = self.by_threads(THREAD_MOST).0.max(least);
+        let useful = self.mill(self.threads, TILE_MOST);
+        let useful = useful.larger(self.decode(self.most_records())).sum();
+        let most = self.by_threads(THREAD_MOST).min(useful).0.max(least);
         let work = (least + spare / SPARE.1 * SPARE.0).min(most);
         let runs = work.saturating_sub(self.decode(0).sum().0) / (self.threads as u64).max(1);
         let records = (runs / self.intake().0).min(self.most_records());

@@ -9,9 +9,8 @@
 //! use pointmill::tile::{Fate, Tile};
 //!
 //! let mut tile = Tile::of(vec![[0, 0, 0], [1, 0, 3]]);
-//! tile.normals[0] = [0.0, 0.0, 1.0];
 //! // The second position is three lattice steps above the plane through the first.
-//! assert_eq!(removal::represent(&mut tile, 1, 0), 1);
+//! assert_eq!(removal::represent(&mut tile, 1, 0, [0.0, 0.0, 1.0]), 1);
 //! assert_eq!(tile.fates, [Fate::Kept, Fate::Represented { deviation: 3.0 }]);
 //! // Nothing of it is left to be removed.
 //! assert_eq!(removal::remove(&mut tile, 1), 0);

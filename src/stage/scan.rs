@@ -24,9 +24,17 @@ pub trait ScanOp: TileOp {
     /// The first phase, called for every tile, from several threads at once. Summaries are stored
     /// in the order of the tiles, which is that of their positions; what they say together must not
     /// depend on how tiles are cut.
+    ///
+    /// # Errors
+    ///
+    /// As [`run`](TileOp::run).
     fn gather(&self, tile: &mut Tile, tally: &mut Tally) -> Result<Self::Summary>;
 
     /// Called once, between the phases. Returns what the user is to be warned of.
+    ///
+    /// # Errors
+    ///
+    /// Those of reading what was gathered, and figures that the scan does not allow.
     fn conclude(&mut self, gathered: &dyn Gathered<Self::Summary>) -> Result<Option<String>>;
 }
 
@@ -62,6 +70,10 @@ impl<T: Pod> Summary for Vec<T> {
 /// What the tiles of a first phase left, wherever it is stored.
 pub trait Gathered<S> {
     /// Calls `visit` with the summary of every tile, in their order; as often as one likes.
+    ///
+    /// # Errors
+    ///
+    /// Those of reading it, and of `visit`.
     fn each(&self, visit: &mut dyn FnMut(S) -> Result<()>) -> Result<()>;
 
     /// Records that the stage decides about.
@@ -74,15 +86,27 @@ pub trait AnyScanOp: TileOp {
     fn gather_needs(&self) -> Needs;
 
     /// See [`ScanOp::gather`]; appends the summary as it is stored.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`ScanOp::gather`].
     fn gather_into(&self, tile: &mut Tile, tally: &mut Tally, bytes: &mut Vec<u8>) -> Result<()>;
 
     /// See [`ScanOp::conclude`].
+    ///
+    /// # Errors
+    ///
+    /// Those of [`ScanOp::conclude`].
     fn conclude_from(&mut self, stored: &dyn StoredSummaries) -> Result<Option<String>>;
 }
 
 /// Stored summaries, of whatever stage.
 pub trait StoredSummaries {
     /// As [`Gathered::each`], with the bytes of each.
+    ///
+    /// # Errors
+    ///
+    /// Those of reading it, and of `visit`.
     fn each(&self, visit: &mut dyn FnMut(&[u8]) -> Result<()>) -> Result<()>;
 
     /// As [`Gathered::records`].
