@@ -334,11 +334,11 @@ fn chunks(
     computed: &[Vec<ComputedDimension>],
     source: &dyn Source,
 ) -> Result<Vec<ChunkSize>> {
-    let chunk = |(sink, computed): (&Box<dyn CreateSink>, &Vec<ComputedDimension>)| {
+    let each = sinks.iter().zip(computed).map(|(sink, computed)| {
         let metadata = Metadata { computed: computed.clone(), ..source.metadata().clone() };
         sink.chunk(source.schema(), &metadata)
-    };
-    sinks.iter().zip(computed).map(chunk).collect()
+    });
+    each.collect()
 }
 
 /// What z is multiplied by where stages measure distances; else 1.

@@ -14,18 +14,12 @@ use crate::point::Position;
 ///
 /// Two positions that follow each other in Morton order are in different cubes of side 2^j exactly
 /// when the highest bit in which they differ is at or above j; so one count per bit is enough.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Levels {
     first: bool,
     /// For each bit, in halves: `serde` knows arrays of no more than 32.
     splits: [[u64; 32]; 2],
     positions: u64,
-}
-
-impl Default for Levels {
-    fn default() -> Self {
-        Levels { first: false, splits: [[0; 32]; 2], positions: 0 }
-    }
 }
 
 impl Levels {

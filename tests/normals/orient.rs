@@ -94,7 +94,7 @@ fn a_viewpoint_sees_the_side_of_every_surface_that_faces_it() {
         let scan = sphere(center);
         let outwards = |tile: &Tile, i: usize| {
             let p = tile.positions[i];
-            let n = normals(&tile)[i];
+            let n = normals(tile)[i];
             (0..3).map(|a| (p[a] - center[a]) as f64 * f64::from(n[a])).sum::<f64>() > 0.0
         };
         let world = center.map(|v| v as f64 * STEP);

@@ -199,7 +199,8 @@ fn a_column_goes_into_every_format_and_into_outputs_in_any_order() {
         rises("d.ply", &format!("{ply}\nencoding = 'binary'")).into_values().collect();
     let mut las: Vec<f64> = expected.into_values().collect();
     let mut ply = ply;
-    (las.sort_by(f64::total_cmp), ply.sort_by(f64::total_cmp));
+    las.sort_by(f64::total_cmp);
+    ply.sort_by(f64::total_cmp);
     assert!(ply == las, "PLY has the same values");
 }
 

@@ -1,6 +1,7 @@
 //! Whole runs, of which the phases are compared with the list, and all that items came to with what
 //! text brings back of it.
 
+use std::num::NonZero;
 use std::path::Path;
 use std::sync::Mutex;
 
@@ -36,13 +37,14 @@ impl Watch for Told {
 }
 
 fn graph() -> Graph {
-    let mut settings = RunSettings::default();
-    settings.threads = std::num::NonZero::new(2);
-    settings.tile_points = std::num::NonZero::new(900);
-    settings.memory = Some(4 << 30);
-    settings.spill = SpillSetting::Always;
-    settings.nonfinite = Nonfinite::Drop;
-    Graph::new(settings)
+    Graph::new(RunSettings {
+        threads: NonZero::new(2),
+        tile_points: NonZero::new(900),
+        memory: Some(4 << 30),
+        spill: SpillSetting::Always,
+        nonfinite: Nonfinite::Drop,
+        ..RunSettings::default()
+    })
 }
 
 fn scan(seed: u64) -> Role {
@@ -59,7 +61,7 @@ fn phases(graph: Graph) -> (Vec<RunPhase>, Vec<String>) {
     (listed, names)
 }
 
-/// Runs the graph and compares the report with the list, of which this is what is told.
+/// Runs the graph and compares the report with the list, of which `expected` is told.
 fn has(graph: Graph, expected: &[&str]) -> Vec<RunPhase> {
     let (listed, names) = phases(graph);
     assert_eq!(names, expected);
@@ -81,53 +83,49 @@ fn inputs(at: &Path) -> Role {
     role::<Read>(json!({ "path": at }))
 }
 
-#[test]
-fn a_report_has_the_phases_of_the_list_and_items_come_to_what_text_can_hold() {
-    let at = tempfile::tempdir().unwrap();
-    let write = |keys: Value| role::<Write>(keys);
-    let file = |name: &str| write(json!({ "path": at.path().join("out").join(name) }));
-    let (read, scans) = (at.path().join("in"), tempfile::tempdir().unwrap());
-    std::fs::create_dir_all(at.path().join("out")).unwrap();
-    std::fs::create_dir_all(&read).unwrap();
-
-    // A chain into an output in canonical order, another in the input's, and a folder.
+/// A chain into an output in canonical order, another in the input's, and a folder.
+fn chain(at: &Path) -> Graph {
     let mut chain = graph();
-    chain.add("read", inputs(&read), &[]);
+    chain.add("read", inputs(&at.join("in")), &[]);
     chain.add("normals", role::<Normals>(json!({})), &[0]);
     chain.add("cells", role::<Cells>(json!({ "max_angle": "8deg" })), &[1]);
     chain.add("median", role::<Median>(json!({})), &[2]);
-    chain.add("write", file("a.las"), &[3]);
-    let ranked = json!({ "path": at.path().join("out/b.las"), "order": "input" });
-    chain.add("write", write(ranked), &[3]);
-    chain.add("write", write(json!({ "folder": scans.path() })), &[3]);
-    let listed = has(chain, &["decode", "merge", "mill", "write", "write", "survey"]);
-    assert_eq!(
-        listed[2..6],
-        [RunPhase::Look(0), RunPhase::Mill(0), RunPhase::Write(2), RunPhase::Write(1)]
-    );
+    chain.add("write", role::<Write>(json!({ "path": at.join("a.las") })), &[3]);
+    let ranked = json!({ "path": at.join("b.las"), "order": "input" });
+    chain.add("write", role::<Write>(ranked), &[3]);
+    chain.add("write", role::<Write>(json!({ "folder": at.join("each") })), &[3]);
+    chain
+}
 
-    // A stage of two phases on one branch, a stage that streams behind tiles on another.
+/// A stage of two phases on one branch, a stage that streams behind tiles on another.
+fn branches(at: &Path) -> Graph {
     let mut branches = graph();
     branches.add("synth", scan(3), &[]);
     branches.add("normals", role::<Normals>(json!({ "neighbors": "auto" })), &[0]);
     branches.add("cells", role::<Cells>(json!({ "keep": "10%" })), &[1]);
     branches.add("median", role::<Median>(json!({})), &[2]);
-    branches.add("write", file("c.las"), &[3]);
+    branches.add("write", role::<Write>(json!({ "path": at.join("c.las") })), &[3]);
     branches.add("grid", role::<Grid>(json!({ "side": 2.0 })), &[0]);
     branches.add("filter", role::<Filter>(json!({ "keep_classes": [2, 5] })), &[5]);
-    branches.add("write", file("d.laz"), &[6]);
-    let listed = phases(branches);
-    let named: Vec<&str> = listed.0.iter().filter_map(|phase| phase.name()).collect();
-    assert_eq!(listed.1, named);
+    branches.add("write", role::<Write>(json!({ "path": at.join("d.laz") })), &[6]);
+    branches
+}
+
+#[test]
+fn a_report_has_the_phases_of_the_list_and_items_come_to_what_text_can_hold() {
+    let at = tempfile::tempdir().unwrap();
+    std::fs::create_dir(at.path().join("in")).unwrap();
+    let listed = has(chain(at.path()), &["decode", "merge", "mill", "write", "write", "survey"]);
+    let looks = [RunPhase::Look(0), RunPhase::Mill(0), RunPhase::Write(2), RunPhase::Write(1)];
+    assert_eq!(listed[2..6], looks);
+    let (listed, names) = phases(branches(at.path()));
+    let named: Vec<&str> = listed.iter().filter_map(|phase| phase.name()).collect();
+    assert_eq!(names, named);
     let count = |name: &str| named.iter().filter(|one| **one == name).count();
     assert_eq!((count("decode"), count("gather"), count("survey")), (1, 1, 2), "{named:?}");
 
     // Every tally of these runs was written down and read again on its way.
     let longest = written::longest();
-    let went = |name: &str| {
-        let all = longest.iter().filter(|(of, _)| of.contains(name)).map(|(_, bytes)| *bytes);
-        all.max().unwrap_or(0)
-    };
     for (name, least) in [
         ("(u64, pointmill::report::tally::Tally)", 60),
         ("Merged", 1_000),
@@ -139,6 +137,7 @@ fn a_report_has_the_phases_of_the_list_and_items_come_to_what_text_can_hold() {
         ("ScanSurvey", 1_000),
         ("Pair<pointmill::report::sums::Distances>", 60),
     ] {
-        assert!(went(name) >= least, "{name}: {longest:?}");
+        let texts = longest.iter().filter(|(of, _)| of.contains(name)).map(|(_, bytes)| *bytes);
+        assert!(texts.max() >= Some(least), "{name}: {longest:?}");
     }
 }
