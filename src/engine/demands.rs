@@ -12,11 +12,12 @@ use super::outlet::A_THREAD;
 use super::pass::{ColumnBytes, decides_by_normals};
 use super::placed::{BATCH, Placed};
 use super::product::Product;
+use super::shares::Demands;
 use super::survey::survey_bytes;
 use crate::budget::{Bytes, Holders};
 use crate::geom::nearest::Nearest;
 use crate::report::Baseline;
-use crate::stage::{ChunkSize, Needs, Source};
+use crate::stage::Needs;
 use crate::store::{FATE_BYTES, Intake, Pieces, RecordState, SealedTiles, merge_bytes, ref_bytes};
 use crate::tile::{Loader, Remote};
 
@@ -29,81 +30,7 @@ const RUNS: u64 = 64;
 const THREAD_OVERHEAD: Bytes = Bytes(3 << 20);
 const PROCESS_OVERHEAD: Bytes = Bytes(6 << 20);
 
-/// What the division depends on.
-#[derive(Debug, Clone)]
-pub struct Demands {
-    /// Bound of the process's resident memory.
-    pub limit: u64,
-    /// Resident before the run.
-    pub resident: u64,
-    /// Worker threads.
-    pub threads: usize,
-    /// Bytes of a record.
-    pub stride: usize,
-    /// Points that the headers claim.
-    pub points: u64,
-    /// Bytes that reading a part holds.
-    pub part_bytes: u64,
-    /// What the largest chunk of a sink is.
-    pub chunk: ChunkSize,
-    /// Sinks that are written at once.
-    pub sinks: usize,
-    /// Bytes of the lists of records by input, where each input has an output of its own.
-    pub lists: Bytes,
-    /// True if the run needs tiles; else it streams.
-    pub mills: bool,
-    /// True if records have tags.
-    pub tagged: bool,
-    /// True if an output wants the order of the inputs.
-    pub ranked: bool,
-    /// Records that a run has at most, if something other than the memory bounds it.
-    pub run_most: Option<u64>,
-    /// True if stages stream behind stages that work on tiles.
-    pub filters: bool,
-    /// Outcomes of passes that are there at once: states and fates.
-    pub standings: usize,
-    /// True if a stage decides by figures of the whole scan, which are kept until it does.
-    pub gathers: bool,
-    /// True if a stage decides about cells together: how many points those have only the decode
-    /// tells.
-    pub has_cells: bool,
-    /// Bytes that columns take for each position, at most.
-    pub columns: ColumnBytes,
-    /// What the stages of each pass need.
-    pub passes: Vec<Vec<Needs>>,
-}
-
 impl Demands {
-    /// The demands of `source` into sinks with these chunks.
-    pub fn of(source: &dyn Source, chunks: &[ChunkSize], limit: u64, threads: usize) -> Self {
-        let largest = |of: fn(&ChunkSize) -> u64| chunks.iter().map(of).max().unwrap_or(0);
-        let chunk = ChunkSize {
-            points: largest(|chunk| chunk.points as u64) as usize,
-            bytes: largest(|chunk| chunk.bytes),
-        };
-        Demands {
-            limit,
-            resident: crate::host::process::resident_now().unwrap_or(8 << 20),
-            threads,
-            stride: source.schema().stride,
-            points: source.points(),
-            part_bytes: source.part_bytes(),
-            chunk,
-            sinks: chunks.len(),
-            lists: Bytes(0),
-            mills: false,
-            tagged: false,
-            ranked: false,
-            run_most: None,
-            standings: 2,
-            filters: false,
-            gathers: false,
-            has_cells: false,
-            columns: ColumnBytes::default(),
-            passes: Vec::new(),
-        }
-    }
-
     /// What the program holds whatever it does.
     pub fn base(&self) -> Holders {
         Holders::of([

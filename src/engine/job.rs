@@ -1,5 +1,5 @@
-//! What every phase of a run shares: the task, the stages as they settled, the memory, and how it is
-//! told to stop.
+//! What every phase of a run shares: the task, the stages as they settled, the memory, and how it
+//! is told to stop.
 //!
 //! Phases change none of it while their threads work, so threads share it without locks but for
 //! warnings. Between phases stages settle by what is known of the scan by then; all else stays as

@@ -15,7 +15,7 @@ mod chunks;
 mod clock;
 mod cut;
 mod decode;
-pub(crate) mod demands;
+mod demands;
 mod each;
 mod encoding;
 mod filtering;

@@ -4,9 +4,10 @@
 //! read, and a budget that is too small is refused with the one that would do. A sum that 64 bits
 //! do not hold is refused like any that is too large ([`Bytes`]).
 
-use super::demands::Demands;
+use super::pass::ColumnBytes;
 use crate::budget::{Bytes, Holders, at_least_mebibytes, at_most_mebibytes, whole_mebibytes};
 use crate::report::Grouped;
+use crate::stage::{ChunkSize, Needs, Source};
 use crate::store::{Block, FATE_BYTES, RecordState, ref_bytes};
 use crate::{Error, Result};
 
@@ -19,6 +20,50 @@ pub const MILL_SPARE: Bytes = Bytes(1 << 20);
 /// By how much what is resident before a run differs from process to process: a budget that is
 /// named must do in the next.
 const RESIDENT_VARIES: Bytes = Bytes(1 << 20);
+
+/// What the division depends on.
+#[derive(Debug, Clone)]
+pub struct Demands {
+    /// Bound of the process's resident memory.
+    pub limit: u64,
+    /// Resident before the run.
+    pub resident: u64,
+    /// Worker threads.
+    pub threads: usize,
+    /// Bytes of a record.
+    pub stride: usize,
+    /// Points that the headers claim.
+    pub points: u64,
+    /// Bytes that reading a part holds.
+    pub part_bytes: u64,
+    /// What the largest chunk of a sink is.
+    pub chunk: ChunkSize,
+    /// Sinks that are written at once.
+    pub sinks: usize,
+    /// Bytes of the lists of records by input, where each input has an output of its own.
+    pub lists: Bytes,
+    /// True if the run needs tiles; else it streams.
+    pub mills: bool,
+    /// True if records have tags.
+    pub tagged: bool,
+    /// True if an output wants the order of the inputs.
+    pub ranked: bool,
+    /// Records that a run has at most, if something other than the memory bounds it.
+    pub run_most: Option<u64>,
+    /// True if stages stream behind stages that work on tiles.
+    pub filters: bool,
+    /// Outcomes of passes that are there at once: states and fates.
+    pub standings: usize,
+    /// True if a stage decides by figures of the whole scan, which are kept until it does.
+    pub gathers: bool,
+    /// True if a stage decides about cells together: how many points those have only the decode
+    /// tells.
+    pub has_cells: bool,
+    /// Bytes that columns take for each position, at most.
+    pub columns: ColumnBytes,
+    /// What the stages of each pass need.
+    pub passes: Vec<Vec<Needs>>,
+}
 
 /// The division.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,6 +83,36 @@ pub struct Shares {
 }
 
 impl Demands {
+    /// The demands of `source` into sinks with these chunks.
+    pub fn of(source: &dyn Source, chunks: &[ChunkSize], limit: u64, threads: usize) -> Self {
+        let largest = |of: fn(&ChunkSize) -> u64| chunks.iter().map(of).max().unwrap_or(0);
+        let chunk = ChunkSize {
+            points: largest(|chunk| chunk.points as u64) as usize,
+            bytes: largest(|chunk| chunk.bytes),
+        };
+        Demands {
+            limit,
+            resident: crate::host::process::resident_now().unwrap_or(8 << 20),
+            threads,
+            stride: source.schema().stride,
+            points: source.points(),
+            part_bytes: source.part_bytes(),
+            chunk,
+            sinks: chunks.len(),
+            lists: Bytes(0),
+            mills: false,
+            tagged: false,
+            ranked: false,
+            run_most: None,
+            standings: 2,
+            filters: false,
+            gathers: false,
+            has_cells: false,
+            columns: ColumnBytes::default(),
+            passes: Vec::new(),
+        }
+    }
+
     /// The least limit in whole mebibytes with which `millers` of the threads have tiles of
     /// `positions` positions, rim included, whatever of the scan is kept in memory by then.
     pub fn limit_for_tile(&self, millers: usize, positions: u64) -> u64 {

@@ -1,15 +1,14 @@
 //! What the engine runs: a pipeline whose stages fit each other, its inputs and the memory.
 //!
 //! It is made by the plan and says everything that a run depends on, so the engine asks neither the
-//! pipeline's text nor its graph. A run changes none of it. The tile stages are not in it, since they
-//! settle by what they see of the scan: those the run takes for itself.
+//! pipeline's text nor its graph. A run changes none of it. The tile stages are not in it, since
+//! they settle by what they see of the scan: those the run takes for itself.
 
 use std::sync::Arc;
 
 use super::beside::Beside;
-use super::demands::Demands;
 use super::pass::{Branch, Pass, PassFilter};
-use super::shares::Shares;
+use super::shares::{Demands, Shares};
 use super::tagger::Tagger;
 use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
