@@ -153,16 +153,8 @@ mod tests {
     use crate::ErrorKind;
     use crate::budget::Budget;
     use crate::host::Threads;
-    use crate::store::{Folder, Intake, SpillArea, Tag, TileStore, seal};
-
-    #[derive(Debug)]
-    struct In(PathBuf);
-
-    impl Folder for In {
-        fn file(&self, name: &str) -> Result<PathBuf> {
-            Ok(self.0.join(name))
-        }
-    }
+    use crate::store::spill::tests::In;
+    use crate::store::{Intake, SpillArea, Tag, TileStore, seal};
 
     const STRIDE: usize = 37;
     const RECORDS: u64 = 30_000;

@@ -236,21 +236,12 @@ impl Pieces {
 #[cfg(test)]
 mod tests {
     use std::fs;
-    use std::path::{Path, PathBuf};
+    use std::path::Path;
 
     use super::*;
     use crate::ErrorKind;
     use crate::budget::Budget;
-    use crate::store::Folder;
-
-    #[derive(Debug)]
-    struct In(PathBuf);
-
-    impl Folder for In {
-        fn file(&self, name: &str) -> Result<PathBuf> {
-            Ok(self.0.join(name))
-        }
-    }
+    use crate::store::spill::tests::In;
 
     fn area(at: &Path, memory: u64) -> Arc<SpillArea> {
         SpillArea::new(Budget::new(1 << 30), memory, Box::new(In(at.to_owned())))

@@ -317,13 +317,14 @@ impl Drop for Spill {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::path::Path;
 
     use super::*;
 
+    /// A folder for files of tests.
     #[derive(Debug)]
-    struct In(PathBuf);
+    pub struct In(pub PathBuf);
 
     impl Folder for In {
         fn file(&self, name: &str) -> Result<PathBuf> {
