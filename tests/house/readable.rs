@@ -21,28 +21,6 @@ fn own_code() -> Vec<(String, String)> {
     each.collect()
 }
 
-/// Names that types of LAS share, with each other or with a type that more of the crate knows. The
-/// decoder of each item of a record has its own `First` or `Second` version, `Fields`, `Layer` and
-/// `Kind`, in files that do not meet; the others are private to the format.
-const SHARED_IN_LAS: [&str; 16] = [
-    "Block",
-    "Bytes",
-    "Bytewise",
-    "Fields",
-    "First",
-    "Gathered",
-    "Input",
-    "Item",
-    "Kind",
-    "Layer",
-    "Median",
-    "Normals",
-    "Record",
-    "Second",
-    "Symbols256",
-    "Table",
-];
-
 /// The types that a text declares. Those of traits and instruction sets (`F32`, `F64`, `Mask`) stand
 /// within an `impl`, as types of the same name must.
 fn declared(text: &str) -> impl Iterator<Item = &str> {
@@ -75,11 +53,7 @@ fn no_two_types_have_one_name() {
     let files = own_code();
     let count = files.iter().flat_map(|(_, text)| declared(text)).count();
     assert!(count > 300, "{count} types");
-    let mut shared = shared(&files);
-    let outside = |file: &&&str| !file.starts_with("io/las/");
-    shared.retain(|name, files| {
-        !SHARED_IN_LAS.contains(name) || files.iter().filter(outside).count() > 1
-    });
+    let shared = shared(&files);
     assert!(shared.is_empty(), "{shared:#?}");
 }
 

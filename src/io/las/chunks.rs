@@ -5,7 +5,7 @@ use super::file::InputFile;
 use super::header::Header;
 use super::laz::{Compression, Compressor, Damage, Numbers, Why};
 pub use super::table::Chunk;
-use super::table::Table;
+use super::table::ChunkList;
 use crate::error::shown;
 use crate::{Error, Result};
 
@@ -19,7 +19,7 @@ const TABLE_OFFSET_BYTES: u64 = 8;
 #[derive(Debug, Clone)]
 pub enum Chunks {
     /// Known one by one: they can be read in any order.
-    Known(Table),
+    Known(ChunkList),
     /// Known to follow each other: they are read in one go.
     InARow {
         /// All of them; `points` as the header claims.
@@ -41,12 +41,12 @@ impl Chunks {
         let points = header.points();
         let start = u64::from(header.offset_to_point_data);
         if points == 0 {
-            return Ok((Chunks::Known(Table::default()), None));
+            return Ok((Chunks::Known(ChunkList::default()), None));
         }
         if compression.compressor == Compressor::PointWise {
             let all = Chunk { start, end, points, whole: true };
             plausible(file, all)?;
-            return Ok((Chunks::Known(Table::of(all)), None));
+            return Ok((Chunks::Known(ChunkList::of(all)), None));
         }
         let first = start + TABLE_OFFSET_BYTES;
         if first > file.len() {
@@ -130,7 +130,7 @@ impl<T: Into<String>> From<T> for Unusable {
 }
 
 /// Refuses a file of more chunks than are held.
-fn too_many(file: &InputFile, chunks: &Table) -> Error {
+fn too_many(file: &InputFile, chunks: &ChunkList) -> Error {
     let (chunks, points) = (chunks.chunks(), chunks.points());
     let told =
         format!("its first {chunks} chunks hold {points} points: that is a table too long to hold");
@@ -150,7 +150,7 @@ fn table(
     let at = table_start(file, start).map_err(Unusable::Failed)?;
     let at = at.ok_or("the file has no chunk table where it says")?;
     let variable = compression.chunk_points.is_none();
-    let mut chunks = Table::default();
+    let mut chunks = ChunkList::default();
     let (mut byte, mut left, mut unread) = (start + TABLE_OFFSET_BYTES, points, 0u64);
     let entry = |bytes: u64, held: u64| {
         if left == 0 {
@@ -260,9 +260,9 @@ fn entries(
 }
 
 /// The chunks of a layered file without a usable table: each says how long its layers are.
-fn walk(file: &InputFile, first: u64, points: u64, compression: &Compression) -> Result<Table> {
+fn walk(file: &InputFile, first: u64, points: u64, compression: &Compression) -> Result<ChunkList> {
     let (mut start, mut left) = (first, points);
-    let mut chunks = Table::default();
+    let mut chunks = ChunkList::default();
     while left > 0 {
         let head = layered_head(file, start, file.len(), compression)?;
         let held = head.points.min(left);

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::chunks::Chunks;
 use super::crs;
 use super::format::has_gps_time;
-use super::input::{Input, Storage};
+use super::input::{LasInput, Storage};
 use super::laz::Compressor;
 use super::text::text;
 use crate::Result;
@@ -98,7 +98,7 @@ pub struct Record {
 ///
 /// As [`open`](super::open).
 pub fn describe(path: &Path) -> Result<Description> {
-    let input = Input::open(path)?;
+    let input = LasInput::open(path)?;
     let (header, schema) = (&input.header, input.schema());
     let [min, max] = header.bounds();
     let (compressor, chunk_points, chunks) = storage(&input.storage);
@@ -159,7 +159,7 @@ fn storage(storage: &Storage) -> (&'static str, Option<u32>, Option<u64>) {
     (compressor, compression.chunk_points.filter(|_| !whole_file), count)
 }
 
-fn records(input: &Input) -> Vec<Record> {
+fn records(input: &LasInput) -> Vec<Record> {
     let record = |v: &super::vlr::Vlr| Record {
         user_id: v.user(),
         record_id: v.record(),
@@ -169,7 +169,7 @@ fn records(input: &Input) -> Vec<Record> {
     input.vlrs.iter().map(record).collect()
 }
 
-fn extended(input: &Input) -> Vec<Record> {
+fn extended(input: &LasInput) -> Vec<Record> {
     let record = |v: &super::vlr::Evlr| Record {
         user_id: v.user(),
         record_id: v.record(),

@@ -49,7 +49,7 @@ pub enum Storage {
 
 /// One LAS or LAZ file.
 #[derive(Debug, Clone)]
-pub struct Input {
+pub struct LasInput {
     /// Its path.
     pub path: PathBuf,
     /// What the file was when it was opened.
@@ -72,7 +72,7 @@ pub struct Input {
     pub warnings: Vec<String>,
 }
 
-impl Input {
+impl LasInput {
     /// Reads everything but the points of `path`.
     pub fn open(path: &Path) -> Result<Self> {
         let file = InputFile::open(path)?;
@@ -104,7 +104,7 @@ impl Input {
         warnings.extend(odd.map(path_said));
         let waveforms = Waveforms::of(&path, &header);
         warnings.extend(waveforms.missing.clone().map(path_said));
-        Ok(Input {
+        Ok(LasInput {
             path,
             origin,
             header,
@@ -173,7 +173,7 @@ impl Input {
     /// The same without the records, whose payloads of thousands of files would add up.
     pub fn without_records(self) -> Self {
         let described = Described::default();
-        Input { vlrs: Vec::new(), gap: Vec::new(), evlrs: Vec::new(), described, ..self }
+        LasInput { vlrs: Vec::new(), gap: Vec::new(), evlrs: Vec::new(), described, ..self }
     }
 
     /// The records that say in which coordinate reference system the points are.

@@ -4,7 +4,7 @@
 use super::fields::encoding;
 use super::format::{has_gps_time, has_waveforms};
 use super::header::Header;
-use super::input::Input;
+use super::input::LasInput;
 use super::native::Native;
 use super::read::Shift;
 use super::text::{field, split_at_room};
@@ -21,25 +21,25 @@ const WHOLE: f64 = 1e-6;
 /// of their records the union.
 pub struct Merge {
     /// The first, with its records: the others are compared with it.
-    first: Input,
+    first: LasInput,
     records: Records,
 }
 
 impl Merge {
     /// Begins with one file.
-    pub fn of(first: Input) -> Result<Self> {
+    pub fn of(first: LasInput) -> Result<Self> {
         Ok(Merge { records: Records::of(&first)?, first })
     }
 
     /// Adds a file; fails if the two cannot be one.
-    pub fn add(&mut self, other: &Input) -> Result<()> {
+    pub fn add(&mut self, other: &LasInput) -> Result<()> {
         agree(&self.first, other)?;
         self.records.add(other)
     }
 
     /// One header and one list of records for all `inputs`, which are the files taken in, and how
     /// far each must be shifted.
-    pub fn finish(self, inputs: &[Input]) -> Result<(Native, Vec<Shift>)> {
+    pub fn finish(self, inputs: &[LasInput]) -> Result<(Native, Vec<Shift>)> {
         if inputs.len() <= 1 {
             return Ok((Native::of(&self.first), vec![Shift::default()]));
         }
@@ -55,7 +55,7 @@ impl Merge {
 }
 
 /// Refuses two files that cannot be one.
-fn agree(a: &Input, b: &Input) -> Result<()> {
+fn agree(a: &LasInput, b: &LasInput) -> Result<()> {
     let (one, two) = (&a.header, &b.header);
     same(a, b, "point format", one.format(), two.format())?;
     same(a, b, "record length", one.point_data_record_length, two.point_data_record_length)?;
@@ -102,8 +102,8 @@ fn told_apart(one: Option<String>, two: Option<String>) -> (String, String) {
 }
 
 fn same<T: PartialEq + std::fmt::Debug>(
-    a: &Input,
-    b: &Input,
+    a: &LasInput,
+    b: &LasInput,
     what: &str,
     one: T,
     two: T,
@@ -114,7 +114,7 @@ fn same<T: PartialEq + std::fmt::Debug>(
     Err(refuse(a, b, format!("their {what} differs: {one:?} and {two:?}")))
 }
 
-fn refuse(a: &Input, b: &Input, why: String) -> Error {
+fn refuse(a: &LasInput, b: &LasInput, why: String) -> Error {
     let (one, two) = (shown(&a.path), shown(&b.path));
     Error::data(&b.path, format!("{one} and {two} cannot be read as one scan: {why}"))
         .help("bring the files to one form first, or run them one by one")
@@ -126,7 +126,7 @@ fn short(text: &str) -> String {
 }
 
 /// The smallest offset of all inputs per axis, and each input's whole steps to it.
-fn shifts(inputs: &[Input]) -> Result<([f64; 3], Vec<Shift>)> {
+fn shifts(inputs: &[LasInput]) -> Result<([f64; 3], Vec<Shift>)> {
     let first = &inputs[0];
     let scale = first.header.scale();
     let smallest: [f64; 3] = std::array::from_fn(|axis| {
@@ -169,7 +169,7 @@ pub fn whole_steps(from: f64, to: f64, scale: f64) -> Option<i64> {
 
 /// Fields that all inputs share are carried; the others become neutral, the version and the date
 /// the largest.
-fn header(inputs: &[Input]) -> Header {
+fn header(inputs: &[LasInput]) -> Header {
     let headers = || inputs.iter().map(|i| &i.header);
     let first = &inputs[0].header;
     let minor = headers().map(Header::minor).max().unwrap_or(4);
@@ -200,15 +200,15 @@ fn header(inputs: &[Input]) -> Header {
 }
 
 /// Records refer to waveforms in the one file that has the name of theirs: two files cannot be one.
-fn external(inputs: &[Input]) -> Result<()> {
+fn external(inputs: &[LasInput]) -> Result<()> {
     let Some(one) = inputs.iter().find(|input| input.waveforms.is_some()) else { return Ok(()) };
     let other = inputs.iter().find(|input| input.path != one.path).unwrap_or(one);
     Err(refuse(one, other, "their waveforms are in files of their own".to_owned()))
 }
 
 /// Records refer to waveforms by their place in one block: two blocks cannot be one.
-fn waveforms(inputs: &[Input], evlrs: &[Evlr]) -> Result<()> {
-    let inside = |i: &&Input| {
+fn waveforms(inputs: &[LasInput], evlrs: &[Evlr]) -> Result<()> {
+    let inside = |i: &&LasInput| {
         has_waveforms(i.header.format()) && i.header.encoding() & encoding::WAVEFORM_INTERNAL != 0
     };
     let blocks = evlrs.iter().filter(|e| e.is("LASF_Spec", 65535)).count();

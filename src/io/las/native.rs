@@ -9,7 +9,7 @@ use super::fields::encoding;
 use super::file::InputFile;
 use super::format::{format_of, record_size};
 use super::header::Header;
-use super::input::{Input, extra_len, is_carried, is_carried_extended};
+use super::input::{LasInput, extra_len, is_carried, is_carried_extended};
 use super::text::field;
 use super::vlr::{Evlr, Vlr, read_evlrs, read_vlrs};
 use super::waveforms::Waveforms;
@@ -37,7 +37,7 @@ pub struct Native {
 
 impl Native {
     /// Of one input, as it is.
-    pub fn of(input: &Input) -> Self {
+    pub fn of(input: &LasInput) -> Self {
         let (vlrs, evlrs) = input.carried();
         Native {
             header: input.header.clone(),

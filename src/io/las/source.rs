@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::chunks::{Chunk, Chunks};
 use super::crs;
 use super::format::{has_gps_time, selection};
-use super::input::{Input, Storage};
+use super::input::{LasInput, Storage};
 use super::laz::Layers;
 use super::merge::Merge;
 use super::native::Native;
@@ -32,13 +32,13 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
     let Some((first, others)) = paths.split_first() else {
         return Err(Error::pipeline("there is no input file"));
     };
-    let first = Input::open(first)?;
+    let first = LasInput::open(first)?;
     let mut schema = first.schema();
     let mut inputs = vec![first.clone().without_records()];
     let (mut tables, mut points) = (first.table_bytes(), first.points());
     let mut merge = Merge::of(first)?;
     for path in others {
-        let input = Input::open(path)?;
+        let input = LasInput::open(path)?;
         tables = tables.saturating_add(input.table_bytes());
         points = points.saturating_add(input.points());
         if !is_held(tables, points) {
@@ -73,7 +73,7 @@ struct LasSource {
 }
 
 struct Opened {
-    input: Input,
+    input: LasInput,
     shift: Shift,
     compression: Option<Arc<super::laz::Compression>>,
     evidence: Arc<Evidence>,
@@ -89,7 +89,7 @@ struct PartPlace {
 }
 
 impl Opened {
-    fn new((input, shift): (Input, Shift)) -> Self {
+    fn new((input, shift): (LasInput, Shift)) -> Self {
         let compression = match &input.storage {
             Storage::Plain => None,
             Storage::Laz(compression, _) => Some(Arc::new(compression.clone())),
@@ -148,7 +148,7 @@ impl Opened {
 }
 
 /// The stretches that the parts of a file are: first and count of records, or a part of its chunks.
-fn stretches(input: &Input) -> Vec<(u64, u64)> {
+fn stretches(input: &LasInput) -> Vec<(u64, u64)> {
     match &input.storage {
         Storage::Plain => {
             let points = input.points();

@@ -27,7 +27,7 @@ pub struct Chunk {
 
 /// Chunks that follow each other, in parts of some that are read together.
 #[derive(Debug, Clone, Default)]
-pub struct Table {
+pub struct ChunkList {
     parts: Vec<Place>,
     /// Bytes and points of each chunk, in as few bytes as they take, in pieces; no part is in two.
     sizes: Vec<Vec<u8>>,
@@ -52,10 +52,10 @@ struct Place {
     before: u64,
 }
 
-impl Table {
+impl ChunkList {
     /// The table of one chunk.
-    pub fn of(chunk: Chunk) -> Table {
-        let mut table = Table::default();
+    pub fn of(chunk: Chunk) -> ChunkList {
+        let mut table = ChunkList::default();
         table.push(chunk);
         table
     }
@@ -98,7 +98,7 @@ impl Table {
     }
 
     /// The same in no more memory than it needs.
-    pub fn closed(mut self) -> Table {
+    pub fn closed(mut self) -> ChunkList {
         self.sizes.iter_mut().for_each(Vec::shrink_to_fit);
         self.parts.shrink_to_fit();
         self
@@ -206,7 +206,7 @@ mod tests {
             start = end;
         }
         chunks.last_mut().unwrap().whole = false;
-        let mut table = Table::default();
+        let mut table = ChunkList::default();
         assert!(chunks.iter().all(|chunk| table.push(*chunk)));
         let table = table.closed();
         assert_eq!(table.chunks(), 300_000);
@@ -225,7 +225,7 @@ mod tests {
 
     #[test]
     fn a_chunk_of_a_point_takes_two_bytes_and_too_many_are_refused() {
-        let mut table = Table::default();
+        let mut table = ChunkList::default();
         let chunk = |i: u64| Chunk { start: 30 * i, end: 30 * i + 30, points: 1, whole: true };
         let held = (0..).take_while(|i| table.push(chunk(*i))).count() as u64;
         assert!((SIZES_MOST / 2..SIZES_MOST / 2 + 4096).contains(&held), "{held}");
@@ -233,7 +233,7 @@ mod tests {
         // A scan of any size in usual chunks is.
         let usual =
             |i: u64| Chunk { start: i << 19, end: (i + 1) << 19, points: 50_000, whole: true };
-        let mut table = Table::default();
+        let mut table = ChunkList::default();
         assert!((0..4_000_000).all(|i| table.push(usual(i))));
     }
 }

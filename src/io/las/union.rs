@@ -6,7 +6,7 @@ use std::cmp::Ordering;
 use super::crs;
 use super::described::{EXTRA_BYTES, record};
 use super::extra::Descriptor;
-use super::input::Input;
+use super::input::LasInput;
 use super::system::CrsRecords;
 use super::vlr::{Evlr, Vlr, check_held};
 use crate::Result;
@@ -30,7 +30,7 @@ pub struct Records {
 
 impl Records {
     /// Those of one file.
-    pub fn of(first: &Input) -> Result<Self> {
+    pub fn of(first: &LasInput) -> Result<Self> {
         let (vlrs, evlrs) = first.carried();
         Ok(Records {
             crs: first.crs_records()?,
@@ -44,7 +44,7 @@ impl Records {
     }
 
     /// Adds those of another file, which agrees with the first.
-    pub fn add(&mut self, other: &Input) -> Result<()> {
+    pub fn add(&mut self, other: &LasInput) -> Result<()> {
         let crs = other.crs_records()?;
         self.crs_differ |= !crs.equal(&self.crs);
         if crs.order(&self.crs) == Ordering::Less {
@@ -75,7 +75,7 @@ impl Records {
 }
 
 /// The descriptors of a file's extra bytes without what is a statistic of it.
-pub fn described(input: &Input) -> Vec<Descriptor> {
+pub fn described(input: &LasInput) -> Vec<Descriptor> {
     input.descriptors().iter().map(Descriptor::without_range).collect()
 }
 
@@ -88,17 +88,17 @@ fn without_ranges(mut vlrs: Vec<Vlr>) -> Vec<Vlr> {
 }
 
 /// What a union is made of; comparing extended records reads them.
-trait Item: Clone {
+trait UnionRecord: Clone {
     fn compare(&self, other: &Self) -> Result<Ordering>;
 }
 
-impl Item for Vlr {
+impl UnionRecord for Vlr {
     fn compare(&self, other: &Self) -> Result<Ordering> {
         self.order(other)
     }
 }
 
-impl Item for Evlr {
+impl UnionRecord for Evlr {
     fn compare(&self, other: &Self) -> Result<Ordering> {
         self.order(other)
     }
@@ -112,7 +112,7 @@ struct Union<T> {
     all: Vec<T>,
 }
 
-impl<T: Item> Union<T> {
+impl<T: UnionRecord> Union<T> {
     fn of(first: Vec<T>) -> Self {
         Union { first, all: Vec::new() }
     }

@@ -92,11 +92,11 @@ pub struct Evidence {
     compressed: bool,
     /// Bits of the byte at 14 that hold the return number, and how far up the number of returns is.
     return_bits: (u8, u32),
-    gathered: Mutex<Gathered>,
+    gathered: Mutex<VerifiedSoFar>,
 }
 
 #[derive(Debug)]
-struct Gathered {
+struct VerifiedSoFar {
     found: Found,
     /// Which parts were read to their end.
     read: Vec<bool>,
@@ -107,7 +107,7 @@ impl Evidence {
     /// Of a file with this header, which is read in `parts` parts.
     pub fn new(header: &Header, parts: usize) -> Evidence {
         let gathered =
-            Gathered { found: Found::NONE, read: vec![false; parts], warnings: Vec::new() };
+            VerifiedSoFar { found: Found::NONE, read: vec![false; parts], warnings: Vec::new() };
         Evidence {
             claimed: Claimed::of(header),
             compressed: header.compressed(),

@@ -12,7 +12,7 @@
 //! Source: A. Said, HPL-2004-76, section 3, with the constants of the LAZ specification 1.4.
 
 use super::model::{BEHIND, BIT_BITS, BITS, Bit, Model};
-use super::stream::{Buffer, Bytes, peek};
+use super::stream::{Buffer, ByteStream, peek};
 
 /// Shortest interval; shorter ones take in another byte.
 const SHORTEST: u32 = 1 << 24;
@@ -31,7 +31,7 @@ pub struct Coder {
     value: u32,
     length: u32,
     wrong: bool,
-    bytes: Bytes,
+    bytes: ByteStream,
 }
 
 /// A decoder that is reading; see [`Coder::enter`].
@@ -45,7 +45,7 @@ pub struct Left(State);
 
 impl Coder {
     /// A decoder that has nothing to read yet.
-    pub fn new(bytes: Bytes) -> Self {
+    pub fn new(bytes: ByteStream) -> Self {
         Coder { value: 0, length: u32::MAX, wrong: false, bytes }
     }
 
@@ -60,7 +60,7 @@ impl Coder {
     }
 
     /// The bytes that it reads.
-    pub fn bytes(&mut self) -> &mut Bytes {
+    pub fn bytes(&mut self) -> &mut ByteStream {
         &mut self.bytes
     }
 

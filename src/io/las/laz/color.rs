@@ -10,7 +10,7 @@ use super::model::Model;
 /// Red, green and blue.
 pub type Rgb = [u16; 3];
 
-type Symbols256 = Model<257, 256>;
+type ColorModel = Model<257, 256>;
 
 /// Reads a colour as it is stored.
 pub fn unpack(bytes: &[u8]) -> Rgb {
@@ -31,15 +31,15 @@ pub fn pack(rgb: Rgb, bytes: &mut [u8]) {
 
 /// The decoder of version 1.
 #[derive(Clone)]
-pub struct First {
+pub struct FirstColor {
     changes: Model<65, 64>,
     bytes: Integers<8, 6>,
 }
 
-impl First {
+impl FirstColor {
     /// Nothing is learned yet.
     pub const fn new() -> Self {
-        First { changes: Model::new(64), bytes: Integers::new() }
+        FirstColor { changes: Model::new(64), bytes: Integers::new() }
     }
 
     /// Reads the colour that follows `last`.
@@ -57,16 +57,19 @@ impl First {
 
 /// The decoder of version 2 and of the layer.
 #[derive(Clone)]
-pub struct Second {
+pub struct SecondColor {
     changes: Model<129, 128>,
     /// Lower and upper bytes of red, green and blue.
-    bytes: [[Symbols256; 2]; 3],
+    bytes: [[ColorModel; 2]; 3],
 }
 
-impl Second {
+impl SecondColor {
     /// Nothing is learned yet.
     pub const fn new() -> Self {
-        Second { changes: Model::new(128), bytes: [const { [const { Model::new(256) }; 2] }; 3] }
+        SecondColor {
+            changes: Model::new(128),
+            bytes: [const { [const { Model::new(256) }; 2] }; 3],
+        }
     }
 
     /// Reads the colour that follows `last`.
@@ -111,7 +114,7 @@ fn shifted(byte: u8, by: i32) -> u8 {
 #[derive(Clone)]
 pub struct Infrared {
     changes: Model<5, 16>,
-    bytes: [Symbols256; 2],
+    bytes: [ColorModel; 2],
 }
 
 impl Infrared {

@@ -7,7 +7,7 @@ use super::damage::Damage;
 use super::model::Model;
 use super::point10;
 use super::record::Item;
-use super::stream::{Bytes, WINDOW};
+use super::stream::{ByteStream, WINDOW};
 use super::time::{self, Times};
 use super::wave::{self, Packet, Waves};
 
@@ -15,44 +15,51 @@ use super::wave::{self, Packet, Waves};
 const PIECE: usize = WINDOW / 4;
 
 /// The decoder of one group of fields.
-enum Fields {
-    Point1(Box<point10::First>),
-    Point2(Box<point10::Second>),
-    Time1(Box<time::First>),
+enum InterleavedFields {
+    Point1(Box<point10::FirstPoint10>),
+    Point2(Box<point10::SecondPoint10>),
+    Time1(Box<time::FirstTime>),
     Time2(Box<Times>),
-    Color1(Box<color::First>, Rgb),
-    Color2(Box<color::Second>, Rgb),
+    Color1(Box<color::FirstColor>, Rgb),
+    Color2(Box<color::SecondColor>, Rgb),
     Wave(Box<Waves>, Packet),
     Bytes(Vec<(Model<257, 256>, u8)>),
 }
 
-impl Fields {
+impl InterleavedFields {
     /// Nothing is learned yet; the first of a chunk was `first`.
     fn begin(item: &Item, first: &[u8]) -> Option<Self> {
         let time = || Some(i64::from_le_bytes(*first.first_chunk()?));
         Some(match (item.kind, item.version) {
             (6, 1) => {
-                let mut point = point10::First::new();
+                let mut point = point10::FirstPoint10::new();
                 point.begin(first.first_chunk()?);
-                Fields::Point1(point)
+                InterleavedFields::Point1(point)
             }
             (6, _) => {
-                let mut point = point10::Second::new();
+                let mut point = point10::SecondPoint10::new();
                 point.begin(first.first_chunk()?);
-                Fields::Point2(point)
+                InterleavedFields::Point2(point)
             }
             (7, 1) => {
-                let mut times = time::First::new();
+                let mut times = time::FirstTime::new();
                 times.begin(time()?);
-                Fields::Time1(times)
+                InterleavedFields::Time1(times)
             }
-            (7, _) => Fields::Time2(Times::begin(time::Kind::Item, time()?)),
-            (8, 1) => Fields::Color1(Box::new(color::First::new()), color::unpack(first)),
-            (8, _) => Fields::Color2(Box::new(color::Second::new()), color::unpack(first)),
-            (9, _) => Fields::Wave(Box::new(Waves::new()), Packet::unpack(first.first_chunk()?)),
-            _ => {
-                Fields::Bytes(first.iter().map(|&byte| (const { Model::new(256) }, byte)).collect())
+            (7, _) => InterleavedFields::Time2(Times::begin(time::TimeForm::Item, time()?)),
+            (8, 1) => {
+                InterleavedFields::Color1(Box::new(color::FirstColor::new()), color::unpack(first))
             }
+            (8, _) => {
+                InterleavedFields::Color2(Box::new(color::SecondColor::new()), color::unpack(first))
+            }
+            (9, _) => InterleavedFields::Wave(
+                Box::new(Waves::new()),
+                Packet::unpack(first.first_chunk()?),
+            ),
+            _ => InterleavedFields::Bytes(
+                first.iter().map(|&byte| (const { Model::new(256) }, byte)).collect(),
+            ),
         })
     }
 
@@ -60,35 +67,37 @@ impl Fields {
     #[inline(always)]
     fn read(&mut self, coder: &mut Cursor, out: &mut [u8]) {
         match self {
-            Fields::Point1(point) => {
+            InterleavedFields::Point1(point) => {
                 if let Some(out) = out.first_chunk_mut() {
                     point.read(coder, out);
                 }
             }
-            Fields::Point2(point) => {
+            InterleavedFields::Point2(point) => {
                 if let Some(out) = out.first_chunk_mut() {
                     point.read(coder, out);
                 }
             }
-            Fields::Time1(times) => out.copy_from_slice(&times.read(coder).to_le_bytes()),
-            Fields::Time2(times) => {
-                out.copy_from_slice(&times.read(coder, time::Kind::Item).to_le_bytes());
+            InterleavedFields::Time1(times) => {
+                out.copy_from_slice(&times.read(coder).to_le_bytes())
             }
-            Fields::Color1(colors, last) => {
+            InterleavedFields::Time2(times) => {
+                out.copy_from_slice(&times.read(coder, time::TimeForm::Item).to_le_bytes());
+            }
+            InterleavedFields::Color1(colors, last) => {
                 *last = colors.read(coder, *last);
                 color::pack(*last, out);
             }
-            Fields::Color2(colors, last) => {
+            InterleavedFields::Color2(colors, last) => {
                 *last = colors.read(coder, *last);
                 color::pack(*last, out);
             }
-            Fields::Wave(waves, last) => {
+            InterleavedFields::Wave(waves, last) => {
                 *last = waves.read(coder, last);
                 if let Some(out) = out.first_chunk_mut::<{ wave::SIZE }>() {
                     last.pack(out);
                 }
             }
-            Fields::Bytes(bytes) => read_bytes(bytes, coder, out),
+            InterleavedFields::Bytes(bytes) => read_bytes(bytes, coder, out),
         }
     }
 }
@@ -104,7 +113,7 @@ fn read_bytes(bytes: &mut [(Model<257, 256>, u8)], coder: &mut Cursor, out: &mut
 /// The decoder of a stream of points.
 pub struct Interleaved {
     items: Vec<Item>,
-    fields: Vec<(usize, Fields)>,
+    fields: Vec<(usize, InterleavedFields)>,
     coder: Coder,
     /// Points that are read at once.
     block: usize,
@@ -114,7 +123,7 @@ pub struct Interleaved {
 
 impl Interleaved {
     /// A decoder that stands nowhere yet.
-    pub fn new(items: &[Item], bytes: Bytes) -> Self {
+    pub fn new(items: &[Item], bytes: ByteStream) -> Self {
         let most: usize = items.iter().map(Item::most_bytes).sum();
         let block = (PIECE / most.max(1)).clamp(1, 64);
         let (items, fields, coder) = (items.to_vec(), Vec::new(), Coder::new(bytes));
@@ -164,7 +173,7 @@ impl Interleaved {
         let mut rest = record;
         for (size, fields) in &mut self.fields {
             let Some((out, behind)) = rest.split_at_mut_checked(*size) else { break };
-            if let Fields::Bytes(bytes) = fields {
+            if let InterleavedFields::Bytes(bytes) = fields {
                 for (bytes, out) in bytes.chunks_mut(PIECE / 2).zip(out.chunks_mut(PIECE / 2)) {
                     let mut cursor = self.coder.enter(PIECE);
                     read_bytes(bytes, &mut cursor, out);
@@ -188,7 +197,7 @@ impl Interleaved {
         for item in &self.items {
             let size = usize::from(item.size);
             let Some((first, behind)) = rest.split_at_checked(size) else { break };
-            self.fields.extend(Fields::begin(item, first).map(|fields| (size, fields)));
+            self.fields.extend(InterleavedFields::begin(item, first).map(|fields| (size, fields)));
             rest = behind;
         }
         self.coder.start();

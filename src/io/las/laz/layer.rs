@@ -7,7 +7,7 @@
 //! ends that.
 
 use super::coder::{Coder, Cursor};
-use super::stream::Bytes;
+use super::stream::ByteStream;
 
 /// Bytes of the fields of a point.
 pub const SIZE: usize = 30;
@@ -17,7 +17,7 @@ pub const BLOCK: usize = 128;
 pub const MOST: usize = 32;
 
 /// The fields of a point as they are stored.
-pub type Record = [u8; SIZE];
+pub type Point14Record = [u8; SIZE];
 
 /// What the layers need to know of a point.
 #[derive(Clone, Copy, Default)]
@@ -61,7 +61,7 @@ pub struct Layer<M: Learned> {
 
 impl<M: Learned> Layer<M> {
     /// A layer that stands nowhere yet.
-    pub fn new(bytes: Bytes) -> Self {
+    pub fn new(bytes: ByteStream) -> Self {
         Layer {
             coder: Coder::new(bytes),
             is_read: false,
@@ -94,23 +94,23 @@ impl<M: Learned> Layer<M> {
 
 /// Reads one field of a point.
 pub trait ReadField<M: Learned>:
-    Fn(&mut M, &mut M::Value, &mut Cursor, Note, usize, &mut Record)
+    Fn(&mut M, &mut M::Value, &mut Cursor, Note, usize, &mut Point14Record)
 {
 }
 
 impl<M: Learned, F> ReadField<M> for F where
-    F: Fn(&mut M, &mut M::Value, &mut Cursor, Note, usize, &mut Record)
+    F: Fn(&mut M, &mut M::Value, &mut Cursor, Note, usize, &mut Point14Record)
 {
 }
 
 /// A block of points and what the layers need to know of them.
-pub struct Block<'a> {
+pub struct LayerBlock<'a> {
     pub notes: &'a Notes,
     pub records: &'a mut [u8],
     pub stride: usize,
 }
 
-impl Block<'_> {
+impl LayerBlock<'_> {
     /// Reads two layers, point by point in one loop: each symbol of a layer waits for the one
     /// before, and the two wait at the same time.
     #[inline(always)]
@@ -171,7 +171,7 @@ impl Block<'_> {
 
 /// Stores a field.
 #[inline(always)]
-pub fn put<const N: usize>(record: &mut Record, at: usize, bytes: [u8; N]) {
+pub fn put<const N: usize>(record: &mut Point14Record, at: usize, bytes: [u8; N]) {
     if let Some(field) = record[at..].first_chunk_mut() {
         *field = bytes;
     }

@@ -10,17 +10,17 @@ use super::layers::Layers;
 use super::model::Model;
 use super::point14::Point14;
 use super::record::Item;
-use super::stream::Bytes;
+use super::stream::ByteStream;
 use super::wave::{self, Packet, Waves};
 
 /// A stream, and whether it is to be read: a field that does not change in a chunk has none.
-struct Layer {
+struct ItemLayer {
     coder: Coder,
     is_read: bool,
     length: u64,
 }
 
-impl Layer {
+impl ItemLayer {
     fn begin(&mut self, start: u64, length: u64, wanted: bool) {
         self.length = length;
         self.is_read = wanted && length > 0;
@@ -57,48 +57,51 @@ impl Layer {
 }
 
 /// The fields beside a point.
-enum Fields {
-    Color(Contexts<Rgb, color::Second>, Layer),
-    Infrared(Contexts<u16, Infrared>, Layer),
-    Wave(Contexts<Packet, Waves>, Layer),
+enum LayeredFields {
+    Color(Contexts<Rgb, color::SecondColor>, ItemLayer),
+    Infrared(Contexts<u16, Infrared>, ItemLayer),
+    Wave(Contexts<Packet, Waves>, ItemLayer),
     /// Each byte has a layer.
-    Bytes(Vec<(Contexts<u8, Model<257, 256>>, Layer)>),
+    Bytes(Vec<(Contexts<u8, Model<257, 256>>, ItemLayer)>),
 }
 
-impl Fields {
-    fn layers(&mut self) -> Vec<&mut Layer> {
+impl LayeredFields {
+    fn layers(&mut self) -> Vec<&mut ItemLayer> {
         match self {
-            Fields::Color(_, layer) | Fields::Infrared(_, layer) | Fields::Wave(_, layer) => {
+            LayeredFields::Color(_, layer)
+            | LayeredFields::Infrared(_, layer)
+            | LayeredFields::Wave(_, layer) => {
                 vec![layer]
             }
-            Fields::Bytes(bytes) => bytes.iter_mut().map(|(_, layer)| layer).collect(),
+            LayeredFields::Bytes(bytes) => bytes.iter_mut().map(|(_, layer)| layer).collect(),
         }
     }
 
     fn which(&self) -> (Layers, &'static str) {
         match self {
-            Fields::Color(..) => (Layers::RGB, "colour"),
-            Fields::Infrared(..) => (Layers::NIR, "infrared"),
-            Fields::Wave(..) => (Layers::WAVES, "waveform packets"),
-            Fields::Bytes(..) => (Layers::EXTRA, "extra bytes"),
+            LayeredFields::Color(..) => (Layers::RGB, "colour"),
+            LayeredFields::Infrared(..) => (Layers::NIR, "infrared"),
+            LayeredFields::Wave(..) => (Layers::WAVES, "waveform packets"),
+            LayeredFields::Bytes(..) => (Layers::EXTRA, "extra bytes"),
         }
     }
 
     /// Begins with the first of a chunk.
     fn begin(&mut self, context: usize, first: &[u8]) {
         match self {
-            Fields::Color(contexts, _) => {
-                contexts.begin(context, color::unpack(first), || Box::new(color::Second::new()));
+            LayeredFields::Color(contexts, _) => {
+                contexts
+                    .begin(context, color::unpack(first), || Box::new(color::SecondColor::new()));
             }
-            Fields::Infrared(contexts, _) => {
+            LayeredFields::Infrared(contexts, _) => {
                 let value = first.first_chunk().map_or(0, |bytes| u16::from_le_bytes(*bytes));
                 contexts.begin(context, value, || Box::new(Infrared::new()));
             }
-            Fields::Wave(contexts, _) => {
+            LayeredFields::Wave(contexts, _) => {
                 let packet = first.first_chunk().map(Packet::unpack).unwrap_or_default();
                 contexts.begin(context, packet, || Box::new(Waves::new()));
             }
-            Fields::Bytes(bytes) => {
+            LayeredFields::Bytes(bytes) => {
                 for ((contexts, _), first) in bytes.iter_mut().zip(first) {
                     contexts.begin(context, *first, || Box::new(const { Model::new(256) }));
                 }
@@ -109,9 +112,9 @@ impl Fields {
     /// Reads those of a block, which begin at byte `at` of each record.
     fn read(&mut self, contexts: &[u8], records: &mut [u8], stride: usize, at: usize) {
         match self {
-            Fields::Color(all, layer) => {
+            LayeredFields::Color(all, layer) => {
                 let points = points_from(at, contexts, records, stride);
-                let new = || Box::new(color::Second::new());
+                let new = || Box::new(color::SecondColor::new());
                 layer.each(all, new, points, |models, last, cursor, out| {
                     if let Some(cursor) = cursor {
                         *last = models.read(cursor, *last);
@@ -119,7 +122,7 @@ impl Fields {
                     color::pack(*last, out);
                 });
             }
-            Fields::Infrared(all, layer) => {
+            LayeredFields::Infrared(all, layer) => {
                 let points = points_from(at, contexts, records, stride);
                 let new = || Box::new(Infrared::new());
                 layer.each(all, new, points, |models, last, cursor, out| {
@@ -131,7 +134,7 @@ impl Fields {
                     }
                 });
             }
-            Fields::Wave(all, layer) => {
+            LayeredFields::Wave(all, layer) => {
                 let points = points_from(at, contexts, records, stride);
                 let new = || Box::new(Waves::new());
                 layer.each(all, new, points, |models, last, cursor, out| {
@@ -143,7 +146,7 @@ impl Fields {
                     }
                 });
             }
-            Fields::Bytes(bytes) => {
+            LayeredFields::Bytes(bytes) => {
                 for (i, (all, layer)) in bytes.iter_mut().enumerate() {
                     let points = points_from(at + i, contexts, records, stride);
                     let new = || Box::new(const { Model::new(256) });
@@ -181,8 +184,8 @@ fn points_from<'a>(
 pub struct Layered {
     point: Point14,
     /// Where the fields are in a record, and the fields.
-    fields: Vec<(usize, Fields)>,
-    head: Bytes,
+    fields: Vec<(usize, LayeredFields)>,
+    head: ByteStream,
     started: bool,
     wanted: Layers,
     start: u64,
@@ -190,23 +193,23 @@ pub struct Layered {
 
 impl Layered {
     /// A decoder that stands nowhere yet; `bytes` makes the streams.
-    pub fn new(items: &[Item], bytes: impl Fn() -> Bytes) -> Self {
-        let layer = || Layer { coder: Coder::new(bytes()), is_read: false, length: 0 };
+    pub fn new(items: &[Item], bytes: impl Fn() -> ByteStream) -> Self {
+        let layer = || ItemLayer { coder: Coder::new(bytes()), is_read: false, length: 0 };
         let mut fields = Vec::new();
         let version = items.first().map_or(3, |item| item.version);
         let mut at = 0;
         for &Item { kind, size, version } in items {
             match kind {
                 10 => {}
-                11 => fields.push((at, Fields::Color(Contexts::new(version), layer()))),
+                11 => fields.push((at, LayeredFields::Color(Contexts::new(version), layer()))),
                 12 => {
-                    fields.push((at, Fields::Color(Contexts::new(version), layer())));
-                    fields.push((at + 6, Fields::Infrared(Contexts::new(version), layer())));
+                    fields.push((at, LayeredFields::Color(Contexts::new(version), layer())));
+                    fields.push((at + 6, LayeredFields::Infrared(Contexts::new(version), layer())));
                 }
-                13 => fields.push((at, Fields::Wave(Contexts::new(version), layer()))),
+                13 => fields.push((at, LayeredFields::Wave(Contexts::new(version), layer()))),
                 _ => {
                     let bytes = (0..size).map(|_| (Contexts::new(version), layer())).collect();
-                    fields.push((at, Fields::Bytes(bytes)));
+                    fields.push((at, LayeredFields::Bytes(bytes)));
                 }
             }
             at += usize::from(size);

@@ -56,15 +56,15 @@ use coder::Coder;
 use integer::Integers;
 use interleaved::Interleaved;
 use layered::Layered;
-use stream::Bytes;
+use stream::ByteStream;
 
 /// The decoder of compressed points.
 pub struct Decoder {
     stride: usize,
-    kind: Kind,
+    kind: ChunkDecoder,
 }
 
-enum Kind {
+enum ChunkDecoder {
     Interleaved(Box<Interleaved>),
     Layered(Box<Layered>),
 }
@@ -72,18 +72,18 @@ enum Kind {
 impl Decoder {
     /// A decoder that stands nowhere yet.
     pub fn new(compression: &Compression, file: &InputFile) -> Self {
-        let bytes = || Bytes::new(file.clone());
+        let bytes = || ByteStream::new(file.clone());
         let items = compression.items();
         let kind = match compression.compressor {
-            Compressor::Layered => Kind::Layered(Box::new(Layered::new(items, bytes))),
-            _ => Kind::Interleaved(Box::new(Interleaved::new(items, bytes()))),
+            Compressor::Layered => ChunkDecoder::Layered(Box::new(Layered::new(items, bytes))),
+            _ => ChunkDecoder::Interleaved(Box::new(Interleaved::new(items, bytes()))),
         };
         Decoder { stride: compression.stride, kind }
     }
 
     /// Reads these layers alone, where there are layers.
     pub fn select(&mut self, wanted: Layers) {
-        if let Kind::Layered(layered) = &mut self.kind {
+        if let ChunkDecoder::Layered(layered) = &mut self.kind {
             layered.select(wanted);
         }
     }
@@ -91,40 +91,40 @@ impl Decoder {
     /// Begins with the chunk `start..end` of the file.
     pub fn begin(&mut self, start: u64, end: u64) {
         match &mut self.kind {
-            Kind::Interleaved(decoder) => decoder.begin(start, end),
-            Kind::Layered(decoder) => decoder.begin(start, end),
+            ChunkDecoder::Interleaved(decoder) => decoder.begin(start, end),
+            ChunkDecoder::Layered(decoder) => decoder.begin(start, end),
         }
     }
 
     /// Reads the next points, whole records.
     pub fn read(&mut self, records: &mut [u8]) -> Result<(), Damage> {
         match &mut self.kind {
-            Kind::Interleaved(decoder) => decoder.read(records, self.stride),
-            Kind::Layered(decoder) => decoder.read(records, self.stride),
+            ChunkDecoder::Interleaved(decoder) => decoder.read(records, self.stride),
+            ChunkDecoder::Layered(decoder) => decoder.read(records, self.stride),
         }
     }
 
     /// File position of the next byte of a stream of points; of layered ones, of the chunk.
     pub fn position(&mut self) -> u64 {
         match &mut self.kind {
-            Kind::Interleaved(decoder) => decoder.position(),
-            Kind::Layered(decoder) => decoder.start(),
+            ChunkDecoder::Interleaved(decoder) => decoder.position(),
+            ChunkDecoder::Layered(decoder) => decoder.start(),
         }
     }
 
     /// All points of a chunk were read that has no known end.
     pub fn pause(&mut self) -> Result<(), Damage> {
         match &mut self.kind {
-            Kind::Interleaved(decoder) => decoder.pause(),
-            Kind::Layered(decoder) => decoder.finish(),
+            ChunkDecoder::Interleaved(decoder) => decoder.pause(),
+            ChunkDecoder::Layered(decoder) => decoder.finish(),
         }
     }
 
     /// All points of the chunk were read: its bytes must end here.
     pub fn finish(&mut self) -> Result<(), Damage> {
         match &mut self.kind {
-            Kind::Interleaved(decoder) => decoder.finish(),
-            Kind::Layered(decoder) => decoder.finish(),
+            ChunkDecoder::Interleaved(decoder) => decoder.finish(),
+            ChunkDecoder::Layered(decoder) => decoder.finish(),
         }
     }
 }
@@ -138,7 +138,7 @@ pub struct Numbers {
 impl Numbers {
     /// Those from byte `at` of the file.
     pub fn new(file: &InputFile, at: u64) -> Self {
-        let mut coder = Coder::new(Bytes::new(file.clone()));
+        let mut coder = Coder::new(ByteStream::new(file.clone()));
         coder.bytes().move_to(at, file.len());
         coder.start();
         Numbers { coder, integers: Box::new(Integers::new()) }

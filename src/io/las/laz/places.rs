@@ -2,10 +2,10 @@
 
 use super::coder::{Coder, Cursor};
 use super::integer::Integers;
-use super::layer::{BLOCK, MOST, Note, Notes, Record, put};
+use super::layer::{BLOCK, MOST, Note, Notes, Point14Record, put};
 use super::model::Model;
-use super::predict::{Median, RETURN_KINDS, level};
-use super::stream::Bytes;
+use super::predict::{RETURN_KINDS, RunningMedian, level};
+use super::stream::ByteStream;
 
 type Symbols16 = Model<17, 32>;
 
@@ -29,8 +29,8 @@ struct Channel {
     numbers_of_pulse: Symbols16,
     dx: Integers<32, 2>,
     dy: Integers<32, 22>,
-    dxs: [Median; 12],
-    dys: [Median; 12],
+    dxs: [RunningMedian; 12],
+    dys: [RunningMedian; 12],
 }
 
 impl Channel {
@@ -48,8 +48,8 @@ impl Channel {
             numbers_of_pulse: const { Model::new(13) },
             dx: const { Integers::new() },
             dy: const { Integers::new() },
-            dxs: [Median::NEW; 12],
-            dys: [Median::NEW; 12],
+            dxs: [RunningMedian::NEW; 12],
+            dys: [RunningMedian::NEW; 12],
         })
     }
 
@@ -74,7 +74,7 @@ impl Channel {
 
     /// Reads the next point, whose changes are known.
     #[inline(always)]
-    fn read(&mut self, cursor: &mut Cursor, changed: usize, record: &mut Record) -> Note {
+    fn read(&mut self, cursor: &mut Cursor, changed: usize, record: &mut Point14Record) -> Note {
         self.read_returns(cursor, changed);
         let time_changed = changed & 16 != 0;
         self.time_changed = time_changed;
@@ -117,12 +117,12 @@ pub struct Places {
 
 impl Places {
     /// A layer of version 3 or 4 that stands nowhere yet.
-    pub fn new(version: u16, bytes: Bytes) -> Self {
+    pub fn new(version: u16, bytes: ByteStream) -> Self {
         Places { coder: Coder::new(bytes), version, now: 0, channels: [None, None, None, None] }
     }
 
     /// Begins with the first point of a chunk; its scanner channel.
-    pub fn begin(&mut self, first: &Record) -> usize {
+    pub fn begin(&mut self, first: &Point14Record) -> usize {
         let int = |at| i32::from_le_bytes(field(first, at));
         let returns = first[at::RETURNS];
         self.now = usize::from((first[at::FLAGS] >> 4) & 3);
@@ -133,7 +133,13 @@ impl Places {
 
     /// Reads a block of points into records that else are as `first`; notes what the layers need to
     /// know.
-    pub fn read(&mut self, first: &Record, notes: &mut Notes, records: &mut [u8], stride: usize) {
+    pub fn read(
+        &mut self,
+        first: &Point14Record,
+        notes: &mut Notes,
+        records: &mut [u8],
+        stride: usize,
+    ) {
         let mut cursor = self.coder.enter(BLOCK * MOST);
         notes.run_count = 0;
         let mut run = 0;
@@ -176,6 +182,6 @@ impl Places {
 }
 
 /// A field of a record.
-pub fn field<const N: usize>(record: &Record, at: usize) -> [u8; N] {
+pub fn field<const N: usize>(record: &Point14Record, at: usize) -> [u8; N] {
     record.get(at..).and_then(|bytes| bytes.first_chunk()).copied().unwrap_or([0; N])
 }

@@ -5,13 +5,13 @@
 use super::coder::Cursor;
 use super::integer::Integers;
 use super::model::{Model, learned};
-use super::predict::{Median, RETURNS, level};
+use super::predict::{RETURNS, RunningMedian, level};
 
 /// Bytes of the fields.
 pub const SIZE: usize = 20;
 
-type Symbols256 = Model<257, 256>;
-type Bytewise = [Option<Box<Symbols256>>; 256];
+type ByteModel = Model<257, 256>;
+type ByteModels = [Option<Box<ByteModel>>; 256];
 
 /// Where bytes are in a record.
 mod at {
@@ -57,14 +57,14 @@ impl Last {
 
     /// Reads a byte whose likely values depend on what it was.
     #[inline(always)]
-    fn byte(&mut self, at: usize, coder: &mut Cursor, models: &mut Bytewise) {
+    fn byte(&mut self, at: usize, coder: &mut Cursor, models: &mut ByteModels) {
         let byte = &mut self.bytes[at];
         *byte = coder.symbol(learned(&mut models[usize::from(*byte)], 256)) as u8;
     }
 }
 
 /// The decoder of version 1.
-pub struct First {
+pub struct FirstPoint10 {
     last: Last,
     dxs: [i32; 3],
     dys: [i32; 3],
@@ -76,9 +76,9 @@ pub struct First {
     angle: Integers<8, 2>,
     source: Integers<16, 1>,
     changes: Model<65, 64>,
-    returns: Bytewise,
-    classes: Bytewise,
-    users: Bytewise,
+    returns: ByteModels,
+    classes: ByteModels,
+    users: ByteModels,
 }
 
 /// The median of three.
@@ -86,10 +86,10 @@ fn median([a, b, c]: [i32; 3]) -> i32 {
     a.min(b).max(a.max(b).min(c))
 }
 
-impl First {
+impl FirstPoint10 {
     /// Nothing is learned yet.
     pub fn new() -> Box<Self> {
-        Box::new(First {
+        Box::new(FirstPoint10 {
             last: Last::NEW,
             dxs: [0; 3],
             dys: [0; 3],
@@ -152,28 +152,28 @@ impl First {
 }
 
 /// The decoder of version 2.
-pub struct Second {
+pub struct SecondPoint10 {
     last: Last,
     changes: Model<65, 64>,
-    returns: Bytewise,
+    returns: ByteModels,
     intensity: Integers<16, 4>,
     intensities: [u16; 16],
-    classes: Bytewise,
-    angles: [Symbols256; 2],
-    users: Bytewise,
+    classes: ByteModels,
+    angles: [ByteModel; 2],
+    users: ByteModels,
     source: Integers<16, 1>,
     dx: Integers<32, 2>,
     dy: Integers<32, 22>,
-    dxs: [Median; 16],
-    dys: [Median; 16],
+    dxs: [RunningMedian; 16],
+    dys: [RunningMedian; 16],
     z: Integers<32, 20>,
     zs: [i32; 8],
 }
 
-impl Second {
+impl SecondPoint10 {
     /// Nothing is learned yet.
     pub fn new() -> Box<Self> {
-        Box::new(Second {
+        Box::new(SecondPoint10 {
             last: Last::NEW,
             changes: const { Model::new(64) },
             returns: [const { None }; 256],
@@ -185,8 +185,8 @@ impl Second {
             source: const { Integers::new() },
             dx: const { Integers::new() },
             dy: const { Integers::new() },
-            dxs: [Median::NEW; 16],
-            dys: [Median::NEW; 16],
+            dxs: [RunningMedian::NEW; 16],
+            dys: [RunningMedian::NEW; 16],
             z: const { Integers::new() },
             zs: [0; 8],
         })

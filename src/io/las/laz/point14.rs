@@ -5,12 +5,12 @@
 use super::coder::Coder;
 use super::damage::Damage;
 use super::integer::Integers;
-use super::layer::{BLOCK, Block, Layer, Learned, Note, Notes, Record, put};
+use super::layer::{BLOCK, Layer, LayerBlock, Learned, Note, Notes, Point14Record, put};
 use super::layers::Layers;
 use super::model::{Model, learned};
 use super::places::{Places, field};
-use super::stream::Bytes;
-use super::time::{Kind, Times};
+use super::stream::ByteStream;
+use super::time::{TimeForm, Times};
 
 /// Layers, in the order in which they are stored.
 pub const LAYERS: usize = 9;
@@ -67,12 +67,12 @@ impl Learned for Intensities {
 }
 
 /// Bytes that depend on the one before.
-struct Bytewise<const N: usize, const T: usize>([Option<Box<Model<N, T>>>; 64]);
+struct ModelsByByte<const N: usize, const T: usize>([Option<Box<Model<N, T>>>; 64]);
 
-impl<const N: usize, const T: usize> Learned for Bytewise<N, T> {
+impl<const N: usize, const T: usize> Learned for ModelsByByte<N, T> {
     type Value = u8;
     fn new(_first: u8) -> Box<Self> {
-        Box::new(Bytewise([const { None }; 64]))
+        Box::new(ModelsByByte([const { None }; 64]))
     }
 }
 
@@ -86,22 +86,22 @@ impl<const CONTEXTS: usize> Learned for Integers<16, CONTEXTS> {
 impl Learned for Times {
     type Value = i64;
     fn new(first: i64) -> Box<Self> {
-        Times::begin(Kind::Layer, first)
+        Times::begin(TimeForm::Layer, first)
     }
 }
 
 /// The decoder of these fields.
 pub struct Point14 {
     /// The first point of the chunk: what no layer changes.
-    first: Record,
+    first: Point14Record,
     places: Places,
     places_are_read: bool,
     heights: Layer<Heights>,
-    classes: Layer<Bytewise<257, 256>>,
-    flags: Layer<Bytewise<65, 128>>,
+    classes: Layer<ModelsByByte<257, 256>>,
+    flags: Layer<ModelsByByte<65, 128>>,
     intensities: Layer<Intensities>,
     angles: Layer<Integers<16, 2>>,
-    users: Layer<Bytewise<257, 256>>,
+    users: Layer<ModelsByByte<257, 256>>,
     sources: Layer<Integers<16, 1>>,
     times: Layer<Times>,
     notes: Box<Notes>,
@@ -109,7 +109,7 @@ pub struct Point14 {
 
 impl Point14 {
     /// A decoder of version 3 or 4; `bytes` makes the streams.
-    pub fn new(version: u16, bytes: &impl Fn() -> Bytes) -> Self {
+    pub fn new(version: u16, bytes: &impl Fn() -> ByteStream) -> Self {
         Point14 {
             first: [0; _],
             places: Places::new(version, bytes()),
@@ -132,7 +132,7 @@ impl Point14 {
     }
 
     /// Begins with the first point of a chunk; its scanner channel.
-    pub fn begin(&mut self, record: &Record) -> usize {
+    pub fn begin(&mut self, record: &Point14Record) -> usize {
         self.first = *record;
         let word = |at| u16::from_le_bytes(field(record, at));
         let flags = record[at::FLAGS];
@@ -199,7 +199,7 @@ impl Point14 {
 
     /// The layers that have a symbol for each point.
     fn read_all(&mut self, records: &mut [u8], stride: usize) {
-        let mut block = Block { notes: &self.notes, records, stride };
+        let mut block = LayerBlock { notes: &self.notes, records, stride };
         block.read_both(
             &mut self.heights,
             |models, last, cursor, note, _, record| {
@@ -240,7 +240,7 @@ impl Point14 {
 
     /// The layers that have symbols only where x, y and returns said that the field changes.
     fn read_changes(&mut self, records: &mut [u8], stride: usize) {
-        let mut block = Block { notes: &self.notes, records, stride };
+        let mut block = LayerBlock { notes: &self.notes, records, stride };
         block.read_both(
             &mut self.angles,
             |models, last, cursor, note, _, record| {
@@ -253,7 +253,7 @@ impl Point14 {
             &mut self.times,
             |models, last, cursor, note, _, record| {
                 if note.time_changed {
-                    *last = models.read(cursor, Kind::Layer);
+                    *last = models.read(cursor, TimeForm::Layer);
                 }
                 put(record, at::TIME, last.to_le_bytes());
             },

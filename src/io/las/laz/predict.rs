@@ -3,16 +3,16 @@
 
 /// The median of about five recent values.
 #[derive(Clone, Copy)]
-pub struct Median {
+pub struct RunningMedian {
     /// Ascending.
     values: [i32; 5],
     /// The largest value makes way next, not the smallest.
     high: bool,
 }
 
-impl Median {
+impl RunningMedian {
     /// Of zeros.
-    pub const NEW: Median = Median { values: [0; 5], high: true };
+    pub const NEW: RunningMedian = RunningMedian { values: [0; 5], high: true };
 
     /// The median.
     #[inline(always)]

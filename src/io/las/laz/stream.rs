@@ -13,7 +13,7 @@ const PAD: usize = 8;
 pub type Buffer = [u8; WINDOW + PAD];
 
 /// A stretch of a file. Behind its end are zeros.
-pub struct Bytes {
+pub struct ByteStream {
     file: InputFile,
     buffer: Box<Buffer>,
     /// Next byte of `buffer`.
@@ -34,11 +34,11 @@ pub fn peek(buffer: &Buffer, at: usize) -> u32 {
     u32::from_be_bytes([buffer[at], buffer[at + 1], buffer[at + 2], buffer[at + 3]])
 }
 
-impl Bytes {
+impl ByteStream {
     /// Nothing of `file` yet.
     pub fn new(file: InputFile) -> Self {
         let buffer = Box::new([0; WINDOW + PAD]);
-        Bytes { file, buffer, next: 0, filled: 0, behind: 0, end: 0, failed: None }
+        ByteStream { file, buffer, next: 0, filled: 0, behind: 0, end: 0, failed: None }
     }
 
     /// Moves to the stretch `start..end`.

@@ -19,7 +19,7 @@ const PATIENCE: u8 = 3;
 
 /// Which symbols mean what: layers have none for a time that did not change.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum TimeForm {
     /// Among other fields, version 2.
     Item,
     /// A layer.
@@ -57,17 +57,17 @@ impl Times {
     }
 
     /// Begins with a time.
-    pub fn begin(kind: Kind, first: i64) -> Box<Self> {
+    pub fn begin(kind: TimeForm, first: i64) -> Box<Self> {
         static ITEM: Times = Times::ITEM;
         static LAYER: Times = Times::LAYER;
-        let mut times = Box::new(if kind == Kind::Item { ITEM.clone() } else { LAYER.clone() });
+        let mut times = Box::new(if kind == TimeForm::Item { ITEM.clone() } else { LAYER.clone() });
         times.times[0] = first;
         times
     }
 
     /// The next time of a layer, where it changed.
     #[inline(always)]
-    pub fn read(&mut self, coder: &mut Cursor, kind: Kind) -> i64 {
+    pub fn read(&mut self, coder: &mut Cursor, kind: TimeForm) -> i64 {
         // One symbol may say that the next is of another sequence, and no encoder says so twice.
         if !self.step(coder, kind) && !self.step(coder, kind) {
             coder.refuse();
@@ -77,10 +77,10 @@ impl Times {
 
     /// False if only the sequence was changed.
     #[inline(always)]
-    fn step(&mut self, coder: &mut Cursor, kind: Kind) -> bool {
+    fn step(&mut self, coder: &mut Cursor, kind: TimeForm) -> bool {
         // The symbols of a layer are those of an item without the one for a time that did not
         // change.
-        let skipped = usize::from(kind == Kind::Layer);
+        let skipped = usize::from(kind == TimeForm::Layer);
         if self.differences[self.now] == 0 {
             match coder.symbol(&mut self.kinds) + skipped {
                 0 => {}
@@ -161,7 +161,7 @@ impl Times {
 }
 
 /// The decoder of version 1: one sequence.
-pub struct First {
+pub struct FirstTime {
     multiples: Model<513, 256>,
     kinds: Model<4, 16>,
     integers: Integers<32, 6>,
@@ -170,14 +170,14 @@ pub struct First {
     extremes: u8,
 }
 
-impl First {
+impl FirstTime {
     /// Multiplier of a time that is far, and of one that did not change, where there is a
     /// difference.
     const FAR: usize = 510;
 
     /// Nothing is learned yet.
     pub fn new() -> Box<Self> {
-        Box::new(First {
+        Box::new(FirstTime {
             multiples: const { Model::new(512) },
             kinds: const { Model::new(3) },
             integers: const { Integers::new() },
