@@ -80,6 +80,7 @@ fn samples(
             }
             let (tile, _) = worker.run(key, Some(op))?;
             tile.limits = job.ops[op].selection;
+            tile.of_neighbors = Some(job.ops[op].op.tile().needs().of_neighbors.into());
             let figures = job.ops[op].op.tile().sample(tile)?;
             Ok(Some(figures.into_iter().map(f64::to_bits).collect::<Vec<_>>()))
         },

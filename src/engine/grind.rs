@@ -22,7 +22,7 @@ use super::encoding::ChunkEncoders;
 use super::filtering::Filtering;
 use super::job::Job;
 use super::outlet::Outlet;
-use super::pass::{Op, Pass};
+use super::pass::{Op, Pass, needs};
 use super::product::Product;
 use super::rounded::Rounded;
 use super::row::RowLayout;
@@ -242,6 +242,7 @@ impl<'a> Worker<'a> {
         for call in self.pass.calls.iter().take_while(|call| Some(call.op) != until) {
             let stage = &self.job.ops[call.op];
             tile.limits = stage.selection;
+            tile.of_neighbors = Some(needs(&self.job.ops, *call).of_neighbors.into());
             match (&stage.op, call.gathers) {
                 (Op::Scan(op), true) => {
                     let bytes = summary.insert(Vec::new());

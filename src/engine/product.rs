@@ -227,8 +227,15 @@ struct StoredColumn<'a> {
 impl<'a> StoredColumn<'a> {
     fn all(kinds: &[ColumnKind], tile: &'a Tile) -> Result<Vec<Self>> {
         let of = |kind: &ColumnKind| {
-            let missing = || Error::internal(format!("a tile has no column {}", kind.name()));
-            let values = tile.columns.bytes_of(*kind).ok_or_else(missing)?;
+            let missing = || {
+                Error::internal(format!(
+                    "a stage took the column {} and did not put it back",
+                    kind.name()
+                ))
+            };
+            let values = tile.columns.bytes_of(*kind);
+            let whole = values.filter(|v| v.len() == tile.positions.len() * kind.bytes());
+            let values = whole.ok_or_else(missing)?;
             Ok(StoredColumn { values, bytes: kind.bytes(), unknown: kind.unknown() })
         };
         kinds.iter().map(of).collect()

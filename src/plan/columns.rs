@@ -1,6 +1,7 @@
 //! Which columns there are on a branch, and which pass computed them.
 
 use crate::engine::pass::StageOp;
+use crate::error::listed;
 use crate::point::{ColumnKind, ComputedDimension, NORMAL};
 use crate::stage::Needs;
 use crate::{Error, Result};
@@ -42,8 +43,18 @@ impl NewestColumns {
         self.0.push(NewestColumn { kind, pass, is_read: false });
     }
 
-    /// Refuses a stage that would replace values that nothing has read.
-    pub fn check_read(&self, stage: &StageOp, needs: &Needs) -> Result<()> {
+    /// Refuses a stage that would replace values that nothing has read, or that gives a column
+    /// another type.
+    pub fn check_written(&self, stage: &StageOp, needs: &Needs) -> Result<()> {
+        let other = |kind: &&ColumnKind| self.have_named(kind.name()) && !self.have(kind);
+        if let Some(kind) = needs.writes.iter().find(other) {
+            let told = format!(
+                "`{}` computes {} of another type than the stage that did before",
+                stage.kind,
+                kind.name()
+            );
+            return Err(stage.written.wrong(told).help("one of the two needs another name for it"));
+        }
         let lost = |newest: &&NewestColumn| {
             let NewestColumn { kind, is_read, .. } = newest;
             !is_read && needs.writes.contains(kind) && !needs.reads.contains(kind)
@@ -59,10 +70,24 @@ impl NewestColumns {
         let found = self.0.iter().rev().find_map(|newest| newest.kind.part(name));
         found.ok_or_else(|| {
             let told = format!("the output wants {name}, which no stage computes");
-            let before = giver(name)
-                .map_or(String::new(), |stage| format!("put a `{stage}` stage before it, or "));
-            Error::pipeline(told).help(format!("{before}leave {name} out of `write.dimensions`"))
+            Error::pipeline(told).help(self.remedy(name))
         })
+    }
+
+    /// What to write instead of `name`, which no column has.
+    fn remedy(&self, name: &str) -> String {
+        let all = || self.0.iter().flat_map(|newest| newest.kind.parts());
+        if let Some(newest) = self.0.iter().find(|newest| newest.kind.name() == name) {
+            return format!("its numbers are {}", listed(newest.kind.parts(), "and"));
+        }
+        let leave = format!("leave {name} out of `write.dimensions`");
+        match (giver(name), all().next()) {
+            (Some(stage), _) => format!("put a `{stage}` stage before it, or {leave}"),
+            (None, Some(_)) => {
+                format!("{leave}; the stages above compute {}", listed(all(), "and"))
+            }
+            (None, None) => leave,
+        }
     }
 }
 

@@ -247,7 +247,7 @@ impl PassLayout<'_> {
 
     /// The pass of a stage that needs this: the one that the branch is at, or one that begins.
     fn place(&mut self, stage: &StageOp, needs: &Needs) -> Result<usize> {
-        self.at.columns.check_read(stage, needs)?;
+        self.at.columns.check_written(stage, needs)?;
         let at = self.pass();
         let last = &self.out.passes[at];
         let is_new = |column: &ColumnKind| last.writes.contains(column);
@@ -301,7 +301,7 @@ impl PassLayout<'_> {
         }
         if self.schema.find(name).is_none() {
             let help = giver(name).map_or_else(
-                || format!("put a stage that computes {name} before it"),
+                || format!("no stage computes {name}, and the records of the input have none"),
                 |stage| format!("put a `{stage}` stage before it"),
             );
             return Err(missing(stage, name, &help));
@@ -365,7 +365,8 @@ impl PassLayout<'_> {
     fn computed(&mut self, sink: usize, at: usize) -> Result<Vec<ComputedDimension>> {
         let mut computed = Vec::new();
         for name in self.sorted.sinks[sink].computed() {
-            let dimension = self.at.columns.dimension(name)?;
+            let found = self.at.columns.dimension(name);
+            let dimension = found.map_err(|error| error.at(self.sorted.sinks[sink].path()))?;
             self.bring(at, dimension.column);
             computed.push(dimension);
         }

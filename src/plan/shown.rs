@@ -92,11 +92,11 @@ impl Plan {
         if call.gathers {
             write!(f, " gathers over the whole scan")?;
         }
-        write!(f, ": reads {}", needs.read_names().join(", "))?;
-        let written = needs.written_names().join(", ");
-        if !written.is_empty() {
-            write!(f, ", writes {written}")?;
-        }
+        let each = [("reads", needs.read_names()), ("writes", needs.written_names())];
+        let told = each.iter().filter(|(_, names)| !names.is_empty());
+        let told: Vec<_> =
+            told.map(|(what, names)| format!("{what} {}", names.join(", "))).collect();
+        write!(f, ": {}", told.join(", "))?;
         if needs.neighbors > 0 {
             let most = if needs.fewer_neighbors { "up to " } else { "" };
             write!(f, ", {most}{} nearest neighbours", needs.neighbors)?;

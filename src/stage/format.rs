@@ -81,7 +81,7 @@ pub trait Format: Send + Sync {
     }
 
     /// What `metadata` of this format's inputs has and outputs of other families do not hold, each
-    /// said as what follows "PLY does not hold".
+    /// said as what follows "this format does not hold".
     fn lost(&self, _metadata: &Metadata) -> Vec<String> {
         Vec::new()
     }
@@ -101,6 +101,12 @@ pub trait Format: Send + Sync {
         create: &CreateFor<'_>,
     ) -> Result<Box<dyn Sink>> {
         create(schema)
+    }
+
+    /// True if its files hold dimensions that stages computed ([`Metadata::computed`]), which come
+    /// with [`PointBatch::columns`]; else an output that is to have some is refused.
+    fn holds_computed(&self) -> bool {
+        false
     }
 
     /// The keys among `scale`, `offset`, `encoding` and `colors` that `write` takes for it.

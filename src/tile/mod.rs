@@ -19,10 +19,11 @@ pub(crate) use remote::Remote;
 pub(crate) use sieve::{ReadDimensions, RecordRun, Sieve};
 
 use std::ops::Range;
+use std::sync::Arc;
 
-use crate::Result;
 use crate::geom::simd::Simd;
-use crate::point::{Bounds, Column, ColumnValue, Columns, Position};
+use crate::point::{Bounds, Column, ColumnKind, ColumnValue, Columns, Position};
+use crate::{Error, Result};
 
 /// The points of one cube, then a rim of its neighbours' points.
 ///
@@ -60,6 +61,8 @@ pub struct Tile {
     pub(crate) selections: Vec<u8>,
     /// The selections that the stage at work is limited to.
     pub(crate) limits: u8,
+    /// The columns that the stage at work reads of its neighbours; None where nobody says.
+    pub(crate) of_neighbors: Option<Arc<[ColumnKind]>>,
 }
 
 impl Tile {
@@ -79,6 +82,7 @@ impl Tile {
             around: Around::default(),
             selections: Vec::new(),
             limits: 0,
+            of_neighbors: None,
         }
     }
 
@@ -101,6 +105,7 @@ impl Tile {
             around: Around::default(),
             selections: Vec::new(),
             limits: 0,
+            of_neighbors: None,
         }
     }
 
@@ -167,6 +172,19 @@ impl Tile {
     /// neighbours' values of `column` besides, in their order. The column is one that the stage
     /// declared to read [of its neighbours](crate::stage::Needs::reads_of_neighbors).
     ///
+    /// ```
+    /// use pointmill::point::Column;
+    /// use pointmill::tile::Tile;
+    ///
+    /// const ROUGHNESS: Column<f32> = Column::new("Roughness", &[]);
+    /// let mut tile = Tile::of(vec![[0, 0, 0], [1, 0, 0], [3, 0, 0]]);
+    /// tile.columns.set(&ROUGHNESS, &[1.0, 2.0, 4.0]);
+    /// let mut nearest = [0.0; 3];
+    /// tile.each_neighborhood_with(1, &ROUGHNESS, |i, _, values| nearest[i] = values[0])?;
+    /// assert_eq!(nearest, [2.0, 1.0, 2.0]);
+    /// # Ok::<(), pointmill::Error>(())
+    /// ```
+    ///
     /// # Errors
     ///
     /// A column that was not declared, and what reading the scan fails with.
@@ -176,6 +194,12 @@ impl Tile {
         column: &Column<T>,
         mut visit: impl FnMut(usize, &Neighborhood<'_>, &[T]),
     ) -> Result<()> {
+        let declared = self.of_neighbors.as_ref();
+        if declared.is_some_and(|declared| !declared.contains(&column.kind())) {
+            let name = column.kind().name();
+            let told = format!("a stage reads {name} of its neighbours and does not declare it");
+            return Err(Error::internal(told));
+        }
         let Tile { positions, zone, around, selections, limits, columns, .. } = self;
         let is_asked = |i: usize| zone.contains(positions[i]) && chosen(selections, *limits, i);
         let (loaded, mut beyond) = (columns.get(column)?, around.values_beyond(column.kind()));

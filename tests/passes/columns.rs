@@ -87,8 +87,23 @@ stage!(Glow, "glow", Needs::none().reads_of_neighbors(&INTENSITY, K).writes(&GLO
     Ok(())
 });
 
+stage!(Sneaky, "sneaky", Needs::none().reads(&RISE).neighbors(K), |tile| {
+    tile.each_neighborhood_with(K, &RISE, |_, _, _| {})
+});
+
+stage!(Thief, "thief", Needs::none().writes(&RISE), |tile| {
+    tile.columns.take(&RISE)?;
+    Ok(())
+});
+
+stage!(Other, "other", Needs::none().writes(&OTHER_RISE), |_tile| { Ok(()) });
+
+/// A column that is called as another and of another type.
+const OTHER_RISE: Column<f64> = Column::new("Rise", &[]);
+
 fn registry() -> Registry {
-    Registry::builtin().with::<Rise>().with::<Rises>().with::<Glow>()
+    let registry = Registry::builtin().with::<Rise>().with::<Rises>().with::<Glow>();
+    registry.with::<Sneaky>().with::<Thief>().with::<Other>()
 }
 
 const TILED: &str =
@@ -265,5 +280,16 @@ fn what_no_stage_gives_is_refused_by_name() {
     let twice = format!("{RISE_STAGES}[[stage]]\nkind = 'rise'\n[[stage]]\nkind = 'rise'\n");
     let told = refused(&twice, "dimensions = ['Rise']");
     assert!(told.contains("would replace values of Rise that nothing has read"), "{told}");
+    let told = refused("[[stage]]\nkind = 'rise'\n", "dimensions = ['Raise', 'Rise']");
+    assert!(told.contains("out.las") && told.contains("the stages above compute Rise"), "{told}");
+    let told = refused("[[stage]]\nkind = 'normals'\n", "dimensions = ['Normal']");
+    assert!(told.contains("its numbers are NormalX, NormalY and NormalZ"), "{told}");
+    let rise = "[[stage]]\nkind = 'rise'\n";
+    let told = refused(&format!("{rise}[[stage]]\nkind = 'sneaky'\n"), "");
+    assert!(told.contains("reads Rise of its neighbours and does not declare it"), "{told}");
+    let told = refused("[[stage]]\nkind = 'thief'\n", "dimensions = ['Rise']");
+    assert!(told.contains("took the column Rise and did not put it back"), "{told}");
+    let told = refused(&format!("{rise}[[stage]]\nkind = 'other'\n"), "");
+    assert!(told.contains("`other` computes Rise of another type"), "{told}");
     assert!(!folder.path().join("out.las").exists());
 }

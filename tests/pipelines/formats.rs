@@ -47,6 +47,9 @@ fn a_format_from_outside_is_read_converted_and_written() {
     assert_eq!(text("b.toy"), POINTS);
     run(at, "odd.dat'\nformat = 'toy'", "c.toy'").unwrap();
     assert_eq!(text("c.toy"), POINTS);
+    // Where the extension tells nothing, the first bytes do.
+    run(at, "odd.dat'", "g.toy'").unwrap();
+    assert_eq!(text("g.toy"), POINTS);
     // To LAS and PLY, and back: what LAS has besides coordinates must be dropped by name.
     run(at, "a.toy'", "d.laz'\nscale = 0.25").unwrap();
     let lost = told(&run(at, "d.laz'", "e.toy'").unwrap_err());
@@ -76,6 +79,7 @@ fn a_format_from_outside_is_named_in_messages() {
     refused("a.toy'\nformat = 'toys'", "o.las'", "did you mean `toy`? valid: las, laz, ply, toy");
     refused("a.toy'\nformat = 5", "o.las'", "`format`: takes one of las, laz, ply, toy");
     refused("a.toy'", "o.las'", "a TOY scan written as LAS needs a scale");
+    refused("a.toy'", "o.toy'\ndimensions = ['NormalX']", "and toy holds nothing computed");
     refused("a.toy'", "o.toy'\nscale = 1.0", "`write.scale` is for las and laz, the output is toy");
     let both = format!("a.toy', '{}/c.ply", at.display());
     let both = pipeline(at, &both, "o.las'").replacen("path = '", "path = ['", 1);

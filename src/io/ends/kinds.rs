@@ -30,7 +30,7 @@ pub struct Read {
     /// A file, a pattern, a folder, or a list of them.
     #[serde(deserialize_with = "one_or_more")]
     pub path: Vec<String>,
-    /// Format of all of them; none: as their extensions say.
+    /// Format of all of them; none: as their extensions say, else as their first bytes do.
     #[serde(default)]
     pub format: Option<FormatName>,
 }
@@ -64,7 +64,7 @@ pub struct Read {
 /// records and its offset, holding those of its points that are kept, even if that is none. The
 /// inputs are one scan all the same: neighbourhoods and cells go on from file to file, and the
 /// outputs together have the points that the one file would have.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Write {
     /// The file; it appears under this name when it is complete. Either this or `folder` is given.
@@ -153,6 +153,11 @@ pub(super) fn check(
         let is = format.name();
         let told = format!("`write.{key}` is for {having}, the output is {is}");
         return Err((key, Error::pipeline(told)));
+    }
+    if let Some(name) = keys.computed.first().filter(|_| !format.holds_computed()) {
+        let is = format.name();
+        let told = format!("`write.dimensions` asks for {name}, and {is} holds nothing computed");
+        return Err(("dimensions", Error::pipeline(told).help("write LAS, LAZ or PLY")));
     }
     match keys.offset.is_some_and(|offset| offset.iter().any(|v| !v.is_finite())) {
         true => Err(("offset", Error::pipeline("an offset is three finite numbers"))),

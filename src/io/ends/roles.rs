@@ -7,6 +7,7 @@ use super::kinds::{Read, Write, unknown_extension};
 use super::outputs::Outputs;
 use super::{connect, inputs, kinds};
 use crate::error::shown;
+use crate::io::sniff::first_bytes;
 use crate::stage::{Format, Formats, OpenSource, Role, StageKind, StagePlace, WriteKeys};
 use crate::{Error, Result};
 
@@ -15,12 +16,13 @@ impl Read {
     ///
     /// # Errors
     ///
-    /// A path that names no file, a file whose name tells no format, and files of which the records
+    /// A path that names no file, a file of which neither name nor first bytes tell a format, and files of which the records
     /// are not alike.
     pub fn source(&self, formats: &Formats) -> Result<Box<dyn OpenSource>> {
         let files = inputs::expand(&self.path, formats)?;
         let asked = self.format.as_ref().map(|name| formats.named(name)).transpose()?;
-        let known = |file: &PathBuf| asked.or(formats.of(file));
+        let sniffed = |file: &PathBuf| formats.sniffed(&first_bytes(file).ok()?);
+        let known = |file: &PathBuf| asked.or(formats.of(file)).or_else(|| sniffed(file));
         // A file that is not there is told when it is opened, whatever its name.
         let missing = files.iter().find_map(known).or(formats.iter().next());
         let mut all = Vec::new();

@@ -149,7 +149,7 @@ fn put_computed(dimension: &Dimension, record: &mut [u8], value: Value) -> Resul
     }
     let name = &dimension.name;
     Err(Error::pipeline(format!("the input's {name} cannot hold what is computed for it"))
-        .help("drop the input's before new values are written"))
+        .help(format!("leave {name} out of `write.dimensions`, or compute it by another name")))
 }
 
 impl Encode for LasEncoder {

@@ -137,6 +137,10 @@ impl Format for LasFormat {
         })
     }
 
+    fn holds_computed(&self) -> bool {
+        true
+    }
+
     fn likes_time(&self) -> bool {
         self.compressed
     }

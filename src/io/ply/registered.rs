@@ -82,6 +82,10 @@ impl Format for PlyFormat {
         Ok(sink::plan(&options(keys, metadata, false), schema, metadata)?.disk_bytes())
     }
 
+    fn holds_computed(&self) -> bool {
+        true
+    }
+
     fn unread<'a>(&self, keys: &'a WriteKeys) -> &'a [String] {
         &keys.drop
     }
