@@ -16,8 +16,8 @@ impl Read {
     ///
     /// # Errors
     ///
-    /// A path that names no file, a file of which neither name nor first bytes tell a format, and files of which the records
-    /// are not alike.
+    /// A path that names no file, a file of which neither name nor first bytes tell a format, and
+    /// files of which the records are not alike.
     pub fn source(&self, formats: &Formats) -> Result<Box<dyn OpenSource>> {
         let files = inputs::expand(&self.path, formats)?;
         let asked = self.format.as_ref().map(|name| formats.named(name)).transpose()?;
