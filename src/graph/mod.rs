@@ -102,8 +102,7 @@ impl Graph {
     /// Adds a stage that takes from those with the numbers `from`; returns its own.
     ///
     /// A role does not say what it was made of: reports and outputs name its settings as they stand
-    /// in [`GraphStage::keys`], and limits it as [`GraphStage::limits`] does, which both are empty
-    /// until they are set.
+    /// in [`GraphStage::keys`], which is empty until it is set.
     pub fn add(&mut self, kind: &str, role: Role, from: &[usize]) -> usize {
         let written = Arc::new(written::Unwritten::new(kind, self.stages.len()));
         self.stages.push(GraphStage {

@@ -97,8 +97,7 @@ pub(super) fn missing(stage: &StageOp, name: &str, help: &str) -> Error {
     stage.written.wrong(told).help(help.to_owned())
 }
 
-/// The stage that computes a column which has this name, or a number of that name.
-pub(super) fn giver(name: &str) -> Option<&'static str> {
-    let known = NORMAL.kind();
-    (known.name() == name || known.part(name).is_some()).then_some("normals")
+/// The stage that computes the normals, if that is the name of one of their numbers.
+fn giver(name: &str) -> Option<&'static str> {
+    NORMAL.kind().part(name).and_then(|dimension| dimension.column.computed_by())
 }

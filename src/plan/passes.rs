@@ -1,12 +1,13 @@
 //! The tile stages of a pipeline as passes over the scan: a pass ends where points are removed, or
 //! where a stage must have seen all tiles before it decides.
 
-use super::columns::{NewestColumns, giver, missing};
+use super::columns::{NewestColumns, missing};
 use super::limits::seen_by;
 use super::sorted::{Sorted, StageWork};
 use crate::engine::pass::{Branch, Call, Op, Pass, PassFilter, StageOp, decides, needs};
 use crate::point::{ColumnKind, ComputedDimension, Scalar, Schema, names};
 use crate::stage::Needs;
+use crate::tile::Partition;
 use crate::{Error, Result};
 
 /// The passes of a graph.
@@ -300,7 +301,7 @@ impl PassLayout<'_> {
             return Err(Error::internal(told));
         }
         if self.schema.find(name).is_none() {
-            let help = giver(name).map_or_else(
+            let help = column.computed_by().map_or_else(
                 || format!("no stage computes {name}, and the records of the input have none"),
                 |stage| format!("put a `{stage}` stage before it"),
             );
@@ -333,14 +334,14 @@ impl PassLayout<'_> {
     }
 
     fn no_cells(&self, stage: &StageOp) -> Error {
-        missing(
-            stage,
-            "Cell",
-            match self.out.passes.iter().any(|pass| pass.makes_cells) {
-                true => "cells last until points are removed: put a `cells` stage right before it",
-                false => "put a `cells` stage before it",
-            },
-        )
+        let by = Partition::MADE_BY;
+        let help = match self.out.passes.iter().any(|pass| pass.makes_cells) {
+            true => {
+                format!("cells last until points are removed: put a `{by}` stage right before it")
+            }
+            false => format!("put a `{by}` stage before it"),
+        };
+        missing(stage, "Cell", &help)
     }
 
     /// Attaches sinks to the pass that the branch is at: they take what is there before it, if its

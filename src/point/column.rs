@@ -65,8 +65,14 @@ impl<T: ColumnValue> Column<T> {
     /// Where there are not as many names as numbers; in a constant the compiler tells.
     pub const fn new(name: &'static str, parts: &'static [&'static str]) -> Self {
         assert!(if parts.is_empty() { T::PARTS == 1 } else { parts.len() == T::PARTS });
-        let kind = ColumnKind { name, parts, scalar: T::SCALAR };
+        let kind = ColumnKind { name, parts, scalar: T::SCALAR, by: None };
         Column { kind, of: PhantomData }
+    }
+
+    /// The same, to be told as computed by the stage `kind` where none computes it.
+    #[must_use]
+    pub const fn computed_by(self, kind: &'static str) -> Self {
+        Column { kind: ColumnKind { by: Some(kind), ..self.kind }, of: PhantomData }
     }
 
     /// The column of this kind, which must be of a type `T`.
@@ -81,20 +87,34 @@ impl<T: ColumnValue> Column<T> {
 }
 
 /// Unit surface normals; NaN where there is none.
-pub const NORMAL: Column<[f32; 3]> = Column::new("Normal", &names::NORMAL);
+pub const NORMAL: Column<[f32; 3]> = Column::new("Normal", &names::NORMAL).computed_by("normals");
 
 /// What a column is, for those that do not know its type.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub struct ColumnKind {
     name: &'static str,
     parts: &'static [&'static str],
     scalar: Scalar,
+    by: Option<&'static str>,
 }
+
+impl PartialEq for ColumnKind {
+    fn eq(&self, other: &Self) -> bool {
+        (self.name, self.parts, self.scalar) == (other.name, other.parts, other.scalar)
+    }
+}
+
+impl Eq for ColumnKind {}
 
 impl ColumnKind {
     /// Its name.
     pub fn name(&self) -> &'static str {
         self.name
+    }
+
+    /// The stage that computes it, if one is told to.
+    pub fn computed_by(&self) -> Option<&'static str> {
+        self.by
     }
 
     /// The names of the numbers of a value, as outputs have them.

@@ -264,6 +264,9 @@ pub struct Partition {
 }
 
 impl Partition {
+    /// The stage that is told to make one where a stage needs it and none does.
+    pub(crate) const MADE_BY: &'static str = "cells";
+
     /// Forgets all groups, keeps the memory.
     pub fn clear(&mut self) {
         self.members.clear();

@@ -96,6 +96,10 @@ stage!(Thief, "thief", Needs::none().writes(&RISE), |tile| {
     Ok(())
 });
 
+stage!(Wordy, "wordy", Needs::none().writes(&WORDY), |_tile| { Ok(()) });
+
+const WORDY: Column<u8> = Column::new("MoreThanThirtyTwoBytesAreALongName", &[]);
+
 stage!(Other, "other", Needs::none().writes(&OTHER_RISE), |_tile| { Ok(()) });
 
 /// A column that is called as another and of another type.
@@ -103,7 +107,7 @@ const OTHER_RISE: Column<f64> = Column::new("Rise", &[]);
 
 fn registry() -> Registry {
     let registry = Registry::builtin().with::<Rise>().with::<Rises>().with::<Glow>();
-    registry.with::<Sneaky>().with::<Thief>().with::<Other>()
+    registry.with::<Sneaky>().with::<Thief>().with::<Other>().with::<Wordy>()
 }
 
 const TILED: &str =
@@ -291,5 +295,8 @@ fn what_no_stage_gives_is_refused_by_name() {
     assert!(told.contains("took the column Rise and did not put it back"), "{told}");
     let told = refused(&format!("{rise}[[stage]]\nkind = 'other'\n"), "");
     assert!(told.contains("`other` computes Rise of another type"), "{told}");
+    let long = format!("dimensions = ['{}']", WORDY.kind().name());
+    let told = refused("[[stage]]\nkind = 'wordy'\n", &long);
+    assert!(told.contains("longer than the 32 bytes that LAS has for the name"), "{told}");
     assert!(!folder.path().join("out.las").exists());
 }

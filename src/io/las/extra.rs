@@ -7,6 +7,9 @@ use crate::point::{ComputedDimension, Dimension, Scalar};
 /// Bytes of one descriptor.
 pub const DESCRIPTOR_BYTES: usize = 192;
 
+/// Bytes of the longest name in a descriptor.
+pub const LONGEST_NAME: usize = 32;
+
 mod at {
     pub const KIND: usize = 2;
     pub const OPTIONS: usize = 3;

@@ -13,7 +13,7 @@ use laz::{LazVlr, LazVlrBuilder};
 use super::credit::{count_gps_time, credit, drop_ranges, name_system};
 use super::described::{Described, describe};
 use super::encode::{ComputedFields, LasEncoder};
-use super::extra::{DESCRIPTOR_BYTES, with_computed};
+use super::extra::{DESCRIPTOR_BYTES, LONGEST_NAME, with_computed};
 use super::fields::encoding;
 use super::format::{format_of, record_size};
 use super::header::{COMPRESSED, Header};
@@ -128,6 +128,13 @@ fn describe_computed(
     schema: &Schema,
     computed: &[ComputedDimension],
 ) -> Result<()> {
+    if let Some(long) = computed.iter().find(|dimension| dimension.name.len() > LONGEST_NAME) {
+        let told = format!(
+            "`{}` is longer than the {LONGEST_NAME} bytes that LAS has for the name of a dimension",
+            long.name
+        );
+        return Err(Error::pipeline(told).help("write PLY, or compute it by a shorter name"));
+    }
     let extra = schema.stride - usize::from(record_size(format).unwrap_or(0));
     let known = Described::of(&native.vlrs, &native.evlrs, extra)?.descriptors;
     let all = with_computed(&known, extra, computed);
