@@ -768,7 +768,7 @@ fn files_of_unclear_format_are_told_what_helps_the_command() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();
     case(at, "160-las-named.ply");
-    fs::write(at.join("a.bin"), b"LASF").unwrap();
+    fs::write(at.join("a.bin"), b"what it is").unwrap();
     let file = "in a pipeline file (`pointmill run FILE`)\n";
     let las = told(at, &["convert", "160-las-named.ply", "-o", "o.laz"], 1);
     let help = format!("help: name it .las or .laz, or give `read.format = \"las\"` {file}");
