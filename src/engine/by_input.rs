@@ -93,9 +93,7 @@ impl ByInput {
         list.open.extend_from_slice(&entry.number.to_le_bytes());
         list.open.extend_from_slice(&entry.count.to_le_bytes());
         list.open.push(state.0);
-        if self.layout.bytes() > 0 {
-            list.open.extend_from_slice(row);
-        }
+        self.layout.enter(row, &mut list.open);
         list.records += u64::from(entry.count);
         if list.open.len() + ENTRY + self.layout.bytes() > self.list_bytes {
             list.stretches.push(self.spill.store(&list.open)?);

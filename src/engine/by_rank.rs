@@ -172,9 +172,7 @@ impl ByRank {
             list.open.extend_from_slice(&rank.to_le_bytes());
             list.open.extend_from_slice(&stored.to_le_bytes());
             list.open.push(state.0);
-            if self.layout.bytes() > 0 {
-                list.open.extend_from_slice(row);
-            }
+            self.layout.enter(row, &mut list.open);
             if list.open.len() + ENTRY + self.layout.bytes() > self.list_bytes {
                 list.stretches.push(self.spill.store(&list.open)?);
                 list.open.clear();

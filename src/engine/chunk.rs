@@ -84,9 +84,7 @@ impl Open {
         while left > 0 {
             let now = left.min(u32::try_from(self.room).unwrap_or(u32::MAX));
             self.chunk.records.push((first, now, state));
-            if self.layout.bytes() > 0 {
-                self.chunk.rows.extend_from_slice(row);
-            }
+            self.layout.enter(row, &mut self.chunk.rows);
             (first, left) = (first + u64::from(now), left - now);
             self.room -= now as usize;
             if self.room == 0 {

@@ -7,7 +7,7 @@
 
 use super::grind::{DecodedScan, Worker};
 use super::job::Job;
-use super::pass::Pass;
+use super::pass::{Call, Pass, put_to_work};
 use super::row::RowLayout;
 use super::shares::Shares;
 use crate::Result;
@@ -79,8 +79,7 @@ fn samples(
                 return Ok(None);
             }
             let (tile, _) = worker.run(key, Some(op))?;
-            tile.limits = job.ops[op].selection;
-            tile.of_neighbors = Some(job.ops[op].op.tile().needs().of_neighbors.into());
+            put_to_work(tile, &job.ops, Call { op, gathers: false });
             let figures = job.ops[op].op.tile().sample(tile)?;
             Ok(Some(figures.into_iter().map(f64::to_bits).collect::<Vec<_>>()))
         },

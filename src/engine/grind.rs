@@ -22,7 +22,7 @@ use super::encoding::ChunkEncoders;
 use super::filtering::Filtering;
 use super::job::Job;
 use super::outlet::Outlet;
-use super::pass::{Op, Pass, needs};
+use super::pass::{Op, Pass, put_to_work};
 use super::product::Product;
 use super::rounded::Rounded;
 use super::row::RowLayout;
@@ -240,10 +240,8 @@ impl<'a> Worker<'a> {
         let (tile, _) = self.loader.tile();
         let mut summary = None;
         for call in self.pass.calls.iter().take_while(|call| Some(call.op) != until) {
-            let stage = &self.job.ops[call.op];
-            tile.limits = stage.selection;
-            tile.of_neighbors = Some(needs(&self.job.ops, *call).of_neighbors.into());
-            match (&stage.op, call.gathers) {
+            put_to_work(tile, &self.job.ops, *call);
+            match (&self.job.ops[call.op].op, call.gathers) {
                 (Op::Scan(op), true) => {
                     let bytes = summary.insert(Vec::new());
                     op.gather_into(tile, &mut self.sum.tally, bytes)?;

@@ -13,7 +13,7 @@ use super::row::RowLayout;
 use crate::graph::{Limits, Written};
 use crate::point::{ColumnKind, ComputedDimension, Mark, NORMAL, Schema};
 use crate::stage::{AnyScanOp, Needs, TileOp, Transform};
-use crate::tile::{Loader, ReadDimensions, Sieve};
+use crate::tile::{Loader, ReadDimensions, Sieve, Tile};
 
 /// A tile stage and where it stands.
 pub(crate) struct StageOp {
@@ -131,6 +131,13 @@ impl ColumnBytes {
             of_records: self.of_records || other.of_records,
         }
     }
+}
+
+/// Lets the stage of a call work on `tile`: on the records that it is limited to, and with the
+/// columns that it says it reads of its neighbours.
+pub(crate) fn put_to_work(tile: &mut Tile, ops: &[StageOp], call: Call) {
+    tile.limits = ops[call.op].selection;
+    tile.of_neighbors = Some(needs(ops, call).of_neighbors.into());
 }
 
 /// What a call needs.

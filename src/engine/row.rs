@@ -36,6 +36,13 @@ impl RowLayout {
         &self.kinds
     }
 
+    /// Appends `row` to `rows`, unless rows have no column.
+    pub fn enter(&self, row: &[u8], rows: &mut Vec<u8>) {
+        if self.bytes > 0 {
+            rows.extend_from_slice(row);
+        }
+    }
+
     /// The columns of records of which `counts` each have one of `rows`.
     pub fn spread(&self, rows: &[u8], counts: impl Iterator<Item = usize> + Clone) -> Columns {
         let (mut columns, mut begin) = (Columns::default(), 0);
@@ -44,7 +51,7 @@ impl RowLayout {
             let range = begin..begin + kind.bytes();
             let rows = rows.chunks_exact(self.bytes).zip(counts.clone());
             let each = rows.flat_map(|(row, n)| std::iter::repeat_n(&row[range.clone()], n));
-            columns.append_each(*kind, 0, each);
+            columns.append(*kind, 0, each);
             begin = range.end;
         }
         columns

@@ -6,7 +6,7 @@
 use bytemuck::{cast_slice, cast_slice_mut};
 
 use super::column::{Column, ColumnKind, ColumnValue, ComputedDimension};
-use super::schema::{Dimension, Endian};
+use super::schema::{Dimension, Endian, Value};
 use crate::{Error, Result};
 
 /// Columns with as many values each.
@@ -132,35 +132,41 @@ impl Columns {
         self.resize(len);
     }
 
-    /// True if there is none.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
-    /// The columns that there are.
-    pub fn kinds(&self) -> impl Iterator<Item = ColumnKind> + '_ {
-        self.0.iter().map(|(kind, _)| *kind)
-    }
-
     /// The bytes of a column's values, one after the other.
     pub(crate) fn bytes_of(&self, kind: ColumnKind) -> Option<&[u8]> {
         self.0.iter().find(|(known, _)| *known == kind).map(|(_, values)| values.bytes())
     }
 
-    /// The bytes of the values of `dimension`'s column, for `points` positions.
+    /// The numbers of `dimension` for `points` positions, each in this machine's bytes.
     ///
     /// # Errors
     ///
     /// If they are not there: what writes them was created for columns that no stage computes.
-    pub(crate) fn of_dimension(
+    pub(crate) fn bytes_of_dimension(
         &self,
         dimension: &ComputedDimension,
         points: usize,
-    ) -> Result<&[u8]> {
-        let bytes = self.bytes_of(dimension.column);
-        let whole = bytes.filter(|bytes| bytes.len() == points * dimension.column.bytes());
+    ) -> Result<impl Iterator<Item = &[u8]>> {
+        let (size, range) = (dimension.column.bytes(), dimension.range());
+        let bytes = self.bytes_of(dimension.column).filter(|bytes| bytes.len() == points * size);
         let name = dimension.name;
-        whole.ok_or_else(|| Error::internal(format!("{name} is to be written and not computed")))
+        let missing = || Error::internal(format!("{name} is to be written and not computed"));
+        Ok(bytes.ok_or_else(missing)?.chunks_exact(size).map(move |value| &value[range.clone()]))
+    }
+
+    /// The numbers of `dimension` for `points` positions.
+    ///
+    /// # Errors
+    ///
+    /// As for [`bytes_of_dimension`](Columns::bytes_of_dimension).
+    pub(crate) fn numbers(
+        &self,
+        dimension: &ComputedDimension,
+        points: usize,
+    ) -> Result<impl Iterator<Item = Value>> {
+        let field = Dimension::new(dimension.name, dimension.scalar(), 0);
+        let bytes = self.bytes_of_dimension(dimension, points)?;
+        Ok(bytes.map(move |number| field.get(number, COLUMN_ENDIAN)))
     }
 
     fn find_mut(&mut self, kind: ColumnKind) -> Option<&mut Aligned> {
@@ -202,16 +208,8 @@ impl Columns {
         });
     }
 
-    /// Appends values of one column, behind `len` that it gets first.
-    pub(crate) fn append(&mut self, kind: ColumnKind, len: usize, values: &[u8]) {
-        if let Some(column) = self.find_mut(kind) {
-            column.fill(len * kind.bytes(), &kind.unknown());
-            column.extend(values);
-        }
-    }
-
-    /// The same with one value after the other.
-    pub(crate) fn append_each<'a>(
+    /// Appends values of one column, some after others, behind `len` that it gets first.
+    pub(crate) fn append<'a>(
         &mut self,
         kind: ColumnKind,
         len: usize,
@@ -219,7 +217,7 @@ impl Columns {
     ) {
         if let Some(column) = self.find_mut(kind) {
             column.fill(len * kind.bytes(), &kind.unknown());
-            values.for_each(|value| column.extend(value));
+            values.for_each(|values| column.extend(values));
         }
     }
 
@@ -244,13 +242,6 @@ impl Columns {
 fn undeclared(kind: ColumnKind) -> Error {
     let name = kind.name();
     Error::internal(format!("a stage asks for the column {name}, which it does not declare"))
-}
-
-impl ComputedDimension {
-    /// Where its number is in the bytes of a value of its column.
-    pub(crate) fn field(&self) -> Dimension {
-        Dimension::new(self.name, self.scalar(), self.range().start)
-    }
 }
 
 /// The order of the bytes of columns: this machine's, since they never leave it.

@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use super::sieve::{MoreRuns, RecordRun, Runs, Sieve};
-use super::values::DimensionColumns;
+use super::values::{DimensionColumns, first_of_each};
 use super::{Fate, Tile};
 use crate::Result;
 use crate::budget::Bytes;
@@ -188,7 +188,6 @@ impl Loader {
         let block = self.tiles.block(b);
         let (positions, copies) = self.tiles.read(b, &mut self.reader)?;
         let (tile, first_records) = (&mut self.tile, &mut self.core.first_records);
-        let mut record = block.first_record;
         let is_core = tile.cube.holds(&block.bounds);
         if loaded.holds(&block.bounds) && (is_core || !tile.cube.meets(&block.bounds)) {
             // Nearly all blocks: no position has to be looked at.
@@ -198,23 +197,17 @@ impl Loader {
                 tile.core.start = tile.positions.len() + positions.len();
             }
             if is_core {
-                first_records.extend(copies.iter().map(|&n| {
-                    record += u64::from(n);
-                    record - u64::from(n)
-                }));
+                first_records.extend(first_of_each(block.first_record, copies));
             }
             tile.positions.extend_from_slice(positions);
             tile.copies.extend_from_slice(copies);
             if let Some(dimensions) = &mut self.dimensions {
-                let mut record = block.first_record;
-                dimensions.numbers.extend(copies.iter().map(|&n| {
-                    record += u64::from(n);
-                    record - u64::from(n)
-                }));
+                dimensions.numbers.extend(first_of_each(block.first_record, copies));
             }
             return Ok(());
         }
-        for (j, (&p, &n)) in positions.iter().zip(copies).enumerate() {
+        let records = first_of_each(block.first_record, copies);
+        for (j, ((&p, &n), record)) in positions.iter().zip(copies).zip(records).enumerate() {
             if loaded.contains(p) {
                 if tile.cube.contains(p) {
                     if first_records.is_empty() {
@@ -230,7 +223,6 @@ impl Loader {
                     dimensions.numbers.push(record);
                 }
             }
-            record += u64::from(n);
         }
         Ok(())
     }
@@ -303,8 +295,13 @@ impl Loader {
         for (column, pieces) in &sieve.columns {
             read_column(pieces, span, stored)?;
             let size = column.bytes();
-            let value = |j: &usize| &stored[(j - lowest) * size..][..size];
-            tile.columns.append_each(*column, begin, places.iter().map(value));
+            let value = |places: &[usize]| {
+                let (first, count) = (places[0] - lowest, places.len());
+                &stored[first * size..(first + count) * size]
+            };
+            // Positions that follow one another, as nearly all of a block do, have their values so.
+            let stretches = places.chunk_by(|a, b| a + 1 == *b);
+            tile.columns.append(*column, begin, stretches.map(value));
         }
         Ok(())
     }

@@ -19,6 +19,15 @@ use crate::{Error, Result};
 /// Records that are read together.
 const AT_ONCE: usize = 4096;
 
+/// The number of the first record of each position, where positions have so many `copies` each and
+/// the first of all is `record`.
+pub(super) fn first_of_each(mut record: u64, copies: &[u32]) -> impl Iterator<Item = u64> + '_ {
+    copies.iter().map(move |&n| {
+        record += u64::from(n);
+        record - u64::from(n)
+    })
+}
+
 /// Reads dimensions of records as columns; one a thread.
 #[derive(Debug)]
 pub(super) struct DimensionReader {
@@ -44,7 +53,7 @@ impl DimensionReader {
                 let world = |record| dimension.world(record, self.read.schema.endian);
                 self.values.clear();
                 self.values.extend(self.batch.iter().flat_map(|r| world(r).to_ne_bytes()));
-                columns.append(*column, done, &self.values);
+                columns.append(*column, done, std::iter::once(&self.values[..]));
             }
             done += numbers.len();
         }
@@ -87,16 +96,25 @@ pub(super) struct ValuesBeyond {
     column: ColumnKind,
     /// None if the tile is all there is.
     scan: Option<(Arc<SealedTiles>, Sieve)>,
+    /// Where the value of one neighbour is found and put.
+    lookup: ValueLookup,
+}
+
+/// What looking up values one by one keeps from one to the next.
+#[derive(Default)]
+struct ValueLookup {
     reader: Reader,
     runs: Runs,
+    dimensions: Option<DimensionReader>,
+    columns: Columns,
     buffer: Vec<u8>,
+    /// The value looked up last.
     bytes: Vec<u8>,
 }
 
 impl ValuesBeyond {
     pub(super) fn new(column: ColumnKind, scan: Option<(Arc<SealedTiles>, Sieve)>) -> Self {
-        let (reader, runs) = (Reader::default(), Runs::default());
-        ValuesBeyond { column, scan, reader, runs, buffer: Vec::new(), bytes: Vec::new() }
+        ValuesBeyond { column, scan, lookup: ValueLookup::default() }
     }
 
     /// Appends the value of each of `found` to `values`.
@@ -105,23 +123,26 @@ impl ValuesBeyond {
         found: &[FoundPosition],
         values: &mut Vec<T>,
     ) -> Result<()> {
-        let Some((tiles, sieve)) = self.scan.clone() else {
+        let ValuesBeyond { column, scan, lookup } = self;
+        let Some((tiles, sieve)) = scan else {
             return Err(Error::internal("a neighbour lies beyond a tile that is all there is"));
         };
-        let stored = sieve.columns.iter().find(|(kind, _)| *kind == self.column);
+        let stored = sieve.columns.iter().find(|(kind, _)| kind == column);
         for found in found {
             match stored {
-                Some((_, pieces)) => self.stored(&tiles, pieces, found)?,
-                None => self.of_record(&tiles, &sieve, found)?,
+                Some((_, pieces)) => lookup.stored(tiles, pieces, found)?,
+                None => lookup.of_record(tiles, sieve, *column, found)?,
             }
-            if self.bytes.len() != size_of::<T>() {
+            if lookup.bytes.len() != size_of::<T>() {
                 return Err(Error::internal("a neighbour's value is of another type"));
             }
-            values.push(pod_read_unaligned(&self.bytes));
+            values.push(pod_read_unaligned(&lookup.bytes));
         }
         Ok(())
     }
+}
 
+impl ValueLookup {
     fn stored(
         &mut self,
         tiles: &SealedTiles,
@@ -136,24 +157,27 @@ impl ValuesBeyond {
         &mut self,
         tiles: &SealedTiles,
         sieve: &Sieve,
+        column: ColumnKind,
         found: &FoundPosition,
     ) -> Result<()> {
+        let ValueLookup { reader, runs, dimensions, columns, bytes, .. } = self;
         let undeclared = || Error::internal("a stage asks for a column that nobody stored");
         let read = sieve.dimensions.as_ref().ok_or_else(undeclared)?;
-        let (_, copies) = tiles.read(found.block, &mut self.reader)?;
+        let (_, copies) = tiles.read(found.block, reader)?;
         let index = found.index as usize;
-        let first = tiles.block(found.block).first_record;
-        let mut number = first + copies[..index].iter().map(|&n| u64::from(n)).sum::<u64>();
+        let mut number = first_of_each(tiles.block(found.block).first_record, copies).nth(index);
         if sieve.is_fine(tiles) {
-            self.runs.read(tiles, sieve, found.block, copies)?;
-            let run = RecordRun::first_of(self.runs.of(index), sieve);
-            number = run.map_or(number, |run| run.number);
+            runs.read(tiles, sieve, found.block, copies)?;
+            number = RecordRun::first_of(runs.of(index), sieve).map(|run| run.number).or(number);
         }
-        let mut columns = Columns::default();
-        columns.declare(&[self.column]);
-        DimensionReader::new(read, 1).read(tiles, &[number], &mut columns)?;
-        self.bytes.clear();
-        self.bytes.extend_from_slice(columns.bytes_of(self.column).unwrap_or_default());
+        let unknown = || Error::internal("a neighbour is no position of its block");
+        let number = number.ok_or_else(unknown)?;
+        columns.declare(&[column]);
+        columns.clear_values();
+        let dimensions = dimensions.get_or_insert_with(|| DimensionReader::new(read, 1));
+        dimensions.read(tiles, &[number], columns)?;
+        bytes.clear();
+        bytes.extend_from_slice(columns.bytes_of(column).unwrap_or_default());
         Ok(())
     }
 }

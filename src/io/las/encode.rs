@@ -48,12 +48,11 @@ impl ComputedFields {
         let stride = own + self.appended_bytes();
         let mut at = own;
         for dimension in &self.appended {
-            let values = batch.columns.of_dimension(dimension, points)?;
-            let values = values.chunks_exact(dimension.column.bytes());
+            let numbers = batch.columns.bytes_of_dimension(dimension, points)?;
             let field = at..at + dimension.scalar().size();
-            for (record, value) in records.chunks_exact_mut(stride).zip(values) {
+            for (record, number) in records.chunks_exact_mut(stride).zip(numbers) {
                 let bytes = &mut record[field.clone()];
-                bytes.copy_from_slice(&value[dimension.range()]);
+                bytes.copy_from_slice(number);
                 if COLUMN_ENDIAN == Endian::Big {
                     bytes.reverse();
                 }
@@ -61,11 +60,9 @@ impl ComputedFields {
             at = field.end;
         }
         for (dimension, target) in &self.in_place {
-            let (values, from) =
-                (batch.columns.of_dimension(dimension, points)?, dimension.field());
-            let values = values.chunks_exact(dimension.column.bytes());
-            for (record, value) in records.chunks_exact_mut(stride).zip(values) {
-                put_computed(target, record, from.get(value, COLUMN_ENDIAN))?;
+            let numbers = batch.columns.numbers(dimension, points)?;
+            for (record, number) in records.chunks_exact_mut(stride).zip(numbers) {
+                put_computed(target, record, number)?;
             }
         }
         Ok(())

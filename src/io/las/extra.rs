@@ -54,8 +54,8 @@ impl Descriptor {
         let mut bytes = [0; DESCRIPTOR_BYTES];
         let kind = SCALARS.iter().position(|s| *s == scalar).map_or(1, |i| i as u8 + 1);
         bytes[at::KIND] = kind;
-        let (head, tail) = split_at_room(name, 32);
-        bytes[at::NAME..at::NAME + 32].copy_from_slice(&field::<32>(head));
+        let (head, tail) = split_at_room(name, LONGEST_NAME);
+        bytes[at::NAME..at::NAME + LONGEST_NAME].copy_from_slice(&field::<LONGEST_NAME>(head));
         bytes[at::DESCRIPTION..at::DESCRIPTION + 32].copy_from_slice(&field::<32>(tail));
         Descriptor(bytes)
     }
@@ -86,7 +86,7 @@ impl Descriptor {
 
     /// Name as written, without trailing zeros.
     pub fn name(&self) -> String {
-        text(&self.0[at::NAME..at::NAME + 32])
+        text(&self.0[at::NAME..at::NAME + LONGEST_NAME])
     }
 
     /// Bytes of a record that it describes.

@@ -9,9 +9,7 @@ use super::source::PlyNative;
 use super::text;
 use super::vertex::ply_schema;
 use crate::io::convert::Projection;
-use crate::point::{
-    COLUMN_ENDIAN, ComputedDimension, Dimension, PointBatch, Scalar, Schema, Spare, Value,
-};
+use crate::point::{ComputedDimension, Dimension, PointBatch, Scalar, Schema, Spare, Value};
 use crate::stage::{ChunkSize, Colors, Encode, Encoded};
 use crate::{Error, Result};
 
@@ -120,10 +118,9 @@ impl Form {
 
     fn put_computed(&self, batch: &PointBatch, vertices: &mut [u8]) -> Result<()> {
         for (dimension, target) in &self.computed {
-            let values = batch.columns.of_dimension(dimension, batch.len())?;
-            let (from, values) = (dimension.field(), values.chunks_exact(dimension.column.bytes()));
-            for (vertex, value) in vertices.chunks_exact_mut(self.vertex.stride).zip(values) {
-                let value = match from.get(value, COLUMN_ENDIAN) {
+            let numbers = batch.columns.numbers(dimension, batch.len())?;
+            for (vertex, number) in vertices.chunks_exact_mut(self.vertex.stride).zip(numbers) {
+                let value = match number {
                     Value::Double(v) if target.scalar == Scalar::F32 => Value::Single(v as f32),
                     value => value,
                 };
