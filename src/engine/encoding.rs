@@ -159,7 +159,8 @@ fn change(job: &Job<'_>, filters: &[usize], batch: &mut PointBatch) -> Result<()
     let records = batch.len();
     for &filter in filters {
         let PassFilter { kind, transform } = &job.task.filters[filter];
-        transform.apply(batch)?;
+        // What it counts was counted when it was first applied.
+        transform.apply(batch, &mut Tally::default())?;
         if batch.len() != records {
             let told = format!("the stage {kind} removes records that it kept before");
             return Err(Error::internal(told));

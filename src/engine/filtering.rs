@@ -98,7 +98,7 @@ impl<'a> Filtering<'a> {
         for &filter in self.filters {
             let PassFilter { kind, transform } = &self.job.task.filters[filter];
             let before = self.batch.len();
-            transform.apply(&mut self.batch)?;
+            transform.apply(&mut self.batch, tally)?;
             let removed = before
                 .checked_sub(self.batch.len())
                 .ok_or_else(|| Error::internal(format!("the stage {kind} made points up")))?;

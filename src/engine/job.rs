@@ -105,7 +105,7 @@ impl<'a> Job<'a> {
         self.classes.read(batch, tally);
         for (kind, transform) in &self.task.transforms {
             let before = batch.len();
-            transform.apply(batch)?;
+            transform.apply(batch, tally)?;
             let removed = before
                 .checked_sub(batch.len())
                 .ok_or_else(|| Error::internal(format!("the stage {kind} made points up")))?;

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::point::{Flag, PointBatch, Schema, Selection, names};
+use crate::report::Tally;
 use crate::stage::{Needs, Role, StageKind, StagePlace, Transform};
 use crate::{Error, Result};
 
@@ -118,7 +119,7 @@ impl Transform for Filter {
         keys.into_iter().filter(|(_, is_empty)| !is_empty).map(|(key, _)| key).collect()
     }
 
-    fn apply(&self, batch: &mut PointBatch) -> Result<()> {
+    fn apply(&self, batch: &mut PointBatch, _tally: &mut Tally) -> Result<()> {
         let selection = self.selection();
         if !selection.is_all() {
             let chooser = selection.of(batch.schema());
