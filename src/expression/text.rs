@@ -1,0 +1,75 @@
+//! Expressions as values of keys: read from their text, and written as it.
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use serde::de::{Deserializer, Visitor};
+
+use super::fault::ExpressionFault;
+
+/// Something that is written as an expression.
+pub(crate) trait FromText: Sized {
+    /// The name that serde has for it, by which a reader with places knows it.
+    const NAME: &'static str;
+    /// What a key takes, in words.
+    const EXPECTED: &'static str;
+
+    /// Reads it, or says what is wrong and where.
+    fn read(text: &str) -> Result<Self, ExpressionFault>;
+}
+
+struct TextVisitor<T>(PhantomData<T>);
+
+impl<'de, T: FromText> Visitor<'de> for TextVisitor<T> {
+    type Value = T;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(T::EXPECTED)
+    }
+
+    fn visit_newtype_struct<D: Deserializer<'de>>(self, from: D) -> Result<T, D::Error> {
+        from.deserialize_str(self)
+    }
+
+    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<T, E> {
+        T::read(text).map_err(|fault| E::custom(fault.told))
+    }
+}
+
+/// Reads an expression as the value of a key.
+pub(super) fn deserialize<'de, T: FromText, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
+    from.deserialize_newtype_struct(T::NAME, TextVisitor(PhantomData))
+}
+
+/// Implements what both kinds of expressions have in common: they are their text.
+macro_rules! is_its_text {
+    ($type:ty) => {
+        impl PartialEq for $type {
+            fn eq(&self, other: &Self) -> bool {
+                self.text == other.text
+            }
+        }
+
+        impl Eq for $type {}
+
+        impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str(&self.text)
+            }
+        }
+
+        impl serde::Serialize for $type {
+            fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+                to.serialize_str(&self.text)
+            }
+        }
+
+        impl<'de> serde::Deserialize<'de> for $type {
+            fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+                $crate::expression::text::deserialize(from)
+            }
+        }
+    };
+}
+
+pub(super) use is_its_text;
