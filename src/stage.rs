@@ -10,6 +10,7 @@ mod source;
 mod tile_op;
 
 use crate::Result;
+use crate::expression::KeyExpression;
 use crate::point::{PointBatch, Schema};
 use crate::report::Tally;
 
@@ -52,6 +53,12 @@ pub use tile_op::{Forecast, ScanFacts, TileOp};
 pub trait Transform: Send + Sync {
     /// What it reads and writes.
     fn needs(&self) -> Needs;
+
+    /// The expressions among its keys, each with its key: their names are looked up before the run,
+    /// and the columns that they name are there in each batch.
+    fn expressions(&self) -> Vec<(&'static str, KeyExpression<'_>)> {
+        Vec::new()
+    }
 
     /// Refuses records of a schema that it cannot work on; called once, before any of them is read.
     ///

@@ -62,6 +62,11 @@ impl Assignment {
         &self.target.0
     }
 
+    /// The names that its value is made of, each once.
+    pub fn names(&self) -> Vec<&str> {
+        self.tree.names()
+    }
+
     /// Refuses names that are not there, and a target that is no dimension of the records.
     pub(crate) fn check(&self, names: Names<'_>) -> Result<(), ExpressionFault> {
         self.bind(names).map(drop)

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::fault::ExpressionFault;
 use super::lanes::Field;
 use super::tree::{Function, Operator, Relation, Tree, TreeNode};
-use crate::point::{ColumnKind, Dimension, Scalar, Schema};
+use crate::point::{ColumnKind, Dimension, NORMAL, Scalar, Schema};
 
 /// A number for each record.
 #[derive(Debug, Clone)]
@@ -57,6 +57,10 @@ impl Names<'_> {
                 .help(help);
         }
         let told = format!("there is no dimension `{name}`");
+        if let Some(by) = NORMAL.kind().part(name).and_then(|part| part.column.computed_by()) {
+            let help = format!("put a `{by}` stage above it");
+            return ExpressionFault::new(span.clone(), told).help(help);
+        }
         ExpressionFault::word(span.clone(), told, name, "dimensions", &self.listed())
     }
 
@@ -101,9 +105,7 @@ pub(super) fn number(tree: &Tree, names: Names<'_>) -> Result<Number, Expression
         TreeNode::Number(value) => Number::Literal(*value),
         TreeNode::Name(name) => Number::Field(names.field(name, &tree.span)?),
         TreeNode::Negated(of) => Number::Negated(boxed(of)?),
-        TreeNode::Arithmetic(operator, a, b) => {
-            Number::Arithmetic(*operator, boxed(a)?, boxed(b)?)
-        }
+        TreeNode::Arithmetic(operator, a, b) => Number::Arithmetic(*operator, boxed(a)?, boxed(b)?),
         TreeNode::Call(function, of) => {
             let numbers = of.iter().map(|part| number(part, names));
             Number::Call(*function, numbers.collect::<Result<_, _>>()?)

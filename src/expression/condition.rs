@@ -47,13 +47,7 @@ impl Condition {
 
     /// The names of dimensions and columns in it, each once, in the order of the text.
     pub fn names(&self) -> Vec<&str> {
-        let mut names: Vec<&str> = Vec::new();
-        self.tree.each_name(&mut |name, _| {
-            if !names.contains(&name) {
-                names.push(name);
-            }
-        });
-        names
+        self.tree.names()
     }
 
     /// The condition for records of `schema`.

@@ -33,10 +33,8 @@ impl ExpressionFault {
             false => format!("{all}: {}", valid.join(", ")),
         };
         // What is shown of a word may say more than the word.
-        let plain: Vec<String> = valid
-            .iter()
-            .map(|word| word.split(" (").next().unwrap_or(word).to_owned())
-            .collect();
+        let plain: Vec<String> =
+            valid.iter().map(|word| word.split(" (").next().unwrap_or(word).to_owned()).collect();
         let help = match nearest(word, &plain) {
             Some(near) => format!("did you mean `{near}`? {list}"),
             None => list,

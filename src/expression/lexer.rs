@@ -23,9 +23,8 @@ pub(super) enum TokenKind {
 }
 
 /// Longer ones before those that they begin with.
-const SIGNS: [&str; 18] = [
-    "==", "!=", "<=", ">=", "..", "<", ">", "+", "-", "*", "/", "%", "(", ")", "[", "]", ",", "=",
-];
+const SIGNS: [&str; 18] =
+    ["==", "!=", "<=", ">=", "..", "<", ">", "+", "-", "*", "/", "%", "(", ")", "[", "]", ",", "="];
 
 /// Signs of other languages, and what is written here.
 const FOREIGN: [(&str, &str); 6] =

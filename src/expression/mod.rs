@@ -23,9 +23,11 @@
 
 mod assignment;
 mod bind;
+mod choice;
 mod condition;
 mod eval;
 mod fault;
+mod key;
 mod lanes;
 mod lexer;
 mod parser;
@@ -37,6 +39,9 @@ mod tests;
 
 pub use assignment::Assignment;
 pub(crate) use bind::Names;
+pub(crate) use choice::Choice;
 pub use condition::{BoundCondition, Condition};
 pub(crate) use fault::ExpressionFault;
-pub(crate) use text::FromText;
+pub use key::KeyExpression;
+pub use text::OneOrSeveral;
+pub(crate) use text::{FromText, ONE_OR_SEVERAL};

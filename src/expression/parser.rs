@@ -271,16 +271,11 @@ impl Parser {
     }
 
     fn product(&mut self) -> Parsed {
-        let signs =
-            [("*", Operator::Times), ("/", Operator::Over), ("%", Operator::Remainder)];
+        let signs = [("*", Operator::Times), ("/", Operator::Over), ("%", Operator::Remainder)];
         self.arithmetic(&signs, Parser::signed)
     }
 
-    fn arithmetic(
-        &mut self,
-        signs: &[(&str, Operator)],
-        part: fn(&mut Self) -> Parsed,
-    ) -> Parsed {
+    fn arithmetic(&mut self, signs: &[(&str, Operator)], part: fn(&mut Self) -> Parsed) -> Parsed {
         let mut left = part(self)?;
         let mut links = 0;
         while let Some((_, operator)) = signs.iter().find(|(sign, _)| self.takes(sign)) {

@@ -5,9 +5,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 
 use super::*;
-use crate::point::{
-    Column, Columns, Dimension, Endian, Layout, PointBatch, Scalar, Schema, names,
-};
+use crate::point::{Column, Columns, Dimension, Endian, Layout, PointBatch, Scalar, Schema, names};
 
 const LIFT: Column<[f32; 3]> = Column::new("Lift", &["LiftX", "LiftY", "LiftZ"]);
 

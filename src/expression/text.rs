@@ -3,7 +3,8 @@
 use std::fmt;
 use std::marker::PhantomData;
 
-use serde::de::{Deserializer, Visitor};
+use serde::de::{Deserializer, SeqAccess, Visitor};
+use serde::{Deserialize, Serialize};
 
 use super::fault::ExpressionFault;
 
@@ -39,6 +40,46 @@ impl<'de, T: FromText> Visitor<'de> for TextVisitor<T> {
 /// Reads an expression as the value of a key.
 pub(super) fn deserialize<'de, T: FromText, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
     from.deserialize_newtype_struct(T::NAME, TextVisitor(PhantomData))
+}
+
+/// One expression, or a list of them.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct OneOrSeveral<T>(pub Vec<T>);
+
+/// The name that serde has for [`OneOrSeveral`], by which a reader with places knows it.
+pub(crate) const ONE_OR_SEVERAL: &str = "OneOrSeveral";
+
+impl<'de, T: FromText + Deserialize<'de>> Deserialize<'de> for OneOrSeveral<T> {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        from.deserialize_newtype_struct(ONE_OR_SEVERAL, SeveralVisitor(PhantomData))
+    }
+}
+
+struct SeveralVisitor<T>(PhantomData<T>);
+
+impl<'de, T: FromText + Deserialize<'de>> Visitor<'de> for SeveralVisitor<T> {
+    type Value = OneOrSeveral<T>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}, or a list of them", T::EXPECTED)
+    }
+
+    fn visit_newtype_struct<D: Deserializer<'de>>(self, from: D) -> Result<Self::Value, D::Error> {
+        from.deserialize_any(self)
+    }
+
+    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Self::Value, E> {
+        let one = T::read(text).map_err(|fault| E::custom(fault.told))?;
+        Ok(OneOrSeveral(vec![one]))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut from: A) -> Result<Self::Value, A::Error> {
+        let mut all = Vec::new();
+        while let Some(one) = from.next_element()? {
+            all.push(one);
+        }
+        Ok(OneOrSeveral(all))
+    }
 }
 
 /// Implements what both kinds of expressions have in common: they are their text.

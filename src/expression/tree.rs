@@ -97,11 +97,19 @@ impl Tree {
         }
     }
 
-    /// Calls `visit` with every name in it and its place.
-    pub fn each_name<'a>(&'a self, visit: &mut dyn FnMut(&'a str, &Range<usize>)) {
-        if let TreeNode::Name(name) = &self.node {
-            visit(name, &self.span);
+    /// The names in it, each once, in the order of the text.
+    pub fn names(&self) -> Vec<&str> {
+        let mut names = Vec::new();
+        self.add_names(&mut names);
+        names
+    }
+
+    fn add_names<'a>(&'a self, names: &mut Vec<&'a str>) {
+        if let TreeNode::Name(name) = &self.node
+            && !names.contains(&name.as_str())
+        {
+            names.push(name);
         }
-        self.parts().into_iter().for_each(|part| part.each_name(visit));
+        self.parts().into_iter().for_each(|part| part.add_names(names));
     }
 }
