@@ -110,6 +110,7 @@ impl Task {
             ledger,
             decisions,
             counts: finished.tally.counts.iter().map(named).collect(),
+            stats: finished.tally.stats.iter().map(|(name, s)| s.figures(name)).collect(),
             passes: finished.passes,
             tile_side,
             totals,

@@ -39,7 +39,7 @@ pub(crate) struct Names<'a> {
 }
 
 impl Names<'_> {
-    fn field(&self, name: &str, span: &Range<usize>) -> Result<Field, ExpressionFault> {
+    pub(super) fn field(&self, name: &str, span: &Range<usize>) -> Result<Field, ExpressionFault> {
         let column = self.columns.iter().rev().find_map(|column| column.part(name));
         if let Some(part) = column {
             return Ok(Field::of_column(&part));

@@ -1,12 +1,21 @@
 //! What an expression is for records, block by block.
 
 use super::bind::{Number, Truth};
-use super::lanes::{Block, LANES, Lanes};
+use super::lanes::{Block, Field, LANES, Lanes};
 use super::tree::{Function, Operator, Relation};
 use crate::point::PointBatch;
 
 /// Whether something holds for each record of a block.
 type Mask = [bool; LANES];
+
+/// Calls `visit` with the stored numbers of `field` in `batch`, block by block.
+pub(super) fn each_stored(field: &Field, batch: &PointBatch, visit: &mut dyn FnMut(&[f64])) {
+    for block in blocks(batch) {
+        let mut lanes = [0.0; LANES];
+        field.load_stored(block, &mut lanes);
+        visit(&lanes[..block.count]);
+    }
+}
 
 /// The blocks of a batch.
 fn blocks(batch: &PointBatch) -> impl Iterator<Item = Block<'_>> {

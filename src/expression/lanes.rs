@@ -49,8 +49,27 @@ impl Field {
         scalar == Scalar::F32 && scale == 1.0 && origin == 0.0
     }
 
+    /// World units of a stored one, and the world value of a stored 0.
+    pub fn units(&self) -> [f64; 2] {
+        [self.dimension.scale, self.dimension.origin]
+    }
+
+    /// True if its stored numbers are whole and below 2^32.
+    pub fn is_whole(&self) -> bool {
+        !self.dimension.scalar.is_float() && self.dimension.scalar.size() <= 4
+    }
+
     /// Writes its world values in a block into `out`; NaN where a column is not there.
     pub fn load(&self, block: Block<'_>, out: &mut Lanes) {
+        self.load_stored(block, out);
+        let [scale, origin] = self.units();
+        if scale != 1.0 || origin != 0.0 {
+            out.iter_mut().for_each(|value| *value = *value * scale + origin);
+        }
+    }
+
+    /// The same of its values as they are stored.
+    pub fn load_stored(&self, block: Block<'_>, out: &mut Lanes) {
         let (bytes, stride) = match self.column {
             None => (Some(block.batch.records()), block.batch.schema().stride),
             Some(kind) => (block.batch.columns.bytes_of(kind), kind.bytes()),
@@ -61,10 +80,6 @@ impl Field {
             out.fill(f64::NAN);
         }
         self.read(rows, out);
-        let Dimension { scale, origin, .. } = self.dimension;
-        if scale != 1.0 || origin != 0.0 {
-            out.iter_mut().for_each(|value| *value = *value * scale + origin);
-        }
     }
 
     /// The numbers as they are stored.

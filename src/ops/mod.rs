@@ -11,6 +11,8 @@ pub mod normals;
 pub(crate) mod outliers;
 pub mod removal;
 mod scatter;
+mod stats;
+mod tap;
 
 pub use assign::Assign;
 pub use cells::{By, Cells, Keep, Measure, Reference, Side, Split};
@@ -19,3 +21,5 @@ pub use filter::Filter;
 pub use grid::{Grid, Pick};
 pub use median::Median;
 pub use outliers::{OutlierMethod, Outliers};
+pub use stats::Stats;
+pub use tap::Tap;

@@ -2,6 +2,7 @@
 //! branches, and what stands behind it.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use crate::engine::pass::{Op, StageOp, StreamOp};
 use crate::graph::{Graph, GraphStage, Written};
@@ -57,12 +58,14 @@ impl Sorted {
             |stage: &GraphStage| serde_json::json!({ "kind": stage.kind, "keys": stage.keys });
         let names = graph.stages.iter().map(name).collect();
         let columns = columns_above(&graph.stages);
+        let mut labels = labels(&graph.stages).into_iter();
         let mut source: Option<(String, Box<dyn OpenSource>)> = None;
         let mut works = Vec::new();
         let (mut transforms, mut filters) = (Vec::new(), Vec::new());
         let (mut ops, mut sinks) = (Vec::new(), Vec::new());
         for ((n, stage), above) in graph.stages.into_iter().enumerate().zip(columns) {
             let GraphStage { kind, written, limits, role, .. } = stage;
+            let label = labels.next().unwrap_or_default();
             works.push(match &role {
                 Role::Source(_) => StageWork::Decode,
                 Role::Transform(_) if decoded.contains(&n) => StageWork::Decode,
@@ -83,7 +86,14 @@ impl Sorted {
                 }
                 Role::Transform(transform) => {
                     let all = if decoded.contains(&n) { &mut transforms } else { &mut filters };
-                    all.push(StreamOp { kind, written, transform, choice: limits.choice, above });
+                    all.push(StreamOp {
+                        kind,
+                        label,
+                        written,
+                        transform,
+                        choice: limits.choice,
+                        above,
+                    });
                 }
                 Role::TileOp(op) => {
                     let op = Op::Tile(op);
@@ -129,6 +139,21 @@ impl Sorted {
         let named = named.filter(|n| on_path.contains(n) || is_decode(n) || is_sink(n));
         named.map(|n| self.names[n].clone()).collect()
     }
+}
+
+/// The name of each stage; of those that have none their kind, from the second of a kind on with
+/// its number.
+fn labels(stages: &[GraphStage]) -> Vec<Arc<str>> {
+    let label = |(n, stage): (usize, &GraphStage)| {
+        let is_nameless = |other: &&GraphStage| other.name.is_none() && other.kind == stage.kind;
+        let before = stages[..n].iter().filter(is_nameless).count();
+        match (&stage.name, before) {
+            (Some(name), _) => name.as_str().into(),
+            (None, 0) => stage.kind.as_str().into(),
+            (None, before) => format!("{}.{}", stage.kind, before + 1).into(),
+        }
+    };
+    stages.iter().enumerate().map(label).collect()
 }
 
 /// For each stage the columns that those above it compute, the newest last.
