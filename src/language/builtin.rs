@@ -5,7 +5,9 @@ use crate::io::ends::{Read, Write};
 use crate::io::las::{LAS, LAZ};
 use crate::io::ply::PLY;
 use crate::ops::normals::Normals;
-use crate::ops::{Assign, Cells, Drop, Filter, Grid, Median, Outliers, Stats, Tap};
+use crate::ops::{
+    Assign, Cells, Crop, Drop, Filter, Grid, Median, Outliers, Sample, Stats, Tap, Transformation,
+};
 use crate::synth::Synth;
 
 impl Registry {
@@ -17,6 +19,8 @@ impl Registry {
             .with::<Write>()
             .with::<Filter>()
             .with::<Drop>()
+            .with::<Crop>()
+            .with::<Transformation>()
             .with::<Assign>()
             .with::<Stats>()
             .with::<Tap>()
@@ -25,6 +29,7 @@ impl Registry {
             .with::<Cells>()
             .with::<Median>()
             .with::<Grid>()
+            .with::<Sample>()
             .with_format(LAS)
             .with_format(LAZ)
             .with_format(PLY)

@@ -4,13 +4,17 @@
 mod angle;
 mod count;
 mod figure;
+mod fraction;
 mod length;
 mod setting;
+mod turn;
 mod whole;
 
 pub use angle::Angle;
 pub use count::parse_count;
 pub(crate) use figure::Figure;
+pub use fraction::Fraction;
 pub use length::Length;
 pub use setting::Setting;
+pub use turn::Turn;
 pub(crate) use whole::Whole;
