@@ -76,8 +76,8 @@
 //!   stage of your own, or [`Format`](stage::Format) to add a format.
 //! - [`io`]: LAS, LAZ and PLY, conversion between their records, and the stages `read` and `write`.
 //! - [`synth`]: synthetic scans, and the stage `synth`.
-//! - [`ops`]: the stages that compute or select: `filter`, `outliers`, `normals`, `cells`, `median`
-//!   and `grid`.
+//! - [`ops`]: the stages that compute, select or look: `filter`, `drop`, `assign`, `stats`, `tap`,
+//!   `outliers`, `normals`, `cells`, `median` and `grid`.
 //! - [`picture`]: scans drawn from above or from a side, side by side.
 //! - [`graph`]: what a pipeline is, whoever wrote it: a [`Graph`] of stages.
 //! - [`Registry`]: the kinds and formats that a text may name; [`Set`]: what is put in the place of

@@ -11,6 +11,7 @@ mod passes;
 mod places;
 mod shown;
 mod sorted;
+mod streaming;
 mod stretch;
 
 pub use fitted::Plan;
