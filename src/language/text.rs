@@ -288,7 +288,7 @@ fn check_files(
             Role::Source(source) => {
                 source.paths().iter().for_each(|path| files.read(path, Use::Input));
             }
-            Role::Sink(sink) => {
+            Role::Sink(sink) if sink.is_file() => {
                 let key = |key| draft.keys.at(key);
                 let at = key("path").or(key("folder")).unwrap_or(&draft.kind.1);
                 outputs.push((sink.path(), at));

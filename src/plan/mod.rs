@@ -9,6 +9,7 @@ mod look;
 mod outline;
 mod passes;
 mod places;
+mod pull;
 mod shown;
 mod sorted;
 mod streaming;
@@ -16,3 +17,4 @@ mod stretch;
 
 pub use fitted::Plan;
 pub use outline::Outline;
+pub use pull::Pulled;
