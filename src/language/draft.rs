@@ -20,15 +20,18 @@ pub(crate) struct Draft {
     pub mistakes: Vec<Mistake>,
 }
 
+/// A word of a text and where it is written.
+pub(crate) type Word = (String, TextPlace);
+
 /// A `[[stage]]` table.
 pub(crate) struct StageDraft {
-    /// Its kind and where it is written.
-    pub kind: (String, TextPlace),
+    /// Its kind and where it is written; None if it has none, which is told.
+    pub kind: Option<Word>,
     /// Its name, if it has one.
-    pub name: Option<(String, TextPlace)>,
-    /// The stage that it takes from, if it says.
-    pub from: Option<(String, TextPlace)>,
-    /// All other keys.
+    pub name: Option<Word>,
+    /// The stages that it takes from, if it says.
+    pub from: Option<Vec<Word>>,
+    /// All other keys; their place is that of the kind, or else of the table.
     pub keys: Node,
 }
 
@@ -49,7 +52,8 @@ pub(crate) fn read(entries: Vec<KeyEntry>, len: usize, registry: &Registry) -> D
                 for (n, node) in list.into_iter().enumerate() {
                     if n == MOST_STAGES {
                         let told = format!("a pipeline has at most {MOST_STAGES} stages");
-                        draft.mistakes.push(Mistake::new(node.place, told));
+                        draft.mistakes.push(Mistake::new(node.place.clone(), told));
+                        draft.stages.push(StageDraft::unknown(node));
                         break;
                     }
                     draft.stage(node, registry);
@@ -89,7 +93,7 @@ pub(crate) fn read(entries: Vec<KeyEntry>, len: usize, registry: &Registry) -> D
 fn without_kind(
     place: TextPlace,
     entries: &[KeyEntry],
-    name: Option<(String, TextPlace)>,
+    name: Option<Word>,
     registry: &Registry,
 ) -> Mistake {
     if let Some((name, at)) = name.filter(|(name, _)| registry.has(name)) {
@@ -105,43 +109,72 @@ fn without_kind(
     Mistake::new(place, "a stage needs `kind`").note(advice("", "kinds", kinds()))
 }
 
+fn text(node: Node) -> Result<Word, (TextPlace, &'static str)> {
+    match node.value {
+        NodeValue::Text(text) => Ok((text, node.place)),
+        _ => Err((node.place, "a text in quotes")),
+    }
+}
+
+/// One name or a list of them.
+fn names(node: Node) -> Result<Vec<Word>, (TextPlace, &'static str)> {
+    const TAKES: &str = "the name of a stage, or a list of names";
+    let name = |node: Node| text(node).map_err(|(place, _)| (place, TAKES));
+    match node.value {
+        NodeValue::List(list) if list.is_empty() => Err((node.place, TAKES)),
+        NodeValue::List(list) => list.into_iter().map(name).collect(),
+        _ => name(node).map(|name| vec![name]),
+    }
+}
+
+impl StageDraft {
+    /// A stage of which nothing is known.
+    fn unknown(keys: Node) -> Self {
+        StageDraft { kind: None, name: None, from: None, keys }
+    }
+
+    /// True if it is of that kind.
+    fn is(&self, kind: &str) -> bool {
+        self.kind.as_ref().is_some_and(|(own, _)| own == kind)
+    }
+}
+
 impl Draft {
     fn stage(&mut self, node: Node, registry: &Registry) {
         let NodeValue::Table(mut entries) = node.value else {
-            self.mistakes.push(Mistake::new(node.place, "a stage is a table: write [[stage]]"));
+            let mistake = Mistake::new(node.place.clone(), "a stage is a table: write [[stage]]");
+            self.mistakes.push(mistake);
+            self.stages.push(StageDraft::unknown(node));
             return;
         };
-        let kind = self.take(&mut entries, "kind");
-        let name = self.take(&mut entries, "name");
-        let from = self.take(&mut entries, "from");
-        match kind {
-            Some(Some(kind)) => {
-                let keys = Node { place: kind.1.clone(), value: NodeValue::Table(entries) };
-                let (name, from) = (name.flatten(), from.flatten());
-                self.stages.push(StageDraft { kind, name, from, keys });
-            }
-            Some(None) => {}
-            None => {
-                let mistake = without_kind(node.place, &entries, name.flatten(), registry);
-                self.mistakes.push(mistake);
-            }
+        let has_kind = entries.iter().any(|entry| entry.key == "kind");
+        let kind = self.take(&mut entries, "kind", text);
+        let name = self.take(&mut entries, "name", text);
+        let from = self.take(&mut entries, "from", names);
+        if !has_kind {
+            let mistake = without_kind(node.place.clone(), &entries, name.clone(), registry);
+            self.mistakes.push(mistake);
         }
+        let place = kind.as_ref().map_or(node.place, |(_, place)| place.clone());
+        let keys = Node { place, value: NodeValue::Table(entries) };
+        self.stages.push(StageDraft { kind, name, from, keys });
     }
 
-    /// Takes the text `key` out of a stage's keys: none if it is not there, some none if it is not
-    /// a text, which is told.
-    fn take(
+    /// Takes `key` out of a stage's keys and reads it; what it cannot be is told.
+    fn take<T>(
         &mut self,
         entries: &mut Vec<KeyEntry>,
         key: &str,
-    ) -> Option<Option<(String, TextPlace)>> {
+        read: fn(Node) -> Result<T, (TextPlace, &'static str)>,
+    ) -> Option<T> {
         let at = entries.iter().position(|e| e.key == key)?;
-        let Node { place, value } = entries.remove(at).node;
-        if let NodeValue::Text(text) = value {
-            return Some(Some((text, place)));
+        match read(entries.remove(at).node) {
+            Ok(read) => Some(read),
+            Err((place, takes)) => {
+                self.mistakes.push(Mistake::new(place, format!("`{key}` takes {takes}")));
+                None
+            }
         }
-        self.mistakes.push(Mistake::new(place, format!("`{key}` takes a text in quotes")));
-        Some(None)
     }
 
     /// Puts the value of `set`, which is text `source`, in its place.
@@ -174,7 +207,7 @@ impl Draft {
                 let addressed = self.addressed(stage).map_err(|(told, note)| {
                     vec![Mistake::new(set.place(source, stage), told).note(note)]
                 })?;
-                (&mut addressed.keys, addressed.kind.0.as_str())
+                (&mut addressed.keys, addressed.kind.as_ref().map_or("", |(kind, _)| kind.as_str()))
             }
         };
         let NodeValue::Table(entries) = &mut table.value else { return Ok(()) };
@@ -191,7 +224,7 @@ impl Draft {
             return Ok(&mut self.stages[i]);
         }
         let of = |kind: &str| -> Vec<usize> {
-            (0..self.stages.len()).filter(|&i| self.stages[i].kind.0 == kind).collect()
+            (0..self.stages.len()).filter(|&i| self.stages[i].is(kind)).collect()
         };
         let numbered = address.rsplit_once('.').and_then(|(kind, n)| {
             let n: usize = n.parse().ok()?;
@@ -215,7 +248,7 @@ impl Draft {
     }
 
     fn addresses(&self) -> Vec<String> {
-        let kinds = self.stages.iter().map(|s| s.kind.0.clone());
+        let kinds = self.stages.iter().filter_map(|s| Some(s.kind.as_ref()?.0.clone()));
         let names = self.stages.iter().filter_map(|s| Some(s.name.as_ref()?.0.clone()));
         kinds.chain(names).chain(["run".to_owned()]).collect()
     }

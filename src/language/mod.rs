@@ -8,10 +8,12 @@ mod foreign;
 mod keys;
 mod mistake;
 mod node;
+mod outputs;
 mod place;
 mod registry;
 mod set;
 mod text;
+mod tree;
 mod written;
 
 pub use registry::Registry;

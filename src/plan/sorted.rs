@@ -42,8 +42,6 @@ pub(super) struct Sorted {
 impl Sorted {
     /// Sorts a graph, or says the first thing that is wrong with it.
     pub fn new(graph: Graph) -> Result<Sorted> {
-        let takers: Vec<Vec<usize>> =
-            (0..graph.stages.len()).map(|n| graph.takers(n).collect()).collect();
         if let Some(wrong) = graph.mistakes().into_iter().next() {
             let error = graph.stages[wrong.stage].written.wrong(wrong.told);
             return Err(match wrong.help {
@@ -51,6 +49,9 @@ impl Sorted {
                 None => error,
             });
         }
+        let graph = graph.without_merges();
+        let takers: Vec<Vec<usize>> =
+            (0..graph.stages.len()).map(|n| graph.takers(n).collect()).collect();
         let (decoded, root) = decoded(&graph.stages, &takers)?;
         let name =
             |stage: &GraphStage| serde_json::json!({ "kind": stage.kind, "keys": stage.keys });
@@ -67,6 +68,7 @@ impl Sorted {
                 Role::Transform(_) => StageWork::Filter(filters.len()),
                 Role::TileOp(_) | Role::ScanOp(_) => StageWork::Op(ops.len()),
                 Role::Sink(_) => StageWork::Sink(sinks.len()),
+                Role::Merge => return Err(Error::internal("a merge is left in the graph")),
             });
             let blamed = written.clone();
             let tile = |kind, op| StageOp { kind, written, op, limits, selection: 0 };
@@ -85,6 +87,7 @@ impl Sorted {
                 Role::TileOp(op) => ops.push(tile(kind, Op::Tile(op))),
                 Role::ScanOp(op) => ops.push(tile(kind, Op::Scan(op))),
                 Role::Sink(sink) => sinks.push(sink),
+                Role::Merge => {}
             }
         }
         let source = source.ok_or_else(|| Error::pipeline("the pipeline reads nothing"))?;

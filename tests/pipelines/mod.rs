@@ -3,6 +3,7 @@
 mod formats;
 mod inputs;
 mod text;
+mod trees;
 mod user_files;
 mod values;
 mod words;
