@@ -36,7 +36,7 @@ impl Transform for Class {
         Needs::none().looks_at([names::CLASSIFICATION]).removes(None)
     }
 
-    fn apply(&self, batch: &mut PointBatch) -> Result<()> {
+    fn apply(&self, batch: &mut PointBatch, _tally: &mut Tally) -> Result<()> {
         let schema = batch.schema().clone();
         let dimension = schema
             .find(names::CLASSIFICATION)

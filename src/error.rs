@@ -211,6 +211,26 @@ impl Error {
         self
     }
 
+    /// All of `errors` as one, which lists them where they are several; fine if there are none.
+    pub(crate) fn all(errors: Vec<Error>) -> Result<()> {
+        let mut errors = errors;
+        match errors.len() {
+            0 => Ok(()),
+            1 => Err(errors.remove(0)),
+            number => {
+                let one = |error: &Error| match error.remedy() {
+                    Some(help) => format!("{error}\n  = {help}"),
+                    None => error.to_string(),
+                };
+                let all: Vec<String> = errors.iter().map(one).collect();
+                let kind = errors[0].kind();
+                let same = errors.iter().all(|error| error.kind() == kind);
+                let kind = if same { kind } else { ErrorKind::Pipeline };
+                Err(Error::new(kind, format!("{number} mistakes\n{}", all.join("\n"))))
+            }
+        }
+    }
+
     /// Adds the cause beneath.
     pub fn because(mut self, cause: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
         self.0.source = Some(cause.into());

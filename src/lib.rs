@@ -68,6 +68,7 @@
 //! - [`point`]: points side by side. A [`PointBatch`](point::PointBatch) holds records as their
 //!   file's own bytes; a [`Schema`](point::Schema) says where in them a dimension is.
 //! - [`quantity`]: counts, angles and lengths as people write them, the types of stages' keys.
+//! - [`expression`]: conditions and values over dimensions and columns, as pipelines write them.
 //! - [`tile`]: a [`Tile`](tile::Tile) is the points of a cube with neighbourhoods that are exact
 //!   beyond its faces.
 //! - [`report`]: what a run counts and measures, merged so that no order and no cut changes a byte.
@@ -99,6 +100,7 @@ mod budget;
 pub mod cli;
 mod engine;
 mod error;
+pub mod expression;
 mod geom;
 pub mod graph;
 mod host;

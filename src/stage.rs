@@ -10,7 +10,9 @@ mod source;
 mod tile_op;
 
 use crate::Result;
+use crate::expression::KeyExpression;
 use crate::point::{PointBatch, Schema};
+use crate::report::Tally;
 
 pub use crate::geom::lattice::{Lattice, Misplaced};
 pub use crate::store::Levels;
@@ -29,6 +31,7 @@ pub use tile_op::{Forecast, ScanFacts, TileOp};
 /// ```
 /// use pointmill::Result;
 /// use pointmill::point::{PointBatch, names};
+/// use pointmill::report::Tally;
 /// use pointmill::stage::{Needs, Transform};
 ///
 /// /// Leaves every second point of a batch out.
@@ -40,7 +43,7 @@ pub use tile_op::{Forecast, ScanFacts, TileOp};
 ///         Needs::none().looks_at(names::XYZ).removes(None)
 ///     }
 ///
-///     fn apply(&self, batch: &mut PointBatch) -> Result<()> {
+///     fn apply(&self, batch: &mut PointBatch, _tally: &mut Tally) -> Result<()> {
 ///         batch.retain(|number, _record| number % 2 == 0);
 ///         Ok(())
 ///     }
@@ -50,6 +53,12 @@ pub use tile_op::{Forecast, ScanFacts, TileOp};
 pub trait Transform: Send + Sync {
     /// What it reads and writes.
     fn needs(&self) -> Needs;
+
+    /// The expressions among its keys, each with its key: their names are looked up before the run,
+    /// and the columns that they name are there in each batch.
+    fn expressions(&self) -> Vec<(&'static str, KeyExpression<'_>)> {
+        Vec::new()
+    }
 
     /// Refuses records of a schema that it cannot work on; called once, before any of them is read.
     ///
@@ -77,12 +86,13 @@ pub trait Transform: Send + Sync {
     }
 
     /// Called for every batch, from several threads at once. Points that it removes are entered in
-    /// the ledger by the caller.
+    /// the ledger by the caller; what it counts besides goes into `tally`, and is counted once for
+    /// each record even where records come by twice.
     ///
     /// # Errors
     ///
     /// A record that it cannot make sense of; the run ends.
-    fn apply(&self, batch: &mut PointBatch) -> Result<()>;
+    fn apply(&self, batch: &mut PointBatch, tally: &mut Tally) -> Result<()>;
 }
 
 /// A stage in its role.

@@ -126,15 +126,13 @@ pub(super) fn nothing_left(finished: &Finished, job: &Job<'_>) -> Vec<String> {
     if finished.read == 0 {
         return vec!["the inputs have no points: what is written has none either".to_owned()];
     }
-    let behind = job.task.filters.iter().map(|filter| (&filter.kind, &filter.transform));
-    let streams: Vec<_> =
-        job.task.transforms.iter().map(|(kind, stage)| (kind, stage)).chain(behind).collect();
+    let streams: Vec<_> = job.task.transforms.iter().chain(&job.task.filters).collect();
     let keys = |r: &Removed| -> Vec<&str> {
-        let ours = streams.iter().filter(|(kind, _)| **kind == r.stage);
+        let ours = streams.iter().filter(|stage| stage.kind == r.stage);
         let run = LEFT_OUT.iter().filter(|(reason, ..)| *reason == r.reason);
         let nonfinite = (r.reason == NOT_FINITE).then_some("run.nonfinite");
         let of_run = run.map(|(_, setting, _)| *setting).chain(nonfinite);
-        ours.flat_map(|(_, stage)| stage.removes_by()).chain(of_run).collect()
+        ours.flat_map(|stage| stage.transform.removes_by()).chain(of_run).collect()
     };
     let by = |r: &Removed| {
         let keys: Vec<String> = keys(r).iter().map(|key| format!("`{key}`")).collect();

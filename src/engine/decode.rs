@@ -83,12 +83,18 @@ impl Placed {
         tags.clear();
         left_out.clear();
         useless.clear();
-        let mut misplaced = Vec::new();
+        let (mut misplaced, mut held) = (Vec::new(), Vec::new());
         let tagger = &job.task.tagger;
+        tagger.conditions(batch, &mut held)?;
+        let held = |i: usize| held.get(i).copied().unwrap_or(0);
         lattice.place(
             batch.schema(),
             records,
-            |i, position| match tagger.look(&records[i * stride..(i + 1) * stride], batch.source) {
+            |i, position| match tagger.look(
+                &records[i * stride..(i + 1) * stride],
+                batch.source,
+                held(i),
+            ) {
                 Err(reason) => {
                     *useless.entry(reason).or_default() += 1;
                     left_out.push(i);

@@ -119,7 +119,7 @@ impl Demands {
         let by_normals = self.passes.iter().flatten().any(decides_by_normals);
         let baseline = if by_normals { Baseline::BYTES } else { 0 };
         let filters = match self.filters {
-            true => Filtering::bytes(self.stride),
+            true => Filtering::bytes(self.stride, self.columns.row),
             false => Bytes(0),
         };
         let dimensions = match self.columns.of_records {

@@ -10,7 +10,6 @@ use std::sync::Arc;
 use super::by_time::ByTime;
 use super::chunk::OutputChunk;
 use super::job::Job;
-use super::pass::PassFilter;
 use crate::budget::Bytes;
 use crate::point::{Edit, PointBatch};
 use crate::report::{KEY_POINTS, Tally};
@@ -154,14 +153,15 @@ fn count_key_points(states: &[RecordState], tally: &mut Tally) {
     }
 }
 
-/// Applies stages that stream to records that they keep.
-fn change(job: &Job<'_>, filters: &[usize], batch: &mut PointBatch) -> Result<()> {
+/// Applies stages that stream to records that they keep, whose columns are those that they saw.
+pub(crate) fn change(job: &Job<'_>, filters: &[usize], batch: &mut PointBatch) -> Result<()> {
     let records = batch.len();
     for &filter in filters {
-        let PassFilter { kind, transform } = &job.task.filters[filter];
-        transform.apply(batch)?;
+        let stage = &job.task.filters[filter];
+        // What it counts was counted when it was first applied.
+        stage.apply(batch, &mut Tally::default())?;
         if batch.len() != records {
-            let told = format!("the stage {kind} removes records that it kept before");
+            let told = format!("the stage {} removes records that it kept before", stage.kind);
             return Err(Error::internal(told));
         }
     }

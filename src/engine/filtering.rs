@@ -8,9 +8,9 @@
 
 use std::ops::Range;
 
-use super::encoding::edit;
+use super::encoding::{change, edit};
 use super::job::Job;
-use super::pass::PassFilter;
+use super::pass::Pass;
 use super::product::Product;
 use super::row::RowLayout;
 use crate::budget::Bytes;
@@ -22,11 +22,12 @@ use crate::{Error, Result};
 /// Records that are looked at together.
 const AT_ONCE: usize = 4096;
 
-/// Applies stages that stream to the products of tiles; one a thread.
+/// Applies stages that stream to the products of tiles, and chooses the records that the stage
+/// behind them is limited to; one a thread.
 pub(crate) struct Filtering<'a> {
     job: &'a Job<'a>,
     tiles: &'a SealedTiles,
-    filters: &'a [usize],
+    pass: &'a Pass,
     fetch: Fetch,
     batch: PointBatch,
     numbers: Vec<u64>,
@@ -34,12 +35,12 @@ pub(crate) struct Filtering<'a> {
 }
 
 impl<'a> Filtering<'a> {
-    /// For these of the job's filters.
-    pub fn new(job: &'a Job<'a>, tiles: &'a SealedTiles, filters: &'a [usize]) -> Self {
+    /// For the products of `pass`.
+    pub fn new(job: &'a Job<'a>, tiles: &'a SealedTiles, pass: &'a Pass) -> Self {
         Filtering {
             job,
             tiles,
-            filters,
+            pass,
             fetch: Fetch::default(),
             batch: PointBatch::new(job.task.source.schema().clone(), AT_ONCE),
             numbers: Vec::with_capacity(AT_ONCE),
@@ -47,70 +48,83 @@ impl<'a> Filtering<'a> {
         }
     }
 
-    /// Bytes that it holds for records of `stride` bytes.
-    pub fn bytes(stride: usize) -> Bytes {
+    /// Bytes that it holds for records of `stride` bytes and rows of `row`: the records twice where
+    /// a stage works on some of them.
+    pub fn bytes(stride: usize, row: usize) -> Bytes {
         let numbers = size_of::<u64>() + size_of::<RecordState>() + size_of::<u32>();
-        let records = Bytes::of(AT_ONCE as u64, stride) + Bytes::of(AT_ONCE as u64, numbers);
+        let records = Bytes::of(2 * AT_ONCE as u64, stride + row);
+        let records = records + Bytes::of(AT_ONCE as u64, numbers + row);
         records + Fetch::bytes(AT_ONCE as u64, stride)
     }
 
-    /// Enters into `product` which of its records the filters remove.
+    /// Enters into `product` what becomes of its records.
     pub fn apply(
         &mut self,
         product: &mut Product,
         layout: &RowLayout,
         tally: &mut Tally,
     ) -> Result<()> {
-        let mut kept = Vec::new();
-        let written: u64 = product.written().map(|(_, n, _)| n).sum();
+        let mut states = Vec::new();
+        let written: u64 = product.written().map(|(_, entry)| u64::from(entry.count)).sum();
         let mut done = 0;
         while done < written {
             let end = written.min(done + AT_ONCE as u64);
-            self.look(product, done..end, &mut kept, tally)?;
+            self.fetch(product, layout, done..end)?;
+            self.look(&mut states, tally)?;
             done = end;
         }
-        product.keep(&kept, layout);
+        product.replace(&states, layout);
         Ok(())
     }
 
-    /// Appends to `kept` whether each of those written records that have the places `span` is kept.
-    fn look(
-        &mut self,
-        product: &Product,
-        span: Range<u64>,
-        kept: &mut Vec<bool>,
-        tally: &mut Tally,
-    ) -> Result<()> {
+    /// Fetches those written records of `product` that have the places `span`.
+    fn fetch(&mut self, product: &Product, layout: &RowLayout, span: Range<u64>) -> Result<()> {
         self.numbers.clear();
         self.states.clear();
-        let mut place = 0;
-        for (first, count, state) in product.written() {
+        let (mut place, mut rows, mut counts) = (0, Vec::new(), Vec::new());
+        for (n, entry) in product.written() {
+            let count = u64::from(entry.count);
             let skipped = span.start.saturating_sub(place).min(count);
-            let until = span.end.saturating_sub(place).min(count);
-            self.numbers.extend(first + skipped..first + until.max(skipped));
-            self.states.resize(self.numbers.len(), state);
+            let until = span.end.saturating_sub(place).min(count).max(skipped);
             place += count;
+            if until > skipped {
+                self.numbers.extend(entry.number + skipped..entry.number + until);
+                self.states.resize(self.numbers.len(), entry.now);
+                layout.enter(product.row(n, layout), &mut rows);
+                counts.push((until - skipped) as usize);
+            }
         }
         self.batch.clear();
         self.tiles.fetch(&self.numbers, &mut self.fetch, &mut self.batch)?;
         edit(&mut self.batch, &self.states)?;
+        self.batch.columns = layout.spread(&rows, counts.into_iter());
+        change(self.job, &self.pass.changed_by, &mut self.batch)
+    }
+
+    /// Appends to `states` what becomes of each of the fetched records.
+    fn look(&mut self, states: &mut Vec<RecordState>, tally: &mut Tally) -> Result<()> {
         self.batch.number_records();
-        for &filter in self.filters {
-            let PassFilter { kind, transform } = &self.job.task.filters[filter];
+        for &filter in &self.pass.filters {
+            let stage = &self.job.task.filters[filter];
             let before = self.batch.len();
-            transform.apply(&mut self.batch)?;
-            let removed = before
-                .checked_sub(self.batch.len())
-                .ok_or_else(|| Error::internal(format!("the stage {kind} made points up")))?;
-            tally.remove(kind, "removed", removed as u64);
+            stage.apply(&mut self.batch, tally)?;
+            tally.remove(&stage.kind, "removed", (before - self.batch.len()) as u64);
+        }
+        let mut chosen = Vec::new();
+        if let Some(op) = self.pass.chooses {
+            self.job.ops[op].limits.choice.holds(&self.batch, &mut chosen)?;
         }
         let numbers = self.batch.numbers().filter(|numbers| numbers.len() == self.batch.len());
         let numbers = numbers.ok_or_else(|| {
             Error::internal("a stage that streams removes records other than by `retain`")
         })?;
-        let begin = kept.len();
-        kept.resize(begin + self.numbers.len(), false);
-        numbers.iter().for_each(|&number| kept[begin + number as usize] = true);
+        let begin = states.len();
+        states.resize(begin + self.numbers.len(), RecordState::REMOVED);
+        for (n, &number) in numbers.iter().enumerate() {
+            let was = self.states[number as usize];
+            let now = chosen.get(n).map_or(was, |is_chosen| was.chosen(*is_chosen));
+            states[begin + number as usize] = now;
+        }
         Ok(())
     }
 }

@@ -205,8 +205,7 @@ impl<'a> Worker<'a> {
         let reach = reach(&job.ops, pass);
         let ranks =
             pass.before.iter().chain(&pass.after).any(|sink| job.task.in_input_order[*sink]);
-        let filters = &pass.filters[..];
-        let filtering = (!filters.is_empty()).then(|| Filtering::new(job, &field.tiles, filters));
+        let filtering = pass.streams().then(|| Filtering::new(job, &field.tiles, pass));
         Worker {
             filtering,
             ranks,

@@ -103,13 +103,10 @@ impl<'a> Job<'a> {
         }
         tally.work("read", read);
         self.classes.read(batch, tally);
-        for (kind, transform) in &self.task.transforms {
+        for stage in &self.task.transforms {
             let before = batch.len();
-            transform.apply(batch)?;
-            let removed = before
-                .checked_sub(batch.len())
-                .ok_or_else(|| Error::internal(format!("the stage {kind} made points up")))?;
-            tally.remove(kind, "removed", removed as u64);
+            stage.apply(batch, tally)?;
+            tally.remove(&stage.kind, "removed", (before - batch.len()) as u64);
         }
         self.advance(read)?;
         Ok(true)
@@ -129,10 +126,13 @@ impl<'a> Job<'a> {
         lock(&self.warnings).clone()
     }
 
-    /// The rows of a sink's entries, where those of its pass are `all`: none if it writes no
-    /// column.
+    /// The rows of a sink's entries, where those of its pass are `all`: none if neither it nor a
+    /// stage that streams above it looks at a column.
     pub fn layout(&self, sink: usize, all: &RowLayout) -> RowLayout {
-        if self.task.computed[sink].is_empty() { RowLayout::default() } else { all.clone() }
+        let reads = |filter: &usize| !self.task.filters[*filter].reads().is_empty();
+        let streamed = self.task.changed_by[sink].iter().any(reads);
+        let is_read = streamed || !self.task.computed[sink].is_empty();
+        if is_read { all.clone() } else { RowLayout::default() }
     }
 
     /// True if a sink takes what the last stage of a branch leaves: classes are counted by its
@@ -147,8 +147,8 @@ impl<'a> Job<'a> {
         if tally.work.get("read").is_none_or(|&read| read == 0) {
             return;
         }
-        let idle = self.task.transforms.iter().filter(|(kind, _)| !removed(kind));
-        let told = idle.flat_map(|(_, transform)| transform.idle(self.task.source.schema()));
+        let idle = self.task.transforms.iter().filter(|stage| !removed(&stage.kind));
+        let told = idle.flat_map(|stage| stage.transform.idle(self.task.source.schema()));
         told.for_each(|told| self.warn(told));
     }
 

@@ -123,8 +123,9 @@ impl Standing {
         }
         let called = pass.calls.iter().map(|call| job.ops[call.op].kind.clone());
         let streamed = pass.filters.iter().map(|&filter| job.task.filters[filter].kind.clone());
-        let (stages, after) = (called.chain(streamed).collect(), milled.counts.alive);
-        self.passes.push(PassFigures { stages, before: self.alive, after });
+        let chosen = pass.chooses.map(|op| format!("{}.where", job.ops[op].kind));
+        let (stages, after) = (called.chain(streamed).chain(chosen), milled.counts.alive);
+        self.passes.push(PassFigures { stages: stages.collect(), before: self.alive, after });
         self.sieve.states = Some(milled.stored.states);
         self.sieve.fates = Some(milled.stored.fates);
         let columns = milled.stored.columns;

@@ -10,10 +10,13 @@
 use std::sync::Arc;
 
 use super::row::RowLayout;
+use crate::expression::{Choice, Condition};
 use crate::graph::{Limits, Written};
-use crate::point::{ColumnKind, ComputedDimension, Mark, NORMAL, Schema};
+use crate::point::{ColumnKind, ComputedDimension, Mark, NORMAL, PointBatch, Schema};
+use crate::report::Tally;
 use crate::stage::{AnyScanOp, Needs, TileOp, Transform};
 use crate::tile::{Loader, ReadDimensions, Sieve, Tile};
+use crate::{Error, Result};
 
 /// A tile stage and where it stands.
 pub(crate) struct StageOp {
@@ -22,8 +25,25 @@ pub(crate) struct StageOp {
     pub written: Arc<dyn Written>,
     pub op: Op,
     pub limits: Limits,
-    /// The bit of the records that it is limited to; 0 for all.
+    /// The columns that stages above it compute.
+    pub above: Vec<ColumnKind>,
+    /// The bits of the records that it is limited to; 0 for all.
     pub selection: u8,
+}
+
+impl StageOp {
+    /// The columns by which its records are chosen; none if the records alone say which they are.
+    pub fn chosen_by(&self) -> Vec<ColumnKind> {
+        let condition = self.limits.choice.condition.as_ref();
+        let names = condition.map_or(Vec::new(), Condition::names);
+        named_columns(&names, &self.above)
+    }
+}
+
+/// The columns among `all` that have a number with one of these names.
+pub(crate) fn named_columns(names: &[&str], all: &[ColumnKind]) -> Vec<ColumnKind> {
+    let is_named = |kind: &&ColumnKind| names.iter().any(|name| kind.part(name).is_some());
+    all.iter().filter(is_named).copied().collect()
 }
 
 /// The role of a tile stage.
@@ -48,11 +68,50 @@ impl Op {
     }
 }
 
-/// A stage that streams, behind stages that work on tiles or on one of several branches: what it
-/// removes is entered in a pass of its own, and what it changes is changed as records are written.
-pub(crate) struct PassFilter {
+/// A stage that streams and where it stands: in the decode, or behind stages that work on tiles or
+/// on one of several branches. There, what it removes is entered in a pass of its own, and what it
+/// changes is changed as records are written.
+pub(crate) struct StreamOp {
     pub kind: String,
+    /// How it is written in its pipeline.
+    pub written: Arc<dyn Written>,
     pub transform: Box<dyn Transform>,
+    pub choice: Choice,
+    /// The columns that stages above it compute.
+    pub above: Vec<ColumnKind>,
+}
+
+impl StreamOp {
+    /// The columns that its expressions and what it is limited to name.
+    pub fn reads(&self) -> Vec<ColumnKind> {
+        let expressions = self.transform.expressions();
+        let own = expressions.iter().flat_map(|(_, expression)| expression.names());
+        let condition = self.choice.condition.as_ref();
+        let names: Vec<&str> =
+            own.chain(condition.into_iter().flat_map(Condition::names)).collect();
+        named_columns(&names, &self.above)
+    }
+
+    /// The dimensions of the records that it changes.
+    pub fn changes(&self) -> Vec<String> {
+        self.transform.needs().changes
+    }
+
+    /// Lets it work on those records of `batch` that it is limited to.
+    pub fn apply(&self, batch: &mut PointBatch, tally: &mut Tally) -> Result<()> {
+        let before = batch.len();
+        if self.choice.is_all() {
+            self.transform.apply(batch, tally)?;
+        } else {
+            let mut chosen = Vec::with_capacity(before);
+            self.choice.holds(batch, &mut chosen)?;
+            batch.change_some(&chosen, |some| self.transform.apply(some, tally))?;
+        }
+        match batch.len() > before {
+            true => Err(Error::internal(format!("the stage {} made points up", self.kind))),
+            false => Ok(()),
+        }
+    }
 }
 
 /// A path through the graph, from the source to the last stage that works.
@@ -84,6 +143,12 @@ pub(crate) struct Pass {
     pub behind: Option<usize>,
     /// Stages that stream and are applied to what the calls leave.
     pub filters: Vec<usize>,
+    /// Stages that stream above these and change what they may look at.
+    pub changed_by: Vec<usize>,
+    /// The tile stage whose records are chosen by what this pass finds, for the pass behind it.
+    pub chooses: Option<usize>,
+    /// Columns that stages which stream look at, here or as records are written.
+    pub streamed: Vec<ColumnKind>,
     pub calls: Vec<Call>,
     /// How often the stages were applied before, where they are repeated.
     pub round: usize,
@@ -194,10 +259,17 @@ impl Pass {
         }
     }
 
-    /// What entries have for the outputs of the pass.
+    /// True if records are looked at one by one for what becomes of them.
+    pub fn streams(&self) -> bool {
+        !self.filters.is_empty() || self.chooses.is_some()
+    }
+
+    /// What entries have for the outputs of the pass, and for stages that stream.
     pub fn row(&self, computed: &[Vec<ComputedDimension>]) -> RowLayout {
         let sinks = self.before.iter().chain(&self.after);
-        RowLayout::of(sinks.filter_map(|sink| computed.get(*sink)).flatten())
+        let written = sinks.filter_map(|sink| computed.get(*sink)).flatten();
+        let written = written.map(|dimension| dimension.column);
+        RowLayout::of(self.streamed.iter().copied().chain(written))
     }
 }
 

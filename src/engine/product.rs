@@ -99,26 +99,26 @@ impl Product {
         Ok(product)
     }
 
-    /// The records that are written so far: the first of each stretch, how many, and their state.
-    pub fn written(&self) -> impl Iterator<Item = (u64, u64, RecordState)> + '_ {
-        let written = self.entries.iter().filter(|entry| entry.now.is_written());
-        written.map(|entry| (entry.number, u64::from(entry.count), entry.now))
+    /// The entries of records that are written so far, with their numbers.
+    pub fn written(&self) -> impl Iterator<Item = (usize, &RecordEntry)> + '_ {
+        self.entries.iter().enumerate().filter(|(_, entry)| entry.now.is_written())
     }
 
-    /// Removes those of the [written](Product::written) records that are not `kept`.
-    pub fn keep(&mut self, kept: &[bool], layout: &RowLayout) {
-        if !kept.contains(&false) {
-            return;
-        }
+    /// The row of entry `number`.
+    pub fn row(&self, number: usize, layout: &RowLayout) -> &[u8] {
+        &self.rows[number * layout.bytes()..(number + 1) * layout.bytes()]
+    }
+
+    /// Gives each of the [written](Product::written) records its state of `states`.
+    pub fn replace(&mut self, states: &[RecordState], layout: &RowLayout) {
         let (mut entries, mut rows) = (Vec::with_capacity(self.entries.len()), Vec::new());
-        let mut kept = kept.iter();
+        let mut states = states.iter();
         for (n, entry) in self.entries.iter().enumerate() {
             let begin = entries.len();
             match entry.now.is_written() {
                 false => entries.push(*entry),
-                true => (0..entry.count).zip(&mut kept).for_each(|(i, &is_kept)| {
+                true => (0..entry.count).zip(&mut states).for_each(|(i, &now)| {
                     let number = entry.number + u64::from(i);
-                    let now = if is_kept { entry.now } else { RecordState::REMOVED };
                     match entries.last_mut() {
                         Some(RecordEntry { count, now: before, .. }) if i > 0 && *before == now => {
                             *count += 1;
@@ -127,7 +127,7 @@ impl Product {
                     }
                 }),
             }
-            let row = &self.rows[n * layout.bytes()..(n + 1) * layout.bytes()];
+            let row = self.row(n, layout);
             (begin..entries.len()).for_each(|_| rows.extend_from_slice(row));
         }
         (self.entries, self.rows) = (entries, rows);

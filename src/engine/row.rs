@@ -4,7 +4,7 @@
 //! come along. It is kept as bytes of one length, so that lists of entries, in memory and in the
 //! spill, need not know what it is.
 
-use crate::point::{ColumnKind, Columns, ComputedDimension};
+use crate::point::{ColumnKind, Columns};
 
 /// Which columns, in which order.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -14,12 +14,12 @@ pub(crate) struct RowLayout {
 }
 
 impl RowLayout {
-    /// The columns of the dimensions that outputs write.
-    pub fn of<'a>(computed: impl IntoIterator<Item = &'a ComputedDimension>) -> Self {
+    /// These columns, each once.
+    pub fn of(columns: impl IntoIterator<Item = ColumnKind>) -> Self {
         let mut layout = RowLayout::default();
-        for ComputedDimension { column, .. } in computed {
-            if !layout.kinds.contains(column) {
-                layout.kinds.push(*column);
+        for column in columns {
+            if !layout.kinds.contains(&column) {
+                layout.kinds.push(column);
                 layout.bytes += column.bytes();
             }
         }

@@ -5,6 +5,8 @@
 //! of their format, in another order than positions. A tag of four bytes beside the reference to a
 //! record answers without fetching it, and is not stored where no stage asks.
 
+use crate::Result;
+use crate::expression::Choice;
 use crate::graph::{RunSettings, Treatment};
 use crate::point::{
     Chooser, Dimension, Endian, Flag, PointBatch, Scalar, Schema, Selection, Value, names,
@@ -15,7 +17,7 @@ use crate::store::{ASIDE, RecordState, Tag};
 /// Tells records apart as stages and settings ask.
 #[derive(Debug, Clone)]
 pub(crate) struct Tagger {
-    selections: Vec<(Selection, Chooser)>,
+    choices: Vec<(Choice, Chooser)>,
     useless: Vec<Useless>,
     /// Where the class is that tags carry, if they are to.
     class: Option<ClassOf>,
@@ -49,12 +51,13 @@ impl Tagger {
     /// A tagger for records of `schema`; `inputs` are the numbers that tags carry for the inputs,
     /// if they are to, and `classes` says if they carry the class. A selection by what these do not
     /// have selects nothing.
-    pub fn new(schema: &Schema, selections: &[Selection], classes: bool, inputs: Vec<u32>) -> Self {
-        let mut idle: Vec<Flag> = selections.iter().flat_map(|s| s.idle(schema)).collect();
+    pub fn new(schema: &Schema, choices: &[Choice], classes: bool, inputs: Vec<u32>) -> Self {
+        let mut idle: Vec<Flag> =
+            choices.iter().flat_map(|choice| choice.selection.idle(schema)).collect();
         idle.sort_unstable();
         idle.dedup();
         Tagger {
-            selections: selections.iter().map(|s| (s.clone(), s.of(schema))).collect(),
+            choices: choices.iter().map(|c| (c.clone(), c.selection.of(schema))).collect(),
             useless: Vec::new(),
             class: classes.then(|| ClassOf::new(schema)),
             inputs,
@@ -83,12 +86,28 @@ impl Tagger {
     pub fn tags(&self) -> bool {
         !self.inputs.is_empty()
             || self.class.is_some()
-            || !self.selections.is_empty()
+            || !self.choices.is_empty()
             || self.useless.iter().any(|useless| !useless.is_dropped)
     }
 
-    /// The tag of `record` from input `input`; if it is to be removed, why.
-    pub fn look(&self, record: &[u8], input: u32) -> Result<Tag, &'static str> {
+    /// Replaces `held` by a byte for each record of `batch`: the conditions of choices that hold, a
+    /// bit each. Empty if no choice has a condition.
+    pub fn conditions(&self, batch: &PointBatch, held: &mut Vec<u8>) -> Result<()> {
+        held.clear();
+        let mut holds = Vec::new();
+        for (n, (choice, _)) in self.choices.iter().enumerate() {
+            let Some(condition) = &choice.condition else { continue };
+            holds.clear();
+            condition.holds(batch, &mut holds)?;
+            held.resize(batch.len(), 0);
+            held.iter_mut().zip(&holds).for_each(|(held, is)| *held |= u8::from(*is) << n);
+        }
+        Ok(())
+    }
+
+    /// The tag of `record` from input `input`, for which the conditions `held`; if it is to be
+    /// removed, why.
+    pub fn look(&self, record: &[u8], input: u32, held: u8) -> Result<Tag, &'static str> {
         let mut aside = 0;
         for useless in self.useless.iter().filter(|useless| useless.chooser.holds(record)) {
             if useless.is_dropped {
@@ -96,8 +115,10 @@ impl Tagger {
             }
             aside = ASIDE;
         }
-        let in_which =
-            self.selections.iter().enumerate().map(|(n, (_, s))| u8::from(s.holds(record)) << n);
+        let in_which = self.choices.iter().enumerate().map(|(n, (choice, chooser))| {
+            let holds = choice.condition.is_none() || held >> n & 1 == 1;
+            u8::from(holds && chooser.holds(record)) << n
+        });
         let selections = in_which.sum::<u8>() | aside;
         let tag = Tag::new(selections, self.inputs.get(input as usize).copied().unwrap_or(0));
         Ok(self.class.as_ref().map_or(tag, |class| tag.of_class(class.of(record))))
@@ -106,15 +127,15 @@ impl Tagger {
     /// What the user should know when all records have been looked at; `met` are the selections
     /// that one of them is in, a bit each.
     pub fn warnings(&self, met: u8) -> Vec<String> {
-        let nobody = |(n, (selection, _)): (usize, &(Selection, Chooser))| {
+        let nobody = |(n, (choice, _)): (usize, &(Choice, Chooser))| {
             (met >> n & 1 == 0).then(|| {
-                format!("no point is {selection}: what was asked for those points did nothing")
+                format!("no point is {choice}: what was asked for those points did nothing")
             })
         };
         let idle = |flag: &Flag| {
             format!("the input has no flag {}: `without` leaves no point out by it", flag.name())
         };
-        let unmet = self.selections.iter().enumerate().filter_map(nobody);
+        let unmet = self.choices.iter().enumerate().filter_map(nobody);
         unmet.chain(self.idle.iter().map(idle)).collect()
     }
 }

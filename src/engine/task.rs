@@ -7,14 +7,14 @@
 use std::sync::Arc;
 
 use super::beside::Beside;
-use super::pass::{Branch, Pass, PassFilter};
+use super::pass::{Branch, Pass, StreamOp};
 use super::shares::{Demands, Shares};
 use super::tagger::Tagger;
 use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
 use crate::graph::{Nonfinite, RunSettings, SpillSetting};
 use crate::point::{ComputedDimension, Metadata, names};
-use crate::stage::{CreateSink, Source, Transform};
+use crate::stage::{CreateSink, Source};
 
 /// A run that can begin.
 pub(crate) struct Task {
@@ -23,9 +23,9 @@ pub(crate) struct Task {
     pub simd: Simd,
     pub source: Box<dyn Source>,
     pub source_kind: String,
-    pub transforms: Vec<(String, Box<dyn Transform>)>,
+    pub transforms: Vec<StreamOp>,
     /// Stages that stream behind the decode.
-    pub filters: Vec<PassFilter>,
+    pub filters: Vec<StreamOp>,
     pub passes: Vec<Pass>,
     pub branches: Vec<Branch>,
     pub sinks: Vec<Box<dyn CreateSink>>,

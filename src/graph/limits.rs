@@ -1,15 +1,21 @@
-//! The keys that every tile stage takes: which records it is limited to.
+//! The keys that every stage takes which works on points: which records it is limited to.
 
 use serde::{Deserialize, Serialize};
 
+use crate::expression::{Choice, Condition};
 use crate::point::{Flag, Selection};
 
-/// The records that a tile stage decides about. What is not selected passes through untouched.
+/// The records that a stage works on. What is not selected passes through untouched.
 ///
-/// Any stage that works on tiles takes these keys besides its own.
+/// Any stage between a source and a sink takes these keys besides its own; `sees` is for stages
+/// that work on tiles.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LimitKeys {
+    /// A condition that holds for the records, over their dimensions and the columns that stages
+    /// above computed: "Intensity > 40 and NormalZ > 0.9".
+    #[serde(rename = "where", skip_serializing_if = "Option::is_none")]
+    pub condition: Option<Condition>,
     /// Classes of the records, as their number (2 is ground); none: whatever their class.
     pub classes: Vec<u8>,
     /// Flags that a record must have.
@@ -33,16 +39,20 @@ pub enum Sees {
 
 impl LimitKeys {
     /// The names of the keys.
-    pub const KEYS: [&'static str; 4] = ["classes", "with", "without", "sees"];
+    pub const KEYS: [&'static str; 5] = [Self::WHERE, "classes", "with", "without", Self::SEES];
+    /// That of them which is an expression.
+    pub const WHERE: &'static str = "where";
+    /// That of them which is for stages that work on tiles alone.
+    pub const SEES: &'static str = "sees";
 
     /// What they say.
     pub(crate) fn limits(self) -> Limits {
-        let LimitKeys { mut classes, mut with, mut without, sees } = self;
+        let LimitKeys { condition, mut classes, mut with, mut without, sees } = self;
         classes.sort_unstable();
         with.sort_unstable();
         without.sort_unstable();
         let selection = Selection { classes, with, without, ..Selection::default() };
-        Limits { selection, sees }
+        Limits { choice: Choice { selection, condition }, sees }
     }
 }
 
@@ -50,7 +60,7 @@ impl LimitKeys {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Limits {
     /// Those that it decides about.
-    pub selection: Selection,
+    pub choice: Choice,
     /// Those that it sees as neighbours.
     pub sees: Sees,
 }

@@ -1,6 +1,7 @@
 //! Where a stage is written, for what turns out to be wrong once the inputs are known.
 
 use crate::Error;
+use crate::expression::ExpressionFault;
 
 /// How a stage was written, by whoever made the graph.
 pub trait Written: Send + Sync {
@@ -9,6 +10,9 @@ pub trait Written: Send + Sync {
 
     /// An error about the value of `key`, told where that is written.
     fn wrong_key(&self, key: &str, told: String) -> Error;
+
+    /// An error in an expression that is the value of `key` or one of several, told at its place.
+    fn wrong_expression(&self, key: &str, text: &str, fault: ExpressionFault) -> Error;
 }
 
 /// A stage that a program put there.
@@ -28,5 +32,14 @@ impl Written for Unwritten {
 
     fn wrong_key(&self, _: &str, told: String) -> Error {
         self.wrong(told)
+    }
+
+    fn wrong_expression(&self, key: &str, text: &str, fault: ExpressionFault) -> Error {
+        let error = fault.error(text);
+        let told = self.wrong(format!("`{key}`: {error}"));
+        match error.remedy() {
+            Some(help) => told.help(help.to_owned()),
+            None => told,
+        }
     }
 }

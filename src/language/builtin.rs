@@ -5,7 +5,7 @@ use crate::io::ends::{Read, Write};
 use crate::io::las::{LAS, LAZ};
 use crate::io::ply::PLY;
 use crate::ops::normals::Normals;
-use crate::ops::{Cells, Filter, Grid, Median, Merge, Outliers};
+use crate::ops::{Assign, Cells, Drop, Filter, Grid, Median, Merge, Outliers};
 use crate::synth::Synth;
 
 impl Registry {
@@ -17,6 +17,8 @@ impl Registry {
             .with::<Merge>()
             .with::<Write>()
             .with::<Filter>()
+            .with::<Drop>()
+            .with::<Assign>()
             .with::<Outliers>()
             .with::<Normals>()
             .with::<Cells>()

@@ -8,6 +8,7 @@ use super::mistake::Mistake;
 use super::node::Node;
 use super::place::TextPlace;
 use crate::error::nearest;
+use crate::expression::ExpressionFault;
 use crate::quantity::Figure;
 
 /// A value that does not fit, as serde tells it.
@@ -23,6 +24,7 @@ pub(super) enum Problem {
     UnknownKey(String, Vec<&'static str>),
     UnknownWord(String, Vec<&'static str>),
     Missing(&'static str),
+    Expression(ExpressionFault),
     /// What is wrong, and a word that was meant, perhaps.
     Wrong(String, Option<Box<str>>),
 }
@@ -55,6 +57,10 @@ impl Fault {
             ),
             Problem::UnknownWord(word, valid) => {
                 Mistake::word(place, format!("`{key}` cannot be `{word}`"), word, "valid", valid)
+            }
+            Problem::Expression(fault) => {
+                let told = format!("`{key}`: {}", fault.told);
+                Mistake::new(place, told).note(fault.help.clone())
             }
             Problem::Missing(key) => Mistake::new(place, format!("`{subject}` needs `{key}`")),
             Problem::Wrong(what, near) => {

@@ -8,6 +8,7 @@ use serde::de::{self, DeserializeOwned, Deserializer, IntoDeserializer, Visitor}
 use super::fault::{Fault, Problem};
 use super::mistake::Mistake;
 use super::node::{KeyEntry, Node, NodeValue};
+use crate::expression::{Assignment, Condition, FromText, ONE_OR_SEVERAL};
 use crate::quantity::parse_count;
 
 /// Reads the table `keys` as a `T`, or tells every key that `subject` (a stage kind, `[run]`) does
@@ -23,7 +24,8 @@ pub(crate) fn read<T: DeserializeOwned>(
     let mut dropped: Vec<String> = Vec::new();
     loop {
         let unknown = RefCell::new(Vec::new());
-        let outcome = T::deserialize(NodeReader { node: &rest, unknown: &unknown, formats });
+        let outcome =
+            T::deserialize(NodeReader { node: &rest, unknown: &unknown, formats, is_list: false });
         let fault = match outcome {
             Ok(read) if mistakes.is_empty() && unknown.borrow().is_empty() => return Ok(read),
             Ok(_) => None,
@@ -64,6 +66,8 @@ struct NodeReader<'a> {
     node: &'a Node,
     unknown: &'a RefCell<Vec<Fault>>,
     formats: &'a [&'static str],
+    /// True if a value that is no list is one of a single item.
+    is_list: bool,
 }
 
 /// Below it floats hold all whole numbers.
@@ -79,6 +83,15 @@ impl<'de> NodeReader<'de> {
             }
             Err(_) => self.deserialize_any(visitor),
         }
+    }
+
+    /// Refuses a text that is no `T`, at its place in the text.
+    fn expression<T: FromText>(self) -> Result<(), Fault> {
+        let NodeValue::Text(text) = &self.node.value else { return Ok(()) };
+        T::read(text).map(drop).map_err(|fault| {
+            let place = self.node.place.within(text, &fault.span);
+            Fault::new(Problem::Expression(fault)).at(&place)
+        })
     }
 
     /// The value, which is to be one of `valid` words.
@@ -110,6 +123,11 @@ impl<'de> Deserializer<'de> for NodeReader<'de> {
     type Error = Fault;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        if self.is_list && !matches!(self.node.value, NodeValue::List(_)) {
+            let reader = NodeReader { is_list: false, ..self };
+            let mut item = Items { items: std::slice::from_ref(self.node).iter(), reader };
+            return visitor.visit_seq(&mut item);
+        }
         match &self.node.value {
             NodeValue::Text(v) => visitor.visit_borrowed_str(v),
             NodeValue::Flag(v) => visitor.visit_bool(*v),
@@ -124,7 +142,8 @@ impl<'de> Deserializer<'de> for NodeReader<'de> {
                 _ => Err(de::Error::custom("the whole number is too large")),
             },
             NodeValue::List(list) => {
-                let mut items = Items { items: list.iter(), reader: self };
+                let reader = NodeReader { is_list: false, ..self };
+                let mut items = Items { items: list.iter(), reader };
                 let read = visitor.visit_seq(&mut items)?;
                 match items.items.len() {
                     0 => Ok(read),
@@ -151,6 +170,12 @@ impl<'de> Deserializer<'de> for NodeReader<'de> {
                 let is_known = self.formats.contains(&word);
                 is_known.then_some(()).ok_or_else(|| Fault::new(problem()))
             }),
+            Condition::NAME => self.expression::<Condition>(),
+            Assignment::NAME => self.expression::<Assignment>(),
+            ONE_OR_SEVERAL => {
+                let reader = NodeReader { is_list: true, ..self };
+                return visitor.visit_newtype_struct(reader);
+            }
             _ => Ok(()),
         };
         known

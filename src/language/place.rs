@@ -18,4 +18,17 @@ impl TextPlace {
     pub fn new(source: usize, span: Range<usize>) -> Self {
         TextPlace { source, start: span.start, end: span.end }
     }
+
+    /// The bytes `span` of the value `text` that is written here: in quotes, in three quotes or in
+    /// none. Where escapes shift them, all of the place.
+    pub fn within(&self, text: &str, span: &Range<usize>) -> TextPlace {
+        let quotes = match (self.end - self.start).checked_sub(text.len()) {
+            Some(0) => 0,
+            Some(2) => 1,
+            Some(6) => 3,
+            _ => return self.clone(),
+        };
+        let start = self.start + quotes;
+        TextPlace { source: self.source, start: start + span.start, end: start + span.end }
+    }
 }

@@ -34,6 +34,7 @@ type ReadStage = fn(&Node, &StagePlace) -> Result<(Role, serde_json::Value), Vec
 struct RegisteredKind {
     about: &'static str,
     either: &'static [&'static str],
+    is_limited: bool,
     read: ReadStage,
 }
 
@@ -48,7 +49,12 @@ impl Registry {
     pub fn with<K: StageKind>(mut self) -> Self {
         self.kinds.insert(
             K::KIND,
-            RegisteredKind { about: K::ABOUT, either: K::EITHER, read: read::<K> },
+            RegisteredKind {
+                about: K::ABOUT,
+                either: K::EITHER,
+                is_limited: K::IS_LIMITED,
+                read: read::<K>,
+            },
         );
         self
     }
@@ -73,6 +79,11 @@ impl Registry {
     /// True if there is a kind of that name.
     pub fn has(&self, kind: &str) -> bool {
         self.kinds.contains_key(kind)
+    }
+
+    /// True if a stage of that kind takes the keys that limit it to some records.
+    pub(crate) fn is_limited(&self, kind: &str) -> bool {
+        self.kinds.get(kind).is_none_or(|kind| kind.is_limited)
     }
 
     /// Keys that `key` of a stage of that kind takes the place of.

@@ -143,7 +143,12 @@ fn place(
     let SourceText { text, origin, .. } = &sources[0];
     let line = text.as_bytes()[..at.start.min(text.len())].iter().filter(|&&b| b == b'\n').count();
     let place = StagePlace::new(origin.as_str(), line + 1).knowing(registry.formats());
-    let (limits, keys) = split_limits(&stage.keys);
+    let (limits, keys) = match registry.is_limited(kind) {
+        true => split_limits(&stage.keys),
+        false => {
+            (Node { value: NodeValue::Table(Vec::new()), ..stage.keys.clone() }, stage.keys.clone())
+        }
+    };
     let Some(built) = registry.build(kind, &keys, &place) else {
         let kinds = registry.kinds().map(|(kind, _)| kind);
         let told = format!("there is no stage `{kind}`");
@@ -158,12 +163,9 @@ fn place(
         }
     };
     let limits = read?;
-    if !matches!(role, Role::TileOp(_) | Role::ScanOp(_)) {
-        let told = |e: &KeyEntry| format!("`{}` is for stages that work on tiles", e.key);
-        let wrong: Vec<_> = given.iter().map(|e| Mistake::new(e.at.clone(), told(e))).collect();
-        if !wrong.is_empty() {
-            return Err(wrong);
-        }
+    let wrong: Vec<_> = given.iter().filter_map(|entry| misplaced_limit(entry, &role)).collect();
+    if !wrong.is_empty() {
+        return Err(wrong);
     }
     if let (false, Some(keys)) = (given.is_empty(), canonical.as_object_mut()) {
         let told = serde_json::to_value(&limits).unwrap_or_default();
@@ -182,7 +184,18 @@ fn place(
     })
 }
 
-/// The keys that every tile stage takes, and the stage's own.
+/// What a key that limits a stage is told where it cannot.
+fn misplaced_limit(KeyEntry { key, at, .. }: &KeyEntry, role: &Role) -> Option<Mistake> {
+    let which = match role {
+        Role::TileOp(_) | Role::ScanOp(_) => return None,
+        Role::Transform(_) if key != LimitKeys::SEES => return None,
+        Role::Transform(_) => "that work on tiles: this one sees no neighbours",
+        Role::Source(_) | Role::Sink(_) | Role::Merge => "between a source and a sink",
+    };
+    Some(Mistake::new(at.clone(), format!("`{key}` is for stages {which}")))
+}
+
+/// The keys that limit a stage, and the stage's own.
 fn split_limits(keys: &Node) -> (Node, Node) {
     let (limits, own) =
         keys.entries().iter().cloned().partition(|e| LimitKeys::KEYS.contains(&e.key.as_str()));

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use super::mistake;
 use super::mistake::{Mistake, SourceText};
-use super::node::Node;
+use super::node::{Node, NodeValue};
 use crate::Error;
+use crate::expression::ExpressionFault;
 use crate::graph::Written;
 
 /// A stage as it is written.
@@ -32,5 +33,21 @@ impl Written for WrittenText {
     fn wrong_key(&self, key: &str, told: String) -> Error {
         let place = self.keys.at(key).unwrap_or(&self.keys.place);
         mistake::tell(vec![Mistake::new(place.clone(), told)], &self.sources)
+    }
+
+    fn wrong_expression(&self, key: &str, text: &str, fault: ExpressionFault) -> Error {
+        let node = self.keys.entries().iter().find(|entry| entry.key == key);
+        let nodes = match node.map(|entry| &entry.node) {
+            Some(Node { value: NodeValue::List(list), .. }) => &list[..],
+            Some(node) => std::slice::from_ref(node),
+            None => &[],
+        };
+        let is_it = |node: &&Node| matches!(&node.value, NodeValue::Text(is) if is == text);
+        let place = match nodes.iter().find(is_it) {
+            Some(node) => node.place.within(text, &fault.span),
+            None => self.keys.place.clone(),
+        };
+        let told = format!("`{key}`: {}", fault.told);
+        mistake::tell(vec![Mistake::new(place, told).note(fault.help)], &self.sources)
     }
 }

@@ -2,23 +2,30 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::expression::{Choice, Condition, KeyExpression};
 use crate::point::{Flag, PointBatch, Schema, Selection, names};
+use crate::report::Tally;
 use crate::stage::{Needs, Role, StageKind, StagePlace, Transform};
 use crate::{Error, Result};
 
-/// Keeps the records of some classes and flags, and removes all others as they are decoded.
+/// Keeps the records for which a condition holds, or of some classes and flags, and removes all
+/// others.
 ///
-/// A record stays if its class is among `keep_classes` (where any are given) and not among
+/// A record stays if the condition `where` holds for it (where one is given), if its class is among `keep_classes` (where any are given) and not among
 /// `drop_classes`, and if it has all of `keep_flags` and none of `drop_flags`. A scan without
 /// classes has nothing of a class to drop, which the run says; to keep some of its classes is an
 /// error. Point formats 0 to 5 have no overlap flag: there the flag `overlap` is class 12.
 ///
-/// It stands between the source and the stages that work on tiles, so they neither see nor count
-/// what it removes. To limit one stage to some records and let the others pass, give that stage
-/// `classes`, `with` or `without` instead.
+/// Stages below it neither see nor count what it removes. Behind stages that compute columns, a
+/// condition may name these, too: `where = "NormalZ > 0.9"`. To limit one stage to some records and
+/// let the others pass, give that stage `where`, `classes`, `with` or `without` instead; to name
+/// what goes instead of what stays, use `drop`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Filter {
+    /// A condition that holds for the records that stay, such as "Intensity > 40".
+    #[serde(rename = "where")]
+    pub condition: Option<Condition>,
     /// Classes that stay, as their number (2 is ground); none: all.
     pub keep_classes: Vec<u8>,
     /// Classes that go, such as 7 and 18, which are noise.
@@ -32,7 +39,7 @@ pub struct Filter {
 impl Filter {
     /// Refuses a filter that says nothing, or of one class or flag both; names the key.
     pub(crate) fn check(&self) -> Result<(), (&'static str, Error)> {
-        let Filter { keep_classes, drop_classes, keep_flags, drop_flags } = self;
+        let Filter { keep_classes, drop_classes, keep_flags, drop_flags, .. } = self;
         if let Some(class) = drop_classes.iter().find(|class| keep_classes.contains(class)) {
             let told = format!("class {class} is both kept and dropped");
             return Err(("drop_classes", Error::pipeline(told)));
@@ -44,7 +51,7 @@ impl Filter {
         Ok(())
     }
 
-    /// The records that stay.
+    /// The classes and flags of the records that stay.
     fn selection(&self) -> Selection {
         Selection {
             classes: self.keep_classes.clone(),
@@ -57,7 +64,9 @@ impl Filter {
 
 impl StageKind for Filter {
     const KIND: &'static str = "filter";
-    const ABOUT: &'static str = "Removes records by class and flags.";
+    const ABOUT: &'static str =
+        "Keeps the records for which a condition holds, or of some classes and flags.";
+    const IS_LIMITED: bool = false;
 
     fn build(self, at: &StagePlace) -> Result<Role> {
         self.check().map_err(|(key, error)| at.blame(key, error))?;
@@ -68,6 +77,10 @@ impl StageKind for Filter {
 impl Transform for Filter {
     fn needs(&self) -> Needs {
         Needs { removes: true, ..Needs::default() }
+    }
+
+    fn expressions(&self) -> Vec<(&'static str, KeyExpression<'_>)> {
+        self.condition.iter().map(|c| ("where", KeyExpression::Condition(c))).collect()
     }
 
     fn check(&self, schema: &Schema) -> Result<()> {
@@ -95,6 +108,9 @@ impl Transform for Filter {
     }
 
     fn idle(&self, schema: &Schema) -> Vec<String> {
+        let condition = self.condition.iter().map(|condition| {
+            format!("every point is where {condition}: `filter.where` leaves no point out")
+        });
         let classes = Selection { classes: self.drop_classes.clone(), ..Selection::default() };
         let is_there = |dropped: &Selection| !dropped.is_all() && dropped.missing(schema).is_none();
         let told = |dropped: Selection, key| {
@@ -105,11 +121,13 @@ impl Transform for Filter {
             let with = Selection { with: vec![*flag], ..Selection::default() };
             Some(with).filter(is_there).map(|which| told(which, "drop_flags"))
         };
-        classes.into_iter().chain(self.drop_flags.iter().filter_map(flag)).collect()
+        let flags = self.drop_flags.iter().filter_map(flag);
+        condition.chain(classes).chain(flags).collect()
     }
 
     fn removes_by(&self) -> Vec<&'static str> {
         let keys = [
+            ("filter.where", self.condition.is_none()),
             ("filter.keep_classes", self.keep_classes.is_empty()),
             ("filter.drop_classes", self.drop_classes.is_empty()),
             ("filter.keep_flags", self.keep_flags.is_empty()),
@@ -118,11 +136,12 @@ impl Transform for Filter {
         keys.into_iter().filter(|(_, is_empty)| !is_empty).map(|(key, _)| key).collect()
     }
 
-    fn apply(&self, batch: &mut PointBatch) -> Result<()> {
-        let selection = self.selection();
-        if !selection.is_all() {
-            let chooser = selection.of(batch.schema());
-            batch.retain(|_, record| chooser.holds(record));
+    fn apply(&self, batch: &mut PointBatch, _tally: &mut Tally) -> Result<()> {
+        let choice = Choice { selection: self.selection(), condition: self.condition.clone() };
+        if !choice.is_all() {
+            let mut stays = Vec::with_capacity(batch.len());
+            choice.holds(batch, &mut stays)?;
+            batch.retain(|i, _| stays[i]);
         }
         Ok(())
     }

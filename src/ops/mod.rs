@@ -1,6 +1,8 @@
 //! The built-in stages that compute: one file each.
 
+mod assign;
 mod cells;
+mod drop;
 mod filter;
 mod grid;
 mod lengths;
@@ -11,7 +13,9 @@ pub(crate) mod outliers;
 pub mod removal;
 mod scatter;
 
+pub use assign::Assign;
 pub use cells::{By, Cells, Keep, Measure, Reference, Side, Split};
+pub use drop::Drop;
 pub use filter::Filter;
 pub use grid::{Grid, Pick};
 pub use median::Median;

@@ -13,18 +13,19 @@ use super::sorted::Sorted;
 use super::stretch::Stretch;
 use crate::engine::by_input::lists_bytes;
 use crate::engine::by_rank;
-use crate::engine::pass::{ColumnBytes, Op, Pass, StageOp, standings};
+use crate::engine::pass::{ColumnBytes, Op, Pass, StageOp, StreamOp, standings};
 use crate::engine::shares::Demands;
 use crate::engine::tagger::Tagger;
 use crate::engine::task::Task;
 use crate::engine::{Done, Watch};
 use crate::error::shown;
+use crate::expression::Choice;
 use crate::geom::lattice::Lattice;
 use crate::graph::Graph;
 use crate::graph::{MOST_THREADS, Nonfinite, Overrides, RunSettings};
 use crate::host::Threads;
 use crate::host::process::default_memory;
-use crate::point::{ComputedDimension, Metadata, Schema, Selection, Units};
+use crate::point::{ComputedDimension, Metadata, Schema, Units};
 use crate::quantity::Figure;
 use crate::stage::{ChunkSize, CreateSink, Order, Source};
 use crate::store::CLASSED_INPUTS;
@@ -106,8 +107,9 @@ impl Graph {
         let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;
         let beside = copies(&*source, &sorted.sinks, &each, &settings, &mut files)?;
         let schema = source.schema();
+        check_limits(&sorted, schema)?;
         check_transforms(&sorted, schema).map_err(in_file)?;
-        let selections = fit(&mut sorted.ops, schema, &source.metadata().units)?;
+        let selections = fit(&mut sorted.ops, &source.metadata().units)?;
         let passes = unroll(&sorted, schema)?;
         let tagger = tagger(&sorted.ops, &passes.passes, &selections, &ranks, &*source, &settings)?;
         let order = WriteOrder::new(&sorted, &*source)?;
@@ -151,10 +153,9 @@ impl Graph {
     }
 }
 
-/// Fits tile stages to the records and the units of the scan: lengths with a unit of their own are
+/// Fits tile stages to the units of the scan: lengths with a unit of their own are
 /// converted. Returns what records the stages are limited to.
-fn fit(ops: &mut [StageOp], schema: &Schema, units: &Units) -> Result<Vec<Selection>> {
-    check_limits(ops, schema)?;
+fn fit(ops: &mut [StageOp], units: &Units) -> Result<Vec<Choice>> {
     ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().convert(units))?;
     number_selections(ops)
 }
@@ -163,7 +164,7 @@ fn fit(ops: &mut [StageOp], schema: &Schema, units: &Units) -> Result<Vec<Select
 fn tagger(
     ops: &[StageOp],
     passes: &[Pass],
-    selections: &[Selection],
+    choices: &[Choice],
     ranks: &[u32],
     source: &dyn Source,
     settings: &RunSettings,
@@ -176,7 +177,7 @@ fn tagger(
         );
         return Err(Error::pipeline(told).help("run them in several parts"));
     }
-    let mut tagger = Tagger::new(source.schema(), selections, classed, ranks.to_vec());
+    let mut tagger = Tagger::new(source.schema(), choices, classed, ranks.to_vec());
     if !ops.is_empty() {
         tagger.treat(source.schema(), settings);
     }
@@ -216,7 +217,7 @@ fn demands(
         lists: by_rank::lists_bytes(source.points()) * ranked,
         ranked: ranked > 0,
         mills: order.mills,
-        filters: !sorted.filters.is_empty(),
+        filters: passes.iter().any(Pass::streams),
         standings: standings(passes),
         columns: columns.fold(ColumnBytes::default(), ColumnBytes::larger),
         passes: passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect(),
@@ -275,9 +276,7 @@ fn check_lengths(ops: &[StageOp], lattice: &Lattice) -> Result<()> {
 
 fn check_transforms(sorted: &Sorted, schema: &Schema) -> Result<()> {
     let mut written: Vec<String> = Vec::new();
-    let decoded = sorted.transforms.iter().map(|(kind, transform)| (kind, transform));
-    let behind = sorted.filters.iter().map(|filter| (&filter.kind, &filter.transform));
-    for (kind, transform) in decoded.chain(behind) {
+    for StreamOp { kind, transform, .. } in sorted.transforms.iter().chain(&sorted.filters) {
         let needs = transform.needs();
         let there = |name: &&String| schema.find(name).is_some() || written.contains(name);
         if let Some(missing) = needs.dimensions.iter().find(|name| !there(name)) {
@@ -307,9 +306,8 @@ fn warnings(source: &dyn Source, sorted: &Sorted, settings: &RunSettings) -> Res
         let help = error.remedy().map_or(String::new(), |help| format!("; {help}"));
         warnings.push(format!("{error}: the run fails if such a point is kept{help}"));
     }
-    let decoded = transforms.iter().map(|(_, transform)| transform);
-    let all = decoded.chain(filters.iter().map(|filter| &filter.transform));
-    warnings.extend(all.flat_map(|transform| transform.warnings(schema)));
+    let all = transforms.iter().chain(filters);
+    warnings.extend(all.flat_map(|stage| stage.transform.warnings(schema)));
     Ok(warnings)
 }
 

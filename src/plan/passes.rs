@@ -2,11 +2,12 @@
 //! where a stage must have seen all tiles before it decides.
 
 use super::columns::{NewestColumns, missing};
-use super::limits::seen_by;
+use super::limits::{rewritten, seen_by};
 use super::sorted::{Sorted, StageWork};
-use crate::engine::pass::{Branch, Call, Op, Pass, PassFilter, StageOp, decides, needs};
+use crate::engine::pass::{Branch, Call, Op, Pass, StageOp, decides, needs};
 use crate::point::{ColumnKind, ComputedDimension, Scalar, Schema, names};
 use crate::stage::Needs;
+use crate::store::CHOSEN;
 use crate::tile::Partition;
 use crate::{Error, Result};
 
@@ -104,7 +105,7 @@ impl PassLayout<'_> {
             return vec![self.at.clone(); branches];
         };
         let shared = &self.out.passes[pass];
-        let is_idle = shared.calls.is_empty() && shared.filters.is_empty();
+        let is_idle = shared.calls.is_empty() && !shared.streams();
         let behind = if is_idle { shared.behind } else { Some(pass) };
         let of = |n: usize| match is_idle && n == 0 {
             true => self.at.clone(),
@@ -148,32 +149,79 @@ impl PassLayout<'_> {
     /// What streams behind tiles has a pass of its own, unless nothing but such stages is in the
     /// last.
     fn filter(&mut self, filter: usize) -> Result<()> {
-        let at = self.pass();
-        let pass = &self.out.passes[at];
-        let at = match !pass.calls.is_empty() || !pass.after.is_empty() {
-            true => self.begin(),
-            false => at,
-        };
+        let at = self.streaming();
+        self.stream(at, self.sorted.filters[filter].reads());
         self.out.passes[at].filters.push(filter);
         self.at.filters.push(filter);
         (self.at.is_open, self.at.decides) = (false, true);
         Ok(())
     }
 
+    /// The pass in which records may be looked at one by one, behind all calls.
+    fn streaming(&mut self) -> usize {
+        let at = self.pass();
+        let pass = &self.out.passes[at];
+        let begins = !pass.calls.is_empty() || !pass.after.is_empty() || pass.chooses.is_some();
+        if !begins {
+            return at;
+        }
+        let changes = |filter: &usize| !self.sorted.filters[*filter].changes().is_empty();
+        let changed_by: Vec<usize> = self.at.filters.iter().copied().filter(changes).collect();
+        let reads: Vec<ColumnKind> =
+            changed_by.iter().flat_map(|&filter| self.sorted.filters[filter].reads()).collect();
+        let at = self.begin();
+        self.out.passes[at].changed_by = changed_by;
+        self.stream(at, reads);
+        at
+    }
+
+    /// Lets stages that stream look at these columns in pass `at`.
+    fn stream(&mut self, at: usize, columns: Vec<ColumnKind>) {
+        for column in columns {
+            self.bring(at, column);
+            let streamed = &mut self.out.passes[at].streamed;
+            if !streamed.contains(&column) {
+                streamed.push(column);
+            }
+        }
+    }
+
+    /// Chooses the records that stage `op` is limited to by columns, in a pass before it.
+    fn choose(&mut self, op: usize) {
+        let columns = self.ops[op].chosen_by();
+        if columns.is_empty() {
+            return;
+        }
+        let at = self.streaming();
+        self.stream(at, columns);
+        self.out.passes[at].chooses = Some(op);
+        self.at.is_open = false;
+    }
+
     /// Refuses a tile stage that reads what a stage above, which streams, changes only in what is
     /// written.
     fn check_unchanged(&self, op: usize) -> Result<()> {
-        let StageOp { kind, written, op, .. } = &self.ops[op];
+        let StageOp { kind, written, op, limits, selection, .. } = &self.ops[op];
         let needs = op.tile().needs();
+        // Where columns choose, records are looked at as the stages above leave them.
+        let is_chosen_by = |name: &str| *selection & CHOSEN == 0 && limits.choice.looks_at(name);
         let is_column = |name: &str| needs.reads.iter().any(|column| column.name() == name);
         let is_read = |name: &String| {
             names::XYZ.contains(&name.as_str())
                 || needs.dimensions.contains(name)
                 || is_column(name)
+                || is_chosen_by(name)
         };
         for filter in &self.at.filters {
-            let PassFilter { kind: above, transform } = &self.sorted.filters[*filter];
-            if let Some(name) = transform.needs().changes.iter().find(|name| is_read(name)) {
+            let stream = &self.sorted.filters[*filter];
+            let above = &stream.kind;
+            if let Some(column) = rewritten(stream, &needs.writes) {
+                let name = column.name();
+                let told = format!("`{kind}` computes {name} anew, which `{above}` looks at");
+                let help = format!("put `{above}` behind `{kind}`");
+                return Err(written.wrong(told).help(help));
+            }
+            if let Some(name) = stream.changes().iter().find(|name| is_read(name)) {
                 let told =
                     format!("`{kind}` works by {name} as it is read, and `{above}` changes it");
                 let help = format!(
@@ -208,6 +256,7 @@ impl PassLayout<'_> {
     }
 
     fn add(&mut self, op: usize, round: usize) -> Result<()> {
+        self.choose(op);
         if let Op::Scan(_) = &self.ops[op].op {
             self.call(Call { op, gathers: true }, round)?;
             self.at.is_open = false;
@@ -258,7 +307,7 @@ impl PassLayout<'_> {
         let is_computed = |column: &ColumnKind| self.at.columns.have(column);
         let on_columns = needs.takes_cells || needs.reads.iter().any(is_computed);
         let other_records = !on_columns && last.decided != stage.selection;
-        let begun = !last.calls.is_empty() || !last.filters.is_empty();
+        let begun = !last.calls.is_empty() || last.streams();
         match begun && (!self.at.is_open || rewrites || other_neighbors || other_records) {
             true => Ok(self.begin()),
             false => Ok(at),
@@ -350,13 +399,16 @@ impl PassLayout<'_> {
         for &sink in sinks {
             let at = self.pass();
             self.out.computed[sink] = self.computed(sink, at)?;
+            let filters = self.at.filters.clone();
+            let reads = filters.iter().flat_map(|&filter| self.sorted.filters[filter].reads());
+            self.stream(at, reads.collect());
             let pass = &mut self.out.passes[at];
             if self.at.decides {
                 pass.after.push(sink)
             } else {
                 pass.before.push(sink)
             }
-            self.out.changed_by[sink] = self.at.filters.clone();
+            self.out.changed_by[sink] = filters;
             self.out.branch_of[sink] = self.out.branches.len();
         }
         Ok(())

@@ -4,8 +4,9 @@ use std::fmt;
 
 use super::fitted::Plan;
 use crate::budget::Bytes;
-use crate::engine::pass::{Call, Pass, needs};
+use crate::engine::pass::{Call, Pass, StageOp, StreamOp, needs};
 use crate::error::shown;
+use crate::expression::Choice;
 use crate::quantity::Figure;
 
 impl fmt::Display for Plan {
@@ -17,8 +18,9 @@ impl fmt::Display for Plan {
             self.task.source.inputs().len(),
             self.task.source.points()
         )?;
-        for (kind, _) in &self.task.transforms {
-            writeln!(f, "streams  {kind}")?;
+        for StreamOp { kind, choice, .. } in &self.task.transforms {
+            write!(f, "streams  {kind}")?;
+            limits_shown(f, choice)?;
         }
         match self.ops.is_empty() && self.task.filters.is_empty() {
             true => self.task.sinks.iter().try_for_each(|sink| sink_line(f, sink.path()))?,
@@ -45,6 +47,14 @@ impl fmt::Display for Plan {
 
 fn sink_line(f: &mut fmt::Formatter<'_>, path: &std::path::Path) -> fmt::Result {
     writeln!(f, "sink     {}", shown(path))
+}
+
+/// Ends a line with the records that a stage is limited to.
+fn limits_shown(f: &mut fmt::Formatter<'_>, choice: &Choice) -> fmt::Result {
+    match choice.is_all() {
+        true => writeln!(f),
+        false => writeln!(f, ", of points {choice}"),
+    }
 }
 
 impl Plan {
@@ -76,7 +86,13 @@ impl Plan {
             }
             for &filter in &pass.filters {
                 let filter = &self.task.filters[filter];
-                writeln!(f, "{label:<8} {} of what is left", filter.kind)?;
+                write!(f, "{label:<8} {} of what is left", filter.kind)?;
+                limits_shown(f, &filter.choice)?;
+            }
+            if let Some(op) = pass.chooses {
+                let StageOp { kind, limits, .. } = &self.ops[op];
+                write!(f, "{label:<8} chooses for {kind}")?;
+                limits_shown(f, &limits.choice)?;
             }
             sinks(f, &pass.after)?;
         }
@@ -104,10 +120,7 @@ impl Plan {
         if needs.removes || needs.mark.is_some() {
             write!(f, ", {}", if needs.mark.is_some() { "marks" } else { "removes" })?;
         }
-        if !stage.limits.selection.is_all() {
-            write!(f, ", of some classes or flags only")?;
-        }
-        writeln!(f)
+        limits_shown(f, &stage.limits.choice)
     }
 
     fn memory(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

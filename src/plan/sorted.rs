@@ -3,9 +3,10 @@
 
 use std::collections::BTreeSet;
 
-use crate::engine::pass::{Op, PassFilter, StageOp};
+use crate::engine::pass::{Op, StageOp, StreamOp};
 use crate::graph::{Graph, GraphStage, Written};
-use crate::stage::{CreateSink, OpenSource, Role, Transform};
+use crate::point::ColumnKind;
+use crate::stage::{CreateSink, OpenSource, Role};
 use crate::{Error, Result};
 
 /// What a stage behind the decode is.
@@ -25,9 +26,9 @@ pub(super) enum StageWork {
 pub(super) struct Sorted {
     pub source: (String, Box<dyn OpenSource>),
     /// The stages that the decode applies to all records.
-    pub transforms: Vec<(String, Box<dyn Transform>)>,
+    pub transforms: Vec<StreamOp>,
     pub ops: Vec<StageOp>,
-    pub filters: Vec<PassFilter>,
+    pub filters: Vec<StreamOp>,
     pub sinks: Vec<Box<dyn CreateSink>>,
     /// What each stage of the graph is.
     pub works: Vec<StageWork>,
@@ -56,11 +57,12 @@ impl Sorted {
         let name =
             |stage: &GraphStage| serde_json::json!({ "kind": stage.kind, "keys": stage.keys });
         let names = graph.stages.iter().map(name).collect();
+        let columns = columns_above(&graph.stages);
         let mut source: Option<(String, Box<dyn OpenSource>)> = None;
         let mut works = Vec::new();
         let (mut transforms, mut filters) = (Vec::new(), Vec::new());
         let (mut ops, mut sinks) = (Vec::new(), Vec::new());
-        for (n, stage) in graph.stages.into_iter().enumerate() {
+        for ((n, stage), above) in graph.stages.into_iter().enumerate().zip(columns) {
             let GraphStage { kind, written, limits, role, .. } = stage;
             works.push(match &role {
                 Role::Source(_) => StageWork::Decode,
@@ -71,7 +73,6 @@ impl Sorted {
                 Role::Merge => return Err(Error::internal("a merge is left in the graph")),
             });
             let blamed = written.clone();
-            let tile = |kind, op| StageOp { kind, written, op, limits, selection: 0 };
             match role {
                 Role::Source(open) => {
                     source = Some(match source {
@@ -82,10 +83,18 @@ impl Sorted {
                         }
                     });
                 }
-                Role::Transform(one) if decoded.contains(&n) => transforms.push((kind, one)),
-                Role::Transform(transform) => filters.push(PassFilter { kind, transform }),
-                Role::TileOp(op) => ops.push(tile(kind, Op::Tile(op))),
-                Role::ScanOp(op) => ops.push(tile(kind, Op::Scan(op))),
+                Role::Transform(transform) => {
+                    let all = if decoded.contains(&n) { &mut transforms } else { &mut filters };
+                    all.push(StreamOp { kind, written, transform, choice: limits.choice, above });
+                }
+                Role::TileOp(op) => {
+                    let op = Op::Tile(op);
+                    ops.push(StageOp { kind, written, op, limits, above, selection: 0 });
+                }
+                Role::ScanOp(op) => {
+                    let op = Op::Scan(op);
+                    ops.push(StageOp { kind, written, op, limits, above, selection: 0 });
+                }
                 Role::Sink(sink) => sinks.push(sink),
                 Role::Merge => {}
             }
@@ -123,6 +132,28 @@ impl Sorted {
         let named = named.filter(|n| on_path.contains(n) || is_decode(n) || is_sink(n));
         named.map(|n| self.names[n].clone()).collect()
     }
+}
+
+/// For each stage the columns that those above it compute, the newest last.
+fn columns_above(stages: &[GraphStage]) -> Vec<Vec<ColumnKind>> {
+    let mut above: Vec<Vec<ColumnKind>> = Vec::with_capacity(stages.len());
+    for stage in stages {
+        let mut columns = Vec::new();
+        for &from in &stage.from {
+            columns.extend_from_slice(&above[from]);
+            let op = match &stages[from].role {
+                Role::TileOp(op) => op.needs(),
+                Role::ScanOp(op) => op.needs(),
+                _ => continue,
+            };
+            columns.retain(|known: &ColumnKind| {
+                op.writes.iter().all(|new| new.name() != known.name())
+            });
+            columns.extend(op.writes);
+        }
+        above.push(columns);
+    }
+    above
 }
 
 /// What is wrong with a stage, told where it is written.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::columns::Columns;
 use super::schema::Schema;
+use crate::{Error, Result};
 
 /// Up to `capacity` records of one schema, refilled rather than rebuilt.
 ///
@@ -129,6 +130,38 @@ impl PointBatch {
     pub fn extend(&mut self, records: &[u8]) {
         debug_assert_eq!(records.len() % self.schema.stride, 0);
         self.records.extend_from_slice(records);
+    }
+
+    /// Lets `change` work on the records that are `chosen`, a flag for each; the others stay as they
+    /// are, and where they are among those that are left.
+    pub(crate) fn change_some(
+        &mut self,
+        chosen: &[bool],
+        change: impl FnOnce(&mut PointBatch) -> Result<()>,
+    ) -> Result<()> {
+        if chosen.iter().all(|is_chosen| *is_chosen) {
+            return change(self);
+        }
+        let mut some = self.clone();
+        some.retain(|i, _| chosen[i]);
+        let from: Vec<usize> = (0..chosen.len()).filter(|&i| chosen[i]).collect();
+        some.number_records();
+        change(&mut some)?;
+        let left = some.numbers.take().filter(|numbers| numbers.len() == some.len());
+        let left = left.ok_or_else(|| {
+            Error::internal("a stage that streams removes records other than by `retain`")
+        })?;
+        let stride = self.schema.stride;
+        let mut stays: Vec<bool> = chosen.iter().map(|is_chosen| !is_chosen).collect();
+        for (&number, record) in left.iter().zip(some.records.chunks_exact(stride)) {
+            let at = from[number as usize];
+            self.records[at * stride..(at + 1) * stride].copy_from_slice(record);
+            stays[at] = true;
+        }
+        if stays.contains(&false) {
+            self.retain(|i, _| stays[i]);
+        }
+        Ok(())
     }
 
     /// Keeps the records for which `keep(index, record)` holds, in order.

@@ -132,6 +132,11 @@ impl Columns {
         self.resize(len);
     }
 
+    /// What columns there are.
+    pub(crate) fn kinds(&self) -> Vec<ColumnKind> {
+        self.0.iter().map(|(kind, _)| *kind).collect()
+    }
+
     /// The bytes of a column's values, one after the other.
     pub(crate) fn bytes_of(&self, kind: ColumnKind) -> Option<&[u8]> {
         self.0.iter().find(|(known, _)| *known == kind).map(|(_, values)| values.bytes())

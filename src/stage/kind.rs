@@ -28,6 +28,10 @@ pub trait StageKind: DeserializeOwned + Serialize {
     /// where a file gives several the stage tells.
     const EITHER: &'static [&'static str] = &[];
 
+    /// True if it takes `where`, `classes`, `with` and `without` besides its own keys, to work on
+    /// some records and let the others pass; false if that is what its own keys are about.
+    const IS_LIMITED: bool = true;
+
     /// Puts the stage in its role. Called once every key fits its field; an error is told with the
     /// stage's place in the file, or that of a key if it went through [`StagePlace::blame`].
     ///

@@ -35,7 +35,8 @@ pub use levels::Levels;
 pub use merge::{merge_bytes, seal};
 pub use pieces::{PIECE, Pieces};
 pub use record::{
-    ASIDE, CLASSED_INPUTS, FATE_BYTES, RecordState, SELECTIONS, TAGGED_INPUTS, Tag, ref_bytes,
+    ASIDE, CHOSEN, CLASSED_INPUTS, FATE_BYTES, RecordState, SELECTIONS, TAGGED_INPUTS, Tag,
+    ref_bytes,
 };
 pub use sealed::{Reader, SealedTiles};
 pub use spill::{Folder, Spill, SpillArea, StoredStretch};

@@ -10,6 +10,9 @@ use crate::point::Edit;
 pub const SELECTIONS: u32 = 7;
 /// Set in the selections of a record that takes no part in any pass and is written as it is.
 pub const ASIDE: u8 = 1 << SELECTIONS;
+/// Asks, among selections that a record must be in, that it was chosen by what a pass before
+/// computed: the tag of a record is written before any pass, its state is not.
+pub const CHOSEN: u8 = 1 << SELECTIONS;
 
 /// What accompanies a record from the decode on: the selections that it is in, a bit each, its
 /// class where a stage reads it, and the number of its input.
@@ -54,7 +57,8 @@ impl Tag {
     }
 }
 
-/// The state of a record between passes, as it is stored: a byte.
+/// The state of a record between passes, as it is stored: a byte. From the lowest bit: two bits for
+/// what became of it, five for its edits, and one that says that it was not chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RecordState(pub u8);
 
@@ -69,7 +73,18 @@ impl RecordState {
     /// The same state with an edit of the record more.
     #[must_use]
     pub fn edited(self, edit: Edit) -> RecordState {
-        RecordState(self.0 & 3 | edit.added_to(self.edits()) << 2)
+        RecordState(self.0 & !EDITS | edit.added_to(self.edits()) << 2)
+    }
+
+    /// The same state of a record that is chosen, or not.
+    #[must_use]
+    pub fn chosen(self, is_chosen: bool) -> RecordState {
+        RecordState(self.0 & !UNCHOSEN | if is_chosen { 0 } else { UNCHOSEN })
+    }
+
+    /// True unless a choice left the record out.
+    pub fn is_chosen(self) -> bool {
+        self.0 & UNCHOSEN == 0
     }
 
     /// Set aside, with the edits that it has.
@@ -90,14 +105,18 @@ impl RecordState {
 
     /// True if the record is in the output and no mark says that it would be removed.
     pub fn is_kept(self) -> bool {
-        self.is_alive() || self == RecordState::ASIDE
+        self.is_alive() || self.chosen(true) == RecordState::ASIDE
     }
 
     /// The set of edits that the record is written with: see [`Edit::of`].
     pub fn edits(self) -> u8 {
-        self.0 >> 2
+        (self.0 & EDITS) >> 2
     }
 }
+
+/// The bits of a state that are edits, and the one that is set where a record was not chosen.
+const EDITS: u8 = 0b0111_1100;
+const UNCHOSEN: u8 = 0b1000_0000;
 
 /// Bytes of a record's entry in the canonical order: its number in the store and, if records have
 /// them, its tag.
@@ -107,3 +126,22 @@ pub const fn ref_bytes(tagged: bool) -> usize {
 
 /// Bytes of a stored fate; see the survey.
 pub const FATE_BYTES: usize = size_of::<f32>();
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_choice_changes_nothing_else_and_is_taken_back() {
+        let edited = RecordState::ALIVE.edited(Edit::HighNoise).edited(Edit::SetKeyPoint);
+        for state in [RecordState::ALIVE, RecordState::REMOVED, RecordState::ASIDE, edited] {
+            let left_out = state.chosen(false);
+            assert!(!left_out.is_chosen() && state.is_chosen());
+            assert_eq!(left_out.edits(), state.edits());
+            assert_eq!(left_out.is_alive(), state.is_alive());
+            assert_eq!(left_out.is_kept(), state.is_kept());
+            assert_eq!(left_out.chosen(true), state);
+            assert_eq!(left_out.edited(Edit::LowNoise).chosen(true), state.edited(Edit::LowNoise));
+        }
+    }
+}

@@ -256,7 +256,7 @@ impl Loader {
             }
             if is_seen {
                 let alive = runs.iter().filter(|run| run.is_alive());
-                tile.selections.push(alive.fold(0, |of, run| of | run.tag.selections()));
+                tile.selections.push(alive.fold(0, |of, run| of | run.selections()));
                 let decided = || runs.iter().filter(|run| run.is_in(decided));
                 tile.copies.push(decided().map(|run| run.count).sum());
                 let first = RecordRun::first_of(runs, sieve);

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use crate::Result;
 use crate::budget::{Bytes, Lease};
 use crate::point::{ColumnKind, Dimension, Schema};
-use crate::store::{ASIDE, Pieces, RecordState, SealedTiles, Tag};
+use crate::store::{ASIDE, CHOSEN, Pieces, RecordState, SealedTiles, Tag};
 
 /// What a pass sees of the scan, and what earlier passes stored.
 #[derive(Debug, Clone, Default)]
@@ -86,9 +86,15 @@ impl RecordRun {
         self.state.is_alive() && self.tag.selections() & ASIDE == 0
     }
 
+    /// The selections that it is in, [`CHOSEN`] among them.
+    pub fn selections(&self) -> u8 {
+        let chosen = if self.state.is_chosen() { CHOSEN } else { 0 };
+        self.tag.selections() & !ASIDE | chosen
+    }
+
     /// True if it takes part and is in all of `selections`.
     pub fn is_in(&self, selections: u8) -> bool {
-        self.is_alive() && self.tag.selections() & selections == selections
+        self.is_alive() && self.selections() & selections == selections
     }
 }
 

@@ -10,10 +10,11 @@ use std::path::{Path, PathBuf};
 use super::modules::Modules;
 
 /// The modules from the bottom up. Those of one layer do not import each other.
-const LAYERS: [&[&str]; 16] = [
+const LAYERS: [&[&str]; 17] = [
     &["error"],
     &["host", "point"],
     &["geom", "quantity", "budget"],
+    &["expression"],
     &["store"],
     &["tile"],
     &["report"],

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use pointmill::point::{Edit, PointBatch, names};
-use pointmill::report::result_bytes;
+use pointmill::report::{Tally, result_bytes};
 use pointmill::stage::{Needs, Role, Transform};
 use pointmill::{Done, Graph, Overrides, Quiet, Registry, Result};
 
@@ -174,7 +174,7 @@ impl Transform for Reclass {
         Needs::none().changes([names::CLASSIFICATION])
     }
 
-    fn apply(&self, batch: &mut PointBatch) -> Result<()> {
+    fn apply(&self, batch: &mut PointBatch, _tally: &mut Tally) -> Result<()> {
         let schema = batch.schema().clone();
         let class = schema.find(names::CLASSIFICATION).unwrap().clone();
         batch.retain(|_, record| class.get(record, schema.endian).as_f64() != 6.0);

@@ -3,5 +3,6 @@
 mod branches;
 mod columns;
 mod exact;
+mod limits;
 mod lossless;
 mod same_bytes;

@@ -74,7 +74,7 @@ impl Transform for Trouble {
     fn needs(&self) -> Needs {
         Needs::default()
     }
-    fn apply(&self, _batch: &mut PointBatch) -> Result<()> {
+    fn apply(&self, _batch: &mut PointBatch, _tally: &mut Tally) -> Result<()> {
         self.meet()
     }
 }

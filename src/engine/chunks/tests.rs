@@ -37,7 +37,7 @@ fn product(kept: &[(u64, u32)]) -> Product {
 #[test]
 fn chunks_are_cut_by_rank_and_copies_are_one_entry() {
     let area = SpillArea::new(Budget::new(1 << 26), 1 << 26, Box::new(Nowhere));
-    let row = RowLayout::of(&[NUMBER.kind().part("Number").unwrap()]);
+    let row = RowLayout::of([NUMBER.kind()]);
     let outputs = vec![Open::new(0, 1000, &row, false)];
     let copies = 10_000_000;
     let all = 8 + u64::from(copies);

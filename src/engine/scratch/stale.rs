@@ -150,9 +150,10 @@ pub(crate) fn remove(at: impl AsFd, name: impl Arg, folder: &OwnedFd) -> io::Res
         Ok(()) | Err(Errno::NOENT) => {}
         Err(cause) => return Err(cause.into()),
     }
-    // Another run that finds the same folder may have been quicker.
+    // Another run that finds the same folder may have been quicker, and a third may have made and
+    // marked a folder of this name since: that one is in use.
     match unlinkat(at, name, AtFlags::REMOVEDIR) {
-        Ok(()) | Err(Errno::NOENT) => Ok(()),
+        Ok(()) | Err(Errno::NOENT | Errno::NOTEMPTY) => Ok(()),
         Err(cause) => Err(cause.into()),
     }
 }

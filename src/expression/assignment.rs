@@ -1,0 +1,139 @@
+//! What a dimension of a record is given.
+
+use std::ops::Range;
+
+use super::bind::{Names, Number, Truth, number, truth, type_of};
+use super::eval;
+use super::fault::ExpressionFault;
+use super::parser::parse_assignment;
+use super::text::{FromText, is_its_text};
+use super::tree::Tree;
+use crate::point::{Dimension, PointBatch, Scalar, Schema, Value, names};
+use crate::quantity::Figure;
+use crate::{Error, Result};
+
+/// `NAME = EXPRESSION`, as it was written: see the [module](super). A condition gives 1 where it
+/// holds, else 0.
+#[derive(Debug, Clone)]
+pub struct Assignment {
+    text: String,
+    target: (String, Range<usize>),
+    tree: Tree,
+}
+
+is_its_text!(Assignment);
+
+enum BoundValue {
+    Number(Number),
+    Truth(Truth),
+}
+
+impl FromText for Assignment {
+    const NAME: &'static str = "Assignment";
+    const EXPECTED: &'static str = "an assignment in quotes, such as \"Classification = 7\"";
+
+    fn read(text: &str) -> Result<Assignment, ExpressionFault> {
+        let (name, span, tree) = parse_assignment(text)?;
+        if names::XYZ.contains(&name.as_str()) {
+            let told = format!("{name} is a coordinate, and coordinates are not assigned");
+            return Err(ExpressionFault::new(span, told).help("a stage `transform` moves points"));
+        }
+        Ok(Assignment { text: text.to_owned(), target: (name, span), tree })
+    }
+}
+
+impl Assignment {
+    /// Reads an assignment.
+    ///
+    /// # Errors
+    ///
+    /// What is no assignment, with its place in the text.
+    pub fn parse(text: &str) -> Result<Assignment> {
+        Assignment::read(text).map_err(|fault| fault.error(text))
+    }
+
+    /// As it was written.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The dimension that is given a value.
+    pub fn target(&self) -> &str {
+        &self.target.0
+    }
+
+    /// The names that its value is made of, each once.
+    pub fn names(&self) -> Vec<&str> {
+        self.tree.names()
+    }
+
+    /// Refuses names that are not there, and a target that is no dimension of the records.
+    pub(crate) fn check(&self, names: Names<'_>) -> Result<(), ExpressionFault> {
+        self.bind(names).map(drop)
+    }
+
+    fn bind(&self, names: Names<'_>) -> Result<(Dimension, BoundValue), ExpressionFault> {
+        let (name, span) = &self.target;
+        let of_records = Names { columns: &[], ..names };
+        let Some(field) = names.schema.find(name) else {
+            return Err(of_records.unknown(name, span));
+        };
+        let value = match self.tree.is_condition() {
+            Some(true) => BoundValue::Truth(truth(&self.tree, names)?),
+            _ => BoundValue::Number(number(&self.tree, names)?),
+        };
+        Ok((field.clone(), value))
+    }
+
+    /// Gives the dimension its value in every record of `batch`.
+    ///
+    /// # Errors
+    ///
+    /// Names that are not there, and a value that the dimension cannot hold.
+    pub(crate) fn apply(&self, batch: &mut PointBatch) -> Result<()> {
+        let names = Names { schema: batch.schema(), columns: &batch.columns.kinds() };
+        let bound = self.bind(names).map_err(|fault| fault.error(&self.text))?;
+        let (field, mut numbers) = (bound.0, Vec::new());
+        match bound.1 {
+            BoundValue::Number(number) => eval::numbers(&number, batch, &mut numbers),
+            BoundValue::Truth(truth) => {
+                let mut held = Vec::new();
+                eval::holds(&truth, batch, &mut held);
+                numbers.extend(held.into_iter().map(|held| f64::from(u8::from(held))));
+            }
+        }
+        let schema = batch.schema().clone();
+        let records = batch.records_mut().chunks_exact_mut(schema.stride);
+        for (record, number) in records.zip(numbers) {
+            if !put(&field, &schema, record, number) {
+                return Err(self.too_much(&field, number));
+            }
+        }
+        Ok(())
+    }
+
+    fn too_much(&self, field: &Dimension, number: f64) -> Error {
+        let Assignment { text, target: (name, _), .. } = self;
+        let told = match number.is_nan() {
+            true => format!("`{text}` is not a number for a point"),
+            false => format!("`{text}` is {} for a point", Figure(number)),
+        };
+        let (holds, help) = (type_of(field), "limit it by `where`, `min` or `max`");
+        Error::pipeline(format!("{told}, which {name} ({holds}) cannot hold")).help(help)
+    }
+}
+
+/// Stores a world value: rounded to the nearest that the field has. False if it is out of range.
+fn put(field: &Dimension, schema: &Schema, record: &mut [u8], world: f64) -> bool {
+    let stored = match field.scale == 1.0 && field.origin == 0.0 {
+        true => world,
+        false => (world - field.origin) / field.scale,
+    };
+    let value = match field.scalar {
+        Scalar::F32 if (stored as f32).is_infinite() && stored.is_finite() => return false,
+        Scalar::F32 => Value::Single(stored as f32),
+        Scalar::F64 => Value::Double(stored),
+        _ => Value::Double(stored.round_ties_even()),
+    };
+    field.put(record, schema.endian, value)
+}

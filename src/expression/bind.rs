@@ -1,0 +1,171 @@
+//! From the names of an expression to fields of records and columns: what each is, and whether it
+//! fits where it stands.
+
+use std::ops::Range;
+
+use super::fault::ExpressionFault;
+use super::lanes::Field;
+use super::tree::{Function, Operator, Relation, Tree, TreeNode};
+use crate::point::{ColumnKind, Dimension, NORMAL, Scalar, Schema};
+
+/// A number for each record.
+#[derive(Debug, Clone)]
+pub(super) enum Number {
+    Literal(f64),
+    Field(Field),
+    Negated(Box<Number>),
+    Arithmetic(Operator, Box<Number>, Box<Number>),
+    Call(Function, Vec<Number>),
+}
+
+/// True or false for each record.
+#[derive(Debug, Clone)]
+pub(super) enum Truth {
+    Compared(Relation, Number, Number),
+    Among(Number, Vec<(Number, Number)>),
+    IsNan(Number),
+    /// A field of one bit.
+    Set(Number),
+    Not(Box<Truth>),
+    All(Vec<Truth>),
+    Any(Vec<Truth>),
+}
+
+/// What names may mean: the columns of a batch, then the dimensions of its records.
+#[derive(Clone, Copy)]
+pub(crate) struct Names<'a> {
+    pub schema: &'a Schema,
+    pub columns: &'a [ColumnKind],
+}
+
+impl Names<'_> {
+    fn field(&self, name: &str, span: &Range<usize>) -> Result<Field, ExpressionFault> {
+        let column = self.columns.iter().rev().find_map(|column| column.part(name));
+        if let Some(part) = column {
+            return Ok(Field::of_column(&part));
+        }
+        match self.schema.find(name) {
+            Some(dimension) => Ok(Field::of_record(dimension, self.schema)),
+            None => Err(self.unknown(name, span)),
+        }
+    }
+
+    pub(super) fn unknown(&self, name: &str, span: &Range<usize>) -> ExpressionFault {
+        if let Some(column) = self.columns.iter().find(|column| column.name() == name) {
+            let help = format!("its numbers are {}", column.parts().join(", "));
+            return ExpressionFault::new(span.clone(), format!("{name} is several numbers"))
+                .help(help);
+        }
+        let told = format!("there is no dimension `{name}`");
+        if let Some(by) = NORMAL.kind().part(name).and_then(|part| part.column.computed_by()) {
+            let help = format!("put a `{by}` stage above it");
+            return ExpressionFault::new(span.clone(), told).help(help);
+        }
+        ExpressionFault::word(span.clone(), told, name, "dimensions", &self.listed())
+    }
+
+    /// All names with their types, in alphabetical order.
+    fn listed(&self) -> Vec<String> {
+        let of_records = self.schema.dimensions.iter();
+        let of_records = of_records.map(|d| format!("{} ({})", d.name, type_of(d)));
+        let parts = self.columns.iter().flat_map(|column| {
+            column.parts().iter().map(|part| format!("{part} ({})", words(column.scalar())))
+        });
+        let mut all: Vec<String> = of_records.chain(parts).collect();
+        all.sort();
+        all.dedup();
+        all
+    }
+}
+
+/// The type of a dimension in words: `whole`, `flag`, `float`.
+pub(super) fn type_of(dimension: &Dimension) -> String {
+    match dimension.bits {
+        Some(bits) if bits.width == 1 => "flag".to_owned(),
+        Some(bits) => format!("whole, 0 to {}", (1u64 << bits.width) - 1),
+        None if dimension.scale != 1.0 || dimension.origin != 0.0 => "float".to_owned(),
+        None => words(dimension.scalar).to_owned(),
+    }
+}
+
+fn words(scalar: Scalar) -> &'static str {
+    match scalar {
+        Scalar::U8 => "whole, 0 to 255",
+        Scalar::U16 => "whole, 0 to 65535",
+        Scalar::U32 | Scalar::U64 => "whole, from 0",
+        Scalar::I8 | Scalar::I16 | Scalar::I32 | Scalar::I64 => "whole",
+        Scalar::F32 | Scalar::F64 => "float",
+    }
+}
+
+/// The number that `tree` is.
+pub(super) fn number(tree: &Tree, names: Names<'_>) -> Result<Number, ExpressionFault> {
+    let boxed = |tree: &Tree| number(tree, names).map(Box::new);
+    Ok(match &tree.node {
+        TreeNode::Number(value) => Number::Literal(*value),
+        TreeNode::Name(name) => Number::Field(names.field(name, &tree.span)?),
+        TreeNode::Negated(of) => Number::Negated(boxed(of)?),
+        TreeNode::Arithmetic(operator, a, b) => Number::Arithmetic(*operator, boxed(a)?, boxed(b)?),
+        TreeNode::Call(function, of) => {
+            let numbers = of.iter().map(|part| number(part, names));
+            Number::Call(*function, numbers.collect::<Result<_, _>>()?)
+        }
+        _ => {
+            let told = "this is true or false, and a number belongs here";
+            return Err(ExpressionFault::new(tree.span.clone(), told));
+        }
+    })
+}
+
+/// The condition that `tree` is.
+pub(super) fn truth(tree: &Tree, names: Names<'_>) -> Result<Truth, ExpressionFault> {
+    let all = |parts: &[Tree]| -> Result<Vec<Truth>, ExpressionFault> {
+        parts.iter().map(|part| truth(part, names)).collect()
+    };
+    Ok(match &tree.node {
+        TreeNode::Compared(relation, a, b) => {
+            let (a, b) = alike(number(a, names)?, number(b, names)?);
+            Truth::Compared(*relation, a, b)
+        }
+        TreeNode::Among(of, ranges) => {
+            let of = number(of, names)?;
+            let bound = |(lo, hi): &(Tree, Tree)| {
+                let lo = alike(of.clone(), number(lo, names)?).1;
+                Ok((lo, alike(of.clone(), number(hi, names)?).1))
+            };
+            let ranges = ranges.iter().map(bound).collect::<Result<_, ExpressionFault>>()?;
+            Truth::Among(of, ranges)
+        }
+        TreeNode::IsNan(of) => Truth::IsNan(number(of, names)?),
+        TreeNode::Not(of) => Truth::Not(Box::new(truth(of, names)?)),
+        TreeNode::All(parts) => Truth::All(all(parts)?),
+        TreeNode::Any(parts) => Truth::Any(all(parts)?),
+        TreeNode::Name(name) => match names.field(name, &tree.span)? {
+            field if field.is_flag() => Truth::Set(Number::Field(field)),
+            _ => {
+                let told = format!("{name} is a number, and something true or false belongs here");
+                let help = format!("compare it, as in `{name} > 0`");
+                return Err(ExpressionFault::new(tree.span.clone(), told).help(help));
+            }
+        },
+        _ => {
+            super::parser::condition(tree)?;
+            return Err(ExpressionFault::new(tree.span.clone(), "this is no condition"));
+        }
+    })
+}
+
+/// Two numbers that are compared: one that is written out beside a field of `f32` is rounded as
+/// that field's values were, so that `Reflectance == 0.1` holds for what was stored as 0.1.
+fn alike(a: Number, b: Number) -> (Number, Number) {
+    let single = |number: &Number| matches!(number, Number::Field(field) if field.is_single());
+    let rounded = |number: Number| match number {
+        Number::Literal(value) => Number::Literal(f64::from(value as f32)),
+        other => other,
+    };
+    match (single(&a), single(&b)) {
+        (true, false) => (a, rounded(b)),
+        (false, true) => (rounded(a), b),
+        _ => (a, b),
+    }
+}

@@ -1,0 +1,42 @@
+//! The expressions of a stage, whatever they are, for those that look their names up.
+
+use super::assignment::Assignment;
+use super::bind::Names;
+use super::condition::Condition;
+use super::fault::ExpressionFault;
+
+/// A condition or an assignment that is the value of a stage's key, or one of its values.
+#[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
+pub enum KeyExpression<'a> {
+    /// Something that is true or false.
+    Condition(&'a Condition),
+    /// What a dimension is given.
+    Assignment(&'a Assignment),
+}
+
+impl<'a> KeyExpression<'a> {
+    /// As it was written.
+    pub fn text(self) -> &'a str {
+        match self {
+            KeyExpression::Condition(condition) => condition.text(),
+            KeyExpression::Assignment(assignment) => assignment.text(),
+        }
+    }
+
+    /// The names that it reads, each once.
+    pub fn names(self) -> Vec<&'a str> {
+        match self {
+            KeyExpression::Condition(condition) => condition.names(),
+            KeyExpression::Assignment(assignment) => assignment.names(),
+        }
+    }
+
+    /// Refuses names that are not there, and what does not fit where it stands.
+    pub(crate) fn check(self, names: Names<'_>) -> Result<(), ExpressionFault> {
+        match self {
+            KeyExpression::Condition(condition) => condition.bind_names(names).map(drop),
+            KeyExpression::Assignment(assignment) => assignment.check(names),
+        }
+    }
+}

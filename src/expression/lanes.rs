@@ -1,0 +1,106 @@
+//! The numbers of a field side by side, as expressions work on them: a block of records at a time,
+//! so that what a field is, is asked once a block instead of once a record.
+
+use crate::point::{
+    COLUMN_ENDIAN, ColumnKind, ComputedDimension, Dimension, Endian, PointBatch, Scalar, Schema,
+};
+
+/// Records that are worked on at once.
+pub(super) const LANES: usize = 256;
+/// A number for each.
+pub(super) type Lanes = [f64; LANES];
+
+/// Records of a batch that are worked on at once.
+#[derive(Clone, Copy)]
+pub(super) struct Block<'a> {
+    pub batch: &'a PointBatch,
+    /// The first.
+    pub first: usize,
+    /// How many, at most [`LANES`].
+    pub count: usize,
+}
+
+/// A field of records, or a number of a column.
+#[derive(Debug, Clone)]
+pub(super) struct Field {
+    dimension: Dimension,
+    endian: Endian,
+    column: Option<ColumnKind>,
+}
+
+impl Field {
+    pub fn of_record(dimension: &Dimension, schema: &Schema) -> Field {
+        Field { dimension: dimension.clone(), endian: schema.endian, column: None }
+    }
+
+    pub fn of_column(part: &ComputedDimension) -> Field {
+        let dimension = Dimension::new(part.name, part.scalar(), part.range().start);
+        Field { dimension, endian: COLUMN_ENDIAN, column: Some(part.column) }
+    }
+
+    /// True if it is one bit.
+    pub fn is_flag(&self) -> bool {
+        self.dimension.bits.is_some_and(|bits| bits.width == 1)
+    }
+
+    /// True if its values are `f32` as they are stored.
+    pub fn is_single(&self) -> bool {
+        let Dimension { scalar, scale, origin, .. } = self.dimension;
+        scalar == Scalar::F32 && scale == 1.0 && origin == 0.0
+    }
+
+    /// Writes its world values in a block into `out`; NaN where a column is not there.
+    pub fn load(&self, block: Block<'_>, out: &mut Lanes) {
+        let (bytes, stride) = match self.column {
+            None => (Some(block.batch.records()), block.batch.schema().stride),
+            Some(kind) => (block.batch.columns.bytes_of(kind), kind.bytes()),
+        };
+        let rows = bytes.and_then(|all| all.get(block.first * stride..)).unwrap_or_default();
+        let rows = rows.chunks_exact(stride).take(block.count);
+        if rows.len() < block.count {
+            out.fill(f64::NAN);
+        }
+        self.read(rows, out);
+        let Dimension { scale, origin, .. } = self.dimension;
+        if scale != 1.0 || origin != 0.0 {
+            out.iter_mut().for_each(|value| *value = *value * scale + origin);
+        }
+    }
+
+    /// The numbers as they are stored.
+    fn read<'a>(&self, rows: impl Iterator<Item = &'a [u8]>, out: &mut Lanes) {
+        let Dimension { scalar, offset, bits, .. } = self.dimension;
+        // Foreign byte orders, and bits of what is no byte, are rare.
+        let is_plain = self.endian == Endian::Little && (bits.is_none() || scalar == Scalar::U8);
+        let rows = out.iter_mut().zip(rows);
+        if !is_plain {
+            let get = |row: &[u8]| self.dimension.get(row, self.endian).as_f64();
+            return rows.for_each(|(value, row)| *value = get(row));
+        }
+        macro_rules! read {
+            ($t:ty) => {
+                rows.for_each(|(value, row)| {
+                    let mut bytes = [0; size_of::<$t>()];
+                    bytes.copy_from_slice(&row[offset..offset + size_of::<$t>()]);
+                    *value = <$t>::from_le_bytes(bytes) as f64;
+                })
+            };
+        }
+        match scalar {
+            Scalar::U8 => {
+                let (shift, width) = bits.map_or((0, 8), |bits| (bits.shift, bits.width));
+                let mask = ((1u16 << width) - 1) as u8;
+                rows.for_each(|(value, row)| *value = f64::from(row[offset] >> shift & mask));
+            }
+            Scalar::I8 => read!(i8),
+            Scalar::U16 => read!(u16),
+            Scalar::I16 => read!(i16),
+            Scalar::U32 => read!(u32),
+            Scalar::I32 => read!(i32),
+            Scalar::U64 => read!(u64),
+            Scalar::I64 => read!(i64),
+            Scalar::F32 => read!(f32),
+            Scalar::F64 => read!(f64),
+        }
+    }
+}
