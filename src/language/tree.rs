@@ -1,7 +1,8 @@
 //! Which stage of a pipeline text takes from which, by the names that they have there.
 
-use super::draft::{StageDraft, Word};
+use super::draft::StageDraft;
 use super::mistake::{Mistake, advice};
+use super::place::Word;
 use super::registry::Registry;
 use crate::graph::{GraphMistake, GraphStage, TreeStage, tree_mistakes};
 use crate::stage::Role;
@@ -14,7 +15,7 @@ pub(super) fn check_names(stages: &[StageDraft], registry: &Registry, mistakes: 
         let word = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
         let wrong = if name.is_empty() || !name.chars().all(word) {
             "a name is made of letters, digits, - and _"
-        } else if name == "run" || registry.has(name) {
+        } else if ["run", "params"].contains(&name.as_str()) || registry.has(name) {
             "the name means something else already"
         } else if stages[..i].iter().any(taken) {
             "another stage above has this name"

@@ -2,6 +2,9 @@
 
 mod formats;
 mod inputs;
+mod json;
+mod lines;
+mod params;
 mod text;
 mod trees;
 mod user_files;
