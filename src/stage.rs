@@ -107,4 +107,6 @@ pub enum Role {
     ScanOp(Box<dyn AnyScanOp>),
     /// Takes records.
     Sink(Box<dyn CreateSink>),
+    /// Gives what it takes from several stages one name, and does nothing to it.
+    Merge,
 }

@@ -34,6 +34,7 @@ type ReadStage = fn(&Node, &StagePlace) -> Result<(Role, serde_json::Value), Vec
 struct RegisteredKind {
     about: &'static str,
     either: &'static [&'static str],
+    main: Option<&'static str>,
     is_limited: bool,
     read: ReadStage,
 }
@@ -52,6 +53,7 @@ impl Registry {
             RegisteredKind {
                 about: K::ABOUT,
                 either: K::EITHER,
+                main: K::MAIN,
                 is_limited: K::IS_LIMITED,
                 read: read::<K>,
             },
@@ -79,6 +81,11 @@ impl Registry {
     /// True if there is a kind of that name.
     pub fn has(&self, kind: &str) -> bool {
         self.kinds.contains_key(kind)
+    }
+
+    /// The key of a stage of that kind whose value a line of words may give without naming it.
+    pub(crate) fn main(&self, kind: &str) -> Option<&'static str> {
+        self.kinds.get(kind).and_then(|kind| kind.main)
     }
 
     /// True if a stage of that kind takes the keys that limit it to some records.

@@ -29,6 +29,7 @@ pub struct Assign {
 impl StageKind for Assign {
     const KIND: &'static str = "assign";
     const ABOUT: &'static str = "Gives dimensions of the records the values of expressions.";
+    const MAIN: Option<&'static str> = Some("set");
 
     fn build(self, at: &StagePlace) -> Result<Role> {
         if self.set.0.is_empty() {

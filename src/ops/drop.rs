@@ -42,6 +42,7 @@ impl StageKind for Drop {
     const ABOUT: &'static str =
         "Removes the records of some classes or flags, or for which a condition holds.";
     const IS_LIMITED: bool = false;
+    const MAIN: Option<&'static str> = Some("where");
 
     fn build(self, _: &StagePlace) -> Result<Role> {
         if self.choice().is_all() {

@@ -68,6 +68,7 @@ impl StageKind for Filter {
     const ABOUT: &'static str =
         "Keeps the records for which a condition holds, or of some classes and flags.";
     const IS_LIMITED: bool = false;
+    const MAIN: Option<&'static str> = Some("where");
 
     fn build(self, at: &StagePlace) -> Result<Role> {
         self.check().map_err(|(key, error)| at.blame(key, error))?;

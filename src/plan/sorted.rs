@@ -44,9 +44,10 @@ pub(super) struct Sorted {
 impl Sorted {
     /// Sorts a graph, or says the first thing that is wrong with it.
     pub fn new(graph: Graph) -> Result<Sorted> {
+        refuse_mistakes(&graph)?;
+        let graph = graph.without_merges();
         let takers: Vec<Vec<usize>> =
             (0..graph.stages.len()).map(|n| graph.takers(n).collect()).collect();
-        refuse_mistakes(&graph)?;
         let (decoded, root) = decoded(&graph.stages, &takers)?;
         let name =
             |stage: &GraphStage| serde_json::json!({ "kind": stage.kind, "keys": stage.keys });
@@ -66,6 +67,7 @@ impl Sorted {
                 Role::Transform(_) => StageWork::Filter(filters.len()),
                 Role::TileOp(_) | Role::ScanOp(_) => StageWork::Op(ops.len()),
                 Role::Sink(_) => StageWork::Sink(sinks.len()),
+                Role::Merge => return Err(Error::internal("a merge is left in the graph")),
             });
             match role {
                 Role::Source(open) => source = Some(merged(source, kind, open, &*written)?),
@@ -89,6 +91,7 @@ impl Sorted {
                     ops.push(StageOp { kind, written, op, limits, above, selection: 0 });
                 }
                 Role::Sink(sink) => sinks.push(sink),
+                Role::Merge => {}
             }
         }
         let source = source.ok_or_else(|| Error::pipeline("the pipeline reads nothing"))?;
@@ -165,8 +168,12 @@ fn columns_above(stages: &[GraphStage]) -> Vec<Vec<ColumnKind>> {
 
 /// All mistakes in how the stages hang together.
 fn refuse_mistakes(graph: &Graph) -> Result<()> {
-    let told = |GraphMistake { stage, told, help }| {
-        let error = graph.stages[stage].written.wrong(told);
+    let told = |GraphMistake { stage, told, help, key }| {
+        let written = &graph.stages[stage].written;
+        let error = match key {
+            Some(key) => written.wrong_key(key, told),
+            None => written.wrong(told),
+        };
         match help {
             Some(help) => error.help(help),
             None => error,

@@ -20,7 +20,7 @@ use pointmill::graph::RunSettings;
 use pointmill::internals::LimitKeys;
 use pointmill::io::{Read, Write};
 use pointmill::ops::normals::Normals;
-use pointmill::ops::{Cells, Filter, Grid, Median, Outliers};
+use pointmill::ops::{Cells, Filter, Grid, Median, Merge, Outliers};
 use pointmill::stage::{Format, StageKind};
 use pointmill::synth::Synth;
 use pointmill::{Overrides, Quiet, Registry};
@@ -87,6 +87,7 @@ fn pages() -> Vec<Page> {
             words: &["src/synth/scene.rs"],
             ..page::<Synth>("src/synth/kind.rs", "scene = 'als'\npoints = 1000")
         },
+        page::<Merge>("src/ops/merge.rs", ""),
         Page { words: &["src/point/selection.rs"], ..page::<Filter>("src/ops/filter.rs", "") },
         page::<Outliers>("src/ops/outliers.rs", ""),
         Page {
@@ -217,7 +218,7 @@ fn stage_page(page: &Page) -> (String, Value) {
         }
     };
     let said = keys_said(page.kind, &fields, &files, default);
-    let on_tiles = !["read", "synth", "filter", "write"].contains(&page.kind);
+    let on_tiles = !["read", "synth", "merge", "filter", "write"].contains(&page.kind);
     let mut out = format!("# {}\n\n<!-- {SAYS_SO} -->\n\n{}\n\n{docs}\n", page.kind, page.about);
     out += "\n## Keys\n\n";
     match said.is_empty() {

@@ -2,7 +2,11 @@
 
 mod formats;
 mod inputs;
+mod json;
+mod lines;
+mod params;
 mod text;
+mod trees;
 mod user_files;
 mod values;
 mod words;

@@ -51,6 +51,7 @@ impl Read {
 impl StageKind for Read {
     const KIND: &'static str = "read";
     const ABOUT: &'static str = "Reads LAS, LAZ or PLY files.";
+    const MAIN: Option<&'static str> = Some("path");
     const PLACES: &'static [&'static str] = &["path", "format"];
 
     fn build(self, at: &StagePlace) -> Result<Role> {
@@ -61,6 +62,7 @@ impl StageKind for Read {
 impl StageKind for Write {
     const KIND: &'static str = "write";
     const ABOUT: &'static str = "Writes a LAS, LAZ or PLY file, or one for each input.";
+    const MAIN: Option<&'static str> = Some("path");
     const PLACES: &'static [&'static str] = &["path", "folder"];
     const EITHER: &'static [&'static str] = &["path", "folder"];
 
