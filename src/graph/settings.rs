@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use serde::{Deserialize, Deserializer, de};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use super::size::some_bytes;
 use crate::geom::simd;
@@ -14,7 +14,7 @@ use crate::{Error, Result};
 /// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`,
 /// `withheld` and `noise` changes what is computed. All are optional; arguments of the same name
 /// take their place.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RunSettings {
     /// Bound of the process's peak resident memory, in bytes; none: half of what the machine or its
@@ -69,7 +69,7 @@ pub struct RunSettings {
 }
 
 /// What becomes of files that are already where an output or the report is to be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Existing {
@@ -84,7 +84,7 @@ pub enum Existing {
 pub const MOST_THREADS: usize = 1024;
 
 /// What becomes of points whose coordinates are not finite.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Nonfinite {
@@ -96,7 +96,7 @@ pub enum Nonfinite {
 }
 
 /// What becomes of scans whose points contradict their header.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Headers {
@@ -108,7 +108,7 @@ pub enum Headers {
 }
 
 /// What becomes of scans whose x, y and z have different units.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum MixedUnits {
@@ -131,7 +131,7 @@ pub enum ZScale {
 }
 
 /// What becomes of points that the scan itself says are of no use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Treatment {
@@ -145,7 +145,7 @@ pub enum Treatment {
 }
 
 /// Where decoded points wait for the mill.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum SpillSetting {
@@ -157,7 +157,7 @@ pub enum SpillSetting {
 }
 
 /// Which of the equal code paths runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum SimdSetting {
@@ -224,6 +224,15 @@ impl RunSettings {
             scratch: over.scratch.or(self.scratch),
             report: over.report.or(self.report),
             ..self
+        }
+    }
+}
+
+impl Serialize for ZScale {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        match self {
+            ZScale::Auto => to.serialize_str("auto"),
+            ZScale::Factor(factor) => to.serialize_f64(*factor),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The pipeline language: from a text, and what arguments put in the place of its values, to a
 //! [`Graph`](crate::graph::Graph); every mistake with its place. Knows no plan and no input.
 
+mod builder;
 mod builtin;
 mod draft;
 mod fault;
@@ -23,6 +24,7 @@ mod text;
 mod tree;
 mod written;
 
+pub use builder::GraphBuilder;
 pub use parameter::{Parameter, ParameterType};
 pub use pipeline::PipelineText;
 pub use registry::Registry;

@@ -28,7 +28,16 @@ pub struct Registry {
     formats: Formats,
 }
 
-type ReadStage = fn(&Node, &StagePlace) -> Result<(Role, serde_json::Value), Vec<Mistake>>;
+type ReadStage = fn(&Node, &StagePlace) -> Result<BuiltStage, Vec<Mistake>>;
+
+/// A stage in its role.
+pub(crate) struct BuiltStage {
+    pub role: Role,
+    /// Its keys as reports have them.
+    pub keys: serde_json::Value,
+    /// Its keys as a text gives them; None if no text can.
+    pub given: Option<serde_json::Value>,
+}
 
 #[derive(Clone, Copy)]
 struct RegisteredKind {
@@ -106,39 +115,44 @@ impl Registry {
         kind: &str,
         keys: &Node,
         at: &StagePlace,
-    ) -> Option<Result<(Role, serde_json::Value), Vec<Mistake>>> {
+    ) -> Option<Result<BuiltStage, Vec<Mistake>>> {
         self.kinds.get(kind).map(|kind| (kind.read)(keys, at))
     }
 }
 
-fn read<K: StageKind>(
-    keys: &Node,
-    at: &StagePlace,
-) -> Result<(Role, serde_json::Value), Vec<Mistake>> {
+fn read<K: StageKind>(keys: &Node, at: &StagePlace) -> Result<BuiltStage, Vec<Mistake>> {
     let stage: K = keys::read(K::KIND, keys, &at.formats().names())?;
-    let wrong = |error: Error| vec![Mistake::of(keys.place.clone(), &error)];
-    let canonical = canonical(&stage).map_err(wrong)?;
-    stage.build(at).map(|role| (role, canonical)).map_err(|error| {
+    built(stage, at).map_err(|error| {
         let blamed = at.blamed();
         let place = blamed.as_deref().and_then(|key| keys.at(key)).unwrap_or(&keys.place);
         vec![Mistake::of(place.clone(), &error)]
     })
 }
 
-/// The stage's keys with all defaults filled in, sorted by name; those without a value and those
-/// that name files are left out.
-fn canonical<K: StageKind>(stage: &K) -> Result<serde_json::Value> {
+/// Puts a stage in its role.
+pub(crate) fn built<K: StageKind>(stage: K, at: &StagePlace) -> Result<BuiltStage> {
+    let given = given_keys(&stage)?;
+    let is_reported = |key: &str| !K::PLACES.contains(&key);
+    let keys =
+        given.iter().filter(|(key, _)| is_reported(key)).map(|(k, v)| (k.clone(), v.clone()));
+    let keys = keys.collect::<serde_json::Map<_, _>>().into();
+    let role = stage.build(at)?;
+    Ok(BuiltStage { role, keys, given: Some(given.into()) })
+}
+
+/// The stage's keys with all defaults filled in, sorted by name; those without a value are left
+/// out.
+fn given_keys<K: StageKind>(stage: &K) -> Result<serde_json::Map<String, serde_json::Value>> {
     let value = serde_json::to_value(stage).map_err(|e| {
         Error::internal(format!("cannot list the keys of `{}`", K::KIND)).because(e)
     })?;
     Ok(match value {
         serde_json::Value::Object(keys) => keys
             .into_iter()
-            .filter(|(key, value)| !value.is_null() && !K::PLACES.contains(&key.as_str()))
+            .filter(|(_, value)| !value.is_null())
             .collect::<BTreeMap<_, _>>()
             .into_iter()
-            .collect::<serde_json::Map<_, _>>()
-            .into(),
-        _ => serde_json::Map::new().into(),
+            .collect(),
+        _ => serde_json::Map::new(),
     })
 }
