@@ -123,5 +123,5 @@ pub mod tile;
 pub use engine::{Done, Quiet, Watch};
 pub use error::{Error, ErrorKind, Result};
 pub use graph::{Graph, Overrides};
-pub use language::{Registry, Set};
+pub use language::{KeyDescription, Registry, Set, TableDescription, WordDescription};
 pub use plan::{Outline, Plan};

@@ -95,6 +95,19 @@ pub trait Transform: Send + Sync {
     fn apply(&self, batch: &mut PointBatch, tally: &mut Tally) -> Result<()>;
 }
 
+/// Which role a stage plays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RoleName {
+    /// It yields records.
+    Source,
+    /// It streams.
+    Transform,
+    /// It works on tiles, once or twice.
+    OnTiles,
+    /// It takes records.
+    Sink,
+}
+
 /// A stage in its role.
 pub enum Role {
     /// Yields records.
@@ -107,4 +120,16 @@ pub enum Role {
     ScanOp(Box<dyn AnyScanOp>),
     /// Takes records.
     Sink(Box<dyn CreateSink>),
+}
+
+impl Role {
+    /// Which it is.
+    pub fn name(&self) -> RoleName {
+        match self {
+            Role::Source(_) => RoleName::Source,
+            Role::Transform(_) => RoleName::Transform,
+            Role::TileOp(_) | Role::ScanOp(_) => RoleName::OnTiles,
+            Role::Sink(_) => RoleName::Sink,
+        }
+    }
 }

@@ -9,7 +9,6 @@ mod classes;
 mod console;
 mod convert;
 mod describe;
-mod described;
 mod draw;
 mod events;
 mod exit;
@@ -73,7 +72,7 @@ pub fn run_with(arguments: Vec<OsString>, registry: &Registry) -> u8 {
             return if told.use_stderr() { 2 } else { 0 };
         }
     };
-    let console = Console::new(&arguments.command);
+    let console = Console::new(&arguments.command, registry);
     match execute(&arguments.command, registry, &console) {
         Ok(()) => 0,
         Err(error) => {

@@ -2,6 +2,7 @@
 //! [`Graph`](crate::graph::Graph); every mistake with its place. Knows no plan and no input.
 
 mod builtin;
+mod described;
 mod draft;
 mod fault;
 mod foreign;
@@ -10,9 +11,11 @@ mod mistake;
 mod node;
 mod place;
 mod registry;
+mod schema;
 mod set;
 mod text;
 mod written;
 
+pub use described::{KeyDescription, TableDescription, WordDescription};
 pub use registry::Registry;
 pub use set::Set;
