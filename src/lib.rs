@@ -126,5 +126,8 @@ pub mod tile;
 pub use engine::{Done, Quiet, Watch};
 pub use error::{Error, ErrorKind, Result};
 pub use graph::{Graph, Overrides};
-pub use language::{GraphBuilder, Parameter, ParameterType, PipelineText, Registry, Set};
+pub use language::{
+    GraphBuilder, KeyDescription, Parameter, ParameterType, PipelineText, Registry, Set,
+    TableDescription, WordDescription,
+};
 pub use plan::{Outline, Plan, Pulled};

@@ -1,5 +1,6 @@
 //! The keys that every stage takes which works on points: which records it is limited to.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::expression::{Choice, Condition};
@@ -9,7 +10,7 @@ use crate::point::{Flag, Selection};
 ///
 /// Any stage between a source and a sink takes these keys besides its own; `sees` is for stages
 /// that work on tiles.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LimitKeys {
     /// A condition that holds for the records, over their dimensions and the columns that stages
@@ -27,7 +28,7 @@ pub struct LimitKeys {
 }
 
 /// Which records a stage that is limited to some sees as neighbours.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Sees {
     /// Those that it is limited to.

@@ -3,6 +3,7 @@
 
 mod builder;
 mod builtin;
+mod described;
 mod draft;
 mod fault;
 mod foreign;
@@ -19,12 +20,14 @@ mod pipeline;
 mod place;
 mod references;
 mod registry;
+mod schema;
 mod set;
 mod text;
 mod tree;
 mod written;
 
 pub use builder::GraphBuilder;
+pub use described::{KeyDescription, TableDescription, WordDescription};
 pub use parameter::{Parameter, ParameterType};
 pub use pipeline::PipelineText;
 pub use registry::Registry;
