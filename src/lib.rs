@@ -79,7 +79,7 @@
 //!   iterator.
 //! - [`synth`]: synthetic scans, and the stage `synth`.
 //! - [`ops`]: the stages that compute, select or look: `filter`, `drop`, `assign`, `stats`, `tap`,
-//!   `outliers`, `normals`, `cells`, `median` and `grid`.
+//!   `merge`, `outliers`, `normals`, `cells`, `median` and `grid`.
 //! - [`picture`]: scans drawn from above or from a side, side by side.
 //! - [`graph`]: what a pipeline is, whoever wrote it: a [`Graph`] of stages.
 //! - [`Registry`]: the kinds and formats that a text may name; [`Set`]: what is put in the place of
