@@ -6,7 +6,8 @@ use crate::io::las::{LAS, LAZ};
 use crate::io::ply::PLY;
 use crate::ops::normals::Normals;
 use crate::ops::{
-    Assign, Cells, Crop, Drop, Filter, Grid, Median, Outliers, Sample, Stats, Tap, Transformation,
+    Assign, Cells, Crop, Drop, Filter, Grid, Median, Merge, Outliers, Sample, Stats, Tap,
+    Transformation,
 };
 use crate::synth::Synth;
 
@@ -16,6 +17,7 @@ impl Registry {
         Registry::empty()
             .with::<Read>()
             .with::<Synth>()
+            .with::<Merge>()
             .with::<Write>()
             .with::<Filter>()
             .with::<Drop>()

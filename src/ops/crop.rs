@@ -8,12 +8,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::geom::polygon::Area;
 use crate::point::{PointBatch, Schema, names};
 use crate::report::Tally;
-use crate::stage::{Needs, Role, StageKind, StagePlace, Transform};
+use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform};
 use crate::{Error, Result};
 
 pub use corners::CropBox;
@@ -40,7 +41,7 @@ const MOST_BYTES: u64 = 64 << 20;
 /// corners are brought to these steps; one that is nearer to a step than a thousandth of it is on
 /// it, since decimals are seldom exact in binary. Points whose coordinates are no numbers are not
 /// inside.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Crop {
     /// Corners of a box: the smallest x and y, then the largest; or x, y and z.
@@ -55,7 +56,7 @@ pub struct Crop {
 }
 
 /// What stays of a scan that is cropped.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum CropSide {
@@ -143,6 +144,7 @@ fn read(path: &Path) -> Result<String> {
 impl StageKind for Crop {
     const KIND: &'static str = "crop";
     const ABOUT: &'static str = "Keeps what is inside of a box or of polygons, or what is outside.";
+    const ROLE: RoleName = RoleName::Transform;
     const EITHER: &'static [&'static str] = &["box", "polygon", "file"];
 
     fn build(self, at: &StagePlace) -> Result<Role> {

@@ -1,26 +1,28 @@
 //! The stage `filter`: records of some classes or flags stay, all others go. Knows no neighbours.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::expression::{Choice, Condition, KeyExpression};
 use crate::point::{Flag, PointBatch, Schema, Selection, names};
 use crate::report::Tally;
-use crate::stage::{Needs, Role, StageKind, StagePlace, Transform};
+use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform};
 use crate::{Error, Result};
 
 /// Keeps the records for which a condition holds, or of some classes and flags, and removes all
 /// others.
 ///
-/// A record stays if the condition `where` holds for it (where one is given), if its class is among `keep_classes` (where any are given) and not among
-/// `drop_classes`, and if it has all of `keep_flags` and none of `drop_flags`. A scan without
-/// classes has nothing of a class to drop, which the run says; to keep some of its classes is an
-/// error. Point formats 0 to 5 have no overlap flag: there the flag `overlap` is class 12.
+/// A record stays if the condition `where` holds for it (where one is given), if its class is among
+/// `keep_classes` (where any are given) and not among `drop_classes`, and if it has all of
+/// `keep_flags` and none of `drop_flags`. A scan without classes has nothing of a class to drop,
+/// which the run says; to keep some of its classes is an error. Point formats 0 to 5 have no overlap
+/// flag: there the flag `overlap` is class 12.
 ///
 /// Stages below it neither see nor count what it removes. Behind stages that compute columns, a
 /// condition may name these, too: `where = "NormalZ > 0.9"`. To limit one stage to some records and
 /// let the others pass, give that stage `where`, `classes`, `with` or `without` instead; to name
 /// what goes instead of what stays, use `drop`.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Filter {
     /// A condition that holds for the records that stay, such as "Intensity > 40".
@@ -64,9 +66,11 @@ impl Filter {
 
 impl StageKind for Filter {
     const KIND: &'static str = "filter";
+    const ROLE: RoleName = RoleName::Transform;
     const ABOUT: &'static str =
         "Keeps the records for which a condition holds, or of some classes and flags.";
     const IS_LIMITED: bool = false;
+    const MAIN: Option<&'static str> = Some("where");
 
     fn build(self, at: &StagePlace) -> Result<Role> {
         self.check().map_err(|(key, error)| at.blame(key, error))?;

@@ -8,10 +8,11 @@ mod random;
 
 use std::num::NonZeroU64;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::quantity::{Fraction, Length};
-use crate::stage::{Role, StageKind, StagePlace};
+use crate::stage::{Role, RoleName, StageKind, StagePlace};
 use crate::{Error, Result};
 
 use disc::PoissonDisc;
@@ -36,7 +37,7 @@ use random::RandomSample;
 /// random order by `seed`, so that how a scan is cut into tiles changes nothing. Distances are
 /// compared exactly, in lattice steps. Copies of a position weigh as one, and one record of them
 /// stays.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Sample {
     /// The part of the records that stays, by chance: above 0 and at most 1, or as "10%".
@@ -90,6 +91,7 @@ impl StageKind for Sample {
     const KIND: &'static str = "sample";
     const ABOUT: &'static str =
         "Keeps some of the points: by chance, by their number, or so far from each other.";
+    const ROLE: RoleName = RoleName::OnTiles;
     const EITHER: &'static [&'static str] = &["fraction", "every", "distance"];
 
     fn build(self, at: &StagePlace) -> Result<Role> {

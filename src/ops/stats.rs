@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::expression::{KeyExpression, NamedField};
 use crate::point::{PointBatch, Schema, names};
-use crate::report::{Numbers, StatsTally, Tally};
-use crate::stage::{Needs, Role, StageKind, StagePlace, Transform};
+use crate::report::{StatsTally, StoredNumbers, Tally};
+use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform};
 use crate::{Error, Result};
 
 /// Tells what the numbers of dimensions come to: smallest, largest, mean, standard deviation and a
@@ -17,7 +18,7 @@ use crate::{Error, Result};
 /// has none), and are the same to the last bit however the points come. A histogram has up to 256
 /// bins, as wide as the smallest power of two that does; of whole numbers that few values have, it
 /// is the count of each value. Columns that stages above compute are dimensions, too.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Stats {
     /// The dimensions, such as ["Z", "Intensity"]; none: all that the records have.
@@ -28,6 +29,7 @@ pub struct Stats {
 
 impl StageKind for Stats {
     const KIND: &'static str = "stats";
+    const ROLE: RoleName = RoleName::Transform;
     const ABOUT: &'static str = "Tells what the numbers of dimensions come to, for the report.";
 
     fn build(self, at: &StagePlace) -> Result<Role> {
@@ -82,9 +84,9 @@ impl Transform for Stats {
     }
 }
 
-fn numbers<'a>(field: &NamedField, stored: &'a [f64]) -> Numbers<'a> {
+fn numbers<'a>(field: &NamedField, stored: &'a [f64]) -> StoredNumbers<'a> {
     let [scale, origin] = field.units();
-    Numbers { stored, scale, origin, whole: field.is_whole() }
+    StoredNumbers { stored, scale, origin, whole: field.is_whole() }
 }
 
 /// The class of each record, as the report counts them: what is no class is class 0.
@@ -95,7 +97,7 @@ fn classes(batch: &PointBatch) -> Result<Vec<u8>> {
     Ok(classes)
 }
 
-/// Numbers by class, those of the records from `place` on.
+/// StoredNumbers by class, those of the records from `place` on.
 fn by_class(classes: &[u8], place: usize, stored: &[f64]) -> BTreeMap<u8, Vec<f64>> {
     let mut all: BTreeMap<u8, Vec<f64>> = BTreeMap::new();
     if !classes.is_empty() {

@@ -4,12 +4,13 @@ mod affine;
 mod keys;
 mod stored;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::point::{PointBatch, Schema, names};
 use crate::quantity::Figure;
 use crate::report::Tally;
-use crate::stage::{Needs, Role, StageKind, StagePlace, Transform};
+use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform};
 use crate::{Error, Result};
 
 pub use keys::{MatrixRows, Rotation, RotationAxis, ScaleFactors};
@@ -34,7 +35,7 @@ use stored::StoredMap;
 ///
 /// Points move before anything looks at where they are, so this stands above stages that work on
 /// tiles and above branches. Stages below it, such as `crop`, see points where they have gone.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Transformation {
     /// An affine matrix by its rows: 16 numbers, or 4 lists of 4, of which the last is [0, 0, 0, 1].
@@ -93,6 +94,7 @@ impl Transformation {
 impl StageKind for Transformation {
     const KIND: &'static str = "transform";
     const ABOUT: &'static str = "Moves, turns and scales the points.";
+    const ROLE: RoleName = RoleName::Transform;
     const IS_LIMITED: bool = false;
 
     fn build(self, at: &StagePlace) -> Result<Role> {

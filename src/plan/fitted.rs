@@ -2,6 +2,7 @@
 //! divided.
 
 use std::num::NonZeroUsize;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use rayon::ThreadPool;
@@ -102,19 +103,33 @@ impl Graph {
         let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
         let mut sorted = Sorted::new(self)?;
         let open = &*sorted.source.1;
-        check_places(file.as_deref(), &open.paths(), &sorted.sinks, &settings)?;
-        let source = open.open()?;
+        let places = |read: &[PathBuf], sinks: &[Box<dyn CreateSink>]| {
+            check_places(file.as_deref(), read, sinks, &settings)
+        };
+        let (_, mut wrong) = places(&open.paths(), &sorted.sinks);
+        let source = match open.open() {
+            Ok(source) => source,
+            Err(error) => {
+                wrong.push(error);
+                return Err(Error::several(wrong));
+            }
+        };
+        let (schemas, unfit) = fit_transforms(&sorted, source.schema());
+        wrong.extend(unfit.into_iter().map(in_file));
+        let schema = &schemas.last;
+        let units = source.metadata().units;
+        wrong.extend(check_limits(&sorted, schema));
+        wrong.extend(check_numbers(&sorted, &*source).err());
+        wrong.extend(fit(&mut sorted.ops, &units));
+        let choices = number_selections(&mut sorted.ops)?;
+        let passes = unroll(&sorted, schema, &mut wrong)?;
+        Error::all(wrong)?;
         let read = all_read(open, &*source);
-        let mut files = check_places(file.as_deref(), &read, &sorted.sinks, &settings)?;
+        let (mut files, wrong) = places(&read, &sorted.sinks);
+        Error::all(wrong)?;
         let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;
         let beside = copies(&*source, &sorted.sinks, &each, &settings, &mut files)?;
-        let schemas = fit_transforms(&sorted, source.schema()).map_err(in_file)?;
-        let schema = &schemas.last;
-        check_limits(&sorted, schema)?;
-        check_numbers(&sorted, &*source)?;
-        let selections = fit(&mut sorted.ops, &source.metadata().units)?;
-        let passes = unroll(&sorted, schema)?;
-        let tagger = tagger(&sorted.ops, &passes.passes, &selections, &ranks, schema, &settings)?;
+        let tagger = tagger(&sorted.ops, &passes.passes, &choices, &ranks, schema, &settings)?;
         let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, (&*source, schema), &sorted.ops, order.mills)?;
         let simd = settings.simd.resolve().map_err(in_file)?;
@@ -157,11 +172,9 @@ impl Graph {
     }
 }
 
-/// Fits tile stages to the units of the scan: lengths with a unit of their own are
-/// converted. Returns what records the stages are limited to.
-fn fit(ops: &mut [StageOp], units: &Units) -> Result<Vec<Choice>> {
-    ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().convert(units))?;
-    number_selections(ops)
+/// Fits tile stages to the units of the scan: lengths with a unit of their own are converted.
+fn fit(ops: &mut [StageOp], units: &Units) -> Vec<Error> {
+    ops.iter_mut().filter_map(|stage| stage.op.tile_mut().convert(units).err()).collect()
 }
 
 /// What tells records apart as they are decoded.
@@ -336,11 +349,15 @@ fn chunks(
     computed: &[Vec<ComputedDimension>],
     (source, schema): (&dyn Source, &Arc<Schema>),
 ) -> Result<Vec<ChunkSize>> {
-    let each = sinks.iter().zip(computed).map(|(sink, computed)| {
+    let (mut chunks, mut wrong) = (Vec::new(), Vec::new());
+    for (sink, computed) in sinks.iter().zip(computed) {
         let metadata = Metadata { computed: computed.clone(), ..source.metadata().clone() };
-        sink.chunk(schema, &metadata)
-    });
-    each.collect()
+        match sink.chunk(schema, &metadata) {
+            Ok(chunk) => chunks.push(chunk),
+            Err(error) => wrong.push(error),
+        }
+    }
+    Error::all(wrong).map(|()| chunks)
 }
 
 /// What z is multiplied by where stages measure distances; else 1.

@@ -9,10 +9,13 @@ mod look;
 mod outline;
 mod passes;
 mod places;
+mod pull;
 mod shown;
 mod sorted;
 mod streamed;
+mod streaming;
 mod stretch;
 
 pub use fitted::Plan;
 pub use outline::Outline;
+pub use pull::Pulled;

@@ -9,21 +9,25 @@ use crate::point::Schema;
 use crate::stage::Source;
 use crate::{Error, Result};
 
-/// Checks that stages which stream can work on what comes to them, where records are of `schema` as
-/// they are read; what they become.
-pub(super) fn fit_transforms(sorted: &Sorted, schema: &Arc<Schema>) -> Result<Schemas> {
-    let mut written: Vec<String> = Vec::new();
+/// What records of `schema` become on their way through the stages that stream, and what is wrong
+/// with stages that cannot work on what comes to them.
+pub(super) fn fit_transforms(sorted: &Sorted, schema: &Arc<Schema>) -> (Schemas, Vec<Error>) {
+    let (mut written, mut wrong) = (Vec::new(), Vec::new());
     let (mut last, mut left_by) = (schema.clone(), Vec::new());
     for stage in &sorted.transforms {
-        fit(stage, &last, &mut written)?;
-        if let Some(leaves) = stage.transform.leaves(&last)? {
-            check_moved(stage, &last, &leaves)?;
-            last = Arc::new(leaves);
+        let unfit = wrong.len();
+        wrong.extend(fit(stage, &last, &mut written));
+        if wrong.len() == unfit {
+            match leaves(stage, &last) {
+                Ok(None) => {}
+                Ok(Some(leaves)) => last = Arc::new(leaves),
+                Err(error) => wrong.push(error),
+            }
         }
         left_by.push(last.clone());
     }
     for stage in &sorted.filters {
-        fit(stage, &last, &mut written)?;
+        wrong.extend(fit(stage, &last, &mut written));
         if stage.moves() {
             let told = format!(
                 "`{}` moves points, and stands behind stages that looked at where they are, or on \
@@ -31,27 +35,30 @@ pub(super) fn fit_transforms(sorted: &Sorted, schema: &Arc<Schema>) -> Result<Sc
                 stage.kind
             );
             let help = "put it above stages that work on tiles, and above branches";
-            return Err(stage.written.wrong(told).help(help));
+            wrong.push(stage.written.wrong(told).help(help));
         }
     }
-    Ok(Schemas { left_by, last })
+    (Schemas { left_by, last }, wrong)
 }
 
-fn fit(stage: &StreamOp, schema: &Schema, written: &mut Vec<String>) -> Result<()> {
+/// What is wrong with a stage that gets records of `schema`, where those before it have `written`
+/// some dimensions.
+fn fit(stage: &StreamOp, schema: &Schema, written: &mut Vec<String>) -> Vec<Error> {
     let StreamOp { kind, transform, .. } = stage;
     let needs = transform.needs();
     let there = |name: &&String| schema.find(name).is_some() || written.contains(name);
-    if let Some(missing) = needs.dimensions.iter().find(|name| !there(name)) {
+    let missing = needs.dimensions.iter().find(|name| !there(name)).map(|missing| {
         let told = format!("`{kind}` needs {missing}, which nothing before it gives");
-        return Err(Error::pipeline(told).help("the input has no such dimension"));
-    }
-    transform.check(schema)?;
+        Error::pipeline(told).help("the input has no such dimension")
+    });
+    let unfit = transform.check(schema).err();
     written.extend(needs.changes);
-    Ok(())
+    missing.into_iter().chain(unfit).collect()
 }
 
-/// Holds a stage to what it may change of a schema.
-fn check_moved(stage: &StreamOp, from: &Schema, to: &Schema) -> Result<()> {
+/// The schema of what a stage leaves, if it is another; what it may not change of it is an error.
+fn leaves(stage: &StreamOp, from: &Schema) -> Result<Option<Schema>> {
+    let Some(to) = stage.transform.leaves(from)? else { return Ok(None) };
     let kind = &stage.kind;
     let is_same = to.stride == from.stride
         && to.dimensions.len() == from.dimensions.len()
@@ -63,7 +70,7 @@ fn check_moved(stage: &StreamOp, from: &Schema, to: &Schema) -> Result<()> {
         return Err(Error::internal(told));
     }
     match stage.choice.is_all() {
-        true => Ok(()),
+        true => Ok(Some(to)),
         false => {
             let told = format!("`{kind}` stores the coordinates of all points anew");
             Err(stage.written.wrong(told).help("limit it to none of them"))

@@ -83,6 +83,14 @@ impl Visitor<'_> for FractionVisitor {
     }
 }
 
+super::has_schema!(Fraction, "Fraction", {
+    "title": "a part (up to 1, or such as `\"10%\"`)",
+    "anyOf": [
+        { "type": "number", "exclusiveMinimum": 0, "maximum": 1 },
+        { "type": "string", "pattern": r"^[-+.0-9eE]+\s*%$" },
+    ],
+});
+
 #[cfg(test)]
 mod tests {
     use super::*;

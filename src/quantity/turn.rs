@@ -98,6 +98,14 @@ impl Visitor<'_> for TurnVisitor {
     }
 }
 
+super::has_schema!(Turn, "Turn", {
+    "title": "an angle (such as `\"30 deg\"`, or radians)",
+    "anyOf": [
+        { "type": "number" },
+        { "type": "string", "pattern": r"^\s*[-+.0-9eE]+\s*(deg|°|rad)$" },
+    ],
+});
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,20 +2,30 @@
 
 use std::cell::RefCell;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::Role;
 use super::format::Formats;
+use super::{Role, RoleName};
 use crate::{Error, Result};
 
 /// What a `[[stage]]` of a pipeline file may be. The struct's fields are the stage's keys.
 ///
 /// Keys that are no field are refused whatever the struct says; a field without a serde default is
 /// a key that must be given. `flatten` and `untagged` hide keys and places and are not supported.
-pub trait StageKind: DeserializeOwned + Serialize {
+///
+/// The doc comments are its manual page, which the command `stages` prints and editors show: that
+/// of the struct up to its first example, those of the fields and, where a field is an enum, those
+/// of its variants. A field whose type reads its value itself says what it takes by
+/// `#[schemars(...)]`; the `title` of its schema is what that is in words.
+pub trait StageKind: DeserializeOwned + Serialize + JsonSchema {
     /// Its name in a file: one plain word, or two with a hyphen.
     const KIND: &'static str;
+
+    /// The role that [`build`](StageKind::build) puts it in, which decides which keys it takes
+    /// besides its own. A kind that works on tiles may stream with some keys: it says `OnTiles`.
+    const ROLE: RoleName;
 
     /// What it does, in one sentence.
     const ABOUT: &'static str;
@@ -27,6 +37,10 @@ pub trait StageKind: DeserializeOwned + Serialize {
     /// Keys of which a stage takes one: an argument that gives one takes the place of the others,
     /// where a file gives several the stage tells.
     const EITHER: &'static [&'static str] = &[];
+
+    /// The key that a pipeline in one line may give without its name: `read in.laz` is
+    /// `read path=in.laz`.
+    const MAIN: Option<&'static str> = None;
 
     /// True if it takes `where`, `classes`, `with` and `without` besides its own keys, to work on
     /// some records and let the others pass; false if that is what its own keys are about.

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::quantity::has_schema;
+
 /// A box in world units, both of whose corners belong to it: `[x0, y0, x1, y1]`, or
 /// `[x0, y0, z0, x1, y1, z1]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -51,6 +53,14 @@ impl From<CropBox> for Vec<f64> {
         [of.lo, of.hi].concat()
     }
 }
+
+has_schema!(CropBox, "CropBox", {
+    "title": "4 numbers, or 6",
+    "anyOf": [
+        { "type": "array", "items": { "type": "number" }, "minItems": 4, "maxItems": 4 },
+        { "type": "array", "items": { "type": "number" }, "minItems": 6, "maxItems": 6 },
+    ],
+});
 
 #[cfg(test)]
 mod tests {

@@ -2,8 +2,11 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
 use serde::de::{Deserializer, Error, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
+
+use crate::quantity::{Turn, has_schema};
 
 /// A 4 × 4 matrix by its rows: a list of 16 numbers, or of 4 lists of 4.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -11,13 +14,13 @@ use serde::{Deserialize, Serialize, Serializer};
 pub struct MatrixRows(pub [[f64; 4]; 4]);
 
 /// A turn about an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rotation {
     /// The axis: "x", "y" or "z", or the direction of another, `[x, y, z]`.
     pub axis: RotationAxis,
     /// By how much, counterclockwise if one looks against the axis: "30 deg", or radians.
-    pub angle: crate::quantity::Turn,
+    pub angle: Turn,
 }
 
 /// The direction of an axis, of any length above 0.
@@ -167,6 +170,36 @@ impl<'de> Deserialize<'de> for ScaleFactors {
         }
     }
 }
+
+has_schema!(MatrixRows, "MatrixRows", {
+    "title": "16 numbers, or 4 lists of 4",
+    "anyOf": [
+        { "type": "array", "items": { "type": "number" }, "minItems": 16, "maxItems": 16 },
+        {
+            "type": "array",
+            "items": {
+                "type": "array", "items": { "type": "number" }, "minItems": 4, "maxItems": 4
+            },
+            "minItems": 4,
+            "maxItems": 4
+        },
+    ],
+});
+
+has_schema!(RotationAxis, "RotationAxis", {
+    "anyOf": [
+        { "enum": ["x", "y", "z"] },
+        { "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 },
+    ],
+});
+
+has_schema!(ScaleFactors, "ScaleFactors", {
+    "title": "a number, or 3",
+    "anyOf": [
+        { "type": "number" },
+        { "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 },
+    ],
+});
 
 #[cfg(test)]
 mod tests {
