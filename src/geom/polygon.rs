@@ -1,8 +1,9 @@
 //! Areas of polygons: whether a point is in one, exactly, the border included. Knows no file.
 //!
-//! Whether a point is left of an edge is asked of adaptive predicates (Shewchuk, "Adaptive precision
-//! floating-point arithmetic and fast robust geometric predicates", 1997), which are exact. Edges
-//! are in rows by their y, so that a point is held against a few of them, however many there are.
+//! Whether a point is left of an edge is asked of adaptive predicates (Shewchuk, "Adaptive
+//! precision floating-point arithmetic and fast robust geometric predicates", 1997), which are
+//! exact. Edges are in rows by their y, so that a point is held against a few of them, however many
+//! there are.
 
 use robust::{Coord, orient2d};
 

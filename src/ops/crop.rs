@@ -146,6 +146,7 @@ impl StageKind for Crop {
     const ABOUT: &'static str = "Keeps what is inside of a box or of polygons, or what is outside.";
     const ROLE: RoleName = RoleName::Transform;
     const EITHER: &'static [&'static str] = &["box", "polygon", "file"];
+    const MAIN: Option<&'static str> = Some("file");
 
     fn build(self, at: &StagePlace) -> Result<Role> {
         let cropping = self.cropping().map_err(|(key, error)| at.blame(key, error))?;
@@ -204,7 +205,8 @@ impl Transform for Cropping {
         };
         let (extent, key, doubt) = (self.extent(), self.key, self.doubt());
         vec![format!(
-            "every point is {side} of the area of `crop.{key}`, {extent}: no point is left out{doubt}"
+            "every point is {side} of the area of `crop.{key}`, {extent}: no point is left \
+             out{doubt}"
         )]
     }
 

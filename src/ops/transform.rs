@@ -21,9 +21,9 @@ use stored::StoredMap;
 /// Moves, turns and scales a scan.
 ///
 /// Give `matrix`, or any of `scale`, `rotate` and `translate`, which are done in this order, the
-/// first two about `center`. All other bytes of the records stay as they are: normals that the input has are not
-/// turned. The output keeps the coordinate reference system of the input, which may not hold any
-/// more; the run says so.
+/// first two about `center`. All other bytes of the records stay as they are: normals that the
+/// input has are not turned. The output keeps the coordinate reference system of the input, which
+/// may not hold any more; the run says so.
 ///
 /// LAS coordinates are whole steps of a scale from an offset. Where an axis comes from one other
 /// alone (moved, scaled, turned by a quarter), the stored numbers stay, up to a sign, and scale and
@@ -38,7 +38,7 @@ use stored::StoredMap;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Transformation {
-    /// An affine matrix by its rows: 16 numbers, or 4 lists of 4, of which the last is [0, 0, 0, 1].
+    /// An affine matrix by its rows: 16 numbers, or 4 lists of 4; the last row is [0, 0, 0, 1].
     pub matrix: Option<MatrixRows>,
     /// By what x, y and z are multiplied: a number, or one for each.
     pub scale: Option<ScaleFactors>,
@@ -75,7 +75,8 @@ impl Transformation {
                 .map_err(|told| ("matrix", Error::pipeline(format!("`transform.matrix`: {told}")))),
             None if center.is_some() && !is_turned => wrong(
                 "center",
-                "`transform.center` is where `scale` and `rotate` are done about, and neither is given",
+                "`transform.center` is what `scale` and `rotate` leave in its place, and neither \
+                 is given",
                 "leave `center` out",
             ),
             None if !is_turned && translate.is_none() => wrong(

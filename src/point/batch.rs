@@ -118,8 +118,8 @@ impl PointBatch {
         &mut self.records[len * self.schema.stride..]
     }
 
-    /// The number of each record in the input, from 0 over all inputs in their order; for stages that
-    /// say that they [read them](crate::stage::Needs::reads_record_numbers), None for others.
+    /// The number of each record in the input, from 0 over all inputs in their order; for stages
+    /// that say that they [read them](crate::stage::Needs::reads_record_numbers), None for others.
     pub fn record_numbers(&self) -> Option<&[u64]> {
         self.in_input.as_deref()
     }

@@ -178,7 +178,8 @@ fn measured_beside_random_order() {
         }
         let per = |kept: usize| kept as f64 * steps * steps / (size[0] * size[1]) as f64;
         println!(
-            "{size:?} {steps}: {kept} kept ({:.4}/r²), random order {random} ({:.4}/r²), {nanoseconds:.0} ns",
+            "{size:?} {steps}: {kept} kept ({:.4}/r²), random order {random} ({:.4}/r²), \
+             {nanoseconds:.0} ns",
             per(kept),
             per(random)
         );
