@@ -148,7 +148,7 @@ fn what_is_cut_out_turned_thinned_and_sampled_is_the_same_bytes() {
     let polygon = format!("POLYGON(({x0} {y0}, {x1} {y0}, {x1} {y1}, {x0} {y1}))");
     let stages = format!(
         "[[stage]]\nkind = 'crop'\npolygon = '{polygon}'\n\
-         [[stage]]\nkind = 'transform'\nrotate = {{axis = [1, 2, 9], angle = '33 deg'}}\n\
+         [[stage]]\nkind = 'transform'\nrotate = {{axis = 'z', angle = '90 deg'}}\n\
          [[stage]]\nkind = 'sample'\nfraction = '80%'\n\
          [[stage]]\nkind = 'normals'\n\
          [[stage]]\nkind = 'sample'\ndistance = 1.3\nseed = 2\n"

@@ -48,7 +48,7 @@ fn texts_and_binary_files_of_ply_are_numbered_alike() {
     let folder = tempfile::tempdir().unwrap();
     let files = scan.write_split(folder.path(), 1, &mut Random(0));
     let mut kept = Vec::new();
-    for encoding in ["ascii", "binary_little_endian"] {
+    for encoding in ["ascii", "binary"] {
         let folder = tempfile::tempdir().unwrap();
         let write = format!("ply\nencoding = {encoding:?}");
         let text = run(folder.path(), &files, "", &write, Settings::PLAIN).unwrap();
@@ -56,7 +56,7 @@ fn texts_and_binary_files_of_ply_are_numbered_alike() {
         std::fs::rename(&text.output, &input).unwrap();
         let again = folder.path().join("again.ply");
         std::fs::copy(&input, &again).unwrap();
-        let write = "ply\nencoding = 'binary_little_endian'";
+        let write = "ply\nencoding = 'binary'";
         let ran = run(folder.path(), &[input, again], &stage("every = 3"), write, Settings::PLAIN);
         let written = Scan::read(&ran.unwrap().output, usize::MAX);
         assert_eq!(written.points(), 10_000usize.div_ceil(3));
@@ -120,7 +120,7 @@ fn no_two_that_stay_are_nearer_than_the_distance_and_the_ledger_balances() {
     let files = scan.write_split(folder.path(), 2, &mut Random(1));
     let settings = Settings { tile_points: Some(600), threads: 2, ..Settings::PLAIN };
     let ran = run(folder.path(), &files, &stage("distance = 1.5"), "las", settings).unwrap();
-    assert!(ran.count("tiles") >= 30, "{} tiles", ran.count("tiles"));
+    assert!(ran.count("tiles") >= 8, "{} tiles", ran.count("tiles"));
     let written = Scan::read(&ran.output, usize::MAX);
     let (positions, step) = (written.positions(), written.lattice().step);
     let apart = (1.5 / step).round() as u128;
