@@ -151,7 +151,7 @@ fn what_is_cut_out_turned_thinned_and_sampled_is_the_same_bytes() {
          [[stage]]\nkind = 'transform'\nrotate = {{axis = 'z', angle = '90 deg'}}\n\
          [[stage]]\nkind = 'sample'\nfraction = '80%'\n\
          [[stage]]\nkind = 'normals'\n\
-         [[stage]]\nkind = 'sample'\ndistance = 1.3\nseed = 2\n"
+         [[stage]]\nkind = 'sample'\ndistance = 0.4\nseed = 2\n"
     );
     let write = &format!("laz\n{NORMALS}");
     let tile_points = &[200, 300, 500];
