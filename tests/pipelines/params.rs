@@ -206,7 +206,7 @@ fn commands_take_parameters_and_the_environment_and_list_them() {
     }
     assert!(at.path().join("o/${a}-10-x.laz").exists());
     let wrong = ["run", "p.toml", "--param", "keep=10k%"];
-    fails(at.path(), &wrong, 2, &["error: --param: takes", "| keep=10k%\n   |      ^^^^"]);
+    fails(at.path(), &wrong, 2, &["error: --param: `keep`: takes", "| keep=10k%\n   |      ^^^^"]);
     let lacking = fs::read_to_string(at.path().join("p.toml")).unwrap();
     let lacking = lacking.replace("type = 'path', default = 'out'", "type = 'path'");
     fs::write(at.path().join("q.toml"), lacking).unwrap();
