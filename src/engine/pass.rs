@@ -73,6 +73,8 @@ impl Op {
 /// changes is changed as records are written.
 pub(crate) struct StreamOp {
     pub kind: String,
+    /// Its name or, where it has none, its kind, with a number if several are of it.
+    pub label: Arc<str>,
     /// How it is written in its pipeline.
     pub written: Arc<dyn Written>,
     pub transform: Box<dyn Transform>,
@@ -100,6 +102,7 @@ impl StreamOp {
     /// Lets it work on those records of `batch` that it is limited to.
     pub fn apply(&self, batch: &mut PointBatch, tally: &mut Tally) -> Result<()> {
         let before = batch.len();
+        tally.stage = self.label.clone();
         if self.choice.is_all() {
             self.transform.apply(batch, tally)?;
         } else {
@@ -107,6 +110,7 @@ impl StreamOp {
             self.choice.holds(batch, &mut chosen)?;
             batch.change_some(&chosen, |some| self.transform.apply(some, tally))?;
         }
+        tally.stage = Arc::default();
         match batch.len() > before {
             true => Err(Error::internal(format!("the stage {} made points up", self.kind))),
             false => Ok(()),

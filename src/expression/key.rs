@@ -13,6 +13,8 @@ pub enum KeyExpression<'a> {
     Condition(&'a Condition),
     /// What a dimension is given.
     Assignment(&'a Assignment),
+    /// The name of a dimension, or of a number of a column.
+    Name(&'a str),
 }
 
 impl<'a> KeyExpression<'a> {
@@ -21,6 +23,7 @@ impl<'a> KeyExpression<'a> {
         match self {
             KeyExpression::Condition(condition) => condition.text(),
             KeyExpression::Assignment(assignment) => assignment.text(),
+            KeyExpression::Name(name) => name,
         }
     }
 
@@ -29,6 +32,7 @@ impl<'a> KeyExpression<'a> {
         match self {
             KeyExpression::Condition(condition) => condition.names(),
             KeyExpression::Assignment(assignment) => assignment.names(),
+            KeyExpression::Name(name) => vec![name],
         }
     }
 
@@ -37,6 +41,7 @@ impl<'a> KeyExpression<'a> {
         match self {
             KeyExpression::Condition(condition) => condition.bind_names(names).map(drop),
             KeyExpression::Assignment(assignment) => assignment.check(names),
+            KeyExpression::Name(name) => names.field(name, &(0..name.len())).map(drop),
         }
     }
 }

@@ -1,5 +1,5 @@
 //! Conditions and values over the dimensions of records and the columns that stages compute, as
-//! pipelines write them: `Classification in [2, 6] and not Withheld`, `Intensity = Intensity / 256`.
+//! pipelines write them: `Classification in [2, 6] and not Withheld`, `UserData = Intensity / 256`.
 //!
 //! - Names are those of dimensions (`Z`, `Intensity`, `Classification`; coordinates in world units)
 //!   and of numbers of columns (`NormalZ`). A name with spaces stands in backticks.
@@ -30,7 +30,9 @@ mod fault;
 mod key;
 mod lanes;
 mod lexer;
+mod named;
 mod parser;
+mod rules;
 mod text;
 mod tree;
 
@@ -43,5 +45,6 @@ pub(crate) use choice::Choice;
 pub use condition::{BoundCondition, Condition};
 pub(crate) use fault::ExpressionFault;
 pub use key::KeyExpression;
+pub(crate) use named::NamedField;
 pub use text::OneOrSeveral;
 pub(crate) use text::{FromText, ONE_OR_SEVERAL};

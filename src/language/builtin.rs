@@ -5,7 +5,7 @@ use crate::io::ends::{Read, Write};
 use crate::io::las::{LAS, LAZ};
 use crate::io::ply::PLY;
 use crate::ops::normals::Normals;
-use crate::ops::{Assign, Cells, Drop, Filter, Grid, Median, Merge, Outliers};
+use crate::ops::{Assign, Cells, Drop, Filter, Grid, Median, Merge, Outliers, Stats, Tap};
 use crate::synth::Synth;
 
 impl Registry {
@@ -19,6 +19,8 @@ impl Registry {
             .with::<Filter>()
             .with::<Drop>()
             .with::<Assign>()
+            .with::<Stats>()
+            .with::<Tap>()
             .with::<Outliers>()
             .with::<Normals>()
             .with::<Cells>()

@@ -27,7 +27,7 @@ pub(super) fn check(
             Some(Role::Source(source)) => {
                 source.paths().iter().for_each(|path| files.read(path, Use::Input));
             }
-            Some(Role::Sink(sink)) => {
+            Some(Role::Sink(sink)) if sink.is_file() => {
                 let key = |key| draft.keys.at(key);
                 let at = key("path").or(key("folder")).unwrap_or(&draft.keys.place);
                 outputs.push((sink.path(), at));

@@ -12,6 +12,8 @@ pub mod normals;
 pub(crate) mod outliers;
 pub mod removal;
 mod scatter;
+mod stats;
+mod tap;
 
 pub use assign::Assign;
 pub use cells::{By, Cells, Keep, Measure, Reference, Side, Split};
@@ -21,3 +23,5 @@ pub use grid::{Grid, Pick};
 pub use median::Median;
 pub use merge::Merge;
 pub use outliers::{OutlierMethod, Outliers};
+pub use stats::Stats;
+pub use tap::Tap;

@@ -15,7 +15,7 @@ use super::sorted::Sorted;
 pub(super) fn check_limits(sorted: &Sorted, schema: &Schema) -> Result<()> {
     let mut wrong = Vec::new();
     for stage in sorted.transforms.iter().chain(&sorted.filters) {
-        let StreamOp { kind, written, transform, choice, above } = stage;
+        let StreamOp { kind, written, transform, choice, above, .. } = stage;
         let names = Names { schema, columns: above };
         for (key, expression) in transform.expressions() {
             wrong.extend(check(&**written, key, expression, names).err());

@@ -2,9 +2,10 @@
 //! branches, and what stands behind it.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use crate::engine::pass::{Op, StageOp, StreamOp};
-use crate::graph::{Graph, GraphStage, Written};
+use crate::graph::{Graph, GraphMistake, GraphStage, Written};
 use crate::point::ColumnKind;
 use crate::stage::{CreateSink, OpenSource, Role};
 use crate::{Error, Result};
@@ -43,13 +44,7 @@ pub(super) struct Sorted {
 impl Sorted {
     /// Sorts a graph, or says the first thing that is wrong with it.
     pub fn new(graph: Graph) -> Result<Sorted> {
-        if let Some(wrong) = graph.mistakes().into_iter().next() {
-            let error = graph.stages[wrong.stage].written.wrong(wrong.told);
-            return Err(match wrong.help {
-                Some(help) => error.help(help),
-                None => error,
-            });
-        }
+        refuse_mistakes(&graph)?;
         let graph = graph.without_merges();
         let takers: Vec<Vec<usize>> =
             (0..graph.stages.len()).map(|n| graph.takers(n).collect()).collect();
@@ -58,12 +53,14 @@ impl Sorted {
             |stage: &GraphStage| serde_json::json!({ "kind": stage.kind, "keys": stage.keys });
         let names = graph.stages.iter().map(name).collect();
         let columns = columns_above(&graph.stages);
+        let mut labels = labels(&graph.stages).into_iter();
         let mut source: Option<(String, Box<dyn OpenSource>)> = None;
         let mut works = Vec::new();
         let (mut transforms, mut filters) = (Vec::new(), Vec::new());
         let (mut ops, mut sinks) = (Vec::new(), Vec::new());
         for ((n, stage), above) in graph.stages.into_iter().enumerate().zip(columns) {
             let GraphStage { kind, written, limits, role, .. } = stage;
+            let label = labels.next().unwrap_or_default();
             works.push(match &role {
                 Role::Source(_) => StageWork::Decode,
                 Role::Transform(_) if decoded.contains(&n) => StageWork::Decode,
@@ -72,20 +69,18 @@ impl Sorted {
                 Role::Sink(_) => StageWork::Sink(sinks.len()),
                 Role::Merge => return Err(Error::internal("a merge is left in the graph")),
             });
-            let blamed = written.clone();
             match role {
-                Role::Source(open) => {
-                    source = Some(match source {
-                        None => (kind, open),
-                        Some((first, all)) => {
-                            let merged = all.merged(&*open);
-                            (first, merged.map_err(|error| blame(&*blamed, error))?)
-                        }
-                    });
-                }
+                Role::Source(open) => source = Some(merged(source, kind, open, &*written)?),
                 Role::Transform(transform) => {
                     let all = if decoded.contains(&n) { &mut transforms } else { &mut filters };
-                    all.push(StreamOp { kind, written, transform, choice: limits.choice, above });
+                    all.push(StreamOp {
+                        kind,
+                        label,
+                        written,
+                        transform,
+                        choice: limits.choice,
+                        above,
+                    });
                 }
                 Role::TileOp(op) => {
                     let op = Op::Tile(op);
@@ -134,6 +129,21 @@ impl Sorted {
     }
 }
 
+/// The name of each stage; of those that have none their kind, from the second of a kind on with
+/// its number.
+fn labels(stages: &[GraphStage]) -> Vec<Arc<str>> {
+    let label = |(n, stage): (usize, &GraphStage)| {
+        let is_nameless = |other: &&GraphStage| other.name.is_none() && other.kind == stage.kind;
+        let before = stages[..n].iter().filter(is_nameless).count();
+        match (&stage.name, before) {
+            (Some(name), _) => name.as_str().into(),
+            (None, 0) => stage.kind.as_str().into(),
+            (None, before) => format!("{}.{}", stage.kind, before + 1).into(),
+        }
+    };
+    stages.iter().enumerate().map(label).collect()
+}
+
 /// For each stage the columns that those above it compute, the newest last.
 fn columns_above(stages: &[GraphStage]) -> Vec<Vec<ColumnKind>> {
     let mut above: Vec<Vec<ColumnKind>> = Vec::with_capacity(stages.len());
@@ -154,6 +164,38 @@ fn columns_above(stages: &[GraphStage]) -> Vec<Vec<ColumnKind>> {
         above.push(columns);
     }
     above
+}
+
+/// All mistakes in how the stages hang together.
+fn refuse_mistakes(graph: &Graph) -> Result<()> {
+    let told = |GraphMistake { stage, told, help, key }| {
+        let written = &graph.stages[stage].written;
+        let error = match key {
+            Some(key) => written.wrong_key(key, told),
+            None => written.wrong(told),
+        };
+        match help {
+            Some(help) => error.help(help),
+            None => error,
+        }
+    };
+    Error::all(graph.mistakes().into_iter().map(told).collect())
+}
+
+/// A source, and another that is merged with it.
+fn merged(
+    source: Option<(String, Box<dyn OpenSource>)>,
+    kind: String,
+    open: Box<dyn OpenSource>,
+    written: &dyn Written,
+) -> Result<(String, Box<dyn OpenSource>)> {
+    match source {
+        None => Ok((kind, open)),
+        Some((first, all)) => {
+            let merged = all.merged(&*open);
+            Ok((first, merged.map_err(|error| blame(written, error))?))
+        }
+    }
 }
 
 /// What is wrong with a stage, told where it is written.

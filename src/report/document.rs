@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::figures::{ClassFigures, PassFigures, Totals};
 use super::ledger::Ledger;
 use super::machine::Machine;
+use super::stats::StatsFigures;
 use crate::budget::Holders;
 
 /// What a run says it did.
@@ -39,6 +40,8 @@ pub struct Outcome {
     pub decisions: Vec<Decision>,
     /// Counts by name.
     pub counts: BTreeMap<String, u64>,
+    /// What stages counted of the points that came by, in alphabetical order of their names.
+    pub stats: Vec<StatsFigures>,
     /// The passes over the scan, in order; none if the pipeline streams.
     pub passes: Vec<PassFigures>,
     /// Side of the report tiles in world units; None if the pipeline streams, which has no tiles.
@@ -182,6 +185,9 @@ impl Outcome {
         object.entry("ledger", &self.ledger)?;
         object.entry("decisions", &self.decisions)?;
         object.entry("counts", &self.counts)?;
+        if !self.stats.is_empty() {
+            object.entry("stats", &self.stats)?;
+        }
         object.entry("passes", &self.passes)?;
         object.entry("totals", &self.totals)?;
         object.entry("classes", &self.classes)?;

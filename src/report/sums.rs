@@ -51,6 +51,11 @@ impl FixedSum {
         (shift <= 43).then(|| u128::from(mantissa) << shift.max(0))
     }
 
+    /// True if it is at its end.
+    pub fn is_full(&self) -> bool {
+        *self == FixedSum::FULL
+    }
+
     /// Adds another sum.
     pub fn merge(&mut self, other: &FixedSum) {
         self.plus(other.high, other.low);
@@ -70,6 +75,19 @@ impl FixedSum {
         let (low, carry) = self.low.overflowing_add(low);
         let sum = self.high.checked_add(high).and_then(|h| h.checked_add(u128::from(carry)));
         *self = sum.map_or(FixedSum::FULL, |high| FixedSum { high, low });
+    }
+
+    /// The sum as an f64 near it, and another that is what it leaves.
+    pub(super) fn parts(&self) -> [f64; 2] {
+        let near = self.value();
+        let mut sum = FixedSum::default();
+        sum.add(near, 1);
+        let is_above = (sum.high, sum.low) > (self.high, self.low);
+        let (large, small) = if is_above { (&sum, self) } else { (self, &sum) };
+        let (low, borrowed) = large.low.overflowing_sub(small.low);
+        let high = large.high - small.high - u128::from(borrowed);
+        let rest = FixedSum { high, low }.value();
+        [near, if is_above { -rest } else { rest }]
     }
 
     /// The sum, rounded to f64 (relative error below 2^-51).

@@ -10,6 +10,7 @@ use super::digits::{Coordinate, Grouped, Long, Share};
 use super::document::{Decision, Outcome, Report};
 use super::figures::{BaselineFigures, ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
 use super::ledger::{Ledger, Removed};
+use super::stats::{DimensionFigures, StatsFigures};
 use super::tally::KEY_POINTS;
 use crate::budget::Bytes;
 use crate::error::shown;
@@ -72,6 +73,7 @@ impl Table<'_> {
         removed_line(f, &result.ledger)?;
         class_lines(f, &result.classes, marks(result).next().is_some())?;
         marked_lines(f, result)?;
+        stats_lines(f, &result.stats)?;
         if let Some(&cells) = result.counts.get("cells") {
             write!(f, "\ncells      {}", Grouped(cells))?;
             // Passes that compute normals again count the same points again.
@@ -94,6 +96,32 @@ impl Table<'_> {
         }
         Ok(())
     }
+}
+
+/// What stages counted: points, and a line for each dimension.
+fn stats_lines(f: &mut fmt::Formatter<'_>, stats: &[StatsFigures]) -> fmt::Result {
+    for StatsFigures { name, points, dimensions, .. } in stats {
+        write!(f, "\n{name:<9}  {} points", Grouped(*points))?;
+        let width = dimensions.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+        for (name, figures) in dimensions {
+            write!(f, "\n{:9}  {name:width$}  ", "")?;
+            let DimensionFigures { min, max, mean, deviation, not_finite, .. } = figures;
+            // As many decimals as tell numbers apart that are a thousandth of the deviation apart.
+            let digits = deviation.filter(|v| *v > 0.0).map_or(0.0, |v| (3.0 - v.log10()).ceil());
+            let decimals = digits.clamp(0.0, 12.0) as usize;
+            match (min, max) {
+                (Some(min), Some(max)) => write!(f, "{min:.decimals$} to {max:.decimals$}")?,
+                _ => f.write_str("no numbers")?,
+            }
+            if let (Some(mean), Some(deviation)) = (mean, deviation) {
+                write!(f, ", mean {mean:.decimals$}, deviation {deviation:.decimals$}")?;
+            }
+            if *not_finite > 0 {
+                write!(f, ", {} not finite", Grouped(*not_finite))?;
+            }
+        }
+    }
+    Ok(())
 }
 
 /// True if a number of points to keep was asked for.

@@ -2,10 +2,12 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::ClassCounts;
+use super::stats::StatsTally;
 
 /// The count of records that were written with the key-point flag that a stage set.
 pub const KEY_POINTS: &str = "key_points";
@@ -27,6 +29,11 @@ pub struct Tally {
     pub removed: BTreeMap<(String, Name), u64>,
     /// Selections that a record is in, a bit each.
     pub(crate) selections: u8,
+    /// What stages count of the points that come by, by the name of the stage.
+    pub(crate) stats: BTreeMap<String, StatsTally>,
+    /// The name of the stage that counts now.
+    #[serde(skip)]
+    pub(crate) stage: Arc<str>,
     /// Records by class; None where they have none.
     pub(crate) classes: Option<ClassCounts>,
     /// How far apart unequal coordinates are that share a position; None where there are none.
@@ -96,6 +103,11 @@ impl Tally {
         }
     }
 
+    /// What the stage that counts now has counted of the points that came by.
+    pub(crate) fn own_stats(&mut self) -> &mut StatsTally {
+        self.stats.entry(self.stage.to_string()).or_default()
+    }
+
     /// Adds another tally.
     pub fn merge(&mut self, other: &Tally) {
         for (name, n) in &other.counts {
@@ -106,6 +118,9 @@ impl Tally {
         }
         for (key, n) in &other.removed {
             *self.removed.entry(key.clone()).or_default() += n;
+        }
+        for (name, stats) in &other.stats {
+            self.stats.entry(name.clone()).or_default().merge(stats);
         }
         self.selections |= other.selections;
         let apart = [self.apart, other.apart].into_iter().flatten();

@@ -173,7 +173,10 @@ fn almost_pipelines_are_told_what_to_type() {
         assert!(one.starts_with(expected), "{text}\n{one}");
     }
     fs::write(at.join("p.toml"), format!("{read}[[stage]]\ntype = 'normal'\n{write}")).unwrap();
-    assert!(told(at, &["check", "p.toml"], 2).contains("= did you mean `normals`? kinds: cells, "));
+    assert!(
+        told(at, &["check", "p.toml"], 2)
+            .contains("= did you mean `normals`? kinds: assign, cells, ")
+    );
 }
 
 #[test]

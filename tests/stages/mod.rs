@@ -10,5 +10,6 @@ mod outliers;
 mod reduce_auto;
 mod run;
 mod same_bytes;
+mod stats;
 mod tiles;
 mod unread;

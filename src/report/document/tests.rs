@@ -57,6 +57,7 @@ fn report(tiles: u64) -> Report {
         counts: BTreeMap::from([("cells".into(), 812_300), ("coincident".into(), 4)]),
         tile_side: Some(4.096),
         totals: Some(totals),
+        stats: Vec::new(),
         passes: Vec::new(),
         classes: vec![
             ClassFigures { class: 2, before: 1_500_000, after: 75_000 },
