@@ -36,7 +36,7 @@ impl<'a> From<&'a GraphStage> for TreeStage<'a> {
 /// Everything that is wrong with how these stages hang together, and that is certain whatever the
 /// unknown ones turn out to be.
 pub(crate) fn mistakes(stages: &[TreeStage<'_>]) -> Vec<GraphMistake> {
-    let tree = Tree { stages, takes: merged(stages.iter().map(|s| (s.from, s.is_merge()))) };
+    let tree = StageTree { stages, takes: merged(stages.iter().map(|s| (s.from, s.is_merge()))) };
     let each = (0..stages.len())
         .flat_map(|n| [tree.wrong_from(n), tree.wrong_end(n), wrong_order(n, &stages[n])]);
     each.flatten().collect()
@@ -93,13 +93,13 @@ impl TreeStage<'_> {
     }
 }
 
-struct Tree<'a> {
+struct StageTree<'a> {
     stages: &'a [TreeStage<'a>],
     /// For each stage what it takes from, through merges.
     takes: Vec<Vec<usize>>,
 }
 
-impl Tree<'_> {
+impl StageTree<'_> {
     /// What is wrong with what stage `n` takes from.
     fn wrong_from(&self, n: usize) -> Option<GraphMistake> {
         let stage = &self.stages[n];

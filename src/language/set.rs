@@ -6,7 +6,7 @@ use super::mistake;
 use super::mistake::{Mistake, SourceText};
 use super::node;
 use super::node::Node;
-use super::place::{TextPlace, Word};
+use super::place::{PlacedWord, TextPlace};
 use super::references;
 use crate::{Error, Result};
 
@@ -130,7 +130,7 @@ impl Set {
     }
 
     /// The value as it was typed, with its place in source `source`.
-    pub(crate) fn text(&self, source: usize) -> Word {
+    pub(crate) fn text(&self, source: usize) -> PlacedWord {
         let from = if let Given::Text { from } = self.value { from } else { 0 };
         let text = self.text[from..].trim();
         let start = from + self.text[from..].len() - self.text[from..].trim_start().len();

@@ -8,7 +8,7 @@ use super::keys;
 use super::mistake::{Mistake, SourceText};
 use super::node::{KeyEntry, Node, NodeValue};
 use super::outputs;
-use super::place::Word;
+use super::place::PlacedWord;
 use super::registry::Registry;
 use super::tree;
 use super::written::WrittenText;
@@ -45,7 +45,7 @@ pub(super) fn build(
 
 fn place(
     stage: &StageDraft,
-    (kind, at): &Word,
+    (kind, at): &PlacedWord,
     sources: &Arc<[SourceText]>,
     registry: &Registry,
 ) -> Result<GraphStage, Vec<Mistake>> {
@@ -80,7 +80,7 @@ fn place(
         let told = serde_json::to_value(&limits).unwrap_or_default();
         keys.extend(told.as_object().cloned().unwrap_or_default());
     }
-    let text = |part: &Option<Word>| part.as_ref().map(|(text, _)| text.clone());
+    let text = |part: &Option<PlacedWord>| part.as_ref().map(|(text, _)| text.clone());
     Ok(GraphStage {
         kind: kind.clone(),
         name: text(&stage.name),
