@@ -19,9 +19,9 @@ pub(super) const PARAMETERS: &str = "params";
 
 /// One value put in the place of a pipeline file's.
 ///
-/// The address is `run.KEY` for a setting, `params.NAME` for a parameter, else `STAGE.KEY`: the stage by its `name`, or by its
-/// kind where only one stage is of that kind, or as `KIND.N.KEY`, the N-th stage of that kind, from
-/// 1.
+/// The address is `run.KEY` for a setting, `params.NAME` for a parameter, else `STAGE.KEY`: the
+/// stage by its `name`, or by its kind where only one stage is of that kind, or as `KIND.N.KEY`,
+/// the N-th stage of that kind, from 1.
 #[derive(Debug, Clone)]
 pub struct Set {
     argument: String,

@@ -282,9 +282,11 @@ fn run_page() -> (String, Value) {
     };
     let said = keys_said("run", &fields, std::slice::from_ref(&text), default);
     let out = format!(
-        "# The `[run]` table\n\n<!-- {SAYS_SO} -->\n\n{docs}\n\n{}\n## Sizes\n\n{}\n",
+        "# The `[run]` table\n\n<!-- {SAYS_SO} -->\n\n{docs}\n\n{}\n## Sizes\n\n{}\n\n\
+         ## The pipeline around it\n\n{}\n",
         keys::markdown(&said),
-        item_docs(&source("src/graph/size.rs"), "fn", "parse_bytes")
+        item_docs(&source("src/graph/size.rs"), "fn", "parse_bytes"),
+        item_docs(&source("src/language/pipeline.rs"), "struct", "PipelineText")
     );
     let (first, _) = docs.split_once(". ").unwrap();
     (out, keys::described("run", &format!("{first}."), &said))

@@ -99,7 +99,20 @@ fn docs_above(lines: &[&str]) -> String {
         .collect();
     let text: Vec<&str> =
         comment.iter().rev().map(|line| line.strip_prefix(' ').unwrap_or(line)).collect();
-    let text: Vec<&str> = text.into_iter().take_while(|line| !line.starts_with("```")).collect();
+    // An example in Rust ends what they are told; one of a pipeline belongs to it.
+    let mut in_pipeline = false;
+    let is_told = |line: &&str| match (line.strip_prefix("```"), in_pipeline) {
+        (None, _) => true,
+        (Some(_), true) => {
+            in_pipeline = false;
+            true
+        }
+        (Some(language), false) => {
+            in_pipeline = language == "toml";
+            in_pipeline
+        }
+    };
+    let text: Vec<&str> = text.into_iter().take_while(is_told).collect();
     without_links(text.join("\n").trim())
 }
 

@@ -4,7 +4,7 @@ use std::fs;
 
 use pointmill::{Graph, ParameterType, PipelineText, Registry, Set};
 
-use crate::support::command::{fails, pointmill};
+use crate::support::command::{fails, pointmill, scans};
 
 const TEXT: &str = "\
 [params]
@@ -226,4 +226,18 @@ fn commands_take_parameters_and_the_environment_and_list_them() {
     assert!(code == 1 && stdout.contains("Usage: ") && stderr.contains("none.toml"), "{stderr}");
     assert_eq!(pointmill(at.path(), &["run", "--help"]).0, 0);
     assert_eq!(pointmill(at.path(), &["reduce", "--help"]).0, 0);
+}
+
+#[test]
+fn the_page_shows_a_pipeline_that_runs() {
+    let page = include_str!("../../docs/run.md");
+    let shown = page.split_once("```toml\n").unwrap().1.split_once("```").unwrap().0;
+    let at = scans(&["in.laz"]);
+    fs::write(at.path().join("p.toml"), shown).unwrap();
+    let run = ["run", "p.toml", "--param", "scan=in.laz", "--param", "keep=40%"];
+    let (code, _, stderr) = pointmill(at.path(), &run);
+    assert_eq!(code, 0, "{stderr}");
+    for output in ["reduced.laz", "thin.laz"] {
+        assert!(at.path().join(output).exists(), "{output}");
+    }
 }
