@@ -4,7 +4,7 @@ use std::fs;
 
 use pointmill::{Graph, ParameterType, PipelineText, Registry, Set};
 
-use crate::support::command::{fails, pointmill, scans};
+use crate::support::command::{command, fails, pointmill, scans};
 
 const TEXT: &str = "\
 [params]
@@ -194,17 +194,21 @@ fn parameters_are_listed() {
 #[test]
 fn commands_take_parameters_and_the_environment_and_list_them() {
     let at = tempfile::tempdir().unwrap();
+    let text = TEXT.replace("[run]\nscratch = '${ENV:SCRATCH}'\n", "");
+    let text = text.replace("drop = ['${format}', 'b']", "");
     let text =
-        TEXT.replace("${ENV:SCRATCH}", "${ENV:PATH}").replace("drop = ['${format}', 'b']", "");
-    let text = text.replace("[run]\nscratch = '${ENV:PATH}'\n", "");
+        text.replace("ENV:NAME", "ENV:POINTMILL_TEST_NAME").replace("ENV:POINTS", "ENV:NONE");
     fs::write(at.path().join("p.toml"), text).unwrap();
     fs::create_dir(at.path().join("o")).unwrap();
     let params = ["--param", "out=o", "--param", "points=3k", "--param", "keep=40%"];
-    for command in ["check", "plan", "run"] {
-        let (code, _, stderr) = pointmill(at.path(), &[&[command, "p.toml"], &params[..]].concat());
-        assert_eq!(code, 0, "{command}: {stderr}");
+    for name in ["check", "plan", "run"] {
+        let (code, _, stderr) = pointmill(at.path(), &[&[name, "p.toml"], &params[..]].concat());
+        assert_eq!(code, 0, "{name}: {stderr}");
     }
     assert!(at.path().join("o/${a}-10-x.laz").exists());
+    let mut run = command(at.path(), &[&["run", "p.toml"], &params[..]].concat());
+    assert!(run.env("POINTMILL_TEST_NAME", "tail").output().unwrap().status.success());
+    assert!(at.path().join("o/${a}-10-tail.laz").exists());
     let wrong = ["run", "p.toml", "--param", "keep=10k%"];
     fails(at.path(), &wrong, 2, &["error: --param: `keep`: takes", "| keep=10k%\n   |      ^^^^"]);
     let lacking = fs::read_to_string(at.path().join("p.toml")).unwrap();
