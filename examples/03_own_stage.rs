@@ -9,20 +9,22 @@
 use pointmill::ops::removal::represent;
 use pointmill::point::{NORMAL, PointBatch, names};
 use pointmill::report::Tally;
-use pointmill::stage::{Needs, Role, StageKind, StagePlace, TileOp, Transform};
+use pointmill::stage::{Needs, Role, RoleName, StageKind, StagePlace, TileOp, Transform};
 use pointmill::tile::Tile;
 use pointmill::{Error, Result};
 use pointmill::{Graph, Overrides, Quiet, Registry};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Keeps the points of one class. The fields are the stage's keys in a pipeline file.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 struct Class {
     class: u8,
 }
 
 impl StageKind for Class {
     const KIND: &'static str = "class";
+    const ROLE: RoleName = RoleName::Transform;
     const ABOUT: &'static str = "Keeps the points of one class.";
 
     fn build(self, _: &StagePlace) -> Result<Role> {
@@ -48,11 +50,12 @@ impl Transform for Class {
 }
 
 /// Keeps the lowest point of every cell.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 struct Lowest {}
 
 impl StageKind for Lowest {
     const KIND: &'static str = "lowest";
+    const ROLE: RoleName = RoleName::OnTiles;
     const ABOUT: &'static str = "Keeps the lowest point of every cell.";
 
     fn build(self, _: &StagePlace) -> Result<Role> {

@@ -10,9 +10,10 @@ use std::io::Read as _;
 
 use pointmill::point::Column;
 use pointmill::report::Tally;
-use pointmill::stage::{Needs, Role, ScanFacts, StageKind, StagePlace, TileOp};
+use pointmill::stage::{Needs, Role, RoleName, ScanFacts, StageKind, StagePlace, TileOp};
 use pointmill::tile::Tile;
 use pointmill::{Graph, Overrides, Quiet, Registry, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Whoever knows these constants knows the columns; no other place lists them.
@@ -20,7 +21,7 @@ const ROUGHNESS: Column<f32> = Column::new("Roughness", &[]);
 const EVENED: Column<f32> = Column::new("EvenRoughness", &[]);
 
 /// How far the neighbours are above or below, on average, in world units.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 struct Rough {
     neighbors: usize,
     /// World units of a lattice step, known when the scan is.
@@ -30,6 +31,7 @@ struct Rough {
 
 impl StageKind for Rough {
     const KIND: &'static str = "rough";
+    const ROLE: RoleName = RoleName::OnTiles;
     const ABOUT: &'static str = "Computes how rough the surface is.";
 
     fn build(self, _: &StagePlace) -> Result<Role> {
@@ -62,13 +64,14 @@ impl TileOp for Rough {
 }
 
 /// The mean roughness of the neighbours.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 struct Even {
     neighbors: usize,
 }
 
 impl StageKind for Even {
     const KIND: &'static str = "even";
+    const ROLE: RoleName = RoleName::OnTiles;
     const ABOUT: &'static str = "Evens the roughness out.";
 
     fn build(self, _: &StagePlace) -> Result<Role> {

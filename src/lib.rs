@@ -78,8 +78,8 @@
 //! - [`memory`]: points from and into a program's own memory; [`Plan::pull`] gives results as an
 //!   iterator.
 //! - [`synth`]: synthetic scans, and the stage `synth`.
-//! - [`ops`]: the stages that compute, select or look: `merge`, `filter`, `drop`, `assign`,
-//!   `stats`, `tap`, `outliers`, `normals`, `cells`, `median` and `grid`.
+//! - [`ops`]: the stages that compute, select or look: `filter`, `drop`, `assign`, `stats`, `tap`,
+//!   `merge`, `outliers`, `normals`, `cells`, `median` and `grid`.
 //! - [`picture`]: scans drawn from above or from a side, side by side.
 //! - [`graph`]: what a pipeline is, whoever wrote it: a [`Graph`] of stages.
 //! - [`PipelineText`]: a pipeline as it is written, in TOML, JSON or one line, with [`Parameter`]s.
@@ -127,5 +127,8 @@ pub mod tile;
 pub use engine::{Done, Quiet, Watch};
 pub use error::{Error, ErrorKind, Result};
 pub use graph::{Graph, Overrides};
-pub use language::{Parameter, ParameterType, PipelineText, Registry, Set};
+pub use language::{
+    GraphBuilder, KeyDescription, Parameter, ParameterType, PipelineText, Registry, Set,
+    TableDescription, WordDescription,
+};
 pub use plan::{Outline, Plan, Pulled};

@@ -95,6 +95,21 @@ pub trait Transform: Send + Sync {
     fn apply(&self, batch: &mut PointBatch, tally: &mut Tally) -> Result<()>;
 }
 
+/// Which role a stage plays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RoleName {
+    /// It yields records.
+    Source,
+    /// It streams.
+    Transform,
+    /// It works on tiles, once or twice.
+    OnTiles,
+    /// It takes records.
+    Sink,
+    /// It gives what it takes from several stages one name.
+    Merge,
+}
+
 /// A stage in its role.
 pub enum Role {
     /// Yields records.
@@ -109,4 +124,17 @@ pub enum Role {
     Sink(Box<dyn CreateSink>),
     /// Gives what it takes from several stages one name, and does nothing to it.
     Merge,
+}
+
+impl Role {
+    /// Which it is.
+    pub fn name(&self) -> RoleName {
+        match self {
+            Role::Source(_) => RoleName::Source,
+            Role::Transform(_) => RoleName::Transform,
+            Role::TileOp(_) | Role::ScanOp(_) => RoleName::OnTiles,
+            Role::Sink(_) => RoleName::Sink,
+            Role::Merge => RoleName::Merge,
+        }
+    }
 }

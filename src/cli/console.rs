@@ -15,6 +15,7 @@ use super::words::{Told, Words};
 use super::{interrupt, print};
 use crate::engine::{Done, Watch};
 use crate::error::shown;
+use crate::language::Registry;
 use crate::plan::Plan;
 use crate::report::{Decision, Short};
 use crate::{Error, Result};
@@ -40,7 +41,7 @@ enum Voice {
 impl Console {
     /// As the arguments of a command ask for, in its words; one that has none of these speaks
     /// plainly.
-    pub fn new(command: &Command) -> Self {
+    pub fn new(command: &Command, registry: &Registry) -> Self {
         let common = command.common();
         let progress = common.map_or(Progress::Never, |common| common.progress);
         let quiet = common.is_some_and(|common| common.quiet);
@@ -49,7 +50,7 @@ impl Console {
                 Progress::Json => Voice::Json(Events::new()),
                 Progress::Auto | Progress::Never => Voice::Text(progress == Progress::Auto),
             },
-            words: Words::of(command),
+            words: Words::of(command, registry),
             quiet,
             verbose: common.is_some_and(|common| common.verbose),
             interrupted: OnceLock::new(),

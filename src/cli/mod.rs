@@ -9,7 +9,6 @@ mod classes;
 mod console;
 mod convert;
 mod describe;
-mod described;
 mod draw;
 mod events;
 mod exit;
@@ -79,7 +78,7 @@ pub fn run_with(arguments: Vec<OsString>, registry: &Registry) -> u8 {
             };
         }
     };
-    let console = Console::new(&arguments.command);
+    let console = Console::new(&arguments.command, registry);
     match execute(&arguments.command, registry, &console) {
         Ok(()) => 0,
         Err(error) => {
@@ -102,7 +101,7 @@ fn parameters(known: &clap::Command, given: &[OsString], registry: &Registry) ->
     match pipeline::parameters(arguments, registry).and_then(print::result) {
         Ok(()) => 0,
         Err(error) => {
-            Console::new(&command).error(&error);
+            Console::new(&command, registry).error(&error);
             exit_number(&error)
         }
     }

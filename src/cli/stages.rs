@@ -1,12 +1,11 @@
 //! `stages`: the kinds of stages with their keys, as text or JSON.
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::arguments::StagesArguments;
-use super::described::{Key, StageDescription, Word, described};
 use super::print;
 use crate::error::nearest;
-use crate::language::Registry;
+use crate::language::{KeyDescription, Registry, TableDescription, WordDescription};
 use crate::{Error, Result};
 
 /// Columns of a terminal that text is wrapped to.
@@ -14,53 +13,104 @@ const COLUMNS: usize = 96;
 
 /// Prints the `[run]` table and all kinds of stages, or one of them.
 pub(super) fn stages(arguments: &StagesArguments, registry: &Registry) -> Result<()> {
-    let all = described(registry)?;
-    let shown: Vec<&StageDescription> = match &arguments.kind {
-        None => all.iter().collect(),
-        Some(kind) => vec![all.iter().find(|d| d.kind == *kind).ok_or_else(|| {
-            let kinds: Vec<String> = all.iter().map(|d| d.kind.clone()).collect();
-            let near = nearest(kind, &kinds).map(|near| format!("did you mean `{near}`? "));
-            let told = format!("there is no stage `{kind}`");
-            let near = near.unwrap_or_default();
-            Error::pipeline(told).help(format!("{near}stages: {}", kinds.join(", ")))
-        })?],
-    };
-    if arguments.json {
-        let json = match (&arguments.kind, &shown[..]) {
-            (Some(_), [one]) => serde_json::to_string_pretty(one),
-            _ => serde_json::to_string_pretty(&shown),
+    let Some(kind) = &arguments.kind else {
+        let kinds = registry.kinds().filter_map(|(kind, _)| registry.describe(kind));
+        let all: Vec<TableDescription> =
+            std::iter::once(registry.describe_run()).chain(kinds).collect();
+        return match arguments.json {
+            true => printed(&all.iter().map(as_json).collect()),
+            false => print::result(all.iter().map(text).collect::<Vec<_>>().join("\n")),
         };
-        let failed = |e| Error::internal("the stages could not be written as JSON").because(e);
-        return print::json(&json.map_err(failed)?);
+    };
+    let described = match kind.as_str() {
+        "run" => Some(registry.describe_run()),
+        kind => registry.describe(kind),
+    };
+    let described = described.ok_or_else(|| unknown(kind, registry))?;
+    match arguments.json {
+        true => printed(&as_json(&described)),
+        false => print::result(text_of_one(&described)),
     }
-    let text: Vec<String> = shown.into_iter().map(text).collect();
-    print::result(text.join("\n"))
 }
 
-fn text(described: &StageDescription) -> String {
-    let heading = match described.kind.as_str() {
+fn unknown(kind: &str, registry: &Registry) -> Error {
+    let kinds = registry.kinds().map(|(kind, _)| kind.to_owned());
+    let kinds: Vec<String> = std::iter::once("run".to_owned()).chain(kinds).collect();
+    let near = nearest(kind, &kinds).map(|near| format!("did you mean `{near}`? "));
+    let near = near.unwrap_or_default();
+    Error::pipeline(format!("there is no stage `{kind}`"))
+        .help(format!("{near}stages: {}", kinds.join(", ")))
+}
+
+fn printed(json: &Value) -> Result<()> {
+    let failed = |e| Error::internal("the stages could not be written as JSON").because(e);
+    print::json(&serde_json::to_string_pretty(json).map_err(failed)?)
+}
+
+/// Markdown for a terminal, on one line.
+fn plain(text: &str) -> String {
+    text.replace('\n', " ").replace('`', "")
+}
+
+fn as_json(table: &TableDescription) -> Value {
+    let word = |WordDescription { word, docs, .. }: &WordDescription| json!({ "word": word, "about": plain(docs) });
+    let key = |key: &KeyDescription| {
+        json!({
+            "key": key.name,
+            "value": plain(&key.value),
+            "required": key.is_required,
+            "default": key.default,
+            "about": plain(&key.docs),
+            "words": key.words.iter().map(word).collect::<Value>(),
+        })
+    };
+    json!({
+        "kind": table.name,
+        "about": plain(&table.about),
+        "docs": table.docs,
+        "keys": table.all_keys().map(key).collect::<Value>(),
+    })
+}
+
+fn text(table: &TableDescription) -> String {
+    let heading = match table.name.as_str() {
         "run" => "[run]",
         kind => kind,
     };
-    let mut out = format!("{heading}\n{}", wrapped(&described.about, 2));
-    match &described.keys {
-        None => out += &wrapped("Its keys are not described here.", 2),
-        Some(keys) if keys.is_empty() => out += &wrapped("It has no keys.", 2),
-        Some(keys) => keys.iter().for_each(|key| out += &key_text(key)),
-    }
-    out
+    let about = format!("{heading}\n{}", wrapped(&plain(&table.about), 2));
+    about + &keys_text(table)
 }
 
-fn key_text(key: &Key) -> String {
+/// The same with all that is said of it.
+fn text_of_one(table: &TableDescription) -> String {
+    let mut out = format!("{}\n{}", table.name, wrapped(&plain(&table.about), 2));
+    for paragraph in table.docs.split("\n\n") {
+        out.push('\n');
+        // The lines of a list are not one paragraph.
+        let mut items = paragraph.split("\n- ");
+        out += &wrapped(&plain(items.next().unwrap_or_default()), 2);
+        items.for_each(|item| out += &wrapped(&plain(&format!("- {item}")), 4));
+    }
+    out + &keys_text(table)
+}
+
+fn keys_text(table: &TableDescription) -> String {
+    match table.all_keys().next() {
+        None => wrapped("It has no keys.", 2),
+        Some(_) => table.all_keys().map(key_text).collect(),
+    }
+}
+
+fn key_text(key: &KeyDescription) -> String {
     let default = match &key.default {
-        _ if key.required => "must be given".to_owned(),
-        Value::Null => "default: none".to_owned(),
-        value => format!("default: {value}"),
+        _ if key.is_required => "must be given".to_owned(),
+        None => "default: none".to_owned(),
+        Some(value) => format!("default: {value}"),
     };
-    let mut out = format!("\n  {} = {} [{default}]\n", key.key, key.value);
-    out += &wrapped(&key.about, 6);
-    for Word { word, about } in &key.words {
-        out += &wrapped(&format!("\"{word}\": {about}"), 8);
+    let mut out = format!("\n  {} = {} [{default}]\n", key.name, plain(&key.value));
+    out += &wrapped(&plain(&key.docs), 6);
+    for WordDescription { word, docs, .. } in &key.words {
+        out += &wrapped(&plain(&format!("\"{word}\": {docs}")), 8);
     }
     out
 }

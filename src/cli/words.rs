@@ -1,24 +1,22 @@
 //! The words of what was typed: messages of the library, which name settings as a pipeline file has
 //! them, are put into the flags that the user of the command can type.
 
-use std::collections::BTreeSet;
-
 use super::arguments::Command;
-use super::described::settings;
 use super::flags::{common_flags, convert_flags, reduce_flags, synth_flags};
 use crate::Error;
+use crate::language::Registry;
 
 /// What the user of one command can type for the settings that messages name.
 pub(super) struct Words {
     flags: Vec<(&'static str, &'static str)>,
     /// True if the command takes a pipeline file, which may have any setting.
     has_file: bool,
-    settings: BTreeSet<String>,
+    registry: Registry,
 }
 
 impl Words {
-    /// The words of `command`.
-    pub fn of(command: &Command) -> Words {
+    /// The words of `command`, whose pipelines may name what is in `registry`.
+    pub fn of(command: &Command, registry: &Registry) -> Words {
         let flags = match command {
             Command::Run(_) | Command::Plan(_) | Command::Check(_) => Vec::new(),
             Command::Reduce(reduce) => reduce_flags(reduce),
@@ -32,7 +30,7 @@ impl Words {
         Words {
             flags: flags.collect(),
             has_file: matches!(command, Command::Run(_) | Command::Plan(_) | Command::Check(_)),
-            settings: settings(),
+            registry: registry.clone(),
         }
     }
 
@@ -58,6 +56,16 @@ impl Words {
         out + rest
     }
 
+    /// True for the address of a setting, as `--set` takes it.
+    fn is_setting(&self, address: &str) -> bool {
+        let Some((table, key)) = address.split_once('.') else { return false };
+        let described = match table {
+            "run" => Some(self.registry.describe_run()),
+            kind => self.registry.describe(kind),
+        };
+        described.is_some_and(|table| table.all_keys().any(|known| known.name == key))
+    }
+
     /// What can be typed for a setting, with its value or without; None if `text` is no setting.
     fn typed(&self, text: &str) -> Option<String> {
         let (address, value) = match text.split_once(" = ") {
@@ -71,7 +79,7 @@ impl Words {
         }
         let flag = self.flags.iter().find(|(known, _)| *known == address);
         match (flag, value) {
-            (None, _) if !self.settings.contains(address) => None,
+            (None, _) if !self.is_setting(address) => None,
             (None, _) if self.has_file => Some(format!("`{text}`")),
             (None, _) => Some(format!("`{text}` in a pipeline file (`pointmill run FILE`)")),
             (Some((_, name)), Some(value)) if !matches!(value, "true" | "false") => {
@@ -146,7 +154,7 @@ mod tests {
 
     fn words(command: &[&str]) -> Words {
         let typed = [&["pointmill"], command].concat();
-        Words::of(&Arguments::try_parse_from(typed).unwrap().command)
+        Words::of(&Arguments::try_parse_from(typed).unwrap().command, &Registry::builtin())
     }
 
     #[test]
@@ -194,7 +202,7 @@ mod tests {
             let words = words(command);
             assert!(words.flags.len() >= 4, "{command:?}");
             for (address, flag) in &words.flags {
-                assert!(words.settings.contains(*address), "{flag} stands for {address}");
+                assert!(words.is_setting(address), "{flag} stands for {address}");
             }
         }
     }

@@ -1,8 +1,10 @@
 //! Expressions as values of keys: read from their text, and written as it.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Deserializer, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize};
 
@@ -52,6 +54,19 @@ pub(crate) const ONE_OR_SEVERAL: &str = "OneOrSeveral";
 impl<'de, T: FromText + Deserialize<'de>> Deserialize<'de> for OneOrSeveral<T> {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         from.deserialize_newtype_struct(ONE_OR_SEVERAL, SeveralVisitor(PhantomData))
+    }
+}
+
+impl<T: JsonSchema> JsonSchema for OneOrSeveral<T> {
+    fn schema_name() -> Cow<'static, str> {
+        format!("{ONE_OR_SEVERAL}_{}", T::schema_name()).into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let one = generator.subschema_for::<T>();
+        json_schema!({
+            "anyOf": [one, { "title": "a list of them", "type": "array", "items": one }],
+        })
     }
 }
 
@@ -108,6 +123,17 @@ macro_rules! is_its_text {
         impl<'de> serde::Deserialize<'de> for $type {
             fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
                 $crate::expression::text::deserialize(from)
+            }
+        }
+
+        impl schemars::JsonSchema for $type {
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                <$type as $crate::expression::FromText>::NAME.into()
+            }
+
+            fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+                let title = <$type as $crate::expression::FromText>::EXPECTED;
+                schemars::json_schema!({ "title": title, "type": "string" })
             }
         }
     };

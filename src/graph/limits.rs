@@ -1,5 +1,6 @@
 //! The keys that every stage takes which works on points: which records it is limited to.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::expression::{Choice, Condition};
@@ -9,7 +10,7 @@ use crate::point::{Flag, Selection};
 ///
 /// Any stage between a source and a sink takes these keys besides its own; `sees` is for stages
 /// that work on tiles.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LimitKeys {
     /// A condition that holds for the records, over their dimensions and the columns that stages
@@ -27,7 +28,7 @@ pub struct LimitKeys {
 }
 
 /// Which records a stage that is limited to some sees as neighbours.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Sees {
     /// Those that it is limited to.
@@ -44,10 +45,12 @@ impl LimitKeys {
     pub const WHERE: &'static str = "where";
     /// That of them which is for stages that work on tiles alone.
     pub const SEES: &'static str = "sees";
+}
 
-    /// What they say.
-    pub(crate) fn limits(self) -> Limits {
-        let LimitKeys { condition, mut classes, mut with, mut without, sees } = self;
+impl Limits {
+    /// What the keys say.
+    pub fn of(keys: LimitKeys) -> Limits {
+        let LimitKeys { condition, mut classes, mut with, mut without, sees } = keys;
         classes.sort_unstable();
         with.sort_unstable();
         without.sort_unstable();

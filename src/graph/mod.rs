@@ -8,6 +8,7 @@
 pub(crate) mod limits;
 mod settings;
 mod size;
+mod toml;
 mod tree;
 mod written;
 
@@ -17,7 +18,8 @@ use std::sync::Arc;
 
 use crate::stage::Role;
 
-pub(crate) use limits::{LimitKeys, Limits, Sees};
+pub(crate) use limits::Limits;
+pub use limits::{LimitKeys, Sees};
 pub(crate) use settings::MOST_THREADS;
 pub use settings::{
     Existing, Headers, MixedUnits, Nonfinite, Overrides, RunSettings, SimdSetting, SpillSetting,
@@ -26,7 +28,7 @@ pub use settings::{
 pub use size::parse_bytes;
 pub use tree::GraphMistake;
 pub(crate) use tree::{TreeStage, mistakes as tree_mistakes};
-pub(crate) use written::Written;
+pub(crate) use written::{Written, unwritten};
 
 /// A pipeline: stages, each of which takes from stages before it.
 ///
@@ -76,6 +78,9 @@ pub struct GraphStage {
     pub role: Role,
     /// Its keys with all defaults filled in, those that name files left out.
     pub keys: serde_json::Value,
+    /// Its keys as a text gives them, those that name files included; None if no text can name the
+    /// stage.
+    pub(crate) given: Option<serde_json::Value>,
     /// Line of its `kind` in its text, from 1.
     pub line: Option<usize>,
     /// The records that it is limited to.
@@ -102,6 +107,7 @@ impl Graph {
             from: from.to_vec(),
             role,
             keys: serde_json::json!({}),
+            given: None,
             line: None,
             limits: Limits::default(),
             written,
@@ -157,6 +163,13 @@ impl<'a> From<&'a GraphStage> for TreeStage<'a> {
             role: Some(&stage.role),
             from: Some(&stage.from),
         }
+    }
+}
+
+impl GraphStage {
+    /// True if it may work on some records and let the others pass.
+    pub(crate) fn can_be_limited(&self) -> bool {
+        matches!(self.role, Role::Transform(_) | Role::TileOp(_) | Role::ScanOp(_))
     }
 }
 

@@ -3,30 +3,40 @@
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use serde::{Deserialize, Deserializer, de};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use super::size::some_bytes;
+use super::size::{Bytes, some_bytes};
 use crate::geom::simd;
 use crate::geom::simd::Level;
-use crate::quantity::Whole;
+use crate::quantity::{Whole, has_schema};
 use crate::{Error, Result};
 
 /// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`,
 /// `withheld` and `noise` changes what is computed. All are optional; arguments of the same name
 /// take their place.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+///
+/// # Sizes
+///
+/// A size is `512MiB`, `1.5 GiB`, `2GB`, or bytes without a unit. A fraction of a byte is cut
+/// off.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RunSettings {
     /// Bound of the process's peak resident memory, in bytes; none: half of what the machine or its
     /// control group has.
     #[serde(deserialize_with = "some_bytes")]
+    #[schemars(with = "Option<Bytes>")]
     pub memory: Option<u64>,
     /// Threads that work at once, at most 1024; none: all processors.
     #[serde(deserialize_with = "some_threads")]
+    #[schemars(with = "Option<Whole<1, { MOST_THREADS as u64 }>>")]
     pub threads: Option<NonZeroUsize>,
     /// Folder for what does not fit in memory; none: beside the output.
+    #[schemars(title = "a path")]
     pub scratch: Option<PathBuf>,
     /// Where the report is written; none: nowhere.
+    #[schemars(title = "a path")]
     pub report: Option<PathBuf>,
     /// What becomes of files that are already where an output or the report is to be.
     pub existing: Existing,
@@ -36,6 +46,7 @@ pub struct RunSettings {
     /// are powers of two of steps: another step gives them other lengths, and other points are
     /// kept, also in number.
     #[serde(deserialize_with = "some_step")]
+    #[schemars(schema_with = "above_0")]
     pub lattice: Option<f64>,
     /// What z is multiplied by wherever distances are measured, so that its unit is that of x and
     /// y; the records keep their z. None: 1, where the units match or are not known; of units that
@@ -69,7 +80,7 @@ pub struct RunSettings {
 }
 
 /// What becomes of files that are already where an output or the report is to be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Existing {
@@ -84,7 +95,7 @@ pub enum Existing {
 pub const MOST_THREADS: usize = 1024;
 
 /// What becomes of points whose coordinates are not finite.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Nonfinite {
@@ -96,7 +107,7 @@ pub enum Nonfinite {
 }
 
 /// What becomes of scans whose points contradict their header.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Headers {
@@ -108,7 +119,7 @@ pub enum Headers {
 }
 
 /// What becomes of scans whose x, y and z have different units.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum MixedUnits {
@@ -131,7 +142,7 @@ pub enum ZScale {
 }
 
 /// What becomes of points that the scan itself says are of no use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Treatment {
@@ -145,7 +156,7 @@ pub enum Treatment {
 }
 
 /// Where decoded points wait for the mill.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum SpillSetting {
@@ -157,7 +168,7 @@ pub enum SpillSetting {
 }
 
 /// Which of the equal code paths runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum SimdSetting {
@@ -228,6 +239,15 @@ impl RunSettings {
     }
 }
 
+impl Serialize for ZScale {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        match self {
+            ZScale::Auto => to.serialize_str("auto"),
+            ZScale::Factor(factor) => to.serialize_f64(*factor),
+        }
+    }
+}
+
 impl<'de> Deserialize<'de> for ZScale {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         struct Factor;
@@ -262,6 +282,14 @@ impl<'de> Deserialize<'de> for ZScale {
         }
         from.deserialize_any(Factor)
     }
+}
+
+has_schema!(ZScale, "ZScale", {
+    "anyOf": [{ "type": "number", "exclusiveMinimum": 0 }, { "const": "auto" }],
+});
+
+fn above_0(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": "number", "exclusiveMinimum": 0 })
 }
 
 fn some_threads<'de, D: Deserializer<'de>>(from: D) -> Result<Option<NonZeroUsize>, D::Error> {

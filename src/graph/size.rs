@@ -2,6 +2,8 @@
 
 use serde::{Deserializer, de};
 
+use crate::quantity::has_schema;
+
 /// Bytes in a unit; the first of each is the one that messages use.
 const UNITS: [(&str, u64); 9] = [
     ("B", 1),
@@ -63,6 +65,20 @@ fn meant(text: &str) -> Option<String> {
     Some(format!("{}{unit}", number.trim_end()))
         .filter(|size| size != text && parse_bytes(size).is_ok())
 }
+
+/// A size, as a key takes it.
+pub(super) struct Bytes;
+
+has_schema!(Bytes, "Bytes", {
+    "title": "a size (such as `\"2GiB\"`, or a number of bytes)",
+    "anyOf": [
+        { "type": "integer", "minimum": 1 },
+        {
+            "type": "string",
+            "pattern": r"^\s*[0-9]+(\.[0-9]+)?\s*(B|KiB|MiB|GiB|TiB|kB|MB|GB|TB)?\s*$",
+        },
+    ],
+});
 
 pub(super) fn some_bytes<'de, D: Deserializer<'de>>(from: D) -> Result<Option<u64>, D::Error> {
     struct Size;

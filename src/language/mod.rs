@@ -1,7 +1,9 @@
 //! The pipeline language: from a text, and what arguments put in the place of its values, to a
 //! [`Graph`](crate::graph::Graph); every mistake with its place. Knows no plan and no input.
 
+mod builder;
 mod builtin;
+mod described;
 mod draft;
 mod fault;
 mod foreign;
@@ -18,11 +20,14 @@ mod pipeline;
 mod place;
 mod references;
 mod registry;
+mod schema;
 mod set;
 mod text;
 mod tree;
 mod written;
 
+pub use builder::GraphBuilder;
+pub use described::{KeyDescription, TableDescription, WordDescription};
 pub use parameter::{Parameter, ParameterType};
 pub use pipeline::PipelineText;
 pub use registry::Registry;

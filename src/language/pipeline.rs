@@ -28,78 +28,7 @@ use crate::{Error, Result};
 /// Bytes of the longest pipeline file: whoever names a scan in its place waits for no gigabytes.
 const LONGEST: u64 = 16 << 20;
 
-/// The text of a pipeline: stages from top to bottom, each of which takes the points of the one
-/// above it.
-///
-/// ```toml
-/// [params]
-/// scan = {type = "path", about = "What is read"}
-/// keep = "10%"
-///
-/// [run]
-/// memory = "2GiB"
-///
-/// [[stage]]
-/// kind = "read"
-/// path = "${scan}"
-/// name = "scan"
-///
-/// [[stage]]
-/// kind = "normals"
-///
-/// [[stage]]
-/// kind = "cells"
-/// keep = "${keep}"
-///
-/// [[stage]]
-/// kind = "median"
-///
-/// [[stage]]
-/// kind = "write"
-/// path = "${ENV:OUT:-.}/reduced.laz"
-///
-/// [[stage]]
-/// kind = "grid"
-/// from = "scan"
-/// side = 0.5
-///
-/// [[stage]]
-/// kind = "write"
-/// path = "thin.laz"
-/// ```
-///
-/// **Stages.** Each has a `kind` and the keys of that kind. It takes from the stage above it that
-/// gives points (what `write` takes, the stage behind it takes too), or from what its `from` names:
-/// one earlier stage by its `name`, or a list. So a chain needs no names, and every branch begins
-/// with a `from`. What a branch gives is what its chain alone would give; what is `"auto"` in it is
-/// settled by all that the sources give, though, and not by what a stage that streams leaves of it.
-/// Several sources are one scan: a stage that takes from one of them names all of them in its
-/// `from`, or takes from a `merge` that does. Their records come in the order in which the sources
-/// stand. Branches are not merged again.
-///
-/// **Parameters.** `[params]` declares them: by their default (`keep = "10%"`), whose type they
-/// have, or by a table with `type` (`text`, `path`, `number`, `whole`, `flag` or `list`),
-/// `default`, `about` and `choices`, a list of the values that there are. One without a default
-/// must be given. `${name}` in a value of `[run]` or of a stage's own keys (not `kind`, `name` and
-/// `from`) is the value of the parameter, of its type where it is all of the value and as text
-/// where it is a part of one. `${ENV:NAME}` is a variable of the environment, a text;
-/// `${ENV:NAME:-default}` does without it, also where it is empty. A default may refer to the
-/// environment, which then has the type of the parameter. `$${` is a literal `${`.
-/// `--param name=value` gives a parameter its value, and `pointmill run FILE --help` lists those of
-/// a file. What `--set` puts in the place of a value is taken as it is.
-///
-/// **JSON.** A file is JSON with the same keys where its name ends in `.json` or its first
-/// character other than space is a brace:
-/// `{"run": {…}, "stage": [{"kind": "read", "path": "a.laz"}, …]}`. A key that is `null` is as if
-/// it were not there. What strict JSON does not have is refused, and so are a key that is there
-/// twice and whole numbers beyond 2^53, which programs round: in quotes they are exact.
-///
-/// **One line.** An argument with a `!` between spaces is a pipeline, and any other the name of a
-/// file: `read in.laz ! normals ! cells max_angle=6deg ! median ! write out.laz`. A stage is its
-/// kind, then the value of its main key (`path` of `read` and `write`, `where` of `filter` and
-/// `drop`, `set` of `assign`, `scene` of `synth`), then `key=value` for all others, `name` and
-/// `from` included. Values are as `--set` takes them: in quotes where they have spaces, lists in
-/// brackets.
+#[doc = include_str!("pipeline.md")]
 #[derive(Clone)]
 pub struct PipelineText {
     form: TextForm,

@@ -3,10 +3,16 @@
 
 use std::collections::BTreeMap;
 
+use schemars::{Schema, SchemaGenerator};
+use serde_json::{Map, Value, json};
+
+use super::described::TableDescription;
 use super::keys;
 use super::mistake::Mistake;
 use super::node::Node;
-use crate::stage::{Format, Formats, Role, StageKind, StagePlace};
+use super::schema;
+use super::schema::StageTable;
+use crate::stage::{Format, Formats, Role, RoleName, StageKind, StagePlace};
 use crate::{Error, Result};
 
 /// The stage kinds and formats that a pipeline file may name.
@@ -28,7 +34,16 @@ pub struct Registry {
     formats: Formats,
 }
 
-type ReadStage = fn(&Node, &StagePlace) -> Result<(Role, serde_json::Value), Vec<Mistake>>;
+type ReadStage = fn(&Node, &StagePlace) -> Result<BuiltStage, Vec<Mistake>>;
+
+/// A stage in its role.
+pub(crate) struct BuiltStage {
+    pub role: Role,
+    /// Its keys as reports have them.
+    pub keys: serde_json::Value,
+    /// Its keys as a text gives them; None if no text can.
+    pub given: Option<serde_json::Value>,
+}
 
 #[derive(Clone, Copy)]
 struct RegisteredKind {
@@ -36,6 +51,9 @@ struct RegisteredKind {
     either: &'static [&'static str],
     main: Option<&'static str>,
     is_limited: bool,
+    role: RoleName,
+    schema: fn(&mut SchemaGenerator) -> Schema,
+    defaults: fn() -> Map<String, Value>,
     read: ReadStage,
 }
 
@@ -55,6 +73,9 @@ impl Registry {
                 either: K::EITHER,
                 main: K::MAIN,
                 is_limited: K::IS_LIMITED,
+                role: K::ROLE,
+                schema: K::json_schema,
+                defaults: defaults::<K>,
                 read: read::<K>,
             },
         );
@@ -93,6 +114,56 @@ impl Registry {
         self.kinds.get(kind).is_none_or(|kind| kind.is_limited)
     }
 
+    /// What there is to know of a kind of stage; none if there is no such kind.
+    pub fn describe(&self, kind: &str) -> Option<TableDescription> {
+        let (name, kind) = self.kinds.get_key_value(kind)?;
+        let table = self.table(name, kind, &mut schema::generator());
+        Some(
+            TableDescription::of(name, kind.about, &table.schema)
+                .of_stage(kind.role, &table.limits),
+        )
+    }
+
+    /// What there is to know of the keys that limit a stage to some records, which stages take
+    /// besides their own: all of them if they work on tiles.
+    pub fn describe_limits(&self) -> TableDescription {
+        let limits = schema::limits(&mut schema::generator(), &self.formats, RoleName::OnTiles);
+        TableDescription::of_docs("limits", &limits)
+    }
+
+    /// What there is to know of the table `[run]`.
+    pub fn describe_run(&self) -> TableDescription {
+        let run = schema::run(&mut schema::generator(), &self.formats);
+        TableDescription::of_docs("run", &run)
+    }
+
+    /// The JSON Schema (2020-12) of a pipeline file that may name these kinds and formats, for
+    /// editors to complete and check by. What only a run can know it does not say: whether keys go
+    /// together, or whether a file is there.
+    pub fn schema(&self) -> Value {
+        let mut generator = schema::generator();
+        let run = schema::run(&mut generator, &self.formats);
+        let stages =
+            self.kinds.iter().map(|(name, kind)| self.table(name, kind, &mut generator)).collect();
+        schema::pipeline(run, stages, generator.take_definitions(true))
+    }
+
+    fn table(
+        &self,
+        name: &'static str,
+        kind: &RegisteredKind,
+        generator: &mut SchemaGenerator,
+    ) -> StageTable {
+        let own = schema::table((kind.schema)(generator), (kind.defaults)(), &self.formats);
+        let limits = match (kind.is_limited, kind.role) {
+            (true, role @ (RoleName::Transform | RoleName::OnTiles)) => {
+                schema::limits(generator, &self.formats, role)
+            }
+            _ => Map::new(),
+        };
+        StageTable { name, about: kind.about, role: kind.role, schema: own, limits }
+    }
+
     /// Keys that `key` of a stage of that kind takes the place of.
     pub(crate) fn others(&self, kind: &str, key: &str) -> impl Iterator<Item = &'static str> {
         let either = self.kinds.get(kind).map_or(&[][..], |kind| kind.either);
@@ -106,39 +177,66 @@ impl Registry {
         kind: &str,
         keys: &Node,
         at: &StagePlace,
-    ) -> Option<Result<(Role, serde_json::Value), Vec<Mistake>>> {
+    ) -> Option<Result<BuiltStage, Vec<Mistake>>> {
         self.kinds.get(kind).map(|kind| (kind.read)(keys, at))
     }
 }
 
-fn read<K: StageKind>(
-    keys: &Node,
-    at: &StagePlace,
-) -> Result<(Role, serde_json::Value), Vec<Mistake>> {
+fn read<K: StageKind>(keys: &Node, at: &StagePlace) -> Result<BuiltStage, Vec<Mistake>> {
     let stage: K = keys::read(K::KIND, keys, &at.formats().names())?;
-    let wrong = |error: Error| vec![Mistake::of(keys.place.clone(), &error)];
-    let canonical = canonical(&stage).map_err(wrong)?;
-    stage.build(at).map(|role| (role, canonical)).map_err(|error| {
+    built(stage, at).map_err(|error| {
         let blamed = at.blamed();
         let place = blamed.as_deref().and_then(|key| keys.at(key)).unwrap_or(&keys.place);
         vec![Mistake::of(place.clone(), &error)]
     })
 }
 
-/// The stage's keys with all defaults filled in, sorted by name; those without a value and those
-/// that name files are left out.
-fn canonical<K: StageKind>(stage: &K) -> Result<serde_json::Value> {
+/// Puts a stage in its role.
+pub(crate) fn built<K: StageKind>(stage: K, at: &StagePlace) -> Result<BuiltStage> {
+    let given = given_keys(&stage)?;
+    let is_reported = |key: &str| !K::PLACES.contains(&key);
+    let keys =
+        given.iter().filter(|(key, _)| is_reported(key)).map(|(k, v)| (k.clone(), v.clone()));
+    let keys = keys.collect::<serde_json::Map<_, _>>().into();
+    let role = stage.build(at).and_then(in_its_role::<K>)?;
+    Ok(BuiltStage { role, keys, given: Some(given.into()) })
+}
+
+/// The role that a kind says it plays, which its author may have got wrong.
+fn in_its_role<K: StageKind>(role: Role) -> Result<Role> {
+    match role.name() {
+        name if name == K::ROLE => Ok(role),
+        name => Err(Error::internal(format!(
+            "the stage kind `{}` says that its role is {:?}, and it is {name:?}",
+            K::KIND,
+            K::ROLE
+        ))),
+    }
+}
+
+/// The keys of a stage of which none is given, with what they are then; none where one must be.
+fn defaults<K: StageKind>() -> Map<String, Value> {
+    let stage = serde_json::from_value::<K>(json!({})).ok();
+    let keys = stage.and_then(|stage| serde_json::to_value(stage).ok());
+    match keys {
+        Some(Value::Object(keys)) => keys,
+        _ => Map::new(),
+    }
+}
+
+/// The stage's keys with all defaults filled in, sorted by name; those without a value are left
+/// out.
+fn given_keys<K: StageKind>(stage: &K) -> Result<serde_json::Map<String, serde_json::Value>> {
     let value = serde_json::to_value(stage).map_err(|e| {
         Error::internal(format!("cannot list the keys of `{}`", K::KIND)).because(e)
     })?;
     Ok(match value {
-        serde_json::Value::Object(keys) => keys
+        Value::Object(keys) => keys
             .into_iter()
-            .filter(|(key, value)| !value.is_null() && !K::PLACES.contains(&key.as_str()))
+            .filter(|(_, value)| !value.is_null())
             .collect::<BTreeMap<_, _>>()
             .into_iter()
-            .collect::<serde_json::Map<_, _>>()
-            .into(),
-        _ => serde_json::Map::new().into(),
+            .collect(),
+        _ => serde_json::Map::new(),
     })
 }

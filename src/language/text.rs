@@ -9,11 +9,11 @@ use super::mistake::{Mistake, SourceText};
 use super::node::{KeyEntry, Node, NodeValue};
 use super::outputs;
 use super::place::PlacedWord;
-use super::registry::Registry;
+use super::registry::{BuiltStage, Registry};
 use super::tree;
 use super::written::WrittenText;
 use crate::graph::RunSettings;
-use crate::graph::{Graph, GraphStage, LimitKeys};
+use crate::graph::{Graph, GraphStage, LimitKeys, Limits};
 use crate::stage::Role;
 use crate::stage::StagePlace;
 
@@ -52,20 +52,20 @@ fn place(
     let SourceText { text, origin, .. } = &sources[0];
     let line = text.as_bytes()[..at.start.min(text.len())].iter().filter(|&&b| b == b'\n').count();
     let place = StagePlace::new(origin.as_str(), line + 1).knowing(registry.formats());
-    let (limits, keys) = match registry.is_limited(kind) {
+    let (limits, own) = match registry.is_limited(kind) {
         true => split_limits(&stage.keys),
         false => {
             (Node { value: NodeValue::Table(Vec::new()), ..stage.keys.clone() }, stage.keys.clone())
         }
     };
-    let Some(built) = registry.build(kind, &keys, &place) else {
+    let Some(built) = registry.build(kind, &own, &place) else {
         let kinds = registry.kinds().map(|(kind, _)| kind);
         let told = format!("there is no stage `{kind}`");
         return Err(vec![Mistake::word(at.clone(), told, kind, "stages", kinds)]);
     };
     let given = limits.entries();
     let read = keys::read::<LimitKeys>(kind, &limits, &[]);
-    let (role, mut canonical) = match (built, read.is_ok()) {
+    let BuiltStage { role, mut keys, given: mut all } = match (built, read.is_ok()) {
         (Ok(built), true) => built,
         (built, _) => {
             return Err(built.err().into_iter().chain(read.err()).flatten().collect());
@@ -76,9 +76,11 @@ fn place(
     if !wrong.is_empty() {
         return Err(wrong);
     }
-    if let (false, Some(keys)) = (given.is_empty(), canonical.as_object_mut()) {
+    if !given.is_empty() {
         let told = serde_json::to_value(&limits).unwrap_or_default();
-        keys.extend(told.as_object().cloned().unwrap_or_default());
+        let told = told.as_object().cloned().unwrap_or_default();
+        let tables = [Some(&mut keys), all.as_mut()].into_iter().flatten();
+        tables.filter_map(|keys| keys.as_object_mut()).for_each(|keys| keys.extend(told.clone()));
     }
     let text = |part: &Option<PlacedWord>| part.as_ref().map(|(text, _)| text.clone());
     Ok(GraphStage {
@@ -87,9 +89,10 @@ fn place(
         from: Vec::new(),
         line: Some(place.line()),
         written: Arc::new(WrittenText::new(sources, &stage.keys)),
-        limits: limits.limits(),
+        limits: Limits::of(limits),
         role,
-        keys: canonical,
+        keys,
+        given: all,
     })
 }
 

@@ -1,11 +1,12 @@
 //! The stage `assign`: dimensions of records get the values of expressions.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::expression::{Assignment, KeyExpression, OneOrSeveral};
 use crate::point::PointBatch;
 use crate::report::Tally;
-use crate::stage::{Needs, Role, StageKind, StagePlace, Transform};
+use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform};
 use crate::{Error, Result};
 
 /// Gives dimensions of the records the values of expressions.
@@ -19,7 +20,7 @@ use crate::{Error, Result};
 /// that a dimension cannot hold ends the run. Coordinates are not assigned: a stage `transform`
 /// moves points. Stages that work on tiles see classes and other dimensions as they are when the
 /// points are read: an `assign` that one of them is to see stands above all of them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Assign {
     /// What is assigned: "NAME = EXPRESSION", or a list of such texts.
@@ -28,6 +29,7 @@ pub struct Assign {
 
 impl StageKind for Assign {
     const KIND: &'static str = "assign";
+    const ROLE: RoleName = RoleName::Transform;
     const ABOUT: &'static str = "Gives dimensions of the records the values of expressions.";
     const MAIN: Option<&'static str> = Some("set");
 

@@ -21,7 +21,7 @@ use crate::geom::lattice::Lattice;
 use crate::point::{NORMAL, Units, names};
 use crate::quantity::{Length, Setting};
 use crate::report::Tally;
-use crate::stage::{Forecast, Needs, Role, ScanFacts, StageKind, StagePlace, TileOp};
+use crate::stage::{Forecast, Needs, Role, RoleName, ScanFacts, StageKind, StagePlace, TileOp};
 use crate::tile::Tile;
 
 use division::{Division, DivisionCounts};
@@ -39,6 +39,7 @@ const SORTING_BYTES: usize = 32;
 
 impl StageKind for Cells {
     const KIND: &'static str = "cells";
+    const ROLE: RoleName = RoleName::OnTiles;
     const ABOUT: &'static str = "Divides the scan into cells whose normals agree.";
     const EITHER: &'static [&'static str] = &["keep", "max_angle"];
 

@@ -1,11 +1,12 @@
 //! The stage `drop`: records of some classes or flags, or for which a condition holds, go.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::expression::{Choice, Condition, KeyExpression};
 use crate::point::{Flag, PointBatch, Schema, Selection};
 use crate::report::Tally;
-use crate::stage::{Needs, Role, StageKind, StagePlace, Transform};
+use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform};
 use crate::{Error, Result};
 
 /// Removes the records of some classes or flags, or for which a condition holds.
@@ -14,7 +15,7 @@ use crate::{Error, Result};
 /// `classes = [7, 18]` removes what is classified as noise. What stays is what a stage `filter`
 /// with the opposite condition keeps. A scan that has no such class or flag has nothing to remove,
 /// which the run says.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Drop {
     /// A condition that holds for the records that go, such as "Intensity < 40".
@@ -39,6 +40,7 @@ impl Drop {
 
 impl StageKind for Drop {
     const KIND: &'static str = "drop";
+    const ROLE: RoleName = RoleName::Transform;
     const ABOUT: &'static str =
         "Removes the records of some classes or flags, or for which a condition holds.";
     const IS_LIMITED: bool = false;

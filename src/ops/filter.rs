@@ -1,11 +1,12 @@
 //! The stage `filter`: records of some classes or flags stay, all others go. Knows no neighbours.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::expression::{Choice, Condition, KeyExpression};
 use crate::point::{Flag, PointBatch, Schema, Selection, names};
 use crate::report::Tally;
-use crate::stage::{Needs, Role, StageKind, StagePlace, Transform};
+use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform};
 use crate::{Error, Result};
 
 /// Keeps the records for which a condition holds, or of some classes and flags, and removes all
@@ -21,7 +22,7 @@ use crate::{Error, Result};
 /// condition may name these, too: `where = "NormalZ > 0.9"`. To limit one stage to some records and
 /// let the others pass, give that stage `where`, `classes`, `with` or `without` instead; to name
 /// what goes instead of what stays, use `drop`.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Filter {
     /// A condition that holds for the records that stay, such as "Intensity > 40".
@@ -65,6 +66,7 @@ impl Filter {
 
 impl StageKind for Filter {
     const KIND: &'static str = "filter";
+    const ROLE: RoleName = RoleName::Transform;
     const ABOUT: &'static str =
         "Keeps the records for which a condition holds, or of some classes and flags.";
     const IS_LIMITED: bool = false;

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -13,7 +14,7 @@ use crate::geom::plane::{Covariance, smallest};
 use crate::point::{Bounds, NORMAL, Position, Units, distance2, names};
 use crate::quantity::Length;
 use crate::report::Tally;
-use crate::stage::{Needs, Role, ScanFacts, StageKind, StagePlace, TileOp};
+use crate::stage::{Needs, Role, RoleName, ScanFacts, StageKind, StagePlace, TileOp};
 use crate::tile::Tile;
 use crate::{Error, Result};
 
@@ -39,7 +40,7 @@ const FEWEST: usize = 4;
 /// `normals` with the normal of that point; else with that of the least-squares plane of the cube's
 /// positions, where there are four or more that are not on one line. What is in other cubes is not
 /// measured, and the report counts what is.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Grid {
     /// Side of the cubes, a length above 0; rounded to whole lattice steps.
@@ -52,7 +53,7 @@ pub struct Grid {
 }
 
 /// Which position of a cube stays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Pick {
@@ -86,6 +87,7 @@ impl Grid {
 
 impl StageKind for Grid {
     const KIND: &'static str = "grid";
+    const ROLE: RoleName = RoleName::OnTiles;
     const ABOUT: &'static str = "Keeps one point of every cube of a uniform grid.";
 
     fn build(self, _: &StagePlace) -> Result<Role> {

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::removal::{RemovalAccount, keep_once, represent};
@@ -10,7 +11,7 @@ use crate::geom::wide::Wide;
 use crate::point::{Mark, NORMAL, Position};
 use crate::quantity::Whole;
 use crate::report::Tally;
-use crate::stage::{Needs, Role, StageKind, StagePlace, TileOp};
+use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, TileOp};
 use crate::tile::{Partition, Tile};
 use crate::{Error, Result};
 
@@ -34,12 +35,13 @@ pub const MAX_PASSES: usize = 16;
 /// key-point flag of those that stay and clears it of the others, `"withheld"` sets the withheld
 /// flag of the others, 7 and 18 make that their class. The report counts the others as
 /// `median_marked`, and those that got the key-point flag as `key_points`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Median {
     /// How often the stages from the last `normals` to this one are applied (the paper's degree of
     /// reduction), 1 to 16.
     #[serde(deserialize_with = "checked_passes")]
+    #[schemars(with = "Whole<1, { MAX_PASSES as u64 }>")]
     pub passes: usize,
     /// How records are marked, instead of removing any.
     pub mark: Option<Mark>,
@@ -73,6 +75,7 @@ fn checked_passes<'de, D: Deserializer<'de>>(from: D) -> Result<usize, D::Error>
 
 impl StageKind for Median {
     const KIND: &'static str = "median";
+    const ROLE: RoleName = RoleName::OnTiles;
     const ABOUT: &'static str = "Keeps the median point of every cell.";
 
     fn build(self, at: &StagePlace) -> Result<Role> {

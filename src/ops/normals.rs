@@ -7,6 +7,7 @@ mod fan;
 mod noise;
 mod orient;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::scatter::{scatter, typical};
@@ -14,7 +15,7 @@ use crate::geom::angle::is_known;
 use crate::point::{NORMAL, names};
 use crate::quantity::{Setting, Whole};
 use crate::report::Tally;
-use crate::stage::{Forecast, Needs, Role, ScanFacts, StageKind, StagePlace, TileOp};
+use crate::stage::{Forecast, Needs, Role, RoleName, ScanFacts, StageKind, StagePlace, TileOp};
 use crate::tile::Tile;
 use crate::{Error, Result};
 
@@ -41,13 +42,14 @@ const MAX_NEIGHBORS: usize = 64;
 /// With `neighbors = "auto"` it looks at a sample of the scan first: `scatter_of_10` of the report
 /// is how far, in radians, normals of 10 neighbours are off their linear trend where the scan is
 /// planar, which is what noise does. Up to 0.01 it takes 10 neighbours, beyond 20.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Normals {
     /// How many nearest other positions the fit uses (k), besides the position itself; 3 to 64, or
     /// `"auto"`, by the noise. The paper finds 6 to 20 useful and 10 best; more smooth noise and
     /// edges.
     #[serde(deserialize_with = "checked_neighbors")]
+    #[schemars(with = "Setting<Whole<{ MIN_NEIGHBORS as u64 }, { MAX_NEIGHBORS as u64 }>>")]
     pub neighbors: Setting<usize>,
     /// How a normal is estimated.
     pub method: Method,
@@ -118,6 +120,7 @@ impl Normals {
 
 impl StageKind for Normals {
     const KIND: &'static str = "normals";
+    const ROLE: RoleName = RoleName::OnTiles;
     const ABOUT: &'static str =
         "Computes a surface normal at every point from its nearest neighbours.";
 

@@ -4,12 +4,13 @@ mod neighbors;
 mod radius;
 mod statistical;
 
+use schemars::JsonSchema;
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
 
 use crate::point::Mark;
 use crate::quantity::Length;
-use crate::stage::{Role, StageKind, StagePlace};
+use crate::stage::{Role, RoleName, StageKind, StagePlace};
 use crate::{Error, Result};
 
 pub use radius::RadiusOutliers;
@@ -40,25 +41,28 @@ const MULTIPLIER: f64 = 2.0;
 /// withheld flag of outliers, 7 and 18 (low and high noise) make that their class, `"key-point"`
 /// sets the key-point flag of all others and clears that of outliers. The report counts the records
 /// as `outliers_marked`.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Outliers {
     /// What an outlier is.
     pub method: OutlierMethod,
     /// Of statistical: how many nearest other positions the mean distance is taken to, 1 to 64.
+    #[schemars(range(min = 1, max = 64))]
     pub neighbors: Option<usize>,
     /// Of statistical: how many σ above the mean are still no outlier, 0 or more.
+    #[schemars(range(min = 0))]
     pub multiplier: Option<f64>,
     /// Of radius, and required there: how far to look.
     pub radius: Option<Length>,
     /// Of radius, and required there: so many other positions make a point none, 1 to 64.
+    #[schemars(range(min = 1, max = 64))]
     pub min_neighbors: Option<usize>,
     /// How records are marked, instead of removing any.
     pub mark: Option<Mark>,
 }
 
 /// What an outlier is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum OutlierMethod {
@@ -130,6 +134,7 @@ impl Serialize for Outliers {
 
 impl StageKind for Outliers {
     const KIND: &'static str = "outliers";
+    const ROLE: RoleName = RoleName::OnTiles;
     const ABOUT: &'static str = "Removes points that are far from all others.";
 
     fn build(self, at: &StagePlace) -> Result<Role> {

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::expression::{KeyExpression, NamedField};
 use crate::point::{PointBatch, Schema, names};
 use crate::report::{StatsTally, StoredNumbers, Tally};
-use crate::stage::{Needs, Role, StageKind, StagePlace, Transform};
+use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform};
 use crate::{Error, Result};
 
 /// Tells what the numbers of dimensions come to: smallest, largest, mean, standard deviation and a
@@ -17,7 +18,7 @@ use crate::{Error, Result};
 /// has none), and are the same to the last bit however the points come. A histogram has up to 256
 /// bins, as wide as the smallest power of two that does; of whole numbers that few values have, it
 /// is the count of each value. Columns that stages above compute are dimensions, too.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Stats {
     /// The dimensions, such as ["Z", "Intensity"]; none: all that the records have.
@@ -28,6 +29,7 @@ pub struct Stats {
 
 impl StageKind for Stats {
     const KIND: &'static str = "stats";
+    const ROLE: RoleName = RoleName::Transform;
     const ABOUT: &'static str = "Tells what the numbers of dimensions come to, for the report.";
 
     fn build(self, at: &StagePlace) -> Result<Role> {

@@ -2,6 +2,7 @@
 //! divided.
 
 use std::num::NonZeroUsize;
+use std::path::PathBuf;
 
 use rayon::ThreadPool;
 
@@ -100,18 +101,31 @@ impl Graph {
         let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
         let mut sorted = Sorted::new(self)?;
         let open = &*sorted.source.1;
-        check_places(file.as_deref(), &open.paths(), &sorted.sinks, &settings)?;
-        let source = open.open()?;
+        let places = |read: &[PathBuf], sinks: &[Box<dyn CreateSink>]| {
+            check_places(file.as_deref(), read, sinks, &settings)
+        };
+        let (_, mut wrong) = places(&open.paths(), &sorted.sinks);
+        let source = match open.open() {
+            Ok(source) => source,
+            Err(error) => {
+                wrong.push(error);
+                return Err(Error::several(wrong));
+            }
+        };
+        let schema = source.schema();
+        let units = source.metadata().units;
+        wrong.extend(check_limits(&sorted, schema));
+        wrong.extend(check_transforms(&sorted, schema).into_iter().map(in_file));
+        wrong.extend(fit(&mut sorted.ops, &units));
+        let choices = number_selections(&mut sorted.ops)?;
+        let passes = unroll(&sorted, schema, &mut wrong)?;
+        Error::all(wrong)?;
         let read = all_read(open, &*source);
-        let mut files = check_places(file.as_deref(), &read, &sorted.sinks, &settings)?;
+        let (mut files, wrong) = places(&read, &sorted.sinks);
+        Error::all(wrong)?;
         let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;
         let beside = copies(&*source, &sorted.sinks, &each, &settings, &mut files)?;
-        let schema = source.schema();
-        check_limits(&sorted, schema)?;
-        check_transforms(&sorted, schema).map_err(in_file)?;
-        let selections = fit(&mut sorted.ops, &source.metadata().units)?;
-        let passes = unroll(&sorted, schema)?;
-        let tagger = tagger(&sorted.ops, &passes.passes, &selections, &ranks, &*source, &settings)?;
+        let tagger = tagger(&sorted.ops, &passes.passes, &choices, &ranks, &*source, &settings)?;
         let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, &*source, &sorted.ops, order.mills)?;
         let simd = settings.simd.resolve().map_err(in_file)?;
@@ -153,11 +167,9 @@ impl Graph {
     }
 }
 
-/// Fits tile stages to the units of the scan: lengths with a unit of their own are
-/// converted. Returns what records the stages are limited to.
-fn fit(ops: &mut [StageOp], units: &Units) -> Result<Vec<Choice>> {
-    ops.iter_mut().try_for_each(|stage| stage.op.tile_mut().convert(units))?;
-    number_selections(ops)
+/// Fits tile stages to the units of the scan: lengths with a unit of their own are converted.
+fn fit(ops: &mut [StageOp], units: &Units) -> Vec<Error> {
+    ops.iter_mut().filter_map(|stage| stage.op.tile_mut().convert(units).err()).collect()
 }
 
 /// What tells records apart as they are decoded.
@@ -274,19 +286,20 @@ fn check_lengths(ops: &[StageOp], lattice: &Lattice) -> Result<()> {
     }
 }
 
-fn check_transforms(sorted: &Sorted, schema: &Schema) -> Result<()> {
+fn check_transforms(sorted: &Sorted, schema: &Schema) -> Vec<Error> {
     let mut written: Vec<String> = Vec::new();
+    let mut wrong = Vec::new();
     for StreamOp { kind, transform, .. } in sorted.transforms.iter().chain(&sorted.filters) {
         let needs = transform.needs();
         let there = |name: &&String| schema.find(name).is_some() || written.contains(name);
         if let Some(missing) = needs.dimensions.iter().find(|name| !there(name)) {
             let told = format!("`{kind}` needs {missing}, which nothing before it gives");
-            return Err(Error::pipeline(told).help("the input has no such dimension"));
+            wrong.push(Error::pipeline(told).help("the input has no such dimension"));
         }
-        transform.check(schema)?;
+        wrong.extend(transform.check(schema).err());
         written.extend(needs.changes);
     }
-    Ok(())
+    wrong
 }
 
 /// What outputs will not hold. Records that they cannot hold are an error where all are written,
@@ -332,11 +345,15 @@ fn chunks(
     computed: &[Vec<ComputedDimension>],
     source: &dyn Source,
 ) -> Result<Vec<ChunkSize>> {
-    let each = sinks.iter().zip(computed).map(|(sink, computed)| {
+    let (mut chunks, mut wrong) = (Vec::new(), Vec::new());
+    for (sink, computed) in sinks.iter().zip(computed) {
         let metadata = Metadata { computed: computed.clone(), ..source.metadata().clone() };
-        sink.chunk(source.schema(), &metadata)
-    });
-    each.collect()
+        match sink.chunk(source.schema(), &metadata) {
+            Ok(chunk) => chunks.push(chunk),
+            Err(error) => wrong.push(error),
+        }
+    }
+    Error::all(wrong).map(|()| chunks)
 }
 
 /// What z is multiplied by where stages measure distances; else 1.

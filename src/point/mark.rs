@@ -1,5 +1,8 @@
 //! What a stage writes into a record instead of removing it.
 
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, de};
 
 use super::names;
@@ -84,6 +87,16 @@ impl<'de> Deserialize<'de> for Mark {
             }
         }
         from.deserialize_any(Marks)
+    }
+}
+
+impl JsonSchema for Mark {
+    fn schema_name() -> Cow<'static, str> {
+        "Mark".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> schemars::Schema {
+        json_schema!({ "enum": ["key-point", "withheld", 7, 18] })
     }
 }
 

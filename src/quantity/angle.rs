@@ -116,3 +116,11 @@ impl Visitor<'_> for AngleVisitor {
         Angle::read(text).ok_or_else(|| E::invalid_value(Unexpected::Str(text), &self))
     }
 }
+
+super::has_schema!(Angle, "Angle", {
+    "title": "an angle (radians, or such as `\"6deg\"`)",
+    "anyOf": [
+        { "type": "number", "minimum": 0, "maximum": PI },
+        { "type": "string", "pattern": r"^\s*[-+.0-9eE]+\s*(deg|°|rad)$" },
+    ],
+});

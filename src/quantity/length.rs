@@ -195,6 +195,14 @@ impl Visitor<'_> for LengthVisitor {
     }
 }
 
+super::has_schema!(Length, "Length", {
+    "title": "a length (a number in the scan's unit, or such as `\"2m\"`)",
+    "anyOf": [
+        { "type": "number", "exclusiveMinimum": 0 },
+        { "type": "string", "pattern": r"^\s*[-+.0-9eE]+\s*(mm|cm|km|in|us-ft|ft|m)$" },
+    ],
+});
+
 #[cfg(test)]
 mod tests {
     use super::*;

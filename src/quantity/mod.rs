@@ -5,6 +5,7 @@ mod angle;
 mod count;
 mod figure;
 mod length;
+mod schema;
 mod setting;
 mod whole;
 
@@ -12,5 +13,6 @@ pub use angle::Angle;
 pub use count::parse_count;
 pub(crate) use figure::Figure;
 pub use length::Length;
+pub(crate) use schema::{COUNT_TEXT, OrNone, has_schema};
 pub use setting::Setting;
 pub(crate) use whole::Whole;

@@ -1,13 +1,17 @@
 //! A value that is given, or found in the scan.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
 
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::value::{
     BoolDeserializer, F64Deserializer, I64Deserializer, StrDeserializer, U64Deserializer,
 };
 use serde::de::{Deserializer, Error, IntoDeserializer, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
+
+use super::schema::or_word;
 
 /// A value that is given, or `"auto"`: found in the scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,6 +65,16 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Setting<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let read = deserializer.deserialize_any(SettingVisitor { none: false, of: PhantomData })?;
         read.ok_or_else(|| D::Error::custom("there is no value"))
+    }
+}
+
+impl<T: JsonSchema> JsonSchema for Setting<T> {
+    fn schema_name() -> Cow<'static, str> {
+        format!("Setting_{}", T::schema_name()).into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        or_word(generator.subschema_for::<T>(), "auto")
     }
 }
 

@@ -5,10 +5,12 @@
 //! for each input, errors that name the file) is not a format's to do: `read` and `write` do it for
 //! all of them.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use schemars::{JsonSchema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use super::sink::{ChunkSize, Sink};
@@ -225,7 +227,7 @@ impl WriteKeys {
 }
 
 /// Encoding of a PLY file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum OutputEncoding {
@@ -236,7 +238,7 @@ pub enum OutputEncoding {
 }
 
 /// How many bits the colours of LAS records have in a PLY file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[non_exhaustive]
 pub enum Colors {
     /// 8 where that loses nothing, else 16.
@@ -254,6 +256,22 @@ pub enum Colors {
 /// The name of a registered format, as a key of a stage takes it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FormatName(pub String);
+
+impl JsonSchema for FormatName {
+    fn schema_name() -> Cow<'static, str> {
+        "FormatName".into()
+    }
+
+    /// Which names there are is for the registry to say.
+    fn json_schema(_: &mut SchemaGenerator) -> schemars::Schema {
+        json_schema!({ "type": "string", "format": FormatName::SCHEMA })
+    }
+}
+
+impl FormatName {
+    /// What the `format` of its schema is.
+    pub(crate) const SCHEMA: &'static str = "name-of-a-format";
+}
 
 /// The formats that are registered, in the order in which they were. Cloning it copies no format.
 #[derive(Clone, Default)]

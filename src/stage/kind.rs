@@ -2,20 +2,30 @@
 
 use std::cell::RefCell;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::Role;
 use super::format::Formats;
+use super::{Role, RoleName};
 use crate::{Error, Result};
 
 /// What a `[[stage]]` of a pipeline file may be. The struct's fields are the stage's keys.
 ///
 /// Keys that are no field are refused whatever the struct says; a field without a serde default is
 /// a key that must be given. `flatten` and `untagged` hide keys and places and are not supported.
-pub trait StageKind: DeserializeOwned + Serialize {
+///
+/// The doc comments are its manual page, which the command `stages` prints and editors show: that
+/// of the struct up to its first example, those of the fields and, where a field is an enum, those
+/// of its variants. A field whose type reads its value itself says what it takes by
+/// `#[schemars(...)]`; the `title` of its schema is what that is in words.
+pub trait StageKind: DeserializeOwned + Serialize + JsonSchema {
     /// Its name in a file: one plain word, or two with a hyphen.
     const KIND: &'static str;
+
+    /// The role that [`build`](StageKind::build) puts it in, which decides which keys it takes
+    /// besides its own.
+    const ROLE: RoleName;
 
     /// What it does, in one sentence.
     const ABOUT: &'static str;

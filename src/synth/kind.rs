@@ -1,15 +1,16 @@
 //! The stage `synth`.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de};
 
 use super::scene::Scene;
 use super::synthetic::Synthetic;
 use crate::Result;
-use crate::stage::{Role, StageKind, StagePlace};
+use crate::stage::{Role, RoleName, StageKind, StagePlace};
 
 /// A source that needs no file: for trying, for tests, and to see what a setting does where the
 /// truth is known. It streams at any size, and equal keys give equal bytes on every machine.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Synth {
     /// What is scanned.
@@ -21,11 +22,13 @@ pub struct Synth {
     pub seed: u64,
     /// Standard deviation of the noise in world units; none: the scene's own.
     #[serde(default, deserialize_with = "some_length")]
+    #[schemars(range(min = 0))]
     pub noise: Option<f64>,
 }
 
 impl StageKind for Synth {
     const KIND: &'static str = "synth";
+    const ROLE: RoleName = RoleName::Source;
     const ABOUT: &'static str = "Makes a synthetic scan: of a simple surface, a machine part, \
                                  projected squares or a landscape.";
     const MAIN: Option<&'static str> = Some("scene");

@@ -90,11 +90,9 @@ fn stages_lists_what_the_registry_has_and_the_keys_of_each() {
         }
     }
     let cells = done(at.path(), &["stages", "cells"]);
-    assert!(
-        cells.contains(
-            "\n  max_angle = radians, text such as \"6deg\", or \"auto\" [default: 0.1]\n"
-        )
-    );
+    assert!(cells.contains(
+        "\n  max_angle = an angle (radians, or such as \"6deg\") or \"auto\" [default: 0.1]\n"
+    ));
     let run = all.as_array().unwrap().iter().find(|d| d["kind"] == "run").unwrap();
     assert!(run["keys"].as_array().unwrap().len() >= 8);
     let _all_optional: RunSettings = toml::from_str("").unwrap();

@@ -16,15 +16,15 @@ fn page(name: &str) -> String {
 
 /// The kinds of stages, their keys, and the words that these can be given.
 fn vocabulary() -> BTreeSet<String> {
-    let all: serde_json::Value = serde_json::from_str(&page("src/cli/stages.json")).unwrap();
+    let registry = Registry::builtin();
+    let kinds = registry.kinds().filter_map(|(kind, _)| registry.describe(kind));
     let mut words = BTreeSet::new();
-    for described in all.as_array().unwrap() {
-        words.insert(described["kind"].as_str().unwrap().to_owned());
-        for key in described["keys"].as_array().unwrap() {
-            words.insert(key["key"].as_str().unwrap().to_owned());
-            let of_key = key["words"].as_array().unwrap().iter();
-            words.extend(of_key.map(|word| word["word"].as_str().unwrap().to_owned()));
+    for described in kinds.chain([registry.describe_run()]) {
+        for key in described.all_keys() {
+            words.insert(key.name.clone());
+            words.extend(key.words.iter().map(|word| word.word.clone()));
         }
+        words.insert(described.name);
     }
     assert!(words.len() > 50, "{words:?}");
     words

@@ -9,10 +9,11 @@ use std::path::Path;
 use pointmill::internals::morton_cmp;
 use pointmill::point::{Column, Dimension, Position, distance2, names};
 use pointmill::report::Tally;
-use pointmill::stage::{Needs, Role, StageKind, StagePlace, TileOp};
+use pointmill::stage::{Needs, Role, RoleName, StageKind, StagePlace, TileOp};
 use pointmill::synth::Scene;
 use pointmill::tile::Tile;
 use pointmill::{Done, Graph, Overrides, Quiet, Registry, Result};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::support::scan::Scan;
@@ -31,11 +32,12 @@ const GLOW: Column<u32> = Column::new("Glow", &[]);
 /// Defines a stage without keys.
 macro_rules! stage {
     ($name:ident, $kind:literal, $needs:expr, |$tile:ident| $run:block) => {
-        #[derive(Debug, Serialize, Deserialize)]
+        #[derive(Debug, Serialize, Deserialize, JsonSchema)]
         struct $name {}
 
         impl StageKind for $name {
             const KIND: &'static str = $kind;
+            const ROLE: RoleName = RoleName::OnTiles;
             const ABOUT: &'static str = "Computes a column.";
 
             fn build(self, _: &StagePlace) -> Result<Role> {

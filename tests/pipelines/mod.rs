@@ -1,5 +1,6 @@
 //! Pipeline files: their text, values, and the files that they name.
 
+mod builder;
 mod formats;
 mod inputs;
 mod json;

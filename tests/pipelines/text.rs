@@ -7,15 +7,16 @@ use pointmill::io::Write;
 use pointmill::io::las::{LAS, LAZ};
 use pointmill::io::ply::PLY;
 use pointmill::report::Tally;
-use pointmill::stage::{Needs, Role, StageKind, StagePlace, TileOp};
+use pointmill::stage::{Needs, Role, RoleName, StageKind, StagePlace, TileOp};
 use pointmill::synth::Synth;
 use pointmill::tile::Tile;
 use pointmill::{Error, ErrorKind, Result};
 use pointmill::{Graph, Overrides, Registry, Set};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A tile stage with a key of every sort.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct Thin {
     #[serde(default)]
     angle: f64,
@@ -27,7 +28,7 @@ struct Thin {
     names: Vec<String>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 enum Pick {
     Center,
@@ -37,6 +38,7 @@ enum Pick {
 
 impl StageKind for Thin {
     const KIND: &'static str = "thin";
+    const ROLE: RoleName = RoleName::OnTiles;
     const ABOUT: &'static str = "Thins.";
 
     fn build(self, at: &StagePlace) -> Result<Role> {
@@ -524,11 +526,12 @@ fn a_pipeline_file_is_named_when_it_cannot_be_read() {
 /// A tile stage that removes points by their neighbours, and one that does so by cubes alone.
 macro_rules! removing {
     ($stage:ident, $kind:literal, $neighbors:literal) => {
-        #[derive(Serialize, Deserialize)]
+        #[derive(Serialize, Deserialize, JsonSchema)]
         struct $stage {}
 
         impl StageKind for $stage {
             const KIND: &'static str = $kind;
+            const ROLE: RoleName = RoleName::OnTiles;
             const ABOUT: &'static str = "Removes.";
 
             fn build(self, _: &StagePlace) -> Result<Role> {
@@ -577,13 +580,14 @@ fn a_neighbourhood_after_any_removal_is_a_second_pass() {
 }
 
 /// A tile stage that reads a dimension of the records.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct Bright {
     dimension: String,
 }
 
 impl StageKind for Bright {
     const KIND: &'static str = "bright";
+    const ROLE: RoleName = RoleName::OnTiles;
     const ABOUT: &'static str = "Reads a dimension.";
 
     fn build(self, _: &StagePlace) -> Result<Role> {

@@ -5,6 +5,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use pointmill::{Registry, TableDescription};
+
 fn sources(folder: &Path, into: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -37,18 +39,15 @@ fn texts() -> Vec<(String, String)> {
     lines
 }
 
-/// The settings that `stages --json` lists, as `--set` takes them.
+/// The settings that there are, as `--set` takes them.
 fn settings() -> BTreeSet<String> {
-    let json = include_str!("../../src/cli/stages.json");
-    let all: serde_json::Value = serde_json::from_str(json).unwrap();
-    let mut settings = BTreeSet::new();
-    for described in all.as_array().unwrap() {
-        for key in described["keys"].as_array().unwrap() {
-            let (kind, key) = (&described["kind"], &key["key"]);
-            settings.insert(format!("{}.{}", kind.as_str().unwrap(), key.as_str().unwrap()));
-        }
-    }
-    settings
+    let registry = Registry::builtin();
+    let kinds = registry.kinds().filter_map(|(kind, _)| registry.describe(kind));
+    let tables: Vec<_> = kinds.chain([registry.describe_run()]).collect();
+    let of = |table: &TableDescription| -> Vec<String> {
+        table.all_keys().map(|key| format!("{}.{}", table.name, key.name)).collect()
+    };
+    tables.iter().flat_map(of).collect()
 }
 
 #[test]

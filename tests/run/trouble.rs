@@ -8,10 +8,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use pointmill::point::{Column, PointBatch};
 use pointmill::report::Tally;
-use pointmill::stage::{Gathered, Needs, Role, ScanOp, StageKind, StagePlace, TileOp, Transform};
+use pointmill::stage::{
+    Gathered, Needs, Role, RoleName, ScanOp, StageKind, StagePlace, TileOp, Transform,
+};
 use pointmill::tile::Tile;
 use pointmill::{Error, ErrorKind, Result};
 use pointmill::{Overrides, Quiet, Registry, Watch};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::support::case::{Case, REDUCE, execute, execute_with};
@@ -41,16 +44,15 @@ fn what_cannot_be_written_is_refused_before_any_work() {
 }
 
 /// A stage that fails or panics at its n-th call.
-#[derive(Debug, Serialize, Deserialize)]
-struct Trouble {
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+struct Trouble<const TILES: bool> {
     after: u64,
     panics: bool,
-    tiles: bool,
     #[serde(skip)]
     calls: Arc<AtomicU64>,
 }
 
-impl Trouble {
+impl<const TILES: bool> Trouble<TILES> {
     fn meet(&self) -> Result<()> {
         match self.calls.fetch_add(1, Ordering::Relaxed) == self.after {
             // Unlike `panic!`, says nothing on stderr.
@@ -61,16 +63,17 @@ impl Trouble {
     }
 }
 
-impl StageKind for Trouble {
-    const KIND: &'static str = "trouble";
+impl<const TILES: bool> StageKind for Trouble<TILES> {
+    const KIND: &'static str = if TILES { "tile-trouble" } else { "stream-trouble" };
+    const ROLE: RoleName = if TILES { RoleName::OnTiles } else { RoleName::Transform };
     const ABOUT: &'static str = "Fails.";
 
     fn build(self, _at: &StagePlace) -> Result<Role> {
-        Ok(if self.tiles { Role::TileOp(Box::new(self)) } else { Role::Transform(Box::new(self)) })
+        Ok(if TILES { Role::TileOp(Box::new(self)) } else { Role::Transform(Box::new(self)) })
     }
 }
 
-impl Transform for Trouble {
+impl<const TILES: bool> Transform for Trouble<TILES> {
     fn needs(&self) -> Needs {
         Needs::default()
     }
@@ -79,7 +82,7 @@ impl Transform for Trouble {
     }
 }
 
-impl TileOp for Trouble {
+impl<const TILES: bool> TileOp for Trouble<TILES> {
     fn needs(&self) -> Needs {
         Needs::default()
     }
@@ -96,18 +99,20 @@ fn trouble_in_a_stage_ends_the_run_and_leaves_nothing_behind() {
     case.ply(&points);
     fs::write(case.path("out.ply"), "old").unwrap();
     for threads in [1, 3] {
-        for (tiles, order) in [(false, "input"), (false, "canonical"), (true, "canonical")] {
+        for (trouble, order) in
+            [("stream", "input"), ("stream", "canonical"), ("tile", "canonical")]
+        {
             for (panics, kind) in [(false, ErrorKind::Data), (true, ErrorKind::Internal)] {
                 let stage = format!(
-                    "[[stage]]\nkind = 'trouble'\nafter = 4\npanics = {panics}\ntiles = {tiles}\n"
+                    "[[stage]]\nkind = '{trouble}-trouble'\nafter = 4\npanics = {panics}\n"
                 );
                 let run = format!("threads = {threads}\ntile_points = 3000\nspill = 'always'");
                 let write = format!("order = '{order}'");
                 let text = case.text(&run, &stage, &write);
-                let registry = Registry::builtin().with::<Trouble>();
+                let registry = Registry::builtin().with::<Trouble<true>>().with::<Trouble<false>>();
                 let error = execute_with(&registry, &text, &Overrides::default(), &Quiet);
                 let error = error.unwrap_err();
-                assert_eq!(error.kind(), kind, "{threads} {tiles} {order}: {error}");
+                assert_eq!(error.kind(), kind, "{threads} {trouble} {order}: {error}");
                 assert_eq!(case.left(), ["in.ply", "out.ply"]);
             }
         }
@@ -116,7 +121,7 @@ fn trouble_in_a_stage_ends_the_run_and_leaves_nothing_behind() {
 }
 
 /// A stage of two phases that fails or panics in one of them.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 struct ScanTrouble {
     phase: String,
     panics: bool,
@@ -143,6 +148,7 @@ impl ScanTrouble {
 
 impl StageKind for ScanTrouble {
     const KIND: &'static str = "scan-trouble";
+    const ROLE: RoleName = RoleName::OnTiles;
     const ABOUT: &'static str = "Fails in one of two phases.";
 
     fn build(self, _at: &StagePlace) -> Result<Role> {

@@ -10,20 +10,7 @@ use crate::error::{listed, shown, whereabouts};
 use crate::stage::Formats;
 use crate::{Error, ErrorKind, Result};
 
-/// The files that the paths mean, in their order. For each path:
-///
-/// - a file that exists means itself, whatever characters its name has;
-/// - a folder means every LAS, LAZ and PLY file in it, sorted by the bytes of their names, hidden
-///   ones left out;
-/// - else `*`, `?`, `[…]` and `**` make it a pattern: the files that match, sorted by the bytes of
-///   their paths; one that matches none is an error, like a file that is not there;
-/// - else it is a file that does not exist (yet): opening it will tell.
-///
-/// Names that are not UTF-8 text are refused, however they are meant ([`unreadable`]). A pattern
-/// looks at a million names at most.
-///
-/// Upper and lower case differ, and `*` and `?` do not match a dot at the beginning of a name, as
-/// in a shell. A file meant twice, by whatever names, is an error: its points would be read twice.
+/// The files that the paths mean, in their order, as [`Read`](super::kinds::Read) says.
 pub fn expand<P: AsRef<str>>(paths: &[P], formats: &Formats) -> Result<Vec<PathBuf>> {
     let files = expand_any(paths, formats)?;
     match files.iter().find(|file| file.to_str().is_none()) {

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, de};
 
 use crate::error::{listed, shown};
@@ -24,11 +25,29 @@ use crate::{Error, Result};
 /// for: a text is looked through for such before it is read. `scalar_Intensity` and other scalar
 /// fields, as CloudCompare writes them, are the dimensions that they are named after. A text that
 /// ends within a line is told, since its last number may be cut short.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+///
+/// # What a path means
+///
+/// Paths mean files, in their order. Each path:
+///
+/// - a file that exists means itself, whatever characters its name has;
+/// - a folder means every LAS, LAZ and PLY file in it, sorted by the bytes of their names, hidden
+///   ones left out;
+/// - else `*`, `?`, `[…]` and `**` make it a pattern: the files that match, sorted by the bytes of
+///   their paths; one that matches none is an error, like a file that is not there;
+/// - else it is a file that does not exist (yet): opening it will tell.
+///
+/// Names that are not UTF-8 text are refused, however they are meant. A pattern
+/// looks at a million names at most.
+///
+/// Upper and lower case differ, and `*` and `?` do not match a dot at the beginning of a name, as
+/// in a shell. A file meant twice, by whatever names, is an error: its points would be read twice.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Read {
     /// A file, a pattern, a folder, or a list of them.
     #[serde(deserialize_with = "one_or_more")]
+    #[schemars(schema_with = "texts")]
     pub path: Vec<String>,
     /// Format of all of them; none: as their extensions say, else as their first bytes do.
     #[serde(default)]
@@ -64,14 +83,16 @@ pub struct Read {
 /// records and its offset, holding those of its points that are kept, even if that is none. The
 /// inputs are one scan all the same: neighbourhoods and cells go on from file to file, and the
 /// outputs together have the points that the one file would have.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Write {
     /// The file; it appears under this name when it is complete. Either this or `folder` is given.
     #[serde(default)]
+    #[schemars(title = "a path")]
     pub path: Option<PathBuf>,
     /// The folder that gets a file for each input; it is made if it does not exist.
     #[serde(default)]
+    #[schemars(title = "a path")]
     pub folder: Option<PathBuf>,
     /// The format; none: as the extension says, in a folder that of the input. A file whose
     /// extension says another is written, with a warning.
@@ -82,6 +103,7 @@ pub struct Write {
     pub drop: Vec<String>,
     /// Scale of LAS coordinates per axis, in world units; none: the input's.
     #[serde(default, deserialize_with = "some_scale")]
+    #[schemars(schema_with = "one_or_three")]
     pub scale: Option<[f64; 3]>,
     /// Offset of LAS coordinates per axis, in world units; none: the input's, or 0.
     #[serde(default, deserialize_with = "some_offset")]
@@ -103,7 +125,7 @@ pub struct Write {
 }
 
 /// Order of the records of an output, as a file names it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum OutputOrder {
@@ -184,6 +206,17 @@ pub(super) fn unknown_extension(path: &Path, setting: &str, formats: &Formats) -
         None => Error::pipeline(format!("the extension of `{name}` names no format"))
             .help(format!("name it {dotted}, or give `{setting}`")),
     }
+}
+
+fn texts(_: &mut SchemaGenerator) -> Schema {
+    let text = json_schema!({ "type": "string" });
+    json_schema!({ "anyOf": [text, { "type": "array", "items": text }] })
+}
+
+fn one_or_three(_: &mut SchemaGenerator) -> Schema {
+    let above_0 = json_schema!({ "type": "number", "exclusiveMinimum": 0 });
+    let three = json_schema!({ "type": "array", "items": above_0, "minItems": 3, "maxItems": 3 });
+    json_schema!({ "anyOf": [above_0, three] })
 }
 
 fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {

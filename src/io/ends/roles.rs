@@ -8,7 +8,7 @@ use super::outputs::Outputs;
 use super::{connect, inputs, kinds};
 use crate::error::shown;
 use crate::io::sniff::first_bytes;
-use crate::stage::{Format, Formats, OpenSource, Role, StageKind, StagePlace, WriteKeys};
+use crate::stage::{Format, Formats, OpenSource, Role, RoleName, StageKind, StagePlace, WriteKeys};
 use crate::{Error, Result};
 
 impl Read {
@@ -50,6 +50,7 @@ impl Read {
 
 impl StageKind for Read {
     const KIND: &'static str = "read";
+    const ROLE: RoleName = RoleName::Source;
     const ABOUT: &'static str = "Reads LAS, LAZ or PLY files.";
     const MAIN: Option<&'static str> = Some("path");
     const PLACES: &'static [&'static str] = &["path", "format"];
@@ -61,6 +62,7 @@ impl StageKind for Read {
 
 impl StageKind for Write {
     const KIND: &'static str = "write";
+    const ROLE: RoleName = RoleName::Sink;
     const ABOUT: &'static str = "Writes a LAS, LAZ or PLY file, or one for each input.";
     const MAIN: Option<&'static str> = Some("path");
     const PLACES: &'static [&'static str] = &["path", "folder"];

@@ -2,6 +2,7 @@
 
 use std::num::NonZeroUsize;
 
+use schemars::JsonSchema;
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
 
@@ -12,7 +13,7 @@ use super::settings::{By, Measure, Reference, Side, Split};
 use super::target::Keep;
 use super::threshold::Threshold;
 use crate::geom::angle::MaxAngle;
-use crate::quantity::{Angle, Length, Setting};
+use crate::quantity::{Angle, Length, OrNone, Setting};
 use crate::store::Levels;
 use crate::{Error, Result};
 
@@ -60,7 +61,7 @@ pub(super) const LARGEST_SIDE: i64 = 1 << 62;
 ///
 /// What is "auto" is settled then, by the points alone, and told in the report: a run with the
 /// values found gives the same bytes.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Cells {
     /// Side of the initial cells: a length, rounded to whole lattice steps; or "auto": the smallest
@@ -83,12 +84,14 @@ pub struct Cells {
     pub min_points: NonZeroUsize,
     /// Length beyond which no cell is kept whole; or "none".
     #[serde(deserialize_with = "Length::or_none")]
+    #[schemars(with = "OrNone<Length>")]
     pub max_side: Option<Length>,
     /// Length up to which no cell is divided; or "auto": with `keep` 0.75 sides of a grid that
     /// keeps as many points, without a quarter of `side`, and none to keep more than a third, where
     /// planes have no noise (`normal_scatter` up to 0.01), or where `classes` or flags select some
     /// of the points; or "none".
     #[serde(deserialize_with = "Setting::or_none")]
+    #[schemars(with = "OrNone<Setting<Length>>")]
     pub min_spacing: Option<Setting<Length>>,
     /// What all positions of a cell have in common besides its cube: nothing, or
     /// ["Classification"]. A position has the class of its first record in canonical order.

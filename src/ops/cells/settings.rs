@@ -1,12 +1,14 @@
 //! What a pipeline file may say about cells.
 
+use std::borrow::Cow;
 use std::fmt;
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Deserializer, Error, SeqAccess, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 
 use crate::geom::angle::direction;
-use crate::quantity::Length;
+use crate::quantity::{Length, has_schema};
 
 /// Side of the initial cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +24,7 @@ pub enum Side {
 }
 
 /// How a cell is divided.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
     /// Between the position with the smallest angle and that with the largest: each position goes
@@ -33,7 +35,7 @@ pub enum Split {
 }
 
 /// What the positions of a cell have in common.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[non_exhaustive]
 pub enum By {
     /// Their class: no cell has positions of two, so that a reduction leaves points of each.
@@ -41,7 +43,7 @@ pub enum By {
 }
 
 /// What the range of angles of a cell is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Measure {
     /// θ_max − θ_min of the angles to N (the paper's; blind to rotations about N). The sites of
@@ -95,6 +97,13 @@ impl<'de> Deserialize<'de> for Reference {
     }
 }
 
+has_schema!(Reference, "Reference", {
+    "anyOf": [
+        { "enum": ["x", "y", "z"] },
+        { "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 },
+    ],
+});
+
 struct ReferenceVisitor;
 
 impl<'de> Visitor<'de> for ReferenceVisitor {
@@ -147,6 +156,17 @@ impl Serialize for Side {
 impl<'de> Deserialize<'de> for Side {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(SideVisitor)
+    }
+}
+
+impl JsonSchema for Side {
+    fn schema_name() -> Cow<'static, str> {
+        "Side".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let length = generator.subschema_for::<Length>();
+        json_schema!({ "anyOf": [length, { "enum": ["auto", "spread"] }] })
     }
 }
 

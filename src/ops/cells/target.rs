@@ -5,7 +5,7 @@ use std::fmt;
 use serde::de::{Deserializer, Error, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 
-use crate::quantity::parse_count;
+use crate::quantity::{COUNT_TEXT, has_schema, parse_count};
 
 /// How many records are to stay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,6 +78,20 @@ impl fmt::Display for Percent {
         f.write_str(digits.trim_end_matches('0').trim_end_matches('.'))
     }
 }
+
+has_schema!(Keep, "Keep", {
+    "anyOf": [
+        { "title": "a share such as `\"10%\"`", "type": "string", "pattern": r"^[-+.0-9eE\s]+%$" },
+        {
+            "title": "a number such as `\"250k\"`",
+            "anyOf": [
+                { "type": "integer", "minimum": 1 },
+                { "type": "string", "pattern": COUNT_TEXT },
+            ],
+        },
+        { "const": "auto" },
+    ],
+});
 
 struct KeepVisitor;
 

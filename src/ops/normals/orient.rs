@@ -1,5 +1,6 @@
 //! To which side normals point.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::geom::lattice::Lattice;
@@ -7,7 +8,7 @@ use crate::geom::plane::dot;
 use crate::point::Position;
 
 /// To which side normals point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Orient {
