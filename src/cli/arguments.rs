@@ -23,7 +23,7 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Run a pipeline: a file, or one line
-    Run(RunArguments),
+    Run(PipelineArguments),
     /// Reduce scans to the points that matter
     Reduce(Box<ReduceArguments>),
     /// Convert between LAS, LAZ and PLY
@@ -31,9 +31,9 @@ pub(super) enum Command {
     /// Show what files contain, from their headers
     Info(InfoArguments),
     /// Show how a pipeline would be run, without running it
-    Plan(PlanArguments),
+    Plan(PipelineArguments),
     /// Check a pipeline and tell every mistake; reads its inputs' headers, writes nothing
-    Check(PlanArguments),
+    Check(PipelineArguments),
     /// List the stages that a pipeline can have, with their keys
     Stages(StagesArguments),
     /// Draw scans side by side, from above or from a side
@@ -50,8 +50,7 @@ impl Command {
     /// The pipeline of commands that take one.
     pub fn pipeline(&self) -> Option<&PipelineArguments> {
         match self {
-            Command::Run(run) => Some(&run.pipeline),
-            Command::Plan(plan) | Command::Check(plan) => Some(&plan.pipeline),
+            Command::Run(all) | Command::Plan(all) | Command::Check(all) => Some(all),
             _ => None,
         }
     }
@@ -60,10 +59,10 @@ impl Command {
     pub fn common(&self) -> Option<&CommonArguments> {
         match self {
             Command::Reduce(reduce) => Some(&reduce.common),
-            Command::Run(RunArguments { common, .. })
+            Command::Run(PipelineArguments { common, .. })
+            | Command::Plan(PipelineArguments { common, .. })
+            | Command::Check(PipelineArguments { common, .. })
             | Command::Convert(ConvertArguments { common, .. })
-            | Command::Plan(PlanArguments { common, .. })
-            | Command::Check(PlanArguments { common, .. })
             | Command::Synth(SynthArguments { common, .. }) => Some(common),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => None,
             Command::Completions(_) | Command::Man(_) => None,
@@ -134,20 +133,6 @@ pub(super) struct PipelineArguments {
     /// it has
     #[arg(long = "param", value_name = "NAME=VALUE")]
     pub params: Vec<String>,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct RunArguments {
-    #[command(flatten)]
-    pub pipeline: PipelineArguments,
-    #[command(flatten)]
-    pub common: CommonArguments,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct PlanArguments {
-    #[command(flatten)]
-    pub pipeline: PipelineArguments,
     #[command(flatten)]
     pub common: CommonArguments,
 }

@@ -4,22 +4,18 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::arguments::{CommonArguments, PipelineArguments};
+use super::arguments::PipelineArguments;
 use super::flags::{common_flags, given};
 use crate::graph::Graph;
 use crate::language::{Parameter, PipelineText, Registry, Set};
 use crate::{Error, Result};
 
 /// The graph that the arguments of a command mean.
-pub(super) fn read(
-    arguments: &PipelineArguments,
-    common: &CommonArguments,
-    registry: &Registry,
-) -> Result<Graph> {
+pub(super) fn read(arguments: &PipelineArguments, registry: &Registry) -> Result<Graph> {
     let sets = arguments.sets.iter().map(|set| Set::parse(set));
     let params = arguments.params.iter().map(|param| Set::param(param));
     let sets = sets.chain(params).collect::<Result<Vec<Set>>>()?;
-    let sets = [sets, given([common_flags(common)])].concat();
+    let sets = [sets, given([common_flags(&arguments.common)])].concat();
     text(arguments, registry)?.graph(registry, &sets)
 }
 

@@ -100,6 +100,8 @@ fn the_run_table_has_a_page_that_says_what_the_code_does() {
         }
     }
     let text = page(&run, "The `[run]` table") + "\n## Keys\n\n" + &keys::markdown(&run.keys);
+    let language = include_str!("../../src/language/pipeline.md");
+    let text = format!("{text}\n## The pipeline around it\n\n{language}");
     keep("docs/run.md", &text);
 }
 

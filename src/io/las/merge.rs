@@ -19,16 +19,16 @@ const WHOLE: f64 = 1e-6;
 
 /// Files that are to be read as one scan, taken in one by one: of each only its header is kept, and
 /// of their records the union.
-pub struct Merge {
+pub struct LasMerge {
     /// The first, with its records: the others are compared with it.
     first: LasInput,
     records: UnionRecords,
 }
 
-impl Merge {
+impl LasMerge {
     /// Begins with one file.
     pub fn of(first: LasInput) -> Result<Self> {
-        Ok(Merge { records: UnionRecords::of(&first)?, first })
+        Ok(LasMerge { records: UnionRecords::of(&first)?, first })
     }
 
     /// Adds a file; fails if the two cannot be one.
