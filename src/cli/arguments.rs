@@ -36,6 +36,12 @@ pub(super) enum Command {
     Check(PlanArguments),
     /// List the stages that a pipeline can have, with their keys
     Stages(StagesArguments),
+    /// Draw the graph of a pipeline, without opening its inputs
+    Graph(GraphArguments),
+    /// Write a commented pipeline file for a job, to be changed
+    New(NewArguments),
+    /// Print the JSON Schema of pipeline files, by which editors complete and check them
+    Schema,
     /// Draw scans side by side, from above or from a side
     Picture(PictureArguments),
     /// Make a synthetic scan
@@ -57,6 +63,7 @@ impl Command {
             | Command::Check(PlanArguments { common, .. })
             | Command::Synth(SynthArguments { common, .. }) => Some(common),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => None,
+            Command::Graph(_) | Command::New(_) | Command::Schema => None,
             Command::Completions(_) | Command::Man(_) => None,
         }
     }
@@ -351,6 +358,39 @@ pub(super) struct StagesArguments {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct GraphArguments {
+    /// The pipeline file
+    #[arg(value_name = "PIPELINE")]
+    pub pipeline: PathBuf,
+    /// Put a value in the place of the file's, as in `run`
+    #[arg(long = "set", value_name = "STAGE.KEY=VALUE")]
+    pub sets: Vec<String>,
+    /// What it is drawn as
+    #[arg(long = "as", value_name = "HOW", default_value = "text")]
+    pub drawing: Drawing,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Drawing {
+    /// Lines for a terminal
+    Text,
+    /// A flowchart for web pages
+    Mermaid,
+    /// The language of Graphviz
+    Dot,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct NewArguments {
+    /// The job; without one, the jobs are listed
+    #[arg(value_name = "JOB")]
+    pub job: Option<String>,
+    /// The file, which must not exist [default: JOB.toml]
+    #[arg(short, long, value_name = "FILE", requires = "job")]
+    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

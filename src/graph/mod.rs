@@ -5,6 +5,7 @@
 //! it is whole ([`Graph::mistakes`]): the language tells what is found there with the places in its
 //! text, the plan as an error.
 
+mod drawn;
 pub(crate) mod limits;
 mod settings;
 mod size;
@@ -183,18 +184,6 @@ impl Graph {
             })
         };
         self.stages.iter().map(stage).collect()
-    }
-}
-
-impl fmt::Display for Graph {
-    /// A line a stage: its number, kind and keys, and where it takes from.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (n, GraphStage { kind, from, keys, .. }) in self.stages.iter().enumerate() {
-            let from: Vec<String> = from.iter().map(usize::to_string).collect();
-            let takes = if from.is_empty() { String::new() } else { " <- ".to_owned() };
-            writeln!(f, "{n} {kind} {keys}{takes}{}", from.join(", "))?;
-        }
-        Ok(())
     }
 }
 
