@@ -1,5 +1,6 @@
 //! The one error type: what went wrong, where, and what to do about it.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -214,6 +215,9 @@ impl Error {
     /// All of `errors` as one, which lists them where they are several; fine if there are none.
     pub(crate) fn all(errors: Vec<Error>) -> Result<()> {
         let mut errors = errors;
+        // Stages that share a limit, as those of a command do, share what is wrong with it.
+        let mut told = BTreeSet::new();
+        errors.retain(|error| told.insert(error.to_string()));
         match errors.len() {
             0 => Ok(()),
             1 => Err(errors.remove(0)),

@@ -16,7 +16,7 @@ pub use crate::geom::nearest::Nearest;
 pub use crate::geom::plane;
 pub use crate::geom::simd::Simd;
 pub use crate::geom::star::Star;
-pub use crate::graph::limits::LimitKeys;
+pub use crate::graph::LimitKeys;
 pub use crate::host::Threads;
 pub use crate::host::process::cpu_seconds;
 pub use crate::ops::normals::estimate::{Estimate, Fallback};

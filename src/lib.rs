@@ -75,9 +75,11 @@
 //! - [`stage`]: the roles that a stage can play and what it tells the plan. Implement one to add a
 //!   stage of your own, or [`Format`](stage::Format) to add a format.
 //! - [`io`]: LAS, LAZ and PLY, conversion between their records, and the stages `read` and `write`.
+//! - [`memory`]: points from and into a program's own memory; [`Plan::pull`] gives results as an
+//!   iterator.
 //! - [`synth`]: synthetic scans, and the stage `synth`.
-//! - [`ops`]: the stages that compute or select: `filter`, `outliers`, `normals`, `cells`, `median`
-//!   and `grid`.
+//! - [`ops`]: the stages that compute, select or look: `filter`, `drop`, `assign`, `stats`, `tap`,
+//!   `outliers`, `normals`, `cells`, `median` and `grid`.
 //! - [`picture`]: scans drawn from above or from a side, side by side.
 //! - [`graph`]: what a pipeline is, whoever wrote it: a [`Graph`] of stages.
 //! - [`Registry`]: the kinds and formats that a text may name; [`Set`]: what is put in the place of
@@ -108,6 +110,7 @@ mod host;
 pub mod internals;
 pub mod io;
 mod language;
+pub mod memory;
 pub mod ops;
 pub mod picture;
 mod plan;
@@ -123,5 +126,8 @@ pub mod tile;
 pub use engine::{Done, Quiet, Watch};
 pub use error::{Error, ErrorKind, Result};
 pub use graph::{Graph, Overrides};
-pub use language::{KeyDescription, Registry, Set, TableDescription, WordDescription};
-pub use plan::{Outline, Plan};
+pub use language::{
+    GraphBuilder, KeyDescription, Parameter, ParameterType, PipelineText, Registry, Set,
+    TableDescription, WordDescription,
+};
+pub use plan::{Outline, Plan, Pulled};

@@ -100,6 +100,8 @@ pub trait Transform: Send + Sync {
 pub enum RoleName {
     /// It yields records.
     Source,
+    /// It makes one scan of several sources.
+    Merge,
     /// It streams.
     Transform,
     /// It works on tiles, once or twice.
@@ -120,6 +122,8 @@ pub enum Role {
     ScanOp(Box<dyn AnyScanOp>),
     /// Takes records.
     Sink(Box<dyn CreateSink>),
+    /// Gives what it takes from several stages one name, and does nothing to it.
+    Merge,
 }
 
 impl Role {
@@ -127,6 +131,7 @@ impl Role {
     pub fn name(&self) -> RoleName {
         match self {
             Role::Source(_) => RoleName::Source,
+            Role::Merge => RoleName::Merge,
             Role::Transform(_) => RoleName::Transform,
             Role::TileOp(_) | Role::ScanOp(_) => RoleName::OnTiles,
             Role::Sink(_) => RoleName::Sink,

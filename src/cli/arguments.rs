@@ -22,7 +22,7 @@ pub(super) struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Run a pipeline file
+    /// Run a pipeline: a file, or one line
     Run(RunArguments),
     /// Reduce scans to the points that matter
     Reduce(Box<ReduceArguments>),
@@ -53,6 +53,16 @@ pub(super) enum Command {
 }
 
 impl Command {
+    /// The pipeline of commands that take one.
+    pub fn pipeline(&self) -> Option<&PipelineArguments> {
+        match self {
+            Command::Run(run) => Some(&run.pipeline),
+            Command::Plan(plan) | Command::Check(plan) => Some(&plan.pipeline),
+            Command::Graph(graph) => Some(&graph.pipeline),
+            _ => None,
+        }
+    }
+
     /// What commands that plan or run a pipeline have in common.
     pub fn common(&self) -> Option<&CommonArguments> {
         match self {
@@ -117,27 +127,35 @@ fn parse_threads(text: &str) -> Result<usize, String> {
     within(text, 1, MOST_THREADS as u64).map(|threads| threads as usize)
 }
 
+/// A pipeline, and what is put in the place of its values.
 #[derive(Debug, Args)]
-pub(super) struct RunArguments {
-    /// The pipeline file
+pub(super) struct PipelineArguments {
+    /// The pipeline file, in TOML or JSON; or a pipeline in one line, which has ` ! ` between its
+    /// stages: 'read in.laz ! normals ! write out.ply'
     #[arg(value_name = "PIPELINE")]
-    pub pipeline: PathBuf,
-    /// Put a value in the place of the file's: the stage by its name or kind (KIND.N, from 1, where
-    /// there are several), or `run`
+    pub pipeline: String,
+    /// Put a value in the place of the pipeline's: the stage by its name or kind (KIND.N, from 1,
+    /// where there are several), or `run`
     #[arg(long = "set", value_name = "STAGE.KEY=VALUE")]
     pub sets: Vec<String>,
+    /// Give a parameter of the pipeline a value; `--help` behind a pipeline file lists those that
+    /// it has
+    #[arg(long = "param", value_name = "NAME=VALUE")]
+    pub params: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct RunArguments {
+    #[command(flatten)]
+    pub pipeline: PipelineArguments,
     #[command(flatten)]
     pub common: CommonArguments,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct PlanArguments {
-    /// The pipeline file
-    #[arg(value_name = "PIPELINE")]
-    pub pipeline: PathBuf,
-    /// Put a value in the place of the file's, as in `run`
-    #[arg(long = "set", value_name = "STAGE.KEY=VALUE")]
-    pub sets: Vec<String>,
+    #[command(flatten)]
+    pub pipeline: PipelineArguments,
     #[command(flatten)]
     pub common: CommonArguments,
 }
@@ -362,12 +380,8 @@ pub(super) struct StagesArguments {
 
 #[derive(Debug, Args)]
 pub(super) struct GraphArguments {
-    /// The pipeline file
-    #[arg(value_name = "PIPELINE")]
-    pub pipeline: PathBuf,
-    /// Put a value in the place of the file's, as in `run`
-    #[arg(long = "set", value_name = "STAGE.KEY=VALUE")]
-    pub sets: Vec<String>,
+    #[command(flatten)]
+    pub pipeline: PipelineArguments,
     /// What it is drawn as
     #[arg(long = "as", value_name = "HOW", default_value = "text")]
     pub drawing: Drawing,

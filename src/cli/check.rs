@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use super::arguments::PlanArguments;
 use super::console::Console;
 use super::mistyped::marked;
+use super::pipeline;
 use super::print;
-use super::run::parse_sets;
 use crate::error::shown;
 use crate::graph::Graph;
 use crate::graph::Overrides;
@@ -65,8 +65,7 @@ fn read(arguments: &PlanArguments, registry: &Registry) -> Result<Graph> {
         let told = marked(&format!("{flag}: is for commands that write files"), flag, "");
         return Err(Error::pipeline(told).help("give it to `run`"));
     }
-    let sets = parse_sets(&arguments.sets, &arguments.common)?;
-    Graph::read(&arguments.pipeline, registry, &sets)
+    pipeline::read(&arguments.pipeline, &arguments.common, registry)
 }
 
 fn inputs(pipeline: &Graph) -> Vec<PathBuf> {

@@ -1,15 +1,13 @@
 //! `graph`: a pipeline as a drawing.
 
 use super::arguments::{Drawing, GraphArguments};
-use super::print;
+use super::{pipeline, print};
 use crate::Result;
-use crate::graph::Graph;
-use crate::language::{Registry, Set};
+use crate::language::Registry;
 
-/// Draws the graph of a pipeline file.
+/// Draws the graph of a pipeline.
 pub(super) fn graph(arguments: &GraphArguments, registry: &Registry) -> Result<()> {
-    let sets = arguments.sets.iter().map(|set| Set::parse(set)).collect::<Result<Vec<Set>>>()?;
-    let graph = Graph::read(&arguments.pipeline, registry, &sets)?;
+    let graph = pipeline::read_with(&arguments.pipeline, Vec::new(), registry)?;
     let drawn = match arguments.drawing {
         Drawing::Text => graph.to_string(),
         Drawing::Mermaid => graph.to_mermaid(),

@@ -85,7 +85,10 @@ pub(super) fn told(
         }
         ErrorKind::UnknownArgument => {
             let told = format!("`{}` takes no more arguments", command.get_name());
-            message(&told, &argument, "")
+            let is_line = typed.iter().any(|word| word == "!");
+            let note =
+                if is_line { "put the whole pipeline in quotes: 'read IN ! …'" } else { "" };
+            message(&told, &argument, note)
         }
         ErrorKind::TooManyValues => message(&format!("{name}: takes no value"), &value, ""),
         ErrorKind::InvalidSubcommand => {

@@ -19,6 +19,7 @@ mod interrupt;
 mod jobs;
 mod mistyped;
 mod picture;
+mod pipeline;
 mod preset;
 mod print;
 mod progress;
@@ -32,6 +33,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::FromArgMatches;
+use clap::error::ErrorKind;
 
 use crate::Result;
 use crate::error::shown;
@@ -71,7 +73,11 @@ pub fn run_with(arguments: Vec<OsString>, registry: &Registry) -> u8 {
                 Some(told) => print::message(told),
                 None => print::usage(&told),
             }
-            return if told.use_stderr() { 2 } else { 0 };
+            return match told.kind() {
+                ErrorKind::DisplayHelp => parameters(&known, &given, registry),
+                _ if told.use_stderr() => 2,
+                _ => 0,
+            };
         }
     };
     let console = Console::new(&arguments.command, registry);
@@ -79,6 +85,25 @@ pub fn run_with(arguments: Vec<OsString>, registry: &Registry) -> u8 {
         Ok(()) => 0,
         Err(error) => {
             console.error(&error);
+            exit_number(&error)
+        }
+    }
+}
+
+/// Prints the parameters of the pipeline that help was asked for, if it was for one; returns the
+/// exit code.
+fn parameters(known: &clap::Command, given: &[OsString], registry: &Registry) -> u8 {
+    let rest = given.iter().filter(|argument| *argument != "--help" && *argument != "-h");
+    let typed = known.clone().try_get_matches_from(rest);
+    let Ok(Arguments { command }) = typed.and_then(|typed| Arguments::from_arg_matches(&typed))
+    else {
+        return 0; // help of a command, and of no pipeline
+    };
+    let Some(arguments) = command.pipeline() else { return 0 };
+    match pipeline::parameters(arguments, registry).and_then(print::result) {
+        Ok(()) => 0,
+        Err(error) => {
+            Console::new(&command, registry).error(&error);
             exit_number(&error)
         }
     }

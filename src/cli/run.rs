@@ -1,14 +1,15 @@
 //! `run`, `reduce` and `synth`: arguments to a pipeline, and the pipeline's run.
 
-use super::arguments::{CommonArguments, ReduceArguments, RunArguments, SynthArguments};
+use super::arguments::{ReduceArguments, RunArguments, SynthArguments};
 use super::console::Console;
 use super::flags::{common_flags, given, reduce_flags, synth_flags};
+use super::pipeline;
 use super::preset::Preset;
 use crate::Result;
 use crate::engine::Done;
 use crate::graph::Graph;
 use crate::graph::Overrides;
-use crate::language::{Registry, Set};
+use crate::language::Registry;
 
 /// The pipeline of `reduce`, which users copy.
 const REDUCE: &str = include_str!("../../pipelines/reduce.toml");
@@ -28,10 +29,9 @@ kind = \"synth\"
 kind = \"write\"
 ";
 
-/// Runs a pipeline file and prints its closing table.
+/// Runs a pipeline and prints its closing table.
 pub(super) fn run(arguments: &RunArguments, registry: &Registry, console: &Console) -> Result<()> {
-    let sets = parse_sets(&arguments.sets, &arguments.common)?;
-    let pipeline = Graph::read(&arguments.pipeline, registry, &sets)?;
+    let pipeline = pipeline::read(&arguments.pipeline, &arguments.common, registry)?;
     console.result(mill(pipeline, console)?)
 }
 
@@ -68,12 +68,6 @@ pub(super) fn synth(
 pub(super) fn mill(pipeline: Graph, console: &Console) -> Result<Done> {
     console.hear_interrupts();
     console.run(pipeline.plan(&Overrides::default())?)
-}
-
-/// The values of `--set`, and those of other arguments.
-pub(super) fn parse_sets(sets: &[String], common: &CommonArguments) -> Result<Vec<Set>> {
-    let sets = sets.iter().map(|set| Set::parse(set)).collect::<Result<Vec<Set>>>()?;
-    Ok([sets, given([common_flags(common)])].concat())
 }
 
 /// The pipeline `text` with stages of these kinds behind the first, which reads.

@@ -76,6 +76,11 @@ impl Words {
             Some((address, value)) => (address, Some(value)),
             None => (text, None),
         };
+        if let (true, Some(name), Some(value)) =
+            (self.has_file, address.strip_prefix("params."), value)
+        {
+            return Some(format!("`--param {name}={}`", argument(value)));
+        }
         let flag = self.flags.iter().find(|(known, _)| *known == address);
         match (flag, value) {
             (None, _) if !self.is_setting(address) => None,
@@ -184,6 +189,9 @@ mod tests {
         let run = words(&["run", "p.toml"]);
         let message = "`run.scratch`, `run.nonfinite = \"drop\"`, `write.drop = [\"A\"]`";
         let told = "`--scratch`, `run.nonfinite = \"drop\"`, `write.drop = [\"A\"]`";
+        assert_eq!(run.told(message), told);
+        let message = "give `params.keep = VALUE`: `params.keep` has no default";
+        let told = "give `--param keep=VALUE`: `params.keep` has no default";
         assert_eq!(run.told(message), told);
     }
 

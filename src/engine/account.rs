@@ -41,7 +41,8 @@ impl Task {
         let all = finished.written.iter().flatten();
         warnings.extend(all.flat_map(|(_, sink)| sink.notes.iter().cloned()));
         let outputs = self.written(finished).map(|(sink, (_, summary))| {
-            FileFigures::of(sink.path(), summary.points, Some(summary.bytes))
+            let bytes = sink.is_file().then_some(summary.bytes);
+            FileFigures::of(sink.path(), summary.points, bytes)
         });
         RunFigures {
             version: env!("CARGO_PKG_VERSION").to_owned(),

@@ -110,6 +110,7 @@ impl StreamOp {
             self.choice.holds(batch, &mut chosen)?;
             batch.change_some(&chosen, |some| self.transform.apply(some, tally))?;
         }
+        tally.stage = Arc::default();
         match batch.len() > before {
             true => Err(Error::internal(format!("the stage {} made points up", self.kind))),
             false => Ok(()),

@@ -24,10 +24,10 @@ use super::scratch::{Scratch, Trouble, memory_warning};
 use super::shares::Demands;
 use super::stream::stream;
 use super::task::Task;
+use crate::Result;
 use crate::host::{Threads, lock};
 use crate::report::{FileFigures, Report, RunFigures};
 use crate::stage::Sink;
-use crate::{Error, Result};
 
 /// A run that is done. Displayed as a few lines for the terminal.
 #[derive(Debug)]
@@ -77,20 +77,20 @@ impl Task {
     ) -> Result<Done> {
         let mut clock = Clock::new(watch, self.phases());
         let outputs = self.stage(trouble)?;
-        let nothing = || Error::pipeline("the pipeline writes nothing");
-        let first = outputs.iter().flatten().next().ok_or_else(nothing)?;
-        let staged_report =
-            self.settings.report.as_deref().map(|path| first.also(path, trouble)).transpose()?;
+        let first = outputs.iter().flatten().next();
+        let report = self.settings.report.as_deref();
+        let staged_report = report.map(|path| self.place(first, path, trouble)).transpose()?;
         let tell = |error| outputs.iter().flatten().fold(error, |error, output| output.tell(error));
-        let scratch = match &self.settings.scratch {
-            None => first.scratch().clone(),
-            Some(folder) => Arc::new(Scratch::below(folder, trouble)),
+        let scratch = match (&self.settings.scratch, first.or(staged_report.as_ref())) {
+            (None, Some(first)) => first.scratch().clone(),
+            (None, None) => Arc::new(Scratch::below(&std::env::temp_dir(), trouble)),
+            (Some(folder), _) => Arc::new(Scratch::below(folder, trouble)),
         };
         let (finished, mut run) =
             self.work(ops, &outputs, &scratch, threads, watch, &mut clock).map_err(tell)?;
         drop(scratch);
-        let beside: Vec<Staged> =
-            self.beside.iter().map(|copy| copy.make(first, trouble)).collect::<Result<_>>()?;
+        let copies = first.map(|first| self.beside.iter().map(|copy| copy.make(first, trouble)));
+        let beside: Vec<Staged> = copies.into_iter().flatten().collect::<Result<_>>()?;
         run.outputs.extend(beside.iter().zip(&self.beside).map(|(staged, copy)| {
             let bytes = fs::metadata(staged.file()).ok().map(|about| about.len());
             FileFigures::of(&copy.to, 0, bytes)
@@ -117,16 +117,21 @@ impl Task {
                 make_folder(sink.path())?;
             }
             let mut staged: Vec<Staged> = Vec::new();
-            for file in self.files(n) {
-                let one = match staged.first().or(outputs.iter().flatten().next()) {
-                    Some(first) => first.also(file.path(), trouble)?,
-                    None => Staged::beside(file.path(), self.settings.existing, trouble)?,
-                };
-                staged.push(one);
+            for file in self.files(n).iter().filter(|file| file.is_file()) {
+                let first = staged.first().or(outputs.iter().flatten().next());
+                staged.push(self.place(first, file.path(), trouble)?);
             }
             outputs.push(staged);
         }
         Ok(outputs)
+    }
+
+    /// A place for the file that is to be at `path`, beside the `first` if there is one.
+    fn place(&self, first: Option<&Staged>, path: &Path, trouble: &Trouble) -> Result<Staged> {
+        match first {
+            Some(first) => first.also(path, trouble),
+            None => Staged::beside(path, self.settings.existing, trouble),
+        }
     }
 
     /// Opens the sinks but those of the inputs, which are created one by one, when their records
@@ -137,8 +142,11 @@ impl Task {
         let mut sinks = Vec::new();
         for (n, (sink, staged)) in self.sinks.iter().zip(outputs).enumerate() {
             let metadata = self.metadata(n, (!whole).then(|| self.pipeline(n)));
-            let file = staged.first().filter(|_| !sink.is_folder());
-            let open = file.map(|file| sink.create(file.file(), schema, &metadata, whole));
+            let file = match sink.is_file() {
+                true => staged.first().filter(|_| !sink.is_folder()).map(Staged::file),
+                false => Some(Path::new("")),
+            };
+            let open = file.map(|file| sink.create(file, schema, &metadata, whole));
             sinks.push(open.transpose()?);
         }
         Ok(sinks)

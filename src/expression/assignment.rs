@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-use super::bind::{Names, Number, Truth, number, truth, type_of};
+use super::bind::{Names, NumberNode, TruthNode, number, truth, type_of};
 use super::eval;
 use super::fault::ExpressionFault;
 use super::parser::parse_assignment;
 use super::text::{FromText, is_its_text};
-use super::tree::Tree;
+use super::tree::ExpressionTree;
 use crate::point::{Dimension, PointBatch, Scalar, Schema, Value, names};
 use crate::quantity::Figure;
 use crate::{Error, Result};
@@ -18,14 +18,14 @@ use crate::{Error, Result};
 pub struct Assignment {
     text: String,
     target: (String, Range<usize>),
-    tree: Tree,
+    tree: ExpressionTree,
 }
 
 is_its_text!(Assignment);
 
 enum BoundValue {
-    Number(Number),
-    Truth(Truth),
+    Number(NumberNode),
+    Truth(TruthNode),
 }
 
 impl FromText for Assignment {

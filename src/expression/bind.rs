@@ -4,31 +4,31 @@
 use std::ops::Range;
 
 use super::fault::ExpressionFault;
-use super::lanes::Field;
-use super::tree::{Function, Operator, Relation, Tree, TreeNode};
+use super::lanes::LoadedField;
+use super::tree::{ExpressionTree, Function, Operator, Relation, TreeNode};
 use crate::point::{ColumnKind, Dimension, NORMAL, Scalar, Schema};
 
 /// A number for each record.
 #[derive(Debug, Clone)]
-pub(super) enum Number {
+pub(super) enum NumberNode {
     Literal(f64),
-    Field(Field),
-    Negated(Box<Number>),
-    Arithmetic(Operator, Box<Number>, Box<Number>),
-    Call(Function, Vec<Number>),
+    Field(LoadedField),
+    Negated(Box<NumberNode>),
+    Arithmetic(Operator, Box<NumberNode>, Box<NumberNode>),
+    Call(Function, Vec<NumberNode>),
 }
 
 /// True or false for each record.
 #[derive(Debug, Clone)]
-pub(super) enum Truth {
-    Compared(Relation, Number, Number),
-    Among(Number, Vec<(Number, Number)>),
-    IsNan(Number),
+pub(super) enum TruthNode {
+    Compared(Relation, NumberNode, NumberNode),
+    Among(NumberNode, Vec<(NumberNode, NumberNode)>),
+    IsNan(NumberNode),
     /// A field of one bit.
-    Set(Number),
-    Not(Box<Truth>),
-    All(Vec<Truth>),
-    Any(Vec<Truth>),
+    Set(NumberNode),
+    Not(Box<TruthNode>),
+    All(Vec<TruthNode>),
+    Any(Vec<TruthNode>),
 }
 
 /// What names may mean: the columns of a batch, then the dimensions of its records.
@@ -39,13 +39,17 @@ pub(crate) struct Names<'a> {
 }
 
 impl Names<'_> {
-    pub(super) fn field(&self, name: &str, span: &Range<usize>) -> Result<Field, ExpressionFault> {
+    pub(super) fn field(
+        &self,
+        name: &str,
+        span: &Range<usize>,
+    ) -> Result<LoadedField, ExpressionFault> {
         let column = self.columns.iter().rev().find_map(|column| column.part(name));
         if let Some(part) = column {
-            return Ok(Field::of_column(&part));
+            return Ok(LoadedField::of_column(&part));
         }
         match self.schema.find(name) {
-            Some(dimension) => Ok(Field::of_record(dimension, self.schema)),
+            Some(dimension) => Ok(LoadedField::of_record(dimension, self.schema)),
             None => Err(self.unknown(name, span)),
         }
     }
@@ -99,16 +103,21 @@ fn words(scalar: Scalar) -> &'static str {
 }
 
 /// The number that `tree` is.
-pub(super) fn number(tree: &Tree, names: Names<'_>) -> Result<Number, ExpressionFault> {
-    let boxed = |tree: &Tree| number(tree, names).map(Box::new);
+pub(super) fn number(
+    tree: &ExpressionTree,
+    names: Names<'_>,
+) -> Result<NumberNode, ExpressionFault> {
+    let boxed = |tree: &ExpressionTree| number(tree, names).map(Box::new);
     Ok(match &tree.node {
-        TreeNode::Number(value) => Number::Literal(*value),
-        TreeNode::Name(name) => Number::Field(names.field(name, &tree.span)?),
-        TreeNode::Negated(of) => Number::Negated(boxed(of)?),
-        TreeNode::Arithmetic(operator, a, b) => Number::Arithmetic(*operator, boxed(a)?, boxed(b)?),
+        TreeNode::Number(value) => NumberNode::Literal(*value),
+        TreeNode::Name(name) => NumberNode::Field(names.field(name, &tree.span)?),
+        TreeNode::Negated(of) => NumberNode::Negated(boxed(of)?),
+        TreeNode::Arithmetic(operator, a, b) => {
+            NumberNode::Arithmetic(*operator, boxed(a)?, boxed(b)?)
+        }
         TreeNode::Call(function, of) => {
             let numbers = of.iter().map(|part| number(part, names));
-            Number::Call(*function, numbers.collect::<Result<_, _>>()?)
+            NumberNode::Call(*function, numbers.collect::<Result<_, _>>()?)
         }
         _ => {
             let told = "this is true or false, and a number belongs here";
@@ -118,30 +127,30 @@ pub(super) fn number(tree: &Tree, names: Names<'_>) -> Result<Number, Expression
 }
 
 /// The condition that `tree` is.
-pub(super) fn truth(tree: &Tree, names: Names<'_>) -> Result<Truth, ExpressionFault> {
-    let all = |parts: &[Tree]| -> Result<Vec<Truth>, ExpressionFault> {
+pub(super) fn truth(tree: &ExpressionTree, names: Names<'_>) -> Result<TruthNode, ExpressionFault> {
+    let all = |parts: &[ExpressionTree]| -> Result<Vec<TruthNode>, ExpressionFault> {
         parts.iter().map(|part| truth(part, names)).collect()
     };
     Ok(match &tree.node {
         TreeNode::Compared(relation, a, b) => {
             let (a, b) = alike(number(a, names)?, number(b, names)?);
-            Truth::Compared(*relation, a, b)
+            TruthNode::Compared(*relation, a, b)
         }
         TreeNode::Among(of, ranges) => {
             let of = number(of, names)?;
-            let bound = |(lo, hi): &(Tree, Tree)| {
+            let bound = |(lo, hi): &(ExpressionTree, ExpressionTree)| {
                 let lo = alike(of.clone(), number(lo, names)?).1;
                 Ok((lo, alike(of.clone(), number(hi, names)?).1))
             };
             let ranges = ranges.iter().map(bound).collect::<Result<_, ExpressionFault>>()?;
-            Truth::Among(of, ranges)
+            TruthNode::Among(of, ranges)
         }
-        TreeNode::IsNan(of) => Truth::IsNan(number(of, names)?),
-        TreeNode::Not(of) => Truth::Not(Box::new(truth(of, names)?)),
-        TreeNode::All(parts) => Truth::All(all(parts)?),
-        TreeNode::Any(parts) => Truth::Any(all(parts)?),
+        TreeNode::IsNan(of) => TruthNode::IsNan(number(of, names)?),
+        TreeNode::Not(of) => TruthNode::Not(Box::new(truth(of, names)?)),
+        TreeNode::All(parts) => TruthNode::All(all(parts)?),
+        TreeNode::Any(parts) => TruthNode::Any(all(parts)?),
         TreeNode::Name(name) => match names.field(name, &tree.span)? {
-            field if field.is_flag() => Truth::Set(Number::Field(field)),
+            field if field.is_flag() => TruthNode::Set(NumberNode::Field(field)),
             _ => {
                 let told = format!("{name} is a number, and something true or false belongs here");
                 let help = format!("compare it, as in `{name} > 0`");
@@ -149,7 +158,7 @@ pub(super) fn truth(tree: &Tree, names: Names<'_>) -> Result<Truth, ExpressionFa
             }
         },
         _ => {
-            super::parser::condition(tree)?;
+            super::rules::condition(tree)?;
             return Err(ExpressionFault::new(tree.span.clone(), "this is no condition"));
         }
     })
@@ -157,10 +166,11 @@ pub(super) fn truth(tree: &Tree, names: Names<'_>) -> Result<Truth, ExpressionFa
 
 /// Two numbers that are compared: one that is written out beside a field of `f32` is rounded as
 /// that field's values were, so that `Reflectance == 0.1` holds for what was stored as 0.1.
-fn alike(a: Number, b: Number) -> (Number, Number) {
-    let single = |number: &Number| matches!(number, Number::Field(field) if field.is_single());
-    let rounded = |number: Number| match number {
-        Number::Literal(value) => Number::Literal(f64::from(value as f32)),
+fn alike(a: NumberNode, b: NumberNode) -> (NumberNode, NumberNode) {
+    let single =
+        |number: &NumberNode| matches!(number, NumberNode::Field(field) if field.is_single());
+    let rounded = |number: NumberNode| match number {
+        NumberNode::Literal(value) => NumberNode::Literal(f64::from(value as f32)),
         other => other,
     };
     match (single(&a), single(&b)) {

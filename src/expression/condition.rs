@@ -1,11 +1,12 @@
 //! What is true or false for a record.
 
-use super::bind::{Names, Truth, truth};
+use super::bind::{Names, TruthNode, truth};
 use super::eval;
 use super::fault::ExpressionFault;
-use super::parser::{condition, parse};
+use super::parser::parse;
+use super::rules::condition;
 use super::text::{FromText, is_its_text};
-use super::tree::Tree;
+use super::tree::ExpressionTree;
 use crate::Result;
 use crate::point::{PointBatch, Schema};
 
@@ -13,7 +14,7 @@ use crate::point::{PointBatch, Schema};
 #[derive(Debug, Clone)]
 pub struct Condition {
     text: String,
-    tree: Tree,
+    tree: ExpressionTree,
 }
 
 is_its_text!(Condition);
@@ -65,8 +66,8 @@ impl Condition {
         Ok(BoundCondition(truth(&self.tree, names)?))
     }
 
-    /// Appends to `held` for each record of `batch` whether it holds, by the records and the columns
-    /// of the batch.
+    /// Appends to `held` for each record of `batch` whether it holds, by records and columns of the
+    /// batch.
     pub(crate) fn holds(&self, batch: &PointBatch, held: &mut Vec<bool>) -> Result<()> {
         let names = Names { schema: batch.schema(), columns: &batch.columns.kinds() };
         let bound = self.bind_names(names).map_err(|fault| fault.error(&self.text))?;
@@ -77,7 +78,7 @@ impl Condition {
 
 /// A [`Condition`] for records of one schema.
 #[derive(Debug, Clone)]
-pub struct BoundCondition(Truth);
+pub struct BoundCondition(TruthNode);
 
 impl BoundCondition {
     /// Appends to `held` for each record of `batch`, which are of the schema that it was bound to,

@@ -1,15 +1,15 @@
 //! What an expression is for records, block by block.
 
-use super::bind::{Number, Truth};
-use super::lanes::{Block, Field, LANES, Lanes};
+use super::bind::{NumberNode, TruthNode};
+use super::lanes::{BatchBlock, LANES, LoadedField, NumberLanes};
 use super::tree::{Function, Operator, Relation};
 use crate::point::PointBatch;
 
 /// Whether something holds for each record of a block.
-type Mask = [bool; LANES];
+type HeldLanes = [bool; LANES];
 
 /// Calls `visit` with the stored numbers of `field` in `batch`, block by block.
-pub(super) fn each_stored(field: &Field, batch: &PointBatch, visit: &mut dyn FnMut(&[f64])) {
+pub(super) fn each_stored(field: &LoadedField, batch: &PointBatch, visit: &mut dyn FnMut(&[f64])) {
     for block in blocks(batch) {
         let mut lanes = [0.0; LANES];
         field.load_stored(block, &mut lanes);
@@ -18,13 +18,13 @@ pub(super) fn each_stored(field: &Field, batch: &PointBatch, visit: &mut dyn FnM
 }
 
 /// The blocks of a batch.
-fn blocks(batch: &PointBatch) -> impl Iterator<Item = Block<'_>> {
+fn blocks(batch: &PointBatch) -> impl Iterator<Item = BatchBlock<'_>> {
     let each = (0..batch.len()).step_by(LANES);
-    each.map(|first| Block { batch, first, count: LANES.min(batch.len() - first) })
+    each.map(|first| BatchBlock { batch, first, count: LANES.min(batch.len() - first) })
 }
 
 /// Appends to `out` for each record of `batch` whether `truth` holds.
-pub(super) fn holds(truth: &Truth, batch: &PointBatch, out: &mut Vec<bool>) {
+pub(super) fn holds(truth: &TruthNode, batch: &PointBatch, out: &mut Vec<bool>) {
     out.reserve(batch.len());
     for block in blocks(batch) {
         let mut mask = [false; LANES];
@@ -34,7 +34,7 @@ pub(super) fn holds(truth: &Truth, batch: &PointBatch, out: &mut Vec<bool>) {
 }
 
 /// Appends to `out` the number of each record of `batch`.
-pub(super) fn numbers(number: &Number, batch: &PointBatch, out: &mut Vec<f64>) {
+pub(super) fn numbers(number: &NumberNode, batch: &PointBatch, out: &mut Vec<f64>) {
     out.reserve(batch.len());
     for block in blocks(batch) {
         let mut lanes = [0.0; LANES];
@@ -43,22 +43,22 @@ pub(super) fn numbers(number: &Number, batch: &PointBatch, out: &mut Vec<f64>) {
     }
 }
 
-impl Number {
-    fn evaluate(&self, block: Block<'_>, out: &mut Lanes) {
+impl NumberNode {
+    fn evaluate(&self, block: BatchBlock<'_>, out: &mut NumberLanes) {
         match self {
-            Number::Literal(value) => out.fill(*value),
-            Number::Field(field) => field.load(block, out),
-            Number::Negated(of) => {
+            NumberNode::Literal(value) => out.fill(*value),
+            NumberNode::Field(field) => field.load(block, out),
+            NumberNode::Negated(of) => {
                 of.evaluate(block, out);
                 out.iter_mut().for_each(|value| *value = -*value);
             }
-            Number::Arithmetic(operator, a, b) => {
+            NumberNode::Arithmetic(operator, a, b) => {
                 a.evaluate(block, out);
                 let mut right = [0.0; LANES];
                 b.evaluate(block, &mut right);
                 operator.apply(out, &right);
             }
-            Number::Call(function, of) => {
+            NumberNode::Call(function, of) => {
                 of.first().into_iter().for_each(|of| of.evaluate(block, out));
                 let mut second = [0.0; LANES];
                 of.get(1).into_iter().for_each(|of| of.evaluate(block, &mut second));
@@ -69,12 +69,12 @@ impl Number {
 }
 
 /// Changes each lane by that of another.
-fn each(out: &mut Lanes, other: &Lanes, change: impl Fn(f64, f64) -> f64) {
+fn each(out: &mut NumberLanes, other: &NumberLanes, change: impl Fn(f64, f64) -> f64) {
     out.iter_mut().zip(other).for_each(|(a, b)| *a = change(*a, *b));
 }
 
 impl Operator {
-    fn apply(self, out: &mut Lanes, right: &Lanes) {
+    fn apply(self, out: &mut NumberLanes, right: &NumberLanes) {
         match self {
             Operator::Plus => each(out, right, |a, b| a + b),
             Operator::Minus => each(out, right, |a, b| a - b),
@@ -86,7 +86,7 @@ impl Operator {
 }
 
 impl Function {
-    fn apply(self, out: &mut Lanes, second: &Lanes) {
+    fn apply(self, out: &mut NumberLanes, second: &NumberLanes) {
         match self {
             Function::Abs => each(out, second, |a, _| a.abs()),
             Function::Sqrt => each(out, second, |a, _| a.sqrt()),
@@ -100,36 +100,36 @@ impl Function {
     }
 }
 
-impl Truth {
-    fn evaluate(&self, block: Block<'_>, out: &mut Mask) {
+impl TruthNode {
+    fn evaluate(&self, block: BatchBlock<'_>, out: &mut HeldLanes) {
         match self {
-            Truth::Compared(relation, a, b) => relation.evaluate(block, [a, b], out),
-            Truth::Among(of, ranges) => among(block, of, ranges, out),
-            Truth::IsNan(of) => with(block, of, |lanes| set(out, lanes, f64::is_nan)),
-            Truth::Set(of) => with(block, of, |lanes| set(out, lanes, |value| value != 0.0)),
-            Truth::Not(of) => {
+            TruthNode::Compared(relation, a, b) => relation.evaluate(block, [a, b], out),
+            TruthNode::Among(of, ranges) => among(block, of, ranges, out),
+            TruthNode::IsNan(of) => with(block, of, |lanes| set(out, lanes, f64::is_nan)),
+            TruthNode::Set(of) => with(block, of, |lanes| set(out, lanes, |value| value != 0.0)),
+            TruthNode::Not(of) => {
                 of.evaluate(block, out);
                 out.iter_mut().for_each(|held| *held = !*held);
             }
-            Truth::All(parts) => several(block, parts, out, true),
-            Truth::Any(parts) => several(block, parts, out, false),
+            TruthNode::All(parts) => several(block, parts, out, true),
+            TruthNode::Any(parts) => several(block, parts, out, false),
         }
     }
 }
 
 /// Calls `use_lanes` with the numbers of a block.
-fn with(block: Block<'_>, number: &Number, use_lanes: impl FnOnce(&Lanes)) {
+fn with(block: BatchBlock<'_>, number: &NumberNode, use_lanes: impl FnOnce(&NumberLanes)) {
     let mut lanes = [0.0; LANES];
     number.evaluate(block, &mut lanes);
     use_lanes(&lanes);
 }
 
-fn set(out: &mut Mask, lanes: &Lanes, holds: impl Fn(f64) -> bool) {
+fn set(out: &mut HeldLanes, lanes: &NumberLanes, holds: impl Fn(f64) -> bool) {
     out.iter_mut().zip(lanes).for_each(|(held, value)| *held = holds(*value));
 }
 
 /// Whether all parts hold (`all`), or any does. Parts that cannot change a block are not looked at.
-fn several(block: Block<'_>, parts: &[Truth], out: &mut Mask, all: bool) {
+fn several(block: BatchBlock<'_>, parts: &[TruthNode], out: &mut HeldLanes, all: bool) {
     out.fill(all);
     for part in parts {
         if out[..block.count].iter().all(|held| *held != all) {
@@ -145,11 +145,16 @@ fn several(block: Block<'_>, parts: &[Truth], out: &mut Mask, all: bool) {
     }
 }
 
-fn among(block: Block<'_>, of: &Number, ranges: &[(Number, Number)], out: &mut Mask) {
+fn among(
+    block: BatchBlock<'_>,
+    of: &NumberNode,
+    ranges: &[(NumberNode, NumberNode)],
+    out: &mut HeldLanes,
+) {
     out.fill(false);
     with(block, of, |lanes| {
         for range in ranges {
-            if let (Number::Literal(lo), Number::Literal(hi)) = range {
+            if let (NumberNode::Literal(lo), NumberNode::Literal(hi)) = range {
                 let within = |value: f64| (value >= *lo) & (value <= *hi);
                 out.iter_mut().zip(lanes).for_each(|(held, value)| *held |= within(*value));
                 continue;
@@ -166,14 +171,14 @@ fn among(block: Block<'_>, of: &Number, ranges: &[(Number, Number)], out: &mut M
 }
 
 impl Relation {
-    fn evaluate(self, block: Block<'_>, [a, b]: [&Number; 2], out: &mut Mask) {
+    fn evaluate(self, block: BatchBlock<'_>, [a, b]: [&NumberNode; 2], out: &mut HeldLanes) {
         with(block, a, |a| match b {
-            Number::Literal(b) => self.apply(out, a, &|_| *b),
+            NumberNode::Literal(b) => self.apply(out, a, &|_| *b),
             b => with(block, b, |b| self.apply(out, a, &|i| b[i])),
         });
     }
 
-    fn apply(self, out: &mut Mask, a: &Lanes, b: &impl Fn(usize) -> f64) {
+    fn apply(self, out: &mut HeldLanes, a: &NumberLanes, b: &impl Fn(usize) -> f64) {
         let lanes = out.iter_mut().zip(a).enumerate();
         match self {
             Relation::Equal => lanes.for_each(|(i, (held, a))| *held = *a == b(i)),

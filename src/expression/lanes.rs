@@ -8,11 +8,11 @@ use crate::point::{
 /// Records that are worked on at once.
 pub(super) const LANES: usize = 256;
 /// A number for each.
-pub(super) type Lanes = [f64; LANES];
+pub(super) type NumberLanes = [f64; LANES];
 
 /// Records of a batch that are worked on at once.
 #[derive(Clone, Copy)]
-pub(super) struct Block<'a> {
+pub(super) struct BatchBlock<'a> {
     pub batch: &'a PointBatch,
     /// The first.
     pub first: usize,
@@ -22,20 +22,20 @@ pub(super) struct Block<'a> {
 
 /// A field of records, or a number of a column.
 #[derive(Debug, Clone)]
-pub(super) struct Field {
+pub(super) struct LoadedField {
     dimension: Dimension,
     endian: Endian,
     column: Option<ColumnKind>,
 }
 
-impl Field {
-    pub fn of_record(dimension: &Dimension, schema: &Schema) -> Field {
-        Field { dimension: dimension.clone(), endian: schema.endian, column: None }
+impl LoadedField {
+    pub fn of_record(dimension: &Dimension, schema: &Schema) -> LoadedField {
+        LoadedField { dimension: dimension.clone(), endian: schema.endian, column: None }
     }
 
-    pub fn of_column(part: &ComputedDimension) -> Field {
+    pub fn of_column(part: &ComputedDimension) -> LoadedField {
         let dimension = Dimension::new(part.name, part.scalar(), part.range().start);
-        Field { dimension, endian: COLUMN_ENDIAN, column: Some(part.column) }
+        LoadedField { dimension, endian: COLUMN_ENDIAN, column: Some(part.column) }
     }
 
     /// True if it is one bit.
@@ -60,7 +60,7 @@ impl Field {
     }
 
     /// Writes its world values in a block into `out`; NaN where a column is not there.
-    pub fn load(&self, block: Block<'_>, out: &mut Lanes) {
+    pub fn load(&self, block: BatchBlock<'_>, out: &mut NumberLanes) {
         self.load_stored(block, out);
         let [scale, origin] = self.units();
         if scale != 1.0 || origin != 0.0 {
@@ -69,7 +69,7 @@ impl Field {
     }
 
     /// The same of its values as they are stored.
-    pub fn load_stored(&self, block: Block<'_>, out: &mut Lanes) {
+    pub fn load_stored(&self, block: BatchBlock<'_>, out: &mut NumberLanes) {
         let (bytes, stride) = match self.column {
             None => (Some(block.batch.records()), block.batch.schema().stride),
             Some(kind) => (block.batch.columns.bytes_of(kind), kind.bytes()),
@@ -83,7 +83,7 @@ impl Field {
     }
 
     /// The numbers as they are stored.
-    fn read<'a>(&self, rows: impl Iterator<Item = &'a [u8]>, out: &mut Lanes) {
+    fn read<'a>(&self, rows: impl Iterator<Item = &'a [u8]>, out: &mut NumberLanes) {
         let Dimension { scalar, offset, bits, .. } = self.dimension;
         // Foreign byte orders, and bits of what is no byte, are rare.
         let is_plain = self.endian == Endian::Little && (bits.is_none() || scalar == Scalar::U8);

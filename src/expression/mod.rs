@@ -1,5 +1,5 @@
 //! Conditions and values over the dimensions of records and the columns that stages compute, as
-//! pipelines write them: `Classification in [2, 6] and not Withheld`, `Intensity = Intensity / 256`.
+//! pipelines write them: `Classification in [2, 6] and not Withheld`, `UserData = Intensity / 256`.
 //!
 //! - Names are those of dimensions (`Z`, `Intensity`, `Classification`; coordinates in world units)
 //!   and of numbers of columns (`NormalZ`). A name with spaces stands in backticks.
@@ -32,6 +32,7 @@ mod lanes;
 mod lexer;
 mod named;
 mod parser;
+mod rules;
 mod text;
 mod tree;
 

@@ -2,12 +2,12 @@
 
 use super::bind::Names;
 use super::eval;
-use super::lanes::Field;
+use super::lanes::LoadedField;
 use crate::Result;
 use crate::point::PointBatch;
 
 /// A dimension of the records of a batch, or a number of one of its columns.
-pub(crate) struct NamedField(Field);
+pub(crate) struct NamedField(LoadedField);
 
 impl NamedField {
     /// The one called `name`.

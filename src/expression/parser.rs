@@ -1,20 +1,18 @@
-//! From a text to the [`Tree`] of an expression, by precedence: `or`, `and`, `not`, comparisons,
-//! sums, products, signs.
+//! From a text to the tree of an expression, by precedence: `or`, `and`, `not`, comparisons, sums,
+//! products, signs.
 
 use std::ops::Range;
 
 use super::fault::{ExpressionFault, quoted};
 use super::lexer::{Token, TokenKind, tokens};
-use super::tree::{Function, Operator, Relation, Tree, TreeNode};
-
-/// Parts inside parts that an expression has at most, so that no text exhausts the stack.
-const DEEPEST: usize = 64;
+use super::rules::{DEEPEST, condition, depth, direction, not, number, relation, too_deep};
+use super::tree::{ExpressionTree, Function, Operator, TreeNode};
 
 /// Words that are no names.
 const WORDS: [&str; 6] = ["and", "or", "not", "in", "is", "nan"];
 
 /// Reads all of `text` as an expression.
-pub(super) fn parse(text: &str) -> Result<Tree, ExpressionFault> {
+pub(super) fn parse(text: &str) -> Result<ExpressionTree, ExpressionFault> {
     let mut parser = Parser { tokens: tokens(text)?, at: 0, depth: 0 };
     if parser.tokens.len() == 1 {
         return Err(ExpressionFault::new(0..text.len(), "the expression is empty"));
@@ -25,7 +23,7 @@ pub(super) fn parse(text: &str) -> Result<Tree, ExpressionFault> {
 /// Reads `text` as `name = expression`; the name with its place.
 pub(super) fn parse_assignment(
     text: &str,
-) -> Result<(String, Range<usize>, Tree), ExpressionFault> {
+) -> Result<(String, Range<usize>, ExpressionTree), ExpressionFault> {
     let mut parser = Parser { tokens: tokens(text)?, at: 0, depth: 0 };
     let help = "write NAME = VALUE, such as `Classification = 7`";
     let span = parser.peek().span.clone();
@@ -51,7 +49,7 @@ struct Parser {
     depth: usize,
 }
 
-type Parsed = Result<Tree, ExpressionFault>;
+type Parsed = Result<ExpressionTree, ExpressionFault>;
 
 impl Parser {
     fn peek(&self) -> &Token {
@@ -135,7 +133,7 @@ impl Parser {
         &mut self,
         word: &str,
         part: fn(&mut Self) -> Parsed,
-        all: fn(Vec<Tree>) -> TreeNode,
+        all: fn(Vec<ExpressionTree>) -> TreeNode,
     ) -> Parsed {
         let mut parts = vec![part(self)?];
         while self.takes(word) {
@@ -146,7 +144,7 @@ impl Parser {
             _ => {
                 parts.iter().try_for_each(condition)?;
                 let span = parts[0].span.start..parts[parts.len() - 1].span.end;
-                Ok(Tree { node: all(parts), span })
+                Ok(ExpressionTree { node: all(parts), span })
             }
         }
     }
@@ -159,7 +157,7 @@ impl Parser {
         let part = self.deeper(Parser::negated)?;
         condition(&part)?;
         let span = start..part.span.end;
-        Ok(Tree { node: TreeNode::Not(Box::new(part)), span })
+        Ok(ExpressionTree { node: TreeNode::Not(Box::new(part)), span })
     }
 
     /// A comparison, a chain of comparisons in one direction (`1 <= Z < 2`), a membership, or a
@@ -187,13 +185,13 @@ impl Parser {
             number(&first)?;
             let span = start..self.tokens[self.at - 1].span.end;
             let node = TreeNode::IsNan(Box::new(first));
-            let is = Tree { node, span };
+            let is = ExpressionTree { node, span };
             return Ok(if negated { not(is, start) } else { is });
         }
         self.chain(first)
     }
 
-    fn chain(&mut self, first: Tree) -> Parsed {
+    fn chain(&mut self, first: ExpressionTree) -> Parsed {
         let start = first.span.start;
         let (mut left, mut links, mut before) = (first, Vec::new(), None);
         while let Some(relation) = relation(&self.peek().kind) {
@@ -210,18 +208,18 @@ impl Parser {
             before = Some(relation);
             let span = left.span.start..right.span.end;
             let (a, b) = (Box::new(left), Box::new(right.clone()));
-            links.push(Tree { node: TreeNode::Compared(relation, a, b), span });
+            links.push(ExpressionTree { node: TreeNode::Compared(relation, a, b), span });
             left = right;
         }
         Ok(match links.len() {
             0 => left,
             1 => links.remove(0),
-            _ => Tree { span: start..left.span.end, node: TreeNode::All(links) },
+            _ => ExpressionTree { span: start..left.span.end, node: TreeNode::All(links) },
         })
     }
 
     /// What stands behind `in`: a range, or a list of numbers and ranges.
-    fn among(&mut self, of: Tree) -> Parsed {
+    fn among(&mut self, of: ExpressionTree) -> Parsed {
         let (start, open) = (of.span.start, self.peek().span.clone());
         let mut ranges = Vec::new();
         if self.takes("[") {
@@ -239,11 +237,14 @@ impl Parser {
         if ranges.is_empty() {
             return Err(ExpressionFault::new(open.start..span.end, "the list is empty"));
         }
-        Ok(Tree { node: TreeNode::Among(Box::new(of), ranges), span })
+        Ok(ExpressionTree { node: TreeNode::Among(Box::new(of), ranges), span })
     }
 
     /// `a..b`, ends included, or a single number where that `may` stand.
-    fn range(&mut self, may_be_single: bool) -> Result<(Tree, Tree), ExpressionFault> {
+    fn range(
+        &mut self,
+        may_be_single: bool,
+    ) -> Result<(ExpressionTree, ExpressionTree), ExpressionFault> {
         let low = self.sum()?;
         number(&low)?;
         if self.takes("..") {
@@ -288,7 +289,7 @@ impl Parser {
             number(&right)?;
             let span = left.span.start..right.span.end;
             let node = TreeNode::Arithmetic(*operator, Box::new(left), Box::new(right));
-            left = Tree { node, span };
+            left = ExpressionTree { node, span };
         }
         Ok(left)
     }
@@ -302,8 +303,8 @@ impl Parser {
         number(&part)?;
         let span = start..part.span.end;
         Ok(match part.node {
-            TreeNode::Number(value) => Tree { node: TreeNode::Number(-value), span },
-            _ => Tree { node: TreeNode::Negated(Box::new(part)), span },
+            TreeNode::Number(value) => ExpressionTree { node: TreeNode::Number(-value), span },
+            _ => ExpressionTree { node: TreeNode::Negated(Box::new(part)), span },
         })
     }
 
@@ -334,7 +335,7 @@ impl Parser {
                 return Err(ExpressionFault::new(span, "the expression ends too early"));
             }
         };
-        Ok(Tree { node, span })
+        Ok(ExpressionTree { node, span })
     }
 
     fn call(&mut self, word: &str, span: Range<usize>) -> Parsed {
@@ -359,71 +360,12 @@ impl Parser {
         let all = span.start..self.tokens[self.at - 1].span.end;
         match (function.takes(), numbers.len()) {
             (takes, given) if takes == given => {
-                Ok(Tree { node: TreeNode::Call(function, numbers), span: all })
+                Ok(ExpressionTree { node: TreeNode::Call(function, numbers), span: all })
             }
             (takes, given) => {
                 let told = format!("`{word}` takes {takes} numbers, not {given}");
                 Err(ExpressionFault::new(all, told.replace(" 1 numbers", " one number")))
             }
         }
-    }
-}
-
-fn too_deep(span: Range<usize>) -> ExpressionFault {
-    let told = format!("more than {DEEPEST} parts stand in each other, or numbers in a row");
-    ExpressionFault::new(span, told)
-}
-
-/// Parts inside parts.
-fn depth(tree: &Tree) -> usize {
-    1 + tree.parts().into_iter().map(depth).max().unwrap_or(0)
-}
-
-fn not(part: Tree, start: usize) -> Tree {
-    let span = start..part.span.end;
-    Tree { node: TreeNode::Not(Box::new(part)), span }
-}
-
-fn relation(token: &TokenKind) -> Option<Relation> {
-    let TokenKind::Sign(sign) = token else { return None };
-    Some(match *sign {
-        "==" => Relation::Equal,
-        "!=" => Relation::Unequal,
-        "<" => Relation::Less,
-        "<=" => Relation::AtMost,
-        ">" => Relation::Greater,
-        ">=" => Relation::AtLeast,
-        _ => return None,
-    })
-}
-
-/// 1 for what ascends, -1 for what descends, else 0.
-fn direction(relation: Relation) -> i8 {
-    match relation {
-        Relation::Less | Relation::AtMost => 1,
-        Relation::Greater | Relation::AtLeast => -1,
-        Relation::Equal | Relation::Unequal => 0,
-    }
-}
-
-fn number(tree: &Tree) -> Result<(), ExpressionFault> {
-    match tree.is_condition() {
-        Some(true) => {
-            let told = "this is true or false, and a number belongs here";
-            Err(ExpressionFault::new(tree.span.clone(), told))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Refuses a number where something that is true or false belongs.
-pub(super) fn condition(tree: &Tree) -> Result<(), ExpressionFault> {
-    match tree.is_condition() {
-        Some(false) => {
-            let told = "this is a number, and something true or false belongs here";
-            let help = "compare it, as in `Intensity > 40`";
-            Err(ExpressionFault::new(tree.span.clone(), told).help(help))
-        }
-        _ => Ok(()),
     }
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// A part of an expression and where it stands in the text.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Tree {
+pub(super) struct ExpressionTree {
     pub node: TreeNode,
     pub span: Range<usize>,
 }
@@ -14,16 +14,16 @@ pub(super) enum TreeNode {
     Number(f64),
     /// A dimension of the records, or a number of a column.
     Name(String),
-    Negated(Box<Tree>),
-    Arithmetic(Operator, Box<Tree>, Box<Tree>),
-    Call(Function, Vec<Tree>),
-    Compared(Relation, Box<Tree>, Box<Tree>),
+    Negated(Box<ExpressionTree>),
+    Arithmetic(Operator, Box<ExpressionTree>, Box<ExpressionTree>),
+    Call(Function, Vec<ExpressionTree>),
+    Compared(Relation, Box<ExpressionTree>, Box<ExpressionTree>),
     /// Whether a number is one of these, or in one of these ranges, ends included.
-    Among(Box<Tree>, Vec<(Tree, Tree)>),
-    IsNan(Box<Tree>),
-    Not(Box<Tree>),
-    All(Vec<Tree>),
-    Any(Vec<Tree>),
+    Among(Box<ExpressionTree>, Vec<(ExpressionTree, ExpressionTree)>),
+    IsNan(Box<ExpressionTree>),
+    Not(Box<ExpressionTree>),
+    All(Vec<ExpressionTree>),
+    Any(Vec<ExpressionTree>),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,7 +72,7 @@ impl Function {
     }
 }
 
-impl Tree {
+impl ExpressionTree {
     /// True if it is true or false; none where that depends on what a name means.
     pub fn is_condition(&self) -> Option<bool> {
         use TreeNode as N;
@@ -84,7 +84,7 @@ impl Tree {
     }
 
     /// The parts that it is made of.
-    pub fn parts(&self) -> Vec<&Tree> {
+    pub fn parts(&self) -> Vec<&ExpressionTree> {
         use TreeNode as N;
         match &self.node {
             N::Number(_) | N::Name(_) => Vec::new(),

@@ -107,7 +107,7 @@ fn lines(stage: &GraphStage) -> Vec<String> {
         None => stage.kind.clone(),
     }];
     let all = || {
-        let keys = stage.keys.as_object().into_iter().flatten();
+        let keys = stage.given.as_ref().unwrap_or(&stage.keys).as_object().into_iter().flatten();
         keys.map(|(key, value): (&String, &Value)| (key.clone(), value.to_string())).collect()
     };
     let keys: Vec<(String, String)> = stage.written.keys().unwrap_or_else(all);

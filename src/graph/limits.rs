@@ -45,10 +45,12 @@ impl LimitKeys {
     pub const WHERE: &'static str = "where";
     /// That of them which is for stages that work on tiles alone.
     pub const SEES: &'static str = "sees";
+}
 
-    /// What they say.
-    pub(crate) fn limits(self) -> Limits {
-        let LimitKeys { condition, mut classes, mut with, mut without, sees } = self;
+impl Limits {
+    /// What the keys say.
+    pub fn of(keys: LimitKeys) -> Limits {
+        let LimitKeys { condition, mut classes, mut with, mut without, sees } = keys;
         classes.sort_unstable();
         with.sort_unstable();
         without.sort_unstable();

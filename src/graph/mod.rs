@@ -1,7 +1,7 @@
 //! What a pipeline is, however it was written: stages, and which takes from which. Knows neither
 //! the language that it was written in, nor the inputs that it will be fitted to.
 //!
-//! A [`Graph`] is a tree of stages below one or several sources. It is checked in one place, when
+//! A [`Graph`] is a tree of stages below one or several sources, which are one scan. It is checked in one place, when
 //! it is whole ([`Graph::mistakes`]): the language tells what is found there with the places in its
 //! text, the plan as an error.
 
@@ -9,22 +9,26 @@ mod drawn;
 pub(crate) mod limits;
 mod settings;
 mod size;
+mod toml;
+mod tree;
 mod written;
 
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::stage::{Order, Role};
+use crate::stage::Role;
 
-pub(crate) use limits::{LimitKeys, Limits, Sees};
+pub(crate) use limits::Limits;
+pub use limits::{LimitKeys, Sees};
 pub(crate) use settings::MOST_THREADS;
 pub use settings::{
     Existing, Headers, MixedUnits, Nonfinite, Overrides, RunSettings, SimdSetting, SpillSetting,
     Treatment, ZScale,
 };
 pub use size::parse_bytes;
-pub(crate) use written::Written;
+pub(crate) use tree::{TreeStage, mistakes as tree_mistakes};
+pub(crate) use written::{Written, unwritten};
 
 /// A pipeline: stages, each of which takes from stages before it.
 ///
@@ -74,6 +78,9 @@ pub struct GraphStage {
     pub role: Role,
     /// Its keys with all defaults filled in, those that name files left out.
     pub keys: serde_json::Value,
+    /// Its keys as a text gives them, those that name files included; None if no text can name the
+    /// stage.
+    pub(crate) given: Option<serde_json::Value>,
     /// Line of its `kind` in its text, from 1.
     pub line: Option<usize>,
     /// The records that it is limited to.
@@ -91,7 +98,26 @@ pub struct GraphMistake {
     /// What is wrong.
     pub told: String,
     /// What would be right, where it is known.
-    pub help: Option<&'static str>,
+    pub help: Option<String>,
+    /// The key that it is about, where it is about one.
+    pub key: Option<&'static str>,
+}
+
+impl GraphMistake {
+    /// `told` of stage number `stage`.
+    pub(crate) fn new(stage: usize, told: impl Into<String>) -> Self {
+        GraphMistake { stage, told: told.into(), help: None, key: None }
+    }
+
+    /// The same about the value of `key`.
+    pub(crate) fn of(self, key: &'static str) -> Self {
+        GraphMistake { key: Some(key), ..self }
+    }
+
+    /// The same with what would be right.
+    pub(crate) fn help(self, help: impl Into<String>) -> Self {
+        GraphMistake { help: Some(help.into()), ..self }
+    }
 }
 
 impl Graph {
@@ -112,6 +138,7 @@ impl Graph {
             from: from.to_vec(),
             role,
             keys: serde_json::json!({}),
+            given: None,
             line: None,
             limits: Limits::default(),
             written,
@@ -127,52 +154,7 @@ impl Graph {
 
     /// Everything that is wrong with how the stages hang together.
     pub fn mistakes(&self) -> Vec<GraphMistake> {
-        let mut wrong = Vec::new();
-        let mut tell = |stage, told: &str, help| {
-            wrong.push(GraphMistake { stage, told: told.to_owned(), help });
-        };
-        let is_source = |n: &usize| matches!(self.stages[*n].role, Role::Source(_));
-        let is_sink = |n: &usize| matches!(self.stages[*n].role, Role::Sink(_));
-        let sources: Vec<usize> = (0..self.stages.len()).filter(is_source).collect();
-        for (n, stage) in self.stages.iter().enumerate() {
-            if stage.from.iter().any(|from| *from >= n) {
-                tell(n, "a stage takes from stages before it", None);
-                continue;
-            }
-            match (is_source(&n), &stage.from[..]) {
-                (true, [_, ..]) => tell(n, "a source takes from no stage", None),
-                (false, []) => tell(n, "the first stage must be a source, such as `read`", None),
-                (false, from) if from.iter().any(is_sink) => {
-                    tell(n, "a sink gives no points that a stage could take", None);
-                }
-                (false, [_, _, ..]) if !stage.from.iter().all(is_source) => {
-                    tell(n, "only sources can be merged", None);
-                }
-                (false, from) if from.iter().any(is_source) && from != sources => {
-                    tell(n, "the sources of a pipeline are one scan: take from all of them", None);
-                }
-                _ => {}
-            }
-            if !is_sink(&n) && self.takers(n).next().is_none() {
-                match n + 1 == self.stages.len() {
-                    true => tell(n, "nothing takes these points: end with `write`", None),
-                    false => {
-                        let told = format!("no output takes what `{}` leaves", stage.kind);
-                        tell(n, &told, Some("add a `write` behind it that has no `from`"));
-                    }
-                }
-            }
-            if let Role::Sink(sink) = &stage.role
-                && sink.is_folder()
-                && sink.order() == Order::Input
-            {
-                let told = "`write.order = \"input\"` is for one file of all inputs";
-                let help =
-                    "give `write.path` instead of `write.folder`, or leave `write.order` out";
-                tell(n, told, Some(help));
-            }
-        }
-        wrong
+        tree::mistakes(&self.stages.iter().map(TreeStage::from).collect::<Vec<_>>())
     }
 
     /// The graph as JSON: for each stage its kind, name, keys, and the numbers of those it takes
@@ -184,6 +166,13 @@ impl Graph {
             })
         };
         self.stages.iter().map(stage).collect()
+    }
+}
+
+impl GraphStage {
+    /// True if it may work on some records and let the others pass.
+    pub(crate) fn can_be_limited(&self) -> bool {
+        matches!(self.role, Role::Transform(_) | Role::TileOp(_) | Role::ScanOp(_))
     }
 }
 

@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Deserializer, Serialize, de};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use super::size::{Bytes, some_bytes};
 use crate::geom::simd;
@@ -20,7 +20,7 @@ use crate::{Error, Result};
 ///
 /// A size is `512MiB`, `1.5 GiB`, `2GB`, or bytes without a unit. A fraction of a byte is cut
 /// off.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RunSettings {
     /// Bound of the process's peak resident memory, in bytes; none: half of what the machine or its
@@ -80,7 +80,7 @@ pub struct RunSettings {
 }
 
 /// What becomes of files that are already where an output or the report is to be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Existing {
@@ -95,7 +95,7 @@ pub enum Existing {
 pub const MOST_THREADS: usize = 1024;
 
 /// What becomes of points whose coordinates are not finite.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Nonfinite {
@@ -107,7 +107,7 @@ pub enum Nonfinite {
 }
 
 /// What becomes of scans whose points contradict their header.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Headers {
@@ -119,7 +119,7 @@ pub enum Headers {
 }
 
 /// What becomes of scans whose x, y and z have different units.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum MixedUnits {
@@ -142,7 +142,7 @@ pub enum ZScale {
 }
 
 /// What becomes of points that the scan itself says are of no use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Treatment {
@@ -156,7 +156,7 @@ pub enum Treatment {
 }
 
 /// Where decoded points wait for the mill.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum SpillSetting {
@@ -168,7 +168,7 @@ pub enum SpillSetting {
 }
 
 /// Which of the equal code paths runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum SimdSetting {
@@ -235,6 +235,15 @@ impl RunSettings {
             scratch: over.scratch.or(self.scratch),
             report: over.report.or(self.report),
             ..self
+        }
+    }
+}
+
+impl Serialize for ZScale {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        match self {
+            ZScale::Auto => to.serialize_str("auto"),
+            ZScale::Factor(factor) => to.serialize_f64(*factor),
         }
     }
 }

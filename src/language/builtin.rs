@@ -5,7 +5,7 @@ use crate::io::ends::{Read, Write};
 use crate::io::las::{LAS, LAZ};
 use crate::io::ply::PLY;
 use crate::ops::normals::Normals;
-use crate::ops::{Assign, Cells, Drop, Filter, Grid, Median, Outliers, Stats, Tap};
+use crate::ops::{Assign, Cells, Drop, Filter, Grid, Median, Merge, Outliers, Stats, Tap};
 use crate::synth::Synth;
 
 impl Registry {
@@ -14,6 +14,7 @@ impl Registry {
         Registry::empty()
             .with::<Read>()
             .with::<Synth>()
+            .with::<Merge>()
             .with::<Write>()
             .with::<Filter>()
             .with::<Drop>()

@@ -1,19 +1,25 @@
 //! A pipeline file's tables as written, before any stage is built: settings, stages, and what
 //! arguments put in their place.
 
+use super::form::TextForm;
 use super::mistake::{Mistake, advice};
 use super::node::{KeyEntry, Node, NodeValue};
-use super::place::TextPlace;
+use super::place::{TextPlace, Word};
 use super::registry::Registry;
-use super::set::Set;
+use super::set::{PARAMETERS, Set};
 
 /// Stages of a pipeline at most: each sink has a file open and memory of its own.
 const MOST_STAGES: usize = 256;
 
 /// The tables of a pipeline file.
 pub(crate) struct Draft {
+    form: TextForm,
     /// The `[run]` table.
     pub run: Node,
+    /// The `[params]` table.
+    pub params: Node,
+    /// What arguments give for parameters: their names and the texts of their values.
+    pub given: Vec<(Word, Word)>,
     /// The `[[stage]]` tables, from top to bottom.
     pub stages: Vec<StageDraft>,
     /// What is wrong so far.
@@ -22,126 +28,186 @@ pub(crate) struct Draft {
 
 /// A `[[stage]]` table.
 pub(crate) struct StageDraft {
-    /// Its kind and where it is written.
-    pub kind: (String, TextPlace),
+    /// Its kind and where it is written; None if it has none, which is told.
+    pub kind: Option<Word>,
     /// Its name, if it has one.
-    pub name: Option<(String, TextPlace)>,
-    /// The stage that it takes from, if it says.
-    pub from: Option<(String, TextPlace)>,
-    /// All other keys.
+    pub name: Option<Word>,
+    /// The stages that it takes from, if it says.
+    pub from: Option<Vec<Word>>,
+    /// All other keys; their place is that of the kind, or else of the table.
     pub keys: Node,
 }
 
-/// Sorts the tables of a file whose first text is `len` bytes long.
-pub(crate) fn read(entries: Vec<KeyEntry>, len: usize, registry: &Registry) -> Draft {
-    let whole = TextPlace::new(0, 0..0);
-    let run = Node { place: whole, value: NodeValue::Table(Vec::new()) };
-    let mut draft = Draft { run, stages: Vec::new(), mistakes: Vec::new() };
-    let mut any = false;
+/// Sorts the tables of a file in this form, whose first text is `len` bytes long.
+pub(crate) fn read(
+    entries: Vec<KeyEntry>,
+    len: usize,
+    form: TextForm,
+    registry: &Registry,
+) -> Draft {
+    let empty = || Node { place: TextPlace::new(0, 0..0), value: NodeValue::Table(Vec::new()) };
+    let mut draft = Draft {
+        form,
+        run: empty(),
+        params: empty(),
+        given: Vec::new(),
+        stages: Vec::new(),
+        mistakes: Vec::new(),
+    };
+    let is_stages = |entry: &KeyEntry| matches!(entry.key.as_str(), "stage" | "stages");
+    if !entries.iter().any(is_stages) {
+        let begin = format!("begin with {} and {}", form.stages(), form.key("kind", "read"));
+        let told = Mistake::new(TextPlace::new(0, len..len), "a pipeline needs stages");
+        draft.mistakes.push(told.note(begin));
+    }
     for KeyEntry { key, at, node } in entries {
-        match (key.as_str(), node.value) {
-            ("run", NodeValue::Table(table)) => {
-                draft.run = Node { place: at, value: NodeValue::Table(table) };
-            }
-            ("run", _) => draft.mistakes.push(Mistake::new(at, "`run` is a table: write [run]")),
-            ("stage", NodeValue::List(list)) => {
-                any = true;
-                for (n, node) in list.into_iter().enumerate() {
-                    if n == MOST_STAGES {
-                        let told = format!("a pipeline has at most {MOST_STAGES} stages");
-                        draft.mistakes.push(Mistake::new(node.place, told));
-                        break;
-                    }
-                    draft.stage(node, registry);
-                }
-            }
-            ("stage", _) => {
-                any = true;
-                let told = "a stage is one of several tables: write [[stage]]";
-                draft.mistakes.push(Mistake::new(at, told));
-            }
-            ("stages", NodeValue::List(list)) => {
-                any = true;
-                let told = "a pipeline file has no `stages`: write [[stage]]";
-                draft.mistakes.push(Mistake::new(at, told));
-                for node in list {
-                    draft.stage(node, registry);
-                }
-            }
-            (word, _) => draft.mistakes.push(Mistake::word(
+        match key.as_str() {
+            "run" => draft.run = draft.table("run", at, node),
+            "params" => draft.params = draft.table("params", at, node),
+            "stage" | "stages" => draft.add_stages(&key, at, node, registry),
+            word => draft.mistakes.push(Mistake::word(
                 at,
                 format!("a pipeline file has no `{word}`"),
                 word,
                 "tables",
-                ["run", "stage"],
+                ["params", "run", "stage"],
             )),
         }
-    }
-    if !any {
-        let told = Mistake::new(TextPlace::new(0, len..len), "a pipeline needs stages")
-            .note("begin with [[stage]] and kind = \"read\"");
-        draft.mistakes.push(told);
     }
     draft
 }
 
-/// What a stage without a kind is told: the key that was meant to be it, if there is one.
-fn without_kind(
-    place: TextPlace,
-    entries: &[KeyEntry],
-    name: Option<(String, TextPlace)>,
-    registry: &Registry,
-) -> Mistake {
-    if let Some((name, at)) = name.filter(|(name, _)| registry.has(name)) {
-        return Mistake::new(at, format!("a stage needs `kind`: write kind = \"{name}\""))
-            .note("`name` is a word of your own, for the `from` of other stages");
+fn text(node: Node) -> Result<Word, (TextPlace, &'static str)> {
+    match node.value {
+        NodeValue::Text(text) => Ok((text, node.place)),
+        _ => Err((node.place, "a text in quotes")),
     }
-    let kinds = || registry.kinds().map(|(kind, _)| kind);
-    if let Some(KeyEntry { at, node, .. }) = entries.iter().find(|e| e.key == "type") {
-        let word = if let NodeValue::Text(word) = &node.value { word.as_str() } else { "" };
-        let told = "a stage has no `type`: write `kind`";
-        return Mistake::word(at.clone(), told, word, "kinds", kinds());
+}
+
+/// One name or a list of them.
+fn names(node: Node) -> Result<Vec<Word>, (TextPlace, &'static str)> {
+    const TAKES: &str = "the name of a stage, or a list of names";
+    let name = |node: Node| text(node).map_err(|(place, _)| (place, TAKES));
+    match node.value {
+        NodeValue::List(list) if list.is_empty() => Err((node.place, TAKES)),
+        NodeValue::List(list) => list.into_iter().map(name).collect(),
+        _ => name(node).map(|name| vec![name]),
     }
-    Mistake::new(place, "a stage needs `kind`").note(advice("", "kinds", kinds()))
+}
+
+impl StageDraft {
+    /// A stage of which nothing is known.
+    fn unknown(keys: Node) -> Self {
+        StageDraft { kind: None, name: None, from: None, keys }
+    }
+
+    /// True if it is of that kind.
+    fn is(&self, kind: &str) -> bool {
+        self.kind.as_ref().is_some_and(|(own, _)| own == kind)
+    }
 }
 
 impl Draft {
-    fn stage(&mut self, node: Node, registry: &Registry) {
-        let NodeValue::Table(mut entries) = node.value else {
-            self.mistakes.push(Mistake::new(node.place, "a stage is a table: write [[stage]]"));
-            return;
-        };
-        let kind = self.take(&mut entries, "kind");
-        let name = self.take(&mut entries, "name");
-        let from = self.take(&mut entries, "from");
-        match kind {
-            Some(Some(kind)) => {
-                let keys = Node { place: kind.1.clone(), value: NodeValue::Table(entries) };
-                let (name, from) = (name.flatten(), from.flatten());
-                self.stages.push(StageDraft { kind, name, from, keys });
-            }
-            Some(None) => {}
-            None => {
-                let mistake = without_kind(node.place, &entries, name.flatten(), registry);
-                self.mistakes.push(mistake);
+    /// The table `name`; what is none is told, and empty.
+    fn table(&mut self, name: &str, at: TextPlace, node: Node) -> Node {
+        match node.value {
+            NodeValue::Table(table) => Node { place: at, value: NodeValue::Table(table) },
+            _ => {
+                let told = format!("`{name}` is a table: write {}", self.form.table(name));
+                self.mistakes.push(Mistake::new(at.clone(), told));
+                Node { place: at, value: NodeValue::Table(Vec::new()) }
             }
         }
     }
 
-    /// Takes the text `key` out of a stage's keys: none if it is not there, some none if it is not
-    /// a text, which is told.
-    fn take(
+    fn add_stages(&mut self, key: &str, at: TextPlace, node: Node, registry: &Registry) {
+        let NodeValue::List(list) = node.value else {
+            let told = format!("a stage is one of several tables: write {}", self.form.stages());
+            self.mistakes.push(Mistake::new(at, told));
+            return;
+        };
+        if key != "stage" {
+            let told = format!("a pipeline file has no `{key}`: write {}", self.form.stages());
+            self.mistakes.push(Mistake::new(at, told));
+        }
+        for node in list {
+            if self.stages.len() == MOST_STAGES {
+                let told = format!("a pipeline has at most {MOST_STAGES} stages");
+                self.mistakes.push(Mistake::new(node.place.clone(), told));
+                self.stages.push(StageDraft::unknown(node));
+                return;
+            }
+            self.stage(node, registry);
+        }
+    }
+
+    fn stage(&mut self, node: Node, registry: &Registry) {
+        let NodeValue::Table(mut entries) = node.value else {
+            let told = format!("a stage is a table: write {}", self.form.stage());
+            self.mistakes.push(Mistake::new(node.place.clone(), told));
+            self.stages.push(StageDraft::unknown(node));
+            return;
+        };
+        let has_kind = entries.iter().any(|entry| entry.key == "kind");
+        let kind = self.take(&mut entries, "kind", text);
+        let name = self.take(&mut entries, "name", text);
+        let from = self.take(&mut entries, "from", names);
+        if !has_kind {
+            let mistake = self.without_kind(node.place.clone(), &entries, &name, registry);
+            self.mistakes.push(mistake);
+        }
+        let place = kind.as_ref().map_or(node.place, |(_, place)| place.clone());
+        let keys = Node { place, value: NodeValue::Table(entries) };
+        self.stages.push(StageDraft { kind, name, from, keys });
+    }
+
+    /// What a stage without a kind is told: the key that was meant to be it, if there is one.
+    fn without_kind(
+        &self,
+        place: TextPlace,
+        entries: &[KeyEntry],
+        name: &Option<Word>,
+        registry: &Registry,
+    ) -> Mistake {
+        if let Some((name, at)) = name.as_ref().filter(|(name, _)| registry.has(name)) {
+            let told = format!("a stage needs `kind`: write {}", self.form.key("kind", name));
+            return Mistake::new(at.clone(), told)
+                .note("`name` is a word of your own, for the `from` of other stages");
+        }
+        let kinds = || registry.kinds().map(|(kind, _)| kind);
+        if let Some(KeyEntry { at, node, .. }) = entries.iter().find(|e| e.key == "type") {
+            let word = if let NodeValue::Text(word) = &node.value { word.as_str() } else { "" };
+            let told = "a stage has no `type`: write `kind`";
+            return Mistake::word(at.clone(), told, word, "kinds", kinds());
+        }
+        Mistake::new(place, "a stage needs `kind`").note(advice("", "kinds", kinds()))
+    }
+
+    /// Takes `key` out of a stage's keys and reads it; what it cannot be is told.
+    fn take<T>(
         &mut self,
         entries: &mut Vec<KeyEntry>,
         key: &str,
-    ) -> Option<Option<(String, TextPlace)>> {
+        read: fn(Node) -> Result<T, (TextPlace, &'static str)>,
+    ) -> Option<T> {
         let at = entries.iter().position(|e| e.key == key)?;
-        let Node { place, value } = entries.remove(at).node;
-        if let NodeValue::Text(text) = value {
-            return Some(Some((text, place)));
+        match read(entries.remove(at).node) {
+            Ok(read) => Some(read),
+            Err((place, takes)) => {
+                self.mistakes.push(Mistake::new(place, format!("`{key}` takes {takes}")));
+                None
+            }
         }
-        self.mistakes.push(Mistake::new(place, format!("`{key}` takes a text in quotes")));
-        Some(None)
+    }
+
+    /// The values of settings and of the stages' keys.
+    pub fn values(&self) -> impl Iterator<Item = &Node> {
+        std::iter::once(&self.run).chain(self.stages.iter().map(|stage| &stage.keys))
+    }
+
+    /// The same, to be changed.
+    pub fn values_mut(&mut self) -> impl Iterator<Item = &mut Node> {
+        std::iter::once(&mut self.run).chain(self.stages.iter_mut().map(|stage| &mut stage.keys))
     }
 
     /// Puts the value of `set`, which is text `source`, in its place.
@@ -162,6 +228,11 @@ impl Draft {
             let told = Mistake::new(set.place(source, ""), "the value has no address");
             return Err(vec![told.note("write stage.key=value, or run.key=value")]);
         };
+        if stage == PARAMETERS {
+            let name = (key.to_owned(), set.place(source, key));
+            self.given.push((name, set.text(source)));
+            return Ok(());
+        }
         if stage != "run" && ["kind", "name", "from"].contains(&key) {
             let told = format!("`{key}` is for the pipeline file alone");
             return Err(vec![Mistake::new(set.place(source, key), told)]);
@@ -174,7 +245,7 @@ impl Draft {
                 let addressed = self.addressed(stage).map_err(|(told, note)| {
                     vec![Mistake::new(set.place(source, stage), told).note(note)]
                 })?;
-                (&mut addressed.keys, addressed.kind.0.as_str())
+                (&mut addressed.keys, addressed.kind.as_ref().map_or("", |(kind, _)| kind.as_str()))
             }
         };
         let NodeValue::Table(entries) = &mut table.value else { return Ok(()) };
@@ -191,7 +262,7 @@ impl Draft {
             return Ok(&mut self.stages[i]);
         }
         let of = |kind: &str| -> Vec<usize> {
-            (0..self.stages.len()).filter(|&i| self.stages[i].kind.0 == kind).collect()
+            (0..self.stages.len()).filter(|&i| self.stages[i].is(kind)).collect()
         };
         let numbered = address.rsplit_once('.').and_then(|(kind, n)| {
             let n: usize = n.parse().ok()?;
@@ -215,7 +286,7 @@ impl Draft {
     }
 
     fn addresses(&self) -> Vec<String> {
-        let kinds = self.stages.iter().map(|s| s.kind.0.clone());
+        let kinds = self.stages.iter().filter_map(|s| Some(s.kind.as_ref()?.0.clone()));
         let names = self.stages.iter().filter_map(|s| Some(s.name.as_ref()?.0.clone()));
         kinds.chain(names).chain(["run".to_owned()]).collect()
     }

@@ -24,6 +24,8 @@ pub(super) enum Problem {
     UnknownKey(String, Vec<&'static str>),
     UnknownWord(String, Vec<&'static str>),
     Missing(&'static str),
+    /// The value is wrong, which is told already.
+    Told,
     Expression(ExpressionFault),
     /// What is wrong, and a word that was meant, perhaps.
     Wrong(String, Option<Box<str>>),
@@ -63,6 +65,7 @@ impl Fault {
                 Mistake::new(place, told).note(fault.help.clone())
             }
             Problem::Missing(key) => Mistake::new(place, format!("`{subject}` needs `{key}`")),
+            Problem::Told => Mistake::new(place, format!("`{key}` is wrong")),
             Problem::Wrong(what, near) => {
                 let near = near.as_ref().map(|near| format!("did you mean `{near}`?"));
                 // A message may begin with the key that it is about.

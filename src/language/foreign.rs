@@ -1,33 +1,42 @@
 //! Pipeline texts that are not quite: tables in single brackets, and pipelines of other programs.
 
+use super::form::{TextForm, begin};
 use super::mistake::Mistake;
-use super::node;
 use super::node::KeyEntry;
 use super::place::TextPlace;
+use super::{json, node};
 
-/// Reads a pipeline file's text as TOML, or says every place where it is none, or the one thing
-/// that it is instead.
-pub(crate) fn parse(text: &str) -> Result<Vec<KeyEntry>, Vec<Mistake>> {
-    node::parse(text, 0).map_err(|wrong| match json(text).or_else(|| single_brackets(text)) {
+/// Reads a pipeline file's text in its form, or says every place where it is not of that form, or
+/// the one thing that it is instead.
+pub(super) fn parse(text: &str, form: TextForm) -> Result<Vec<KeyEntry>, Vec<Mistake>> {
+    let read = match form {
+        TextForm::Json => json::parse(text),
+        _ => node::parse(text, 0),
+    };
+    let has = |key: &str| read.as_ref().is_ok_and(|all| all.iter().any(|e| e.key == key));
+    let is_pdal = form == TextForm::Json && has("pipeline") && !has("stage");
+    if is_pdal || read.is_err() && is_list(text) {
+        return Err(vec![pdal(text)]);
+    }
+    read.map_err(|wrong| match single_brackets(text).filter(|_| form == TextForm::Toml) {
         Some(one) => vec![one],
         None => wrong,
     })
 }
 
-/// What a text that is JSON is told.
-fn json(text: &str) -> Option<Mistake> {
-    let begin = text.len() - text.trim_start_matches('\u{feff}').trim_start().len();
-    let json = serde_json::from_str::<serde_json::Value>(&text[begin..]);
-    if json.is_err() && !text[begin..].starts_with('{') {
-        return None; // a TOML file may begin with any other bracket, but never with this one
-    }
-    let is_pdal = json.is_ok_and(|value| value.is_array() || value.get("pipeline").is_some());
-    let told = match is_pdal {
-        true => "this is a pipeline of PDAL, in JSON; a pipeline file of pointmill is TOML",
-        false => "this is JSON; a pipeline file is TOML",
-    };
-    let note = "write a table [[stage]] with kind = \"read\", and one for every further stage";
-    Some(Mistake::new(TextPlace::new(0, begin..begin + 1), told).note(note))
+/// True for a list in JSON.
+fn is_list(text: &str) -> bool {
+    let json = serde_json::from_str::<serde_json::Value>(begin(text).1);
+    json.is_ok_and(|value| value.is_array())
+}
+
+/// What a pipeline of PDAL is told.
+fn pdal(text: &str) -> Mistake {
+    let (begin, _) = begin(text);
+    let told = "this is a pipeline of PDAL, which pointmill does not run";
+    let note = "the same stages in the words of pointmill: {\"stage\": [{\"kind\": \"read\", \
+                \"path\": …}, …]}, or [[stage]] and kind = \"read\" in TOML";
+    Mistake::new(TextPlace::new(0, begin..begin + 1), told).note(note)
 }
 
 /// What a text with `[stage]` for `[[stage]]` is told: once, though TOML refuses every table after

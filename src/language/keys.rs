@@ -27,7 +27,7 @@ pub(crate) fn read<T: DeserializeOwned>(
         let outcome =
             T::deserialize(NodeReader { node: &rest, unknown: &unknown, formats, is_list: false });
         let fault = match outcome {
-            Ok(read) if mistakes.is_empty() && unknown.borrow().is_empty() => return Ok(read),
+            Ok(read) if dropped.is_empty() && unknown.borrow().is_empty() => return Ok(read),
             Ok(_) => None,
             Err(fault) => Some(fault),
         };
@@ -35,9 +35,12 @@ pub(crate) fn read<T: DeserializeOwned>(
             mistakes.extend(unknown.into_inner().iter().map(|f| f.mistake(subject, keys)));
             return Err(mistakes);
         };
-        let missed =
-            matches!(&fault.problem, Problem::Missing(key) if dropped.iter().any(|d| d == key));
-        if !missed {
+        let is_told = match &fault.problem {
+            Problem::Missing(key) => dropped.iter().any(|dropped| dropped == key),
+            Problem::Told => true,
+            _ => false,
+        };
+        if !is_told {
             mistakes.push(fault.mistake(subject, keys));
         }
         // Try again without the key at fault: the next mistake comes to light.
@@ -98,6 +101,7 @@ impl<'de> NodeReader<'de> {
     fn word(self, valid: &[&'static str]) -> Result<&'de str, Fault> {
         match &self.node.value {
             NodeValue::Text(word) => Ok(word),
+            NodeValue::Told => Err(Fault::new(Problem::Told)),
             _ => Err(de::Error::custom(format!("takes one of {}", valid.join(", ")))),
         }
     }
@@ -151,6 +155,7 @@ impl<'de> Deserializer<'de> for NodeReader<'de> {
                 }
             }
             NodeValue::Table(entries) => self.table(entries, None, visitor),
+            NodeValue::Told => Err(Fault::new(Problem::Told)),
         }
         .map_err(|fault: Fault| fault.at(&self.node.place))
     }

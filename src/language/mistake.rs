@@ -19,6 +19,8 @@ pub(crate) struct SourceText {
     pub origin: String,
     /// What it says.
     pub text: String,
+    /// True for a file: its lines have numbers.
+    pub has_lines: bool,
     /// The setting that the argument stands for, where its name says it (`--keep`): messages at
     /// this place need not name it again.
     pub setting: Option<String>,
@@ -99,17 +101,14 @@ impl Mistake {
         let end = floor(text, self.place.end.clamp(start, from + line.len().max(start - from)));
         let number = text[..from].matches('\n').count() + 1;
         let before = &text[from..start];
-        let (place, gutter) = if self.place.source == 0 {
+        let (place, gutter) = if source.has_lines {
             let column = before.chars().count() + 1;
             (format!("{}:{number}:{column}", source.origin), number.to_string())
         } else {
             (source.origin.clone(), String::new())
         };
-        // One character each, so that the carets stay below what they mean.
-        let plain = |c: char| if c != '\t' && is_control(c) { '\u{fffd}' } else { c };
-        let shown: String = line.chars().take(WIDEST).map(plain).collect();
-        let pad: String = before.chars().map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
         let carets = text[start..end].chars().count().max(1);
+        let (shown, pad) = around(line, before, carets);
         // Words of the text are quoted in it: a line's end there is no line's end here.
         let message = source.shortened(&self.message).replace('\n', "\\n");
         if source.origin.is_empty() {
@@ -129,6 +128,23 @@ impl Mistake {
         }
         out
     }
+}
+
+/// As much of a line as is shown, and the space below it before the carets, which stand behind
+/// `before`: the beginning of the line if they are there, else what is around them.
+fn around(line: &str, before: &str, carets: usize) -> (String, String) {
+    // One character each, so that the carets stay below what they mean.
+    let plain = |c: char| if c != '\t' && is_control(c) { '\u{fffd}' } else { c };
+    let blank = |c: char| if c == '\t' { '\t' } else { ' ' };
+    let column = before.chars().count();
+    if column + carets <= WIDEST || carets > WIDEST / 2 {
+        let shown = line.chars().take(WIDEST).map(plain).collect();
+        return (shown, before.chars().map(blank).collect());
+    }
+    let cut = column + carets - WIDEST / 2;
+    let shown: String = line.chars().skip(cut).take(WIDEST - 1).map(plain).collect();
+    let pad: String = before.chars().skip(cut).map(blank).collect();
+    (format!("…{shown}"), format!(" {pad}"))
 }
 
 /// All mistakes as one error, in the order of their places.
@@ -184,11 +200,27 @@ mod tests {
 
     #[test]
     fn a_place_at_the_end_of_the_text_or_inside_a_letter_is_rendered() {
-        let sources =
-            [SourceText { origin: "p.toml".into(), text: "a = 'ö'\r\nb".into(), setting: None }];
+        let sources = [file("a = 'ö'\r\nb")];
         let at = |span| Mistake::new(TextPlace::new(0, span), "wrong").render(&sources);
         assert_eq!(at(10..10), "p.toml:2:1: wrong\n  2 | b\n    | ^");
         assert_eq!(at(99..120), "p.toml:2:2: wrong\n  2 | b\n    |  ^");
         assert_eq!(at(6..8), "p.toml:1:6: wrong\n  1 | a = 'ö'\n    |      ^^");
+    }
+
+    #[test]
+    fn a_place_far_behind_the_beginning_of_a_line_is_shown_with_what_is_around_it() {
+        let text = format!("{}here{}", "ö ".repeat(200), " x".repeat(200));
+        let at = text.find("here").unwrap();
+        let told = Mistake::new(TextPlace::new(0, at..at + 4), "wrong").render(&[file(&text)]);
+        let lines: Vec<Vec<char>> = told.lines().map(|line| line.chars().collect()).collect();
+        assert!(told.starts_with("p.toml:1:401: wrong\n  1 | …"), "{told}");
+        let caret = lines[2].iter().position(|c| *c == '^').unwrap();
+        assert_eq!(lines[1][caret..caret + 4], ['h', 'e', 'r', 'e']);
+        assert_eq!(lines[2][caret..], ['^'; 4]);
+        assert!(lines[1].len() <= WIDEST + 6);
+    }
+
+    fn file(text: &str) -> SourceText {
+        SourceText { origin: "p.toml".into(), text: text.into(), has_lines: true, setting: None }
     }
 }

@@ -1,21 +1,34 @@
 //! The pipeline language: from a text, and what arguments put in the place of its values, to a
 //! [`Graph`](crate::graph::Graph); every mistake with its place. Knows no plan and no input.
 
+mod builder;
 mod builtin;
 mod described;
 mod draft;
 mod fault;
 mod foreign;
+mod form;
+mod json;
 mod keys;
+mod line;
 mod mistake;
 mod node;
+mod outputs;
+mod parameter;
+mod params;
+mod pipeline;
 mod place;
+mod references;
 mod registry;
 mod schema;
 mod set;
 mod text;
+mod tree;
 mod written;
 
+pub use builder::GraphBuilder;
 pub use described::{KeyDescription, TableDescription, WordDescription};
+pub use parameter::{Parameter, ParameterType};
+pub use pipeline::PipelineText;
 pub use registry::Registry;
 pub use set::Set;

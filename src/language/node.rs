@@ -46,6 +46,7 @@ impl fmt::Display for Node {
                 let items: Vec<String> = list.iter().map(Node::to_string).collect();
                 write!(f, "[{}]", items.join(", "))
             }
+            NodeValue::Told => f.write_str("?"),
             NodeValue::Table(entries) => {
                 let entry = |entry: &KeyEntry| format!("{} = {}", entry.key, entry.node);
                 let entries: Vec<String> = entries.iter().map(entry).collect();
@@ -64,6 +65,8 @@ pub(crate) enum NodeValue {
     Flag(bool),
     List(Vec<Node>),
     Table(Vec<KeyEntry>),
+    /// What is wrong, and told already.
+    Told,
 }
 
 /// A key with its value.
@@ -111,6 +114,23 @@ pub(crate) fn parse_value(text: &str, source: usize, shift: usize) -> Result<Nod
         }
         _ => Err(mistakes.into_iter().map(|m| m.moved_to(place.clone())).collect()),
     }
+}
+
+/// Reads a list in brackets, at `place`: as TOML, or each of its items as a value is read.
+pub(crate) fn parse_list(text: &str, place: &TextPlace) -> Option<Node> {
+    let inside = text.strip_prefix('[')?.strip_suffix(']')?;
+    if let Ok(node @ Node { value: NodeValue::List(_), .. }) =
+        parse_value(text, place.source, place.start)
+    {
+        return Some(node);
+    }
+    let items = inside.split(',').map(str::trim).filter(|item| !item.is_empty());
+    let items = items.map(|item| {
+        let mut node = parse_value(item, place.source, place.start).ok()?;
+        move_to(&mut node, place);
+        Some(node)
+    });
+    Some(Node { place: place.clone(), value: NodeValue::List(items.collect::<Option<_>>()?) })
 }
 
 /// The same value, given by the program rather than a text; `place` is all that points to it.

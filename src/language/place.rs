@@ -32,3 +32,6 @@ impl TextPlace {
         TextPlace { source: self.source, start: start + span.start, end: start + span.end }
     }
 }
+
+/// A word of a text and where it is written.
+pub(crate) type Word = (String, TextPlace);

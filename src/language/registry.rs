@@ -34,12 +34,22 @@ pub struct Registry {
     formats: Formats,
 }
 
-type ReadStage = fn(&Node, &StagePlace) -> Result<(Role, Value), Vec<Mistake>>;
+type ReadStage = fn(&Node, &StagePlace) -> Result<BuiltStage, Vec<Mistake>>;
+
+/// A stage in its role.
+pub(crate) struct BuiltStage {
+    pub role: Role,
+    /// Its keys as reports have them.
+    pub keys: Value,
+    /// Its keys as a text gives them; None if no text can.
+    pub given: Option<Value>,
+}
 
 #[derive(Clone, Copy)]
 struct RegisteredKind {
     about: &'static str,
     either: &'static [&'static str],
+    main: Option<&'static str>,
     is_limited: bool,
     role: RoleName,
     schema: fn(&mut SchemaGenerator) -> Schema,
@@ -61,6 +71,7 @@ impl Registry {
             RegisteredKind {
                 about: K::ABOUT,
                 either: K::EITHER,
+                main: K::MAIN,
                 is_limited: K::IS_LIMITED,
                 role: K::ROLE,
                 schema: K::json_schema,
@@ -91,6 +102,11 @@ impl Registry {
     /// True if there is a kind of that name.
     pub fn has(&self, kind: &str) -> bool {
         self.kinds.contains_key(kind)
+    }
+
+    /// The key of a stage of that kind whose value a line of words may give without naming it.
+    pub(crate) fn main(&self, kind: &str) -> Option<&'static str> {
+        self.kinds.get(kind).and_then(|kind| kind.main)
     }
 
     /// True if a stage of that kind takes the keys that limit it to some records.
@@ -161,21 +177,29 @@ impl Registry {
         kind: &str,
         keys: &Node,
         at: &StagePlace,
-    ) -> Option<Result<(Role, Value), Vec<Mistake>>> {
+    ) -> Option<Result<BuiltStage, Vec<Mistake>>> {
         self.kinds.get(kind).map(|kind| (kind.read)(keys, at))
     }
 }
 
-fn read<K: StageKind>(keys: &Node, at: &StagePlace) -> Result<(Role, Value), Vec<Mistake>> {
+fn read<K: StageKind>(keys: &Node, at: &StagePlace) -> Result<BuiltStage, Vec<Mistake>> {
     let stage: K = keys::read(K::KIND, keys, &at.formats().names())?;
-    let wrong = |error: Error| vec![Mistake::of(keys.place.clone(), &error)];
-    let canonical = canonical(&stage).map_err(wrong)?;
-    let built = stage.build(at).and_then(in_its_role::<K>);
-    built.map(|role| (role, canonical)).map_err(|error| {
+    built(stage, at).map_err(|error| {
         let blamed = at.blamed();
         let place = blamed.as_deref().and_then(|key| keys.at(key)).unwrap_or(&keys.place);
         vec![Mistake::of(place.clone(), &error)]
     })
+}
+
+/// Puts a stage in its role.
+pub(crate) fn built<K: StageKind>(stage: K, at: &StagePlace) -> Result<BuiltStage> {
+    let given = given_keys(&stage)?;
+    let is_reported = |key: &str| !K::PLACES.contains(&key);
+    let keys =
+        given.iter().filter(|(key, _)| is_reported(key)).map(|(k, v)| (k.clone(), v.clone()));
+    let keys = keys.collect::<Map<_, _>>().into();
+    let role = stage.build(at).and_then(in_its_role::<K>)?;
+    Ok(BuiltStage { role, keys, given: Some(given.into()) })
 }
 
 /// The role that a kind says it plays, which its author may have got wrong.
@@ -200,20 +224,19 @@ fn defaults<K: StageKind>() -> Map<String, Value> {
     }
 }
 
-/// The stage's keys with all defaults filled in, sorted by name; those without a value and those
-/// that name files are left out.
-fn canonical<K: StageKind>(stage: &K) -> Result<Value> {
+/// The stage's keys with all defaults filled in, sorted by name; those without a value are left
+/// out.
+fn given_keys<K: StageKind>(stage: &K) -> Result<Map<String, Value>> {
     let value = serde_json::to_value(stage).map_err(|e| {
         Error::internal(format!("cannot list the keys of `{}`", K::KIND)).because(e)
     })?;
     Ok(match value {
         Value::Object(keys) => keys
             .into_iter()
-            .filter(|(key, value)| !value.is_null() && !K::PLACES.contains(&key.as_str()))
+            .filter(|(_, value)| !value.is_null())
             .collect::<BTreeMap<_, _>>()
             .into_iter()
-            .collect::<Map<_, _>>()
-            .into(),
-        _ => Map::new().into(),
+            .collect(),
+        _ => Map::new(),
     })
 }

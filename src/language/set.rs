@@ -1,18 +1,25 @@
 //! Values that an argument puts in the place of a pipeline file's: `--set stage.key=value`.
 
+use std::ops::Range;
+
 use super::mistake;
 use super::mistake::{Mistake, SourceText};
 use super::node;
 use super::node::Node;
-use super::place::TextPlace;
-use crate::Result;
+use super::place::{TextPlace, Word};
+use super::references;
+use crate::{Error, Result};
 
-/// The argument whose texts [`Set::parse`] reads, as errors name it.
+/// The arguments whose texts [`Set::parse`] and [`Set::param`] read, as errors name them.
 const ARGUMENT: &str = "--set";
+const PARAMETER: &str = "--param";
+
+/// What stands in an address in the place of a stage where a parameter is meant.
+pub(super) const PARAMETERS: &str = "params";
 
 /// One value put in the place of a pipeline file's.
 ///
-/// The address is `run.KEY` for a setting, else `STAGE.KEY`: the stage by its `name`, or by its
+/// The address is `run.KEY` for a setting, `params.NAME` for a parameter, else `STAGE.KEY`: the stage by its `name`, or by its
 /// kind where only one stage is of that kind, or as `KIND.N.KEY`, the N-th stage of that kind, from
 /// 1.
 #[derive(Debug, Clone)]
@@ -41,17 +48,42 @@ impl Set {
     /// A text without `=`. Whether there is such a key is found where it is put into a text.
     pub fn parse(text: &str) -> Result<Set> {
         let Some((address, _)) = text.split_once('=') else {
-            let told = Mistake::new(TextPlace::new(1, 0..text.len()), "there is no `=`")
-                .note("write STAGE.KEY=VALUE, such as cells.max_angle=0.2 or run.threads=2");
-            let none = || SourceText { origin: String::new(), text: String::new(), setting: None };
-            let given = SourceText { origin: ARGUMENT.to_owned(), text: text.to_owned(), ..none() };
-            return Err(mistake::tell(vec![told], &[none(), given]));
+            let help = "write STAGE.KEY=VALUE, such as cells.max_angle=0.2 or run.threads=2";
+            return Err(refused(ARGUMENT, text, 0..text.len(), "there is no `=`", help));
         };
+        let end = address.len();
+        let address = address.trim_end().to_owned();
+        if address.split('.').next() == Some(PARAMETERS) {
+            let told = "a parameter has an argument of its own";
+            return Err(refused(ARGUMENT, text, 0..end, told, "write --param NAME=VALUE"));
+        }
+        let value = Given::Text { from: end + 1 };
+        Ok(Set { argument: ARGUMENT.to_owned(), text: text.to_owned(), address, value })
+    }
+
+    /// Reads `name=value`, as `--param` takes it: a value for a parameter that the pipeline
+    /// declares. It is read as the parameter's type asks for, a text as it is.
+    ///
+    /// # Errors
+    ///
+    /// A text without `=`, or without a name before it. Whether there is such a parameter is found
+    /// where it is put into a text.
+    pub fn param(text: &str) -> Result<Set> {
+        let end = text.find('=').unwrap_or(0);
+        let name = text[..end].trim_end();
+        if !references::is_name(name) {
+            let told = match text.contains('=') {
+                true => "a parameter's name is made of letters, digits, - and _",
+                false => "there is no `=`",
+            };
+            let help = "write NAME=VALUE, NAME as the pipeline declares it under `params`";
+            return Err(refused(PARAMETER, text, 0..text.len(), told, help));
+        }
         Ok(Set {
-            argument: ARGUMENT.to_owned(),
+            argument: PARAMETER.to_owned(),
             text: text.to_owned(),
-            address: address.trim_end().to_owned(),
-            value: Given::Text { from: address.len() + 1 },
+            address: format!("{PARAMETERS}.{name}"),
+            value: Given::Text { from: end + 1 },
         })
     }
 
@@ -77,7 +109,8 @@ impl Set {
     /// The text that errors show.
     pub(crate) fn source(&self) -> SourceText {
         let setting = matches!(self.value, Given::Json(_)).then(|| self.address.clone());
-        SourceText { origin: self.argument.clone(), text: self.text.clone(), setting }
+        let (origin, text) = (self.argument.clone(), self.text.clone());
+        SourceText { origin, text, has_lines: false, setting }
     }
 
     /// The stage part and the key part of the address.
@@ -96,13 +129,36 @@ impl Set {
         TextPlace::new(source, span)
     }
 
+    /// The value as it was typed, with its place in source `source`.
+    pub(crate) fn text(&self, source: usize) -> Word {
+        let from = if let Given::Text { from } = self.value { from } else { 0 };
+        let text = self.text[from..].trim();
+        let start = from + self.text[from..].len() - self.text[from..].trim_start().len();
+        (text.to_owned(), TextPlace::new(source, start..start + text.len()))
+    }
+
     /// The value, its place in source `source`.
     pub(crate) fn value(&self, source: usize) -> Result<Node, Vec<Mistake>> {
         match &self.value {
-            Given::Text { from } => node::parse_value(self.text[*from..].trim(), source, *from),
+            Given::Text { .. } => {
+                let (text, place) = self.text(source);
+                node::parse_value(&text, source, place.start)
+            }
             Given::Json(value) => {
                 Ok(node::from_json(value, &TextPlace::new(source, 0..self.text.len())))
             }
         }
     }
+}
+
+/// What is wrong with the part `span` of an argument.
+fn refused(argument: &str, text: &str, span: Range<usize>, told: &str, help: &str) -> Error {
+    let mistake = Mistake::new(TextPlace::new(1, span), told).note(help);
+    let source = |origin: &str, text: &str| SourceText {
+        origin: origin.to_owned(),
+        text: text.to_owned(),
+        has_lines: false,
+        setting: None,
+    };
+    mistake::tell(vec![mistake], &[source("", ""), source(argument, text)])
 }

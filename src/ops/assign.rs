@@ -31,6 +31,7 @@ impl StageKind for Assign {
     const KIND: &'static str = "assign";
     const ROLE: RoleName = RoleName::Transform;
     const ABOUT: &'static str = "Gives dimensions of the records the values of expressions.";
+    const MAIN: Option<&'static str> = Some("set");
 
     fn build(self, at: &StagePlace) -> Result<Role> {
         if self.set.0.is_empty() {

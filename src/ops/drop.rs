@@ -12,9 +12,9 @@ use crate::{Error, Result};
 /// Removes the records of some classes or flags, or for which a condition holds.
 ///
 /// The keys are those that limit any other stage: a record goes if all that are given hold for it.
-/// `classes = [7, 18]` removes what is classified as noise. What stays is what a stage `filter` with
-/// the opposite condition keeps. A scan that has no such class or flag has nothing to remove, which
-/// the run says.
+/// `classes = [7, 18]` removes what is classified as noise. What stays is what a stage `filter`
+/// with the opposite condition keeps. A scan that has no such class or flag has nothing to remove,
+/// which the run says.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Drop {
@@ -44,6 +44,7 @@ impl StageKind for Drop {
     const ABOUT: &'static str =
         "Removes the records of some classes or flags, or for which a condition holds.";
     const IS_LIMITED: bool = false;
+    const MAIN: Option<&'static str> = Some("where");
 
     fn build(self, _: &StagePlace) -> Result<Role> {
         if self.choice().is_all() {

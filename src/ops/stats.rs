@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::expression::{KeyExpression, NamedField};
 use crate::point::{PointBatch, Schema, names};
-use crate::report::{Numbers, StatsTally, Tally};
+use crate::report::{StatsTally, StoredNumbers, Tally};
 use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform};
 use crate::{Error, Result};
 
@@ -84,9 +84,9 @@ impl Transform for Stats {
     }
 }
 
-fn numbers<'a>(field: &NamedField, stored: &'a [f64]) -> Numbers<'a> {
+fn numbers<'a>(field: &NamedField, stored: &'a [f64]) -> StoredNumbers<'a> {
     let [scale, origin] = field.units();
-    Numbers { stored, scale, origin, whole: field.is_whole() }
+    StoredNumbers { stored, scale, origin, whole: field.is_whole() }
 }
 
 /// The class of each record, as the report counts them: what is no class is class 0.
@@ -97,7 +97,7 @@ fn classes(batch: &PointBatch) -> Result<Vec<u8>> {
     Ok(classes)
 }
 
-/// Numbers by class, those of the records from `place` on.
+/// StoredNumbers by class, those of the records from `place` on.
 fn by_class(classes: &[u8], place: usize, stored: &[f64]) -> BTreeMap<u8, Vec<f64>> {
     let mut all: BTreeMap<u8, Vec<f64>> = BTreeMap::new();
     if !classes.is_empty() {

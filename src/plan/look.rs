@@ -31,7 +31,7 @@ pub(crate) fn look(
 ) -> Result<Option<Unfit>> {
     let schema = source.schema();
     let looking: Vec<_> = sinks.iter().filter(|sink| sink.checks(schema)).collect();
-    if looking.is_empty() {
+    if looking.is_empty() || source.is_read_once() {
         return Ok(None);
     }
     let records = RECORDS.min(BYTES / schema.stride.max(1)).max(1);

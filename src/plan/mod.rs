@@ -9,9 +9,12 @@ mod look;
 mod outline;
 mod passes;
 mod places;
+mod pull;
 mod shown;
 mod sorted;
+mod streaming;
 mod stretch;
 
 pub use fitted::Plan;
 pub use outline::Outline;
+pub use pull::Pulled;

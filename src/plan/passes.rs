@@ -2,12 +2,11 @@
 //! where a stage must have seen all tiles before it decides.
 
 use super::columns::{NewestColumns, missing};
-use super::limits::{rewritten, seen_by};
+use super::limits::seen_by;
 use super::sorted::{Sorted, StageWork};
 use crate::engine::pass::{Branch, Call, Op, Pass, StageOp, decides, needs};
 use crate::point::{ColumnKind, ComputedDimension, Scalar, Schema, names};
 use crate::stage::Needs;
-use crate::store::CHOSEN;
 use crate::tile::Partition;
 use crate::{Error, Result};
 
@@ -42,23 +41,23 @@ pub(super) fn unroll(sorted: &Sorted, schema: &Schema) -> Result<Passes> {
     Ok(layout.out)
 }
 
-struct PassLayout<'a> {
-    sorted: &'a Sorted,
-    ops: &'a [StageOp],
+pub(super) struct PassLayout<'a> {
+    pub sorted: &'a Sorted,
+    pub ops: &'a [StageOp],
     schema: &'a Schema,
-    out: Passes,
-    at: BranchCursor,
+    pub out: Passes,
+    pub at: BranchCursor,
 }
 
 /// How far a branch is laid out.
 #[derive(Debug, Clone, Default)]
-struct BranchCursor {
+pub(super) struct BranchCursor {
     /// The pass that the next stage may join; None if it begins one.
     pass: Option<usize>,
     /// The pass that one which begins goes on from.
     behind: Option<usize>,
     /// False once the pass removes or gathers.
-    is_open: bool,
+    pub is_open: bool,
     /// The newest values of each column that a stage computed.
     columns: NewestColumns,
     /// Stages of the graph so far, the decode's left out.
@@ -66,9 +65,9 @@ struct BranchCursor {
     /// The tile stages among them.
     ops: Vec<usize>,
     /// The stages that stream among them.
-    filters: Vec<usize>,
+    pub filters: Vec<usize>,
     /// True if the last stage takes records away.
-    decides: bool,
+    pub decides: bool,
 }
 
 impl PassLayout<'_> {
@@ -115,7 +114,7 @@ impl PassLayout<'_> {
     }
 
     /// The pass that the branch is at; begins one if it is at none.
-    fn pass(&mut self) -> usize {
+    pub(super) fn pass(&mut self) -> usize {
         match self.at.pass {
             Some(pass) => pass,
             None => self.begin(),
@@ -123,7 +122,7 @@ impl PassLayout<'_> {
     }
 
     /// Begins a pass behind the one that the branch is at.
-    fn begin(&mut self) -> usize {
+    pub(super) fn begin(&mut self) -> usize {
         let behind = self.at.pass.or(self.at.behind);
         self.out.passes.push(Pass { behind, ..Pass::default() });
         (self.at.pass, self.at.is_open) = (Some(self.out.passes.len() - 1), true);
@@ -143,93 +142,6 @@ impl PassLayout<'_> {
             }
         }
         self.at.decides = decides(&needs);
-        Ok(())
-    }
-
-    /// What streams behind tiles has a pass of its own, unless nothing but such stages is in the
-    /// last.
-    fn filter(&mut self, filter: usize) -> Result<()> {
-        let at = self.streaming();
-        self.stream(at, self.sorted.filters[filter].reads());
-        self.out.passes[at].filters.push(filter);
-        self.at.filters.push(filter);
-        (self.at.is_open, self.at.decides) = (false, true);
-        Ok(())
-    }
-
-    /// The pass in which records may be looked at one by one, behind all calls.
-    fn streaming(&mut self) -> usize {
-        let at = self.pass();
-        let pass = &self.out.passes[at];
-        let begins = !pass.calls.is_empty() || !pass.after.is_empty() || pass.chooses.is_some();
-        if !begins {
-            return at;
-        }
-        let changes = |filter: &usize| !self.sorted.filters[*filter].changes().is_empty();
-        let changed_by: Vec<usize> = self.at.filters.iter().copied().filter(changes).collect();
-        let reads: Vec<ColumnKind> =
-            changed_by.iter().flat_map(|&filter| self.sorted.filters[filter].reads()).collect();
-        let at = self.begin();
-        self.out.passes[at].changed_by = changed_by;
-        self.stream(at, reads);
-        at
-    }
-
-    /// Lets stages that stream look at these columns in pass `at`.
-    fn stream(&mut self, at: usize, columns: Vec<ColumnKind>) {
-        for column in columns {
-            self.bring(at, column);
-            let streamed = &mut self.out.passes[at].streamed;
-            if !streamed.contains(&column) {
-                streamed.push(column);
-            }
-        }
-    }
-
-    /// Chooses the records that stage `op` is limited to by columns, in a pass before it.
-    fn choose(&mut self, op: usize) {
-        let columns = self.ops[op].chosen_by();
-        if columns.is_empty() {
-            return;
-        }
-        let at = self.streaming();
-        self.stream(at, columns);
-        self.out.passes[at].chooses = Some(op);
-        self.at.is_open = false;
-    }
-
-    /// Refuses a tile stage that reads what a stage above, which streams, changes only in what is
-    /// written.
-    fn check_unchanged(&self, op: usize) -> Result<()> {
-        let StageOp { kind, written, op, limits, selection, .. } = &self.ops[op];
-        let needs = op.tile().needs();
-        // Where columns choose, records are looked at as the stages above leave them.
-        let is_chosen_by = |name: &str| *selection & CHOSEN == 0 && limits.choice.looks_at(name);
-        let is_column = |name: &str| needs.reads.iter().any(|column| column.name() == name);
-        let is_read = |name: &String| {
-            names::XYZ.contains(&name.as_str())
-                || needs.dimensions.contains(name)
-                || is_column(name)
-                || is_chosen_by(name)
-        };
-        for filter in &self.at.filters {
-            let stream = &self.sorted.filters[*filter];
-            let above = &stream.kind;
-            if let Some(column) = rewritten(stream, &needs.writes) {
-                let name = column.name();
-                let told = format!("`{kind}` computes {name} anew, which `{above}` looks at");
-                let help = format!("put `{above}` behind `{kind}`");
-                return Err(written.wrong(told).help(help));
-            }
-            if let Some(name) = stream.changes().iter().find(|name| is_read(name)) {
-                let told =
-                    format!("`{kind}` works by {name} as it is read, and `{above}` changes it");
-                let help = format!(
-                    "put `{above}` above all stages that work on tiles, or behind `{kind}`"
-                );
-                return Err(written.wrong(told).help(help));
-            }
-        }
         Ok(())
     }
 
@@ -368,7 +280,7 @@ impl PassLayout<'_> {
     }
 
     /// Brings the newest values of a column to pass `at`; false if no stage computed any.
-    fn bring(&mut self, at: usize, column: ColumnKind) -> bool {
+    pub(super) fn bring(&mut self, at: usize, column: ColumnKind) -> bool {
         let Some(from) = self.at.columns.read(column) else { return false };
         if from != at {
             let add = |columns: &mut Vec<ColumnKind>| {

@@ -23,7 +23,8 @@ pub(super) fn check_places(
     let mut files = Files::default();
     pipeline.iter().for_each(|path| files.read(path, Use::Pipeline));
     inputs.iter().for_each(|path| files.read(path, Use::Input));
-    let outputs = sinks.iter().map(|sink| (sink.path(), sink.is_folder()));
+    let files_of = sinks.iter().filter(|sink| sink.is_file());
+    let outputs = files_of.map(|sink| (sink.path(), sink.is_folder()));
     for (path, is_folder) in outputs.chain(settings.report.as_deref().map(|path| (path, false))) {
         files.write(path).map_err(|clash| refuse(&clash, path))?;
         if !is_folder {

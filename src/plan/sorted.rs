@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::engine::pass::{Op, StageOp, StreamOp};
-use crate::graph::{Graph, GraphStage, Written};
+use crate::graph::{Graph, GraphMistake, GraphStage, Written};
 use crate::point::ColumnKind;
 use crate::stage::{CreateSink, OpenSource, Role};
 use crate::{Error, Result};
@@ -44,15 +44,10 @@ pub(super) struct Sorted {
 impl Sorted {
     /// Sorts a graph, or says the first thing that is wrong with it.
     pub fn new(graph: Graph) -> Result<Sorted> {
+        refuse_mistakes(&graph)?;
+        let graph = graph.without_merges();
         let takers: Vec<Vec<usize>> =
             (0..graph.stages.len()).map(|n| graph.takers(n).collect()).collect();
-        if let Some(wrong) = graph.mistakes().into_iter().next() {
-            let error = graph.stages[wrong.stage].written.wrong(wrong.told);
-            return Err(match wrong.help {
-                Some(help) => error.help(help),
-                None => error,
-            });
-        }
         let (decoded, root) = decoded(&graph.stages, &takers)?;
         let name =
             |stage: &GraphStage| serde_json::json!({ "kind": stage.kind, "keys": stage.keys });
@@ -72,18 +67,10 @@ impl Sorted {
                 Role::Transform(_) => StageWork::Filter(filters.len()),
                 Role::TileOp(_) | Role::ScanOp(_) => StageWork::Op(ops.len()),
                 Role::Sink(_) => StageWork::Sink(sinks.len()),
+                Role::Merge => return Err(Error::internal("a merge is left in the graph")),
             });
-            let blamed = written.clone();
             match role {
-                Role::Source(open) => {
-                    source = Some(match source {
-                        None => (kind, open),
-                        Some((first, all)) => {
-                            let merged = all.merged(&*open);
-                            (first, merged.map_err(|error| blame(&*blamed, error))?)
-                        }
-                    });
-                }
+                Role::Source(open) => source = Some(merged(source, kind, open, &*written)?),
                 Role::Transform(transform) => {
                     let all = if decoded.contains(&n) { &mut transforms } else { &mut filters };
                     all.push(StreamOp {
@@ -104,6 +91,7 @@ impl Sorted {
                     ops.push(StageOp { kind, written, op, limits, above, selection: 0 });
                 }
                 Role::Sink(sink) => sinks.push(sink),
+                Role::Merge => {}
             }
         }
         let source = source.ok_or_else(|| Error::pipeline("the pipeline reads nothing"))?;
@@ -176,6 +164,38 @@ fn columns_above(stages: &[GraphStage]) -> Vec<Vec<ColumnKind>> {
         above.push(columns);
     }
     above
+}
+
+/// All mistakes in how the stages hang together.
+fn refuse_mistakes(graph: &Graph) -> Result<()> {
+    let told = |GraphMistake { stage, told, help, key }| {
+        let written = &graph.stages[stage].written;
+        let error = match key {
+            Some(key) => written.wrong_key(key, told),
+            None => written.wrong(told),
+        };
+        match help {
+            Some(help) => error.help(help),
+            None => error,
+        }
+    };
+    Error::all(graph.mistakes().into_iter().map(told).collect())
+}
+
+/// A source, and another that is merged with it.
+fn merged(
+    source: Option<(String, Box<dyn OpenSource>)>,
+    kind: String,
+    open: Box<dyn OpenSource>,
+    written: &dyn Written,
+) -> Result<(String, Box<dyn OpenSource>)> {
+    match source {
+        None => Ok((kind, open)),
+        Some((first, all)) => {
+            let merged = all.merged(&*open);
+            Ok((first, merged.map_err(|error| blame(written, error))?))
+        }
+    }
 }
 
 /// What is wrong with a stage, told where it is written.

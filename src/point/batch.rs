@@ -132,8 +132,8 @@ impl PointBatch {
         self.records.extend_from_slice(records);
     }
 
-    /// Lets `change` work on the records that are `chosen`, a flag for each; the others stay as they
-    /// are, and where they are among those that are left.
+    /// Lets `change` work on the records that are `chosen`, a flag for each; the others stay as
+    /// they are, and where they are among those that are left.
     pub(crate) fn change_some(
         &mut self,
         chosen: &[bool],

@@ -1,28 +1,22 @@
 //! What the numbers of a dimension come to: extremes, mean, deviation and a histogram, the same in
 //! any order.
-//!
-//! A histogram needs its range before its first number, and one walk does not know it. So its bins
-//! are as wide as a power of two, from multiples of it: when a number falls outside, neighbours are
-//! joined, and a bin of the wider ones is exactly two of the narrower. The width in the end is a
-//! function of the smallest and the largest number alone, whoever counted what first.
+
+mod bins;
+mod twofold;
 
 use std::collections::BTreeMap;
-use std::ops::{Add, Mul, Sub};
 
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::sums::FixedSum;
+use bins::{Bins, NARROWEST};
 
-/// Bins that a histogram has at most: as many as there are classes.
-pub const BINS: usize = 256;
-/// Binary digits of a number that bins tell apart at most, so that their numbers fit in words.
-const DIGITS: i32 = 40;
-/// Exponent of the narrowest bins.
-const NARROWEST: i32 = -1000;
+pub use bins::DimensionHistogram;
+use twofold::Twofold;
 
 /// Numbers as a dimension stores them: world value = stored · scale + origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Numbers<'a> {
+pub struct StoredNumbers<'a> {
     /// As they are stored.
     pub stored: &'a [f64],
     /// World units of a stored one.
@@ -33,7 +27,7 @@ pub struct Numbers<'a> {
     pub whole: bool,
 }
 
-/// What is counted of the numbers of a dimension. Numbers that are not finite are only counted.
+/// What is counted of the numbers of a dimension; those that are not finite are only counted.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct DimensionTally {
     count: u64,
@@ -84,24 +78,12 @@ pub struct DimensionFigures {
     /// sqrt(Σ(v - mean)²/n); none likewise.
     pub deviation: Option<f64>,
     /// How they are spread.
-    pub histogram: Option<Histogram>,
-}
-
-/// Counts of numbers in bins of one width, each from its lower end on, its upper end left out.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
-pub struct Histogram {
-    /// Lower end of the first bin.
-    pub from: f64,
-    /// Width of a bin: a power of two.
-    pub width: f64,
-    /// How many numbers are in each.
-    pub counts: Vec<u64>,
+    pub histogram: Option<DimensionHistogram>,
 }
 
 impl DimensionTally {
     /// Adds numbers of the dimension.
-    pub fn add(&mut self, numbers: Numbers<'_>) {
+    pub fn add(&mut self, numbers: StoredNumbers<'_>) {
         self.units = FloatPair([numbers.scale, numbers.origin]);
         let narrowest = if numbers.whole && numbers.scale == 1.0 { 0 } else { NARROWEST };
         let (mut sum, mut squares) = (0i128, 0i128);
@@ -252,174 +234,18 @@ fn by_name<S: Serializer>(
     into.collect_map(dimensions.iter().map(|(name, figures)| (name, figures)))
 }
 
-/// Counts of numbers in bins of 2^`exponent`, the first of which begins at its `first` multiple.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-struct Bins {
-    exponent: i32,
-    first: i64,
-    counts: Vec<u64>,
-}
-
-/// 2^`exponent`, for exponents of normal numbers.
-fn power(exponent: i32) -> f64 {
-    f64::from_bits(((1023 + exponent) as u64) << 52)
-}
-
-impl Bins {
-    /// Adds a finite number; bins of whole numbers are no narrower than 2^`narrowest`.
-    fn add(&mut self, number: f64, narrowest: i32) {
-        let exponent = (number.to_bits() >> 52 & 0x7ff) as i32 - 1023;
-        let least = (exponent - DIGITS).max(narrowest);
-        if self.counts.is_empty() {
-            self.exponent = least;
-        } else if least > self.exponent {
-            self.join(least);
-        }
-        let mut at = (number * power(-self.exponent)).floor() as i64;
-        if self.counts.is_empty() {
-            self.first = at;
-        }
-        if let Some(count) = self.counts.get_mut((at - self.first) as usize) {
-            *count += 1;
-            return;
-        }
-        at = self.reach(at, at);
-        self.counts[(at - self.first) as usize] += 1;
-    }
-
-    /// Sees to it that there are bins from `low` to `high`, multiples of the width that it has now;
-    /// what `low` is a multiple of then.
-    fn reach(&mut self, mut low: i64, mut high: i64) -> i64 {
-        loop {
-            let last = self.first + self.counts.len().max(1) as i64 - 1;
-            let (begin, end) = (low.min(self.first), high.max(last));
-            if end - begin < BINS as i64 {
-                let before = std::iter::repeat_n(0, (self.first - begin) as usize);
-                self.counts.splice(0..0, before);
-                self.counts.resize((end - begin) as usize + 1, 0);
-                self.first = begin;
-                return low;
-            }
-            self.join(self.exponent + 1);
-            (low, high) = (low >> 1, high >> 1);
-        }
-    }
-
-    /// Makes bins as wide as 2^`exponent`.
-    fn join(&mut self, exponent: i32) {
-        let by = (exponent - self.exponent).clamp(0, 63);
-        let first = self.first >> by;
-        let mut counts = Vec::new();
-        for (n, count) in self.counts.iter().enumerate() {
-            let at = ((self.first + n as i64 >> by) - first) as usize;
-            if at >= counts.len() {
-                counts.resize(at + 1, 0);
-            }
-            counts[at] += count;
-        }
-        (self.exponent, self.first, self.counts) = (exponent, first, counts);
-    }
-
-    fn merge(&mut self, other: &Bins) {
-        if other.counts.is_empty() {
-            return;
-        }
-        if self.counts.is_empty() {
-            *self = other.clone();
-            return;
-        }
-        let mut other = other.clone();
-        let exponent = self.exponent.max(other.exponent);
-        self.join(exponent);
-        other.join(exponent);
-        self.reach(other.first, other.first + other.counts.len() as i64 - 1);
-        other.join(self.exponent);
-        let begin = (other.first - self.first) as usize;
-        self.counts[begin..].iter_mut().zip(&other.counts).for_each(|(mine, n)| *mine += n);
-    }
-
-    fn histogram(&self) -> Option<Histogram> {
-        let width = power(self.exponent);
-        let from = self.first as f64 * width;
-        let counts = self.counts.clone();
-        (!counts.is_empty()).then_some(Histogram { from, width, counts })
-    }
-}
-
-/// A number as the sum of two floats, the second of which is what the first leaves: the difference
-/// of two squares of large numbers keeps the digits that it is about.
-#[derive(Debug, Clone, Copy)]
-struct Twofold(f64, f64);
-
-impl Twofold {
-    fn of(whole: i128) -> Twofold {
-        let near = whole as f64;
-        Twofold(near, (whole - near as i128) as f64)
-    }
-
-    fn of_sums(plus: &FixedSum, minus: &FixedSum) -> Twofold {
-        let [plus, minus] = [plus, minus].map(FixedSum::parts).map(|[a, b]| Twofold(a, b));
-        plus - minus
-    }
-
-    fn value(self) -> f64 {
-        self.0 + self.1
-    }
-
-    /// The sum of two floats and what its rounding leaves (Knuth).
-    fn sum(a: f64, b: f64) -> Twofold {
-        let sum = a + b;
-        let part = sum - a;
-        Twofold(sum, (a - (sum - part)) + (b - part))
-    }
-}
-
-impl Add for Twofold {
-    type Output = Twofold;
-
-    fn add(self, other: Twofold) -> Twofold {
-        let Twofold(sum, rest) = Twofold::sum(self.0, other.0);
-        Twofold::sum(sum, rest + self.1 + other.1)
-    }
-}
-
-impl Sub for Twofold {
-    type Output = Twofold;
-
-    fn sub(self, other: Twofold) -> Twofold {
-        self + Twofold(-other.0, -other.1)
-    }
-}
-
-impl Mul for Twofold {
-    type Output = Twofold;
-
-    fn mul(self, other: Twofold) -> Twofold {
-        let product = self.0 * other.0;
-        let rest = libm::fma(self.0, other.0, -product);
-        Twofold::sum(product, rest + self.0 * other.1 + self.1 * other.0)
-    }
-}
-
-impl Mul<f64> for Twofold {
-    type Output = Twofold;
-
-    fn mul(self, factor: f64) -> Twofold {
-        self * Twofold(factor, 0.0)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
+    use super::bins::{BINS, power};
     use super::*;
 
-    fn floats(stored: &[f64]) -> Numbers<'_> {
-        Numbers { stored, scale: 1.0, origin: 0.0, whole: false }
+    fn floats(stored: &[f64]) -> StoredNumbers<'_> {
+        StoredNumbers { stored, scale: 1.0, origin: 0.0, whole: false }
     }
 
-    fn tally(numbers: Numbers<'_>) -> DimensionTally {
+    fn tally(numbers: StoredNumbers<'_>) -> DimensionTally {
         let mut tally = DimensionTally::default();
         tally.add(numbers);
         tally
@@ -429,16 +255,17 @@ mod tests {
     fn the_figures_are_those_of_the_numbers() {
         let stored: Vec<f64> = (0..1000).map(|n| f64::from(n % 10)).collect();
         let figures =
-            tally(Numbers { stored: &stored, scale: 0.5, origin: 100.0, whole: true }).figures();
+            tally(StoredNumbers { stored: &stored, scale: 0.5, origin: 100.0, whole: true })
+                .figures();
         assert_eq!((figures.min, figures.max), (Some(100.0), Some(104.5)));
         assert_eq!(figures.mean, Some(102.25));
         assert!((figures.deviation.unwrap() - 8.25f64.sqrt() / 2.0).abs() < 1e-15);
-        let Histogram { from, width, counts } = figures.histogram.unwrap();
+        let DimensionHistogram { from, width, counts } = figures.histogram.unwrap();
         assert_eq!(counts.iter().sum::<u64>(), 1000);
         assert_eq!(from + width * (counts.len() as f64 - 1.0), 104.5, "the last bin");
         let classes =
-            tally(Numbers { stored: &[2.0, 6.0, 2.0], scale: 1.0, origin: 0.0, whole: true });
-        let Histogram { from, width, counts } = classes.figures().histogram.unwrap();
+            tally(StoredNumbers { stored: &[2.0, 6.0, 2.0], scale: 1.0, origin: 0.0, whole: true });
+        let DimensionHistogram { from, width, counts } = classes.figures().histogram.unwrap();
         assert_eq!((from, width, counts), (2.0, 1.0, vec![2, 0, 0, 0, 1]));
     }
 

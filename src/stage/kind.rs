@@ -38,6 +38,10 @@ pub trait StageKind: DeserializeOwned + Serialize + JsonSchema {
     /// where a file gives several the stage tells.
     const EITHER: &'static [&'static str] = &[];
 
+    /// The key that a pipeline in one line may give without its name: `read in.laz` is
+    /// `read path=in.laz`.
+    const MAIN: Option<&'static str> = None;
+
     /// True if it takes `where`, `classes`, `with` and `without` besides its own keys, to work on
     /// some records and let the others pass; false if that is what its own keys are about.
     const IS_LIMITED: bool = true;

@@ -114,6 +114,12 @@ pub trait CreateSink: Send + Sync {
     /// The final path of the output; the folder where there is one output for each input.
     fn path(&self) -> &Path;
 
+    /// False if it writes no file: then [`path`](CreateSink::path) is what reports and messages call
+    /// it, and it is created with an empty path.
+    fn is_file(&self) -> bool {
+        true
+    }
+
     /// True if each input gets an output of its own, in the folder [`path`](CreateSink::path).
     fn is_folder(&self) -> bool {
         false

@@ -113,6 +113,11 @@ pub trait Source: Send + Sync {
         self.part(index)
     }
 
+    /// True if its records come once: then none is looked at before the run.
+    fn is_read_once(&self) -> bool {
+        false
+    }
+
     /// Warnings for the user that opening or reading gave rise to (dropped faces, odd headers).
     fn warnings(&self) -> Vec<String> {
         Vec::new()

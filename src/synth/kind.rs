@@ -31,6 +31,7 @@ impl StageKind for Synth {
     const ROLE: RoleName = RoleName::Source;
     const ABOUT: &'static str = "Makes a synthetic scan: of a simple surface, a machine part, \
                                  projected squares or a landscape.";
+    const MAIN: Option<&'static str> = Some("scene");
 
     fn build(self, _at: &StagePlace) -> Result<Role> {
         let Synth { scene, points, seed, noise } = self;

@@ -19,7 +19,7 @@ const LAYERS: [&[&str]; 17] = [
     &["tile"],
     &["report"],
     &["stage"],
-    &["ops", "io"],
+    &["ops", "io", "memory"],
     &["synth"],
     &["picture"],
     &["graph"],

@@ -281,8 +281,16 @@ fn graphs_that_hang_together_wrongly_are_told() {
     assert_eq!(told(&|graph| graph.stages[2].from = vec![0]), only(1, unused));
     let ahead = told(&|graph| graph.stages[1].from = vec![2]);
     assert!(ahead.contains(&(1, "a stage takes from stages before it".to_owned())), "{ahead:?}");
+    let nowhere = told(&|graph| graph.stages[2].from = vec![1, 99]);
+    assert_eq!(nowhere, only(2, "a stage takes from stages before it"));
     let rootless = told(&|graph| graph.stages[1].from.clear());
     assert!(rootless.iter().any(|(at, told)| *at == 1 && told.contains("must be a source")));
+    let merge = told(&|graph| {
+        graph.stages[1].role = Role::Merge;
+        graph.stages[1].from = vec![99];
+        graph.stages[2].from = vec![0, 1];
+    });
+    assert_eq!(merge, only(1, "a stage takes from stages before it"));
     let cut = told(&|graph| drop(graph.stages.pop()));
     assert_eq!(cut, only(1, "nothing takes these points: end with `write`"));
     let mut graph = chain(folder.path(), NORMALS, "a.las");

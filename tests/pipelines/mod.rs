@@ -1,8 +1,13 @@
 //! Pipeline files: their text, values, and the files that they name.
 
+mod builder;
 mod formats;
 mod inputs;
+mod json;
+mod lines;
+mod params;
 mod text;
+mod trees;
 mod user_files;
 mod values;
 mod words;

@@ -2,6 +2,7 @@
 
 mod edges;
 mod killed;
+mod memory_ends;
 mod spill_damage;
 mod threads;
 mod trouble;

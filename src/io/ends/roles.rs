@@ -52,6 +52,7 @@ impl StageKind for Read {
     const KIND: &'static str = "read";
     const ROLE: RoleName = RoleName::Source;
     const ABOUT: &'static str = "Reads LAS, LAZ or PLY files.";
+    const MAIN: Option<&'static str> = Some("path");
     const PLACES: &'static [&'static str] = &["path", "format"];
 
     fn build(self, at: &StagePlace) -> Result<Role> {
@@ -63,6 +64,7 @@ impl StageKind for Write {
     const KIND: &'static str = "write";
     const ROLE: RoleName = RoleName::Sink;
     const ABOUT: &'static str = "Writes a LAS, LAZ or PLY file, or one for each input.";
+    const MAIN: Option<&'static str> = Some("path");
     const PLACES: &'static [&'static str] = &["path", "folder"];
     const EITHER: &'static [&'static str] = &["path", "folder"];
 
