@@ -1,4 +1,4 @@
-//! `stages`: the kinds of stages with their keys, as text or JSON.
+//! `stages` and `schema`: the kinds of stages with their keys, for people, programs and editors.
 
 use serde_json::{Value, json};
 
@@ -33,6 +33,11 @@ pub(super) fn stages(arguments: &StagesArguments, registry: &Registry) -> Result
     }
 }
 
+/// Prints the JSON Schema of pipeline files.
+pub(super) fn schema(registry: &Registry) -> Result<()> {
+    printed(&registry.schema())
+}
+
 fn unknown(kind: &str, registry: &Registry) -> Error {
     let kinds = registry.kinds().map(|(kind, _)| kind.to_owned());
     let kinds: Vec<String> = std::iter::once("run".to_owned()).chain(kinds).collect();
@@ -43,7 +48,8 @@ fn unknown(kind: &str, registry: &Registry) -> Error {
 }
 
 fn printed(json: &Value) -> Result<()> {
-    let failed = |e| Error::internal("the stages could not be written as JSON").because(e);
+    let failed =
+        |e| Error::internal("what is known of stages could not be written as JSON").because(e);
     print::json(&serde_json::to_string_pretty(json).map_err(failed)?)
 }
 
