@@ -212,27 +212,29 @@ impl Error {
         self
     }
 
-    /// All of `errors` as one, which lists them where they are several; fine if there are none.
+    /// Fails if there are `errors`, with all of them as one.
     pub(crate) fn all(errors: Vec<Error>) -> Result<()> {
-        let mut errors = errors;
+        if errors.is_empty() { Ok(()) } else { Err(Error::several(errors)) }
+    }
+
+    /// These errors as one, which lists them where they are several.
+    pub(crate) fn several(mut errors: Vec<Error>) -> Error {
         // Stages that share a limit, as those of a command do, share what is wrong with it.
         let mut told = BTreeSet::new();
         errors.retain(|error| told.insert(error.to_string()));
-        match errors.len() {
-            0 => Ok(()),
-            1 => Err(errors.remove(0)),
-            number => {
-                let one = |error: &Error| match error.remedy() {
-                    Some(help) => format!("{error}\n  = {help}"),
-                    None => error.to_string(),
-                };
-                let all: Vec<String> = errors.iter().map(one).collect();
-                let kind = errors[0].kind();
-                let same = errors.iter().all(|error| error.kind() == kind);
-                let kind = if same { kind } else { ErrorKind::Pipeline };
-                Err(Error::new(kind, format!("{number} mistakes\n{}", all.join("\n"))))
-            }
+        if errors.len() == 1 {
+            return errors.remove(0);
         }
+        let number = errors.len();
+        let one = |error: &Error| match error.remedy() {
+            Some(help) => format!("{error}\n  = {help}"),
+            None => error.to_string(),
+        };
+        let all: Vec<String> = errors.iter().map(one).collect();
+        let kind = errors.first().map_or(ErrorKind::Internal, Error::kind);
+        let same = errors.iter().all(|error| error.kind() == kind);
+        let kind = if same { kind } else { ErrorKind::Pipeline };
+        Error::new(kind, format!("{number} mistakes\n{}", all.join("\n")))
     }
 
     /// Adds the cause beneath.

@@ -23,7 +23,7 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Run a pipeline: a file, or one line
-    Run(RunArguments),
+    Run(PlanArguments),
     /// Reduce scans to the points that matter
     Reduce(Box<ReduceArguments>),
     /// Convert between LAS, LAZ and PLY
@@ -56,8 +56,7 @@ impl Command {
     /// The pipeline of commands that take one.
     pub fn pipeline(&self) -> Option<&PipelineArguments> {
         match self {
-            Command::Run(run) => Some(&run.pipeline),
-            Command::Plan(plan) | Command::Check(plan) => Some(&plan.pipeline),
+            Command::Run(all) | Command::Plan(all) | Command::Check(all) => Some(&all.pipeline),
             Command::Graph(graph) => Some(&graph.pipeline),
             _ => None,
         }
@@ -67,10 +66,10 @@ impl Command {
     pub fn common(&self) -> Option<&CommonArguments> {
         match self {
             Command::Reduce(reduce) => Some(&reduce.common),
-            Command::Run(RunArguments { common, .. })
-            | Command::Convert(ConvertArguments { common, .. })
+            Command::Run(PlanArguments { common, .. })
             | Command::Plan(PlanArguments { common, .. })
             | Command::Check(PlanArguments { common, .. })
+            | Command::Convert(ConvertArguments { common, .. })
             | Command::Synth(SynthArguments { common, .. }) => Some(common),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => None,
             Command::Graph(_) | Command::New(_) | Command::Schema => None,
@@ -144,14 +143,7 @@ pub(super) struct PipelineArguments {
     pub params: Vec<String>,
 }
 
-#[derive(Debug, Args)]
-pub(super) struct RunArguments {
-    #[command(flatten)]
-    pub pipeline: PipelineArguments,
-    #[command(flatten)]
-    pub common: CommonArguments,
-}
-
+/// Of commands that plan a pipeline, or run it.
 #[derive(Debug, Args)]
 pub(super) struct PlanArguments {
     #[command(flatten)]

@@ -206,6 +206,7 @@ pub(crate) fn built<K: StageKind>(stage: K, at: &StagePlace) -> Result<BuiltStag
 fn in_its_role<K: StageKind>(role: Role) -> Result<Role> {
     match role.name() {
         name if name == K::ROLE => Ok(role),
+        RoleName::Transform if K::ROLE == RoleName::OnTiles => Ok(role),
         name => Err(Error::internal(format!(
             "the stage kind `{}` says that its role is {:?}, and it is {name:?}",
             K::KIND,

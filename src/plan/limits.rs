@@ -10,9 +10,9 @@ use crate::{Error, Result};
 
 use super::sorted::Sorted;
 
-/// Refuses stages that are limited by what neither records of `schema` nor the stages above have,
-/// and expressions that name it; all of them at once.
-pub(super) fn check_limits(sorted: &Sorted, schema: &Schema) -> Result<()> {
+/// What is wrong with stages that are limited by what neither records of `schema` nor the stages
+/// above have, and with expressions that name it.
+pub(super) fn check_limits(sorted: &Sorted, schema: &Schema) -> Vec<Error> {
     let mut wrong = Vec::new();
     for stage in sorted.transforms.iter().chain(&sorted.filters) {
         let StreamOp { kind, written, transform, choice, above, .. } = stage;
@@ -26,7 +26,7 @@ pub(super) fn check_limits(sorted: &Sorted, schema: &Schema) -> Result<()> {
         let names = Names { schema, columns: above };
         wrong.extend(check_choice(kind, &**written, &limits.choice, names).err());
     }
-    Error::all(wrong)
+    wrong
 }
 
 fn check_choice(

@@ -12,6 +12,7 @@ mod places;
 mod pull;
 mod shown;
 mod sorted;
+mod streamed;
 mod streaming;
 mod stretch;
 

@@ -26,8 +26,8 @@ pub(super) struct Passes {
 
 /// Lays the stages out as passes.
 ///
-/// Fails if a stage reads what nothing before it gives, or what a pass cannot carry.
-pub(super) fn unroll(sorted: &Sorted, schema: &Schema) -> Result<Passes> {
+/// Adds to `wrong` what a stage reads that nothing before it gives, or that a pass cannot carry.
+pub(super) fn unroll(sorted: &Sorted, schema: &Schema, wrong: &mut Vec<Error>) -> Result<Passes> {
     let sinks = sorted.sinks.len();
     let out = Passes {
         changed_by: vec![Vec::new(); sinks],
@@ -35,9 +35,10 @@ pub(super) fn unroll(sorted: &Sorted, schema: &Schema) -> Result<Passes> {
         computed: vec![Vec::new(); sinks],
         ..Passes::default()
     };
-    let mut layout =
-        PassLayout { sorted, ops: &sorted.ops, schema, out, at: BranchCursor::default() };
+    let at = BranchCursor::default();
+    let mut layout = PassLayout { sorted, ops: &sorted.ops, schema, out, at, wrong: Vec::new() };
     layout.branch(sorted.root)?;
+    wrong.append(&mut layout.wrong);
     Ok(layout.out)
 }
 
@@ -47,6 +48,8 @@ pub(super) struct PassLayout<'a> {
     schema: &'a Schema,
     pub out: Passes,
     pub at: BranchCursor,
+    /// What stages lack; they are laid out all the same, so that all of it is told.
+    pub wrong: Vec<Error>,
 }
 
 /// How far a branch is laid out.
@@ -182,7 +185,8 @@ impl PassLayout<'_> {
         let at = self.place(stage, &needs)?;
         self.look(at, stage, &needs)?;
         if needs.takes_cells && !self.out.passes[at].makes_cells {
-            return Err(self.no_cells(stage));
+            let told = self.no_cells(stage);
+            self.wrong.push(told);
         }
         for column in &needs.reads {
             self.provide(at, *column, stage)?;
@@ -209,7 +213,7 @@ impl PassLayout<'_> {
 
     /// The pass of a stage that needs this: the one that the branch is at, or one that begins.
     fn place(&mut self, stage: &StageOp, needs: &Needs) -> Result<usize> {
-        self.at.columns.check_written(stage, needs)?;
+        self.wrong.extend(self.at.columns.check_written(stage, needs).err());
         let at = self.pass();
         let last = &self.out.passes[at];
         let is_new = |column: &ColumnKind| last.writes.contains(column);
@@ -230,7 +234,8 @@ impl PassLayout<'_> {
     fn look(&mut self, at: usize, stage: &StageOp, needs: &Needs) -> Result<()> {
         for name in &needs.dimensions {
             if self.schema.find(name).is_none() {
-                return Err(missing(stage, name, "the input has no such dimension"));
+                self.wrong.push(missing(stage, name, "the input has no such dimension"));
+                continue;
             }
             match name.as_str() {
                 names::CLASSIFICATION => self.out.passes[at].reads_classes = true,
@@ -266,7 +271,8 @@ impl PassLayout<'_> {
                 || format!("no stage computes {name}, and the records of the input have none"),
                 |stage| format!("put a `{stage}` stage before it"),
             );
-            return Err(missing(stage, name, &help));
+            self.wrong.push(missing(stage, name, &help));
+            return Ok(());
         }
         if column.scalar() != Scalar::F64 || column.parts().len() > 1 {
             let told = format!("`{}` reads {name} as another type than f64", stage.kind);
@@ -331,9 +337,13 @@ impl PassLayout<'_> {
         let mut computed = Vec::new();
         for name in self.sorted.sinks[sink].computed() {
             let found = self.at.columns.dimension(name);
-            let dimension = found.map_err(|error| error.at(self.sorted.sinks[sink].path()))?;
-            self.bring(at, dimension.column);
-            computed.push(dimension);
+            match found.map_err(|error| error.at(self.sorted.sinks[sink].path())) {
+                Ok(dimension) => {
+                    self.bring(at, dimension.column);
+                    computed.push(dimension);
+                }
+                Err(error) => self.wrong.push(error),
+            }
         }
         Ok(computed)
     }

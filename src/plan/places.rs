@@ -12,31 +12,33 @@ use crate::stage::{CreateSink, OpenSource, Source};
 use crate::store::TAGGED_INPUTS;
 use crate::{Error, ErrorKind, Result};
 
-/// Refuses outputs that would replace what is read or each other, or that cannot appear where they
-/// should. The files of folders are not among them: [`each_input`] adds these to what is returned.
+/// The files of a run, and what is wrong with outputs: that they would replace what is read or each
+/// other, or cannot appear where they should. The files of folders are not among them:
+/// [`each_input`] adds these to what is returned.
 pub(super) fn check_places(
     pipeline: Option<&Path>,
     inputs: &[PathBuf],
     sinks: &[Box<dyn CreateSink>],
     settings: &RunSettings,
-) -> Result<Files> {
+) -> (Files, Vec<Error>) {
     let mut files = Files::default();
     pipeline.iter().for_each(|path| files.read(path, Use::Pipeline));
     inputs.iter().for_each(|path| files.read(path, Use::Input));
     let files_of = sinks.iter().filter(|sink| sink.is_file());
     let outputs = files_of.map(|sink| (sink.path(), sink.is_folder()));
+    let mut wrong = Vec::new();
     for (path, is_folder) in outputs.chain(settings.report.as_deref().map(|path| (path, false))) {
-        files.write(path).map_err(|clash| refuse(&clash, path))?;
-        if !is_folder {
-            check_place(path, settings.existing)?;
+        match files.write(path) {
+            Err(clash) => wrong.push(refuse(&clash, path)),
+            Ok(()) if is_folder => {}
+            Ok(()) => wrong.extend(check_place(path, settings.existing).err()),
         }
     }
-    match settings.scratch.as_ref().filter(|folder| !folder.is_dir()) {
-        Some(folder) => Err(Error::new(ErrorKind::Io, "the folder for scratch does not exist")
-            .at(folder)
-            .help("create it first, or name another with `run.scratch`")),
-        None => Ok(files),
+    if let Some(folder) = settings.scratch.as_ref().filter(|folder| !folder.is_dir()) {
+        let told = Error::new(ErrorKind::Io, "the folder for scratch does not exist").at(folder);
+        wrong.push(told.help("create it first, or name another with `run.scratch`"));
     }
+    (files, wrong)
 }
 
 /// The inputs, and what their records refer to.

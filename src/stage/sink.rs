@@ -114,8 +114,8 @@ pub trait CreateSink: Send + Sync {
     /// The final path of the output; the folder where there is one output for each input.
     fn path(&self) -> &Path;
 
-    /// False if it writes no file: then [`path`](CreateSink::path) is what reports and messages call
-    /// it, and it is created with an empty path.
+    /// False if it writes no file: then [`path`](CreateSink::path) is what reports and messages
+    /// call it, and it is created with an empty path.
     fn is_file(&self) -> bool {
         true
     }

@@ -118,11 +118,10 @@ fn the_run_table_has_a_page_that_says_what_the_code_does() {
             assert_eq!(set == RunSettings::default(), is_default, "{} = {word}", key.name);
         }
     }
-    let keys = keys::markdown(&run.keys);
-    keep(
-        "docs/run.md",
-        &format!("{}\n## Keys\n\n{keys}\n{EDITORS}", page(&run, "The `[run]` table")),
-    );
+    let text = page(&run, "The `[run]` table") + "\n## Keys\n\n" + &keys::markdown(&run.keys);
+    let language = include_str!("../../src/language/pipeline.md");
+    let text = format!("{text}\n## The pipeline around it\n\n{language}\n{EDITORS}");
+    keep("docs/run.md", &text);
 }
 
 fn help(command: Option<&str>) -> String {

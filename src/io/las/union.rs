@@ -12,7 +12,7 @@ use super::vlr::{Evlr, Vlr, check_held};
 use crate::Result;
 
 /// The records of the files that were added.
-pub struct Records {
+pub struct UnionRecords {
     /// Descriptors of the first file's extra bytes.
     descriptors: Vec<Descriptor>,
     /// As they are, while all files describe their extra bytes alike.
@@ -28,11 +28,11 @@ pub struct Records {
     gap: Option<Vec<u8>>,
 }
 
-impl Records {
+impl UnionRecords {
     /// Those of one file.
     pub fn of(first: &LasInput) -> Result<Self> {
         let (vlrs, evlrs) = first.carried();
-        Ok(Records {
+        Ok(UnionRecords {
             crs: first.crs_records()?,
             crs_differ: false,
             descriptors: first.descriptors().to_vec(),
