@@ -36,7 +36,7 @@ pub(super) enum Command {
     Check(PlanArguments),
     /// List the stages that a pipeline can have, with their keys
     Stages(StagesArguments),
-    /// Draw the graph of a pipeline, without opening its inputs
+    /// Draw the graph of a pipeline; its inputs are not opened
     Graph(GraphArguments),
     /// Write a commented pipeline file for a job, to be changed
     New(NewArguments),

@@ -40,7 +40,7 @@ pub(super) fn new(arguments: &NewArguments) -> Result<()> {
     let file = arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.toml")));
     write(&file, &for_file(name, text, &file))?;
     let file = shown(&file).to_string();
-    print::result(format_args!("{file} is written: change it, then check it by `pointmill check`"))
+    print::result(format_args!("{file} is written: change it, then `pointmill check {file}`"))
 }
 
 /// The text with its commands naming the file that it is written to, where a comment can.

@@ -92,10 +92,10 @@ fn text_of_one(table: &TableDescription) -> String {
     let mut out = format!("{}\n{}", table.name, wrapped(&plain(&table.about), 2));
     for paragraph in table.docs.split("\n\n") {
         out.push('\n');
-        // The lines of a list are not one paragraph.
-        let mut items = paragraph.split("\n- ");
-        out += &wrapped(&plain(items.next().unwrap_or_default()), 2);
-        items.for_each(|item| out += &wrapped(&plain(&format!("- {item}")), 4));
+        // The items of a list are lines of their own.
+        for line in paragraph.trim_start_matches("# ").replace("\n- ", "\0- ").split('\0') {
+            out += &wrapped(&plain(line), 2);
+        }
     }
     out + &keys_text(table)
 }

@@ -5,10 +5,105 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use boon::{Compiler, SchemaIndex, Schemas};
-use pointmill::{Graph, Registry};
+use pointmill::point::PointBatch;
+use pointmill::quantity::Length;
+use pointmill::report::Tally;
+use pointmill::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform};
+use pointmill::{Graph, KeyDescription, Registry};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{keep, root};
+
+/// Thins out, see [`Registry`].
+///
+/// ```
+/// // An example.
+/// ```
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Thinning<const LIES: bool> {
+    /// How far apart.
+    distance: Length,
+    /// Which stay.
+    #[serde(default)]
+    which: Which,
+    /// How many at most.
+    most: Option<u32>,
+}
+
+#[derive(Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+enum Which {
+    /// Any of them.
+    #[default]
+    AnyOne,
+    /// The highest.
+    Highest,
+}
+
+impl<const LIES: bool> StageKind for Thinning<LIES> {
+    const KIND: &'static str = "thinning";
+    const ROLE: RoleName = if LIES { RoleName::OnTiles } else { RoleName::Transform };
+    const ABOUT: &'static str = "Thins out.";
+
+    fn build(self, _: &StagePlace) -> pointmill::Result<Role> {
+        Ok(Role::Transform(Box::new(Idle)))
+    }
+}
+
+struct Idle;
+
+impl Transform for Idle {
+    fn needs(&self) -> Needs {
+        Needs::none()
+    }
+
+    fn apply(&self, _: &mut PointBatch, _: &mut Tally) -> pointmill::Result<()> {
+        Ok(())
+    }
+}
+
+const THINNING: &str = "[[stage]]\nkind = 'synth'\nscene = 'als'\npoints = 9\n\
+    [[stage]]\nkind = 'thinning'\ndistance = '1m'\nwhich = 'highest'\nclasses = [2]\n\
+    [[stage]]\nkind = 'write'\npath = 'out.laz'\n";
+
+#[test]
+fn a_stage_of_a_program_is_described_as_those_that_are_built_in() {
+    let registry = Registry::builtin().with::<Thinning<false>>();
+    let described = registry.describe("thinning").unwrap();
+    assert_eq!((&*described.about, &*described.docs), ("Thins out.", "Thins out, see `Registry`."));
+    let keys = |key: &KeyDescription| {
+        let default = key.default.as_ref().map(Value::to_string).unwrap_or_default();
+        format!("{} = {} [{default}{}] {}", key.name, key.value, key.is_required, key.docs)
+    };
+    let keys: Vec<String> = described.keys.iter().map(keys).collect();
+    let length = "a length (a number in the scan's unit, or such as `\"2m\"`)";
+    assert_eq!(keys[0], format!("distance = {length} [true] How far apart."));
+    assert_eq!(keys[1], "which = `\"any-one\"` or `\"highest\"` [\"any-one\"false] Which stay.");
+    assert_eq!(keys[2], "most = a whole number [false] How many at most.");
+    let words: Vec<&str> = described.keys[1].words.iter().map(|word| &*word.docs).collect();
+    assert_eq!(words, ["Any of them.", "The highest."]);
+    let limits: Vec<&str> = described.limits.iter().map(|key| &*key.name).collect();
+    assert_eq!(limits, ["where", "classes", "with", "without"], "it streams");
+
+    let validator = Validator::new(registry.schema());
+    validator.check(THINNING).unwrap();
+    assert!(validator.check(&THINNING.replace("highest", "lowest")).is_err());
+    assert!(Validator::new(Registry::builtin().schema()).check(THINNING).is_err());
+    assert!(Graph::parse(THINNING, "p.toml", &registry).is_ok());
+}
+
+#[test]
+fn a_kind_whose_role_is_another_than_it_says_is_told_so() {
+    let registry = Registry::builtin().with::<Thinning<true>>();
+    let told = Graph::parse(THINNING, "p.toml", &registry).unwrap_err().to_string();
+    assert!(
+        told.contains("`thinning` says that its role is OnTiles, and it is Transform"),
+        "{told}"
+    );
+}
 
 struct Validator {
     schemas: Schemas,
@@ -90,10 +185,10 @@ fn whatever_the_language_takes_for_a_value_the_schema_takes_too() {
         ("", "kind = 'stats'\ndimensions = ['Z']\nby_class = true"),
     ] {
         let text = format!(
-            "[params]\nkept = 'out.laz'\nbits = {{ type = 'text', default = '8bit', about = 'B' }}\n\
+            "[params]\nkept = 'out'\nending = {{ type = 'text', default = 'laz', about = 'E' }}\n\
              [run]\n{run}\n[[stage]]\nkind = 'synth'\nscene = 'als'\npoints = '1k'\n\
              [[stage]]\n{stage}\n\
-             [[stage]]\nkind = 'write'\npath = '${{kept}}'\nscale = 0.01\noffset = [0, 0.5, 0]\n\
+             [[stage]]\nkind = 'write'\npath = '${{kept}}.${{ending}}'\nscale = 0.01\noffset = [0, 0.5, 0]\n\
              drop = ['GpsTime']\n"
         );
         let parsed = Graph::parse(&text, "p.toml", &registry);
