@@ -82,6 +82,7 @@
 //!   `merge`, `outliers`, `normals`, `cells`, `median` and `grid`.
 //! - [`picture`]: scans drawn from above or from a side, side by side.
 //! - [`graph`]: what a pipeline is, whoever wrote it: a [`Graph`] of stages.
+//! - [`PipelineText`]: a pipeline as it is written, in TOML, JSON or one line, with [`Parameter`]s.
 //! - [`Registry`]: the kinds and formats that a text may name; [`Set`]: what is put in the place of
 //!   a text's values.
 //! - [`Plan`]: a graph that is fitted to headers and memory. It runs, and tells a [`Watch`] how it

@@ -117,14 +117,14 @@ pub trait Transform: Send + Sync {
 pub enum RoleName {
     /// It yields records.
     Source,
+    /// It makes one scan of several sources.
+    Merge,
     /// It streams.
     Transform,
     /// It works on tiles, once or twice.
     OnTiles,
     /// It takes records.
     Sink,
-    /// It gives what it takes from several stages one name.
-    Merge,
 }
 
 /// A stage in its role.

@@ -16,10 +16,19 @@ pub(super) fn read(
     common: &CommonArguments,
     registry: &Registry,
 ) -> Result<Graph> {
+    read_with(arguments, given([common_flags(common)]), registry)
+}
+
+/// The same for a command without the arguments of runs: `others` are put in the place of values.
+pub(super) fn read_with(
+    arguments: &PipelineArguments,
+    others: Vec<Set>,
+    registry: &Registry,
+) -> Result<Graph> {
     let sets = arguments.sets.iter().map(|set| Set::parse(set));
     let params = arguments.params.iter().map(|param| Set::param(param));
     let sets = sets.chain(params).collect::<Result<Vec<Set>>>()?;
-    let sets = [sets, given([common_flags(common)])].concat();
+    let sets = [sets, others].concat();
     text(arguments, registry)?.graph(registry, &sets)
 }
 

@@ -1,6 +1,6 @@
 //! `run`, `reduce` and `synth`: arguments to a pipeline, and the pipeline's run.
 
-use super::arguments::{ReduceArguments, RunArguments, SynthArguments};
+use super::arguments::{PlanArguments, ReduceArguments, SynthArguments};
 use super::console::Console;
 use super::flags::{common_flags, given, reduce_flags, synth_flags};
 use super::pipeline;
@@ -30,7 +30,7 @@ kind = \"write\"
 ";
 
 /// Runs a pipeline and prints its closing table.
-pub(super) fn run(arguments: &RunArguments, registry: &Registry, console: &Console) -> Result<()> {
+pub(super) fn run(arguments: &PlanArguments, registry: &Registry, console: &Console) -> Result<()> {
     let pipeline = pipeline::read(&arguments.pipeline, &arguments.common, registry)?;
     console.result(mill(pipeline, console)?)
 }

@@ -1,10 +1,11 @@
 //! What a pipeline is, however it was written: stages, and which takes from which. Knows neither
 //! the language that it was written in, nor the inputs that it will be fitted to.
 //!
-//! A [`Graph`] is a tree of stages below one or several sources, which are one scan. It is checked in one place, when
-//! it is whole ([`Graph::mistakes`]): the language tells what is found there with the places in its
-//! text, the plan as an error.
+//! A [`Graph`] is a tree of stages below one or several sources, which are one scan. It is checked
+//! in one place, `tree.rs` ([`Graph::mistakes`]): the language tells what is found there with the
+//! places in its text, the plan as an error.
 
+mod drawn;
 pub(crate) mod limits;
 mod settings;
 mod size;
@@ -26,6 +27,7 @@ pub use settings::{
     Treatment, ZScale,
 };
 pub use size::parse_bytes;
+pub use tree::GraphMistake;
 pub(crate) use tree::{TreeStage, mistakes as tree_mistakes};
 pub(crate) use written::{Written, unwritten};
 
@@ -88,37 +90,6 @@ pub struct GraphStage {
     pub(crate) written: Arc<dyn Written>,
 }
 
-/// What is wrong with the way in which the stages of a graph hang together.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct GraphMistake {
-    /// The number of the stage.
-    pub stage: usize,
-    /// What is wrong.
-    pub told: String,
-    /// What would be right, where it is known.
-    pub help: Option<String>,
-    /// The key that it is about, where it is about one.
-    pub key: Option<&'static str>,
-}
-
-impl GraphMistake {
-    /// `told` of stage number `stage`.
-    pub(crate) fn new(stage: usize, told: impl Into<String>) -> Self {
-        GraphMistake { stage, told: told.into(), help: None, key: None }
-    }
-
-    /// The same about the value of `key`.
-    pub(crate) fn of(self, key: &'static str) -> Self {
-        GraphMistake { key: Some(key), ..self }
-    }
-
-    /// The same with what would be right.
-    pub(crate) fn help(self, help: impl Into<String>) -> Self {
-        GraphMistake { help: Some(help.into()), ..self }
-    }
-}
-
 impl Graph {
     /// A graph without stages.
     pub fn new(settings: RunSettings) -> Self {
@@ -156,6 +127,23 @@ impl Graph {
         tree::mistakes(&self.stages.iter().map(TreeStage::from).collect::<Vec<_>>())
     }
 
+    /// The same graph without merges: who takes from one takes from what it takes from.
+    pub(crate) fn without_merges(mut self) -> Graph {
+        let is_merge = |stage: &GraphStage| matches!(stage.role, Role::Merge);
+        let takes = tree::merged(self.stages.iter().map(|s| (Some(&s.from[..]), is_merge(s))));
+        let mut number = 0;
+        let mut numbers = Vec::new();
+        for stage in &self.stages {
+            numbers.push(number);
+            number += usize::from(!is_merge(stage));
+        }
+        for (stage, takes) in self.stages.iter_mut().zip(takes) {
+            stage.from = takes.into_iter().map(|from| numbers[from]).collect();
+        }
+        self.stages.retain(|stage| !is_merge(stage));
+        self
+    }
+
     /// The graph as JSON: for each stage its kind, name, keys, and the numbers of those it takes
     /// from.
     pub fn to_json(&self) -> serde_json::Value {
@@ -168,22 +156,21 @@ impl Graph {
     }
 }
 
+impl<'a> From<&'a GraphStage> for TreeStage<'a> {
+    fn from(stage: &'a GraphStage) -> Self {
+        TreeStage {
+            kind: &stage.kind,
+            name: stage.name.as_deref(),
+            role: Some(&stage.role),
+            from: Some(&stage.from),
+        }
+    }
+}
+
 impl GraphStage {
     /// True if it may work on some records and let the others pass.
     pub(crate) fn can_be_limited(&self) -> bool {
         matches!(self.role, Role::Transform(_) | Role::TileOp(_) | Role::ScanOp(_))
-    }
-}
-
-impl fmt::Display for Graph {
-    /// A line a stage: its number, kind and keys, and where it takes from.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (n, GraphStage { kind, from, keys, .. }) in self.stages.iter().enumerate() {
-            let from: Vec<String> = from.iter().map(usize::to_string).collect();
-            let takes = if from.is_empty() { String::new() } else { " <- ".to_owned() };
-            writeln!(f, "{n} {kind} {keys}{takes}{}", from.join(", "))?;
-        }
-        Ok(())
     }
 }
 

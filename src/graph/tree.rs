@@ -3,12 +3,42 @@
 
 use std::collections::BTreeSet;
 
-use super::{Graph, GraphMistake, GraphStage};
 use crate::stage::{Order, Role};
 
 /// What helps where branches are to become one again.
 const MERGE_LATER: &str = "give each a `write` of its own, and read the files that they leave \
                            together: `read.path` takes a list";
+
+/// What is wrong with the way in which the stages of a graph hang together.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct GraphMistake {
+    /// The number of the stage.
+    pub stage: usize,
+    /// What is wrong.
+    pub told: String,
+    /// What would be right, where it is known.
+    pub help: Option<String>,
+    /// The key that it is about, where it is about one.
+    pub key: Option<&'static str>,
+}
+
+impl GraphMistake {
+    /// `told` of stage number `stage`.
+    pub(crate) fn new(stage: usize, told: impl Into<String>) -> Self {
+        GraphMistake { stage, told: told.into(), help: None, key: None }
+    }
+
+    /// The same about the value of `key`.
+    pub(crate) fn of(self, key: &'static str) -> Self {
+        GraphMistake { key: Some(key), ..self }
+    }
+
+    /// The same with what would be right.
+    pub(crate) fn help(self, help: impl Into<String>) -> Self {
+        GraphMistake { help: Some(help.into()), ..self }
+    }
+}
 
 /// A stage and what it takes from, as far as they are known.
 pub(crate) struct TreeStage<'a> {
@@ -22,48 +52,20 @@ pub(crate) struct TreeStage<'a> {
     pub from: Option<&'a [usize]>,
 }
 
-impl<'a> From<&'a GraphStage> for TreeStage<'a> {
-    fn from(stage: &'a GraphStage) -> Self {
-        TreeStage {
-            kind: &stage.kind,
-            name: stage.name.as_deref(),
-            role: Some(&stage.role),
-            from: Some(&stage.from),
-        }
-    }
-}
-
 /// Everything that is wrong with how these stages hang together, and that is certain whatever the
 /// unknown ones turn out to be.
 pub(crate) fn mistakes(stages: &[TreeStage<'_>]) -> Vec<GraphMistake> {
-    let tree = Tree { stages, takes: merged(stages.iter().map(|s| (s.from, s.is_merge()))) };
+    let tree = StageTree { stages, takes: merged(stages.iter().map(|s| (s.from, s.is_merge()))) };
     let each = (0..stages.len())
         .flat_map(|n| [tree.wrong_from(n), tree.wrong_end(n), wrong_order(n, &stages[n])]);
     each.flatten().collect()
 }
 
-impl Graph {
-    /// The same graph without merges: who takes from one takes from what it takes from.
-    pub(crate) fn without_merges(mut self) -> Graph {
-        let is_merge = |stage: &GraphStage| matches!(stage.role, Role::Merge);
-        let takes = merged(self.stages.iter().map(|s| (Some(&s.from[..]), is_merge(s))));
-        let mut number = 0;
-        let mut numbers = Vec::new();
-        for stage in &self.stages {
-            numbers.push(number);
-            number += usize::from(!is_merge(stage));
-        }
-        for (stage, takes) in self.stages.iter_mut().zip(takes) {
-            stage.from = takes.into_iter().map(|from| numbers[from]).collect();
-        }
-        self.stages.retain(|stage| !is_merge(stage));
-        self
-    }
-}
-
 /// For each stage the ones that it takes from, through merges and in order, from what it names and
 /// whether it is a merge itself.
-fn merged<'a>(stages: impl Iterator<Item = (Option<&'a [usize]>, bool)>) -> Vec<Vec<usize>> {
+pub(super) fn merged<'a>(
+    stages: impl Iterator<Item = (Option<&'a [usize]>, bool)>,
+) -> Vec<Vec<usize>> {
     let mut all: Vec<(BTreeSet<usize>, bool)> = Vec::new();
     for (from, is_merge) in stages {
         let mut takes = BTreeSet::new();
@@ -93,13 +95,13 @@ impl TreeStage<'_> {
     }
 }
 
-struct Tree<'a> {
+struct StageTree<'a> {
     stages: &'a [TreeStage<'a>],
     /// For each stage what it takes from, through merges.
     takes: Vec<Vec<usize>>,
 }
 
-impl Tree<'_> {
+impl StageTree<'_> {
     /// What is wrong with what stage `n` takes from.
     fn wrong_from(&self, n: usize) -> Option<GraphMistake> {
         let stage = &self.stages[n];

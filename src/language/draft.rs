@@ -4,7 +4,7 @@
 use super::form::TextForm;
 use super::mistake::{Mistake, advice};
 use super::node::{KeyEntry, Node, NodeValue};
-use super::place::{TextPlace, Word};
+use super::place::{PlacedWord, TextPlace};
 use super::registry::Registry;
 use super::set::{PARAMETERS, Set};
 
@@ -19,7 +19,7 @@ pub(crate) struct Draft {
     /// The `[params]` table.
     pub params: Node,
     /// What arguments give for parameters: their names and the texts of their values.
-    pub given: Vec<(Word, Word)>,
+    pub given: Vec<(PlacedWord, PlacedWord)>,
     /// The `[[stage]]` tables, from top to bottom.
     pub stages: Vec<StageDraft>,
     /// What is wrong so far.
@@ -29,11 +29,11 @@ pub(crate) struct Draft {
 /// A `[[stage]]` table.
 pub(crate) struct StageDraft {
     /// Its kind and where it is written; None if it has none, which is told.
-    pub kind: Option<Word>,
+    pub kind: Option<PlacedWord>,
     /// Its name, if it has one.
-    pub name: Option<Word>,
+    pub name: Option<PlacedWord>,
     /// The stages that it takes from, if it says.
-    pub from: Option<Vec<Word>>,
+    pub from: Option<Vec<PlacedWord>>,
     /// All other keys; their place is that of the kind, or else of the table.
     pub keys: Node,
 }
@@ -77,7 +77,7 @@ pub(crate) fn read(
     draft
 }
 
-fn text(node: Node) -> Result<Word, (TextPlace, &'static str)> {
+fn text(node: Node) -> Result<PlacedWord, (TextPlace, &'static str)> {
     match node.value {
         NodeValue::Text(text) => Ok((text, node.place)),
         _ => Err((node.place, "a text in quotes")),
@@ -85,7 +85,7 @@ fn text(node: Node) -> Result<Word, (TextPlace, &'static str)> {
 }
 
 /// One name or a list of them.
-fn names(node: Node) -> Result<Vec<Word>, (TextPlace, &'static str)> {
+fn names(node: Node) -> Result<Vec<PlacedWord>, (TextPlace, &'static str)> {
     const TAKES: &str = "the name of a stage, or a list of names";
     let name = |node: Node| text(node).map_err(|(place, _)| (place, TAKES));
     match node.value {
@@ -166,7 +166,7 @@ impl Draft {
         &self,
         place: TextPlace,
         entries: &[KeyEntry],
-        name: &Option<Word>,
+        name: &Option<PlacedWord>,
         registry: &Registry,
     ) -> Mistake {
         if let Some((name, at)) = name.as_ref().filter(|(name, _)| registry.has(name)) {

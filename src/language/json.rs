@@ -58,7 +58,9 @@ impl JsonReader {
     fn syntax(&self, error: &ParseError) -> Mistake {
         let note = match error.kind() {
             ParseErrorKind::CommentsNotAllowed => "a pipeline file with comments is TOML",
-            ParseErrorKind::NonFiniteNumbersNotAllowed => "no key takes such a number",
+            ParseErrorKind::UnexpectedToken | ParseErrorKind::UnexpectedWord => {
+                "JSON has texts in double quotes, numbers, true, false and null"
+            }
             _ => "",
         };
         let told = error.kind().to_string();

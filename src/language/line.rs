@@ -4,7 +4,7 @@
 use super::mistake::Mistake;
 use super::node;
 use super::node::{KeyEntry, Node, NodeValue};
-use super::place::{TextPlace, Word};
+use super::place::{PlacedWord, TextPlace};
 use super::references::is_name;
 use super::registry::Registry;
 
@@ -43,7 +43,12 @@ pub(super) fn parse(text: &str, registry: &Registry) -> Result<Vec<KeyEntry>, Ve
 }
 
 /// The table of a stage from its words.
-fn stage(kind: &Word, words: &[Word], registry: &Registry, mistakes: &mut Vec<Mistake>) -> Node {
+fn stage(
+    kind: &PlacedWord,
+    words: &[PlacedWord],
+    registry: &Registry,
+    mistakes: &mut Vec<Mistake>,
+) -> Node {
     let (name, at) = kind;
     let mut entries = vec![entry("kind", at, text(kind))];
     for (n, word) in words.iter().enumerate() {
@@ -75,12 +80,12 @@ fn entry(key: &str, at: &TextPlace, node: Node) -> KeyEntry {
     KeyEntry { key: key.to_owned(), at: at.clone(), node }
 }
 
-fn text((text, place): &Word) -> Node {
+fn text((text, place): &PlacedWord) -> Node {
     Node { place: place.clone(), value: NodeValue::Text(text.clone()) }
 }
 
 /// The two sides of `key=value`; None of any other word.
-fn key_value((word, place): &Word) -> Option<(Word, Word)> {
+fn key_value((word, place): &PlacedWord) -> Option<(PlacedWord, PlacedWord)> {
     let (key, value) = word.split_once('=').filter(|(key, _)| is_name(key))?;
     let (start, middle) = (place.start, place.start + key.len());
     let at = |span| TextPlace::new(place.source, span);
@@ -89,7 +94,7 @@ fn key_value((word, place): &Word) -> Option<(Word, Word)> {
 }
 
 /// A value as `--set` takes it; the items of a list in brackets need no quotes either.
-fn read_value((text, place): &Word) -> Result<Node, Vec<Mistake>> {
+fn read_value((text, place): &PlacedWord) -> Result<Node, Vec<Mistake>> {
     match node::parse_list(text, place) {
         Some(list) => Ok(list),
         None => node::parse_value(text, place.source, place.start),
@@ -97,7 +102,7 @@ fn read_value((text, place): &Word) -> Result<Node, Vec<Mistake>> {
 }
 
 /// What a word is told that is no `key=value`.
-fn no_key((word, at): &Word, kind: &str, main: Option<&str>) -> Mistake {
+fn no_key((word, at): &PlacedWord, kind: &str, main: Option<&str>) -> Mistake {
     let told = format!("`{word}` is no KEY=VALUE");
     let help = match main {
         Some(main) => format!(
@@ -112,7 +117,7 @@ fn no_key((word, at): &Word, kind: &str, main: Option<&str>) -> Mistake {
 /// The words of a text. Space within quotes and brackets is a part of a word; both are taken for
 /// such at the beginning of a word or a value alone, so that `it's.laz` and `tile[12].laz` are
 /// words.
-fn words(text: &str) -> Result<Vec<Word>, Mistake> {
+fn words(text: &str) -> Result<Vec<PlacedWord>, Mistake> {
     let mut words = Vec::new();
     let mut rest = text.char_indices().peekable();
     while let Some(&(start, first)) = rest.peek() {

@@ -11,7 +11,7 @@ use super::keys;
 use super::mistake::{Mistake, advice};
 use super::node::{KeyEntry, Node, NodeValue};
 use super::parameter::{Parameter, ParameterType, value_words};
-use super::place::{TextPlace, Word};
+use super::place::{PlacedWord, TextPlace};
 use super::references::{self, Environment, Piece};
 use crate::error::nearest;
 
@@ -107,7 +107,7 @@ impl Declared {
     /// Its value: what it is given, else its default. None if it can have none, which is told.
     fn value(
         &self,
-        given: Option<&Word>,
+        given: Option<&PlacedWord>,
         environment: Environment<'_>,
         mistakes: &mut Vec<Mistake>,
     ) -> Option<Node> {
@@ -217,7 +217,7 @@ impl<'a> ParameterValues<'a> {
     /// The values of parameters that the text refers to by the names `used`.
     fn new(
         declared: &[Declared],
-        given: &[(Word, Word)],
+        given: &[(PlacedWord, PlacedWord)],
         used: &BTreeSet<String>,
         environment: Environment<'a>,
         mistakes: &mut Vec<Mistake>,

@@ -28,22 +28,7 @@ use crate::{Error, Result};
 /// Bytes of the longest pipeline file: whoever names a scan in its place waits for no gigabytes.
 const LONGEST: u64 = 16 << 20;
 
-/// The text of a pipeline.
-///
-/// A file is TOML, or JSON with the same keys: where its name ends in `.json` or its first character
-/// other than space is a brace.
-///
-/// ```
-/// use pointmill::{PipelineText, Registry};
-///
-/// let text = r#"{"stage": [
-///     {"kind": "synth", "scene": "plane", "points": 1000},
-///     {"kind": "write", "path": "plane.laz"}
-/// ]}"#;
-/// let graph = PipelineText::new(text, "plane.json").graph(&Registry::builtin(), &[])?;
-/// assert_eq!(graph.stages.len(), 2);
-/// # Ok::<(), pointmill::Error>(())
-/// ```
+#[doc = include_str!("pipeline.md")]
 #[derive(Clone)]
 pub struct PipelineText {
     form: TextForm,
@@ -60,6 +45,18 @@ type Variables = dyn Fn(&str) -> Option<OsString> + Send + Sync;
 impl PipelineText {
     /// The text of a file; `origin` is the name of the file for errors, empty for a text that the
     /// user does not know: then errors name what is wrong without a place in it.
+    ///
+    /// ```
+    /// use pointmill::{PipelineText, Registry};
+    ///
+    /// let text = r#"{"stage": [
+    ///     {"kind": "synth", "scene": "plane", "points": 1000},
+    ///     {"kind": "write", "path": "plane.laz"}
+    /// ]}"#;
+    /// let graph = PipelineText::new(text, "plane.json").graph(&Registry::builtin(), &[])?;
+    /// assert_eq!(graph.stages.len(), 2);
+    /// # Ok::<(), pointmill::Error>(())
+    /// ```
     pub fn new(text: impl Into<String>, origin: impl Into<String>) -> Self {
         let (text, origin) = (text.into(), origin.into());
         let form = TextForm::of(&text, &origin);
@@ -88,10 +85,10 @@ impl PipelineText {
         PipelineText { environment: Arc::new(environment), ..self }
     }
 
-    /// A pipeline in one line: stages between ` ! `, such as `read in.laz ! normals ! write out.ply`.
-    /// A stage is its kind, the value of its main key (the path of `read` and `write`), and
-    /// `key=value`; values are as [`Set::parse`] takes them, those with spaces in quotes, lists in
-    /// brackets.
+    /// A pipeline in one line: stages between ` ! `, such as
+    /// `read in.laz ! normals ! write out.ply`. A stage is its kind, the value of its main key (the
+    /// path of `read` and `write`), and `key=value`; values are as [`Set::parse`] takes them, those
+    /// with spaces in quotes, lists in brackets.
     ///
     /// ```
     /// use pointmill::{PipelineText, Registry};
@@ -111,7 +108,8 @@ impl PipelineText {
         line::is_line(text)
     }
 
-    /// The text of the file at `path`; a scan, which begins as one of `formats` does, is told apart.
+    /// The text of the file at `path`; a scan, which begins as one of `formats` does, is told
+    /// apart.
     ///
     /// # Errors
     ///

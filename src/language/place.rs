@@ -34,4 +34,4 @@ impl TextPlace {
 }
 
 /// A word of a text and where it is written.
-pub(crate) type Word = (String, TextPlace);
+pub(crate) type PlacedWord = (String, TextPlace);

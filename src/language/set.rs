@@ -6,7 +6,7 @@ use super::mistake;
 use super::mistake::{Mistake, SourceText};
 use super::node;
 use super::node::Node;
-use super::place::{TextPlace, Word};
+use super::place::{PlacedWord, TextPlace};
 use super::references;
 use crate::{Error, Result};
 
@@ -19,9 +19,9 @@ pub(super) const PARAMETERS: &str = "params";
 
 /// One value put in the place of a pipeline file's.
 ///
-/// The address is `run.KEY` for a setting, `params.NAME` for a parameter, else `STAGE.KEY`: the stage by its `name`, or by its
-/// kind where only one stage is of that kind, or as `KIND.N.KEY`, the N-th stage of that kind, from
-/// 1.
+/// The address is `run.KEY` for a setting, `params.NAME` for a parameter, else `STAGE.KEY`: the
+/// stage by its `name`, or by its kind where only one stage is of that kind, or as `KIND.N.KEY`,
+/// the N-th stage of that kind, from 1.
 #[derive(Debug, Clone)]
 pub struct Set {
     argument: String,
@@ -130,7 +130,7 @@ impl Set {
     }
 
     /// The value as it was typed, with its place in source `source`.
-    pub(crate) fn text(&self, source: usize) -> Word {
+    pub(crate) fn text(&self, source: usize) -> PlacedWord {
         let from = if let Given::Text { from } = self.value { from } else { 0 };
         let text = self.text[from..].trim();
         let start = from + self.text[from..].len() - self.text[from..].trim_start().len();

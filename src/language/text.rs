@@ -8,7 +8,7 @@ use super::keys;
 use super::mistake::{Mistake, SourceText};
 use super::node::{KeyEntry, Node, NodeValue};
 use super::outputs;
-use super::place::Word;
+use super::place::PlacedWord;
 use super::registry::{BuiltStage, Registry};
 use super::tree;
 use super::written::WrittenText;
@@ -45,7 +45,7 @@ pub(super) fn build(
 
 fn place(
     stage: &StageDraft,
-    (kind, at): &Word,
+    (kind, at): &PlacedWord,
     sources: &Arc<[SourceText]>,
     registry: &Registry,
 ) -> Result<GraphStage, Vec<Mistake>> {
@@ -82,7 +82,7 @@ fn place(
         let tables = [Some(&mut keys), all.as_mut()].into_iter().flatten();
         tables.filter_map(|keys| keys.as_object_mut()).for_each(|keys| keys.extend(told.clone()));
     }
-    let text = |part: &Option<Word>| part.as_ref().map(|(text, _)| text.clone());
+    let text = |part: &Option<PlacedWord>| part.as_ref().map(|(text, _)| text.clone());
     Ok(GraphStage {
         kind: kind.clone(),
         name: text(&stage.name),

@@ -2,7 +2,7 @@
 
 use super::draft::StageDraft;
 use super::mistake::{Mistake, advice};
-use super::place::Word;
+use super::place::PlacedWord;
 use super::registry::Registry;
 use crate::graph::{GraphMistake, GraphStage, TreeStage, tree_mistakes};
 use crate::stage::Role;
@@ -15,7 +15,10 @@ pub(super) fn check_names(stages: &[StageDraft], registry: &Registry, mistakes: 
         let word = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
         let wrong = if name.is_empty() || !name.chars().all(word) {
             "a name is made of letters, digits, - and _"
-        } else if ["run", "params"].contains(&name.as_str()) || registry.has(name) {
+        } else if ["run", "params"].contains(&name.as_str())
+            || registry.has(name) && stage.kind.is_some()
+        {
+            // A stage without a kind is told that its name may be meant for one.
             "the name means something else already"
         } else if stages[..i].iter().any(taken) {
             "another stage above has this name"
@@ -96,7 +99,7 @@ fn taken(
 
 /// The stage above number `n` that has this name and gives points.
 fn find(
-    (name, at): &Word,
+    (name, at): &PlacedWord,
     n: usize,
     drafts: &[StageDraft],
     stages: &[Option<GraphStage>],
@@ -121,7 +124,7 @@ fn find(
 }
 
 /// A name that stands twice in a list.
-fn twice(names: &[Word]) -> Option<Mistake> {
+fn twice(names: &[PlacedWord]) -> Option<Mistake> {
     let again = |n: &usize| names[..*n].iter().any(|(other, _)| *other == names[*n].0);
     let (name, at) = &names[(0..names.len()).find(again)?];
     Some(Mistake::new(at.clone(), format!("`{name}` is named twice")))

@@ -156,5 +156,43 @@ fn seeds(folder: &Path) -> Vec<Vec<u8>> {
             stages.concat()
         ));
     }
+    all.extend([JSON, PARAMETERS].map(str::to_owned));
     all.into_iter().map(String::into_bytes).collect()
 }
+
+/// A tree in JSON, and parameters at every place that they can have.
+const JSON: &str = r#"{
+"run": {"threads": 2, "memory": "1GiB"},
+"params": {"keep": "10%", "side": {"type": "number", "default": 0.5, "about": "Side"}},
+"stage": [
+{"kind": "synth", "name": "scan", "scene": "part", "points": 1e3, "noise": null},
+{"kind": "grid", "side": "${side}"},
+{"kind": "write", "path": "a.laz", "scale": [0.1, 0.1, 0.01]},
+{"kind": "cells", "from": ["scan"], "keep": "${keep}"},
+{"kind": "write", "path": "b-${side}.laz"}
+]}"#;
+const PARAMETERS: &str = "\
+[params]
+keep = '10%'
+scene = {choices = ['part', 'als'], default = 'part'}
+points = {type = 'whole', default = '${ENV:POINTS:-5k}'}
+drop = {type = 'list', default = ['a', 'b']}
+[[stage]]
+kind = 'synth'
+scene = '${scene}'
+points = '${points}'
+name = 'scan'
+[[stage]]
+kind = 'merge'
+[[stage]]
+kind = 'cells'
+keep = '${keep}'
+[[stage]]
+kind = 'write'
+path = '$${a}-${keep}.laz'
+drop = '${drop}'
+[[stage]]
+kind = 'write'
+from = 'scan'
+path = 'all.ply'
+";

@@ -1,4 +1,5 @@
-//! Target `text`: one argument `stage.key=value`; its value is also taken as a size.
+//! Target `text`: one argument `stage.key=value`; its value is also taken as a size, and the text as
+//! a pipeline in one line and as a parameter.
 
 use std::path::Path;
 
@@ -48,6 +49,16 @@ fn target(_: &Path, data: &[u8]) -> Judgement {
     }];
     // A text may name a file that is not there.
     let wrong = &[pointmill::ErrorKind::Pipeline, pointmill::ErrorKind::Io];
+    marks.push(match Graph::parse_line(&text, &Registry::builtin()) {
+        Ok(graph) => format!("a line of {} stages", graph.stages.len()),
+        Err(error) => {
+            let told = judge::proper("line", &error, wrong)?;
+            format!("no line: {}", shape(told.lines().next().unwrap_or_default()))
+        }
+    });
+    if let Err(error) = Set::param(&text) {
+        judge::proper("param", &error, wrong)?;
+    }
     let set = match Set::parse(&text) {
         Ok(set) => set,
         Err(error) => {
@@ -92,6 +103,8 @@ fn change(random: &mut Random, data: &mut Vec<u8>, other: &[u8]) {
 fn seeds(folder: &Path) -> Vec<Vec<u8>> {
     furnish(folder);
     let all = [
+        "read tiny.las ! normals neighbors=12 ! cells keep=\"10 %\" ! median ! write out.laz",
+        "synth part points=10k name=a ! grid side=0.5 from=[a] ! write 'o.ply' drop=[b, \"c\"]",
         "run.memory=2GiB",
         "run.memory=1.5 MB",
         "run.memory=18446744073709551615",

@@ -4,7 +4,7 @@ use std::fs;
 
 use pointmill::{Graph, ParameterType, PipelineText, Registry, Set};
 
-use crate::support::command::{fails, pointmill};
+use crate::support::command::{command, fails, pointmill, scans};
 
 const TEXT: &str = "\
 [params]
@@ -194,19 +194,23 @@ fn parameters_are_listed() {
 #[test]
 fn commands_take_parameters_and_the_environment_and_list_them() {
     let at = tempfile::tempdir().unwrap();
+    let text = TEXT.replace("[run]\nscratch = '${ENV:SCRATCH}'\n", "");
+    let text = text.replace("drop = ['${format}', 'b']", "");
     let text =
-        TEXT.replace("${ENV:SCRATCH}", "${ENV:PATH}").replace("drop = ['${format}', 'b']", "");
-    let text = text.replace("[run]\nscratch = '${ENV:PATH}'\n", "");
+        text.replace("ENV:NAME", "ENV:POINTMILL_TEST_NAME").replace("ENV:POINTS", "ENV:NONE");
     fs::write(at.path().join("p.toml"), text).unwrap();
     fs::create_dir(at.path().join("o")).unwrap();
     let params = ["--param", "out=o", "--param", "points=3k", "--param", "keep=40%"];
-    for command in ["check", "plan", "run"] {
-        let (code, _, stderr) = pointmill(at.path(), &[&[command, "p.toml"], &params[..]].concat());
-        assert_eq!(code, 0, "{command}: {stderr}");
+    for name in ["check", "plan", "run"] {
+        let (code, _, stderr) = pointmill(at.path(), &[&[name, "p.toml"], &params[..]].concat());
+        assert_eq!(code, 0, "{name}: {stderr}");
     }
     assert!(at.path().join("o/${a}-10-x.laz").exists());
+    let mut run = command(at.path(), &[&["run", "p.toml"], &params[..]].concat());
+    assert!(run.env("POINTMILL_TEST_NAME", "tail").output().unwrap().status.success());
+    assert!(at.path().join("o/${a}-10-tail.laz").exists());
     let wrong = ["run", "p.toml", "--param", "keep=10k%"];
-    fails(at.path(), &wrong, 2, &["error: --param: takes", "| keep=10k%\n   |      ^^^^"]);
+    fails(at.path(), &wrong, 2, &["error: --param: `keep`: takes", "| keep=10k%\n   |      ^^^^"]);
     let lacking = fs::read_to_string(at.path().join("p.toml")).unwrap();
     let lacking = lacking.replace("type = 'path', default = 'out'", "type = 'path'");
     fs::write(at.path().join("q.toml"), lacking).unwrap();
@@ -226,4 +230,30 @@ fn commands_take_parameters_and_the_environment_and_list_them() {
     assert!(code == 1 && stdout.contains("Usage: ") && stderr.contains("none.toml"), "{stderr}");
     assert_eq!(pointmill(at.path(), &["run", "--help"]).0, 0);
     assert_eq!(pointmill(at.path(), &["reduce", "--help"]).0, 0);
+}
+
+#[test]
+fn the_page_shows_a_pipeline_that_runs() {
+    let page = include_str!("../../docs/run.md");
+    let shown = page.split_once("```toml\n").unwrap().1.split_once("```").unwrap().0;
+    let at = scans(&["in.laz"]);
+    fs::write(at.path().join("p.toml"), shown).unwrap();
+    let run = ["run", "p.toml", "--param", "scan=in.laz", "--param", "keep=40%"];
+    let (code, _, stderr) = pointmill(at.path(), &run);
+    assert_eq!(code, 0, "{stderr}");
+    for output in ["reduced.laz", "thin.laz"] {
+        assert!(at.path().join(output).exists(), "{output}");
+    }
+}
+
+#[test]
+fn a_graph_prints_references_that_are_none_as_such() {
+    let text = "[[stage]]\nkind = 'synth'\nscene = 'part'\npoints = 9\n\
+                [[stage]]\nkind = 'write'\npath = '$${a}/$$${b}/${ENV:C:-c}.laz'\ndrop = ['$${d}']\n";
+    let graph = Graph::parse(text, "p.toml", &Registry::builtin()).unwrap();
+    let printed = graph.to_toml().unwrap();
+    assert!(printed.contains("\"$${a}/$$${b}/c.laz\""), "{printed}");
+    let again = Graph::parse(&printed, "p.toml", &Registry::builtin()).unwrap();
+    assert_eq!(again.to_toml().unwrap(), printed);
+    assert_eq!(again.to_json(), graph.to_json());
 }

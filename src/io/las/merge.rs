@@ -19,16 +19,16 @@ const WHOLE: f64 = 1e-6;
 
 /// Files that are to be read as one scan, taken in one by one: of each only its header is kept, and
 /// of their records the union.
-pub struct Merge {
+pub struct LasMerge {
     /// The first, with its records: the others are compared with it.
     first: LasInput,
     records: UnionRecords,
 }
 
-impl Merge {
+impl LasMerge {
     /// Begins with one file.
     pub fn of(first: LasInput) -> Result<Self> {
-        Ok(Merge { records: UnionRecords::of(&first)?, first })
+        Ok(LasMerge { records: UnionRecords::of(&first)?, first })
     }
 
     /// Adds a file; fails if the two cannot be one.
@@ -199,14 +199,14 @@ fn header(inputs: &[LasInput]) -> Header {
     merged
 }
 
-/// UnionRecords refer to waveforms in the one file that has the name of theirs: two files cannot be one.
+/// Records refer to waveforms in the one file that has the name of theirs: two files cannot be one.
 fn external(inputs: &[LasInput]) -> Result<()> {
     let Some(one) = inputs.iter().find(|input| input.waveforms.is_some()) else { return Ok(()) };
     let other = inputs.iter().find(|input| input.path != one.path).unwrap_or(one);
     Err(refuse(one, other, "their waveforms are in files of their own".to_owned()))
 }
 
-/// UnionRecords refer to waveforms by their place in one block: two blocks cannot be one.
+/// Records refer to waveforms by their place in one block: two blocks cannot be one.
 fn waveforms(inputs: &[LasInput], evlrs: &[Evlr]) -> Result<()> {
     let inside = |i: &&LasInput| {
         has_waveforms(i.header.format()) && i.header.encoding() & encoding::WAVEFORM_INTERNAL != 0

@@ -8,7 +8,7 @@ use super::crs;
 use super::format::{has_gps_time, selection};
 use super::input::{LasInput, Storage};
 use super::laz::Layers;
-use super::merge::Merge;
+use super::merge::LasMerge;
 use super::native::Native;
 use super::read::{LazPart, PlainPart, Shift};
 use super::table::is_held;
@@ -36,7 +36,7 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
     let mut schema = first.schema();
     let mut inputs = vec![first.clone().without_records()];
     let (mut tables, mut points) = (first.table_bytes(), first.points());
-    let mut merge = Merge::of(first)?;
+    let mut merge = LasMerge::of(first)?;
     for path in others {
         let input = LasInput::open(path)?;
         tables = tables.saturating_add(input.table_bytes());
