@@ -69,6 +69,18 @@ pub trait Transform: Send + Sync {
         Ok(())
     }
 
+    /// The schema of the records that it leaves of those of `schema`, where that is another: the
+    /// same fields at the same bytes, of which coordinates have other scales or origins. Such a
+    /// stage says that it [changes](Needs::changes) coordinates, and the engine has the batch say
+    /// the new schema once it was applied.
+    ///
+    /// # Errors
+    ///
+    /// As [`check`](Transform::check), which was called before.
+    fn leaves(&self, _schema: &Schema) -> Result<Option<Schema>> {
+        Ok(None)
+    }
+
     /// What it was asked to do and has nothing to do of with records of a schema.
     fn warnings(&self, _schema: &Schema) -> Vec<String> {
         Vec::new()
@@ -78,6 +90,11 @@ pub trait Transform: Send + Sync {
     /// of a schema. It need not repeat its [`warnings`](Transform::warnings).
     fn idle(&self, _schema: &Schema) -> Vec<String> {
         Vec::new()
+    }
+
+    /// What may explain, where no point of a scan was left and it removed some, that it did.
+    fn emptied(&self) -> Option<String> {
+        None
     }
 
     /// The keys that say what it removes, each with its stage, as in `filter.keep_classes`.
@@ -100,14 +117,14 @@ pub trait Transform: Send + Sync {
 pub enum RoleName {
     /// It yields records.
     Source,
+    /// It makes one scan of several sources.
+    Merge,
     /// It streams.
     Transform,
     /// It works on tiles, once or twice.
     OnTiles,
     /// It takes records.
     Sink,
-    /// It gives what it takes from several stages one name.
-    Merge,
 }
 
 /// A stage in its role.

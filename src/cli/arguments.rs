@@ -23,7 +23,7 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Run a pipeline: a file, or one line
-    Run(PipelineArguments),
+    Run(PlanArguments),
     /// Reduce scans to the points that matter
     Reduce(Box<ReduceArguments>),
     /// Convert between LAS, LAZ and PLY
@@ -31,11 +31,17 @@ pub(super) enum Command {
     /// Show what files contain, from their headers
     Info(InfoArguments),
     /// Show how a pipeline would be run, without running it
-    Plan(PipelineArguments),
+    Plan(PlanArguments),
     /// Check a pipeline and tell every mistake; reads its inputs' headers, writes nothing
-    Check(PipelineArguments),
+    Check(PlanArguments),
     /// List the stages that a pipeline can have, with their keys
     Stages(StagesArguments),
+    /// Draw the graph of a pipeline; its inputs are not opened
+    Graph(GraphArguments),
+    /// Write a commented pipeline file for a job, to be changed
+    New(NewArguments),
+    /// Print the JSON Schema of pipeline files, by which editors complete and check them
+    Schema,
     /// Draw scans side by side, from above or from a side
     Picture(PictureArguments),
     /// Make a synthetic scan
@@ -50,7 +56,8 @@ impl Command {
     /// The pipeline of commands that take one.
     pub fn pipeline(&self) -> Option<&PipelineArguments> {
         match self {
-            Command::Run(all) | Command::Plan(all) | Command::Check(all) => Some(all),
+            Command::Run(all) | Command::Plan(all) | Command::Check(all) => Some(&all.pipeline),
+            Command::Graph(graph) => Some(&graph.pipeline),
             _ => None,
         }
     }
@@ -59,12 +66,13 @@ impl Command {
     pub fn common(&self) -> Option<&CommonArguments> {
         match self {
             Command::Reduce(reduce) => Some(&reduce.common),
-            Command::Run(PipelineArguments { common, .. })
-            | Command::Plan(PipelineArguments { common, .. })
-            | Command::Check(PipelineArguments { common, .. })
+            Command::Run(PlanArguments { common, .. })
+            | Command::Plan(PlanArguments { common, .. })
+            | Command::Check(PlanArguments { common, .. })
             | Command::Convert(ConvertArguments { common, .. })
             | Command::Synth(SynthArguments { common, .. }) => Some(common),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => None,
+            Command::Graph(_) | Command::New(_) | Command::Schema => None,
             Command::Completions(_) | Command::Man(_) => None,
         }
     }
@@ -133,6 +141,13 @@ pub(super) struct PipelineArguments {
     /// it has
     #[arg(long = "param", value_name = "NAME=VALUE")]
     pub params: Vec<String>,
+}
+
+/// Of commands that plan a pipeline, or run it.
+#[derive(Debug, Args)]
+pub(super) struct PlanArguments {
+    #[command(flatten)]
+    pub pipeline: PipelineArguments,
     #[command(flatten)]
     pub common: CommonArguments,
 }
@@ -353,6 +368,35 @@ pub(super) struct StagesArguments {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct GraphArguments {
+    #[command(flatten)]
+    pub pipeline: PipelineArguments,
+    /// What it is drawn as
+    #[arg(long = "as", value_name = "HOW", default_value = "text")]
+    pub drawing: Drawing,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Drawing {
+    /// Lines for a terminal
+    Text,
+    /// A flowchart for web pages
+    Mermaid,
+    /// The language of Graphviz
+    Dot,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct NewArguments {
+    /// The job; without one, the jobs are listed
+    #[arg(value_name = "JOB")]
+    pub job: Option<String>,
+    /// The file, which must not exist [default: JOB.toml]
+    #[arg(short, long, value_name = "FILE", requires = "job")]
+    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

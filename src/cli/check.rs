@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::arguments::PipelineArguments;
+use super::arguments::PlanArguments;
 use super::console::Console;
 use super::mistyped::marked;
 use super::pipeline;
@@ -18,7 +18,7 @@ use crate::{Error, Result, io};
 
 /// Prints how a pipeline would be run.
 pub(super) fn plan(
-    arguments: &PipelineArguments,
+    arguments: &PlanArguments,
     registry: &Registry,
     console: &Console,
 ) -> Result<()> {
@@ -30,7 +30,7 @@ pub(super) fn plan(
 /// Prints that a pipeline can be run, or fails as its run would before it reads a point; then the
 /// inputs that cannot be read are all told, and not the first alone.
 pub(super) fn check(
-    arguments: &PipelineArguments,
+    arguments: &PlanArguments,
     registry: &Registry,
     console: &Console,
 ) -> Result<()> {
@@ -56,7 +56,7 @@ pub(super) fn check(
     }
 }
 
-fn read(arguments: &PipelineArguments, registry: &Registry) -> Result<Graph> {
+fn read(arguments: &PlanArguments, registry: &Registry) -> Result<Graph> {
     let flags = [
         ("--report", arguments.common.report.is_some()),
         ("--no-clobber", arguments.common.no_clobber),
@@ -65,7 +65,7 @@ fn read(arguments: &PipelineArguments, registry: &Registry) -> Result<Graph> {
         let told = marked(&format!("{flag}: is for commands that write files"), flag, "");
         return Err(Error::pipeline(told).help("give it to `run`"));
     }
-    pipeline::read(arguments, registry)
+    pipeline::read(&arguments.pipeline, &arguments.common, registry)
 }
 
 fn inputs(pipeline: &Graph) -> Vec<PathBuf> {

@@ -111,6 +111,19 @@ Examples:
   pointmill check 'read survey/*.laz ! grid side=\"5 cm\" ! write thin.laz'",
     ),
     ("stages", "Examples:\n  pointmill stages\n  pointmill stages cells\n  pointmill stages run"),
+    (
+        "graph",
+        "\
+Examples:
+  pointmill graph pipelines/classes.toml
+  pointmill graph pipelines/classes.toml --as mermaid
+  pointmill graph pipelines/classes.toml --as dot | dot -Tsvg > classes.svg",
+    ),
+    (
+        "new",
+        "Examples:\n  pointmill new\n  pointmill new reduce\n  pointmill new grid -o thin.toml",
+    ),
+    ("schema", "Example:\n  pointmill schema > pipeline.schema.json"),
     ("synth", "Example:\n  pointmill synth als -n 1M -o landscape.laz --seed 7"),
     (
         "completions",

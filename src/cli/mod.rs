@@ -13,8 +13,10 @@ mod draw;
 mod events;
 mod exit;
 mod flags;
+mod graph;
 mod help;
 mod interrupt;
+mod jobs;
 mod mistyped;
 mod picture;
 mod pipeline;
@@ -121,6 +123,9 @@ fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<
         Command::Plan(arguments) => check::plan(arguments, registry, console),
         Command::Check(arguments) => check::check(arguments, registry, console),
         Command::Stages(arguments) => stages::stages(arguments, registry),
+        Command::Graph(arguments) => graph::graph(arguments, registry),
+        Command::New(arguments) => jobs::new(arguments),
+        Command::Schema => stages::schema(registry),
         Command::Info(arguments) => describe::info(arguments, registry.formats(), console),
         Command::Picture(arguments) => picture::picture(arguments, registry.formats()),
         Command::Completions(arguments) => help::completions(arguments),

@@ -4,18 +4,31 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::arguments::PipelineArguments;
+use super::arguments::{CommonArguments, PipelineArguments};
 use super::flags::{common_flags, given};
 use crate::graph::Graph;
 use crate::language::{Parameter, PipelineText, Registry, Set};
 use crate::{Error, Result};
 
 /// The graph that the arguments of a command mean.
-pub(super) fn read(arguments: &PipelineArguments, registry: &Registry) -> Result<Graph> {
+pub(super) fn read(
+    arguments: &PipelineArguments,
+    common: &CommonArguments,
+    registry: &Registry,
+) -> Result<Graph> {
+    read_with(arguments, given([common_flags(common)]), registry)
+}
+
+/// The same for a command without the arguments of runs: `others` are put in the place of values.
+pub(super) fn read_with(
+    arguments: &PipelineArguments,
+    others: Vec<Set>,
+    registry: &Registry,
+) -> Result<Graph> {
     let sets = arguments.sets.iter().map(|set| Set::parse(set));
     let params = arguments.params.iter().map(|param| Set::param(param));
     let sets = sets.chain(params).collect::<Result<Vec<Set>>>()?;
-    let sets = [sets, given([common_flags(&arguments.common)])].concat();
+    let sets = [sets, others].concat();
     text(arguments, registry)?.graph(registry, &sets)
 }
 

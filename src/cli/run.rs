@@ -1,6 +1,6 @@
 //! `run`, `reduce` and `synth`: arguments to a pipeline, and the pipeline's run.
 
-use super::arguments::{PipelineArguments, ReduceArguments, SynthArguments};
+use super::arguments::{PlanArguments, ReduceArguments, SynthArguments};
 use super::console::Console;
 use super::flags::{common_flags, given, reduce_flags, synth_flags};
 use super::pipeline;
@@ -30,12 +30,8 @@ kind = \"write\"
 ";
 
 /// Runs a pipeline and prints its closing table.
-pub(super) fn run(
-    arguments: &PipelineArguments,
-    registry: &Registry,
-    console: &Console,
-) -> Result<()> {
-    let pipeline = pipeline::read(arguments, registry)?;
+pub(super) fn run(arguments: &PlanArguments, registry: &Registry, console: &Console) -> Result<()> {
+    let pipeline = pipeline::read(&arguments.pipeline, &arguments.common, registry)?;
     console.result(mill(pipeline, console)?)
 }
 

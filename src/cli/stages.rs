@@ -1,4 +1,4 @@
-//! `stages`: the kinds of stages with their keys, as text or JSON.
+//! `stages` and `schema`: the kinds of stages with their keys, for people, programs and editors.
 
 use serde_json::{Value, json};
 
@@ -33,6 +33,11 @@ pub(super) fn stages(arguments: &StagesArguments, registry: &Registry) -> Result
     }
 }
 
+/// Prints the JSON Schema of pipeline files.
+pub(super) fn schema(registry: &Registry) -> Result<()> {
+    printed(&registry.schema())
+}
+
 fn unknown(kind: &str, registry: &Registry) -> Error {
     let kinds = registry.kinds().map(|(kind, _)| kind.to_owned());
     let kinds: Vec<String> = std::iter::once("run".to_owned()).chain(kinds).collect();
@@ -43,7 +48,8 @@ fn unknown(kind: &str, registry: &Registry) -> Error {
 }
 
 fn printed(json: &Value) -> Result<()> {
-    let failed = |e| Error::internal("the stages could not be written as JSON").because(e);
+    let failed =
+        |e| Error::internal("what is known of stages could not be written as JSON").because(e);
     print::json(&serde_json::to_string_pretty(json).map_err(failed)?)
 }
 
@@ -86,10 +92,10 @@ fn text_of_one(table: &TableDescription) -> String {
     let mut out = format!("{}\n{}", table.name, wrapped(&plain(&table.about), 2));
     for paragraph in table.docs.split("\n\n") {
         out.push('\n');
-        // The lines of a list are not one paragraph.
-        let mut items = paragraph.split("\n- ");
-        out += &wrapped(&plain(items.next().unwrap_or_default()), 2);
-        items.for_each(|item| out += &wrapped(&plain(&format!("- {item}")), 4));
+        // The items of a list are lines of their own.
+        for line in paragraph.trim_start_matches("# ").replace("\n- ", "\0- ").split('\0') {
+            out += &wrapped(&plain(line), 2);
+        }
     }
     out + &keys_text(table)
 }

@@ -14,7 +14,7 @@ use super::clock::Clock;
 use super::finished::{Finished, FinishedBranch};
 use super::job::Job;
 use super::lines::TileLines;
-use super::pass::Branch;
+use super::pass::{Branch, StreamOp};
 use super::tagger::{LEFT_OUT, NOT_FINITE};
 use super::task::Task;
 use crate::host::process::peak_memory;
@@ -145,7 +145,10 @@ pub(super) fn nothing_left(finished: &Finished, job: &Job<'_>) -> Vec<String> {
     let ledgers = empty.map(|branch| Ledger::new(finished.read, branch.kept, &branch.tally));
     let told = ledgers.map(|ledger| {
         let by: Vec<String> = ledger.removed.iter().map(by).collect();
-        format!("no point is left of {}: {}", Grouped(ledger.read), by.join(", "))
+        let removed = |stage: &&&StreamOp| ledger.removed.iter().any(|r| r.stage == stage.kind);
+        let why = streams.iter().filter(removed).filter_map(|stage| stage.transform.emptied());
+        let why: String = why.map(|why| format!("; {why}")).collect();
+        format!("no point is left of {}: {}{why}", Grouped(ledger.read), by.join(", "))
     });
     told.collect()
 }

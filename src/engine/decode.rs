@@ -20,7 +20,7 @@ use crate::store::{Intake, TileStore};
 
 pub(crate) fn decode(job: &Job<'_>, lattice: &Lattice) -> Result<(TileStore, Starts, Tally)> {
     let Task { source, tagger, in_input_order, .. } = job.task;
-    let mut store = TileStore::new(&job.area, &job.budget, source.schema().stride, tagger.tags());
+    let mut store = TileStore::new(&job.area, &job.budget, job.task.schema().stride, tagger.tags());
     let ranked = in_input_order.contains(&true);
     if ranked {
         store = store.with_places();
@@ -57,9 +57,9 @@ fn decode_part(
     arena: &mut Arena<'_>,
 ) -> Result<(u64, Tally)> {
     let Arena { intake, batch, placed } = arena;
-    let mut part = job.task.source.part_without(index, &job.unread)?;
+    let mut part = job.open(index)?;
     let (mut read, mut tally) = (0, Tally::default());
-    while job.read(&mut *part, batch, &mut tally)? {
+    while job.read(&mut part, batch, &mut tally)? {
         placed.first = place(index, read);
         placed.place(job, lattice, batch, &mut tally)?;
         placed.hand_over(batch, intake)?;

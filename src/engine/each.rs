@@ -25,8 +25,8 @@ impl ByInput {
         job: &Job<'_>,
         tiles: &SealedTiles,
     ) -> Result<(Vec<(u64, SinkSummary)>, Tally)> {
-        let Task { source, sinks, demands, .. } = job.task;
-        let chunk = sinks[self.sink].chunk(source.schema(), &job.task.metadata(self.sink, None));
+        let Task { sinks, demands, .. } = job.task;
+        let chunk = sinks[self.sink].chunk(job.task.schema(), &job.task.metadata(self.sink, None));
         let chunk_points = chunk.map_or(demands.chunk.points, |chunk| chunk.points);
         let (mut written, mut total) = (Vec::new(), Tally::default());
         job.items(job.task.files(self.sink).len()).run(
@@ -59,8 +59,9 @@ impl ByInput {
         let rank = *task.ranks.get(input).ok_or_else(missing)? as usize;
         let pipeline = Some(task.pipeline(number));
         let computed = task.computed[number].clone();
-        let metadata = Metadata { pipeline, computed, ..task.source.metadata_of(input)? };
-        let mut sink = create.create(staged.file(), task.source.schema(), &metadata, false)?;
+        let said = task.said(task.source.metadata_of(input)?);
+        let metadata = Metadata { pipeline, computed, ..said };
+        let mut sink = create.create(staged.file(), task.schema(), &metadata, false)?;
         let encoders = ChunkEncoders::of_one(job, tiles, number, &*sink, create.likes_time());
         let mut open = Open::new(0, sink.chunk_points(), &self.layout, false);
         let (mut given, mut full) = (0, Vec::new());

@@ -105,7 +105,7 @@ impl ChunkEncoder {
             numbers: Vec::with_capacity(chunk_points),
             states: Vec::with_capacity(chunk_points),
             fetch: Fetch::default(),
-            batch: PointBatch::new(job.task.source.schema().clone(), chunk_points),
+            batch: PointBatch::new(job.task.schema().clone(), chunk_points),
             tally: Tally::default(),
         }
     }
@@ -141,7 +141,7 @@ impl ChunkEncoder {
 }
 
 fn by_time(job: &Job<'_>, likes_time: bool) -> Option<ByTime> {
-    likes_time.then(|| ByTime::of(job.task.source.schema())).flatten()
+    likes_time.then(|| ByTime::of(job.task.schema())).flatten()
 }
 
 /// Counts the records that are written with the key-point flag because they stay.

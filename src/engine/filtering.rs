@@ -42,7 +42,7 @@ impl<'a> Filtering<'a> {
             tiles,
             pass,
             fetch: Fetch::default(),
-            batch: PointBatch::new(job.task.source.schema().clone(), AT_ONCE),
+            batch: PointBatch::new(job.task.schema().clone(), AT_ONCE),
             numbers: Vec::with_capacity(AT_ONCE),
             states: Vec::with_capacity(AT_ONCE),
         }

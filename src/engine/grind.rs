@@ -200,8 +200,7 @@ impl<'a> Worker<'a> {
         // Counted once, in the first pass; fates are stored by every pass that removes.
         let first = sieve.states.is_none();
         let rounds = field.lattice.rounds() && (first || pass.removes);
-        let rounded =
-            rounds.then(|| Rounded::new(&field.tiles, field.lattice, job.task.source.schema()));
+        let rounded = rounds.then(|| Rounded::new(&field.tiles, field.lattice, job.task.schema()));
         let reach = reach(&job.ops, pass);
         let ranks =
             pass.before.iter().chain(&pass.after).any(|sink| job.task.in_input_order[*sink]);

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
-use super::pass::StageOp;
+use super::pass::{StageOp, StreamOp};
 use super::publish::Staged;
 use super::row::RowLayout;
 use super::scratch::Scratch;
@@ -52,6 +52,13 @@ pub(crate) struct Job<'a> {
     _base: Vec<Lease>,
 }
 
+/// A part of the source that is being read.
+pub(crate) struct OpenPart<'a> {
+    part: Box<dyn Part + 'a>,
+    /// The number of the record that comes next, if a stage reads such numbers.
+    next: Option<u64>,
+}
+
 impl<'a> Job<'a> {
     /// The job of `task` with its tile stages, into files that grow at `outputs`; what does not fit
     /// in memory goes to `scratch`.
@@ -76,7 +83,7 @@ impl<'a> Job<'a> {
             ops,
             outputs,
             unread: task.unread(),
-            classes: ClassOf::new(task.source.schema()),
+            classes: ClassOf::new(task.schema()),
             shares,
             area: SpillArea::new(budget.clone(), kept, Box::new(scratch.clone())),
             budget,
@@ -88,24 +95,38 @@ impl<'a> Job<'a> {
         })
     }
 
+    /// Opens a part of the source.
+    pub fn open(&self, index: usize) -> Result<OpenPart<'_>> {
+        let part = self.task.source.part_without(index, &self.unread)?;
+        let is_numbered = self.task.transforms.iter().any(StreamOp::reads_record_numbers);
+        let next = is_numbered.then(|| self.task.source.first_record(index)).flatten();
+        Ok(OpenPart { part, next })
+    }
+
     /// Reads the next batch of a part through the transforms; false at its end.
     pub fn read(
         &self,
-        part: &mut dyn Part,
+        open: &mut OpenPart<'_>,
         batch: &mut PointBatch,
         tally: &mut Tally,
     ) -> Result<bool> {
         batch.clear();
-        part.read(batch)?;
+        batch.relabel(self.task.source.schema());
+        open.part.read(batch)?;
         let read = batch.len() as u64;
         if read == 0 {
             return Ok(false);
         }
+        if let Some(next) = &mut open.next {
+            batch.number_in_input(*next);
+            *next += read;
+        }
         tally.work("read", read);
         self.classes.read(batch, tally);
-        for stage in &self.task.transforms {
+        for (stage, leaves) in self.task.transforms.iter().zip(&self.task.schemas.left_by) {
             let before = batch.len();
             stage.apply(batch, tally)?;
+            batch.relabel(leaves);
             tally.remove(&stage.kind, "removed", (before - batch.len()) as u64);
         }
         self.advance(read)?;
@@ -148,7 +169,7 @@ impl<'a> Job<'a> {
             return;
         }
         let idle = self.task.transforms.iter().filter(|stage| !removed(&stage.kind));
-        let told = idle.flat_map(|stage| stage.transform.idle(self.task.source.schema()));
+        let told = idle.flat_map(|stage| stage.transform.idle(self.task.schema()));
         told.for_each(|told| self.warn(told));
     }
 

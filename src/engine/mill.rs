@@ -243,7 +243,7 @@ impl Course<'_, '_> {
         field: &DecodedScan<'_>,
     ) -> Result<Standing> {
         let (tiles, pass) = (&field.tiles, &job.task.passes[number]);
-        let sieve = pass.sieve(&before.sieve, job.task.source.schema());
+        let sieve = pass.sieve(&before.sieve, job.task.schema());
         self.clock.begin(RunPhase::Look(number), None)?;
         self.foresee(job, pass, field, &sieve)?;
         let held = working.iter().map(Lease::bytes).sum();

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use super::row::RowLayout;
 use crate::expression::{Choice, Condition};
 use crate::graph::{Limits, Written};
-use crate::point::{ColumnKind, ComputedDimension, Mark, NORMAL, PointBatch, Schema};
+use crate::point::{ColumnKind, ComputedDimension, Mark, NORMAL, PointBatch, Schema, names};
 use crate::report::Tally;
 use crate::stage::{AnyScanOp, Needs, TileOp, Transform};
 use crate::tile::{Loader, ReadDimensions, Sieve, Tile};
@@ -97,6 +97,16 @@ impl StreamOp {
     /// The dimensions of the records that it changes.
     pub fn changes(&self) -> Vec<String> {
         self.transform.needs().changes
+    }
+
+    /// True if it changes coordinates.
+    pub fn moves(&self) -> bool {
+        self.changes().iter().any(|name| names::XYZ.contains(&name.as_str()))
+    }
+
+    /// True if it reads the numbers that records have in the input.
+    pub fn reads_record_numbers(&self) -> bool {
+        self.transform.needs().record_numbers
     }
 
     /// Lets it work on those records of `batch` that it is limited to.

@@ -137,7 +137,7 @@ impl Task {
     /// Opens the sinks but those of the inputs, which are created one by one, when their records
     /// are known.
     fn create_sinks(&self, outputs: &[Vec<Staged>]) -> Result<Vec<Option<Box<dyn Sink>>>> {
-        let schema = self.source.schema();
+        let schema = self.schema();
         let whole = !self.mills && self.transforms.is_empty() && !self.drops_nonfinite();
         let mut sinks = Vec::new();
         for (n, (sink, staged)) in self.sinks.iter().zip(outputs).enumerate() {
@@ -196,7 +196,7 @@ impl Task {
         let each = self.sinks.iter().zip(job.outputs).enumerate();
         for (n, (sink, staged)) in each.filter(|_| keeps) {
             let Some(staged) = staged.first() else { continue };
-            let each = sink.disk_bytes(self.source.schema(), &self.metadata(n, None))?;
+            let each = sink.disk_bytes(self.schema(), &self.metadata(n, None))?;
             let [bytes, again] = each.map(|bytes| self.source.points().saturating_mul(bytes));
             all.push(Taken { folder: staged.scratch().parent(), spilled: false, bytes, again });
         }

@@ -25,7 +25,7 @@ pub(crate) fn stream(
     sinks: Vec<Box<dyn Sink>>,
     lattice: Option<&Lattice>,
 ) -> Result<Finished> {
-    let chunks = SinkChunks::new(job.task.source.schema(), &sinks);
+    let chunks = SinkChunks::new(job.task.schema(), &sinks);
     let (commit, encode) = (|batch| Ok(chunks.commit(batch)), |chunk| chunks.encode(chunk));
     let outlet = Outlet::new(sinks, job.threads.count(), &commit);
     let (parts, mut tally) = (job.task.source.parts(), Tally::default());
@@ -64,11 +64,11 @@ fn stream_part(
     chunks: &SinkChunks,
     outlet: &Outlet<'_, PointBatch, SinkChunk>,
 ) -> Result<Tally> {
-    let mut part = job.task.source.part_without(index, &job.unread)?;
+    let mut part = job.open(index)?;
     let (schema, mut tally) = (job.task.source.schema(), Tally::default());
     for number in 0.. {
         let mut batch = chunks.spare_batches.take(|| PointBatch::new(schema.clone(), BATCH));
-        let more = job.read(&mut *part, &mut batch, &mut tally)?;
+        let more = job.read(&mut part, &mut batch, &mut tally)?;
         if let Some(lattice) = lattice {
             drop_nonfinite(job, lattice, &mut batch, &mut tally)?;
         }

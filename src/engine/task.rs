@@ -13,8 +13,16 @@ use super::tagger::Tagger;
 use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
 use crate::graph::{Nonfinite, RunSettings, SpillSetting};
-use crate::point::{ComputedDimension, Metadata, names};
+use crate::point::{ComputedDimension, Metadata, Schema, names};
 use crate::stage::{CreateSink, Source};
+
+/// The schemas of records on their way through the stages that stream in the decode.
+pub(crate) struct Schemas {
+    /// For each stage, that of the records that it leaves.
+    pub left_by: Vec<Arc<Schema>>,
+    /// That of all records behind the decode.
+    pub last: Arc<Schema>,
+}
 
 /// A run that can begin.
 pub(crate) struct Task {
@@ -24,6 +32,8 @@ pub(crate) struct Task {
     pub source: Box<dyn Source>,
     pub source_kind: String,
     pub transforms: Vec<StreamOp>,
+    /// The schemas of the records that each of these gets, and last of those that they leave.
+    pub schemas: Schemas,
     /// Stages that stream behind the decode.
     pub filters: Vec<StreamOp>,
     pub passes: Vec<Pass>,
@@ -54,10 +64,21 @@ pub(crate) struct Task {
 }
 
 impl Task {
+    /// What every record holds behind the decode.
+    pub fn schema(&self) -> &Arc<Schema> {
+        &self.schemas.last
+    }
+
+    /// What an input says, for its own output or for that of all.
+    pub fn said(&self, metadata: Metadata) -> Metadata {
+        let moved = *self.schemas.last != **self.source.schema();
+        Metadata { moved, ..metadata }
+    }
+
     /// What the source says, for a sink whose records go through the stages `pipeline`.
     pub fn metadata(&self, sink: usize, pipeline: Option<Arc<str>>) -> Metadata {
         let computed = self.computed[sink].clone();
-        Metadata { pipeline, computed, ..self.source.metadata().clone() }
+        Metadata { pipeline, computed, ..self.said(self.source.metadata().clone()) }
     }
 
     /// The files of a sink, one for each input where it is a folder.

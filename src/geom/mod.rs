@@ -6,6 +6,7 @@ mod decimal;
 pub mod lattice;
 pub mod nearest;
 pub mod plane;
+pub mod polygon;
 pub mod rows;
 pub mod simd;
 pub mod star;

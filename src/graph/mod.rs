@@ -5,6 +5,7 @@
 //! in one place, `tree.rs` ([`Graph::mistakes`]): the language tells what is found there with the
 //! places in its text, the plan as an error.
 
+mod drawn;
 pub(crate) mod limits;
 mod settings;
 mod size;
@@ -170,18 +171,6 @@ impl GraphStage {
     /// True if it may work on some records and let the others pass.
     pub(crate) fn can_be_limited(&self) -> bool {
         matches!(self.role, Role::Transform(_) | Role::TileOp(_) | Role::ScanOp(_))
-    }
-}
-
-impl fmt::Display for Graph {
-    /// A line a stage: its number, kind and keys, and where it takes from.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (n, GraphStage { kind, from, keys, .. }) in self.stages.iter().enumerate() {
-            let from: Vec<String> = from.iter().map(usize::to_string).collect();
-            let takes = if from.is_empty() { String::new() } else { " <- ".to_owned() };
-            writeln!(f, "{n} {kind} {keys}{takes}{}", from.join(", "))?;
-        }
-        Ok(())
     }
 }
 

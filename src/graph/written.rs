@@ -11,6 +11,12 @@ pub trait Written: Send + Sync {
     /// An error about the value of `key`, told where that is written.
     fn wrong_key(&self, key: &str, told: String) -> Error;
 
+    /// The keys that are written, in order, each with its value as a pipeline file has it; none if
+    /// no text says which they are.
+    fn keys(&self) -> Option<Vec<(String, String)>> {
+        None
+    }
+
     /// An error in an expression that is the value of `key` or one of several, told at its place.
     fn wrong_expression(&self, key: &str, text: &str, fault: ExpressionFault) -> Error;
 }

@@ -5,7 +5,10 @@ use crate::io::ends::{Read, Write};
 use crate::io::las::{LAS, LAZ};
 use crate::io::ply::PLY;
 use crate::ops::normals::Normals;
-use crate::ops::{Assign, Cells, Drop, Filter, Grid, Median, Merge, Outliers, Stats, Tap};
+use crate::ops::{
+    Assign, Cells, Crop, Drop, Filter, Grid, Median, Merge, Outliers, Sample, Stats, Tap,
+    Transformation,
+};
 use crate::synth::Synth;
 
 impl Registry {
@@ -18,6 +21,8 @@ impl Registry {
             .with::<Write>()
             .with::<Filter>()
             .with::<Drop>()
+            .with::<Crop>()
+            .with::<Transformation>()
             .with::<Assign>()
             .with::<Stats>()
             .with::<Tap>()
@@ -26,6 +31,7 @@ impl Registry {
             .with::<Cells>()
             .with::<Median>()
             .with::<Grid>()
+            .with::<Sample>()
             .with_format(LAS)
             .with_format(LAZ)
             .with_format(PLY)

@@ -1,5 +1,7 @@
 //! A pipeline file's values, each with its place in the text it was read from.
 
+use std::fmt;
+
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -28,6 +30,29 @@ impl Node {
     pub fn at(&self, key: &str) -> Option<&TextPlace> {
         let NodeValue::Table(entries) = &self.value else { return None };
         entries.iter().find(|e| e.key == key).map(|e| &e.node.place)
+    }
+}
+
+impl fmt::Display for Node {
+    /// As it stands in a pipeline file, on one line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.value {
+            // What JSON escapes in a text, TOML reads, too.
+            NodeValue::Text(text) => serde_json::Value::from(text.as_str()).fmt(f),
+            NodeValue::Whole(number) => number.fmt(f),
+            NodeValue::Number(number) => write!(f, "{number:?}"),
+            NodeValue::Flag(flag) => flag.fmt(f),
+            NodeValue::List(list) => {
+                let items: Vec<String> = list.iter().map(Node::to_string).collect();
+                write!(f, "[{}]", items.join(", "))
+            }
+            NodeValue::Told => f.write_str("?"),
+            NodeValue::Table(entries) => {
+                let entry = |entry: &KeyEntry| format!("{} = {}", entry.key, entry.node);
+                let entries: Vec<String> = entries.iter().map(entry).collect();
+                write!(f, "{{ {} }}", entries.join(", "))
+            }
+        }
     }
 }
 

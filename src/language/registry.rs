@@ -40,9 +40,9 @@ type ReadStage = fn(&Node, &StagePlace) -> Result<BuiltStage, Vec<Mistake>>;
 pub(crate) struct BuiltStage {
     pub role: Role,
     /// Its keys as reports have them.
-    pub keys: serde_json::Value,
+    pub keys: Value,
     /// Its keys as a text gives them; None if no text can.
-    pub given: Option<serde_json::Value>,
+    pub given: Option<Value>,
 }
 
 #[derive(Clone, Copy)]
@@ -197,7 +197,7 @@ pub(crate) fn built<K: StageKind>(stage: K, at: &StagePlace) -> Result<BuiltStag
     let is_reported = |key: &str| !K::PLACES.contains(&key);
     let keys =
         given.iter().filter(|(key, _)| is_reported(key)).map(|(k, v)| (k.clone(), v.clone()));
-    let keys = keys.collect::<serde_json::Map<_, _>>().into();
+    let keys = keys.collect::<Map<_, _>>().into();
     let role = stage.build(at).and_then(in_its_role::<K>)?;
     Ok(BuiltStage { role, keys, given: Some(given.into()) })
 }
@@ -206,6 +206,7 @@ pub(crate) fn built<K: StageKind>(stage: K, at: &StagePlace) -> Result<BuiltStag
 fn in_its_role<K: StageKind>(role: Role) -> Result<Role> {
     match role.name() {
         name if name == K::ROLE => Ok(role),
+        RoleName::Transform if K::ROLE == RoleName::OnTiles => Ok(role),
         name => Err(Error::internal(format!(
             "the stage kind `{}` says that its role is {:?}, and it is {name:?}",
             K::KIND,
@@ -226,7 +227,7 @@ fn defaults<K: StageKind>() -> Map<String, Value> {
 
 /// The stage's keys with all defaults filled in, sorted by name; those without a value are left
 /// out.
-fn given_keys<K: StageKind>(stage: &K) -> Result<serde_json::Map<String, serde_json::Value>> {
+fn given_keys<K: StageKind>(stage: &K) -> Result<Map<String, Value>> {
     let value = serde_json::to_value(stage).map_err(|e| {
         Error::internal(format!("cannot list the keys of `{}`", K::KIND)).because(e)
     })?;
@@ -237,6 +238,6 @@ fn given_keys<K: StageKind>(stage: &K) -> Result<serde_json::Map<String, serde_j
             .collect::<BTreeMap<_, _>>()
             .into_iter()
             .collect(),
-        _ => serde_json::Map::new(),
+        _ => Map::new(),
     })
 }

@@ -8,9 +8,13 @@ use schemars::transform::{Transform, transform_subschemas};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde_json::{Map, Value, json};
 
+use super::parameter::ParameterType;
 use crate::graph::{LimitKeys, RunSettings};
 use crate::quantity::COUNT_TEXT;
 use crate::stage::{Format, FormatName, Formats, RoleName};
+
+/// What a name is made of.
+const NAME: &str = r"^[\p{L}\p{N}_-]+$";
 
 /// A kind of stage.
 pub(crate) struct StageTable {
@@ -159,7 +163,7 @@ pub(crate) fn pipeline(
         "type": "object",
         "properties": {
             "run": written(run),
-            "params": { "description": "Parameters of the pipeline.", "type": "object" },
+            "params": parameters(),
             "stage": {
                 "description": "The stages. Each takes from the one above it, or from those that \
                                 its `from` names.",
@@ -174,6 +178,31 @@ pub(crate) fn pipeline(
     })
 }
 
+/// The schema of the table `[params]`.
+fn parameters() -> Value {
+    let value = json!({ "type": ["string", "number", "boolean", "array"] });
+    let declared = json!({
+        "type": "object",
+        "properties": {
+            "type": { "description": "What it takes.", "enum": ParameterType::WORDS },
+            "default": {
+                "description": "What it is where it is not given; none: it must be given.",
+                "type": value["type"],
+            },
+            "about": { "description": "What it is for.", "type": "string" },
+            "choices": { "description": "All that it can be.", "type": "array", "items": value },
+        },
+        "additionalProperties": false,
+    });
+    json!({
+        "description": "Parameters of the pipeline, whose values take the place of ${NAME} in \
+                        others: each with its default, or a table of what it takes.",
+        "type": "object",
+        "propertyNames": { "pattern": NAME },
+        "additionalProperties": { "anyOf": [value, declared] },
+    })
+}
+
 /// The schema of a `[[stage]]`.
 fn stage(table: StageTable) -> Value {
     let StageTable { name, about, role, schema: own, limits } = table;
@@ -185,7 +214,7 @@ fn stage(table: StageTable) -> Value {
             "description": "A name by which `from` and `--set` mean the stage: letters, digits, - \
                             and _.",
             "type": "string",
-            "pattern": r"^[\p{L}\p{N}_-]+$",
+            "pattern": NAME,
         }),
     );
     if role != RoleName::Source {

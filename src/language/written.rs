@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::mistake;
 use super::mistake::{Mistake, SourceText};
-use super::node::{Node, NodeValue};
+use super::node::{KeyEntry, Node, NodeValue};
 use crate::Error;
 use crate::expression::ExpressionFault;
 use crate::graph::Written;
@@ -33,6 +33,11 @@ impl Written for WrittenText {
     fn wrong_key(&self, key: &str, told: String) -> Error {
         let place = self.keys.at(key).unwrap_or(&self.keys.place);
         mistake::tell(vec![Mistake::new(place.clone(), told)], &self.sources)
+    }
+
+    fn keys(&self) -> Option<Vec<(String, String)>> {
+        let key = |entry: &KeyEntry| (entry.key.clone(), entry.node.to_string());
+        Some(self.keys.entries().iter().map(key).collect())
     }
 
     fn wrong_expression(&self, key: &str, text: &str, fault: ExpressionFault) -> Error {

@@ -111,6 +111,10 @@ impl Source for Records {
         self.len().div_ceil(PART)
     }
 
+    fn first_record(&self, index: usize) -> Option<u64> {
+        Some((index * PART) as u64)
+    }
+
     fn part(&self, index: usize) -> Result<Box<dyn Part + '_>> {
         let stride = self.schema.stride;
         let end = self.len().min((index + 1) * PART);

@@ -15,8 +15,8 @@ pub struct Merge {}
 
 impl StageKind for Merge {
     const KIND: &'static str = "merge";
-    const ABOUT: &'static str = "Makes one scan of several sources.";
     const ROLE: RoleName = RoleName::Merge;
+    const ABOUT: &'static str = "Makes one scan of several sources.";
     const IS_LIMITED: bool = false;
 
     fn build(self, _: &StagePlace) -> Result<Role> {

@@ -2,6 +2,7 @@
 
 mod assign;
 mod cells;
+mod crop;
 mod drop;
 mod filter;
 mod grid;
@@ -11,17 +12,22 @@ mod merge;
 pub mod normals;
 pub(crate) mod outliers;
 pub mod removal;
+mod sample;
 mod scatter;
 mod stats;
 mod tap;
+mod transform;
 
 pub use assign::Assign;
 pub use cells::{By, Cells, Keep, Measure, Reference, Side, Split};
+pub use crop::{Crop, CropBox, CropSide};
 pub use drop::Drop;
 pub use filter::Filter;
 pub use grid::{Grid, Pick};
 pub use median::Median;
 pub use merge::Merge;
 pub use outliers::{OutlierMethod, Outliers};
+pub use sample::Sample;
 pub use stats::Stats;
 pub use tap::Tap;
+pub use transform::{MatrixRows, Rotation, RotationAxis, ScaleFactors, Transformation};

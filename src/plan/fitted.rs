@@ -3,6 +3,7 @@
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use rayon::ThreadPool;
 
@@ -12,12 +13,13 @@ use super::passes::{Passes, unroll};
 use super::places::{all_read, check_places, copies, each_input};
 use super::sorted::Sorted;
 use super::stretch::Stretch;
+use super::transforms::{check_numbers, fit_transforms};
 use crate::engine::by_input::lists_bytes;
 use crate::engine::by_rank;
-use crate::engine::pass::{ColumnBytes, Op, Pass, StageOp, StreamOp, standings};
+use crate::engine::pass::{ColumnBytes, Op, Pass, StageOp, standings};
 use crate::engine::shares::Demands;
 use crate::engine::tagger::Tagger;
-use crate::engine::task::Task;
+use crate::engine::task::{Schemas, Task};
 use crate::engine::{Done, Watch};
 use crate::error::shown;
 use crate::expression::Choice;
@@ -104,32 +106,21 @@ impl Graph {
         let places = |read: &[PathBuf], sinks: &[Box<dyn CreateSink>]| {
             check_places(file.as_deref(), read, sinks, &settings)
         };
-        let (_, mut wrong) = places(&open.paths(), &sorted.sinks);
-        let source = match open.open() {
-            Ok(source) => source,
-            Err(error) => {
-                wrong.push(error);
-                return Err(Error::several(wrong));
-            }
-        };
-        let schema = source.schema();
-        let units = source.metadata().units;
-        wrong.extend(check_limits(&sorted, schema));
-        wrong.extend(check_transforms(&sorted, schema).into_iter().map(in_file));
-        wrong.extend(fit(&mut sorted.ops, &units));
-        let choices = number_selections(&mut sorted.ops)?;
-        let passes = unroll(&sorted, schema, &mut wrong)?;
-        Error::all(wrong)?;
+        let (_, wrong) = places(&open.paths(), &sorted.sinks);
+        let FittedStages { source, schemas, choices, passes } =
+            fit_stages(&mut sorted, wrong, &in_file)?;
+        let schema = &schemas.last;
+        let open = &*sorted.source.1;
         let read = all_read(open, &*source);
         let (mut files, wrong) = places(&read, &sorted.sinks);
         Error::all(wrong)?;
         let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;
         let beside = copies(&*source, &sorted.sinks, &each, &settings, &mut files)?;
-        let tagger = tagger(&sorted.ops, &passes.passes, &choices, &ranks, &*source, &settings)?;
+        let tagger = tagger(&sorted.ops, &passes.passes, &choices, &ranks, schema, &settings)?;
         let order = WriteOrder::new(&sorted, &*source)?;
-        let (lattice, doubt) = lattice(&settings, &*source, &sorted.ops, order.mills)?;
+        let (lattice, doubt) = lattice(&settings, (&*source, schema), &sorted.ops, order.mills)?;
         let simd = settings.simd.resolve().map_err(in_file)?;
-        let demands = demands(&sorted, &passes, &*source, &order, &settings)?;
+        let demands = demands(&sorted, &passes, (&*source, schema), &order, &settings)?;
         let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
         let demands = Demands {
             lists: demands.lists + lists_bytes(ranks.len()) * folders,
@@ -137,7 +128,7 @@ impl Graph {
             ..demands
         };
         demands.divide()?;
-        let mut warnings = warnings(&*source, &sorted, &settings)?;
+        let mut warnings = warnings(&*source, &sorted, &schemas, &settings)?;
         warnings.extend(doubt);
         let task = Task {
             warnings,
@@ -147,6 +138,7 @@ impl Graph {
             source,
             source_kind: sorted.source.0,
             transforms: sorted.transforms,
+            schemas,
             filters: sorted.filters,
             passes: passes.passes,
             branches: passes.branches,
@@ -167,6 +159,39 @@ impl Graph {
     }
 }
 
+/// Stages that fit each other and the headers of the inputs.
+struct FittedStages {
+    source: Box<dyn Source>,
+    schemas: Schemas,
+    choices: Vec<Choice>,
+    passes: Passes,
+}
+
+/// Opens the inputs and fits the stages to them. What is `wrong` so far is told with what is found
+/// here; `in_file` tells in which text a stage stands.
+fn fit_stages(
+    sorted: &mut Sorted,
+    mut wrong: Vec<Error>,
+    in_file: &impl Fn(Error) -> Error,
+) -> Result<FittedStages> {
+    let source = match sorted.source.1.open() {
+        Ok(source) => source,
+        Err(error) => {
+            wrong.push(error);
+            return Err(Error::several(wrong));
+        }
+    };
+    let (schemas, unfit) = fit_transforms(sorted, source.schema());
+    wrong.extend(unfit.into_iter().map(in_file));
+    wrong.extend(check_limits(sorted, &schemas.last));
+    wrong.extend(check_numbers(sorted, &*source).err());
+    wrong.extend(fit(&mut sorted.ops, &source.metadata().units));
+    let choices = number_selections(&mut sorted.ops)?;
+    let passes = unroll(sorted, &schemas.last, &mut wrong)?;
+    Error::all(wrong)?;
+    Ok(FittedStages { source, schemas, choices, passes })
+}
+
 /// Fits tile stages to the units of the scan: lengths with a unit of their own are converted.
 fn fit(ops: &mut [StageOp], units: &Units) -> Vec<Error> {
     ops.iter_mut().filter_map(|stage| stage.op.tile_mut().convert(units).err()).collect()
@@ -178,7 +203,7 @@ fn tagger(
     passes: &[Pass],
     choices: &[Choice],
     ranks: &[u32],
-    source: &dyn Source,
+    schema: &Schema,
     settings: &RunSettings,
 ) -> Result<Tagger> {
     let classed = passes.iter().any(|pass| pass.reads_classes);
@@ -189,9 +214,9 @@ fn tagger(
         );
         return Err(Error::pipeline(told).help("run them in several parts"));
     }
-    let mut tagger = Tagger::new(source.schema(), choices, classed, ranks.to_vec());
+    let mut tagger = Tagger::new(schema, choices, classed, ranks.to_vec());
     if !ops.is_empty() {
-        tagger.treat(source.schema(), settings);
+        tagger.treat(schema, settings);
     }
     Ok(tagger)
 }
@@ -199,7 +224,7 @@ fn tagger(
 /// Where points are, for a run that asks, and why z may be measured wrong.
 fn lattice(
     settings: &RunSettings,
-    source: &dyn Source,
+    (source, schema): (&dyn Source, &Schema),
     ops: &[StageOp],
     mills: bool,
 ) -> Result<(Option<Lattice>, Option<String>)> {
@@ -207,7 +232,7 @@ fn lattice(
     if !mills && settings.nonfinite != Nonfinite::Drop {
         return Ok((None, doubt));
     }
-    let lattice = Lattice::stretched(source.schema(), settings.lattice, factor)?;
+    let lattice = Lattice::stretched(schema, settings.lattice, factor)?;
     check_lengths(ops, &lattice)?;
     Ok((Some(lattice), doubt))
 }
@@ -216,12 +241,12 @@ fn lattice(
 fn demands(
     sorted: &Sorted,
     Passes { passes, computed, .. }: &Passes,
-    source: &dyn Source,
+    (source, schema): (&dyn Source, &Arc<Schema>),
     order: &WriteOrder,
     settings: &RunSettings,
 ) -> Result<Demands> {
     let limit = settings.memory.unwrap_or_else(default_memory);
-    let chunks = chunks(&sorted.sinks, computed, source)?;
+    let chunks = chunks(&sorted.sinks, computed, (source, schema))?;
     let columns = passes.iter().map(|pass| pass.column_bytes(computed));
     let ranked =
         order.in_input_order.iter().filter(|ranked| **ranked && order.mills).count() as u64;
@@ -286,31 +311,20 @@ fn check_lengths(ops: &[StageOp], lattice: &Lattice) -> Result<()> {
     }
 }
 
-fn check_transforms(sorted: &Sorted, schema: &Schema) -> Vec<Error> {
-    let mut written: Vec<String> = Vec::new();
-    let mut wrong = Vec::new();
-    for StreamOp { kind, transform, .. } in sorted.transforms.iter().chain(&sorted.filters) {
-        let needs = transform.needs();
-        let there = |name: &&String| schema.find(name).is_some() || written.contains(name);
-        if let Some(missing) = needs.dimensions.iter().find(|name| !there(name)) {
-            let told = format!("`{kind}` needs {missing}, which nothing before it gives");
-            wrong.push(Error::pipeline(told).help("the input has no such dimension"));
-        }
-        wrong.extend(transform.check(schema).err());
-        written.extend(needs.changes);
-    }
-    wrong
-}
-
 /// What outputs will not hold. Records that they cannot hold are an error where all are written,
 /// and a warning where a stage may remove them first and leave others. Then what stages have
 /// nothing to do of.
-fn warnings(source: &dyn Source, sorted: &Sorted, settings: &RunSettings) -> Result<Vec<String>> {
+fn warnings(
+    source: &dyn Source,
+    sorted: &Sorted,
+    schemas: &Schemas,
+    settings: &RunSettings,
+) -> Result<Vec<String>> {
     let Sorted { sinks, transforms, filters, ops, .. } = sorted;
-    let schema = source.schema();
+    let schema = &schemas.last;
     let lost = sinks.iter().flat_map(|sink| sink.warnings(schema, source.metadata()));
     let mut warnings: Vec<String> = lost.collect();
-    let unfit = look(source, sinks, settings.nonfinite == Nonfinite::Drop)?;
+    let unfit = look(source, sinks, (transforms, schemas), settings.nonfinite == Nonfinite::Drop)?;
     if let Some(Unfit { error, none_fits }) = unfit {
         // Where none fits there is nothing that stages could leave.
         if none_fits || transforms.is_empty() && filters.is_empty() && ops.is_empty() {
@@ -319,8 +333,18 @@ fn warnings(source: &dyn Source, sorted: &Sorted, settings: &RunSettings) -> Res
         let help = error.remedy().map_or(String::new(), |help| format!("; {help}"));
         warnings.push(format!("{error}: the run fails if such a point is kept{help}"));
     }
-    let all = transforms.iter().chain(filters);
-    warnings.extend(all.flat_map(|stage| stage.transform.warnings(schema)));
+    let seen = [source.schema()].into_iter().chain(&schemas.left_by);
+    let decoded = transforms.iter().zip(seen);
+    let all = decoded.chain(filters.iter().map(|stage| (stage, schema)));
+    warnings.extend(all.flat_map(|(stage, schema)| stage.transform.warnings(schema)));
+    let mover = transforms.iter().find(|stage| stage.moves());
+    warnings.extend(mover.filter(|_| source.metadata().crs.is_some()).map(|stage| {
+        format!(
+            "outputs carry on the coordinate reference system of the input, which may not hold for \
+             the points that `{}` moves",
+            stage.kind
+        )
+    }));
     Ok(warnings)
 }
 
@@ -343,12 +367,12 @@ fn threads(settings: &RunSettings) -> Result<usize> {
 fn chunks(
     sinks: &[Box<dyn CreateSink>],
     computed: &[Vec<ComputedDimension>],
-    source: &dyn Source,
+    (source, schema): (&dyn Source, &Arc<Schema>),
 ) -> Result<Vec<ChunkSize>> {
     let (mut chunks, mut wrong) = (Vec::new(), Vec::new());
     for (sink, computed) in sinks.iter().zip(computed) {
         let metadata = Metadata { computed: computed.clone(), ..source.metadata().clone() };
-        match sink.chunk(source.schema(), &metadata) {
+        match sink.chunk(schema, &metadata) {
             Ok(chunk) => chunks.push(chunk),
             Err(error) => wrong.push(error),
         }

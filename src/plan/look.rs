@@ -1,7 +1,10 @@
 //! A look at some records before a run, so that values which an output cannot hold are told before
 //! the work and not in the middle of it. It finds what is common, and proves nothing.
 
+use crate::engine::pass::StreamOp;
+use crate::engine::task::Schemas;
 use crate::point::{PointBatch, Schema};
+use crate::report::Tally;
 use crate::stage::{CreateSink, Source};
 use crate::{Error, Result};
 
@@ -27,9 +30,10 @@ pub(crate) struct Unfit {
 pub(crate) fn look(
     source: &dyn Source,
     sinks: &[Box<dyn CreateSink>],
+    (transforms, schemas): (&[StreamOp], &Schemas),
     drop_nonfinite: bool,
 ) -> Result<Option<Unfit>> {
-    let schema = source.schema();
+    let schema = &schemas.last;
     let looking: Vec<_> = sinks.iter().filter(|sink| sink.checks(schema)).collect();
     if looking.is_empty() || source.is_read_once() {
         return Ok(None);
@@ -40,7 +44,9 @@ pub(crate) fn look(
     let parts = || (0..source.parts()).step_by(step);
     let read = |index: usize, batch: &mut PointBatch| {
         batch.clear();
+        batch.relabel(source.schema());
         source.part(index)?.read(batch)?;
+        moved(batch, transforms, schemas);
         if drop_nonfinite {
             batch.retain(|_, record| is_finite(record, schema));
         }
@@ -53,7 +59,7 @@ pub(crate) fn look(
             let mut none_fits = true;
             for other in parts() {
                 read(other, &mut batch)?;
-                none_fits = none_fits && !any_fits(source, sink.as_ref(), &batch);
+                none_fits = none_fits && !any_fits(sink.as_ref(), &batch, source);
             }
             return Ok(Some(Unfit { error: error.at(sink.path()), none_fits }));
         }
@@ -61,9 +67,20 @@ pub(crate) fn look(
     Ok(None)
 }
 
+/// Moves the records of a batch to where stages of the decode move them; forgets them where one
+/// cannot, since a stage above it may remove that.
+fn moved(batch: &mut PointBatch, transforms: &[StreamOp], schemas: &Schemas) {
+    for (stage, leaves) in transforms.iter().zip(&schemas.left_by) {
+        if stage.moves() && stage.apply(batch, &mut Tally::default()).is_err() {
+            batch.clear();
+        }
+        batch.relabel(leaves);
+    }
+}
+
 /// True if one of some records of `batch` fits `sink`.
-fn any_fits(source: &dyn Source, sink: &dyn CreateSink, batch: &PointBatch) -> bool {
-    let mut single = PointBatch::new(source.schema().clone(), 1);
+fn any_fits(sink: &dyn CreateSink, batch: &PointBatch, source: &dyn Source) -> bool {
+    let mut single = PointBatch::new(batch.schema().clone(), 1);
     batch.iter().step_by(batch.len().div_ceil(SINGLES).max(1)).any(|record| {
         single.clear();
         single.extend(record);

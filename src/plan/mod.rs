@@ -14,6 +14,7 @@ mod shown;
 mod sorted;
 mod streaming;
 mod stretch;
+mod transforms;
 
 pub use fitted::Plan;
 pub use outline::Outline;

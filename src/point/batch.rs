@@ -38,6 +38,8 @@ pub struct PointBatch {
     pub columns: Columns,
     /// For each record its number when they were numbered, if somebody asks which are left.
     numbers: Option<Vec<u32>>,
+    /// For each record its number in the input, if a stage reads it.
+    in_input: Option<Vec<u64>>,
 }
 
 impl PointBatch {
@@ -45,12 +47,19 @@ impl PointBatch {
     pub fn new(schema: Arc<Schema>, capacity: usize) -> Self {
         let records = Vec::with_capacity(capacity * schema.stride);
         let columns = Columns::default();
-        PointBatch { schema, records, capacity, source: 0, columns, numbers: None }
+        PointBatch { schema, records, capacity, source: 0, columns, numbers: None, in_input: None }
     }
 
     /// What the records hold.
     pub fn schema(&self) -> &Arc<Schema> {
         &self.schema
+    }
+
+    /// Has the batch say that its records are of `schema`, whose fields are at the same bytes.
+    pub(crate) fn relabel(&mut self, schema: &Arc<Schema>) {
+        if !Arc::ptr_eq(&self.schema, schema) {
+            self.schema = schema.clone();
+        }
     }
 
     /// How many records it takes.
@@ -88,6 +97,7 @@ impl PointBatch {
         self.records.clear();
         self.columns = Columns::default();
         self.numbers = None;
+        self.in_input = None;
     }
 
     /// Makes the batch hold exactly `len ≤ capacity` records and returns their bytes for the
@@ -96,6 +106,7 @@ impl PointBatch {
         assert!(len <= self.capacity, "a batch is refilled within its capacity");
         self.columns = Columns::default();
         self.numbers = None;
+        self.in_input = None;
         self.records.resize(len * self.schema.stride, 0);
         &mut self.records
     }
@@ -105,6 +116,17 @@ impl PointBatch {
         assert!(len + more <= self.capacity, "a batch is refilled within its capacity");
         self.records.resize((len + more) * self.schema.stride, 0);
         &mut self.records[len * self.schema.stride..]
+    }
+
+    /// The number of each record in the input, from 0 over all inputs in their order; for stages
+    /// that say that they [read them](crate::stage::Needs::reads_record_numbers), None for others.
+    pub fn record_numbers(&self) -> Option<&[u64]> {
+        self.in_input.as_deref()
+    }
+
+    /// Tells that the records follow each other in the input from number `first` on.
+    pub(crate) fn number_in_input(&mut self, first: u64) {
+        self.in_input = Some((first..).take(self.len()).collect());
     }
 
     /// Numbers the records from 0: [`retain`](PointBatch::retain) then tells which are left.
@@ -122,6 +144,9 @@ impl PointBatch {
         self.records.truncate(len * self.schema.stride);
         self.columns.truncate(len);
         if let Some(numbers) = &mut self.numbers {
+            numbers.truncate(len);
+        }
+        if let Some(numbers) = &mut self.in_input {
             numbers.truncate(len);
         }
     }
@@ -174,6 +199,9 @@ impl PointBatch {
                     self.records.copy_within(i * stride..(i + 1) * stride, kept * stride);
                     self.columns.copy(i, kept);
                     if let Some(numbers) = &mut self.numbers {
+                        numbers[kept] = numbers[i];
+                    }
+                    if let Some(numbers) = &mut self.in_input {
                         numbers[kept] = numbers[i];
                     }
                 }

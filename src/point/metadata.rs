@@ -31,6 +31,8 @@ pub struct Metadata {
     pub pipeline: Option<Arc<str>>,
     /// The dimensions that stages computed and the output is to have.
     pub computed: Vec<ComputedDimension>,
+    /// True if stages moved the points, so that offsets of the input are not theirs any more.
+    pub moved: bool,
     /// Free text lines, such as the comments of a PLY header.
     pub comments: Vec<String>,
     /// The format's own header and records, known to sources and sinks of that format alone.
@@ -45,6 +47,7 @@ impl std::fmt::Debug for Metadata {
             .field("gps_time", &self.gps_time)
             .field("pipeline", &self.pipeline)
             .field("computed", &self.computed)
+            .field("moved", &self.moved)
             .field("comments", &self.comments)
             .field("native", &self.native.is_some())
             .finish()

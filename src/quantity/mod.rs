@@ -4,15 +4,19 @@
 mod angle;
 mod count;
 mod figure;
+mod fraction;
 mod length;
 mod schema;
 mod setting;
+mod turn;
 mod whole;
 
 pub use angle::Angle;
 pub use count::parse_count;
 pub(crate) use figure::Figure;
+pub use fraction::Fraction;
 pub use length::Length;
 pub(crate) use schema::{COUNT_TEXT, OrNone, has_schema};
 pub use setting::Setting;
+pub use turn::Turn;
 pub(crate) use whole::Whole;

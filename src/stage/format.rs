@@ -21,7 +21,7 @@ use crate::{Error, Result};
 /// Creates a sink for records of a schema.
 pub type CreateFor<'a> = dyn Fn(&Arc<Schema>) -> Result<Box<dyn Sink>> + 'a;
 
-/// A format of files that hold points. `examples/04_own_format.rs` has one of its own from end to
+/// A format of files that hold points. `examples/10_own_format.rs` has one of its own from end to
 /// end; those that are there are in a registry:
 ///
 /// ```

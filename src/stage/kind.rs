@@ -24,7 +24,7 @@ pub trait StageKind: DeserializeOwned + Serialize + JsonSchema {
     const KIND: &'static str;
 
     /// The role that [`build`](StageKind::build) puts it in, which decides which keys it takes
-    /// besides its own.
+    /// besides its own. A kind that works on tiles may stream with some keys: it says `OnTiles`.
     const ROLE: RoleName;
 
     /// What it does, in one sentence.

@@ -44,6 +44,9 @@ pub struct Needs {
     pub cell_aligned: bool,
     /// Working memory per position of the tile, rim included.
     pub bytes_per_point: usize,
+    /// True if it reads the [numbers](crate::point::PointBatch::record_numbers) that records have
+    /// in the input.
+    pub record_numbers: bool,
     /// True if it removes points.
     pub removes: bool,
     /// How it marks records instead of removing any, if it does.
@@ -128,6 +131,14 @@ impl Needs {
     #[must_use]
     pub fn makes_cells(mut self) -> Self {
         self.makes_cells = true;
+        self
+    }
+
+    /// And it reads the numbers that records have in the input, which are known where every record
+    /// still comes in the order of the input.
+    #[must_use]
+    pub fn reads_record_numbers(mut self) -> Self {
+        self.record_numbers = true;
         self
     }
 

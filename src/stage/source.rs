@@ -96,6 +96,12 @@ pub trait Source: Send + Sync {
     /// How many parts there are. Parts are independent and numbered in input order.
     fn parts(&self) -> usize;
 
+    /// The number of the first record of part `index`, over all inputs from 0: the records of all
+    /// parts before it. None if that is not known before they are read.
+    fn first_record(&self, index: usize) -> Option<u64> {
+        (index == 0).then_some(0)
+    }
+
     /// Opens part `index < parts()`.
     ///
     /// # Errors

@@ -132,6 +132,10 @@ impl Source for Scan {
         self.points.div_ceil(PART_POINTS) as usize // at most 1.6e8
     }
 
+    fn first_record(&self, index: usize) -> Option<u64> {
+        Some((index as u64).saturating_mul(PART_POINTS).min(self.points))
+    }
+
     fn part(&self, index: usize) -> Result<Box<dyn Part + '_>> {
         let start = (index as u64).saturating_mul(PART_POINTS).min(self.points);
         let end = start.saturating_add(PART_POINTS).min(self.points);

@@ -6,5 +6,6 @@ mod events;
 mod interrupt;
 mod names;
 mod picture;
+mod tools;
 mod values;
 mod words;

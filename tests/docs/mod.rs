@@ -5,6 +5,7 @@
 
 mod formats;
 mod keys;
+mod schema;
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -38,6 +39,24 @@ pub fn keep(page: &str, text: &str) {
     let kept = fs::read_to_string(&path).unwrap_or_default();
     assert!(kept == text, "{page} is not what the code says: it is {SAYS_SO}");
 }
+
+/// What the page of the `[run]` table says of editors.
+const EDITORS: &str = "\\
+## Editors
+
+An editor that has the schema of pipeline files completes their keys, shows what these are, and marks
+mistakes as they are typed. [`pipeline.schema.json`](pipeline.schema.json) is that of this version;
+`pointmill schema > pipeline.schema.json` writes it, and a program with stages of its own writes one
+that has them. Editors that use Taplo (Even Better TOML in Visual Studio Code, among others) take it
+from the first line of a pipeline file, as a path from the file's folder or as an address:
+
+```toml
+#:schema ./pipeline.schema.json
+```
+
+It knows kinds, keys and values. What hangs together with other keys, with files or with what a scan
+has, `pointmill check` tells.
+";
 
 fn page(table: &TableDescription, title: &str) -> String {
     let about = match table.docs.starts_with(&table.about) {
@@ -101,7 +120,7 @@ fn the_run_table_has_a_page_that_says_what_the_code_does() {
     }
     let text = page(&run, "The `[run]` table") + "\n## Keys\n\n" + &keys::markdown(&run.keys);
     let language = include_str!("../../src/language/pipeline.md");
-    let text = format!("{text}\n## The pipeline around it\n\n{language}");
+    let text = format!("{text}\n## The pipeline around it\n\n{language}\n{EDITORS}");
     keep("docs/run.md", &text);
 }
 

@@ -9,7 +9,7 @@ use std::path::Path;
 use pointmill::{Error, Graph, Overrides, Quiet, Registry, cli, io};
 use serde_json::json;
 
-#[path = "../../examples/04_own_format.rs"]
+#[path = "../../examples/10_own_format.rs"]
 mod own_format;
 
 use own_format::registry;

@@ -3,6 +3,7 @@
 mod builder;
 mod formats;
 mod inputs;
+mod jobs;
 mod json;
 mod lines;
 mod params;

@@ -2,6 +2,7 @@
 
 mod bad_luck;
 mod classes;
+mod crop;
 mod exact;
 mod extremes;
 mod grid;
@@ -10,6 +11,8 @@ mod outliers;
 mod reduce_auto;
 mod run;
 mod same_bytes;
+mod sample;
 mod stats;
 mod tiles;
+mod transform;
 mod unread;

@@ -135,6 +135,30 @@ fn a_part_with_sharp_edges_reduces_to_the_same_bytes() {
 }
 
 #[test]
+fn what_is_cut_out_turned_thinned_and_sampled_is_the_same_bytes() {
+    let scan = landscape();
+    let axes = scan.schema.coordinates().unwrap();
+    let of = |axis: usize| {
+        let at = |record| axes[axis].world(record, scan.schema.endian);
+        let mut all: Vec<f64> = scan.records.chunks_exact(scan.schema.stride).map(at).collect();
+        all.sort_by(f64::total_cmp);
+        [all[all.len() / 10], all[all.len() * 9 / 10]]
+    };
+    let ([x0, x1], [y0, y1]) = (of(0), of(1));
+    let polygon = format!("POLYGON(({x0} {y0}, {x1} {y0}, {x1} {y1}, {x0} {y1}))");
+    let stages = format!(
+        "[[stage]]\nkind = 'crop'\npolygon = '{polygon}'\n\
+         [[stage]]\nkind = 'transform'\nrotate = {{axis = [1, 2, 9], angle = '33 deg'}}\n\
+         [[stage]]\nkind = 'sample'\nfraction = '80%'\n\
+         [[stage]]\nkind = 'normals'\n\
+         [[stage]]\nkind = 'sample'\ndistance = 1.3\nseed = 2\n"
+    );
+    let write = &format!("laz\n{NORMALS}");
+    let tile_points = &[200, 300, 500];
+    Family { scan: &scan, stages, write, tile_points, configurations: 6, seed: 11 }.same();
+}
+
+#[test]
 #[ignore = "needs the real scans: POINTMILL_SCANS"]
 fn a_city_on_a_grid_of_a_centimetre_reduces_to_the_same_bytes() {
     let scans = scans();

@@ -12,14 +12,16 @@ use crate::{Error, Result};
 
 /// The form that records of `schema` have in the file that `metadata` is of: where its offset is
 /// another, its schema and how far stored coordinates move to it. None if they are in it already,
-/// or come from no LAS file.
+/// come from no LAS file, or were moved by stages.
 ///
 /// # Errors
 ///
 /// An offset that is not whole steps away: the file was not among those read together.
 pub fn own_form(schema: &Schema, metadata: &Metadata) -> Result<Option<(Arc<Schema>, Shift)>> {
     let native = metadata.native.as_ref().and_then(|native| native.downcast_ref::<Native>());
-    let Some(native) = native.filter(|native| native.fits(schema)) else { return Ok(None) };
+    let Some(native) = native.filter(|native| native.fits(schema) && !metadata.moved) else {
+        return Ok(None);
+    };
     let (mut own, mut shift) = (schema.clone(), Shift::default());
     let offset = native.header.offset();
     for (axis, name) in names::XYZ.into_iter().enumerate() {

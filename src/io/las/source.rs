@@ -59,7 +59,8 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
     let native = Some(Arc::new(native) as Arc<_>);
     let metadata = Metadata { crs, units, gps_time, native, ..Metadata::default() };
     let files: Vec<Opened> = inputs.into_iter().zip(shifts).map(Opened::new).collect();
-    let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i)).collect();
+    let mut start = 0;
+    let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i, &mut start)).collect();
     Ok(Box::new(LasSource { files, parts, schema: Arc::new(schema), metadata, warnings }))
 }
 
@@ -86,6 +87,8 @@ struct PartPlace {
     number: usize,
     first: u64,
     count: u64,
+    /// Records of all inputs before its first.
+    start: u64,
 }
 
 impl Opened {
@@ -98,9 +101,25 @@ impl Opened {
         Opened { input, shift, compression, evidence }
     }
 
-    fn parts(&self, file: usize) -> Vec<PartPlace> {
-        let place = |(number, (first, count))| PartPlace { file, number, first, count };
+    /// The parts of this file, the number `file` of all; `start` counts the records before each.
+    fn parts(&self, file: usize, start: &mut u64) -> Vec<PartPlace> {
+        let place = |(number, (first, count))| {
+            let place = PartPlace { file, number, first, count, start: *start };
+            *start = start.saturating_add(self.points_of(&place));
+            place
+        };
         stretches(&self.input).into_iter().enumerate().map(place).collect()
+    }
+
+    /// Records of a part.
+    fn points_of(&self, place: &PartPlace) -> u64 {
+        match &self.input.storage {
+            Storage::Plain => place.count,
+            Storage::Laz(_, Chunks::InARow { all, .. }) => all.points,
+            Storage::Laz(_, Chunks::Known(chunks)) => {
+                chunks.part(place.first as usize).iter().map(|chunk| chunk.points).sum()
+            }
+        }
     }
 
     fn part_bytes(&self) -> u64 {
@@ -201,6 +220,10 @@ impl Source for LasSource {
 
     fn parts(&self) -> usize {
         self.parts.len()
+    }
+
+    fn first_record(&self, index: usize) -> Option<u64> {
+        self.parts.get(index).map(|place| place.start)
     }
 
     fn part(&self, index: usize) -> Result<Box<dyn Part + '_>> {

@@ -102,6 +102,14 @@ impl PlySource {
     }
 }
 
+impl PlySource {
+    /// The file of a part, and the number of the part in it.
+    fn place(&self, index: usize) -> (usize, usize) {
+        let number = self.ends.partition_point(|&end| end <= index);
+        (number, index - number.checked_sub(1).map_or(0, |before| self.ends[before]))
+    }
+}
+
 /// What the comments of a file say to us, and the others.
 struct Texts {
     crs: Option<String>,
@@ -259,10 +267,9 @@ fn metadata(files: &[PlyFile], mut texts: Vec<Texts>) -> Metadata {
         units: crs.as_deref().map(crate::io::wkt::units).unwrap_or_default(),
         crs,
         gps_time: texts[0].gps_time,
-        pipeline: None,
-        computed: Vec::new(),
         comments: union(texts.into_iter().map(|t| t.comments).collect()),
         native: Some(Arc::new(native)),
+        ..Metadata::default()
     }
 }
 
@@ -349,12 +356,17 @@ impl Source for PlySource {
         self.ends.last().copied().unwrap_or(0)
     }
 
+    fn first_record(&self, index: usize) -> Option<u64> {
+        let (number, within) = self.place(index);
+        let before = self.files.get(..number)?.iter().map(|file| file.points).sum::<u64>();
+        Some(before + within as u64 * PART_POINTS)
+    }
+
     fn part(&self, index: usize) -> Result<Box<dyn Part + '_>> {
-        let number = self.ends.partition_point(|&end| end <= index);
+        let (number, within) = self.place(index);
         let Some(file) = self.files.get(number) else {
             return Err(Error::internal(format!("part {index} of {}", self.parts())));
         };
-        let within = index - number.checked_sub(1).map_or(0, |before| self.ends[before]);
         let handle = file.origin.reopen()?;
         let source = number as u32;
         if file.header.encoding == Encoding::Ascii {

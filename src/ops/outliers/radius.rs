@@ -1,5 +1,6 @@
 //! Outliers with too few neighbours within a radius: a tile at a time.
 
+use super::super::lengths::Square;
 use super::super::removal::{RemovalAccount, remove};
 use super::neighbors::checked;
 use crate::point::{Mark, Units, distance2, names};
@@ -8,10 +9,6 @@ use crate::report::Tally;
 use crate::stage::{Needs, ScanFacts, TileOp};
 use crate::tile::Tile;
 use crate::{Error, Result};
-
-/// A radius that differs from whole steps by less than this part of it is whole: decimals are
-/// seldom exact in binary, and who asks for 0.3 means three steps of 0.1.
-const WHOLE: f64 = 1e-9;
 
 /// `outliers` by radius.
 #[derive(Debug, Clone)]
@@ -39,17 +36,6 @@ impl RadiusOutliers {
     }
 }
 
-/// The largest whole squared distance that is at most `steps`².
-fn square(steps: f64) -> u128 {
-    let whole = steps.round();
-    if (steps - whole).abs() <= WHOLE * whole {
-        let whole = whole as u128;
-        whole.saturating_mul(whole)
-    } else {
-        (steps * steps) as u128
-    }
-}
-
 impl TileOp for RadiusOutliers {
     fn needs(&self) -> Needs {
         let looks = Needs::none().looks_at(names::XYZ).neighbors(self.min_neighbors);
@@ -66,7 +52,7 @@ impl TileOp for RadiusOutliers {
     }
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
-        self.within = Some(square(self.radius.value() / scan.lattice.step));
+        self.within = Some(Square::of(self.radius.value() / scan.lattice.step).at_most());
         Ok(())
     }
 
@@ -88,22 +74,5 @@ impl TileOp for RadiusOutliers {
         }
         RemovalAccount::of_outliers(self.mark).enter(tally, "outlier", records);
         Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_radius_of_whole_steps_is_whole_despite_binary_fractions() {
-        // 0.3 / 0.1 is less than 3: rounding would lose the points at 0.3.
-        assert_eq!(square(0.3 / 0.1), 9);
-        assert_eq!(square(2.5), 6);
-        assert_eq!(square(0.4), 0);
-        assert_eq!(square(0.999_999), 0);
-        assert_eq!(square(1e15), 10u128.pow(30), "exact beyond the digits of a float");
-        assert_eq!(square(1e30), u128::MAX);
-        assert_eq!(square(f64::INFINITY), u128::MAX);
     }
 }

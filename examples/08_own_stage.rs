@@ -2,7 +2,7 @@
 //! points as they stream by) and a tile op (of every cell the lowest point, in the place of
 //! `median`), added to the registry and named by a pipeline text like any other stage.
 //!
-//! `cargo run --example 03_own_stage`
+//! `cargo run --example 08_own_stage`
 
 #![allow(clippy::print_stdout, reason = "an example shows its results")]
 

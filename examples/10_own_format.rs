@@ -2,7 +2,7 @@
 //! here of lines with three numbers below a first line that says so. It is registered by one line;
 //! then `read` and `write`, `info` and every command know it by its extension and by its first line.
 //!
-//! `cargo run --example 04_own_format`
+//! `cargo run --example 10_own_format`
 
 #![allow(clippy::print_stdout, reason = "an example shows its results")]
 

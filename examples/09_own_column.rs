@@ -2,7 +2,7 @@
 //! one stage says how rough the surface is at every point, a later one evens that out over the
 //! neighbours, and the output has both.
 //!
-//! `cargo run --example 05_own_column`
+//! `cargo run --example 09_own_column`
 
 #![allow(clippy::print_stdout, reason = "an example shows its results")]
 

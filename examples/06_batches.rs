@@ -1,7 +1,7 @@
 //! Reach for this when you want the points themselves: read any source batch by batch, in bounded
 //! memory, and look at a field by its name. Here, the classes of a computed airborne scan.
 //!
-//! `cargo run --example 01_batches -- 5000000`
+//! `cargo run --example 06_batches -- 5000000`
 
 #![allow(clippy::print_stdout, reason = "an example shows its results")]
 

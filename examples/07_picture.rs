@@ -1,7 +1,7 @@
 //! Reach for this when you want to see what a reduction keeps: draws a scan and its reduction side
 //! by side, from one oblique view, coloured by height, as an SVG of dots.
 //!
-//! `cargo run --example 02_picture -- picture.svg scan.laz reduced.laz`
+//! `cargo run --example 07_picture -- picture.svg scan.laz reduced.laz`
 //!
 //! Without files, the picture is of a computed scan and every sixth point of it.
 
@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let kept = scan.iter().step_by(6).copied().collect();
             (scan, kept, "every sixth point")
         }
-        _ => return Err("usage: 02_picture [PICTURE.svg [SCAN REDUCED]]".into()),
+        _ => return Err("usage: 07_picture [PICTURE.svg [SCAN REDUCED]]".into()),
     };
     let share = 100.0 * kept.len() as f64 / scan.len() as f64;
     let picture = draw(&[
