@@ -165,7 +165,7 @@ fn almost_pipelines_are_told_what_to_type() {
         ),
         (
             "{ \"stage\": ".to_owned(),
-            "error: p.toml:1:10: not JSON: expected value after colon in object property\n",
+            "error: p.toml:1:12: not JSON: expected value after colon in object property\n",
         ),
     ] {
         fs::write(at.join("p.toml"), &text).unwrap();
