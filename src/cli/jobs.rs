@@ -19,7 +19,10 @@ macro_rules! jobs {
 
 /// Every file of `pipelines/`: a name and a text.
 const JOBS: &[(&str, &str)] =
-    jobs!["classes", "convert", "demo", "grid", "mark", "outliers", "reduce",];
+    jobs![
+        "cad", "classes", "clean", "convert", "demo", "grid", "ground", "indoor", "mark", "normals",
+        "outliers", "reduce", "resolutions", "split", "terrain", "web",
+    ];
 
 /// Writes the file of a job, or lists the jobs.
 pub(super) fn new(arguments: &NewArguments) -> Result<()> {

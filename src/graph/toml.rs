@@ -30,7 +30,8 @@ impl Graph {
                 above = Some(n);
             }
         }
-        let document = Document { run: settings(&self.settings)?, stage };
+        let stage = stage.into_iter().map(literal).collect();
+        let document = Document { run: literal(settings(&self.settings)?), stage };
         toml::to_string(&document)
             .map_err(|cause| Error::internal("the graph is no TOML").because(cause))
     }
@@ -96,4 +97,17 @@ fn settings(settings: &RunSettings) -> Result<Map<String, Value>> {
     let (given, default) = (all(settings)?, all(&RunSettings::default())?);
     let differs = |(key, value): &(String, Value)| default.get(key) != Some(value);
     Ok(given.into_iter().filter(differs).collect())
+}
+
+/// The same table with texts that refer to nothing: a `${` in them stands for itself.
+fn literal(table: Map<String, Value>) -> Map<String, Value> {
+    fn value(of: Value) -> Value {
+        match of {
+            Value::String(text) => text.replace("${", "$${").into(),
+            Value::Array(list) => list.into_iter().map(value).collect(),
+            Value::Object(table) => literal(table).into(),
+            other => other,
+        }
+    }
+    table.into_iter().map(|(key, of)| (key, value(of))).collect()
 }

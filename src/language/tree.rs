@@ -15,7 +15,10 @@ pub(super) fn check_names(stages: &[StageDraft], registry: &Registry, mistakes: 
         let word = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
         let wrong = if name.is_empty() || !name.chars().all(word) {
             "a name is made of letters, digits, - and _"
-        } else if ["run", "params"].contains(&name.as_str()) || registry.has(name) {
+        } else if ["run", "params"].contains(&name.as_str())
+            || registry.has(name) && stage.kind.is_some()
+        {
+            // A stage without a kind is told that its name may be meant for one.
             "the name means something else already"
         } else if stages[..i].iter().any(taken) {
             "another stage above has this name"

@@ -12,8 +12,8 @@ use super::look::{Unfit, look};
 use super::passes::{Passes, unroll};
 use super::places::{all_read, check_places, copies, each_input};
 use super::sorted::Sorted;
-use super::streamed::{check_numbers, fit_transforms};
 use super::stretch::Stretch;
+use super::transforms::{check_numbers, fit_transforms};
 use crate::engine::by_input::lists_bytes;
 use crate::engine::by_rank;
 use crate::engine::pass::{ColumnBytes, Op, Pass, StageOp, standings};
@@ -106,24 +106,11 @@ impl Graph {
         let places = |read: &[PathBuf], sinks: &[Box<dyn CreateSink>]| {
             check_places(file.as_deref(), read, sinks, &settings)
         };
-        let (_, mut wrong) = places(&open.paths(), &sorted.sinks);
-        let source = match open.open() {
-            Ok(source) => source,
-            Err(error) => {
-                wrong.push(error);
-                return Err(Error::several(wrong));
-            }
-        };
-        let (schemas, unfit) = fit_transforms(&sorted, source.schema());
-        wrong.extend(unfit.into_iter().map(in_file));
+        let (_, wrong) = places(&open.paths(), &sorted.sinks);
+        let FittedStages { source, schemas, choices, passes } =
+            fit_stages(&mut sorted, wrong, &in_file)?;
         let schema = &schemas.last;
-        let units = source.metadata().units;
-        wrong.extend(check_limits(&sorted, schema));
-        wrong.extend(check_numbers(&sorted, &*source).err());
-        wrong.extend(fit(&mut sorted.ops, &units));
-        let choices = number_selections(&mut sorted.ops)?;
-        let passes = unroll(&sorted, schema, &mut wrong)?;
-        Error::all(wrong)?;
+        let open = &*sorted.source.1;
         let read = all_read(open, &*source);
         let (mut files, wrong) = places(&read, &sorted.sinks);
         Error::all(wrong)?;
@@ -170,6 +157,39 @@ impl Graph {
         };
         Ok(Plan { task, ops: sorted.ops })
     }
+}
+
+/// Stages that fit each other and the headers of the inputs.
+struct FittedStages {
+    source: Box<dyn Source>,
+    schemas: Schemas,
+    choices: Vec<Choice>,
+    passes: Passes,
+}
+
+/// Opens the inputs and fits the stages to them. What is `wrong` so far is told with what is found
+/// here; `in_file` tells in which text a stage stands.
+fn fit_stages(
+    sorted: &mut Sorted,
+    mut wrong: Vec<Error>,
+    in_file: &impl Fn(Error) -> Error,
+) -> Result<FittedStages> {
+    let source = match sorted.source.1.open() {
+        Ok(source) => source,
+        Err(error) => {
+            wrong.push(error);
+            return Err(Error::several(wrong));
+        }
+    };
+    let (schemas, unfit) = fit_transforms(sorted, source.schema());
+    wrong.extend(unfit.into_iter().map(in_file));
+    wrong.extend(check_limits(sorted, &schemas.last));
+    wrong.extend(check_numbers(sorted, &*source).err());
+    wrong.extend(fit(&mut sorted.ops, &source.metadata().units));
+    let choices = number_selections(&mut sorted.ops)?;
+    let passes = unroll(sorted, &schemas.last, &mut wrong)?;
+    Error::all(wrong)?;
+    Ok(FittedStages { source, schemas, choices, passes })
 }
 
 /// Fits tile stages to the units of the scan: lengths with a unit of their own are converted.

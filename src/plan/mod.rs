@@ -12,9 +12,9 @@ mod places;
 mod pull;
 mod shown;
 mod sorted;
-mod streamed;
 mod streaming;
 mod stretch;
+mod transforms;
 
 pub use fitted::Plan;
 pub use outline::Outline;

@@ -4,6 +4,7 @@ mod builder;
 mod drawn;
 mod formats;
 mod inputs;
+mod jobs;
 mod json;
 mod lines;
 mod params;

@@ -245,3 +245,15 @@ fn the_page_shows_a_pipeline_that_runs() {
         assert!(at.path().join(output).exists(), "{output}");
     }
 }
+
+#[test]
+fn a_graph_prints_references_that_are_none_as_such() {
+    let text = "[[stage]]\nkind = 'synth'\nscene = 'part'\npoints = 9\n\
+                [[stage]]\nkind = 'write'\npath = '$${a}/$$${b}/${ENV:C:-c}.laz'\ndrop = ['$${d}']\n";
+    let graph = Graph::parse(text, "p.toml", &Registry::builtin()).unwrap();
+    let printed = graph.to_toml().unwrap();
+    assert!(printed.contains("\"$${a}/$$${b}/c.laz\""), "{printed}");
+    let again = Graph::parse(&printed, "p.toml", &Registry::builtin()).unwrap();
+    assert_eq!(again.to_toml().unwrap(), printed);
+    assert_eq!(again.to_json(), graph.to_json());
+}

@@ -199,14 +199,14 @@ fn header(inputs: &[LasInput]) -> Header {
     merged
 }
 
-/// UnionRecords refer to waveforms in the one file that has the name of theirs: two files cannot be one.
+/// Records refer to waveforms in the one file that has the name of theirs: two files cannot be one.
 fn external(inputs: &[LasInput]) -> Result<()> {
     let Some(one) = inputs.iter().find(|input| input.waveforms.is_some()) else { return Ok(()) };
     let other = inputs.iter().find(|input| input.path != one.path).unwrap_or(one);
     Err(refuse(one, other, "their waveforms are in files of their own".to_owned()))
 }
 
-/// UnionRecords refer to waveforms by their place in one block: two blocks cannot be one.
+/// Records refer to waveforms by their place in one block: two blocks cannot be one.
 fn waveforms(inputs: &[LasInput], evlrs: &[Evlr]) -> Result<()> {
     let inside = |i: &&LasInput| {
         has_waveforms(i.header.format()) && i.header.encoding() & encoding::WAVEFORM_INTERNAL != 0
