@@ -1,9 +1,10 @@
 //! What can be typed.
 
+mod plain;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use clap_complete::Shell;
 
 use super::classes::{Classes, parse_classes};
 use super::exit::EXIT_CODES;
@@ -11,6 +12,10 @@ use super::preset::Preset;
 use crate::graph::MOST_THREADS;
 use crate::picture::{ColorBy, View};
 use crate::quantity::parse_count;
+
+pub(super) use plain::{
+    CompletionsArguments, Drawing, InfoArguments, ManArguments, NewArguments, StagesArguments,
+};
 
 /// Reduces laser scans that do not fit in memory to the points that matter.
 #[derive(Debug, Parser)]
@@ -324,16 +329,6 @@ pub(super) struct ConvertArguments {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct InfoArguments {
-    /// LAS, LAZ or PLY files, patterns or folders
-    #[arg(value_name = "FILE", required = true)]
-    pub files: Vec<String>,
-    /// Print a JSON list with one object a file
-    #[arg(long)]
-    pub json: bool,
-}
-
-#[derive(Debug, Args)]
 pub(super) struct PictureArguments {
     /// LAS, LAZ or PLY files, patterns or folders: a scan each, drawn side by side, 4 at most.
     /// Quote a pattern, so that its files are one scan
@@ -361,56 +356,12 @@ fn parse_width(text: &str) -> Result<u32, String> {
 }
 
 #[derive(Debug, Args)]
-pub(super) struct StagesArguments {
-    /// One stage, or `run` for the settings above all stages
-    #[arg(value_name = "KIND")]
-    pub kind: Option<String>,
-    /// Print JSON
-    #[arg(long)]
-    pub json: bool,
-}
-
-#[derive(Debug, Args)]
 pub(super) struct GraphArguments {
     #[command(flatten)]
     pub pipeline: PipelineArguments,
     /// What it is drawn as
     #[arg(long = "as", value_name = "HOW", default_value = "text")]
     pub drawing: Drawing,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Drawing {
-    /// Lines for a terminal
-    Text,
-    /// A flowchart for web pages
-    Mermaid,
-    /// The language of Graphviz
-    Dot,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct NewArguments {
-    /// The job; without one, the jobs are listed
-    #[arg(value_name = "JOB")]
-    pub job: Option<String>,
-    /// The file, which must not exist [default: JOB.toml]
-    #[arg(short, long, value_name = "FILE", requires = "job")]
-    pub output: Option<PathBuf>,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct CompletionsArguments {
-    /// The shell
-    #[arg(value_name = "SHELL")]
-    pub shell: Shell,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct ManArguments {
-    /// The folder; it is made if it does not exist
-    #[arg(value_name = "DIR")]
-    pub folder: Option<String>,
 }
 
 #[derive(Debug, Args)]

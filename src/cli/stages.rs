@@ -59,7 +59,6 @@ fn plain(text: &str) -> String {
 }
 
 fn as_json(table: &TableDescription) -> Value {
-    let word = |WordDescription { word, docs, .. }: &WordDescription| json!({ "word": word, "about": plain(docs) });
     let key = |key: &KeyDescription| {
         json!({
             "key": key.name,
@@ -67,7 +66,7 @@ fn as_json(table: &TableDescription) -> Value {
             "required": key.is_required,
             "default": key.default,
             "about": plain(&key.docs),
-            "words": key.words.iter().map(word).collect::<Value>(),
+            "words": key.words.iter().map(word_as_json).collect::<Value>(),
         })
     };
     json!({
@@ -76,6 +75,10 @@ fn as_json(table: &TableDescription) -> Value {
         "docs": table.docs,
         "keys": table.all_keys().map(key).collect::<Value>(),
     })
+}
+
+fn word_as_json(word: &WordDescription) -> Value {
+    json!({ "word": word.word, "about": plain(&word.docs) })
 }
 
 fn text(table: &TableDescription) -> String {

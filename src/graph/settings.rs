@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use super::size::{Bytes, some_bytes};
+use super::size::{SizeText, some_bytes};
 use crate::geom::simd;
 use crate::geom::simd::Level;
 use crate::quantity::{Whole, has_schema};
@@ -26,7 +26,7 @@ pub struct RunSettings {
     /// Bound of the process's peak resident memory, in bytes; none: half of what the machine or its
     /// control group has.
     #[serde(deserialize_with = "some_bytes")]
-    #[schemars(with = "Option<Bytes>")]
+    #[schemars(with = "Option<SizeText>")]
     pub memory: Option<u64>,
     /// Threads that work at once, at most 1024; none: all processors.
     #[serde(deserialize_with = "some_threads")]

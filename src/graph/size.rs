@@ -67,9 +67,9 @@ fn meant(text: &str) -> Option<String> {
 }
 
 /// A size, as a key takes it.
-pub(super) struct Bytes;
+pub(super) struct SizeText;
 
-has_schema!(Bytes, "Bytes", {
+has_schema!(SizeText, "SizeText", {
     "title": "a size (such as `\"2GiB\"`, or a number of bytes)",
     "anyOf": [
         { "type": "integer", "minimum": 1 },

@@ -93,11 +93,15 @@ impl Transform for Plain<'_> {
         }
         let names_format = object.get("format").is_some_and(|format| format == FormatName::SCHEMA);
         if names_format && self.formats.iter().next().is_some() {
-            let word = |format: &Arc<dyn Format>| json!({ "const": format.name(), "description": format.about() });
             object.retain(|key, _| key != "type" && key != "format");
-            object.insert("oneOf".to_owned(), self.formats.iter().map(word).collect());
+            object.insert("oneOf".to_owned(), self.formats.iter().map(format_word).collect());
         }
     }
+}
+
+/// A format as a word of a key.
+fn format_word(format: &Arc<dyn Format>) -> Value {
+    json!({ "const": format.name(), "description": format.about() })
 }
 
 /// Leaves null out of a list of types, values or schemas; one schema that is left takes the place
@@ -258,7 +262,7 @@ fn written(table: Map<String, Value>) -> Map<String, Value> {
     let keys = table.get_mut("properties").and_then(Value::as_object_mut);
     for key in keys.into_iter().flat_map(|keys| keys.values_mut()) {
         if let Ok(key) = <&mut Schema>::try_from(key) {
-            Counts.transform(key);
+            CountTexts.transform(key);
             or_parameter(key);
         }
     }
@@ -266,9 +270,9 @@ fn written(table: Map<String, Value>) -> Map<String, Value> {
 }
 
 /// Lets whole numbers be written as counts are.
-struct Counts;
+struct CountTexts;
 
-impl Transform for Counts {
+impl Transform for CountTexts {
     fn transform(&mut self, schema: &mut Schema) {
         transform_subschemas(self, schema);
         let Some(object) = schema.as_object_mut() else { return };

@@ -36,8 +36,10 @@ impl Written for WrittenText {
     }
 
     fn keys(&self) -> Option<Vec<(String, String)>> {
+        let mut entries: Vec<&KeyEntry> = self.keys.entries().iter().collect();
+        entries.sort_by(|a, b| a.at.cmp(&b.at)); // as they are written
         let key = |entry: &KeyEntry| (entry.key.clone(), entry.node.to_string());
-        Some(self.keys.entries().iter().map(key).collect())
+        Some(entries.into_iter().map(key).collect())
     }
 
     fn wrong_expression(&self, key: &str, text: &str, fault: ExpressionFault) -> Error {

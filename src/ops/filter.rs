@@ -12,8 +12,8 @@ use crate::{Error, Result};
 /// Keeps the records for which a condition holds, or of some classes and flags, and removes all
 /// others.
 ///
-/// A record stays if the condition `where` holds for it (where one is given), if its class is among
-/// `keep_classes` (where any are given) and not among `drop_classes`, and if it has all of
+/// A record stays if the condition `where` holds for it (where one is given), if its class is
+/// among `keep_classes` (where any are given) and not among `drop_classes`, and if it has all of
 /// `keep_flags` and none of `drop_flags`. A scan without classes has nothing of a class to drop,
 /// which the run says; to keep some of its classes is an error. Point formats 0 to 5 have no
 /// overlap flag: there the flag `overlap` is class 12.

@@ -1,4 +1,4 @@
-//! What a key of a pipeline file takes, as JSON Schema: the types that read texts say it themselves.
+//! What a key of a pipeline file takes, as JSON Schema: types that read texts say it themselves.
 //!
 //! The `title` of a schema is what it takes in words, as manual pages have it: code in backticks.
 

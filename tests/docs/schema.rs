@@ -45,7 +45,7 @@ enum Which {
 
 impl<const LIES: bool> StageKind for Thinning<LIES> {
     const KIND: &'static str = "thinning";
-    const ROLE: RoleName = if LIES { RoleName::OnTiles } else { RoleName::Transform };
+    const ROLE: RoleName = if LIES { RoleName::Sink } else { RoleName::Transform };
     const ABOUT: &'static str = "Thins out.";
 
     fn build(self, _: &StagePlace) -> pointmill::Result<Role> {
@@ -99,10 +99,7 @@ fn a_stage_of_a_program_is_described_as_those_that_are_built_in() {
 fn a_kind_whose_role_is_another_than_it_says_is_told_so() {
     let registry = Registry::builtin().with::<Thinning<true>>();
     let told = Graph::parse(THINNING, "p.toml", &registry).unwrap_err().to_string();
-    assert!(
-        told.contains("`thinning` says that its role is OnTiles, and it is Transform"),
-        "{told}"
-    );
+    assert!(told.contains("`thinning` says that its role is Sink, and it is Transform"), "{told}");
 }
 
 struct Validator {

@@ -1,6 +1,7 @@
 //! Pipeline files: their text, values, and the files that they name.
 
 mod builder;
+mod drawn;
 mod formats;
 mod inputs;
 mod jobs;
