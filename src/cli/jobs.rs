@@ -18,11 +18,24 @@ macro_rules! jobs {
 }
 
 /// Every file of `pipelines/`: a name and a text.
-const JOBS: &[(&str, &str)] =
-    jobs![
-        "cad", "classes", "clean", "convert", "demo", "grid", "ground", "indoor", "mark", "normals",
-        "outliers", "reduce", "resolutions", "split", "terrain", "web",
-    ];
+const JOBS: &[(&str, &str)] = jobs![
+    "cad",
+    "classes",
+    "clean",
+    "convert",
+    "demo",
+    "grid",
+    "ground",
+    "indoor",
+    "mark",
+    "normals",
+    "outliers",
+    "reduce",
+    "resolutions",
+    "split",
+    "terrain",
+    "web",
+];
 
 /// Writes the file of a job, or lists the jobs.
 pub(super) fn new(arguments: &NewArguments) -> Result<()> {

@@ -42,7 +42,8 @@ fn sets(text: &str, folder: &Path, scan: &str, area: &str) -> Vec<Set> {
     let out = |name: &str| folder.join(name).display().to_string();
     let has = |line: &str| text.lines().any(|l| l.starts_with(line));
     let mut sets = Vec::new();
-    let extension = if text.contains("encoding =") || text.contains("colors =") { "ply" } else { "laz" };
+    let extension =
+        if text.contains("encoding =") || text.contains("colors =") { "ply" } else { "laz" };
     for (param, value) in [
         ("input", scan.to_owned()),
         ("area", area.to_owned()),
