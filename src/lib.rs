@@ -78,8 +78,9 @@
 //! - [`memory`]: points from and into a program's own memory; [`Plan::pull`] gives results as an
 //!   iterator.
 //! - [`synth`]: synthetic scans, and the stage `synth`.
-//! - [`ops`]: the stages that compute, select or look: `filter`, `drop`, `assign`, `stats`, `tap`,
-//!   `merge`, `outliers`, `normals`, `cells`, `median` and `grid`.
+//! - [`ops`]: the stages that compute, select or look: `filter`, `drop`, `crop`, `sample`,
+//!   `assign`, `transform`, `stats`, `tap`, `merge`, `outliers`, `normals`, `cells`, `median` and
+//!   `grid`.
 //! - [`picture`]: scans drawn from above or from a side, side by side.
 //! - [`graph`]: what a pipeline is, whoever wrote it: a [`Graph`] of stages.
 //! - [`PipelineText`]: a pipeline as it is written, in TOML, JSON or one line, with [`Parameter`]s.

@@ -8,11 +8,11 @@
 use robust::{Coord, orient2d};
 
 /// A corner, or another point: x and y.
-pub(crate) type Corner = [f64; 2];
+pub(crate) type PolygonCorner = [f64; 2];
 
 /// A polygon: its outer ring and its holes, each as its corners. What an odd number of rings goes
 /// around is in it.
-pub(crate) type PolygonRings = Vec<Vec<Corner>>;
+pub(crate) type PolygonRings = Vec<Vec<PolygonCorner>>;
 
 /// Edges that rows hold for each edge, on average; more rows hold edges more often.
 const IN_ROWS: f64 = 4.0;
@@ -22,8 +22,8 @@ const MOST_PAIRS: usize = 1 << 28;
 /// What is in one of several polygons.
 #[derive(Debug, Clone)]
 pub(crate) struct Area {
-    lo: Corner,
-    hi: Corner,
+    lo: PolygonCorner,
+    hi: PolygonCorner,
     rows_per_unit: f64,
     /// End of each row in `members`.
     ends: Vec<usize>,
@@ -35,8 +35,8 @@ pub(crate) struct Area {
 #[derive(Debug, Clone, Copy)]
 struct PolygonEdge {
     /// The end of smaller y; the other one.
-    low: Corner,
-    high: Corner,
+    low: PolygonCorner,
+    high: PolygonCorner,
     polygon: u32,
 }
 
@@ -50,7 +50,7 @@ enum EdgeSide {
 }
 
 impl PolygonEdge {
-    fn of(from: Corner, to: Corner, polygon: u32) -> Self {
+    fn of(from: PolygonCorner, to: PolygonCorner, polygon: u32) -> Self {
         let (low, high) = if from[1] <= to[1] { (from, to) } else { (to, from) };
         PolygonEdge { low, high, polygon }
     }
@@ -66,7 +66,7 @@ impl PolygonEdge {
     /// An edge has its lower end and not its upper one, so that a ray through a corner meets one of
     /// two edges that go on, and both or none of two that turn back.
     #[inline]
-    fn side(&self, [x, y]: Corner) -> EdgeSide {
+    fn side(&self, [x, y]: PolygonCorner) -> EdgeSide {
         if y < self.low[1] || y > self.high[1] || x > self.right() {
             return EdgeSide::Missed;
         }
@@ -93,8 +93,8 @@ impl PolygonEdge {
 }
 
 /// Above 0 if `p` is left of the way from `a` to `b`, 0 on the line through both.
-fn turn(a: Corner, b: Corner, p: Corner) -> f64 {
-    let coord = |[x, y]: Corner| Coord { x, y };
+fn turn(a: PolygonCorner, b: PolygonCorner, p: PolygonCorner) -> f64 {
+    let coord = |[x, y]: PolygonCorner| Coord { x, y };
     orient2d(coord(a), coord(b), coord(p))
 }
 
@@ -163,13 +163,13 @@ impl Area {
     }
 
     /// The smallest and the largest coordinates of its corners.
-    pub fn bounds(&self) -> [Corner; 2] {
+    pub fn bounds(&self) -> [PolygonCorner; 2] {
         [self.lo, self.hi]
     }
 
     /// True if the point is in one of the polygons or on the border of one; false of one whose
     /// coordinates are no numbers.
-    pub fn contains(&self, p: Corner) -> bool {
+    pub fn contains(&self, p: PolygonCorner) -> bool {
         if !(0..2).all(|axis| self.lo[axis] <= p[axis] && p[axis] <= self.hi[axis]) {
             return false;
         }
@@ -192,7 +192,7 @@ impl Area {
 
     /// An end of an edge that crosses another of its polygon, if there is one among the pairs of
     /// edges that are looked at: all, but of areas of a million corners and more.
-    pub fn crossing(&self) -> Option<Corner> {
+    pub fn crossing(&self) -> Option<PolygonCorner> {
         let mut pairs = 0;
         for row in 0..self.ends.len() {
             let mut others = self.edges_of(row);

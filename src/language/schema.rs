@@ -215,7 +215,7 @@ fn stage(table: StageTable) -> Value {
     keys.insert(
         "name".to_owned(),
         json!({
-            "description": "A name by which `from` and `--set` mean the stage: letters, digits, - \
+            "description": "A name by which `from` means the stage: letters, digits, - \
                             and _.",
             "type": "string",
             "pattern": NAME,

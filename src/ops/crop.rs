@@ -19,8 +19,8 @@ use crate::{Error, Result};
 
 pub use corners::CropBox;
 
-use outline::Outline;
-use shape::{Fitted, Shape};
+use outline::AreaOutline;
+use shape::{AreaShape, Fitted};
 
 /// Bytes of a file of polygons: a corner takes 20 to 40 of them, so these are millions of corners.
 const MOST_BYTES: u64 = 64 << 20;
@@ -71,7 +71,7 @@ pub enum CropSide {
 struct Cropping {
     /// The key that gives the area.
     key: &'static str,
-    shape: Shape,
+    shape: AreaShape,
     keep: CropSide,
     /// True if the area is of GeoJSON.
     is_geojson: bool,
@@ -85,7 +85,7 @@ impl Crop {
         let Crop { bounds, polygon, file, keep } = self;
         let (key, text) = match (bounds, polygon, &file) {
             (Some(bounds), None, None) => {
-                let shape = Shape::Box(bounds);
+                let shape = AreaShape::Box(bounds);
                 let fitted = OnceLock::new();
                 return Ok(Cropping { key: "box", shape, keep, is_geojson: false, fitted });
             }
@@ -109,17 +109,17 @@ impl Crop {
                 return Err((key, Error::pipeline(told).help(help)));
             }
         };
-        let outline = Outline::read(&text).map_err(|told| {
+        let outline = AreaOutline::read(&text).map_err(|told| {
             let error = match &file {
                 Some(file) => Error::data(file, told),
                 None => Error::pipeline(format!("`crop.{key}`: {told}")).help(EXAMPLE),
             };
             (key, error)
         })?;
-        let Outline { polygons, is_geojson } = outline;
+        let AreaOutline { polygons, is_geojson } = outline;
         Ok(Cropping {
             key,
-            shape: Shape::Polygons(polygons),
+            shape: AreaShape::Polygons(polygons),
             keep,
             is_geojson,
             fitted: OnceLock::new(),
@@ -186,7 +186,7 @@ impl Transform for Cropping {
     }
 
     fn warnings(&self, _: &Schema) -> Vec<String> {
-        let Shape::Polygons(polygons) = &self.shape else { return Vec::new() };
+        let AreaShape::Polygons(polygons) = &self.shape else { return Vec::new() };
         let crossing = Area::of(polygons).crossing();
         let told = crossing.map(|[x, y]| {
             format!(

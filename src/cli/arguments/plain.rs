@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use clap_complete::Shell;
 
 #[derive(Debug, Args)]
-pub(in crate::cli) struct NewArguments {
+pub(crate) struct NewArguments {
     /// The job; without one, the jobs are listed
     #[arg(value_name = "JOB")]
     pub job: Option<String>,
@@ -16,7 +16,7 @@ pub(in crate::cli) struct NewArguments {
 }
 
 #[derive(Debug, Args)]
-pub(in crate::cli) struct StagesArguments {
+pub(crate) struct StagesArguments {
     /// One stage, or `run` for the settings above all stages
     #[arg(value_name = "KIND")]
     pub kind: Option<String>,
@@ -26,21 +26,21 @@ pub(in crate::cli) struct StagesArguments {
 }
 
 #[derive(Debug, Args)]
-pub(in crate::cli) struct CompletionsArguments {
+pub(crate) struct CompletionsArguments {
     /// The shell
     #[arg(value_name = "SHELL")]
     pub shell: Shell,
 }
 
 #[derive(Debug, Args)]
-pub(in crate::cli) struct ManArguments {
+pub(crate) struct ManArguments {
     /// The folder; it is made if it does not exist
     #[arg(value_name = "DIR")]
     pub folder: Option<String>,
 }
 
 #[derive(Debug, Args)]
-pub(in crate::cli) struct InfoArguments {
+pub(crate) struct InfoArguments {
     /// LAS, LAZ or PLY files, patterns or folders
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<String>,
@@ -50,7 +50,7 @@ pub(in crate::cli) struct InfoArguments {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(in crate::cli) enum Drawing {
+pub(crate) enum Drawing {
     /// Lines for a terminal
     Text,
     /// A flowchart for web pages

@@ -138,7 +138,7 @@ fn measured_with_ten_thousand_corners() {
         let crosses = area.crossing().is_some();
         let looked = begun.elapsed();
         let mut numbers = Numbers(1);
-        let points: Vec<Corner> = (0..1_000_000)
+        let points: Vec<PolygonCorner> = (0..1_000_000)
             .map(|_| [0, 0].map(|_: i32| numbers.below(3000) as f64 - 1500.0))
             .collect();
         let begun = std::time::Instant::now();

@@ -3,11 +3,11 @@
 use geojson::{Feature, GeoJson, Geometry, GeometryValue};
 use wkt::Wkt;
 
-use crate::geom::polygon::{Corner, PolygonRings};
+use crate::geom::polygon::{PolygonCorner, PolygonRings};
 
 /// The polygons of a text.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Outline {
+pub(super) struct AreaOutline {
     pub polygons: Vec<PolygonRings>,
     /// True if they are of GeoJSON, whose coordinates are degrees by its standard (RFC 7946, 4).
     pub is_geojson: bool,
@@ -18,13 +18,13 @@ const KINDS: &str = "an area is a POLYGON or a MULTIPOLYGON";
 /// The kind of WKT that holds others, to any depth.
 const NESTED: &str = "GEOMETRYCOLLECTION";
 
-impl Outline {
+impl AreaOutline {
     /// Reads the polygons of a text.
     ///
     /// # Errors
     ///
     /// What is wrong with it, as half a sentence.
-    pub fn read(text: &str) -> Result<Outline, String> {
+    pub fn read(text: &str) -> Result<AreaOutline, String> {
         let text = text.trim_start_matches('\u{feff}').trim();
         let is_geojson = text.starts_with('{');
         let polygons = if is_geojson { of_geojson(text)? } else { of_wkt(text)? };
@@ -32,14 +32,14 @@ impl Outline {
             polygons.into_iter().map(closed).collect::<Result<_, _>>()?;
         match polygons.iter().all(Vec::is_empty) {
             true => Err("it holds no polygon, so that nothing would be inside".to_owned()),
-            false => Ok(Outline { polygons, is_geojson }),
+            false => Ok(AreaOutline { polygons, is_geojson }),
         }
     }
 }
 
 /// Rings without the last corner that says the first again; refused where they go around nothing.
 fn closed(rings: PolygonRings) -> Result<PolygonRings, String> {
-    let check = |mut ring: Vec<Corner>| {
+    let check = |mut ring: Vec<PolygonCorner>| {
         if let Some([x, y]) = ring.iter().find(|corner| !corner.iter().all(|v| v.is_finite())) {
             return Err(format!("the corner ({x}, {y}) is not finite"));
         }
@@ -145,11 +145,11 @@ mod tests {
             feature,
             polygon,
         ] {
-            let read = Outline::read(&text).unwrap_or_else(|told| panic!("{text}: {told}"));
+            let read = AreaOutline::read(&text).unwrap_or_else(|told| panic!("{text}: {told}"));
             assert_eq!(read.polygons, expected, "{text}");
             assert_eq!(read.is_geojson, text.starts_with('{'));
         }
-        let holed = Outline::read("POLYGON((0 0,9 0,9 9,0 9),(1 1,2 1,2 2))").unwrap();
+        let holed = AreaOutline::read("POLYGON((0 0,9 0,9 9,0 9),(1 1,2 1,2 2))").unwrap();
         assert_eq!(holed.polygons[0].iter().map(Vec::len).collect::<Vec<_>>(), [4, 3]);
     }
 
@@ -174,7 +174,7 @@ mod tests {
             ("{\"type\": \"Polygon\", \"coordinates\": [[[1], [2], [3]]]}", ""),
             ("{\"type\": \"FeatureCollection\", \"features\": []}", "it holds no polygon"),
         ] {
-            let error = Outline::read(text).unwrap_err();
+            let error = AreaOutline::read(text).unwrap_err();
             assert!(error.contains(told), "{text:.60}: {error}");
         }
     }

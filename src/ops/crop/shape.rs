@@ -1,13 +1,13 @@
 //! The area of a crop, in world units and in the steps in which records store coordinates.
 
 use super::corners::CropBox;
-use crate::geom::polygon::{Area, Corner, PolygonRings};
+use crate::geom::polygon::{Area, PolygonCorner, PolygonRings};
 use crate::point::{Dimension, Endian, Schema};
 use crate::{Error, Result};
 
 /// An area in world units.
 #[derive(Debug)]
-pub(super) enum Shape {
+pub(super) enum AreaShape {
     Box(CropBox),
     Polygons(Vec<PolygonRings>),
 }
@@ -37,17 +37,19 @@ fn stored(world: f64, field: &Dimension) -> f64 {
     if is_on { whole } else { stored }
 }
 
-impl Shape {
+impl AreaShape {
     /// True if z decides, too.
     pub fn has_heights(&self) -> bool {
-        matches!(self, Shape::Box(bounds) if bounds.lo().len() > 2)
+        matches!(self, AreaShape::Box(bounds) if bounds.lo().len() > 2)
     }
 
     /// The smallest and the largest x and y.
-    pub fn bounds(&self) -> [Corner; 2] {
+    pub fn bounds(&self) -> [PolygonCorner; 2] {
         match self {
-            Shape::Box(bounds) => [bounds.lo(), bounds.hi()].map(|corner| [corner[0], corner[1]]),
-            Shape::Polygons(polygons) => Area::of(polygons).bounds(),
+            AreaShape::Box(bounds) => {
+                [bounds.lo(), bounds.hi()].map(|corner| [corner[0], corner[1]])
+            }
+            AreaShape::Polygons(polygons) => Area::of(polygons).bounds(),
         }
     }
 
@@ -61,10 +63,12 @@ impl Shape {
             corner.iter().zip(axes).map(|(v, axis)| stored(*v, axis)).collect()
         };
         let area = match self {
-            Shape::Box(bounds) => FittedArea::Box { lo: each(bounds.lo()), hi: each(bounds.hi()) },
-            Shape::Polygons(polygons) => {
-                let corner = |[x, y]: &Corner| [stored(*x, axes[0]), stored(*y, axes[1])];
-                let ring = |ring: &Vec<Corner>| ring.iter().map(corner).collect();
+            AreaShape::Box(bounds) => {
+                FittedArea::Box { lo: each(bounds.lo()), hi: each(bounds.hi()) }
+            }
+            AreaShape::Polygons(polygons) => {
+                let corner = |[x, y]: &PolygonCorner| [stored(*x, axes[0]), stored(*y, axes[1])];
+                let ring = |ring: &Vec<PolygonCorner>| ring.iter().map(corner).collect();
                 let rings = |rings: &PolygonRings| rings.iter().map(ring).collect();
                 FittedArea::Polygons(Area::of(&polygons.iter().map(rings).collect::<Vec<_>>()))
             }
@@ -106,7 +110,7 @@ mod tests {
                 let [lo, hi] = [n, n + 1].map(|n| decimal(n).parse::<f64>().unwrap());
                 let bounds = CropBox::try_from(vec![lo, lo, hi, hi]).unwrap();
                 let square = vec![vec![[lo, lo], [hi, lo], [hi, hi], [lo, hi]]];
-                for shape in [Shape::Box(bounds), Shape::Polygons(vec![square])] {
+                for shape in [AreaShape::Box(bounds), AreaShape::Polygons(vec![square])] {
                     let fitted = shape.fit(&schema).unwrap();
                     for (step, expected) in [(-1, false), (0, true), (1, true), (2, false)] {
                         for axis in &schema.dimensions[..2] {

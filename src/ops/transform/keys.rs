@@ -35,37 +35,37 @@ const AXES: [(&str, [f64; 3]); 3] =
     [("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0]), ("z", [0.0, 0.0, 1.0])];
 
 /// A number, or a list of them.
-struct Numbers(Result<f64, Vec<f64>>);
+struct OneOrThree(Result<f64, Vec<f64>>);
 
-impl<'de> Deserialize<'de> for Numbers {
+impl<'de> Deserialize<'de> for OneOrThree {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct NumbersVisitor;
 
         impl<'de> Visitor<'de> for NumbersVisitor {
-            type Value = Numbers;
+            type Value = OneOrThree;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("a number or a list of numbers")
             }
 
-            fn visit_f64<E: Error>(self, number: f64) -> Result<Numbers, E> {
-                Ok(Numbers(Ok(number)))
+            fn visit_f64<E: Error>(self, number: f64) -> Result<OneOrThree, E> {
+                Ok(OneOrThree(Ok(number)))
             }
 
-            fn visit_i64<E: Error>(self, number: i64) -> Result<Numbers, E> {
+            fn visit_i64<E: Error>(self, number: i64) -> Result<OneOrThree, E> {
                 self.visit_f64(number as f64)
             }
 
-            fn visit_u64<E: Error>(self, number: u64) -> Result<Numbers, E> {
+            fn visit_u64<E: Error>(self, number: u64) -> Result<OneOrThree, E> {
                 self.visit_f64(number as f64)
             }
 
-            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Numbers, A::Error> {
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<OneOrThree, A::Error> {
                 let mut numbers = Vec::new();
                 while let Some(number) = list.next_element()? {
                     numbers.push(number);
                 }
-                Ok(Numbers(Err(numbers)))
+                Ok(OneOrThree(Err(numbers)))
             }
         }
 
@@ -84,14 +84,14 @@ fn finite<const N: usize>(numbers: &[f64], what: &str) -> Result<[f64; N], Strin
 
 impl<'de> Deserialize<'de> for MatrixRows {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let list = Vec::<Numbers>::deserialize(deserializer)?;
+        let list = Vec::<OneOrThree>::deserialize(deserializer)?;
         let rows = if list.iter().all(|entry| entry.0.is_ok()) {
             let all: Vec<f64> = list.into_iter().flat_map(|entry| entry.0).collect();
             finite::<16>(&all, "a matrix").map(|all| {
                 std::array::from_fn(|row| std::array::from_fn(|column| all[4 * row + column]))
             })
         } else {
-            let row = |entry: Numbers| match entry.0 {
+            let row = |entry: OneOrThree| match entry.0 {
                 Err(row) => finite::<4>(&row, "a row of a matrix"),
                 Ok(_) => Err("a matrix is 16 numbers, or 4 lists of 4".to_owned()),
             };
@@ -159,7 +159,7 @@ impl Serialize for ScaleFactors {
 
 impl<'de> Deserialize<'de> for ScaleFactors {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let factors = match Numbers::deserialize(deserializer)?.0 {
+        let factors = match OneOrThree::deserialize(deserializer)?.0 {
             Ok(factor) => finite::<3>(&[factor; 3], "a scale"),
             Err(factors) => finite::<3>(&factors, "a scale of three axes"),
         };
