@@ -231,9 +231,10 @@ impl Error {
             None => error.to_string(),
         };
         let all: Vec<String> = errors.iter().map(one).collect();
-        let kind = errors.first().map_or(ErrorKind::Internal, Error::kind);
-        let same = errors.iter().all(|error| error.kind() == kind);
-        let kind = if same { kind } else { ErrorKind::Pipeline };
+        // Of several kinds, that which is for the user of the pipeline to mend.
+        let kinds = || errors.iter().map(Error::kind);
+        let kind = kinds().find(|kind| *kind == ErrorKind::Pipeline);
+        let kind = kind.or_else(|| kinds().next()).unwrap_or(ErrorKind::Internal);
         Error::new(kind, format!("{number} mistakes\n{}", all.join("\n")))
     }
 

@@ -152,8 +152,10 @@ impl StageTree<'_> {
     fn wrong_end(&self, n: usize) -> Option<GraphMistake> {
         let stage = &self.stages[n];
         // Who takes from one source and not from all is told, and not what is left over.
-        let meant =
-            |from: &usize| *from == n || stage.is_source() && self.stages[*from].is_source();
+        let meant = |from: &usize| {
+            *from == n
+                || stage.is_source() && self.stages.get(*from).is_some_and(TreeStage::is_source)
+        };
         let takes = |taker: &TreeStage<'_>| taker.from.is_none_or(|from| from.iter().any(meant));
         if stage.role.is_none() || stage.is_sink() || self.stages[n + 1..].iter().any(takes) {
             return None;

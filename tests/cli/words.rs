@@ -125,8 +125,10 @@ fn stages_that_do_not_fit_are_told_with_line_column_and_caret() {
     fs::write(at.path().join("p.toml"), text).unwrap();
     assert_eq!(
         told(at.path(), &["check", "p.toml"], 2),
-        "error: p.toml:5:8: `median` needs Cell, which nothing before it gives\n  \
-         5 | kind = 'median'\n    |        ^^^^^^^^\nhelp: put a `cells` stage before it\n"
+        "error: 2 mistakes\np.toml:5:8: `median` needs Cell, which nothing before it gives\n  \
+         5 | kind = 'median'\n    |        ^^^^^^^^\n  = put a `cells` stage before it\n\
+         p.toml:5:8: `median` needs Normal, which nothing before it gives\n  \
+         5 | kind = 'median'\n    |        ^^^^^^^^\n  = put a `normals` stage before it\n"
     );
 }
 
@@ -202,7 +204,7 @@ fn files_that_are_not_there_are_told_what_their_paths_are_relative_to() {
     assert!(told(&folder, &["run", "no.toml"], 1).ends_with(&relative));
     fs::write(folder.join("a.las"), b"").unwrap();
     let one = check("a.las", "no/o.laz");
-    let create = |name: &str| format!("help: create it first, such as by `mkdir -p {name}`");
+    let create = |name: &str| format!("= create it first, such as by `mkdir -p {name}`");
     assert!(
         one.contains(&create("no")) && one.contains(relative.trim_start_matches("help: ")),
         "{one}"

@@ -295,7 +295,7 @@ fn graphs_that_hang_together_wrongly_are_told() {
     assert_eq!(cut, only(1, "nothing takes these points: end with `write`"));
     let mut graph = chain(folder.path(), NORMALS, "a.las");
     assert_eq!(graph.mistakes(), []);
-    assert!(graph.to_string().contains("2 write"), "{graph}");
+    assert!(graph.to_string().lines().any(|line| line.starts_with("write")), "{graph}");
     assert_eq!(graph.to_json()[2]["from"], serde_json::json!([1]));
     graph.stages.clear();
     assert!(graph.plan(&Overrides::default()).is_err());

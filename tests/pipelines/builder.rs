@@ -87,14 +87,19 @@ fn every_pipeline_of_the_repository_comes_back_as_its_text() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines");
     let folder = tempfile::tempdir().unwrap();
     let there = [Set::argument("--input", "read.path", scan(folder.path()).into())];
+    let area = folder.path().join("area.wkt");
+    fs::write(&area, "POLYGON((0 0, 9 0, 9 9, 0 0))").unwrap();
     let mut count = 0;
     for file in fs::read_dir(root).unwrap() {
         let path = file.unwrap().path();
         let text = fs::read_to_string(&path).unwrap();
         // The files that they read are not there.
         let reads = text.contains("kind = \"read\"");
-        let sets: &[Set] = if reads { &there } else { &[] };
-        let graph = Graph::read(&path, &Registry::builtin(), sets).unwrap();
+        let mut sets = if reads { there.to_vec() } else { Vec::new() };
+        if text.contains("kind = \"crop\"") {
+            sets.push(Set::argument("--area", "crop.file", area.display().to_string().into()));
+        }
+        let graph = Graph::read(&path, &Registry::builtin(), &sets).unwrap();
         assert_round_trip(&graph, &path.display().to_string());
         count += 1;
     }

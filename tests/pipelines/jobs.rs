@@ -26,7 +26,7 @@ fn inputs(folder: &Path) -> (String, String) {
     graph.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
     let about = pointmill::io::describe(&scan, Registry::builtin().formats()).unwrap();
     let [lo, hi] = ["min", "max"].map(|end| {
-        let at = |axis: usize| about["bounds"][end][axis].as_f64().unwrap();
+        let at = |axis: usize| about[end][axis].as_f64().unwrap();
         [at(0), at(1)]
     });
     let [x, y] = [(lo[0] + hi[0]) / 2.0, (lo[1] + hi[1]) / 2.0];

@@ -120,33 +120,3 @@ fn rings_that_cross_themselves_are_found_and_those_that_touch_are_not() {
     let both = area(&[vec![outer], vec![vec![[5, 5], [12, 5], [5, 7]]]]);
     assert!(both.crossing().is_none() && both.contains([6.0, 5.5]));
 }
-
-/// Nanoseconds a point of a polygon of many corners; not held by a test.
-#[test]
-#[ignore = "measures: prints nanoseconds a point"]
-fn measured_with_ten_thousand_corners() {
-    for corners in [4, 100, 10_000, 1_000_000] {
-        let at = |n: usize| {
-            let angle = n as f64 / corners as f64 * std::f64::consts::TAU;
-            let radius = 1000.0 + 300.0 * (angle * 37.0).sin() + (n % 2) as f64;
-            [radius * angle.cos(), radius * angle.sin()]
-        };
-        let begun = std::time::Instant::now();
-        let area = Area::of(&[vec![(0..corners).map(at).collect()]]);
-        let made = begun.elapsed();
-        let begun = std::time::Instant::now();
-        let crosses = area.crossing().is_some();
-        let looked = begun.elapsed();
-        let mut numbers = Numbers(1);
-        let points: Vec<PolygonCorner> = (0..1_000_000)
-            .map(|_| [0, 0].map(|_: i32| numbers.below(3000) as f64 - 1500.0))
-            .collect();
-        let begun = std::time::Instant::now();
-        let inside = points.iter().filter(|p| area.contains(**p)).count();
-        let each = begun.elapsed().as_nanos() as f64 / points.len() as f64;
-        println!(
-            "{corners} corners: {each:.0} ns a point, {inside} inside; made in {made:?}, \
-             crossings ({crosses}) in {looked:?}"
-        );
-    }
-}

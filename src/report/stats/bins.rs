@@ -85,7 +85,7 @@ impl Bins {
         let first = self.first >> by;
         let mut counts = Vec::new();
         for (n, count) in self.counts.iter().enumerate() {
-            let at = ((self.first + n as i64 >> by) - first) as usize;
+            let at = (((self.first + n as i64) >> by) - first) as usize;
             if at >= counts.len() {
                 counts.resize(at + 1, 0);
             }

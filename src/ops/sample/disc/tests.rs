@@ -1,7 +1,6 @@
 use std::collections::BTreeSet;
 
 use super::*;
-use crate::host::process::cpu_seconds;
 use crate::point::Bounds;
 use crate::store::morton_cmp;
 use crate::tile::Fate;
@@ -137,59 +136,5 @@ fn distances_as_long_as_the_lattice_do_not_overflow() {
         let mut tile = Tile::of(vec![[-far; 3], [far; 3]]);
         disc(steps, 0).run(&mut tile, &mut Tally::default()).unwrap();
         assert_eq!(tile.fates, [Fate::Kept; 2], "{steps}");
-    }
-}
-
-/// Points kept for a distance on a plane, and CPU time a point; not held by a test.
-#[test]
-#[ignore = "measures: prints figures beside those of random order"]
-fn measured_beside_random_order() {
-    for (points, size, steps) in [
-        (400_000, [4000, 4000, 1], 12.0),
-        (400_000, [4000, 4000, 1], 60.0),
-        (400_000, [4000, 4000, 1], 5.0),
-        (400_000, [300, 300, 300], 15.0),
-    ] {
-        let scan = cloud(points, size, 1);
-        let stage = disc(steps, 0);
-        let mut tile = Tile::of(scan.clone());
-        let begun = cpu_seconds().unwrap();
-        stage.run(&mut tile, &mut Tally::default()).unwrap();
-        let nanoseconds = (cpu_seconds().unwrap() - begun) * 1e9 / scan.len() as f64;
-        let kept = tile.fates.iter().filter(|fate| **fate == Fate::Kept).count();
-        // How even it is: what stays in cubes of each colour.
-        let mut of_colors = [0; 8];
-        for (p, _) in scan.iter().zip(&tile.fates).filter(|(_, fate)| **fate == Fate::Kept) {
-            let side = SettledDisc::of(steps, steps).side;
-            of_colors[color_of(p.map(|v| v.div_euclid(side)))] += 1;
-        }
-        println!("by colour, in their order: {:?}", COLORS.map(|color| of_colors[color]));
-        // Random order over the whole: by the same hash, without colours.
-        let mut order: Vec<(u64, Position)> =
-            scan.iter().map(|&p| (disc(steps, 99).visited(p), p)).collect();
-        order.sort_unstable();
-        let apart = SettledDisc::of(steps, steps).apart;
-        let cube = |p: Position| p.map(|v| v.div_euclid(steps as i64));
-        let mut grid = std::collections::HashMap::<Position, Vec<Position>>::new();
-        let mut random = 0;
-        for (_, p) in order {
-            let at = cube(p);
-            let is_free = (0..27).all(|n| {
-                let by = [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
-                let place: Position = std::array::from_fn(|axis| at[axis] + by[axis]);
-                grid.get(&place).is_none_or(|held| held.iter().all(|&q| distance2(p, q) >= apart))
-            });
-            if is_free {
-                grid.entry(at).or_default().push(p);
-                random += 1;
-            }
-        }
-        let per = |kept: usize| kept as f64 * steps * steps / (size[0] * size[1]) as f64;
-        println!(
-            "{size:?} {steps}: {kept} kept ({:.4}/r²), random order {random} ({:.4}/r²), \
-             {nanoseconds:.0} ns",
-            per(kept),
-            per(random)
-        );
     }
 }
