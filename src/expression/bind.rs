@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use super::fault::ExpressionFault;
 use super::lanes::LoadedField;
+use super::rules::{no_condition, no_number};
 use super::tree::{ExpressionTree, Function, Operator, Relation, TreeNode};
 use crate::point::{ColumnKind, Dimension, NORMAL, Scalar, Schema};
 
@@ -119,10 +120,7 @@ pub(super) fn number(
             let numbers = of.iter().map(|part| number(part, names));
             NumberNode::Call(*function, numbers.collect::<Result<_, _>>()?)
         }
-        _ => {
-            let told = "this is true or false, and a number belongs here";
-            return Err(ExpressionFault::new(tree.span.clone(), told));
-        }
+        _ => return Err(no_number(tree)),
     })
 }
 
@@ -157,10 +155,7 @@ pub(super) fn truth(tree: &ExpressionTree, names: Names<'_>) -> Result<TruthNode
                 return Err(ExpressionFault::new(tree.span.clone(), told).help(help));
             }
         },
-        _ => {
-            super::rules::condition(tree)?;
-            return Err(ExpressionFault::new(tree.span.clone(), "this is no condition"));
-        }
+        _ => return Err(no_condition(tree)),
     })
 }
 

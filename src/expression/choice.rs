@@ -33,18 +33,29 @@ impl Choice {
 
     /// Appends to `chosen` for each record of `batch` whether it is among them.
     pub fn holds(&self, batch: &PointBatch, chosen: &mut Vec<bool>) -> Result<()> {
-        let begin = chosen.len();
-        match &self.condition {
-            Some(condition) => condition.holds(batch, chosen)?,
-            None => chosen.resize(begin + batch.len(), true),
-        }
-        if !self.selection.is_all() {
-            let chooser = self.selection.of(batch.schema());
-            let each = chosen[begin..].iter_mut().zip(batch.iter());
-            each.for_each(|(is_chosen, record)| *is_chosen &= chooser.holds(record));
-        }
-        Ok(())
+        choose(&self.selection, self.condition.as_ref(), batch, chosen)
     }
+}
+
+/// Appends to `chosen` for each record of `batch` whether it is of the classes and flags of
+/// `selection` and the condition holds.
+pub(crate) fn choose(
+    selection: &Selection,
+    condition: Option<&Condition>,
+    batch: &PointBatch,
+    chosen: &mut Vec<bool>,
+) -> Result<()> {
+    let begin = chosen.len();
+    match condition {
+        Some(condition) => condition.holds(batch, chosen)?,
+        None => chosen.resize(begin + batch.len(), true),
+    }
+    if !selection.is_all() {
+        let chooser = selection.of(batch.schema());
+        let each = chosen[begin..].iter_mut().zip(batch.iter());
+        each.for_each(|(is_chosen, record)| *is_chosen &= chooser.holds(record));
+    }
+    Ok(())
 }
 
 /// In words that complete "points": `of class 2 or 6, where Z > 3`.

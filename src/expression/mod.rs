@@ -41,7 +41,7 @@ mod tests;
 
 pub use assignment::Assignment;
 pub(crate) use bind::Names;
-pub(crate) use choice::Choice;
+pub(crate) use choice::{Choice, choose};
 pub use condition::{BoundCondition, Condition};
 pub(crate) use fault::ExpressionFault;
 pub use key::KeyExpression;

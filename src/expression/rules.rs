@@ -46,24 +46,24 @@ pub(super) fn direction(relation: Relation) -> i8 {
     }
 }
 
+/// Refuses something that is true or false where a number belongs.
 pub(super) fn number(tree: &ExpressionTree) -> Result<(), ExpressionFault> {
-    match tree.is_condition() {
-        Some(true) => {
-            let told = "this is true or false, and a number belongs here";
-            Err(ExpressionFault::new(tree.span.clone(), told))
-        }
-        _ => Ok(()),
-    }
+    if tree.is_condition() == Some(true) { Err(no_number(tree)) } else { Ok(()) }
 }
 
 /// Refuses a number where something that is true or false belongs.
 pub(super) fn condition(tree: &ExpressionTree) -> Result<(), ExpressionFault> {
-    match tree.is_condition() {
-        Some(false) => {
-            let told = "this is a number, and something true or false belongs here";
-            let help = "compare it, as in `Intensity > 40`";
-            Err(ExpressionFault::new(tree.span.clone(), told).help(help))
-        }
-        _ => Ok(()),
-    }
+    if tree.is_condition() == Some(false) { Err(no_condition(tree)) } else { Ok(()) }
+}
+
+/// The fault of what is true or false and should be a number.
+pub(super) fn no_number(tree: &ExpressionTree) -> ExpressionFault {
+    let told = "this is true or false, and a number belongs here";
+    ExpressionFault::new(tree.span.clone(), told)
+}
+
+/// The fault of what is a number and should be true or false.
+pub(super) fn no_condition(tree: &ExpressionTree) -> ExpressionFault {
+    let told = "this is a number, and something true or false belongs here";
+    ExpressionFault::new(tree.span.clone(), told).help("compare it, as in `Intensity > 40`")
 }

@@ -18,6 +18,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::stage::Role;
+use crate::{Error, Result};
 
 pub(crate) use limits::Limits;
 pub use limits::{LimitKeys, Sees};
@@ -29,7 +30,7 @@ pub use settings::{
 pub use size::parse_bytes;
 pub use tree::GraphMistake;
 pub(crate) use tree::{TreeStage, mistakes as tree_mistakes};
-pub(crate) use written::{Written, unwritten};
+pub(crate) use written::Written;
 
 /// A pipeline: stages, each of which takes from stages before it.
 ///
@@ -127,6 +128,23 @@ impl Graph {
         tree::mistakes(&self.stages.iter().map(TreeStage::from).collect::<Vec<_>>())
     }
 
+    /// Fails with everything that is wrong with how the stages hang together, told where they are
+    /// written.
+    pub(crate) fn refuse_mistakes(&self) -> Result<()> {
+        let told = |GraphMistake { stage, told, help, key }| {
+            let written = &self.stages[stage].written;
+            let error = match key {
+                Some(key) => written.wrong_key(key, told),
+                None => written.wrong(told),
+            };
+            match help {
+                Some(help) => error.help(help),
+                None => error,
+            }
+        };
+        Error::all(self.mistakes().into_iter().map(told).collect())
+    }
+
     /// The same graph without merges: who takes from one takes from what it takes from.
     pub(crate) fn without_merges(mut self) -> Graph {
         let is_merge = |stage: &GraphStage| matches!(stage.role, Role::Merge);
@@ -171,6 +189,17 @@ impl GraphStage {
     /// True if it may work on some records and let the others pass.
     pub(crate) fn can_be_limited(&self) -> bool {
         matches!(self.role, Role::Transform(_) | Role::TileOp(_) | Role::ScanOp(_))
+    }
+
+    /// Limits it to some records, and enters that among its keys.
+    pub(crate) fn limit(&mut self, limits: LimitKeys) {
+        let told = serde_json::to_value(&limits).unwrap_or_default();
+        for keys in [Some(&mut self.keys), self.given.as_mut()].into_iter().flatten() {
+            if let (Some(keys), Some(told)) = (keys.as_object_mut(), told.as_object()) {
+                keys.extend(told.clone());
+            }
+        }
+        self.limits = Limits::of(limits);
     }
 }
 

@@ -21,11 +21,6 @@ pub trait Written: Send + Sync {
     fn wrong_expression(&self, key: &str, text: &str, fault: ExpressionFault) -> Error;
 }
 
-/// Stage `number`, of this kind, that a program put there.
-pub(crate) fn unwritten(kind: &str, number: usize) -> impl Written + use<> {
-    Unwritten::new(kind, number)
-}
-
 /// A stage that a program put there.
 pub struct Unwritten(String);
 

@@ -1,11 +1,10 @@
 //! The same graph as a text's, put together in code: stages as values, closures among them.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use super::registry::{BuiltStage, Registry, built};
 use crate::expression::Condition;
-use crate::graph::{Graph, GraphMistake, GraphStage, LimitKeys, Limits, RunSettings, unwritten};
+use crate::graph::{Graph, GraphStage, LimitKeys, RunSettings};
 use crate::io::{Read, Write};
 use crate::point::{PointBatch, Schema};
 use crate::report::Tally;
@@ -161,16 +160,8 @@ impl GraphBuilder {
     /// Limits the last stage to some records; the others pass by.
     #[must_use]
     pub fn limited(mut self, limits: LimitKeys) -> Self {
-        let told = serde_json::to_value(&limits).unwrap_or_default();
         match self.graph.stages.last_mut() {
-            Some(stage) if stage.can_be_limited() => {
-                for keys in [Some(&mut stage.keys), stage.given.as_mut()].into_iter().flatten() {
-                    if let (Some(keys), Some(told)) = (keys.as_object_mut(), told.as_object()) {
-                        keys.extend(told.clone());
-                    }
-                }
-                stage.limits = Limits::of(limits);
-            }
+            Some(stage) if stage.can_be_limited() => stage.limit(limits),
             Some(stage) => {
                 let told = format!("a stage `{}` cannot be limited to some records", stage.kind);
                 self.wrong.push(Error::pipeline(told));
@@ -209,40 +200,23 @@ impl GraphBuilder {
     /// Everything that is wrong with the stages and with how they hang together.
     pub fn build(mut self) -> Result<Graph> {
         Error::all(std::mem::take(&mut self.wrong))?;
-        let graph = self.graph;
-        let told = |GraphMistake { stage, told, help, .. }| {
-            let error = graph.stages[stage].written.wrong(told);
-            match help {
-                Some(help) => error.help(help),
-                None => error,
-            }
-        };
-        Error::all(graph.mistakes().into_iter().map(told).collect())?;
-        Ok(graph)
+        self.graph.refuse_mistakes()?;
+        Ok(self.graph)
     }
 
     fn push(mut self, kind: &str, BuiltStage { role, keys, given }: BuiltStage) -> Self {
-        let number = self.graph.stages.len();
-        let is_source = matches!(role, Role::Source(_));
+        let (is_source, is_sink) = (matches!(role, Role::Source(_)), matches!(role, Role::Sink(_)));
         let from = match self.from.take() {
             None if is_source => Vec::new(),
             None => self.above.into_iter().collect(),
             Some(names) => names.iter().filter_map(|name| self.find(name)).collect(),
         };
-        if !matches!(role, Role::Sink(_)) {
+        let number = self.graph.add(kind, role, &from);
+        if !is_sink {
             self.above = Some(number);
         }
-        self.graph.stages.push(GraphStage {
-            kind: kind.to_owned(),
-            name: None,
-            from,
-            role,
-            keys,
-            given,
-            line: None,
-            limits: Limits::default(),
-            written: Arc::new(unwritten(kind, number)),
-        });
+        let stage = &mut self.graph.stages[number];
+        (stage.keys, stage.given) = (keys, given);
         self
     }
 

@@ -65,7 +65,7 @@ fn place(
     };
     let given = limits.entries();
     let read = keys::read::<LimitKeys>(kind, &limits, &[]);
-    let BuiltStage { role, mut keys, given: mut all } = match (built, read.is_ok()) {
+    let BuiltStage { role, keys, given: all } = match (built, read.is_ok()) {
         (Ok(built), true) => built,
         (built, _) => {
             return Err(built.err().into_iter().chain(read.err()).flatten().collect());
@@ -76,24 +76,22 @@ fn place(
     if !wrong.is_empty() {
         return Err(wrong);
     }
-    if !given.is_empty() {
-        let told = serde_json::to_value(&limits).unwrap_or_default();
-        let told = told.as_object().cloned().unwrap_or_default();
-        let tables = [Some(&mut keys), all.as_mut()].into_iter().flatten();
-        tables.filter_map(|keys| keys.as_object_mut()).for_each(|keys| keys.extend(told.clone()));
-    }
     let text = |part: &Option<PlacedWord>| part.as_ref().map(|(text, _)| text.clone());
-    Ok(GraphStage {
+    let mut placed = GraphStage {
         kind: kind.clone(),
         name: text(&stage.name),
         from: Vec::new(),
         line: Some(place.line()),
         written: Arc::new(WrittenText::new(sources, &stage.keys)),
-        limits: Limits::of(limits),
+        limits: Limits::default(),
         role,
         keys,
         given: all,
-    })
+    };
+    if !given.is_empty() {
+        placed.limit(limits);
+    }
+    Ok(placed)
 }
 
 /// What a key that limits a stage is told where it cannot.

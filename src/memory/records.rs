@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::point::{Dimension, Endian, Layout, Metadata, PointBatch, Scalar, Schema, names};
+use crate::point::{COLUMN_ENDIAN, Dimension, Layout, Metadata, PointBatch, Scalar, Schema, names};
 use crate::stage::{OpenSource, Part, Source};
 use crate::{Error, Result};
 
@@ -24,18 +24,26 @@ pub struct Records {
 ///
 /// Two dimensions of one name, and none of the three coordinates.
 pub fn schema(dimensions: &[(&str, Scalar)]) -> Result<Schema> {
-    let endian = if cfg!(target_endian = "big") { Endian::Big } else { Endian::Little };
-    let mut schema =
-        Schema { layout: Layout::plain("MEMORY"), endian, stride: 0, dimensions: Vec::new() };
+    let twice = |(n, (name, _)): &(usize, &(&str, Scalar))| {
+        dimensions[..*n].iter().any(|(other, _)| other == name)
+    };
+    if let Some((_, (name, _))) = dimensions.iter().enumerate().find(twice) {
+        return Err(Error::pipeline(format!("two dimensions are called {name}")));
+    }
+    let schema = packed(dimensions);
+    check(&schema)?;
+    Ok(schema)
+}
+
+/// The same of dimensions that are known to be right.
+fn packed(dimensions: &[(&str, Scalar)]) -> Schema {
+    let layout = Layout::plain("MEMORY");
+    let mut schema = Schema { layout, endian: COLUMN_ENDIAN, stride: 0, dimensions: Vec::new() };
     for (name, scalar) in dimensions {
-        if schema.find(name).is_some() {
-            return Err(Error::pipeline(format!("two dimensions are called {name}")));
-        }
         schema.dimensions.push(Dimension::new(*name, *scalar, schema.stride));
         schema.stride += scalar.size();
     }
-    check(&schema)?;
-    Ok(schema)
+    schema
 }
 
 /// Refuses records that have no place.
@@ -65,11 +73,8 @@ impl Records {
 
     /// Positions in world units, which are all that a record holds.
     pub fn of_positions(positions: &[[f64; 3]]) -> Records {
-        let field = |(n, name): (usize, &str)| Dimension::new(name, Scalar::F64, 8 * n);
-        let dimensions = names::XYZ.into_iter().enumerate().map(field).collect();
-        let layout = Layout::plain("MEMORY");
-        let schema = Schema { layout, endian: Endian::Little, stride: 24, dimensions };
-        let bytes = positions.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
+        let schema = packed(&names::XYZ.map(|name| (name, Scalar::F64)));
+        let bytes = bytemuck::cast_slice::<[f64; 3], u8>(positions).into();
         Records { schema: Arc::new(schema), metadata: Metadata::default(), bytes }
     }
 

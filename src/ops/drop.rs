@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::expression::{Choice, Condition, KeyExpression};
+use crate::expression::{Choice, Condition, KeyExpression, choose};
 use crate::point::{Flag, PointBatch, Schema, Selection};
 use crate::report::Tally;
 use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform};
@@ -31,10 +31,15 @@ pub struct Drop {
 }
 
 impl Drop {
+    /// The classes and flags of the records that go.
+    fn selection(&self) -> Selection {
+        let Drop { classes, with, without, .. } = self;
+        let (classes, with, without) = (classes.clone(), with.clone(), without.clone());
+        Selection { classes, with, without, ..Selection::default() }
+    }
+
     fn choice(&self) -> Choice {
-        let Drop { condition, classes, with, without } = self.clone();
-        let selection = Selection { classes, with, without, ..Selection::default() };
-        Choice { selection, condition }
+        Choice { selection: self.selection(), condition: self.condition.clone() }
     }
 }
 
@@ -67,7 +72,7 @@ impl Transform for Drop {
     }
 
     fn warnings(&self, schema: &Schema) -> Vec<String> {
-        let missing = self.choice().selection.missing(schema);
+        let missing = self.selection().missing(schema);
         let told = |name| format!("the input has no {name}: `drop` leaves no point out by it");
         missing.map(told).into_iter().collect()
     }
@@ -91,12 +96,12 @@ impl Transform for Drop {
     }
 
     fn apply(&self, batch: &mut PointBatch, _tally: &mut Tally) -> Result<()> {
-        let choice = self.choice();
-        if choice.selection.missing(batch.schema()).is_some() {
+        let selection = self.selection();
+        if selection.missing(batch.schema()).is_some() {
             return Ok(());
         }
         let mut goes = Vec::with_capacity(batch.len());
-        choice.holds(batch, &mut goes)?;
+        choose(&selection, self.condition.as_ref(), batch, &mut goes)?;
         batch.retain(|i, _| !goes[i]);
         Ok(())
     }

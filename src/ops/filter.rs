@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::expression::{Choice, Condition, KeyExpression};
+use crate::expression::{Condition, KeyExpression, choose};
 use crate::point::{Flag, PointBatch, Schema, Selection, names};
 use crate::report::Tally;
 use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform};
@@ -141,10 +141,10 @@ impl Transform for Filter {
     }
 
     fn apply(&self, batch: &mut PointBatch, _tally: &mut Tally) -> Result<()> {
-        let choice = Choice { selection: self.selection(), condition: self.condition.clone() };
-        if !choice.is_all() {
+        let (selection, condition) = (self.selection(), self.condition.as_ref());
+        if condition.is_some() || !selection.is_all() {
             let mut stays = Vec::with_capacity(batch.len());
-            choice.holds(batch, &mut stays)?;
+            choose(&selection, condition, batch, &mut stays)?;
             batch.retain(|i, _| stays[i]);
         }
         Ok(())

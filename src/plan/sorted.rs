@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::engine::pass::{Op, StageOp, StreamOp};
-use crate::graph::{Graph, GraphMistake, GraphStage, Written};
+use crate::graph::{Graph, GraphStage, Written};
 use crate::point::ColumnKind;
 use crate::stage::{CreateSink, OpenSource, Role};
 use crate::{Error, Result};
@@ -44,7 +44,7 @@ pub(super) struct Sorted {
 impl Sorted {
     /// Sorts a graph, or says the first thing that is wrong with it.
     pub fn new(graph: Graph) -> Result<Sorted> {
-        refuse_mistakes(&graph)?;
+        graph.refuse_mistakes()?;
         let graph = graph.without_merges();
         let takers: Vec<Vec<usize>> =
             (0..graph.stages.len()).map(|n| graph.takers(n).collect()).collect();
@@ -164,22 +164,6 @@ fn columns_above(stages: &[GraphStage]) -> Vec<Vec<ColumnKind>> {
         above.push(columns);
     }
     above
-}
-
-/// All mistakes in how the stages hang together.
-fn refuse_mistakes(graph: &Graph) -> Result<()> {
-    let told = |GraphMistake { stage, told, help, key }| {
-        let written = &graph.stages[stage].written;
-        let error = match key {
-            Some(key) => written.wrong_key(key, told),
-            None => written.wrong(told),
-        };
-        match help {
-            Some(help) => error.help(help),
-            None => error,
-        }
-    };
-    Error::all(graph.mistakes().into_iter().map(told).collect())
 }
 
 /// A source, and another that is merged with it.
