@@ -3,9 +3,11 @@
 //! looks at.
 
 mod columns;
+mod demanded;
 mod fitted;
 mod limits;
 mod look;
+mod order;
 mod outline;
 mod passes;
 mod places;
