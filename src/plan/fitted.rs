@@ -7,7 +7,7 @@ use rayon::ThreadPool;
 
 use super::demanded::{demands, lists_bytes};
 use super::limits::{check_limits, number_selections};
-use super::look::{Unfit, look};
+use super::look::{Unfit, look, look_at_corners};
 use super::order::WriteOrder;
 use super::passes::{Passes, unroll};
 use super::places::{all_read, check_places, copies, each_input, square_sides};
@@ -279,6 +279,12 @@ fn warnings(
         }
         let help = error.remedy().map_or(String::new(), |help| format!("; {help}"));
         warnings.push(format!("{error}: the run fails if such a point is kept{help}"));
+    } else if let Some(error) = look_at_corners(source, sinks, (transforms, schemas))? {
+        let help = error.remedy().map_or(String::new(), |help| format!("; {help}"));
+        warnings.push(format!(
+            "{error}: the box in the header of the input reaches there, and the run fails if a \
+             point that is kept does{help}"
+        ));
     }
     let seen = [source.schema()].into_iter().chain(&schemas.left_by);
     let decoded = transforms.iter().zip(seen);
