@@ -5,6 +5,7 @@ mod builder;
 mod builtin;
 mod described;
 mod draft;
+mod elsewhere;
 mod fault;
 mod foreign;
 mod form;

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::draft::{Draft, StageDraft};
+use super::elsewhere;
 use super::keys;
 use super::mistake::{Mistake, SourceText};
 use super::node::{KeyEntry, Node, NodeValue};
@@ -59,6 +60,9 @@ fn place(
         }
     };
     let Some(built) = registry.build(kind, &own, &place) else {
+        if let Some((told, note)) = elsewhere::told(kind, &own) {
+            return Err(vec![Mistake::new(at.clone(), told).note(note)]);
+        }
         let kinds = registry.kinds().map(|(kind, _)| kind);
         let told = format!("there is no stage `{kind}`");
         return Err(vec![Mistake::word(at.clone(), told, kind, "stages", kinds)]);
