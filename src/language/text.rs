@@ -87,6 +87,7 @@ fn place(
         from: Vec::new(),
         line: Some(place.line()),
         written: Arc::new(WrittenText::new(sources, &stage.keys)),
+        is_limited: registry.is_limited(kind),
         limits: Limits::default(),
         role,
         keys,

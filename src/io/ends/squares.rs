@@ -25,7 +25,9 @@ impl Squares {
     /// True if `path` has a place for the corner of a square.
     pub fn is_pattern(path: &Path) -> bool {
         let text = path.to_string_lossy();
-        CORNER.iter().any(|corner| text.contains(corner))
+        // `${x}` is a parameter, or was to be one.
+        let stands = |(at, _): (usize, &str)| !text[..at].ends_with('$');
+        CORNER.iter().any(|corner| text.match_indices(corner).any(stands))
     }
 
     /// Refuses a path that does not tell squares apart.
