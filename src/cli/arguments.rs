@@ -43,6 +43,8 @@ pub(super) enum Command {
     Stages(StagesArguments),
     /// Draw the graph of a pipeline; its inputs are not opened
     Graph(GraphArguments),
+    /// Print a pipeline with every key of every stage, and where each value is from
+    Explain(ExplainArguments),
     /// Write a commented pipeline file for a job, to be changed
     New(NewArguments),
     /// Print the JSON Schema of pipeline files, by which editors complete and check them
@@ -63,6 +65,7 @@ impl Command {
         match self {
             Command::Run(all) | Command::Plan(all) | Command::Check(all) => Some(&all.pipeline),
             Command::Graph(graph) => Some(&graph.pipeline),
+            Command::Explain(explain) => Some(&explain.pipeline),
             _ => None,
         }
     }
@@ -77,7 +80,7 @@ impl Command {
             | Command::Convert(ConvertArguments { common, .. })
             | Command::Synth(SynthArguments { common, .. }) => Some(common),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => None,
-            Command::Graph(_) | Command::New(_) | Command::Schema => None,
+            Command::Graph(_) | Command::Explain(_) | Command::New(_) | Command::Schema => None,
             Command::Completions(_) | Command::Man(_) => None,
         }
     }
@@ -362,6 +365,15 @@ pub(super) struct GraphArguments {
     /// What it is drawn as
     #[arg(long = "as", value_name = "HOW", default_value = "text")]
     pub drawing: Drawing,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ExplainArguments {
+    #[command(flatten)]
+    pub pipeline: PipelineArguments,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -120,6 +120,15 @@ Examples:
   pointmill graph pipelines/classes.toml --as dot | dot -Tsvg > classes.svg",
     ),
     (
+        "explain",
+        "\
+Examples:
+  pointmill explain pipelines/web.toml --set write.path=thin.laz > thin.toml
+  pointmill explain 'read in.laz ! normals ! cells ! median ! write out.laz'
+
+What it prints is a pipeline file that does the same. Inputs are not opened.",
+    ),
+    (
         "new",
         "Examples:\n  pointmill new\n  pointmill new reduce\n  pointmill new grid -o thin.toml",
     ),
