@@ -132,4 +132,4 @@ pub use language::{
     Explained, GraphBuilder, KeyDescription, Parameter, ParameterType, PipelineText, Registry, Set,
     TableDescription, WordDescription,
 };
-pub use plan::{Outline, Plan, Pulled};
+pub use plan::{Outline, Plan, PredictedOutput, PredictedPhase, Prediction, Pulled, Trial};

@@ -44,9 +44,12 @@ const WIDEST: usize = 48;
 /// let set = Set::parse("write.path=out.laz")?;
 /// let explained = PipelineText::new(text, "p.toml").explain(&Registry::builtin(), &[set])?;
 /// let told = explained.to_string();
-/// assert!(told.lines().any(|line| line.starts_with("points = 10000 ") && line.ends_with("# p.toml:2")));
-/// assert!(told.lines().any(|line| line.starts_with("seed = 0 ") && line.ends_with("# default")));
-/// assert!(told.lines().any(|line| line.starts_with("path = \"out.laz\" ") && line.ends_with("# --set")));
+/// let says = |begin: &str, end: &str| {
+///     told.lines().any(|line| line.starts_with(begin) && line.ends_with(end))
+/// };
+/// assert!(says("points = 10000 ", "# p.toml:2"));
+/// assert!(says("seed = 0 ", "# default"));
+/// assert!(says("path = \"out.laz\" ", "# --set"));
 /// # Ok::<(), pointmill::Error>(())
 /// ```
 #[derive(Debug, Clone)]
