@@ -71,11 +71,12 @@ impl Task {
         &self,
         finished: Finished,
         mut run: RunFigures,
-        clock: Clock<'_>,
+        mut clock: Clock<'_>,
     ) -> Result<(Report, Vec<Option<TileLines>>)> {
         for (path, _, (given, summary)) in self.written(&finished) {
             check_written(path, *given, summary.points)?;
         }
+        run.cpu_by_phase = clock.cpu_by_phase();
         (run.seconds, run.cpu_seconds, run.phases) = clock.finish();
         run.peak_memory_bytes = peak_memory();
         run.work = finished.tally.work.iter().map(named).collect();

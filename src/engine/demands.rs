@@ -13,7 +13,7 @@ use super::outlet::A_THREAD;
 use super::pass::{ColumnBytes, decides_by_normals};
 use super::placed::{BATCH, Placed};
 use super::product::Product;
-use super::shares::Demands;
+use super::shares::{Demands, Shares};
 use super::survey::survey_bytes;
 use crate::budget::{Bytes, Holders};
 use crate::geom::nearest::Nearest;
@@ -30,6 +30,8 @@ const RUNS: u64 = 64;
 /// Stacks, allocator slack and decoder tables of a thread, and the same for the process.
 const THREAD_OVERHEAD: Bytes = Bytes(3 << 20);
 const PROCESS_OVERHEAD: Bytes = Bytes(6 << 20);
+/// Of what a stream leases, one part of so many is touched.
+const STREAMED: u64 = 2;
 
 impl Demands {
     /// What the program holds whatever it does.
@@ -207,6 +209,24 @@ impl Demands {
             .larger(self.merge(run_records))
             .larger(survey)
             .larger(if self.ranked { self.ordering() } else { Holders::default() })
+    }
+
+    /// The most memory that the process is expected to hold at once: what is leased less the parts
+    /// of it that are seldom touched. Tiles are half as full as they may be, and of the buffers of
+    /// outputs a quarter is in use.
+    pub fn expected_peak(&self, shares: &Shares) -> Bytes {
+        let program = Bytes(self.resident);
+        if !self.mills {
+            return program + Bytes(self.stream().sum().0 / STREAMED);
+        }
+        let points = self.points.max(1);
+        let held = |most: usize| (most as u64).min(points.div_ceil(self.threads.max(1) as u64));
+        let kept = Bytes(shares.kept_in_memory.min(self.standing_bytes()));
+        let standing = program + SealedTiles::index_bytes(points) + kept;
+        let decode = self.decode(held(shares.run_records)).sum();
+        let tiles = self.tile_bytes_per_point() * held(shares.tile_positions / 2);
+        let mill = self.by_threads(tiles) + Bytes(self.outputs().sum().0 / 4);
+        standing + decode.max(mill)
     }
 
     pub(super) fn least(&self) -> Holders {

@@ -28,7 +28,7 @@ mod lines;
 mod mill;
 mod outlet;
 pub(crate) mod pass;
-mod phase;
+pub(crate) mod phase;
 mod placed;
 mod product;
 pub(crate) mod publish;

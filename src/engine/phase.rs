@@ -47,6 +47,19 @@ impl RunPhase {
     }
 }
 
+impl RunPhase {
+    /// As predictions name it, which tell all phases apart that grow in other ways with the scan.
+    pub fn name_in_predictions(self) -> &'static str {
+        match self {
+            RunPhase::Look(_) => LOOK,
+            _ => self.name().unwrap_or("publish"),
+        }
+    }
+}
+
+/// What predictions call the look at samples before a pass, whose number is bounded.
+pub(crate) const LOOK: &str = "look";
+
 impl Task {
     /// All phases of the run, in their order.
     pub fn phases(&self) -> Vec<RunPhase> {

@@ -23,7 +23,7 @@ use super::room;
 use super::room::Taken;
 use super::row::RowLayout;
 use super::scratch::{Scratch, Trouble, memory_warning};
-use super::shares::Demands;
+use super::shares::{Demands, Shares};
 use super::stream::stream;
 use super::task::Task;
 use crate::Result;
@@ -238,7 +238,7 @@ impl Task {
     fn check_room(&self, job: &Job<'_>, folder: &Path) -> Result<Vec<String>> {
         let mut all = Vec::new();
         if self.mills {
-            let bytes = spilled(&self.demands, self.kept_in_memory(&job.shares));
+            let bytes = self.spilled(&job.shares);
             all.push(Taken { folder, spilled: true, bytes, again: 0 });
         }
         let of_squares = self.sides.iter().flatten().count() as u64;
@@ -259,13 +259,30 @@ impl Task {
     }
 }
 
-/// Bytes that a run spills: records, their order, packed positions twice (runs and merged scan),
-/// states and fates twice (of the pass before and of the pass at work), and columns between passes.
-/// Ranks in the input, and the lists that are sorted by them.
-fn spilled(demands: &Demands, kept_in_memory: u64) -> u64 {
-    let order = if demands.tagged { 12 } else { 8 }
-        + if demands.ranked { 8 + listed_bytes(demands.columns.row) } else { 0 };
-    let columns = demands.columns.stored as u64 + if demands.passes.len() > 1 { 1 + 4 } else { 0 };
-    let each = demands.stride as u64 + order + 2 * 8 + 1 + 4 + columns;
-    demands.points.saturating_mul(each).saturating_sub(kept_in_memory)
+impl Task {
+    /// Bytes that the run spills where memory is divided like this.
+    pub fn spilled(&self, shares: &Shares) -> u64 {
+        self.demands.stored_bytes().saturating_sub(self.kept_in_memory(shares))
+    }
 }
+
+impl Demands {
+    /// Bytes that a run sets down between its phases: records, their order, packed positions twice
+    /// (runs and merged scan), states and fates twice (of the pass before and of the pass at work),
+    /// and columns between passes. Ranks in the input, and the lists that are sorted by them.
+    fn stored_bytes(&self) -> u64 {
+        let order = if self.tagged { 12 } else { 8 }
+            + if self.ranked { 8 + listed_bytes(self.columns.row) } else { 0 };
+        let columns = self.columns.stored as u64 + if self.passes.len() > 1 { 1 + 4 } else { 0 };
+        let each = self.stride as u64 + order + 2 * POSITION_BYTES + 1 + 4 + columns;
+        self.points.saturating_mul(each)
+    }
+
+    /// The same without what is given back when the runs are merged.
+    pub fn standing_bytes(&self) -> u64 {
+        self.stored_bytes().saturating_sub(self.points.saturating_mul(POSITION_BYTES))
+    }
+}
+
+/// Bytes that a packed position takes, about, where coordinates have the steps of a scan's headers.
+const POSITION_BYTES: u64 = 8;

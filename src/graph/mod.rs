@@ -28,6 +28,7 @@ pub use settings::{
     Treatment, ZScale,
 };
 pub use size::parse_bytes;
+pub(crate) use toml::literal;
 pub use tree::GraphMistake;
 pub(crate) use tree::{TreeStage, mistakes as tree_mistakes};
 pub(crate) use written::Written;

@@ -27,6 +27,7 @@ pub(crate) struct Draft {
 }
 
 /// A `[[stage]]` table.
+#[derive(Clone)]
 pub(crate) struct StageDraft {
     /// Its kind and where it is written; None if it has none, which is told.
     pub kind: Option<PlacedWord>,

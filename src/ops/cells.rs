@@ -65,6 +65,12 @@ impl TileOp for Cells {
         needs.cells(side, aligned).bytes_per_point(bytes)
     }
 
+    fn for_share(&mut self, share: f64) {
+        if let Some(Keep::Records(count)) = &mut self.keep {
+            *count = ((*count as f64 * share).round() as u64).max(1);
+        }
+    }
+
     fn convert(&mut self, units: &Units) -> Result<()> {
         if let Side::Length(side) = &mut self.side {
             *side = side.in_scan(units, "cells.side")?;

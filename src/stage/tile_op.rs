@@ -64,6 +64,10 @@ pub trait TileOp: Send + Sync {
         Vec::new()
     }
 
+    /// Called before all else in a trial on a `share` of the scan, above 0 and at most 1: keys that
+    /// count records of the whole scan count as many of that share from now on.
+    fn for_share(&mut self, _share: f64) {}
+
     /// Called once, after the decode and before the first tile, with what is known of the whole
     /// scan: the place to fix figures that depend on it.
     ///

@@ -10,7 +10,7 @@ use pointmill::stage::Role;
 use pointmill::synth::{Scene, Synthetic};
 use pointmill::{Graph, Overrides, PipelineText, Quiet, Registry, Set};
 
-fn pipelines() -> Vec<PathBuf> {
+pub(super) fn pipelines() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines");
     let mut files: Vec<PathBuf> =
         fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
@@ -19,7 +19,7 @@ fn pipelines() -> Vec<PathBuf> {
 }
 
 /// A small airborne scan in `folder`, as LAZ; and an area that cuts it.
-fn inputs(folder: &Path) -> (String, String) {
+pub(super) fn inputs(folder: &Path) -> (String, String) {
     let scan = folder.join("scan.laz");
     let source = Synthetic { scene: Scene::Als, points: 12_000, seed: 2, noise: None };
     let graph = Graph::builder().source(source).write(&scan).build().unwrap();
@@ -38,7 +38,7 @@ fn inputs(folder: &Path) -> (String, String) {
 }
 
 /// The arguments that bring a pipeline to the files of the test.
-fn sets(text: &str, folder: &Path, scan: &str, area: &str) -> Vec<Set> {
+pub(super) fn sets(text: &str, folder: &Path, scan: &str, area: &str) -> Vec<Set> {
     let out = |name: &str| folder.join(name).display().to_string();
     let has = |line: &str| text.lines().any(|l| l.starts_with(line));
     let mut sets = Vec::new();
