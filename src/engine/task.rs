@@ -30,6 +30,8 @@ pub(crate) type GivenLengths = Vec<(&'static str, String)>;
 /// A run that can begin.
 pub(crate) struct Task {
     pub settings: RunSettings,
+    /// See [`Graph::whole_rims`](crate::Graph).
+    pub whole_rims: bool,
     pub threads: usize,
     pub simd: Simd,
     pub source: Box<dyn Source>,

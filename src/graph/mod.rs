@@ -67,6 +67,9 @@ pub struct Graph {
     pub stages: Vec<GraphStage>,
     /// The file that it was read from, which no output may replace.
     pub(crate) file: Option<PathBuf>,
+    /// True if every tile is to see the whole scan, which changes no answer of a stage that looks
+    /// no further than it says: whoever proves stages compares the two.
+    pub(crate) whole_rims: bool,
 }
 
 /// A stage and where it stands.

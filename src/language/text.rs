@@ -41,7 +41,7 @@ pub(super) fn build(
     outputs::check(file, &draft, &placed, &settings, &mut mistakes);
     let file = file.map(Path::to_owned);
     let stages = placed.into_iter().flatten().collect();
-    (Graph { origin: origin.clone(), settings, stages, file }, mistakes)
+    (Graph { origin: origin.clone(), settings, stages, file, ..Graph::default() }, mistakes)
 }
 
 fn place(

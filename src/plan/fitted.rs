@@ -97,6 +97,7 @@ impl Graph {
     pub fn plan(self, overrides: &Overrides) -> Result<Plan> {
         let (origin, file) = (self.origin.clone(), self.file.clone());
         let settings = self.settings.clone().with(overrides);
+        let whole_rims = self.whole_rims;
         let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
         let mut sorted = Sorted::new(self)?;
         let open = &*sorted.source.1;
@@ -129,6 +130,7 @@ impl Graph {
             simd,
             threads: demands.threads,
             settings,
+            whole_rims,
             source,
             source_kind: sorted.source.0,
             transforms: sorted.transforms,
