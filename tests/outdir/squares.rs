@@ -186,3 +186,22 @@ fn more_squares_than_there_may_be_end_the_run_and_leave_nothing() {
     assert!(error.to_string().contains("more than 16384 squares of 1"), "{error}");
     assert_eq!(files(case.at.path()).len(), 1);
 }
+
+#[test]
+fn many_files_have_one_line_for_their_folder() {
+    let case = Case::new();
+    let points: Vec<_> = (0..30).map(|n| ([f64::from(n), 0.5, 0.0], n as u32)).collect();
+    case.ply(&points);
+    let lines = |side: u32| {
+        let folder = case.path(&format!("of {side}"));
+        fs::create_dir(&folder).unwrap();
+        let write = format!("path = '{}'\nside = {side}", folder.join("{x}_{y}.ply").display());
+        let report = run("", &case.path("in.ply"), "", &write).unwrap();
+        let told = report.table(None).to_string();
+        told.lines().filter(|line| line.starts_with("output")).map(str::to_owned).collect()
+    };
+    let few: Vec<String> = lines(10);
+    assert_eq!(few.len(), 3, "{few:?}");
+    let many: Vec<String> = lines(1);
+    assert!(many.len() == 1 && many[0].contains(" 30 files in "), "{many:?}");
+}
