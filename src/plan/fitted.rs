@@ -11,7 +11,7 @@ use super::limits::{check_limits, number_selections};
 use super::look::{Unfit, look};
 use super::passes::{Passes, unroll};
 use super::places::{all_read, check_places, copies, each_input};
-use super::sorted::Sorted;
+use super::sorted::{Sorted, blame};
 use super::stretch::Stretch;
 use super::transforms::{check_numbers, fit_transforms};
 use crate::engine::by_input::lists_bytes;
@@ -107,8 +107,7 @@ impl Graph {
             check_places(file.as_deref(), read, sinks, &settings)
         };
         let (_, wrong) = places(&open.paths(), &sorted.sinks);
-        let FittedStages { source, schemas, choices, passes } =
-            fit_stages(&mut sorted, wrong, &in_file)?;
+        let FittedStages { source, schemas, choices, passes } = fit_stages(&mut sorted, wrong)?;
         let schema = &schemas.last;
         let open = &*sorted.source.1;
         let read = all_read(open, &*source);
@@ -168,12 +167,8 @@ struct FittedStages {
 }
 
 /// Opens the inputs and fits the stages to them. What is `wrong` so far is told with what is found
-/// here; `in_file` tells in which text a stage stands.
-fn fit_stages(
-    sorted: &mut Sorted,
-    mut wrong: Vec<Error>,
-    in_file: &impl Fn(Error) -> Error,
-) -> Result<FittedStages> {
+/// here.
+fn fit_stages(sorted: &mut Sorted, mut wrong: Vec<Error>) -> Result<FittedStages> {
     let source = match sorted.source.1.open() {
         Ok(source) => source,
         Err(error) => {
@@ -182,7 +177,7 @@ fn fit_stages(
         }
     };
     let (schemas, unfit) = fit_transforms(sorted, source.schema());
-    wrong.extend(unfit.into_iter().map(in_file));
+    wrong.extend(unfit);
     wrong.extend(check_limits(sorted, &schemas.last));
     wrong.extend(check_numbers(sorted, &*source).err());
     wrong.extend(fit(&mut sorted.ops, &source.metadata().units));
@@ -194,7 +189,11 @@ fn fit_stages(
 
 /// Fits tile stages to the units of the scan: lengths with a unit of their own are converted.
 fn fit(ops: &mut [StageOp], units: &Units) -> Vec<Error> {
-    ops.iter_mut().filter_map(|stage| stage.op.tile_mut().convert(units).err()).collect()
+    let unfit = |stage: &mut StageOp| {
+        let error = stage.op.tile_mut().convert(units).err()?;
+        Some(blame(&*stage.written, error))
+    };
+    ops.iter_mut().filter_map(unfit).collect()
 }
 
 /// What tells records apart as they are decoded.
@@ -246,7 +245,7 @@ fn demands(
     settings: &RunSettings,
 ) -> Result<Demands> {
     let limit = settings.memory.unwrap_or_else(default_memory);
-    let chunks = chunks(&sorted.sinks, computed, (source, schema))?;
+    let chunks = chunks(sorted, computed, (source, schema))?;
     let columns = passes.iter().map(|pass| pass.column_bytes(computed));
     let ranked =
         order.in_input_order.iter().filter(|ranked| **ranked && order.mills).count() as u64;
@@ -365,16 +364,17 @@ fn threads(settings: &RunSettings) -> Result<usize> {
 
 /// The chunks of all outputs.
 fn chunks(
-    sinks: &[Box<dyn CreateSink>],
+    sorted: &Sorted,
     computed: &[Vec<ComputedDimension>],
     (source, schema): (&dyn Source, &Arc<Schema>),
 ) -> Result<Vec<ChunkSize>> {
     let (mut chunks, mut wrong) = (Vec::new(), Vec::new());
-    for (sink, computed) in sinks.iter().zip(computed) {
+    let sinks = sorted.sinks.iter().zip(&sorted.written_sinks);
+    for ((sink, written), computed) in sinks.zip(computed) {
         let metadata = Metadata { computed: computed.clone(), ..source.metadata().clone() };
         match sink.chunk(schema, &metadata) {
             Ok(chunk) => chunks.push(chunk),
-            Err(error) => wrong.push(error),
+            Err(error) => wrong.push(blame(&**written, error)),
         }
     }
     Error::all(wrong).map(|()| chunks)
