@@ -47,6 +47,8 @@ pub struct Needs {
     /// True if it reads the [numbers](crate::point::PointBatch::record_numbers) that records have
     /// in the input.
     pub record_numbers: bool,
+    /// True if any byte of a record may decide what it does with it, whatever dimension that is of.
+    pub whole_records: bool,
     /// True if it removes points.
     pub removes: bool,
     /// How it marks records instead of removing any, if it does.
@@ -139,6 +141,13 @@ impl Needs {
     #[must_use]
     pub fn reads_record_numbers(mut self) -> Self {
         self.record_numbers = true;
+        self
+    }
+
+    /// And any byte of a record may decide what it does with it.
+    #[must_use]
+    pub fn reads_whole_records(mut self) -> Self {
+        self.whole_records = true;
         self
     }
 

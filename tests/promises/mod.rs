@@ -1,0 +1,4 @@
+//! `pointmill::testing`: what it finds, and that it finds nothing in stages that keep their promises.
+
+mod own;
+mod wrong;
