@@ -19,9 +19,9 @@ use crate::{Error, ErrorKind, Result};
 
 /// How often each of two unequal runs is repeated before they count as unequal.
 const REPEATS: usize = 3;
-/// Memory that a tight run is tried with first, doubled up to the second.
+/// Memory that a tight run is tried with first, doubled up to what others have.
 const LEAST: u64 = 24 << 20;
-const MOST: u64 = 8 << 30;
+const AMPLE: u64 = 8 << 30;
 
 /// A question to a scan: whether a promise holds.
 #[derive(Debug, Clone)]
@@ -92,15 +92,13 @@ impl Bench {
 
     fn run_until(&self, scan: &MadeScan, setup: &Setup, stop: u64) -> Ran {
         let witness = Arc::new(Witness::new(setup.tile_points.is_none()));
-        let mut memory = setup.is_tight.then_some(LEAST);
+        let mut memory = if setup.is_tight { LEAST } else { AMPLE };
         let asked = Arc::new(AtomicU64::new(0));
         let answer = loop {
             asked.store(0, Ordering::Relaxed);
             let answer = self.answer((scan, setup), memory, &witness, &asked, stop);
-            match (&answer, memory) {
-                (Err(error), Some(bytes)) if error.kind() == ErrorKind::Memory && bytes < MOST => {
-                    memory = Some(2 * bytes);
-                }
+            match &answer {
+                Err(error) if error.kind() == ErrorKind::Memory && memory < AMPLE => memory *= 2,
                 _ => break answer,
             }
         };
@@ -122,7 +120,7 @@ impl Bench {
     fn answer(
         &self,
         (scan, setup): (&MadeScan, &Setup),
-        memory: Option<u64>,
+        memory: u64,
         witness: &Arc<Witness>,
         asked: &Arc<AtomicU64>,
         stop: u64,

@@ -48,9 +48,9 @@ impl Setup {
     };
 
     /// The settings of a run with so much memory.
-    pub fn settings(&self, memory: Option<u64>, scratch: &Path) -> RunSettings {
+    pub fn settings(&self, memory: u64, scratch: &Path) -> RunSettings {
         RunSettings {
-            memory,
+            memory: Some(memory),
             threads: NonZeroUsize::new(self.threads),
             tile_points: self.tile_points.and_then(NonZeroUsize::new),
             scratch: Some(scratch.to_owned()),
