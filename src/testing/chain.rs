@@ -155,7 +155,7 @@ impl Chain {
 impl Declared {
     fn enter(&mut self, needs: &Needs) {
         let mark = needs.mark.map(Mark::dimension).map(str::to_owned);
-        self.looked_at.extend(needs.dimensions.iter().cloned());
+        self.looked_at.extend(needs.dimensions.iter().chain(&needs.if_there).cloned());
         self.looked_at.extend(needs.reads.iter().map(|kind| kind.name().to_owned()));
         self.looked_at.extend(needs.changes.iter().chain(&mark).cloned());
         self.changed.extend(needs.changes.iter().chain(&mark).cloned());

@@ -4,11 +4,11 @@
 use std::fmt::Write as _;
 use std::sync::Arc;
 
+use crate::Result;
 use crate::io::las;
 use crate::memory;
 use crate::point::{Bits, Dimension, Horizontal, Metadata, Scalar, Schema, Units, Value, names};
 use crate::synth::Random;
-use crate::Result;
 
 /// How the points of a scan lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

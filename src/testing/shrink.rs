@@ -4,7 +4,7 @@
 use super::made::MadeScan;
 
 /// Scans that are tried at most.
-const TRIES: usize = 400;
+const TRIES: usize = 200;
 
 /// The smallest part of `scan` that is found for which `breaks` gives something, and what it gave.
 /// `found` is what it gave for all of it.

@@ -109,23 +109,36 @@ impl<S: TileOp + ?Sized> Watched<S> {
         tile: &mut Tile,
         tally: &mut Tally,
         work: impl FnOnce(&S, &mut Tile, &mut Tally) -> Result<()>,
-    ) -> Result<()> {
+    ) -> (Result<()>, u64) {
         let before = TileState::of(tile, needs);
         let (of_stage, of_any) = entered(tally, &self.kind);
         let hidden = Hidden::of(tile, needs);
         let (outcome, bytes) = measured(|| work(&self.stage, tile, tally));
         hidden.give_back(tile);
-        self.witness.took(tile.positions.len(), needs.bytes_per_point, bytes);
-        self.hear(outcome)?;
-        before.compare(tile, needs, &self.witness);
-        let (now_of_stage, now_of_any) = entered(tally, &self.kind);
-        let (own, all) = (now_of_stage - of_stage, now_of_any - of_any);
-        if all != own {
-            let told = format!("it entered {} records under the name of another", all - own);
-            self.witness.tell(Promise::Ledger, told);
+        if outcome.is_ok() {
+            before.compare(tile, needs, &self.witness);
+            let (now_of_stage, now_of_any) = entered(tally, &self.kind);
+            let (own, all) = (now_of_stage - of_stage, now_of_any - of_any);
+            if all != own {
+                let told = format!("it entered {} records under the name of another", all - own);
+                self.witness.tell(Promise::Ledger, told);
+            }
+            before.balance(tile, needs, own, &self.witness);
         }
-        before.balance(tile, needs, own, &self.witness);
-        Ok(())
+        (self.hear(outcome), bytes)
+    }
+
+    /// Does the work of a tile, for which the stage declares memory.
+    fn mill(
+        &self,
+        needs: &Needs,
+        tile: &mut Tile,
+        tally: &mut Tally,
+        work: impl FnOnce(&S, &mut Tile, &mut Tally) -> Result<()>,
+    ) -> Result<()> {
+        let (outcome, bytes) = self.work(needs, tile, tally, work);
+        self.witness.took(tile.positions.len(), needs.bytes_per_point, bytes);
+        outcome
     }
 
     /// Tells of an error that the stage has only because it did not declare what it asked for.
@@ -172,7 +185,7 @@ impl<S: TileOp + ?Sized> TileOp for Watched<S> {
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
-        self.work(&self.stage.needs(), tile, tally, |stage, tile, tally| stage.run(tile, tally))
+        self.mill(&self.stage.needs(), tile, tally, |stage, tile, tally| stage.run(tile, tally))
     }
 
     fn decisions(&self) -> Vec<(String, serde_json::Value)> {
@@ -186,11 +199,13 @@ impl<S: TileOp + ?Sized> TileOp for Watched<S> {
     fn sample(&self, tile: &mut Tile) -> Result<Vec<f64>> {
         let mut figures = Vec::new();
         let needs = self.stage.needs();
-        self.work(&needs, tile, &mut Tally::default(), |stage, tile, _| {
+        // Samples have so few positions that no memory is planned for what they take.
+        let (outcome, bytes) = self.work(&needs, tile, &mut Tally::default(), |stage, tile, _| {
             figures = stage.sample(tile)?;
             Ok(())
-        })?;
-        Ok(figures)
+        });
+        self.witness.took_besides(tile.positions.len(), bytes);
+        outcome.map(|()| figures)
     }
 
     fn forecast(&mut self, samples: &[Vec<f64>]) -> Forecast {
@@ -205,7 +220,7 @@ impl AnyScanOp for Watched<dyn AnyScanOp> {
     }
 
     fn gather_into(&self, tile: &mut Tile, tally: &mut Tally, bytes: &mut Vec<u8>) -> Result<()> {
-        self.work(&self.stage.gather_needs(), tile, tally, |stage, tile, tally| {
+        self.mill(&self.stage.gather_needs(), tile, tally, |stage, tile, tally| {
             stage.gather_into(tile, tally, bytes)
         })
     }
