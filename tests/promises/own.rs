@@ -93,10 +93,11 @@ fn is_asked(conduct: &Conduct) -> bool {
 /// Checks stages of these kinds.
 fn assert_kept(kinds: &[&str]) {
     let mut checks = checks();
-    let own = |kind: &&str| checks.remove(*kind).map(|own| own.into_iter().enumerate());
-    let own: Vec<_> = kinds.iter().map(|kind| (*kind, own(kind).unwrap())).collect();
-    let each = own.into_iter().flat_map(|(kind, own)| own.map(move |(n, check)| (kind, n, check)));
-    let broken: Vec<String> = each.filter_map(|(kind, n, check)| wrong(kind, n, check)).collect();
+    let mut broken = Vec::new();
+    for kind in kinds {
+        let own = checks.remove(kind).unwrap().into_iter().enumerate();
+        broken.extend(own.filter_map(|(number, check)| wrong(kind, number, check)));
+    }
     assert!(broken.is_empty(), "{}", broken.join("\n\n"));
 }
 
