@@ -1,5 +1,6 @@
 //! What can be typed.
 
+mod pipeline;
 mod plain;
 
 use std::path::PathBuf;
@@ -13,8 +14,9 @@ use crate::graph::MOST_THREADS;
 use crate::picture::{ColorBy, View};
 use crate::quantity::parse_count;
 
+pub(super) use pipeline::{Drawing, ExplainArguments, GraphArguments, PipelineArguments};
 pub(super) use plain::{
-    CompletionsArguments, Drawing, InfoArguments, ManArguments, NewArguments, StagesArguments,
+    CompletionsArguments, InfoArguments, ManArguments, NewArguments, StagesArguments,
 };
 
 /// Reduces laser scans that do not fit in memory to the points that matter.
@@ -35,14 +37,16 @@ pub(super) enum Command {
     Convert(ConvertArguments),
     /// Show what files contain, from their headers
     Info(InfoArguments),
-    /// Show how a pipeline would be run, without running it
-    Plan(PlanArguments),
+    /// Show how a pipeline would be run and what the run would use, without running it
+    Plan(PredictArguments),
     /// Check a pipeline and tell every mistake; reads its inputs' headers, writes nothing
     Check(PlanArguments),
     /// List the stages that a pipeline can have, with their keys
     Stages(StagesArguments),
     /// Draw the graph of a pipeline; its inputs are not opened
     Graph(GraphArguments),
+    /// Print a pipeline with every key of every stage, and where each value is from
+    Explain(ExplainArguments),
     /// Write a commented pipeline file for a job, to be changed
     New(NewArguments),
     /// Print the JSON Schema of pipeline files, by which editors complete and check them
@@ -61,8 +65,10 @@ impl Command {
     /// The pipeline of commands that take one.
     pub fn pipeline(&self) -> Option<&PipelineArguments> {
         match self {
-            Command::Run(all) | Command::Plan(all) | Command::Check(all) => Some(&all.pipeline),
+            Command::Run(all) | Command::Check(all) => Some(&all.pipeline),
+            Command::Plan(PredictArguments { planned, .. }) => Some(&planned.pipeline),
             Command::Graph(graph) => Some(&graph.pipeline),
+            Command::Explain(explain) => Some(&explain.pipeline),
             _ => None,
         }
     }
@@ -72,12 +78,12 @@ impl Command {
         match self {
             Command::Reduce(reduce) => Some(&reduce.common),
             Command::Run(PlanArguments { common, .. })
-            | Command::Plan(PlanArguments { common, .. })
+            | Command::Plan(PredictArguments { planned: PlanArguments { common, .. }, .. })
             | Command::Check(PlanArguments { common, .. })
             | Command::Convert(ConvertArguments { common, .. })
             | Command::Synth(SynthArguments { common, .. }) => Some(common),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => None,
-            Command::Graph(_) | Command::New(_) | Command::Schema => None,
+            Command::Graph(_) | Command::Explain(_) | Command::New(_) | Command::Schema => None,
             Command::Completions(_) | Command::Man(_) => None,
         }
     }
@@ -131,23 +137,6 @@ fn parse_threads(text: &str) -> Result<usize, String> {
     within(text, 1, MOST_THREADS as u64).map(|threads| threads as usize)
 }
 
-/// A pipeline, and what is put in the place of its values.
-#[derive(Debug, Args)]
-pub(super) struct PipelineArguments {
-    /// The pipeline file, in TOML or JSON; or a pipeline in one line, which has ` ! ` between its
-    /// stages: 'read in.laz ! normals ! write out.ply'
-    #[arg(value_name = "PIPELINE")]
-    pub pipeline: String,
-    /// Put a value in the place of the pipeline's: the stage by its name or kind (KIND.N, from 1,
-    /// where there are several), or `run`
-    #[arg(long = "set", value_name = "STAGE.KEY=VALUE")]
-    pub sets: Vec<String>,
-    /// Give a parameter of the pipeline a value; `--help` behind a pipeline file lists those that
-    /// it has
-    #[arg(long = "param", value_name = "NAME=VALUE")]
-    pub params: Vec<String>,
-}
-
 /// Of commands that plan a pipeline, or run it.
 #[derive(Debug, Args)]
 pub(super) struct PlanArguments {
@@ -155,6 +144,19 @@ pub(super) struct PlanArguments {
     pub pipeline: PipelineArguments,
     #[command(flatten)]
     pub common: CommonArguments,
+}
+
+/// Of `plan`.
+#[derive(Debug, Args)]
+pub(super) struct PredictArguments {
+    #[command(flatten)]
+    pub planned: PlanArguments,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Read headers alone: what only a trial on a part of the points can tell is left out
+    #[arg(long)]
+    pub no_trial: bool,
 }
 
 #[derive(Debug, Args)]
@@ -353,15 +355,6 @@ pub(super) struct PictureArguments {
 
 fn parse_width(text: &str) -> Result<u32, String> {
     within(text, 64, 4096).map(|width| width as u32)
-}
-
-#[derive(Debug, Args)]
-pub(super) struct GraphArguments {
-    #[command(flatten)]
-    pub pipeline: PipelineArguments,
-    /// What it is drawn as
-    #[arg(long = "as", value_name = "HOW", default_value = "text")]
-    pub drawing: Drawing,
 }
 
 #[derive(Debug, Args)]

@@ -18,9 +18,12 @@ pub(crate) struct Clock<'a> {
     /// Those that are still to come.
     later: IntoIter<RunPhase>,
     start: Instant,
-    cpu_before: Option<f64>,
+    cpu_before: f64,
     open: Option<(&'static str, Instant)>,
     phases: Vec<Phase>,
+    /// The phase that runs, told or not, and the CPU seconds of the process when it began.
+    at_work: Option<(&'static str, f64)>,
+    cpu_by_phase: Vec<(&'static str, f64)>,
 }
 
 impl<'a> Clock<'a> {
@@ -33,6 +36,8 @@ impl<'a> Clock<'a> {
             cpu_before: cpu_seconds(),
             open: None,
             phases: Vec::new(),
+            at_work: None,
+            cpu_by_phase: Vec::new(),
         }
     }
 
@@ -46,6 +51,8 @@ impl<'a> Clock<'a> {
         if next != Some(phase) {
             return Err(Error::internal(format!("the next phase is {next:?}, not {phase:?}")));
         }
+        self.count();
+        self.at_work = Some((phase.name_in_predictions(), cpu_seconds()));
         if let Some(name) = phase.name() {
             self.end();
             self.open = Some((name, Instant::now()));
@@ -61,11 +68,22 @@ impl<'a> Clock<'a> {
         }
     }
 
+    /// Enters what the phase that ends took of the processors.
+    fn count(&mut self) {
+        let Some((name, before)) = self.at_work.take() else { return };
+        self.cpu_by_phase.push((name, cpu_seconds() - before));
+    }
+
+    /// CPU seconds of each phase, those that are not told included; what follows is in none.
+    pub fn cpu_by_phase(&mut self) -> Vec<(&'static str, f64)> {
+        self.count();
+        std::mem::take(&mut self.cpu_by_phase)
+    }
+
     /// Wall-clock seconds in all, CPU seconds in all, and wall-clock seconds by phase.
-    pub fn finish(mut self) -> (f64, Option<f64>, Vec<Phase>) {
+    pub fn finish(mut self) -> (f64, f64, Vec<Phase>) {
         self.end();
-        let cpu = self.cpu_before.and_then(|before| Some(cpu_seconds()? - before));
-        (self.start.elapsed().as_secs_f64(), cpu, self.phases)
+        (self.start.elapsed().as_secs_f64(), cpu_seconds() - self.cpu_before, self.phases)
     }
 }
 
