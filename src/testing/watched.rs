@@ -11,6 +11,7 @@ use crate::error::Undeclared;
 use crate::expression::KeyExpression;
 use crate::geom::lattice::Lattice;
 use crate::point::{PointBatch, Schema, Units};
+use crate::quantity::Length;
 use crate::report::Tally;
 use crate::stage::{
     AnyScanOp, Forecast, Needs, Role, ScanFacts, StoredSummaries, TileOp, Transform,
@@ -171,8 +172,12 @@ impl<S: TileOp + ?Sized> TileOp for Watched<S> {
         self.stage.convert(units)
     }
 
-    fn lengths(&self) -> Vec<(&'static str, f64)> {
+    fn lengths(&self) -> Vec<(&'static str, Length)> {
         self.stage.lengths()
+    }
+
+    fn for_share(&mut self, share: f64) {
+        self.stage.for_share(share);
     }
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
