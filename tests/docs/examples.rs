@@ -24,7 +24,7 @@ fn page(name: &str) -> String {
 fn survey() -> tempfile::TempDir {
     let at = scans(&["more.laz"]);
     let als = ["synth", "als", "-n", "5000", "-o"];
-    for name in ["scan.laz", "a.laz", "b.laz", "scan.las", "scan.ply"] {
+    for name in ["scan.laz", "more.laz", "a.laz", "b.laz", "scan.las", "scan.ply"] {
         done(at.path(), &[&als[..], &[name]].concat());
     }
     fs::create_dir(at.path().join("survey")).unwrap();
