@@ -73,6 +73,7 @@ fn as_json(table: &TableDescription) -> Value {
         "kind": table.name,
         "about": plain(&table.about),
         "docs": table.docs,
+        "main": table.main,
         "keys": table.all_keys().map(key).collect::<Value>(),
     })
 }
@@ -100,7 +101,14 @@ fn text_of_one(table: &TableDescription) -> String {
             out += &wrapped(&plain(line), 2);
         }
     }
-    out + &keys_text(table)
+    out += &keys_text(table);
+    match table.main {
+        Some(main) => {
+            let told = "In a pipeline of one line the word right behind it is its";
+            out + "\n" + &wrapped(&format!("{told} {main}."), 2)
+        }
+        None => out,
+    }
 }
 
 fn keys_text(table: &TableDescription) -> String {

@@ -15,6 +15,8 @@ pub struct TableDescription {
     pub name: String,
     /// The role of the stage; none of what is no stage.
     pub role: Option<RoleName>,
+    /// The key whose value stands right behind the kind in a pipeline of one line, if there is one.
+    pub main: Option<&'static str>,
     /// What it is, in one sentence.
     pub about: String,
     /// All that is said of it.
@@ -59,6 +61,7 @@ impl TableDescription {
         TableDescription {
             name: name.to_owned(),
             role: None,
+            main: None,
             about: about.to_owned(),
             docs: text(schema, "description"),
             keys: keys(schema),
@@ -73,9 +76,14 @@ impl TableDescription {
         TableDescription::of(name, &about, schema)
     }
 
-    /// The same of a stage of this role, with the keys that limit it.
-    pub(crate) fn of_stage(self, role: RoleName, limits: &Map<String, Value>) -> Self {
-        TableDescription { role: Some(role), limits: keys(limits), ..self }
+    /// The same of a stage of this role, with its main key and those that limit it.
+    pub(crate) fn of_stage(
+        self,
+        role: RoleName,
+        main: Option<&'static str>,
+        limits: &Map<String, Value>,
+    ) -> Self {
+        TableDescription { role: Some(role), main, limits: keys(limits), ..self }
     }
 
     /// Its own keys, then those that limit it.

@@ -132,10 +132,11 @@ impl Registry {
     pub fn describe(&self, kind: &str) -> Option<TableDescription> {
         let (name, kind) = self.kinds.get_key_value(kind)?;
         let table = self.table(name, kind, &mut schema::generator());
-        Some(
-            TableDescription::of(name, kind.about, &table.schema)
-                .of_stage(kind.role, &table.limits),
-        )
+        Some(TableDescription::of(name, kind.about, &table.schema).of_stage(
+            kind.role,
+            kind.main,
+            &table.limits,
+        ))
     }
 
     /// What there is to know of the keys that limit a stage to some records, which stages take

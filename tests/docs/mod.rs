@@ -82,6 +82,12 @@ fn stage_page(table: &TableDescription) -> String {
             out += "\nIt takes [the keys that limit a stage](README.md#limits) but `sees` too.\n";
         }
     }
+    if let Some(main) = table.main {
+        out += &format!(
+            "\nIn a pipeline of one line the word right behind `{}` is its `{main}`.\n",
+            table.name
+        );
+    }
     out += "\nEvery stage may also have a `name`, by which `--set` and `from` mean it.\n";
     out + &worked::section(&table.name)
 }
