@@ -1,11 +1,12 @@
 //! Stages as other programs name them, and what pointmill leaves to others: what to write instead.
 
 use super::node::{Node, NodeValue};
+use crate::error::nearest;
 
 /// Names of stages of other programs, without a prefix such as `filters.`, and what does the same
 /// here.
 const ELSEWHERE: [(&[&str], &str); 17] = [
-    (&["las", "laz", "ply", "reader", "load"], "`read` with the `path`, or `write` with it"),
+    (&["load", "reader", "open"], "`read` with the `path`"),
     (&["range", "expression", "mongo", "keep_class"], "`filter` with `where`"),
     (&["delete", "drop_points"], "`drop` with `where`, `classes`, `with` or `without`"),
     (&["assign", "ferry", "set_attribute"], "`assign` with `set`"),
@@ -73,8 +74,21 @@ pub(super) fn told(kind: &str, keys: &Node) -> Option<(String, String)> {
         let told = format!("there is no stage `{kind}`: pointmill does not {what}");
         return Some((told, (*help).to_owned()));
     }
+    let of_files =
+        [("readers.", "`read` with the `path`"), ("writers.", "`write` with the `path`")];
+    if let Some((_, here)) = of_files.iter().find(|(prefix, _)| lower.starts_with(prefix)) {
+        return Some(is_here(kind, here));
+    }
     let (_, here) = ELSEWHERE.iter().find(|(names, _)| names.contains(&name))?;
-    Some((format!("there is no stage `{kind}`"), format!("what it does elsewhere is here {here}")))
+    // What is mistyped by a letter is told as such.
+    let own: Vec<String> = here.split('`').skip(1).step_by(2).map(str::to_owned).collect();
+    let is_mistyped = name == lower && nearest(name, &own).is_some();
+    (!is_mistyped).then(|| is_here(kind, here))
+}
+
+/// What is said of a stage that is here under another name.
+fn is_here(kind: &str, here: &str) -> (String, String) {
+    (format!("there is no stage `{kind}`"), format!("what it does elsewhere is here {here}"))
 }
 
 /// The reference system that the keys of a stage name.
@@ -128,7 +142,10 @@ mod tests {
         assert!(text.contains("is here `grid` with `side`"), "{text}");
         let text = told("kind = 'filters.smrf'");
         assert!(text.contains("pdal translate scan.laz ground.laz smrf"), "{text}");
-        // A name that nobody has gets the nearest.
+        let text = told("kind = 'readers.las', filename = 'a.las'");
+        assert!(text.contains("is here `read` with the `path`"), "{text}");
+        // A name that nobody has, or that is ours but for a letter, gets the nearest.
+        assert!(told("kind = 'normal'").contains("did you mean `normals`"));
         assert!(told("kind = 'gird', side = 1").contains("did you mean `grid`"));
     }
 
