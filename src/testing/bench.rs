@@ -5,13 +5,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::answer::{Answer, Sameness};
-use super::chain::{Chain, Declared};
+use super::chain::{Chain, DeclaredNeeds};
 use super::made::MadeScan;
 use super::promise::Promise;
 use super::setup::Setup;
 use super::split::SplitSource;
 use super::witness::{MemoryTaken, Violation, Witness};
 use crate::engine::Watch;
+use crate::error::shown;
 use crate::graph::Overrides;
 use crate::memory::channel;
 use crate::point::PointBatch;
@@ -53,7 +54,7 @@ impl ProbeKind {
 
 /// How a probe ended.
 #[derive(Debug)]
-pub(super) enum Verdict {
+pub(super) enum ProbeOutcome {
     Holds,
     /// The scan was refused, or the setup cannot be.
     NotAsked,
@@ -73,8 +74,8 @@ pub(super) struct Ran {
 /// A chain, what its stages say, and a folder for what its runs spill.
 pub(super) struct Bench {
     pub chain: Chain,
-    pub declared: Declared,
-    scratch: Scratch,
+    pub declared: DeclaredNeeds,
+    scratch: SpillFolder,
 }
 
 impl Bench {
@@ -82,7 +83,7 @@ impl Bench {
     ///
     /// Stages that cannot be made, and a folder for scratch that the system refuses.
     pub fn new(chain: Chain) -> Result<Bench> {
-        Ok(Bench { declared: chain.declared()?, chain, scratch: Scratch::new()? })
+        Ok(Bench { declared: chain.declared()?, chain, scratch: SpillFolder::new()? })
     }
 
     /// Runs the chain on `scan`.
@@ -149,8 +150,9 @@ impl Bench {
         Some(Violation { promise: Promise::Changes, told })
     }
 
-    /// Asks whether a promise holds on `scan`; `plain` is what the plain setup gave, if it is known.
-    pub fn ask(&self, probe: &Probe, scan: &MadeScan, plain: Option<&Ran>) -> Verdict {
+    /// Asks whether a promise holds on `scan`; `plain` is what the plain setup gave, where that is
+    /// known.
+    pub fn ask(&self, probe: &Probe, scan: &MadeScan, plain: Option<&Ran>) -> ProbeOutcome {
         match &probe.kind {
             ProbeKind::Alone(setup) => self.verdict(&self.run(scan, setup), setup),
             ProbeKind::Same(a, b, same) => self.compare(probe.promise, [a, b], same, scan, plain),
@@ -158,11 +160,11 @@ impl Bench {
         }
     }
 
-    fn verdict(&self, ran: &Ran, setup: &Setup) -> Verdict {
+    fn verdict(&self, ran: &Ran, setup: &Setup) -> ProbeOutcome {
         match (&ran.violation, &ran.answer) {
-            (Some(seen), _) => Verdict::Breaks(seen.clone(), [setup.clone(), setup.clone()]),
-            (None, Ok(_)) => Verdict::Holds,
-            (None, Err(_)) => Verdict::NotAsked,
+            (Some(seen), _) => ProbeOutcome::Breaks(seen.clone(), [setup.clone(), setup.clone()]),
+            (None, Ok(_)) => ProbeOutcome::Holds,
+            (None, Err(_)) => ProbeOutcome::NotAsked,
         }
     }
 
@@ -181,7 +183,7 @@ impl Bench {
         same: &Sameness,
         scan: &MadeScan,
         plain: Option<&Ran>,
-    ) -> Verdict {
+    ) -> ProbeOutcome {
         let alike = matches!(same, Sameness::Dimensions(_)).then(|| scan.distinct());
         let (scan, plain) = match &alike {
             Some(scan) => (scan, None),
@@ -196,17 +198,17 @@ impl Bench {
         let is_refused = |ran: &Ran, kind| ran.answer.as_ref().err().is_some_and(|e| e.0 == kind);
         let cannot_be = is_refused(&second, ErrorKind::Pipeline) && *same == Sameness::Records;
         if cannot_be || [&first, &second].iter().any(|ran| is_refused(ran, ErrorKind::Memory)) {
-            return Verdict::NotAsked;
+            return ProbeOutcome::NotAsked;
         }
         let Some(told) = self.difference(&first, &second, same) else {
-            return if first.answer.is_ok() { Verdict::Holds } else { Verdict::NotAsked };
+            return if first.answer.is_ok() { ProbeOutcome::Holds } else { ProbeOutcome::NotAsked };
         };
         for (ran, setup) in [(&first, a), (&second, b)] {
             if let Some(told) = self.chance(ran, setup, scan) {
-                return Verdict::Breaks(told, [setup.clone(), setup.clone()]);
+                return ProbeOutcome::Breaks(told, [setup.clone(), setup.clone()]);
             }
         }
-        Verdict::Breaks(Violation { promise, told }, [a.clone(), b.clone()])
+        ProbeOutcome::Breaks(Violation { promise, told }, [a.clone(), b.clone()])
     }
 
     /// A difference between a run and one that is the same in everything.
@@ -227,31 +229,31 @@ impl Bench {
         }
     }
 
-    fn stop(&self, setup: &Setup, part: f64, scan: &MadeScan, plain: Option<&Ran>) -> Verdict {
+    fn stop(&self, setup: &Setup, part: f64, scan: &MadeScan, plain: Option<&Ran>) -> ProbeOutcome {
         let before = self.run_as(&Setup::PLAIN, scan, plain);
         let whole = self.run(scan, setup);
         if before.answer.is_err() || whole.answer.is_err() {
-            return Verdict::NotAsked;
+            return ProbeOutcome::NotAsked;
         }
         let stop = (whole.asked as f64 * part) as u64;
         let stopped = self.run_until(scan, setup, stop);
         let breaks = |told: String| {
             let violation = Violation { promise: Promise::Stops, told };
-            Verdict::Breaks(violation, [setup.clone(), Setup::PLAIN])
+            ProbeOutcome::Breaks(violation, [setup.clone(), Setup::PLAIN])
         };
         match &stopped.answer {
             Err((ErrorKind::Interrupted, _)) | Ok(_) => {}
             Err((_, told)) => return breaks(format!("a run that is stopped fails: {told}")),
         }
         if let Some(left) = self.scratch.left() {
-            return breaks(format!("a run that was stopped left {}", left.display()));
+            return breaks(format!("a run that was stopped left {}", shown(&left)));
         }
         let behind = self.run(scan, &Setup::PLAIN);
         match self.difference(&before, &behind, &Sameness::Everything) {
             Some(told) => {
                 breaks(format!("a run before one that is stopped, and one after: {told}"))
             }
-            None => Verdict::Holds,
+            None => ProbeOutcome::Holds,
         }
     }
 }
@@ -273,16 +275,16 @@ impl Watch for Asked {
 }
 
 /// A folder of its own, removed with what is in it.
-struct Scratch(PathBuf);
+struct SpillFolder(PathBuf);
 
-impl Scratch {
-    fn new() -> Result<Scratch> {
+impl SpillFolder {
+    fn new() -> Result<SpillFolder> {
         static NUMBER: AtomicU64 = AtomicU64::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let name = format!("pointmill-testing-{}-{number}", std::process::id());
         let path = std::env::temp_dir().join(name);
         std::fs::create_dir(&path).map_err(|e| Error::io(&path, "create this folder", e))?;
-        Ok(Scratch(path))
+        Ok(SpillFolder(path))
     }
 
     fn path(&self) -> &Path {
@@ -296,7 +298,7 @@ impl Scratch {
     }
 }
 
-impl Drop for Scratch {
+impl Drop for SpillFolder {
     fn drop(&mut self) {
         // What cannot be removed is in the folder for what may be lost.
         let _ = std::fs::remove_dir_all(&self.0);

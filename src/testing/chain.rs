@@ -62,7 +62,7 @@ pub(super) struct Chain {
 }
 
 /// What the stages of a chain say, for a check.
-pub(super) struct Declared {
+pub(super) struct DeclaredNeeds {
     /// Dimensions that they look at or change, and those with the names of columns that they read:
     /// all others may hold anything.
     pub looked_at: Vec<String>,
@@ -82,8 +82,8 @@ impl Chain {
     }
 
     /// What the stages say before they know a scan.
-    pub fn declared(&self) -> Result<Declared> {
-        let mut declared = Declared {
+    pub fn declared(&self) -> Result<DeclaredNeeds> {
+        let mut declared = DeclaredNeeds {
             looked_at: Vec::new(),
             changed: Vec::new(),
             columns: Vec::new(),
@@ -152,7 +152,7 @@ impl Chain {
     }
 }
 
-impl Declared {
+impl DeclaredNeeds {
     fn enter(&mut self, needs: &Needs) {
         let mark = needs.mark.map(Mark::dimension).map(str::to_owned);
         self.looked_at.extend(needs.dimensions.iter().chain(&needs.if_there).cloned());

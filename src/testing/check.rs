@@ -3,7 +3,7 @@
 
 use super::allocator::counts;
 use super::answer::Sameness;
-use super::bench::{Bench, Probe, ProbeKind, Ran, Verdict};
+use super::bench::{Bench, Probe, ProbeKind, ProbeOutcome, Ran};
 use super::broken::{Broken, Case, Conduct, simpler};
 use super::chain::{Chain, StageMaker};
 use super::made::{Arrangement, MadeScan};
@@ -170,9 +170,9 @@ impl Conformance {
         conduct: &mut Conduct,
     ) -> std::result::Result<(), Broken> {
         match bench.ask(probe, scan, Some(plain)) {
-            Verdict::Holds => *conduct.answers.entry(probe.promise).or_default() += 1,
-            Verdict::NotAsked => {}
-            Verdict::Breaks(violation, setups) => {
+            ProbeOutcome::Holds => *conduct.answers.entry(probe.promise).or_default() += 1,
+            ProbeOutcome::NotAsked => {}
+            ProbeOutcome::Breaks(violation, setups) => {
                 return Err(self.smallest(bench, probe, scan, (violation, setups)));
             }
         }
@@ -189,7 +189,7 @@ impl Conformance {
     ) -> Broken {
         let promise = found.0.promise;
         let breaks = |probe: &Probe, scan: &MadeScan| match bench.ask(probe, scan, None) {
-            Verdict::Breaks(violation, setups) if violation.promise == promise => {
+            ProbeOutcome::Breaks(violation, setups) if violation.promise == promise => {
                 Some((violation, setups))
             }
             _ => None,

@@ -213,9 +213,7 @@ impl MadeScan {
 
 /// The coordinates of a record and what it holds of the dimensions `named`.
 pub(super) fn told(schema: &Schema, record: &[u8], named: &[String]) -> String {
-    let is_told = |d: &&Dimension| {
-        names::XYZ.contains(&d.name.as_str()) || named.iter().any(|name| *name == d.name)
-    };
+    let is_told = |d: &&Dimension| names::XYZ.contains(&d.name.as_str()) || named.contains(&d.name);
     let mut text = String::new();
     for dimension in schema.dimensions.iter().filter(is_told) {
         let value = dimension.world(record, schema.endian);

@@ -1,7 +1,7 @@
 //! Proof for stages of your own: a check that a test calls. Behind the feature `testing`.
 //!
-//! A run gives the same whatever its tiles, threads, memory and files are, because every stage keeps
-//! the [promises](Promise) that the engine relies on, and says in its
+//! A run gives the same whatever its tiles, threads, memory and files are, because every stage
+//! keeps the [promises](Promise) that the engine relies on, and says in its
 //! [needs](crate::stage::Needs) what it looks at. Nothing but a test can hold a stage to that. A
 //! [`Conformance`] makes small scans (points in a box, clusters, planes, copies by the hundred, one
 //! point, none, far from the origin, at the ends of what integers hold), runs the stage on each in
@@ -68,8 +68,8 @@
 //! the two runs that differ, the first record that they differ in, and the smallest scan on which
 //! they do. To try more, give other seeds.
 //!
-//! What it finds is by trying: a stage that depends on what no scan has here (a dimension of values
-//! beyond the common, thousands of points in a cell) passes. It sees no memory that a stage takes on
+//! What it finds is by trying: a stage that depends on what no scan has here (rare values of a
+//! dimension, thousands of points in a cell) passes. It sees no memory that a stage takes on
 //! threads of its own, and nothing that a stage writes elsewhere.
 
 mod allocator;

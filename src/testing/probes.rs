@@ -3,7 +3,7 @@
 
 use super::answer::Sameness;
 use super::bench::{Probe, ProbeKind};
-use super::chain::Declared;
+use super::chain::DeclaredNeeds;
 use super::promise::Promise;
 use super::setup::{Setup, instruction_sets};
 use crate::point::names;
@@ -13,7 +13,7 @@ use crate::synth::Random;
 const PLAIN: Setup = Setup::PLAIN;
 
 /// The probes of a scan, chosen by `seed`.
-pub(super) fn probes(declared: &Declared, seed: u64) -> Vec<Probe> {
+pub(super) fn probes(declared: &DeclaredNeeds, seed: u64) -> Vec<Probe> {
     let mut random = Random::new(seed, 2);
     let mut up_to = |most: usize| 1 + (random.unit() * most as f64) as usize;
     let points = [1, 2, 3, 8, 24][up_to(5) - 1];

@@ -20,7 +20,7 @@ use crate::tile::Tile;
 use crate::{Error, Result};
 
 /// A stage and who looks at it.
-struct Watched<S: ?Sized> {
+struct WatchedStage<S: ?Sized> {
     kind: String,
     witness: Arc<Witness>,
     stage: Box<S>,
@@ -30,9 +30,9 @@ struct Watched<S: ?Sized> {
 pub(super) fn watched(kind: &str, role: Role, witness: &Arc<Witness>) -> Role {
     let (kind, witness) = (kind.to_owned(), witness.clone());
     match role {
-        Role::Transform(stage) => Role::Transform(Box::new(Watched { kind, witness, stage })),
-        Role::TileOp(stage) => Role::TileOp(Box::new(Watched { kind, witness, stage })),
-        Role::ScanOp(stage) => Role::ScanOp(Box::new(Watched { kind, witness, stage })),
+        Role::Transform(stage) => Role::Transform(Box::new(WatchedStage { kind, witness, stage })),
+        Role::TileOp(stage) => Role::TileOp(Box::new(WatchedStage { kind, witness, stage })),
+        Role::ScanOp(stage) => Role::ScanOp(Box::new(WatchedStage { kind, witness, stage })),
         other => other,
     }
 }
@@ -47,7 +47,7 @@ pub(super) fn entered(tally: &Tally, kind: &str) -> (u64, u64) {
 }
 
 #[warn(clippy::missing_trait_methods, reason = "every call is passed on")]
-impl Transform for Watched<dyn Transform> {
+impl Transform for WatchedStage<dyn Transform> {
     fn needs(&self) -> Needs {
         self.stage.needs()
     }
@@ -101,7 +101,7 @@ impl Transform for Watched<dyn Transform> {
     }
 }
 
-impl<S: TileOp + ?Sized> Watched<S> {
+impl<S: TileOp + ?Sized> WatchedStage<S> {
     /// Lets the stage work on `tile`: it sees what `needs` say, and what it does is compared with
     /// them.
     fn work(
@@ -163,7 +163,7 @@ impl<S: TileOp + ?Sized> Watched<S> {
 }
 
 #[warn(clippy::missing_trait_methods, reason = "every call is passed on")]
-impl<S: TileOp + ?Sized> TileOp for Watched<S> {
+impl<S: TileOp + ?Sized> TileOp for WatchedStage<S> {
     fn needs(&self) -> Needs {
         self.stage.needs()
     }
@@ -219,7 +219,7 @@ impl<S: TileOp + ?Sized> TileOp for Watched<S> {
     }
 }
 
-impl AnyScanOp for Watched<dyn AnyScanOp> {
+impl AnyScanOp for WatchedStage<dyn AnyScanOp> {
     fn gather_needs(&self) -> Needs {
         self.stage.gather_needs()
     }

@@ -141,7 +141,7 @@ fn a_stage_that_depends_on_time_is_found() {
     let broken = on_tiles(removes, |tile, tally| {
         remove_if(tile, tally, |_, i| {
             let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
-            (now.as_nanos() / 8 + i as u128) % 2 == 0
+            (now.as_nanos() / 8 + i as u128).is_multiple_of(2)
         })
     });
     assert_broken(&broken, Promise::Time, 16, "comes out of the");
