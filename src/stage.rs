@@ -8,6 +8,7 @@ mod scan;
 mod sink;
 mod source;
 mod tile_op;
+mod unread;
 
 use crate::Result;
 use crate::expression::KeyExpression;
@@ -25,6 +26,7 @@ pub use scan::{AnyScanOp, Gathered, ScanOp, StoredSummaries, Summary};
 pub use sink::{ChunkSize, CreateSink, Encode, Encoded, Order, Sink, SinkSummary};
 pub use source::{Contradiction, Input, OpenSource, Part, Source};
 pub use tile_op::{Forecast, ScanFacts, TileOp};
+pub use unread::Unread;
 
 /// Changes or removes points as they stream by; knows no neighbours.
 ///

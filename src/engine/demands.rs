@@ -5,6 +5,7 @@
 //! which a run leases them and a refusal lists them.
 
 use super::by_rank::ordering_bytes;
+use super::by_square::writing_bytes;
 use super::chunk::OutputChunk;
 use super::encoding::ChunkEncoder;
 use super::filtering::Filtering;
@@ -38,7 +39,7 @@ impl Demands {
         Holders::of([
             ("program", Bytes(self.resident) + PROCESS_OVERHEAD),
             ("overhead of threads", self.by_threads(THREAD_OVERHEAD)),
-            ("list of records by input", self.lists),
+            ("lists of records by output", self.lists),
         ])
     }
 
@@ -154,6 +155,12 @@ impl Demands {
             ("queue of chunks", self.by_threads(chunks)),
             ("encoding of chunks", self.by_threads(Bytes(self.chunk.bytes) * A_THREAD)),
         ])
+    }
+
+    /// What is held while the files of squares are written.
+    pub fn squares(&self) -> Holders {
+        let writing = writing_bytes(self.chunk, self.stride + self.columns.row);
+        Holders::of([("writing of squares", self.by_threads(writing))])
     }
 
     /// Bytes of a tile per position it holds, the product that it leaves behind included.

@@ -5,6 +5,7 @@ mod builder;
 mod builtin;
 mod described;
 mod draft;
+mod elsewhere;
 mod explained;
 mod fault;
 mod foreign;

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::draft::{Draft, StageDraft};
+use super::elsewhere;
 use super::keys;
 use super::mistake::{Mistake, SourceText};
 use super::node::{KeyEntry, Node, NodeValue};
@@ -15,7 +16,6 @@ use super::written::WrittenText;
 use crate::graph::RunSettings;
 use crate::graph::{Graph, GraphStage, LimitKeys, Limits};
 use crate::stage::Role;
-use crate::stage::StagePlace;
 
 /// The graph that `draft` is, and what is wrong with it. It is read from `file` and `sources`.
 pub(super) fn build(
@@ -40,7 +40,7 @@ pub(super) fn build(
     outputs::check(file, &draft, &placed, &settings, &mut mistakes);
     let file = file.map(Path::to_owned);
     let stages = placed.into_iter().flatten().collect();
-    (Graph { origin: origin.clone(), settings, stages, file }, mistakes)
+    (Graph { origin: origin.clone(), settings, stages, file, ..Graph::default() }, mistakes)
 }
 
 fn place(
@@ -51,7 +51,7 @@ fn place(
 ) -> Result<GraphStage, Vec<Mistake>> {
     let SourceText { text, origin, .. } = &sources[0];
     let line = text.as_bytes()[..at.start.min(text.len())].iter().filter(|&&b| b == b'\n').count();
-    let place = StagePlace::new(origin.as_str(), line + 1).knowing(registry.formats());
+    let place = registry.place(origin, line + 1);
     let (limits, own) = match registry.is_limited(kind) {
         true => split_limits(&stage.keys),
         false => {
@@ -59,6 +59,9 @@ fn place(
         }
     };
     let Some(built) = registry.build(kind, &own, &place) else {
+        if let Some((told, note)) = elsewhere::told(kind, &own) {
+            return Err(vec![Mistake::new(at.clone(), told).note(note)]);
+        }
         let kinds = registry.kinds().map(|(kind, _)| kind);
         let told = format!("there is no stage `{kind}`");
         return Err(vec![Mistake::word(at.clone(), told, kind, "stages", kinds)]);
@@ -83,6 +86,7 @@ fn place(
         from: Vec::new(),
         line: Some(place.line()),
         written: Arc::new(WrittenText::new(sources, &stage.keys)),
+        is_limited: registry.is_limited(kind),
         limits: Limits::default(),
         role,
         keys,

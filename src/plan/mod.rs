@@ -3,10 +3,12 @@
 //! point but a few that it looks at and those of a trial.
 
 mod columns;
+mod demanded;
 mod document;
 mod fitted;
 mod limits;
 mod look;
+mod order;
 mod outline;
 mod passes;
 mod places;

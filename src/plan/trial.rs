@@ -111,7 +111,7 @@ impl Plan {
         let records = Records::new((**schema).clone(), chosen)?;
         let graph = on_records(again, records.with_metadata(source.metadata().clone()));
         let share = points as f64 / source.points().max(points).max(1) as f64;
-        let mut graph = rehearsed(graph, share, &source.inputs(), &scratch, &written)?;
+        let mut graph = rehearsed(graph, share, &*source, &scratch, &written)?;
         self.equip(&mut graph.settings, folder)?;
         let done = graph.plan(&Overrides::default())?.run(&Unheard(watch))?;
         drop(scratch);
