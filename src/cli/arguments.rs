@@ -1,6 +1,7 @@
 //! What can be typed.
 
 mod plain;
+mod showing;
 
 use std::path::PathBuf;
 
@@ -16,6 +17,7 @@ use crate::quantity::parse_count;
 pub(super) use plain::{
     CompletionsArguments, Drawing, InfoArguments, ManArguments, NewArguments, StagesArguments,
 };
+pub(super) use showing::{ExplainArguments, GraphArguments, PredictArguments};
 
 /// Reduces laser scans that do not fit in memory to the points that matter.
 #[derive(Debug, Parser)]
@@ -159,19 +161,6 @@ pub(super) struct PlanArguments {
     pub pipeline: PipelineArguments,
     #[command(flatten)]
     pub common: CommonArguments,
-}
-
-/// Of `plan`.
-#[derive(Debug, Args)]
-pub(super) struct PredictArguments {
-    #[command(flatten)]
-    pub planned: PlanArguments,
-    /// Print JSON
-    #[arg(long)]
-    pub json: bool,
-    /// Read headers alone: what only a trial on a part of the points can tell is left out
-    #[arg(long)]
-    pub no_trial: bool,
 }
 
 #[derive(Debug, Args)]
@@ -370,24 +359,6 @@ pub(super) struct PictureArguments {
 
 fn parse_width(text: &str) -> Result<u32, String> {
     within(text, 64, 4096).map(|width| width as u32)
-}
-
-#[derive(Debug, Args)]
-pub(super) struct GraphArguments {
-    #[command(flatten)]
-    pub pipeline: PipelineArguments,
-    /// What it is drawn as
-    #[arg(long = "as", value_name = "HOW", default_value = "text")]
-    pub drawing: Drawing,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct ExplainArguments {
-    #[command(flatten)]
-    pub pipeline: PipelineArguments,
-    /// Print JSON
-    #[arg(long)]
-    pub json: bool,
 }
 
 #[derive(Debug, Args)]

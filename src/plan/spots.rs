@@ -7,13 +7,13 @@ const BITS: u32 = 8;
 /// Where records lie: the fine column of each, numbered so that those of a larger column follow
 /// each other.
 pub(super) struct Spots {
-    grid: Grid,
+    grid: FineColumns,
     columns: Vec<u16>,
 }
 
 /// Some of the columns in which records lie.
 pub(super) struct ChosenSpots {
-    grid: Grid,
+    grid: FineColumns,
     /// Bits of a fine column that one of these leaves out.
     level: u32,
     is_chosen: Vec<bool>,
@@ -21,13 +21,13 @@ pub(super) struct ChosenSpots {
 
 /// Fine columns: squares along the two axes along which records are spread the widest.
 #[derive(Clone, Copy)]
-struct Grid {
+struct FineColumns {
     axes: [usize; 2],
     lo: [f64; 2],
     side: f64,
 }
 
-impl Grid {
+impl FineColumns {
     /// The fine column of a place, which is the first for what is nowhere; None beyond the records
     /// that the grid was made for.
     fn column(&self, at: [f64; 3]) -> Option<u16> {
@@ -53,7 +53,7 @@ impl Spots {
         }
         let axes = widest(lo, hi);
         let side = (hi[axes[0]] - lo[axes[0]]) / f64::from(1 << BITS);
-        let grid = Grid { axes, lo: axes.map(|axis| lo[axis]), side };
+        let grid = FineColumns { axes, lo: axes.map(|axis| lo[axis]), side };
         Spots { grid, columns: places.map(|at| grid.column(at).unwrap_or_default()).collect() }
     }
 
