@@ -263,16 +263,23 @@ impl Error {
             return errors.remove(0);
         }
         let number = errors.len();
-        let one = |error: &Error| match error.remedy() {
-            Some(help) => format!("{error}\n  = {help}"),
-            None => error.to_string(),
-        };
-        let all: Vec<String> = errors.iter().map(one).collect();
+        let all: Vec<String> = errors.iter().map(Error::with_causes).collect();
         // Of several kinds, that which is for the user of the pipeline to mend.
         let kinds = || errors.iter().map(Error::kind);
         let kind = kinds().find(|kind| *kind == ErrorKind::Pipeline);
         let kind = kind.or_else(|| kinds().next()).unwrap_or(ErrorKind::Internal);
         Error::new(kind, format!("{number} mistakes\n{}", all.join("\n")))
+    }
+
+    /// All that it says, its causes and its remedy included.
+    fn with_causes(&self) -> String {
+        let first = std::error::Error::source(self);
+        let causes = std::iter::successors(first, |cause| cause.source());
+        let causes: String = causes.map(|cause| format!(": {cause}")).collect();
+        match self.remedy() {
+            Some(help) => format!("{self}{causes}\n  = {help}"),
+            None => format!("{self}{causes}"),
+        }
     }
 
     /// Adds the cause beneath.

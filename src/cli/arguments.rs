@@ -1,7 +1,7 @@
 //! What can be typed.
 
+mod pipeline;
 mod plain;
-mod showing;
 
 use std::path::PathBuf;
 
@@ -14,10 +14,10 @@ use crate::graph::MOST_THREADS;
 use crate::picture::{ColorBy, View};
 use crate::quantity::parse_count;
 
+pub(super) use pipeline::{Drawing, ExplainArguments, GraphArguments, PipelineArguments};
 pub(super) use plain::{
-    CompletionsArguments, Drawing, InfoArguments, ManArguments, NewArguments, StagesArguments,
+    CompletionsArguments, InfoArguments, ManArguments, NewArguments, StagesArguments,
 };
-pub(super) use showing::{ExplainArguments, GraphArguments, PredictArguments};
 
 /// Reduces laser scans that do not fit in memory to the points that matter.
 #[derive(Debug, Parser)]
@@ -137,23 +137,6 @@ fn parse_threads(text: &str) -> Result<usize, String> {
     within(text, 1, MOST_THREADS as u64).map(|threads| threads as usize)
 }
 
-/// A pipeline, and what is put in the place of its values.
-#[derive(Debug, Args)]
-pub(super) struct PipelineArguments {
-    /// The pipeline file, in TOML or JSON; or a pipeline in one line, which has ` ! ` between its
-    /// stages: 'read in.laz ! normals ! write out.ply'
-    #[arg(value_name = "PIPELINE")]
-    pub pipeline: String,
-    /// Put a value in the place of the pipeline's: the stage by its name or kind (KIND.N, from 1,
-    /// where there are several), or `run`
-    #[arg(long = "set", value_name = "STAGE.KEY=VALUE")]
-    pub sets: Vec<String>,
-    /// Give a parameter of the pipeline a value; `--help` behind a pipeline file lists those that
-    /// it has
-    #[arg(long = "param", value_name = "NAME=VALUE")]
-    pub params: Vec<String>,
-}
-
 /// Of commands that plan a pipeline, or run it.
 #[derive(Debug, Args)]
 pub(super) struct PlanArguments {
@@ -161,6 +144,19 @@ pub(super) struct PlanArguments {
     pub pipeline: PipelineArguments,
     #[command(flatten)]
     pub common: CommonArguments,
+}
+
+/// Of `plan`.
+#[derive(Debug, Args)]
+pub(super) struct PredictArguments {
+    #[command(flatten)]
+    pub planned: PlanArguments,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Read headers alone: what only a trial on a part of the points can tell is left out
+    #[arg(long)]
+    pub no_trial: bool,
 }
 
 #[derive(Debug, Args)]

@@ -61,7 +61,8 @@ pub(super) fn check(
             console.result(format_args!("{name} is right: {}", said(&plan.outline())))
         }
         Err(error) => {
-            let others = inputs.iter().filter(|input| error.path() != Some(input));
+            let told = error.to_string(); // of one input, or of several and other mistakes
+            let others = inputs.iter().filter(|input| !told.contains(&shown(input).to_string()));
             let wrong = |input: &PathBuf| {
                 io::describe(input, registry.formats()).err().map(|e| e.at(input))
             };

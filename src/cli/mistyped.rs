@@ -81,7 +81,12 @@ pub(super) fn told(
         }
         ErrorKind::UnknownArgument if argument.starts_with('-') => {
             let told = format!("`{}` has no {argument}", command.get_name());
-            message(&told, &argument, meant(like(command, &argument).iter()).trim_end())
+            let like = like(command, &argument);
+            let note = match like.is_empty() {
+                true => format!("`pointmill {} --help` lists its options", command.get_name()),
+                false => meant(like.iter()).trim_end().to_owned(),
+            };
+            message(&told, &argument, &note)
         }
         ErrorKind::UnknownArgument => {
             let told = format!("`{}` takes no more arguments", command.get_name());

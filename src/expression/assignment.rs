@@ -8,7 +8,7 @@ use super::fault::ExpressionFault;
 use super::lanes::{LANES, LoadedField};
 use super::parser::parse_assignment;
 use super::text::{FromText, is_its_text};
-use super::tree::ExpressionTree;
+use super::tree::{ExpressionTree, TreeNode};
 use crate::point::{Dimension, PointBatch, names};
 use crate::quantity::Figure;
 use crate::{Error, Result};
@@ -69,8 +69,17 @@ impl Assignment {
     }
 
     /// Refuses names that are not there, and a target that is no dimension of the records.
+    /// A number that the dimension can hold for no point is refused, too.
     pub(crate) fn check(&self, names: Names<'_>) -> Result<(), ExpressionFault> {
-        self.bind(names).map(drop)
+        let (field, _) = self.bind(names)?;
+        let TreeNode::Number(number) = self.tree.node else { return Ok(()) };
+        let target = LoadedField::of_record(&field, names.schema);
+        let stride = names.schema.stride;
+        if target.store(&[number], &mut vec![0; stride], stride).is_ok() {
+            return Ok(());
+        }
+        let told = format!("{} ({}) cannot hold it", self.target.0, type_of(&field));
+        Err(ExpressionFault::new(self.tree.span.clone(), told))
     }
 
     fn bind(&self, names: Names<'_>) -> Result<(Dimension, BoundValue), ExpressionFault> {

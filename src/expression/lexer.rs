@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::fault::ExpressionFault;
+use crate::error::is_control;
 
 /// A word or sign and where it stands.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +26,10 @@ pub(super) enum TokenKind {
 /// Longer ones before those that they begin with.
 const SIGNS: [&str; 18] =
     ["==", "!=", "<=", ">=", "..", "<", ">", "+", "-", "*", "/", "%", "(", ")", "[", "]", ",", "="];
+
+/// What helps where a number has a unit.
+pub(super) const UNITLESS: &str =
+    "numbers of an expression have no units: lengths are in the unit of the scan";
 
 /// Signs of other languages, and what is written here.
 const FOREIGN: [(&str, &str); 6] =
@@ -79,9 +84,11 @@ fn token(text: &str, first: char) -> Result<(TokenKind, usize), ExpressionFault>
     let help = match first {
         '"' | '\'' => "dimensions hold numbers; a name with spaces stands in backticks",
         '.' => "write a digit before the point",
+        ':' => "a range is written with two points: `Classification in 2..6`",
         _ => "",
     };
-    let told = format!("`{}` is no sign of an expression", first.escape_debug());
+    let shown = if is_control(first) { '\u{fffd}' } else { first };
+    let told = format!("`{shown}` is no sign of an expression");
     Err(ExpressionFault::new(0..first.len_utf8(), told).help(help))
 }
 
@@ -109,8 +116,7 @@ fn number(text: &str) -> Result<(TokenKind, usize), ExpressionFault> {
     if behind > 0 {
         let (number, unit) = (&text[..len], &text[len..len + behind]);
         let told = format!("`{number}{unit}` is no number");
-        let help = "numbers of an expression have no units: lengths are in the unit of the scan";
-        return Err(ExpressionFault::new(0..len + behind, told).help(help));
+        return Err(ExpressionFault::new(0..len + behind, told).help(UNITLESS));
     }
     match text[..len].replace('_', "").parse::<f64>() {
         Ok(value) if value.is_finite() => Ok((TokenKind::Number(value), len)),

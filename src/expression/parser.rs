@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use super::fault::{ExpressionFault, quoted};
-use super::lexer::{Token, TokenKind, tokens};
+use super::lexer::{Token, TokenKind, UNITLESS, tokens};
 use super::rules::{DEEPEST, condition, depth, direction, not, number, relation, too_deep};
 use super::tree::{ExpressionTree, Function, Operator, TreeNode};
 
@@ -96,7 +96,13 @@ impl Parser {
             TokenKind::Number(_) => "there is no sign before this number".to_owned(),
         };
         let words = ["and", "or", "==", "<", "in"];
-        let help = format!("{} may stand there", quoted(words));
+        let is_number = |token: &Token| matches!(token.kind, TokenKind::Number(_));
+        let is_word = matches!(token.kind, TokenKind::Word(_));
+        let behind_number = self.at.checked_sub(1).is_some_and(|at| is_number(&self.tokens[at]));
+        let help = match is_word && behind_number {
+            true => UNITLESS.to_owned(),
+            false => format!("{} may stand there", quoted(words)),
+        };
         Err(ExpressionFault::new(token.span.clone(), told).help(help))
     }
 
@@ -324,7 +330,11 @@ impl Parser {
             }
             TokenKind::Word(word) => {
                 let told = format!("`{word}` stands where a number or a name belongs");
-                return Err(ExpressionFault::new(span, told));
+                let fault = ExpressionFault::new(span, told);
+                return Err(match word.as_str() {
+                    "nan" => fault.help("nothing equals nan: ask `Z is nan`"),
+                    _ => fault,
+                });
             }
             TokenKind::Sign(sign) => {
                 let told = format!("`{sign}` stands where a number or a name belongs");
@@ -332,7 +342,8 @@ impl Parser {
                 return Err(if sign == "=" { error.help("write `==`") } else { error });
             }
             TokenKind::End => {
-                return Err(ExpressionFault::new(span, "the expression ends too early"));
+                let fault = ExpressionFault::new(span, "the expression ends too early");
+                return Err(fault.help("a number, a name or `(` belongs here"));
             }
         };
         Ok(ExpressionTree { node, span })

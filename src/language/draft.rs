@@ -228,8 +228,9 @@ impl Draft {
         registry: &Registry,
     ) -> Result<(), Vec<Mistake>> {
         let Some((stage, key)) = set.address() else {
-            let told = Mistake::new(set.place(source, ""), "the value has no address");
-            return Err(vec![told.note("write stage.key=value, or run.key=value")]);
+            let told = "it is not said of which stage the value is";
+            let told = Mistake::new(set.place(source, set.written()), told);
+            return Err(vec![told.note("write STAGE.KEY=VALUE, or run.KEY=VALUE")]);
         };
         if stage == PARAMETERS {
             let name = (key.to_owned(), set.place(source, key));

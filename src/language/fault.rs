@@ -64,7 +64,7 @@ impl Fault {
                 let told = format!("`{key}`: {}", fault.told);
                 Mistake::new(place, told).note(fault.help.clone())
             }
-            Problem::Missing(key) => Mistake::new(place, format!("`{subject}` needs `{key}`")),
+            Problem::Missing(lacks) => Mistake::new(place, format!("`{key}` needs `{lacks}`")),
             Problem::Told => Mistake::new(place, format!("`{key}` is wrong")),
             Problem::Wrong(what, near) => {
                 let near = near.as_ref().map(|near| format!("did you mean `{near}`?"));
@@ -132,7 +132,9 @@ impl de::Error for Fault {
 fn plain(expected: &dyn Expected) -> String {
     let name = expected.to_string();
     match name.as_str() {
-        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number from 0",
+        "u8" => "a whole number from 0 to 255",
+        "u16" => "a whole number from 0 to 65535",
+        "u32" | "u64" | "usize" => "a whole number from 0",
         "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
         "a nonzero u8" | "a nonzero u32" | "a nonzero u64" | "a nonzero usize" => {
             "a whole number from 1"
@@ -140,7 +142,7 @@ fn plain(expected: &dyn Expected) -> String {
         "f32" | "f64" => "a number",
         "a string" | "path string" => "a text in quotes",
         "a boolean" => "true or false",
-        "a sequence" => "a list",
+        "a sequence" => "a list in brackets",
         _ => match name.strip_prefix("an array of length ") {
             Some(length) => return format!("a list of {length} values"),
             None => &name,

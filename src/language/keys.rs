@@ -8,6 +8,7 @@ use serde::de::{self, DeserializeOwned, Deserializer, IntoDeserializer, Visitor}
 use super::fault::{Fault, Problem};
 use super::mistake::Mistake;
 use super::node::{KeyEntry, Node, NodeValue};
+use crate::error::nearest;
 use crate::expression::{Assignment, Condition, FromText, ONE_OR_SEVERAL};
 use crate::quantity::parse_count;
 
@@ -22,6 +23,7 @@ pub(crate) fn read<T: DeserializeOwned>(
     let mut rest = keys.clone();
     let mut mistakes = Vec::new();
     let mut dropped: Vec<String> = Vec::new();
+    let mut missing: Vec<(usize, &'static str)> = Vec::new();
     loop {
         let unknown = RefCell::new(Vec::new());
         let outcome =
@@ -31,8 +33,10 @@ pub(crate) fn read<T: DeserializeOwned>(
             Ok(_) => None,
             Err(fault) => Some(fault),
         };
+        let unknown = unknown.into_inner();
         let Some(fault) = fault else {
-            mistakes.extend(unknown.into_inner().iter().map(|f| f.mistake(subject, keys)));
+            forget_mistyped(&mut mistakes, missing, &unknown);
+            mistakes.extend(unknown.iter().map(|f| f.mistake(subject, keys)));
             return Err(mistakes);
         };
         let is_told = match &fault.problem {
@@ -41,14 +45,36 @@ pub(crate) fn read<T: DeserializeOwned>(
             _ => false,
         };
         if !is_told {
+            if let (Problem::Missing(key), None) = (&fault.problem, &fault.key) {
+                missing.push((mistakes.len(), key));
+            }
             mistakes.push(fault.mistake(subject, keys));
         }
         // Try again without the key at fault: the next mistake comes to light.
         if !fault.key.as_deref().is_some_and(|key| remove(&mut rest, key)) {
-            mistakes.extend(unknown.into_inner().iter().map(|f| f.mistake(subject, keys)));
+            forget_mistyped(&mut mistakes, missing, &unknown);
+            mistakes.extend(unknown.iter().map(|f| f.mistake(subject, keys)));
             return Err(mistakes);
         }
         dropped.extend(fault.key);
+    }
+}
+
+/// Takes those out of `mistakes` that tell of a `missing` key which an `unknown` one was meant to
+/// be: that is told of the unknown one.
+fn forget_mistyped(
+    mistakes: &mut Vec<Mistake>,
+    missing: Vec<(usize, &'static str)>,
+    unknown: &[Fault],
+) {
+    let is_meant = |lacks: &str| {
+        unknown.iter().any(|fault| match &fault.problem {
+            Problem::UnknownKey(key, _) => nearest(key, &[lacks.to_owned()]).is_some(),
+            _ => false,
+        })
+    };
+    for (at, _) in missing.into_iter().rev().filter(|(_, lacks)| is_meant(lacks)) {
+        mistakes.remove(at);
     }
 }
 

@@ -59,7 +59,7 @@ fn stage(
             (None, None) if n == 0 && !registry.has(name) => continue,
             (None, main) => {
                 mistakes.push(no_key(word, name, main));
-                continue;
+                break; // the words behind it are of the same value, most likely
             }
         };
         let (key, at) = key;

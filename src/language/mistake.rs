@@ -42,7 +42,9 @@ impl SourceText {
         let Some(setting) = &self.setting else { return message };
         let key = setting.rsplit('.').next().unwrap_or(setting);
         let told = |name: &str| message.strip_prefix(&format!("`{name}`"));
-        match told(setting).or_else(|| told(key)) {
+        // The value is shown below the message.
+        let assigned = || Some(message.strip_prefix(&format!("`{setting} = "))?.split_once('`')?.1);
+        match told(setting).or_else(|| told(key)).or_else(assigned) {
             Some(rest) => {
                 let rest = rest.trim_start_matches(':').trim_start();
                 rest.strip_prefix(key).and_then(|rest| rest.strip_prefix(' ')).unwrap_or(rest)

@@ -87,16 +87,29 @@ pub(crate) fn parse(text: &str, source: usize) -> Result<Vec<KeyEntry>, Vec<Mist
         .iter()
         .map(|e| {
             let place = TextPlace::new(source, e.span().unwrap_or(text.len()..text.len()));
-            let mistake = Mistake::new(place, format!("not TOML: {}", e.message()));
-            let key = e.span().and_then(|span| text.get(span)).unwrap_or_default();
-            match e.message().starts_with("duplicate key") && key.trim() == "kind" {
-                true => mistake.note("a second stage begins with a line [[stage]] of its own"),
-                false => mistake,
+            let key = e.span().and_then(|span| text.get(span)).unwrap_or_default().trim();
+            if e.message().starts_with("duplicate key") {
+                let mistake = Mistake::new(place, format!("`{key}` is given twice"));
+                return match key {
+                    "kind" => mistake.note("a second stage begins with a line [[stage]]"),
+                    _ => mistake,
+                };
             }
+            Mistake::new(place, format!("not TOML: {}", in_plain_words(e.message())))
         })
         .collect();
     let entries = entries(table.into_inner(), source, &mut mistakes);
     if mistakes.is_empty() { Ok(entries) } else { Err(mistakes) }
+}
+
+/// What the parser of TOML says, without the words of its grammar where users meet it most.
+fn in_plain_words(message: &str) -> &str {
+    match message {
+        "string values must be quoted, expected literal string" => "a text stands in quotes",
+        "invalid basic string, expected `\"`" => "the text has no `\"` at its end",
+        "invalid literal string, expected `'`" => "the text has no `'` at its end",
+        _ => message,
+    }
 }
 
 /// Reads a value as it stands behind `=` in TOML; what is no TOML is a text (`out.laz`, `6deg`).
@@ -195,7 +208,7 @@ fn convert(
             }
         },
         DeValue::Datetime(_) => {
-            mistakes.push(refused("no key takes a date"));
+            mistakes.push(refused("no key takes a date").note("a text stands in quotes"));
             return None;
         }
         DeValue::Array(list) => NodeValue::List(

@@ -194,6 +194,9 @@ impl Declared {
 pub(super) fn used(draft: &Draft) -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     draft.values().for_each(|node| references::enter_names(node, &mut names));
+    // No kind takes a parameter: the stage is told so, and the parameter is not told, too.
+    let kinds = draft.stages.iter().filter_map(|stage| stage.kind.as_ref());
+    kinds.for_each(|(kind, _)| references::enter_text(kind, &mut names));
     names
 }
 
@@ -309,7 +312,9 @@ fn unused<'a>(
     let names: Vec<String> = declared.iter().map(|one| one.name.clone()).collect();
     let meant: BTreeSet<String> =
         used.iter().filter_map(|name| nearest(name, &names).cloned()).collect();
-    let unused = declared.iter().filter(move |one| !meant.contains(&one.name));
+    // What has no name that a value could say is told so already.
+    let named = declared.iter().filter(|one| references::is_name(&one.name));
+    let unused = named.filter(move |one| !meant.contains(&one.name));
     unused.map(|one| {
         let told = format!("no value uses the parameter `{}`", one.name);
         let help = format!("write `${{{}}}` where its value is to stand", one.name);

@@ -32,7 +32,7 @@ use crate::{Error, Result};
 /// Bytes of the longest pipeline file: whoever names a scan in its place waits for no gigabytes.
 const LONGEST: u64 = 16 << 20;
 
-#[doc = include_str!("pipeline.md")]
+#[doc = include_str!("../../docs/pipeline.md")]
 #[derive(Clone)]
 pub struct PipelineText {
     form: TextForm,

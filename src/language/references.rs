@@ -83,22 +83,35 @@ fn reference(inside: &str) -> Result<Piece<'_>, (String, &'static str)> {
 
 /// True for what names parameters and variables.
 pub(super) fn is_name(word: &str) -> bool {
-    !word.is_empty() && word.chars().all(|c| c.is_alphanumeric() || c == '-' || c == '_')
+    !word.is_empty() && word.chars().all(is_part_of_name)
+}
+
+fn is_part_of_name(c: char) -> bool {
+    c.is_alphanumeric() || c == '-' || c == '_'
 }
 
 /// Enters the parameters that the texts of `node` refer to.
 pub(super) fn enter_names(node: &Node, names: &mut BTreeSet<String>) {
     match &node.value {
-        NodeValue::Text(text) => {
-            for (piece, _) in pieces(text).unwrap_or_default() {
-                if let Piece::Parameter(name) = piece {
-                    names.insert(name.to_owned());
-                }
-            }
-        }
+        NodeValue::Text(text) => enter_text(text, names),
         NodeValue::List(list) => list.iter().for_each(|item| enter_names(item, names)),
         NodeValue::Table(entries) => entries.iter().for_each(|e| enter_names(&e.node, names)),
         _ => {}
+    }
+}
+
+/// The names of the parameters that a text refers to; where a reference is wrong, what all of them
+/// begin with: that is told, and not that a parameter is of no use.
+pub(super) fn enter_text(text: &str, names: &mut BTreeSet<String>) {
+    let Ok(pieces) = pieces(text) else {
+        let begun = text.split("${").skip(1);
+        let name = |begun: &str| begun.chars().take_while(|c| is_part_of_name(*c)).collect();
+        return names.extend(begun.map(name));
+    };
+    for (piece, _) in pieces {
+        if let Piece::Parameter(name) = piece {
+            names.insert(name.to_owned());
+        }
     }
 }
 

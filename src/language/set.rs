@@ -113,7 +113,12 @@ impl Set {
         SourceText { origin, text, has_lines: false, setting }
     }
 
-    /// The stage part and the key part of the address.
+    /// The address as it was written.
+    pub(crate) fn written(&self) -> &str {
+        &self.address
+    }
+
+    /// The stage part and the key part of the address, if it has both.
     pub(crate) fn address(&self) -> Option<(&str, &str)> {
         self.address.rsplit_once('.').filter(|(stage, key)| !stage.is_empty() && !key.is_empty())
     }

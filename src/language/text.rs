@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use super::draft::{Draft, StageDraft};
 use super::elsewhere;
+use super::foreign;
 use super::keys;
-use super::mistake::{Mistake, SourceText};
+use super::mistake::{Mistake, SourceText, advice};
 use super::node::{KeyEntry, Node, NodeValue};
 use super::outputs;
 use super::place::PlacedWord;
@@ -63,8 +64,12 @@ fn place(
             return Err(vec![Mistake::new(at.clone(), told).note(note)]);
         }
         let kinds = registry.kinds().map(|(kind, _)| kind);
+        if kind.contains("${") {
+            let told = "`kind` takes no parameter: write the kind itself";
+            return Err(vec![Mistake::new(at.clone(), told).note(advice("", "stages", kinds))]);
+        }
         let told = format!("there is no stage `{kind}`");
-        return Err(vec![Mistake::word(at.clone(), told, kind, "stages", kinds)]);
+        return Err(vec![Mistake::word(at.clone(), told, foreign::kind(kind), "stages", kinds)]);
     };
     let given = limits.entries();
     let read = keys::read::<LimitKeys>(kind, &limits, &[]);
@@ -106,7 +111,12 @@ fn misplaced_limit(KeyEntry { key, at, .. }: &KeyEntry, role: &Role) -> Option<M
         Role::Transform(_) => "that work on tiles: this one sees no neighbours",
         Role::Source(_) | Role::Sink(_) | Role::Merge => "between a source and a sink",
     };
-    Some(Mistake::new(at.clone(), format!("`{key}` is for stages {which}")))
+    let help = match role {
+        Role::Sink(_) => "to write some of the records alone, put a `filter` above it",
+        Role::Source(_) | Role::Merge => "to go on with some of the records, put a `filter` below",
+        _ => "",
+    };
+    Some(Mistake::new(at.clone(), format!("`{key}` is for stages {which}")).note(help))
 }
 
 /// The keys that limit a stage, and the stage's own.

@@ -14,14 +14,15 @@ pub(super) fn check_names(stages: &[StageDraft], registry: &Registry, mistakes: 
         let taken = |s: &StageDraft| s.name.as_ref().is_some_and(|(other, _)| other == name);
         let word = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
         let wrong = if name.is_empty() || !name.chars().all(word) {
-            "a name is made of letters, digits, - and _"
+            "a name is made of letters, digits, - and _".to_owned()
         } else if ["run", "params"].contains(&name.as_str())
             || registry.has(name) && stage.kind.is_some()
         {
             // A stage without a kind is told that its name may be meant for one.
-            "the name means something else already"
+            let means = if registry.has(name) { "a kind of stage" } else { "a table of the file" };
+            format!("`{name}` is {means} already: give the stage a name of its own")
         } else if stages[..i].iter().any(taken) {
-            "another stage above has this name"
+            "another stage above has this name".to_owned()
         } else {
             continue;
         };
@@ -111,7 +112,9 @@ fn find(
         return Ok(found);
     }
     let is_kind = |draft: &StageDraft| draft.kind.as_ref().is_some_and(|(kind, _)| kind == name);
-    let note = if drafts[n..].iter().any(named) {
+    let note = if named(&drafts[n]) {
+        "a stage cannot take from itself".to_owned()
+    } else if drafts[n..].iter().any(named) {
         format!("put the stage `{name}` above this one")
     } else if drafts[..n].iter().any(is_kind) {
         format!("`from` means the `name` of a stage: give the `{name}` that is meant a name")

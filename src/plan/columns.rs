@@ -66,22 +66,20 @@ impl NewestColumns {
     }
 
     /// The computed dimension that an output calls `name`, of the newest column that has it.
-    pub fn dimension(&self, name: &str) -> Result<ComputedDimension> {
-        let found = self.0.iter().rev().find_map(|newest| newest.kind.part(name));
-        found.ok_or_else(|| {
-            let told = format!("the output wants {name}, which no stage computes");
-            Error::pipeline(told).help(self.remedy(name))
-        })
+    pub fn dimension(&self, name: &str) -> Option<ComputedDimension> {
+        self.0.iter().rev().find_map(|newest| newest.kind.part(name))
     }
 
-    /// What to write instead of `name`, which no column has.
-    fn remedy(&self, name: &str) -> String {
+    /// What to write instead of `names`, which no column has.
+    pub fn remedy(&self, names: &[&str]) -> String {
         let all = || self.0.iter().flat_map(|newest| newest.kind.parts());
-        if let Some(newest) = self.0.iter().find(|newest| newest.kind.name() == name) {
-            return format!("its numbers are {}", listed(newest.kind.parts(), "and"));
+        let is_named = |newest: &&NewestColumn| names.contains(&newest.kind.name());
+        if let Some(newest) = self.0.iter().find(is_named) {
+            let (name, parts) = (newest.kind.name(), listed(newest.kind.parts(), "and"));
+            return format!("the numbers of {name} are {parts}");
         }
-        let leave = format!("leave {name} out of `write.dimensions`");
-        match (giver(name), all().next()) {
+        let leave = format!("leave {} out of `write.dimensions`", listed(names, "and"));
+        match (names.iter().find_map(|name| giver(name)), all().next()) {
             (Some(stage), _) => format!("put a `{stage}` stage before it, or {leave}"),
             (None, Some(_)) => {
                 format!("{leave}; the stages above compute {}", listed(all(), "and"))

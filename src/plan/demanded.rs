@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::order::WriteOrder;
 use super::passes::Passes;
-use super::sorted::Sorted;
+use super::sorted::{Sorted, blame};
 use crate::budget::Bytes;
 use crate::engine::pass::{ColumnBytes, Op, Pass, standings};
 use crate::engine::shares::Demands;
@@ -26,7 +26,7 @@ pub(super) fn demands(
     settings: &RunSettings,
 ) -> Result<Demands> {
     let limit = settings.memory.unwrap_or_else(default_memory);
-    let chunks = chunks(&sorted.sinks, computed, (source, schema))?;
+    let chunks = chunks(sorted, computed, (source, schema))?;
     let columns = passes.iter().map(|pass| pass.column_bytes(computed));
     let ranked =
         order.in_input_order.iter().filter(|ranked| **ranked && order.mills).count() as u64;
@@ -73,16 +73,17 @@ fn threads(settings: &RunSettings) -> Result<usize> {
 
 /// The chunks of all outputs.
 fn chunks(
-    sinks: &[Box<dyn CreateSink>],
+    sorted: &Sorted,
     computed: &[Vec<ComputedDimension>],
     (source, schema): (&dyn Source, &Arc<Schema>),
 ) -> Result<Vec<ChunkSize>> {
     let (mut chunks, mut wrong) = (Vec::new(), Vec::new());
-    for (sink, computed) in sinks.iter().zip(computed) {
+    let sinks = sorted.sinks.iter().zip(&sorted.written_sinks);
+    for ((sink, written), computed) in sinks.zip(computed) {
         let metadata = Metadata { computed: computed.clone(), ..source.metadata().clone() };
         match sink.chunk(schema, &metadata) {
             Ok(chunk) => chunks.push(chunk),
-            Err(error) => wrong.push(error),
+            Err(error) => wrong.push(blame(&**written, error)),
         }
     }
     Error::all(wrong).map(|()| chunks)

@@ -11,7 +11,7 @@ use super::look::{Unfit, look, look_at_corners};
 use super::order::WriteOrder;
 use super::passes::{Passes, unroll};
 use super::places::{all_read, check_places, copies, each_input, square_sides};
-use super::sorted::Sorted;
+use super::sorted::{Sorted, blame};
 use super::stretch::Stretch;
 use super::transforms::{check_numbers, fit_transforms};
 use crate::engine::pass::{Pass, StageOp};
@@ -100,16 +100,14 @@ impl Graph {
         let whole_rims = self.whole_rims;
         let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
         let mut sorted = Sorted::new(self)?;
-        let open = &*sorted.source.1;
         let places = |read: &[PathBuf], sinks: &[Box<dyn CreateSink>]| {
             check_places(file.as_deref(), read, sinks, &settings)
         };
-        let (_, wrong) = places(&open.paths(), &sorted.sinks);
+        let (_, wrong) = places(&sorted.source.1.paths(), &sorted.sinks);
         let FittedStages { source, schemas, choices, passes, given } =
-            fit_stages(&mut sorted, wrong, &in_file)?;
+            fit_stages(&mut sorted, wrong)?;
         let schema = &schemas.last;
-        let open = &*sorted.source.1;
-        let read = all_read(open, &*source);
+        let read = all_read(&*sorted.source.1, &*source);
         let (mut files, wrong) = places(&read, &sorted.sinks);
         Error::all(wrong)?;
         let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;
@@ -167,12 +165,8 @@ struct FittedStages {
 }
 
 /// Opens the inputs and fits the stages to them. What is `wrong` so far is told with what is found
-/// here; `in_file` tells in which text a stage stands.
-fn fit_stages(
-    sorted: &mut Sorted,
-    mut wrong: Vec<Error>,
-    in_file: &impl Fn(Error) -> Error,
-) -> Result<FittedStages> {
+/// here.
+fn fit_stages(sorted: &mut Sorted, mut wrong: Vec<Error>) -> Result<FittedStages> {
     let source = match sorted.source.1.open() {
         Ok(source) => source,
         Err(error) => {
@@ -181,7 +175,7 @@ fn fit_stages(
         }
     };
     let (schemas, unfit) = fit_transforms(sorted, source.schema());
-    wrong.extend(unfit.into_iter().map(in_file));
+    wrong.extend(unfit);
     wrong.extend(check_limits(sorted, &schemas.last));
     wrong.extend(check_numbers(sorted, &*source).err());
     let (unfit, given) = fit(&mut sorted.ops, &source.metadata().units);
@@ -198,7 +192,8 @@ fn fit(ops: &mut [StageOp], units: &Units) -> (Vec<Error>, Vec<GivenLengths>) {
     let (mut wrong, mut given) = (Vec::new(), Vec::new());
     for stage in ops {
         let lengths = stage.op.tile().lengths();
-        wrong.extend(stage.op.tile_mut().convert(units).err());
+        let unfit = stage.op.tile_mut().convert(units).err();
+        wrong.extend(unfit.map(|error| blame(&*stage.written, error)));
         let texts = lengths.into_iter().filter(|(_, length)| length.has_unit());
         given.push(texts.map(|(key, length)| (key, length.to_string())).collect());
     }

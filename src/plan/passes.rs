@@ -5,6 +5,7 @@ use super::columns::{NewestColumns, missing};
 use super::limits::seen_by;
 use super::sorted::{Sorted, StageWork};
 use crate::engine::pass::{Branch, Call, Op, Pass, StageOp, decides, needs};
+use crate::error::listed;
 use crate::point::{ColumnKind, ComputedDimension, Scalar, Schema, names};
 use crate::stage::Needs;
 use crate::tile::Partition;
@@ -272,6 +273,9 @@ impl PassLayout<'_> {
                 |stage| format!("put a `{stage}` stage before it"),
             );
             self.wrong.push(missing(stage, name, &help));
+            // It is one mistake, however many stages below need the column, too.
+            self.at.columns.write(column, at);
+            self.at.columns.read(column);
             return Ok(());
         }
         if column.scalar() != Scalar::F64 || column.parts().len() > 1 {
@@ -334,16 +338,21 @@ impl PassLayout<'_> {
 
     /// The computed dimensions that a sink of what pass `at` finds or leaves writes.
     fn computed(&mut self, sink: usize, at: usize) -> Result<Vec<ComputedDimension>> {
-        let mut computed = Vec::new();
+        let (mut computed, mut unknown) = (Vec::new(), Vec::new());
         for name in self.sorted.sinks[sink].computed() {
-            let found = self.at.columns.dimension(name);
-            match found.map_err(|error| error.at(self.sorted.sinks[sink].path())) {
-                Ok(dimension) => {
+            match self.at.columns.dimension(name) {
+                Some(dimension) => {
                     self.bring(at, dimension.column);
                     computed.push(dimension);
                 }
-                Err(error) => self.wrong.push(error),
+                None => unknown.push(name.as_str()),
             }
+        }
+        if !unknown.is_empty() {
+            let told =
+                format!("the output wants {}, which no stage computes", listed(&unknown, "and"));
+            let error = self.sorted.written_sinks[sink].wrong_key("dimensions", told);
+            self.wrong.push(error.help(self.at.columns.remedy(&unknown)));
         }
         Ok(computed)
     }

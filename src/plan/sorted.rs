@@ -8,7 +8,7 @@ use crate::engine::pass::{Op, StageOp, StreamOp};
 use crate::graph::{Graph, GraphStage, Written};
 use crate::point::ColumnKind;
 use crate::stage::{CreateSink, OpenSource, Role};
-use crate::{Error, Result};
+use crate::{Error, ErrorKind, Result};
 
 /// What a stage behind the decode is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +31,8 @@ pub(super) struct Sorted {
     pub ops: Vec<StageOp>,
     pub filters: Vec<StreamOp>,
     pub sinks: Vec<Box<dyn CreateSink>>,
+    /// For each sink, how it is written.
+    pub written_sinks: Vec<Arc<dyn Written>>,
     /// What each stage of the graph is.
     pub works: Vec<StageWork>,
     /// For each stage of the graph, those that take from it, in order.
@@ -57,7 +59,7 @@ impl Sorted {
         let mut source: Option<(String, Box<dyn OpenSource>)> = None;
         let mut works = Vec::new();
         let (mut transforms, mut filters) = (Vec::new(), Vec::new());
-        let (mut ops, mut sinks) = (Vec::new(), Vec::new());
+        let (mut ops, mut sinks, mut written_sinks) = (Vec::new(), Vec::new(), Vec::new());
         for ((n, stage), above) in graph.stages.into_iter().enumerate().zip(columns) {
             let GraphStage { kind, written, limits, role, .. } = stage;
             let label = labels.next().unwrap_or_default();
@@ -90,7 +92,10 @@ impl Sorted {
                     let op = Op::Scan(op);
                     ops.push(StageOp { kind, written, op, limits, above, selection: 0 });
                 }
-                Role::Sink(sink) => sinks.push(sink),
+                Role::Sink(sink) => {
+                    sinks.push(sink);
+                    written_sinks.push(written);
+                }
                 Role::Merge => {}
             }
         }
@@ -98,7 +103,19 @@ impl Sorted {
         if sinks.is_empty() {
             return Err(Error::pipeline("the pipeline writes nothing"));
         }
-        Ok(Sorted { source, transforms, ops, filters, sinks, works, takers, root, names })
+        let sorted = Sorted {
+            source,
+            transforms,
+            ops,
+            filters,
+            sinks,
+            written_sinks,
+            works,
+            takers,
+            root,
+            names,
+        };
+        Ok(sorted)
     }
 
     /// The stages that take from stage `number` and work, and the sinks that take from it.
@@ -182,9 +199,18 @@ fn merged(
     }
 }
 
-/// What is wrong with a stage, told where it is written.
-fn blame(written: &dyn Written, error: Error) -> Error {
-    let told = written.wrong(error.to_string());
+/// What is wrong with a stage, told where it is written; at the value of the key if it begins with
+/// an assignment of one: `grid.side = 1`.
+pub(super) fn blame(written: &dyn Written, error: Error) -> Error {
+    if error.kind() != ErrorKind::Pipeline {
+        return error; // it is about a file
+    }
+    let told = error.to_string();
+    let assigned = told.strip_prefix('`').and_then(|rest| rest.split_once(" = "));
+    let told = match assigned.and_then(|(address, _)| address.rsplit_once('.')) {
+        Some((_, key)) => written.wrong_key(key, told.clone()),
+        None => written.wrong(told),
+    };
     match error.remedy() {
         Some(help) => told.help(help.to_owned()),
         None => told,

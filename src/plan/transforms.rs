@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::sorted::Sorted;
+use super::sorted::{Sorted, blame};
 use crate::engine::pass::StreamOp;
 use crate::engine::task::Schemas;
 use crate::point::Schema;
@@ -21,7 +21,7 @@ pub(super) fn fit_transforms(sorted: &Sorted, schema: &Arc<Schema>) -> (Schemas,
             match leaves(stage, &last) {
                 Ok(None) => {}
                 Ok(Some(leaves)) => last = Arc::new(leaves),
-                Err(error) => wrong.push(error),
+                Err(error) => wrong.push(blame(&*stage.written, error)),
             }
         }
         left_by.push(last.clone());
@@ -53,7 +53,8 @@ fn fit(stage: &StreamOp, schema: &Schema, written: &mut Vec<String>) -> Vec<Erro
     });
     let unfit = transform.check(schema).err();
     written.extend(needs.changes);
-    missing.into_iter().chain(unfit).collect()
+    let here = |error| blame(&*stage.written, error);
+    missing.into_iter().chain(unfit).map(here).collect()
 }
 
 /// The schema of what a stage leaves, if it is another; what it may not change of it is an error.

@@ -156,31 +156,6 @@ fn inputs_that_are_not_there_exit_with_1_however_they_are_named() {
 }
 
 #[test]
-fn flags_of_reduce_are_told_as_they_were_typed() {
-    let at = here();
-    fs::write(at.path().join("a.laz"), b"").unwrap();
-    let reduce = |flags: &[&str], parts: &[&str]| {
-        let arguments = [&["reduce", "a.laz", "-o", "b.laz"], flags].concat();
-        refused(at.path(), &arguments, parts);
-    };
-    reduce(&["--split", "octnt"], &["error: --split: cannot be `octnt`", "did you mean `octant`?"]);
-    reduce(&["--method", "vardy"], &["--method: ", "did you mean `varady`?"]);
-    refused(at.path(), &["reduce", "a.laz", "-o", "b"], &["-o: the extension of `b` names no"]);
-    refused(at.path(), &["reduce", "a.laz", "-o", "./a.laz"], &["-o: ./a.laz is the input a.laz"]);
-    reduce(&["--passes", "0"], &["error: --passes: takes a whole number from 1 to 16, not 0"]);
-    reduce(&["--mark", "keypoint"], &["--mark: ", "keypoint"]);
-    reduce(&["--keep", "110%"], &["--keep: "]);
-    reduce(
-        &["--keep", "10%", "--max-angle", "0.2"],
-        &["--keep", "--max-angle", "do not go together"],
-    );
-    reduce(&["--withheld", "drp"], &["--withheld: ", "did you mean `drop`?"]);
-    reduce(&["--classes", "2,256"], &["--classes", "256"]);
-    reduce(&["--report", "a.laz"], &["--report: a.laz is an input"]);
-    reduce(&["--report", "./b.laz"], &["--report: ./b.laz is written twice"]);
-}
-
-#[test]
 fn conversions_into_a_folder_are_checked_before_the_first() {
     let at = here();
     for name in ["a.las", "a.laz", "b.las", "c.txt"] {
@@ -203,22 +178,6 @@ fn conversions_into_a_folder_are_checked_before_the_first() {
     convert(&["a.las", "-o", "x.laz", "--scale", "1,0,1"], &["--scale: ", "a number above 0"]);
     convert(&["a.las", "-o", "x.ply", "--encoding", "txt"], &["--encoding: ", "ascii, binary"]);
     convert(&["a.las", "-o", "x"], &["-o: the extension of `x` names no format"]);
-}
-
-#[test]
-fn flags_of_synth_are_told_as_they_were_typed() {
-    let at = here();
-    let synth = |kind: &str, flags: &[&str], parts: &[&str]| {
-        let arguments = [&["synth", kind, "-n", "100", "-o", "a.laz"], flags].concat();
-        refused(at.path(), &arguments, parts);
-    };
-    synth("plain", &[], &["error: KIND: cannot be `plain`", "did you mean `plane`?"]);
-    synth("part", &["--noise", "-1"], &["--noise: ", "a number from 0"]);
-    synth("part", &["--noise", "nan"], &["--noise: "]);
-    for count in ["1.5", "5MB", "1e"] {
-        let arguments = ["synth", "part", "-n", count, "-o", "a.laz"];
-        refused(at.path(), &arguments, &["error: -n: takes a whole number"]);
-    }
 }
 
 #[test]

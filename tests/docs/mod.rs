@@ -3,9 +3,11 @@
 //!
 //! `POINTMILL_WRITE_DOCS=1 cargo test --test repository` writes the generated pages again.
 
+pub mod examples;
 mod formats;
 mod keys;
 mod schema;
+mod worked;
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -41,7 +43,7 @@ pub fn keep(page: &str, text: &str) {
 }
 
 /// What the page of the `[run]` table says of editors.
-const EDITORS: &str = "\\
+const EDITORS: &str = "\
 ## Editors
 
 An editor that has the schema of pipeline files completes their keys, shows what these are, and marks
@@ -80,7 +82,8 @@ fn stage_page(table: &TableDescription) -> String {
             out += "\nIt takes [the keys that limit a stage](README.md#limits) but `sees` too.\n";
         }
     }
-    out + "\nEvery stage may also have a `name`, by which `--set` and `from` mean it.\n"
+    out += "\nEvery stage may also have a `name`, by which `--set` and `from` mean it.\n";
+    out + &worked::section(&table.name)
 }
 
 #[test]
@@ -102,7 +105,8 @@ fn every_stage_has_a_page_that_says_what_the_code_does() {
     assert_eq!(names, LimitKeys::KEYS);
     let keys = keys::markdown(&limits.keys);
     let _ = write!(index, "\n## Limits\n\n{}\n\n{keys}", limits.docs);
-    index += "\nWhat stands above all of them: [the `[run]` table](../run.md).\n";
+    index += "\nWhat stands above all of them: [the `[run]` table](../run.md); what is around them: \
+              [the pipeline language](../pipeline.md).\n";
     keep("docs/stages/README.md", &index);
     let stored = fs::read_dir(root().join("docs/stages")).unwrap().count();
     assert_eq!(stored, tables.len() + 1, "docs/stages has pages of no stage");
@@ -119,8 +123,9 @@ fn the_run_table_has_a_page_that_says_what_the_code_does() {
         }
     }
     let text = page(&run, "The `[run]` table") + "\n## Keys\n\n" + &keys::markdown(&run.keys);
-    let language = include_str!("../../src/language/pipeline.md");
-    let text = format!("{text}\n## The pipeline around it\n\n{language}\n{EDITORS}");
+    let text = format!(
+        "{text}\nThe pipeline around it has [a page of its own](pipeline.md).\n\n{EDITORS}"
+    );
     keep("docs/run.md", &text);
 }
 

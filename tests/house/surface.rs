@@ -1,6 +1,8 @@
 //! What is public, as a kept list: nothing is added to it, and nothing taken from it, unnoticed.
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
 
 use super::imports::sources;
 use crate::docs::{SAYS_SO, keep};
@@ -97,4 +99,37 @@ fn what_is_public_is_found_however_it_is_written() {
     let files = files.map(|(module, text)| (module.to_owned(), text.to_owned()));
     let expected = ["A", "b::", "b::B", "b::H", "b::I", "b::Other", "b::g", "b::renamed"];
     assert_eq!(public(&files.into_iter().collect()), expected);
+}
+
+/// What a release had that is gone, and of which the changelog does not say so.
+fn gone_unsaid(released: &str, now: &str, changelog: &str) -> Vec<String> {
+    let items = |list: &str| -> Vec<String> {
+        list.lines()
+            .filter(|line| !line.contains(' ') && !line.is_empty())
+            .map(Into::into)
+            .collect()
+    };
+    let now = items(now);
+    let coming = changelog.split("\n## [").nth(1).unwrap_or_default();
+    let breaking = coming.split("### Breaking").nth(1).unwrap_or_default();
+    let breaking = breaking.split("\n### ").next().unwrap_or_default();
+    let is_said = |item: &String| breaking.contains(&format!("`{item}`"));
+    items(released).into_iter().filter(|item| !now.contains(item) && !is_said(item)).collect()
+}
+
+#[test]
+fn what_is_gone_since_the_last_release_is_in_the_changelog() {
+    let log = "# Changelog\n\n## [Unreleased]\n\n### Breaking\n\n- `b::B` is gone.\n\n### Added\n\n\
+               - `b::C`\n\n## [0.1.0]\n\n### Breaking\n\n- `a`\n";
+    assert_eq!(gone_unsaid("Says: 3.\n\na\nb::B\nb::C\nd\n", "d\n", log), ["a", "b::C"]);
+
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
+    let read = |path: &Path| fs::read_to_string(path).unwrap();
+    let (now, changelog) = (read(&docs.join("surface.txt")), read(&docs.join("../CHANGELOG.md")));
+    for file in fs::read_dir(&docs).unwrap().map(|entry| entry.unwrap().path()) {
+        if file.file_name().unwrap().to_str().unwrap().starts_with("surface-") {
+            let gone = gone_unsaid(&read(&file), &now, &changelog);
+            assert!(gone.is_empty(), "{} has {gone:?}, which are gone", file.display());
+        }
+    }
 }

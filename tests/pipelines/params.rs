@@ -234,8 +234,9 @@ fn commands_take_parameters_and_the_environment_and_list_them() {
 
 #[test]
 fn the_page_shows_a_pipeline_that_runs() {
-    let page = include_str!("../../docs/run.md");
-    let shown = page.split_once("```toml\n").unwrap().1.split_once("```").unwrap().0;
+    let page = include_str!("../../docs/pipeline.md");
+    let shown = page.split("```").find(|block| block.starts_with("toml\n[params]")).unwrap();
+    let shown = shown.strip_prefix("toml").unwrap();
     let at = scans(&["in.laz"]);
     fs::write(at.path().join("p.toml"), shown).unwrap();
     let run = ["run", "p.toml", "--param", "scan=in.laz", "--param", "keep=40%"];

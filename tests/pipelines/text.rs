@@ -319,8 +319,8 @@ fn from_names_an_earlier_stage() {
     let unknown = told(&format!("{synth}{thin}{}", write("lest")));
     assert!(unknown.contains("did you mean `less`? names: less, scan"), "{unknown}");
     for (name, wrong) in [
-        ("run", "means something else"),
-        ("thin", "means something else"),
+        ("run", "is a table of the file already"),
+        ("thin", "is a kind of stage already"),
         ("a.b", "is made of letters"),
         ("", "is made of letters"),
         ("less", "another stage above"),
@@ -480,8 +480,8 @@ fn mistakes_of_an_argument_point_into_it() {
    = did you mean `thin`? stages: run, synth, thin, write";
     assert_eq!(told("thn.neighbors=3"), expected);
     for (set, expected) in [
-        ("neighbors=3", "the value has no address"),
-        (".neighbors=3", "the value has no address"),
+        ("neighbors=3", "it is not said of which stage"),
+        (".neighbors=3", "it is not said of which stage"),
         ("thin.kind=write", "`kind` is for the pipeline file alone"),
         ("thin.0.angle=1", "no stage `thin.0`"),
         ("thin.2.angle=1", "no stage `thin.2`"),

@@ -36,9 +36,11 @@ pub fn expand_any<P: AsRef<str>>(paths: &[P], formats: &Formats) -> Result<Vec<P
     for path in paths.iter().map(AsRef::as_ref) {
         for file in one(path, formats)? {
             if !named.insert(file.canonicalize().unwrap_or_else(|_| file.clone())) {
-                let twice = shown(&file);
-                let path = shown(Path::new(path));
-                let told = format!("`{path}` means {twice}, which is named before");
+                let (twice, path) = (shown(&file).to_string(), shown(Path::new(path)).to_string());
+                let told = match twice == path {
+                    true => format!("`{path}` is a file that is named before it"),
+                    false => format!("`{path}` means {twice}, which is named before it"),
+                };
                 return Err(Error::pipeline(told));
             }
             files.push(file);
