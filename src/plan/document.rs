@@ -24,6 +24,7 @@ impl Plan {
             "outputs": self.sinks(&(0..self.task.sinks.len()).collect::<Vec<_>>()),
             "report": report,
             "units": units,
+            "lengths": self.lengths().into_iter().map(length).collect::<Value>(),
             "lattice_step": lattice.map(|lattice| lattice.step),
             "z_scale": lattice.map(Lattice::z_scale),
             "order": if self.task.mills { "canonical" } else { "input" },
@@ -84,6 +85,10 @@ impl Plan {
             "limited_to": limited_to(&stage.limits.choice),
         })
     }
+}
+
+fn length((key, given, value): (&str, &str, f64)) -> Value {
+    json!({ "key": key, "given": given, "value": value })
 }
 
 fn streamed(StreamOp { kind, choice, .. }: &StreamOp) -> Value {

@@ -11,7 +11,9 @@ use crate::graph::{Graph, GraphStage};
 use crate::host::lock;
 use crate::memory::Records;
 use crate::point::{Metadata, PointBatch, Schema};
-use crate::stage::{ChunkSize, CreateSink, Encode, Encoded, Input, Order, Role, Sink, SinkSummary};
+use crate::stage::{
+    ChunkSize, CreateSink, Encode, Encoded, Order, Role, Sink, SinkSummary, Source,
+};
 
 /// What each sink was given, by its number among the sinks.
 pub(super) type WrittenFiles = Arc<Mutex<BTreeMap<usize, SinkSummary>>>;
@@ -43,15 +45,18 @@ pub(super) fn on_records(graph: Graph, records: Records) -> Graph {
 pub(super) fn rehearsed(
     mut graph: Graph,
     share: f64,
-    inputs: &[Input],
+    source: &dyn Source,
     scratch: &Arc<Scratch>,
     written: &WrittenFiles,
 ) -> Result<Graph> {
-    let mut number = 0;
+    let (mut number, inputs) = (0, &source.inputs());
     let mut rehearse = |role: Role| {
         Ok(match role {
             Role::Sink(sink) => {
-                let of_one = sink.each_input(inputs)?.and_then(|each| each.into_iter().next());
+                let of_one = match sink.square_side(&source.metadata().units)? {
+                    Some(side) => Some(sink.of_square([0, 0], side)?),
+                    None => sink.each_input(inputs)?.and_then(|each| each.into_iter().next()),
+                };
                 number += 1;
                 let (scratch, written) = (scratch.clone(), written.clone());
                 let sink = RehearsedSink { sink, of_one, number, scratch, written };
@@ -75,10 +80,10 @@ pub(super) fn rehearsed(
 }
 
 /// A sink that writes what another would into a scratch file, and enters how much that was. Where
-/// each input has an output, it writes one for all.
+/// each input or each square has an output, it writes one for all.
 struct RehearsedSink {
     sink: Box<dyn CreateSink>,
-    /// That of the first input, where each has one.
+    /// That of the first input or of a square, where each has one.
     of_one: Option<Box<dyn CreateSink>>,
     number: usize,
     scratch: Arc<Scratch>,

@@ -58,6 +58,20 @@ fn limits_shown(f: &mut fmt::Formatter<'_>, choice: &Choice) -> fmt::Result {
 }
 
 impl Plan {
+    /// The lengths that were given in a unit of their own: their keys, what was given, and what
+    /// that is in the scan's unit.
+    pub(super) fn lengths(&self) -> Vec<(&str, &str, f64)> {
+        let mut all = Vec::new();
+        for (stage, given) in self.ops.iter().zip(&self.task.given) {
+            let lengths = stage.op.tile().lengths();
+            for (key, text) in given {
+                let found = lengths.iter().find(|(named, _)| named == key);
+                all.extend(found.map(|(_, length)| (&**key, &**text, length.value())));
+            }
+        }
+        all
+    }
+
     fn units_shown(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let units = self.task.source.metadata().units;
         write!(f, "units    {}", units.words())?;
@@ -68,17 +82,10 @@ impl Plan {
             _ => writeln!(f)?,
         }
         // What lengths in a unit of their own are here.
-        for (stage, given) in self.ops.iter().zip(&self.task.given) {
-            let lengths = stage.op.tile().lengths();
-            for (key, text) in given {
-                let Some((_, length)) = lengths.iter().find(|(named, _)| named == key) else {
-                    continue;
-                };
-                let sign = units.sign().map_or(String::new(), |sign| format!(" {sign}"));
-                writeln!(f, "length   {key} = {text} is {}{sign}", Figure(length.value()))?;
-            }
-        }
-        Ok(())
+        let sign = units.sign().map_or(String::new(), |sign| format!(" {sign}"));
+        self.lengths().into_iter().try_for_each(|(key, text, length)| {
+            writeln!(f, "length   {key} = {text} is {}{sign}", Figure(length))
+        })
     }
 
     fn passes_shown(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

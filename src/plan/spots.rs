@@ -7,11 +7,42 @@ const BITS: u32 = 8;
 /// Where records lie: the fine column of each, numbered so that those of a larger column follow
 /// each other.
 pub(super) struct Spots {
+    grid: FineColumns,
     columns: Vec<u16>,
 }
 
+/// Some of the columns in which records lie.
+pub(super) struct ChosenSpots {
+    grid: FineColumns,
+    /// Bits of a fine column that one of these leaves out.
+    level: u32,
+    is_chosen: Vec<bool>,
+}
+
+/// Fine columns: squares along the two axes along which records are spread the widest.
+#[derive(Clone, Copy)]
+struct FineColumns {
+    axes: [usize; 2],
+    lo: [f64; 2],
+    side: f64,
+}
+
+impl FineColumns {
+    /// The fine column of a place, which is the first for what is nowhere; None beyond the records
+    /// that the grid was made for.
+    fn column(&self, at: [f64; 3]) -> Option<u16> {
+        let number = |n: usize| {
+            let number = (at[self.axes[n]] - self.lo[n]) / self.side;
+            let is_beyond = number < 0.0 || number > f64::from(1 << BITS);
+            // What is no number is 0.
+            (!is_beyond).then_some((number as u16).min((1 << BITS) - 1))
+        };
+        Some(interleaved(number(0)?, number(1)?))
+    }
+}
+
 impl Spots {
-    /// Of records at these places; those that are nowhere are in the first column.
+    /// Of records at these places.
     pub fn of(places: impl Iterator<Item = [f64; 3]> + Clone) -> Spots {
         let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for at in places.clone().filter(|at| at.iter().all(|x| x.is_finite())) {
@@ -20,20 +51,14 @@ impl Spots {
                 hi[axis] = hi[axis].max(at[axis]);
             }
         }
-        let [a, b] = widest(lo, hi);
-        // Of one width along both axes: a column is a square.
-        let side = (hi[a] - lo[a]) / f64::from(1 << BITS);
-        let number = |at: [f64; 3], axis: usize| {
-            let number = (at[axis] - lo[axis]) / side;
-            (number as u16).min((1 << BITS) - 1) // what is no number is 0
-        };
-        let columns = places.map(|at| interleaved(number(at, a), number(at, b)));
-        Spots { columns: columns.collect() }
+        let axes = widest(lo, hi);
+        let side = (hi[axes[0]] - lo[axes[0]]) / f64::from(1 << BITS);
+        let grid = FineColumns { axes, lo: axes.map(|axis| lo[axis]), side };
+        Spots { grid, columns: places.map(|at| grid.column(at).unwrap_or_default()).collect() }
     }
 
-    /// The records in about `count` columns, spread evenly over the records, that hold about
-    /// `records` in all: for each record whether it is one of them.
-    pub fn chosen(&self, count: usize, records: usize) -> Vec<bool> {
+    /// About `count` columns, spread evenly over the records, that hold about `records` in all.
+    pub fn chosen(&self, count: usize, records: usize) -> ChosenSpots {
         let level = self.level(records as f64 / count.max(1) as f64);
         let mut held = vec![0usize; 1 << (2 * BITS - level)];
         self.columns.iter().for_each(|fine| held[usize::from(fine >> level)] += 1);
@@ -47,7 +72,7 @@ impl Spots {
             }
             is_chosen[column] = true;
         }
-        self.columns.iter().map(|fine| is_chosen[usize::from(fine >> level)]).collect()
+        ChosenSpots { grid: self.grid, level, is_chosen }
     }
 
     /// Bits of a fine column that a column leaves out which holds about so many records, as a
@@ -66,6 +91,14 @@ impl Spots {
             held = held.chunks(4).map(|four| four.iter().sum()).collect();
         }
         best.1
+    }
+}
+
+impl ChosenSpots {
+    /// True for what lies in one of them.
+    pub fn hold(&self, at: [f64; 3]) -> bool {
+        let column = self.grid.column(at);
+        column.is_some_and(|fine| self.is_chosen[usize::from(fine >> self.level)])
     }
 }
 
@@ -91,8 +124,10 @@ mod tests {
         // A million records of a plane a thousand wide; the height is any.
         let at = |n: u32| [f64::from(n % 1000), 0.001 * f64::from(n % 7), f64::from(n / 1000)];
         let places = (0..1_000_000).map(at);
-        let chosen = Spots::of(places.clone()).chosen(8, 240_000);
+        let spots = Spots::of(places.clone()).chosen(8, 240_000);
+        let chosen: Vec<bool> = places.map(|at| spots.hold(at)).collect();
         let count = chosen.iter().filter(|chosen| **chosen).count();
+        assert!(!spots.hold([-1.0, 0.0, 0.0]) && !spots.hold([0.0, 0.0, 1001.0]));
         assert!((100_000..400_000).contains(&count), "{count}");
         // A record has all of its neighbours, but at the faces of columns.
         let is = |n: u32| chosen[n as usize];
@@ -105,8 +140,8 @@ mod tests {
     #[test]
     fn one_place_and_no_number_are_no_trouble() {
         for places in [vec![], vec![[1.0; 3]; 100], vec![[f64::NAN, 0.0, f64::INFINITY]; 5]] {
-            let chosen = Spots::of(places.iter().copied()).chosen(8, 10);
-            assert_eq!(chosen, vec![true; places.len()]);
+            let spots = Spots::of(places.iter().copied()).chosen(8, 10);
+            assert!(places.iter().all(|at| spots.hold(*at)), "{places:?}");
         }
     }
 }

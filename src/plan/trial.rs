@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
@@ -21,7 +22,7 @@ use crate::graph::{Graph, Overrides, RunSettings, SpillSetting};
 use crate::host::process::{cpu_seconds, resident_now};
 use crate::host::{Threads, lock};
 use crate::memory::Records;
-use crate::point::{PointBatch, Schema};
+use crate::point::PointBatch;
 use crate::stage::{Role, SinkSummary, Source};
 use crate::{Error, ErrorKind, Result};
 
@@ -33,8 +34,10 @@ const TRIED: usize = 240_000;
 const SPOTS: usize = 8;
 /// A scan of no more is tried as a whole.
 const WHOLE: u64 = 300_000;
+/// Parts of the rest of the input that are looked at, a batch of each.
+const ELSEWHERE: usize = 32;
 /// Records that are read at once.
-const BATCH: usize = 8192;
+const BATCH: usize = 4096;
 
 /// A run of the same stages on a part of the scan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -46,6 +49,9 @@ pub struct Trial {
     pub points: u64,
     /// Records of the scan by its headers.
     pub of_points: u64,
+    /// Of the points that lie where those do, the part that was read, as far as a look at the rest
+    /// of the input tells: 1 where the points of a place are together in it.
+    pub density: f64,
     /// Wall-clock seconds that it took, reading included.
     pub seconds: f64,
 }
@@ -90,23 +96,22 @@ impl Plan {
         // Parts are read from a source of their own: that of the plan counts what it gives.
         let source = opened(&again)?;
         let (schema, limit) = (source.schema(), READ_BYTES.min(self.task.demands.limit / 4));
-        let read = Threads::start(self.task.threads, |threads| {
-            let unread = &self.task.unread();
-            let reading = TrialReading { source: &*source, unread, threads, watch, limit };
-            reading.records(self.task.mills)
+        let unread = &self.task.unread();
+        let (read, reading) = Threads::start(self.task.threads, |threads| {
+            let from = TrialReading { source: &*source, unread, threads, watch, limit };
+            let read = from.records(self.task.mills)?;
+            let reading = cpu_seconds() - cpu_before;
+            Ok((from.chosen(read, self.task.mills)?, reading))
         })?;
-        let reading = cpu_seconds() - cpu_before;
-        let count = |bytes: usize| (bytes / schema.stride) as u64;
-        let read_points = count(read.iter().map(Vec::len).sum());
-        let chosen = if self.task.mills { in_spots(read, schema) } else { read.concat() };
-        let points = count(chosen.len());
+        let TrialRecords { read: read_points, chosen, density } = read;
+        let points = (chosen.len() / schema.stride) as u64;
         let (trouble, written) = (Trouble::default(), WrittenFiles::default());
         let folder = self.task.settings.scratch.clone().unwrap_or_else(std::env::temp_dir);
         let scratch = Arc::new(Scratch::below(&folder, &trouble));
         let records = Records::new((**schema).clone(), chosen)?;
         let graph = on_records(again, records.with_metadata(source.metadata().clone()));
         let share = points as f64 / source.points().max(points).max(1) as f64;
-        let mut graph = rehearsed(graph, share, &source.inputs(), &scratch, &written)?;
+        let mut graph = rehearsed(graph, share, &*source, &scratch, &written)?;
         self.equip(&mut graph.settings, folder)?;
         let done = graph.plan(&Overrides::default())?.run(&Unheard(watch))?;
         drop(scratch);
@@ -115,7 +120,7 @@ impl Plan {
         let seconds = start.elapsed().as_secs_f64();
         let outputs = std::mem::take(&mut *lock(&written)).into_values().collect();
         Ok(TrialRun {
-            trial: Trial { read_points, points, of_points, seconds },
+            trial: Trial { read_points, points, of_points, density, seconds },
             reading,
             phases: done.report.run.cpu_by_phase,
             outputs,
@@ -150,21 +155,19 @@ fn opened(graph: &Graph) -> Result<Box<dyn Source>> {
     sources.try_fold(merged, |merged, next| merged.merged(&**next))?.open()
 }
 
-/// Of records those in a few columns of space, or all if they are few.
-fn in_spots(read: Vec<Vec<u8>>, schema: &Schema) -> Vec<u8> {
-    let stride = schema.stride;
-    let is_few = read.iter().map(Vec::len).sum::<usize>() as u64 <= WHOLE * stride as u64;
-    let Some(axes) = schema.coordinates().filter(|_| !is_few) else { return read.concat() };
-    let records = || read.iter().flat_map(|bytes| bytes.chunks_exact(stride));
-    let at = |record: &[u8]| axes.map(|axis| axis.world(record, schema.endian));
-    let chosen = Spots::of(records().map(at)).chosen(SPOTS, TRIED);
-    let mut bytes = Vec::new();
-    for (record, is_chosen) in records().zip(chosen) {
-        if is_chosen {
-            bytes.extend_from_slice(record);
-        }
-    }
-    bytes
+/// Records of some parts.
+struct ReadParts {
+    parts: Range<usize>,
+    read: Vec<Vec<u8>>,
+}
+
+/// The records that a trial works on.
+struct TrialRecords {
+    /// How many were read to choose from.
+    read: u64,
+    chosen: Vec<u8>,
+    /// See [`Trial::density`].
+    density: f64,
 }
 
 /// The reading of some of a source's records.
@@ -179,27 +182,55 @@ struct TrialReading<'a> {
 
 impl TrialReading<'_> {
     /// A stretch from the middle of the input, or several that are spread over it.
-    fn records(&self, in_one: bool) -> Result<Vec<Vec<u8>>> {
+    fn records(&self, in_one: bool) -> Result<ReadParts> {
         let (parts, all) = (self.source.parts().max(1), self.source.points());
         let most = READ.min(self.limit / self.source.schema().stride.max(1) as u64).max(1);
         let whole = if in_one { most } else { WHOLE.min(most) };
         if all <= whole {
-            return self.parts((0..self.source.parts()).collect(), most);
+            let parts = 0..self.source.parts();
+            return Ok(ReadParts { read: self.parts(parts.clone().collect(), most)?, parts });
         }
         if !in_one {
             let mut some: Vec<usize> =
                 (0..SPOTS).map(|n| parts * (2 * n + 1) / (2 * SPOTS)).collect();
             some.dedup();
             let each = most.min(TRIED as u64) / some.len() as u64;
-            return self.parts(some, each);
+            return Ok(ReadParts { parts: 0..parts, read: self.parts(some, each)? });
         }
         let each = all.div_ceil(parts as u64).max(1);
         let count = usize::try_from(most / each).unwrap_or(parts).clamp(1, parts);
         let first = (parts - count) / 2;
-        self.parts((first..first + count).collect(), most)
+        let parts = first..first + count;
+        Ok(ReadParts { read: self.parts(parts.clone().collect(), most)?, parts })
     }
 
-    /// The records of these parts, so many of each at most.
+    /// Of records that were read those in a few columns of space, where they are to have their
+    /// neighbours and are not few.
+    fn chosen(&self, ReadParts { parts, read }: ReadParts, in_spots: bool) -> Result<TrialRecords> {
+        let (schema, stride) = (self.source.schema(), self.source.schema().stride);
+        let count = (read.iter().map(Vec::len).sum::<usize>() / stride) as u64;
+        let axes = schema.coordinates().filter(|_| in_spots && count > WHOLE);
+        let Some(axes) = axes else {
+            return Ok(TrialRecords { read: count, chosen: read.concat(), density: 1.0 });
+        };
+        let at = |record: &[u8]| axes.map(|axis| axis.world(record, schema.endian));
+        let records = || read.iter().flat_map(|bytes| bytes.chunks_exact(stride));
+        let spots = Spots::of(records().map(at)).chosen(SPOTS, TRIED);
+        let mut chosen = Vec::new();
+        records().filter(|record| spots.hold(at(record))).for_each(|r| chosen.extend_from_slice(r));
+        let others: Vec<usize> =
+            (0..self.source.parts()).filter(|part| !parts.contains(part)).collect();
+        let step = others.len().div_ceil(ELSEWHERE).max(1);
+        let elsewhere = self.parts(others.into_iter().step_by(step).collect(), 1)?;
+        let elsewhere = || elsewhere.iter().flat_map(|bytes| bytes.chunks_exact(stride));
+        let there = elsewhere().filter(|record| spots.hold(at(record))).count() as f64;
+        let rest = self.source.points().saturating_sub(count) as f64;
+        let near = (chosen.len() / stride) as f64;
+        let missing = rest * there / elsewhere().count().max(1) as f64;
+        Ok(TrialRecords { read: count, chosen, density: near / (near + missing).max(1.0) })
+    }
+
+    /// The records of these parts, so many of each at most, in whole batches.
     fn parts(&self, parts: Vec<usize>, most: u64) -> Result<Vec<Vec<u8>>> {
         let (schema, read) = (self.source.schema(), Mutex::new(BTreeMap::new()));
         let most = most.saturating_mul(schema.stride as u64);
