@@ -125,6 +125,23 @@ struct Inner {
     source: Option<Box<dyn std::error::Error + Send + Sync>>,
 }
 
+/// What a stage asked for and did not declare.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Undeclared {
+    /// A column, its own or that of neighbours.
+    Column,
+    /// Neighbours.
+    Neighbors,
+}
+
+impl fmt::Display for Undeclared {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("what a stage looks at it has to say in its needs")
+    }
+}
+
+impl std::error::Error for Undeclared {}
+
 impl Error {
     /// An error of `kind` that says `message`.
     pub fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
@@ -184,6 +201,26 @@ impl Error {
     /// A promise of our own that did not hold.
     pub fn internal(message: impl Into<String>) -> Self {
         Error::new(ErrorKind::Internal, message)
+    }
+
+    /// Something that a stage asks for without having declared it; `told` begins with "a stage".
+    pub(crate) fn undeclared(what: Undeclared, told: String) -> Self {
+        Error::internal(told).because(what)
+    }
+
+    /// What a stage asked for and did not declare, if it is about that.
+    pub(crate) fn is_undeclared(&self) -> Option<Undeclared> {
+        self.0.source.as_ref()?.downcast_ref().copied()
+    }
+
+    /// The same, which names the stage where it is about what that did not declare.
+    pub(crate) fn of_stage(mut self, kind: &str) -> Self {
+        if self.is_undeclared().is_some()
+            && let Some(rest) = self.0.message.strip_prefix("a stage")
+        {
+            self.0.message = format!("the stage `{kind}`{rest}");
+        }
+        self
     }
 
     /// Adds the file that the error is about.

@@ -129,7 +129,7 @@ pub use engine::{Done, Quiet, Watch};
 pub use error::{Error, ErrorKind, Result};
 pub use graph::{Graph, Overrides};
 pub use language::{
-    GraphBuilder, KeyDescription, Parameter, ParameterType, PipelineText, Registry, Set,
+    Explained, GraphBuilder, KeyDescription, Parameter, ParameterType, PipelineText, Registry, Set,
     TableDescription, WordDescription,
 };
-pub use plan::{Outline, Plan, Pulled};
+pub use plan::{Outline, Plan, PredictedOutput, PredictedPhase, Prediction, Pulled, Trial};

@@ -35,14 +35,16 @@ pub(super) enum Command {
     Convert(ConvertArguments),
     /// Show what files contain, from their headers
     Info(InfoArguments),
-    /// Show how a pipeline would be run, without running it
-    Plan(PlanArguments),
+    /// Show how a pipeline would be run and what the run would use, without running it
+    Plan(PredictArguments),
     /// Check a pipeline and tell every mistake; reads its inputs' headers, writes nothing
     Check(PlanArguments),
     /// List the stages that a pipeline can have, with their keys
     Stages(StagesArguments),
     /// Draw the graph of a pipeline; its inputs are not opened
     Graph(GraphArguments),
+    /// Print a pipeline with every key of every stage, and where each value is from
+    Explain(ExplainArguments),
     /// Write a commented pipeline file for a job, to be changed
     New(NewArguments),
     /// Print the JSON Schema of pipeline files, by which editors complete and check them
@@ -61,8 +63,10 @@ impl Command {
     /// The pipeline of commands that take one.
     pub fn pipeline(&self) -> Option<&PipelineArguments> {
         match self {
-            Command::Run(all) | Command::Plan(all) | Command::Check(all) => Some(&all.pipeline),
+            Command::Run(all) | Command::Check(all) => Some(&all.pipeline),
+            Command::Plan(PredictArguments { planned, .. }) => Some(&planned.pipeline),
             Command::Graph(graph) => Some(&graph.pipeline),
+            Command::Explain(explain) => Some(&explain.pipeline),
             _ => None,
         }
     }
@@ -72,12 +76,12 @@ impl Command {
         match self {
             Command::Reduce(reduce) => Some(&reduce.common),
             Command::Run(PlanArguments { common, .. })
-            | Command::Plan(PlanArguments { common, .. })
+            | Command::Plan(PredictArguments { planned: PlanArguments { common, .. }, .. })
             | Command::Check(PlanArguments { common, .. })
             | Command::Convert(ConvertArguments { common, .. })
             | Command::Synth(SynthArguments { common, .. }) => Some(common),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => None,
-            Command::Graph(_) | Command::New(_) | Command::Schema => None,
+            Command::Graph(_) | Command::Explain(_) | Command::New(_) | Command::Schema => None,
             Command::Completions(_) | Command::Man(_) => None,
         }
     }
@@ -155,6 +159,19 @@ pub(super) struct PlanArguments {
     pub pipeline: PipelineArguments,
     #[command(flatten)]
     pub common: CommonArguments,
+}
+
+/// Of `plan`.
+#[derive(Debug, Args)]
+pub(super) struct PredictArguments {
+    #[command(flatten)]
+    pub planned: PlanArguments,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Read headers alone: what only a trial on a part of the points can tell is left out
+    #[arg(long)]
+    pub no_trial: bool,
 }
 
 #[derive(Debug, Args)]
@@ -362,6 +379,15 @@ pub(super) struct GraphArguments {
     /// What it is drawn as
     #[arg(long = "as", value_name = "HOW", default_value = "text")]
     pub drawing: Drawing,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ExplainArguments {
+    #[command(flatten)]
+    pub pipeline: PipelineArguments,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::arguments::PlanArguments;
+use super::arguments::{PlanArguments, PredictArguments};
 use super::console::Console;
+use super::draw::{Nothing, watched};
 use super::mistyped::marked;
 use super::pipeline;
 use super::print;
@@ -18,13 +19,29 @@ use crate::{Error, Result, io};
 
 /// Prints how a pipeline would be run.
 pub(super) fn plan(
-    arguments: &PlanArguments,
+    PredictArguments { planned, json, no_trial }: &PredictArguments,
     registry: &Registry,
     console: &Console,
 ) -> Result<()> {
-    let plan = read(arguments, registry)?.plan(&Overrides::default())?;
+    let plan = read(planned, registry)?.plan(&Overrides::default())?;
     plan.warnings().iter().for_each(|warning| console.warn(warning));
-    print::result(plan)
+    let prediction = match no_trial {
+        true => plan.predict()?,
+        false => {
+            console.hear_interrupts();
+            let again = read(planned, registry)?;
+            watched(&mut Nothing, &|| console.cancelled(), |watch| {
+                plan.predict_by_trial(again, watch)
+            })?
+        }
+    };
+    if !json {
+        return print::result(format_args!("{plan}\n{prediction}"));
+    }
+    let mut told = plan.to_json();
+    let failed = |e| Error::internal("a prediction could not be written as JSON").because(e);
+    told["prediction"] = serde_json::to_value(&prediction).map_err(failed)?;
+    print::json(&format!("{told:#}"))
 }
 
 /// Prints that a pipeline can be run, or fails as its run would before it reads a point; then the

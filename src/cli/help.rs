@@ -102,7 +102,16 @@ Examples:
   pointmill picture survey.laz reduced.laz -o both.png --by class --from south
   pointmill picture 'survey/*.laz' -o survey.png --width 4096",
     ),
-    ("plan", "Example:\n  pointmill plan pipelines/demo.toml --memory 1GiB --threads 4"),
+    (
+        "plan",
+        "\
+Examples:
+  pointmill plan pipelines/demo.toml --memory 1GiB --threads 4
+  pointmill plan pipelines/demo.toml --json --no-trial
+
+Size of outputs and time are estimated by a trial: the stages run on some 100,000 to 500,000 of the
+points. Nothing is written but scratch files, which are gone when it ends.",
+    ),
     (
         "check",
         "\
@@ -118,6 +127,15 @@ Examples:
   pointmill graph pipelines/classes.toml
   pointmill graph pipelines/classes.toml --as mermaid
   pointmill graph pipelines/classes.toml --as dot | dot -Tsvg > classes.svg",
+    ),
+    (
+        "explain",
+        "\
+Examples:
+  pointmill explain pipelines/web.toml --set write.path=thin.laz > thin.toml
+  pointmill explain 'read in.laz ! normals ! cells ! median ! write out.laz'
+
+What it prints is a pipeline file that does the same. Inputs are not opened.",
     ),
     (
         "new",

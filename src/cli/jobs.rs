@@ -34,6 +34,7 @@ const JOBS: &[(&str, &str)] = jobs![
     "resolutions",
     "split",
     "terrain",
+    "tiles",
     "web",
 ];
 

@@ -12,6 +12,7 @@ mod describe;
 mod draw;
 mod events;
 mod exit;
+mod explain;
 mod flags;
 mod graph;
 mod help;
@@ -124,6 +125,7 @@ fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<
         Command::Check(arguments) => check::check(arguments, registry, console),
         Command::Stages(arguments) => stages::stages(arguments, registry),
         Command::Graph(arguments) => graph::graph(arguments, registry),
+        Command::Explain(arguments) => explain::explain(arguments, registry),
         Command::New(arguments) => jobs::new(arguments),
         Command::Schema => stages::schema(registry),
         Command::Info(arguments) => describe::info(arguments, registry.formats(), console),

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::arguments::{CommonArguments, PipelineArguments};
 use super::flags::{common_flags, given};
 use crate::graph::Graph;
-use crate::language::{Parameter, PipelineText, Registry, Set};
+use crate::language::{Explained, Parameter, PipelineText, Registry, Set};
 use crate::{Error, Result};
 
 /// The graph that the arguments of a command mean.
@@ -25,11 +25,18 @@ pub(super) fn read_with(
     others: Vec<Set>,
     registry: &Registry,
 ) -> Result<Graph> {
+    text(arguments, registry)?.graph(registry, &[sets(arguments)?, others].concat())
+}
+
+/// The pipeline with the origin of every value.
+pub(super) fn explain(arguments: &PipelineArguments, registry: &Registry) -> Result<Explained> {
+    text(arguments, registry)?.explain(registry, &sets(arguments)?)
+}
+
+fn sets(arguments: &PipelineArguments) -> Result<Vec<Set>> {
     let sets = arguments.sets.iter().map(|set| Set::parse(set));
     let params = arguments.params.iter().map(|param| Set::param(param));
-    let sets = sets.chain(params).collect::<Result<Vec<Set>>>()?;
-    let sets = [sets, others].concat();
-    text(arguments, registry)?.graph(registry, &sets)
+    sets.chain(params).collect()
 }
 
 /// What help says of the parameters of a pipeline.

@@ -23,7 +23,8 @@ impl Words {
             Command::Convert(convert) => convert_flags(convert, None, None),
             Command::Synth(synth) => synth_flags(synth),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => Vec::new(),
-            Command::Graph(_) | Command::New(_) | Command::Schema => Vec::new(),
+            Command::Graph(_) | Command::Explain(_) => Vec::new(),
+            Command::New(_) | Command::Schema => Vec::new(),
             Command::Completions(_) | Command::Man(_) => Vec::new(),
         };
         let common = command.common().map(common_flags).unwrap_or_default();
@@ -32,7 +33,11 @@ impl Words {
             flags: flags.collect(),
             has_file: matches!(
                 command,
-                Command::Run(_) | Command::Plan(_) | Command::Check(_) | Command::Graph(_)
+                Command::Run(_)
+                    | Command::Plan(_)
+                    | Command::Check(_)
+                    | Command::Graph(_)
+                    | Command::Explain(_)
             ),
             registry: registry.clone(),
         }

@@ -22,17 +22,24 @@ use crate::report::{
     Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome, Removed, Report,
     RunFigures, check_written,
 };
-use crate::stage::{CreateSink, Input, SinkSummary, Source};
+use crate::stage::{Input, SinkSummary, Source};
 use crate::{Error, Result};
 
 impl Task {
-    /// The files of all sinks, each with the records that it was given and what it said.
+    /// The files of all sinks, each with the records that it was given and what it said; false
+    /// with the path of what is no file.
     fn written<'a>(
         &'a self,
         finished: &'a Finished,
-    ) -> impl Iterator<Item = (&'a dyn CreateSink, &'a (u64, SinkSummary))> {
-        let files = (0..self.sinks.len()).flat_map(|sink| self.files(sink)).map(|file| &**file);
-        files.zip(finished.written.iter().flatten())
+    ) -> impl Iterator<Item = (&'a Path, bool, &'a (u64, SinkSummary))> {
+        let files = |sink: usize| -> Vec<(&'a Path, bool)> {
+            match self.has_squares(sink) {
+                true => finished.squares[sink].iter().map(|path| (&**path, true)).collect(),
+                false => self.files(sink).iter().map(|to| (to.path(), to.is_file())).collect(),
+            }
+        };
+        let files = (0..self.sinks.len()).flat_map(files);
+        files.zip(finished.written.iter().flatten()).map(|((path, is_file), w)| (path, is_file, w))
     }
 
     /// What is known of the run when its output is written.
@@ -40,9 +47,8 @@ impl Task {
         let mut warnings = self.source.warnings();
         let all = finished.written.iter().flatten();
         warnings.extend(all.flat_map(|(_, sink)| sink.notes.iter().cloned()));
-        let outputs = self.written(finished).map(|(sink, (_, summary))| {
-            let bytes = sink.is_file().then_some(summary.bytes);
-            FileFigures::of(sink.path(), summary.points, bytes)
+        let outputs = self.written(finished).map(|(path, is_file, (_, summary))| {
+            FileFigures::of(path, summary.points, is_file.then_some(summary.bytes))
         });
         RunFigures {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -65,11 +71,12 @@ impl Task {
         &self,
         finished: Finished,
         mut run: RunFigures,
-        clock: Clock<'_>,
+        mut clock: Clock<'_>,
     ) -> Result<(Report, Vec<Option<TileLines>>)> {
-        for (sink, (given, summary)) in self.written(&finished) {
-            check_written(sink.path(), *given, summary.points)?;
+        for (path, _, (given, summary)) in self.written(&finished) {
+            check_written(path, *given, summary.points)?;
         }
+        run.cpu_by_phase = clock.cpu_by_phase();
         (run.seconds, run.cpu_seconds, run.phases) = clock.finish();
         run.peak_memory_bytes = peak_memory();
         run.work = finished.tally.work.iter().map(named).collect();
@@ -105,6 +112,12 @@ impl Task {
             let (stage, name) = ("run".to_owned(), "z_scale".to_owned());
             decisions.insert(0, Decision { stage, name, value: lattice.z_scale().into() });
         }
+        let on_branch = self.branch_of.iter().map(|&of| std::ptr::eq(&self.branches[of], branch));
+        let sides = self.sides.iter().zip(on_branch).filter(|(_, is_on)| *is_on);
+        decisions.extend(sides.filter_map(|(side, _)| *side).map(|side| {
+            let (stage, name) = ("write".to_owned(), "side".to_owned());
+            Decision { stage, name, value: side.into() }
+        }));
         let outcome = Outcome {
             pipeline: branch.stages.clone(),
             lattice: lattice.map(|l| LatticeFigures { step: l.step, shift: l.shift }),

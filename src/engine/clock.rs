@@ -21,6 +21,9 @@ pub(crate) struct Clock<'a> {
     cpu_before: Option<f64>,
     open: Option<(&'static str, Instant)>,
     phases: Vec<Phase>,
+    /// The phase that runs, told or not, and the CPU seconds of the process when it began.
+    at_work: Option<(&'static str, Option<f64>)>,
+    cpu_by_phase: Vec<(&'static str, f64)>,
 }
 
 impl<'a> Clock<'a> {
@@ -33,6 +36,8 @@ impl<'a> Clock<'a> {
             cpu_before: cpu_seconds(),
             open: None,
             phases: Vec::new(),
+            at_work: None,
+            cpu_by_phase: Vec::new(),
         }
     }
 
@@ -46,6 +51,8 @@ impl<'a> Clock<'a> {
         if next != Some(phase) {
             return Err(Error::internal(format!("the next phase is {next:?}, not {phase:?}")));
         }
+        self.count();
+        self.at_work = Some((phase.name_in_predictions(), cpu_seconds()));
         if let Some(name) = phase.name() {
             self.end();
             self.open = Some((name, Instant::now()));
@@ -59,6 +66,19 @@ impl<'a> Clock<'a> {
             let seconds = since.elapsed().as_secs_f64();
             self.phases.push(Phase { name: name.to_owned(), seconds });
         }
+    }
+
+    /// Enters what the phase that ends took of the processors.
+    fn count(&mut self) {
+        let Some((name, before)) = self.at_work.take() else { return };
+        let took = before.and_then(|before| Some(cpu_seconds()? - before));
+        self.cpu_by_phase.extend(took.map(|took| (name, took)));
+    }
+
+    /// CPU seconds of each phase, those that are not told included; what follows is in none.
+    pub fn cpu_by_phase(&mut self) -> Vec<(&'static str, f64)> {
+        self.count();
+        std::mem::take(&mut self.cpu_by_phase)
     }
 
     /// Wall-clock seconds in all, CPU seconds in all, and wall-clock seconds by phase.

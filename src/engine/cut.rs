@@ -148,7 +148,8 @@ fn cut(
             let Some(fewer) = (1..millers).rev().find(fits) else {
                 let limit = demands.limit_for_tile(1, tile);
                 let error = too_heavy(lattice, key, positions, most);
-                return Err(error.help(remedy(limit, held == 0 && is_sampled(job))));
+                let smaller = smaller(&job.ops);
+                return Err(error.help(remedy(limit, &smaller, held == 0 && is_sampled(job))));
             };
             let enough = whole_mebibytes(demands.limit_for_tile(millers, tile));
             job.warn(format!(
@@ -199,14 +200,24 @@ fn is_sampled(job: &Job<'_>) -> bool {
     job.ops.iter().any(sampled)
 }
 
+/// What makes tiles lighter besides memory: a shorter length of the stage with the widest cells.
+fn smaller(ops: &[StageOp]) -> String {
+    let widest = ops.iter().max_by_key(|stage| stage.op.tile().needs().cell_side);
+    let lengths = widest.map_or(Vec::new(), |stage| stage.op.tile().lengths());
+    match lengths.first() {
+        Some((key, _)) => format!("a smaller `{key}`"),
+        None => "a smaller cell side".to_owned(),
+    }
+}
+
 /// What does for the heaviest tile.
-fn remedy(limit: u64, may_grow: bool) -> String {
+fn remedy(limit: u64, smaller: &str, may_grow: bool) -> String {
     let limit = whole_mebibytes(limit);
     match may_grow {
-        false => format!("give `run.memory = \"{limit}\"` or more, or a smaller cell side"),
+        false => format!("give `run.memory = \"{limit}\"` or more, or {smaller}"),
         true => format!(
-            "give `run.memory = \"{limit}\"` at least, or a smaller cell side: a side that is \
-             chosen by samples of the points is known behind this, and may take more"
+            "give `run.memory = \"{limit}\"` at least, or {smaller}: a side that is chosen by \
+             samples of the points is known behind this, and may take more"
         ),
     }
 }

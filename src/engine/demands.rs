@@ -5,6 +5,7 @@
 //! which a run leases them and a refusal lists them.
 
 use super::by_rank::ordering_bytes;
+use super::by_square::writing_bytes;
 use super::chunk::OutputChunk;
 use super::encoding::ChunkEncoder;
 use super::filtering::Filtering;
@@ -12,7 +13,7 @@ use super::outlet::A_THREAD;
 use super::pass::{ColumnBytes, decides_by_normals};
 use super::placed::{BATCH, Placed};
 use super::product::Product;
-use super::shares::Demands;
+use super::shares::{Demands, Shares};
 use super::survey::survey_bytes;
 use crate::budget::{Bytes, Holders};
 use crate::geom::nearest::Nearest;
@@ -29,6 +30,8 @@ const RUNS: u64 = 64;
 /// Stacks, allocator slack and decoder tables of a thread, and the same for the process.
 const THREAD_OVERHEAD: Bytes = Bytes(3 << 20);
 const PROCESS_OVERHEAD: Bytes = Bytes(6 << 20);
+/// Of what a stream leases, one part of so many is touched.
+const STREAMED: u64 = 2;
 
 impl Demands {
     /// What the program holds whatever it does.
@@ -36,7 +39,7 @@ impl Demands {
         Holders::of([
             ("program", Bytes(self.resident) + PROCESS_OVERHEAD),
             ("overhead of threads", self.by_threads(THREAD_OVERHEAD)),
-            ("list of records by input", self.lists),
+            ("lists of records by output", self.lists),
         ])
     }
 
@@ -154,6 +157,12 @@ impl Demands {
         ])
     }
 
+    /// What is held while the files of squares are written.
+    pub fn squares(&self) -> Holders {
+        let writing = writing_bytes(self.chunk, self.stride + self.columns.row);
+        Holders::of([("writing of squares", self.by_threads(writing))])
+    }
+
     /// Bytes of a tile per position it holds, the product that it leaves behind included.
     fn tile_bytes_per_point(&self) -> Bytes {
         let of = |pass: &Vec<Needs>| {
@@ -200,6 +209,24 @@ impl Demands {
             .larger(self.merge(run_records))
             .larger(survey)
             .larger(if self.ranked { self.ordering() } else { Holders::default() })
+    }
+
+    /// The most memory that the process is expected to hold at once: what is leased less the parts
+    /// of it that are seldom touched. Tiles are half as full as they may be, and of the buffers of
+    /// outputs a quarter is in use.
+    pub fn expected_peak(&self, shares: &Shares) -> Bytes {
+        let program = Bytes(self.resident);
+        if !self.mills {
+            return program + Bytes(self.stream().sum().0 / STREAMED);
+        }
+        let points = self.points.max(1);
+        let held = |most: usize| (most as u64).min(points.div_ceil(self.threads.max(1) as u64));
+        let kept = Bytes(shares.kept_in_memory.min(self.standing_bytes()));
+        let standing = program + SealedTiles::index_bytes(points) + kept;
+        let decode = self.decode(held(shares.run_records)).sum();
+        let tiles = self.tile_bytes_per_point() * held(shares.tile_positions / 2);
+        let mill = self.by_threads(tiles) + Bytes(self.outputs().sum().0 / 4);
+        standing + decode.max(mill)
     }
 
     pub(super) fn least(&self) -> Holders {

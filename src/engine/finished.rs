@@ -4,6 +4,8 @@
 //! one kind of report. A run with several branches has counts for each, as if it had been the only
 //! one, and counts of all for what was done once.
 
+use std::path::PathBuf;
+
 use super::survey::Measured;
 use crate::report::{ClassFigures, Decision, PassFigures, Tally};
 use crate::stage::SinkSummary;
@@ -13,6 +15,8 @@ pub(crate) struct Finished {
     pub read: u64,
     /// For each file of each sink, the records that it was given, and what it says.
     pub written: Vec<Vec<(u64, SinkSummary)>>,
+    /// For each sink the paths of these files, if it is one of squares.
+    pub squares: Vec<Vec<PathBuf>>,
     /// Counts of all branches together.
     pub tally: Tally,
     /// What each branch came to.

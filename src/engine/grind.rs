@@ -192,6 +192,9 @@ impl<'a> Worker<'a> {
             // Half for the zone, half for the rim, as where memory decides.
             loader.limit_rim(points.saturating_mul(2));
         }
+        if job.task.whole_rims {
+            loader.see_all();
+        }
         let tile = loader.tile().0;
         tile.compute_by(job.task.simd);
         if neighbors > 0 {
@@ -239,13 +242,12 @@ impl<'a> Worker<'a> {
         let mut summary = None;
         for call in self.pass.calls.iter().take_while(|call| Some(call.op) != until) {
             put_to_work(tile, &self.job.ops, *call);
-            match (&self.job.ops[call.op].op, call.gathers) {
-                (Op::Scan(op), true) => {
-                    let bytes = summary.insert(Vec::new());
-                    op.gather_into(tile, &mut self.sum.tally, bytes)?;
-                }
-                (op, _) => op.tile().run(tile, &mut self.sum.tally)?,
-            }
+            let (stage, tally) = (&self.job.ops[call.op], &mut self.sum.tally);
+            let done = match (&stage.op, call.gathers) {
+                (Op::Scan(op), true) => op.gather_into(tile, tally, summary.insert(Vec::new())),
+                (op, _) => op.tile().run(tile, tally),
+            };
+            done.map_err(|error| error.of_stage(&stage.kind))?;
         }
         Ok((tile, summary))
     }

@@ -15,7 +15,7 @@ use crate::graph::{Limits, Written};
 use crate::point::{ColumnKind, ComputedDimension, Mark, NORMAL, PointBatch, Schema, names};
 use crate::report::Tally;
 use crate::stage::{AnyScanOp, Needs, TileOp, Transform};
-use crate::tile::{Loader, ReadDimensions, Sieve, Tile};
+use crate::tile::{Loader, NeighborNeeds, ReadDimensions, Sieve, Tile};
 use crate::{Error, Result};
 
 /// A tile stage and where it stands.
@@ -213,10 +213,11 @@ impl ColumnBytes {
 }
 
 /// Lets the stage of a call work on `tile`: on the records that it is limited to, and with the
-/// columns that it says it reads of its neighbours.
+/// neighbours and columns of theirs that it says it looks at.
 pub(crate) fn put_to_work(tile: &mut Tile, ops: &[StageOp], call: Call) {
     tile.limits = ops[call.op].selection;
-    tile.of_neighbors = Some(needs(ops, call).of_neighbors.into());
+    let needs = needs(ops, call);
+    tile.looks = Some(NeighborNeeds { count: needs.neighbors, columns: needs.of_neighbors.into() });
 }
 
 /// What a call needs.

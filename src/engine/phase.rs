@@ -21,7 +21,8 @@ pub(crate) enum RunPhase {
     Gather(usize),
     /// Tiles in this pass.
     Mill(usize),
-    /// Files of this sink, or stretches of it, which are written behind the tiles of a pass.
+    /// Files of this sink, or stretches of it, which are written behind the tiles of a pass, or
+    /// behind all points where they are squares.
     Write(usize),
     /// Ranges of blocks, for the figures of this branch.
     Survey(usize),
@@ -46,11 +47,26 @@ impl RunPhase {
     }
 }
 
+impl RunPhase {
+    /// As predictions name it, which tell all phases apart that grow in other ways with the scan.
+    pub fn name_in_predictions(self) -> &'static str {
+        match self {
+            RunPhase::Look(_) => LOOK,
+            _ => self.name().unwrap_or("publish"),
+        }
+    }
+}
+
+/// What predictions call the look at samples before a pass, whose number is bounded.
+pub(crate) const LOOK: &str = "look";
+
 impl Task {
     /// All phases of the run, in their order.
     pub fn phases(&self) -> Vec<RunPhase> {
+        let squares = (0..self.sinks.len()).filter(|sink| self.has_squares(*sink));
+        let end = squares.map(RunPhase::Write).chain([RunPhase::Publish]);
         if !self.mills {
-            return vec![RunPhase::Convert, RunPhase::Publish];
+            return [RunPhase::Convert].into_iter().chain(end).collect();
         }
         let mut phases = vec![RunPhase::Decode, RunPhase::Merge];
         for (n, pass) in self.passes.iter().enumerate() {
@@ -67,7 +83,7 @@ impl Task {
             let branch = self.branches.iter().position(|branch| branch.pass == n);
             phases.extend(branch.map(RunPhase::Survey));
         }
-        phases.push(RunPhase::Publish);
+        phases.extend(end);
         phases
     }
 }

@@ -44,9 +44,14 @@ impl Staged {
 
     /// The same for another file of the run, in this one's scratch folder where both are beside it.
     pub fn also(&self, path: &Path, trouble: &Trouble) -> Result<Self> {
-        if folder_of(path) != folder_of(&self.path) {
-            return Staged::beside(path, self.existing, trouble);
+        match folder_of(path) == folder_of(&self.path) {
+            true => self.in_same_folder(path),
+            false => Staged::beside(path, self.existing, trouble),
         }
+    }
+
+    /// The same for another file of the run in the folder of this one.
+    pub fn in_same_folder(&self, path: &Path) -> Result<Self> {
         check_place(path, self.existing)?;
         let scratch = self.scratch.clone();
         let file = scratch.path("report")?;
@@ -263,7 +268,8 @@ pub fn check_place(path: &Path, existing: Existing) -> Result<()> {
     Err(Error::new(ErrorKind::Io, "the folder does not exist").at(folder).help(help))
 }
 
-fn folder_of(path: &Path) -> PathBuf {
+/// The folder that a file is in.
+pub fn folder_of(path: &Path) -> PathBuf {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
         _ => PathBuf::from("."),

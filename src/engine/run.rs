@@ -11,6 +11,7 @@ use std::sync::Arc;
 use super::Watch;
 use super::account::{nothing_left, write_report};
 use super::by_rank::listed_bytes;
+use super::by_square::{BySquare, SquareFile, SquareSink};
 use super::clock::Clock;
 use super::finished::Finished;
 use super::job::Job;
@@ -20,13 +21,14 @@ use super::phase::RunPhase;
 use super::publish::{Staged, make_folder, publish};
 use super::room;
 use super::room::Taken;
+use super::row::RowLayout;
 use super::scratch::{Scratch, Trouble, memory_warning};
-use super::shares::Demands;
+use super::shares::{Demands, Shares};
 use super::stream::stream;
 use super::task::Task;
 use crate::Result;
 use crate::host::{Threads, lock};
-use crate::report::{FileFigures, Report, RunFigures};
+use crate::report::{FileFigures, Report, RunFigures, check_written};
 use crate::stage::Sink;
 
 /// A run that is done. Displayed as a few lines for the terminal.
@@ -86,7 +88,7 @@ impl Task {
             (None, None) => Arc::new(Scratch::below(&std::env::temp_dir(), trouble)),
             (Some(folder), _) => Arc::new(Scratch::below(folder, trouble)),
         };
-        let (finished, mut run) =
+        let (finished, mut run, squares) =
             self.work(ops, &outputs, &scratch, threads, watch, &mut clock).map_err(tell)?;
         drop(scratch);
         let copies = first.map(|first| self.beside.iter().map(|copy| copy.make(first, trouble)));
@@ -102,8 +104,9 @@ impl Task {
         }
         drop(tiles);
         // What an output refers to comes first, so that none refers to what is not there.
-        let outputs: Vec<Staged> =
-            beside.into_iter().chain(outputs.into_iter().flatten()).collect();
+        let places = (0..).zip(outputs).filter(|(sink, _)| !self.has_squares(*sink));
+        let files = places.flat_map(|(_, staged)| staged).chain(squares);
+        let outputs: Vec<Staged> = beside.into_iter().chain(files).collect();
         publish(&outputs, staged_report.as_ref())?;
         let unit = self.source.metadata().units.sign();
         Ok(Done { report, report_path: self.settings.report.clone(), unit })
@@ -135,13 +138,22 @@ impl Task {
     }
 
     /// Opens the sinks but those of the inputs, which are created one by one, when their records
-    /// are known.
-    fn create_sinks(&self, outputs: &[Vec<Staged>]) -> Result<Vec<Option<Box<dyn Sink>>>> {
+    /// are known. Those of squares set their records down.
+    fn create_sinks(
+        &self,
+        outputs: &[Vec<Staged>],
+        squares: &[Option<Arc<BySquare>>],
+    ) -> Result<Vec<Option<Box<dyn Sink>>>> {
         let schema = self.schema();
         let whole = !self.mills && self.transforms.is_empty() && !self.drops_nonfinite();
-        let mut sinks = Vec::new();
+        let mut sinks: Vec<Option<Box<dyn Sink>>> = Vec::new();
         for (n, (sink, staged)) in self.sinks.iter().zip(outputs).enumerate() {
             let metadata = self.metadata(n, (!whole).then(|| self.pipeline(n)));
+            if let Some(squares) = &squares[n] {
+                let chunk = sink.chunk(schema, &metadata)?;
+                sinks.push(Some(Box::new(SquareSink::new(squares.clone(), chunk))));
+                continue;
+            }
             let file = match sink.is_file() {
                 true => staged.first().filter(|_| !sink.is_folder()).map(Staged::file),
                 false => Some(Path::new("")),
@@ -161,13 +173,14 @@ impl Task {
         threads: Threads<'_>,
         watch: &dyn Watch,
         clock: &mut Clock<'_>,
-    ) -> Result<(Finished, RunFigures)> {
-        let sinks = self.create_sinks(outputs)?;
+    ) -> Result<(Finished, RunFigures, Vec<Staged>)> {
         let mut job = Job::new(self, ops, outputs, scratch, threads, watch)?;
+        let squares: Vec<_> = (0..self.sinks.len()).map(|n| self.by_square(&job, n)).collect();
+        let sinks = self.create_sinks(outputs, &squares)?;
         let folder = scratch.parent();
         let doubts = self.check_room(&job, folder)?;
         self.warnings.iter().cloned().chain(doubts).for_each(|warning| job.warn(warning));
-        let finished = match &self.lattice {
+        let mut finished = match &self.lattice {
             Some(lattice) if self.mills => mill(&mut job, lattice, sinks, clock)?,
             lattice => {
                 clock.begin(RunPhase::Convert, Some(self.source.points()))?;
@@ -176,12 +189,48 @@ impl Task {
                 stream(&job, sinks, lattice.as_ref())?
             }
         };
+        let files = self.write_squares(&job, &squares, &mut finished, clock)?;
         let mut run = self.figures(&finished, &job);
         run.warnings.extend(nothing_left(&finished, &job));
         run.warnings.extend(memory_warning(folder, job.area.written()));
         run.warnings.iter().for_each(|warning| watch.warn(warning));
         run.warnings.splice(0..0, job.warned());
-        Ok((finished, run))
+        Ok((finished, run, files))
+    }
+
+    /// The squares of a sink, if it is cut into such.
+    fn by_square(&self, job: &Job<'_>, sink: usize) -> Option<Arc<BySquare>> {
+        let layout = RowLayout::of(self.computed[sink].iter().map(|computed| computed.column));
+        let squares = |side| BySquare::new(&job.area, side, self.schema(), layout);
+        self.sides[sink].map(squares).map(Arc::new)
+    }
+
+    /// Writes the files of all squares; where they grew.
+    fn write_squares(
+        &self,
+        job: &Job<'_>,
+        squares: &[Option<Arc<BySquare>>],
+        finished: &mut Finished,
+        clock: &mut Clock<'_>,
+    ) -> Result<Vec<Staged>> {
+        let mut staged = Vec::new();
+        finished.squares.resize_with(squares.len(), Vec::new);
+        for (sink, squares) in squares.iter().enumerate() {
+            let Some(squares) = squares else { continue };
+            clock.begin(RunPhase::Write(sink), Some(squares.records()))?;
+            let _working = job.budget.lease_all(&self.demands.squares(), "squares")?;
+            let (given, set_down) = (&mut finished.written[sink], squares.records());
+            check_written(self.sinks[sink].path(), given.iter().map(|(n, _)| n).sum(), set_down)?;
+            given.clear();
+            for SquareFile { path, staged: file, given: records, summary } in
+                squares.write(job, sink)?
+            {
+                given.push((records, summary));
+                finished.squares[sink].push(path);
+                staged.push(file);
+            }
+        }
+        Ok(staged)
     }
 
     /// Refuses disks that have no room for what is spilled and, where nothing is removed, for
@@ -189,7 +238,13 @@ impl Task {
     fn check_room(&self, job: &Job<'_>, folder: &Path) -> Result<Vec<String>> {
         let mut all = Vec::new();
         if self.mills {
-            let bytes = spilled(&self.demands, self.kept_in_memory(&job.shares));
+            let bytes = self.spilled(&job.shares);
+            all.push(Taken { folder, spilled: true, bytes, again: 0 });
+        }
+        let of_squares = self.sides.iter().flatten().count() as u64;
+        if of_squares > 0 {
+            let each = (self.schema().stride as u64).saturating_mul(of_squares);
+            let bytes = self.source.points().saturating_mul(each);
             all.push(Taken { folder, spilled: true, bytes, again: 0 });
         }
         let keeps = !self.streams() && job.ops.is_empty() && !self.drops_nonfinite();
@@ -204,13 +259,30 @@ impl Task {
     }
 }
 
-/// Bytes that a run spills: records, their order, packed positions twice (runs and merged scan),
-/// states and fates twice (of the pass before and of the pass at work), and columns between passes.
-/// Ranks in the input, and the lists that are sorted by them.
-fn spilled(demands: &Demands, kept_in_memory: u64) -> u64 {
-    let order = if demands.tagged { 12 } else { 8 }
-        + if demands.ranked { 8 + listed_bytes(demands.columns.row) } else { 0 };
-    let columns = demands.columns.stored as u64 + if demands.passes.len() > 1 { 1 + 4 } else { 0 };
-    let each = demands.stride as u64 + order + 2 * 8 + 1 + 4 + columns;
-    demands.points.saturating_mul(each).saturating_sub(kept_in_memory)
+impl Task {
+    /// Bytes that the run spills where memory is divided like this.
+    pub fn spilled(&self, shares: &Shares) -> u64 {
+        self.demands.stored_bytes().saturating_sub(self.kept_in_memory(shares))
+    }
 }
+
+impl Demands {
+    /// Bytes that a run sets down between its phases: records, their order, packed positions twice
+    /// (runs and merged scan), states and fates twice (of the pass before and of the pass at work),
+    /// and columns between passes. Ranks in the input, and the lists that are sorted by them.
+    fn stored_bytes(&self) -> u64 {
+        let order = if self.tagged { 12 } else { 8 }
+            + if self.ranked { 8 + listed_bytes(self.columns.row) } else { 0 };
+        let columns = self.columns.stored as u64 + if self.passes.len() > 1 { 1 + 4 } else { 0 };
+        let each = self.stride as u64 + order + 2 * POSITION_BYTES + 1 + 4 + columns;
+        self.points.saturating_mul(each)
+    }
+
+    /// The same without what is given back when the runs are merged.
+    pub fn standing_bytes(&self) -> u64 {
+        self.stored_bytes().saturating_sub(self.points.saturating_mul(POSITION_BYTES))
+    }
+}
+
+/// Bytes that a packed position takes, about, where coordinates have the steps of a scan's headers.
+const POSITION_BYTES: u64 = 8;

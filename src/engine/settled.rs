@@ -12,8 +12,10 @@ use serde_json::Value;
 use super::chunks::StoredGathered;
 use super::job::Job;
 use super::pass::{Branch, Op};
+use super::task::GivenLengths;
 use crate::geom::lattice::Lattice;
 use crate::point::Bounds;
+use crate::quantity::Length;
 use crate::report::{Decision, Grouped, Short, Tally};
 use crate::stage::{ScanFacts, StoredSummaries};
 use crate::store::SealedTiles;
@@ -95,6 +97,21 @@ pub(crate) fn rounding(
     Some(Decision { stage, name, value: apart.farthest.into() })
 }
 
+/// What lengths in a unit of their own are in that of the scan, each under its key; and what they
+/// were `given` as.
+fn converted(lengths: &[(&'static str, Length)], given: &GivenLengths) -> Vec<(String, Value)> {
+    let each = given.iter().flat_map(|(key, text)| {
+        let value =
+            lengths.iter().find(|(named, _)| named == key).map(|(_, length)| length.value());
+        let name = key.rsplit('.').next().unwrap_or(key);
+        [
+            (format!("{name}_given"), text.clone().into()),
+            (format!("{name}_converted"), value.into()),
+        ]
+    });
+    each.collect()
+}
+
 /// What the stages of a branch settled by themselves and what they expected, in their order.
 pub(crate) fn decisions(
     job: &Job<'_>,
@@ -108,6 +125,7 @@ pub(crate) fn decisions(
         let is_new = |(name, _): &(String, Value)| settled.iter().all(|(other, _)| other != name);
         let expected: Vec<_> = expected.into_iter().flatten().filter(is_new).collect();
         settled.extend(expected);
+        settled.extend(converted(&stage.op.tile().lengths(), &job.task.given[op]));
         settled.into_iter().map(|(name, value)| Decision { stage: stage.kind.clone(), name, value })
     });
     each.collect()

@@ -50,6 +50,7 @@ pub(crate) fn stream(
     };
     Ok(Finished {
         read,
+        squares: Vec::new(),
         written: written.into_iter().map(|summary| vec![(kept, summary)]).collect(),
         tally,
         branches: vec![branch],

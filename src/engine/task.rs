@@ -24,9 +24,14 @@ pub(crate) struct Schemas {
     pub last: Arc<Schema>,
 }
 
+/// The lengths of a stage that were given in a unit of their own: key and text.
+pub(crate) type GivenLengths = Vec<(&'static str, String)>;
+
 /// A run that can begin.
 pub(crate) struct Task {
     pub settings: RunSettings,
+    /// See [`Graph::whole_rims`](crate::Graph).
+    pub whole_rims: bool,
     pub threads: usize,
     pub simd: Simd,
     pub source: Box<dyn Source>,
@@ -41,6 +46,10 @@ pub(crate) struct Task {
     pub sinks: Vec<Box<dyn CreateSink>>,
     /// For each sink, those of the inputs if it is a folder; else none.
     pub each: Vec<Vec<Box<dyn CreateSink>>>,
+    /// For each tile stage, the lengths that were converted to the unit of the scan.
+    pub given: Vec<GivenLengths>,
+    /// For each sink, the side of the squares that it is cut into.
+    pub sides: Vec<Option<f64>>,
     /// What is to be copied beside outputs.
     pub beside: Vec<Beside>,
     /// See [`ranks`].
@@ -87,6 +96,11 @@ impl Task {
             Some(each) if !each.is_empty() => each,
             _ => &self.sinks[sink..=sink],
         }
+    }
+
+    /// True if a sink is cut into squares.
+    pub fn has_squares(&self, sink: usize) -> bool {
+        self.sides[sink].is_some()
     }
 
     /// The stages on the branch of a sink, as outputs name them.

@@ -5,10 +5,11 @@ use std::ops::Range;
 use super::bind::{Names, NumberNode, TruthNode, number, truth, type_of};
 use super::eval;
 use super::fault::ExpressionFault;
+use super::lanes::{LANES, LoadedField};
 use super::parser::parse_assignment;
 use super::text::{FromText, is_its_text};
 use super::tree::{ExpressionTree, TreeNode};
-use crate::point::{Dimension, PointBatch, Scalar, Schema, Value, names};
+use crate::point::{Dimension, PointBatch, names};
 use crate::quantity::Figure;
 use crate::{Error, Result};
 
@@ -72,7 +73,9 @@ impl Assignment {
     pub(crate) fn check(&self, names: Names<'_>) -> Result<(), ExpressionFault> {
         let (field, _) = self.bind(names)?;
         let TreeNode::Number(number) = self.tree.node else { return Ok(()) };
-        if put(&field, names.schema, &mut vec![0; names.schema.stride], number) {
+        let target = LoadedField::of_record(&field, names.schema);
+        let (stride, mut record) = (names.schema.stride, vec![0; names.schema.stride]);
+        if target.store(&[number], &mut record, stride).is_ok() {
             return Ok(());
         }
         let told = format!("{} ({}) cannot hold it", self.target.0, type_of(&field));
@@ -110,13 +113,12 @@ impl Assignment {
             }
         }
         let schema = batch.schema().clone();
-        let records = batch.records_mut().chunks_exact_mut(schema.stride);
-        for (record, number) in records.zip(numbers) {
-            if !put(&field, &schema, record, number) {
-                return Err(self.too_much(&field, number));
-            }
-        }
-        Ok(())
+        let target = LoadedField::of_record(&field, &schema);
+        let blocks = batch.records_mut().chunks_mut(LANES * schema.stride);
+        blocks.zip(numbers.chunks(LANES)).try_for_each(|(records, numbers)| {
+            let stored = target.store(numbers, records, schema.stride);
+            stored.map_err(|number| self.too_much(&field, number))
+        })
     }
 
     fn too_much(&self, field: &Dimension, number: f64) -> Error {
@@ -128,19 +130,4 @@ impl Assignment {
         let (holds, help) = (type_of(field), "limit it by `where`, `min` or `max`");
         Error::pipeline(format!("{told}, which {name} ({holds}) cannot hold")).help(help)
     }
-}
-
-/// Stores a world value: rounded to the nearest that the field has. False if it is out of range.
-fn put(field: &Dimension, schema: &Schema, record: &mut [u8], world: f64) -> bool {
-    let stored = match field.scale == 1.0 && field.origin == 0.0 {
-        true => world,
-        false => (world - field.origin) / field.scale,
-    };
-    let value = match field.scalar {
-        Scalar::F32 if (stored as f32).is_infinite() && stored.is_finite() => return false,
-        Scalar::F32 => Value::Single(stored as f32),
-        Scalar::F64 => Value::Double(stored),
-        _ => Value::Double(stored.round_ties_even()),
-    };
-    field.put(record, schema.endian, value)
 }

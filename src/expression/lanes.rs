@@ -3,6 +3,7 @@
 
 use crate::point::{
     COLUMN_ENDIAN, ColumnKind, ComputedDimension, Dimension, Endian, PointBatch, Scalar, Schema,
+    Value,
 };
 
 /// Records that are worked on at once.
@@ -95,9 +96,9 @@ impl LoadedField {
         macro_rules! read {
             ($t:ty) => {
                 rows.for_each(|(value, row)| {
-                    let mut bytes = [0; size_of::<$t>()];
-                    bytes.copy_from_slice(&row[offset..offset + size_of::<$t>()]);
-                    *value = <$t>::from_le_bytes(bytes) as f64;
+                    if let Some(bytes) = row.get(offset..).and_then(<[u8]>::first_chunk) {
+                        *value = <$t>::from_le_bytes(*bytes) as f64;
+                    }
                 })
             };
         }
@@ -117,5 +118,64 @@ impl LoadedField {
             Scalar::F32 => read!(f32),
             Scalar::F64 => read!(f64),
         }
+    }
+
+    /// Stores world values into the field of `rows`, records one after the other: rounded to the
+    /// nearest that it has.
+    ///
+    /// # Errors
+    ///
+    /// The first value that it cannot hold.
+    pub fn store(&self, worlds: &[f64], rows: &mut [u8], stride: usize) -> Result<(), f64> {
+        let Dimension { scalar, offset, bits, .. } = self.dimension;
+        let [scale, origin] = self.units();
+        let is_world = scale == 1.0 && origin == 0.0;
+        let stored = |world: f64| if is_world { world } else { (world - origin) / scale };
+        let rows = rows.chunks_exact_mut(stride).zip(worlds);
+        macro_rules! store {
+            ($t:ty) => {{
+                let most = <$t>::MIN as f64..=<$t>::MAX as f64;
+                let fits = |world: &f64| most.contains(&stored(*world).round_ties_even());
+                if let Some(beyond) = worlds.iter().find(|world| !fits(world)) {
+                    return Err(*beyond);
+                }
+                rows.for_each(|(row, world)| {
+                    if let Some(bytes) = row.get_mut(offset..).and_then(<[u8]>::first_chunk_mut) {
+                        *bytes = (stored(*world).round_ties_even() as $t).to_le_bytes();
+                    }
+                });
+                Ok(())
+            }};
+        }
+        match scalar {
+            Scalar::U8 if bits.is_none() => store!(u8),
+            Scalar::I8 if bits.is_none() => store!(i8),
+            Scalar::U16 if self.is_plain() => store!(u16),
+            Scalar::I16 if self.is_plain() => store!(i16),
+            Scalar::U32 if self.is_plain() => store!(u32),
+            Scalar::I32 if self.is_plain() => store!(i32),
+            _ => {
+                rows.into_iter().try_for_each(|(row, world)| match self.put(row, stored(*world)) {
+                    true => Ok(()),
+                    false => Err(*world),
+                })
+            }
+        }
+    }
+
+    /// True if its bytes are all its own, in this order.
+    fn is_plain(&self) -> bool {
+        self.endian == Endian::Little && self.dimension.bits.is_none()
+    }
+
+    /// Stores a number into one record. False if it is out of range.
+    fn put(&self, row: &mut [u8], stored: f64) -> bool {
+        let value = match self.dimension.scalar {
+            Scalar::F32 if (stored as f32).is_infinite() && stored.is_finite() => return false,
+            Scalar::F32 => Value::Single(stored as f32),
+            Scalar::F64 => Value::Double(stored),
+            _ => Value::Double(stored.round_ties_even()),
+        };
+        self.dimension.put(row, self.endian, value)
     }
 }

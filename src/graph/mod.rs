@@ -28,6 +28,7 @@ pub use settings::{
     Treatment, ZScale,
 };
 pub use size::parse_bytes;
+pub(crate) use toml::literal;
 pub use tree::GraphMistake;
 pub(crate) use tree::{TreeStage, mistakes as tree_mistakes};
 pub(crate) use written::Written;
@@ -66,6 +67,9 @@ pub struct Graph {
     pub stages: Vec<GraphStage>,
     /// The file that it was read from, which no output may replace.
     pub(crate) file: Option<PathBuf>,
+    /// True if every tile is to see the whole scan, which changes no answer of a stage that looks
+    /// no further than it says: whoever proves stages compares the two.
+    pub(crate) whole_rims: bool,
 }
 
 /// A stage and where it stands.
@@ -85,6 +89,8 @@ pub struct GraphStage {
     pub(crate) given: Option<serde_json::Value>,
     /// Line of its `kind` in its text, from 1.
     pub line: Option<usize>,
+    /// False if what it says itself decides about which records it is.
+    pub(crate) is_limited: bool,
     /// The records that it is limited to.
     pub(crate) limits: Limits,
     /// How it is written.
@@ -111,6 +117,7 @@ impl Graph {
             keys: serde_json::json!({}),
             given: None,
             line: None,
+            is_limited: true,
             limits: Limits::default(),
             written,
         });
@@ -188,7 +195,8 @@ impl<'a> From<&'a GraphStage> for TreeStage<'a> {
 impl GraphStage {
     /// True if it may work on some records and let the others pass.
     pub(crate) fn can_be_limited(&self) -> bool {
-        matches!(self.role, Role::Transform(_) | Role::TileOp(_) | Role::ScanOp(_))
+        let works = matches!(self.role, Role::Transform(_) | Role::TileOp(_) | Role::ScanOp(_));
+        works && self.is_limited
     }
 
     /// Limits it to some records, and enters that among its keys.

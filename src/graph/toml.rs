@@ -30,8 +30,8 @@ impl Graph {
                 above = Some(n);
             }
         }
-        let stage = stage.into_iter().map(literal).collect();
-        let document = Document { run: literal(settings(&self.settings)?), stage };
+        let stage = stage.into_iter().map(literal_table).collect();
+        let document = Document { run: literal_table(settings(&self.settings)?), stage };
         toml::to_string(&document)
             .map_err(|cause| Error::internal("the graph is no TOML").because(cause))
     }
@@ -100,14 +100,16 @@ fn settings(settings: &RunSettings) -> Result<Map<String, Value>> {
 }
 
 /// The same table with texts that refer to nothing: a `${` in them stands for itself.
-fn literal(table: Map<String, Value>) -> Map<String, Value> {
-    fn value(of: Value) -> Value {
-        match of {
-            Value::String(text) => text.replace("${", "$${").into(),
-            Value::Array(list) => list.into_iter().map(value).collect(),
-            Value::Object(table) => literal(table).into(),
-            other => other,
-        }
+fn literal_table(table: Map<String, Value>) -> Map<String, Value> {
+    table.into_iter().map(|(key, of)| (key, literal(of))).collect()
+}
+
+/// The same value, in whose texts a `${` stands for itself.
+pub(crate) fn literal(of: Value) -> Value {
+    match of {
+        Value::String(text) => text.replace("${", "$${").into(),
+        Value::Array(list) => list.into_iter().map(literal).collect(),
+        Value::Object(table) => literal_table(table).into(),
+        other => other,
     }
-    table.into_iter().map(|(key, of)| (key, value(of))).collect()
 }

@@ -92,7 +92,13 @@ impl GraphBuilder {
     pub fn stage<K: StageKind>(mut self, stage: K) -> Self {
         let at = StagePlace::new("", 0).knowing(&self.formats);
         match built(stage, &at) {
-            Ok(built) => self.push(K::KIND, built),
+            Ok(built) => {
+                let mut builder = self.push(K::KIND, built);
+                if let Some(stage) = builder.graph.stages.last_mut() {
+                    stage.is_limited = K::IS_LIMITED;
+                }
+                builder
+            }
             Err(error) => {
                 self.wrong.push(error);
                 self

@@ -27,6 +27,7 @@ pub(crate) struct Draft {
 }
 
 /// A `[[stage]]` table.
+#[derive(Clone)]
 pub(crate) struct StageDraft {
     /// Its kind and where it is written; None if it has none, which is told.
     pub kind: Option<PlacedWord>,
@@ -65,6 +66,8 @@ pub(crate) fn read(
             "run" => draft.run = draft.table("run", at, node),
             "params" => draft.params = draft.table("params", at, node),
             "stage" | "stages" => draft.add_stages(&key, at, node, registry),
+            // By which editors know how to complete and check the file.
+            "$schema" => {}
             word => draft.mistakes.push(Mistake::word(
                 at,
                 format!("a pipeline file has no `{word}`"),

@@ -27,6 +27,16 @@ pub(crate) struct SourceText {
 }
 
 impl SourceText {
+    /// The name of the text with the line that byte `at` is in, if its lines have numbers.
+    pub fn line(&self, at: usize) -> String {
+        let number = self.text[..floor(&self.text, at)].matches('\n').count() + 1;
+        match (self.has_lines, self.origin.as_str()) {
+            (false, origin) => origin.to_owned(),
+            (true, "") => format!("line {number}"),
+            (true, origin) => format!("{origin}:{number}"),
+        }
+    }
+
     /// `message` as it is told behind the name of this text.
     fn shortened<'a>(&self, message: &'a str) -> &'a str {
         let Some(setting) = &self.setting else { return message };

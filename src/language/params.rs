@@ -30,11 +30,12 @@ struct ParameterKeys {
 
 /// A parameter as it is declared.
 pub(super) struct Declared {
-    name: String,
-    at: TextPlace,
+    pub name: String,
+    /// Where it is declared.
+    pub at: TextPlace,
     /// None if the declaration is wrong, which is told.
     takes: Option<ParameterType>,
-    default: Option<Node>,
+    pub default: Option<Node>,
     choices: Vec<Node>,
     about: String,
 }
@@ -200,13 +201,19 @@ pub(super) fn used(draft: &Draft) -> BTreeSet<String> {
 }
 
 /// Puts values in the place of all references in a pipeline, which refers to the parameters `used`
-/// where no argument changes it.
-pub(super) fn fill(draft: &mut Draft, used: &BTreeSet<String>, environment: Environment<'_>) {
+/// where no argument changes it. Returns the values that parameters have, by their names.
+pub(super) fn fill(
+    draft: &mut Draft,
+    used: &BTreeSet<String>,
+    environment: Environment<'_>,
+) -> BTreeMap<String, Node> {
     let mut mistakes = Vec::new();
     let declared = declared(&draft.params, &mut mistakes);
     let values = ParameterValues::new(&declared, &draft.given, used, environment, &mut mistakes);
     draft.values_mut().for_each(|node| values.fill(node, &mut mistakes));
+    let ParameterValues { values, .. } = values;
     draft.mistakes.extend(mistakes);
+    values.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
 }
 
 /// The values of all parameters, and the environment.

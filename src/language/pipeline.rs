@@ -1,5 +1,6 @@
 //! The text of a pipeline before it is a graph: where it is from, and the form that it is in.
 
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fmt;
 use std::io::Read;
@@ -7,12 +8,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::draft;
+use super::draft::Draft;
+use super::explained::{Explained, WrittenKeys};
 use super::foreign;
 use super::form::TextForm;
 use super::line;
 use super::mistake;
 use super::mistake::{Mistake, SourceText};
 use super::node::KeyEntry;
+use super::origins::Origins;
 use super::parameter::Parameter;
 use super::params;
 use super::params::{Declared, declared};
@@ -147,18 +151,47 @@ impl PipelineText {
     ///
     /// All mistakes of the text and of `sets` at once, each with its place.
     pub fn graph(&self, registry: &Registry, sets: &[Set]) -> Result<Graph> {
+        let Drafted { sources, mut draft, used } = self.draft(registry, sets)?;
+        params::fill(&mut draft, &used, &*self.environment);
+        self.built(draft, &sources, registry)
+    }
+
+    /// The pipeline that the text means with these values, and for each value where it is from. No
+    /// input is opened.
+    ///
+    /// # Errors
+    ///
+    /// As [`graph`](PipelineText::graph).
+    pub fn explain(&self, registry: &Registry, sets: &[Set]) -> Result<Explained> {
+        let Drafted { sources, mut draft, used } = self.draft(registry, sets)?;
+        let origins = Origins::of(&draft, &sources, &*self.environment);
+        let written = WrittenKeys::of(&draft);
+        let params = params::fill(&mut draft, &used, &*self.environment);
+        let graph = self.built(draft, &sources, registry)?;
+        Explained::new(&graph, &written, &params, &origins, registry)
+    }
+
+    /// The tables of the text with the values of `sets`, references not replaced yet.
+    fn draft(&self, registry: &Registry, sets: &[Set]) -> Result<Drafted> {
         let sources: Arc<[SourceText]> =
             std::iter::once(self.source()).chain(sets.iter().map(Set::source)).collect();
-        let told = |mistakes| mistake::tell(mistakes, &sources);
-        let entries = self.entries(registry).map_err(told)?;
+        let entries = self.entries(registry).map_err(|wrong| mistake::tell(wrong, &sources))?;
         let mut draft = draft::read(entries, self.text.len(), self.form, registry);
         let used = params::used(&draft);
         for (i, set) in sets.iter().enumerate() {
             draft.apply(set, i + 1, registry);
         }
-        params::fill(&mut draft, &used, &*self.environment);
-        let (graph, mistakes) = build(draft, self.file.as_deref(), &sources, registry);
-        if mistakes.is_empty() { Ok(graph) } else { Err(told(mistakes)) }
+        Ok(Drafted { sources, draft, used })
+    }
+
+    fn built(
+        &self,
+        draft: Draft,
+        sources: &Arc<[SourceText]>,
+        registry: &Registry,
+    ) -> Result<Graph> {
+        let (graph, mistakes) = build(draft, self.file.as_deref(), sources, registry);
+        if mistakes.is_empty() { Ok(graph) } else { Err(mistake::tell(mistakes, sources)) }
     }
 
     /// The parameters that the text declares, in its order.
@@ -193,6 +226,15 @@ impl PipelineText {
             form => foreign::parse(&self.text, form),
         }
     }
+}
+
+/// A text as tables.
+struct Drafted {
+    /// The text, then those of arguments.
+    sources: Arc<[SourceText]>,
+    draft: Draft,
+    /// The parameters that the text refers to.
+    used: BTreeSet<String>,
 }
 
 impl fmt::Debug for PipelineText {

@@ -166,6 +166,7 @@ pub(crate) fn pipeline(
         "title": "A pipeline of pointmill",
         "type": "object",
         "properties": {
+            "$schema": { "description": "This schema, for editors.", "type": "string" },
             "run": written(run),
             "params": parameters(),
             "stage": {

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::draft::{Draft, StageDraft};
-use super::foreign;
+use super::elsewhere;
 use super::keys;
 use super::mistake::{Mistake, SourceText, advice};
 use super::node::{KeyEntry, Node, NodeValue};
@@ -41,7 +41,7 @@ pub(super) fn build(
     outputs::check(file, &draft, &placed, &settings, &mut mistakes);
     let file = file.map(Path::to_owned);
     let stages = placed.into_iter().flatten().collect();
-    (Graph { origin: origin.clone(), settings, stages, file }, mistakes)
+    (Graph { origin: origin.clone(), settings, stages, file, ..Graph::default() }, mistakes)
 }
 
 fn place(
@@ -60,13 +60,16 @@ fn place(
         }
     };
     let Some(built) = registry.build(kind, &own, &place) else {
+        if let Some((told, note)) = elsewhere::told(kind, &own) {
+            return Err(vec![Mistake::new(at.clone(), told).note(note)]);
+        }
         let kinds = registry.kinds().map(|(kind, _)| kind);
         if kind.contains("${") {
             let told = "`kind` takes no parameter: write the kind itself";
             return Err(vec![Mistake::new(at.clone(), told).note(advice("", "stages", kinds))]);
         }
         let told = format!("there is no stage `{kind}`");
-        return Err(vec![Mistake::word(at.clone(), told, foreign::kind(kind), "stages", kinds)]);
+        return Err(vec![Mistake::word(at.clone(), told, kind, "stages", kinds)]);
     };
     let given = limits.entries();
     let read = keys::read::<LimitKeys>(kind, &limits, &[]);
@@ -88,6 +91,7 @@ fn place(
         from: Vec::new(),
         line: Some(place.line()),
         written: Arc::new(WrittenText::new(sources, &stage.keys)),
+        is_limited: registry.is_limited(kind),
         limits: Limits::default(),
         role,
         keys,

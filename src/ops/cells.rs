@@ -65,6 +65,12 @@ impl TileOp for Cells {
         needs.cells(side, aligned).bytes_per_point(bytes)
     }
 
+    fn for_share(&mut self, share: f64) {
+        if let Some(Keep::Records(count)) = &mut self.keep {
+            *count = ((*count as f64 * share).round() as u64).max(1);
+        }
+    }
+
     fn convert(&mut self, units: &Units) -> Result<()> {
         if let Side::Length(side) = &mut self.side {
             *side = side.in_scan(units, "cells.side")?;
@@ -78,7 +84,7 @@ impl TileOp for Cells {
         self.check().map_err(|(_, error)| error)
     }
 
-    fn lengths(&self) -> Vec<(&'static str, f64)> {
+    fn lengths(&self) -> Vec<(&'static str, Length)> {
         let side = match self.side {
             Side::Length(length) => Some(length),
             Side::Auto | Side::Spread => None,
@@ -88,7 +94,7 @@ impl TileOp for Cells {
             ("cells.max_side", self.max_side),
             ("cells.min_spacing", self.min_spacing.and_then(Setting::given)),
         ];
-        lengths.into_iter().filter_map(|(key, length)| Some((key, length?.value()))).collect()
+        lengths.into_iter().filter_map(|(key, length)| Some((key, length?))).collect()
     }
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
@@ -113,7 +119,7 @@ impl TileOp for Cells {
 
     fn warnings(&self, lattice: &Lattice) -> Vec<String> {
         let each = self.lengths().into_iter();
-        each.filter_map(|(address, length)| rounded(lattice, address, length)).collect()
+        each.filter_map(|(address, length)| rounded(lattice, address, length.value())).collect()
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {

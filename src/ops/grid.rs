@@ -107,8 +107,8 @@ impl TileOp for Grid {
         Ok(())
     }
 
-    fn lengths(&self) -> Vec<(&'static str, f64)> {
-        vec![("grid.side", self.side.value())]
+    fn lengths(&self) -> Vec<(&'static str, Length)> {
+        vec![("grid.side", self.side)]
     }
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {

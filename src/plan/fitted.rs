@@ -1,36 +1,33 @@
 //! A pipeline that fits: its source open, its lattice fixed, its stages in passes, its memory
 //! divided.
 
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use rayon::ThreadPool;
 
+use super::demanded::{demands, lists_bytes};
 use super::limits::{check_limits, number_selections};
-use super::look::{Unfit, look};
+use super::look::{Unfit, look, look_at_corners};
+use super::order::WriteOrder;
 use super::passes::{Passes, unroll};
-use super::places::{all_read, check_places, copies, each_input};
+use super::places::{all_read, check_places, copies, each_input, square_sides};
 use super::sorted::{Sorted, blame};
 use super::stretch::Stretch;
 use super::transforms::{check_numbers, fit_transforms};
-use crate::engine::by_input::lists_bytes;
-use crate::engine::by_rank;
-use crate::engine::pass::{ColumnBytes, Op, Pass, StageOp, standings};
+use crate::engine::pass::{Pass, StageOp};
 use crate::engine::shares::Demands;
 use crate::engine::tagger::Tagger;
-use crate::engine::task::{Schemas, Task};
+use crate::engine::task::{GivenLengths, Schemas, Task};
 use crate::engine::{Done, Watch};
 use crate::error::shown;
 use crate::expression::Choice;
 use crate::geom::lattice::Lattice;
 use crate::graph::Graph;
-use crate::graph::{MOST_THREADS, Nonfinite, Overrides, RunSettings};
+use crate::graph::{Nonfinite, Overrides, RunSettings};
 use crate::host::Threads;
-use crate::host::process::default_memory;
-use crate::point::{ComputedDimension, Metadata, Schema, Units};
+use crate::point::{Schema, Units};
 use crate::quantity::Figure;
-use crate::stage::{ChunkSize, CreateSink, Order, Source};
+use crate::stage::{CreateSink, Source};
 use crate::store::CLASSED_INPUTS;
 use crate::{Error, Result};
 
@@ -100,6 +97,7 @@ impl Graph {
     pub fn plan(self, overrides: &Overrides) -> Result<Plan> {
         let (origin, file) = (self.origin.clone(), self.file.clone());
         let settings = self.settings.clone().with(overrides);
+        let whole_rims = self.whole_rims;
         let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
         let mut sorted = Sorted::new(self)?;
         let open = &*sorted.source.1;
@@ -107,25 +105,23 @@ impl Graph {
             check_places(file.as_deref(), read, sinks, &settings)
         };
         let (_, wrong) = places(&open.paths(), &sorted.sinks);
-        let FittedStages { source, schemas, choices, passes } = fit_stages(&mut sorted, wrong)?;
+        let FittedStages { source, schemas, choices, passes, given } =
+            fit_stages(&mut sorted, wrong)?;
         let schema = &schemas.last;
         let open = &*sorted.source.1;
         let read = all_read(open, &*source);
         let (mut files, wrong) = places(&read, &sorted.sinks);
         Error::all(wrong)?;
         let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;
+        let sides = square_sides(&*source, &sorted.sinks, &settings, &read)?;
         let beside = copies(&*source, &sorted.sinks, &each, &settings, &mut files)?;
         let tagger = tagger(&sorted.ops, &passes.passes, &choices, &ranks, schema, &settings)?;
         let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, (&*source, schema), &sorted.ops, order.mills)?;
         let simd = settings.simd.resolve().map_err(in_file)?;
         let demands = demands(&sorted, &passes, (&*source, schema), &order, &settings)?;
-        let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
-        let demands = Demands {
-            lists: demands.lists + lists_bytes(ranks.len()) * folders,
-            tagged: tagger.tags(),
-            ..demands
-        };
+        let lists = demands.lists + lists_bytes(&each, &sides, &ranks);
+        let demands = Demands { lists, tagged: tagger.tags(), ..demands };
         demands.divide()?;
         let mut warnings = warnings(&*source, &sorted, &schemas, &settings)?;
         warnings.extend(doubt);
@@ -134,6 +130,7 @@ impl Graph {
             simd,
             threads: demands.threads,
             settings,
+            whole_rims,
             source,
             source_kind: sorted.source.0,
             transforms: sorted.transforms,
@@ -147,6 +144,8 @@ impl Graph {
             computed: passes.computed,
             in_input_order: order.in_input_order,
             each,
+            sides,
+            given,
             beside,
             ranks,
             tagger,
@@ -164,6 +163,7 @@ struct FittedStages {
     schemas: Schemas,
     choices: Vec<Choice>,
     passes: Passes,
+    given: Vec<GivenLengths>,
 }
 
 /// Opens the inputs and fits the stages to them. What is `wrong` so far is told with what is found
@@ -180,20 +180,26 @@ fn fit_stages(sorted: &mut Sorted, mut wrong: Vec<Error>) -> Result<FittedStages
     wrong.extend(unfit);
     wrong.extend(check_limits(sorted, &schemas.last));
     wrong.extend(check_numbers(sorted, &*source).err());
-    wrong.extend(fit(&mut sorted.ops, &source.metadata().units));
+    let (unfit, given) = fit(&mut sorted.ops, &source.metadata().units);
+    wrong.extend(unfit);
     let choices = number_selections(&mut sorted.ops)?;
     let passes = unroll(sorted, &schemas.last, &mut wrong)?;
     Error::all(wrong)?;
-    Ok(FittedStages { source, schemas, choices, passes })
+    Ok(FittedStages { source, schemas, choices, passes, given })
 }
 
-/// Fits tile stages to the units of the scan: lengths with a unit of their own are converted.
-fn fit(ops: &mut [StageOp], units: &Units) -> Vec<Error> {
-    let unfit = |stage: &mut StageOp| {
-        let error = stage.op.tile_mut().convert(units).err()?;
-        Some(blame(&*stage.written, error))
-    };
-    ops.iter_mut().filter_map(unfit).collect()
+/// Fits tile stages to the units of the scan: lengths with a unit of their own are converted. What
+/// is wrong, and of each stage what its lengths were given as.
+fn fit(ops: &mut [StageOp], units: &Units) -> (Vec<Error>, Vec<GivenLengths>) {
+    let (mut wrong, mut given) = (Vec::new(), Vec::new());
+    for stage in ops {
+        let lengths = stage.op.tile().lengths();
+        let unfit = stage.op.tile_mut().convert(units).err();
+        wrong.extend(unfit.map(|error| blame(&*stage.written, error)));
+        let texts = lengths.into_iter().filter(|(_, length)| length.has_unit());
+        given.push(texts.map(|(key, length)| (key, length.to_string())).collect());
+    }
+    (wrong, given)
 }
 
 /// What tells records apart as they are decoded.
@@ -236,73 +242,14 @@ fn lattice(
     Ok((Some(lattice), doubt))
 }
 
-/// What a run depends on in its memory, but the lists of outputs that are one for each input.
-fn demands(
-    sorted: &Sorted,
-    Passes { passes, computed, .. }: &Passes,
-    (source, schema): (&dyn Source, &Arc<Schema>),
-    order: &WriteOrder,
-    settings: &RunSettings,
-) -> Result<Demands> {
-    let limit = settings.memory.unwrap_or_else(default_memory);
-    let chunks = chunks(sorted, computed, (source, schema))?;
-    let columns = passes.iter().map(|pass| pass.column_bytes(computed));
-    let ranked =
-        order.in_input_order.iter().filter(|ranked| **ranked && order.mills).count() as u64;
-    Ok(Demands {
-        lists: by_rank::lists_bytes(source.points()) * ranked,
-        ranked: ranked > 0,
-        mills: order.mills,
-        filters: passes.iter().any(Pass::streams),
-        standings: standings(passes),
-        columns: columns.fold(ColumnBytes::default(), ColumnBytes::larger),
-        passes: passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect(),
-        run_most: settings.tile_points.map(|points| (points.get() as u64).saturating_mul(4)),
-        gathers: sorted.ops.iter().any(|stage| matches!(stage.op, Op::Scan(_))),
-        has_cells: sorted.ops.iter().any(|stage| stage.op.tile().needs().cells),
-        ..Demands::of(source, &chunks, limit, threads(settings)?)
-    })
-}
-
-/// In which order records are written.
-struct WriteOrder {
-    /// True if the run needs tiles: for its stages, or because an output is to be in canonical
-    /// order.
-    mills: bool,
-    /// For each sink, whether it gets the order of the inputs.
-    in_input_order: Vec<bool>,
-}
-
-impl WriteOrder {
-    fn new(sorted: &Sorted, source: &dyn Source) -> Result<WriteOrder> {
-        let sinks = &sorted.sinks;
-        // Branches of stages that stream go by tiles, and keep the order that a stream has.
-        let (ops, streams) = (!sorted.ops.is_empty(), !sorted.filters.is_empty());
-        let each = || sinks.iter().map(|sink| &**sink);
-        let sorts = |sink: &dyn CreateSink| sink.is_folder() || sink.order() == Order::Canonical;
-        let mills = ops || streams || each().any(sorts);
-        let keeps = |sink: &dyn CreateSink| match sink.order() {
-            Order::Input => true,
-            Order::Auto => streams && !ops && !sink.is_folder(),
-            Order::Canonical => false,
-        };
-        let in_input_order: Vec<bool> = each().map(keeps).collect();
-        if mills && in_input_order.contains(&true) && source.parts() > by_rank::MOST_PARTS {
-            let told = "the inputs have too many parts for an output in their order";
-            return Err(Error::pipeline(told).help("leave `write.order` out"));
-        }
-        Ok(WriteOrder { mills, in_input_order })
-    }
-}
-
 /// Refuses lengths that are longer than the lattice.
 fn check_lengths(ops: &[StageOp], lattice: &Lattice) -> Result<()> {
     let longest = lattice.longest();
     let mut lengths = ops.iter().flat_map(|stage| stage.op.tile().lengths());
-    match lengths.find(|(_, length)| *length > longest) {
+    match lengths.find(|(_, length)| length.value() > longest) {
         None => Ok(()),
         Some((key, length)) => {
-            let (length, steps) = (Figure(length), Figure(lattice.step));
+            let (length, steps) = (Figure(length.value()), Figure(lattice.step));
             let told = format!("`{key} = {length}` is longer than any scan in steps of {steps}");
             // In three digits, and never more than it is.
             Err(Error::pipeline(told).help(format!("give {:.2e} or less", longest * 0.995)))
@@ -331,6 +278,12 @@ fn warnings(
         }
         let help = error.remedy().map_or(String::new(), |help| format!("; {help}"));
         warnings.push(format!("{error}: the run fails if such a point is kept{help}"));
+    } else if let Some(error) = look_at_corners(source, sinks, (transforms, schemas))? {
+        let help = error.remedy().map_or(String::new(), |help| format!("; {help}"));
+        warnings.push(format!(
+            "{error}: the box in the header of the input reaches there, and the run fails if a \
+             point that is kept does{help}"
+        ));
     }
     let seen = [source.schema()].into_iter().chain(&schemas.left_by);
     let decoded = transforms.iter().zip(seen);
@@ -345,39 +298,6 @@ fn warnings(
         )
     }));
     Ok(warnings)
-}
-
-/// Threads that work at once.
-fn threads(settings: &RunSettings) -> Result<usize> {
-    match settings.threads.map(NonZeroUsize::get) {
-        Some(threads) if threads > MOST_THREADS => {
-            let told = format!("a run has at most {MOST_THREADS} threads, not {threads}");
-            Err(Error::pipeline(told).help("leave `run.threads` out: all processors work"))
-        }
-        Some(threads) => Ok(threads),
-        None => {
-            let processors = std::thread::available_parallelism().map_or(1, usize::from);
-            Ok(processors.min(MOST_THREADS))
-        }
-    }
-}
-
-/// The chunks of all outputs.
-fn chunks(
-    sorted: &Sorted,
-    computed: &[Vec<ComputedDimension>],
-    (source, schema): (&dyn Source, &Arc<Schema>),
-) -> Result<Vec<ChunkSize>> {
-    let (mut chunks, mut wrong) = (Vec::new(), Vec::new());
-    let sinks = sorted.sinks.iter().zip(&sorted.written_sinks);
-    for ((sink, written), computed) in sinks.zip(computed) {
-        let metadata = Metadata { computed: computed.clone(), ..source.metadata().clone() };
-        match sink.chunk(schema, &metadata) {
-            Ok(chunk) => chunks.push(chunk),
-            Err(error) => wrong.push(blame(&**written, error)),
-        }
-    }
-    Error::all(wrong).map(|()| chunks)
 }
 
 /// What z is multiplied by where stages measure distances; else 1.

@@ -3,7 +3,7 @@
 
 use crate::engine::pass::StreamOp;
 use crate::engine::task::Schemas;
-use crate::point::{PointBatch, Schema};
+use crate::point::{PointBatch, Schema, Value};
 use crate::report::Tally;
 use crate::stage::{CreateSink, Source};
 use crate::{Error, Result};
@@ -62,6 +62,47 @@ pub(crate) fn look(
                 none_fits = none_fits && !any_fits(sink.as_ref(), &batch, source);
             }
             return Ok(Some(Unfit { error: error.at(sink.path()), none_fits }));
+        }
+    }
+    Ok(None)
+}
+
+/// The error that writing a point at a corner of the box that headers claim would be. Where a scan
+/// reaches to is seen by none of its first records.
+pub(crate) fn look_at_corners(
+    source: &dyn Source,
+    sinks: &[Box<dyn CreateSink>],
+    (transforms, schemas): (&[StreamOp], &Schemas),
+) -> Result<Option<Error>> {
+    let last = &schemas.last;
+    let looking: Vec<_> = sinks.iter().filter(|sink| sink.checks(last)).collect();
+    let can_look = !looking.is_empty() && source.parts() > 0 && !source.is_read_once();
+    let Some(corners) = source.claimed_box().filter(|_| can_look) else { return Ok(None) };
+    let schema = source.schema();
+    let Some(axes) = schema.coordinates() else { return Ok(None) };
+    let mut batch = PointBatch::new(schema.clone(), RECORDS);
+    source.part(0)?.read(&mut batch)?;
+    batch.truncate(1);
+    let Some(record) = batch.iter().next().map(<[u8]>::to_vec) else { return Ok(None) };
+    for n in 0..8 {
+        batch.clear();
+        batch.relabel(schema);
+        let mut record = record.clone();
+        let is_stored = axes.iter().enumerate().all(|(axis, field)| {
+            let world = corners[n >> axis & 1][axis];
+            let stored = ((world - field.origin) / field.scale).round();
+            field.put(&mut record, schema.endian, Value::Double(stored))
+        });
+        // A box that the input itself cannot hold says nothing of its points.
+        if !is_stored {
+            continue;
+        }
+        batch.extend(&record);
+        moved(&mut batch, transforms, schemas);
+        for sink in &looking {
+            if let Err(error) = sink.check(source.metadata(), &batch) {
+                return Ok(Some(error.at(sink.path())));
+            }
         }
     }
     Ok(None)

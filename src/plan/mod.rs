@@ -1,21 +1,30 @@
 //! From a graph, the headers of its inputs and the memory to a [`Plan`]: do the stages fit each
-//! other, the inputs and the memory? Knows no stage by name, and reads no point but a few that it
-//! looks at.
+//! other, the inputs and the memory? What will its run use? Knows no stage by name, and reads no
+//! point but a few that it looks at and those of a trial.
 
 mod columns;
+mod demanded;
+mod document;
 mod fitted;
 mod limits;
 mod look;
+mod order;
 mod outline;
 mod passes;
 mod places;
+mod prediction;
 mod pull;
+mod rehearsal;
 mod shown;
 mod sorted;
+mod spots;
 mod streaming;
 mod stretch;
 mod transforms;
+mod trial;
 
 pub use fitted::Plan;
 pub use outline::Outline;
+pub use prediction::{PredictedOutput, PredictedPhase, Prediction};
 pub use pull::Pulled;
+pub use trial::Trial;

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use crate::engine::beside::Beside;
 use crate::engine::by_input::ranks;
-use crate::engine::publish::check_place;
+use crate::engine::publish::{check_place, folder_of, refuse_existing};
+use crate::error::shown;
 use crate::graph::RunSettings;
 use crate::host::{Clash, Files, Use};
 use crate::stage::{CreateSink, OpenSource, Source};
@@ -105,4 +106,36 @@ pub(super) fn each_input(
     }
     let folders = each.iter().any(|own| !own.is_empty());
     Ok((each, if folders { ranks(&inputs) } else { Vec::new() }))
+}
+
+/// For each sink the side of the squares that it is cut into. Refuses squares of which one could
+/// have the path of a file that is `read`, or that is there already and must not be replaced.
+pub(super) fn square_sides(
+    source: &dyn Source,
+    sinks: &[Box<dyn CreateSink>],
+    settings: &RunSettings,
+    read: &[PathBuf],
+) -> Result<Vec<Option<f64>>> {
+    let units = source.metadata().units;
+    let side = |sink: &Box<dyn CreateSink>| {
+        let side = sink.square_side(&units)?;
+        if side.is_none() {
+            return Ok(None);
+        }
+        if let Some(input) = read.iter().find(|input| sink.may_name(input)) {
+            let told = format!("a square could have the name of the input {}", shown(input));
+            return Err(Error::pipeline(told).at(sink.path()).help("write into another folder"));
+        }
+        let refer = source.inputs().into_iter().find(|input| input.beside.is_some());
+        if let Some(input) = refer {
+            let told = "its records refer to waveforms in a file beside it, which has no copy \
+                        beside each square";
+            return Err(Error::pipeline(told).at(&input.path).help("write one file"));
+        }
+        let there = std::fs::read_dir(folder_of(sink.path())).into_iter().flatten().flatten();
+        let there = there.map(|entry| entry.path()).find(|path| sink.may_name(path));
+        there.map_or(Ok(()), |path| refuse_existing(&path, settings.existing))?;
+        Ok(side)
+    };
+    sinks.iter().map(side).collect()
 }

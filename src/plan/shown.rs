@@ -63,10 +63,22 @@ impl Plan {
         write!(f, "units    {}", units.words())?;
         match units.vertical {
             None if units.mismatch().is_none() => {
-                writeln!(f, ": z is taken to be in that of x and y")
+                writeln!(f, ": z is taken to be in that of x and y")?;
             }
-            _ => writeln!(f),
+            _ => writeln!(f)?,
         }
+        // What lengths in a unit of their own are here.
+        for (stage, given) in self.ops.iter().zip(&self.task.given) {
+            let lengths = stage.op.tile().lengths();
+            for (key, text) in given {
+                let Some((_, length)) = lengths.iter().find(|(named, _)| named == key) else {
+                    continue;
+                };
+                let sign = units.sign().map_or(String::new(), |sign| format!(" {sign}"));
+                writeln!(f, "length   {key} = {text} is {}{sign}", Figure(length.value()))?;
+            }
+        }
+        Ok(())
     }
 
     fn passes_shown(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

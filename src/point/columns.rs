@@ -7,6 +7,7 @@ use bytemuck::{cast_slice, cast_slice_mut};
 
 use super::column::{Column, ColumnKind, ColumnValue, ComputedDimension};
 use super::schema::{Dimension, Endian, Value};
+use crate::error::Undeclared;
 use crate::{Error, Result};
 
 /// Columns with as many values each.
@@ -246,7 +247,8 @@ impl Columns {
 
 fn undeclared(kind: ColumnKind) -> Error {
     let name = kind.name();
-    Error::internal(format!("a stage asks for the column {name}, which it does not declare"))
+    let told = format!("a stage asks for the column {name}, which it does not declare");
+    Error::undeclared(Undeclared::Column, told)
 }
 
 /// The order of the bytes of columns: this machine's, since they never leave it.

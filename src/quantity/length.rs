@@ -78,6 +78,11 @@ impl Length {
         self.value
     }
 
+    /// True if it has a unit of its own.
+    pub fn has_unit(self) -> bool {
+        self.unit.is_some()
+    }
+
     /// True if it is known to be less than `other`: lengths compare in one unit.
     pub fn is_less_than(self, other: Length) -> bool {
         match (self.unit, other.unit) {

@@ -104,6 +104,8 @@ pub struct RunFigures {
     pub cpu_seconds: Option<f64>,
     /// Wall-clock seconds by phase, in the order of the run.
     pub phases: Vec<Phase>,
+    /// CPU seconds by phase, for predictions; not written.
+    pub(crate) cpu_by_phase: Vec<(&'static str, f64)>,
     /// Counts that depend on how the work was cut up (tiles, rim positions, …).
     pub work: BTreeMap<String, u64>,
     /// What the user was warned of.

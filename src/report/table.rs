@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::classes::class_name;
 use super::digits::{Coordinate, Grouped, Long, Share};
-use super::document::{Decision, Outcome, Report};
+use super::document::{Decision, FileFigures, Outcome, Report};
 use super::figures::{BaselineFigures, ClassFigures, DeviationTotals, Pair, PlaneFigures, Totals};
 use super::ledger::{Ledger, Removed};
 use super::stats::{DimensionFigures, StatsFigures};
@@ -52,17 +52,32 @@ impl fmt::Display for Table<'_> {
         if run.spill_bytes > 0 {
             write!(f, "\nspill      {}", Bytes(run.spill_bytes))?;
         }
-        for output in &run.outputs {
-            write!(f, "\noutput     {}", shown(Path::new(&output.path)))?;
-            if let Some(bytes) = output.bytes {
-                write!(f, ", {}", Bytes(bytes))?;
-            }
-        }
+        output_lines(f, &run.outputs)?;
         if let Some(path) = self.path {
             write!(f, "\nreport     {}", shown(path))?;
         }
         writeln!(f)
     }
+}
+
+/// Outputs that have a line each: of more, each folder has one.
+const MOST_OUTPUTS: usize = 12;
+
+/// What was written where.
+fn output_lines(f: &mut fmt::Formatter<'_>, outputs: &[FileFigures]) -> fmt::Result {
+    if outputs.len() <= MOST_OUTPUTS {
+        return outputs.iter().try_for_each(|output| {
+            write!(f, "\noutput     {}", shown(Path::new(&output.path)))?;
+            output.bytes.map_or(Ok(()), |bytes| write!(f, ", {}", Bytes(bytes)))
+        });
+    }
+    let folder = |output: &FileFigures| Path::new(&output.path).parent().map(Path::to_owned);
+    outputs.chunk_by(|a, b| folder(a) == folder(b)).try_for_each(|files| {
+        let bytes = files.iter().filter_map(|file| file.bytes).sum();
+        let folder = folder(&files[0]).filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.as_deref().unwrap_or(Path::new("."));
+        write!(f, "\noutput     {} files in {}, {}", files.len(), shown(folder), Bytes(bytes))
+    })
 }
 
 impl Table<'_> {

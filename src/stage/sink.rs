@@ -6,8 +6,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::source::Input;
-use crate::Result;
-use crate::point::{Metadata, PointBatch, Schema};
+use crate::point::{Metadata, PointBatch, Schema, Units};
+use crate::{Error, Result};
 
 /// Where records go. A sink writes below the path it is given; the run puts the finished file in
 /// its final place.
@@ -139,6 +139,31 @@ pub trait CreateSink: Send + Sync {
     /// Two outputs that would have one name.
     fn each_input(&self, _inputs: &[Input]) -> Result<Option<Vec<Box<dyn CreateSink>>>> {
         Ok(None)
+    }
+
+    /// The side of the squares, in the unit of x and y, if the output is cut into a file for each
+    /// square of the plane that has points: this sink then is not created, but those
+    /// [of its squares](CreateSink::of_square), each when its records are known.
+    ///
+    /// # Errors
+    ///
+    /// A side in a unit of its own where that of the scan is not known.
+    fn square_side(&self, _units: &Units) -> Result<Option<f64>> {
+        Ok(None)
+    }
+
+    /// The sink of the square so many sides of `side` from the origin along x and y.
+    ///
+    /// # Errors
+    ///
+    /// If the output is not cut into squares.
+    fn of_square(&self, _square: [i64; 2], _side: f64) -> Result<Box<dyn CreateSink>> {
+        Err(Error::internal("an output that is one file has no squares").at(self.path()))
+    }
+
+    /// True if a file of one of its squares could have this path.
+    fn may_name(&self, _path: &Path) -> bool {
+        false
     }
 
     /// The order in which records are wanted.

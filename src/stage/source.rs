@@ -67,6 +67,12 @@ pub trait Source: Send + Sync {
     /// What outputs carry on besides points.
     fn metadata(&self) -> &Metadata;
 
+    /// The smallest and the largest x, y and z that headers claim, in world units; None where they
+    /// claim nothing. Points may lie nearer to each other, and those of a damaged file beyond.
+    fn claimed_box(&self) -> Option<[[f64; 3]; 2]> {
+        None
+    }
+
     /// The files, in input order, as the report names them; empty when there are none.
     fn inputs(&self) -> Vec<Input> {
         Vec::new()

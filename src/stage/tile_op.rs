@@ -4,6 +4,7 @@ use super::needs::Needs;
 use crate::Result;
 use crate::geom::lattice::Lattice;
 use crate::point::{Bounds, Units};
+use crate::quantity::Length;
 use crate::report::Tally;
 use crate::store::Levels;
 use crate::tile::Tile;
@@ -57,11 +58,15 @@ pub trait TileOp: Send + Sync {
         Ok(())
     }
 
-    /// The lengths that it was given, in the scan's unit, each with its key as in `grid.side`;
-    /// those that the lattice cannot hold are refused before the work.
-    fn lengths(&self) -> Vec<(&'static str, f64)> {
+    /// The lengths that it was given, each with its key as in `grid.side`: those that the lattice
+    /// cannot hold are refused before the work, and the report says what others were converted to.
+    fn lengths(&self) -> Vec<(&'static str, Length)> {
         Vec::new()
     }
+
+    /// Called before all else in a trial on a `share` of the scan, above 0 and at most 1: keys that
+    /// count records of the whole scan count as many of that share from now on.
+    fn for_share(&mut self, _share: f64) {}
 
     /// Called once, after the decode and before the first tile, with what is known of the whole
     /// scan: the place to fix figures that depend on it.

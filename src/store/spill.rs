@@ -157,6 +157,41 @@ pub struct StoredStretch {
     checksum: Checksum,
 }
 
+/// A stretch can begin with the place of another, so that a chain of them is known by its last.
+impl StoredStretch {
+    /// Bytes of such a place.
+    pub const LINK: usize = size_of::<u64>() + 2 * size_of::<u32>();
+
+    /// The place of `stretch` as bytes; that of none is zeros.
+    pub fn link(stretch: Option<StoredStretch>) -> [u8; Self::LINK] {
+        let mut bytes = [0; Self::LINK];
+        if let Some(StoredStretch { address, length, checksum }) = stretch {
+            bytes[..8].copy_from_slice(&address.0.to_le_bytes());
+            bytes[8..12].copy_from_slice(&length.to_le_bytes());
+            bytes[12..].copy_from_slice(&checksum.0.to_le_bytes());
+        }
+        bytes
+    }
+
+    /// The place that a stretch of these bytes begins with.
+    ///
+    /// # Errors
+    ///
+    /// A stretch that is too short to begin with one.
+    pub fn linked(bytes: &[u8]) -> Result<Option<StoredStretch>> {
+        let short = || Error::internal("a stretch of a chain has no link");
+        let (address, rest) = bytes.split_first_chunk().ok_or_else(short)?;
+        let (length, rest) = rest.split_first_chunk().ok_or_else(short)?;
+        let checksum = rest.first_chunk().ok_or_else(short)?;
+        let stretch = StoredStretch {
+            address: Address(u64::from_le_bytes(*address)),
+            length: u32::from_le_bytes(*length),
+            checksum: Checksum(u32::from_le_bytes(*checksum)),
+        };
+        Ok((stretch.length > 0).then_some(stretch))
+    }
+}
+
 /// Appended stretches of bytes of one sort. Dropping it frees its memory and removes its files.
 #[derive(Debug)]
 pub struct Spill {

@@ -30,6 +30,8 @@ pub struct Loader {
     capacity: usize,
     /// Positions up to which a tile gets a rim.
     rim_limit: usize,
+    /// True if every tile is to see the whole scan.
+    sees_all: bool,
     tile: Tile,
     core: Core,
     dimensions: Option<DimensionColumns>,
@@ -130,6 +132,7 @@ impl Loader {
             stored: Vec::new(),
             capacity,
             rim_limit: capacity,
+            sees_all: false,
             tile,
             core: Core::default(),
             dimensions,
@@ -140,6 +143,12 @@ impl Loader {
     /// searched for in the whole scan.
     pub fn limit_rim(&mut self, positions: usize) {
         self.rim_limit = self.rim_limit.min(positions);
+    }
+
+    /// Makes the whole scan the zone of every tile, whatever that takes: for scans of a few points
+    /// and stages of which nobody knows yet whether they look no further than they say.
+    pub fn see_all(&mut self) {
+        self.sees_all = true;
     }
 
     /// The scan that it loads from.
@@ -155,8 +164,10 @@ impl Loader {
     /// Those of reading the store.
     pub fn load(&mut self, key: TileKey, reach: i64, neighbors: usize) -> Result<&mut Tile> {
         let cube = key.cube();
-        let zone = cube.grown(reach);
-        let loaded = self.rim(&zone, neighbors)?;
+        let (zone, loaded) = match self.sees_all {
+            true => (cube.union(&self.tiles.bounds()), cube.union(&self.tiles.bounds())),
+            false => (cube.grown(reach), self.rim(&cube.grown(reach), neighbors)?),
+        };
         self.tile.clear(cube, zone);
         self.core.clear();
         if let Some(dimensions) = &mut self.dimensions {

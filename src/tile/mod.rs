@@ -21,6 +21,7 @@ pub(crate) use sieve::{ReadDimensions, RecordRun, Sieve};
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::error::Undeclared;
 use crate::geom::simd::Simd;
 use crate::point::{Bounds, Column, ColumnKind, ColumnValue, Columns, Position};
 use crate::{Error, Result};
@@ -61,8 +62,17 @@ pub struct Tile {
     pub(crate) selections: Vec<u8>,
     /// The selections that the stage at work is limited to.
     pub(crate) limits: u8,
-    /// The columns that the stage at work reads of its neighbours; None where nobody says.
-    pub(crate) of_neighbors: Option<Arc<[ColumnKind]>>,
+    /// How far the stage at work says that it looks; None where nobody says.
+    pub(crate) looks: Option<NeighborNeeds>,
+}
+
+/// What a stage says that it needs of the neighbours of each position.
+#[derive(Debug, Clone)]
+pub(crate) struct NeighborNeeds {
+    /// How many it looks at, at most.
+    pub count: usize,
+    /// The columns that it reads of them.
+    pub columns: Arc<[ColumnKind]>,
 }
 
 impl Tile {
@@ -82,7 +92,7 @@ impl Tile {
             around: Around::default(),
             selections: Vec::new(),
             limits: 0,
-            of_neighbors: None,
+            looks: None,
         }
     }
 
@@ -105,7 +115,7 @@ impl Tile {
             around: Around::default(),
             selections: Vec::new(),
             limits: 0,
-            of_neighbors: None,
+            looks: None,
         }
     }
 
@@ -157,15 +167,29 @@ impl Tile {
     ///
     /// # Errors
     ///
-    /// Those of reading the store, where neighbours are not in the tile.
+    /// More neighbours than the stage [declares](crate::stage::Needs::neighbors), and those of
+    /// reading the store, where neighbours are not in the tile.
     pub fn each_neighborhood(
         &mut self,
         k: usize,
         visit: impl FnMut(usize, &Neighborhood<'_>),
     ) -> Result<()> {
+        self.refuse_undeclared(k)?;
         let Tile { positions, zone, around, selections, limits, .. } = self;
         let is_asked = |i: usize| zone.contains(positions[i]) && chosen(selections, *limits, i);
         around.each_neighborhood(positions, k, is_asked, visit)
+    }
+
+    /// Refuses to look for more neighbours than the stage at work says: the rim of the tile is as
+    /// wide as these need it, and each one more would be searched for in the whole scan.
+    fn refuse_undeclared(&self, k: usize) -> Result<()> {
+        match &self.looks {
+            Some(NeighborNeeds { count, .. }) if k > *count => Err(Error::undeclared(
+                Undeclared::Neighbors,
+                format!("a stage looks for {k} neighbours and declares {count}"),
+            )),
+            _ => Ok(()),
+        }
     }
 
     /// Does what [`each_neighborhood`](Tile::each_neighborhood) does, and calls `visit` with the
@@ -187,18 +211,19 @@ impl Tile {
     ///
     /// # Errors
     ///
-    /// A column that was not declared, and what reading the scan fails with.
+    /// More neighbours than were declared, a column that was not, and what reading the scan fails
+    /// with.
     pub fn each_neighborhood_with<T: ColumnValue>(
         &mut self,
         k: usize,
         column: &Column<T>,
         mut visit: impl FnMut(usize, &Neighborhood<'_>, &[T]),
     ) -> Result<()> {
-        let declared = self.of_neighbors.as_ref();
-        if declared.is_some_and(|declared| !declared.contains(&column.kind())) {
+        self.refuse_undeclared(k)?;
+        if self.looks.as_ref().is_some_and(|looks| !looks.columns.contains(&column.kind())) {
             let name = column.kind().name();
             let told = format!("a stage reads {name} of its neighbours and does not declare it");
-            return Err(Error::internal(told));
+            return Err(Error::undeclared(Undeclared::Column, told));
         }
         let Tile { positions, zone, around, selections, limits, columns, .. } = self;
         let is_asked = |i: usize| zone.contains(positions[i]) && chosen(selections, *limits, i);

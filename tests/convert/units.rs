@@ -2,9 +2,10 @@
 //! refused with the value that would do where it does not.
 
 use crate::support::case::{Case, execute};
-use pointmill::Quiet;
+use crate::support::case_file;
 use pointmill::point::{Horizontal, Units};
 use pointmill::quantity::{Angle, Length};
+use pointmill::{Graph, Overrides, Quiet, Registry};
 
 fn in_units(text: &str, horizontal: Option<Horizontal>) -> Result<f64, String> {
     let units = Units { horizontal, ..Units::default() };
@@ -61,4 +62,35 @@ fn a_pipeline_with_a_length_in_metres_is_refused_before_work_if_the_scan_does_no
         assert!(error.remedy().unwrap().contains("= 2"), "{error}");
         assert_eq!(case.left(), ["in.ply"]);
     }
+}
+
+#[test]
+fn the_plan_and_the_report_say_what_lengths_were_converted_to() {
+    let folder = tempfile::tempdir().unwrap();
+    // Its x and y are in US survey feet, its heights in metres.
+    let input = case_file("15c-geokeys-epsg-only-2277-5703.las");
+    let output = folder.path().join("t_{x}_{y}.las");
+    let text = format!(
+        "[run]\nz_scale = 3.28\n[[stage]]\nkind = 'read'\npath = '{}'\n[[stage]]\nkind = 'grid'\n\
+         side = '3 m'\n[[stage]]\nkind = 'grid'\nside = 20\n[[stage]]\nkind = 'write'\npath = '{}'\n\
+         side = '1 km'\n",
+        input.display(),
+        output.display()
+    );
+    let graph = Graph::parse(&text, "test.toml", &Registry::builtin()).unwrap();
+    let plan = graph.plan(&Overrides::default()).unwrap();
+    let shown = plan.to_string();
+    assert!(shown.contains("\nlength   grid.side = 3m is 9.8425 US survey ft\n"), "{shown}");
+    let report = plan.run(&Quiet).unwrap().report;
+    let told = report.result.decisions.iter();
+    let told: Vec<(&str, String)> =
+        told.map(|told| (&*told.name, told.value.to_string())).collect();
+    let has = |name: &str, value: &str| {
+        assert!(told.iter().any(|(n, v)| *n == name && v.starts_with(value)), "{name}: {told:?}");
+    };
+    has("side_given", "\"3m\"");
+    has("side_converted", "9.8425");
+    assert_eq!(told.iter().filter(|(name, _)| *name == "side_given").count(), 1, "{told:?}");
+    // The side of the squares.
+    has("side", "3280.83333");
 }

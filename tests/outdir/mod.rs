@@ -2,3 +2,4 @@
 
 mod io;
 mod run;
+mod squares;

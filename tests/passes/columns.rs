@@ -93,6 +93,15 @@ stage!(Sneaky, "sneaky", Needs::none().reads(&RISE).neighbors(K), |tile| {
     tile.each_neighborhood_with(K, &RISE, |_, _, _| {})
 });
 
+stage!(Greedy, "greedy", Needs::none().neighbors(K), |tile| {
+    tile.each_neighborhood(K + 1, |_, _| {})
+});
+
+stage!(Curious, "curious", Needs::none(), |tile| {
+    tile.columns.get(&RISE)?;
+    Ok(())
+});
+
 stage!(Thief, "thief", Needs::none().writes(&RISE), |tile| {
     tile.columns.take(&RISE)?;
     Ok(())
@@ -109,6 +118,7 @@ const OTHER_RISE: Column<f64> = Column::new("Rise", &[]);
 
 fn registry() -> Registry {
     let registry = Registry::builtin().with::<Rise>().with::<Rises>().with::<Glow>();
+    let registry = registry.with::<Greedy>().with::<Curious>();
     registry.with::<Sneaky>().with::<Thief>().with::<Other>().with::<Wordy>()
 }
 
@@ -292,7 +302,12 @@ fn what_no_stage_gives_is_refused_by_name() {
     assert!(told.contains("its numbers are NormalX, NormalY and NormalZ"), "{told}");
     let rise = "[[stage]]\nkind = 'rise'\n";
     let told = refused(&format!("{rise}[[stage]]\nkind = 'sneaky'\n"), "");
-    assert!(told.contains("reads Rise of its neighbours and does not declare it"), "{told}");
+    let sneaky = "the stage `sneaky` reads Rise of its neighbours and does not declare it";
+    assert!(told.contains(sneaky), "{told}");
+    let told = refused("[[stage]]\nkind = 'greedy'\n", "");
+    assert!(told.contains("the stage `greedy` looks for 7 neighbours and declares 6"), "{told}");
+    let told = refused("[[stage]]\nkind = 'curious'\n", "");
+    assert!(told.contains("the stage `curious` asks for the column Rise, which it"), "{told}");
     let told = refused("[[stage]]\nkind = 'thief'\n", "dimensions = ['Rise']");
     assert!(told.contains("took the column Rise and did not put it back"), "{told}");
     let told = refused(&format!("{rise}[[stage]]\nkind = 'other'\n"), "");

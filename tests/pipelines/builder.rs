@@ -170,6 +170,11 @@ fn everything_that_is_wrong_is_told_at_once() {
     ] {
         assert!(wrong.contains(part), "{part}\n{wrong}");
     }
+    // As in a text: what a filter keeps, its own condition says.
+    let filter = Filter { keep_classes: vec![2], ..Filter::default() };
+    let limited = Graph::builder().read("in.las").stage(filter).only("Z > 2").write("out.las");
+    let limited = limited.build().err().unwrap().to_string();
+    assert!(limited.contains("a stage `filter` cannot be limited"), "{limited}");
     let ends = Graph::builder().read("in.las").stage(grid(1.0)).build().err().unwrap();
     assert!(ends.to_string().contains("nothing takes these points"), "{ends}");
 }

@@ -10,7 +10,7 @@ use pointmill::stage::Role;
 use pointmill::synth::{Scene, Synthetic};
 use pointmill::{Graph, Overrides, PipelineText, Quiet, Registry, Set};
 
-fn pipelines() -> Vec<PathBuf> {
+pub(super) fn pipelines() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines");
     let mut files: Vec<PathBuf> =
         fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
@@ -19,7 +19,7 @@ fn pipelines() -> Vec<PathBuf> {
 }
 
 /// A small airborne scan in `folder`, as LAZ; and an area that cuts it.
-fn inputs(folder: &Path) -> (String, String) {
+pub(super) fn inputs(folder: &Path) -> (String, String) {
     let scan = folder.join("scan.laz");
     let source = Synthetic { scene: Scene::Als, points: 12_000, seed: 2, noise: None };
     let graph = Graph::builder().source(source).write(&scan).build().unwrap();
@@ -38,7 +38,7 @@ fn inputs(folder: &Path) -> (String, String) {
 }
 
 /// The arguments that bring a pipeline to the files of the test.
-fn sets(text: &str, folder: &Path, scan: &str, area: &str) -> Vec<Set> {
+pub(super) fn sets(text: &str, folder: &Path, scan: &str, area: &str) -> Vec<Set> {
     let out = |name: &str| folder.join(name).display().to_string();
     let has = |line: &str| text.lines().any(|l| l.starts_with(line));
     let mut sets = Vec::new();
@@ -94,7 +94,14 @@ fn every_pipeline_says_what_it_is_for_and_how_it_is_run_and_runs() {
         let done = graph.plan(&Overrides::default()).unwrap().run(&Quiet);
         let done = done.unwrap_or_else(|error| panic!("{name}: {error}"));
         let result = &done.report.result;
-        for (output, figures) in outputs.iter().zip(&done.report.run.outputs) {
+        let written: Vec<&Path> =
+            done.report.run.outputs.iter().map(|output| Path::new(&output.path)).collect();
+        // An output of squares names none of its files.
+        let is_pattern = |output: &PathBuf| output.to_string_lossy().contains("{x}");
+        for output in outputs.iter().filter(|output| !is_pattern(output)) {
+            assert!(written.contains(&&**output), "{name}: {}", output.display());
+        }
+        for (output, figures) in written.iter().zip(&done.report.run.outputs) {
             assert!(output.starts_with(folder.path()), "{name}: {}", output.display());
             assert!(output.is_file() && figures.points > 0, "{name}: {}", output.display());
         }
@@ -132,6 +139,9 @@ fn jobs_do_what_their_first_lines_say() {
     assert_eq!(names, ["cropped", "written"]);
     assert_eq!(clean.result.stats[1].points, clean.result.ledger.kept);
     assert!(clean.result.stats[0].points < 10_000, "half of the area");
+    let (tiles, _) = run("tiles");
+    assert!(!tiles.run.outputs.is_empty());
+    assert_eq!(tiles.run.outputs.iter().map(|output| output.points).sum::<u64>(), 12_000);
     let (normals, _) = run("normals");
     assert_eq!(normals.result.ledger.kept, 12_000);
 }

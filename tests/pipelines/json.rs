@@ -36,6 +36,9 @@ fn json_says_what_toml_says() {
     for (text, origin) in [(GOOD.to_owned(), "p"), (format!("\u{feff}\n\t {GOOD}"), "p.toml")] {
         assert!(Graph::parse(&text, origin, &Registry::builtin()).is_ok(), "{origin}");
     }
+    // Editors find the schema by a key in the file.
+    let named = GOOD.replacen('{', "{\"$schema\": \"pipeline.schema.json\", ", 1);
+    assert_eq!(parse(&named).unwrap().to_json(), toml.to_json());
     assert!(told("stage = 3").contains("p.json:1:1: not JSON: "));
     assert!(told("").contains("p.json:1:1: a pipeline in JSON is an object"));
     let sets = [Set::parse("cells.side=2").unwrap()];

@@ -2,6 +2,7 @@
 
 mod builder;
 mod drawn;
+mod explain;
 mod formats;
 mod inputs;
 mod jobs;

@@ -7,11 +7,13 @@ use std::sync::Mutex;
 
 use crate::support::case::REDUCE;
 use crate::support::case_file;
+use crate::support::scan::Scan;
 use pointmill::Result;
 use pointmill::io::{las, ply};
 use pointmill::point::{PointBatch, Scalar, Schema};
 use pointmill::stage::Source;
-use pointmill::{Done, Graph, Overrides, Registry, Watch};
+use pointmill::synth::Scene;
+use pointmill::{Done, Graph, Overrides, Quiet, Registry, Watch};
 
 /// Hears what a run warns of.
 #[derive(Default)]
@@ -280,4 +282,31 @@ fn lengths_that_the_lattice_rounds_are_told() {
     };
     assert_eq!(cells("side = 1.23\nmax_side = 2.34\nmin_spacing = 0.12").len(), 3);
     assert!(cells("side = 1.2\nmax_side = 2.3\nmin_spacing = 0.1").is_empty());
+}
+
+#[test]
+fn a_scale_that_the_far_end_of_a_scan_does_not_fit_is_told_by_the_plan() {
+    let folder = tempfile::tempdir().unwrap();
+    let [input, output] = ["in.las", "out.las"].map(|name| folder.path().join(name));
+    let scan = Scan::synthetic(Scene::Als, 20_000, 1);
+    let last = scan.points() - 1;
+    // One point of many is far away, where nobody looks before the run.
+    let moved =
+        scan.moved(|i, stored| if i == last { [2_000_000_000, stored[1], 0] } else { stored });
+    moved.write(&input);
+    let plan = |stages: &str, write: &str| {
+        let text = text("", &[input.clone()], stages, &output, write);
+        let graph = Graph::parse(&text, "test.toml", &Registry::builtin()).unwrap();
+        graph.plan(&Overrides::default()).unwrap()
+    };
+    let finer = "scale = 0.0001";
+    let warned = plan("", finer).warnings();
+    let told = warned.iter().find(|told| told.contains("the box in the header")).unwrap();
+    assert!(told.contains("out.las") && told.contains("a point that is kept does"), "{told}");
+    let error = plan("", finer).run(&Quiet).unwrap_err();
+    assert!(error.path().is_some_and(|path| path.ends_with("out.las")), "{error}");
+    // Where it is cut off, or stored as it is, there is nothing to tell of.
+    let crop = "[[stage]]\nkind = 'filter'\nwhere = 'X < 1e6'\n";
+    plan(crop, finer).run(&Quiet).unwrap();
+    assert_eq!(plan("", "").warnings(), [""; 0]);
 }

@@ -53,10 +53,14 @@ fn settings() -> BTreeSet<String> {
 #[test]
 fn the_library_names_no_flag() {
     let is_flag = |text: &str| {
-        let mut dashes = text.match_indices("--");
-        dashes.any(|(at, _)| text[at + 2..].starts_with(|c: char| c.is_ascii_lowercase()))
+        text.match_indices("--").any(|(at, _)| {
+            let end = |c: char| !(c.is_ascii_lowercase() || c == '-' || c == '.');
+            let name = text[at + 2..].split(end).next().unwrap_or_default();
+            // Those of PDAL have a dot.
+            !name.is_empty() && !name.contains('.')
+        })
     };
-    assert!(is_flag("give --memory"));
+    assert!(is_flag("give --memory") && !is_flag("--writers.las.extra_dims=A"));
     for (place, line) in texts() {
         // `Set` reads the text of `--set`, and is named by it.
         if !place.starts_with("src/language/set.rs") {

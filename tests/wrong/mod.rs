@@ -31,7 +31,9 @@ fn files(name: &str) -> Vec<PathBuf> {
 /// A folder with all that the pipelines and the commands read.
 fn inputs() -> tempfile::TempDir {
     let at = tempfile::tempdir().unwrap();
-    let copy = |from: &Path, name: &str| drop(fs::copy(from, at.path().join(name)).unwrap());
+    let copy = |from: &Path, name: &str| {
+        fs::copy(from, at.path().join(name)).unwrap();
+    };
     for input in files("inputs") {
         copy(&input, input.file_name().unwrap().to_str().unwrap());
     }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Deserializer, Serialize, de};
 
 use crate::error::{listed, shown};
 use crate::io::sniff::{of_extension, upper};
+use crate::quantity::Length;
 use crate::stage::{Colors, Format, FormatName, Formats, Order, OutputEncoding, WriteKeys};
 use crate::{Error, Result};
 
@@ -83,6 +84,13 @@ pub struct Read {
 /// records and its offset, holding those of its points that are kept, even if that is none. The
 /// inputs are one scan all the same: neighbourhoods and cells go on from file to file, and the
 /// outputs together have the points that the one file would have.
+///
+/// With `side` the output is cut into a file for each square of the plane that has points, of which
+/// `path` is the pattern: `path = "tiles/{x}_{y}.laz"` with `side = "500 m"` writes
+/// `tiles/638000_4851500.laz` and so on, named by the smallest x and y of each square. A point on a
+/// border is in the square of larger coordinates. Squares begin at the origin of the coordinates,
+/// so that those of neighbouring scans fit together. The points of a square have the order that
+/// they would have in one file. Up to 16,384 squares may have points.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Write {
@@ -94,6 +102,10 @@ pub struct Write {
     #[serde(default)]
     #[schemars(title = "a path")]
     pub folder: Option<PathBuf>,
+    /// Side of the squares that get a file each; none: one file. `path` has `{x}` and `{y}` where
+    /// the corner of a square is to stand.
+    #[serde(default)]
+    pub side: Option<Length>,
     /// The format; none: as the extension says, in a folder that of the input. A file whose
     /// extension says another is written, with a warning.
     #[serde(default)]

@@ -6,6 +6,7 @@ mod inputs;
 mod kinds;
 mod outputs;
 mod roles;
+mod squares;
 
 #[cfg(feature = "cli")]
 pub(crate) use inputs::{expand, expand_any, unreadable};

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use super::kinds::{Read, Write, unknown_extension};
 use super::outputs::Outputs;
+use super::squares::Squares;
 use super::{connect, inputs, kinds};
 use crate::error::shown;
 use crate::io::sniff::first_bytes;
-use crate::stage::{Format, Formats, OpenSource, Role, RoleName, StageKind, StagePlace, WriteKeys};
+use crate::stage::{Formats, OpenSource, Role, RoleName, StageKind, StagePlace};
 use crate::{Error, Result};
 
 impl Read {
@@ -63,17 +64,13 @@ impl StageKind for Read {
 impl StageKind for Write {
     const KIND: &'static str = "write";
     const ROLE: RoleName = RoleName::Sink;
-    const ABOUT: &'static str = "Writes a LAS, LAZ or PLY file, or one for each input.";
+    const ABOUT: &'static str =
+        "Writes a LAS, LAZ or PLY file, or one for each input or square of the plane.";
     const MAIN: Option<&'static str> = Some("path");
     const PLACES: &'static [&'static str] = &["path", "folder"];
     const EITHER: &'static [&'static str] = &["path", "folder"];
 
     fn build(self, at: &StagePlace) -> Result<Role> {
-        let formats = at.formats();
-        let check = |keys: &WriteKeys, format: &dyn Format| {
-            kinds::check(keys, format, formats).map_err(|(key, error)| at.blame(key, error))
-        };
-        let asked = self.format.as_ref().map(|name| formats.named(name)).transpose()?;
         match (self.path.clone(), self.folder.clone()) {
             (Some(_), Some(_)) => {
                 let told = "`write.path` makes one file and `write.folder` one for each input: \
@@ -82,41 +79,75 @@ impl StageKind for Write {
             }
             (None, None) => Err(Error::pipeline("a `write` needs `write.path` or `write.folder`")
                 .help("`write.path` is one file, `write.folder` gets one for each input")),
-            (Some(path), None) if path.as_os_str().as_bytes().ends_with(b"/") || path.is_dir() => {
-                let told = format!("`{}` is a folder, not a file to write", shown(&path));
-                let help = format!(
-                    "name a file in it, such as `{}`, or give the folder as `write.folder`, which \
-                     gets a file for each input",
-                    shown(&path.join("out.laz"))
-                );
+            (Some(path), None) => self.file(path, at),
+            (None, Some(folder)) => self.each(folder, at),
+        }
+    }
+}
+
+impl Write {
+    /// The sink of one file, or of a file for each square.
+    fn file(&self, path: PathBuf, at: &StagePlace) -> Result<Role> {
+        let formats = at.formats();
+        if path.as_os_str().as_bytes().ends_with(b"/") || path.is_dir() {
+            let told = format!("`{}` is a folder, not a file to write", shown(&path));
+            let help = format!(
+                "name a file in it, such as `{}`, or give the folder as `write.folder`, which \
+                 gets a file for each input",
+                shown(&path.join("out.laz"))
+            );
+            return Err(at.blame("path", Error::pipeline(told).help(help)));
+        }
+        let asked = self.format.as_ref().map(|name| formats.named(name)).transpose()?;
+        let Some(format) = asked.or(formats.of(&path)) else {
+            let unknown = unknown_extension(&path, "write.format", formats);
+            return Err(at.blame("path", unknown));
+        };
+        let named = formats.of(&path);
+        if let Some((what, plain)) = named.and_then(|named| named.promises(&path)) {
+            let path = shown(&path);
+            let told = format!("`{path}` is named as {what}, which is not written");
+            let is = named.map_or("", |named| named.name()).to_uppercase();
+            let help = format!("name it `{}`: it is plain {is}", shown(&plain));
+            return Err(at.blame("path", Error::pipeline(told).help(help)));
+        }
+        let keys = self.keys(path);
+        let checked = kinds::check(&keys, &**format, formats);
+        checked.map_err(|(key, error)| at.blame(key, error))?;
+        let (format, formats) = (format.clone(), formats.clone());
+        let order = self.stage_order();
+        let file = connect::OutputFile { keys, order, format, formats, of_one: false };
+        match self.side {
+            Some(side) => {
+                Squares::check(&file.keys.path).map_err(|error| at.blame("path", error))?;
+                Ok(Role::Sink(Box::new(Squares { file, side })))
+            }
+            None if Squares::is_pattern(&file.keys.path) => {
+                let told = "a path with `{x}` or `{y}` is one for each square, and no `write.side` \
+                            says how large they are";
+                let help = "give it too, such as `side = \"500 m\"`";
                 Err(at.blame("path", Error::pipeline(told).help(help)))
             }
-            (Some(path), None) => {
-                let Some(format) = asked.or(formats.of(&path)) else {
-                    let unknown = unknown_extension(&path, "write.format", formats);
-                    return Err(at.blame("path", unknown));
-                };
-                let named = formats.of(&path);
-                if let Some((what, plain)) = named.and_then(|named| named.promises(&path)) {
-                    let path = shown(&path);
-                    let told = format!("`{path}` is named as {what}, which is not written");
-                    let is = named.map_or("", |named| named.name()).to_uppercase();
-                    let help = format!("name it `{}`: it is plain {is}", shown(&plain));
-                    return Err(at.blame("path", Error::pipeline(told).help(help)));
-                }
-                let keys = self.keys(path);
-                check(&keys, &**format)?;
-                let (format, formats) = (format.clone(), formats.clone());
-                let order = self.stage_order();
-                let output = connect::OutputFile { keys, order, format, formats, of_one: false };
-                Ok(Role::Sink(Box::new(output)))
-            }
-            (None, Some(folder)) => {
-                let keys = self.keys(folder);
-                asked.map_or(Ok(()), |format| check(&keys, &**format))?;
-                let (order, format) = (self.stage_order(), asked.cloned());
-                Ok(Role::Sink(Box::new(Outputs { keys, order, format, formats: formats.clone() })))
-            }
+            None => Ok(Role::Sink(Box::new(file))),
         }
+    }
+
+    /// The sink of a file for each input.
+    fn each(&self, folder: PathBuf, at: &StagePlace) -> Result<Role> {
+        let formats = at.formats();
+        if self.side.is_some() {
+            let told = "`write.side` cuts the output of `write.path` into squares, and \
+                        `write.folder` has a file for each input";
+            let help = "give a path such as `path = \"{x}_{y}.laz\"` instead of the folder";
+            return Err(at.blame("side", Error::pipeline(told).help(help)));
+        }
+        let asked = self.format.as_ref().map(|name| formats.named(name)).transpose()?;
+        let keys = self.keys(folder);
+        if let Some(format) = asked {
+            let checked = kinds::check(&keys, &**format, formats);
+            checked.map_err(|(key, error)| at.blame(key, error))?;
+        }
+        let (order, format) = (self.stage_order(), asked.cloned());
+        Ok(Role::Sink(Box::new(Outputs { keys, order, format, formats: formats.clone() })))
     }
 }

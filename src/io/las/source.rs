@@ -192,6 +192,16 @@ impl Source for LasSource {
         &self.metadata
     }
 
+    fn claimed_box(&self) -> Option<[[f64; 3]; 2]> {
+        let filled = self.files.iter().filter(|file| file.input.points() > 0);
+        filled.map(|file| file.input.header.bounds()).reduce(|[lo, hi], [other_lo, other_hi]| {
+            let each = |of: fn(f64, f64) -> f64, a: [f64; 3], b: [f64; 3]| {
+                [of(a[0], b[0]), of(a[1], b[1]), of(a[2], b[2])]
+            };
+            [each(f64::min, lo, other_lo), each(f64::max, hi, other_hi)]
+        })
+    }
+
     fn inputs(&self) -> Vec<stage::Input> {
         let input = |f: &Opened| stage::Input {
             path: f.input.path.clone(),

@@ -47,8 +47,8 @@ impl TileOp for RadiusOutliers {
         Ok(())
     }
 
-    fn lengths(&self) -> Vec<(&'static str, f64)> {
-        vec![("outliers.radius", self.radius.value())]
+    fn lengths(&self) -> Vec<(&'static str, Length)> {
+        vec![("outliers.radius", self.radius)]
     }
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {

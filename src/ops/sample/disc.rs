@@ -142,8 +142,8 @@ impl TileOp for PoissonDisc {
         Ok(())
     }
 
-    fn lengths(&self) -> Vec<(&'static str, f64)> {
-        vec![("sample.distance", self.distance.value())]
+    fn lengths(&self) -> Vec<(&'static str, Length)> {
+        vec![("sample.distance", self.distance)]
     }
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {

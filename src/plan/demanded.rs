@@ -1,0 +1,90 @@
+//! What a run depends on in its memory, as far as headers and stages tell.
+
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+
+use super::order::WriteOrder;
+use super::passes::Passes;
+use super::sorted::{Sorted, blame};
+use crate::budget::Bytes;
+use crate::engine::pass::{ColumnBytes, Op, Pass, standings};
+use crate::engine::shares::Demands;
+use crate::engine::{by_input, by_rank, by_square};
+use crate::graph::{MOST_THREADS, RunSettings};
+use crate::host::process::default_memory;
+use crate::point::{ComputedDimension, Metadata, Schema};
+use crate::stage::{ChunkSize, CreateSink, Source};
+use crate::{Error, Result};
+
+/// What a run depends on in its memory, but the
+/// [lists](lists_bytes) of outputs that are several files.
+pub(super) fn demands(
+    sorted: &Sorted,
+    Passes { passes, computed, .. }: &Passes,
+    (source, schema): (&dyn Source, &Arc<Schema>),
+    order: &WriteOrder,
+    settings: &RunSettings,
+) -> Result<Demands> {
+    let limit = settings.memory.unwrap_or_else(default_memory);
+    let chunks = chunks(sorted, computed, (source, schema))?;
+    let columns = passes.iter().map(|pass| pass.column_bytes(computed));
+    let ranked =
+        order.in_input_order.iter().filter(|ranked| **ranked && order.mills).count() as u64;
+    Ok(Demands {
+        lists: by_rank::lists_bytes(source.points()) * ranked,
+        ranked: ranked > 0,
+        mills: order.mills,
+        filters: passes.iter().any(Pass::streams),
+        standings: standings(passes),
+        columns: columns.fold(ColumnBytes::default(), ColumnBytes::larger),
+        passes: passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect(),
+        run_most: settings.tile_points.map(|points| (points.get() as u64).saturating_mul(4)),
+        gathers: sorted.ops.iter().any(|stage| matches!(stage.op, Op::Scan(_))),
+        has_cells: sorted.ops.iter().any(|stage| stage.op.tile().needs().cells),
+        ..Demands::of(source, &chunks, limit, threads(settings)?)
+    })
+}
+
+/// Bytes of the lists of outputs that are a file for each input, or one for each square.
+pub(super) fn lists_bytes(
+    each: &[Vec<Box<dyn CreateSink>>],
+    sides: &[Option<f64>],
+    ranks: &[u32],
+) -> Bytes {
+    let folders = each.iter().filter(|each| !each.is_empty()).count() as u64;
+    let squares = sides.iter().flatten().count() as u64;
+    by_input::lists_bytes(ranks.len()) * folders + by_square::lists_bytes() * squares
+}
+
+/// Threads that work at once.
+fn threads(settings: &RunSettings) -> Result<usize> {
+    match settings.threads.map(NonZeroUsize::get) {
+        Some(threads) if threads > MOST_THREADS => {
+            let told = format!("a run has at most {MOST_THREADS} threads, not {threads}");
+            Err(Error::pipeline(told).help("leave `run.threads` out: all processors work"))
+        }
+        Some(threads) => Ok(threads),
+        None => {
+            let processors = std::thread::available_parallelism().map_or(1, usize::from);
+            Ok(processors.min(MOST_THREADS))
+        }
+    }
+}
+
+/// The chunks of all outputs.
+fn chunks(
+    sorted: &Sorted,
+    computed: &[Vec<ComputedDimension>],
+    (source, schema): (&dyn Source, &Arc<Schema>),
+) -> Result<Vec<ChunkSize>> {
+    let (mut chunks, mut wrong) = (Vec::new(), Vec::new());
+    let sinks = sorted.sinks.iter().zip(&sorted.written_sinks);
+    for ((sink, written), computed) in sinks.zip(computed) {
+        let metadata = Metadata { computed: computed.clone(), ..source.metadata().clone() };
+        match sink.chunk(schema, &metadata) {
+            Ok(chunk) => chunks.push(chunk),
+            Err(error) => wrong.push(blame(&**written, error)),
+        }
+    }
+    Error::all(wrong).map(|()| chunks)
+}

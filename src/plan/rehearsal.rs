@@ -1,0 +1,207 @@
+//! A graph with other ends: records of a program for its sources, and sinks that write the same to
+//! where nobody looks.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+use crate::Result;
+use crate::engine::scratch::Scratch;
+use crate::graph::{Graph, GraphStage};
+use crate::host::lock;
+use crate::memory::Records;
+use crate::point::{Metadata, PointBatch, Schema};
+use crate::stage::{ChunkSize, CreateSink, Encode, Encoded, Input, Order, Role, Sink, SinkSummary};
+
+/// What each sink was given, by its number among the sinks.
+pub(super) type WrittenFiles = Arc<Mutex<BTreeMap<usize, SinkSummary>>>;
+
+/// The same graph that takes `records` instead of what its sources give.
+pub(super) fn on_records(graph: Graph, records: Records) -> Graph {
+    let mut graph = graph.without_merges();
+    let is_source = |stage: &GraphStage| matches!(stage.role, Role::Source(_));
+    let sources: Vec<bool> = graph.stages.iter().map(is_source).collect();
+    let first = sources.iter().position(|is_source| *is_source);
+    let is_further = |n: usize| sources[n] && Some(n) != first;
+    // Without the further sources, whose points are in the records.
+    let number = |n: usize| n - (0..n).filter(|before| is_further(*before)).count();
+    for stage in &mut graph.stages {
+        stage.from.retain(|from| !is_further(*from));
+        stage.from.iter_mut().for_each(|from| *from = number(*from));
+    }
+    if let Some(source) = first.and_then(|first| graph.stages.get_mut(first)) {
+        source.role = Role::Source(Box::new(records));
+    }
+    let kept = (0..sources.len()).map(|n| !is_further(n)).zip(graph.stages);
+    let stages = kept.filter(|(is_kept, _)| *is_kept).map(|(_, stage)| stage).collect();
+    graph.stages = stages;
+    graph
+}
+
+/// The same graph, tried on a `share` of the scan: its sinks write files in `scratch`, and enter in
+/// `written` how much that was.
+pub(super) fn rehearsed(
+    mut graph: Graph,
+    share: f64,
+    inputs: &[Input],
+    scratch: &Arc<Scratch>,
+    written: &WrittenFiles,
+) -> Result<Graph> {
+    let mut number = 0;
+    let mut rehearse = |role: Role| {
+        Ok(match role {
+            Role::Sink(sink) => {
+                let of_one = sink.each_input(inputs)?.and_then(|each| each.into_iter().next());
+                number += 1;
+                let (scratch, written) = (scratch.clone(), written.clone());
+                let sink = RehearsedSink { sink, of_one, number, scratch, written };
+                Role::Sink(Box::new(sink))
+            }
+            Role::TileOp(mut op) => {
+                op.for_share(share);
+                Role::TileOp(op)
+            }
+            Role::ScanOp(mut op) => {
+                op.for_share(share);
+                Role::ScanOp(op)
+            }
+            other => other,
+        })
+    };
+    let stages = std::mem::take(&mut graph.stages).into_iter();
+    let stages = stages.map(|stage| Ok(GraphStage { role: rehearse(stage.role)?, ..stage }));
+    graph.stages = stages.collect::<Result<_>>()?;
+    Ok(graph)
+}
+
+/// A sink that writes what another would into a scratch file, and enters how much that was. Where
+/// each input has an output, it writes one for all.
+struct RehearsedSink {
+    sink: Box<dyn CreateSink>,
+    /// That of the first input, where each has one.
+    of_one: Option<Box<dyn CreateSink>>,
+    number: usize,
+    scratch: Arc<Scratch>,
+    written: WrittenFiles,
+}
+
+impl RehearsedSink {
+    fn one(&self) -> &dyn CreateSink {
+        self.of_one.as_deref().unwrap_or(&*self.sink)
+    }
+}
+
+impl CreateSink for RehearsedSink {
+    fn path(&self) -> &Path {
+        self.sink.path()
+    }
+
+    fn is_file(&self) -> bool {
+        false
+    }
+
+    fn order(&self) -> Order {
+        if self.sink.is_folder() { Order::Canonical } else { self.sink.order() }
+    }
+
+    fn likes_time(&self) -> bool {
+        self.one().likes_time()
+    }
+
+    fn computed(&self) -> &[String] {
+        self.sink.computed()
+    }
+
+    fn unread(&self) -> &[String] {
+        self.sink.unread()
+    }
+
+    fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize> {
+        self.sink.chunk(schema, metadata)
+    }
+
+    fn create(
+        &self,
+        _: &Path,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+        whole: bool,
+    ) -> Result<Box<dyn Sink>> {
+        let sink: Box<dyn Sink> = match self.sink.is_file() {
+            true => self.one().create(&self.scratch.path("output")?, schema, metadata, whole)?,
+            // What a program takes is not for a trial.
+            false => Box::new(Counted { chunk: self.sink.chunk(schema, metadata)?, points: 0 }),
+        };
+        let (number, written) = (self.number, self.written.clone());
+        Ok(Box::new(Rehearsed { sink, number, written }))
+    }
+}
+
+/// An open sink of a rehearsal.
+struct Rehearsed {
+    sink: Box<dyn Sink>,
+    number: usize,
+    written: WrittenFiles,
+}
+
+impl Sink for Rehearsed {
+    fn chunk_points(&self) -> usize {
+        self.sink.chunk_points()
+    }
+
+    fn chunk_bytes(&self) -> u64 {
+        self.sink.chunk_bytes()
+    }
+
+    fn encoder(&self) -> Arc<dyn Encode> {
+        self.sink.encoder()
+    }
+
+    fn append(&mut self, chunk: Encoded) -> Result<()> {
+        self.sink.append(chunk)
+    }
+
+    fn finish(self: Box<Self>) -> Result<SinkSummary> {
+        let summary = self.sink.finish()?;
+        lock(&self.written).insert(self.number, summary.clone());
+        Ok(summary)
+    }
+}
+
+/// Counts records and writes nothing.
+struct Counted {
+    chunk: ChunkSize,
+    points: u64,
+}
+
+impl Sink for Counted {
+    fn chunk_points(&self) -> usize {
+        self.chunk.points
+    }
+
+    fn chunk_bytes(&self) -> u64 {
+        self.chunk.bytes
+    }
+
+    fn encoder(&self) -> Arc<dyn Encode> {
+        Arc::new(Counting)
+    }
+
+    fn append(&mut self, chunk: Encoded) -> Result<()> {
+        self.points += chunk.points;
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<SinkSummary> {
+        Ok(SinkSummary::new(self.points, 0))
+    }
+}
+
+/// The encoder of what is only counted.
+struct Counting;
+
+impl Encode for Counting {
+    fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
+        Ok(Encoded::new(Vec::new(), batch.len() as u64))
+    }
+}
