@@ -56,11 +56,11 @@ fn main() {
     });
     for (text, terms, stage) in conditions.into_iter().chain(assignments) {
         stage.check(batch.schema()).unwrap();
-        let (rounds, begin) = (points.div_ceil(BATCH), cpu_seconds().unwrap());
+        let (rounds, begin) = (points.div_ceil(BATCH), cpu_seconds());
         for _ in 0..rounds {
             stage.apply(black_box(&mut batch), &mut Tally::default()).unwrap();
         }
-        let each = (cpu_seconds().unwrap() - begin) * 1e9 / (rounds * BATCH) as f64;
+        let each = (cpu_seconds() - begin) * 1e9 / (rounds * BATCH) as f64;
         assert_eq!(batch.len(), BATCH, "`{text}` removes none");
         println!("{each:6.2} {:6.2}  {text}", each / terms as f64);
     }

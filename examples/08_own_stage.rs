@@ -2,6 +2,8 @@
 //! points as they stream by) and a tile op (of every cell the lowest point, in the place of
 //! `median`), added to the registry and named by a pipeline text like any other stage.
 //!
+//! Whether a stage keeps what it says is for a test to tell: see the end of this file.
+//!
 //! `cargo run --example 08_own_stage`
 
 #![allow(clippy::print_stdout, reason = "an example shows its results")]
@@ -73,7 +75,7 @@ impl TileOp for Lowest {
     // every tile comes to the same choice; each says what becomes of the positions in its own core.
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let normals = tile.columns.get(&NORMAL)?;
-        let mut stands_for = Vec::new();
+        let mut stands_for = Vec::with_capacity(tile.positions.len());
         for group in tile.cells.groups() {
             let members = tile.cells.members[group].iter().map(|&i| i as usize);
             // Positions are distinct and indices follow Morton order, so this breaks all ties.
@@ -128,4 +130,26 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
         println!("{} removed {} points as {}", removed.stage, removed.records, removed.reason);
     }
     Ok(())
+}
+
+/// What proves the stages, with the feature `testing`: each runs on scans that the check makes, in
+/// all the ways that must not matter.
+#[cfg(test)]
+mod tests {
+    use pointmill::ops::Cells;
+    use pointmill::ops::normals::Normals;
+    use pointmill::testing::Conformance;
+
+    use super::*;
+
+    #[test]
+    fn class_keeps_its_promises() {
+        Conformance::of(Class { class: 2 }).check().unwrap();
+    }
+
+    #[test]
+    fn lowest_keeps_its_promises() {
+        let check = Conformance::of(Lowest {});
+        check.after(Normals::default()).after(Cells::default()).check().unwrap();
+    }
 }

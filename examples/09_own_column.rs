@@ -132,3 +132,24 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
     assert_eq!(added, ["property float Roughness", "property float EvenRoughness"]);
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use pointmill::testing::Conformance;
+
+    use super::*;
+
+    fn rough() -> Rough {
+        Rough { neighbors: 8, step: 0.0 }
+    }
+
+    #[test]
+    fn rough_keeps_its_promises() {
+        Conformance::of(rough()).check().unwrap();
+    }
+
+    #[test]
+    fn even_keeps_its_promises() {
+        Conformance::of(Even { neighbors: 4 }).after(rough()).check().unwrap();
+    }
+}

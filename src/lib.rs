@@ -123,6 +123,8 @@ pub mod stage;
 #[allow(clippy::missing_errors_doc, reason = "no program calls it: see `internals`")]
 mod store;
 pub mod synth;
+#[cfg(feature = "testing")]
+pub mod testing;
 pub mod tile;
 
 pub use engine::{Done, Quiet, Watch};

@@ -8,6 +8,7 @@ mod scan;
 mod sink;
 mod source;
 mod tile_op;
+mod unread;
 
 use crate::Result;
 use crate::expression::KeyExpression;
@@ -25,6 +26,7 @@ pub use scan::{AnyScanOp, Gathered, ScanOp, StoredSummaries, Summary};
 pub use sink::{ChunkSize, CreateSink, Encode, Encoded, Order, Sink, SinkSummary};
 pub use source::{Contradiction, Input, OpenSource, Part, Source};
 pub use tile_op::{Forecast, ScanFacts, TileOp};
+pub use unread::Unread;
 
 /// Changes or removes points as they stream by; knows no neighbours.
 ///
@@ -34,21 +36,25 @@ pub use tile_op::{Forecast, ScanFacts, TileOp};
 /// use pointmill::report::Tally;
 /// use pointmill::stage::{Needs, Transform};
 ///
-/// /// Leaves every second point of a batch out.
-/// struct Half;
+/// /// Leaves points out that the scanner hardly saw. What it decides is a function of the record:
+/// /// which batch that comes in, and where in it, differs from run to run.
+/// struct Bright;
 ///
-/// impl Transform for Half {
+/// impl Transform for Bright {
 ///     fn needs(&self) -> Needs {
-///         // That coordinates are there is checked before the run.
-///         Needs::none().looks_at(names::XYZ).removes(None)
+///         // That the dimension is there is checked before the run.
+///         Needs::none().looks_at([names::INTENSITY]).removes(None)
 ///     }
 ///
 ///     fn apply(&self, batch: &mut PointBatch, _tally: &mut Tally) -> Result<()> {
-///         batch.retain(|number, _record| number % 2 == 0);
+///         let schema = batch.schema().clone();
+///         if let Some(intensity) = schema.find(names::INTENSITY) {
+///             batch.retain(|_, record| intensity.world(record, schema.endian) > 8.0);
+///         }
 ///         Ok(())
 ///     }
 /// }
-/// # let _: Box<dyn Transform> = Box::new(Half);
+/// # let _: Box<dyn Transform> = Box::new(Bright);
 /// ```
 pub trait Transform: Send + Sync {
     /// What it reads and writes.

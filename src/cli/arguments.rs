@@ -1,5 +1,6 @@
 //! What can be typed.
 
+mod pipeline;
 mod plain;
 
 use std::path::PathBuf;
@@ -13,8 +14,9 @@ use crate::graph::MOST_THREADS;
 use crate::picture::{ColorBy, View};
 use crate::quantity::parse_count;
 
+pub(super) use pipeline::{Drawing, ExplainArguments, GraphArguments, PipelineArguments};
 pub(super) use plain::{
-    CompletionsArguments, Drawing, InfoArguments, ManArguments, NewArguments, StagesArguments,
+    CompletionsArguments, InfoArguments, ManArguments, NewArguments, StagesArguments,
 };
 
 /// Reduces laser scans that do not fit in memory to the points that matter.
@@ -133,23 +135,6 @@ fn within(text: &str, least: u64, most: u64) -> Result<u64, String> {
 
 fn parse_threads(text: &str) -> Result<usize, String> {
     within(text, 1, MOST_THREADS as u64).map(|threads| threads as usize)
-}
-
-/// A pipeline, and what is put in the place of its values.
-#[derive(Debug, Args)]
-pub(super) struct PipelineArguments {
-    /// The pipeline file, in TOML or JSON; or a pipeline in one line, which has ` ! ` between its
-    /// stages: 'read in.laz ! normals ! write out.ply'
-    #[arg(value_name = "PIPELINE")]
-    pub pipeline: String,
-    /// Put a value in the place of the pipeline's: the stage by its name or kind (KIND.N, from 1,
-    /// where there are several), or `run`
-    #[arg(long = "set", value_name = "STAGE.KEY=VALUE")]
-    pub sets: Vec<String>,
-    /// Give a parameter of the pipeline a value; `--help` behind a pipeline file lists those that
-    /// it has
-    #[arg(long = "param", value_name = "NAME=VALUE")]
-    pub params: Vec<String>,
 }
 
 /// Of commands that plan a pipeline, or run it.
@@ -370,24 +355,6 @@ pub(super) struct PictureArguments {
 
 fn parse_width(text: &str) -> Result<u32, String> {
     within(text, 64, 4096).map(|width| width as u32)
-}
-
-#[derive(Debug, Args)]
-pub(super) struct GraphArguments {
-    #[command(flatten)]
-    pub pipeline: PipelineArguments,
-    /// What it is drawn as
-    #[arg(long = "as", value_name = "HOW", default_value = "text")]
-    pub drawing: Drawing,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct ExplainArguments {
-    #[command(flatten)]
-    pub pipeline: PipelineArguments,
-    /// Print JSON
-    #[arg(long)]
-    pub json: bool,
 }
 
 #[derive(Debug, Args)]

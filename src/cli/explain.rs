@@ -7,7 +7,7 @@ use crate::language::Registry;
 
 /// Prints a pipeline with every key, and where each value is from.
 pub(super) fn explain(arguments: &ExplainArguments, registry: &Registry) -> Result<()> {
-    let explained = pipeline::explain(&arguments.pipeline, registry)?;
+    let explained = pipeline::explain(&arguments.pipeline, &registry.clone().unread())?;
     match arguments.json {
         true => print::json(&format!("{:#}", explained.to_json())),
         // Texts in TOML escape as those of JSON do.

@@ -7,7 +7,8 @@ use crate::language::Registry;
 
 /// Draws the graph of a pipeline.
 pub(super) fn graph(arguments: &GraphArguments, registry: &Registry) -> Result<()> {
-    let graph = pipeline::read_with(&arguments.pipeline, Vec::new(), registry)?;
+    let registry = registry.clone().unread();
+    let graph = pipeline::read_with(&arguments.pipeline, Vec::new(), &registry)?;
     let drawn = match arguments.drawing {
         Drawing::Text => graph.to_string(),
         Drawing::Mermaid => graph.to_mermaid(),

@@ -77,7 +77,9 @@ impl Task {
             check_written(path, *given, summary.points)?;
         }
         run.cpu_by_phase = clock.cpu_by_phase();
-        (run.seconds, run.cpu_seconds, run.phases) = clock.finish();
+        let cpu_seconds;
+        (run.seconds, cpu_seconds, run.phases) = clock.finish();
+        run.cpu_seconds = Some(cpu_seconds);
         run.peak_memory_bytes = peak_memory();
         run.work = finished.tally.work.iter().map(named).collect();
         let (mut results, mut lines) = (Vec::new(), Vec::new());

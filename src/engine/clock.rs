@@ -18,11 +18,11 @@ pub(crate) struct Clock<'a> {
     /// Those that are still to come.
     later: IntoIter<RunPhase>,
     start: Instant,
-    cpu_before: Option<f64>,
+    cpu_before: f64,
     open: Option<(&'static str, Instant)>,
     phases: Vec<Phase>,
     /// The phase that runs, told or not, and the CPU seconds of the process when it began.
-    at_work: Option<(&'static str, Option<f64>)>,
+    at_work: Option<(&'static str, f64)>,
     cpu_by_phase: Vec<(&'static str, f64)>,
 }
 
@@ -71,8 +71,7 @@ impl<'a> Clock<'a> {
     /// Enters what the phase that ends took of the processors.
     fn count(&mut self) {
         let Some((name, before)) = self.at_work.take() else { return };
-        let took = before.and_then(|before| Some(cpu_seconds()? - before));
-        self.cpu_by_phase.extend(took.map(|took| (name, took)));
+        self.cpu_by_phase.push((name, cpu_seconds() - before));
     }
 
     /// CPU seconds of each phase, those that are not told included; what follows is in none.
@@ -82,10 +81,9 @@ impl<'a> Clock<'a> {
     }
 
     /// Wall-clock seconds in all, CPU seconds in all, and wall-clock seconds by phase.
-    pub fn finish(mut self) -> (f64, Option<f64>, Vec<Phase>) {
+    pub fn finish(mut self) -> (f64, f64, Vec<Phase>) {
         self.end();
-        let cpu = self.cpu_before.and_then(|before| Some(cpu_seconds()? - before));
-        (self.start.elapsed().as_secs_f64(), cpu, self.phases)
+        (self.start.elapsed().as_secs_f64(), cpu_seconds() - self.cpu_before, self.phases)
     }
 }
 

@@ -30,8 +30,8 @@ const RUNS: u64 = 64;
 /// Stacks, allocator slack and decoder tables of a thread, and the same for the process.
 const THREAD_OVERHEAD: Bytes = Bytes(3 << 20);
 const PROCESS_OVERHEAD: Bytes = Bytes(6 << 20);
-/// Of what a stream leases, one part of so many is touched.
-const STREAMED: u64 = 2;
+/// Of what encoders lease in a stream, one part of so many is touched.
+const ENCODED: u64 = 4;
 
 impl Demands {
     /// What the program holds whatever it does.
@@ -217,7 +217,9 @@ impl Demands {
     pub fn expected_peak(&self, shares: &Shares) -> Bytes {
         let program = Bytes(self.resident);
         if !self.mills {
-            return program + Bytes(self.stream().sum().0 / STREAMED);
+            let encoding = self.by_threads(Bytes(self.chunk.bytes) * A_THREAD).0;
+            let others = self.stream().sum().0.saturating_sub(encoding);
+            return program + Bytes(others + encoding / ENCODED);
         }
         let points = self.points.max(1);
         let held = |most: usize| (most as u64).min(points.div_ceil(self.threads.max(1) as u64));

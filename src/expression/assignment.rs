@@ -74,8 +74,8 @@ impl Assignment {
         let (field, _) = self.bind(names)?;
         let TreeNode::Number(number) = self.tree.node else { return Ok(()) };
         let target = LoadedField::of_record(&field, names.schema);
-        let (stride, mut record) = (names.schema.stride, vec![0; names.schema.stride]);
-        if target.store(&[number], &mut record, stride).is_ok() {
+        let stride = names.schema.stride;
+        if target.store(&[number], &mut vec![0; stride], stride).is_ok() {
             return Ok(());
         }
         let told = format!("{} ({}) cannot hold it", self.target.0, type_of(&field));

@@ -32,6 +32,7 @@ use crate::{Error, Result};
 pub struct Registry {
     kinds: BTreeMap<&'static str, RegisteredKind>,
     formats: Formats,
+    is_unread: bool,
 }
 
 type ReadStage = fn(&Node, &StagePlace) -> Result<BuiltStage, Vec<Mistake>>;
@@ -87,6 +88,19 @@ impl Registry {
     pub fn with_format(mut self, format: impl Format + 'static) -> Self {
         self.formats = self.formats.with(format);
         self
+    }
+
+    /// The same for pipelines that are drawn or explained and not run: files that they name need
+    /// not be there.
+    #[must_use]
+    pub fn unread(self) -> Self {
+        Registry { is_unread: true, ..self }
+    }
+
+    /// Where a stage of a text stands.
+    pub(super) fn place(&self, origin: &str, line: usize) -> StagePlace {
+        let place = StagePlace::new(origin, line).knowing(&self.formats);
+        if self.is_unread { place.unread() } else { place }
     }
 
     /// The formats.

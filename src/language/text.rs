@@ -16,7 +16,6 @@ use super::written::WrittenText;
 use crate::graph::RunSettings;
 use crate::graph::{Graph, GraphStage, LimitKeys, Limits};
 use crate::stage::Role;
-use crate::stage::StagePlace;
 
 /// The graph that `draft` is, and what is wrong with it. It is read from `file` and `sources`.
 pub(super) fn build(
@@ -52,7 +51,7 @@ fn place(
 ) -> Result<GraphStage, Vec<Mistake>> {
     let SourceText { text, origin, .. } = &sources[0];
     let line = text.as_bytes()[..at.start.min(text.len())].iter().filter(|&&b| b == b'\n').count();
-    let place = StagePlace::new(origin.as_str(), line + 1).knowing(registry.formats());
+    let place = registry.place(origin, line + 1);
     let (limits, own) = match registry.is_limited(kind) {
         true => split_limits(&stage.keys),
         false => {

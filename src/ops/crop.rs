@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::geom::polygon::Area;
 use crate::point::{PointBatch, Schema, names};
 use crate::report::Tally;
-use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform};
+use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform, Unread};
 use crate::{Error, Result};
 
 pub use corners::CropBox;
@@ -149,6 +149,10 @@ impl StageKind for Crop {
     const MAIN: Option<&'static str> = Some("file");
 
     fn build(self, at: &StagePlace) -> Result<Role> {
+        // An area in a file that is not there yet.
+        if at.is_unread() && self.file.as_ref().is_some_and(|file| !file.exists()) {
+            return Ok(Role::Transform(Box::new(Unread::default())));
+        }
         let cropping = self.cropping().map_err(|(key, error)| at.blame(key, error))?;
         Ok(Role::Transform(Box::new(cropping)))
     }

@@ -64,7 +64,7 @@ impl StageKind for Drop {
 
 impl Transform for Drop {
     fn needs(&self) -> Needs {
-        Needs::none().removes(None)
+        Needs::none().looks_at_if_there(self.selection().names()).removes(None)
     }
 
     fn expressions(&self) -> Vec<(&'static str, KeyExpression<'_>)> {

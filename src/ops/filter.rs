@@ -80,7 +80,7 @@ impl StageKind for Filter {
 
 impl Transform for Filter {
     fn needs(&self) -> Needs {
-        Needs { removes: true, ..Needs::default() }
+        Needs::none().looks_at_if_there(self.selection().names()).removes(None)
     }
 
     fn expressions(&self) -> Vec<(&'static str, KeyExpression<'_>)> {

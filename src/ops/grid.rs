@@ -133,6 +133,7 @@ impl TileOp for Grid {
         let (mut entries, mut axis) = (Vec::new(), Vec::new());
         for bucket in keyed(tile, side).chunk_by(|a, b| a >> u32::BITS == b >> u32::BITS) {
             entries.clear();
+            entries.reserve_exact(bucket.len());
             entries.extend(bucket.iter().map(|&key| {
                 let i = key as u32;
                 (cube(tile.positions[i as usize], side), i)
@@ -206,6 +207,8 @@ impl CubeCounts {
             std::array::from_fn(|axis| p[axis].saturating_sub(at[axis]))
         };
         self.offsets.clear();
+        // No more than is declared, which growing by itself would be.
+        self.offsets.reserve_exact(group.len());
         self.offsets.extend(others.filter(|&i| i != kept).map(offset));
         let covariance = Covariance::of(&self.offsets);
         (!covariance.is_of_a_line()).then(|| smallest(covariance.matrix()).1)
@@ -268,6 +271,7 @@ impl Pick {
                 let mut median = [0; 3];
                 for (i, median) in median.iter_mut().enumerate() {
                     axis.clear();
+                    axis.reserve_exact(group.len());
                     axis.extend(group.iter().map(|entry| at(entry)[i]));
                     let middle = (axis.len() - 1) / 2;
                     *median = *axis.select_nth_unstable(middle).1;

@@ -6,6 +6,7 @@ use super::fitted::Plan;
 use super::outline::Outline;
 use crate::engine::pass::{Call, Pass, StageOp, StreamOp, needs};
 use crate::expression::Choice;
+use crate::geom::lattice::Lattice;
 
 impl Plan {
     /// What the plan's text says, for programs: a JSON object that `docs/formats.md` describes.
@@ -13,15 +14,18 @@ impl Plan {
         let Outline { inputs, points, report, threads, memory_bytes, scratch, .. } = self.outline();
         let lattice = self.task.lattice.as_ref();
         let units = (!self.ops.is_empty()).then(|| self.task.source.metadata().units.words());
+        // What streams has none that anybody should know of.
+        let is_stream = self.ops.is_empty() && self.task.filters.is_empty();
+        let passes = self.task.passes.iter().filter(|_| !is_stream);
         json!({
             "source": { "kind": self.task.source_kind, "files": inputs, "points": points },
             "streams": self.task.transforms.iter().map(streamed).collect::<Value>(),
-            "passes": self.task.passes.iter().map(|pass| self.pass(pass)).collect::<Value>(),
+            "passes": passes.map(|pass| self.pass(pass)).collect::<Value>(),
             "outputs": self.sinks(&(0..self.task.sinks.len()).collect::<Vec<_>>()),
             "report": report,
             "units": units,
             "lattice_step": lattice.map(|lattice| lattice.step),
-            "z_scale": lattice.map(crate::geom::lattice::Lattice::z_scale),
+            "z_scale": lattice.map(Lattice::z_scale),
             "order": if self.task.mills { "canonical" } else { "input" },
             "threads": threads,
             "memory_bytes": memory_bytes,
@@ -58,7 +62,7 @@ impl Plan {
         });
         json!({
             "behind": pass.behind.map(|pass| pass + 1),
-            "round": pass.round,
+            "round": pass.round.max(1),
             "outputs_before": self.sinks(&pass.before),
             "stages": pass.calls.iter().map(|&call| self.call(call)).collect::<Value>(),
             "streams": filters.collect::<Value>(),

@@ -100,16 +100,14 @@ impl Graph {
         let whole_rims = self.whole_rims;
         let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
         let mut sorted = Sorted::new(self)?;
-        let open = &*sorted.source.1;
         let places = |read: &[PathBuf], sinks: &[Box<dyn CreateSink>]| {
             check_places(file.as_deref(), read, sinks, &settings)
         };
-        let (_, wrong) = places(&open.paths(), &sorted.sinks);
+        let (_, wrong) = places(&sorted.source.1.paths(), &sorted.sinks);
         let FittedStages { source, schemas, choices, passes, given } =
             fit_stages(&mut sorted, wrong)?;
         let schema = &schemas.last;
-        let open = &*sorted.source.1;
-        let read = all_read(open, &*source);
+        let read = all_read(&*sorted.source.1, &*source);
         let (mut files, wrong) = places(&read, &sorted.sinks);
         Error::all(wrong)?;
         let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;

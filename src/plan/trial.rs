@@ -86,7 +86,7 @@ impl Plan {
     }
 
     fn tried(&self, again: Graph, watch: &dyn Watch) -> Result<TrialRun> {
-        let (start, cpu_before) = (Instant::now(), cpu_seconds().unwrap_or_default());
+        let (start, cpu_before) = (Instant::now(), cpu_seconds());
         // Parts are read from a source of their own: that of the plan counts what it gives.
         let source = opened(&again)?;
         let (schema, limit) = (source.schema(), READ_BYTES.min(self.task.demands.limit / 4));
@@ -95,7 +95,7 @@ impl Plan {
             let reading = TrialReading { source: &*source, unread, threads, watch, limit };
             reading.records(self.task.mills)
         })?;
-        let reading = cpu_seconds().unwrap_or_default() - cpu_before;
+        let reading = cpu_seconds() - cpu_before;
         let count = |bytes: usize| (bytes / schema.stride) as u64;
         let read_points = count(read.iter().map(Vec::len).sum());
         let chosen = if self.task.mills { in_spots(read, schema) } else { read.concat() };

@@ -133,6 +133,18 @@ impl Columns {
         self.resize(len);
     }
 
+    /// Takes the columns out that are `asked` for, to be [put back](Columns::put_back).
+    #[cfg(feature = "testing")]
+    pub(crate) fn take_out(&mut self, asked: impl Fn(ColumnKind) -> bool) -> Columns {
+        Columns(self.0.extract_if(.., |(kind, _)| asked(*kind)).collect())
+    }
+
+    /// Puts back what was taken out.
+    #[cfg(feature = "testing")]
+    pub(crate) fn put_back(&mut self, columns: Columns) {
+        self.0.extend(columns.0);
+    }
+
     /// What columns there are.
     pub(crate) fn kinds(&self) -> Vec<ColumnKind> {
         self.0.iter().map(|(kind, _)| *kind).collect()

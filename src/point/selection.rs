@@ -79,6 +79,18 @@ impl Selection {
         *self == Selection::default()
     }
 
+    /// The dimensions that it looks at, where records have them.
+    pub fn names(&self) -> Vec<&'static str> {
+        let flags = self.with.iter().chain(&self.without);
+        let mut all: Vec<&str> = flags.map(|flag| flag.dimension()).collect();
+        // Of records without a flag for it, a class says overlap.
+        let by_class = all.contains(&names::OVERLAP);
+        if by_class || !self.classes.is_empty() || !self.not_classes.is_empty() {
+            all.push(names::CLASSIFICATION);
+        }
+        all
+    }
+
     /// What it asks for and records of `schema` do not have, so that it would hold none of them.
     pub fn missing(&self, schema: &Schema) -> Option<&'static str> {
         let class = (!self.classes.is_empty()).then_some(names::CLASSIFICATION);

@@ -64,6 +64,7 @@ pub struct StagePlace {
     file: String,
     line: usize,
     formats: Formats,
+    is_unread: bool,
     blamed: RefCell<Option<String>>,
 }
 
@@ -71,7 +72,19 @@ impl StagePlace {
     /// A stage at line `line` (from 1) of `file`; no format is known there.
     pub fn new(file: impl Into<String>, line: usize) -> Self {
         let (formats, blamed) = (Formats::default(), RefCell::new(None));
-        StagePlace { file: file.into(), line, formats, blamed }
+        StagePlace { file: file.into(), line, formats, is_unread: false, blamed }
+    }
+
+    /// The same where no file is to be looked at: see [`is_unread`](StagePlace::is_unread).
+    #[must_use]
+    pub fn unread(self) -> Self {
+        StagePlace { is_unread: true, ..self }
+    }
+
+    /// True if the pipeline will not run, but is drawn or explained: a stage need not find the
+    /// files that it names, and may play its role by [`Unread`](super::Unread).
+    pub fn is_unread(&self) -> bool {
+        self.is_unread
     }
 
     /// The same, `formats` being the ones that it may name.

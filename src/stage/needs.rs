@@ -18,6 +18,8 @@ pub struct Needs {
     /// Dimensions of the records that it looks at. Stages that work on tiles look at `X`, `Y`, `Z`
     /// and `Classification` by this, and at any other as at a [column](Needs::reads).
     pub dimensions: Vec<String>,
+    /// Dimensions of the records that it looks at where they have them, and does without else.
+    pub if_there: Vec<String>,
     /// Dimensions of the records that it changes.
     pub changes: Vec<String>,
     /// Columns whose values it reads at the positions that it decides about, or computes for.
@@ -47,6 +49,8 @@ pub struct Needs {
     /// True if it reads the [numbers](crate::point::PointBatch::record_numbers) that records have
     /// in the input.
     pub record_numbers: bool,
+    /// True if any byte of a record may decide what it does with it, whatever dimension that is of.
+    pub whole_records: bool,
     /// True if it removes points.
     pub removes: bool,
     /// How it marks records instead of removing any, if it does.
@@ -66,6 +70,13 @@ impl Needs {
     #[must_use]
     pub fn looks_at<'a>(mut self, names: impl IntoIterator<Item = &'a str>) -> Self {
         self.dimensions.extend(names.into_iter().map(str::to_owned));
+        self
+    }
+
+    /// And it looks at these dimensions of the records where they have them.
+    #[must_use]
+    pub fn looks_at_if_there<'a>(mut self, names: impl IntoIterator<Item = &'a str>) -> Self {
+        self.if_there.extend(names.into_iter().map(str::to_owned));
         self
     }
 
@@ -139,6 +150,13 @@ impl Needs {
     #[must_use]
     pub fn reads_record_numbers(mut self) -> Self {
         self.record_numbers = true;
+        self
+    }
+
+    /// And any byte of a record may decide what it does with it.
+    #[must_use]
+    pub fn reads_whole_records(mut self) -> Self {
+        self.whole_records = true;
         self
     }
 

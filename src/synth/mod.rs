@@ -17,6 +17,8 @@ mod synthetic;
 mod truth;
 
 pub use kind::Synth;
+#[cfg(feature = "testing")]
+pub(crate) use random::Random;
 pub use scene::Scene;
 pub use synthetic::Synthetic;
 pub use truth::Truth;

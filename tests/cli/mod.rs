@@ -6,6 +6,7 @@ mod events;
 mod interrupt;
 mod names;
 mod picture;
+mod plan;
 mod tools;
 mod values;
 mod words;

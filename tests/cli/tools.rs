@@ -34,6 +34,13 @@ fn a_graph_is_drawn_without_its_inputs_and_the_same_every_time() {
     }
     fails(at, &["graph", "p.toml", "--as", "svg"], 2, &["text", "mermaid", "dot"]);
     fails(at, &["graph", "q.toml"], 1, &["q.toml"]);
+    // Neither patterns that mean no file yet, nor areas, need to be there.
+    let later = "crop file=area.wkt ! write out.laz";
+    let line = format!("read 'survey/*.laz' ! {later}");
+    assert!(done(at, &["graph", &line]).contains("crop"));
+    assert!(done(at, &["explain", &line]).contains("path = [\"survey/*.laz\"]"));
+    fails(at, &["check", &line], 1, &["no file matches `survey/*.laz`"]);
+    fails(at, &["check", &format!("synth scene=plane points=10 ! {later}")], 1, &["area.wkt"]);
 }
 
 #[test]

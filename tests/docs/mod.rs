@@ -197,6 +197,16 @@ fn the_formats_that_are_documented_are_those_that_are_written() {
         &pointmill::io::describe(&folder.path().join("reduced.laz"), registry.formats()).unwrap(),
         "info: LAS and LAZ",
     );
+    let text = "[params]\nout = 'o.laz'\n[[stage]]\nkind = 'read'\npath = 'scan.laz'\n\
+                [[stage]]\nkind = 'drop'\nclasses = [7]\n[[stage]]\nkind = 'grid'\nside = 2\n\
+                [[stage]]\nkind = 'filter'\nwhere = 'Intensity > 40'\n\
+                [[stage]]\nkind = 'write'\npath = '${out}'\n";
+    fs::write(folder.path().join("p.toml"), text).unwrap();
+    for command in ["plan", "explain"] {
+        let (code, printed, told) = pointmill(folder.path(), &[command, "p.toml", "--json"]);
+        assert_eq!(code, 0, "{told}");
+        agree(&serde_json::from_str(&printed).unwrap(), command);
+    }
     reduce(folder.path(), "reduced.ply");
     agree(
         &pointmill::io::describe(&folder.path().join("reduced.ply"), registry.formats()).unwrap(),

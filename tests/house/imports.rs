@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use super::modules::Modules;
 
 /// The modules from the bottom up. Those of one layer do not import each other.
-const LAYERS: [&[&str]; 17] = [
+const LAYERS: [&[&str]; 18] = [
     &["error"],
     &["host", "point"],
     &["geom", "quantity", "budget"],
@@ -26,6 +26,7 @@ const LAYERS: [&[&str]; 17] = [
     &["engine"],
     &["plan"],
     &["language"],
+    &["testing"],
     &["cli"],
     &["internals"],
 ];

@@ -1,6 +1,7 @@
 //! Runs and what may go wrong in them.
 
 mod edges;
+mod foretold;
 mod killed;
 mod memory_ends;
 mod spill_damage;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use clap_complete::Shell;
 
 #[derive(Debug, Args)]
@@ -47,14 +47,4 @@ pub(crate) struct InfoArguments {
     /// Print a JSON list with one object a file
     #[arg(long)]
     pub json: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Drawing {
-    /// Lines for a terminal
-    Text,
-    /// A flowchart for web pages
-    Mermaid,
-    /// The language of Graphviz
-    Dot,
 }

@@ -9,7 +9,7 @@ use super::squares::Squares;
 use super::{connect, inputs, kinds};
 use crate::error::shown;
 use crate::io::sniff::first_bytes;
-use crate::stage::{Formats, OpenSource, Role, RoleName, StageKind, StagePlace};
+use crate::stage::{Formats, OpenSource, Role, RoleName, StageKind, StagePlace, Unread};
 use crate::{Error, Result};
 
 impl Read {
@@ -57,6 +57,10 @@ impl StageKind for Read {
     const PLACES: &'static [&'static str] = &["path", "format"];
 
     fn build(self, at: &StagePlace) -> Result<Role> {
+        if at.is_unread() {
+            let paths = self.path.iter().map(PathBuf::from).collect();
+            return Ok(Role::Source(Box::new(Unread { paths })));
+        }
         Ok(Role::Source(self.source(at.formats()).map_err(|error| at.blame("path", error))?))
     }
 }

@@ -22,7 +22,7 @@ impl RandomSample {
 
 impl Transform for RandomSample {
     fn needs(&self) -> Needs {
-        Needs::none().looks_at(names::XYZ).removes(None)
+        Needs::none().looks_at(names::XYZ).reads_whole_records().removes(None)
     }
 
     fn idle(&self, _: &Schema) -> Vec<String> {

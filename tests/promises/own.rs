@@ -1,0 +1,133 @@
+//! The stages that pointmill has, each by some of its keys.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use pointmill::Registry;
+use pointmill::ops::normals::Normals;
+use pointmill::ops::{
+    Assign, Cells, Crop, Drop, Filter, Grid, Median, Outliers, Sample, Stats, Tap, Transformation,
+};
+use pointmill::stage::StageKind;
+use pointmill::testing::{Conduct, Conformance, Promise};
+use serde_json::{Value, json};
+
+/// Scans that each stage is checked on.
+const RUNS: usize = 10;
+
+fn of<K: StageKind>(keys: Value) -> K {
+    serde_json::from_value(keys).unwrap()
+}
+
+fn check<K: StageKind>(keys: Value) -> Conformance {
+    Conformance::of(of::<K>(keys))
+}
+
+/// The checks of each kind. Those that are none between a source and a sink have none.
+fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
+    let normals = || of::<Normals>(json!({ "neighbors": 6 }));
+    let cells = || of::<Cells>(json!({ "side": 2.0, "max_angle": 0.4 }));
+    BTreeMap::from([
+        ("read", vec![]),
+        ("synth", vec![]),
+        ("merge", vec![]),
+        ("write", vec![]),
+        ("filter", vec![check::<Filter>(json!({ "where": "Intensity > 6 and X > 0.1" }))]),
+        ("drop", vec![check::<Drop>(json!({ "classes": [2, 7] }))]),
+        ("crop", vec![check::<Crop>(json!({ "box": [0, 0, 0, 2, 3, 1] }))]),
+        ("transform", vec![check::<Transformation>(json!({ "translate": [1, 2, 3] }))]),
+        ("assign", vec![check::<Assign>(json!({ "set": "UserData = Intensity + 1" }))]),
+        ("stats", vec![check::<Stats>(json!({ "dimensions": ["Z", "Intensity"] }))]),
+        ("tap", vec![check::<Tap>(json!({}))]),
+        (
+            "outliers",
+            vec![
+                check::<Outliers>(json!({ "neighbors": 4, "multiplier": 1.0 })),
+                check::<Outliers>(json!({ "method": "radius", "radius": 1.5, "min_neighbors": 3 })),
+            ],
+        ),
+        ("normals", vec![check::<Normals>(json!({ "neighbors": 6 })), check::<Normals>(json!({}))]),
+        (
+            "cells",
+            vec![
+                check::<Cells>(json!({ "side": 2.0 })).after(normals()).before(Median::default()),
+                check::<Cells>(json!({})).after(normals()).before(Median::default()),
+            ],
+        ),
+        ("median", vec![check::<Median>(json!({})).after(normals()).after(cells())]),
+        (
+            "grid",
+            vec![check::<Grid>(json!({ "side": 2.0 })), check::<Grid>(json!({ "side": 2.048 }))],
+        ),
+        (
+            "sample",
+            vec![
+                check::<Sample>(json!({ "distance": 1.5 })),
+                check::<Sample>(json!({ "every": 3 })).streams(),
+                check::<Sample>(json!({ "fraction": 0.4 })).streams(),
+            ],
+        ),
+    ])
+}
+
+/// What is wrong with a stage; nothing if it keeps its promises and was asked all of them.
+fn wrong(kind: &str, number: usize, check: Conformance) -> Option<String> {
+    match check.runs(RUNS).check() {
+        Ok(conduct) => {
+            println!("{kind} {number}: {conduct}\n");
+            (!is_asked(&conduct)).then(|| format!("{kind} {number} was hardly asked: {conduct}"))
+        }
+        Err(broken) => Some(format!("{kind} {number}: {broken}")),
+    }
+}
+
+/// True if it was asked what can be asked of every stage, and more than once.
+fn is_asked(conduct: &Conduct) -> bool {
+    use Promise::{Answers, Budget, Ledger, Memory, Split, Stops, Threads, Tiles, Time};
+    let often = |promise| conduct.answers.get(promise).is_some_and(|count| *count > 4);
+    conduct.refused <= conduct.scans / 2
+        && [Answers, Time, Ledger, Split, Tiles, Threads, Budget, Stops].iter().all(often)
+        && conduct.answers.get(&Memory) == Some(&1)
+        && conduct.memory.is_some()
+}
+
+/// Checks stages of these kinds.
+fn assert_kept(kinds: &[&str]) {
+    let mut checks = checks();
+    let mut broken = Vec::new();
+    for kind in kinds {
+        let own = checks.remove(kind).unwrap().into_iter().enumerate();
+        broken.extend(own.filter_map(|(number, check)| wrong(kind, number, check)));
+    }
+    assert!(broken.is_empty(), "{}", broken.join("\n\n"));
+}
+
+const STREAM: [&str; 7] = ["assign", "crop", "drop", "filter", "stats", "tap", "transform"];
+const SELECT: [&str; 3] = ["grid", "outliers", "sample"];
+const REDUCE: [&str; 3] = ["cells", "median", "normals"];
+const ENDS: [&str; 4] = ["merge", "read", "synth", "write"];
+
+#[test]
+fn every_stage_of_ours_is_checked() {
+    let registry = Registry::builtin();
+    let all: BTreeSet<&str> = registry.kinds().map(|(kind, _)| kind).collect();
+    let lists = [&STREAM[..], &SELECT, &REDUCE, &ENDS].concat();
+    assert_eq!(all, lists.into_iter().collect());
+    for (kind, checks) in checks() {
+        assert_eq!(checks.is_empty(), ENDS.contains(&kind), "{kind}");
+    }
+}
+
+#[test]
+fn stages_that_stream_keep_their_promises() {
+    assert_kept(&STREAM);
+}
+
+#[test]
+fn stages_that_select_keep_their_promises() {
+    assert_kept(&SELECT);
+}
+
+#[test]
+fn stages_that_reduce_keep_their_promises() {
+    assert_kept(&REDUCE);
+}
