@@ -25,7 +25,8 @@ pub(super) fn read_with(
     others: Vec<Set>,
     registry: &Registry,
 ) -> Result<Graph> {
-    text(arguments, registry)?.graph(registry, &[sets(arguments)?, others].concat())
+    let sets = [sets(arguments)?, others].concat();
+    text(arguments, registry)?.graph(registry, &sets)
 }
 
 /// The pipeline with the origin of every value.

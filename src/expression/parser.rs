@@ -8,6 +8,9 @@ use super::lexer::{Token, TokenKind, UNITLESS, tokens};
 use super::rules::{DEEPEST, condition, depth, direction, not, number, relation, too_deep};
 use super::tree::{ExpressionTree, Function, Operator, TreeNode};
 
+/// Words behind a number that are meant for its unit.
+const UNITS: [&str; 8] = ["m", "cm", "mm", "km", "ft", "deg", "rad", "meters"];
+
 /// Words that are no names.
 const WORDS: [&str; 6] = ["and", "or", "not", "in", "is", "nan"];
 
@@ -97,9 +100,10 @@ impl Parser {
         };
         let words = ["and", "or", "==", "<", "in"];
         let is_number = |token: &Token| matches!(token.kind, TokenKind::Number(_));
-        let is_word = matches!(token.kind, TokenKind::Word(_));
+        let is_unit =
+            matches!(&token.kind, TokenKind::Word(word) if UNITS.contains(&word.as_str()));
         let behind_number = self.at.checked_sub(1).is_some_and(|at| is_number(&self.tokens[at]));
-        let help = match is_word && behind_number {
+        let help = match is_unit && behind_number {
             true => UNITLESS.to_owned(),
             false => format!("{} may stand there", quoted(words)),
         };

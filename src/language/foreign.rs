@@ -39,16 +39,6 @@ fn pdal(text: &str) -> Mistake {
     Mistake::new(TextPlace::new(0, begin..begin + 1), told).note(note)
 }
 
-/// The word by which the stage is sought that is meant by a kind as PDAL has it.
-pub(super) fn kind(word: &str) -> &str {
-    match word.split_once('.') {
-        Some(("readers", _)) => "read",
-        Some(("writers", _)) => "write",
-        Some(("filters", rest)) => rest,
-        _ => word,
-    }
-}
-
 /// What a text with `[stage]` for `[[stage]]` is told: once, though TOML refuses every table after
 /// the first and all of its keys.
 fn single_brackets(text: &str) -> Option<Mistake> {

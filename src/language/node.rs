@@ -91,7 +91,9 @@ pub(crate) fn parse(text: &str, source: usize) -> Result<Vec<KeyEntry>, Vec<Mist
             if e.message().starts_with("duplicate key") {
                 let mistake = Mistake::new(place, format!("`{key}` is given twice"));
                 return match key {
-                    "kind" => mistake.note("a second stage begins with a line [[stage]]"),
+                    "kind" => {
+                        mistake.note("a second stage begins with a line [[stage]] of its own")
+                    }
                     _ => mistake,
                 };
             }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use super::draft::{Draft, StageDraft};
 use super::elsewhere;
-use super::foreign;
 use super::keys;
 use super::mistake::{Mistake, SourceText, advice};
 use super::node::{KeyEntry, Node, NodeValue};
@@ -69,7 +68,7 @@ fn place(
             return Err(vec![Mistake::new(at.clone(), told).note(advice("", "stages", kinds))]);
         }
         let told = format!("there is no stage `{kind}`");
-        return Err(vec![Mistake::word(at.clone(), told, foreign::kind(kind), "stages", kinds)]);
+        return Err(vec![Mistake::word(at.clone(), told, kind, "stages", kinds)]);
     };
     let given = limits.entries();
     let read = keys::read::<LimitKeys>(kind, &limits, &[]);

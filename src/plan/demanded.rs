@@ -78,7 +78,7 @@ fn chunks(
     (source, schema): (&dyn Source, &Arc<Schema>),
 ) -> Result<Vec<ChunkSize>> {
     let (mut chunks, mut wrong) = (Vec::new(), Vec::new());
-    let sinks = sorted.sinks.iter().zip(&sorted.written_sinks);
+    let sinks = sorted.sinks.iter().zip(&sorted.endings);
     for ((sink, written), computed) in sinks.zip(computed) {
         let metadata = Metadata { computed: computed.clone(), ..source.metadata().clone() };
         match sink.chunk(schema, &metadata) {

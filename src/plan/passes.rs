@@ -351,7 +351,7 @@ impl PassLayout<'_> {
         if !unknown.is_empty() {
             let told =
                 format!("the output wants {}, which no stage computes", listed(&unknown, "and"));
-            let error = self.sorted.written_sinks[sink].wrong_key("dimensions", told);
+            let error = self.sorted.endings[sink].wrong_key("dimensions", told);
             self.wrong.push(error.help(self.at.columns.remedy(&unknown)));
         }
         Ok(computed)

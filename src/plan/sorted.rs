@@ -32,7 +32,7 @@ pub(super) struct Sorted {
     pub filters: Vec<StreamOp>,
     pub sinks: Vec<Box<dyn CreateSink>>,
     /// For each sink, how it is written.
-    pub written_sinks: Vec<Arc<dyn Written>>,
+    pub endings: Vec<Arc<dyn Written>>,
     /// What each stage of the graph is.
     pub works: Vec<StageWork>,
     /// For each stage of the graph, those that take from it, in order.
@@ -55,11 +55,12 @@ impl Sorted {
             |stage: &GraphStage| serde_json::json!({ "kind": stage.kind, "keys": stage.keys });
         let names = graph.stages.iter().map(name).collect();
         let columns = columns_above(&graph.stages);
+        let endings = endings(&graph.stages);
         let mut labels = labels(&graph.stages).into_iter();
         let mut source: Option<(String, Box<dyn OpenSource>)> = None;
         let mut works = Vec::new();
         let (mut transforms, mut filters) = (Vec::new(), Vec::new());
-        let (mut ops, mut sinks, mut written_sinks) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut ops, mut sinks) = (Vec::new(), Vec::new());
         for ((n, stage), above) in graph.stages.into_iter().enumerate().zip(columns) {
             let GraphStage { kind, written, limits, role, .. } = stage;
             let label = labels.next().unwrap_or_default();
@@ -92,10 +93,7 @@ impl Sorted {
                     let op = Op::Scan(op);
                     ops.push(StageOp { kind, written, op, limits, above, selection: 0 });
                 }
-                Role::Sink(sink) => {
-                    sinks.push(sink);
-                    written_sinks.push(written);
-                }
+                Role::Sink(sink) => sinks.push(sink),
                 Role::Merge => {}
             }
         }
@@ -103,19 +101,7 @@ impl Sorted {
         if sinks.is_empty() {
             return Err(Error::pipeline("the pipeline writes nothing"));
         }
-        let sorted = Sorted {
-            source,
-            transforms,
-            ops,
-            filters,
-            sinks,
-            written_sinks,
-            works,
-            takers,
-            root,
-            names,
-        };
-        Ok(sorted)
+        Ok(Sorted { source, transforms, ops, filters, sinks, endings, works, takers, root, names })
     }
 
     /// The stages that take from stage `number` and work, and the sinks that take from it.
@@ -181,6 +167,12 @@ fn columns_above(stages: &[GraphStage]) -> Vec<Vec<ColumnKind>> {
         above.push(columns);
     }
     above
+}
+
+/// How the sinks are written.
+fn endings(stages: &[GraphStage]) -> Vec<Arc<dyn Written>> {
+    let sinks = stages.iter().filter(|stage| matches!(stage.role, Role::Sink(_)));
+    sinks.map(|sink| sink.written.clone()).collect()
 }
 
 /// A source, and another that is merged with it.

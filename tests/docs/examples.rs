@@ -7,7 +7,7 @@ use std::path::Path;
 use pointmill::{Graph, Registry};
 
 use super::root;
-use crate::support::command::{done, pointmill, scans};
+use crate::support::command::{done, pointmill};
 
 /// The blocks of a page in this language, without their fences.
 fn blocks<'a>(page: &'a str, language: &str) -> Vec<&'a str> {
@@ -22,7 +22,7 @@ fn page(name: &str) -> String {
 
 /// A folder with the inputs that the pages name.
 fn survey() -> tempfile::TempDir {
-    let at = scans(&["more.laz"]);
+    let at = tempfile::tempdir().unwrap();
     let als = ["synth", "als", "-n", "5000", "-o"];
     for name in ["scan.laz", "more.laz", "a.laz", "b.laz", "scan.las", "scan.ply"] {
         done(at.path(), &[&als[..], &[name]].concat());
