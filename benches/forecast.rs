@@ -1,6 +1,6 @@
 //! What `pointmill plan` foretells beside what the run then does, for each of some jobs.
 //!
-//! `cargo bench --bench forecast -- SCAN.laz …`. A line a job: what was foretold, what came, and by
+//! `cargo bench --bench forecast -- SCAN.laz …`: a line a job, what was foretold, what came, and by
 //! how much of it the first is off; jobs run one after the other on all processors. Wall-clock time
 //! means something on a machine that does nothing else.
 

@@ -184,11 +184,12 @@ impl BySquare {
             |()| Ok(()),
         )?;
         let each = sinks.iter().zip(staged).zip(lists).zip(said);
-        let file =
-            |(((create, staged), list), summary): (((&Box<dyn CreateSink>, _), &SquareList), _)| {
-                SquareFile { path: create.path().to_owned(), staged, given: list.records, summary }
-            };
-        Ok(each.map(file).collect())
+        let mut files = Vec::with_capacity(sinks.len());
+        for (((create, staged), list), summary) in each {
+            let path = create.path().to_owned();
+            files.push(SquareFile { path, staged, given: list.records, summary });
+        }
+        Ok(files)
     }
 
     /// Records of all squares.

@@ -117,7 +117,7 @@ pub(super) fn square_sides(
     read: &[PathBuf],
 ) -> Result<Vec<Option<f64>>> {
     let units = source.metadata().units;
-    let side = |sink: &Box<dyn CreateSink>| {
+    let side = |sink: &dyn CreateSink| {
         let side = sink.square_side(&units)?;
         if side.is_none() {
             return Ok(None);
@@ -137,5 +137,5 @@ pub(super) fn square_sides(
         there.map_or(Ok(()), |path| refuse_existing(&path, settings.existing))?;
         Ok(side)
     };
-    sinks.iter().map(side).collect()
+    sinks.iter().map(|sink| side(&**sink)).collect()
 }

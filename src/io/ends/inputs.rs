@@ -329,7 +329,7 @@ mod tests {
         let told = |paths: &[&str]| names(at.path(), paths).unwrap_err().to_string();
         assert!(told(&["*.las"]).contains("/*.las`"));
         assert!(told(&["a.laz", "*.laz"]).contains("a.laz, which is named before"));
-        assert!(told(&["a.laz", "./a.laz"]).contains("./a.laz, which is named before"));
+        assert!(told(&["a.laz", "./a.laz"]).contains("./a.laz` is a file that is named"));
         assert!(told(&["[.laz"]).contains("no pattern"));
         let empty = folder_of(&["a.txt"]);
         assert!(names(empty.path(), &[""]).unwrap_err().to_string().contains("has no las"));
