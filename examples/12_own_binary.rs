@@ -1,5 +1,5 @@
-//! Reach for this when others are to use stages of yours: a whole command line with them. It has all
-//! commands of `pointmill`, which know the stages: `stages` lists them with their keys, `run` runs
+//! Reach for this when others are to use stages of yours: a whole command line with them. It has
+//! all commands of `pointmill`, which know the stages: `stages` lists them with their keys, `run` runs
 //! pipelines that name them, `check` tells what is wrong with those, `schema` is for editors.
 //!
 //! `cargo run --example 12_own_binary -- stages fold`
