@@ -20,7 +20,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Fold {
-    /// The classes that go into one. (`classes` is taken: it limits any stage.)
+    /// The classes that go into one.
+    // `classes` is taken: it limits any stage.
     old: Vec<u8>,
     /// The class that they become.
     new: u8,
