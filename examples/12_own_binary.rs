@@ -1,5 +1,5 @@
-//! Reach for this when others are to use stages of yours: a whole command line with them. It has all
-//! commands of `pointmill`, which know the stages: `stages` lists them with their keys, `run` runs
+//! Reach for this when others are to use stages of yours: a whole command line with them. It has
+//! all commands of `pointmill`, which know the stages: `stages` lists them with their keys, `run` runs
 //! pipelines that name them, `check` tells what is wrong with those, `schema` is for editors.
 //!
 //! `cargo run --example 12_own_binary -- stages fold`
@@ -20,7 +20,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Fold {
-    /// The classes that go into one. (`classes` is taken: it limits any stage.)
+    /// The classes that go into one.
+    // `classes` is taken: it limits any stage.
     old: Vec<u8>,
     /// The class that they become.
     new: u8,

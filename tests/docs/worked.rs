@@ -10,8 +10,8 @@ use crate::support::command::{done, pointmill};
 /// The largest picture in bytes.
 const LARGEST: u64 = 60 << 10;
 
-/// A stage, what its example shows, and the pipeline behind `read scan.laz ! `. Those with a picture
-/// write `after.laz`.
+/// A stage, what its example shows, and the pipeline behind `read scan.laz ! `. Those with a
+/// picture write `after.laz`.
 const EXAMPLES: [(&str, &str, &str); 17] = [
     ("read", "Two files become one.", "write copy.laz"),
     ("synth", "A made-up scan of 5,000 points.", "synth als points=5k ! write made.laz"),
@@ -88,7 +88,12 @@ pub fn section(kind: &str) -> String {
     let differs = |line: &&str| line.starts_with("memory ") || line.starts_with("time ");
     let said: Vec<&str> = stdout.lines().filter(|line| !differs(line)).map(str::trim_end).collect();
     assert!(said[0].starts_with("points "), "{stdout}");
-    let made = "`scan.laz` is `pointmill synth als -n 5k -o scan.laz`";
+    let made = match line.contains("more.laz") {
+        true => {
+            "`scan.laz` is `pointmill synth als -n 5k -o scan.laz`, and `more.laz` with `--seed 1`"
+        }
+        false => "`scan.laz` is `pointmill synth als -n 5k -o scan.laz`",
+    };
     let said = said.join("\n");
     let mut out = format!(
         "\n## Example\n\n{says} {made}.\n\n```sh\npointmill run '{line}'\n```\n\n```text\n{said}\n```\n"
