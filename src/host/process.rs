@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn the_work_of_all_threads_is_counted() {
         let before = cpu_seconds();
-        let work = || (0..2_000_000u64).fold(1, |sum, n| std::hint::black_box(sum ^ n * sum));
+        let work = || (0..2_000_000u64).fold(1, |sum, n| std::hint::black_box(sum ^ (n * sum)));
         std::thread::spawn(work).join().unwrap();
         assert!(cpu_seconds() > before + 1e-4);
     }

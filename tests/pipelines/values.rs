@@ -295,7 +295,7 @@ fn a_scale_that_the_far_end_of_a_scan_does_not_fit_is_told_by_the_plan() {
         scan.moved(|i, stored| if i == last { [2_000_000_000, stored[1], 0] } else { stored });
     moved.write(&input);
     let plan = |stages: &str, write: &str| {
-        let text = text("", &[input.clone()], stages, &output, write);
+        let text = text("", std::slice::from_ref(&input), stages, &output, write);
         let graph = Graph::parse(&text, "test.toml", &Registry::builtin()).unwrap();
         graph.plan(&Overrides::default()).unwrap()
     };
