@@ -92,6 +92,12 @@ pub trait Transform: Send + Sync {
         Vec::new()
     }
 
+    /// What to say where it leaves nothing of a scan whose headers claim these smallest and largest
+    /// x, y and z; None where it may leave some.
+    fn misses(&self, _claimed: [[f64; 3]; 2]) -> Option<String> {
+        None
+    }
+
     /// What it was asked to do and did not, where it removed no point of a scan whose records are
     /// of a schema. It need not repeat its [`warnings`](Transform::warnings).
     fn idle(&self, _schema: &Schema) -> Vec<String> {

@@ -18,7 +18,7 @@ use super::job::Job;
 use super::mill::mill;
 use super::pass::StageOp;
 use super::phase::RunPhase;
-use super::publish::{Staged, make_folder, publish};
+use super::publish::{Staged, folder_of, make_folder, publish};
 use super::room;
 use super::room::Taken;
 use super::row::RowLayout;
@@ -118,6 +118,8 @@ impl Task {
         for (n, sink) in self.sinks.iter().enumerate() {
             if sink.is_folder() {
                 make_folder(sink.path())?;
+            } else if sink.has_squares() {
+                make_folder(&folder_of(sink.path()))?;
             }
             let mut staged: Vec<Staged> = Vec::new();
             for file in self.files(n).iter().filter(|file| file.is_file()) {

@@ -80,6 +80,10 @@ impl Parser {
         if self.takes(sign) {
             return Ok(());
         }
+        if sign == ")" && self.takes(",") {
+            let told = "a list stands in brackets, as in `Classification in [2, 6]`";
+            return Err(ExpressionFault::new(of.clone(), told));
+        }
         let told = format!("there is no `{sign}` that closes this");
         Err(ExpressionFault::new(of.clone(), told))
     }

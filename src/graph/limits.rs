@@ -8,8 +8,8 @@ use crate::point::{Flag, Selection};
 
 /// The records that a stage works on. What is not selected passes through untouched.
 ///
-/// Any stage between a source and a sink takes these keys besides its own; `sees` is for stages
-/// that work on tiles.
+/// Stages between a source and a sink take these keys besides their own, but for `merge`,
+/// `transform`, `filter` and `drop`; `sees` is for stages that work on tiles.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LimitKeys {

@@ -161,7 +161,8 @@ impl StageTree<'_> {
             return None;
         }
         Some(match n + 1 == self.stages.len() {
-            true => GraphMistake::new(n, "nothing takes these points: end with `write`"),
+            true => GraphMistake::new(n, "nothing takes these points: end with `write`")
+                .help("or with `discard`, if the report is all that is wanted"),
             false => {
                 let told = format!("no output takes what `{}` leaves", stage.kind);
                 let help = "add a `write` behind it that has no `from`";

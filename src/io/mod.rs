@@ -14,6 +14,6 @@ mod wkt;
 
 pub use convert::{Projection, Rounding};
 pub use describe::describe;
-pub use ends::{OutputOrder, Read, Write};
+pub use ends::{Discard, OutputOrder, Read, Write};
 pub(crate) use origin::open_plain;
 pub use project::Projected;

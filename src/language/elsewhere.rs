@@ -22,7 +22,7 @@ const ELSEWHERE: [(&[&str], &str); 17] = [
     (&["clip", "geofence", "polygon"], "`crop` with `polygon`"),
     (&["transformation", "translate", "rotate", "scale", "apply_transform"], "`transform`"),
     (&["splitter", "chipper", "tile", "tiles", "divider"], "`write` with `side` and `{x}_{y}`"),
-    (&["info", "summarise", "statistics", "statistical"], "`stats`"),
+    (&["summarise", "statistics", "statistical"], "`stats`"),
     (&["reduction", "reduce"], "`normals`, `cells` and `median`, one after the other"),
     (&["concatenate", "append"], "`merge`, or several paths in `read`"),
     (&["progress"], "`tap`"),
@@ -74,10 +74,20 @@ pub(super) fn told(kind: &str, keys: &Node) -> Option<(String, String)> {
         let told = format!("there is no stage `{kind}`: pointmill does not {what}");
         return Some((told, (*help).to_owned()));
     }
-    let of_files =
-        [("readers.", "`read` with the `path`"), ("writers.", "`write` with the `path`")];
-    if let Some((_, here)) = of_files.iter().find(|(prefix, _)| lower.starts_with(prefix)) {
+    let of_files = [
+        ("readers.las", "`read` with the `path`"),
+        ("readers.ply", "`read` with the `path`"),
+        ("writers.las", "`write` with the `path`"),
+        ("writers.ply", "`write` with the `path`"),
+        ("writers.null", "`discard`"),
+    ];
+    if let Some((_, here)) = of_files.iter().find(|(name, _)| lower == *name) {
         return Some(is_here(kind, here));
+    }
+    if let Some((ends @ ("readers" | "writers"), format)) = lower.split_once('.') {
+        let does = if ends == "readers" { "read" } else { "write" };
+        let told = format!("there is no stage `{kind}`: pointmill does not {does} {format} files");
+        return Some((told, "it reads and writes LAS, LAZ and PLY".to_owned()));
     }
     let (_, here) = ELSEWHERE.iter().find(|(names, _)| names.contains(&name))?;
     // What is mistyped by a letter is told as such.
@@ -144,6 +154,12 @@ mod tests {
         assert!(text.contains("pdal translate scan.laz ground.laz smrf"), "{text}");
         let text = told("kind = 'readers.las', filename = 'a.las'");
         assert!(text.contains("is here `read` with the `path`"), "{text}");
+        let text = told("kind = 'writers.gdal', filename = 'a.tif'");
+        assert!(text.contains("pointmill does not write gdal files"), "{text}");
+        assert!(told("kind = 'writers.null'").contains("is here `discard`"));
+        // Keys, too.
+        let text = told("kind = 'grid', cell = 1");
+        assert!(text.contains("did you mean `side`?"), "{text}");
         // A name that nobody has, or that is ours but for a letter, gets the nearest.
         assert!(told("kind = 'normal'").contains("did you mean `normals`"));
         assert!(told("kind = 'gird', side = 1").contains("did you mean `grid`"));

@@ -15,8 +15,16 @@ pub(super) fn parse(text: &str, form: TextForm) -> Result<Vec<KeyEntry>, Vec<Mis
     };
     let has = |key: &str| read.as_ref().is_ok_and(|all| all.iter().any(|e| e.key == key));
     let is_pdal = form == TextForm::Json && has("pipeline") && !has("stage");
-    if is_pdal || read.is_err() && is_list(text) {
-        return Err(vec![pdal(text)]);
+    match read.is_err().then(|| list(text)).flatten() {
+        _ if is_pdal => return Err(vec![pdal(text)]),
+        Some(list) if has_kinds(&list) => {
+            let (begin, _) = begin(text);
+            let told = "a pipeline in JSON is an object, of which this is the list of stages";
+            let note = "write {\"stage\": […]} around it";
+            return Err(vec![Mistake::new(TextPlace::new(0, begin..begin + 1), told).note(note)]);
+        }
+        Some(_) => return Err(vec![pdal(text)]),
+        None => {}
     }
     read.map_err(|wrong| match single_brackets(text).filter(|_| form == TextForm::Toml) {
         Some(one) => vec![one],
@@ -24,10 +32,14 @@ pub(super) fn parse(text: &str, form: TextForm) -> Result<Vec<KeyEntry>, Vec<Mis
     })
 }
 
-/// True for a list in JSON.
-fn is_list(text: &str) -> bool {
-    let json = serde_json::from_str::<serde_json::Value>(begin(text).1);
-    json.is_ok_and(|value| value.is_array())
+/// A list in JSON.
+fn list(text: &str) -> Option<Vec<serde_json::Value>> {
+    serde_json::from_str(begin(text).1).ok()
+}
+
+/// True for a list of stages in the words of pointmill.
+fn has_kinds(list: &[serde_json::Value]) -> bool {
+    list.iter().any(|stage| stage.get("kind").is_some())
 }
 
 /// What a pipeline of PDAL is told.

@@ -192,10 +192,38 @@ pub(crate) fn advice<S: AsRef<str>>(
         return format!("{all}: none");
     }
     let list = format!("{all}: {}", valid.join(", "));
-    match nearest(word, &valid) {
+    match nearest(word, &valid).map(String::as_str).or_else(|| elsewhere(word, &valid)) {
         Some(near) => format!("did you mean `{near}`? {list}"),
         None => list,
     }
+}
+
+/// Words of other programs, and what they may be here.
+const ELSEWHERE: [(&str, &[&str]); 18] = [
+    ("filename", &["path", "file"]),
+    ("input", &["path"]),
+    ("output", &["path"]),
+    ("limits", &["where"]),
+    ("expression", &["where"]),
+    ("value", &["set"]),
+    ("assignment", &["set"]),
+    ("cell", &["side"]),
+    ("cell_size", &["side"]),
+    ("size", &["side"]),
+    ("length", &["side"]),
+    ("radius", &["radius", "distance"]),
+    ("mean_k", &["neighbors"]),
+    ("knn", &["neighbors"]),
+    ("min_k", &["min_neighbors"]),
+    ("bounds", &["box"]),
+    ("wkt", &["polygon"]),
+    ("step", &["every"]),
+];
+
+/// What a word of another program is among those that are `valid`.
+fn elsewhere<'a>(word: &str, valid: &'a [String]) -> Option<&'a str> {
+    let (_, here) = ELSEWHERE.iter().find(|(other, _)| *other == word)?;
+    here.iter().find_map(|here| valid.iter().find(|word| word == here)).map(String::as_str)
 }
 
 fn floor(text: &str, mut at: usize) -> usize {

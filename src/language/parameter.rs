@@ -34,6 +34,8 @@ pub enum ParameterType {
     Path,
     /// A number, without a unit.
     Number,
+    /// A number, or one with a unit, such as `5 cm`.
+    Measure,
     /// A whole number; as a text also such as `10k`.
     Whole,
     /// True or false.
@@ -44,7 +46,8 @@ pub enum ParameterType {
 
 impl ParameterType {
     /// The names of all, as pipelines have them.
-    pub(super) const WORDS: [&'static str; 6] = ["text", "path", "number", "whole", "flag", "list"];
+    pub(super) const WORDS: [&'static str; 7] =
+        ["text", "path", "number", "measure", "whole", "flag", "list"];
 
     /// The type of a value; None of a table, which no parameter takes.
     pub(super) fn of(node: &Node) -> Option<ParameterType> {
@@ -64,6 +67,7 @@ impl ParameterType {
             ParameterType::Text => "a text",
             ParameterType::Path => "a path",
             ParameterType::Number => "a number",
+            ParameterType::Measure => "a number, or one with a unit such as 5 cm",
             ParameterType::Whole => "a whole number",
             ParameterType::Flag => "true or false",
             ParameterType::List => "a list such as [a, b]",
@@ -76,6 +80,8 @@ impl ParameterType {
             (ParameterType::Text, NodeValue::Text(_)) => true,
             (ParameterType::Path, NodeValue::Text(path)) => !path.is_empty(),
             (ParameterType::Number, NodeValue::Number(_) | NodeValue::Whole(_)) => true,
+            (ParameterType::Measure, NodeValue::Number(_) | NodeValue::Whole(_)) => true,
+            (ParameterType::Measure, NodeValue::Text(text)) => begins_with_number(text),
             (ParameterType::Whole, NodeValue::Number(number)) => number.fract() == 0.0,
             (ParameterType::Whole, NodeValue::Whole(_)) => true,
             (ParameterType::Flag, NodeValue::Flag(_)) => true,
@@ -95,6 +101,11 @@ impl ParameterType {
                 (_, Ok(number)) if number.is_finite() => NodeValue::Number(number),
                 _ => return None,
             },
+            ParameterType::Measure => match ParameterType::Number.read(text, place) {
+                Some(number) => return Some(number),
+                None if begins_with_number(text) => NodeValue::Text(text.to_owned()),
+                None => return None,
+            },
             ParameterType::Whole => match (text.parse::<i128>(), parse_count(text)) {
                 (Ok(whole), _) => NodeValue::Whole(whole),
                 (_, Ok(count)) => NodeValue::Whole(count.into()),
@@ -105,6 +116,11 @@ impl ParameterType {
         };
         Some(Node { place: place.clone(), value })
     }
+}
+
+fn begins_with_number(text: &str) -> bool {
+    let digits = text.strip_prefix(['-', '+']).unwrap_or(text).trim_start_matches('.');
+    digits.starts_with(|c: char| c.is_ascii_digit())
 }
 
 /// A value as it is shown, and as it stands within a longer text.

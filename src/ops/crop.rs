@@ -202,6 +202,24 @@ impl Transform for Cropping {
         told.into_iter().collect()
     }
 
+    fn misses(&self, [lo, hi]: [[f64; 3]; 2]) -> Option<String> {
+        let [area_lo, area_hi] = self.shape.bounds();
+        let is_apart = (0..2).any(|axis| area_lo[axis] > hi[axis] || area_hi[axis] < lo[axis]);
+        (is_apart && self.keep == CropSide::Inside).then(|| {
+            format!(
+                "no point will be left: the area of `crop.{}`, {}, is outside of the scan, which \
+                 by its header has x from {} to {}, y from {} to {}{}",
+                self.key,
+                self.extent(),
+                lo[0],
+                hi[0],
+                lo[1],
+                hi[1],
+                self.doubt()
+            )
+        })
+    }
+
     fn idle(&self, _: &Schema) -> Vec<String> {
         let side = match self.keep {
             CropSide::Inside => "inside",

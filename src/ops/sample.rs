@@ -42,7 +42,7 @@ use random::RandomSample;
 pub struct Sample {
     /// The part of the records that stays, by chance: above 0 and at most 1, or as "10%".
     pub fraction: Option<Fraction>,
-    /// Every so-manieth record of the input stays, the first one included.
+    /// Every n-th record of the input stays, the first one included.
     pub every: Option<NonZeroU64>,
     /// How near to each other no two points may stay.
     pub distance: Option<Length>,

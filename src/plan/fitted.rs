@@ -111,7 +111,7 @@ impl Graph {
         let (mut files, wrong) = places(&read, &sorted.sinks);
         Error::all(wrong)?;
         let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;
-        let sides = square_sides(&*source, &sorted.sinks, &settings, &read)?;
+        let (sides, wide) = square_sides(&*source, &sorted.sinks, &settings, &read)?;
         let beside = copies(&*source, &sorted.sinks, &each, &settings, &mut files)?;
         let tagger = tagger(&sorted.ops, &passes.passes, &choices, &ranks, schema, &settings)?;
         let order = WriteOrder::new(&sorted, &*source)?;
@@ -122,7 +122,7 @@ impl Graph {
         let demands = Demands { lists, tagged: tagger.tags(), ..demands };
         demands.divide()?;
         let mut warnings = warnings(&*source, &sorted, &schemas, &settings)?;
-        warnings.extend(doubt);
+        warnings.extend(doubt.into_iter().chain(wide));
         let task = Task {
             warnings,
             simd,
@@ -282,6 +282,10 @@ fn warnings(
             "{error}: the box in the header of the input reaches there, and the run fails if a \
              point that is kept does{help}"
         ));
+    }
+    let unmoved = transforms.iter().take_while(|stage| !stage.moves());
+    if let Some(claimed) = source.claimed_box() {
+        warnings.extend(unmoved.filter_map(|stage| stage.transform.misses(claimed)));
     }
     let seen = [source.schema()].into_iter().chain(&schemas.left_by);
     let decoded = transforms.iter().zip(seen);

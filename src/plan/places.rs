@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 
 use crate::engine::beside::Beside;
 use crate::engine::by_input::ranks;
+use crate::engine::by_square::MOST_SQUARES;
 use crate::engine::publish::{check_place, folder_of, refuse_existing};
 use crate::error::shown;
 use crate::graph::RunSettings;
 use crate::host::{Clash, Files, Use};
+use crate::report::Grouped;
 use crate::stage::{CreateSink, OpenSource, Source};
 use crate::store::TAGGED_INPUTS;
 use crate::{Error, ErrorKind, Result};
@@ -26,12 +28,13 @@ pub(super) fn check_places(
     pipeline.iter().for_each(|path| files.read(path, Use::Pipeline));
     inputs.iter().for_each(|path| files.read(path, Use::Input));
     let files_of = sinks.iter().filter(|sink| sink.is_file());
-    let outputs = files_of.map(|sink| (sink.path(), sink.is_folder()));
+    // Those of several files are looked at when these are known.
+    let outputs = files_of.map(|sink| (sink.path(), sink.is_folder() || sink.has_squares()));
     let mut wrong = Vec::new();
-    for (path, is_folder) in outputs.chain(settings.report.as_deref().map(|path| (path, false))) {
+    for (path, is_several) in outputs.chain(settings.report.as_deref().map(|path| (path, false))) {
         match files.write(path) {
             Err(clash) => wrong.push(refuse(&clash, path)),
-            Ok(()) if is_folder => {}
+            Ok(()) if is_several => {}
             Ok(()) => wrong.extend(check_place(path, settings.existing).err()),
         }
     }
@@ -108,6 +111,9 @@ pub(super) fn each_input(
     Ok((each, if folders { ranks(&inputs) } else { Vec::new() }))
 }
 
+/// For each sink the side of the squares that it is cut into, and what users should know of these.
+pub(super) type SquareSides = (Vec<Option<f64>>, Vec<String>);
+
 /// For each sink the side of the squares that it is cut into. Refuses squares of which one could
 /// have the path of a file that is `read`, or that is there already and must not be replaced.
 pub(super) fn square_sides(
@@ -115,9 +121,10 @@ pub(super) fn square_sides(
     sinks: &[Box<dyn CreateSink>],
     settings: &RunSettings,
     read: &[PathBuf],
-) -> Result<Vec<Option<f64>>> {
+) -> Result<SquareSides> {
     let units = source.metadata().units;
-    let side = |sink: &dyn CreateSink| {
+    let mut wide = Vec::new();
+    let mut side = |sink: &dyn CreateSink| {
         let side = sink.square_side(&units)?;
         if side.is_none() {
             return Ok(None);
@@ -132,10 +139,28 @@ pub(super) fn square_sides(
                         beside each square";
             return Err(Error::pipeline(told).at(&input.path).help("write one file"));
         }
+        if let Some(area) = source.claimed_box().filter(|_| side.is_some()) {
+            wide.extend(too_many(area, side.unwrap_or(f64::NAN), sink.path()));
+        }
         let there = std::fs::read_dir(folder_of(sink.path())).into_iter().flatten().flatten();
         let there = there.map(|entry| entry.path()).find(|path| sink.may_name(path));
         there.map_or(Ok(()), |path| refuse_existing(&path, settings.existing))?;
         Ok(side)
     };
-    sinks.iter().map(|sink| side(&**sink)).collect()
+    let sides = sinks.iter().map(|sink| side(&**sink)).collect::<Result<_>>()?;
+    Ok((sides, wide))
+}
+
+/// What to say where the box that headers claim has more squares than may have points.
+fn too_many([lo, hi]: [[f64; 3]; 2], side: f64, path: &Path) -> Option<String> {
+    let [columns, rows] = [0, 1].map(|axis| ((hi[axis] - lo[axis]) / side).ceil().max(1.0));
+    let (most, all) = (MOST_SQUARES, columns * rows);
+    (all > most as f64).then(|| {
+        format!(
+            "{}: the box of the input's header has {} squares of `write.side = {side}`; the run \
+             fails if more than {most} of them have points",
+            shown(path),
+            Grouped(all as u64)
+        )
+    })
 }

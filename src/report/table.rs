@@ -40,9 +40,14 @@ impl Report {
 impl fmt::Display for Table<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Report { result, further, run } = self.report;
-        self.result_lines(f, result)?;
-        for result in further {
-            writeln!(f)?;
+        let all = std::iter::once(result).chain(further);
+        for (number, result) in all.enumerate() {
+            if number > 0 {
+                writeln!(f)?;
+            }
+            if !further.is_empty() {
+                branch_line(f, number, result)?;
+            }
             self.result_lines(f, result)?;
         }
         if let Some(peak) = run.peak_memory_bytes {
@@ -58,6 +63,14 @@ impl fmt::Display for Table<'_> {
         }
         writeln!(f)
     }
+}
+
+/// Which of several branches the lines below are about: its stages.
+fn branch_line(f: &mut fmt::Formatter<'_>, number: usize, result: &Outcome) -> fmt::Result {
+    let stages = result.pipeline.as_array().map(Vec::as_slice).unwrap_or_default();
+    let kinds = stages.iter().filter_map(|stage| stage.get("kind")?.as_str());
+    let kinds: Vec<&str> = kinds.collect();
+    writeln!(f, "branch {}   {}", number + 1, kinds.join(" ! "))
 }
 
 /// Outputs that have a line each: of more, each folder has one.

@@ -141,6 +141,12 @@ pub trait CreateSink: Send + Sync {
         Ok(None)
     }
 
+    /// True if the output is cut into squares: its [`path`](CreateSink::path) is the pattern of
+    /// their names, and their folder is made by the run.
+    fn has_squares(&self) -> bool {
+        false
+    }
+
     /// The side of the squares, in the unit of x and y, if the output is cut into a file for each
     /// square of the plane that has points: this sink then is not created, but those
     /// [of its squares](CreateSink::of_square), each when its records are known.

@@ -37,7 +37,7 @@ pub(super) enum ProbeKind {
     Alone(Setup),
     /// Two setups give the same.
     Same(Setup, Setup, Sameness),
-    /// A run of this setup that is stopped when it asks for the so-manieth time, as a part of all
+    /// A run of this setup that is stopped when it asks for the n-th time, as a part of all
     /// its questions, leaves nothing; the plain run gives the same before and behind it.
     Stopped(Setup, f64),
 }

@@ -12,7 +12,7 @@ const LARGEST: u64 = 60 << 10;
 
 /// A stage, what its example shows, and the pipeline behind `read scan.laz ! `. Those with a
 /// picture write `after.laz`.
-const EXAMPLES: [(&str, &str, &str); 17] = [
+const EXAMPLES: [(&str, &str, &str); 18] = [
     ("read", "Two files become one.", "write copy.laz"),
     ("synth", "A made-up scan of 5,000 points.", "synth als points=5k ! write made.laz"),
     ("merge", "Two sources are one scan.", "merge from=[a,b] ! write both.laz"),
@@ -35,7 +35,12 @@ const EXAMPLES: [(&str, &str, &str); 17] = [
     (
         "stats",
         "Heights and intensities of the ground.",
-        "stats dimensions=[Z,Intensity] classes=[2] ! write copy.laz",
+        "stats dimensions=[Z,Intensity] classes=[2] ! discard",
+    ),
+    (
+        "discard",
+        "How many points are high, and no file is written.",
+        "tap where=\"Z > 140\" ! discard",
     ),
     ("tap", "How many points are on the ground.", "tap classes=[2] name=ground ! write copy.laz"),
     ("transform", "The scan goes down by 100.", "transform translate=[0,0,-100] ! write low.laz"),

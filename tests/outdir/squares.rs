@@ -9,7 +9,7 @@ use crate::support::case::{Case, execute};
 use crate::support::scan::Scan;
 use pointmill::report::Report;
 use pointmill::synth::Scene;
-use pointmill::{Overrides, Quiet, Result};
+use pointmill::{Graph, Overrides, Quiet, Registry, Result};
 
 /// Reads `input`, does `stages` and writes with the keys `write`; what the run says.
 fn run(run: &str, input: &Path, stages: &str, write: &str) -> Result<Report> {
@@ -185,6 +185,30 @@ fn more_squares_than_there_may_be_end_the_run_and_leave_nothing() {
     let error = run("", &case.path("in.ply"), "", &write).unwrap_err();
     assert!(error.to_string().contains("more than 16384 squares of 1"), "{error}");
     assert_eq!(files(case.at.path()).len(), 1);
+}
+
+#[test]
+fn the_folder_of_squares_is_made_and_a_box_of_too_many_is_told_before_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = Scan::synthetic(Scene::Als, 2_000, 1);
+    scan.write(&folder.path().join("in.las"));
+    let text = |folder: &str, side: &str| {
+        format!(
+            "[[stage]]\nkind = 'read'\npath = '{folder}/in.las'\n[[stage]]\nkind = 'write'\n\
+             path = '{folder}/new/{{x}}_{{y}}.las'\nside = {side}\n"
+        )
+    };
+    let at = folder.path().to_str().unwrap();
+    let plan = |side: &str| {
+        let graph = Graph::parse(&text(at, side), "test.toml", &Registry::builtin()).unwrap();
+        graph.plan(&Overrides::default()).unwrap()
+    };
+    let warned = plan("0.01").warnings().join("\n");
+    assert!(warned.contains("squares of `write.side = 0.01`; the run fails"), "{warned}");
+    assert_eq!(plan("10").warnings(), [""; 0]);
+    assert!(!folder.path().join("new").exists(), "a plan makes no folder");
+    plan("10").run(&Quiet).unwrap();
+    assert!(files(&folder.path().join("new")).len() > 4);
 }
 
 #[test]

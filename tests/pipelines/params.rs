@@ -92,6 +92,23 @@ fn values_take_defaults_and_what_is_given() {
 }
 
 #[test]
+fn a_measure_is_a_number_or_has_a_unit() {
+    let text = "[params]\nside = {type = 'measure', default = 500}\n\
+                [[stage]]\nkind = 'synth'\nscene = 'als'\npoints = 10\n\
+                [[stage]]\nkind = 'grid'\nside = '${side}'\n\
+                [[stage]]\nkind = 'write'\npath = 'o.laz'\n";
+    let side = |params: &[&str]| graph(text, params).unwrap().stages[1].keys["side"].clone();
+    assert_eq!(side(&[]), 500.0);
+    assert_eq!(side(&["side=0.5"]), 0.5);
+    assert_eq!(side(&["side=50 cm"]), "50cm");
+    let wrong = told(text, &["side=wide"]);
+    assert!(
+        wrong.contains("takes a number, or one with a unit such as 5 cm, not `wide`"),
+        "{wrong}"
+    );
+}
+
+#[test]
 fn a_value_that_does_not_fit_is_told_where_it_was_given() {
     let expected = "\
 --param: `keep`: takes";

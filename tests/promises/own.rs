@@ -31,6 +31,7 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
         ("synth", vec![]),
         ("merge", vec![]),
         ("write", vec![]),
+        ("discard", vec![]),
         ("filter", vec![check::<Filter>(json!({ "where": "Intensity > 6 and X > 0.1" }))]),
         ("drop", vec![check::<Drop>(json!({ "classes": [2, 7] }))]),
         ("crop", vec![check::<Crop>(json!({ "box": [0, 0, 0, 2, 3, 1] }))]),
@@ -104,7 +105,7 @@ fn assert_kept(kinds: &[&str]) {
 const STREAM: [&str; 7] = ["assign", "crop", "drop", "filter", "stats", "tap", "transform"];
 const SELECT: [&str; 3] = ["grid", "outliers", "sample"];
 const REDUCE: [&str; 3] = ["cells", "median", "normals"];
-const ENDS: [&str; 4] = ["merge", "read", "synth", "write"];
+const ENDS: [&str; 5] = ["discard", "merge", "read", "synth", "write"];
 
 #[test]
 fn every_stage_of_ours_is_checked() {

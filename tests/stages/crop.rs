@@ -7,6 +7,7 @@ use crate::support::random::Random;
 use crate::support::runs::{Settings, run};
 use crate::support::scan::Scan;
 use pointmill::synth::Scene;
+use pointmill::{Graph, Overrides, Registry};
 
 /// Points on whole numbers, a hundred to a side, tagged by their number.
 fn lattice() -> Vec<([f64; 3], u32)> {
@@ -119,4 +120,25 @@ fn what_is_inside_and_what_is_outside_are_the_scan() {
     all.sort_unstable();
     expected.sort_unstable();
     assert!(all == expected && sides.iter().all(|side| side.points() > 100));
+}
+
+#[test]
+fn an_area_outside_of_the_box_of_the_header_is_told_before_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("in.las");
+    Scan::synthetic(Scene::Als, 500, 1).write(&input);
+    let warned = |keys: &str| {
+        let text = format!(
+            "[[stage]]\nkind = 'read'\npath = '{}'\n[[stage]]\nkind = 'crop'\n{keys}\n\
+             [[stage]]\nkind = 'discard'\n",
+            input.display()
+        );
+        let graph = Graph::parse(&text, "test.toml", &Registry::builtin()).unwrap();
+        graph.plan(&Overrides::default()).unwrap().warnings().join("\n")
+    };
+    let degrees = warned("polygon = 'POLYGON((7 50, 8 50, 8 51))'");
+    assert!(degrees.contains("no point will be left: the area of `crop.polygon`"), "{degrees}");
+    assert!(degrees.contains("by its header has x from 3500"), "{degrees}");
+    assert_eq!(warned("box = [0, 0, 100, 100]\nkeep = 'outside'"), "");
+    assert_eq!(warned("box = [350000, 5600000, 350010, 5600010]"), "");
 }

@@ -3,8 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use pointmill::report::StatsFigures;
+use pointmill::{Overrides, Quiet};
 
-use crate::support::case::Case;
+use crate::support::case::{Case, execute};
 
 /// Points on two slopes; the number of a point is its class, so to speak.
 fn points() -> Vec<([f64; 3], u32)> {
@@ -89,5 +90,25 @@ fn names_that_are_not_there_and_classes_that_are_not_are_told() {
         let error = case.run("", &format!("[[stage]]\nkind = 'stats'\n{stage}\n"), "");
         let error = error.unwrap_err().to_string();
         assert!(error.contains(told), "{error}");
+    }
+}
+
+#[test]
+fn a_pipeline_that_only_looks_ends_in_discard_and_writes_nothing() {
+    let case = Case::new();
+    case.ply(&[([0.0; 3], 1), ([1.0, 2.0, 3.0], 2)]);
+    let text = |stages: &str| {
+        format!(
+            "[[stage]]\nkind = 'read'\npath = '{}'\n{stages}[[stage]]\nkind = 'stats'\n\
+             [[stage]]\nkind = 'discard'\n",
+            case.path("in.ply").display()
+        )
+    };
+    for stages in ["", "[[stage]]\nkind = 'grid'\nside = 0.5\n"] {
+        let report = execute(&text(stages), &Overrides::default(), &Quiet).unwrap().report;
+        assert_eq!(report.result.ledger.kept, 2);
+        assert_eq!(report.result.stats[0].points, 2);
+        assert_eq!(report.run.outputs[0].points, 2);
+        assert_eq!(case.left(), ["in.ply"]);
     }
 }

@@ -2,12 +2,14 @@
 //! sources and sinks of formats.
 
 mod connect;
+mod discard;
 mod inputs;
 mod kinds;
 mod outputs;
 mod roles;
 mod squares;
 
+pub use discard::Discard;
 #[cfg(feature = "cli")]
 pub(crate) use inputs::{expand, expand_any, unreadable};
 pub use kinds::{OutputOrder, Read, Write};

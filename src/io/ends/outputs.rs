@@ -24,24 +24,23 @@ pub struct Outputs {
     pub formats: Formats,
 }
 
-impl Outputs {
-    /// Refuses a folder that is something else or cannot be made.
-    fn check_folder(&self) -> Result<()> {
-        if self.keys.path.is_dir() {
-            return Ok(());
-        }
-        if self.keys.path.symlink_metadata().is_ok() {
-            return Err(Error::pipeline("this is no folder for outputs").at(&self.keys.path));
-        }
-        let parent = self.keys.path.parent().unwrap_or(Path::new(""));
-        if parent == Path::new("") || parent.is_dir() {
-            return Ok(());
-        }
-        let told =
-            Error::new(ErrorKind::Io, "the folder does not exist, and the next is to be in it");
-        Err(told.at(parent).help("create it first"))
+/// Refuses a folder that is something else or cannot be made.
+pub(super) fn check_folder(folder: &Path) -> Result<()> {
+    if folder.is_dir() {
+        return Ok(());
     }
+    if folder.symlink_metadata().is_ok() {
+        return Err(Error::pipeline("this is no folder for outputs").at(folder));
+    }
+    let parent = folder.parent().unwrap_or(Path::new(""));
+    if parent == Path::new("") || parent.is_dir() {
+        return Ok(());
+    }
+    let told = Error::new(ErrorKind::Io, "the folder does not exist, and the next is to be in it");
+    Err(told.at(parent).help("create it first"))
+}
 
+impl Outputs {
     /// An output of `format` at `path`.
     fn output(&self, path: PathBuf, format: &Arc<dyn Format>) -> OutputFile {
         let keys = WriteKeys { path, ..self.keys.clone() };
@@ -96,7 +95,7 @@ impl CreateSink for Outputs {
     }
 
     fn each_input(&self, inputs: &[Input]) -> Result<Option<Vec<Box<dyn CreateSink>>>> {
-        self.check_folder()?;
+        check_folder(&self.keys.path)?;
         if inputs.is_empty() {
             return Err(Error::pipeline("the points come from no file that an output could be of")
                 .at(&self.keys.path)

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::connect::OutputFile;
+use super::outputs::check_folder;
 use crate::error::shown;
 use crate::point::{Metadata, PointBatch, Schema, Units};
 use crate::quantity::Length;
@@ -106,7 +107,13 @@ impl CreateSink for Squares {
         self.file.path()
     }
 
+    fn has_squares(&self) -> bool {
+        true
+    }
+
     fn square_side(&self, units: &Units) -> Result<Option<f64>> {
+        let folder = self.path().parent().filter(|folder| *folder != Path::new(""));
+        check_folder(folder.unwrap_or(Path::new(".")))?;
         Ok(Some(self.side.in_scan(units, "write.side")?.value()))
     }
 

@@ -60,7 +60,35 @@ fn of_wkt(text: &str) -> Result<Vec<PolygonRings>, String> {
     if text.to_ascii_uppercase().contains(NESTED) {
         return Err(format!("a {NESTED} is not read: {KINDS}"));
     }
-    let read: Wkt<f64> = text.parse().map_err(|why| format!("this is no WKT ({why}); {KINDS}"))?;
+    let (mut polygons, mut rest) = (Vec::new(), text);
+    while !rest.is_empty() || text.is_empty() && polygons.is_empty() {
+        let (one, more) = rest.split_at(end_of_geometry(rest));
+        polygons.extend(of_geometry(one)?);
+        // One on each line, as programs write them.
+        rest = more.trim_start_matches([';', ',']).trim();
+    }
+    Ok(polygons)
+}
+
+/// The byte behind the first geometry of a text: behind its last parenthesis.
+fn end_of_geometry(text: &str) -> usize {
+    let mut open = 0u64;
+    for (at, c) in text.char_indices() {
+        match c {
+            '(' => open += 1,
+            ')' if open == 1 => return at + 1,
+            ')' => open = open.saturating_sub(1),
+            _ => {}
+        }
+    }
+    text.len()
+}
+
+fn of_geometry(text: &str) -> Result<Vec<PolygonRings>, String> {
+    let read: Wkt<f64> = text.parse().map_err(|why| {
+        let begin: String = text.chars().take(40).collect();
+        format!("this is no WKT ({why}): `{begin}`; {KINDS}")
+    })?;
     let rings = |polygon: &wkt::types::Polygon<f64>| -> PolygonRings {
         let ring = |ring: &wkt::types::LineString<f64>| {
             ring.coords().iter().map(|corner| [corner.x, corner.y]).collect()
@@ -149,6 +177,9 @@ mod tests {
             assert_eq!(read.polygons, expected, "{text}");
             assert_eq!(read.is_geojson, text.starts_with('{'));
         }
+        // Several, as programs write one on each line.
+        let two = "POLYGON((0 0, 4 0, 0 4))\nPOLYGON((9 9, 8 9, 9 8));\n";
+        assert_eq!(AreaOutline::read(two).unwrap().polygons.len(), 2);
         let holed = AreaOutline::read("POLYGON((0 0,9 0,9 9,0 9),(1 1,2 1,2 2))").unwrap();
         assert_eq!(holed.polygons[0].iter().map(Vec::len).collect::<Vec<_>>(), [4, 3]);
     }
@@ -160,6 +191,9 @@ mod tests {
         for (text, told) in [
             ("", "this is no WKT"),
             ("POLYGON((0 0, 4 0", "this is no WKT"),
+            ("POLYGON((0 0, 4 0, 0 4)) this is nonsense", "no WKT (Invalid type"),
+            ("POLYGON((0 0, 4 0, 0 4))/EPSG:4326", "`/EPSG:4326`"),
+            ("POLYGON((0 0, 4 0, 0 4)))", "this is no WKT"),
             ("POLYGON EMPTY", "it holds no polygon"),
             ("MULTIPOLYGON EMPTY", "it holds no polygon"),
             ("POINT(1 2)", "it is a POINT"),
