@@ -32,6 +32,8 @@ const THREAD_OVERHEAD: Bytes = Bytes(3 << 20);
 const PROCESS_OVERHEAD: Bytes = Bytes(6 << 20);
 /// Of what encoders lease in a stream, one part of so many is touched.
 const ENCODED: u64 = 4;
+/// Fifths of a stream's queues that are in use.
+const STREAMED: u64 = 3;
 
 impl Demands {
     /// What the program holds whatever it does.
@@ -213,13 +215,15 @@ impl Demands {
 
     /// The most memory that the process is expected to hold at once: what is leased less the parts
     /// of it that are seldom touched. Tiles are half as full as they may be, and of the buffers of
-    /// outputs a quarter is in use.
+    /// outputs a quarter is in use; of a stream three fifths are, and packed chunks are a quarter of
+    /// what they may be (three conversions of ten million points).
     pub fn expected_peak(&self, shares: &Shares) -> Bytes {
         let program = Bytes(self.resident);
         if !self.mills {
             let encoding = self.by_threads(Bytes(self.chunk.bytes) * A_THREAD).0;
             let others = self.stream().sum().0.saturating_sub(encoding);
-            return program + Bytes(others + encoding / ENCODED);
+            let encoding = if self.is_plain { encoding } else { encoding / ENCODED };
+            return program + Bytes(others / 5 * STREAMED + encoding);
         }
         let points = self.points.max(1);
         let held = |most: usize| (most as u64).min(points.div_ceil(self.threads.max(1) as u64));

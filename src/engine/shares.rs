@@ -59,6 +59,8 @@ pub struct Demands {
     /// True if a stage decides about cells together: how many points those have only the decode
     /// tells.
     pub has_cells: bool,
+    /// True if encoded chunks are as large as records are in the output, which no encoder packs.
+    pub is_plain: bool,
     /// Bytes that columns take for each position, at most.
     pub columns: ColumnBytes,
     /// What the stages of each pass need.
@@ -108,6 +110,7 @@ impl Demands {
             filters: false,
             gathers: false,
             has_cells: false,
+            is_plain: false,
             columns: ColumnBytes::default(),
             passes: Vec::new(),
         }

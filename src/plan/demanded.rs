@@ -40,9 +40,17 @@ pub(super) fn demands(
         passes: passes.iter().map(|pass| pass.needs(&sorted.ops).collect()).collect(),
         run_most: settings.tile_points.map(|points| (points.get() as u64).saturating_mul(4)),
         gathers: sorted.ops.iter().any(|stage| matches!(stage.op, Op::Scan(_))),
+        is_plain: is_plain(sorted, (source, schema))?,
         has_cells: sorted.ops.iter().any(|stage| stage.op.tile().needs().cells),
         ..Demands::of(source, &chunks, limit, threads(settings)?)
     })
+}
+
+/// True if an output has records of a known size.
+fn is_plain(sorted: &Sorted, (source, schema): (&dyn Source, &Arc<Schema>)) -> Result<bool> {
+    let sizes = sorted.sinks.iter().map(|sink| sink.disk_bytes(schema, source.metadata()));
+    let sizes: Vec<[u64; 2]> = sizes.collect::<Result<_>>()?;
+    Ok(sizes.iter().any(|[each, _]| *each > 0))
 }
 
 /// Bytes of the lists of outputs that are a file for each input, or one for each square.

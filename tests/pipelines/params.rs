@@ -157,7 +157,12 @@ fn every_mistake_with_parameters_is_told_with_its_place() {
         ("'10%'", "'${out}'", &[], "a default cannot refer to `out`, another parameter"),
         ("'10%'", "{about = 'x'}", &[], "p.toml:2:1: `params.keep` needs `type` or `default`"),
         ("'10%'", "{typ = 'text'}", &[], "`params.keep` has no key `typ`"),
-        ("'10%'", "{type = 'txet'}", &[], "did you mean `text`? valid: flag, list, number, "),
+        (
+            "'10%'",
+            "{type = 'txet'}",
+            &[],
+            "did you mean `text`? valid: flag, list, measure, number, ",
+        ),
         ("'10%'", "{type = 'flag', default = 3}", &[], "takes true or false, not `3`"),
         ("'10%'", "{type = 'number', default = 'x'}", &["keep=1"], "takes a number, not `x`"),
         ("['laz', 'las']", "['laz', 7]", &[], "p.toml:5:29: the parameter `format` takes a text"),

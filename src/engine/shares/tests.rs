@@ -25,6 +25,7 @@ fn demands(limit: u64) -> Demands {
         run_most: None,
         gathers: false,
         has_cells: true,
+        is_plain: false,
         columns: ColumnBytes { tile: 12, stored: 20, row: 12, of_records: false },
         passes: vec![vec![Needs { neighbors: 10, bytes_per_point: 40, ..Needs::default() }]],
     }
