@@ -99,7 +99,9 @@ impl Table<'_> {
         let (read, kept) = (result.ledger.read, result.ledger.kept);
         write!(f, "points     {} in, {} out{}", Grouped(read), Grouped(kept), Share(kept, read))?;
         removed_line(f, &result.ledger)?;
-        class_lines(f, &result.classes, marks(result).next().is_some())?;
+        // Where stages remove points besides, marks are not why others are gone.
+        let marked = marks(result).next().is_some() && result.ledger.removed_records() == 0;
+        class_lines(f, &result.classes, marked)?;
         marked_lines(f, result)?;
         stats_lines(f, &result.stats)?;
         if let Some(&cells) = result.counts.get("cells") {
