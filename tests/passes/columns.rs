@@ -297,7 +297,10 @@ fn what_no_stage_gives_is_refused_by_name() {
     let told = refused(&twice, "dimensions = ['Rise']");
     assert!(told.contains("would replace values of Rise that nothing has read"), "{told}");
     let told = refused("[[stage]]\nkind = 'rise'\n", "dimensions = ['Raise', 'Rise']");
-    assert!(told.contains("dimensions = [") && told.contains("the stages above compute Rise"), "{told}");
+    assert!(
+        told.contains("dimensions = [") && told.contains("the stages above compute Rise"),
+        "{told}"
+    );
     let told = refused("[[stage]]\nkind = 'normals'\n", "dimensions = ['Normal']");
     assert!(told.contains("its numbers are NormalX, NormalY and NormalZ"), "{told}");
     let rise = "[[stage]]\nkind = 'rise'\n";
