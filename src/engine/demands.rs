@@ -215,8 +215,8 @@ impl Demands {
 
     /// The most memory that the process is expected to hold at once: what is leased less the parts
     /// of it that are seldom touched. Tiles are half as full as they may be, and of the buffers of
-    /// outputs a quarter is in use; of a stream three fifths are, and packed chunks are a quarter of
-    /// what they may be (three conversions of ten million points).
+    /// outputs a quarter is in use; of a stream three fifths are, and packed chunks are a quarter
+    /// of what they may be (three conversions of ten million points).
     pub fn expected_peak(&self, shares: &Shares) -> Bytes {
         let program = Bytes(self.resident);
         if !self.mills {

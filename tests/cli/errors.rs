@@ -206,3 +206,14 @@ fn a_reader_who_has_gone_is_no_error() {
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(String::from_utf8_lossy(&output.stderr), "");
 }
+
+#[test]
+fn a_length_that_the_memory_does_not_do_for_is_told_by_its_key() {
+    let at = here();
+    let line = "synth als points=400k ! sample distance=500 ! write out.laz";
+    let told = pointmill(at.path(), &["run", "--memory", "96MiB", "--threads", "1", line]);
+    let (code, stderr) = (told.code, told.stderr);
+    assert_eq!(code, 1, "{stderr}");
+    assert!(stderr.contains("or more, or a smaller `sample.distance`"), "{stderr}");
+    assert!(!at.path().join("out.laz").exists());
+}

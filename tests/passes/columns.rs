@@ -302,7 +302,7 @@ fn what_no_stage_gives_is_refused_by_name() {
         "{told}"
     );
     let told = refused("[[stage]]\nkind = 'normals'\n", "dimensions = ['Normal']");
-    assert!(told.contains("its numbers are NormalX, NormalY and NormalZ"), "{told}");
+    assert!(told.contains("the numbers of Normal are NormalX, NormalY and NormalZ"), "{told}");
     let rise = "[[stage]]\nkind = 'rise'\n";
     let told = refused(&format!("{rise}[[stage]]\nkind = 'sneaky'\n"), "");
     let sneaky = "the stage `sneaky` reads Rise of its neighbours and does not declare it";

@@ -1,12 +1,10 @@
 //! What `sample` keeps of files: by number, by chance, and so far apart.
 
-use crate::support::case::{Case, execute};
 use crate::support::random::Random;
 use crate::support::runs::{Settings, run};
 use crate::support::scan::Scan;
 use pointmill::point::distance2;
 use pointmill::synth::Scene;
-use pointmill::{ErrorKind, Overrides, Quiet};
 
 fn stage(keys: &str) -> String {
     format!("[[stage]]\nkind = 'sample'\n{keys}\n")
@@ -135,19 +133,4 @@ fn no_two_that_stay_are_nearer_than_the_distance_and_the_ledger_balances() {
     let reasons: Vec<&str> =
         ran.report.result.ledger.removed.iter().map(|r| r.reason.as_str()).collect();
     assert_eq!(reasons, ["coincident", "too near"]);
-}
-
-#[test]
-fn a_distance_that_the_memory_does_not_do_for_is_told_by_its_key() {
-    let case = Case::new();
-    let text = format!(
-        "[run]\nmemory = '96MiB'\nthreads = 1\n[[stage]]\nkind = 'synth'\nscene = 'als'\npoints = \
-         400_000\n[[stage]]\nkind = 'sample'\ndistance = 500\n[[stage]]\nkind = 'write'\npath = '{}'\n",
-        case.path("out.laz").display()
-    );
-    let error = execute(&text, &Overrides::default(), &Quiet).unwrap_err();
-    assert_eq!(error.kind(), ErrorKind::Memory, "{error}");
-    let remedy = error.remedy().unwrap();
-    assert!(remedy.ends_with("or more, or a smaller `sample.distance`"), "{remedy}");
-    assert_eq!(case.left(), [""; 0]);
 }
