@@ -68,6 +68,10 @@ impl Transform for WatchedStage<dyn Transform> {
         self.stage.warnings(schema)
     }
 
+    fn misses(&self, claimed: [[f64; 3]; 2]) -> Option<String> {
+        self.stage.misses(claimed)
+    }
+
     fn idle(&self, schema: &Schema) -> Vec<String> {
         self.stage.idle(schema)
     }
