@@ -125,10 +125,7 @@ pub(super) fn square_sides(
     let units = source.metadata().units;
     let mut wide = Vec::new();
     let mut side = |sink: &dyn CreateSink| {
-        let side = sink.square_side(&units)?;
-        if side.is_none() {
-            return Ok(None);
-        }
+        let Some(side) = sink.square_side(&units)? else { return Ok(None) };
         if let Some(input) = read.iter().find(|input| sink.may_name(input)) {
             let told = format!("a square could have the name of the input {}", shown(input));
             return Err(Error::pipeline(told).at(sink.path()).help("write into another folder"));
@@ -139,13 +136,12 @@ pub(super) fn square_sides(
                         beside each square";
             return Err(Error::pipeline(told).at(&input.path).help("write one file"));
         }
-        if let Some(area) = source.claimed_box().filter(|_| side.is_some()) {
-            wide.extend(too_many(area, side.unwrap_or(f64::NAN), sink.path()));
-        }
+        let area = source.claimed_box();
+        wide.extend(area.and_then(|area| too_many(area, side, sink.path())));
         let there = std::fs::read_dir(folder_of(sink.path())).into_iter().flatten().flatten();
         let there = there.map(|entry| entry.path()).find(|path| sink.may_name(path));
         there.map_or(Ok(()), |path| refuse_existing(&path, settings.existing))?;
-        Ok(side)
+        Ok(Some(side))
     };
     let sides = sinks.iter().map(|sink| side(&**sink)).collect::<Result<_>>()?;
     Ok((sides, wide))

@@ -9,8 +9,9 @@ use crate::Result;
 use crate::engine::scratch::Scratch;
 use crate::graph::{Graph, GraphStage};
 use crate::host::lock;
+use crate::io::ends::CountedSink;
 use crate::memory::Records;
-use crate::point::{Metadata, PointBatch, Schema};
+use crate::point::{Metadata, Schema};
 use crate::stage::{
     ChunkSize, CreateSink, Encode, Encoded, Order, Role, Sink, SinkSummary, Source,
 };
@@ -135,7 +136,7 @@ impl CreateSink for RehearsedSink {
         let sink: Box<dyn Sink> = match self.sink.is_file() {
             true => self.one().create(&self.scratch.path("output")?, schema, metadata, whole)?,
             // What a program takes is not for a trial.
-            false => Box::new(Counted { chunk: self.sink.chunk(schema, metadata)?, points: 0 }),
+            false => Box::new(CountedSink::new(self.sink.chunk(schema, metadata)?)),
         };
         let (number, written) = (self.number, self.written.clone());
         Ok(Box::new(Rehearsed { sink, number, written }))
@@ -170,43 +171,5 @@ impl Sink for Rehearsed {
         let summary = self.sink.finish()?;
         lock(&self.written).insert(self.number, summary.clone());
         Ok(summary)
-    }
-}
-
-/// Counts records and writes nothing.
-struct Counted {
-    chunk: ChunkSize,
-    points: u64,
-}
-
-impl Sink for Counted {
-    fn chunk_points(&self) -> usize {
-        self.chunk.points
-    }
-
-    fn chunk_bytes(&self) -> u64 {
-        self.chunk.bytes
-    }
-
-    fn encoder(&self) -> Arc<dyn Encode> {
-        Arc::new(Counting)
-    }
-
-    fn append(&mut self, chunk: Encoded) -> Result<()> {
-        self.points += chunk.points;
-        Ok(())
-    }
-
-    fn finish(self: Box<Self>) -> Result<SinkSummary> {
-        Ok(SinkSummary::new(self.points, 0))
-    }
-}
-
-/// The encoder of what is only counted.
-struct Counting;
-
-impl Encode for Counting {
-    fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
-        Ok(Encoded::new(Vec::new(), batch.len() as u64))
     }
 }

@@ -50,23 +50,30 @@ impl CreateSink for Discard {
     }
 
     fn create(&self, _: &Path, _: &Arc<Schema>, _: &Metadata, _: bool) -> Result<Box<dyn Sink>> {
-        Ok(Box::new(Discarded::default()))
+        Ok(Box::new(CountedSink::new(ChunkSize { points: CHUNK, bytes: 0 })))
     }
 }
 
-/// How many points came.
-#[derive(Debug, Default)]
-struct Discarded {
+/// Counts records and writes nothing.
+pub(crate) struct CountedSink {
+    chunk: ChunkSize,
     points: u64,
 }
 
-impl Sink for Discarded {
+impl CountedSink {
+    /// For records in chunks of this size.
+    pub(crate) fn new(chunk: ChunkSize) -> Self {
+        CountedSink { chunk, points: 0 }
+    }
+}
+
+impl Sink for CountedSink {
     fn chunk_points(&self) -> usize {
-        CHUNK
+        self.chunk.points
     }
 
     fn chunk_bytes(&self) -> u64 {
-        0
+        self.chunk.bytes
     }
 
     fn encoder(&self) -> Arc<dyn Encode> {

@@ -9,6 +9,7 @@ mod outputs;
 mod roles;
 mod squares;
 
+pub(crate) use discard::CountedSink;
 pub use discard::Discard;
 #[cfg(feature = "cli")]
 pub(crate) use inputs::{expand, expand_any, unreadable};
