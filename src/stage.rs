@@ -4,6 +4,7 @@
 mod format;
 mod kind;
 mod needs;
+mod rounds;
 mod scan;
 mod sink;
 mod source;
@@ -22,6 +23,9 @@ pub use format::{
 };
 pub use kind::{StageKind, StagePlace};
 pub use needs::Needs;
+pub use rounds::{
+    Choice, Found, Looks, NextRound, Offer, Round, RoundOp, RoundTile, SoFar,
+};
 pub use scan::{AnyScanOp, Gathered, ScanOp, StoredSummaries, Summary};
 pub use sink::{ChunkSize, CreateSink, Encode, Encoded, Order, Sink, SinkSummary};
 pub use source::{Contradiction, Input, OpenSource, Part, Source};
@@ -149,6 +153,8 @@ pub enum Role {
     TileOp(Box<dyn TileOp>),
     /// Works on tiles twice: gathers, then decides.
     ScanOp(Box<dyn AnyScanOp>),
+    /// Works on tiles in rounds that choose what stays, then once more.
+    RoundOp(Box<dyn RoundOp>),
     /// Takes records.
     Sink(Box<dyn CreateSink>),
     /// Gives what it takes from several stages one name, and does nothing to it.
@@ -161,7 +167,7 @@ impl Role {
         match self {
             Role::Source(_) => RoleName::Source,
             Role::Transform(_) => RoleName::Transform,
-            Role::TileOp(_) | Role::ScanOp(_) => RoleName::OnTiles,
+            Role::TileOp(_) | Role::ScanOp(_) | Role::RoundOp(_) => RoleName::OnTiles,
             Role::Sink(_) => RoleName::Sink,
             Role::Merge => RoleName::Merge,
         }

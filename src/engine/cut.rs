@@ -15,6 +15,7 @@ use super::pass::{Pass, StageOp};
 use super::shares::MILL_SPARE;
 use crate::budget::{Bytes, Lease, whole_mebibytes};
 use crate::geom::lattice::Lattice;
+use crate::stage::Round;
 use crate::store::{CutError, SealedTiles, TileKey};
 use crate::{Error, Result};
 
@@ -219,5 +220,51 @@ fn remedy(limit: u64, smaller: &str, may_grow: bool) -> String {
             "give `run.memory = \"{limit}\"` at least, or {smaller}: a side that is chosen by \
              samples of the points is known behind this, and may take more"
         ),
+    }
+}
+
+/// The tiles of a round.
+pub(super) struct CutRound {
+    pub keys: Vec<TileKey>,
+    /// Positions that the arena of a thread takes.
+    pub capacity: usize,
+    _listed: Lease,
+}
+
+/// Tiles of a round at least, where there are so many positions: threads share them.
+const ROUND_TILES: u64 = 16;
+/// A round has no smaller tiles than these, rather than more of them.
+const ROUND_POSITIONS: u64 = 16_384;
+
+/// The tiles of a round of `pass`, in the memory that its mill has.
+pub(super) fn cut_round(
+    job: &Job<'_>,
+    tiles: &SealedTiles,
+    lattice: &Lattice,
+    round: &Round,
+    capacity: usize,
+) -> Result<CutRound> {
+    let share = round.looks.share();
+    let of_all = |positions: u64| (positions as f64 / share).min(1e18) as u64;
+    let few = (tiles.positions() / ROUND_TILES).max(of_all(ROUND_POSITIONS));
+    let wanted = of_all(zone_of(capacity)).min(few);
+    // A sample may be larger than its share.
+    let most = of_all(capacity as u64 * 9 / 10);
+    let cells = CellWidths { side: round.reach.unsigned_abs(), reach: round.reach };
+    let levels = (cells.level(CELLS_ACROSS), cells.level(1).saturating_sub(3));
+    match tiles.cut(wanted, most, cells.reach, levels) {
+        Ok(keys) => {
+            let bytes = Bytes::of(keys.len() as u64, size_of::<TileKey>());
+            let _listed = job.budget.lease(bytes.0, "list of tiles")?;
+            Ok(CutRound { keys, capacity, _listed })
+        }
+        Err(CutError::Read(error)) => Err(error),
+        Err(CutError::TooHeavy { key, positions }) => {
+            let needed = (positions as f64 * share) as u64 * 2;
+            let limit = job.task.demands.limit_for_tile(job.threads.count(), needed);
+            let error = too_heavy(lattice, key, positions, most);
+            let enough = whole_mebibytes(limit);
+            Err(error.help(format!("give `run.memory = \"{enough}\"` or more")))
+        }
     }
 }

@@ -23,6 +23,7 @@ use super::grind::{DecodedScan, Milled, Numbered, grind};
 use super::job::Job;
 use super::pass::{Call, Pass};
 use super::phase::RunPhase;
+use super::rounds::choose;
 use super::settled::{conclude, decisions, rounding, settle};
 use super::survey::survey;
 use super::task::Task;
@@ -253,6 +254,12 @@ impl Course<'_, '_> {
         if milling.sum() > Bytes(held) {
             working.clear();
             *working = job.budget.lease_all(&milling, "mill")?;
+        }
+        if !pass.by_rounds.is_empty() {
+            self.clock.begin(RunPhase::Choose(number), None)?;
+        }
+        for &op in &pass.by_rounds {
+            choose(job, op, field, &sieve, cut.capacity)?;
         }
         let phase = if pass.gathers().is_some() { RunPhase::Gather } else { RunPhase::Mill };
         self.clock.begin(phase(number), Some(tiles.positions()))?;

@@ -34,6 +34,7 @@ mod product;
 pub(crate) mod publish;
 mod room;
 mod rounded;
+mod rounds;
 mod row;
 mod run;
 pub(crate) mod scratch;

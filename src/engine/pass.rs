@@ -14,7 +14,7 @@ use crate::expression::{Choice, Condition};
 use crate::graph::{Limits, Written};
 use crate::point::{ColumnKind, ComputedDimension, Mark, NORMAL, PointBatch, Schema, names};
 use crate::report::Tally;
-use crate::stage::{AnyScanOp, Needs, TileOp, Transform};
+use crate::stage::{AnyScanOp, Needs, RoundOp, TileOp, Transform};
 use crate::tile::{Loader, NeighborNeeds, ReadDimensions, Sieve, Tile};
 use crate::{Error, Result};
 
@@ -50,6 +50,7 @@ pub(crate) fn named_columns(names: &[&str], all: &[ColumnKind]) -> Vec<ColumnKin
 pub(crate) enum Op {
     Tile(Box<dyn TileOp>),
     Scan(Box<dyn AnyScanOp>),
+    Round(Box<dyn RoundOp>),
 }
 
 impl Op {
@@ -57,6 +58,7 @@ impl Op {
         match self {
             Op::Tile(op) => &**op,
             Op::Scan(op) => &**op,
+            Op::Round(op) => &**op,
         }
     }
 
@@ -64,6 +66,7 @@ impl Op {
         match self {
             Op::Tile(op) => &mut **op,
             Op::Scan(op) => &mut **op,
+            Op::Round(op) => &mut **op,
         }
     }
 }
@@ -164,6 +167,8 @@ pub(crate) struct Pass {
     /// Columns that stages which stream look at, here or as records are written.
     pub streamed: Vec<ColumnKind>,
     pub calls: Vec<Call>,
+    /// Those of its stages that choose in rounds before it.
+    pub by_rounds: Vec<usize>,
     /// How often the stages were applied before, where they are repeated.
     pub round: usize,
     /// True if a stage reads the class of positions.

@@ -17,6 +17,8 @@ pub(crate) enum RunPhase {
     Merge,
     /// Samples before this pass, of which stages that ask for them settle what is left to them.
     Look(usize),
+    /// Rounds over tiles before this pass, in which a stage chooses what stays.
+    Choose(usize),
     /// Tiles in this pass, of which a stage gathers what it decides by.
     Gather(usize),
     /// Tiles in this pass.
@@ -38,6 +40,7 @@ impl RunPhase {
             RunPhase::Convert => Some("convert"),
             RunPhase::Decode => Some("decode"),
             RunPhase::Merge => Some("merge"),
+            RunPhase::Choose(_) => Some("choose"),
             RunPhase::Gather(_) => Some("gather"),
             RunPhase::Mill(_) => Some("mill"),
             RunPhase::Write(_) => Some("write"),
@@ -71,6 +74,9 @@ impl Task {
         let mut phases = vec![RunPhase::Decode, RunPhase::Merge];
         for (n, pass) in self.passes.iter().enumerate() {
             phases.push(RunPhase::Look(n));
+            if !pass.by_rounds.is_empty() {
+                phases.push(RunPhase::Choose(n));
+            }
             phases.push(match pass.gathers() {
                 Some(_) => RunPhase::Gather(n),
                 None => RunPhase::Mill(n),

@@ -3,9 +3,11 @@
 
 pub mod angle;
 mod decimal;
+pub mod hash;
 pub mod lattice;
 pub mod nearest;
 pub mod plane;
+pub mod planes;
 pub mod polygon;
 pub mod rows;
 pub mod simd;

@@ -17,7 +17,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::stage::Role;
+use crate::stage::{Role, RoleName};
 use crate::{Error, Result};
 
 pub(crate) use limits::Limits;
@@ -195,7 +195,7 @@ impl<'a> From<&'a GraphStage> for TreeStage<'a> {
 impl GraphStage {
     /// True if it may work on some records and let the others pass.
     pub(crate) fn can_be_limited(&self) -> bool {
-        let works = matches!(self.role, Role::Transform(_) | Role::TileOp(_) | Role::ScanOp(_));
+        let works = matches!(self.role.name(), RoleName::Transform | RoleName::OnTiles);
         works && self.is_limited
     }
 

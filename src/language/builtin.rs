@@ -6,7 +6,7 @@ use crate::io::las::{LAS, LAZ};
 use crate::io::ply::PLY;
 use crate::ops::normals::Normals;
 use crate::ops::{
-    Assign, Cells, Crop, Drop, Filter, Grid, Median, Merge, Outliers, Sample, Stats, Tap,
+    Assign, Cells, Crop, Drop, Filter, Graded, Grid, Median, Merge, Outliers, Sample, Stats, Tap,
     Transformation,
 };
 use crate::synth::Synth;
@@ -31,6 +31,7 @@ impl Registry {
             .with::<Normals>()
             .with::<Cells>()
             .with::<Median>()
+            .with::<Graded>()
             .with::<Grid>()
             .with::<Sample>()
             .with_format(LAS)

@@ -105,7 +105,7 @@ fn place(
 /// What a key that limits a stage is told where it cannot.
 fn misplaced_limit(KeyEntry { key, at, .. }: &KeyEntry, role: &Role) -> Option<Mistake> {
     let which = match role {
-        Role::TileOp(_) | Role::ScanOp(_) => return None,
+        Role::TileOp(_) | Role::ScanOp(_) | Role::RoundOp(_) => return None,
         Role::Transform(_) if key != LimitKeys::SEES => return None,
         Role::Transform(_) => "that work on tiles: this one sees no neighbours",
         Role::Source(_) | Role::Sink(_) | Role::Merge => "between a source and a sink",

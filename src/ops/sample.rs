@@ -3,7 +3,7 @@
 mod cell_table;
 mod disc;
 mod every;
-mod hash;
+
 mod random;
 
 use std::num::NonZeroU64;

@@ -161,7 +161,7 @@ impl PassLayout<'_> {
             ))
         })?;
         let repeated: Vec<usize> = above[first..].iter().copied().chain([op]).collect();
-        let scan = repeated.iter().find(|&&at| matches!(self.ops[at].op, Op::Scan(_)));
+        let scan = repeated.iter().find(|&&at| !matches!(self.ops[at].op, Op::Tile(_)));
         if let Some(&at) = scan {
             let told =
                 format!("`{}` looks at the whole scan and cannot be repeated", self.ops[at].kind);
@@ -194,6 +194,9 @@ impl PassLayout<'_> {
         }
         let pass = &mut self.out.passes[at];
         pass.round = round;
+        if let Op::Round(_) = &stage.op {
+            pass.by_rounds.push(call.op);
+        }
         pass.calls.push(call);
         pass.decided |= stage.selection;
         if needs.neighbors > 0 {

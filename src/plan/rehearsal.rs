@@ -71,6 +71,10 @@ pub(super) fn rehearsed(
                 op.for_share(share);
                 Role::ScanOp(op)
             }
+            Role::RoundOp(mut op) => {
+                op.for_share(share);
+                Role::RoundOp(op)
+            }
             other => other,
         })
     };

@@ -68,7 +68,7 @@ impl Sorted {
                 Role::Source(_) => StageWork::Decode,
                 Role::Transform(_) if decoded.contains(&n) => StageWork::Decode,
                 Role::Transform(_) => StageWork::Filter(filters.len()),
-                Role::TileOp(_) | Role::ScanOp(_) => StageWork::Op(ops.len()),
+                Role::TileOp(_) | Role::ScanOp(_) | Role::RoundOp(_) => StageWork::Op(ops.len()),
                 Role::Sink(_) => StageWork::Sink(sinks.len()),
                 Role::Merge => return Err(Error::internal("a merge is left in the graph")),
             });
@@ -91,6 +91,10 @@ impl Sorted {
                 }
                 Role::ScanOp(op) => {
                     let op = Op::Scan(op);
+                    ops.push(StageOp { kind, written, op, limits, above, selection: 0 });
+                }
+                Role::RoundOp(op) => {
+                    let op = Op::Round(op);
                     ops.push(StageOp { kind, written, op, limits, above, selection: 0 });
                 }
                 Role::Sink(sink) => sinks.push(sink),
@@ -157,6 +161,7 @@ fn columns_above(stages: &[GraphStage]) -> Vec<Vec<ColumnKind>> {
             let op = match &stages[from].role {
                 Role::TileOp(op) => op.needs(),
                 Role::ScanOp(op) => op.needs(),
+                Role::RoundOp(op) => op.needs(),
                 _ => continue,
             };
             columns.retain(|known: &ColumnKind| {

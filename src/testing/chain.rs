@@ -170,6 +170,7 @@ fn needs(role: &Role) -> Vec<Needs> {
         Role::Transform(stage) => vec![stage.needs()],
         Role::TileOp(stage) => vec![stage.needs()],
         Role::ScanOp(stage) => vec![stage.gather_needs(), stage.needs()],
+        Role::RoundOp(stage) => vec![stage.needs()],
         Role::Source(_) | Role::Sink(_) | Role::Merge => Vec::new(),
     }
 }

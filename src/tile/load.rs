@@ -7,6 +7,7 @@
 
 use std::sync::Arc;
 
+use super::only::Only;
 use super::sieve::{MoreRuns, RecordRun, Runs, Sieve};
 use super::values::{DimensionColumns, first_of_each};
 use super::{Fate, Tile};
@@ -32,6 +33,7 @@ pub struct Loader {
     rim_limit: usize,
     /// True if every tile is to see the whole scan.
     sees_all: bool,
+    only: Only,
     tile: Tile,
     core: Core,
     dimensions: Option<DimensionColumns>,
@@ -133,6 +135,7 @@ impl Loader {
             capacity,
             rim_limit: capacity,
             sees_all: false,
+            only: Only::All,
             tile,
             core: Core::default(),
             dimensions,
@@ -149,6 +152,12 @@ impl Loader {
     /// and stages of which nobody knows yet whether they look no further than they say.
     pub fn see_all(&mut self) {
         self.sees_all = true;
+    }
+
+    /// Takes only some positions from now on. What is left of a tile is not a part of the scan
+    /// without gaps, so nothing can be entered for its records.
+    pub(crate) fn take_only(&mut self, only: Only) {
+        self.only = only;
     }
 
     /// The scan that it loads from.
@@ -200,7 +209,10 @@ impl Loader {
         let (positions, copies) = self.tiles.read(b, &mut self.reader)?;
         let (tile, first_records) = (&mut self.tile, &mut self.core.first_records);
         let is_core = tile.cube.holds(&block.bounds);
-        if loaded.holds(&block.bounds) && (is_core || !tile.cube.meets(&block.bounds)) {
+        if self.only.is_all()
+            && loaded.holds(&block.bounds)
+            && (is_core || !tile.cube.meets(&block.bounds))
+        {
             // Nearly all blocks: no position has to be looked at.
             if is_core && first_records.is_empty() {
                 self.core.first_position = block.first_position;
@@ -219,7 +231,7 @@ impl Loader {
         }
         let records = first_of_each(block.first_record, copies);
         for (j, ((&p, &n), record)) in positions.iter().zip(copies).zip(records).enumerate() {
-            if loaded.contains(p) {
+            if loaded.contains(p) && self.only.takes(p) {
                 if tile.cube.contains(p) {
                     if first_records.is_empty() {
                         self.core.first_position = block.first_position + j as u64;
@@ -246,10 +258,13 @@ impl Loader {
         self.runs.read(&self.tiles, &self.sieve, b, copies)?;
         let Sieve { seen, decided, classes, .. } = self.sieve;
         let sieve = &self.sieve;
-        let (tile, core) = (&mut self.tile, &mut self.core);
+        let (tile, core, only) = (&mut self.tile, &mut self.core, &mut self.only);
         let mut places = Vec::with_capacity(positions.len());
         let mut in_core = 0..0;
-        for (j, &p) in positions.iter().enumerate().filter(|(_, p)| loaded.contains(**p)) {
+        for (j, &p) in positions.iter().enumerate() {
+            if !loaded.contains(p) || !only.takes(p) {
+                continue;
+            }
             let runs = self.runs.of(j);
             let is_core = tile.cube.contains(p);
             let is_seen = runs.iter().any(|run| run.is_in(seen));

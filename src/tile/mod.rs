@@ -8,6 +8,7 @@
 
 mod around;
 pub(crate) mod load;
+mod only;
 mod remote;
 pub(crate) mod sieve;
 mod values;
@@ -15,6 +16,7 @@ mod values;
 pub(crate) use around::Around;
 pub use around::Neighborhood;
 pub(crate) use load::{Core, Loader};
+pub(crate) use only::{Cover, Only};
 pub(crate) use remote::Remote;
 pub(crate) use sieve::{ReadDimensions, RecordRun, Sieve};
 

@@ -19,6 +19,7 @@
 //! - A point without such a gap is searched for again in integers alone, within the exact distance
 //!   of the k candidates at hand.
 
+mod among;
 mod exact;
 mod kernel;
 mod refine;

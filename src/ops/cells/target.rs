@@ -28,7 +28,7 @@ const ALL: u64 = 100_000_000;
 impl Keep {
     /// How many of `records` are to stay: rounded to whole ones, halves upwards, at least one. All
     /// where samples decide, until they do.
-    pub(super) fn of(self, records: u64) -> u64 {
+    pub(in crate::ops) fn of(self, records: u64) -> u64 {
         match self {
             Keep::Auto => records,
             Keep::Records(count) => count,

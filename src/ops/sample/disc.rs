@@ -23,7 +23,7 @@ use serde_json::Value;
 use super::super::lengths::Square;
 use super::super::removal::{keep_once, remove};
 use super::cell_table::CellTable;
-use super::hash::Hash;
+use crate::geom::hash::of_position;
 use crate::point::{Position, Units, distance2, names};
 use crate::quantity::Length;
 use crate::report::Tally;
@@ -114,7 +114,7 @@ impl PoissonDisc {
 
     /// When a position is visited among those of its cube; of equal ones the Morton-first is.
     fn visited(&self, p: Position) -> u64 {
-        p.into_iter().fold(Hash::of(self.seed), |hash, v| hash.and(v as u64)).value()
+        of_position(self.seed, p)
     }
 }
 

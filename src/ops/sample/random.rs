@@ -1,6 +1,6 @@
 //! Records that stay by chance: each decides for itself, by a hash of what it is.
 
-use super::hash::Hash;
+use crate::geom::hash::Hash;
 use crate::point::{Dimension, PointBatch, Schema, Value, names};
 use crate::quantity::Fraction;
 use crate::report::Tally;

@@ -1,11 +1,14 @@
 //! Numbers that look random and are a function of what they are of: the finisher of SplitMix64
 //! (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014) after each word.
 
+use crate::point::Position;
+
 /// What was made of the words so far.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Hash(u64);
+pub struct Hash(u64);
 
 impl Hash {
+    /// Of a seed alone.
     pub fn of(seed: u64) -> Self {
         Hash(0).and(seed)
     }
@@ -19,7 +22,15 @@ impl Hash {
         Hash(z ^ (z >> 31))
     }
 
+    /// A number that looks random.
     pub fn value(self) -> u64 {
         self.0
     }
+}
+
+/// The hash of a position by a seed: who is visited first, and who is in a sample, by chance and
+/// yet a function of the position alone.
+#[inline]
+pub fn of_position(seed: u64, p: Position) -> u64 {
+    p.into_iter().fold(Hash::of(seed), |hash, v| hash.and(v as u64)).value()
 }

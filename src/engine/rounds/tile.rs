@@ -1,0 +1,130 @@
+//! A tile of a round: positions of the scan and kept points around a cube, in the arena of a thread.
+
+use super::RoundScan;
+use crate::budget::{Bytes, Lease};
+use crate::engine::job::Job;
+use crate::engine::pass::{Call, Op, put_to_work};
+use crate::point::Position;
+use crate::stage::{Found, Looks, Offer, Round, RoundTile};
+use crate::store::{KeptPoints, KeptReader, TileKey};
+use crate::tile::{Cover, Loader, Only};
+use crate::{Error, Result};
+
+/// What a thread needs to work on tiles of a round.
+pub(super) struct RoundWorker<'a> {
+    job: &'a Job<'a>,
+    call: Call,
+    round: &'a Round,
+    loader: Loader,
+    capacity: usize,
+    chosen: Vec<Position>,
+    reader: KeptReader,
+    found: Found,
+    more: Option<Lease>,
+}
+
+/// What a tile comes to.
+pub(super) struct FoundInTile<'w> {
+    /// Those that the round looked at.
+    pub positions: &'w [Position],
+    /// Indices of those that are kept from now on.
+    pub keep: &'w [u32],
+    pub offers: &'w [Offer],
+    pub counted: u64,
+    /// The kept points of the cube.
+    pub kept: &'w KeptReader,
+}
+
+/// Bytes of a kept point that a tile has around its cube, in its place and in what is searched.
+const KEPT_BYTES: usize = 2 * size_of::<Position>() + 2 * size_of::<u32>() + 32;
+
+impl<'a> RoundWorker<'a> {
+    pub fn new(
+        job: &'a Job<'a>,
+        scan: &RoundScan<'_>,
+        round: &'a Round,
+        capacity: usize,
+    ) -> RoundWorker<'a> {
+        let mut loader = Loader::new(&scan.field.tiles, scan.sieve, capacity);
+        if job.task.whole_rims {
+            loader.see_all();
+        }
+        if let Looks::Sample { most, seed } = round.looks {
+            loader.take_only(Only::Sample { most, seed });
+        }
+        RoundWorker {
+            job,
+            call: scan.call(),
+            round,
+            loader,
+            capacity,
+            chosen: Vec::new(),
+            reader: KeptReader::default(),
+            found: Found::default(),
+            more: None,
+        }
+    }
+
+    /// The positions that were loaded last.
+    pub fn positions(&self) -> &[Position] {
+        &self.chosen
+    }
+
+    /// Loads the positions of a tile that the stage decides about, and leaves the kept points
+    /// around it in the reader. How many records they have.
+    pub fn load(&mut self, key: TileKey, kept: &KeptPoints) -> Result<u64> {
+        let whole = |reach: i64| match self.job.task.whole_rims {
+            true => key.cube().union(&self.loader.tiles().bounds()).grown(reach),
+            false => key.cube().grown(reach),
+        };
+        let (region, covering) = (whole(self.round.kept_reach), whole(self.round.reach));
+        self.more = None;
+        let most = kept.most_near(&region);
+        let mut bytes = Bytes::of(most as u64, KEPT_BYTES);
+        let mut more = self.job.budget.lease(bytes.0, "kept points around tiles")?;
+        if let Looks::Uncovered { apart, .. } = self.round.looks {
+            kept.near(&covering.grown(apart), &mut self.reader)?;
+            let cover = Cover::new(&self.reader.positions, apart);
+            self.loader.take_only(Only::Uncovered(cover));
+        }
+        self.loader.load(key, self.round.reach, 0)?;
+        let (tile, _) = self.loader.tile();
+        let beyond = tile.positions.len().saturating_sub(self.capacity);
+        bytes = Bytes::of(beyond as u64, Loader::BYTES_PER_POINT + size_of::<Position>());
+        more.grow(bytes.0)?;
+        self.more = Some(more);
+        put_to_work(tile, &self.job.ops, self.call);
+        self.chosen.clear();
+        let is_chosen = |i: &usize| tile.is_chosen(*i);
+        let chosen = (0..tile.positions.len()).filter(is_chosen);
+        let mut records = 0;
+        for i in chosen {
+            records += u64::from(tile.copies[i]);
+            self.chosen.push(tile.positions[i]);
+        }
+        kept.near(&region, &mut self.reader)?;
+        Ok(records)
+    }
+
+    /// Lets the stage work on a tile.
+    pub fn run(&mut self, key: TileKey, kept: &KeptPoints) -> Result<FoundInTile<'_>> {
+        self.load(key, kept)?;
+        self.found.clear();
+        let RoundWorker { chosen, reader, found, job, .. } = self;
+        let tile = RoundTile {
+            cube: key.cube(),
+            round: self.round,
+            positions: chosen,
+            kept: &reader.positions,
+            simd: job.task.simd,
+        };
+        let stage = &job.ops[self.call.op];
+        match &stage.op {
+            Op::Round(op) => op.round(&tile, found).map_err(|e| e.of_stage(&stage.kind))?,
+            _ => return Err(Error::internal("a stage is to choose in rounds and does not")),
+        }
+        reader.keep_in(&key.cube());
+        let Found { keep, offers, counted } = found;
+        Ok(FoundInTile { positions: chosen, keep, offers, counted: *counted, kept: reader })
+    }
+}

@@ -1,0 +1,181 @@
+//! Stages that choose in rounds: what one round keeps decides what the next one looks for.
+
+use std::sync::Arc;
+
+use super::tile_op::TileOp;
+use crate::Result;
+use crate::point::{Bounds, Position};
+use crate::store::{KeptPoints, Levels};
+
+/// Chooses the points that stay in rounds over the whole scan, and then runs as a [`TileOp`] that
+/// knows them. Each round sees what those before it kept.
+///
+/// A round goes over tiles, of which each holds positions of the scan and kept points around its
+/// cube. What it decides of its cube may depend on nothing farther away than the round says, so
+/// that no cut into tiles shows.
+pub trait RoundOp: TileOp {
+    /// Called before each round with what those before it came to, and until it ends the rounds.
+    ///
+    /// # Errors
+    ///
+    /// What it was asked for and the scan does not allow.
+    fn next(&mut self, so_far: &SoFar<'_>) -> Result<NextRound>;
+
+    /// Called for every tile of a round, from several threads at once.
+    ///
+    /// # Errors
+    ///
+    /// Broken promises of the engine; the run ends.
+    fn round(&self, tile: &RoundTile<'_>, found: &mut Found) -> Result<()>;
+
+    /// Called once behind the last round, with all that is kept.
+    fn chosen(&mut self, kept: Arc<KeptPoints>);
+}
+
+/// What the rounds came to so far.
+#[non_exhaustive]
+pub struct SoFar<'a> {
+    /// Occupied cubes of the positions that the stage decides about, of every power-of-two side.
+    pub levels: &'a Levels,
+    /// Records that the stage decides about.
+    pub records: u64,
+    /// Tight box of the scan.
+    pub bounds: Bounds,
+    /// Points that are kept.
+    pub kept: u64,
+    /// Those among them that the last round kept.
+    pub added: u64,
+    /// What the tiles of the last round [counted](Found::counted).
+    pub counted: u64,
+}
+
+/// What comes next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum NextRound {
+    /// A round.
+    Round(Round),
+    /// Of what the last round kept, only so many stay that this many are kept in all: those whose
+    /// hash by the seed is smallest.
+    Shorten {
+        /// How many are kept in all.
+        to: u64,
+        /// See [`crate::geom::hash::of_position`].
+        seed: u64,
+    },
+    /// What the last round kept is not kept.
+    Undo,
+    /// No more rounds.
+    Done,
+}
+
+/// What a round looks at, and how it chooses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Round {
+    /// Which positions of the scan it looks at.
+    pub looks: Looks,
+    /// How far around its cube a tile has these.
+    pub reach: i64,
+    /// How far around its cube a tile has kept points.
+    pub kept_reach: i64,
+    /// Who is kept of what its tiles find.
+    pub choice: Choice,
+}
+
+/// Which positions of the scan a round looks at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Looks {
+    /// Those whose hash by `seed` is at most `most`: a sample that is a function of the positions.
+    Sample {
+        /// Of all hashes, that part.
+        most: u64,
+        /// See [`crate::geom::hash::of_position`].
+        seed: u64,
+    },
+    /// Those that have no kept point nearer than `apart`, about so many of all as such a sample has.
+    Uncovered {
+        /// A distance in lattice steps.
+        apart: i64,
+        /// See [`Looks::Sample`].
+        most: u64,
+    },
+}
+
+/// Who is kept of what the tiles of a round find.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Choice {
+    /// What each tile says: see [`Found::keep`].
+    InTile,
+    /// Of all [offers](Found::offers) the best.
+    Best {
+        /// So many offers have the first say.
+        want: u64,
+        /// What of a tile's cube is offered lies at most so far outside of it, as does what
+        /// decides whether it [stands aside](Offer::apart).
+        reach: i64,
+    },
+}
+
+/// A tile of a round.
+#[non_exhaustive]
+pub struct RoundTile<'a> {
+    /// What the tile decides.
+    pub cube: Bounds,
+    /// The round that it is of.
+    pub round: &'a Round,
+    /// The positions that the round looks at and that the stage decides about, in Morton order, of
+    /// the cube and as far around it as the round reaches.
+    pub positions: &'a [Position],
+    /// The kept points of the cube and as far around it as the round asks for, in Morton order.
+    pub kept: &'a [Position],
+    /// The instruction set to compute by.
+    pub(crate) simd: crate::geom::simd::Simd,
+}
+
+/// What a tile of a round finds.
+#[derive(Debug, Default)]
+pub struct Found {
+    /// Indices of the positions of the cube that are kept from now on, in ascending order.
+    pub keep: Vec<u32>,
+    /// What may be kept, of the cells of the kept points in the cube, in their order.
+    pub offers: Vec<Offer>,
+    /// How many positions of the cube are counted, for what comes next.
+    pub counted: u64,
+}
+
+/// A position that is offered for keeping.
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Offer {
+    /// The larger the sooner it is kept; above 0.
+    pub score: f64,
+    /// It stands aside for an offer of a higher score that is nearer than this, in lattice steps.
+    pub apart: f64,
+    /// The position.
+    pub at: Position,
+}
+
+impl Found {
+    /// Forgets everything, keeps the memory.
+    pub(crate) fn clear(&mut self) {
+        self.keep.clear();
+        self.offers.clear();
+        self.counted = 0;
+    }
+}
+
+impl Round {
+    /// A walk over all positions, each once.
+    pub(crate) fn counting() -> Round {
+        let looks = Looks::Sample { most: u64::MAX, seed: 0 };
+        Round { looks, reach: 0, kept_reach: 0, choice: Choice::InTile }
+    }
+}
+
+impl Looks {
+    /// The part of all positions that it looks at, about: above 0 and at most 1.
+    pub(crate) fn share(self) -> f64 {
+        let (Looks::Sample { most, .. } | Looks::Uncovered { most, .. }) = self;
+        (most as f64 + 1.0) / 2f64.powi(64)
+    }
+}
