@@ -12,7 +12,7 @@ pub use crate::budget::Budget;
 pub use crate::geom::angle::{
     MaxAngle, cosine, direction, dominant_axis, is_turned, outer_sum, sine2,
 };
-pub use crate::geom::nearest::Nearest;
+pub use crate::geom::nearest::{Nearest, NearestAmong};
 pub use crate::geom::plane;
 pub use crate::geom::simd::Simd;
 pub use crate::geom::star::Star;

@@ -15,8 +15,9 @@ pub(super) struct ExactWalk<'a> {
     tree: &'a BoxTree,
     positions: &'a [Position],
     work: &'a mut Work,
-    /// The point that searches.
-    query: u32,
+    /// Where the point is that searches, and its rank if it is one of the positions.
+    at: Position,
+    own: Option<u32>,
     /// How many neighbours it wants.
     k: usize,
     /// No neighbour that it wants is beyond this one.
@@ -28,21 +29,21 @@ pub(super) struct ExactWalk<'a> {
 }
 
 impl<'a> ExactWalk<'a> {
-    /// The search of `query` for `k` neighbours, of which none is beyond the last of `candidates`;
+    /// The search of the point at `at`, of rank `own` if it is one of `positions`, for neighbours, of which none is beyond the last of `candidates`;
     /// the answer takes their place.
     pub fn new(
         simd: Simd,
         tree: &'a BoxTree,
         positions: &'a [Position],
         work: &'a mut Work,
-        query: u32,
+        (at, own): (Position, Option<u32>),
         candidates: &'a mut Vec<Neighbor>,
     ) -> Self {
         let limit = candidates.last().copied().unwrap_or_default();
         let k = candidates.len();
         candidates.clear();
         let reach = reach(limit.0);
-        ExactWalk { simd, tree, positions, work, query, k, limit, reach, found: candidates }
+        ExactWalk { simd, tree, positions, work, at, own, k, limit, reach, found: candidates }
     }
 
     /// Finds the `k` nearest others.
@@ -56,7 +57,7 @@ impl<'a> ExactWalk<'a> {
     fn descend(&mut self, level: usize, index: usize) {
         self.work.nodes += 1;
         let node = self.tree.node(level, index);
-        let at = self.positions[self.query as usize];
+        let at = self.at;
         let from = |i: usize| at[i].wrapping_sub(node.origin[i]);
         let lo = std::array::from_fn(|i| below(from(i).saturating_sub(node.error)));
         let hi = std::array::from_fn(|i| above(from(i).saturating_add(node.error)));
@@ -77,8 +78,8 @@ impl<'a> ExactWalk<'a> {
         self.work.leaves += 1;
         for &rank in &self.tree.leaves[leaf].rank {
             let Some(&other) = self.positions.get(rank as usize) else { continue };
-            let neighbor = (distance2(self.positions[self.query as usize], other), rank);
-            if rank == self.query || neighbor > self.limit {
+            let neighbor = (distance2(self.at, other), rank);
+            if Some(rank) == self.own || neighbor > self.limit {
                 continue;
             }
             if self.found.len() == self.k {

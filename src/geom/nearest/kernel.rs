@@ -119,6 +119,32 @@ impl Batch {
     }
 }
 
+/// A new search begins with nothing.
+pub(super) struct Fresh<'a> {
+    pub batch: &'a mut Batch,
+    /// The lanes that search.
+    pub wanted: u32,
+    /// How many candidates they keep.
+    pub kept: usize,
+}
+
+impl Kernel for Fresh<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, _: L) {
+        let Fresh { batch, wanted, kept } = self;
+        batch.kept = kept;
+        batch.best.fill(NONE);
+        for lane in 0..LANES {
+            let is_wanted = wanted >> lane & 1 == 1;
+            batch.bound[lane] = if is_wanted { distance_of(NONE) } else { -1.0 };
+            batch.bound_rank[lane] = rank_of(NONE);
+        }
+        batch.farthest = distance_of(NONE);
+    }
+}
+
 /// The points of a leaf meet each other: a new search begins with the nearest of them.
 pub(super) struct Home<'a> {
     pub batch: &'a mut Batch,

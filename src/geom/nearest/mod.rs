@@ -28,10 +28,11 @@ mod tests;
 mod tree;
 mod walk;
 
+pub use among::NearestAmong;
 use exact::{ExactWalk, Neighbor};
 use kernel::{Batch, distance_of};
 use tree::{BoxNode, BoxTree, EXACT};
-use walk::TreeWalk;
+use walk::{TreeWalk, Visitors};
 pub use walk::Work;
 
 use crate::geom::simd::{LANES, Simd};
@@ -176,9 +177,12 @@ impl Nearest {
         let one_more = (k + 1).min(positions.len() - 1);
         let kept = if likely_exact(node, child, k) { k } else { one_more };
         let Nearest { simd, tree, batch, work, .. } = self;
-        let error = TreeWalk::new(*simd, tree, batch, work, run, child).run(active, kept);
+        let error = TreeWalk::new(*simd, tree, batch, work, Visitors::of(tree, run, child))
+            .run(run, active, kept);
         for (lane, &rank) in ranks.iter().enumerate().filter(|(lane, _)| active >> lane & 1 == 1) {
-            let distance2 = self.settle(positions, k, rank, lane, error);
+            let own = (positions[rank as usize], Some(rank));
+            let is_all = k == positions.len() - 1;
+            let distance2 = self.settle(positions, (k, is_all), own, lane, error);
             visit(rank as usize, &self.neighbors, distance2);
         }
     }
@@ -193,13 +197,14 @@ impl Nearest {
         self.work
     }
 
-    /// Proves or redoes what the batch found for the point of `lane`: leaves its neighbours in
-    /// `neighbors` and returns the last one's squared distance.
+    /// Proves or redoes what the batch found for the point of `lane`, which is `own`: leaves its
+    /// `k` neighbours, all that there are or not, in `neighbors` and returns the last one's squared
+    /// distance.
     fn settle(
         &mut self,
         positions: &[Position],
-        k: usize,
-        query: u32,
+        (k, is_all): (usize, bool),
+        own: (Position, Option<u32>),
         lane: usize,
         error: f64,
     ) -> u128 {
@@ -212,8 +217,8 @@ impl Nearest {
         if error == 0.0 && last < EXACT as f32 {
             return last as u128;
         }
-        let proven = k == positions.len() - 1 || one_more && gap(last, bound, error);
-        let at = positions[query as usize];
+        let proven = is_all || one_more && gap(last, bound, error);
+        let at = own.0;
         self.found.clear();
         self.found.extend(
             self.neighbors.iter().map(|&rank| (distance2(at, positions[rank as usize]), rank)),
@@ -226,7 +231,7 @@ impl Nearest {
                 &self.tree,
                 positions,
                 &mut self.work,
-                query,
+                own,
                 &mut self.found,
             )
             .run();

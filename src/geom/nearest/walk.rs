@@ -1,8 +1,10 @@
 //! The walk of one leaf's points through the tree: from their own leaf upward, and from every
-//! ancestor down into whatever is near enough to matter.
+//! ancestor down into whatever is near enough to matter; or, through the tree of another set, down
+//! from its root.
 
-use super::kernel::{Batch, Boxes, Home, Visit};
-use super::tree::{BoxTree, EXACT, above, below};
+use super::kernel::{Batch, Boxes, Fresh, Home, Visit};
+use super::refine::Leaf;
+use super::tree::{BoxNode, BoxTree, EXACT, above, below};
 use crate::geom::simd::{LANES, Simd};
 use crate::point::Position;
 
@@ -24,18 +26,38 @@ pub struct Work {
     pub leaves: u64,
 }
 
+/// The points of a leaf, which search together.
+#[derive(Clone, Copy)]
+pub(super) struct Visitors<'a> {
+    /// The level-0 node of the leaf, in whose frame the points are.
+    pub node: &'a BoxNode,
+    /// Which of its children the leaf is.
+    pub child: usize,
+    pub leaf: &'a Leaf,
+}
+
+impl<'a> Visitors<'a> {
+    /// The points of leaf `child` of the level-0 node `run`.
+    pub fn of(tree: &'a BoxTree, run: usize, child: usize) -> Visitors<'a> {
+        let node = tree.node(0, run);
+        Visitors { node, child, leaf: &tree.leaves[node.first_child as usize + child] }
+    }
+
+    /// The box of the points, in the frame of their node.
+    fn extremes(&self) -> [[f32; 3]; 2] {
+        [self.node.lo, self.node.hi].map(|side| side.map(|axis| axis[self.child]))
+    }
+}
+
 /// One leaf's points on their way.
 pub(super) struct TreeWalk<'a> {
     simd: Simd,
     tree: &'a BoxTree,
     batch: &'a mut Batch,
     work: &'a mut Work,
-    /// Level-0 node of the leaf.
-    home: usize,
-    /// Which of its children the leaf is.
-    child: usize,
-    /// The points in the frame of their own node.
-    points: &'a [[f32; LANES]; 3],
+    visitors: Visitors<'a>,
+    /// The level-0 node of the leaf in the tree that it walks through, if it is of that.
+    home: Option<usize>,
     /// Exact box of the leaf's points.
     lo: Position,
     hi: Position,
@@ -45,36 +67,46 @@ pub(super) struct TreeWalk<'a> {
 }
 
 impl<'a> TreeWalk<'a> {
-    /// The points of leaf `child` of the level-0 node `home`.
+    /// The way of `visitors` through a tree.
     pub fn new(
         simd: Simd,
         tree: &'a BoxTree,
         batch: &'a mut Batch,
         work: &'a mut Work,
-        home: usize,
-        child: usize,
+        visitors: Visitors<'a>,
     ) -> Self {
-        let node = tree.node(0, home);
-        let points = &tree.leaves[node.first_child as usize + child].at;
+        let Visitors { node, .. } = visitors;
+        let [lo, hi] = visitors.extremes();
         let lo = std::array::from_fn(|axis| {
-            let stored = node.origin[axis].saturating_add(node.lo[axis][child] as i64);
+            let stored = node.origin[axis].saturating_add(lo[axis] as i64);
             stored.saturating_sub(node.error)
         });
         let hi = std::array::from_fn(|axis| {
-            let stored = node.origin[axis].saturating_add(node.hi[axis][child] as i64);
+            let stored = node.origin[axis].saturating_add(hi[axis] as i64);
             stored.saturating_add(node.error)
         });
-        TreeWalk { simd, tree, batch, work, home, child, points, lo, hi, error: 0.0 }
+        TreeWalk { simd, tree, batch, work, visitors, home: None, lo, hi, error: 0.0 }
     }
 
     /// Fills the batch with the `kept` nearest by float distance of the lanes in `wanted`, and
-    /// returns the largest error of a coordinate difference, in lattice steps: see [`super`].
-    pub fn run(mut self, wanted: u32, kept: usize) -> f64 {
-        let first = self.tree.node(0, self.home).first_child as usize;
-        let leaf = &self.tree.leaves[first + self.child];
-        self.simd.run(Home { batch: self.batch, leaf, wanted, kept });
-        self.visit_run(self.home, Some(self.child));
-        let mut child = self.home;
+    /// returns the largest error of a coordinate difference, in lattice steps: see [`super`]. The
+    /// points are not of the tree.
+    pub fn run_from_root(mut self, wanted: u32, kept: usize) -> f64 {
+        self.simd.run(Fresh { batch: self.batch, wanted, kept });
+        match self.tree.levels {
+            0 => {}
+            1 => self.visit_run(0, None),
+            levels => self.descend(levels - 1, 0, None),
+        }
+        self.error
+    }
+
+    /// The same of the points of the level-0 node `home` of the tree, among the others of it.
+    pub fn run(mut self, home: usize, wanted: u32, kept: usize) -> f64 {
+        self.home = Some(home);
+        self.simd.run(Home { batch: self.batch, leaf: self.visitors.leaf, wanted, kept });
+        self.visit_run(home, Some(self.visitors.child));
+        let mut child = home;
         for level in 1..self.tree.levels {
             let parent = child / LANES;
             self.descend(level, parent, Some(child % LANES));
@@ -107,17 +139,17 @@ impl<'a> TreeWalk<'a> {
         self.work.nodes += 1;
         self.note_error(index);
         let node = self.tree.node(0, index);
-        let own = self.tree.node(0, self.home);
         let first = node.first_child as usize;
         let shift = self.shift(index);
+        let [lo, hi] = self.visitors.extremes();
         let visit = Visit {
             batch: self.batch,
             node,
             leaves: &self.tree.leaves[first..first + node.children as usize],
             left: lanes(node.children, skip),
-            points: self.points,
-            lo: [own.lo[0][self.child], own.lo[1][self.child], own.lo[2][self.child]],
-            hi: [own.hi[0][self.child], own.hi[1][self.child], own.hi[2][self.child]],
+            points: &self.visitors.leaf.at,
+            lo,
+            hi,
             shift,
         };
         self.work.leaves += self.simd.run(visit);
@@ -125,18 +157,18 @@ impl<'a> TreeWalk<'a> {
 
     /// From the frame of the home node to that of another.
     fn shift(&self, index: usize) -> [f32; 3] {
-        let (home, other) = (self.tree.node(0, self.home), self.tree.node(0, index));
+        let (home, other) = (self.visitors.node, self.tree.node(0, index));
         std::array::from_fn(|axis| home.origin[axis].wrapping_sub(other.origin[axis]) as f32)
     }
 
     /// Notes what moving the points into the frame of a level-0 node costs in precision.
     fn note_error(&mut self, index: usize) {
         let shift = self.shift(index);
-        let (home, other) = (self.tree.node(0, self.home), self.tree.node(0, index));
+        let (home, other) = (self.visitors.node, self.tree.node(0, index));
         let far = shift.iter().fold(0.0, |far: f64, s| far.max(f64::from(s.abs())));
         let reach = far + home.reach as f64;
         let mut error = (home.error + other.error) as f64;
-        if index != self.home && reach > EXACT as f64 {
+        if self.home != Some(index) && reach > EXACT as f64 {
             // Rounding of the shift, at most 2^-24 of it, and of the sum; second orders are less
             // than the 2^-20 added.
             error += (far + reach) * f64::from(WIDENED) / EXACT as f64;

@@ -3,15 +3,15 @@
 use super::super::removal::{keep_once, remove};
 use super::refine::ASKED_RADII;
 use crate::Result;
-use crate::geom::nearest::Nearest;
+use crate::geom::nearest::NearestAmong;
 use crate::geom::planes::surface_distance;
+use crate::point::distance2;
 use crate::report::Tally;
 use crate::store::{KeptPoints, KeptReader};
 use crate::tile::{Fate, Tile};
 
-/// Kept points whose plane is the surface, those that are as near as the last included.
-const SURFACE: usize = 8;
-/// The same with room for those that are as near.
+/// Kept points that are asked: there is room for some that are as near as the last of those whose
+/// plane is the surface.
 const ROOM: usize = 24;
 
 /// Keeps what is in `kept`, and removes what else is decided about with its distance to the plane
@@ -29,15 +29,17 @@ pub(super) fn measure(
     let core = tile.core.clone();
     let mut deviations = vec![f64::NAN; core.len()];
     let mut is_kept = vec![false; core.len()];
-    let mut nearest = Nearest::with(tile.simd());
-    nearest.build(surface);
+    let mut nearest = NearestAmong::with(tile.simd());
+    let within2 = (within as u128) * (within as u128);
     let positions = &tile.positions[core.clone()];
-    nearest.search_among(surface, positions, ROOM, within, |i, found| {
+    nearest.search(surface, positions, ROOM, |i, found| {
+        let near = |j: &u32| distance2(surface[*j as usize], positions[i]) <= within2;
+        let found = &found[..found.partition_point(near)];
         let Some(&first) = found.first() else { return };
         if surface[first as usize] == positions[i] {
             is_kept[i] = true;
         } else {
-            deviations[i] = surface_distance(positions[i], found, surface, SURFACE);
+            deviations[i] = surface_distance(positions[i], found, surface);
         }
     });
     let (mut coincident, mut represented) = (0, 0);

@@ -8,8 +8,8 @@
 //! much everywhere, so the worst cells are those of shape.
 
 use crate::Result;
-use crate::geom::nearest::Nearest;
-use crate::geom::planes::PlaneErrors;
+use crate::geom::nearest::NearestAmong;
+use crate::geom::planes::{NEAREST, PlaneErrors};
 use crate::point::Position;
 use crate::stage::{Found, Offer, RoundTile};
 
@@ -25,8 +25,6 @@ pub(super) struct Refining {
 
 /// Kept points within so many radii are asked.
 pub(super) const ASKED_RADII: i64 = 4;
-/// How many kept points are asked at most.
-const ASKED: usize = 12;
 /// The part of the squared distance to the nearest kept point that is added to the squared error:
 /// where nothing is wrong, the farthest is the worst.
 const OF_DISTANCE: f64 = 1e-12;
@@ -104,17 +102,17 @@ impl Refining {
         let nothing = Asked { cell: NONE, distance2: 0.0, error2: 0.0 };
         let mut all = vec![nothing; tile.positions.len()];
         let radius2 = (self.radius as f64) * (self.radius as f64);
-        let within = self.radius.saturating_mul(ASKED_RADII);
+        let within2 = radius2 * (ASKED_RADII * ASKED_RADII) as f64;
         let mut errors = PlaneErrors::new(tile.simd);
-        let mut nearest = Nearest::with(tile.simd);
-        nearest.build(tile.kept);
-        nearest.search_among(tile.kept, tile.positions, ASKED, within, |i, found| {
+        let mut nearest = NearestAmong::with(tile.simd);
+        nearest.search(tile.kept, tile.positions, NEAREST, |i, found| {
             let Some(&first) = found.first() else { return };
             let p = tile.positions[i];
             let distance2 = squared(tile.kept[first as usize], p);
             if distance2 > 0.0 && distance2 <= radius2 {
                 all[i] = Asked { cell: first, distance2, error2: 0.0 };
                 let offsets = found.iter().map(|&j| offset(tile.kept[j as usize], p));
+                let offsets = offsets.take_while(|o| squared_length(*o) <= within2);
                 errors.push(i as u32, offsets, |i, error2| all[i as usize].error2 = error2);
             }
         });
@@ -129,6 +127,9 @@ fn offset(p: Position, q: Position) -> [f64; 3] {
 }
 
 fn squared(p: Position, q: Position) -> f64 {
-    let [x, y, z] = offset(p, q);
+    squared_length(offset(p, q))
+}
+
+fn squared_length([x, y, z]: [f64; 3]) -> f64 {
     x * x + y * y + z * z
 }
