@@ -23,7 +23,7 @@ use crate::store::{Block, KeptPoints, KeptReader, Levels, TileKey};
 use crate::tile::Sieve;
 use crate::{Error, Result};
 
-use offers::{Offers, accept};
+use offers::{OfferReader, Offers, accept};
 use select::nth_largest;
 use tile::RoundWorker;
 
@@ -39,6 +39,7 @@ pub(super) fn choose(
     let mut kept = KeptPoints::new(&job.area);
     let mut last = KeptPoints::new(&job.area);
     let (mut number, mut added, mut counted) = (0, 0, 0);
+    let mut before = None;
     loop {
         let bounds = field.tiles.bounds();
         let kept_now = kept.count();
@@ -47,16 +48,19 @@ pub(super) fn choose(
         let scan = RoundScan { op, number, field, sieve, capacity };
         match stage(job, op)?.next(&so_far)? {
             NextRound::Round(round) => {
-                let (new, found) = scan.round(job, &round, &kept)?;
+                let (new, found, left) = scan.round(job, &round, &kept, before.take())?;
+                before = left;
                 (added, counted) = (new.count() - kept.count(), found);
                 last = std::mem::replace(&mut kept, new);
                 number += 1;
             }
             NextRound::Shorten { to, seed } => {
+                before = None;
                 kept = shorten(job, &kept, number.saturating_sub(1), to, seed)?;
                 added = kept.count() - last.count();
             }
             NextRound::Undo => {
+                before = None;
                 kept = std::mem::replace(&mut last, KeptPoints::new(&job.area));
                 added = 0;
             }
@@ -76,6 +80,24 @@ fn stage<'j>(job: &'j mut Job<'_>, op: usize) -> Result<&'j mut dyn crate::stage
     }
 }
 
+/// What a round left that offered.
+struct OfferedBefore {
+    round: Round,
+    keys: Vec<TileKey>,
+    offers: Offers,
+}
+
+impl OfferedBefore {
+    /// The offers, if they are of the same tiles and positions as those of `round` are.
+    fn of(&self, round: &Round, keys: &RoundKeys) -> Option<&Offers> {
+        let alike = |r: &Round| (r.looks, r.reach, r.kept_reach);
+        (alike(&self.round) == alike(round) && self.keys == *keys).then_some(&self.offers)
+    }
+}
+
+/// What is kept behind a round, what its tiles counted, and what it leaves for the next.
+type RoundOutcome = (KeptPoints, u64, Option<OfferedBefore>);
+
 /// What the tiles of a round are about.
 struct RoundScan<'a> {
     op: usize,
@@ -92,15 +114,29 @@ impl RoundScan<'_> {
         Call { op: self.op, gathers: false }
     }
 
-    /// What is kept behind a round, and what its tiles counted.
-    fn round(&self, job: &Job<'_>, round: &Round, kept: &KeptPoints) -> Result<(KeptPoints, u64)> {
+    fn round(
+        &self,
+        job: &Job<'_>,
+        round: &Round,
+        kept: &KeptPoints,
+        before: Option<OfferedBefore>,
+    ) -> Result<RoundOutcome> {
         let cut = cut_round(job, &self.field.tiles, self.field.lattice, round, self.capacity)?;
         match round.choice {
-            Choice::InTile => self.keep(job, round, kept, &cut),
+            Choice::InTile => {
+                let (new, counted) = self.keep(job, round, kept, &cut)?;
+                Ok((new, counted, None))
+            }
             Choice::Best { want, reach } => {
-                let (offers, counted) = self.offers(job, round, kept, &cut)?;
+                let last = before.as_ref().and_then(|before| before.of(round, &cut.keys));
+                let last = last.filter(|_| !job.task.whole_rims);
+                let (offers, counted) = self.offers(job, round, kept, &cut, last)?;
+                drop(before);
                 let chosen = offers.best(want)?;
-                Ok((accept(job, &cut.keys, &chosen, reach, kept, self.number)?, counted))
+                let new = accept(job, &cut.keys, &chosen, reach, kept, self.number)?;
+                let left =
+                    OfferedBefore { round: *round, keys: cut.keys, offers: chosen.all() };
+                Ok((new, counted, Some(left)))
             }
         }
     }
@@ -118,7 +154,7 @@ impl RoundScan<'_> {
         items(job, cut).run(
             || RoundWorker::new(job, self, round, cut.capacity),
             |worker, index| {
-                let found = worker.run(cut.keys[index], kept)?;
+                let found = worker.run(cut.keys[index], kept, None)?;
                 let chosen = found.keep.iter().map(|&i| found.positions[i as usize]);
                 let merged = Merged::of(found.kept, chosen, self.number);
                 job.advance(0)?;
@@ -141,13 +177,18 @@ impl RoundScan<'_> {
         round: &Round,
         kept: &KeptPoints,
         cut: &CutRound,
+        before: Option<&Offers>,
     ) -> Result<(Offers, u64)> {
         let mut offers = Offers::new(&job.area);
         let (mut stretches, mut counted) = (Vec::new(), 0);
         items(job, cut).run(
-            || RoundWorker::new(job, self, round, cut.capacity),
-            |worker, index| {
-                let found = worker.run(cut.keys[index], kept)?;
+            || (RoundWorker::new(job, self, round, cut.capacity), OfferReader::default()),
+            |(worker, last), index| {
+                if let Some(before) = before {
+                    before.load(index, last)?;
+                }
+                let last = before.map(|_| &last.offers[..]);
+                let found = worker.run(cut.keys[index], kept, last)?;
                 job.advance(0)?;
                 Ok((offers.store(found.offers)?, found.counted))
             },

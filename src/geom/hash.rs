@@ -1,6 +1,8 @@
 //! Numbers that look random and are a function of what they are of: the finisher of SplitMix64
 //! (Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014) after each word.
 
+use std::hash::{BuildHasher, Hasher};
+
 use crate::point::Position;
 
 /// What was made of the words so far.
@@ -33,4 +35,47 @@ impl Hash {
 #[inline]
 pub fn of_position(seed: u64, p: Position) -> u64 {
     p.into_iter().fold(Hash::of(seed), |hash, v| hash.and(v as u64)).value()
+}
+
+/// Makes hashes of the places of cubes for tables of the standard library, several times as fast as
+/// its own, which withstand chosen keys: here a bad choice of keys costs time alone.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct PlaceHashes;
+
+impl BuildHasher for PlaceHashes {
+    type Hasher = PlaceHasher;
+
+    fn build_hasher(&self) -> PlaceHasher {
+        PlaceHasher(0)
+    }
+}
+
+/// See [`PlaceHashes`].
+#[derive(Debug)]
+pub struct PlaceHasher(u64);
+
+impl Hasher for PlaceHasher {
+    fn finish(&self) -> u64 {
+        self.0 ^ self.0 >> 32
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for chunk in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word[..chunk.len()].copy_from_slice(chunk);
+            self.write_u64(u64::from_le_bytes(word));
+        }
+    }
+
+    fn write_u64(&mut self, word: u64) {
+        self.0 = (self.0.rotate_left(26) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+
+    fn write_i64(&mut self, word: i64) {
+        self.write_u64(word as u64);
+    }
+
+    fn write_usize(&mut self, word: usize) {
+        self.write_u64(word as u64);
+    }
 }

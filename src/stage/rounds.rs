@@ -128,8 +128,22 @@ pub struct RoundTile<'a> {
     pub positions: &'a [Position],
     /// The kept points of the cube and as far around it as the round asks for, in Morton order.
     pub kept: &'a [Position],
+    /// The number of the round that kept each.
+    pub kept_in: &'a [u32],
+    /// What the round before this one found, if it had the same tiles and looked at the same
+    /// positions.
+    pub before: Option<RoundBefore<'a>>,
     /// The instruction set to compute by.
     pub(crate) simd: crate::geom::simd::Simd,
+}
+
+/// What the round before found in a tile.
+#[derive(Debug, Clone, Copy)]
+pub struct RoundBefore<'a> {
+    /// Its number: points that were kept by it are new.
+    pub number: u32,
+    /// What it offered.
+    pub offers: &'a [Offer],
 }
 
 /// What a tile of a round finds.
@@ -137,22 +151,26 @@ pub struct RoundTile<'a> {
 pub struct Found {
     /// Indices of the positions of the cube that are kept from now on, in ascending order.
     pub keep: Vec<u32>,
-    /// What may be kept, of the cells of the kept points in the cube, in their order.
+    /// What may be kept: an offer of each kept point of the cube, in their order.
     pub offers: Vec<Offer>,
     /// How many positions of the cube are counted, for what comes next.
     pub counted: u64,
 }
 
-/// A position that is offered for keeping.
+/// A position that is offered for keeping, from around a kept point.
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Offer {
-    /// The larger the sooner it is kept; above 0.
+    /// The larger the sooner it is kept; at 0 nothing is offered.
     pub score: f64,
     /// It stands aside for an offer of a higher score that is nearer than this, in lattice steps.
     pub apart: f64,
     /// The position.
     pub at: Position,
+    /// The kept point.
+    pub of: Position,
+    /// A point that is kept farther from that one than this changes nothing of the offer.
+    pub reach: f64,
 }
 
 impl Found {

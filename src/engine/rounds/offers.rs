@@ -12,6 +12,7 @@ use std::sync::Arc;
 use super::{Merged, RoundKeys, nth_largest};
 use crate::Result;
 use crate::engine::job::Job;
+use crate::geom::hash::PlaceHashes;
 use crate::point::{Position, distance2};
 use crate::stage::Offer;
 use crate::store::{
@@ -22,6 +23,13 @@ use crate::store::{
 pub(super) struct Offers {
     spill: Spill,
     tiles: Vec<StoredStretch>,
+}
+
+/// Offers of a tile, and what reading them needs.
+#[derive(Default)]
+pub(super) struct OfferReader {
+    pub offers: Vec<Offer>,
+    bytes: Vec<u8>,
 }
 
 /// Which offers are the best.
@@ -48,6 +56,13 @@ impl Offers {
         self.tiles = tiles;
     }
 
+    /// Replaces what is in `into` by the offers of a tile.
+    pub fn load(&self, tile: usize, into: &mut OfferReader) -> Result<()> {
+        into.offers.clear();
+        let OfferReader { offers, bytes } = into;
+        self.of_tile(tile, bytes, |offer| offers.push(offer))
+    }
+
     /// Calls `visit` for the offers of a tile.
     fn of_tile(
         &self,
@@ -65,7 +80,13 @@ impl Offers {
         let mut bytes = Vec::new();
         let (least, mut left) = nth_largest(want, |visit| {
             let mut tiles = 0..self.tiles.len();
-            tiles.try_for_each(|n| self.of_tile(n, &mut bytes, |offer| visit(offer.score.to_bits())))
+            tiles.try_for_each(|n| {
+                self.of_tile(n, &mut bytes, |offer| {
+                    if offer.score > 0.0 {
+                        visit(offer.score.to_bits());
+                    }
+                })
+            })
         })?;
         let mut ties = Vec::with_capacity(self.tiles.len());
         for tile in 0..self.tiles.len() {
@@ -80,6 +101,11 @@ impl Offers {
 }
 
 impl BestOffers {
+    /// All offers, those that are not the best included.
+    pub fn all(self) -> Offers {
+        self.offers
+    }
+
     /// Appends to `into` those of a tile.
     fn of_tile(&self, tile: usize, bytes: &mut Vec<u8>, into: &mut Vec<Offer>) -> Result<()> {
         let mut ties = self.ties[tile];
@@ -87,7 +113,7 @@ impl BestOffers {
             let bits = offer.score.to_bits();
             let is_tied = bits == self.least && ties > 0;
             ties -= u64::from(is_tied);
-            if bits > self.least || is_tied {
+            if offer.score > 0.0 && (bits > self.least || is_tied) {
                 into.push(offer);
             }
         })
@@ -138,7 +164,7 @@ fn accepted(offers: &[Offer]) -> Vec<Position> {
     }
     let side = (farthest.ceil() as i64).max(1);
     let place = |p: Position| p.map(|v| v.div_euclid(side));
-    let mut cubes: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    let mut cubes: HashMap<[i64; 3], Vec<u32>, PlaceHashes> = HashMap::default();
     for (i, offer) in offers.iter().enumerate() {
         cubes.entry(place(offer.at)).or_default().push(i as u32);
     }

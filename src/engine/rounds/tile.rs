@@ -5,7 +5,7 @@ use crate::budget::{Bytes, Lease};
 use crate::engine::job::Job;
 use crate::engine::pass::{Call, Op, put_to_work};
 use crate::point::Position;
-use crate::stage::{Found, Looks, Offer, Round, RoundTile};
+use crate::stage::{Found, Looks, Offer, Round, RoundBefore, RoundTile};
 use crate::store::{KeptPoints, KeptReader, TileKey};
 use crate::tile::{Cover, Loader, Only};
 use crate::{Error, Result};
@@ -14,6 +14,7 @@ use crate::{Error, Result};
 pub(super) struct RoundWorker<'a> {
     job: &'a Job<'a>,
     call: Call,
+    number: u32,
     round: &'a Round,
     loader: Loader,
     capacity: usize,
@@ -55,6 +56,7 @@ impl<'a> RoundWorker<'a> {
         RoundWorker {
             job,
             call: scan.call(),
+            number: scan.number,
             round,
             loader,
             capacity,
@@ -107,7 +109,13 @@ impl<'a> RoundWorker<'a> {
     }
 
     /// Lets the stage work on a tile.
-    pub fn run(&mut self, key: TileKey, kept: &KeptPoints) -> Result<FoundInTile<'_>> {
+    /// `before` is what the round before offered there, if that can still be of use.
+    pub fn run(
+        &mut self,
+        key: TileKey,
+        kept: &KeptPoints,
+        before: Option<&[Offer]>,
+    ) -> Result<FoundInTile<'_>> {
         self.load(key, kept)?;
         self.found.clear();
         let RoundWorker { chosen, reader, found, job, .. } = self;
@@ -116,6 +124,8 @@ impl<'a> RoundWorker<'a> {
             round: self.round,
             positions: chosen,
             kept: &reader.positions,
+            kept_in: &reader.rounds,
+            before: before.map(|offers| RoundBefore { number: self.number - 1, offers }),
             simd: job.task.simd,
         };
         let stage = &job.ops[self.call.op];

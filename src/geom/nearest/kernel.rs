@@ -119,29 +119,39 @@ impl Batch {
     }
 }
 
-/// A new search begins with nothing.
-pub(super) struct Fresh<'a> {
+/// Points of one set meet a leaf of another: a new search among that begins with all of it.
+pub(super) struct Guests<'a> {
     pub batch: &'a mut Batch,
+    /// The points, in the frame of their own node.
+    pub points: &'a [[f32; LANES]; 3],
+    /// From that frame to the leaf's.
+    pub shift: [f32; 3],
+    pub leaf: &'a Leaf,
     /// The lanes that search.
     pub wanted: u32,
     /// How many candidates they keep.
     pub kept: usize,
 }
 
-impl Kernel for Fresh<'_> {
+impl Kernel for Guests<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self, _: L) {
-        let Fresh { batch, wanted, kept } = self;
+    fn run<L: Lanes>(self, lanes: L) {
+        let Guests { batch, points, shift, leaf, wanted, kept } = self;
         batch.kept = kept;
-        batch.best.fill(NONE);
-        for lane in 0..LANES {
-            let is_wanted = wanted >> lane & 1 == 1;
-            batch.bound[lane] = if is_wanted { distance_of(NONE) } else { -1.0 };
-            batch.bound_rank[lane] = rank_of(NONE);
+        let mut rows = [[NONE; LANES]; LANES];
+        let at = load(lanes, points);
+        let at = [
+            lanes.add(at[0], lanes.splat(shift[0])),
+            lanes.add(at[1], lanes.splat(shift[1])),
+            lanes.add(at[2], lanes.splat(shift[2])),
+        ];
+        for (other, row) in rows.iter_mut().enumerate() {
+            let distances = lanes.store(squared(lanes, at, leaf.point(other)));
+            *row = keys(&distances, leaf.rank[other]);
         }
-        batch.farthest = distance_of(NONE);
+        begin(lanes, batch, &mut rows, wanted);
     }
 }
 
@@ -169,22 +179,28 @@ impl Kernel for Home<'_> {
             *row = keys(&distances, leaf.rank[other]);
             row[other] = NONE;
         }
-        lanes.sort(&mut rows);
-        let shape = batch.shape;
-        batch.best.fill(NONE);
-        for (i, row) in rows.iter().enumerate().take(shape.width()) {
-            let places = batch.best[shape.place(i)..].iter_mut().step_by(shape.width());
-            places.zip(row).for_each(|(place, key)| *place = *key);
-        }
-        let last = shape.place(kept - 1);
-        for lane in 0..LANES {
-            batch.bind(lane, last);
-            if wanted >> lane & 1 == 0 {
-                batch.bound[lane] = -1.0;
-            }
-        }
-        batch.farthest = lanes.largest(lanes.load(&batch.bound));
+        begin(lanes, batch, &mut rows, wanted);
     }
+}
+
+/// Fills the lists of a batch with its first candidates, a row each in any order.
+#[inline(always)]
+fn begin<L: Lanes>(lanes: L, batch: &mut Batch, rows: &mut [Row; LANES], wanted: u32) {
+    lanes.sort(rows);
+    let shape = batch.shape;
+    batch.best.fill(NONE);
+    for (i, row) in rows.iter().enumerate().take(shape.width()) {
+        let places = batch.best[shape.place(i)..].iter_mut().step_by(shape.width());
+        places.zip(row).for_each(|(place, key)| *place = *key);
+    }
+    let last = shape.place(batch.kept - 1);
+    for lane in 0..LANES {
+        batch.bind(lane, last);
+        if wanted >> lane & 1 == 0 {
+            batch.bound[lane] = -1.0;
+        }
+    }
+    batch.farthest = lanes.largest(lanes.load(&batch.bound));
 }
 
 /// The keys of one point as a candidate of others; one that is infinitely far is none.

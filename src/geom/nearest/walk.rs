@@ -2,7 +2,7 @@
 //! ancestor down into whatever is near enough to matter; or, through the tree of another set, down
 //! from its root.
 
-use super::kernel::{Batch, Boxes, Fresh, Home, Visit};
+use super::kernel::{Batch, Boxes, Guests, Home, Visit};
 use super::refine::Leaf;
 use super::tree::{BoxNode, BoxTree, EXACT, above, below};
 use crate::geom::simd::{LANES, Simd};
@@ -58,6 +58,8 @@ pub(super) struct TreeWalk<'a> {
     visitors: Visitors<'a>,
     /// The level-0 node of the leaf in the tree that it walks through, if it is of that.
     home: Option<usize>,
+    /// The leaf that the points met first: its level-0 node, and which child of it it is.
+    met: Option<(usize, usize)>,
     /// Exact box of the leaf's points.
     lo: Position,
     hi: Position,
@@ -85,20 +87,48 @@ impl<'a> TreeWalk<'a> {
             let stored = node.origin[axis].saturating_add(hi[axis] as i64);
             stored.saturating_add(node.error)
         });
-        TreeWalk { simd, tree, batch, work, visitors, home: None, lo, hi, error: 0.0 }
+        TreeWalk { simd, tree, batch, work, visitors, home: None, met: None, lo, hi, error: 0.0 }
     }
 
     /// Fills the batch with the `kept` nearest by float distance of the lanes in `wanted`, and
     /// returns the largest error of a coordinate difference, in lattice steps: see [`super`]. The
     /// points are not of the tree.
     pub fn run_from_root(mut self, wanted: u32, kept: usize) -> f64 {
-        self.simd.run(Fresh { batch: self.batch, wanted, kept });
+        let (run, child) = self.nearest_leaf();
+        self.met = Some((run, child));
+        self.note_error(run);
+        let first = self.tree.node(0, run).first_child as usize;
+        let guests = Guests {
+            points: &self.visitors.leaf.at,
+            shift: self.shift(run),
+            leaf: &self.tree.leaves[first + child],
+            batch: self.batch,
+            wanted,
+            kept,
+        };
+        self.simd.run(guests);
         match self.tree.levels {
-            0 => {}
             1 => self.visit_run(0, None),
             levels => self.descend(levels - 1, 0, None),
         }
         self.error
+    }
+
+    /// A leaf that is likely to be near: of every node the nearest child, from the root on.
+    fn nearest_leaf(&self) -> (usize, usize) {
+        let (mut level, mut index) = (self.tree.levels - 1, 0);
+        loop {
+            let node = self.tree.node(level, index);
+            let lo = std::array::from_fn(|i| below(self.lo[i].saturating_sub(node.origin[i])));
+            let hi = std::array::from_fn(|i| above(self.hi[i].saturating_sub(node.origin[i])));
+            let (distances, _) = self.simd.run(Boxes { node, lo, hi, bound: 0.0 });
+            let child = nearest(&distances, lanes(node.children, None), f32::INFINITY);
+            let child = child.unwrap_or(0);
+            if level == 0 {
+                return (index, child);
+            }
+            (level, index) = (level - 1, node.first_child as usize + child);
+        }
     }
 
     /// The same of the points of the level-0 node `home` of the tree, among the others of it.
@@ -136,6 +166,8 @@ impl<'a> TreeWalk<'a> {
 
     /// Visits the leaves of a level-0 node, nearest first, except `skip`.
     fn visit_run(&mut self, index: usize, skip: Option<usize>) {
+        let met = self.met.filter(|(run, _)| *run == index);
+        let skip = skip.or(met.map(|(_, child)| child));
         self.work.nodes += 1;
         self.note_error(index);
         let node = self.tree.node(0, index);

@@ -10,7 +10,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use crate::geom::hash::of_position;
+use crate::geom::hash::{PlaceHashes, of_position};
 use crate::point::Position;
 use crate::stage::{Found, RoundTile};
 
@@ -75,7 +75,7 @@ struct Cube {
 /// The cubes of a tile on their way.
 struct Filled {
     cubes: Vec<Cube>,
-    numbers: HashMap<[i64; 3], u32, Mixed>,
+    numbers: HashMap<[i64; 3], u32, PlaceHashes>,
     side: i64,
     /// The squared distance.
     apart2: f64,
@@ -200,44 +200,3 @@ const AROUND: [[i64; 3]; 26] = {
     }
     all
 };
-
-/// Hashes of places.
-#[derive(Default, Clone, Copy)]
-struct Mixed;
-
-impl std::hash::BuildHasher for Mixed {
-    type Hasher = MixedHasher;
-
-    fn build_hasher(&self) -> MixedHasher {
-        MixedHasher(0)
-    }
-}
-
-/// See [`Mixed`].
-struct MixedHasher(u64);
-
-impl std::hash::Hasher for MixedHasher {
-    fn finish(&self) -> u64 {
-        self.0 ^ self.0 >> 32
-    }
-
-    fn write(&mut self, bytes: &[u8]) {
-        for chunk in bytes.chunks(8) {
-            let mut word = [0; 8];
-            word[..chunk.len()].copy_from_slice(chunk);
-            self.write_u64(u64::from_le_bytes(word));
-        }
-    }
-
-    fn write_u64(&mut self, word: u64) {
-        self.0 = (self.0.rotate_left(26) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    }
-
-    fn write_i64(&mut self, word: i64) {
-        self.write_u64(word as u64);
-    }
-
-    fn write_usize(&mut self, word: usize) {
-        self.write_u64(word as u64);
-    }
-}

@@ -20,6 +20,8 @@ const LAST_ROUNDS: u32 = 8;
 /// for each kept point; all where there are fewer.
 const FILLED_FROM: f64 = 64.0;
 const PROBED: f64 = 32.0;
+/// The same on rungs above the last one, which only have to find about where points are missing.
+const PROBED_ABOVE: f64 = 12.0;
 /// An offer stands aside for a better one within this share of its distance to a kept point.
 const APART: f64 = 0.5;
 
@@ -39,6 +41,8 @@ pub(super) struct Ladder {
     /// The distances that are filled to, the last one last.
     pub rungs: Vec<i64>,
     at: Next,
+    /// The part of all positions that the rounds of the rung look at.
+    probed: f64,
     work: Option<Work>,
 }
 
@@ -59,7 +63,7 @@ impl Ladder {
         let last = (OF_VOXEL * voxel_side(levels, bounds, want)).round().clamp(1.0, LONGEST);
         let rungs = (0..=RUNGS).rev().map(|n| (last * 2f64.powf(f64::from(n) / 2.0)).round());
         let rungs = rungs.map(|r| r.min(LONGEST) as i64).collect();
-        Ladder { want, seed, rungs, at: Next::Fill { rung: 0 }, work: None }
+        Ladder { want, seed, rungs, at: Next::Fill { rung: 0 }, probed: 1.0, work: None }
     }
 
     /// What the round at hand does.
@@ -98,6 +102,15 @@ impl Ladder {
             }
             Next::Refine { rung, round } => {
                 let missing = self.want - so_far.kept;
+                if round == 0 {
+                    let grown = (so_far.kept as f64 * (1.0 + GROWTH)).min(self.want as f64);
+                    let (of_each, kept) = match rung == last {
+                        true => (PROBED, self.want as f64),
+                        false => (PROBED_ABOVE, grown),
+                    };
+                    let positions = so_far.levels.positions().max(1) as f64;
+                    self.probed = (of_each * kept / positions).min(1.0);
+                }
                 let (rounds, want) = match rung == last {
                     true => (LAST_ROUNDS, missing / u64::from(LAST_ROUNDS.saturating_sub(round).max(1))),
                     false => (ROUNDS, (so_far.kept as f64 * grown(round)) as u64),
@@ -113,7 +126,7 @@ impl Ladder {
                     return NextRound::Done;
                 }
                 let apart = if is_last && rung == last { 0.0 } else { APART };
-                self.refine(rung, want.clamp(1, missing), apart, so_far)
+                self.refine(rung, want.clamp(1, missing), apart)
             }
             Next::Done => NextRound::Done,
         }
@@ -126,11 +139,10 @@ impl Ladder {
         NextRound::Round(Round { looks, reach, kept_reach, choice: Choice::InTile })
     }
 
-    fn refine(&mut self, rung: usize, want: u64, apart: f64, so_far: &SoFar<'_>) -> NextRound {
+    fn refine(&mut self, rung: usize, want: u64, apart: f64) -> NextRound {
         let refining = Refining { radius: self.rungs[rung], apart };
         self.work = Some(Work::Refine(refining));
-        let positions = so_far.levels.positions().max(1) as f64;
-        let most = most_of((PROBED * so_far.kept as f64 / positions).min(1.0));
+        let most = most_of(self.probed);
         NextRound::Round(Round {
             looks: Looks::Sample { most, seed: self.seed },
             reach: refining.reach(),

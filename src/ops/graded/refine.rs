@@ -7,7 +7,10 @@
 //! Neither normals nor a model of the noise are asked: a plane through noisy points is off by as
 //! much everywhere, so the worst cells are those of shape.
 
+use std::collections::HashSet;
+
 use crate::Result;
+use crate::geom::hash::PlaceHashes;
 use crate::geom::nearest::NearestAmong;
 use crate::geom::planes::{NEAREST, PlaneErrors};
 use crate::point::Position;
@@ -36,6 +39,8 @@ struct Asked {
     cell: u32,
     /// Squared distance to it.
     distance2: f64,
+    /// Squared distance within which a further kept point would change what it says.
+    asked2: f64,
     /// Squared error.
     error2: f64,
 }
@@ -47,12 +52,14 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Copy, Default)]
 struct Cell {
     positions: u32,
+    /// The largest product of squared error and squared distance, and whose it is.
+    at: u32,
+    best: f64,
     /// Sums of the squares of squared errors, and of squared distances.
     error4: f64,
     distance2: f64,
-    /// The largest product of squared error and squared distance, and whose it is.
-    best: f64,
-    at: u32,
+    /// How far from the kept point another one changes anything.
+    reach: f64,
 }
 
 impl Refining {
@@ -73,44 +80,87 @@ impl Refining {
 
     /// Offers the worst position of each cell.
     pub fn refine(self, tile: &RoundTile<'_>, found: &mut Found) -> Result<()> {
+        let unchanged = Unchanged::of(tile);
+        let touched: Vec<Position>;
+        let positions = match &unchanged {
+            None => tile.positions,
+            Some(unchanged) => {
+                touched = self.touched(tile, unchanged);
+                &touched
+            }
+        };
         let mut cells = vec![Cell::default(); tile.kept.len()];
         // In Morton order, on which what the sums round to depends.
-        for (i, asked) in self.asked(tile).into_iter().enumerate() {
+        for (i, asked) in self.asked(tile, positions).into_iter().enumerate() {
             let Some(cell) = cells.get_mut(asked.cell as usize) else { continue };
             let error2 = asked.error2 + OF_DISTANCE * asked.distance2;
             cell.positions += 1;
             cell.error4 += error2 * error2;
             cell.distance2 += asked.distance2;
+            let reach = asked.distance2.sqrt() + asked.asked2.sqrt();
+            cell.reach = f64::max(cell.reach, reach * ROUNDED_UP);
             if error2 * asked.distance2 > cell.best {
                 cell.best = error2 * asked.distance2;
                 cell.at = i as u32;
             }
         }
-        let of_cube = cells.iter().zip(tile.kept).filter(|(_, p)| tile.cube.contains(**p));
-        for (cell, kept) in of_cube.filter(|(cell, _)| cell.best > 0.0) {
-            let count = f64::from(cell.positions);
-            let score = cell.error4 / count * (cell.distance2 / count);
-            let at = tile.positions[cell.at as usize];
-            let apart = self.apart * squared(*kept, at).sqrt();
-            found.offers.push(Offer { score, apart, at });
+        for (i, &of) in tile.kept.iter().enumerate().filter(|(_, p)| tile.cube.contains(**p)) {
+            let same = unchanged.as_ref().and_then(|unchanged| unchanged.offers[i]);
+            let mut offer = same.unwrap_or_else(|| Refining::offer(&cells[i], of, positions));
+            offer.apart = self.apart * squared(of, offer.at).sqrt();
+            found.offers.push(offer);
         }
         Ok(())
     }
 
+    /// What a cell offers.
+    fn offer(cell: &Cell, of: Position, positions: &[Position]) -> Offer {
+        if cell.best <= 0.0 {
+            return Offer { score: 0.0, apart: 0.0, at: of, of, reach: cell.reach };
+        }
+        let count = f64::from(cell.positions);
+        let score = cell.error4 / count * (cell.distance2 / count);
+        let at = positions[cell.at as usize];
+        Offer { score, apart: 0.0, at, of, reach: cell.reach }
+    }
+
+    /// The positions in all octree nodes that a cell which changed may reach into.
+    fn touched(self, tile: &RoundTile<'_>, unchanged: &Unchanged) -> Vec<Position> {
+        let level = self.radius.unsigned_abs().next_power_of_two().ilog2();
+        let place = |p: &Position| p.map(|v| v >> level);
+        let mut nodes: HashSet<[i64; 3], PlaceHashes> = HashSet::default();
+        let each = tile.kept.iter().zip(&unchanged.offers);
+        let changed = each.filter(|(p, offer)| offer.is_none() && tile.cube.contains(**p));
+        for (p, _) in changed {
+            let [lo, hi] = [-self.radius, self.radius]
+                .map(|by| p.map(|v| v.saturating_add(by) >> level));
+            for x in lo[0]..=hi[0] {
+                for y in lo[1]..=hi[1] {
+                    nodes.extend((lo[2]..=hi[2]).map(|z| [x, y, z]));
+                }
+            }
+        }
+        let stretches = tile.positions.chunk_by(|a, b| place(a) == place(b));
+        let touched = stretches.filter(|stretch| nodes.contains(&place(&stretch[0])));
+        touched.flatten().copied().collect()
+    }
+
     /// What each position says.
-    fn asked(self, tile: &RoundTile<'_>) -> Vec<Asked> {
-        let nothing = Asked { cell: NONE, distance2: 0.0, error2: 0.0 };
-        let mut all = vec![nothing; tile.positions.len()];
+    fn asked(self, tile: &RoundTile<'_>, positions: &[Position]) -> Vec<Asked> {
+        let nothing = Asked { cell: NONE, distance2: 0.0, asked2: 0.0, error2: 0.0 };
+        let mut all = vec![nothing; positions.len()];
         let radius2 = (self.radius as f64) * (self.radius as f64);
         let within2 = radius2 * (ASKED_RADII * ASKED_RADII) as f64;
         let mut errors = PlaneErrors::new(tile.simd);
         let mut nearest = NearestAmong::with(tile.simd);
-        nearest.search(tile.kept, tile.positions, NEAREST, |i, found| {
+        nearest.search(tile.kept, positions, NEAREST, |i, found| {
             let Some(&first) = found.first() else { return };
-            let p = tile.positions[i];
+            let p = positions[i];
             let distance2 = squared(tile.kept[first as usize], p);
             if distance2 > 0.0 && distance2 <= radius2 {
-                all[i] = Asked { cell: first, distance2, error2: 0.0 };
+                let last = found.get(NEAREST - 1).map(|&j| squared(tile.kept[j as usize], p));
+                let asked2 = last.map_or(within2, |last| last.min(within2));
+                all[i] = Asked { cell: first, distance2, asked2, error2: 0.0 };
                 let offsets = found.iter().map(|&j| offset(tile.kept[j as usize], p));
                 let offsets = offsets.take_while(|o| squared_length(*o) <= within2);
                 errors.push(i as u32, offsets, |i, error2| all[i as usize].error2 = error2);
@@ -118,6 +168,45 @@ impl Refining {
         });
         errors.flush(|i, error2| all[i as usize].error2 = error2);
         all
+    }
+}
+
+/// Roots and their sum round by less.
+const ROUNDED_UP: f64 = 1.0 + 1e-12;
+
+/// Kept points around which nothing changed since the round before: none was kept near them. What
+/// they offer is what they offered then. Most are such, as a round keeps few, and those where the
+/// scan is worst.
+struct Unchanged {
+    /// Of each kept point of the tile, what it offers; none where that changed, or is not known.
+    offers: Vec<Option<Offer>>,
+}
+
+impl Unchanged {
+    /// Those of a tile, if the round before left something that can be used.
+    fn of(tile: &RoundTile<'_>) -> Option<Unchanged> {
+        let before = tile.before?;
+        let is_new = |i: &usize| tile.kept_in[*i] == before.number;
+        let new: Vec<Position> =
+            (0..tile.kept.len()).filter(is_new).map(|i| tile.kept[i]).collect();
+        let mut offers = vec![None; tile.kept.len()];
+        let mut last = before.offers.iter().peekable();
+        for (offer, p) in offers.iter_mut().zip(tile.kept) {
+            // Both are in Morton order.
+            *offer = last.next_if(|offer| offer.of == *p).copied();
+        }
+        let mut nearest = NearestAmong::with(tile.simd);
+        nearest.search(&new, tile.kept, 1, |i, found| {
+            let near = |offer: &Offer, j: u32| {
+                squared(new[j as usize], tile.kept[i]).sqrt() <= offer.reach
+            };
+            if let (Some(offer), Some(&j)) = (&offers[i], found.first())
+                && near(offer, j)
+            {
+                offers[i] = None;
+            }
+        });
+        Some(Unchanged { offers })
     }
 }
 
