@@ -9,6 +9,7 @@ mod offers;
 mod select;
 mod tile;
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::cut::{CutRound, cut_round};
@@ -27,6 +28,9 @@ use offers::{OfferReader, Offers, accept};
 use select::nth_largest;
 use tile::RoundWorker;
 
+/// Rounds that can be undone.
+const UNDONE: usize = 2;
+
 /// Lets the stage `op` choose in rounds, over what `sieve` lets a pass see.
 pub(super) fn choose(
     job: &mut Job<'_>,
@@ -37,7 +41,7 @@ pub(super) fn choose(
 ) -> Result<()> {
     let (levels, records) = candidates(job, op, field, sieve, capacity)?;
     let mut kept = KeptPoints::new(&job.area);
-    let mut last = KeptPoints::new(&job.area);
+    let mut last: VecDeque<KeptPoints> = VecDeque::new();
     let (mut number, mut added, mut counted) = (0, 0, 0);
     let mut before = None;
     loop {
@@ -51,18 +55,30 @@ pub(super) fn choose(
                 let (new, found, left) = scan.round(job, &round, &kept, before.take())?;
                 before = left;
                 (added, counted) = (new.count() - kept.count(), found);
-                last = std::mem::replace(&mut kept, new);
+                last.push_back(std::mem::replace(&mut kept, new));
+                while last.len() > UNDONE {
+                    last.pop_front();
+                }
                 number += 1;
             }
             NextRound::Shorten { to, seed } => {
                 before = None;
                 kept = shorten(job, &kept, number.saturating_sub(1), to, seed)?;
-                added = kept.count() - last.count();
+                added = kept.count() - last.back().map_or(0, KeptPoints::count);
             }
-            NextRound::Undo => {
+            NextRound::Undo { rounds } => {
                 before = None;
-                kept = std::mem::replace(&mut last, KeptPoints::new(&job.area));
+                for _ in 0..rounds {
+                    let more = || Error::internal("more rounds are undone than there were");
+                    kept = last.pop_back().ok_or_else(more)?;
+                }
                 added = 0;
+            }
+            NextRound::Again => {
+                before = None;
+                last.clear();
+                kept = KeptPoints::new(&job.area);
+                (number, added, counted) = (0, 0, 0);
             }
             NextRound::Done => break,
         }

@@ -1,9 +1,16 @@
-//! The stage `graded`: so many points stay, where they say most of the surface.
+//! The stage `graded`: so many points stay, or as many as a tolerance asks for, where they say most
+//! of the surface.
 
-mod fill;
+mod certain;
+mod correct;
 mod figures;
+mod fill;
 mod ladder;
 mod refine;
+mod settings;
+mod sides;
+mod surface;
+mod work;
 
 use std::sync::Arc;
 
@@ -12,8 +19,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::Keep;
-use crate::point::names;
-use crate::report::Tally;
+use crate::point::{Column, Units, names};
+use crate::quantity::Length;
+use crate::report::{Grouped, Tally};
 use crate::stage::{
     Found, Needs, NextRound, Role, RoleName, RoundOp, RoundTile, ScanFacts, SoFar, StageKind,
     StagePlace, TileOp,
@@ -22,91 +30,273 @@ use crate::store::KeptPoints;
 use crate::tile::Tile;
 use crate::{Error, Result};
 
-use figures::measure;
-use ladder::{Ladder, Work};
+use certain::Certain;
+use figures::Judgement;
+use ladder::Ladder;
+pub use settings::Effort;
+use sides::{steps, voxel_side};
+use work::Work;
 
-/// Keeps so many points, and those that say most of the surface.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+/// The number of the round that kept each point: points of rounds before it are a coarser reduction
+/// of the same scan. 65535 are exceptions, which are kept and no part of the surface.
+pub const KEEP_RANK: Column<u16> = Column::new("KeepRank", &[]).computed_by("graded");
+/// The rank of exceptions.
+pub(crate) const EXCEPTION: u16 = u16::MAX;
+
+/// Keeps the points that say most of the surface: so many of them, or as many as a tolerance asks
+/// for. It looks at nothing but positions, so no stage needs to come before it. Copies of a position
+/// weigh as one, and one record of them stays.
+///
+/// With `keep` exactly so many records stay (or all positions, where these are fewer). First
+/// positions are kept until none is farther from a kept one than about the side of the voxel grid
+/// that would keep as many: that much coverage is left everywhere. What is left of the number is
+/// kept in rounds where the surface is told worst. In each, every removed position asks its twelve
+/// nearest kept ones how far it is from the plane of the nearest 5, 8 and 12 of them; the positions
+/// that have the same nearest kept point are a cell, with the score mean(e⁴) · mean(d²) of their
+/// errors e and distances d; and of the worst cells of the whole scan the position of largest e · d
+/// is kept. No cut into tiles shows in what is kept.
+///
+/// With `tolerance` every removed position is within it of the surface: of the least-squares plane
+/// of its 8 nearest surface points, and all that are as near as the eighth, within four times
+/// `max_spacing`; where fewer than 5 are, or they are almost on a line, of the nearest one. Surface
+/// points are added where that does not hold until more of them do not pay; what is still off is
+/// kept as an exception, which is no surface point. The report counts these as `graded_exceptions`,
+/// and its largest deviation is the largest error. Below the noise of a scan a tolerance keeps
+/// nearly everything.
+///
+/// With both, the tolerance is kept where it needs no more points than `keep`; else so many points
+/// are kept, and the report says which came first.
+///
+/// The report's deviations are distances to that surface.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
 pub struct Graded {
-    /// How many records stay.
-    pub keep: Keep,
+    /// How many records stay: a share of those that the stage decides about ("10%"), or a number
+    /// (500000, "250k", "5M").
+    pub keep: Option<Keep>,
+    /// How far from the surface no removed point may be: a length.
+    pub tolerance: Option<Length>,
+    /// How far from the nearest kept point no removed point may be: a length. Without it, with
+    /// `keep` what the number allows; with `tolerance` the side of a voxel grid that keeps one of
+    /// 256 positions.
+    pub max_spacing: Option<Length>,
+    /// How much is computed.
+    pub effort: Effort,
+    /// True to give every kept point a `KeepRank`, which outputs write by `dimensions`: the points
+    /// of low ranks are a coarser reduction, and `cut` makes it. The rounds are then those that do
+    /// for any number.
+    pub ranks: bool,
     /// Of equally good choices, which are made.
-    #[serde(default)]
     pub seed: u64,
     #[serde(skip)]
-    ladder: Option<Ladder>,
+    step: f64,
+    #[serde(skip)]
+    course: Option<Course>,
     #[serde(skip)]
     kept: Option<Arc<KeptPoints>>,
+    /// The largest number that is kept, where a tolerance may come first.
+    #[serde(skip)]
+    most: Option<u64>,
+}
+
+/// The rounds towards a number or a tolerance.
+#[derive(Debug, Clone)]
+enum Course {
+    Count(Ladder),
+    Tolerance(Certain),
 }
 
 /// Bytes a position.
-const BYTES: usize = 64;
+const BYTES: usize = 96;
+/// Where nothing says how far apart kept points are with a tolerance: a voxel grid that keeps one of
+/// so many positions.
+const SPARSE: u64 = 256;
+/// Cubes of it at least.
+const FEWEST: u64 = 64;
 
 impl Graded {
     /// A reduction to that many points.
     pub fn new(keep: Keep) -> Graded {
-        Graded { keep, seed: 0, ladder: None, kept: None }
+        Graded { keep: Some(keep), ..Graded::default() }
+    }
+
+    /// Refuses keys that do not go together, with the key to blame.
+    fn check(&self) -> Result<(), (&'static str, Error)> {
+        match (self.keep, self.tolerance) {
+            (None, None) => {
+                let told = "`graded` does not say how many points stay";
+                let help = "give `graded.keep = \"10%\"`, or `graded.tolerance = 0.005`";
+                Err(("keep", Error::pipeline(told).help(help)))
+            }
+            (Some(Keep::Auto), _) => {
+                let told = "`graded.keep = \"auto\"` is not known: it takes a share or a number";
+                Err(("keep", Error::pipeline(told).help("give `graded.keep = \"10%\"`")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// A length in steps of the lattice.
+    fn in_steps(&self, length: Length) -> f64 {
+        length.value() / self.step
+    }
+
+    /// The rounds to begin with.
+    fn begin(&mut self, so_far: &SoFar<'_>) -> Course {
+        let positions = so_far.levels.positions();
+        self.most = self.keep.map(|keep| keep.of(so_far.records).min(positions));
+        match (self.tolerance, self.most) {
+            (None, most) => self.count(most.unwrap_or(positions), so_far),
+            (Some(tolerance), _) => {
+                let spacing = self.max_spacing.map(|length| self.in_steps(length));
+                let sparse = (positions / SPARSE).max(FEWEST).min(positions);
+                let spacing = spacing
+                    .unwrap_or_else(|| voxel_side(so_far.levels, &so_far.bounds, sparse));
+                let tolerance = self.in_steps(tolerance);
+                Course::Tolerance(Certain::new(tolerance, steps(spacing.floor()), self.seed))
+            }
+        }
+    }
+
+    /// The rounds towards a number.
+    fn count(&self, want: u64, so_far: &SoFar<'_>) -> Course {
+        let spacing = self.max_spacing.map(|length| steps(self.in_steps(length).floor()));
+        let with = (self.effort, self.seed);
+        Course::Count(match self.ranks && spacing.is_none() {
+            true => Ladder::ranked(want, so_far, with),
+            false => Ladder::new(want, so_far, with, spacing),
+        })
+    }
+
+    /// True if the points that are kept are too many for the number, so that they are chosen anew.
+    fn is_too_many(&self, kept: u64, exceptions: u64) -> bool {
+        self.most.is_some_and(|most| kept + exceptions > most)
     }
 }
 
 impl StageKind for Graded {
     const KIND: &'static str = "graded";
     const ROLE: RoleName = RoleName::OnTiles;
-    const ABOUT: &'static str = "Keeps so many points, and those that say most of the surface.";
+    const ABOUT: &'static str =
+        "Keeps the points that say most of the surface: so many, or for a tolerance.";
 
-    fn build(self, _: &StagePlace) -> Result<Role> {
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        self.check().map_err(|(key, error)| at.blame(key, error))?;
         Ok(Role::RoundOp(Box::new(self)))
     }
 }
 
 impl TileOp for Graded {
     fn needs(&self) -> Needs {
-        Needs::none().looks_at(names::XYZ).bytes_per_point(BYTES).removes(None)
+        let needs = Needs::none().looks_at(names::XYZ).bytes_per_point(BYTES).removes(None);
+        if self.ranks { needs.writes(&KEEP_RANK) } else { needs }
     }
 
     fn for_share(&mut self, share: f64) {
-        if let Keep::Records(count) = &mut self.keep {
+        if let Some(Keep::Records(count)) = &mut self.keep {
             *count = ((*count as f64 * share).round() as u64).max(1);
         }
     }
 
-    fn settle(&mut self, _: &ScanFacts) -> Result<()> {
-        (self.ladder, self.kept) = (None, None);
+    fn convert(&mut self, units: &Units) -> Result<()> {
+        for (length, key) in [
+            (&mut self.tolerance, "graded.tolerance"),
+            (&mut self.max_spacing, "graded.max_spacing"),
+        ] {
+            *length = length.map(|length| length.in_scan(units, key)).transpose()?;
+        }
+        Ok(())
+    }
+
+    fn lengths(&self) -> Vec<(&'static str, Length)> {
+        let lengths =
+            [("graded.tolerance", self.tolerance), ("graded.max_spacing", self.max_spacing)];
+        lengths.into_iter().filter_map(|(key, length)| Some((key, length?))).collect()
+    }
+
+    fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
+        (self.course, self.kept, self.most) = (None, None, None);
+        self.step = scan.lattice.step;
         Ok(())
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let early = || Error::internal("the stage graded ran before it chose");
         let kept = self.kept.as_ref().ok_or_else(early)?;
-        let ladder = self.ladder.as_ref().ok_or_else(early)?;
-        measure(tile, kept, ladder.last(), tally)
+        let (radius, tolerance) = match self.course.as_ref().ok_or_else(early)? {
+            Course::Count(ladder) => (ladder.radius(), None),
+            Course::Tolerance(certain) => (certain.radius, Some(certain.tolerance)),
+        };
+        Judgement { kept, radius, tolerance, ranks: self.ranks }.pass(tile, tally)
     }
 
     fn decisions(&self) -> Vec<(String, Value)> {
-        let ladder = self.ladder.iter();
-        ladder.map(|ladder| ("spacing_steps".into(), ladder.last().into())).collect()
+        let length = |steps: i64| Value::from(steps as f64 * self.step);
+        let mut all = Vec::new();
+        match &self.course {
+            Some(Course::Count(ladder)) => {
+                all.push(("spacing".to_owned(), length(ladder.radius())));
+                if self.tolerance.is_some() {
+                    all.push(("ended_by".to_owned(), "keep".into()));
+                }
+            }
+            Some(Course::Tolerance(certain)) => {
+                all.push(("spacing".to_owned(), length(certain.radius)));
+                if self.keep.is_some() {
+                    all.push(("ended_by".to_owned(), "tolerance".into()));
+                }
+            }
+            None => {}
+        }
+        all
     }
 }
 
 impl RoundOp for Graded {
     fn next(&mut self, so_far: &SoFar<'_>) -> Result<NextRound> {
-        let (keep, seed) = (self.keep, self.seed);
-        let ladder = self.ladder.get_or_insert_with(|| {
-            Ladder::new(keep.of(so_far.records), so_far.levels, &so_far.bounds, seed)
-        });
-        Ok(ladder.next(so_far))
+        let mut course = match self.course.take() {
+            Some(course) => course,
+            None => self.begin(so_far),
+        };
+        let (next, exceptions) = match &mut course {
+            Course::Count(ladder) => (ladder.next(so_far), 0),
+            Course::Tolerance(certain) => (certain.next(so_far), certain.exceptions),
+        };
+        if let (NextRound::Done, Course::Tolerance(_), Some(most)) = (next, &course, self.most)
+            && self.is_too_many(so_far.kept, exceptions)
+        {
+            self.course = Some(self.count(most, so_far));
+            return Ok(NextRound::Again);
+        }
+        if let (NextRound::Shorten { to, .. }, Some(spacing)) = (next, self.max_spacing)
+            && !self.ranks
+        {
+            let kept = Grouped(so_far.kept);
+            let told = format!(
+                "`graded.max_spacing = {}` takes {kept} points, and `graded.keep` allows {}",
+                spacing.value(),
+                Grouped(to)
+            );
+            let help = "keep more points, or give a longer `graded.max_spacing`, or none";
+            return Err(Error::new(crate::ErrorKind::Data, told).help(help));
+        }
+        self.course = Some(course);
+        Ok(next)
     }
 
     fn round(&self, tile: &RoundTile<'_>, found: &mut Found) -> Result<()> {
-        match self.ladder.as_ref().and_then(Ladder::work) {
-            Some(Work::Fill(filling)) => {
-                filling.fill(tile, found);
-                Ok(())
-            }
+        let work = match &self.course {
+            Some(Course::Count(ladder)) => ladder.work(),
+            Some(Course::Tolerance(certain)) => certain.work(),
+            None => None,
+        };
+        match work {
+            Some(Work::Fill(filling)) => filling.fill(tile, found),
             Some(Work::Refine(refining)) => refining.refine(tile, found),
-            None => Err(Error::internal("the stage graded has no round to work on")),
+            Some(Work::Correct(correcting)) => correcting.correct(tile, found),
+            None => return Err(Error::internal("the stage graded has no round to work on")),
         }
+        Ok(())
     }
 
     fn chosen(&mut self, kept: Arc<KeptPoints>) {

@@ -24,7 +24,7 @@ pub use cells::{By, Cells, Keep, Measure, Reference, Side, Split};
 pub use crop::{Crop, CropBox, CropSide};
 pub use drop::Drop;
 pub use filter::Filter;
-pub use graded::Graded;
+pub use graded::{Effort, Graded, KEEP_RANK};
 pub use grid::{Grid, Pick};
 pub use median::Median;
 pub use merge::Merge;

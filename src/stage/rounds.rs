@@ -63,8 +63,13 @@ pub enum NextRound {
         /// See [`crate::geom::hash::of_position`].
         seed: u64,
     },
-    /// What the last round kept is not kept.
-    Undo,
+    /// What the last rounds kept is not kept.
+    Undo {
+        /// How many rounds: one or two, behind the last of which nothing else was asked for.
+        rounds: usize,
+    },
+    /// Nothing is kept, and all begins anew.
+    Again,
     /// No more rounds.
     Done,
 }
@@ -191,9 +196,24 @@ impl Round {
 }
 
 impl Looks {
+    /// A sample of about that share of all positions, or all.
+    pub fn sample(share: f64, seed: u64) -> Looks {
+        Looks::Sample { most: most_of(share), seed }
+    }
+
+    /// What has no kept point nearer than `apart`: about as many of all as that share.
+    pub fn uncovered(apart: i64, share: f64) -> Looks {
+        Looks::Uncovered { apart, most: most_of(share) }
+    }
+
     /// The part of all positions that it looks at, about: above 0 and at most 1.
     pub(crate) fn share(self) -> f64 {
         let (Looks::Sample { most, .. } | Looks::Uncovered { most, .. }) = self;
         (most as f64 + 1.0) / 2f64.powi(64)
     }
+}
+
+/// The largest hash of a sample of that share.
+fn most_of(share: f64) -> u64 {
+    if share >= 1.0 { u64::MAX } else { (share * 2f64.powi(64)) as u64 }
 }

@@ -1,72 +1,75 @@
 //! What becomes of each position, and how far what is removed is from the surface of what stays.
 
 use super::super::removal::{keep_once, remove};
+use super::correct::is_beyond;
 use super::refine::ASKED_RADII;
+use super::surface::{Told, ask_surface};
+use super::{EXCEPTION, KEEP_RANK};
 use crate::Result;
-use crate::geom::nearest::NearestAmong;
-use crate::geom::planes::{SURFACE, surface_distance};
-use crate::point::{Position, distance2};
 use crate::report::Tally;
 use crate::store::{KeptPoints, KeptReader};
 use crate::tile::{Fate, Tile};
 
-/// Kept points that are asked first. Whether others are as near as the last of those whose plane is
-/// the surface is known by one more than these; where some are, more are asked.
-const ASKED: usize = SURFACE + 1;
+/// By what positions are judged.
+pub(super) struct Judgement<'a> {
+    pub kept: &'a KeptPoints,
+    /// No removed position is farther from a kept one, in steps.
+    pub radius: i64,
+    /// What is farther from the surface is kept as an exception, in steps.
+    pub tolerance: Option<f64>,
+    /// True if kept points have ranks.
+    pub ranks: bool,
+}
 
-/// Keeps what is in `kept`, and removes what else is decided about with its distance to the plane
-/// of the nearest kept points.
-pub(super) fn measure(
-    tile: &mut Tile,
-    kept: &KeptPoints,
-    radius: i64,
-    tally: &mut Tally,
-) -> Result<()> {
-    let mut reader = KeptReader::default();
-    let within = radius.saturating_mul(ASKED_RADII);
-    kept.near(&tile.cube.grown(within), &mut reader)?;
-    let surface = &reader.positions;
-    let core = tile.core.clone();
-    let mut deviations = vec![f64::NAN; core.len()];
-    let mut is_kept = vec![false; core.len()];
-    let within2 = (within as u128) * (within as u128);
-    let mut nearest = NearestAmong::with(tile.simd());
-    let mut asking: Vec<u32> = (core.start as u32..core.end as u32).collect();
-    let mut asked = ASKED;
-    while !asking.is_empty() {
-        let at: Vec<Position> = asking.iter().map(|&i| tile.positions[i as usize]).collect();
-        let mut tied = Vec::new();
-        nearest.search(surface, &at, asked, |n, found| {
-            let far = |j: u32| distance2(surface[j as usize], at[n]);
-            let i = asking[n] as usize - core.start;
-            let Some(first) = found.first().map(|&j| far(j)) else { return };
-            is_kept[i] = first == 0;
-            let is_tied = found.len() == asked && far(found[asked - 1]) == far(found[SURFACE - 1]);
-            if first > 0 && is_tied && asked < surface.len() {
-                tied.push(asking[n]);
-            } else if (1..=within2).contains(&first) {
-                let near = &found[..found.partition_point(|&j| far(j) <= within2)];
-                deviations[i] = surface_distance(at[n], near, surface);
+impl Judgement<'_> {
+    /// Keeps what was chosen and what is an exception, and removes what else is decided about with
+    /// its distance to the surface.
+    pub fn pass(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
+        let mut reader = KeptReader::default();
+        let within = self.radius.saturating_mul(ASKED_RADII);
+        self.kept.near(&tile.cube.grown(within), &mut reader)?;
+        let core = tile.core.clone();
+        let mut all: Vec<Option<Told>> = vec![None; core.len()];
+        let (surface, at) = (&reader.positions, &tile.positions[core.clone()]);
+        ask_surface(tile.simd(), surface, at, within, |i, told| all[i] = Some(told));
+        let mut ranks = match self.ranks {
+            true => Some(tile.columns.take(&KEEP_RANK)?),
+            false => None,
+        };
+        let (mut coincident, mut represented, mut exceptions) = (0, 0, 0);
+        for (i, told) in core.zip(all) {
+            if !tile.is_chosen(i) {
+                continue;
             }
-        });
-        tied.sort_unstable();
-        (asking, asked) = (tied, 4 * asked);
+            let is_kept = told.is_some_and(|told| told.distance2 == 0);
+            let beyond = |tolerance| told.is_none_or(|told| is_beyond(told.off, tolerance));
+            let is_exception = !is_kept && self.tolerance.is_some_and(beyond);
+            if is_kept || is_exception {
+                coincident += keep_once(tile, i);
+                exceptions += u64::from(is_exception);
+                let round = told.map_or(0, |told| reader.rounds[told.nearest as usize]);
+                let rank = if is_exception { EXCEPTION } else { rank_of(round) };
+                ranks.iter_mut().for_each(|ranks| ranks[i] = rank);
+                continue;
+            }
+            represented += remove(tile, i);
+            if let (Fate::Removed, Some(told)) = (tile.fates[i], told) {
+                tile.fates[i] = Fate::Represented { deviation: told.off as f32 };
+            }
+        }
+        if let Some(ranks) = ranks {
+            tile.columns.put(ranks);
+        }
+        tally.remove("graded", "coincident", coincident);
+        tally.remove("graded", "represented", represented);
+        if self.tolerance.is_some() {
+            tally.count("graded_exceptions", exceptions);
+        }
+        Ok(())
     }
-    let (mut coincident, mut represented) = (0, 0);
-    for (n, i) in core.enumerate() {
-        if !tile.is_chosen(i) {
-            continue;
-        }
-        if is_kept[n] {
-            coincident += keep_once(tile, i);
-            continue;
-        }
-        represented += remove(tile, i);
-        if tile.fates[i] == Fate::Removed && !deviations[n].is_nan() {
-            tile.fates[i] = Fate::Represented { deviation: deviations[n] as f32 };
-        }
-    }
-    tally.remove("graded", "coincident", coincident);
-    tally.remove("graded", "represented", represented);
-    Ok(())
+}
+
+/// The rank of what a round kept: below that of an exception.
+fn rank_of(round: u32) -> u16 {
+    round.min(u32::from(EXCEPTION) - 1) as u16
 }

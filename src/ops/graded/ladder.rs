@@ -1,35 +1,54 @@
-//! Which rounds there are: a ladder of distances that ends where all that is wanted is kept.
+//! Rounds towards a number of points: a ladder of distances that ends where all are kept.
+//!
+//! On each rung positions are kept until none is farther than a distance from a kept one; then a few
+//! rounds add points where the surface is told worst. The distances fall by √2. For one number of
+//! points the last distance follows from that number, and two rungs above it are enough: what they
+//! keep, they keep with little to look at. For an order in which any number can be cut off
+//! (`ranks`), rungs are those of the lattice and begin at the width of the scan, so that they are
+//! the same whatever the number is.
 
-use crate::point::Bounds;
 use crate::stage::{Choice, Looks, NextRound, Round, SoFar};
-use crate::store::Levels;
 
 use super::fill::Filling;
 use super::refine::Refining;
+use super::settings::Effort;
+use super::sides::{LONGEST, extent, occupied, steps, voxel_side};
+use super::work::{Work, fill};
 
 /// The last distance, as a part of the side of the voxel grid that keeps as many.
 const OF_VOXEL: f64 = 0.97;
-/// Rungs above the last one, each √2 as wide as the one below it.
-const RUNGS: u32 = 2;
-/// By how much of what is kept a rung grows by its rounds, and in how many.
+/// By how much of what is kept a rung grows by its rounds.
 const GROWTH: f64 = 2.0 / 3.0;
-const ROUNDS: u32 = 2;
-/// Rounds of the last rung.
-const LAST_ROUNDS: u32 = 8;
-/// Positions that a filling looks at for each cube of its distance that is occupied, and a round
-/// for each kept point; all where there are fewer.
+/// Kept points from which on a rung has rounds.
+const FEWEST: u64 = 200;
+/// Positions that a filling looks at for each cube of its distance that is occupied; all where there
+/// are fewer.
 const FILLED_FROM: f64 = 64.0;
+/// Positions that a round of the last rung looks at for each kept point, and of others, which only
+/// have to find about where points are missing.
 const PROBED: f64 = 32.0;
-/// The same on rungs above the last one, which only have to find about where points are missing.
 const PROBED_ABOVE: f64 = 12.0;
 /// An offer stands aside for a better one within this share of its distance to a kept point.
-const APART: f64 = 0.5;
+pub(super) const APART: f64 = 0.5;
 
-/// What a round does.
+/// The rounds of a ladder.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Work {
-    Fill(Filling),
-    Refine(Refining),
+pub(super) struct Rounds {
+    /// Rungs above the last one.
+    above: u32,
+    /// Rounds of each of these, and of the last one.
+    each: u32,
+    last: u32,
+}
+
+impl Rounds {
+    fn of(effort: Effort) -> Rounds {
+        match effort {
+            Effort::Low => Rounds { above: 0, each: 0, last: 3 },
+            Effort::Normal => Rounds { above: 2, each: 2, last: 8 },
+            Effort::High => Rounds { above: 4, each: 3, last: 16 },
+        }
+    }
 }
 
 /// Where the rounds stand.
@@ -38,8 +57,11 @@ pub(super) struct Ladder {
     /// How many positions are to stay.
     pub want: u64,
     seed: u64,
+    rounds: Rounds,
     /// The distances that are filled to, the last one last.
-    pub rungs: Vec<i64>,
+    rungs: Vec<i64>,
+    /// True if what is kept before the last round does not depend on how many are wanted.
+    ranked: bool,
     at: Next,
     /// The part of all positions that the rounds of the rung look at.
     probed: f64,
@@ -53,17 +75,42 @@ enum Next {
     /// Fills what the sample did not cover.
     Mop,
     Refine { rung: usize, round: u32 },
-    Done,
 }
 
 impl Ladder {
-    /// The rounds that keep `want` of the positions counted by `levels`.
-    pub fn new(want: u64, levels: &Levels, bounds: &Bounds, seed: u64) -> Ladder {
-        let want = want.min(levels.positions());
-        let last = (OF_VOXEL * voxel_side(levels, bounds, want)).round().clamp(1.0, LONGEST);
-        let rungs = (0..=RUNGS).rev().map(|n| (last * 2f64.powf(f64::from(n) / 2.0)).round());
-        let rungs = rungs.map(|r| r.min(LONGEST) as i64).collect();
-        Ladder { want, seed, rungs, at: Next::Fill { rung: 0 }, probed: 1.0, work: None }
+    /// The rounds that keep `want` of the positions, none of which is then farther from a kept one
+    /// than the last distance, or than `spacing` steps.
+    pub fn new(
+        want: u64,
+        so_far: &SoFar<'_>,
+        (effort, seed): (Effort, u64),
+        spacing: Option<i64>,
+    ) -> Ladder {
+        let rounds = Rounds::of(effort);
+        let last = steps(OF_VOXEL * voxel_side(so_far.levels, &so_far.bounds, want));
+        let last = spacing.map_or(last, |spacing| last.min(spacing));
+        let rung = |n: u32| (last as f64 * 2f64.powf(f64::from(n) / 2.0)).round().min(LONGEST);
+        let rungs = (0..=rounds.above).rev().map(|n| rung(n) as i64).collect();
+        Ladder {
+            want,
+            seed,
+            rounds,
+            rungs,
+            ranked: false,
+            at: Next::Fill { rung: 0 },
+            probed: 1.0,
+            work: None,
+        }
+    }
+
+    /// Rounds of which any number of points can be cut off.
+    pub fn ranked(want: u64, so_far: &SoFar<'_>, (effort, seed): (Effort, u64)) -> Ladder {
+        let top = 2 * (extent(&so_far.bounds) / 4).max(1).ilog2();
+        let rungs = (0..=top).rev().map(|n| steps(2f64.powf(f64::from(n) / 2.0)));
+        let ladder = Ladder::new(want, so_far, (effort, seed), None);
+        let each = ladder.rounds.each.max(1) + 1;
+        let rounds = Rounds { each, last: each, ..ladder.rounds };
+        Ladder { rungs: rungs.collect(), ranked: true, rounds, ..ladder }
     }
 
     /// What the round at hand does.
@@ -71,15 +118,21 @@ impl Ladder {
         self.work
     }
 
-    /// The distance that no removed position is from a kept one.
-    pub fn last(&self) -> i64 {
-        self.rungs.last().copied().unwrap_or(1)
+    /// The distance that no removed position is from a kept one, in steps: that which was filled to
+    /// last, or before where the last filling was cut short.
+    pub fn radius(&self) -> i64 {
+        let rung = match self.at {
+            Next::Refine { rung, .. } => rung,
+            Next::Fill { rung } => rung.saturating_sub(1),
+            Next::Mop => self.rungs.len() - 1,
+        };
+        self.rungs[if self.ranked { rung.saturating_sub(1) } else { rung }]
     }
 
     /// What comes next.
     pub fn next(&mut self, so_far: &SoFar<'_>) -> NextRound {
         if so_far.kept > self.want {
-            return NextRound::Shorten { to: self.want, seed: self.seed };
+            return NextRound::Shorten { to: self.want, seed: SHORTENED_BY };
         }
         if so_far.kept == self.want {
             return NextRound::Done;
@@ -92,63 +145,73 @@ impl Ladder {
                     (true, true) => Next::Mop,
                     _ => Next::Refine { rung, round: 0 },
                 };
-                let looks = Looks::Sample { most: most_of(share), seed: self.seed };
-                self.fill(rung, looks)
+                self.fill(rung, Looks::sample(share, self.seed))
             }
             Next::Mop => {
                 self.at = Next::Refine { rung: last, round: 0 };
-                let most = most_of(self.filled_from(last, so_far));
-                self.fill(last, Looks::Uncovered { apart: self.last(), most })
+                let share = self.filled_from(last, so_far);
+                self.fill(last, Looks::uncovered(self.rungs[last], share))
             }
-            Next::Refine { rung, round } => {
-                let missing = self.want - so_far.kept;
-                if round == 0 {
-                    let grown = (so_far.kept as f64 * (1.0 + GROWTH)).min(self.want as f64);
-                    let (of_each, kept) = match rung == last {
-                        true => (PROBED, self.want as f64),
-                        false => (PROBED_ABOVE, grown),
-                    };
-                    let positions = so_far.levels.positions().max(1) as f64;
-                    self.probed = (of_each * kept / positions).min(1.0);
-                }
-                let (rounds, want) = match rung == last {
-                    true => (LAST_ROUNDS, missing / u64::from(LAST_ROUNDS.saturating_sub(round).max(1))),
-                    false => (ROUNDS, (so_far.kept as f64 * grown(round)) as u64),
-                };
-                let is_last = round + 1 >= rounds;
-                self.at = match (is_last, rung == last) {
-                    (true, false) => Next::Fill { rung: rung + 1 },
-                    // Cells that are few offer few: one more round, as long as there are any.
-                    (true, true) if round >= rounds && so_far.added == 0 => Next::Done,
-                    _ => Next::Refine { rung, round: round + 1 },
-                };
-                if self.at == Next::Done {
-                    return NextRound::Done;
-                }
-                let apart = if is_last && rung == last { 0.0 } else { APART };
-                self.refine(rung, want.clamp(1, missing), apart)
+            Next::Refine { rung, round: 0 } if rung < last && so_far.kept < FEWEST => {
+                self.at = Next::Fill { rung: rung + 1 };
+                self.next(so_far)
             }
-            Next::Done => NextRound::Done,
+            Next::Refine { rung, round } => self.refine(rung, round, so_far),
         }
     }
 
     fn fill(&mut self, rung: usize, looks: Looks) -> NextRound {
         let filling = Filling { apart: self.rungs[rung], seed: self.seed };
         self.work = Some(Work::Fill(filling));
-        let (reach, kept_reach) = (filling.reach(), filling.kept_reach());
-        NextRound::Round(Round { looks, reach, kept_reach, choice: Choice::InTile })
+        fill(filling, looks)
     }
 
-    fn refine(&mut self, rung: usize, want: u64, apart: f64) -> NextRound {
+    fn refine(&mut self, rung: usize, round: u32, so_far: &SoFar<'_>) -> NextRound {
+        let is_last_rung = rung == self.rungs.len() - 1 && !self.ranked;
+        let missing = self.want - so_far.kept;
+        if round == 0 {
+            let grown = so_far.kept as f64 * (1.0 + GROWTH);
+            let of_rung = match is_last_rung {
+                true => PROBED * self.want as f64,
+                false => PROBED_ABOVE * grown,
+            };
+            self.probed = (of_rung / so_far.levels.positions().max(1) as f64).min(1.0);
+        }
+        let (rounds, want) = match is_last_rung {
+            true => {
+                let left = self.rounds.last.saturating_sub(round).max(1);
+                (self.rounds.last, missing / u64::from(left))
+            }
+            false => (self.rounds.each, (so_far.kept as f64 * self.grown(round)) as u64),
+        };
+        let is_last = round + 1 >= rounds;
+        let is_bottom = rung == self.rungs.len() - 1;
+        if is_bottom && round >= rounds && so_far.added == 0 && self.probed >= 1.0 {
+            return NextRound::Done;
+        }
+        if is_bottom && round >= rounds {
+            // Cells that are few offer few: more rounds, as long as there are any.
+            self.probed = 1.0;
+        }
+        self.at = match is_last && !is_bottom {
+            true => Next::Fill { rung: rung + 1 },
+            false => Next::Refine { rung, round: round + 1 },
+        };
+        let apart = if is_last && is_last_rung { 0.0 } else { APART };
         let refining = Refining { radius: self.rungs[rung], apart };
         self.work = Some(Work::Refine(refining));
-        let most = most_of(self.probed);
+        let want = if self.ranked { want.max(1) } else { want.clamp(1, missing) };
         NextRound::Round(Round {
-            looks: Looks::Sample { most, seed: self.seed },
+            looks: Looks::sample(self.probed, self.seed),
             reach: refining.reach(),
             kept_reach: refining.kept_reach(),
             choice: Choice::Best { want, reach: refining.offer_reach() },
         })
+    }
+
+    /// The part of what is kept by which round number `round` of a rung grows it.
+    fn grown(&self, round: u32) -> f64 {
+        GROWTH / (f64::from(self.rounds.each) + f64::from(round) * GROWTH)
     }
 
     /// The part of all positions that a rung fills from.
@@ -158,42 +221,6 @@ impl Ladder {
     }
 }
 
-/// No distance is larger, in steps.
-const LONGEST: f64 = (1i64 << 58) as f64;
-
-/// The part of what is kept by which round number `round` of a rung grows it.
-fn grown(round: u32) -> f64 {
-    GROWTH / (f64::from(ROUNDS) + f64::from(round) * GROWTH)
-}
-
-/// The largest hash of a sample of that share.
-fn most_of(share: f64) -> u64 {
-    if share >= 1.0 { u64::MAX } else { (share * 2f64.powi(64)) as u64 }
-}
-
-/// The side in steps of the voxel grid that keeps `count` positions: between the sides that are
-/// powers of two, of which the scan knows, numbers are straight lines over sides in logarithms.
-fn voxel_side(levels: &Levels, bounds: &Bounds, count: u64) -> f64 {
-    let longest = bounds.extent().into_iter().max().unwrap_or(0).max(1);
-    let top = longest.ilog2() + 1;
-    let (mut level, mut above) = (top, None);
-    while level > 0 && levels.occupied(level) < count {
-        above = Some(levels.occupied(level));
-        level -= 1;
-    }
-    let (side, here) = (2f64.powi(level as i32), levels.occupied(level) as f64);
-    match above.map(|above| above as f64) {
-        Some(above) if here > above => {
-            side * 2f64.powf((here / count as f64).ln() / (here / above).ln())
-        }
-        _ => side,
-    }
-}
-
-/// Occupied cubes of a side in steps, by the same lines.
-fn occupied(levels: &Levels, side: f64) -> f64 {
-    let level = side.max(1.0).log2();
-    let (below, part) = (level.floor() as u32, level.fract());
-    let [more, fewer] = [below, below + 1].map(|level| levels.occupied(level).max(1) as f64);
-    more * (fewer / more).powf(part)
-}
+/// By which hash some are left of what a round kept: whoever cuts a number off what is written can
+/// do it, too.
+pub(super) const SHORTENED_BY: u64 = 0;

@@ -9,7 +9,6 @@
 
 use std::collections::HashSet;
 
-use crate::Result;
 use crate::geom::hash::PlaceHashes;
 use crate::geom::nearest::NearestAmong;
 use crate::geom::planes::{NEAREST, PlaneErrors};
@@ -79,7 +78,7 @@ impl Refining {
     }
 
     /// Offers the worst position of each cell.
-    pub fn refine(self, tile: &RoundTile<'_>, found: &mut Found) -> Result<()> {
+    pub fn refine(self, tile: &RoundTile<'_>, found: &mut Found) {
         let unchanged = Unchanged::of(tile);
         let touched: Vec<Position>;
         let positions = match &unchanged {
@@ -110,7 +109,6 @@ impl Refining {
             offer.apart = self.apart * squared(of, offer.at).sqrt();
             found.offers.push(offer);
         }
-        Ok(())
     }
 
     /// What a cell offers.

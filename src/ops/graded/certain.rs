@@ -1,0 +1,108 @@
+//! Rounds towards a tolerance: positions are filled to a distance; then points are added to the
+//! surface where it is too far off, until that does not pay any more.
+//!
+//! What is still too far off then is kept, too, but not made a part of the surface, whose planes it
+//! would only break: an exception. So every removed position is within the tolerance of the surface,
+//! whatever the scan is.
+
+use crate::stage::{Choice, Looks, NextRound, Round, SoFar};
+
+use super::correct::Correcting;
+use super::fill::Filling;
+use super::ladder::APART;
+use super::refine::Refining;
+use super::sides::occupied;
+use super::work::{Work, fill};
+
+/// Rounds at most.
+const MOST_ROUNDS: u32 = 24;
+/// Rounds before it is asked whether they pay.
+const ALWAYS: u32 = 3;
+/// As for a ladder.
+const FILLED_FROM: f64 = 64.0;
+
+/// Where the rounds stand.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Certain {
+    /// Lattice steps.
+    pub tolerance: f64,
+    pub radius: i64,
+    seed: u64,
+    at: Next,
+    /// What would be kept in all before the last round, exceptions included.
+    total: Option<u64>,
+    work: Option<Work>,
+    /// Positions that would be exceptions, as far as is known.
+    pub exceptions: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Next {
+    Fill,
+    Mop,
+    Correct { round: u32 },
+    Done,
+}
+
+impl Certain {
+    /// Rounds that leave no position farther than `radius` steps from a kept one, and none farther
+    /// than `tolerance` from the surface.
+    pub fn new(tolerance: f64, radius: i64, seed: u64) -> Certain {
+        let (at, total, work) = (Next::Fill, None, None);
+        Certain { tolerance, radius, seed, at, total, work, exceptions: 0 }
+    }
+
+    /// What the round at hand does.
+    pub fn work(&self) -> Option<Work> {
+        self.work
+    }
+
+    /// What comes next.
+    pub fn next(&mut self, so_far: &SoFar<'_>) -> NextRound {
+        let cubes = occupied(so_far.levels, self.radius as f64);
+        let share = (FILLED_FROM * cubes / so_far.levels.positions().max(1) as f64).min(1.0);
+        let filling = Filling { apart: self.radius, seed: self.seed };
+        match self.at {
+            Next::Fill => {
+                self.at = if share < 1.0 { Next::Mop } else { Next::Correct { round: 0 } };
+                self.work = Some(Work::Fill(filling));
+                fill(filling, Looks::sample(share, self.seed))
+            }
+            Next::Mop => {
+                self.at = Next::Correct { round: 0 };
+                fill(filling, Looks::uncovered(self.radius, share))
+            }
+            Next::Correct { round } => self.correct(round, so_far),
+            Next::Done => NextRound::Done,
+        }
+    }
+
+    fn correct(&mut self, round: u32, so_far: &SoFar<'_>) -> NextRound {
+        if let Some(before) = round.checked_sub(1) {
+            let total = so_far.kept - so_far.added + so_far.counted;
+            if so_far.counted == 0 {
+                self.exceptions = 0;
+                return NextRound::Done;
+            }
+            if before > ALWAYS && self.total.is_some_and(|least| total > least) {
+                self.at = Next::Done;
+                return NextRound::Undo { rounds: 2 };
+            }
+            (self.total, self.exceptions) = (Some(total), so_far.counted);
+            if round >= MOST_ROUNDS {
+                self.at = Next::Done;
+                return NextRound::Undo { rounds: 1 };
+            }
+        }
+        self.at = Next::Correct { round: round + 1 };
+        let refining = Refining { radius: self.radius, apart: APART };
+        let Certain { radius, tolerance, .. } = *self;
+        self.work = Some(Work::Correct(Correcting { radius, tolerance, apart: APART }));
+        NextRound::Round(Round {
+            looks: Looks::sample(1.0, self.seed),
+            reach: refining.reach(),
+            kept_reach: refining.kept_reach(),
+            choice: Choice::Best { want: u64::MAX, reach: refining.offer_reach() },
+        })
+    }
+}

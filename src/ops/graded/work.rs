@@ -1,0 +1,20 @@
+//! What a round does.
+
+use super::correct::Correcting;
+use super::fill::Filling;
+use super::refine::Refining;
+use crate::stage::{Choice, Looks, NextRound, Round};
+
+/// What a round does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Work {
+    Fill(Filling),
+    Refine(Refining),
+    Correct(Correcting),
+}
+
+/// A round that fills.
+pub(super) fn fill(filling: Filling, looks: Looks) -> NextRound {
+    let (reach, kept_reach) = (filling.reach(), filling.kept_reach());
+    NextRound::Round(Round { looks, reach, kept_reach, choice: Choice::InTile })
+}
