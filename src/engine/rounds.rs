@@ -42,17 +42,18 @@ pub(super) fn choose(
     let (levels, records) = candidates(job, op, field, sieve, capacity)?;
     let mut kept = KeptPoints::new(&job.area);
     let mut last: VecDeque<KeptPoints> = VecDeque::new();
-    let (mut number, mut added, mut counted) = (0, 0, 0);
+    let (mut number, mut added, mut counted, mut least) = (0, 0, 0, 0.0);
     let mut before = None;
     loop {
         let bounds = field.tiles.bounds();
         let kept_now = kept.count();
         let so_far =
-            SoFar { levels: &levels, records, bounds, kept: kept_now, added, counted };
+            SoFar { levels: &levels, records, bounds, kept: kept_now, added, counted, least };
         let scan = RoundScan { op, number, field, sieve, capacity };
         match stage(job, op)?.next(&so_far)? {
             NextRound::Round(round) => {
                 let (new, found, left) = scan.round(job, &round, &kept, before.take())?;
+                least = left.as_ref().map_or(0.0, |left| left.least);
                 before = left;
                 (added, counted) = (new.count() - kept.count(), found);
                 last.push_back(std::mem::replace(&mut kept, new));
@@ -100,6 +101,8 @@ fn stage<'j>(job: &'j mut Job<'_>, op: usize) -> Result<&'j mut dyn crate::stage
 struct OfferedBefore {
     round: Round,
     keys: Vec<TileKey>,
+    /// The lowest score of the best of them.
+    least: f64,
     offers: Offers,
 }
 
@@ -149,9 +152,10 @@ impl RoundScan<'_> {
                 let (offers, counted) = self.offers(job, round, kept, &cut, last)?;
                 drop(before);
                 let chosen = offers.best(want)?;
+                let least = chosen.least();
                 let new = accept(job, &cut.keys, &chosen, reach, kept, self.number)?;
                 let left =
-                    OfferedBefore { round: *round, keys: cut.keys, offers: chosen.all() };
+                    OfferedBefore { round: *round, keys: cut.keys, least, offers: chosen.all() };
                 Ok((new, counted, Some(left)))
             }
         }
@@ -233,11 +237,7 @@ struct Merged {
 impl Merged {
     /// Those that were there, in Morton order with the round that kept each, and those `chosen` in
     /// round `number`, in Morton order.
-    fn of(
-        there: &KeptReader,
-        chosen: impl Iterator<Item = Position>,
-        number: u32,
-    ) -> Merged {
+    fn of(there: &KeptReader, chosen: impl Iterator<Item = Position>, number: u32) -> Merged {
         let mut merged = Merged::default();
         let mut old = there.positions.iter().zip(&there.rounds).peekable();
         for p in chosen {

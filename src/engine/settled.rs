@@ -46,7 +46,9 @@ pub(crate) fn conclude(
 ) -> Result<()> {
     let warning = match &mut job.ops[op].op {
         Op::Scan(op) => op.conclude_from(&GatheredSummaries { gathered, records })?,
-        Op::Tile(_) | Op::Round(_) => return Err(Error::internal("a stage gathered that has one phase")),
+        Op::Tile(_) | Op::Round(_) => {
+            return Err(Error::internal("a stage gathered that has one phase"));
+        }
     };
     warning.into_iter().for_each(|warning| job.warn(warning));
     Ok(())

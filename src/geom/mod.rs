@@ -5,6 +5,7 @@ pub mod angle;
 mod decimal;
 pub mod hash;
 pub mod lattice;
+pub mod morton;
 pub mod nearest;
 pub mod plane;
 pub mod planes;

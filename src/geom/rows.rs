@@ -42,9 +42,36 @@ pub fn sort<T: Ordered>(rows: &mut [T; 16]) {
     order!(rows: 6 7, 8 9);
 }
 
+/// Puts the 16 smallest of two sorted lists into `best`, sorted: the smallest of one and the largest
+/// of the other, and so on, are such a list up and down, which Batcher's merge brings in order
+/// (Knuth, 5.3.4).
+#[inline(always)]
+pub fn merge<T: Ordered>(best: &mut [T; 16], sorted: &[T; 16]) {
+    let mut rows = *best;
+    for i in 0..16 {
+        rows[i] = best[i].ordered(sorted[15 - i]).0;
+    }
+    order!(rows: 0 8, 1 9, 2 10, 3 11, 4 12, 5 13, 6 14, 7 15);
+    order!(rows: 0 4, 1 5, 2 6, 3 7, 8 12, 9 13, 10 14, 11 15);
+    order!(rows: 0 2, 1 3, 4 6, 5 7, 8 10, 9 11, 12 14, 13 15);
+    order!(rows: 0 1, 2 3, 4 5, 6 7, 8 9, 10 11, 12 13, 14 15);
+    *best = rows;
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// As for sorting, lists of zeros and ones are enough.
+    #[test]
+    fn the_smallest_of_two_lists_are_merged() {
+        let list = |zeros: usize| std::array::from_fn(|i| [f64::from(i >= zeros); 2]);
+        for (one, other) in (0..=16).flat_map(|one| (0..=16).map(move |other| (one, other))) {
+            let mut best: [[f64; 2]; 16] = list(one);
+            merge(&mut best, &list(other));
+            assert_eq!(best, list((one + other).min(16)), "{one} {other}");
+        }
+    }
 
     /// A network that sorts all lists of zeros and ones sorts all lists.
     #[test]

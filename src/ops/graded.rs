@@ -150,8 +150,8 @@ impl Graded {
             (Some(tolerance), _) => {
                 let spacing = self.max_spacing.map(|length| self.in_steps(length));
                 let sparse = (positions / SPARSE).max(FEWEST).min(positions);
-                let spacing = spacing
-                    .unwrap_or_else(|| voxel_side(so_far.levels, &so_far.bounds, sparse));
+                let spacing =
+                    spacing.unwrap_or_else(|| voxel_side(so_far.levels, &so_far.bounds, sparse));
                 let tolerance = self.in_steps(tolerance);
                 Course::Tolerance(Certain::new(tolerance, steps(spacing.floor()), self.seed))
             }

@@ -47,6 +47,8 @@ pub struct SoFar<'a> {
     pub added: u64,
     /// What the tiles of the last round [counted](Found::counted).
     pub counted: u64,
+    /// The lowest score of the offers that had the first say in it; 0 if it had none.
+    pub least: f64,
 }
 
 /// What comes next.
@@ -174,8 +176,17 @@ pub struct Offer {
     pub at: Position,
     /// The kept point.
     pub of: Position,
-    /// A point that is kept farther from that one than this changes nothing of the offer.
+    /// A point that is kept farther from that one than this changes nothing of the offer. Where it
+    /// is infinite, something changed already: what is offered is only as good as it was, and is not
+    /// taken.
     pub reach: f64,
+}
+
+impl Offer {
+    /// True if it may be taken.
+    pub(crate) fn is_open(&self) -> bool {
+        self.score > 0.0 && self.reach.is_finite()
+    }
 }
 
 impl Found {

@@ -9,9 +9,10 @@ use std::cmp::Ordering;
 use super::block::{BLOCK, Block};
 use super::emit::Emitter;
 use super::intake::{SortedRun, TileStore};
-use super::key::{first_of_prefix, morton_cmp, morton_prefix};
+use super::key::{first_of_prefix, morton_prefix};
 use crate::Result;
 use crate::budget::Bytes;
+use crate::geom::morton::morton_cmp;
 use crate::point::Position;
 
 /// A range of Morton order.

@@ -5,35 +5,10 @@
 //! closer, but their nodes have to be computed along the way from the root, where here a comparison
 //! of two positions takes a few operations on their bits.
 
-use std::cmp::Ordering;
-
 use crate::point::{Bounds, Position};
 
 /// Bit 63 set: i64 order becomes u64 order, and bit patterns become octree paths.
 const SIGN: u64 = 1 << 63;
-
-/// Morton order: interleaved bits, z above y above x on every level, anchored at the corner of the
-/// lattice (the most negative i64).
-pub fn morton_cmp(a: &Position, b: &Position) -> Ordering {
-    let differ = |axis: usize| (a[axis] ^ b[axis]) as u64;
-    // The axis whose difference has the highest bit decides; z wins equal bits, then y. Selections
-    // instead of branches: which axis it is looks random.
-    let (mut highest, mut deciding) = (differ(2), (a[2], b[2]));
-    for axis in [1, 0] {
-        let other = differ(axis);
-        let higher = (highest < other) & (highest < (highest ^ other));
-        highest = select(higher, other, highest);
-        deciding.0 = select(higher, a[axis], deciding.0);
-        deciding.1 = select(higher, b[axis], deciding.1);
-    }
-    // Flipping the sign bit of both keeps i64 order, so plain comparison is right on every axis.
-    deciding.0.cmp(&deciding.1)
-}
-
-/// One of two, without a branch.
-fn select<T>(condition: bool, yes: T, no: T) -> T {
-    std::hint::select_unpredictable(condition, yes, no)
-}
 
 /// The highest bit in which two positions differ on any axis; None if they are equal.
 pub fn split_level(a: Position, b: Position) -> Option<u32> {
@@ -122,7 +97,10 @@ impl TileKey {
 
 #[cfg(test)]
 mod tests {
+    use std::cmp::Ordering;
+
     use super::*;
+    use crate::geom::morton::morton_cmp;
 
     fn interleaved(p: Position) -> [u8; 192] {
         let mut bits = [0; 192];

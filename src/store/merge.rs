@@ -15,7 +15,7 @@ use std::collections::binary_heap::PeekMut;
 use super::cursor::{Range, RunCursor};
 use super::emit::{Emitter, MergeOutput, Merged};
 use super::intake::{SortedRun, TileStore};
-use super::key::{morton_cmp, split_level};
+use super::key::split_level;
 use super::pieces::Pieces;
 use super::record::ref_bytes;
 use super::sealed::{SealedTiles, Sequence};
@@ -23,6 +23,7 @@ use super::spill::Spill;
 use super::tournament::Tournament;
 use crate::Result;
 use crate::budget::Bytes;
+use crate::geom::morton::morton_cmp;
 use crate::host::{Threads, lock};
 use crate::point::{Bounds, Position};
 

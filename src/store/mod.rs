@@ -27,12 +27,13 @@ mod sealed;
 pub(crate) mod spill;
 mod tournament;
 
+pub use crate::geom::morton::morton_cmp;
 pub use block::{BLOCK, Block};
 pub use cutting::CutError;
 pub use fetch::Fetch;
 pub use intake::{Intake, TileStore};
 pub use kept::{KeptPoints, KeptReader};
-pub use key::{TileKey, morton_cmp};
+pub use key::TileKey;
 pub use levels::Levels;
 pub use merge::{merge_bytes, seal};
 pub use pieces::{PIECE, Pieces};

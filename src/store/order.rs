@@ -9,7 +9,8 @@
 use std::cmp::Ordering;
 
 use super::TileKey;
-use super::key::{morton_cmp, morton_path};
+use super::key::morton_path;
+use crate::geom::morton::morton_cmp;
 use crate::point::{Bounds, Position};
 
 /// Groups up to this size are sorted by comparison.

@@ -71,7 +71,10 @@ impl Offers {
         mut visit: impl FnMut(Offer),
     ) -> Result<()> {
         self.spill.load(&self.tiles[tile], bytes)?;
-        bytes.chunks_exact(size_of::<Offer>()).map(bytemuck::pod_read_unaligned).for_each(&mut visit);
+        bytes
+            .chunks_exact(size_of::<Offer>())
+            .map(bytemuck::pod_read_unaligned)
+            .for_each(&mut visit);
         Ok(())
     }
 
@@ -82,7 +85,7 @@ impl Offers {
             let mut tiles = 0..self.tiles.len();
             tiles.try_for_each(|n| {
                 self.of_tile(n, &mut bytes, |offer| {
-                    if offer.score > 0.0 {
+                    if offer.is_open() {
                         visit(offer.score.to_bits());
                     }
                 })
@@ -91,7 +94,7 @@ impl Offers {
         let mut ties = Vec::with_capacity(self.tiles.len());
         for tile in 0..self.tiles.len() {
             let mut equal = 0;
-            let is_least = |offer: &Offer| offer.score.to_bits() == least;
+            let is_least = |offer: &Offer| offer.is_open() && offer.score.to_bits() == least;
             self.of_tile(tile, &mut bytes, |offer| equal += u64::from(is_least(&offer)))?;
             ties.push(equal.min(left));
             left -= equal.min(left);
@@ -101,6 +104,11 @@ impl Offers {
 }
 
 impl BestOffers {
+    /// The lowest score among them.
+    pub fn least(&self) -> f64 {
+        f64::from_bits(self.least)
+    }
+
     /// All offers, those that are not the best included.
     pub fn all(self) -> Offers {
         self.offers
@@ -110,10 +118,13 @@ impl BestOffers {
     fn of_tile(&self, tile: usize, bytes: &mut Vec<u8>, into: &mut Vec<Offer>) -> Result<()> {
         let mut ties = self.ties[tile];
         self.offers.of_tile(tile, bytes, |offer| {
+            if !offer.is_open() {
+                return;
+            }
             let bits = offer.score.to_bits();
             let is_tied = bits == self.least && ties > 0;
             ties -= u64::from(is_tied);
-            if offer.score > 0.0 && (bits > self.least || is_tied) {
+            if bits > self.least || is_tied {
                 into.push(offer);
             }
         })

@@ -1,12 +1,13 @@
 //! The k nearest points of one set for every point of another.
 //!
 //! The points that ask are cut into leaves as those that are asked are, so that 16 of them that are
-//! near to each other walk together, by the same kernels and the same proofs. They begin at the root
-//! of the other tree, as they have no leaf there.
+//! near to each other walk together, by the same kernels and the same proofs. They have no leaf in
+//! the other tree to begin at, so they begin where they would stand in its order.
 
 use super::tree::EXACT;
 use super::walk::{TreeWalk, Visitors};
 use super::{BoxTree, Nearest};
+use crate::geom::morton::morton_cmp;
 use crate::geom::simd::Simd;
 use crate::point::Position;
 
@@ -63,7 +64,7 @@ impl NearestAmong {
             return;
         }
         let is_all = k == positions.len();
-        nearest.batch.fit((k + 1).min(positions.len()));
+        nearest.batch.fit_together((k + 1).min(positions.len()));
         let mut farthest = f32::MAX;
         for run in 0..asking.runs() {
             for child in 0..asking.node(0, run).children as usize {
@@ -78,7 +79,10 @@ impl NearestAmong {
                 let kept = if exact { k } else { (k + 1).min(positions.len()) };
                 let Nearest { simd, tree, batch, work, .. } = &mut *nearest;
                 let walk = TreeWalk::new(*simd, tree, batch, work, visitors);
-                let error = walk.run_from_root(active, kept);
+                // Who is near in Morton order is mostly near.
+                let at = &queries[ranks[0] as usize];
+                let near = positions.partition_point(|p| morton_cmp(p, at).is_lt());
+                let error = walk.run_as_guests(tree.run_with(near as u32), active, kept);
                 farthest = batch.farthest;
                 for (lane, &rank) in ranks.iter().enumerate().filter(|(_, rank)| is_used(rank)) {
                     let at = queries[rank as usize];
@@ -87,6 +91,11 @@ impl NearestAmong {
                 }
             }
         }
+    }
+
+    /// What the last search did.
+    pub fn work(&self) -> super::Work {
+        self.nearest.work()
     }
 
     /// How many points of the last search floats could not prove.

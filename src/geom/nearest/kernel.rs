@@ -27,11 +27,13 @@ pub(super) struct Batch {
     pub kept: usize,
 }
 
-/// How the list of a point is stored: down the first column, then the second, and so on.
+/// How the list of a point is stored: down the first column, then the second, and so on; or lists
+/// of 16 side by side, a row of all after the other.
 #[derive(Debug, Clone, Copy)]
 struct Shape {
     rows: usize,
     columns: usize,
+    across: bool,
 }
 
 impl Shape {
@@ -39,8 +41,8 @@ impl Shape {
     fn of(most: usize) -> Shape {
         let rows = [1, 2, 3, 4, 5, 6, 8, 12, 18];
         match rows.into_iter().find(|rows| most <= rows * COLUMNS) {
-            Some(rows) => Shape { rows, columns: COLUMNS },
-            None => Shape { rows: most, columns: 1 },
+            Some(rows) => Shape { rows, columns: COLUMNS, across: false },
+            None => Shape { rows: most, columns: 1, across: false },
         }
     }
 
@@ -48,9 +50,18 @@ impl Shape {
         self.rows * self.columns
     }
 
+    /// Lists side by side.
+    const ACROSS: Shape = Shape { rows: LANES, columns: 1, across: true };
+
     /// Where the number `i` of a list is.
     fn place(self, i: usize) -> usize {
         i % self.rows * self.columns + i / self.rows
+    }
+
+    /// Where the number `i` of the list of `lane` is among all.
+    #[inline(always)]
+    fn index(self, lane: usize, i: usize) -> usize {
+        if self.across { i * LANES + lane } else { lane * self.width() + self.place(i) }
     }
 }
 
@@ -80,7 +91,17 @@ impl Batch {
 
     /// Makes room for `most` candidates a point.
     pub fn fit(&mut self, most: usize) {
-        self.shape = Shape::of(most);
+        self.make_room(Shape::of(most));
+    }
+
+    /// The same for points that meet whole leaves together, of which each finds most of its
+    /// candidates in the same: up to 16 candidates are then kept side by side.
+    pub fn fit_together(&mut self, most: usize) {
+        self.make_room(if most <= LANES { Shape::ACROSS } else { Shape::of(most) });
+    }
+
+    fn make_room(&mut self, shape: Shape) {
+        self.shape = shape;
         let numbers = self.shape.width() * LANES;
         self.best.clear();
         self.best.reserve_exact(numbers);
@@ -95,7 +116,12 @@ impl Batch {
     /// Fills `ranks` with those of a lane's first candidates, in ascending order of keys.
     #[inline(always)]
     pub fn ranks(&self, lane: usize, ranks: &mut [u32]) {
-        let Shape { rows, columns } = self.shape;
+        let Shape { rows, columns, across } = self.shape;
+        if across {
+            let keys = self.best[lane..].iter().step_by(LANES);
+            ranks.iter_mut().zip(keys).for_each(|(rank, key)| *rank = rank_of(*key));
+            return;
+        }
         let list = &self.best[lane * rows * columns..(lane + 1) * rows * columns];
         for (column, ranks) in ranks.chunks_mut(rows).enumerate() {
             for (row, rank) in ranks.iter_mut().enumerate() {
@@ -107,13 +133,13 @@ impl Batch {
     /// Number `i` of a lane's list.
     #[inline(always)]
     pub fn key(&self, lane: usize, i: usize) -> f64 {
-        self.best[lane * self.shape.width() + self.shape.place(i)]
+        self.best[self.shape.index(lane, i)]
     }
 
     /// Notes what the last kept candidate of a lane is.
     #[inline(always)]
-    fn bind(&mut self, lane: usize, last: usize) {
-        let last = self.best[lane * self.shape.width() + last];
+    fn bind(&mut self, lane: usize) {
+        let last = self.key(lane, self.kept - 1);
         self.bound[lane] = distance_of(last);
         self.bound_rank[lane] = rank_of(last);
     }
@@ -188,14 +214,17 @@ impl Kernel for Home<'_> {
 fn begin<L: Lanes>(lanes: L, batch: &mut Batch, rows: &mut [Row; LANES], wanted: u32) {
     lanes.sort(rows);
     let shape = batch.shape;
-    batch.best.fill(NONE);
-    for (i, row) in rows.iter().enumerate().take(shape.width()) {
-        let places = batch.best[shape.place(i)..].iter_mut().step_by(shape.width());
-        places.zip(row).for_each(|(place, key)| *place = *key);
+    if shape.across {
+        batch.best.copy_from_slice(rows.as_flattened());
+    } else {
+        batch.best.fill(NONE);
+        for (i, row) in rows.iter().enumerate().take(shape.width()) {
+            let places = batch.best[shape.place(i)..].iter_mut().step_by(shape.width());
+            places.zip(row).for_each(|(place, key)| *place = *key);
+        }
     }
-    let last = shape.place(batch.kept - 1);
     for lane in 0..LANES {
-        batch.bind(lane, last);
+        batch.bind(lane);
         if wanted >> lane & 1 == 0 {
             batch.bound[lane] = -1.0;
         }
@@ -255,13 +284,12 @@ impl Kernel for Visit<'_> {
             let child = lanes.first(&order, left);
             left &= !(1 << child);
             met += 1;
-            if meet(
-                lanes,
-                batch,
-                &leaves[child],
-                lanes_near(lanes, batch, queries, node, child),
-                &at,
-            ) {
+            let near = lanes_near(lanes, batch, queries, node, child);
+            let sunk = match batch.shape.across {
+                true => near != 0 && meet_together(lanes, batch, &leaves[child], queries),
+                false => meet(lanes, batch, &leaves[child], near, &at),
+            };
+            if sunk {
                 batch.farthest = lanes.largest(lanes.load(&batch.bound));
                 left &= lanes.at_most(boxes, lanes.splat(batch.farthest));
             }
@@ -309,7 +337,7 @@ fn meet<L: Lanes>(
     at: &[[f32; LANES]; 3],
 ) -> bool {
     let mut found = false;
-    let (width, last) = (batch.shape.width(), batch.shape.place(batch.kept - 1));
+    let width = batch.shape.width();
     let others = load(lanes, &leaf.at);
     while near != 0 {
         let lane = near.trailing_zeros() as usize & (LANES - 1);
@@ -319,11 +347,33 @@ fn meet<L: Lanes>(
         if hits != 0 {
             let list = &mut batch.best[lane * width..(lane + 1) * width];
             insert(lanes, list, &lanes.store(distances), &leaf.rank, hits);
-            batch.bind(lane, last);
+            batch.bind(lane);
             found = true;
         }
     }
     found
+}
+
+/// All points meet a leaf. True, as a bound may have sunk.
+#[inline(always)]
+fn meet_together<L: Lanes>(lanes: L, batch: &mut Batch, leaf: &Leaf, at: [L::F32; 3]) -> bool {
+    let mut rows = [[NONE; LANES]; LANES];
+    for (other, row) in rows.iter_mut().enumerate() {
+        let distances = lanes.store(squared(lanes, at, leaf.point(other)));
+        *row = keys(&distances, leaf.rank[other]);
+    }
+    let (best, _) = batch.best.as_chunks_mut::<LANES>();
+    let Some(best) = best.first_chunk_mut::<LANES>() else { return false };
+    lanes.merge(best, &mut rows);
+    let last = best[batch.kept - 1];
+    for lane in 0..LANES {
+        // Those that do not search stay so.
+        if batch.bound[lane] >= 0.0 {
+            batch.bound[lane] = distance_of(last[lane]);
+            batch.bound_rank[lane] = rank_of(last[lane]);
+        }
+    }
+    true
 }
 
 /// Three axes.

@@ -32,8 +32,8 @@ pub use among::NearestAmong;
 use exact::{ExactWalk, Neighbor};
 use kernel::{Batch, distance_of};
 use tree::{BoxNode, BoxTree, EXACT};
-use walk::{TreeWalk, Visitors};
 pub use walk::Work;
+use walk::{TreeWalk, Visitors};
 
 use crate::geom::simd::{LANES, Simd};
 use crate::point::{Position, distance2};
@@ -226,15 +226,8 @@ impl Nearest {
         self.found.sort_unstable();
         if !proven {
             self.work.redone += 1;
-            ExactWalk::new(
-                self.simd,
-                &self.tree,
-                positions,
-                &mut self.work,
-                own,
-                &mut self.found,
-            )
-            .run();
+            ExactWalk::new(self.simd, &self.tree, positions, &mut self.work, own, &mut self.found)
+                .run();
         }
         self.neighbors.clear();
         self.neighbors.extend(self.found.iter().map(|&(_, rank)| rank));

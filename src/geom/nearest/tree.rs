@@ -170,6 +170,12 @@ impl BoxTree {
         &self.nodes[self.starts[level] + index]
     }
 
+    /// The node above the leaf with the point of this rank, or the last one.
+    pub fn run_with(&self, rank: u32) -> usize {
+        let begins = |run: &BoxNode| run.first.iter().fold(u32::MAX, |least, &r| least.min(r));
+        self.nodes[..self.runs()].partition_point(|run| begins(run) <= rank).saturating_sub(1)
+    }
+
     /// The nodes above the leaves.
     pub fn runs(&self) -> usize {
         self.starts[1]

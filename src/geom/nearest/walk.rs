@@ -58,8 +58,6 @@ pub(super) struct TreeWalk<'a> {
     visitors: Visitors<'a>,
     /// The level-0 node of the leaf in the tree that it walks through, if it is of that.
     home: Option<usize>,
-    /// The leaf that the points met first: its level-0 node, and which child of it it is.
-    met: Option<(usize, usize)>,
     /// Exact box of the leaf's points.
     lo: Position,
     hi: Position,
@@ -87,56 +85,42 @@ impl<'a> TreeWalk<'a> {
             let stored = node.origin[axis].saturating_add(hi[axis] as i64);
             stored.saturating_add(node.error)
         });
-        TreeWalk { simd, tree, batch, work, visitors, home: None, met: None, lo, hi, error: 0.0 }
+        TreeWalk { simd, tree, batch, work, visitors, home: None, lo, hi, error: 0.0 }
     }
 
     /// Fills the batch with the `kept` nearest by float distance of the lanes in `wanted`, and
     /// returns the largest error of a coordinate difference, in lattice steps: see [`super`]. The
-    /// points are not of the tree.
-    pub fn run_from_root(mut self, wanted: u32, kept: usize) -> f64 {
-        let (run, child) = self.nearest_leaf();
-        self.met = Some((run, child));
-        self.note_error(run);
-        let first = self.tree.node(0, run).first_child as usize;
+    /// points are of another tree; those of the level-0 node `near` are likely to be near to them.
+    pub fn run_as_guests(mut self, near: usize, wanted: u32, kept: usize) -> f64 {
+        let node = self.tree.node(0, near);
+        let (lo, hi) = self.in_frame(node);
+        let (distances, _) = self.simd.run(Boxes { node, lo, hi, bound: 0.0 });
+        let child = nearest(&distances, lanes(node.children, None), f32::INFINITY).unwrap_or(0);
+        self.note_error(near);
         let guests = Guests {
             points: &self.visitors.leaf.at,
-            shift: self.shift(run),
-            leaf: &self.tree.leaves[first + child],
+            shift: self.shift(near),
+            leaf: &self.tree.leaves[node.first_child as usize + child],
             batch: self.batch,
             wanted,
             kept,
         };
         self.simd.run(guests);
-        match self.tree.levels {
-            1 => self.visit_run(0, None),
-            levels => self.descend(levels - 1, 0, None),
-        }
-        self.error
-    }
-
-    /// A leaf that is likely to be near: of every node the nearest child, from the root on.
-    fn nearest_leaf(&self) -> (usize, usize) {
-        let (mut level, mut index) = (self.tree.levels - 1, 0);
-        loop {
-            let node = self.tree.node(level, index);
-            let lo = std::array::from_fn(|i| below(self.lo[i].saturating_sub(node.origin[i])));
-            let hi = std::array::from_fn(|i| above(self.hi[i].saturating_sub(node.origin[i])));
-            let (distances, _) = self.simd.run(Boxes { node, lo, hi, bound: 0.0 });
-            let child = nearest(&distances, lanes(node.children, None), f32::INFINITY);
-            let child = child.unwrap_or(0);
-            if level == 0 {
-                return (index, child);
-            }
-            (level, index) = (level - 1, node.first_child as usize + child);
-        }
+        self.climb(near, child)
     }
 
     /// The same of the points of the level-0 node `home` of the tree, among the others of it.
     pub fn run(mut self, home: usize, wanted: u32, kept: usize) -> f64 {
         self.home = Some(home);
         self.simd.run(Home { batch: self.batch, leaf: self.visitors.leaf, wanted, kept });
-        self.visit_run(home, Some(self.visitors.child));
-        let mut child = home;
+        let child = self.visitors.child;
+        self.climb(home, child)
+    }
+
+    /// From a leaf, which the points have met, upward, and from every ancestor down.
+    fn climb(mut self, run: usize, leaf: usize) -> f64 {
+        self.visit_run(run, Some(leaf));
+        let mut child = run;
         for level in 1..self.tree.levels {
             let parent = child / LANES;
             self.descend(level, parent, Some(child % LANES));
@@ -145,12 +129,19 @@ impl<'a> TreeWalk<'a> {
         self.error
     }
 
+    /// A box around the points in the frame of a node, rounded outward.
+    fn in_frame(&self, node: &BoxNode) -> ([f32; 3], [f32; 3]) {
+        (
+            std::array::from_fn(|i| below(self.lo[i].saturating_sub(node.origin[i]))),
+            std::array::from_fn(|i| above(self.hi[i].saturating_sub(node.origin[i]))),
+        )
+    }
+
     /// Visits the children of a node above level 0, nearest first, except `skip`.
     fn descend(&mut self, level: usize, index: usize, skip: Option<usize>) {
         self.work.nodes += 1;
         let node = self.tree.node(level, index);
-        let lo = std::array::from_fn(|i| below(self.lo[i].saturating_sub(node.origin[i])));
-        let hi = std::array::from_fn(|i| above(self.hi[i].saturating_sub(node.origin[i])));
+        let (lo, hi) = self.in_frame(node);
         let (distances, near) = self.simd.run(Boxes { node, lo, hi, bound: self.reach() });
         let mut left = near & lanes(node.children, skip);
         while let Some(child) = nearest(&distances, left, self.reach()) {
@@ -166,8 +157,6 @@ impl<'a> TreeWalk<'a> {
 
     /// Visits the leaves of a level-0 node, nearest first, except `skip`.
     fn visit_run(&mut self, index: usize, skip: Option<usize>) {
-        let met = self.met.filter(|(run, _)| *run == index);
-        let skip = skip.or(met.map(|(_, child)| child));
         self.work.nodes += 1;
         self.note_error(index);
         let node = self.tree.node(0, index);

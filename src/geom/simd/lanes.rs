@@ -48,6 +48,9 @@ pub trait Lanes: Copy {
     fn store_eight(self, v: Self::F64) -> [f64; EIGHT];
     /// Sorts lists side by side, row i being the i-th numbers of all: smallest first, none NaN.
     fn sort(self, rows: &mut [Row; LANES]);
+    /// Sorts lists side by side, as [`sort`](Lanes::sort) does, and puts the smallest of them and
+    /// of the sorted lists in `best` there, sorted.
+    fn merge(self, best: &mut [Row; LANES], rows: &mut [Row; LANES]);
     /// Merges numbers into an ascending list, of which the smallest stay: for each lane in `hits`
     /// the one with the bits of `high` above those of `low`. All are positive and finite. The list
     /// goes down the first column, then the second, and so on: the number before each is in the row
@@ -168,6 +171,19 @@ impl Lanes for Portable {
             let mut lists = rows.map(|row| [row[first], row[first + 1]]);
             rows::sort(&mut lists);
             for (row, list) in rows.iter_mut().zip(lists) {
+                [row[first], row[first + 1]] = list;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn merge(self, best: &mut [Row; LANES], rows: &mut [Row; LANES]) {
+        for first in (0..LANES).step_by(2) {
+            let mut lists = rows.map(|row| [row[first], row[first + 1]]);
+            rows::sort(&mut lists);
+            let mut kept = best.map(|row| [row[first], row[first + 1]]);
+            rows::merge(&mut kept, &lists);
+            for (row, list) in best.iter_mut().zip(kept) {
                 [row[first], row[first + 1]] = list;
             }
         }

@@ -95,7 +95,7 @@ impl Certain {
             }
         }
         self.at = Next::Correct { round: round + 1 };
-        let refining = Refining { radius: self.radius, apart: APART };
+        let refining = Refining { radius: self.radius, apart: APART, floor: 0.0 };
         let Certain { radius, tolerance, .. } = *self;
         self.work = Some(Work::Correct(Correcting { radius, tolerance, apart: APART }));
         NextRound::Round(Round {

@@ -60,9 +60,9 @@ impl Correcting {
                 apart: self.apart * cell.distance,
                 at: tile.positions[cell.at as usize],
                 of,
-                reach: f64::INFINITY,
+                reach: f64::MAX,
             },
-            false => Offer { score: 0.0, apart: 0.0, at: of, of, reach: f64::INFINITY },
+            false => Offer { score: 0.0, apart: 0.0, at: of, of, reach: f64::MAX },
         }));
     }
 }

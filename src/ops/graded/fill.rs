@@ -148,7 +148,8 @@ impl Filled {
             let Some(&other) = self.numbers.get(&other) else { continue };
             let shift = by.map(|cubes| (cubes * self.side) as f64);
             let kept = &self.cubes[other as usize].kept;
-            self.near.extend(kept.iter().map(|q| std::array::from_fn(|axis| q[axis] + shift[axis])));
+            self.near
+                .extend(kept.iter().map(|q| std::array::from_fn(|axis| q[axis] + shift[axis])));
         }
         let own = self.near.len();
         self.near.extend(&self.cubes[cube].kept);

@@ -51,6 +51,10 @@ impl Rounds {
     }
 }
 
+/// Cells below this part of the lowest score that was chosen in the round before do not come to be
+/// chosen in the next.
+const LOW: f64 = 0.25;
+
 /// Where the rounds stand.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Ladder {
@@ -71,10 +75,15 @@ pub(super) struct Ladder {
 /// What comes next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Next {
-    Fill { rung: usize },
+    Fill {
+        rung: usize,
+    },
     /// Fills what the sample did not cover.
     Mop,
-    Refine { rung: usize, round: u32 },
+    Refine {
+        rung: usize,
+        round: u32,
+    },
 }
 
 impl Ladder {
@@ -198,7 +207,8 @@ impl Ladder {
             false => Next::Refine { rung, round: round + 1 },
         };
         let apart = if is_last && is_last_rung { 0.0 } else { APART };
-        let refining = Refining { radius: self.rungs[rung], apart };
+        let floor = if round > 0 { LOW * so_far.least } else { 0.0 };
+        let refining = Refining { radius: self.rungs[rung], apart, floor };
         self.work = Some(Work::Refine(refining));
         let want = if self.ranked { want.max(1) } else { want.clamp(1, missing) };
         NextRound::Round(Round {

@@ -23,6 +23,8 @@ pub(super) struct Refining {
     /// An offer stands aside for a better one within this share of its distance to the nearest kept
     /// point.
     pub apart: f64,
+    /// A cell whose score was lower is not looked at again where something changed.
+    pub floor: f64,
 }
 
 /// Kept points within so many radii are asked.
@@ -79,7 +81,7 @@ impl Refining {
 
     /// Offers the worst position of each cell.
     pub fn refine(self, tile: &RoundTile<'_>, found: &mut Found) {
-        let unchanged = Unchanged::of(tile);
+        let unchanged = Unchanged::of(tile, self.floor);
         let touched: Vec<Position>;
         let positions = match &unchanged {
             None => tile.positions,
@@ -130,8 +132,8 @@ impl Refining {
         let each = tile.kept.iter().zip(&unchanged.offers);
         let changed = each.filter(|(p, offer)| offer.is_none() && tile.cube.contains(**p));
         for (p, _) in changed {
-            let [lo, hi] = [-self.radius, self.radius]
-                .map(|by| p.map(|v| v.saturating_add(by) >> level));
+            let [lo, hi] =
+                [-self.radius, self.radius].map(|by| p.map(|v| v.saturating_add(by) >> level));
             for x in lo[0]..=hi[0] {
                 for y in lo[1]..=hi[1] {
                     nodes.extend((lo[2]..=hi[2]).map(|z| [x, y, z]));
@@ -174,7 +176,8 @@ const ROUNDED_UP: f64 = 1.0 + 1e-12;
 
 /// Kept points around which nothing changed since the round before: none was kept near them. What
 /// they offer is what they offered then. Most are such, as a round keeps few, and those where the
-/// scan is worst.
+/// scan is worst. What changed where little was wrong before is not looked at either: points that
+/// are added make little worse.
 struct Unchanged {
     /// Of each kept point of the tile, what it offers; none where that changed, or is not known.
     offers: Vec<Option<Offer>>,
@@ -182,7 +185,7 @@ struct Unchanged {
 
 impl Unchanged {
     /// Those of a tile, if the round before left something that can be used.
-    fn of(tile: &RoundTile<'_>) -> Option<Unchanged> {
+    fn of(tile: &RoundTile<'_>, floor: f64) -> Option<Unchanged> {
         let before = tile.before?;
         let is_new = |i: &usize| tile.kept_in[*i] == before.number;
         let new: Vec<Position> =
@@ -198,10 +201,11 @@ impl Unchanged {
             let near = |offer: &Offer, j: u32| {
                 squared(new[j as usize], tile.kept[i]).sqrt() <= offer.reach
             };
-            if let (Some(offer), Some(&j)) = (&offers[i], found.first())
-                && near(offer, j)
+            if let (Some(offer), Some(&j)) = (offers[i], found.first())
+                && near(&offer, j)
             {
-                offers[i] = None;
+                let low = offer.score < floor;
+                offers[i] = low.then_some(Offer { reach: f64::INFINITY, ..offer });
             }
         });
         Some(Unchanged { offers })

@@ -137,6 +137,23 @@ impl Lanes for Avx2 {
     }
 
     #[inline(always)]
+    fn merge(self, best: &mut [Row; LANES], rows: &mut [Row; LANES]) {
+        self.sort(rows);
+        for first in (0..LANES).step_by(4) {
+            let zero = Four(unsafe { _mm256_setzero_pd() });
+            let (mut lists, mut kept) = ([zero; LANES], [zero; LANES]);
+            for i in 0..LANES {
+                lists[i] = Four(unsafe { _mm256_loadu_pd(rows[i].as_ptr().add(first)) });
+                kept[i] = Four(unsafe { _mm256_loadu_pd(best[i].as_ptr().add(first)) });
+            }
+            rows::merge(&mut kept, &lists);
+            for i in 0..LANES {
+                unsafe { _mm256_storeu_pd(best[i].as_mut_ptr().add(first), kept[i].0) };
+            }
+        }
+    }
+
+    #[inline(always)]
     fn insert<const ROWS: usize>(
         self,
         list: &mut [[f64; COLUMNS]; ROWS],

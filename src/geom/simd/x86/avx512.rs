@@ -122,6 +122,25 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
+    fn merge(self, best: &mut [Row; LANES], rows: &mut [Row; LANES]) {
+        for first in (0..LANES).step_by(8) {
+            let mut lists = [EightAvx512(unsafe { _mm512_setzero_pd() }); LANES];
+            let mut kept = lists;
+            for i in 0..LANES {
+                lists[i] = EightAvx512(unsafe { _mm512_loadu_pd(rows[i].as_ptr().add(first)) });
+            }
+            rows::sort(&mut lists);
+            for i in 0..LANES {
+                kept[i] = EightAvx512(unsafe { _mm512_loadu_pd(best[i].as_ptr().add(first)) });
+            }
+            rows::merge(&mut kept, &lists);
+            for i in 0..LANES {
+                unsafe { _mm512_storeu_pd(best[i].as_mut_ptr().add(first), kept[i].0) };
+            }
+        }
+    }
+
+    #[inline(always)]
     fn insert<const ROWS: usize>(
         self,
         list: &mut [[f64; COLUMNS]; ROWS],
