@@ -80,8 +80,8 @@
 //!   iterator.
 //! - [`synth`]: synthetic scans, and the stage `synth`.
 //! - [`ops`]: the stages that compute, select or look: `filter`, `drop`, `crop`, `sample`,
-//!   `assign`, `transform`, `stats`, `tap`, `merge`, `outliers`, `normals`, `cells`, `median` and
-//!   `grid`.
+//!   `assign`, `transform`, `stats`, `tap`, `merge`, `outliers`, `normals`, `cells`, `median`,
+//!   `graded` and `grid`.
 //! - [`picture`]: scans drawn from above or from a side, side by side.
 //! - [`graph`]: what a pipeline is, whoever wrote it: a [`Graph`] of stages.
 //! - [`PipelineText`]: a pipeline as it is written, in TOML, JSON or one line, with [`Parameter`]s.

@@ -24,7 +24,7 @@ pub use format::{
 pub use kind::{StageKind, StagePlace};
 pub use needs::Needs;
 pub use rounds::{
-    Choice, Found, Looks, NextRound, Offer, Round, RoundBefore, RoundOp, RoundTile, SoFar,
+    Looks, NextRound, Offer, Round, RoundBefore, RoundChoice, RoundFound, RoundOp, RoundTile, SoFar,
 };
 pub use scan::{AnyScanOp, Gathered, ScanOp, StoredSummaries, Summary};
 pub use sink::{ChunkSize, CreateSink, Encode, Encoded, Order, Sink, SinkSummary};

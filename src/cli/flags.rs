@@ -109,14 +109,26 @@ fn again(arguments: &ReduceArguments) -> bool {
 
 /// The flags of `reduce`.
 pub(super) fn reduce_flags(arguments: &ReduceArguments) -> Vec<CommandFlag> {
-    let classes = || classes(&arguments.classes);
+    let by_cells = arguments.by_cells();
+    let classes = |of_cells: bool| classes(&arguments.classes).filter(|_| of_cells == by_cells);
+    let keep = |of_cells: bool| {
+        arguments.keep.as_deref().map(whole_or_text).filter(|_| of_cells == by_cells)
+    };
     let mut all = flags([
         ("IN", "read.path", Some(json!(arguments.inputs).into())),
         ("-o", "write.path", arguments.output.clone().map(FlagValue::from)),
         ("--outdir", "write.folder", arguments.outdir.clone().map(FlagValue::from)),
         ("--to", "write.format", arguments.to.clone().map(FlagValue::from)),
         ("--max-angle", "cells.max_angle", arguments.max_angle.as_deref().map(number_or_text)),
-        ("--keep", "cells.keep", arguments.keep.as_deref().map(whole_or_text)),
+        ("--keep", "cells.keep", keep(true)),
+        ("--keep", "graded.keep", keep(false)),
+        ("--tolerance", "graded.tolerance", arguments.tolerance.as_deref().map(number_or_text)),
+        (
+            "--max-spacing",
+            "graded.max_spacing",
+            arguments.max_spacing.as_deref().map(number_or_text),
+        ),
+        ("--effort", "graded.effort", arguments.effort.clone().map(FlagValue::from)),
         ("--max-side", "cells.max_side", arguments.max_side.as_deref().map(number_or_text)),
         (
             "--min-spacing",
@@ -134,10 +146,11 @@ pub(super) fn reduce_flags(arguments: &ReduceArguments) -> Vec<CommandFlag> {
         ("--passes", "cells.max_angle", again(arguments).then(|| "auto".into())),
         ("--order", "write.order", arguments.order.clone().map(FlagValue::from)),
         ("--mark", "median.mark", arguments.mark.as_deref().map(whole_or_text)),
-        ("--classes", "outliers.classes", classes().filter(|_| arguments.outliers)),
-        ("--classes", "normals.classes", classes()),
-        ("--classes", "cells.classes", classes()),
-        ("--classes", "median.classes", classes()),
+        ("--classes", "outliers.classes", classes(by_cells).filter(|_| arguments.outliers)),
+        ("--classes", "normals.classes", classes(true)),
+        ("--classes", "cells.classes", classes(true)),
+        ("--classes", "median.classes", classes(true)),
+        ("--classes", "graded.classes", classes(false)),
         ("--withheld", "run.withheld", arguments.withheld.clone().map(FlagValue::from)),
         ("--noise", "run.noise", Some(noise(arguments).into())),
         ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(FlagValue::from)),

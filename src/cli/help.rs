@@ -79,11 +79,13 @@ Relative paths, in the pipeline file too, start from the folder you are in.",
 Examples:
   pointmill reduce survey/*.laz -o reduced.laz
   pointmill reduce survey/*.laz -o reduced.laz --keep 10% --report reduced.json
+  pointmill reduce survey/*.laz -o reduced.laz --tolerance 5cm
   pointmill reduce survey --outdir reduced --classes 2 --max-side 2
   pointmill reduce part.ply -o part-reduced.ply --preset part --max-angle 6deg
   pointmill reduce survey.laz -o marked.laz --mark key-point --order input
 
-It runs the pipeline pipelines/reduce.toml, which can be copied and changed.",
+It runs the pipeline pipelines/reduce.toml or, by the published method, pipelines/paper.toml, which
+can be copied and changed.",
     ),
     (
         "convert",

@@ -30,6 +30,7 @@ const JOBS: &[(&str, &str)] = jobs![
     "mark",
     "normals",
     "outliers",
+    "paper",
     "reduce",
     "resolutions",
     "split",

@@ -11,8 +11,12 @@ use crate::graph::Graph;
 use crate::graph::Overrides;
 use crate::language::Registry;
 
-/// The pipeline of `reduce`, which users copy.
+/// The pipelines of `reduce`, which users copy: to a number or a tolerance, and by the published
+/// method.
 const REDUCE: &str = include_str!("../../pipelines/reduce.toml");
+const BY_CELLS: &str = include_str!("../../pipelines/paper.toml");
+/// The number that the first of them has, where none is asked for.
+const ITS_NUMBER: &str = "keep = \"10%\"";
 
 /// The origin of the pipelines of commands: users know the flags, not these texts.
 pub(super) const HIDDEN: &str = "";
@@ -35,7 +39,8 @@ pub(super) fn run(arguments: &PlanArguments, registry: &Registry, console: &Cons
     console.result(mill(pipeline, console)?)
 }
 
-/// Runs `pipelines/reduce.toml` on other files and prints the closing table.
+/// Runs `pipelines/reduce.toml` or `pipelines/paper.toml` on other files and prints the closing
+/// table.
 pub(super) fn reduce(
     arguments: &ReduceArguments,
     registry: &Registry,
@@ -43,12 +48,18 @@ pub(super) fn reduce(
 ) -> Result<()> {
     let preset = arguments.preset.map_or(Vec::new(), Preset::sets);
     let sets = [preset, given([reduce_flags(arguments), common_flags(&arguments.common)])].concat();
-    if arguments.preset.is_none() {
+    let by_cells = arguments.by_cells();
+    if arguments.preset.is_none() && by_cells {
         console.hint(OTHERWISE);
     }
     let outliers = arguments.outliers.then_some("outliers");
     let filter = arguments.filter.is_given().then_some("filter");
-    let text = with_stages(REDUCE, filter.into_iter().chain(outliers));
+    let text = match (by_cells, &arguments.keep) {
+        (true, _) => BY_CELLS.to_owned(),
+        (false, Some(_)) => REDUCE.to_owned(),
+        (false, None) => REDUCE.replace(ITS_NUMBER, ""),
+    };
+    let text = with_stages(&text, filter.into_iter().chain(outliers));
     let pipeline = Graph::parse_with(&text, HIDDEN, registry, &sets)?;
     console.result(mill(pipeline, console)?)
 }
@@ -88,6 +99,7 @@ mod tests {
             .lines()
             .filter_map(|line| line.strip_prefix("kind = \"")?.split('"').next().map(str::to_owned))
             .collect();
-        assert_eq!(kinds, ["read", "filter", "outliers", "normals", "cells", "median", "write"]);
+        assert_eq!(kinds, ["read", "filter", "outliers", "graded", "write"]);
+        assert!(REDUCE.contains(ITS_NUMBER));
     }
 }

@@ -20,13 +20,13 @@ pub const FEWEST: usize = PLANES[0];
 #[derive(Debug)]
 pub struct PlaneErrors {
     simd: Simd,
-    points: Box<Eight>,
+    points: Box<EightPoints>,
     used: usize,
 }
 
-/// Eight points.
+/// EightPoints points.
 #[derive(Debug, Default)]
-struct Eight {
+struct EightPoints {
     /// The number that each was given.
     number: [u32; EIGHT],
     /// Offsets of the nearest others by axis; 0 where there are no more.
@@ -70,7 +70,7 @@ impl PlaneErrors {
 
     /// Calls `done` for all that it was not called for yet.
     pub fn flush(&mut self, mut done: impl FnMut(u32, f64)) {
-        self.simd.run(EightPoints(&mut self.points));
+        self.simd.run(EightKernel(&mut self.points));
         let each = self.points.number.iter().zip(&self.points.error2).take(self.used);
         each.for_each(|(number, error2)| done(*number, *error2));
         self.used = 0;
@@ -78,9 +78,9 @@ impl PlaneErrors {
 }
 
 /// Computes the errors of eight points.
-struct EightPoints<'a>(&'a mut Eight);
+struct EightKernel<'a>(&'a mut EightPoints);
 
-impl Kernel for EightPoints<'_> {
+impl Kernel for EightKernel<'_> {
     type Output = ();
 
     #[inline(always)]

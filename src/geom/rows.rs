@@ -42,9 +42,9 @@ pub fn sort<T: Ordered>(rows: &mut [T; 16]) {
     order!(rows: 6 7, 8 9);
 }
 
-/// Puts the 16 smallest of two sorted lists into `best`, sorted: the smallest of one and the largest
-/// of the other, and so on, are such a list up and down, which Batcher's merge brings in order
-/// (Knuth, 5.3.4).
+/// Puts the 16 smallest of two sorted lists into `best`, sorted: the smallest of one and the
+/// largest of the other, and so on, are such a list up and down, which Batcher's merge brings in
+/// order (Knuth, 5.3.4).
 #[inline(always)]
 pub fn merge<T: Ordered>(best: &mut [T; 16], sorted: &[T; 16]) {
     let mut rows = *best;

@@ -6,6 +6,7 @@ mod correct;
 mod figures;
 mod fill;
 mod ladder;
+mod rank;
 mod refine;
 mod settings;
 mod sides;
@@ -19,11 +20,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::Keep;
-use crate::point::{Column, Units, names};
+use crate::point::{Units, names};
 use crate::quantity::Length;
 use crate::report::{Grouped, Tally};
 use crate::stage::{
-    Found, Needs, NextRound, Role, RoleName, RoundOp, RoundTile, ScanFacts, SoFar, StageKind,
+    Needs, NextRound, Role, RoleName, RoundFound, RoundOp, RoundTile, ScanFacts, SoFar, StageKind,
     StagePlace, TileOp,
 };
 use crate::store::KeptPoints;
@@ -33,19 +34,14 @@ use crate::{Error, Result};
 use certain::Certain;
 use figures::Judgement;
 use ladder::Ladder;
+pub use rank::KEEP_RANK;
 pub use settings::Effort;
 use sides::{steps, voxel_side};
-use work::Work;
-
-/// The number of the round that kept each point: points of rounds before it are a coarser reduction
-/// of the same scan. 65535 are exceptions, which are kept and no part of the surface.
-pub const KEEP_RANK: Column<u16> = Column::new("KeepRank", &[]).computed_by("graded");
-/// The rank of exceptions.
-pub(crate) const EXCEPTION: u16 = u16::MAX;
+use work::RoundWork;
 
 /// Keeps the points that say most of the surface: so many of them, or as many as a tolerance asks
-/// for. It looks at nothing but positions, so no stage needs to come before it. Copies of a position
-/// weigh as one, and one record of them stays.
+/// for. It looks at nothing but positions, so no stage needs to come before it. Copies of a
+/// position weigh as one, and one record of them stays.
 ///
 /// With `keep` exactly so many records stay (or all positions, where these are fewer). First
 /// positions are kept until none is farther from a kept one than about the side of the voxel grid
@@ -91,7 +87,7 @@ pub struct Graded {
     #[serde(skip)]
     step: f64,
     #[serde(skip)]
-    course: Option<Course>,
+    course: Option<RoundsCourse>,
     #[serde(skip)]
     kept: Option<Arc<KeptPoints>>,
     /// The largest number that is kept, where a tolerance may come first.
@@ -101,15 +97,15 @@ pub struct Graded {
 
 /// The rounds towards a number or a tolerance.
 #[derive(Debug, Clone)]
-enum Course {
+enum RoundsCourse {
     Count(Ladder),
     Tolerance(Certain),
 }
 
 /// Bytes a position.
 const BYTES: usize = 96;
-/// Where nothing says how far apart kept points are with a tolerance: a voxel grid that keeps one of
-/// so many positions.
+/// Where nothing says how far apart kept points are with a tolerance: a voxel grid that keeps one
+/// of so many positions.
 const SPARSE: u64 = 256;
 /// Cubes of it at least.
 const FEWEST: u64 = 64;
@@ -142,7 +138,7 @@ impl Graded {
     }
 
     /// The rounds to begin with.
-    fn begin(&mut self, so_far: &SoFar<'_>) -> Course {
+    fn begin(&mut self, so_far: &SoFar<'_>) -> RoundsCourse {
         let positions = so_far.levels.positions();
         self.most = self.keep.map(|keep| keep.of(so_far.records).min(positions));
         match (self.tolerance, self.most) {
@@ -153,16 +149,16 @@ impl Graded {
                 let spacing =
                     spacing.unwrap_or_else(|| voxel_side(so_far.levels, &so_far.bounds, sparse));
                 let tolerance = self.in_steps(tolerance);
-                Course::Tolerance(Certain::new(tolerance, steps(spacing.floor()), self.seed))
+                RoundsCourse::Tolerance(Certain::new(tolerance, steps(spacing.floor()), self.seed))
             }
         }
     }
 
     /// The rounds towards a number.
-    fn count(&self, want: u64, so_far: &SoFar<'_>) -> Course {
+    fn count(&self, want: u64, so_far: &SoFar<'_>) -> RoundsCourse {
         let spacing = self.max_spacing.map(|length| steps(self.in_steps(length).floor()));
         let with = (self.effort, self.seed);
-        Course::Count(match self.ranks && spacing.is_none() {
+        RoundsCourse::Count(match self.ranks && spacing.is_none() {
             true => Ladder::ranked(want, so_far, with),
             false => Ladder::new(want, so_far, with, spacing),
         })
@@ -224,8 +220,8 @@ impl TileOp for Graded {
         let early = || Error::internal("the stage graded ran before it chose");
         let kept = self.kept.as_ref().ok_or_else(early)?;
         let (radius, tolerance) = match self.course.as_ref().ok_or_else(early)? {
-            Course::Count(ladder) => (ladder.radius(), None),
-            Course::Tolerance(certain) => (certain.radius, Some(certain.tolerance)),
+            RoundsCourse::Count(ladder) => (ladder.radius(), None),
+            RoundsCourse::Tolerance(certain) => (certain.radius, Some(certain.tolerance)),
         };
         Judgement { kept, radius, tolerance, ranks: self.ranks }.pass(tile, tally)
     }
@@ -234,13 +230,13 @@ impl TileOp for Graded {
         let length = |steps: i64| Value::from(steps as f64 * self.step);
         let mut all = Vec::new();
         match &self.course {
-            Some(Course::Count(ladder)) => {
+            Some(RoundsCourse::Count(ladder)) => {
                 all.push(("spacing".to_owned(), length(ladder.radius())));
                 if self.tolerance.is_some() {
                     all.push(("ended_by".to_owned(), "keep".into()));
                 }
             }
-            Some(Course::Tolerance(certain)) => {
+            Some(RoundsCourse::Tolerance(certain)) => {
                 all.push(("spacing".to_owned(), length(certain.radius)));
                 if self.keep.is_some() {
                     all.push(("ended_by".to_owned(), "tolerance".into()));
@@ -259,10 +255,11 @@ impl RoundOp for Graded {
             None => self.begin(so_far),
         };
         let (next, exceptions) = match &mut course {
-            Course::Count(ladder) => (ladder.next(so_far), 0),
-            Course::Tolerance(certain) => (certain.next(so_far), certain.exceptions),
+            RoundsCourse::Count(ladder) => (ladder.next(so_far), 0),
+            RoundsCourse::Tolerance(certain) => (certain.next(so_far), certain.exceptions),
         };
-        if let (NextRound::Done, Course::Tolerance(_), Some(most)) = (next, &course, self.most)
+        if let (NextRound::Done, RoundsCourse::Tolerance(_), Some(most)) =
+            (next, &course, self.most)
             && self.is_too_many(so_far.kept, exceptions)
         {
             self.course = Some(self.count(most, so_far));
@@ -284,16 +281,16 @@ impl RoundOp for Graded {
         Ok(next)
     }
 
-    fn round(&self, tile: &RoundTile<'_>, found: &mut Found) -> Result<()> {
+    fn round(&self, tile: &RoundTile<'_>, found: &mut RoundFound) -> Result<()> {
         let work = match &self.course {
-            Some(Course::Count(ladder)) => ladder.work(),
-            Some(Course::Tolerance(certain)) => certain.work(),
+            Some(RoundsCourse::Count(ladder)) => ladder.work(),
+            Some(RoundsCourse::Tolerance(certain)) => certain.work(),
             None => None,
         };
         match work {
-            Some(Work::Fill(filling)) => filling.fill(tile, found),
-            Some(Work::Refine(refining)) => refining.refine(tile, found),
-            Some(Work::Correct(correcting)) => correcting.correct(tile, found),
+            Some(RoundWork::Fill(filling)) => filling.fill(tile, found),
+            Some(RoundWork::Refine(refining)) => refining.refine(tile, found),
+            Some(RoundWork::Correct(correcting)) => correcting.correct(tile, found),
             None => return Err(Error::internal("the stage graded has no round to work on")),
         }
         Ok(())

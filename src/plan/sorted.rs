@@ -85,20 +85,12 @@ impl Sorted {
                         above,
                     });
                 }
-                Role::TileOp(op) => {
-                    let op = Op::Tile(op);
-                    ops.push(StageOp { kind, written, op, limits, above, selection: 0 });
-                }
-                Role::ScanOp(op) => {
-                    let op = Op::Scan(op);
-                    ops.push(StageOp { kind, written, op, limits, above, selection: 0 });
-                }
-                Role::RoundOp(op) => {
-                    let op = Op::Round(op);
-                    ops.push(StageOp { kind, written, op, limits, above, selection: 0 });
-                }
                 Role::Sink(sink) => sinks.push(sink),
                 Role::Merge => {}
+                Role::TileOp(_) | Role::ScanOp(_) | Role::RoundOp(_) => {
+                    let op = on_tiles(role)?;
+                    ops.push(StageOp { kind, written, op, limits, above, selection: 0 });
+                }
             }
         }
         let source = source.ok_or_else(|| Error::pipeline("the pipeline reads nothing"))?;
@@ -149,6 +141,16 @@ fn labels(stages: &[GraphStage]) -> Vec<Arc<str>> {
         }
     };
     stages.iter().enumerate().map(label).collect()
+}
+
+/// A stage that works on tiles.
+fn on_tiles(role: Role) -> Result<Op> {
+    match role {
+        Role::TileOp(op) => Ok(Op::Tile(op)),
+        Role::ScanOp(op) => Ok(Op::Scan(op)),
+        Role::RoundOp(op) => Ok(Op::Round(op)),
+        _ => Err(Error::internal("a stage does not work on tiles and is to")),
+    }
 }
 
 /// For each stage the columns that those above it compute, the newest last.

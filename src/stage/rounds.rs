@@ -26,7 +26,7 @@ pub trait RoundOp: TileOp {
     /// # Errors
     ///
     /// Broken promises of the engine; the run ends.
-    fn round(&self, tile: &RoundTile<'_>, found: &mut Found) -> Result<()>;
+    fn round(&self, tile: &RoundTile<'_>, found: &mut RoundFound) -> Result<()>;
 
     /// Called once behind the last round, with all that is kept.
     fn chosen(&mut self, kept: Arc<KeptPoints>);
@@ -45,7 +45,7 @@ pub struct SoFar<'a> {
     pub kept: u64,
     /// Those among them that the last round kept.
     pub added: u64,
-    /// What the tiles of the last round [counted](Found::counted).
+    /// What the tiles of the last round [counted](RoundFound::counted).
     pub counted: u64,
     /// The lowest score of the offers that had the first say in it; 0 if it had none.
     pub least: f64,
@@ -86,7 +86,7 @@ pub struct Round {
     /// How far around its cube a tile has kept points.
     pub kept_reach: i64,
     /// Who is kept of what its tiles find.
-    pub choice: Choice,
+    pub choice: RoundChoice,
 }
 
 /// Which positions of the scan a round looks at.
@@ -99,7 +99,8 @@ pub enum Looks {
         /// See [`crate::geom::hash::of_position`].
         seed: u64,
     },
-    /// Those that have no kept point nearer than `apart`, about so many of all as such a sample has.
+    /// Those that have no kept point nearer than `apart`, about so many of all as such a sample
+    /// has.
     Uncovered {
         /// A distance in lattice steps.
         apart: i64,
@@ -110,10 +111,10 @@ pub enum Looks {
 
 /// Who is kept of what the tiles of a round find.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Choice {
-    /// What each tile says: see [`Found::keep`].
+pub enum RoundChoice {
+    /// What each tile says: see [`RoundFound::keep`].
     InTile,
-    /// Of all [offers](Found::offers) the best.
+    /// Of all [offers](RoundFound::offers) the best.
     Best {
         /// So many offers have the first say.
         want: u64,
@@ -155,7 +156,7 @@ pub struct RoundBefore<'a> {
 
 /// What a tile of a round finds.
 #[derive(Debug, Default)]
-pub struct Found {
+pub struct RoundFound {
     /// Indices of the positions of the cube that are kept from now on, in ascending order.
     pub keep: Vec<u32>,
     /// What may be kept: an offer of each kept point of the cube, in their order.
@@ -177,8 +178,8 @@ pub struct Offer {
     /// The kept point.
     pub of: Position,
     /// A point that is kept farther from that one than this changes nothing of the offer. Where it
-    /// is infinite, something changed already: what is offered is only as good as it was, and is not
-    /// taken.
+    /// is infinite, something changed already: what is offered is only as good as it was, and is
+    /// not taken.
     pub reach: f64,
 }
 
@@ -189,7 +190,7 @@ impl Offer {
     }
 }
 
-impl Found {
+impl RoundFound {
     /// Forgets everything, keeps the memory.
     pub(crate) fn clear(&mut self) {
         self.keep.clear();
@@ -202,7 +203,7 @@ impl Round {
     /// A walk over all positions, each once.
     pub(crate) fn counting() -> Round {
         let looks = Looks::Sample { most: u64::MAX, seed: 0 };
-        Round { looks, reach: 0, kept_reach: 0, choice: Choice::InTile }
+        Round { looks, reach: 0, kept_reach: 0, choice: RoundChoice::InTile }
     }
 }
 

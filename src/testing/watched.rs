@@ -14,8 +14,10 @@ use crate::point::{PointBatch, Schema, Units};
 use crate::quantity::Length;
 use crate::report::Tally;
 use crate::stage::{
-    AnyScanOp, Forecast, Needs, Role, ScanFacts, StoredSummaries, TileOp, Transform,
+    AnyScanOp, Forecast, Needs, NextRound, Role, RoundFound, RoundOp, RoundTile, ScanFacts, SoFar,
+    StoredSummaries, TileOp, Transform,
 };
+use crate::store::KeptPoints;
 use crate::tile::Tile;
 use crate::{Error, Result};
 
@@ -33,6 +35,7 @@ pub(super) fn watched(kind: &str, role: Role, witness: &Arc<Witness>) -> Role {
         Role::Transform(stage) => Role::Transform(Box::new(WatchedStage { kind, witness, stage })),
         Role::TileOp(stage) => Role::TileOp(Box::new(WatchedStage { kind, witness, stage })),
         Role::ScanOp(stage) => Role::ScanOp(Box::new(WatchedStage { kind, witness, stage })),
+        Role::RoundOp(stage) => Role::RoundOp(Box::new(WatchedStage { kind, witness, stage })),
         other => other,
     }
 }
@@ -220,6 +223,21 @@ impl<S: TileOp + ?Sized> TileOp for WatchedStage<S> {
     fn forecast(&mut self, samples: &[Vec<f64>]) -> Forecast {
         let forecast = measured(|| self.stage.forecast(samples));
         self.besides(forecast)
+    }
+}
+
+impl RoundOp for WatchedStage<dyn RoundOp> {
+    fn next(&mut self, so_far: &SoFar<'_>) -> Result<NextRound> {
+        let next = measured(|| self.stage.next(so_far));
+        self.besides(next)
+    }
+
+    fn round(&self, tile: &RoundTile<'_>, found: &mut RoundFound) -> Result<()> {
+        self.stage.round(tile, found)
+    }
+
+    fn chosen(&mut self, kept: Arc<KeptPoints>) {
+        self.stage.chosen(kept);
     }
 }
 

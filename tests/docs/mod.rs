@@ -1,5 +1,5 @@
-//! The pages of docs/ that the code generates are those in the repository, and the keys that docs/formats.md names are those that a real report and real
-//! descriptions have.
+//! The pages of docs/ that the code generates are those in the repository, and the keys that
+//! docs/formats.md names are those that a real report and real descriptions have.
 //!
 //! `POINTMILL_WRITE_DOCS=1 cargo test --test repository` writes the generated pages again.
 

@@ -12,7 +12,7 @@ const LARGEST: u64 = 60 << 10;
 
 /// A stage, what its example shows, and the pipeline behind `read scan.laz ! `. Those with a
 /// picture write `after.laz`.
-const EXAMPLES: [(&str, &str, &str); 18] = [
+const EXAMPLES: [(&str, &str, &str); 19] = [
     ("read", "Two files become one.", "write copy.laz"),
     ("synth", "A made-up scan of 5,000 points.", "synth als points=5k ! write made.laz"),
     ("merge", "Two sources are one scan.", "merge from=[a,b] ! write both.laz"),
@@ -48,6 +48,11 @@ const EXAMPLES: [(&str, &str, &str); 18] = [
         "cells",
         "A fifth of the points stays, more of them where the surface bends.",
         "normals ! cells keep=20% ! median ! write after.laz",
+    ),
+    (
+        "graded",
+        "A twentieth of the points stays: those that say most of the surface.",
+        "graded keep=5% ! write after.laz",
     ),
     ("grid", "One point in each cube of side 2 stays.", "grid side=2 ! write after.laz"),
     (

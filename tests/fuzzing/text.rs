@@ -1,5 +1,5 @@
-//! Target `text`: one argument `stage.key=value`; its value is also taken as a size, and the text as
-//! a pipeline in one line and as a parameter.
+//! Target `text`: one argument `stage.key=value`; its value is also taken as a size, and the text
+//! as a pipeline in one line and as a parameter.
 
 use std::path::Path;
 

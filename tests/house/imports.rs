@@ -1,5 +1,6 @@
-//! Imports point down: every path to another module of the crate leads to a lower layer, and no files
-//! import each other, not even in a circle. The picture of the layers is in docs/architecture.md.
+//! Imports point down: every path to another module of the crate leads to a lower layer, and no
+//! files import each other, not even in a circle. The picture of the layers is in
+//! docs/architecture.md.
 
 #![allow(clippy::unwrap_used, reason = "a test that fails says so")]
 
@@ -201,7 +202,8 @@ fn imports_that_point_down_and_comments_are_no_mistakes() {
     assert_eq!(checked("tile::load", "use super::{stage_of, Reader};").0.len(), 0);
 }
 
-/// What is wrong with a file among rooms that are empty else, and how many of its imports point down.
+/// What is wrong with a file among rooms that are empty else, and how many of its imports point
+/// down.
 fn checked(module: &str, text: &str) -> (Vec<String>, usize) {
     let rooms = LAYERS.concat().into_iter().map(|room| (room, ""));
     let root = ("", "pub use error::{Error, ErrorKind, Result};");

@@ -1,5 +1,5 @@
-//! Which file of the crate imports which, by their texts: every path is followed to the file that has
-//! the thing at its end, through what other files re-export. `mod x;` is no import.
+//! Which file of the crate imports which, by their texts: every path is followed to the file that
+//! has the thing at its end, through what other files re-export. `mod x;` is no import.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -80,8 +80,8 @@ fn is_of_name(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
-/// Names, `::`, and all other characters one by one. A `//` in a text of the program ends the line as a
-/// comment does, which loses no path.
+/// Names, `::`, and all other characters one by one. A `//` in a text of the program ends the line
+/// as a comment does, which loses no path.
 fn tokens(text: &str) -> Vec<&str> {
     let mut tokens = Vec::new();
     for mut line in text.lines().map(|line| line.split("//").next().unwrap_or("")) {
@@ -124,8 +124,8 @@ fn imports_of(text: &str) -> Vec<Import> {
     all
 }
 
-/// Adds the path that begins at token `at`, `before` being what a group has in common, or all paths of
-/// a group, each with what it is called; returns what follows it.
+/// Adds the path that begins at token `at`, `before` being what a group has in common, or all paths
+/// of a group, each with what it is called; returns what follows it.
 fn read_paths<'a>(
     tokens: &[&'a str],
     mut at: usize,

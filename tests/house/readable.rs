@@ -9,7 +9,8 @@ use std::path::Path;
 
 use super::imports::files;
 
-/// The code of the crate, file by file, by its path within `src`; what is only for tests is left out.
+/// The code of the crate, file by file, by its path within `src`; what is only for tests is left
+/// out.
 fn own_code() -> Vec<(String, String)> {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let all = files(&src).into_iter().filter(|file| !file.ends_with("tests.rs"));
@@ -21,8 +22,8 @@ fn own_code() -> Vec<(String, String)> {
     each.collect()
 }
 
-/// The types that a text declares. Those of traits and instruction sets (`F32`, `F64`, `Mask`) stand
-/// within an `impl`, as types of the same name must.
+/// The types that a text declares. Those of traits and instruction sets (`F32`, `F64`, `Mask`)
+/// stand within an `impl`, as types of the same name must.
 fn declared(text: &str) -> impl Iterator<Item = &str> {
     let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
     code.lines().filter_map(|line| {

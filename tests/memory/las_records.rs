@@ -21,8 +21,8 @@ fn describe(path: &Path) -> pointmill::Result<serde_json::Value> {
     pointmill::io::describe(path, Registry::builtin().formats())
 }
 
-/// A file of five points with `count` records, `payload` bytes each: variable length ones behind the
-/// header, or extended ones at the end.
+/// A file of five points with `count` records, `payload` bytes each: variable length ones behind
+/// the header, or extended ones at the end.
 fn file(path: &Path, count: u32, payload: usize, extended: bool) {
     file_of("test", path, count, payload, extended);
 }

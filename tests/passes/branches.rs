@@ -29,7 +29,8 @@ fn chain(folder: &Path, stages: &str, output: &str) -> Graph {
     Graph::parse(&text, "test.toml", &Registry::builtin()).unwrap()
 }
 
-/// The first chain and all others as branches of it, which have its first `shared` stages in common.
+/// The first chain and all others as branches of it, which have its first `shared` stages in
+/// common.
 fn tree(shared: usize, chains: Vec<Graph>) -> Graph {
     let mut chains = chains.into_iter();
     let mut tree = chains.next().unwrap();
@@ -66,8 +67,9 @@ fn results(report: &Path) -> Vec<serde_json::Value> {
     results
 }
 
-/// Runs the chains in one graph and one by one: the same bytes of all outputs and of the `result` of
-/// each of those that end branches, from one decode. Others are outputs of stages that others share.
+/// Runs the chains in one graph and one by one: the same bytes of all outputs and of the `result`
+/// of each of those that end branches, from one decode. Others are outputs of stages that others
+/// share.
 fn compare(shared: usize, ends: &[(&str, &str)], others: &[(&str, &str)]) -> Done {
     let chains = &[ends, others].concat()[..];
     let (together, alone) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());

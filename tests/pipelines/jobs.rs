@@ -1,5 +1,5 @@
-//! The pipeline files that users copy, one a job: each opens with what it is for and the command that
-//! runs it, and that command does what it says.
+//! The pipeline files that users copy, one a job: each opens with what it is for and the command
+//! that runs it, and that command does what it says.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 

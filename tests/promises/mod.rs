@@ -1,4 +1,5 @@
-//! `pointmill::testing`: what it finds, and that it finds nothing in stages that keep their promises.
+//! `pointmill::testing`: what it finds, and that it finds nothing in stages that keep their
+//! promises.
 
 mod examples;
 mod own;

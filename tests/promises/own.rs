@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use pointmill::Registry;
 use pointmill::ops::normals::Normals;
 use pointmill::ops::{
-    Assign, Cells, Crop, Drop, Filter, Grid, Median, Outliers, Sample, Stats, Tap, Transformation,
+    Assign, Cells, Crop, Drop, Filter, Graded, Grid, Median, Outliers, Sample, Stats, Tap,
+    Transformation,
 };
 use pointmill::stage::StageKind;
 use pointmill::testing::{Conduct, Conformance, Promise};
@@ -56,6 +57,13 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
         ),
         ("median", vec![check::<Median>(json!({})).after(normals()).after(cells())]),
         (
+            "graded",
+            vec![
+                check::<Graded>(json!({ "keep": "20%" })),
+                check::<Graded>(json!({ "tolerance": 0.3, "max_spacing": 2.0, "ranks": true })),
+            ],
+        ),
+        (
             "grid",
             vec![check::<Grid>(json!({ "side": 2.0 })), check::<Grid>(json!({ "side": 2.048 }))],
         ),
@@ -104,7 +112,7 @@ fn assert_kept(kinds: &[&str]) {
 
 const STREAM: [&str; 7] = ["assign", "crop", "drop", "filter", "stats", "tap", "transform"];
 const SELECT: [&str; 3] = ["grid", "outliers", "sample"];
-const REDUCE: [&str; 3] = ["cells", "median", "normals"];
+const REDUCE: [&str; 4] = ["cells", "graded", "median", "normals"];
 const ENDS: [&str; 5] = ["discard", "merge", "read", "synth", "write"];
 
 #[test]

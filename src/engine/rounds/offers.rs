@@ -1,15 +1,16 @@
-//! What the tiles of a round offer: the best of the whole scan, and which of those are too near to a
-//! better one.
+//! What the tiles of a round offer: the best of the whole scan, and which of those are too near to
+//! a better one.
 //!
 //! How good the last one is that is kept is found by counting digits of scores, so that the offers
 //! of a large scan need not be in memory. That an offer stands aside for a better one is decided
-//! tile by tile, from those of the tiles around: whether the better one stands aside itself plays no
-//! part, or chains of them would lead across any rim.
+//! tile by tile, from those of the tiles around: whether the better one stands aside itself plays
+//! no part, or chains of them would lead across any rim.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::{Merged, RoundKeys, nth_largest};
+use super::merged::MergedPoints;
+use super::select::nth_largest;
 use crate::Result;
 use crate::engine::job::Job;
 use crate::geom::hash::PlaceHashes;
@@ -134,7 +135,7 @@ impl BestOffers {
 /// What is kept when those of the best offers are that no better one is too near to.
 pub(super) fn accept(
     job: &Job<'_>,
-    keys: &RoundKeys,
+    keys: &[TileKey],
     best: &BestOffers,
     reach: i64,
     kept: &KeptPoints,
@@ -156,7 +157,7 @@ pub(super) fn accept(
             chosen.retain(|p| cube.contains(*p));
             chosen.sort_unstable_by(morton_cmp);
             kept.near(&cube, reader)?;
-            let merged = Merged::of(reader, chosen.into_iter(), number);
+            let merged = MergedPoints::of(reader, chosen.into_iter(), number);
             job.advance(0)?;
             new.pack(&merged.positions, &merged.rounds)
         },

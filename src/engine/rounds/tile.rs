@@ -1,14 +1,32 @@
-//! A tile of a round: positions of the scan and kept points around a cube, in the arena of a thread.
+//! A tile of a round: positions of the scan and kept points around a cube, in the arena of a
+//! thread.
 
-use super::RoundScan;
 use crate::budget::{Bytes, Lease};
+use crate::engine::grind::DecodedScan;
 use crate::engine::job::Job;
 use crate::engine::pass::{Call, Op, put_to_work};
 use crate::point::Position;
-use crate::stage::{Found, Looks, Offer, Round, RoundBefore, RoundTile};
+use crate::stage::{Looks, Offer, Round, RoundBefore, RoundFound, RoundTile};
 use crate::store::{KeptPoints, KeptReader, TileKey};
-use crate::tile::{Cover, Loader, Only};
+use crate::tile::{Cover, Loader, Only, Sieve};
 use crate::{Error, Result};
+
+/// What the tiles of a round are about.
+pub(super) struct RoundScan<'a> {
+    pub op: usize,
+    /// Of the round, from 0.
+    pub number: u32,
+    pub field: &'a DecodedScan<'a>,
+    pub sieve: &'a Sieve,
+    /// Positions that the arena of a thread takes.
+    pub capacity: usize,
+}
+
+impl RoundScan<'_> {
+    fn call(&self) -> Call {
+        Call { op: self.op, gathers: false }
+    }
+}
 
 /// What a thread needs to work on tiles of a round.
 pub(super) struct RoundWorker<'a> {
@@ -20,7 +38,7 @@ pub(super) struct RoundWorker<'a> {
     capacity: usize,
     chosen: Vec<Position>,
     reader: KeptReader,
-    found: Found,
+    found: RoundFound,
     more: Option<Lease>,
 }
 
@@ -62,7 +80,7 @@ impl<'a> RoundWorker<'a> {
             capacity,
             chosen: Vec::new(),
             reader: KeptReader::default(),
-            found: Found::default(),
+            found: RoundFound::default(),
             more: None,
         }
     }
@@ -134,7 +152,7 @@ impl<'a> RoundWorker<'a> {
             _ => return Err(Error::internal("a stage is to choose in rounds and does not")),
         }
         reader.keep_in(&key.cube());
-        let Found { keep, offers, counted } = found;
+        let RoundFound { keep, offers, counted } = found;
         Ok(FoundInTile { positions: chosen, keep, offers, counted: *counted, kept: reader })
     }
 }

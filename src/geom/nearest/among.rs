@@ -4,9 +4,9 @@
 //! near to each other walk together, by the same kernels and the same proofs. They have no leaf in
 //! the other tree to begin at, so they begin where they would stand in its order.
 
-use super::tree::EXACT;
-use super::walk::{TreeWalk, Visitors};
-use super::{BoxTree, Nearest};
+use super::own::Nearest;
+use super::tree::{BoxTree, EXACT};
+use super::walk::{TreeWalk, Visitors, Work};
 use crate::geom::morton::morton_cmp;
 use crate::geom::simd::Simd;
 use crate::point::Position;
@@ -94,7 +94,7 @@ impl NearestAmong {
     }
 
     /// What the last search did.
-    pub fn work(&self) -> super::Work {
+    pub fn work(&self) -> Work {
         self.nearest.work()
     }
 

@@ -29,8 +29,8 @@ pub(super) struct ExactWalk<'a> {
 }
 
 impl<'a> ExactWalk<'a> {
-    /// The search of the point at `at`, of rank `own` if it is one of `positions`, for neighbours, of which none is beyond the last of `candidates`;
-    /// the answer takes their place.
+    /// The search of the point at `at`, of rank `own` if it is one of `positions`, for neighbours,
+    /// of which none is beyond the last of `candidates`; the answer takes their place.
     pub fn new(
         simd: Simd,
         tree: &'a BoxTree,

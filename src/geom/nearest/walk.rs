@@ -2,7 +2,8 @@
 //! ancestor down into whatever is near enough to matter; or, through the tree of another set, down
 //! from its root.
 
-use super::kernel::{Batch, Boxes, Guests, Home, Visit};
+use super::batch::Batch;
+use super::kernel::{Boxes, Guests, Home, Visit};
 use super::refine::Leaf;
 use super::tree::{BoxNode, BoxTree, EXACT, above, below};
 use crate::geom::simd::{LANES, Simd};

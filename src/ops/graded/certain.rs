@@ -2,17 +2,17 @@
 //! surface where it is too far off, until that does not pay any more.
 //!
 //! What is still too far off then is kept, too, but not made a part of the surface, whose planes it
-//! would only break: an exception. So every removed position is within the tolerance of the surface,
-//! whatever the scan is.
+//! would only break: an exception. So every removed position is within the tolerance of the
+//! surface, whatever the scan is.
 
-use crate::stage::{Choice, Looks, NextRound, Round, SoFar};
+use crate::stage::{Looks, NextRound, Round, RoundChoice, SoFar};
 
 use super::correct::Correcting;
 use super::fill::Filling;
 use super::ladder::APART;
 use super::refine::Refining;
 use super::sides::occupied;
-use super::work::{Work, fill};
+use super::work::{RoundWork, fill};
 
 /// Rounds at most.
 const MOST_ROUNDS: u32 = 24;
@@ -28,16 +28,16 @@ pub(super) struct Certain {
     pub tolerance: f64,
     pub radius: i64,
     seed: u64,
-    at: Next,
+    at: CertainStep,
     /// What would be kept in all before the last round, exceptions included.
     total: Option<u64>,
-    work: Option<Work>,
+    work: Option<RoundWork>,
     /// Positions that would be exceptions, as far as is known.
     pub exceptions: u64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Next {
+enum CertainStep {
     Fill,
     Mop,
     Correct { round: u32 },
@@ -48,12 +48,12 @@ impl Certain {
     /// Rounds that leave no position farther than `radius` steps from a kept one, and none farther
     /// than `tolerance` from the surface.
     pub fn new(tolerance: f64, radius: i64, seed: u64) -> Certain {
-        let (at, total, work) = (Next::Fill, None, None);
+        let (at, total, work) = (CertainStep::Fill, None, None);
         Certain { tolerance, radius, seed, at, total, work, exceptions: 0 }
     }
 
     /// What the round at hand does.
-    pub fn work(&self) -> Option<Work> {
+    pub fn work(&self) -> Option<RoundWork> {
         self.work
     }
 
@@ -63,17 +63,18 @@ impl Certain {
         let share = (FILLED_FROM * cubes / so_far.levels.positions().max(1) as f64).min(1.0);
         let filling = Filling { apart: self.radius, seed: self.seed };
         match self.at {
-            Next::Fill => {
-                self.at = if share < 1.0 { Next::Mop } else { Next::Correct { round: 0 } };
-                self.work = Some(Work::Fill(filling));
+            CertainStep::Fill => {
+                self.at =
+                    if share < 1.0 { CertainStep::Mop } else { CertainStep::Correct { round: 0 } };
+                self.work = Some(RoundWork::Fill(filling));
                 fill(filling, Looks::sample(share, self.seed))
             }
-            Next::Mop => {
-                self.at = Next::Correct { round: 0 };
+            CertainStep::Mop => {
+                self.at = CertainStep::Correct { round: 0 };
                 fill(filling, Looks::uncovered(self.radius, share))
             }
-            Next::Correct { round } => self.correct(round, so_far),
-            Next::Done => NextRound::Done,
+            CertainStep::Correct { round } => self.correct(round, so_far),
+            CertainStep::Done => NextRound::Done,
         }
     }
 
@@ -85,24 +86,24 @@ impl Certain {
                 return NextRound::Done;
             }
             if before > ALWAYS && self.total.is_some_and(|least| total > least) {
-                self.at = Next::Done;
+                self.at = CertainStep::Done;
                 return NextRound::Undo { rounds: 2 };
             }
             (self.total, self.exceptions) = (Some(total), so_far.counted);
             if round >= MOST_ROUNDS {
-                self.at = Next::Done;
+                self.at = CertainStep::Done;
                 return NextRound::Undo { rounds: 1 };
             }
         }
-        self.at = Next::Correct { round: round + 1 };
+        self.at = CertainStep::Correct { round: round + 1 };
         let refining = Refining { radius: self.radius, apart: APART, floor: 0.0 };
         let Certain { radius, tolerance, .. } = *self;
-        self.work = Some(Work::Correct(Correcting { radius, tolerance, apart: APART }));
+        self.work = Some(RoundWork::Correct(Correcting { radius, tolerance, apart: APART }));
         NextRound::Round(Round {
             looks: Looks::sample(1.0, self.seed),
             reach: refining.reach(),
             kept_reach: refining.kept_reach(),
-            choice: Choice::Best { want: u64::MAX, reach: refining.offer_reach() },
+            choice: RoundChoice::Best { want: u64::MAX, reach: refining.offer_reach() },
         })
     }
 }

@@ -1,7 +1,7 @@
 //! Rounds towards a tolerance: where is what is removed farther from the surface than it may be?
 
 use crate::point::Position;
-use crate::stage::{Found, Offer, RoundTile};
+use crate::stage::{Offer, RoundFound, RoundTile};
 
 use super::refine::ASKED_RADII;
 use super::surface::ask_surface;
@@ -32,7 +32,7 @@ struct Wrong {
 impl Correcting {
     /// Offers of each cell the position that is too far off and would help most; counts those of
     /// the cube that are too far off.
-    pub fn correct(self, tile: &RoundTile<'_>, found: &mut Found) {
+    pub fn correct(self, tile: &RoundTile<'_>, found: &mut RoundFound) {
         let mut cells = vec![Wrong::default(); tile.kept.len()];
         let radius2 = u128::from(self.radius.unsigned_abs()).pow(2);
         let within = self.radius.saturating_mul(ASKED_RADII);

@@ -2,9 +2,10 @@
 
 use super::super::removal::{keep_once, remove};
 use super::correct::is_beyond;
+use super::rank::{EXCEPTION, KEEP_RANK, rank_of};
 use super::refine::ASKED_RADII;
-use super::surface::{Told, ask_surface};
-use super::{EXCEPTION, KEEP_RANK};
+use super::surface::{SurfaceTold, ask_surface};
+
 use crate::Result;
 use crate::report::Tally;
 use crate::store::{KeptPoints, KeptReader};
@@ -29,7 +30,7 @@ impl Judgement<'_> {
         let within = self.radius.saturating_mul(ASKED_RADII);
         self.kept.near(&tile.cube.grown(within), &mut reader)?;
         let core = tile.core.clone();
-        let mut all: Vec<Option<Told>> = vec![None; core.len()];
+        let mut all: Vec<Option<SurfaceTold>> = vec![None; core.len()];
         let (surface, at) = (&reader.positions, &tile.positions[core.clone()]);
         ask_surface(tile.simd(), surface, at, within, |i, told| all[i] = Some(told));
         let mut ranks = match self.ranks {
@@ -67,9 +68,4 @@ impl Judgement<'_> {
         }
         Ok(())
     }
-}
-
-/// The rank of what a round kept: below that of an exception.
-fn rank_of(round: u32) -> u16 {
-    round.min(u32::from(EXCEPTION) - 1) as u16
 }

@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use crate::geom::hash::{PlaceHashes, of_position};
 use crate::point::Position;
-use crate::stage::{Found, RoundTile};
+use crate::stage::{RoundFound, RoundTile};
 
 /// The order of colours: see `ops/sample/disc.rs`.
 const COLORS: [usize; 8] = [0b000, 0b010, 0b011, 0b111, 0b110, 0b100, 0b101, 0b001];
@@ -49,7 +49,7 @@ impl Filling {
     }
 
     /// Fills the cube of a tile.
-    pub fn fill(self, tile: &RoundTile<'_>, found: &mut Found) {
+    pub fn fill(self, tile: &RoundTile<'_>, found: &mut RoundFound) {
         let mut filled = Filled::of(self, tile);
         for color in COLORS {
             for cube in 0..filled.cubes.len() {

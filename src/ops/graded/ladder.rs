@@ -1,19 +1,19 @@
 //! Rounds towards a number of points: a ladder of distances that ends where all are kept.
 //!
-//! On each rung positions are kept until none is farther than a distance from a kept one; then a few
-//! rounds add points where the surface is told worst. The distances fall by √2. For one number of
-//! points the last distance follows from that number, and two rungs above it are enough: what they
-//! keep, they keep with little to look at. For an order in which any number can be cut off
+//! On each rung positions are kept until none is farther than a distance from a kept one; then a
+//! few rounds add points where the surface is told worst. The distances fall by √2. For one number
+//! of points the last distance follows from that number, and two rungs above it are enough: what
+//! they keep, they keep with little to look at. For an order in which any number can be cut off
 //! (`ranks`), rungs are those of the lattice and begin at the width of the scan, so that they are
 //! the same whatever the number is.
 
-use crate::stage::{Choice, Looks, NextRound, Round, SoFar};
+use crate::stage::{Looks, NextRound, Round, RoundChoice, SoFar};
 
 use super::fill::Filling;
 use super::refine::Refining;
 use super::settings::Effort;
 use super::sides::{LONGEST, extent, occupied, steps, voxel_side};
-use super::work::{Work, fill};
+use super::work::{RoundWork, fill};
 
 /// The last distance, as a part of the side of the voxel grid that keeps as many.
 const OF_VOXEL: f64 = 0.97;
@@ -21,8 +21,8 @@ const OF_VOXEL: f64 = 0.97;
 const GROWTH: f64 = 2.0 / 3.0;
 /// Kept points from which on a rung has rounds.
 const FEWEST: u64 = 200;
-/// Positions that a filling looks at for each cube of its distance that is occupied; all where there
-/// are fewer.
+/// Positions that a filling looks at for each cube of its distance that is occupied; all where
+/// there are fewer.
 const FILLED_FROM: f64 = 64.0;
 /// Positions that a round of the last rung looks at for each kept point, and of others, which only
 /// have to find about where points are missing.
@@ -66,15 +66,15 @@ pub(super) struct Ladder {
     rungs: Vec<i64>,
     /// True if what is kept before the last round does not depend on how many are wanted.
     ranked: bool,
-    at: Next,
+    at: LadderStep,
     /// The part of all positions that the rounds of the rung look at.
     probed: f64,
-    work: Option<Work>,
+    work: Option<RoundWork>,
 }
 
 /// What comes next.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Next {
+enum LadderStep {
     Fill {
         rung: usize,
     },
@@ -106,7 +106,7 @@ impl Ladder {
             rounds,
             rungs,
             ranked: false,
-            at: Next::Fill { rung: 0 },
+            at: LadderStep::Fill { rung: 0 },
             probed: 1.0,
             work: None,
         }
@@ -123,7 +123,7 @@ impl Ladder {
     }
 
     /// What the round at hand does.
-    pub fn work(&self) -> Option<Work> {
+    pub fn work(&self) -> Option<RoundWork> {
         self.work
     }
 
@@ -131,9 +131,9 @@ impl Ladder {
     /// last, or before where the last filling was cut short.
     pub fn radius(&self) -> i64 {
         let rung = match self.at {
-            Next::Refine { rung, .. } => rung,
-            Next::Fill { rung } => rung.saturating_sub(1),
-            Next::Mop => self.rungs.len() - 1,
+            LadderStep::Refine { rung, .. } => rung,
+            LadderStep::Fill { rung } => rung.saturating_sub(1),
+            LadderStep::Mop => self.rungs.len() - 1,
         };
         self.rungs[if self.ranked { rung.saturating_sub(1) } else { rung }]
     }
@@ -148,30 +148,30 @@ impl Ladder {
         }
         let last = self.rungs.len() - 1;
         match self.at {
-            Next::Fill { rung } => {
+            LadderStep::Fill { rung } => {
                 let share = self.filled_from(rung, so_far);
                 self.at = match (rung == last, share < 1.0) {
-                    (true, true) => Next::Mop,
-                    _ => Next::Refine { rung, round: 0 },
+                    (true, true) => LadderStep::Mop,
+                    _ => LadderStep::Refine { rung, round: 0 },
                 };
                 self.fill(rung, Looks::sample(share, self.seed))
             }
-            Next::Mop => {
-                self.at = Next::Refine { rung: last, round: 0 };
+            LadderStep::Mop => {
+                self.at = LadderStep::Refine { rung: last, round: 0 };
                 let share = self.filled_from(last, so_far);
                 self.fill(last, Looks::uncovered(self.rungs[last], share))
             }
-            Next::Refine { rung, round: 0 } if rung < last && so_far.kept < FEWEST => {
-                self.at = Next::Fill { rung: rung + 1 };
+            LadderStep::Refine { rung, round: 0 } if rung < last && so_far.kept < FEWEST => {
+                self.at = LadderStep::Fill { rung: rung + 1 };
                 self.next(so_far)
             }
-            Next::Refine { rung, round } => self.refine(rung, round, so_far),
+            LadderStep::Refine { rung, round } => self.refine(rung, round, so_far),
         }
     }
 
     fn fill(&mut self, rung: usize, looks: Looks) -> NextRound {
         let filling = Filling { apart: self.rungs[rung], seed: self.seed };
-        self.work = Some(Work::Fill(filling));
+        self.work = Some(RoundWork::Fill(filling));
         fill(filling, looks)
     }
 
@@ -203,19 +203,19 @@ impl Ladder {
             self.probed = 1.0;
         }
         self.at = match is_last && !is_bottom {
-            true => Next::Fill { rung: rung + 1 },
-            false => Next::Refine { rung, round: round + 1 },
+            true => LadderStep::Fill { rung: rung + 1 },
+            false => LadderStep::Refine { rung, round: round + 1 },
         };
         let apart = if is_last && is_last_rung { 0.0 } else { APART };
         let floor = if round > 0 { LOW * so_far.least } else { 0.0 };
         let refining = Refining { radius: self.rungs[rung], apart, floor };
-        self.work = Some(Work::Refine(refining));
+        self.work = Some(RoundWork::Refine(refining));
         let want = if self.ranked { want.max(1) } else { want.clamp(1, missing) };
         NextRound::Round(Round {
             looks: Looks::sample(self.probed, self.seed),
             reach: refining.reach(),
             kept_reach: refining.kept_reach(),
-            choice: Choice::Best { want, reach: refining.offer_reach() },
+            choice: RoundChoice::Best { want, reach: refining.offer_reach() },
         })
     }
 

@@ -2,10 +2,10 @@
 //!
 //! A removed position asks its nearest kept ones. How far it is from the plane of the nearest five,
 //! of the nearest eight and of the nearest twelve says how wrong whoever goes on with the kept
-//! points would be there, whatever it is that they do. The positions that have the same nearest kept
-//! point are a cell, and the worst cells of the scan each offer the position that would help most.
-//! Neither normals nor a model of the noise are asked: a plane through noisy points is off by as
-//! much everywhere, so the worst cells are those of shape.
+//! points would be there, whatever it is that they do. The positions that have the same nearest
+//! kept point are a cell, and the worst cells of the scan each offer the position that would help
+//! most. Neither normals nor a model of the noise are asked: a plane through noisy points is off by
+//! as much everywhere, so the worst cells are those of shape.
 
 use std::collections::HashSet;
 
@@ -13,7 +13,7 @@ use crate::geom::hash::PlaceHashes;
 use crate::geom::nearest::NearestAmong;
 use crate::geom::planes::{NEAREST, PlaneErrors};
 use crate::point::Position;
-use crate::stage::{Found, Offer, RoundTile};
+use crate::stage::{Offer, RoundFound, RoundTile};
 
 /// How a round refines.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +35,7 @@ const OF_DISTANCE: f64 = 1e-12;
 
 /// What a removed position says.
 #[derive(Clone, Copy)]
-struct Asked {
+struct AskedPosition {
     /// Index of the nearest kept point; none if it is kept itself or has none near.
     cell: u32,
     /// Squared distance to it.
@@ -80,7 +80,7 @@ impl Refining {
     }
 
     /// Offers the worst position of each cell.
-    pub fn refine(self, tile: &RoundTile<'_>, found: &mut Found) {
+    pub fn refine(self, tile: &RoundTile<'_>, found: &mut RoundFound) {
         let unchanged = Unchanged::of(tile, self.floor);
         let touched: Vec<Position>;
         let positions = match &unchanged {
@@ -146,8 +146,8 @@ impl Refining {
     }
 
     /// What each position says.
-    fn asked(self, tile: &RoundTile<'_>, positions: &[Position]) -> Vec<Asked> {
-        let nothing = Asked { cell: NONE, distance2: 0.0, asked2: 0.0, error2: 0.0 };
+    fn asked(self, tile: &RoundTile<'_>, positions: &[Position]) -> Vec<AskedPosition> {
+        let nothing = AskedPosition { cell: NONE, distance2: 0.0, asked2: 0.0, error2: 0.0 };
         let mut all = vec![nothing; positions.len()];
         let radius2 = (self.radius as f64) * (self.radius as f64);
         let within2 = radius2 * (ASKED_RADII * ASKED_RADII) as f64;
@@ -160,7 +160,7 @@ impl Refining {
             if distance2 > 0.0 && distance2 <= radius2 {
                 let last = found.get(NEAREST - 1).map(|&j| squared(tile.kept[j as usize], p));
                 let asked2 = last.map_or(within2, |last| last.min(within2));
-                all[i] = Asked { cell: first, distance2, asked2, error2: 0.0 };
+                all[i] = AskedPosition { cell: first, distance2, asked2, error2: 0.0 };
                 let offsets = found.iter().map(|&j| offset(tile.kept[j as usize], p));
                 let offsets = offsets.take_while(|o| squared_length(*o) <= within2);
                 errors.push(i as u32, offsets, |i, error2| all[i as usize].error2 = error2);

@@ -11,7 +11,7 @@ const ASKED: usize = SURFACE + 1;
 
 /// What a position is told by the surface.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Told {
+pub(super) struct SurfaceTold {
     /// Index of the nearest kept point.
     pub nearest: u32,
     /// Squared distance to it in steps.
@@ -27,7 +27,7 @@ pub(super) fn ask_surface(
     surface: &[Position],
     at: &[Position],
     within: i64,
-    mut visit: impl FnMut(usize, Told),
+    mut visit: impl FnMut(usize, SurfaceTold),
 ) {
     let within2 = (within.unsigned_abs() as u128).pow(2);
     let mut nearest = NearestAmong::with(simd);
@@ -55,7 +55,7 @@ pub(super) fn ask_surface(
                     surface_distance(positions[n], &found[..near], surface)
                 }
             };
-            visit(i, Told { nearest, distance2, off });
+            visit(i, SurfaceTold { nearest, distance2, off });
         });
         if tied.is_empty() {
             return;

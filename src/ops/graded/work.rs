@@ -3,11 +3,11 @@
 use super::correct::Correcting;
 use super::fill::Filling;
 use super::refine::Refining;
-use crate::stage::{Choice, Looks, NextRound, Round};
+use crate::stage::{Looks, NextRound, Round, RoundChoice};
 
 /// What a round does.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Work {
+pub(super) enum RoundWork {
     Fill(Filling),
     Refine(Refining),
     Correct(Correcting),
@@ -16,5 +16,5 @@ pub(super) enum Work {
 /// A round that fills.
 pub(super) fn fill(filling: Filling, looks: Looks) -> NextRound {
     let (reach, kept_reach) = (filling.reach(), filling.kept_reach());
-    NextRound::Round(Round { looks, reach, kept_reach, choice: Choice::InTile })
+    NextRound::Round(Round { looks, reach, kept_reach, choice: RoundChoice::InTile })
 }

@@ -1,0 +1,76 @@
+//! The arguments that several commands have.
+
+use clap::{Args, ValueEnum};
+
+use crate::cli::classes::{Classes, parse_classes};
+
+/// Common to all commands that run a pipeline.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Run options")]
+pub(crate) struct CommonArguments {
+    /// Bound of the peak memory, such as 512MiB or 2GiB [default: half of what there is]
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
+    /// Threads that work at once [default: all processors]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<String>,
+    /// Folder for what does not fit in memory [default: beside the output]
+    #[arg(long, value_name = "DIR")]
+    pub scratch: Option<String>,
+    /// Progress on stderr: bars where it is a terminal, one JSON event a line, or none
+    #[arg(long, value_name = "HOW", default_value = "auto")]
+    pub progress: Progress,
+    /// Print errors only
+    #[arg(short, long, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Print what the plan and the stages decided, how long each phase took, and what the memory
+    /// was for
+    #[arg(short, long)]
+    pub verbose: bool,
+    /// Write the report to this file
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<String>,
+    /// Replace no file: refuse the run, with exit code 1, if an output or the report exists
+    #[arg(long)]
+    pub no_clobber: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Progress {
+    Auto,
+    Json,
+    Never,
+}
+
+/// Which points are left out as they are read.
+#[derive(Debug, Args)]
+pub(crate) struct FilterArguments {
+    /// Keep the points of these classes alone, such as 2,6
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_classes)]
+    pub keep_classes: Vec<Classes>,
+    /// Leave the points of these classes out, such as 7,18
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_classes)]
+    pub drop_classes: Vec<Classes>,
+}
+
+/// How the output is written.
+#[derive(Debug, Args)]
+pub(crate) struct WrittenArguments {
+    /// Scale of LAS coordinates, or three for X, Y and Z [default: the input's; PLY to LAS must say
+    /// it]
+    #[arg(long, value_name = "SCALE")]
+    pub scale: Option<String>,
+    /// Offset of LAS coordinates on each axis [default: the input's, or 0]
+    #[arg(long, value_name = "X,Y,Z")]
+    pub offset: Option<String>,
+    /// Dimensions that may get lost, such as GpsTime,UserData
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub drop: Vec<String>,
+    /// Encoding of PLY: ascii or binary [default: the input's]
+    #[arg(long, value_name = "HOW")]
+    pub encoding: Option<String>,
+    /// Bits of a colour where LAS becomes PLY: 8bit, 16bit, or auto: 8 where that loses nothing
+    /// [default: auto]
+    #[arg(long, value_name = "BITS")]
+    pub colors: Option<String>,
+}
