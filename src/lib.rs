@@ -103,6 +103,7 @@
 mod budget;
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod compare;
 mod engine;
 mod error;
 pub mod expression;

@@ -4,6 +4,7 @@ mod pipeline;
 mod plain;
 mod reduce;
 mod shared;
+mod verify;
 
 use std::path::PathBuf;
 
@@ -20,6 +21,7 @@ pub(super) use plain::{
 };
 pub(super) use reduce::ReduceArguments;
 pub(super) use shared::{CommonArguments, FilterArguments, Progress, WrittenArguments};
+pub(super) use verify::VerifyArguments;
 
 /// Reduces laser scans that do not fit in memory to the points that matter.
 #[derive(Debug, Parser)]
@@ -53,6 +55,8 @@ pub(super) enum Command {
     New(NewArguments),
     /// Print the JSON Schema of pipeline files, by which editors complete and check them
     Schema,
+    /// Check that a scan is a reduction of another, and how far removed points are from its surface
+    Verify(Box<VerifyArguments>),
     /// Draw scans side by side, from above or from a side
     Picture(PictureArguments),
     /// Make a synthetic scan
@@ -79,6 +83,7 @@ impl Command {
     pub fn common(&self) -> Option<&CommonArguments> {
         match self {
             Command::Reduce(reduce) => Some(&reduce.common),
+            Command::Verify(verify) => Some(&verify.common),
             Command::Run(PlanArguments { common, .. })
             | Command::Plan(PredictArguments { planned: PlanArguments { common, .. }, .. })
             | Command::Check(PlanArguments { common, .. })

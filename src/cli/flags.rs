@@ -5,10 +5,11 @@ use serde_json::{Value, json};
 
 use super::arguments::{
     CommonArguments, ConvertArguments, FilterArguments, ReduceArguments, SynthArguments,
-    WrittenArguments,
+    VerifyArguments, WrittenArguments,
 };
 use super::classes::Classes;
 use crate::language::Set;
+use crate::ops::KEEP_RANK;
 use crate::quantity::parse_count;
 
 /// A flag of a command, the setting that it stands for, and its value if it was given.
@@ -110,6 +111,7 @@ fn again(arguments: &ReduceArguments) -> bool {
 /// The flags of `reduce`.
 pub(super) fn reduce_flags(arguments: &ReduceArguments) -> Vec<CommandFlag> {
     let by_cells = arguments.by_cells();
+    let ranks = !by_cells && (arguments.ranks || arguments.tolerance.is_some());
     let classes = |of_cells: bool| classes(&arguments.classes).filter(|_| of_cells == by_cells);
     let keep = |of_cells: bool| {
         arguments.keep.as_deref().map(whole_or_text).filter(|_| of_cells == by_cells)
@@ -128,6 +130,8 @@ pub(super) fn reduce_flags(arguments: &ReduceArguments) -> Vec<CommandFlag> {
             "graded.max_spacing",
             arguments.max_spacing.as_deref().map(number_or_text),
         ),
+        ("--ranks", "graded.ranks", ranks.then(|| FlagValue::from(true))),
+        ("--ranks", "write.dimensions", ranks.then(|| json!([KEEP_RANK.kind().name()]).into())),
         ("--effort", "graded.effort", arguments.effort.clone().map(FlagValue::from)),
         ("--max-side", "cells.max_side", arguments.max_side.as_deref().map(number_or_text)),
         (
@@ -179,6 +183,18 @@ pub(super) fn convert_flags(
     all.extend(filtered(&arguments.filter));
     all.extend(written(&arguments.written));
     all
+}
+
+/// The flags of `verify`: settings of the run that it is, and names of its own lengths.
+pub(super) fn verify_flags(arguments: &VerifyArguments) -> Vec<CommandFlag> {
+    flags([
+        ("ORIGINAL", "read.path", Some(json!(arguments.files().1).into())),
+        ("--tolerance", "verify.tolerance", None),
+        ("--max-spacing", "verify.max_spacing", None),
+        ("--noise", "run.noise", Some(arguments.noise.as_deref().unwrap_or("drop").into())),
+        ("--withheld", "run.withheld", arguments.withheld.clone().map(FlagValue::from)),
+        ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(FlagValue::from)),
+    ])
 }
 
 /// The flags of `synth`.

@@ -18,6 +18,10 @@ const GROUPS: &[(&str, &str, &[&str])] = &[
         &[
             "preset",
             "keep",
+            "tolerance",
+            "max_spacing",
+            "effort",
+            "ranks",
             "max_angle",
             "max_side",
             "min_spacing",
@@ -57,7 +61,7 @@ const GROUPS: &[(&str, &str, &[&str])] = &[
 ];
 
 /// Commands with the flags of a run that write nothing: they refuse those about what is written.
-const WRITE_NOTHING: [&str; 2] = ["plan", "check"];
+const WRITE_NOTHING: [&str; 3] = ["plan", "check", "verify"];
 
 /// What stands below the help of a command.
 const EXAMPLES: &[(&str, &str)] = &[
@@ -94,6 +98,17 @@ Examples:
   pointmill convert survey/*.las -o survey.laz
   pointmill convert survey/*.las -o compressed/ --to laz
   pointmill convert scan.ply -o scan.laz --scale 0.001 --drop confidence",
+    ),
+    (
+        "verify",
+        "\
+Examples:
+  pointmill verify survey.laz reduced.laz
+  pointmill verify survey.laz reduced.laz --tolerance 5cm --max-spacing 1m
+  pointmill verify survey/*.laz reduced.laz --json
+
+The exit code is 1 if a record of the reduced scan is none of the original, or a point that was
+removed is farther away than it may be.",
     ),
     ("info", "Examples:\n  pointmill info scan.laz\n  pointmill info --json survey/*.laz"),
     (

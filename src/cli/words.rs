@@ -2,7 +2,7 @@
 //! them, are put into the flags that the user of the command can type.
 
 use super::arguments::Command;
-use super::flags::{common_flags, convert_flags, reduce_flags, synth_flags};
+use super::flags::{common_flags, convert_flags, reduce_flags, synth_flags, verify_flags};
 use crate::Error;
 use crate::language::Registry;
 
@@ -20,6 +20,7 @@ impl Words {
         let flags = match command {
             Command::Run(_) | Command::Plan(_) | Command::Check(_) => Vec::new(),
             Command::Reduce(reduce) => reduce_flags(reduce),
+            Command::Verify(verify) => verify_flags(verify),
             Command::Convert(convert) => convert_flags(convert, None, None),
             Command::Synth(synth) => synth_flags(synth),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => Vec::new(),

@@ -136,7 +136,6 @@ impl RoundScan<'_> {
             }
             RoundChoice::Best { want, reach } => {
                 let last = before.as_ref().and_then(|before| before.of(round, &cut.keys));
-                let last = last.filter(|_| !job.task.whole_rims);
                 let (offers, counted) = self.offers(job, round, kept, &cut, last)?;
                 drop(before);
                 let chosen = offers.best(want)?;

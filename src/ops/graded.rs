@@ -24,8 +24,8 @@ use crate::point::{Units, names};
 use crate::quantity::Length;
 use crate::report::{Grouped, Tally};
 use crate::stage::{
-    Needs, NextRound, Role, RoleName, RoundFound, RoundOp, RoundTile, ScanFacts, SoFar, StageKind,
-    StagePlace, TileOp,
+    Lattice, Needs, NextRound, Role, RoleName, RoundFound, RoundOp, RoundTile, ScanFacts, SoFar,
+    StageKind, StagePlace, TileOp,
 };
 use crate::store::KeptPoints;
 use crate::tile::Tile;
@@ -84,8 +84,11 @@ pub struct Graded {
     pub ranks: bool,
     /// Of equally good choices, which are made.
     pub seed: u64,
+    /// The world units of a lattice step, and the records and positions of the scan.
     #[serde(skip)]
     step: f64,
+    #[serde(skip)]
+    scan: (u64, u64),
     #[serde(skip)]
     course: Option<RoundsCourse>,
     #[serde(skip)]
@@ -107,6 +110,8 @@ const BYTES: usize = 96;
 /// Where nothing says how far apart kept points are with a tolerance: a voxel grid that keeps one
 /// of so many positions.
 const SPARSE: u64 = 256;
+/// Where kept points may be anywhere, in steps.
+const FARTHEST: i64 = 1 << 60;
 /// Cubes of it at least.
 const FEWEST: u64 = 64;
 
@@ -213,14 +218,28 @@ impl TileOp for Graded {
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
         (self.course, self.kept, self.most) = (None, None, None);
         self.step = scan.lattice.step;
+        self.scan = (scan.points, scan.positions);
         Ok(())
+    }
+
+    fn warnings(&self, _: &Lattice) -> Vec<String> {
+        let (records, positions) = self.scan;
+        let asked = self.keep.map_or(0, |keep| keep.of(records));
+        let told = || {
+            let (asked, positions) = (Grouped(asked), Grouped(positions));
+            format!(
+                "`graded.keep` asks for {asked} records, and the scan has {positions} positions: \
+                 one record of each stays"
+            )
+        };
+        (asked > positions).then(told).into_iter().collect()
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let early = || Error::internal("the stage graded ran before it chose");
         let kept = self.kept.as_ref().ok_or_else(early)?;
         let (radius, tolerance) = match self.course.as_ref().ok_or_else(early)? {
-            RoundsCourse::Count(ladder) => (ladder.radius(), None),
+            RoundsCourse::Count(ladder) => (ladder.covered().unwrap_or(FARTHEST), None),
             RoundsCourse::Tolerance(certain) => (certain.radius, Some(certain.tolerance)),
         };
         Judgement { kept, radius, tolerance, ranks: self.ranks }.pass(tile, tally)
@@ -231,7 +250,8 @@ impl TileOp for Graded {
         let mut all = Vec::new();
         match &self.course {
             Some(RoundsCourse::Count(ladder)) => {
-                all.push(("spacing".to_owned(), length(ladder.radius())));
+                let covered = ladder.covered();
+                all.extend(covered.map(|covered| ("spacing".to_owned(), length(covered))));
                 if self.tolerance.is_some() {
                     all.push(("ended_by".to_owned(), "keep".into()));
                 }

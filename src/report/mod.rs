@@ -2,7 +2,7 @@
 
 mod baseline;
 mod classes;
-mod deviations;
+pub(crate) mod deviations;
 pub(crate) mod digits;
 mod document;
 mod figures;

@@ -56,9 +56,8 @@ fn help_names_commands_and_exit_codes() {
 fn defaults_in_the_help_are_those_of_the_pipeline() {
     let at = here();
     let help = pointmill(at.path(), &["reduce", "--help"]).stdout;
-    let file = include_str!("../../pipelines/reduce.toml");
+    let file = include_str!("../../pipelines/paper.toml");
     for (flag, key, default) in [
-        ("--keep", "keep", "auto"),
         ("--neighbors", "neighbors", "auto"),
         ("--side", "side", "spread"),
         ("--min-spacing", "min_spacing", "auto"),

@@ -478,7 +478,7 @@ fn what_is_marked_is_told_by_its_number() {
 fn the_summary_says_units_and_what_was_not_measured() {
     let at = scans(&["a.laz"]);
     let at = at.path();
-    let plain = done(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "500"]);
+    let plain = done(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "500", "--measure", "cone"]);
     assert!(plain.contains("\nangle      ") && plain.contains(" rad at most: what normals of"));
     let has_unit = |line: &str| line.split([' ', ',']).any(|word| word == "m");
     let lengths = |told: &str| {
@@ -496,7 +496,7 @@ fn the_summary_says_units_and_what_was_not_measured() {
     let (_, told, chosen) = pointmill(at, &["reduce", "m.ply", "-o", "o.ply"]);
     assert!(lengths(&told).iter().all(|line| has_unit(line)), "{told}");
     assert!(chosen.contains("side ") && chosen.contains(" m, min spacing "), "{chosen}");
-    let most = done(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "2900"]);
+    let most = done(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "2900", "--measure", "cone"]);
     assert!(most.contains("\nbaseline   not measured: a voxel grid of so many"), "{most}");
 }
 
@@ -504,7 +504,12 @@ fn the_summary_says_units_and_what_was_not_measured() {
 fn a_scan_without_points_and_a_number_above_all_are_told() {
     let at = scans(&["a.laz"]);
     let at = at.path();
-    let (_, _, told) = pointmill(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "1e9"]);
+    let all = ["reduce", "a.laz", "-o", "o.laz", "--keep", "1e9"];
+    let (_, _, told) = pointmill(at, &all);
+    let warning =
+        "warning: `--keep` asks for 1,000,000,000 records, and the scan has 3,000 positions";
+    assert!(told.contains(warning), "{told}");
+    let (_, _, told) = pointmill(at, &[&all[..], &["--measure", "cone"]].concat());
     let warning =
         "warning: `--keep` asks for 1000000000 records, and 3000 stay however small the angle";
     assert!(told.contains(warning), "{told}");
@@ -539,7 +544,8 @@ fn points_without_a_normal_are_counted_and_a_better_grid_is_told() {
     assert!(told.contains("40 in, 40 out") && !told.contains("120 points"), "{told}");
     // Leaves, of which no plane tells anything.
     done(at, &["synth", "als", "-n", "30k", "--noise", "3", "-o", "leaves.laz"]);
-    let told = done(at, &["reduce", "leaves.laz", "-o", "o.laz", "--keep", "2%"]);
+    let told =
+        done(at, &["reduce", "leaves.laz", "-o", "o.laz", "--keep", "2%", "--measure", "cone"]);
     let baseline = told.lines().find(|line| line.starts_with("baseline ")).unwrap();
     let rms = |line: &str| -> f64 {
         line.split("RMS ").nth(1).unwrap().split([' ', ',']).next().unwrap().parse().unwrap()

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use super::modules::Modules;
 
 /// The modules from the bottom up. Those of one layer do not import each other.
-const LAYERS: [&[&str]; 18] = [
+const LAYERS: [&[&str]; 19] = [
     &["error"],
     &["host", "point"],
     &["geom", "quantity", "budget"],
@@ -27,6 +27,7 @@ const LAYERS: [&[&str]; 18] = [
     &["engine"],
     &["plan"],
     &["language"],
+    &["compare"],
     &["testing"],
     &["cli"],
     &["internals"],

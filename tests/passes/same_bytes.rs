@@ -192,6 +192,28 @@ fn grids_are_the_same_bytes() {
 }
 
 #[test]
+fn graded_reductions_are_the_same_bytes() {
+    let scan = landscape();
+    for (seed, keys) in [
+        "keep = \"10%\"",
+        "keep = 700\nseed = 4\nclasses = [2, 6]",
+        "keep = \"30%\"\nranks = true\neffort = \"low\"",
+        "tolerance = 0.2\nmax_spacing = 2.5",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let stages = stages(&[("graded", keys)]);
+        let family = Family { stages: &stages, shows: &[], removes: &["graded"], ..FAMILY };
+        family.same(&scan, TILES, 3, seed as u64);
+    }
+    // Behind stages that remove, of two branches' worth of rounds.
+    let chain = stages(&[("grid", "side = 0.6"), ("graded", "keep = \"20%\"")]);
+    let family = Family { stages: &chain, shows: &[], removes: &["grid", "graded"], ..FAMILY };
+    family.same(&scan, TILES, 3, 9);
+}
+
+#[test]
 fn cells_with_a_target_are_the_same_bytes() {
     let scan = landscape();
     let cells = [

@@ -5,6 +5,7 @@ mod classes;
 mod crop;
 mod exact;
 mod extremes;
+mod graded;
 mod grid;
 mod orders;
 mod outliers;

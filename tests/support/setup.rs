@@ -6,7 +6,7 @@ use pointmill::{Done, Graph, Overrides, Quiet, Registry, Result, Set};
 use serde_json::{Value, json};
 
 /// The pipelines that users copy.
-pub const REDUCE: &str = include_str!("../../pipelines/reduce.toml");
+pub const REDUCE: &str = include_str!("../../pipelines/paper.toml");
 pub const CONVERT: &str = include_str!("../../pipelines/convert.toml");
 
 /// How a run of a test is set up: values in the place of the pipeline's, memory and threads.
@@ -46,7 +46,7 @@ pub fn run(text: &str, inputs: &[PathBuf], output: &Path, setup: &Setup) -> Resu
     pipeline.plan(&overrides)?.run(&Quiet)
 }
 
-/// A run of `pipelines/reduce.toml`.
+/// A run of `pipelines/paper.toml`.
 pub fn reduce(inputs: &[PathBuf], output: &Path, setup: &Setup) -> Result<Done> {
     run(REDUCE, inputs, output, setup)
 }

@@ -80,6 +80,10 @@ pub(crate) struct ReduceArguments {
     /// 50cm
     #[arg(long, value_name = "LENGTH", conflicts_with_all = OF_CELLS)]
     pub max_spacing: Option<String>,
+    /// Write KeepRank, by which any coarser reduction can be cut off; with a tolerance it is
+    /// written anyway, since it tells exceptions from the surface
+    #[arg(long, conflicts_with_all = OF_CELLS)]
+    pub ranks: bool,
     /// How much is computed: low, normal or high [default: normal]
     #[arg(long, value_name = "HOW", conflicts_with_all = OF_CELLS)]
     pub effort: Option<String>,

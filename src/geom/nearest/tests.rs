@@ -2,8 +2,13 @@ use std::cmp::Ordering;
 
 use proptest::prelude::*;
 
-use super::*;
+use super::exact::Neighbor;
+use super::own::Nearest;
+use super::tree::{BoxNode, BoxTree, EXACT};
+use super::walk::Work;
+use super::{refine, tree};
 use crate::geom::simd::Simd;
+use crate::point::{Position, distance2};
 
 /// A sequence of pseudo-random numbers (splitmix64).
 struct Random(u64);

@@ -67,6 +67,9 @@ pub(super) struct Ladder {
     /// True if what is kept before the last round does not depend on how many are wanted.
     ranked: bool,
     at: LadderStep,
+    covered: Option<i64>,
+    /// The same once the round at hand is done, if all that it keeps stays.
+    covers: Option<i64>,
     /// The part of all positions that the rounds of the rung look at.
     probed: f64,
     work: Option<RoundWork>,
@@ -107,6 +110,8 @@ impl Ladder {
             rungs,
             ranked: false,
             at: LadderStep::Fill { rung: 0 },
+            covered: None,
+            covers: None,
             probed: 1.0,
             work: None,
         }
@@ -127,22 +132,19 @@ impl Ladder {
         self.work
     }
 
-    /// The distance that no removed position is from a kept one, in steps: that which was filled to
-    /// last, or before where the last filling was cut short.
-    pub fn radius(&self) -> i64 {
-        let rung = match self.at {
-            LadderStep::Refine { rung, .. } => rung,
-            LadderStep::Fill { rung } => rung.saturating_sub(1),
-            LadderStep::Mop => self.rungs.len() - 1,
-        };
-        self.rungs[if self.ranked { rung.saturating_sub(1) } else { rung }]
+    /// The distance in steps that no removed position is farther from a kept one than: the last one
+    /// that was filled to and of whose points all stay.
+    pub fn covered(&self) -> Option<i64> {
+        self.covered
     }
 
     /// What comes next.
     pub fn next(&mut self, so_far: &SoFar<'_>) -> NextRound {
         if so_far.kept > self.want {
+            self.covers = None;
             return NextRound::Shorten { to: self.want, seed: SHORTENED_BY };
         }
+        self.covered = self.covers.take().or(self.covered);
         if so_far.kept == self.want {
             return NextRound::Done;
         }
@@ -172,6 +174,9 @@ impl Ladder {
     fn fill(&mut self, rung: usize, looks: Looks) -> NextRound {
         let filling = Filling { apart: self.rungs[rung], seed: self.seed };
         self.work = Some(RoundWork::Fill(filling));
+        // A sample that is covered says nothing of the others.
+        let looks_at_all = looks.share() >= 1.0 || matches!(looks, Looks::Uncovered { .. });
+        self.covers = looks_at_all.then_some(filling.apart);
         fill(filling, looks)
     }
 

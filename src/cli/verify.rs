@@ -1,0 +1,49 @@
+//! `verify`: is a scan a reduction of another, and how true is it?
+
+use super::arguments::VerifyArguments;
+use super::console::Console;
+use super::draw::{Nothing, watched};
+use super::flags::{common_flags, given, verify_flags};
+use super::print;
+use super::run::HIDDEN;
+use crate::compare::{VerifySettings, verify};
+use crate::graph::Graph;
+use crate::language::Registry;
+use crate::{Error, ErrorKind, Result};
+
+/// What the settings of a run are read with.
+const SETTINGS: &str = "[[stage]]\nkind = \"read\"\n\n[[stage]]\nkind = \"discard\"\n";
+
+/// Checks a reduced scan beside its original and prints what came of it; fails if it does not hold.
+pub(super) fn check_reduction(
+    arguments: &VerifyArguments,
+    registry: &Registry,
+    console: &Console,
+) -> Result<()> {
+    let (Some(reduced), original) = arguments.files() else {
+        let told = "a reduced scan is compared with its original, and one file is given";
+        let help = "give the original's files first, and the reduced one last";
+        return Err(Error::pipeline(told).help(help));
+    };
+    let sets = given([verify_flags(arguments), common_flags(&arguments.common)]);
+    let settings = VerifySettings {
+        tolerance: arguments.tolerance,
+        max_spacing: arguments.max_spacing,
+        run: Graph::parse_with(SETTINGS, HIDDEN, registry, &sets)?.settings,
+    };
+    console.hear_interrupts();
+    let verdict = watched(&mut Nothing, &|| console.cancelled(), |watch| {
+        verify(original, reduced, &settings, registry, watch)
+    })?;
+    if arguments.json {
+        let failed = |e| Error::internal("a verdict could not be written as JSON").because(e);
+        let told = serde_json::to_value(&verdict).map_err(failed)?;
+        print::json(&format!("{told:#}"))?;
+    } else {
+        console.result(&verdict)?;
+    }
+    match verdict.holds() {
+        true => Ok(()),
+        false => Err(Error::new(ErrorKind::Data, "the reduced scan does not hold").at(reduced)),
+    }
+}

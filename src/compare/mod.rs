@@ -1,0 +1,16 @@
+//! Two scans against each other: is one a reduction of the other, and how true is it?
+//!
+//! A check of what a run did must not believe the run. So it is made from the two files alone, by
+//! code that shares nothing with the stages that reduce but the search of nearest neighbours: every
+//! record that was kept is looked for among those of the original, and of every other position of
+//! the original it is measured how far it is from the surface that the kept points say.
+
+mod meet;
+mod records;
+mod reduced;
+mod surface;
+mod verdict;
+mod verify;
+
+pub use verdict::{DistanceFigures, ForeignRecord, Verification};
+pub use verify::{VerifySettings, verify};

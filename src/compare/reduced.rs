@@ -1,0 +1,136 @@
+//! The reduced scan, as it is looked at beside the original.
+
+use std::collections::HashMap;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use super::records::Comparison;
+use crate::budget::{Bytes, whole_mebibytes};
+use crate::geom::hash::PlaceHashes;
+use crate::point::{PointBatch, Scalar, Schema};
+use crate::stage::Source;
+use crate::{Error, ErrorKind, Result};
+
+/// The dimension that tells surface points from exceptions.
+const KEEP_RANK: &str = "KeepRank";
+/// Its value for exceptions: kept, and no part of the surface.
+const EXCEPTION: f64 = 65535.0;
+/// Records that are read at once.
+const BATCH: usize = 8192;
+/// Bytes of a record while it is looked at: its place, its positions as they are searched, and its
+/// entry in a table that is at most half empty.
+const BYTES: usize = size_of::<[f64; 3]>() + 3 * size_of::<[i64; 3]>() + 80;
+
+/// How often a record is in the reduced scan, and how often it was met in the original.
+#[derive(Debug, Default)]
+struct Occurrences {
+    kept: u32,
+    met: AtomicU32,
+}
+
+/// The records of the reduced scan.
+#[derive(Debug)]
+pub(super) struct Reduced {
+    /// World coordinates, and whether the point is a part of the surface.
+    pub points: Vec<([f64; 3], bool)>,
+    records: HashMap<u128, Occurrences, PlaceHashes>,
+}
+
+/// A record by its number in the file and where it is.
+pub(super) type NumberedRecord = (u64, [f64; 3]);
+
+impl Reduced {
+    /// Bytes that a reduced scan of so many records takes.
+    pub fn bytes(records: u64) -> Bytes {
+        Bytes::of(records, BYTES)
+    }
+
+    /// Refuses a reduced scan that does not fit in half of `memory`, and says what would do.
+    pub fn check_memory(records: u64, memory: u64) -> Result<()> {
+        let bytes = Reduced::bytes(records);
+        if bytes.fit(memory / 2) {
+            return Ok(());
+        }
+        let enough = whole_mebibytes((bytes + bytes).0);
+        let told = format!(
+            "a reduced scan of {records} points takes half of the memory or less, and this one \
+             takes more"
+        );
+        Err(Error::memory(told).help(format!("give `run.memory = \"{enough}\"` or more")))
+    }
+
+    /// Reads all records.
+    pub fn read(source: &dyn Source, comparison: &Comparison) -> Result<Reduced> {
+        let mut reduced = Reduced { points: Vec::new(), records: HashMap::default() };
+        let schema = source.schema();
+        let rank = schema.find(KEEP_RANK).filter(|rank| rank.scalar == Scalar::U16);
+        each_record(source, |_, world, record| {
+            let is_surface = rank.is_none_or(|d| d.world(record, schema.endian) != EXCEPTION);
+            reduced.points.push((world, is_surface));
+            reduced.records.entry(comparison.of_reduced(record)).or_default().kept += 1;
+            Ok(())
+        })?;
+        Ok(reduced)
+    }
+
+    /// Enters a record of the original; from several threads at once.
+    pub fn meet(&self, record: u128) {
+        if let Some(occurrences) = self.records.get(&record) {
+            occurrences.met.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// How many records are not in the original, or more often than there, and the first of them.
+    pub fn foreign(
+        &self,
+        source: &dyn Source,
+        comparison: &Comparison,
+    ) -> Result<(u64, Option<NumberedRecord>)> {
+        let more =
+            |of: &Occurrences| u64::from(of.kept.saturating_sub(of.met.load(Ordering::Relaxed)));
+        let foreign = self.records.values().map(more).sum();
+        if foreign == 0 {
+            return Ok((0, None));
+        }
+        let (mut first, mut seen) = (None, HashMap::<u128, u32>::new());
+        each_record(source, |number, world, record| {
+            let hash = comparison.of_reduced(record);
+            let met = self.records.get(&hash).map_or(0, |of| of.met.load(Ordering::Relaxed));
+            let times = seen.entry(hash).or_default();
+            *times += 1;
+            if *times > met && first.is_none() {
+                first = Some((number, world));
+            }
+            Ok(())
+        })?;
+        Ok((foreign, first))
+    }
+}
+
+/// Calls `visit` with the number, the place and the bytes of every record, in the order of the
+/// file.
+fn each_record(
+    source: &dyn Source,
+    mut visit: impl FnMut(u64, [f64; 3], &[u8]) -> Result<()>,
+) -> Result<()> {
+    let schema: &Schema = source.schema();
+    let nowhere = || Error::new(ErrorKind::Data, "the reduced scan has no coordinates");
+    let axes = schema.coordinates().ok_or_else(nowhere)?;
+    let mut batch = PointBatch::new(source.schema().clone(), BATCH);
+    let mut number = 0;
+    for part in 0..source.parts() {
+        let mut part = source.part(part)?;
+        loop {
+            batch.clear();
+            part.read(&mut batch)?;
+            if batch.is_empty() {
+                break;
+            }
+            for record in batch.iter() {
+                let world = axes.map(|axis| axis.world(record, schema.endian));
+                visit(number, world, record)?;
+                number += 1;
+            }
+        }
+    }
+    Ok(())
+}
