@@ -81,7 +81,7 @@
 //! - [`synth`]: synthetic scans, and the stage `synth`.
 //! - [`ops`]: the stages that compute, select or look: `filter`, `drop`, `crop`, `sample`,
 //!   `assign`, `transform`, `stats`, `tap`, `merge`, `outliers`, `normals`, `cells`, `median`,
-//!   `graded` and `grid`.
+//!   `graded`, `cut` and `grid`.
 //! - [`picture`]: scans drawn from above or from a side, side by side.
 //! - [`graph`]: what a pipeline is, whoever wrote it: a [`Graph`] of stages.
 //! - [`PipelineText`]: a pipeline as it is written, in TOML, JSON or one line, with [`Parameter`]s.
@@ -89,6 +89,8 @@
 //!   a text's values.
 //! - [`Plan`]: a graph that is fitted to headers and memory. It runs, and tells a [`Watch`] how it
 //!   goes; [`Done`] has the report.
+//! - [`compare`]: [`verify`](compare::verify) says whether a scan is a reduction of another, and
+//!   how true it is.
 //! - [`cli`]: the command line. A program of yours with stages of its own calls [`cli::main`] with
 //!   its registry and has the same commands.
 //!

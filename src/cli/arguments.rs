@@ -1,5 +1,6 @@
 //! What can be typed.
 
+mod cut;
 mod pipeline;
 mod plain;
 mod reduce;
@@ -15,6 +16,7 @@ use crate::graph::MOST_THREADS;
 use crate::picture::{ColorBy, View};
 use crate::quantity::parse_count;
 
+pub(super) use cut::CutArguments;
 pub(super) use pipeline::{Drawing, ExplainArguments, GraphArguments, PipelineArguments};
 pub(super) use plain::{
     CompletionsArguments, InfoArguments, ManArguments, NewArguments, StagesArguments,
@@ -55,6 +57,8 @@ pub(super) enum Command {
     New(NewArguments),
     /// Print the JSON Schema of pipeline files, by which editors complete and check them
     Schema,
+    /// Cut a coarser reduction off one that has ranks, without computing anything
+    Cut(CutArguments),
     /// Check that a scan is a reduction of another, and how far removed points are from its surface
     Verify(Box<VerifyArguments>),
     /// Draw scans side by side, from above or from a side
@@ -84,6 +88,7 @@ impl Command {
         match self {
             Command::Reduce(reduce) => Some(&reduce.common),
             Command::Verify(verify) => Some(&verify.common),
+            Command::Cut(cut) => Some(&cut.common),
             Command::Run(PlanArguments { common, .. })
             | Command::Plan(PredictArguments { planned: PlanArguments { common, .. }, .. })
             | Command::Check(PlanArguments { common, .. })

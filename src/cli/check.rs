@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::arguments::{PlanArguments, PredictArguments};
+use super::arguments::{CommonArguments, PlanArguments, PredictArguments};
 use super::console::Console;
 use super::draw::{Nothing, watched};
 use super::mistyped::marked;
@@ -75,15 +75,20 @@ pub(super) fn check(
 }
 
 fn read(arguments: &PlanArguments, registry: &Registry) -> Result<Graph> {
-    let flags = [
-        ("--report", arguments.common.report.is_some()),
-        ("--no-clobber", arguments.common.no_clobber),
-    ];
-    if let Some((flag, _)) = flags.into_iter().find(|(_, is_given)| *is_given) {
-        let told = marked(&format!("{flag}: is for commands that write files"), flag, "");
-        return Err(Error::pipeline(told).help("give it to `run`"));
-    }
+    refuse_outputs(&arguments.common)?;
     pipeline::read(&arguments.pipeline, &arguments.common, registry)
+}
+
+/// Refuses flags about files that are written, for commands that write none.
+pub(super) fn refuse_outputs(common: &CommonArguments) -> Result<()> {
+    let flags = [("--report", common.report.is_some()), ("--no-clobber", common.no_clobber)];
+    match flags.into_iter().find(|(_, is_given)| *is_given) {
+        None => Ok(()),
+        Some((flag, _)) => {
+            let told = marked(&format!("{flag}: is for commands that write files"), flag, "");
+            Err(Error::pipeline(told).help("give it to `run`"))
+        }
+    }
 }
 
 fn inputs(pipeline: &Graph) -> Vec<PathBuf> {

@@ -4,8 +4,8 @@
 use serde_json::{Value, json};
 
 use super::arguments::{
-    CommonArguments, ConvertArguments, FilterArguments, ReduceArguments, SynthArguments,
-    VerifyArguments, WrittenArguments,
+    CommonArguments, ConvertArguments, CutArguments, FilterArguments, ReduceArguments,
+    SynthArguments, VerifyArguments, WrittenArguments,
 };
 use super::classes::Classes;
 use crate::language::Set;
@@ -183,6 +183,15 @@ pub(super) fn convert_flags(
     all.extend(filtered(&arguments.filter));
     all.extend(written(&arguments.written));
     all
+}
+
+/// The flags of `cut`.
+pub(super) fn cut_flags(arguments: &CutArguments) -> Vec<CommandFlag> {
+    flags([
+        ("IN", "read.path", Some(arguments.input.clone().into())),
+        ("-o", "write.path", Some(arguments.output.clone().into())),
+        ("--keep", "cut.keep", Some(whole_or_text(&arguments.keep))),
+    ])
 }
 
 /// The flags of `verify`: settings of the run that it is, and names of its own lengths.

@@ -100,6 +100,14 @@ Examples:
   pointmill convert scan.ply -o scan.laz --scale 0.001 --drop confidence",
     ),
     (
+        "cut",
+        "\
+Examples:
+  pointmill reduce survey.laz -o ranked.laz --keep 20% --ranks
+  pointmill cut ranked.laz --keep 1M -o small.laz
+  pointmill run 'read ranked.laz name=r ! cut keep=1M ! write a.laz'",
+    ),
+    (
         "verify",
         "\
 Examples:

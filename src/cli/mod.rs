@@ -122,6 +122,7 @@ fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<
         Command::Reduce(arguments) => run::reduce(arguments, registry, console),
         Command::Convert(arguments) => convert::convert(arguments, registry, console),
         Command::Synth(arguments) => run::synth(arguments, registry, console),
+        Command::Cut(arguments) => run::cut(arguments, registry, console),
         Command::Verify(arguments) => verify::check_reduction(arguments, registry, console),
         Command::Plan(arguments) => check::plan(arguments, registry, console),
         Command::Check(arguments) => check::check(arguments, registry, console),

@@ -1,8 +1,8 @@
 //! `run`, `reduce` and `synth`: arguments to a pipeline, and the pipeline's run.
 
-use super::arguments::{PlanArguments, ReduceArguments, SynthArguments};
+use super::arguments::{CutArguments, PlanArguments, ReduceArguments, SynthArguments};
 use super::console::Console;
-use super::flags::{common_flags, given, reduce_flags, synth_flags};
+use super::flags::{common_flags, cut_flags, given, reduce_flags, synth_flags};
 use super::pipeline;
 use super::preset::Preset;
 use crate::Result;
@@ -28,6 +28,21 @@ const OTHERWISE: &str =
 const SYNTH: &str = "\
 [[stage]]
 kind = \"synth\"
+
+[[stage]]
+kind = \"write\"
+";
+
+/// The pipeline of `cut`: what was kept is kept, noise or not.
+const CUT: &str = "\
+[run]
+withheld = \"keep\"
+
+[[stage]]
+kind = \"read\"
+
+[[stage]]
+kind = \"cut\"
 
 [[stage]]
 kind = \"write\"
@@ -61,6 +76,13 @@ pub(super) fn reduce(
     };
     let text = with_stages(&text, filter.into_iter().chain(outliers));
     let pipeline = Graph::parse_with(&text, HIDDEN, registry, &sets)?;
+    console.result(mill(pipeline, console)?)
+}
+
+/// Cuts a coarser reduction off one with ranks and prints the closing table.
+pub(super) fn cut(arguments: &CutArguments, registry: &Registry, console: &Console) -> Result<()> {
+    let sets = given([cut_flags(arguments), common_flags(&arguments.common)]);
+    let pipeline = Graph::parse_with(CUT, HIDDEN, registry, &sets)?;
     console.result(mill(pipeline, console)?)
 }
 

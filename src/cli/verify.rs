@@ -1,6 +1,7 @@
 //! `verify`: is a scan a reduction of another, and how true is it?
 
 use super::arguments::VerifyArguments;
+use super::check::refuse_outputs;
 use super::console::Console;
 use super::draw::{Nothing, watched};
 use super::flags::{common_flags, given, verify_flags};
@@ -20,6 +21,7 @@ pub(super) fn check_reduction(
     registry: &Registry,
     console: &Console,
 ) -> Result<()> {
+    refuse_outputs(&arguments.common)?;
     let (Some(reduced), original) = arguments.files() else {
         let told = "a reduced scan is compared with its original, and one file is given";
         let help = "give the original's files first, and the reduced one last";

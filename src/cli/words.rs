@@ -2,7 +2,9 @@
 //! them, are put into the flags that the user of the command can type.
 
 use super::arguments::Command;
-use super::flags::{common_flags, convert_flags, reduce_flags, synth_flags, verify_flags};
+use super::flags::{
+    common_flags, convert_flags, cut_flags, reduce_flags, synth_flags, verify_flags,
+};
 use crate::Error;
 use crate::language::Registry;
 
@@ -21,6 +23,7 @@ impl Words {
             Command::Run(_) | Command::Plan(_) | Command::Check(_) => Vec::new(),
             Command::Reduce(reduce) => reduce_flags(reduce),
             Command::Verify(verify) => verify_flags(verify),
+            Command::Cut(cut) => cut_flags(cut),
             Command::Convert(convert) => convert_flags(convert, None, None),
             Command::Synth(synth) => synth_flags(synth),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => Vec::new(),

@@ -8,7 +8,6 @@
 mod candidates;
 mod merged;
 mod offers;
-mod select;
 mod shorten;
 mod tile;
 

@@ -11,6 +11,7 @@ pub mod plane;
 pub mod planes;
 pub mod polygon;
 pub mod rows;
+pub mod select;
 pub mod simd;
 pub mod star;
 pub mod wide;

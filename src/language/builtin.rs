@@ -6,8 +6,8 @@ use crate::io::las::{LAS, LAZ};
 use crate::io::ply::PLY;
 use crate::ops::normals::Normals;
 use crate::ops::{
-    Assign, Cells, Crop, Drop, Filter, Graded, Grid, Median, Merge, Outliers, Sample, Stats, Tap,
-    Transformation,
+    Assign, Cells, Crop, Cut, Drop, Filter, Graded, Grid, Median, Merge, Outliers, Sample, Stats,
+    Tap, Transformation,
 };
 use crate::synth::Synth;
 
@@ -32,6 +32,7 @@ impl Registry {
             .with::<Cells>()
             .with::<Median>()
             .with::<Graded>()
+            .with::<Cut>()
             .with::<Grid>()
             .with::<Sample>()
             .with_format(LAS)

@@ -34,6 +34,7 @@ use crate::{Error, Result};
 use certain::Certain;
 use figures::Judgement;
 use ladder::Ladder;
+pub(super) use ladder::SHORTENED_BY;
 pub use rank::KEEP_RANK;
 pub use settings::Effort;
 use sides::{steps, voxel_side};

@@ -9,4 +9,5 @@ mod picture;
 mod plan;
 mod tools;
 mod values;
+mod verify;
 mod words;

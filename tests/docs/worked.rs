@@ -12,7 +12,7 @@ const LARGEST: u64 = 60 << 10;
 
 /// A stage, what its example shows, and the pipeline behind `read scan.laz ! `. Those with a
 /// picture write `after.laz`.
-const EXAMPLES: [(&str, &str, &str); 19] = [
+const EXAMPLES: [(&str, &str, &str); 20] = [
     ("read", "Two files become one.", "write copy.laz"),
     ("synth", "A made-up scan of 5,000 points.", "synth als points=5k ! write made.laz"),
     ("merge", "Two sources are one scan.", "merge from=[a,b] ! write both.laz"),
@@ -54,6 +54,11 @@ const EXAMPLES: [(&str, &str, &str); 19] = [
         "A twentieth of the points stays: those that say most of the surface.",
         "graded keep=5% ! write after.laz",
     ),
+    (
+        "cut",
+        "Of a reduction with ranks, of which the file has them, a tenth of the points stays.",
+        "cut keep=10% ! write coarse.laz",
+    ),
     ("grid", "One point in each cube of side 2 stays.", "grid side=2 ! write after.laz"),
     (
         "median",
@@ -87,7 +92,12 @@ pub fn section(kind: &str) -> String {
     let synth = ["synth", "als", "-n", "5k", "-o"];
     done(at.path(), &[&synth[..], &["scan.laz"]].concat());
     done(at.path(), &[&synth[..], &["more.laz", "--seed", "1"]].concat());
+    if kind == "cut" {
+        let ranked = ["reduce", "scan.laz", "-o", "ranked.laz", "--keep", "2k", "--ranks"];
+        done(at.path(), &ranked);
+    }
     let line = match kind {
+        "cut" => format!("read ranked.laz ! {pipeline}"),
         "synth" => (*pipeline).to_owned(),
         "read" => format!("read [scan.laz,more.laz] ! {pipeline}"),
         "merge" => format!("read scan.laz name=a ! read more.laz name=b ! {pipeline}"),
@@ -99,6 +109,9 @@ pub fn section(kind: &str) -> String {
     let said: Vec<&str> = stdout.lines().filter(|line| !differs(line)).map(str::trim_end).collect();
     assert!(said[0].starts_with("points "), "{stdout}");
     let made = match line.contains("more.laz") {
+        _ if kind == "cut" => {
+            "`ranked.laz` is `pointmill reduce scan.laz -o ranked.laz --keep 2k --ranks`"
+        }
         true => {
             "`scan.laz` is `pointmill synth als -n 5k -o scan.laz`, and `more.laz` with `--seed 1`"
         }

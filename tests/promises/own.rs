@@ -2,15 +2,51 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use pointmill::Registry;
 use pointmill::ops::normals::Normals;
 use pointmill::ops::{
-    Assign, Cells, Crop, Drop, Filter, Graded, Grid, Median, Outliers, Sample, Stats, Tap,
+    Assign, Cells, Crop, Cut, Drop, Filter, Graded, Grid, Median, Outliers, Sample, Stats, Tap,
     Transformation,
 };
-use pointmill::stage::StageKind;
+use pointmill::point::Column;
+use pointmill::report::Tally;
+use pointmill::stage::{Needs, Role, RoleName, StageKind, StagePlace, TileOp};
 use pointmill::testing::{Conduct, Conformance, Promise};
+use pointmill::tile::Tile;
+use pointmill::{Registry, Result};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+
+/// Gives positions the ranks that a reduction may have left.
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+struct Ranks {}
+
+const RANK: Column<f64> = Column::new("KeepRank", &[]);
+
+impl TileOp for Ranks {
+    fn needs(&self) -> Needs {
+        Needs::none().writes(&RANK)
+    }
+
+    fn run(&self, tile: &mut Tile, _: &mut Tally) -> Result<()> {
+        let mut ranks = tile.columns.take(&RANK)?;
+        for (rank, [x, y, z]) in ranks.iter_mut().zip(&tile.positions) {
+            *rank = (7 * x + 3 * y + z).rem_euclid(5) as f64;
+        }
+        tile.columns.put(ranks);
+        Ok(())
+    }
+}
+
+impl StageKind for Ranks {
+    const KIND: &'static str = "ranks";
+    const ROLE: RoleName = RoleName::OnTiles;
+    const ABOUT: &'static str = "Gives positions ranks.";
+
+    fn build(self, _: &StagePlace) -> Result<Role> {
+        Ok(Role::TileOp(Box::new(self)))
+    }
+}
 
 /// Scans that each stage is checked on.
 const RUNS: usize = 10;
@@ -55,6 +91,7 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
                 check::<Cells>(json!({})).after(normals()).before(Median::default()),
             ],
         ),
+        ("cut", vec![check::<Cut>(json!({ "keep": "30%" })).after(Ranks {})]),
         ("median", vec![check::<Median>(json!({})).after(normals()).after(cells())]),
         (
             "graded",
@@ -112,7 +149,7 @@ fn assert_kept(kinds: &[&str]) {
 
 const STREAM: [&str; 7] = ["assign", "crop", "drop", "filter", "stats", "tap", "transform"];
 const SELECT: [&str; 3] = ["grid", "outliers", "sample"];
-const REDUCE: [&str; 4] = ["cells", "graded", "median", "normals"];
+const REDUCE: [&str; 5] = ["cells", "cut", "graded", "median", "normals"];
 const ENDS: [&str; 5] = ["discard", "merge", "read", "synth", "write"];
 
 #[test]

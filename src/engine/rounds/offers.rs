@@ -10,10 +10,10 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::merged::MergedPoints;
-use super::select::nth_largest;
 use crate::Result;
 use crate::engine::job::Job;
 use crate::geom::hash::PlaceHashes;
+use crate::geom::select::nth_largest;
 use crate::point::{Position, distance2};
 use crate::stage::Offer;
 use crate::store::{

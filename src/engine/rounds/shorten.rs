@@ -1,10 +1,10 @@
 //! Some of what the last round kept, by chance.
 
 use super::merged::MergedPoints;
-use super::select::nth_largest;
 use crate::Result;
 use crate::engine::job::Job;
 use crate::geom::hash::of_position;
+use crate::geom::select::nth_largest;
 use crate::store::{KeptPoints, KeptReader};
 
 /// Blocks of kept points that an item reads.

@@ -200,7 +200,7 @@ impl Ladder {
         };
         let is_last = round + 1 >= rounds;
         let is_bottom = rung == self.rungs.len() - 1;
-        if is_bottom && round >= rounds && so_far.added == 0 && self.probed >= 1.0 {
+        if is_bottom && round > rounds && so_far.added == 0 {
             return NextRound::Done;
         }
         if is_bottom && round >= rounds {
@@ -212,7 +212,7 @@ impl Ladder {
             false => LadderStep::Refine { rung, round: round + 1 },
         };
         let apart = if is_last && is_last_rung { 0.0 } else { APART };
-        let floor = if round > 0 { LOW * so_far.least } else { 0.0 };
+        let floor = if (1..rounds).contains(&round) { LOW * so_far.least } else { 0.0 };
         let refining = Refining { radius: self.rungs[rung], apart, floor };
         self.work = Some(RoundWork::Refine(refining));
         let want = if self.ranked { want.max(1) } else { want.clamp(1, missing) };
@@ -238,4 +238,4 @@ impl Ladder {
 
 /// By which hash some are left of what a round kept: whoever cuts a number off what is written can
 /// do it, too.
-pub(super) const SHORTENED_BY: u64 = 0;
+pub(in crate::ops) const SHORTENED_BY: u64 = 0;

@@ -198,12 +198,10 @@ impl Unchanged {
         }
         let mut nearest = NearestAmong::with(tile.simd);
         nearest.search(&new, tile.kept, 1, |i, found| {
-            let near = |offer: &Offer, j: u32| {
-                squared(new[j as usize], tile.kept[i]).sqrt() <= offer.reach
-            };
-            if let (Some(offer), Some(&j)) = (offers[i], found.first())
-                && near(&offer, j)
-            {
+            let Some(offer) = offers[i] else { return };
+            let near = |j: &u32| squared(new[*j as usize], tile.kept[i]).sqrt() <= offer.reach;
+            // What changed before and was not looked at is still to be looked at.
+            if offer.reach == f64::INFINITY || found.first().is_some_and(near) {
                 let low = offer.score < floor;
                 offers[i] = low.then_some(Offer { reach: f64::INFINITY, ..offer });
             }

@@ -7,7 +7,11 @@ const DIGIT: u32 = 16;
 
 /// The `want`-th largest of the numbers that `each` visits, always the same ones, and how many that
 /// are equal to it are among the first `want`; 0 and all that are 0 where there are fewer.
-pub(super) fn nth_largest(
+///
+/// # Errors
+///
+/// Those of `each`.
+pub fn nth_largest(
     want: u64,
     mut each: impl FnMut(&mut dyn FnMut(u64)) -> Result<()>,
 ) -> Result<(u64, u64)> {

@@ -1,0 +1,164 @@
+//! The stage `cut`: a coarser reduction from one whose points have ranks.
+
+use bytemuck::{Pod, Zeroable};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Keep;
+use super::graded::SHORTENED_BY;
+use super::removal::{keep_once, remove};
+use crate::geom::hash::of_position;
+use crate::geom::select::nth_largest;
+use crate::point::{Column, names};
+use crate::report::Tally;
+use crate::stage::{Gathered, Needs, Role, RoleName, ScanOp, StageKind, StagePlace, TileOp};
+use crate::tile::Tile;
+use crate::{Error, Result};
+
+/// The ranks that the records have.
+const RANK: Column<f64> = Column::new("KeepRank", &[]);
+
+/// Cuts a coarser reduction off one that `graded` made with `ranks`: the points of the lowest
+/// `KeepRank` stay, and of the last rank that is not kept as a whole those whose position has the
+/// smallest hash. What stays is what `graded` with `ranks` would have kept of the original scan for
+/// that number, and nothing is computed for it. (Where the reduction was written in another format
+/// than the scan is in, positions may be on another lattice, and others of the last rank stay.)
+/// Several outputs of several numbers take one read, each on a branch of its own.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cut {
+    /// How many positions stay: a share of those that there are ("10%"), or a number (500000,
+    /// "250k", "5M").
+    pub keep: Keep,
+    #[serde(skip)]
+    limit: Option<RankLimit>,
+}
+
+/// The last point that stays.
+#[derive(Debug, Clone, Copy)]
+struct RankLimit {
+    rank: u64,
+    /// The largest hash that stays of that rank, complemented: the smallest complement.
+    least: u64,
+}
+
+/// A position as it is gathered: its rank, and the complement of its hash.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct RankedPosition {
+    rank: u64,
+    unlike: u64,
+}
+
+impl Cut {
+    /// A reduction to that many positions.
+    pub fn new(keep: Keep) -> Cut {
+        Cut { keep, limit: None }
+    }
+}
+
+/// Bytes a position.
+const BYTES: usize = 2 * size_of::<RankedPosition>();
+
+/// The rank of a position, and the complement of its hash.
+fn ranked(tile: &Tile, ranks: &[f64], i: usize) -> RankedPosition {
+    // What is no rank is a large one.
+    let rank = ranks[i].clamp(0.0, f64::from(u16::MAX));
+    let rank = if rank.is_nan() { u64::from(u16::MAX) } else { rank as u64 };
+    RankedPosition { rank, unlike: !of_position(SHORTENED_BY, tile.positions[i]) }
+}
+
+impl StageKind for Cut {
+    const KIND: &'static str = "cut";
+    const ROLE: RoleName = RoleName::OnTiles;
+    const ABOUT: &'static str = "Cuts a coarser reduction off one whose points have ranks.";
+
+    fn build(self, at: &StagePlace) -> Result<Role> {
+        if self.keep == Keep::Auto {
+            let told = "`cut.keep = \"auto\"` is not known: it takes a share or a number";
+            let error = Error::pipeline(told).help("give `cut.keep = \"10%\"`");
+            return Err(at.blame("keep", error));
+        }
+        Ok(Role::ScanOp(Box::new(self)))
+    }
+}
+
+impl TileOp for Cut {
+    fn needs(&self) -> Needs {
+        let looks = Needs::none().looks_at(names::XYZ).reads(&RANK);
+        looks.bytes_per_point(BYTES).removes(None)
+    }
+
+    fn for_share(&mut self, share: f64) {
+        if let Keep::Records(count) = &mut self.keep {
+            *count = ((*count as f64 * share).round() as u64).max(1);
+        }
+    }
+
+    fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
+        let early = || Error::internal("the stage cut ran before its limit was known");
+        let limit = self.limit.ok_or_else(early)?;
+        let ranks = tile.columns.take(&RANK)?;
+        let (mut coincident, mut gone) = (0, 0);
+        for i in tile.core.clone().filter(|i| tile.copies[*i] > 0).collect::<Vec<usize>>() {
+            if !tile.is_chosen(i) {
+                continue;
+            }
+            let RankedPosition { rank, unlike } = ranked(tile, &ranks, i);
+            let stays = rank < limit.rank || rank == limit.rank && unlike >= limit.least;
+            if stays {
+                coincident += keep_once(tile, i);
+            } else {
+                gone += remove(tile, i);
+            }
+        }
+        tile.columns.put(ranks);
+        tally.remove("cut", "coincident", coincident);
+        tally.remove("cut", "rank", gone);
+        Ok(())
+    }
+}
+
+impl ScanOp for Cut {
+    type Summary = Vec<RankedPosition>;
+
+    fn gather_needs(&self) -> Needs {
+        Needs::none().looks_at(names::XYZ).reads(&RANK).bytes_per_point(BYTES)
+    }
+
+    fn gather(&self, tile: &mut Tile, _: &mut Tally) -> Result<Vec<RankedPosition>> {
+        let ranks = tile.columns.get(&RANK)?;
+        let chosen = tile.core.clone().filter(|i| tile.is_chosen(*i));
+        let mut all = Vec::with_capacity(tile.core.len());
+        all.extend(chosen.map(|i| ranked(tile, ranks, i)));
+        Ok(all)
+    }
+
+    fn conclude(&mut self, gathered: &dyn Gathered<Vec<RankedPosition>>) -> Result<Option<String>> {
+        let mut counts = vec![0u64; usize::from(u16::MAX) + 1];
+        gathered.each(&mut |tile| {
+            tile.iter().for_each(|point| counts[point.rank as usize] += 1);
+            Ok(())
+        })?;
+        let all: u64 = counts.iter().sum();
+        let want = self.keep.of(all);
+        let (mut rank, mut left) = (0, want.min(all));
+        while rank + 1 < counts.len() && counts[rank] < left {
+            left -= counts[rank];
+            rank += 1;
+        }
+        drop(counts);
+        let rank = rank as u64;
+        let (least, _) = nth_largest(left.max(1), |visit| {
+            gathered.each(&mut |tile| {
+                let of_rank = tile.iter().filter(|point| point.rank == rank);
+                of_rank.for_each(|point| visit(point.unlike));
+                Ok(())
+            })
+        })?;
+        self.limit = Some(RankLimit { rank, least });
+        Ok((want > all).then(|| {
+            format!("`cut.keep` asks for {want} points, and there are {all}: all of them stay")
+        }))
+    }
+}
