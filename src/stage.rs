@@ -17,7 +17,7 @@ use crate::point::{PointBatch, Schema};
 use crate::report::Tally;
 
 pub use crate::geom::lattice::{Lattice, Misplaced};
-pub use crate::store::Levels;
+pub use crate::store::{KeptPoints, KeptReader, Levels};
 pub use format::{
     Colors, CreateFor, Format, FormatName, Formats, OutputEncoding, WriteKeys, foreign,
 };

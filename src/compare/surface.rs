@@ -163,7 +163,8 @@ impl KnownSurface {
                 let enough = found.len() == asked.min(self.surface.len());
                 let last = found.last().map_or(u128::MAX, far);
                 let tied = enough && asked < self.surface.len() && last == far(&found[SURFACE - 1]);
-                if !is_all && !(enough && last < to_edge) || tied {
+                let is_proven = is_all || enough && last < to_edge;
+                if tied || !is_proven {
                     open.push(p);
                     return;
                 }

@@ -36,7 +36,7 @@ pub(crate) fn neighbors(ops: &[StageOp], pass: &Pass) -> usize {
 const CELLS_ACROSS: u64 = 4;
 
 /// The tiles of a pass.
-pub(crate) struct Cut {
+pub(crate) struct TileCut {
     cells: CellWidths,
     pub keys: Vec<TileKey>,
     /// Positions that the arena of a thread takes.
@@ -74,8 +74,8 @@ pub(crate) fn cut_all(
     job: &Job<'_>,
     lattice: &Lattice,
     tiles: &SealedTiles,
-) -> Result<Vec<Arc<Cut>>> {
-    let mut known: Vec<(CellWidths, Arc<Cut>)> = Vec::new();
+) -> Result<Vec<Arc<TileCut>>> {
+    let mut known: Vec<(CellWidths, Arc<TileCut>)> = Vec::new();
     let mut cuts = Vec::new();
     for pass in &job.task.passes {
         let cells = CellWidths::of(&job.ops, pass);
@@ -96,9 +96,9 @@ pub(crate) fn cut_again(
     pass: &Pass,
     lattice: &Lattice,
     tiles: &SealedTiles,
-    made: &Arc<Cut>,
+    made: &Arc<TileCut>,
     held: u64,
-) -> Result<Arc<Cut>> {
+) -> Result<Arc<TileCut>> {
     let cells = CellWidths::of(&job.ops, pass);
     match cells == made.cells {
         true => Ok(made.clone()),
@@ -115,7 +115,7 @@ fn cut(
     lattice: &Lattice,
     tiles: &SealedTiles,
     held: u64,
-) -> Result<Cut> {
+) -> Result<TileCut> {
     let (shares, demands) = (&job.shares, &job.task.demands);
     let wanted =
         job.task.tile_points().map_or(zone_of(shares.tile_positions), |points| points as u64);
@@ -135,7 +135,7 @@ fn cut(
             Ok(keys) => {
                 let bytes = Bytes::of(keys.len() as u64, size_of::<TileKey>());
                 let _listed = job.budget.lease(bytes.0, "list of tiles")?;
-                return Ok(Cut { cells, keys, capacity, millers, _listed });
+                return Ok(TileCut { cells, keys, capacity, millers, _listed });
             }
             Err(CutError::Read(error)) => return Err(error),
             Err(CutError::TooHeavy { key, positions }) => (key, positions),

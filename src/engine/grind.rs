@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::by_rank::Starts;
 use super::chunk::{Open, OutputChunk};
 use super::chunks::{Counts, Cutter, GrowingOutcome, Lists, Stored};
-use super::cut::{Cut, neighbors, reach};
+use super::cut::{TileCut, neighbors, reach};
 use super::encoding::ChunkEncoders;
 use super::filtering::Filtering;
 use super::job::Job;
@@ -65,7 +65,7 @@ pub(crate) type Numbered = (usize, Box<dyn Sink>);
 pub(crate) fn grind(
     job: &Job<'_>,
     pass: &Pass,
-    cut: &Cut,
+    cut: &TileCut,
     field: &DecodedScan<'_>,
     sieve: &Sieve,
     sinks: Vec<Numbered>,

@@ -15,7 +15,7 @@ use super::by_input::ByInput;
 use super::by_rank::ByRank;
 use super::chunks::{Lists, StoredGathered};
 use super::clock::Clock;
-use super::cut::{Cut, cut_again, cut_all};
+use super::cut::{TileCut, cut_again, cut_all};
 use super::decode::decode;
 use super::finished::{Finished, FinishedBranch};
 use super::forecast::{forecast, samples_capacity};
@@ -172,7 +172,7 @@ impl Course<'_, '_> {
     ) -> Result<Vec<FinishedBranch>> {
         let Task { passes, branches, demands, .. } = job.task;
         let cuts = cut_all(job, field.lattice, &field.tiles)?;
-        let milling = |cut: &Arc<Cut>| demands.mill(cut.millers, cut.capacity as u64);
+        let milling = |cut: &Arc<TileCut>| demands.mill(cut.millers, cut.capacity as u64);
         let looking = demands.mill(job.threads.count(), samples_capacity(&job.shares) as u64);
         let most = cuts.iter().map(milling).fold(looking, Holders::larger);
         self.tally.merge(&decoded.tally);
@@ -239,7 +239,7 @@ impl Course<'_, '_> {
         &mut self,
         job: &mut Job<'_>,
         number: usize,
-        cut: &Arc<Cut>,
+        cut: &Arc<TileCut>,
         working: &mut Vec<Lease>,
         before: Standing,
         field: &DecodedScan<'_>,

@@ -1,6 +1,5 @@
 //! The stage `cut`: a coarser reduction from one whose points have ranks.
 
-use bytemuck::{Pod, Zeroable};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -31,23 +30,7 @@ pub struct Cut {
     /// "250k", "5M").
     pub keep: Keep,
     #[serde(skip)]
-    limit: Option<RankLimit>,
-}
-
-/// The last point that stays.
-#[derive(Debug, Clone, Copy)]
-struct RankLimit {
-    rank: u64,
-    /// The largest hash that stays of that rank, complemented: the smallest complement.
-    least: u64,
-}
-
-/// A position as it is gathered: its rank, and the complement of its hash.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct RankedPosition {
-    rank: u64,
-    unlike: u64,
+    limit: Option<u64>,
 }
 
 impl Cut {
@@ -58,14 +41,16 @@ impl Cut {
 }
 
 /// Bytes a position.
-const BYTES: usize = 2 * size_of::<RankedPosition>();
+const BYTES: usize = 2 * size_of::<u64>();
 
-/// The rank of a position, and the complement of its hash.
-fn ranked(tile: &Tile, ranks: &[f64], i: usize) -> RankedPosition {
+/// What orders positions: the larger, the sooner one stays. The rank, and of one rank the 48
+/// highest bits of the hash, which no two of a scan are likely to share.
+fn order(tile: &Tile, ranks: &[f64], i: usize) -> u64 {
     // What is no rank is a large one.
-    let rank = ranks[i].clamp(0.0, f64::from(u16::MAX));
-    let rank = if rank.is_nan() { u64::from(u16::MAX) } else { rank as u64 };
-    RankedPosition { rank, unlike: !of_position(SHORTENED_BY, tile.positions[i]) }
+    let highest = f64::from(u16::MAX);
+    let rank = if ranks[i].is_nan() { highest } else { ranks[i].clamp(0.0, highest) };
+    let hash = of_position(SHORTENED_BY, tile.positions[i]);
+    (u64::from(u16::MAX) - rank as u64) << 48 | !hash >> 16
 }
 
 impl StageKind for Cut {
@@ -104,9 +89,7 @@ impl TileOp for Cut {
             if !tile.is_chosen(i) {
                 continue;
             }
-            let RankedPosition { rank, unlike } = ranked(tile, &ranks, i);
-            let stays = rank < limit.rank || rank == limit.rank && unlike >= limit.least;
-            if stays {
+            if order(tile, &ranks, i) >= limit {
                 coincident += keep_once(tile, i);
             } else {
                 gone += remove(tile, i);
@@ -120,43 +103,34 @@ impl TileOp for Cut {
 }
 
 impl ScanOp for Cut {
-    type Summary = Vec<RankedPosition>;
+    type Summary = Vec<u64>;
 
     fn gather_needs(&self) -> Needs {
         Needs::none().looks_at(names::XYZ).reads(&RANK).bytes_per_point(BYTES)
     }
 
-    fn gather(&self, tile: &mut Tile, _: &mut Tally) -> Result<Vec<RankedPosition>> {
+    fn gather(&self, tile: &mut Tile, _: &mut Tally) -> Result<Vec<u64>> {
         let ranks = tile.columns.get(&RANK)?;
         let chosen = tile.core.clone().filter(|i| tile.is_chosen(*i));
         let mut all = Vec::with_capacity(tile.core.len());
-        all.extend(chosen.map(|i| ranked(tile, ranks, i)));
+        all.extend(chosen.map(|i| order(tile, ranks, i)));
         Ok(all)
     }
 
-    fn conclude(&mut self, gathered: &dyn Gathered<Vec<RankedPosition>>) -> Result<Option<String>> {
-        let mut counts = vec![0u64; usize::from(u16::MAX) + 1];
+    fn conclude(&mut self, gathered: &dyn Gathered<Vec<u64>>) -> Result<Option<String>> {
+        let mut all = 0;
         gathered.each(&mut |tile| {
-            tile.iter().for_each(|point| counts[point.rank as usize] += 1);
+            all += tile.len() as u64;
             Ok(())
         })?;
-        let all: u64 = counts.iter().sum();
         let want = self.keep.of(all);
-        let (mut rank, mut left) = (0, want.min(all));
-        while rank + 1 < counts.len() && counts[rank] < left {
-            left -= counts[rank];
-            rank += 1;
-        }
-        drop(counts);
-        let rank = rank as u64;
-        let (least, _) = nth_largest(left.max(1), |visit| {
+        let (least, _) = nth_largest(want.min(all).max(1), |visit| {
             gathered.each(&mut |tile| {
-                let of_rank = tile.iter().filter(|point| point.rank == rank);
-                of_rank.for_each(|point| visit(point.unlike));
+                tile.into_iter().for_each(&mut *visit);
                 Ok(())
             })
         })?;
-        self.limit = Some(RankLimit { rank, least });
+        self.limit = Some(least);
         Ok((want > all).then(|| {
             format!("`cut.keep` asks for {want} points, and there are {all}: all of them stay")
         }))

@@ -23,7 +23,7 @@ mod transform;
 pub use assign::Assign;
 pub use cells::{By, Cells, Keep, Measure, Reference, Side, Split};
 pub use crop::{Crop, CropBox, CropSide};
-pub use cut::{Cut, RankedPosition};
+pub use cut::Cut;
 pub use drop::Drop;
 pub use filter::Filter;
 pub use graded::{Effort, Graded, KEEP_RANK};

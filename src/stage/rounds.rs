@@ -62,7 +62,7 @@ pub enum NextRound {
     Shorten {
         /// How many are kept in all.
         to: u64,
-        /// See [`crate::geom::hash::of_position`].
+        /// Which of all hashes of positions it is.
         seed: u64,
     },
     /// What the last rounds kept is not kept.
@@ -96,7 +96,7 @@ pub enum Looks {
     Sample {
         /// Of all hashes, that part.
         most: u64,
-        /// See [`crate::geom::hash::of_position`].
+        /// Which of all hashes of positions it is.
         seed: u64,
     },
     /// Those that have no kept point nearer than `apart`, about so many of all as such a sample
@@ -104,7 +104,7 @@ pub enum Looks {
     Uncovered {
         /// A distance in lattice steps.
         apart: i64,
-        /// See [`Looks::Sample`].
+        /// As for a sample.
         most: u64,
     },
 }

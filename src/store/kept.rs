@@ -38,9 +38,10 @@ impl KeptReader {
         self.keep_behind(0, region);
     }
 
-    /// Drops those from number `end` on that are outside of `region`.
-    fn keep_behind(&mut self, mut end: usize, region: &Bounds) {
-        for i in end..self.positions.len() {
+    /// Drops those from number `begin` on that are outside of `region`.
+    fn keep_behind(&mut self, begin: usize, region: &Bounds) {
+        let mut end = begin;
+        for i in begin..self.positions.len() {
             if region.contains(self.positions[i]) {
                 self.positions.swap(end, i);
                 self.rounds.swap(end, i);

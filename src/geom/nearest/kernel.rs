@@ -229,11 +229,11 @@ fn meet_together<L: Lanes>(lanes: L, batch: &mut Batch, leaf: &Leaf, at: [L::F32
     let Some(best) = best.first_chunk_mut::<LANES>() else { return false };
     lanes.merge(best, &mut rows);
     let last = best[batch.kept - 1];
-    for lane in 0..LANES {
+    for (lane, &key) in last.iter().enumerate() {
         // Those that do not search stay so.
         if batch.bound[lane] >= 0.0 {
-            batch.bound[lane] = distance_of(last[lane]);
-            batch.bound_rank[lane] = rank_of(last[lane]);
+            batch.bound[lane] = distance_of(key);
+            batch.bound_rank[lane] = rank_of(key);
         }
     }
     true
