@@ -2,7 +2,7 @@
 //!
 //! On each rung positions are kept until none is farther than a distance from a kept one; then a
 //! few rounds add points where the surface is told worst. The distances fall by √2. For one number
-//! of points the last distance follows from that number, and two rungs above it are enough: what
+//! of points the last distance follows from that number, and four rungs above it are enough: what
 //! they keep, they keep with little to look at. For an order in which any number can be cut off
 //! (`ranks`), rungs are those of the lattice and begin at the width of the scan, so that they are
 //! the same whatever the number is.
@@ -45,8 +45,8 @@ impl Rounds {
     fn of(effort: Effort) -> Rounds {
         match effort {
             Effort::Low => Rounds { above: 0, each: 0, last: 3 },
-            Effort::Normal => Rounds { above: 2, each: 2, last: 8 },
-            Effort::High => Rounds { above: 4, each: 3, last: 16 },
+            Effort::Normal => Rounds { above: 4, each: 2, last: 8 },
+            Effort::High => Rounds { above: 6, each: 3, last: 16 },
         }
     }
 }

@@ -10,10 +10,10 @@ use serde::{Deserialize, Serialize};
 pub enum Effort {
     /// Three rounds: a third of the time, and errors that are up to a third larger.
     Low,
-    /// Two coarser distances with two rounds each, then eight rounds.
+    /// Four coarser distances with two rounds each, then eight rounds.
     #[default]
     Normal,
-    /// Four coarser distances with three rounds each, then sixteen rounds: some 1 to 3 % less error
+    /// Six coarser distances with three rounds each, then sixteen rounds: some 1 to 3 % less error
     /// for twice the time.
     High,
 }
