@@ -46,7 +46,6 @@ impl Rounds {
         match effort {
             Effort::Low => Rounds { above: 0, each: 0, last: 3 },
             Effort::Normal => Rounds { above: 4, each: 2, last: 8 },
-            Effort::High => Rounds { above: 6, each: 3, last: 16 },
         }
     }
 }
