@@ -131,7 +131,6 @@ pub(super) fn reduce_flags(arguments: &ReduceArguments) -> Vec<CommandFlag> {
             arguments.max_spacing.as_deref().map(number_or_text),
         ),
         ("--ranks", "graded.ranks", ranks.then(|| FlagValue::from(true))),
-        ("--ranks", "write.dimensions", ranks.then(|| json!([KEEP_RANK.kind().name()]).into())),
         ("--effort", "graded.effort", arguments.effort.clone().map(FlagValue::from)),
         ("--max-side", "cells.max_side", arguments.max_side.as_deref().map(number_or_text)),
         (
@@ -162,6 +161,10 @@ pub(super) fn reduce_flags(arguments: &ReduceArguments) -> Vec<CommandFlag> {
         ("--headers", "run.headers", arguments.headers.clone().map(FlagValue::from)),
         ("--z-scale", "run.z_scale", arguments.z_scale.as_deref().map(number_or_text)),
     ]);
+    if ranks {
+        let dimensions = Some(json!([KEEP_RANK.kind().name()]).into());
+        all.extend(flags([("--ranks", "write.dimensions", dimensions)]));
+    }
     all.extend(filtered(&arguments.filter));
     all.extend(written(&arguments.written));
     all

@@ -54,7 +54,7 @@ pub struct VerifySettings {
 ///     format!("synth scene=part points=2000 ! write path=\"{scan}\""),
 ///     format!("read path=\"{scan}\" ! graded keep=200 ! write path=\"{thin}\""),
 /// ] {
-///     Graph::parse(&line, "", &registry)?.plan(&Overrides::default())?.run(&Quiet)?;
+///     Graph::parse_line(&line, &registry)?.plan(&Overrides::default())?.run(&Quiet)?;
 /// }
 /// let verdict = verify(&[scan], &thin, &VerifySettings::default(), &registry, &Quiet)?;
 /// assert!(verdict.holds());
