@@ -54,8 +54,11 @@ pub(super) struct FoundInTile<'w> {
     pub kept: &'w KeptReader,
 }
 
-/// Bytes of a kept point that a tile has around its cube, in its place and in what is searched.
-const KEPT_BYTES: usize = 2 * size_of::<Position>() + 2 * size_of::<u32>() + 32;
+/// Bytes of a position in a tile of a round: in its place, among those that are chosen and touched,
+/// in what it says and in what is searched.
+const POSITION_BYTES: usize = Loader::BYTES_PER_POINT + 2 * size_of::<Position>() + 56;
+/// The same of a kept point, with its cell and its offers of this round and the one before.
+const KEPT_BYTES: usize = 2 * size_of::<Position>() + 2 * size_of::<Offer>() + 72;
 
 impl<'a> RoundWorker<'a> {
     pub fn new(
@@ -99,9 +102,6 @@ impl<'a> RoundWorker<'a> {
         };
         let (region, covering) = (whole(self.round.kept_reach), whole(self.round.reach));
         self.more = None;
-        let most = kept.most_near(&region);
-        let mut bytes = Bytes::of(most as u64, KEPT_BYTES);
-        let mut more = self.job.budget.lease(bytes.0, "kept points around tiles")?;
         if let Looks::Uncovered { apart, .. } = self.round.looks {
             kept.near(&covering.grown(apart), &mut self.reader)?;
             let cover = Cover::new(&self.reader.positions, apart);
@@ -109,10 +109,12 @@ impl<'a> RoundWorker<'a> {
         }
         self.loader.load(key, self.round.reach, 0)?;
         let (tile, _) = self.loader.tile();
-        let beyond = tile.positions.len().saturating_sub(self.capacity);
-        bytes = Bytes::of(beyond as u64, Loader::BYTES_PER_POINT + size_of::<Position>());
-        more.grow(bytes.0)?;
-        self.more = Some(more);
+        // What the arena of the mill has for positions that are not there is for kept points.
+        let needed = Bytes::of(tile.positions.len() as u64, POSITION_BYTES)
+            + Bytes::of(kept.most_near(&region) as u64, KEPT_BYTES);
+        let there = Bytes::of(self.capacity as u64, POSITION_BYTES);
+        let beyond = needed.0.saturating_sub(there.0);
+        self.more = Some(self.job.budget.lease(beyond, "kept points around tiles")?);
         put_to_work(tile, &self.job.ops, self.call);
         self.chosen.clear();
         let is_chosen = |i: &usize| tile.is_chosen(*i);
