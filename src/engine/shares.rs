@@ -17,9 +17,10 @@ const THREAD_MOST: Bytes = Bytes(192 << 20);
 const TILE_MOST: u64 = 3 << 18;
 /// What tiles larger than planned leave for the list of all tiles.
 pub const MILL_SPARE: Bytes = Bytes(1 << 20);
-/// By how much what is resident before a run differs from process to process: a budget that is
+/// By how much what is resident before a run differs from process to process, by the pages of the
+/// program that the system maps and the counters that it keeps by core: a budget that is
 /// named must do in the next.
-const RESIDENT_VARIES: Bytes = Bytes(1 << 20);
+const RESIDENT_VARIES: Bytes = Bytes(2 << 20);
 
 /// What the division depends on.
 #[derive(Debug, Clone)]
