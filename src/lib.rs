@@ -138,4 +138,6 @@ pub use language::{
     Explained, GraphBuilder, KeyDescription, Parameter, ParameterType, PipelineText, Registry, Set,
     TableDescription, WordDescription,
 };
-pub use plan::{Outline, Plan, PredictedOutput, PredictedPhase, Prediction, Pulled, Trial};
+pub use plan::{
+    Outline, Plan, PredictedOutput, PredictedPhase, Prediction, Preview, Pulled, Trial, TrialPoints,
+};

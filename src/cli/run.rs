@@ -3,8 +3,10 @@
 use super::arguments::{CutArguments, PlanArguments, ReduceArguments, SynthArguments};
 use super::console::Console;
 use super::flags::{common_flags, cut_flags, given, reduce_flags, synth_flags};
+use super::noise::{tolerance_of, warn_of_noise};
 use super::pipeline;
 use super::preset::Preset;
+use super::preview::preview;
 use crate::Result;
 use crate::engine::Done;
 use crate::graph::Graph;
@@ -50,33 +52,39 @@ kind = \"write\"
 
 /// Runs a pipeline and prints its closing table.
 pub(super) fn run(arguments: &PlanArguments, registry: &Registry, console: &Console) -> Result<()> {
-    let pipeline = pipeline::read(&arguments.pipeline, &arguments.common, registry)?;
-    console.result(mill(pipeline, console)?)
+    let read = || pipeline::read(&arguments.pipeline, &arguments.common, registry);
+    console.result(mill_towards(&read, console)?)
 }
 
 /// Runs `pipelines/reduce.toml` or `pipelines/paper.toml` on other files and prints the closing
-/// table.
+/// table; or shows what several such runs would come to.
 pub(super) fn reduce(
     arguments: &ReduceArguments,
     registry: &Registry,
     console: &Console,
 ) -> Result<()> {
-    let preset = arguments.preset.map_or(Vec::new(), Preset::sets);
-    let sets = [preset, given([reduce_flags(arguments), common_flags(&arguments.common)])].concat();
-    let by_cells = arguments.by_cells();
-    if arguments.preset.is_none() && by_cells {
+    if arguments.preview {
+        return preview(arguments, registry, console);
+    }
+    if arguments.preset.is_none() && arguments.by_cells() {
         console.hint(OTHERWISE);
     }
+    console.result(mill_towards(&|| reduction(arguments, registry), console)?)
+}
+
+/// The pipeline of `reduce`.
+pub(super) fn reduction(arguments: &ReduceArguments, registry: &Registry) -> Result<Graph> {
+    let preset = arguments.preset.map_or(Vec::new(), Preset::sets);
+    let sets = [preset, given([reduce_flags(arguments), common_flags(&arguments.common)])].concat();
     let outliers = arguments.outliers.then_some("outliers");
     let filter = arguments.filter.is_given().then_some("filter");
-    let text = match (by_cells, &arguments.keep) {
+    let text = match (arguments.by_cells(), &arguments.keep) {
         (true, _) => BY_CELLS.to_owned(),
         (false, Some(_)) => REDUCE.to_owned(),
         (false, None) => REDUCE.replace(ITS_NUMBER, ""),
     };
     let text = with_stages(&text, filter.into_iter().chain(outliers));
-    let pipeline = Graph::parse_with(&text, HIDDEN, registry, &sets)?;
-    console.result(mill(pipeline, console)?)
+    Graph::parse_with(&text, HIDDEN, registry, &sets)
 }
 
 /// Cuts a coarser reduction off one with ranks and prints the closing table.
@@ -101,6 +109,18 @@ pub(super) fn synth(
 pub(super) fn mill(pipeline: Graph, console: &Console) -> Result<Done> {
     console.hear_interrupts();
     console.run(pipeline.plan(&Overrides::default())?)
+}
+
+/// Plans and runs the pipeline that `read` makes, which may have a tolerance.
+fn mill_towards(read: &dyn Fn() -> Result<Graph>, console: &Console) -> Result<Done> {
+    console.hear_interrupts();
+    let graph = read()?;
+    let tolerance = tolerance_of(&graph)?;
+    let plan = graph.plan(&Overrides::default())?;
+    if let Some(tolerance) = tolerance {
+        warn_of_noise(tolerance, &plan, read, console)?;
+    }
+    console.run(plan)
 }
 
 /// The pipeline `text` with stages of these kinds behind the first, which reads.

@@ -108,7 +108,7 @@ impl Plan {
     }
 
     /// The prediction by a trial, or without one and why.
-    fn prediction(&self, tried: &Tried) -> Result<Prediction> {
+    pub(super) fn prediction(&self, tried: &Tried) -> Result<Prediction> {
         let shares = self.task.demands.divide()?;
         let of = Extrapolation { plan: self, tried: tried.as_ref() };
         let (scratch_bytes, scratch_from) = of.scratch(&shares);

@@ -23,17 +23,22 @@ use crate::host::process::{cpu_seconds, resident_now};
 use crate::host::{Threads, lock};
 use crate::memory::Records;
 use crate::point::PointBatch;
+use crate::report::Outcome;
 use crate::stage::{Role, SinkSummary, Source};
 use crate::{Error, ErrorKind, Result};
 
 /// Records that are read to choose from, at most, and the bytes that they take.
 const READ: u64 = 3_000_000;
 const READ_BYTES: u64 = 96 << 20;
-/// Records that the stages work on, about, and the columns or stretches that these are in.
+/// Records that the stages work on where a run is foretold, about, and the columns or stretches that
+/// these are in: of fewer records fewer columns, since what a column cuts off counts more in a
+/// small one.
 const TRIED: usize = 240_000;
 const SPOTS: usize = 8;
-/// A scan of no more is tried as a whole.
-const WHOLE: u64 = 300_000;
+const A_SPOT: usize = 30_000;
+const FEWEST_SPOTS: usize = 3;
+/// A scan is tried as a whole if it has no more than so many fourths of what is tried of others.
+const WHOLE_FOURTHS: u64 = 5;
 /// Parts of the rest of the input that are looked at, a batch of each.
 const ELSEWHERE: usize = 32;
 /// Records that are read at once.
@@ -68,6 +73,19 @@ pub(super) struct TrialRun {
     pub outputs: Vec<SinkSummary>,
     /// Bytes of scratch files.
     pub spilled: u64,
+    /// What became of the points.
+    pub outcome: Outcome,
+}
+
+/// Some of the points of a scan, on which pipelines are tried: those that
+/// [`Plan::trial_points`] took.
+pub struct TrialPoints {
+    source: Box<dyn Source>,
+    records: Records,
+    /// What was read, and how long that took.
+    trial: Trial,
+    /// CPU seconds of the reading.
+    reading: f64,
 }
 
 /// What a trial came to, or why there was none.
@@ -76,14 +94,11 @@ pub(super) type Tried = std::result::Result<TrialRun, String>;
 impl Plan {
     /// Runs the stages of `again` on some of the points, or says why not.
     pub(super) fn try_on_some(&self, again: Graph, watch: &dyn Watch) -> Result<Tried> {
-        let source = &self.task.source;
-        if source.is_read_once() {
-            return Ok(Err("the source gives its points once, and a run needs them".to_owned()));
+        if let Some(why) = self.no_trial() {
+            return Ok(Err(why));
         }
-        if source.points() == 0 {
-            return Ok(Err("the inputs have no points to try".to_owned()));
-        }
-        match self.tried(again, watch) {
+        let points = self.read_some(&again, TRIED, watch);
+        match points.and_then(|points| self.tried(&points, again, watch)) {
             Err(error) if error.kind() != ErrorKind::Interrupted => {
                 Ok(Err(format!("a trial failed: {error}")))
             }
@@ -91,40 +106,72 @@ impl Plan {
         }
     }
 
-    fn tried(&self, again: Graph, watch: &dyn Watch) -> Result<TrialRun> {
+    /// Why there can be no trial, if so.
+    pub(super) fn no_trial(&self) -> Option<String> {
+        let source = &self.task.source;
+        let why = match (source.is_read_once(), source.points()) {
+            (true, _) => "the source gives its points once, and a run needs them",
+            (false, 0) => "the inputs have no points to try",
+            _ => return None,
+        };
+        Some(why.to_owned())
+    }
+
+    /// Reads the points that trials work on from the sources of `again`.
+    pub(super) fn read_some(
+        &self,
+        again: &Graph,
+        about: usize,
+        watch: &dyn Watch,
+    ) -> Result<TrialPoints> {
         let (start, cpu_before) = (Instant::now(), cpu_seconds());
         // Parts are read from a source of their own: that of the plan counts what it gives.
-        let source = opened(&again)?;
+        let source = opened(again)?;
         let (schema, limit) = (source.schema(), READ_BYTES.min(self.task.demands.limit / 4));
         let unread = &self.task.unread();
         let (read, reading) = Threads::start(self.task.threads, |threads| {
-            let from = TrialReading { source: &*source, unread, threads, watch, limit };
+            let from = TrialReading { source: &*source, unread, threads, watch, limit, about };
             let read = from.records(self.task.mills)?;
             let reading = cpu_seconds() - cpu_before;
             Ok((from.chosen(read, self.task.mills)?, reading))
         })?;
         let TrialRecords { read: read_points, chosen, density } = read;
         let points = (chosen.len() / schema.stride) as u64;
+        let records = Records::new((**schema).clone(), chosen)?;
+        let records = records.with_metadata(source.metadata().clone());
+        let (of_points, seconds) = (source.points(), start.elapsed().as_secs_f64());
+        let trial = Trial { read_points, points, of_points, density, seconds };
+        Ok(TrialPoints { source, records, trial, reading })
+    }
+
+    /// Runs the stages of `again` on these points.
+    pub(super) fn tried(
+        &self,
+        points: &TrialPoints,
+        again: Graph,
+        watch: &dyn Watch,
+    ) -> Result<TrialRun> {
+        let start = Instant::now();
+        let TrialPoints { source, records, trial, reading } = points;
         let (trouble, written) = (Trouble::default(), WrittenFiles::default());
         let folder = self.task.settings.scratch.clone().unwrap_or_else(std::env::temp_dir);
         let scratch = Arc::new(Scratch::below(&folder, &trouble));
-        let records = Records::new((**schema).clone(), chosen)?;
-        let graph = on_records(again, records.with_metadata(source.metadata().clone()));
-        let share = points as f64 / source.points().max(points).max(1) as f64;
-        let mut graph = rehearsed(graph, share, &*source, &scratch, &written)?;
+        let graph = on_records(again, records.clone());
+        let share = trial.points as f64 / source.points().max(trial.points).max(1) as f64;
+        let mut graph = rehearsed(graph, share, &**source, &scratch, &written)?;
         self.equip(&mut graph.settings, folder)?;
         let done = graph.plan(&Overrides::default())?.run(&Unheard(watch))?;
         drop(scratch);
         lock(&trouble).iter().for_each(|told| watch.warn(told));
-        let of_points = source.points();
-        let seconds = start.elapsed().as_secs_f64();
+        let seconds = trial.seconds + start.elapsed().as_secs_f64();
         let outputs = std::mem::take(&mut *lock(&written)).into_values().collect();
         Ok(TrialRun {
-            trial: Trial { read_points, points, of_points, density, seconds },
-            reading,
+            trial: Trial { seconds, ..trial.clone() },
+            reading: *reading,
             phases: done.report.run.cpu_by_phase,
             outputs,
             spilled: done.report.run.spill_bytes,
+            outcome: done.report.result,
         })
     }
 
@@ -178,23 +225,36 @@ struct TrialReading<'a> {
     watch: &'a dyn Watch,
     /// Bytes of records, at most.
     limit: u64,
+    /// Records that are tried, about.
+    about: usize,
 }
 
 impl TrialReading<'_> {
+    /// Records up to which a scan is tried as a whole.
+    fn whole(&self) -> u64 {
+        self.about as u64 / 4 * WHOLE_FOURTHS
+    }
+
+    /// Columns or stretches that are tried.
+    fn spots(&self) -> usize {
+        (self.about / A_SPOT).clamp(FEWEST_SPOTS, SPOTS)
+    }
+
     /// A stretch from the middle of the input, or several that are spread over it.
     fn records(&self, in_one: bool) -> Result<ReadParts> {
         let (parts, all) = (self.source.parts().max(1), self.source.points());
         let most = READ.min(self.limit / self.source.schema().stride.max(1) as u64).max(1);
-        let whole = if in_one { most } else { WHOLE.min(most) };
+        let whole = if in_one { most } else { self.whole().min(most) };
         if all <= whole {
             let parts = 0..self.source.parts();
             return Ok(ReadParts { read: self.parts(parts.clone().collect(), most)?, parts });
         }
         if !in_one {
+            let spots = self.spots();
             let mut some: Vec<usize> =
-                (0..SPOTS).map(|n| parts * (2 * n + 1) / (2 * SPOTS)).collect();
+                (0..spots).map(|n| parts * (2 * n + 1) / (2 * spots)).collect();
             some.dedup();
-            let each = most.min(TRIED as u64) / some.len() as u64;
+            let each = most.min(self.about as u64) / some.len() as u64;
             return Ok(ReadParts { parts: 0..parts, read: self.parts(some, each)? });
         }
         let each = all.div_ceil(parts as u64).max(1);
@@ -209,13 +269,13 @@ impl TrialReading<'_> {
     fn chosen(&self, ReadParts { parts, read }: ReadParts, in_spots: bool) -> Result<TrialRecords> {
         let (schema, stride) = (self.source.schema(), self.source.schema().stride);
         let count = (read.iter().map(Vec::len).sum::<usize>() / stride) as u64;
-        let axes = schema.coordinates().filter(|_| in_spots && count > WHOLE);
+        let axes = schema.coordinates().filter(|_| in_spots && count > self.whole());
         let Some(axes) = axes else {
             return Ok(TrialRecords { read: count, chosen: read.concat(), density: 1.0 });
         };
         let at = |record: &[u8]| axes.map(|axis| axis.world(record, schema.endian));
         let records = || read.iter().flat_map(|bytes| bytes.chunks_exact(stride));
-        let spots = Spots::of(records().map(at)).chosen(SPOTS, TRIED);
+        let spots = Spots::of(records().map(at)).chosen(self.spots(), self.about);
         let mut chosen = Vec::new();
         records().filter(|record| spots.hold(at(record))).for_each(|r| chosen.extend_from_slice(r));
         let others: Vec<usize> =

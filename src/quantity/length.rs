@@ -83,6 +83,12 @@ impl Length {
         self.unit.is_some()
     }
 
+    /// The length so many times, to two digits, in the same unit; none if that is no length.
+    pub fn about_times(self, factor: f64) -> Option<Length> {
+        let value = format!("{:.1e}", self.value * factor).parse().ok()?;
+        Length::of(value).map(|length| Length { unit: self.unit, ..length })
+    }
+
     /// True if it is known to be less than `other`: lengths compare in one unit.
     pub fn is_less_than(self, other: Length) -> bool {
         match (self.unit, other.unit) {

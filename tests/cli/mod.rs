@@ -7,6 +7,7 @@ mod interrupt;
 mod names;
 mod picture;
 mod plan;
+mod preview;
 mod tools;
 mod values;
 mod verify;

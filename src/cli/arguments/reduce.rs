@@ -26,6 +26,12 @@ impl ReduceArguments {
     /// True if the published method is asked for: by one of its options, or as nothing says how
     /// many points stay.
     pub fn by_cells(&self) -> bool {
+        let has_number = self.keep.as_deref().is_some_and(|keep| keep != "auto");
+        self.has_options_of_cells() || !has_number && self.tolerance.is_none()
+    }
+
+    /// True if an option is given that is about cells.
+    pub fn has_options_of_cells(&self) -> bool {
         let options = [
             &self.max_angle,
             &self.neighbors,
@@ -40,20 +46,17 @@ impl ReduceArguments {
             &self.passes,
             &self.mark,
         ];
-        let has_number = self.keep.as_deref().is_some_and(|keep| keep != "auto");
-        self.preset.is_some()
-            || options.into_iter().any(Option::is_some)
-            || !has_number && self.tolerance.is_none()
+        self.preset.is_some() || options.into_iter().any(Option::is_some)
     }
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct ReduceArguments {
     /// LAS, LAZ or PLY files, patterns or folders
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
     /// The reduced file: .las, .laz or .ply
-    #[arg(short, long, value_name = "OUT", required_unless_present = "outdir")]
+    #[arg(short, long, value_name = "OUT", required_unless_present_any = ["outdir", "preview"])]
     pub output: Option<String>,
     /// One reduced file for each input instead, in this folder, under the input's name and header;
     /// neighbours are found across the inputs
@@ -84,6 +87,10 @@ pub(crate) struct ReduceArguments {
     /// written anyway, since it tells exceptions from the surface
     #[arg(long, conflicts_with_all = OF_CELLS)]
     pub ranks: bool,
+    /// Write nothing: show how many points, which errors and how much time several numbers and
+    /// tolerances would come to, by a trial on a part of the scan
+    #[arg(long)]
+    pub preview: bool,
     /// How much is computed: normal, or low, in a quarter of the time and with larger errors
     /// [default: normal]
     #[arg(long, value_name = "HOW", conflicts_with_all = OF_CELLS)]

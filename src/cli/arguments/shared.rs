@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum};
 use crate::cli::classes::{Classes, parse_classes};
 
 /// Common to all commands that run a pipeline.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Run options")]
 pub(crate) struct CommonArguments {
     /// Bound of the peak memory, such as 512MiB or 2GiB [default: half of what there is]
@@ -43,7 +43,7 @@ pub(crate) enum Progress {
 }
 
 /// Which points are left out as they are read.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct FilterArguments {
     /// Keep the points of these classes alone, such as 2,6
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', value_parser = parse_classes)]
@@ -54,7 +54,7 @@ pub(crate) struct FilterArguments {
 }
 
 /// How the output is written.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct WrittenArguments {
     /// Scale of LAS coordinates, or three for X, Y and Z [default: the input's; PLY to LAS must say
     /// it]
