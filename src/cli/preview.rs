@@ -44,10 +44,10 @@ pub(super) fn preview(
     if arguments.output.is_none() && arguments.outdir.is_none() {
         arguments.output = Some(OUTPUT.to_owned());
     }
-    let plan = reduction(&first(&arguments), registry)?.plan(&Overrides::default())?;
+    let plan = reduction(&arguments, registry)?.plan(&Overrides::default())?;
     plan.warnings().iter().for_each(|warning| console.warn(warning));
     let rows = watched(&mut Nothing, &|| console.cancelled(), |watch| {
-        let again = reduction(&first(&arguments), registry)?;
+        let again = reduction(&arguments, registry)?;
         let points = plan.trial_points(&again, TRIED, watch)?;
         Trials { plan: &plan, points, arguments: &arguments, registry, watch }.rows()
     })?;
@@ -56,15 +56,6 @@ pub(super) fn preview(
     }
     let took = start.elapsed().as_secs_f64();
     console.result(text(&rows, plan.unit(), plan.outline().points, took).trim_end())
-}
-
-/// The arguments with a number, if they have neither that nor another one.
-fn first(arguments: &ReduceArguments) -> ReduceArguments {
-    let mut first = arguments.clone();
-    if first.keep.is_none() && first.tolerance.is_none() && !first.has_options_of_cells() {
-        first.keep = Some(SHARES[0].to_owned());
-    }
-    first
 }
 
 /// The trials of a preview.
@@ -79,12 +70,14 @@ struct Trials<'a> {
 impl Trials<'_> {
     /// The rows of numbers and those of tolerances.
     fn rows(&self) -> Result<[Vec<PreviewRow>; 2]> {
-        let asked = self.arguments.keep.iter().map(String::as_str);
+        // With nothing asked for, what the run would choose.
+        let none = self.arguments.tolerance.is_none() && !self.arguments.by_cells();
+        let asked = self.arguments.keep.as_deref().or(none.then_some("auto"));
         let others =
             SHARES.into_iter().filter(|share| self.arguments.keep.as_deref() != Some(share));
         let numbers: Vec<PreviewRow> =
             others.chain(asked).map(|keep| self.number(keep)).collect::<Result<_>>()?;
-        if self.arguments.has_options_of_cells() {
+        if self.arguments.by_cells() {
             return Ok([numbers, Vec::new()]);
         }
         let percentile = |n: usize| Some(numbers.get(n)?.preview.deviation?.p99);

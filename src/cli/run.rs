@@ -67,6 +67,7 @@ pub(super) fn reduce(
         return preview(arguments, registry, console);
     }
     if arguments.preset.is_none() && arguments.by_cells() {
+        // By options of cells, of which some may be left to the scan.
         console.hint(OTHERWISE);
     }
     console.result(mill_towards(&|| reduction(arguments, registry), console)?)
@@ -78,10 +79,10 @@ pub(super) fn reduction(arguments: &ReduceArguments, registry: &Registry) -> Res
     let sets = [preset, given([reduce_flags(arguments), common_flags(&arguments.common)])].concat();
     let outliers = arguments.outliers.then_some("outliers");
     let filter = arguments.filter.is_given().then_some("filter");
-    let text = match (arguments.by_cells(), &arguments.keep) {
+    let text = match (arguments.by_cells(), &arguments.tolerance) {
         (true, _) => BY_CELLS.to_owned(),
-        (false, Some(_)) => REDUCE.to_owned(),
-        (false, None) => REDUCE.replace(ITS_NUMBER, ""),
+        (false, None) => REDUCE.replace(ITS_NUMBER, "keep = \"auto\""),
+        (false, Some(_)) => REDUCE.replace(ITS_NUMBER, ""),
     };
     let text = with_stages(&text, filter.into_iter().chain(outliers));
     Graph::parse_with(&text, HIDDEN, registry, &sets)

@@ -15,6 +15,7 @@ mod sums;
 pub(crate) mod survey;
 mod table;
 mod tally;
+mod towards;
 
 pub use crate::budget::{Bytes, Holder, Holders};
 pub(crate) use baseline::Baseline;

@@ -12,6 +12,7 @@ use super::figures::{BaselineFigures, ClassFigures, DeviationTotals, Pair, Plane
 use super::ledger::{Ledger, Removed};
 use super::stats::{DimensionFigures, StatsFigures};
 use super::tally::KEY_POINTS;
+use super::towards::towards_lines;
 use crate::budget::Bytes;
 use crate::error::shown;
 
@@ -121,6 +122,7 @@ impl Table<'_> {
             let told = "normals of a cell differ by, for the number of points to keep";
             write!(f, "\nangle      {angle:.4} rad at most: what {told}")?;
         }
+        towards_lines(f, result, self.unit)?;
         if let Some(totals) = &result.totals {
             self.totals_lines(f, result, totals)?;
         }

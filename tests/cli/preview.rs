@@ -36,7 +36,8 @@ fn reduced(at: &Path, arguments: &[&str]) -> Value {
 fn a_preview_of_a_scan_that_is_tried_as_a_whole_is_what_comes_out() {
     let at = scan("als", &["-n", "40k"]);
     let at = at.path();
-    let table = done(at, &["reduce", "scan.las", "--preview", "--keep", "3k", "--tolerance", "0.25"]);
+    let table =
+        done(at, &["reduce", "scan.las", "--preview", "--keep", "3k", "--tolerance", "0.25"]);
     let files: Vec<_> = std::fs::read_dir(at).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(files, ["scan.las"], "a preview writes nothing");
     assert!(table.starts_with("40,000 of 40,000 points were tried"), "{table}");

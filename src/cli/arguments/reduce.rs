@@ -23,15 +23,8 @@ const OF_CELLS: [&str; 13] = [
 ];
 
 impl ReduceArguments {
-    /// True if the published method is asked for: by one of its options, or as nothing says how
-    /// many points stay.
+    /// True if the published method is asked for: by a preset, or an option that is about cells.
     pub fn by_cells(&self) -> bool {
-        let has_number = self.keep.as_deref().is_some_and(|keep| keep != "auto");
-        self.has_options_of_cells() || !has_number && self.tolerance.is_none()
-    }
-
-    /// True if an option is given that is about cells.
-    pub fn has_options_of_cells(&self) -> bool {
         let options = [
             &self.max_angle,
             &self.neighbors,
@@ -65,14 +58,14 @@ pub(crate) struct ReduceArguments {
     /// Format: las, laz or ply [default: by extension; in a folder, that of each input]
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
-    /// Settings for a kind of scan, or those of the published method (paper); other options take
-    /// the place of a preset's [default: by the noise and the spacing of the scan; the run says
-    /// what it chose]
+    /// Settings of the published method of cells for a kind of scan, or as it is printed (paper);
+    /// other options take the place of a preset's
     #[arg(long, value_name = "KIND")]
     pub preset: Option<Preset>,
     /// How many points are to stay: 10%, 250k or 1e6. They are those that say most of the surface;
-    /// with a preset or an option of cells, those that the published method keeps [default: as many
-    /// as the noise asks for, by that method]
+    /// with a preset or an option of cells, those that the published method keeps [default: auto,
+    /// as many as the shape asks for: twice as many would hardly lower the error; with cells, as
+    /// the noise does]
     #[arg(long, value_name = "TARGET", conflicts_with = "max_angle")]
     pub keep: Option<String>,
     /// How far from the surface of the points that stay no removed point may be: in the scan's

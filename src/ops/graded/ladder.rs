@@ -16,7 +16,7 @@ use super::sides::{LONGEST, extent, occupied, steps, voxel_side};
 use super::work::{RoundWork, fill};
 
 /// The last distance, as a part of the side of the voxel grid that keeps as many.
-const OF_VOXEL: f64 = 0.97;
+pub(super) const OF_VOXEL: f64 = 0.97;
 /// By how much of what is kept a rung grows by its rounds.
 const GROWTH: f64 = 2.0 / 3.0;
 /// Kept points from which on a rung has rounds.

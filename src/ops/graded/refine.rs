@@ -27,6 +27,28 @@ pub(super) struct Refining {
     pub floor: f64,
 }
 
+/// How a round measures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Measuring {
+    /// As a round would refine.
+    pub refining: Refining,
+    /// Lattice steps that count as one.
+    pub unit: f64,
+}
+
+/// An error counts as no more units.
+const MOST_UNITS: f64 = (1u64 << 32) as f64;
+
+impl Measuring {
+    /// Counts the errors of the positions in the tile's cube, in whole units.
+    pub fn measure(self, tile: &RoundTile<'_>, found: &mut RoundFound) {
+        let asked = self.refining.asked(tile, tile.positions).into_iter().zip(tile.positions);
+        let own = asked.filter(|(asked, p)| asked.cell != NONE && tile.cube.contains(**p));
+        let units = |asked: AskedPosition| (asked.error2.sqrt() / self.unit).min(MOST_UNITS);
+        found.counted += own.map(|(asked, _)| units(asked).round() as u64).sum::<u64>();
+    }
+}
+
 /// Kept points within so many radii are asked.
 pub(super) const ASKED_RADII: i64 = 4;
 /// The part of the squared distance to the nearest kept point that is added to the squared error:

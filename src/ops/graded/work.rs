@@ -2,7 +2,7 @@
 
 use super::correct::Correcting;
 use super::fill::Filling;
-use super::refine::Refining;
+use super::refine::{Measuring, Refining};
 use crate::stage::{Looks, NextRound, Round, RoundChoice};
 
 /// What a round does.
@@ -11,6 +11,7 @@ pub(super) enum RoundWork {
     Fill(Filling),
     Refine(Refining),
     Correct(Correcting),
+    Measure(Measuring),
 }
 
 /// A round that fills.
