@@ -139,5 +139,6 @@ pub use language::{
     TableDescription, WordDescription,
 };
 pub use plan::{
-    Outline, Plan, PredictedOutput, PredictedPhase, Prediction, Preview, Pulled, Trial, TrialPoints,
+    FittedSize, Outline, Plan, PredictedOutput, PredictedPhase, Prediction, Preview, Pulled, Trial,
+    TrialPoints,
 };

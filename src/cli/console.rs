@@ -1,6 +1,7 @@
 //! What a command says while it works: bars, text or events on stderr, as loud as the user wants.
 
 use std::fmt::Display;
+use std::ops::RangeInclusive;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
@@ -16,7 +17,7 @@ use super::{interrupt, print};
 use crate::engine::{Done, Watch};
 use crate::error::shown;
 use crate::language::Registry;
-use crate::plan::Plan;
+use crate::plan::{FittedSize, Plan};
 use crate::report::{Decision, Short};
 use crate::{Error, Result};
 
@@ -89,9 +90,36 @@ impl Console {
     /// Runs a plan and tells what it does, until it is told to stop.
     pub fn run(&self, plan: Plan) -> Result<Done> {
         self.planned(&plan);
-        let (unit, cancelled) = (plan.unit(), || self.cancelled());
-        let run = |watch: &dyn Watch| plan.run(watch);
-        let done = match &self.voice {
+        let unit = plan.unit();
+        self.watched(unit, |watch| plan.run(watch)).inspect(|done| self.done(done))
+    }
+
+    /// The same, for outputs that are to take so many bytes.
+    pub fn run_to_size(&self, plan: Plan, bytes: RangeInclusive<u64>) -> Result<FittedSize> {
+        self.planned(&plan);
+        let unit = plan.unit();
+        let fitted = self.watched(unit, |watch| plan.run_to_size(bytes, watch))?;
+        if let FittedSize::Done(done) = &fitted {
+            self.done(done);
+        }
+        Ok(fitted)
+    }
+
+    /// Tells something of interest, as text alone.
+    pub fn note(&self, text: impl Display) {
+        if let (false, Voice::Text(_)) = (self.quiet, &self.voice) {
+            print::message(text);
+        }
+    }
+
+    /// What `run` comes to, telling what it does in lengths of this unit.
+    fn watched<T>(
+        &self,
+        unit: Option<&'static str>,
+        run: impl FnOnce(&dyn Watch) -> Result<T>,
+    ) -> Result<T> {
+        let cancelled = || self.cancelled();
+        match &self.voice {
             _ if self.quiet => watched(&mut Nothing, &cancelled, run),
             Voice::Json(events) => {
                 watched(&mut RunEvents::new(events, &self.words), &cancelled, run)
@@ -103,8 +131,7 @@ impl Console {
                 text.bars.end();
                 done
             }
-        };
-        done.inspect(|done| self.done(done))
+        }
     }
 
     fn done(&self, done: &Done) {

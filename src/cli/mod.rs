@@ -28,6 +28,7 @@ mod print;
 mod progress;
 mod run;
 mod seen;
+mod size;
 mod stages;
 mod table;
 mod verify;

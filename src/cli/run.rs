@@ -7,6 +7,7 @@ use super::noise::{tolerance_of, warn_of_noise};
 use super::pipeline;
 use super::preset::Preset;
 use super::preview::preview;
+use super::size::reduce_to_size;
 use crate::Result;
 use crate::engine::Done;
 use crate::graph::Graph;
@@ -65,6 +66,9 @@ pub(super) fn reduce(
 ) -> Result<()> {
     if arguments.preview {
         return preview(arguments, registry, console);
+    }
+    if let Some(bytes) = arguments.size {
+        return console.result(reduce_to_size(arguments, bytes, registry, console)?);
     }
     if arguments.preset.is_none() && arguments.by_cells() {
         // By options of cells, of which some may be left to the scan.

@@ -26,10 +26,10 @@ use super::scratch::{Scratch, Trouble, memory_warning};
 use super::shares::{Demands, Shares};
 use super::stream::stream;
 use super::task::Task;
-use crate::Result;
 use crate::host::{Threads, lock};
 use crate::report::{FileFigures, Report, RunFigures, check_written};
 use crate::stage::Sink;
+use crate::{Error, Result};
 
 /// A run that is done. Displayed as a few lines for the terminal.
 #[derive(Debug)]
@@ -99,6 +99,7 @@ impl Task {
         }));
         clock.begin(RunPhase::Publish, None)?;
         let (report, tiles) = self.account(finished, run, clock)?;
+        self.check_size(&report.run.outputs)?;
         if let Some(staged) = &staged_report {
             write_report(staged.file(), &report, &tiles).map_err(|error| staged.tell(error))?;
         }
@@ -110,6 +111,19 @@ impl Task {
         publish(&outputs, staged_report.as_ref())?;
         let unit = self.source.metadata().units.sign();
         Ok(Done { report, report_path: self.settings.report.clone(), unit })
+    }
+
+    /// Refuses outputs that take other bytes than are wanted, and says to whoever planned the run
+    /// how many these are.
+    fn check_size(&self, outputs: &[FileFigures]) -> Result<()> {
+        let Some(wanted) = &self.wanted else { return Ok(()) };
+        let bytes = outputs.iter().filter_map(|output| output.bytes).sum();
+        if wanted.bytes.contains(&bytes) {
+            return Ok(());
+        }
+        let points = outputs.iter().map(|output| output.points).sum();
+        wanted.unfit.get_or_init(|| (points, bytes));
+        Err(Error::internal("outputs take other bytes than are wanted"))
     }
 
     /// Makes places for the files of all sinks.

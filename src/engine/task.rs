@@ -4,7 +4,8 @@
 //! pipeline's text nor its graph. A run changes none of it. The tile stages are not in it, since
 //! they settle by what they see of the scan: those the run takes for itself.
 
-use std::sync::Arc;
+use std::ops::RangeInclusive;
+use std::sync::{Arc, OnceLock};
 
 use super::beside::Beside;
 use super::pass::{Branch, Pass, StreamOp};
@@ -26,6 +27,14 @@ pub(crate) struct Schemas {
 
 /// The lengths of a stage that were given in a unit of their own: key and text.
 pub(crate) type GivenLengths = Vec<(&'static str, String)>;
+
+/// What the outputs of a run may take, which is known when they are there.
+pub(crate) struct WantedSize {
+    /// Bytes of all files.
+    pub bytes: RangeInclusive<u64>,
+    /// Records and bytes of outputs that took others, and were not given their names.
+    pub unfit: OnceLock<(u64, u64)>,
+}
 
 /// A run that can begin.
 pub(crate) struct Task {
@@ -70,6 +79,8 @@ pub(crate) struct Task {
     pub demands: Demands,
     /// What the user should know before the run.
     pub warnings: Vec<String>,
+    /// None where outputs of any size are right.
+    pub wanted: Option<WantedSize>,
 }
 
 impl Task {

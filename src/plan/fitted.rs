@@ -150,6 +150,7 @@ impl Graph {
             mills: order.mills,
             lattice,
             demands,
+            wanted: None,
         };
         Ok(Plan { task, ops: sorted.ops })
     }

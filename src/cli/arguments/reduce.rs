@@ -5,6 +5,8 @@ use clap::Args;
 use super::shared::{CommonArguments, FilterArguments, WrittenArguments};
 use crate::cli::classes::{Classes, parse_classes};
 use crate::cli::preset::Preset;
+use crate::graph::parse_bytes;
+
 /// Arguments of `reduce` that are about cells of agreeing normals.
 const OF_CELLS: [&str; 13] = [
     "preset",
@@ -21,6 +23,10 @@ const OF_CELLS: [&str; 13] = [
     "passes",
     "mark",
 ];
+
+fn parse_size(text: &str) -> Result<u64, String> {
+    parse_bytes(text)
+}
 
 impl ReduceArguments {
     /// True if the published method is asked for: by a preset, or an option that is about cells.
@@ -68,6 +74,11 @@ pub(crate) struct ReduceArguments {
     /// the noise does]
     #[arg(long, value_name = "TARGET", conflicts_with = "max_angle")]
     pub keep: Option<String>,
+    /// How many bytes the output is to take, within 2 %: 200MB. As many points stay as that allows;
+    /// packed ones differ in size, so a run is repeated until it comes out
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    #[arg(conflicts_with_all = OF_CELLS, conflicts_with_all = ["keep", "tolerance", "preview"])]
+    pub size: Option<u64>,
     /// How far from the surface of the points that stay no removed point may be: in the scan's
     /// unit, or as 5mm. Together with a number, whichever needs fewer points
     #[arg(long, value_name = "LENGTH", conflicts_with_all = OF_CELLS)]
