@@ -130,6 +130,8 @@ pub(super) fn reduce_flags(arguments: &ReduceArguments) -> Vec<CommandFlag> {
             "graded.max_spacing",
             arguments.max_spacing.as_deref().map(number_or_text),
         ),
+        ("--weight", "graded.weight", arguments.weight.clone().map(FlagValue::from)),
+        ("--borders", "graded.borders", arguments.borders.then(|| FlagValue::from(true))),
         ("--ranks", "graded.ranks", ranks.then(|| FlagValue::from(true))),
         ("--effort", "graded.effort", arguments.effort.clone().map(FlagValue::from)),
         ("--max-side", "cells.max_side", arguments.max_side.as_deref().map(number_or_text)),

@@ -10,7 +10,7 @@
 use std::sync::Arc;
 
 use super::row::RowLayout;
-use crate::expression::{Choice, Condition};
+use crate::expression::{Choice, Condition, Weight};
 use crate::graph::{Limits, Written};
 use crate::point::{ColumnKind, ComputedDimension, Mark, NORMAL, PointBatch, Schema, names};
 use crate::report::Tally;
@@ -29,6 +29,8 @@ pub(crate) struct StageOp {
     pub above: Vec<ColumnKind>,
     /// The bits of the records that it is limited to; 0 for all.
     pub selection: u8,
+    /// The selections of the conditions by which it weighs positions.
+    pub weighed: Vec<u8>,
 }
 
 impl StageOp {
@@ -59,6 +61,14 @@ impl Op {
             Op::Tile(op) => &**op,
             Op::Scan(op) => &**op,
             Op::Round(op) => &**op,
+        }
+    }
+
+    /// What positions weigh, where it asks for that.
+    pub fn weight(&self) -> Option<(&'static str, &Weight)> {
+        match self {
+            Op::Round(op) => op.weight(),
+            Op::Tile(_) | Op::Scan(_) => None,
         }
     }
 

@@ -57,8 +57,8 @@ pub struct Demands {
     pub standings: usize,
     /// True if a stage decides by figures of the whole scan, which are kept until it does.
     pub gathers: bool,
-    /// True if a stage decides about cells together: how many points those have only the decode
-    /// tells.
+    /// True if a stage decides about cells together, or by what is around a tile: how many points
+    /// those have only the decode tells.
     pub has_cells: bool,
     /// True if encoded chunks are as large as records are in the output, which no encoder packs.
     pub is_plain: bool,

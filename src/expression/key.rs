@@ -4,6 +4,7 @@ use super::assignment::Assignment;
 use super::bind::Names;
 use super::condition::Condition;
 use super::fault::ExpressionFault;
+use super::weight::Weight;
 
 /// A condition or an assignment that is the value of a stage's key, or one of its values.
 #[derive(Debug, Clone, Copy)]
@@ -15,6 +16,8 @@ pub enum KeyExpression<'a> {
     Assignment(&'a Assignment),
     /// The name of a dimension, or of a number of a column.
     Name(&'a str),
+    /// What a record counts.
+    Weight(&'a Weight),
 }
 
 impl<'a> KeyExpression<'a> {
@@ -24,6 +27,7 @@ impl<'a> KeyExpression<'a> {
             KeyExpression::Condition(condition) => condition.text(),
             KeyExpression::Assignment(assignment) => assignment.text(),
             KeyExpression::Name(name) => name,
+            KeyExpression::Weight(weight) => weight.text(),
         }
     }
 
@@ -33,6 +37,7 @@ impl<'a> KeyExpression<'a> {
             KeyExpression::Condition(condition) => condition.names(),
             KeyExpression::Assignment(assignment) => assignment.names(),
             KeyExpression::Name(name) => vec![name],
+            KeyExpression::Weight(weight) => weight.names(),
         }
     }
 
@@ -42,6 +47,7 @@ impl<'a> KeyExpression<'a> {
             KeyExpression::Condition(condition) => condition.bind_names(names).map(drop),
             KeyExpression::Assignment(assignment) => assignment.check(names),
             KeyExpression::Name(name) => names.field(name, &(0..name.len())).map(drop),
+            KeyExpression::Weight(weight) => weight.check(names),
         }
     }
 }

@@ -35,6 +35,7 @@ mod parser;
 mod rules;
 mod text;
 mod tree;
+mod weight;
 
 #[cfg(test)]
 mod tests;
@@ -48,3 +49,4 @@ pub use key::KeyExpression;
 pub(crate) use named::NamedField;
 pub use text::OneOrSeveral;
 pub(crate) use text::{FromText, ONE_OR_SEVERAL};
+pub use weight::Weight;

@@ -9,7 +9,7 @@ use super::fault::{Fault, Problem};
 use super::mistake::Mistake;
 use super::node::{KeyEntry, Node, NodeValue};
 use crate::error::nearest;
-use crate::expression::{Assignment, Condition, FromText, ONE_OR_SEVERAL};
+use crate::expression::{Assignment, Condition, FromText, ONE_OR_SEVERAL, Weight};
 use crate::quantity::parse_count;
 
 /// Reads the table `keys` as a `T`, or tells every key that `subject` (a stage kind, `[run]`) does
@@ -203,6 +203,7 @@ impl<'de> Deserializer<'de> for NodeReader<'de> {
             }),
             Condition::NAME => self.expression::<Condition>(),
             Assignment::NAME => self.expression::<Assignment>(),
+            Weight::NAME => self.expression::<Weight>(),
             ONE_OR_SEVERAL => {
                 let reader = NodeReader { is_list: true, ..self };
                 return visitor.visit_newtype_struct(reader);

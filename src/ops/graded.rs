@@ -21,6 +21,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::Keep;
+use crate::expression::Weight;
 use crate::point::{Units, names};
 use crate::quantity::Length;
 use crate::report::{Grouped, Tally};
@@ -35,8 +36,8 @@ use crate::{Error, Result};
 use certain::Certain;
 use figures::Judgement;
 use knee::{Knee, KneeNext};
-use ladder::Ladder;
 pub(super) use ladder::SHORTENED_BY;
+use ladder::{Ladder, Manner};
 pub use rank::KEEP_RANK;
 pub use settings::Effort;
 use sides::{steps, voxel_side};
@@ -83,6 +84,13 @@ pub struct Graded {
     /// `keep` what the number allows; with `tolerance` the side of a voxel grid that keeps one of
     /// 256 positions.
     pub max_spacing: Option<Length>,
+    /// What the error of a record counts: a number, by conditions that hold for it, as in
+    /// "Classification == 6 ? 3 : 1". The square of the error is so many times as large. Of copies
+    /// of a position the first condition counts that holds for one of them.
+    pub weight: Option<Weight>,
+    /// True to keep the borders of the scan: what lies beyond all kept points around it counts as
+    /// off the surface by a fourth of that distance.
+    pub borders: bool,
     /// How much is computed.
     pub effort: Effort,
     /// True to give every kept point a `KeepRank`, which outputs write by `dimensions`: the points
@@ -144,6 +152,13 @@ impl Graded {
                 let told = "`graded.keep = \"auto\"` and `graded.tolerance` both say how many stay";
                 Err(("keep", Error::pipeline(told).help("give one of them, or a number")))
             }
+            (None, Some(_)) if self.weight.is_some() || self.borders => {
+                let key = if self.weight.is_some() { "weight" } else { "borders" };
+                let told = format!(
+                    "`graded.{key}` is for `graded.keep`, and a tolerance holds for all points alike"
+                );
+                Err((key, Error::pipeline(told).help(format!("leave `graded.{key}` out"))))
+            }
             _ => Ok(()),
         }
     }
@@ -176,7 +191,7 @@ impl Graded {
     /// The rounds towards a number.
     fn count(&self, want: u64, so_far: &SoFar<'_>) -> RoundsCourse {
         let spacing = self.max_spacing.map(|length| steps(self.in_steps(length).floor()));
-        let with = (self.effort, self.seed);
+        let with = Manner { effort: self.effort, seed: self.seed, borders: self.borders };
         RoundsCourse::Count(match self.ranks && spacing.is_none() {
             true => Ladder::ranked(want, so_far, with),
             false => Ladder::new(want, so_far, with, spacing),
@@ -239,7 +254,8 @@ impl TileOp for Graded {
 
     fn warnings(&self, _: &Lattice) -> Vec<String> {
         let (records, positions) = self.scan;
-        let asked = self.keep.map_or(0, |keep| keep.of(records));
+        let number = self.keep.filter(|keep| *keep != Keep::Auto);
+        let asked = number.map_or(0, |keep| keep.of(records));
         let told = || {
             let (asked, positions) = (Grouped(asked), Grouped(positions));
             format!(
@@ -347,6 +363,10 @@ impl RoundOp for Graded {
             None => return Err(Error::internal("the stage graded has no round to work on")),
         }
         Ok(())
+    }
+
+    fn weight(&self) -> Option<(&'static str, &Weight)> {
+        self.weight.as_ref().map(|weight| ("weight", weight))
     }
 
     fn chosen(&mut self, kept: Arc<KeptPoints>) {

@@ -41,7 +41,11 @@ pub(super) fn demands(
         run_most: settings.tile_points.map(|points| (points.get() as u64).saturating_mul(4)),
         gathers: sorted.ops.iter().any(|stage| matches!(stage.op, Op::Scan(_))),
         is_plain: is_plain(sorted, (source, schema))?,
-        has_cells: sorted.ops.iter().any(|stage| stage.op.tile().needs().cells),
+        // What chooses in rounds reaches as far around a tile as its rounds come to ask.
+        has_cells: sorted
+            .ops
+            .iter()
+            .any(|stage| stage.op.tile().needs().cells || matches!(stage.op, Op::Round(_))),
         ..Demands::of(source, &chunks, limit, threads(settings)?)
     })
 }

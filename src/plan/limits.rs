@@ -2,9 +2,9 @@
 //! above have it, and a bit for each way of being limited.
 
 use crate::engine::pass::{StageOp, StreamOp};
-use crate::expression::{Choice, KeyExpression, Names};
+use crate::expression::{Choice, Condition, KeyExpression, Names};
 use crate::graph::{LimitKeys, Limits, Sees, Written};
-use crate::point::{ColumnKind, Schema, names};
+use crate::point::{ColumnKind, Schema, Selection, names};
 use crate::store::{CHOSEN, SELECTIONS};
 use crate::{Error, Result};
 
@@ -22,7 +22,12 @@ pub(super) fn check_limits(sorted: &Sorted, schema: &Schema) -> Vec<Error> {
         }
         wrong.extend(check_choice(kind, &**written, choice, names).err());
     }
-    for StageOp { kind, written, limits, above, .. } in &sorted.ops {
+    for StageOp { kind, written, limits, above, op, .. } in &sorted.ops {
+        if let Some((key, weight)) = op.weight() {
+            // Records are weighed as they are decoded, and have no columns then.
+            let names = Names { schema, columns: &[] };
+            wrong.extend(check(&**written, key, KeyExpression::Weight(weight), names).err());
+        }
         let names = Names { schema, columns: above };
         wrong.extend(check_choice(kind, &**written, &limits.choice, names).err());
     }
@@ -59,26 +64,39 @@ fn check(
 /// that are limited by columns the bit of the records that were chosen for them.
 pub(super) fn number_selections(ops: &mut [StageOp]) -> Result<Vec<Choice>> {
     let mut choices: Vec<Choice> = Vec::new();
-    for op in ops.iter_mut().filter(|op| !op.limits.choice.is_all()) {
+    for op in ops {
         if !op.chosen_by().is_empty() {
             op.selection = CHOSEN;
-            continue;
+        } else if !op.limits.choice.is_all() {
+            op.selection = number_of(&op.limits.choice, &mut choices, &*op.written)?;
         }
-        let same = choices.iter().position(|known| *known == op.limits.choice);
-        let number = same.unwrap_or_else(|| {
-            choices.push(op.limits.choice.clone());
-            choices.len() - 1
-        });
-        if number >= SELECTIONS as usize {
-            let told = format!("stages are limited in more than {SELECTIONS} different ways");
-            return Err(op
-                .written
-                .wrong(told)
-                .help("let some of them have equal `where`, classes and flags"));
-        }
-        op.selection = 1 << number;
+        let choice = |condition: &Condition| Choice {
+            selection: Selection::default(),
+            condition: Some(condition.clone()),
+        };
+        let weight = op.op.weight();
+        let conditions = weight.iter().flat_map(|(_, weight)| weight.conditions());
+        let weighed: Vec<Choice> = conditions.map(choice).collect();
+        let numbers = weighed.iter().map(|one| number_of(one, &mut choices, &*op.written));
+        op.weighed = numbers.collect::<Result<_>>()?;
     }
     Ok(choices)
+}
+
+/// The bit of a way to be limited.
+fn number_of(choice: &Choice, choices: &mut Vec<Choice>, written: &dyn Written) -> Result<u8> {
+    let same = choices.iter().position(|known| known == choice);
+    let number = same.unwrap_or_else(|| {
+        choices.push(choice.clone());
+        choices.len() - 1
+    });
+    if number >= SELECTIONS as usize {
+        let told =
+            format!("stages are limited or weigh points in more than {SELECTIONS} different ways");
+        let help = "let some of them have equal `where`, classes and flags, or fewer weights";
+        return Err(written.wrong(told).help(help));
+    }
+    Ok(1 << number)
 }
 
 /// The records that a stage sees as neighbours, by the selections that they are in.

@@ -89,7 +89,8 @@ impl Sorted {
                 Role::Merge => {}
                 Role::TileOp(_) | Role::ScanOp(_) | Role::RoundOp(_) => {
                     let op = on_tiles(role)?;
-                    ops.push(StageOp { kind, written, op, limits, above, selection: 0 });
+                    let (selection, weighed) = (0, Vec::new());
+                    ops.push(StageOp { kind, written, op, limits, above, selection, weighed });
                 }
             }
         }

@@ -67,7 +67,10 @@ impl PassLayout<'_> {
         let StageOp { kind, written, op, limits, selection, .. } = &self.ops[op];
         let needs = op.tile().needs();
         // Where columns choose, records are looked at as the stages above leave them.
-        let is_chosen_by = |name: &str| *selection & CHOSEN == 0 && limits.choice.looks_at(name);
+        let weight = op.weight();
+        let weighs = |name: &str| weight.is_some_and(|(_, weight)| weight.names().contains(&name));
+        let is_chosen_by =
+            |name: &str| *selection & CHOSEN == 0 && limits.choice.looks_at(name) || weighs(name);
         let is_column = |name: &str| needs.reads.iter().any(|column| column.name() == name);
         let is_read = |name: &String| {
             names::XYZ.contains(&name.as_str())

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::tile_op::TileOp;
 use crate::Result;
+use crate::expression::Weight;
 use crate::point::{Bounds, Position};
 use crate::store::{KeptPoints, Levels};
 
@@ -27,6 +28,12 @@ pub trait RoundOp: TileOp {
     ///
     /// Broken promises of the engine; the run ends.
     fn round(&self, tile: &RoundTile<'_>, found: &mut RoundFound) -> Result<()>;
+
+    /// What positions weigh, of its key of this name: told from the records as they are decoded.
+    /// [`RoundTile::weights`] has it.
+    fn weight(&self) -> Option<(&'static str, &Weight)> {
+        None
+    }
 
     /// Called once behind the last round, with all that is kept.
     fn chosen(&mut self, kept: Arc<KeptPoints>);
@@ -134,6 +141,8 @@ pub struct RoundTile<'a> {
     /// The positions that the round looks at and that the stage decides about, in Morton order, of
     /// the cube and as far around it as the round reaches.
     pub positions: &'a [Position],
+    /// What each weighs, by the conditions that hold for one of its records; none where all weigh 1.
+    pub weights: &'a [f64],
     /// The kept points of the cube and as far around it as the round asks for, in Morton order.
     pub kept: &'a [Position],
     /// The number of the round that kept each.

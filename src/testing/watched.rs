@@ -236,6 +236,10 @@ impl RoundOp for WatchedStage<dyn RoundOp> {
         self.stage.round(tile, found)
     }
 
+    fn weight(&self) -> Option<(&'static str, &Weight)> {
+        self.stage.weight()
+    }
+
     fn chosen(&mut self, kept: Arc<KeptPoints>) {
         self.stage.chosen(kept);
     }

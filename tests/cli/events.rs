@@ -38,7 +38,8 @@ fn names(events: &[Value]) -> Vec<&str> {
 fn every_line_is_an_event_and_they_tell_the_run() {
     let at = scans(&["a.laz", "b.laz"]);
     let report = ["--report", "r.json", "--progress", "json"];
-    let arguments = [&["reduce", "a.laz", "b.laz", "-o", "o.laz"][..], &report].concat();
+    let arguments =
+        [&["reduce", "a.laz", "b.laz", "-o", "o.laz", "--side", "spread"][..], &report].concat();
     let events = events(at.path(), &arguments, 0);
     let (first, last) = (&events[0], &events[events.len() - 1]);
     assert_eq!((&first["event"], &last["event"]), (&"plan".into(), &"done".into()));
@@ -137,7 +138,8 @@ fn quiet_says_nothing_but_errors() {
 #[test]
 fn verbose_says_what_was_decided_and_how_long_it_took() {
     let at = scans(&["a.laz"]);
-    let (code, stdout, stderr) = pointmill(at.path(), &["reduce", "a.laz", "-o", "o.laz", "-v"]);
+    let by_cells = ["reduce", "a.laz", "-o", "o.laz", "-v", "--side", "spread"];
+    let (code, stdout, stderr) = pointmill(at.path(), &by_cells);
     assert_eq!(code, 0, "{stderr}");
     for told in ["source   read", "\nscratch  .\n", "\nmill     ", "\ndecided  cells: side = "] {
         assert!(stderr.contains(told), "{told:?}: {stderr}");

@@ -493,7 +493,7 @@ fn the_summary_says_units_and_what_was_not_measured() {
     let text = fs::read_to_string(at.join("a.ply")).unwrap();
     let text = text.replacen("comment", "comment crs: EPSG:32632\ncomment", 1);
     fs::write(at.join("m.ply"), text).unwrap();
-    let (_, told, chosen) = pointmill(at, &["reduce", "m.ply", "-o", "o.ply"]);
+    let (_, told, chosen) = pointmill(at, &["reduce", "m.ply", "-o", "o.ply", "--side", "spread"]);
     assert!(lengths(&told).iter().all(|line| has_unit(line)), "{told}");
     assert!(chosen.contains("side ") && chosen.contains(" m, min spacing "), "{chosen}");
     let most = done(at, &["reduce", "a.laz", "-o", "o.laz", "--keep", "2900", "--measure", "cone"]);
@@ -519,7 +519,7 @@ fn a_scan_without_points_and_a_number_above_all_are_told() {
         assert_eq!(code, 0, "{told}");
         assert!(told.contains("warning: the inputs have no points"), "{told}");
     }
-    let (_, _, plan) = pointmill(at, &["reduce", "a.laz", "-o", "o.laz", "-v"]);
+    let (_, _, plan) = pointmill(at, &["reduce", "a.laz", "-o", "o.laz", "-v", "--side", "spread"]);
     assert!(plan.contains(", up to 20 nearest neighbours"), "{plan}");
     let (_, _, plan) = pointmill(at, &["reduce", "a.laz", "-o", "o.laz", "-v", "--neighbors", "9"]);
     assert!(plan.contains(", 9 nearest neighbours"), "{plan}");
@@ -533,7 +533,7 @@ fn points_without_a_normal_are_counted_and_a_better_grid_is_told() {
                 property double z\nend_header\n";
     let line: String = (0..40).map(|i| format!("{i} 0 0\n")).collect();
     fs::write(at.join("line.ply"), format!("{head}{line}")).unwrap();
-    let told = done(at, &["reduce", "line.ply", "-o", "o.ply"]);
+    let told = done(at, &["reduce", "line.ply", "-o", "o.ply", "--side", "spread"]);
     assert!(told.contains("40 in, 40 out"), "{told}");
     assert!(
         told.contains("\ncells      0, and 40 points in none: they have no normal, since"),

@@ -144,8 +144,8 @@ fn a_budget_too_small_is_refused_before_any_work_with_the_number_that_does() {
     let (code, told) = pointmill_told(at, "convert scan.las -o scan.laz");
     assert_eq!(code, 0, "{told}");
     for command in [
-        "reduce scan.las -o out.laz --threads 1",
-        "reduce scan.laz -o out.ply --threads 2",
+        "reduce scan.las -o out.laz --threads 1 --side spread",
+        "reduce scan.laz -o out.ply --threads 2 --side spread",
         "reduce scan.laz -o out.laz --threads 4 --method pca --side 1.1",
         "convert scan.las -o out.laz --threads 3",
         "convert scan.laz -o out.ply --threads 1 --encoding ascii",

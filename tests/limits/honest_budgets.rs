@@ -29,7 +29,13 @@ fn scenes() -> Vec<(&'static str, Scan)> {
 
 #[test]
 fn the_budget_that_a_refusal_names_does_and_sixteen_mebibytes_less_do_not() {
-    let stages = ["--max-angle 0.3", "--side 2.5", "--side 100000 --method pca"];
+    let stages = [
+        "--max-angle 0.3",
+        "--side 2.5",
+        "--side 100000 --method pca",
+        "--keep 10%",
+        "--tolerance 1",
+    ];
     let (mut random, mut after_the_decode, mut fewer) = (Random(5), 0, 0);
     for (n, (what, scan)) in scenes().iter().enumerate() {
         let folder = tempfile::tempdir().unwrap();
@@ -79,7 +85,7 @@ fn a_side_that_samples_choose_is_refused_with_a_lower_bound_before_them_and_fits
     scan.write(&at.join("scan.las"));
     let (mut budget, mut refusals, mut was_last) = (12, 0, false);
     loop {
-        let (code, told) = with(at, "reduce scan.las -o out.las --threads 1", budget);
+        let (code, told) = with(at, "reduce scan.las -o out.las --threads 1 --side spread", budget);
         if code == 0 {
             break;
         }
@@ -106,7 +112,7 @@ fn copies_that_differ_in_class_are_refused_with_a_lower_bound_and_fit_in_the_end
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     scan.write(&at.join("scan.las"));
-    let command = "reduce scan.las -o out.las --threads 1 --classes 2,6";
+    let command = "reduce scan.las -o out.las --threads 1 --side spread --classes 2,6";
     let (mut budget, mut refusals, mut of_copies) = (1, 0, 0);
     loop {
         let (code, told) = with(at, command, budget);

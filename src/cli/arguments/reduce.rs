@@ -87,6 +87,14 @@ pub(crate) struct ReduceArguments {
     /// 50cm
     #[arg(long, value_name = "LENGTH", conflicts_with_all = OF_CELLS)]
     pub max_spacing: Option<String>,
+    /// What the errors of points count: a number by conditions, such as "Classification == 6 ? 3 :
+    /// 1"
+    #[arg(long, value_name = "CHOICE", conflicts_with_all = OF_CELLS)]
+    pub weight: Option<String>,
+    /// Keep the borders of the scan, where points would otherwise be left that lie beyond all that
+    /// stay
+    #[arg(long, conflicts_with_all = OF_CELLS)]
+    pub borders: bool,
     /// Write KeepRank, by which any coarser reduction can be cut off; with a tolerance it is
     /// written anyway, since it tells exceptions from the surface
     #[arg(long, conflicts_with_all = OF_CELLS)]

@@ -37,6 +37,8 @@ pub(super) struct RoundWorker<'a> {
     loader: Loader,
     capacity: usize,
     chosen: Vec<Position>,
+    /// What these weigh; none where all weigh 1.
+    weights: Vec<f64>,
     reader: KeptReader,
     found: RoundFound,
     more: Option<Lease>,
@@ -56,7 +58,7 @@ pub(super) struct FoundInTile<'w> {
 
 /// Bytes of a position in a tile of a round: in its place, among those that are chosen and touched,
 /// in what it says and in what is searched.
-const POSITION_BYTES: usize = Loader::BYTES_PER_POINT + 2 * size_of::<Position>() + 56;
+const POSITION_BYTES: usize = Loader::BYTES_PER_POINT + 2 * size_of::<Position>() + 72;
 /// The same of a kept point, with its cell and its offers of this round and the one before.
 const KEPT_BYTES: usize = 2 * size_of::<Position>() + 2 * size_of::<Offer>() + 72;
 
@@ -82,6 +84,7 @@ impl<'a> RoundWorker<'a> {
             loader,
             capacity,
             chosen: Vec::new(),
+            weights: Vec::new(),
             reader: KeptReader::default(),
             found: RoundFound::default(),
             more: None,
@@ -117,12 +120,21 @@ impl<'a> RoundWorker<'a> {
         self.more = Some(self.job.budget.lease(beyond, "kept points around tiles")?);
         put_to_work(tile, &self.job.ops, self.call);
         self.chosen.clear();
+        self.weights.clear();
+        let stage = &self.job.ops[self.call.op];
+        let weight = stage.op.weight();
         let is_chosen = |i: &usize| tile.is_chosen(*i);
         let chosen = (0..tile.positions.len()).filter(is_chosen);
         let mut records = 0;
         for i in chosen {
             records += u64::from(tile.copies[i]);
             self.chosen.push(tile.positions[i]);
+            if let Some((_, weight)) = weight {
+                let is_in = tile.selections.get(i).copied().unwrap_or(0);
+                let holds =
+                    |number: usize| stage.weighed.get(number).is_some_and(|b| is_in & b > 0);
+                self.weights.push(weight.of(holds));
+            }
         }
         kept.near(&region, &mut self.reader)?;
         Ok(records)
@@ -138,11 +150,12 @@ impl<'a> RoundWorker<'a> {
     ) -> Result<FoundInTile<'_>> {
         self.load(key, kept)?;
         self.found.clear();
-        let RoundWorker { chosen, reader, found, job, .. } = self;
+        let RoundWorker { chosen, weights, reader, found, job, .. } = self;
         let tile = RoundTile {
             cube: key.cube(),
             round: self.round,
             positions: chosen,
+            weights,
             kept: &reader.positions,
             kept_in: &reader.rounds,
             before: before.map(|offers| RoundBefore { number: self.number - 1, offers }),

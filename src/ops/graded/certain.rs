@@ -96,7 +96,7 @@ impl Certain {
             }
         }
         self.at = CertainStep::Correct { round: round + 1 };
-        let refining = Refining { radius: self.radius, apart: APART, floor: 0.0 };
+        let refining = Refining { radius: self.radius, apart: APART, borders: false, floor: 0.0 };
         let Certain { radius, tolerance, .. } = *self;
         self.work = Some(RoundWork::Correct(Correcting { radius, tolerance, apart: APART }));
         NextRound::Round(Round {

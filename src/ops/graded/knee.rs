@@ -108,7 +108,7 @@ impl Knee {
     }
 
     fn refine(&mut self, want: u64, so_far: &SoFar<'_>) -> NextRound {
-        let refining = Refining { radius: self.radius, apart: APART, floor: 0.0 };
+        let refining = self.refining();
         self.work = Some(RoundWork::Refine(refining));
         let probed = share_of(PROBED * self.numbers[self.at] as f64, so_far);
         let choice = RoundChoice::Best { want, reach: refining.offer_reach() };
@@ -116,9 +116,14 @@ impl Knee {
     }
 
     fn measure(&mut self, so_far: &SoFar<'_>) -> NextRound {
-        let refining = Refining { radius: self.radius, apart: APART, floor: 0.0 };
+        let refining = self.refining();
         self.work = Some(RoundWork::Measure(Measuring { refining, unit: self.unit }));
         self.round(refining, self.measured(so_far), RoundChoice::InTile)
+    }
+
+    /// What rounds look at; borders are for the reduction itself.
+    fn refining(&self) -> Refining {
+        Refining { radius: self.radius, apart: APART, borders: false, floor: 0.0 }
     }
 
     fn round(&self, refining: Refining, share: f64, choice: RoundChoice) -> NextRound {

@@ -31,6 +31,16 @@ const PROBED_ABOVE: f64 = 12.0;
 /// An offer stands aside for a better one within this share of its distance to a kept point.
 pub(super) const APART: f64 = 0.5;
 
+/// How points are chosen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Manner {
+    pub effort: Effort,
+    /// Of equally good choices, which are made.
+    pub seed: u64,
+    /// See [`Refining::borders`].
+    pub borders: bool,
+}
+
 /// The rounds of a ladder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rounds {
@@ -59,7 +69,7 @@ const LOW: f64 = 0.25;
 pub(super) struct Ladder {
     /// How many positions are to stay.
     pub want: u64,
-    seed: u64,
+    manner: Manner,
     rounds: Rounds,
     /// The distances that are filled to, the last one last.
     rungs: Vec<i64>,
@@ -91,20 +101,15 @@ enum LadderStep {
 impl Ladder {
     /// The rounds that keep `want` of the positions, none of which is then farther from a kept one
     /// than the last distance, or than `spacing` steps.
-    pub fn new(
-        want: u64,
-        so_far: &SoFar<'_>,
-        (effort, seed): (Effort, u64),
-        spacing: Option<i64>,
-    ) -> Ladder {
-        let rounds = Rounds::of(effort);
+    pub fn new(want: u64, so_far: &SoFar<'_>, manner: Manner, spacing: Option<i64>) -> Ladder {
+        let rounds = Rounds::of(manner.effort);
         let last = steps(OF_VOXEL * voxel_side(so_far.levels, &so_far.bounds, want));
         let last = spacing.map_or(last, |spacing| last.min(spacing));
         let rung = |n: u32| (last as f64 * 2f64.powf(f64::from(n) / 2.0)).round().min(LONGEST);
         let rungs = (0..=rounds.above).rev().map(|n| rung(n) as i64).collect();
         Ladder {
             want,
-            seed,
+            manner,
             rounds,
             rungs,
             ranked: false,
@@ -117,10 +122,10 @@ impl Ladder {
     }
 
     /// Rounds of which any number of points can be cut off.
-    pub fn ranked(want: u64, so_far: &SoFar<'_>, (effort, seed): (Effort, u64)) -> Ladder {
+    pub fn ranked(want: u64, so_far: &SoFar<'_>, manner: Manner) -> Ladder {
         let top = 2 * (extent(&so_far.bounds) / 4).max(1).ilog2();
         let rungs = (0..=top).rev().map(|n| steps(2f64.powf(f64::from(n) / 2.0)));
-        let ladder = Ladder::new(want, so_far, (effort, seed), None);
+        let ladder = Ladder::new(want, so_far, manner, None);
         let each = ladder.rounds.each.max(1) + 1;
         let rounds = Rounds { each, last: each, ..ladder.rounds };
         Ladder { rungs: rungs.collect(), ranked: true, rounds, ..ladder }
@@ -155,7 +160,7 @@ impl Ladder {
                     (true, true) => LadderStep::Mop,
                     _ => LadderStep::Refine { rung, round: 0 },
                 };
-                self.fill(rung, Looks::sample(share, self.seed))
+                self.fill(rung, Looks::sample(share, self.manner.seed))
             }
             LadderStep::Mop => {
                 self.at = LadderStep::Refine { rung: last, round: 0 };
@@ -171,7 +176,7 @@ impl Ladder {
     }
 
     fn fill(&mut self, rung: usize, looks: Looks) -> NextRound {
-        let filling = Filling { apart: self.rungs[rung], seed: self.seed };
+        let filling = Filling { apart: self.rungs[rung], seed: self.manner.seed };
         self.work = Some(RoundWork::Fill(filling));
         // A sample that is covered says nothing of the others.
         let looks_at_all = looks.share() >= 1.0 || matches!(looks, Looks::Uncovered { .. });
@@ -212,11 +217,12 @@ impl Ladder {
         };
         let apart = if is_last && is_last_rung { 0.0 } else { APART };
         let floor = if (1..rounds).contains(&round) { LOW * so_far.least } else { 0.0 };
-        let refining = Refining { radius: self.rungs[rung], apart, floor };
+        let refining =
+            Refining { radius: self.rungs[rung], apart, borders: self.manner.borders, floor };
         self.work = Some(RoundWork::Refine(refining));
         let want = if self.ranked { want.max(1) } else { want.clamp(1, missing) };
         NextRound::Round(Round {
-            looks: Looks::sample(self.probed, self.seed),
+            looks: Looks::sample(self.probed, self.manner.seed),
             reach: refining.reach(),
             kept_reach: refining.kept_reach(),
             choice: RoundChoice::Best { want, reach: refining.offer_reach() },

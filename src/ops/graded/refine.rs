@@ -23,6 +23,8 @@ pub(super) struct Refining {
     /// An offer stands aside for a better one within this share of its distance to the nearest kept
     /// point.
     pub apart: f64,
+    /// True if a position that lies beyond all kept points around it counts as far from the surface.
+    pub borders: bool,
     /// A cell whose score was lower is not looked at again where something changed.
     pub floor: f64,
 }
@@ -68,6 +70,10 @@ struct AskedPosition {
     error2: f64,
 }
 
+/// The part of the squared distance by which a position lies beyond all kept points around it that
+/// is added to the squared error: at a border a distance along the surface counts a fourth.
+const OF_BORDER: f64 = 1.0 / 16.0;
+
 /// No cell.
 const NONE: u32 = u32::MAX;
 
@@ -104,19 +110,20 @@ impl Refining {
     /// Offers the worst position of each cell.
     pub fn refine(self, tile: &RoundTile<'_>, found: &mut RoundFound) {
         let unchanged = Unchanged::of(tile, self.floor);
-        let touched: Vec<Position>;
-        let positions = match &unchanged {
-            None => tile.positions,
+        let touched: (Vec<Position>, Vec<f64>);
+        let (positions, weights) = match &unchanged {
+            None => (tile.positions, tile.weights),
             Some(unchanged) => {
                 touched = self.touched(tile, unchanged);
-                &touched
+                (&touched.0[..], &touched.1[..])
             }
         };
         let mut cells = vec![Cell::default(); tile.kept.len()];
         // In Morton order, on which what the sums round to depends.
         for (i, asked) in self.asked(tile, positions).into_iter().enumerate() {
             let Some(cell) = cells.get_mut(asked.cell as usize) else { continue };
-            let error2 = asked.error2 + OF_DISTANCE * asked.distance2;
+            let weight = weights.get(i).copied().unwrap_or(1.0);
+            let error2 = weight * asked.error2 + OF_DISTANCE * asked.distance2;
             cell.positions += 1;
             cell.error4 += error2 * error2;
             cell.distance2 += asked.distance2;
@@ -146,8 +153,9 @@ impl Refining {
         Offer { score, apart: 0.0, at, of, reach: cell.reach }
     }
 
-    /// The positions in all octree nodes that a cell which changed may reach into.
-    fn touched(self, tile: &RoundTile<'_>, unchanged: &Unchanged) -> Vec<Position> {
+    /// The positions in all octree nodes that a cell which changed may reach into, and what they
+    /// weigh.
+    fn touched(self, tile: &RoundTile<'_>, unchanged: &Unchanged) -> (Vec<Position>, Vec<f64>) {
         let level = self.radius.unsigned_abs().next_power_of_two().ilog2();
         let place = |p: &Position| p.map(|v| v >> level);
         let mut nodes: HashSet<[i64; 3], PlaceHashes> = HashSet::default();
@@ -162,9 +170,16 @@ impl Refining {
                 }
             }
         }
-        let stretches = tile.positions.chunk_by(|a, b| place(a) == place(b));
-        let touched = stretches.filter(|stretch| nodes.contains(&place(&stretch[0])));
-        touched.flatten().copied().collect()
+        let (mut touched, mut weights, mut end) = (Vec::new(), Vec::new(), 0);
+        for stretch in tile.positions.chunk_by(|a, b| place(a) == place(b)) {
+            let begin = end;
+            end += stretch.len();
+            if nodes.contains(&place(&stretch[0])) {
+                touched.extend_from_slice(stretch);
+                weights.extend_from_slice(tile.weights.get(begin..end).unwrap_or(&[]));
+            }
+        }
+        (touched, weights)
     }
 
     /// What each position says.
@@ -174,6 +189,7 @@ impl Refining {
         let radius2 = (self.radius as f64) * (self.radius as f64);
         let within2 = radius2 * (ASKED_RADII * ASKED_RADII) as f64;
         let mut errors = PlaneErrors::new(tile.simd);
+        let mut beyond2 = vec![0.0; if self.borders { positions.len() } else { 0 }];
         let mut nearest = NearestAmong::with(tile.simd);
         nearest.search(tile.kept, positions, NEAREST, |i, found| {
             let Some(&first) = found.first() else { return };
@@ -185,10 +201,14 @@ impl Refining {
                 all[i] = AskedPosition { cell: first, distance2, asked2, error2: 0.0 };
                 let offsets = found.iter().map(|&j| offset(tile.kept[j as usize], p));
                 let offsets = offsets.take_while(|o| squared_length(*o) <= within2);
+                if self.borders {
+                    beyond2[i] = OF_BORDER * squared_beyond(offsets.clone());
+                }
                 errors.push(i as u32, offsets, |i, error2| all[i as usize].error2 = error2);
             }
         });
         errors.flush(|i, error2| all[i as usize].error2 = error2);
+        all.iter_mut().zip(beyond2).for_each(|(asked, beyond2)| asked.error2 += beyond2);
         all
     }
 }
@@ -229,6 +249,23 @@ impl Unchanged {
             }
         });
         Some(Unchanged { offers })
+    }
+}
+
+/// How far a position lies beyond all kept points around it, squared, of which these are the
+/// offsets: in the direction from their mean to it, the distance that is left to the last of them;
+/// 0 where they lie on all sides.
+fn squared_beyond(offsets: impl Iterator<Item = [f64; 3]> + Clone) -> f64 {
+    let mut sum = [0.0; 3];
+    for offset in offsets.clone() {
+        (0..3).for_each(|axis| sum[axis] -= offset[axis]);
+    }
+    let length2 = squared_length(sum);
+    let along = |[x, y, z]: [f64; 3]| -(x * sum[0] + y * sum[1] + z * sum[2]);
+    let last = offsets.map(along).fold(f64::INFINITY, f64::min);
+    match last > 0.0 && last.is_finite() && length2 > 0.0 {
+        true => last * last / length2,
+        false => 0.0,
     }
 }
 
