@@ -10,7 +10,7 @@ use super::arguments::{
 use super::classes::Classes;
 use crate::language::Set;
 use crate::ops::KEEP_RANK;
-use crate::quantity::parse_count;
+use crate::quantity::{Length, parse_count};
 
 /// A flag of a command, the setting that it stands for, and its value if it was given.
 pub(super) struct CommandFlag {
@@ -190,12 +190,16 @@ pub(super) fn convert_flags(
     all
 }
 
-/// The flags of `cut`.
+/// The flags of `cut`. A length with a unit is told from a number.
 pub(super) fn cut_flags(arguments: &CutArguments) -> Vec<CommandFlag> {
+    let is_length = |keep: &&str| Length::read(keep).is_some();
+    let keep = arguments.keep.as_deref();
+    let spacing = arguments.spacing.as_deref().or(keep.filter(is_length));
     flags([
         ("IN", "read.path", Some(arguments.input.clone().into())),
         ("-o", "write.path", Some(arguments.output.clone().into())),
-        ("--keep", "cut.keep", Some(whole_or_text(&arguments.keep))),
+        ("--keep", "cut.keep", keep.filter(|keep| !is_length(keep)).map(whole_or_text)),
+        ("--spacing", "cut.spacing", spacing.map(number_or_text)),
     ])
 }
 

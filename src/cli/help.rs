@@ -109,6 +109,7 @@ Examples:
 Examples:
   pointmill reduce survey.laz -o ranked.laz --keep 20% --ranks
   pointmill cut ranked.laz --keep 1M -o small.laz
+  pointmill cut ranked.laz --keep 20cm -o even.laz
   pointmill run 'read ranked.laz name=r ! cut keep=1M ! write a.laz'",
     ),
     (

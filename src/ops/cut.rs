@@ -4,15 +4,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Keep;
-use super::graded::SHORTENED_BY;
+use super::graded::{Rung, SHORTENED_BY};
 use super::removal::{keep_once, remove};
 use crate::geom::hash::of_position;
 use crate::geom::select::nth_largest;
-use crate::point::{Column, names};
+use crate::point::{Column, Units, names};
+use crate::quantity::Length;
 use crate::report::Tally;
 use crate::stage::{Gathered, Needs, Role, RoleName, ScanOp, StageKind, StagePlace, TileOp};
 use crate::tile::Tile;
-use crate::{Error, Result};
+use crate::{Error, ErrorKind, Result};
 
 /// The ranks that the records have.
 const RANK: Column<f64> = Column::new("KeepRank", &[]);
@@ -28,7 +29,10 @@ const RANK: Column<f64> = Column::new("KeepRank", &[]);
 pub struct Cut {
     /// How many positions stay: a share of those that there are ("10%"), or a number (500000,
     /// "250k", "5M").
-    pub keep: Keep,
+    pub keep: Option<Keep>,
+    /// Instead: about how far from each other points are that stay, a length. They are those that
+    /// were kept at this distance or a longer one.
+    pub spacing: Option<Length>,
     #[serde(skip)]
     limit: Option<u64>,
 }
@@ -36,10 +40,12 @@ pub struct Cut {
 impl Cut {
     /// A reduction to that many positions.
     pub fn new(keep: Keep) -> Cut {
-        Cut { keep, limit: None }
+        Cut { keep: Some(keep), spacing: None, limit: None }
     }
 }
 
+/// The key of the length.
+const SPACING: &str = "cut.spacing";
 /// Bytes a position.
 const BYTES: usize = 2 * size_of::<u64>();
 
@@ -53,18 +59,59 @@ fn order(tile: &Tile, ranks: &[f64], i: usize) -> u64 {
     (u64::from(u16::MAX) - rank as u64) << 48 | !hash >> 16
 }
 
+/// The least of what orders positions of this rank.
+fn least_of_rank(rank: u16) -> u64 {
+    u64::from(u16::MAX - rank) << 48
+}
+
+impl Cut {
+    /// Fixes which ranks stay.
+    fn conclude_by_spacing(&mut self, gathered: &dyn Gathered<Vec<u64>>) -> Result<Option<String>> {
+        let spacing = self.spacing.map_or(f64::INFINITY, Length::value);
+        // The shortest distance that is no shorter, of which the rounding of a length is none.
+        let rung = Rung::within(spacing * (1.0 + 1e-9));
+        let rung = if rung.length() < spacing * (1.0 - 1e-9) { rung.coarser() } else { rung };
+        let limit = least_of_rank(rung.last_rank());
+        let (mut stay, mut finer) = (0u64, false);
+        gathered.each(&mut |tile| {
+            stay += tile.iter().filter(|order| **order >= limit).count() as u64;
+            finer |= tile.iter().any(|order| *order < limit && *order >= least_of_rank(LAST_RANK));
+            Ok(())
+        })?;
+        if stay == 0 {
+            let told = format!("no points were kept as far as `{SPACING} = {spacing}` from others");
+            return Err(Error::new(ErrorKind::Data, told).help("give a shorter length"));
+        }
+        self.limit = Some(limit);
+        let told = || {
+            format!(
+                "`{SPACING} = {spacing}` is finer than what was kept last: all points stay but \
+                 exceptions"
+            )
+        };
+        Ok((!finer).then(told))
+    }
+}
+
+/// The last rank that is none of an exception.
+const LAST_RANK: u16 = u16::MAX - 1;
+
 impl StageKind for Cut {
     const KIND: &'static str = "cut";
     const ROLE: RoleName = RoleName::OnTiles;
     const ABOUT: &'static str = "Cuts a coarser reduction off one whose points have ranks.";
 
     fn build(self, at: &StagePlace) -> Result<Role> {
-        if self.keep == Keep::Auto {
-            let told = "`cut.keep = \"auto\"` is not known: it takes a share or a number";
-            let error = Error::pipeline(told).help("give `cut.keep = \"10%\"`");
-            return Err(at.blame("keep", error));
-        }
-        Ok(Role::ScanOp(Box::new(self)))
+        let told = match (self.keep, self.spacing) {
+            (Some(Keep::Auto), _) => {
+                "`cut.keep = \"auto\"` is not known: it takes a share or a number"
+            }
+            (Some(_), None) | (None, Some(_)) => return Ok(Role::ScanOp(Box::new(self))),
+            (None, None) => "`cut` does not say which points stay",
+            (Some(_), Some(_)) => "`cut` takes one of its keys, not `keep` and `spacing`",
+        };
+        let help = "give one of `cut.keep = \"10%\"` and `cut.spacing = 0.5`";
+        Err(at.blame("keep", Error::pipeline(told).help(help)))
     }
 }
 
@@ -75,9 +122,19 @@ impl TileOp for Cut {
     }
 
     fn for_share(&mut self, share: f64) {
-        if let Keep::Records(count) = &mut self.keep {
+        if let Some(Keep::Records(count)) = &mut self.keep {
             *count = ((*count as f64 * share).round() as u64).max(1);
         }
+    }
+
+    fn convert(&mut self, units: &Units) -> Result<()> {
+        let converted = self.spacing.map(|length| length.in_scan(units, SPACING));
+        self.spacing = converted.transpose()?;
+        Ok(())
+    }
+
+    fn lengths(&self) -> Vec<(&'static str, Length)> {
+        self.spacing.iter().map(|length| (SPACING, *length)).collect()
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
@@ -118,12 +175,13 @@ impl ScanOp for Cut {
     }
 
     fn conclude(&mut self, gathered: &dyn Gathered<Vec<u64>>) -> Result<Option<String>> {
+        let Some(keep) = self.keep else { return self.conclude_by_spacing(gathered) };
         let mut all = 0;
         gathered.each(&mut |tile| {
             all += tile.len() as u64;
             Ok(())
         })?;
-        let want = self.keep.of(all);
+        let want = keep.of(all);
         let (least, _) = nth_largest(want.min(all).max(1), |visit| {
             gathered.each(&mut |tile| {
                 tile.into_iter().for_each(&mut *visit);

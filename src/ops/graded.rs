@@ -39,6 +39,7 @@ use knee::{Knee, KneeNext};
 pub(super) use ladder::SHORTENED_BY;
 use ladder::{Ladder, Manner};
 pub use rank::KEEP_RANK;
+pub(super) use rank::Rung;
 pub use settings::Effort;
 use sides::{steps, voxel_side};
 use work::RoundWork;
@@ -193,7 +194,7 @@ impl Graded {
         let spacing = self.max_spacing.map(|length| steps(self.in_steps(length).floor()));
         let with = Manner { effort: self.effort, seed: self.seed, borders: self.borders };
         RoundsCourse::Count(match self.ranks && spacing.is_none() {
-            true => Ladder::ranked(want, so_far, with),
+            true => Ladder::ranked(want, so_far, with, self.step),
             false => Ladder::new(want, so_far, with, spacing),
         })
     }
@@ -269,12 +270,14 @@ impl TileOp for Graded {
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let early = || Error::internal("the stage graded ran before it chose");
         let kept = self.kept.as_ref().ok_or_else(early)?;
-        let (radius, tolerance) = match self.course.as_ref().ok_or_else(early)? {
+        let (radius, tolerance, of_rounds) = match self.course.as_ref().ok_or_else(early)? {
             RoundsCourse::Knee(_) => return Err(early()),
-            RoundsCourse::Count(ladder) => (ladder.covered().unwrap_or(FARTHEST), None),
-            RoundsCourse::Tolerance(certain) => (certain.radius, Some(certain.tolerance)),
+            RoundsCourse::Count(ladder) => {
+                (ladder.covered().unwrap_or(FARTHEST), None, &ladder.ranks[..])
+            }
+            RoundsCourse::Tolerance(certain) => (certain.radius, Some(certain.tolerance), &[][..]),
         };
-        Judgement { kept, radius, tolerance, ranks: self.ranks }.pass(tile, tally)
+        Judgement { kept, radius, tolerance, ranks: self.ranks, of_rounds }.pass(tile, tally)
     }
 
     fn decisions(&self) -> Vec<(String, Value)> {

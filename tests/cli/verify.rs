@@ -116,6 +116,21 @@ fn what_is_cut_off_is_what_is_reduced_to_as_many() {
         format!("{cut}[[stage]]\nkind='write'\npath='{to}'\n")
     };
     let read = "[[stage]]\nkind='read'\nname='all'\npath='ranked.las'\n";
+    // By a length: what was kept at that distance, which is a number like any other.
+    let points_of = |keep: &[&str]| {
+        let cut = [&["cut", "ranked.las", "-o", "cut.las"], keep].concat();
+        let told = done(at, &cut);
+        told.split(" in, ").nth(1).unwrap().split(' ').next().unwrap().replace(',', "")
+    };
+    let (coarse, fine) = (points_of(&["--spacing", "30"]), points_of(&["--spacing", "10"]));
+    assert!(coarse.parse::<u64>().unwrap() * 3 < fine.parse::<u64>().unwrap(), "{coarse} {fine}");
+    reduce(&fine, "direct.las");
+    assert!(points("cut.las") == points("direct.las"), "{fine}");
+    let (code, _, told) = pointmill(at, &["cut", "ranked.las", "--keep", "2mm", "-o", "o.las"]);
+    assert!(code == 2 && told.contains("`--spacing 2mm` has a unit"), "{told}");
+    assert!(told.contains("if they are in metres, give `--spacing 0.002`"), "{told}");
+    let (code, _, told) = pointmill(at, &["cut", "ranked.las", "--spacing", "1e6", "-o", "o.las"]);
+    assert!(code == 1 && told.contains("no points were kept as far as"), "{told}");
     let both = format!("{read}{}{}", cut("10%", "a.las"), cut("50", "b.las"));
     std::fs::write(at.join("both.toml"), both).unwrap();
     done(at, &["run", "both.toml"]);

@@ -20,6 +20,8 @@ pub(super) struct Judgement<'a> {
     pub tolerance: Option<f64>,
     /// True if kept points have ranks.
     pub ranks: bool,
+    /// Those of rounds, where they are not their numbers.
+    pub of_rounds: &'a [u16],
 }
 
 impl Judgement<'_> {
@@ -49,7 +51,9 @@ impl Judgement<'_> {
                 coincident += keep_once(tile, i);
                 exceptions += u64::from(is_exception);
                 let round = told.map_or(0, |told| reader.rounds[told.nearest as usize]);
-                let rank = if is_exception { EXCEPTION } else { rank_of(round) };
+                let of_round = self.of_rounds.get(round as usize).copied();
+                let rank = of_round.unwrap_or_else(|| rank_of(round));
+                let rank = if is_exception { EXCEPTION } else { rank };
                 ranks.iter_mut().for_each(|ranks| ranks[i] = rank);
                 continue;
             }

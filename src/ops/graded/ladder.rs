@@ -4,12 +4,13 @@
 //! few rounds add points where the surface is told worst. The distances fall by √2. For one number
 //! of points the last distance follows from that number, and four rungs above it are enough: what
 //! they keep, they keep with little to look at. For an order in which any number can be cut off
-//! (`ranks`), rungs are those of the lattice and begin at the width of the scan, so that they are
+//! (`ranks`), rungs are powers of √2 of the scan's unit and begin at its width, so that they are
 //! the same whatever the number is.
 
 use crate::stage::{Looks, NextRound, Round, RoundChoice, SoFar};
 
 use super::fill::Filling;
+use super::rank::{Rung, rank_behind};
 use super::refine::Refining;
 use super::settings::Effort;
 use super::sides::{LONGEST, extent, occupied, steps, voxel_side};
@@ -75,6 +76,9 @@ pub(super) struct Ladder {
     rungs: Vec<i64>,
     /// True if what is kept before the last round does not depend on how many are wanted.
     ranked: bool,
+    /// The ranks of what rounds kept, and the first of each rung; none where these are their numbers.
+    pub ranks: Vec<u16>,
+    of_rungs: Vec<u16>,
     at: LadderStep,
     covered: Option<i64>,
     /// The same once the round at hand is done, if all that it keeps stays.
@@ -113,6 +117,8 @@ impl Ladder {
             rounds,
             rungs,
             ranked: false,
+            ranks: Vec::new(),
+            of_rungs: Vec::new(),
             at: LadderStep::Fill { rung: 0 },
             covered: None,
             covers: None,
@@ -121,14 +127,16 @@ impl Ladder {
         }
     }
 
-    /// Rounds of which any number of points can be cut off.
-    pub fn ranked(want: u64, so_far: &SoFar<'_>, manner: Manner) -> Ladder {
-        let top = 2 * (extent(&so_far.bounds) / 4).max(1).ilog2();
-        let rungs = (0..=top).rev().map(|n| steps(2f64.powf(f64::from(n) / 2.0)));
+    /// Rounds of which any number of points can be cut off, on a lattice of steps of this length.
+    pub fn ranked(want: u64, so_far: &SoFar<'_>, manner: Manner, step: f64) -> Ladder {
+        let widest = extent(&so_far.bounds) as f64 / 4.0 * step;
+        let all = || Rung::within(widest.max(step)).down_to(Rung::within(step));
+        let rungs = all().map(|rung| steps(rung.length() / step));
         let ladder = Ladder::new(want, so_far, manner, None);
         let each = ladder.rounds.each.max(1) + 1;
         let rounds = Rounds { each, last: each, ..ladder.rounds };
-        Ladder { rungs: rungs.collect(), ranked: true, rounds, ..ladder }
+        let of_rungs = all().map(Rung::first_rank).collect();
+        Ladder { rungs: rungs.collect(), ranked: true, of_rungs, rounds, ..ladder }
     }
 
     /// What the round at hand does.
@@ -175,7 +183,17 @@ impl Ladder {
         }
     }
 
+    /// Enters the rank of what a round keeps: the first of a rung, or the one behind the last.
+    fn rank(&mut self, of_rung: Option<usize>) {
+        if let Some(&last) = self.ranks.last().or(self.of_rungs.first()) {
+            let first = of_rung.and_then(|rung| self.of_rungs.get(rung).copied());
+            self.ranks.push(first.unwrap_or_else(|| rank_behind(last)));
+        }
+    }
+
     fn fill(&mut self, rung: usize, looks: Looks) -> NextRound {
+        let is_first = matches!(looks, Looks::Sample { .. });
+        self.rank(is_first.then_some(rung));
         let filling = Filling { apart: self.rungs[rung], seed: self.manner.seed };
         self.work = Some(RoundWork::Fill(filling));
         // A sample that is covered says nothing of the others.
@@ -220,6 +238,7 @@ impl Ladder {
         let refining =
             Refining { radius: self.rungs[rung], apart, borders: self.manner.borders, floor };
         self.work = Some(RoundWork::Refine(refining));
+        self.rank(None);
         let want = if self.ranked { want.max(1) } else { want.clamp(1, missing) };
         NextRound::Round(Round {
             looks: Looks::sample(self.probed, self.manner.seed),
