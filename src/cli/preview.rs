@@ -16,7 +16,7 @@ use crate::plan::{Plan, Preview, TrialPoints};
 use crate::report::{DeviationTotals, Grouped, Short};
 
 /// Points that are tried, about.
-const TRIED: usize = 120_000;
+const TRIED: usize = 180_000;
 /// The shares that are tried, besides what is asked for.
 const SHARES: [&str; 5] = ["1%", "2%", "5%", "10%", "20%"];
 /// The percentiles of the errors of these are the tolerances that are tried: what is rounded.

@@ -6,11 +6,15 @@ use serde::Serialize;
 
 use super::fitted::Plan;
 use super::prediction::Prediction;
-use super::trial::TrialPoints;
+use super::trial::{TrialPoints, TrialSize};
 use crate::engine::Watch;
 use crate::graph::Graph;
 use crate::report::DeviationTotals;
 use crate::{Error, Result};
+
+/// Columns of space that pipelines are tried on: few, since kept points at the border of a column lack
+/// neighbours, which counts more the smaller it is.
+const SPOTS: usize = 3;
 
 /// What a pipeline is expected to come to, by a trial on some points of the scan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -44,7 +48,7 @@ impl Plan {
     ) -> Result<TrialPoints> {
         match self.no_trial() {
             Some(why) => Err(Error::pipeline(why)),
-            None => self.read_some(again, about, watch),
+            None => self.read_some(again, TrialSize { about, spots: SPOTS }, watch),
         }
     }
 

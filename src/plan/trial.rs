@@ -30,13 +30,8 @@ use crate::{Error, ErrorKind, Result};
 /// Records that are read to choose from, at most, and the bytes that they take.
 const READ: u64 = 3_000_000;
 const READ_BYTES: u64 = 96 << 20;
-/// Records that the stages work on where a run is foretold, about, and the columns or stretches that
-/// these are in: of fewer records fewer columns, since what a column cuts off counts more in a
-/// small one.
-const TRIED: usize = 240_000;
-const SPOTS: usize = 8;
-const A_SPOT: usize = 30_000;
-const FEWEST_SPOTS: usize = 3;
+/// Where a run is foretold.
+const FORETOLD: TrialSize = TrialSize { about: 240_000, spots: 8 };
 /// A scan is tried as a whole if it has no more than so many fourths of what is tried of others.
 const WHOLE_FOURTHS: u64 = 5;
 /// Parts of the rest of the input that are looked at, a batch of each.
@@ -91,13 +86,22 @@ pub struct TrialPoints {
 /// What a trial came to, or why there was none.
 pub(super) type Tried = std::result::Result<TrialRun, String>;
 
+/// How much a trial works on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TrialSize {
+    /// Records, about.
+    pub about: usize,
+    /// The columns or stretches that these are in.
+    pub spots: usize,
+}
+
 impl Plan {
     /// Runs the stages of `again` on some of the points, or says why not.
     pub(super) fn try_on_some(&self, again: Graph, watch: &dyn Watch) -> Result<Tried> {
         if let Some(why) = self.no_trial() {
             return Ok(Err(why));
         }
-        let points = self.read_some(&again, TRIED, watch);
+        let points = self.read_some(&again, FORETOLD, watch);
         match points.and_then(|points| self.tried(&points, again, watch)) {
             Err(error) if error.kind() != ErrorKind::Interrupted => {
                 Ok(Err(format!("a trial failed: {error}")))
@@ -121,7 +125,7 @@ impl Plan {
     pub(super) fn read_some(
         &self,
         again: &Graph,
-        about: usize,
+        size: TrialSize,
         watch: &dyn Watch,
     ) -> Result<TrialPoints> {
         let (start, cpu_before) = (Instant::now(), cpu_seconds());
@@ -130,7 +134,7 @@ impl Plan {
         let (schema, limit) = (source.schema(), READ_BYTES.min(self.task.demands.limit / 4));
         let unread = &self.task.unread();
         let (read, reading) = Threads::start(self.task.threads, |threads| {
-            let from = TrialReading { source: &*source, unread, threads, watch, limit, about };
+            let from = TrialReading { source: &*source, unread, threads, watch, limit, size };
             let read = from.records(self.task.mills)?;
             let reading = cpu_seconds() - cpu_before;
             Ok((from.chosen(read, self.task.mills)?, reading))
@@ -225,19 +229,13 @@ struct TrialReading<'a> {
     watch: &'a dyn Watch,
     /// Bytes of records, at most.
     limit: u64,
-    /// Records that are tried, about.
-    about: usize,
+    size: TrialSize,
 }
 
 impl TrialReading<'_> {
     /// Records up to which a scan is tried as a whole.
     fn whole(&self) -> u64 {
-        self.about as u64 / 4 * WHOLE_FOURTHS
-    }
-
-    /// Columns or stretches that are tried.
-    fn spots(&self) -> usize {
-        (self.about / A_SPOT).clamp(FEWEST_SPOTS, SPOTS)
+        self.size.about as u64 / 4 * WHOLE_FOURTHS
     }
 
     /// A stretch from the middle of the input, or several that are spread over it.
@@ -250,11 +248,11 @@ impl TrialReading<'_> {
             return Ok(ReadParts { read: self.parts(parts.clone().collect(), most)?, parts });
         }
         if !in_one {
-            let spots = self.spots();
+            let TrialSize { about, spots } = self.size;
             let mut some: Vec<usize> =
                 (0..spots).map(|n| parts * (2 * n + 1) / (2 * spots)).collect();
             some.dedup();
-            let each = most.min(self.about as u64) / some.len() as u64;
+            let each = most.min(about as u64) / some.len() as u64;
             return Ok(ReadParts { parts: 0..parts, read: self.parts(some, each)? });
         }
         let each = all.div_ceil(parts as u64).max(1);
@@ -275,7 +273,7 @@ impl TrialReading<'_> {
         };
         let at = |record: &[u8]| axes.map(|axis| axis.world(record, schema.endian));
         let records = || read.iter().flat_map(|bytes| bytes.chunks_exact(stride));
-        let spots = Spots::of(records().map(at)).chosen(self.spots(), self.about);
+        let spots = Spots::of(records().map(at)).chosen(self.size.spots, self.size.about);
         let mut chosen = Vec::new();
         records().filter(|record| spots.hold(at(record))).for_each(|r| chosen.extend_from_slice(r));
         let others: Vec<usize> =

@@ -8,7 +8,7 @@ use super::promise::Promise;
 use super::tile_state::TileState;
 use super::witness::Witness;
 use crate::error::Undeclared;
-use crate::expression::KeyExpression;
+use crate::expression::{KeyExpression, Weight};
 use crate::geom::lattice::Lattice;
 use crate::point::{PointBatch, Schema, Units};
 use crate::quantity::Length;

@@ -40,7 +40,7 @@ fn sizes_that_cannot_be_met_are_told() {
     assert!(!at.join("out.laz").exists());
     fails(at, &sized("3 apples"), 2, &["is no size such as 512MiB"]);
     let both = [&sized("1MB")[..], &["--keep", "5%"]].concat();
-    fails(at, &both, 2, &["--size <SIZE>"]);
+    fails(at, &both, 2, &["--size and --keep do not go together"]);
     let (code, table, told) = pointmill(at, &sized("10MB"));
     assert!(code == 0 && table.starts_with("points     3,000 in, 3,000 out"), "{table}{told}");
     assert!(told.contains("which is less than 9.5 MiB"), "{told}");

@@ -122,7 +122,7 @@ fn what_is_cut_off_is_what_is_reduced_to_as_many() {
         let told = done(at, &cut);
         told.split(" in, ").nth(1).unwrap().split(' ').next().unwrap().replace(',', "")
     };
-    let (coarse, fine) = (points_of(&["--spacing", "30"]), points_of(&["--spacing", "10"]));
+    let (coarse, fine) = (points_of(&["--spacing", "10"]), points_of(&["--spacing", "4"]));
     assert!(coarse.parse::<u64>().unwrap() * 3 < fine.parse::<u64>().unwrap(), "{coarse} {fine}");
     reduce(&fine, "direct.las");
     assert!(points("cut.las") == points("direct.las"), "{fine}");

@@ -72,6 +72,31 @@ fn the_budget_that_a_refusal_names_does_and_sixteen_mebibytes_less_do_not() {
 }
 
 #[test]
+fn rounds_are_refused_with_budgets_that_lead_to_one_that_does() {
+    for (n, (what, scan)) in scenes().iter().enumerate() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        scan.write(&at.join("scan.las"));
+        for stages in ["--keep 10%", "--tolerance 1"] {
+            let command = format!("reduce scan.las -o out.laz --threads {} {stages}", 1 + n % 3);
+            let (mut budget, mut refusals) = (5, 0);
+            loop {
+                let (code, told) = with(at, &command, budget);
+                if code == 0 {
+                    break;
+                }
+                // Each round may reach farther than those before it.
+                let enough = mebibytes(&told);
+                assert!(enough > budget && refusals < 4, "{what}: {command} in {budget}: {told}");
+                assert!(refusals > 0 || told.contains("at least"), "{told}");
+                (budget, refusals) = (enough, refusals + 1);
+            }
+            assert!(refusals > 0, "{what}: {command} in {budget}");
+        }
+    }
+}
+
+#[test]
 fn a_side_that_samples_choose_is_refused_with_a_lower_bound_before_them_and_fits_in_the_end() {
     // Most points lie in one place: what the first cells take is not what the last do.
     let even = Scan::synthetic(Scene::Als, 400_000, 3);

@@ -67,7 +67,7 @@ fn hull_area(points: &BTreeSet<[i64; 3]>) -> i64 {
     let turn = |a: [i64; 3], b: [i64; 3], c: [i64; 3]| {
         (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     };
-    let mut chain = |points: &mut dyn Iterator<Item = &[i64; 3]>| {
+    let chain = |points: &mut dyn Iterator<Item = &[i64; 3]>| {
         let mut hull: Vec<[i64; 3]> = Vec::new();
         for p in points {
             while hull.len() > 1 && turn(hull[hull.len() - 2], hull[hull.len() - 1], *p) <= 0 {
