@@ -31,7 +31,7 @@ impl TileOp for Ranks {
     fn run(&self, tile: &mut Tile, _: &mut Tally) -> Result<()> {
         let mut ranks = tile.columns.take(&RANK)?;
         for (rank, [x, y, z]) in ranks.iter_mut().zip(&tile.positions) {
-            *rank = (7 * x + 3 * y + z).rem_euclid(5) as f64;
+            *rank = (7 * x + 3 * y + z).rem_euclid(5) as f64 * 200.0;
         }
         tile.columns.put(ranks);
         Ok(())
@@ -91,12 +91,22 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
                 check::<Cells>(json!({})).after(normals()).before(Median::default()),
             ],
         ),
-        ("cut", vec![check::<Cut>(json!({ "keep": "30%" })).after(Ranks {})]),
+        (
+            "cut",
+            vec![
+                check::<Cut>(json!({ "keep": "30%" })).after(Ranks {}),
+                check::<Cut>(json!({ "spacing": 0.5 })).after(Ranks {}),
+            ],
+        ),
         ("median", vec![check::<Median>(json!({})).after(normals()).after(cells())]),
         (
             "graded",
             vec![
                 check::<Graded>(json!({ "keep": "20%" })),
+                check::<Graded>(json!({ "keep": "auto" })),
+                check::<Graded>(json!({
+                    "keep": "10%", "borders": true, "weight": "Classification == 2 ? 0.5 : Z > 0 ? 3 : 1"
+                })),
                 check::<Graded>(json!({ "tolerance": 0.3, "max_spacing": 2.0, "ranks": true })),
             ],
         ),
