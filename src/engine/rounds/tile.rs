@@ -1,7 +1,7 @@
 //! A tile of a round: positions of the scan and kept points around a cube, in the arena of a
 //! thread.
 
-use crate::budget::{Bytes, Lease};
+use crate::budget::{Bytes, Lease, whole_mebibytes};
 use crate::engine::grind::DecodedScan;
 use crate::engine::job::Job;
 use crate::engine::pass::{Call, Op, put_to_work};
@@ -117,7 +117,8 @@ impl<'a> RoundWorker<'a> {
             + Bytes::of(kept.most_near(&region) as u64, KEPT_BYTES);
         let there = Bytes::of(self.capacity as u64, POSITION_BYTES);
         let beyond = needed.0.saturating_sub(there.0);
-        self.more = Some(self.job.budget.lease(beyond, "kept points around tiles")?);
+        let lease = self.job.budget.lease(beyond, "kept points around tiles");
+        self.more = Some(lease.map_err(|error| error.help(self.enough(beyond)))?);
         put_to_work(tile, &self.job.ops, self.call);
         self.chosen.clear();
         self.weights.clear();
@@ -138,6 +139,15 @@ impl<'a> RoundWorker<'a> {
         }
         kept.near(&region, &mut self.reader)?;
         Ok(records)
+    }
+
+    /// What helps where a tile takes so many bytes more than the arena has: as much for every thread
+    /// and, as other tiles may take more, a tenth of all besides.
+    fn enough(&self, beyond: u64) -> String {
+        let limit = self.job.task.demands.limit;
+        let of_threads = beyond.saturating_mul(self.job.threads.count() as u64);
+        let enough = whole_mebibytes(limit.saturating_add(of_threads).saturating_add(limit / 10));
+        format!("give at least `run.memory = \"{enough}\"`")
     }
 
     /// Lets the stage work on a tile.
