@@ -113,27 +113,14 @@ pub(super) fn reduce_flags(arguments: &ReduceArguments) -> Vec<CommandFlag> {
     let by_cells = arguments.by_cells();
     let ranks = !by_cells && (arguments.ranks || arguments.tolerance.is_some());
     let classes = |of_cells: bool| classes(&arguments.classes).filter(|_| of_cells == by_cells);
-    let keep = |of_cells: bool| {
-        arguments.keep.as_deref().map(whole_or_text).filter(|_| of_cells == by_cells)
-    };
+    let keep = arguments.keep.as_deref().map(whole_or_text).filter(|_| by_cells);
     let mut all = flags([
         ("IN", "read.path", Some(json!(arguments.inputs).into())),
         ("-o", "write.path", arguments.output.clone().map(FlagValue::from)),
         ("--outdir", "write.folder", arguments.outdir.clone().map(FlagValue::from)),
         ("--to", "write.format", arguments.to.clone().map(FlagValue::from)),
         ("--max-angle", "cells.max_angle", arguments.max_angle.as_deref().map(number_or_text)),
-        ("--keep", "cells.keep", keep(true)),
-        ("--keep", "graded.keep", keep(false)),
-        ("--tolerance", "graded.tolerance", arguments.tolerance.as_deref().map(number_or_text)),
-        (
-            "--max-spacing",
-            "graded.max_spacing",
-            arguments.max_spacing.as_deref().map(number_or_text),
-        ),
-        ("--weight", "graded.weight", arguments.weight.clone().map(FlagValue::from)),
-        ("--borders", "graded.borders", arguments.borders.then(|| FlagValue::from(true))),
-        ("--ranks", "graded.ranks", ranks.then(|| FlagValue::from(true))),
-        ("--effort", "graded.effort", arguments.effort.clone().map(FlagValue::from)),
+        ("--keep", "cells.keep", keep),
         ("--max-side", "cells.max_side", arguments.max_side.as_deref().map(number_or_text)),
         (
             "--min-spacing",
@@ -163,6 +150,9 @@ pub(super) fn reduce_flags(arguments: &ReduceArguments) -> Vec<CommandFlag> {
         ("--headers", "run.headers", arguments.headers.clone().map(FlagValue::from)),
         ("--z-scale", "run.z_scale", arguments.z_scale.as_deref().map(number_or_text)),
     ]);
+    if !by_cells {
+        all.extend(graded_flags(arguments, ranks));
+    }
     if ranks {
         let dimensions = Some(json!([KEEP_RANK.kind().name()]).into());
         all.extend(flags([("--ranks", "write.dimensions", dimensions)]));
@@ -170,6 +160,20 @@ pub(super) fn reduce_flags(arguments: &ReduceArguments) -> Vec<CommandFlag> {
     all.extend(filtered(&arguments.filter));
     all.extend(written(&arguments.written));
     all
+}
+
+/// Those of them that stand for keys of `graded`.
+fn graded_flags(arguments: &ReduceArguments, ranks: bool) -> Vec<CommandFlag> {
+    let length = |given: &Option<String>| given.as_deref().map(number_or_text);
+    flags([
+        ("--keep", "graded.keep", arguments.keep.as_deref().map(whole_or_text)),
+        ("--tolerance", "graded.tolerance", length(&arguments.tolerance)),
+        ("--max-spacing", "graded.max_spacing", length(&arguments.max_spacing)),
+        ("--weight", "graded.weight", arguments.weight.clone().map(FlagValue::from)),
+        ("--borders", "graded.borders", arguments.borders.then(|| FlagValue::from(true))),
+        ("--ranks", "graded.ranks", ranks.then(|| FlagValue::from(true))),
+        ("--effort", "graded.effort", arguments.effort.clone().map(FlagValue::from)),
+    ])
 }
 
 /// The flags of `convert`, for a run that reads and writes these.

@@ -26,6 +26,7 @@ mod preset;
 mod preview;
 mod print;
 mod progress;
+mod reduction;
 mod run;
 mod seen;
 mod size;

@@ -36,7 +36,7 @@ pub(super) fn warn_of_noise(
     let warning = watched(&mut Nothing, &|| console.cancelled(), |watch| {
         // What cannot be tried is for the run to tell, or to do without.
         match plan.trial_points(&first, TRIED, watch) {
-            Ok(some) => Probe { plan, again, some, watch }.warning(tolerance, points),
+            Ok(some) => NoiseTrials { plan, again, some, watch }.warning(tolerance, points),
             Err(error) if error.kind() == ErrorKind::Interrupted => Err(error),
             Err(_) => Ok(None),
         }
@@ -68,14 +68,14 @@ fn keys(stage: &GraphStage) -> Result<Graded> {
 }
 
 /// Trials with several tolerances.
-struct Probe<'a> {
+struct NoiseTrials<'a> {
     plan: &'a Plan,
     again: &'a dyn Fn() -> Result<Graph>,
     some: TrialPoints,
     watch: &'a dyn Watch,
 }
 
-impl Probe<'_> {
+impl NoiseTrials<'_> {
     fn warning(&self, tolerance: Length, points: u64) -> Result<Option<String>> {
         let share = self.share(tolerance, 1.0)?;
         if share <= MOST {

@@ -10,6 +10,9 @@ use crate::graph::Graph;
 use crate::language::{Explained, Parameter, PipelineText, Registry, Set};
 use crate::{Error, Result};
 
+/// The origin of the pipelines of commands: users know the flags, not these texts.
+pub(super) const HIDDEN: &str = "";
+
 /// The graph that the arguments of a command mean.
 pub(super) fn read(
     arguments: &PipelineArguments,
@@ -90,4 +93,12 @@ fn not_there(typed: &str, error: Error, registry: &Registry) -> Error {
         ),
         false => error,
     }
+}
+
+/// The pipeline `text` with stages of these kinds behind the first, which reads.
+pub(super) fn with_stages<'a>(text: &str, kinds: impl Iterator<Item = &'a str>) -> String {
+    let stage = "[[stage]]\n";
+    let at = text.match_indices(stage).nth(1).map_or(text.len(), |(at, _)| at);
+    let stages: String = kinds.map(|kind| format!("{stage}kind = \"{kind}\"\n\n")).collect();
+    format!("{}{stages}{}", &text[..at], &text[at..])
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::arguments::ReduceArguments;
 use super::console::Console;
 use super::draw::{Nothing, watched};
-use super::run::reduction;
+use super::reduction::reduction;
 use crate::Result;
 use crate::budget::Bytes;
 use crate::engine::Watch;

@@ -2,11 +2,12 @@
 
 use super::arguments::{CutArguments, PlanArguments, ReduceArguments, SynthArguments};
 use super::console::Console;
-use super::flags::{common_flags, cut_flags, given, reduce_flags, synth_flags};
+use super::flags::{common_flags, cut_flags, given, synth_flags};
 use super::noise::{tolerance_of, warn_of_noise};
 use super::pipeline;
-use super::preset::Preset;
+use super::pipeline::HIDDEN;
 use super::preview::preview;
+use super::reduction::reduction;
 use super::size::reduce_to_size;
 use crate::Result;
 use crate::engine::Done;
@@ -14,15 +15,6 @@ use crate::graph::Graph;
 use crate::graph::Overrides;
 use crate::language::Registry;
 
-/// The pipelines of `reduce`, which users copy: to a number or a tolerance, and by the published
-/// method.
-const REDUCE: &str = include_str!("../../pipelines/reduce.toml");
-const BY_CELLS: &str = include_str!("../../pipelines/paper.toml");
-/// The number that the first of them has, where none is asked for.
-const ITS_NUMBER: &str = "keep = \"10%\"";
-
-/// The origin of the pipelines of commands: users know the flags, not these texts.
-pub(super) const HIDDEN: &str = "";
 /// Behind what `reduce` chose by itself.
 const OTHERWISE: &str =
     "by the noise and spacing of the scan; --preset paper is the published method";
@@ -77,21 +69,6 @@ pub(super) fn reduce(
     console.result(mill_towards(&|| reduction(arguments, registry), console)?)
 }
 
-/// The pipeline of `reduce`.
-pub(super) fn reduction(arguments: &ReduceArguments, registry: &Registry) -> Result<Graph> {
-    let preset = arguments.preset.map_or(Vec::new(), Preset::sets);
-    let sets = [preset, given([reduce_flags(arguments), common_flags(&arguments.common)])].concat();
-    let outliers = arguments.outliers.then_some("outliers");
-    let filter = arguments.filter.is_given().then_some("filter");
-    let text = match (arguments.by_cells(), &arguments.tolerance) {
-        (true, _) => BY_CELLS.to_owned(),
-        (false, None) => REDUCE.replace(ITS_NUMBER, "keep = \"auto\""),
-        (false, Some(_)) => REDUCE.replace(ITS_NUMBER, ""),
-    };
-    let text = with_stages(&text, filter.into_iter().chain(outliers));
-    Graph::parse_with(&text, HIDDEN, registry, &sets)
-}
-
 /// Cuts a coarser reduction off one with ranks and prints the closing table.
 pub(super) fn cut(arguments: &CutArguments, registry: &Registry, console: &Console) -> Result<()> {
     let sets = given([cut_flags(arguments), common_flags(&arguments.common)]);
@@ -126,27 +103,4 @@ fn mill_towards(read: &dyn Fn() -> Result<Graph>, console: &Console) -> Result<D
         warn_of_noise(tolerance, &plan, read, console)?;
     }
     console.run(plan)
-}
-
-/// The pipeline `text` with stages of these kinds behind the first, which reads.
-pub(super) fn with_stages<'a>(text: &str, kinds: impl Iterator<Item = &'a str>) -> String {
-    let stage = "[[stage]]\n";
-    let at = text.match_indices(stage).nth(1).map_or(text.len(), |(at, _)| at);
-    let stages: String = kinds.map(|kind| format!("{stage}kind = \"{kind}\"\n\n")).collect();
-    format!("{}{stages}{}", &text[..at], &text[at..])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn stages_of_arguments_go_before_all_other_stages() {
-        let kinds: Vec<String> = with_stages(REDUCE, ["filter", "outliers"].into_iter())
-            .lines()
-            .filter_map(|line| line.strip_prefix("kind = \"")?.split('"').next().map(str::to_owned))
-            .collect();
-        assert_eq!(kinds, ["read", "filter", "outliers", "graded", "write"]);
-        assert!(REDUCE.contains(ITS_NUMBER));
-    }
 }

@@ -7,7 +7,7 @@
 use super::arguments::ReduceArguments;
 use super::console::Console;
 use super::draw::{Nothing, watched};
-use super::run::reduction;
+use super::reduction::reduction;
 use crate::budget::Bytes;
 use crate::engine::Done;
 use crate::graph::Overrides;

@@ -156,7 +156,7 @@ impl Graded {
             (None, Some(_)) if self.weight.is_some() || self.borders => {
                 let key = if self.weight.is_some() { "weight" } else { "borders" };
                 let told = format!(
-                    "`graded.{key}` is for `graded.keep`, and a tolerance holds for all points alike"
+                    "`graded.{key}` is for `graded.keep`: a tolerance holds for all points alike"
                 );
                 Err((key, Error::pipeline(told).help(format!("leave `graded.{key}` out"))))
             }

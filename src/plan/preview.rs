@@ -12,8 +12,8 @@ use crate::graph::Graph;
 use crate::report::DeviationTotals;
 use crate::{Error, Result};
 
-/// Columns of space that pipelines are tried on: few, since kept points at the border of a column lack
-/// neighbours, which counts more the smaller it is.
+/// Columns of space that pipelines are tried on: few, since kept points at the border of a column
+/// lack neighbours, which counts more the smaller it is.
 const SPOTS: usize = 3;
 
 /// What a pipeline is expected to come to, by a trial on some points of the scan.

@@ -141,7 +141,8 @@ pub struct RoundTile<'a> {
     /// The positions that the round looks at and that the stage decides about, in Morton order, of
     /// the cube and as far around it as the round reaches.
     pub positions: &'a [Position],
-    /// What each weighs, by the conditions that hold for one of its records; none where all weigh 1.
+    /// What each weighs, by the conditions that hold for one of its records; none where all weigh
+    /// 1.
     pub weights: &'a [f64],
     /// The kept points of the cube and as far around it as the round asks for, in Morton order.
     pub kept: &'a [Position],

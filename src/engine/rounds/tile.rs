@@ -118,7 +118,7 @@ impl<'a> RoundWorker<'a> {
         let there = Bytes::of(self.capacity as u64, POSITION_BYTES);
         let beyond = needed.0.saturating_sub(there.0);
         let lease = self.job.budget.lease(beyond, "kept points around tiles");
-        self.more = Some(lease.map_err(|error| error.help(self.enough(beyond)))?);
+        self.more = Some(lease.map_err(|error| error.help(enough(self.job, beyond)))?);
         put_to_work(tile, &self.job.ops, self.call);
         self.chosen.clear();
         self.weights.clear();
@@ -139,15 +139,6 @@ impl<'a> RoundWorker<'a> {
         }
         kept.near(&region, &mut self.reader)?;
         Ok(records)
-    }
-
-    /// What helps where a tile takes so many bytes more than the arena has: as much for every thread
-    /// and, as other tiles may take more, a tenth of all besides.
-    fn enough(&self, beyond: u64) -> String {
-        let limit = self.job.task.demands.limit;
-        let of_threads = beyond.saturating_mul(self.job.threads.count() as u64);
-        let enough = whole_mebibytes(limit.saturating_add(of_threads).saturating_add(limit / 10));
-        format!("give at least `run.memory = \"{enough}\"`")
     }
 
     /// Lets the stage work on a tile.
@@ -180,4 +171,13 @@ impl<'a> RoundWorker<'a> {
         let RoundFound { keep, offers, counted } = found;
         Ok(FoundInTile { positions: chosen, keep, offers, counted: *counted, kept: reader })
     }
+}
+
+/// What helps where a tile takes so many bytes more than the arena has: as much for every thread
+/// and, as other tiles may take more, a tenth of all besides.
+fn enough(job: &Job<'_>, beyond: u64) -> String {
+    let limit = job.task.demands.limit;
+    let of_threads = beyond.saturating_mul(job.threads.count() as u64);
+    let enough = whole_mebibytes(limit.saturating_add(of_threads).saturating_add(limit / 10));
+    format!("give at least `run.memory = \"{enough}\"`")
 }

@@ -76,7 +76,8 @@ pub(super) struct Ladder {
     rungs: Vec<i64>,
     /// True if what is kept before the last round does not depend on how many are wanted.
     ranked: bool,
-    /// The ranks of what rounds kept, and the first of each rung; none where these are their numbers.
+    /// The ranks of what rounds kept, and the first of each rung; none where ranks are the numbers
+    /// of rounds.
     pub ranks: Vec<u16>,
     of_rungs: Vec<u16>,
     at: LadderStep,

@@ -1,8 +1,8 @@
 //! In which order points were kept, as outputs have it.
 //!
 //! Where any number is to be cut off, ranks say besides at which distance a point was kept: rungs
-//! of the ladder are powers of √2 of the scan's unit, and each has eight ranks. So a reduction can be
-//! cut off at a length, by whoever has nothing but its points.
+//! of the ladder are powers of √2 of the scan's unit, and each has eight ranks. So a reduction can
+//! be cut off at a length, by whoever has nothing but its points.
 
 use crate::point::Column;
 

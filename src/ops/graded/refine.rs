@@ -23,7 +23,7 @@ pub(super) struct Refining {
     /// An offer stands aside for a better one within this share of its distance to the nearest kept
     /// point.
     pub apart: f64,
-    /// True if a position that lies beyond all kept points around it counts as far from the surface.
+    /// True if a position that lies beyond all kept points around it counts as off the surface.
     pub borders: bool,
     /// A cell whose score was lower is not looked at again where something changed.
     pub floor: f64,
