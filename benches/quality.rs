@@ -1,5 +1,6 @@
 //! How true reductions are at an equal number of points: the published method, what `reduce` chooses by
-//! itself, and a voxel grid.
+//! itself, and a voxel grid. This is the table of docs/paper.md; `graded` beside other tools, and
+//! docs/quality.md, are `bench/quality`.
 //!
 //! `POINTMILL_SCANS=folder cargo bench --bench quality` takes made scenes and real scans;
 //! without the variable, the made ones; `cargo bench --bench quality -- SCAN.laz:10` that scan at 10 %.

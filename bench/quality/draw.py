@@ -1,0 +1,57 @@
+#!/usr/bin/env python3
+"""Writes docs/quality.md and its plots from results.jsonl; `--check` compares instead.
+
+Standard library only: the page can be drawn again where nothing is installed.
+"""
+
+import sys
+from pathlib import Path
+
+sys.dont_write_bytecode = True
+from page import page
+from plot import plot
+from results import cells, lines
+
+HERE = Path(__file__).resolve().parent
+DOCS = HERE.parent.parent / "docs"
+
+
+def drawn(results: Path, bars: Path) -> dict[str, str]:
+    """The text of each file, by its path within `docs`."""
+    found = lines(cells(results, bars))
+    if not found:
+        sys.exit(f"{results}: no scene has figures of graded, of the voxel grid and of another")
+    surface = "Surface error of the others as a multiple of that of graded, by scene and share"
+    mesh = "Mesh error of the others as a multiple of that of graded, by scene and share"
+    return {
+        "quality.md": page(found),
+        "images/quality/surface.svg": plot(found, "p99", surface),
+        "images/quality/mesh.svg": plot(found, "mesh_p99", mesh),
+    }
+
+
+def differing(docs: Path, texts: dict[str, str]) -> list[str]:
+    def same(name: str, text: str) -> bool:
+        path = docs / name
+        return path.exists() and path.read_text(encoding="utf-8") == text
+
+    return [name for name, text in texts.items() if not same(name, text)]
+
+
+def write() -> None:
+    for name, text in drawn(HERE / "results.jsonl", HERE / "bars.json").items():
+        (DOCS / name).parent.mkdir(parents=True, exist_ok=True)
+        (DOCS / name).write_text(text, encoding="utf-8")
+
+
+def main() -> None:
+    if unknown := [word for word in sys.argv[1:] if word != "--check"]:
+        sys.exit(f"{unknown[0]}: the only option is --check")
+    if "--check" not in sys.argv:
+        write()
+    elif wrong := differing(DOCS, drawn(HERE / "results.jsonl", HERE / "bars.json")):
+        sys.exit(f"docs/{wrong[0]} is not what the results say: python3 bench/quality/draw.py")
+
+
+if __name__ == "__main__":
+    main()

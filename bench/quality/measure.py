@@ -1,0 +1,113 @@
+"""Runs and measures what the results do not have yet; `run.py` calls it in its environment."""
+
+import argparse
+import itertools
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from contenders import CONTENDERS
+from figures import Judge
+from keep import SEEDS, SHARES, Bench, keep_scene
+from scenes import SCENES, Maker
+
+Cell = tuple[str, int, float, str]
+
+
+def rows(path: Path) -> dict[Cell, dict]:
+    """What is measured, by scene, seed, share and contender."""
+    if not path.exists():
+        return {}
+    found = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    return {(row["scene"], row["seed"], row["share"], row["contender"]): row for row in found}
+
+
+def write(path: Path, measured: dict[Cell, dict]) -> None:
+    """A line a cell, in the order of the tables."""
+    scenes, names = list(SCENES), list(CONTENDERS)
+    order = sorted(measured, key=lambda c: (scenes.index(c[0]), c[1], c[2], names.index(c[3])))
+    part = path.with_suffix(".part")
+    part.write_text("".join(json.dumps(measured[cell]) + "\n" for cell in order), encoding="utf-8")
+    part.rename(path)
+
+
+def row(bench: Bench, judge: Judge, points: np.ndarray, cell: Cell) -> dict | None:
+    """The figures of a cell; none where the contender keeps too few for any."""
+    scene, seed, share, name = cell
+    with np.load(bench.kept_file(*cell)) as stored:
+        kept, seconds = stored["kept"], float(stored["seconds"])
+    if len(kept) < 12:
+        return None
+    figures = judge.figures(points[kept] if kept.ndim == 1 else kept)
+    short = {key: float(f"{value:.5g}") for key, value in figures.items()}
+    wanted = round(share * len(points))
+    head = {"scene": scene, "seed": seed, "share": share, "contender": name}
+    return head | {"wanted": wanted, "kept": len(kept), "seconds": round(seconds, 1)} | short
+
+
+def measure_scene(bench: Bench, scene: str, seed: int, names: list[str], results: Path) -> None:
+    """Measures what is kept of a scene and not measured yet."""
+    done = rows(results)
+    cells = [(scene, seed, share, name) for share in SHARES for name in names]
+    missing = [c for c in cells if c not in done and bench.kept_file(*c).exists()]
+    if not missing:
+        return
+    made = bench.maker.scene(scene, seed)
+    judge = Judge(made)
+    for cell in missing:
+        found = row(bench, judge, made.points, cell)
+        if found:
+            done[cell] = found
+            print(json.dumps(found), flush=True)
+    write(results, done)
+
+
+def options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--pointmill", type=Path, required=True)
+    parser.add_argument("--cgal", type=Path, required=True)
+    parser.add_argument("--folder", type=Path, required=True)
+    parser.add_argument("--scans", type=Path)
+    parser.add_argument("--results", type=Path, required=True)
+    parser.add_argument("--again", action="store_true")
+    parser.add_argument("--scenes", default=",".join(SCENES))
+    parser.add_argument("--contenders", default=",".join(CONTENDERS))
+    return parser.parse_args()
+
+
+def forget(bench: Bench, scenes: list[str], names: list[str], results: Path) -> None:
+    """Removes what is kept and measured of the chosen scenes by the chosen contenders."""
+    done = rows(results)
+    for cell in [c for c in done if c[0] in scenes and c[3] in names]:
+        del done[cell]
+    write(results, done)
+    for cell in itertools.product(scenes, SEEDS, SHARES, names):
+        bench.kept_file(*cell).unlink(missing_ok=True)
+
+
+def chosen(text: str, known: dict) -> list[str]:
+    names = text.split(",")
+    if unknown := [name for name in names if name not in known]:
+        sys.exit(f"{', '.join(unknown)}: not among {', '.join(known)}")
+    return names
+
+
+def main() -> None:
+    given = options()
+    (given.folder / "kept").mkdir(parents=True, exist_ok=True)
+    maker = Maker(given.pointmill, given.scans, given.folder / "scenes")
+    bench = Bench(given.pointmill, given.cgal, maker, given.folder)
+    names, scenes = chosen(given.contenders, CONTENDERS), chosen(given.scenes, SCENES)
+    if given.again:
+        forget(bench, scenes, names, given.results)
+    for scene in scenes:
+        for seed in SEEDS:
+            for share in SHARES:
+                keep_scene(bench, scene, seed, share, names)
+            measure_scene(bench, scene, seed, names, given.results)
+
+
+if __name__ == "__main__":
+    main()

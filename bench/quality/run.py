@@ -1,0 +1,95 @@
+#!/usr/bin/env python3
+"""How true `graded` is beside other tools at equal numbers of points; README.md says more.
+
+Installs what it needs into a folder of its own, builds pointmill, runs and measures what
+results.jsonl does not have yet, and draws docs/quality.md.
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+sys.dont_write_bytecode = True
+import draw
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+SYSTEM = ["g++", "libcgal-dev", "libtbb-dev"]
+
+
+def options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--scenes", help="only these, as a,b")
+    parser.add_argument("--contenders", help="only these, as a,b")
+    parser.add_argument("--again", action="store_true",
+                        help="run and measure what is chosen again, as after a change of graded")
+    parser.add_argument("--pointmill", type=Path, help="this program instead of one that is built")
+    parser.add_argument("--cache", type=Path, default=ROOT / "target/quality",
+                        help="where packages, scenes and what is kept of them go")
+    return parser.parse_args()
+
+
+def called(*command: str | Path, **more) -> None:
+    """Runs a command, and ends with its error where it fails."""
+    words = [str(word) for word in command]
+    if subprocess.run(words, **more).returncode != 0:
+        sys.exit(f"failed: {' '.join(words)}")
+
+
+def python(cache: Path) -> Path:
+    """A Python that has the packages, installed by pip where they are not there yet."""
+    folder = cache / "venv"
+    wanted = (HERE / "requirements.txt").read_text(encoding="utf-8")
+    stamp = folder / "installed.txt"
+    if not stamp.exists() or stamp.read_text(encoding="utf-8") != wanted:
+        venv.create(folder, with_pip=True)
+        called(folder / "bin/python", "-m", "pip", "install", "-q", "-r", HERE / "requirements.txt")
+        stamp.write_text(wanted, encoding="utf-8")
+    return folder / "bin/python"
+
+
+def cgal(cache: Path) -> Path:
+    """The driver of CGAL, built; its packages are installed where apt and the rights are there."""
+    program = cache / "cgal"
+    if program.exists() and program.stat().st_mtime > (HERE / "cgal.cpp").stat().st_mtime:
+        return program
+    there = subprocess.run(["dpkg", "-s", *SYSTEM], capture_output=True).returncode == 0
+    if not there and shutil.which("apt-get") and os.geteuid() == 0:
+        called("apt-get", "update", "-q")
+        called("apt-get", "install", "-y", "-q", "--no-install-recommends", *SYSTEM)
+    called("g++", "-O3", "-march=native", "-DNDEBUG", "-DCGAL_LINKED_WITH_TBB", "-std=c++17", "-w",
+           HERE / "cgal.cpp", "-o", program, "-ltbb", "-lgmp")
+    return program
+
+
+def built() -> Path:
+    called("cargo", "build", "--release", "--quiet", cwd=ROOT)
+    return Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release/pointmill"
+
+
+def main() -> None:
+    given = options()
+    cache = given.cache.resolve()
+    cache.mkdir(parents=True, exist_ok=True)
+    interpreter = python(cache)
+    # One thread a library: figures do not depend on it, and times are those of one core.
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
+                                "PYTHONDONTWRITEBYTECODE": "1"}
+    called(interpreter, "-m", "unittest", "-q", "test_figures", cwd=HERE, env=environment)
+    command = [interpreter, HERE / "measure.py", "--folder", cache, "--cgal", cgal(cache),
+               "--pointmill", (given.pointmill or built()).resolve(),
+               "--results", HERE / "results.jsonl"]
+    command += ["--again"] if given.again else []
+    for option, value in (("--scenes", given.scenes), ("--contenders", given.contenders),
+                          ("--scans", os.environ.get("POINTMILL_SCANS"))):
+        command += [option, value] if value else []
+    called(*command, env=environment)
+    draw.write()
+
+
+if __name__ == "__main__":
+    main()
