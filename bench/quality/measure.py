@@ -11,6 +11,7 @@ import numpy as np
 from contenders import CONTENDERS
 from figures import Judge
 from keep import SEEDS, SHARES, Bench, keep_scene
+from results import equal
 from scenes import SCENES, Maker
 
 Cell = tuple[str, int, float, str]
@@ -33,35 +34,41 @@ def write(path: Path, measured: dict[Cell, dict]) -> None:
     part.rename(path)
 
 
-def row(bench: Bench, judge: Judge, points: np.ndarray, cell: Cell) -> dict | None:
-    """The figures of a cell; none where the contender keeps too few for any."""
-    scene, seed, share, name = cell
-    with np.load(bench.kept_file(*cell)) as stored:
-        kept, seconds = stored["kept"], float(stored["seconds"])
-    if len(kept) < 12:
+def kept_of(bench: Bench, cell: Cell, points: np.ndarray) -> dict | None:
+    """What a contender kept in a cell, if it did and came near enough to the number to be judged."""
+    path = bench.kept_file(*cell)
+    if not path.exists():
         return None
+    with np.load(path) as stored:
+        found = {"kept": stored["kept"], "seconds": float(stored["seconds"])}
+    found["wanted"] = round(cell[2] * len(points))
+    counts = {"kept": len(found["kept"]), "wanted": found["wanted"]}
+    return found if equal(counts) else None
+
+
+def row(judge: Judge, points: np.ndarray, cell: Cell, found: dict) -> dict:
+    """The figures of a cell."""
+    kept = found["kept"]
     figures = judge.figures(points[kept] if kept.ndim == 1 else kept)
     short = {key: float(f"{value:.5g}") for key, value in figures.items()}
-    wanted = round(share * len(points))
-    head = {"scene": scene, "seed": seed, "share": share, "contender": name}
-    return head | {"wanted": wanted, "kept": len(kept), "seconds": round(seconds, 1)} | short
+    head = dict(zip(("scene", "seed", "share", "contender"), cell))
+    counts = {"wanted": found["wanted"], "kept": len(kept)}
+    return head | counts | {"seconds": round(found["seconds"], 1)} | short
 
 
 def measure_scene(bench: Bench, scene: str, seed: int, names: list[str], results: Path) -> None:
     """Measures what is kept of a scene and not measured yet."""
     done = rows(results)
-    cells = [(scene, seed, share, name) for share in SHARES for name in names]
-    missing = [c for c in cells if c not in done and bench.kept_file(*c).exists()]
-    if not missing:
-        return
+    missing = [cell for share in SHARES for name in names
+               if (cell := (scene, seed, share, name)) not in done]
     made = bench.maker.scene(scene, seed)
-    judge = Judge(made)
-    for cell in missing:
-        found = row(bench, judge, made.points, cell)
-        if found:
-            done[cell] = found
-            print(json.dumps(found), flush=True)
-    write(results, done)
+    kept = {cell: found for cell in missing if (found := kept_of(bench, cell, made.points))}
+    judge = Judge(made) if kept else None
+    for cell, found in kept.items():
+        done[cell] = row(judge, made.points, cell, found)
+        print(json.dumps(done[cell]), flush=True)
+    if kept:
+        write(results, done)
 
 
 def options() -> argparse.Namespace:

@@ -22,7 +22,7 @@ points are held out (a fifth of the smallest). These samples of the surface are 
   restricted to the scan: those triangles of the three-dimensional triangulation whose dual
   Voronoi edge meets the scan. It fits no planes and knows no number of neighbours, and nobody
   here chooses points by it. A wrong triangle, a cut corner, a border that is not reached and a
-  hole all count.
+  hole all count. As noise is not taken off, ratios are nearer to 1 where noise is most of it.
 - *Coverage*: the distance of points of the scan to the nearest kept one, RMS and largest, as
   multiples of those of a voxel grid that keeps as many.
 
@@ -32,8 +32,8 @@ in that cell: below 1 `graded` is truer. Rows are means of the two seeds. The ot
 grid that keeps the point nearest to the middle of each cube, random points, Poisson disks by dart
 throwing, CGAL's hierarchy with four bounds of variation, MeshLab's simplified point cloud,
 MeshLab's Poisson disks whose radius follows the curvature, and Open3D's farthest points up to
-3,000 kept (time grows with their square). CGAL's WLOP, which makes new points, and pointmill's
-published method are measured and not counted among them.
+3,000 kept (time grows with their square). pointmill's published method is measured, too, and
+not counted among them.
 """
 
 

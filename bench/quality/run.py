@@ -79,7 +79,8 @@ def main() -> None:
     # One thread a library: figures do not depend on it, and times are those of one core.
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
                                 "PYTHONDONTWRITEBYTECODE": "1"}
-    called(interpreter, "-m", "unittest", "-q", "test_figures", cwd=HERE, env=environment)
+    called(interpreter, "-m", "unittest", "-q", "test_counts", "test_figures",
+           cwd=HERE, env=environment)
     command = [interpreter, HERE / "measure.py", "--folder", cache, "--cgal", cgal(cache),
                "--pointmill", (given.pointmill or built()).resolve(),
                "--results", HERE / "results.jsonl"]
