@@ -18,15 +18,16 @@ DOCS = HERE.parent.parent / "docs"
 
 def drawn(results: Path, bars: Path) -> dict[str, str]:
     """The text of each file, by its path within `docs`."""
-    found = lines(cells(results, bars))
-    if not found:
-        sys.exit(f"{results}: no scene has figures of graded, of the voxel grid and of another")
+    found = cells(results, bars)
+    compared = lines([cell for cell in found if cell.compared])
+    if not compared:
+        sys.exit(f"{results}: no scene has figures of graded and of the voxel grid")
     surface = "Surface error of the others as a multiple of that of graded, by scene and share"
     mesh = "Mesh error of the others as a multiple of that of graded, by scene and share"
     return {
         "quality.md": page(found),
-        "images/quality/surface.svg": plot(found, "p99", surface),
-        "images/quality/mesh.svg": plot(found, "mesh_p99", mesh),
+        "images/quality/surface.svg": plot(compared, "p99", surface),
+        "images/quality/mesh.svg": plot(compared, "mesh_p99", mesh),
     }
 
 

@@ -27,6 +27,11 @@ class Cell:
     prototype: float | None = None
 
     @property
+    def compared(self) -> bool:
+        """Whether others are measured, too."""
+        return "voxel" in self.rows
+
+    @property
     def ours(self) -> Row:
         return self.rows[OURS]
 
@@ -56,15 +61,14 @@ def equal(row: Row) -> bool:
 
 
 def cells(results: Path, bars: Path) -> list[Cell]:
-    """Cells in which `graded`, the voxel grid and another contender are measured, in file order."""
+    """Cells in which `graded` is measured, in file order."""
     prototype = {(bar["scene"], bar["seed"], bar["share"]): bar["p99"]
                  for bar in json.loads(bars.read_text(encoding="utf-8"))["cells"]}
     rows: dict[tuple, dict[str, Row]] = defaultdict(dict)
     for line in results.read_text(encoding="utf-8").splitlines():
         row = json.loads(line)
         rows[row["scene"], row["seed"], row["share"]][row["contender"]] = row
-    return [Cell(*key, found, prototype.get(key)) for key, found in rows.items()
-            if OURS in found and "voxel" in found]
+    return [Cell(*key, found, prototype.get(key)) for key, found in rows.items() if OURS in found]
 
 
 @dataclass

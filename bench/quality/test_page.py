@@ -73,6 +73,16 @@ class Pages(unittest.TestCase):
         self.assertIn("in 1 cells: sphere at 10%, seed 0 (1.111)", above)
         self.assertNotIn("sphere at 10%, seed 0", draw.drawn(*self.files(rows))["quality.md"])
 
+    def test_a_cell_without_others_is_said_and_counts_beside_the_prototype_alone(self):
+        alone = row("graded", 3.0, share=0.03)
+        files = self.files([row("graded", 1.0), row("voxel", 2.0), alone])
+        bar = {"scene": "sphere", "seed": 0, "share": 0.03, "p99": 1.0}
+        files[1].write_text(json.dumps({"cells": [bar]}), encoding="utf-8")
+        text = draw.drawn(*files)["quality.md"]
+        self.assertIn("not measured yet in sphere at 3%, seed 0.", text)
+        self.assertIn("in 1 cells: sphere at 3%, seed 0 (3.000)", text)
+        self.assertNotIn("### 3% kept", text)
+
     def test_the_check_finds_a_page_that_was_edited_or_is_missing(self):
         texts = draw.drawn(*self.files([row("graded", 1.0), row("voxel", 2.0)]))
         for name, text in texts.items():
