@@ -17,7 +17,7 @@ FAMILIES = {
     "MeshLab simplify": ("#b06fd0", ("MeshLab simplify",)),
     "MeshLab curvature": ("#d9534f", ("MeshLab curvature",)),
 }
-STYLE = """text { font: 12px sans-serif; fill: #333 } .line { stroke: #999 } .one { stroke: #333 }
+STYLE = """text { font: 12px sans-serif; fill: #6a737d } .line { stroke: #999 } .one { stroke: #6a737d }
 @media (prefers-color-scheme: dark) {
 text { fill: #ddd } .line { stroke: #666 } .one { stroke: #eee } }"""
 LEFT, WIDTH, GAP, TOP, STEP = 84, 250, 22, 74, 20

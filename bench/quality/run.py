@@ -10,7 +10,6 @@ import os
 import shutil
 import subprocess
 import sys
-import venv
 from pathlib import Path
 
 sys.dont_write_bytecode = True
@@ -46,7 +45,7 @@ def python(cache: Path) -> Path:
     wanted = (HERE / "requirements.txt").read_text(encoding="utf-8")
     stamp = folder / "installed.txt"
     if not stamp.exists() or stamp.read_text(encoding="utf-8") != wanted:
-        venv.create(folder, with_pip=True)
+        called(sys.executable, "-m", "venv", folder)
         called(folder / "bin/python", "-m", "pip", "install", "-q", "-r", HERE / "requirements.txt")
         stamp.write_text(wanted, encoding="utf-8")
     return folder / "bin/python"
