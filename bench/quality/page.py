@@ -41,8 +41,8 @@ NOISE = """A mesh passes through the points that are kept, and `graded` keeps po
 surface of the others: on a smooth surface, where little is wrong but the noise, these are the ones
 of much noise. At 10 % what it keeps of the noisy sphere is off the true one by 1.7 times the noise
 of the scan (RMS, seed 0, measured apart), of the torus by 1.6 times; Poisson disks by once. Planes
-of several points average that; meshes do not. Where points are to be meshed as they are, and little of the scan
-bends, Poisson disks are the better choice, or the scan is to be smoothed first."""
+of several points average that; meshes do not. Where points are to be meshed as they are, and little
+of the scan bends, Poisson disks are the better choice, or the scan is to be smoothed first."""
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
@@ -191,7 +191,8 @@ Rows whose surface error is more than half of the best other's: {half(lines) or 
 ## Everybody
 
 Figures as multiples of `graded`'s, geometric means of the cells in which the contender keeps as
-many points. Coverage below 1 is nearer than `graded`'s, which spends points where the surface
+many points and is measured (random points and the published method are in some only). Coverage
+below 1 is nearer than `graded`'s, which spends points where the surface
 bends.
 
 {contenders(cells)}
