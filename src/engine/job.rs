@@ -11,6 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
+use super::hashing::InputHashes;
 use super::pass::{StageOp, StreamOp};
 use super::publish::Staged;
 use super::row::RowLayout;
@@ -45,6 +46,8 @@ pub(crate) struct Job<'a> {
     pub area: Arc<SpillArea>,
     pub threads: Threads<'a>,
     pub watch: &'a dyn Watch,
+    /// Those of the files that are read, if outputs or the report are to say them.
+    pub hashes: Option<Arc<InputHashes>>,
     /// What the user was warned of before the end.
     warnings: Mutex<Vec<String>>,
     /// Set once a thread has failed.
@@ -89,6 +92,7 @@ impl<'a> Job<'a> {
             budget,
             threads,
             watch,
+            hashes: task.provenance.hashes(task.source.points()),
             warnings: Mutex::default(),
             failed: AtomicBool::new(false),
             _base: base,
@@ -122,6 +126,9 @@ impl<'a> Job<'a> {
             *next += read;
         }
         tally.work("read", read);
+        if let Some(hashes) = &self.hashes {
+            hashes.follow(read)?;
+        }
         self.classes.read(batch, tally);
         for (stage, leaves) in self.task.transforms.iter().zip(&self.task.schemas.left_by) {
             let before = batch.len();

@@ -26,6 +26,16 @@ pub fn describe(path: &Path, formats: &Formats) -> Result<serde_json::Value> {
     }
 }
 
+/// What the file at `path` says of how it was made; None if it says nothing.
+///
+/// # Errors
+///
+/// As [`describe`].
+pub(crate) fn note(path: &Path, formats: &Formats) -> Result<Option<String>> {
+    let first = sniff::first_bytes(path)?;
+    formats.sniffed(&first).map_or(Ok(None), |format| format.note(path))
+}
+
 /// A description as JSON.
 pub(super) fn json(described: &impl Serialize) -> Result<serde_json::Value> {
     serde_json::to_value(described)
