@@ -13,8 +13,8 @@ use crate::quantity::{Whole, has_schema};
 use crate::{Error, Result};
 
 /// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`,
-/// `withheld` and `noise` changes what is computed. All are optional; arguments of the same name
-/// take their place.
+/// `withheld` and `noise` changes what is computed, and none besides these but `provenance` changes
+/// a byte of an output. All are optional; arguments of the same name take their place.
 ///
 /// # Sizes
 ///

@@ -14,6 +14,8 @@ use crate::{Error, Result};
 pub const NOTE: (&str, u16) = ("pointmill", 2);
 /// Bytes of it that one record holds.
 const PIECE: usize = 60_000;
+/// Bytes of the longest that is read.
+const LONGEST: usize = 4 << 20;
 
 /// The records that hold `text`.
 pub fn records(text: &str) -> Vec<Vlr> {
@@ -21,19 +23,22 @@ pub fn records(text: &str) -> Vec<Vlr> {
     text.as_bytes().chunks(PIECE).map(record).collect()
 }
 
-/// What the file at `path` says of how it was made; None if it says nothing.
+/// What the file at `path` says of how it was made; None if it says nothing, or more than is ever
+/// said.
 pub fn read(path: &Path) -> Result<Option<String>> {
     let file = InputFile::open(path)?;
     let header = Header::read(&file)?;
     let (vlrs, _, _) = read_vlrs(&file, &header)?;
-    let mut text = Vec::new();
-    for vlr in vlrs.iter().filter(|vlr| vlr.is(NOTE.0, NOTE.1)) {
+    let ours: Vec<&Vlr> = vlrs.iter().filter(|vlr| vlr.is(NOTE.0, NOTE.1)).collect();
+    let length: usize = ours.iter().map(|vlr| usize::from(vlr.payload_len())).sum();
+    if !(1..=LONGEST).contains(&length) {
+        return Ok(None);
+    }
+    let mut text = Vec::with_capacity(length);
+    for vlr in ours {
         text.extend_from_slice(&vlr.whole_payload()?);
     }
-    match String::from_utf8(text) {
-        Ok(text) => Ok(Some(text).filter(|text| !text.is_empty())),
-        Err(_) => Err(Error::data(path, "what it says of how it was made is no text")),
-    }
+    Ok(Some(String::from_utf8_lossy(&text).into_owned()))
 }
 
 /// The records of a note in a file that is being written.
