@@ -135,7 +135,7 @@ pub fn reproduce(
     lock(&trouble).iter().for_each(|told| watch.warn(told));
     let (bytes, bytes_again, differs_at) = outcome?;
     let inputs = run.inputs.iter().filter_map(|input| {
-        let path = found.get(&*input.path)?.display().to_string();
+        let path = found.get(&*input.path)?.to_string_lossy().into_owned();
         Some(FoundInput { path, sha256: input.sha256.clone() })
     });
     Ok(Reproduction {

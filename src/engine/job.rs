@@ -7,6 +7,7 @@
 //! makes it to the one that needs it, and is dropped there.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -24,7 +25,7 @@ use crate::error::shown;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::graph::Headers;
 use crate::host::{PhaseItems, Threads, lock};
-use crate::point::PointBatch;
+use crate::point::{PointBatch, RunNote};
 use crate::report::{Grouped, Tally};
 use crate::stage::Part;
 use crate::store::SpillArea;
@@ -147,6 +148,16 @@ impl<'a> Job<'a> {
             self.watch.warn(&message);
             warnings.push(message);
         }
+    }
+
+    /// What the output of a sink that is to be at `path` says of the run.
+    pub fn note(&self, sink: usize, path: &Path) -> Option<Arc<RunNote>> {
+        let is_several = self.task.sinks[sink].is_folder() || self.task.has_squares(sink);
+        let note = self.task.provenance.note(self.hashes.as_ref(), (sink, is_several), path);
+        note.unwrap_or_else(|told| {
+            self.warn(told);
+            None
+        })
     }
 
     /// What the user was warned of so far.

@@ -6,12 +6,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::hashing::InputHashes;
-use super::job::Job;
 use super::publish::folder_of;
 use crate::Result;
-use crate::error::shown;
 use crate::graph::noted::NotedGraph;
-use crate::point::{Note, Settle};
+use crate::point::{RunNote, Settle};
 use crate::report::Grouped;
 
 /// The longest note of an output that is one file, and of one of several, which would all say the
@@ -54,29 +52,36 @@ impl Settle for DraftedNote {
     }
 }
 
-impl Job<'_> {
-    /// What the output of a sink that is to be at `path` says of the run.
-    pub fn note(&self, sink: usize, path: &Path) -> Option<Arc<Note>> {
-        let noted = match &self.task.provenance {
-            Provenance::Untold => return None,
-            Provenance::Again(text) => return Some(Arc::new(Note::new(text))),
-            Provenance::Told { noted, .. } => noted.clone()?,
+impl Provenance {
+    /// What the output of sink `number` that is to be at `path` says of a run that takes `hashes`;
+    /// it is one of several of the sink, or not. None if it says nothing.
+    ///
+    /// # Errors
+    ///
+    /// In words why it cannot say it.
+    pub fn note(
+        &self,
+        hashes: Option<&Arc<InputHashes>>,
+        (number, is_several): (usize, bool),
+        path: &Path,
+    ) -> Result<Option<Arc<RunNote>>, String> {
+        let noted = match self {
+            Provenance::Again(text) => return Ok(Some(Arc::new(RunNote::new(text)))),
+            Provenance::Told { noted, .. } => noted.clone(),
+            Provenance::Untold => None,
         };
-        let hashes = self.hashes.clone()?;
-        let is_several = self.task.sinks[sink].is_folder() || self.task.has_squares(sink);
-        let output = noted.output(sink, path, is_several)?;
+        let (Some(noted), Some(hashes)) = (noted, hashes.cloned()) else { return Ok(None) };
+        let Some(output) = noted.output(number, path, is_several) else { return Ok(None) };
         let folder = folder_of(path);
         let draft = noted.text(&folder, &output, &hashes.drafts());
         if draft.len() > LONGEST[usize::from(is_several)] {
-            self.warn(format!(
-                "{}: outputs do not say how they were made: {} files were read, more than there \
-                 is room for",
-                shown(self.task.sinks[sink].path()),
-                Grouped(noted.files().len() as u64)
+            let files = Grouped(noted.files().len() as u64);
+            return Err(format!(
+                "outputs do not say how they were made: {files} files were read, more than there \
+                 is room for"
             ));
-            return None;
         }
         let settle = DraftedNote { noted, folder, output, hashes };
-        Some(Arc::new(Note::drafted(draft.into(), Arc::new(settle))))
+        Ok(Some(Arc::new(RunNote::drafted(draft.into(), Arc::new(settle)))))
     }
 }

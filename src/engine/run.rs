@@ -290,7 +290,7 @@ impl Task {
 /// Enters the hashes of the files that were `written` and have no names yet.
 fn hash_outputs(run: &mut RunFigures, written: Vec<&Staged>, watch: &dyn Watch) -> Result<()> {
     for staged in written {
-        let name = staged.path().display().to_string();
+        let name = staged.path().to_string_lossy();
         let Some(figures) = run.outputs.iter_mut().find(|output| output.path == name) else {
             continue;
         };

@@ -1,9 +1,9 @@
-//! A graph as outputs note it: what it takes to run it again and get the same bytes. Says nothing of
-//! when, where and how fast it ran.
+//! A graph as outputs note it: what it takes to run it again and get the same bytes. Says nothing
+//! of when, where and how fast it ran.
 //!
-//! Of the settings of the run it has those that decide about bytes. Files that are read are named by
-//! their way from the folder of the output, so that a folder with both may be moved; files that are
-//! written by the role that they play.
+//! Of the settings of the run it has those that decide about bytes. Files that are read are named
+//! by their way from the folder of the output, so that a folder with both may be moved; files that
+//! are written by the role that they play.
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;

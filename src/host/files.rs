@@ -96,8 +96,8 @@ impl Identity {
     }
 }
 
-/// The way from `folder`, which is resolved, to the file at `path`: its folder is resolved, too, and
-/// its name stays as it is, link or not.
+/// The way from `folder`, which is resolved, to the file at `path`: its folder is resolved, too,
+/// and its name stays as it is, link or not.
 pub fn relative(folder: &Path, path: &Path) -> PathBuf {
     let Some(name) = path.file_name() else { return resolved(path) };
     let above = resolved(path.parent().unwrap_or(Path::new("")));

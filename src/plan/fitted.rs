@@ -2,7 +2,6 @@
 //! divided.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use rayon::ThreadPool;
 
@@ -14,9 +13,9 @@ use super::passes::{Passes, unroll};
 use super::places::{all_read, check_places, copies, each_input, square_sides};
 use super::sorted::{Sorted, blame};
 use super::stretch::Stretch;
+use super::told::ToldGraph;
 use super::transforms::{check_numbers, fit_transforms};
-use crate::engine::pass::{Pass, StageOp, StreamOp};
-use crate::engine::provenance::Provenance;
+use crate::engine::pass::{Pass, StageOp};
 use crate::engine::shares::Demands;
 use crate::engine::tagger::Tagger;
 use crate::engine::task::{GivenLengths, Schemas, Task};
@@ -25,7 +24,6 @@ use crate::error::shown;
 use crate::expression::Choice;
 use crate::geom::lattice::Lattice;
 use crate::graph::Graph;
-use crate::graph::noted::NotedGraph;
 use crate::graph::{Nonfinite, Overrides, RunSettings};
 use crate::host::Threads;
 use crate::point::{Schema, Units};
@@ -98,12 +96,10 @@ impl Graph {
     /// Stages that do not fit each other, inputs that disagree, an output that is an input or
     /// cannot appear where it should, and a memory that cannot do, with the size that would.
     pub fn plan(self, overrides: &Overrides) -> Result<Plan> {
-        let (origin, file) = (self.origin.clone(), self.file.clone());
+        let (origin, file, whole_rims) = (self.origin.clone(), self.file.clone(), self.whole_rims);
         let settings = self.settings.clone().with(overrides);
-        let (whole_rims, again) = (self.whole_rims, self.note.clone());
         let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
-        let told = settings.has_provenance();
-        let noted = told.then(|| NotedGraph::of(&self, &settings)).flatten();
+        let told = ToldGraph::of(&self, &settings);
         let mut sorted = Sorted::new(self)?;
         let places = |read: &[PathBuf], sinks: &[Box<dyn CreateSink>]| {
             check_places(file.as_deref(), read, sinks, &settings)
@@ -128,13 +124,9 @@ impl Graph {
         demands.divide()?;
         let mut warnings = warnings(&*source, &sorted, &schemas, &settings)?;
         warnings.extend(doubt.into_iter().chain(wide));
-        let provenance = match again {
-            Some(note) => Provenance::Again(note),
-            None => provenance(noted, &sorted, &order, &settings),
-        };
         let task = Task {
+            provenance: told.provenance(&sorted, &order, &settings),
             warnings,
-            provenance,
             simd,
             threads: demands.threads,
             settings,
@@ -164,27 +156,6 @@ impl Graph {
         };
         Ok(Plan { task, ops: sorted.ops })
     }
-}
-
-/// What outputs and the report say of the run.
-fn provenance(
-    noted: Option<NotedGraph>,
-    sorted: &Sorted,
-    order: &WriteOrder,
-    settings: &RunSettings,
-) -> Provenance {
-    let is_noted = noted.is_some() && sorted.sinks.iter().any(|sink| sink.is_file());
-    if !settings.has_provenance() || !(is_noted || settings.report.is_some()) {
-        return Provenance::Untold;
-    }
-    let numbered = sorted.transforms.iter().any(StreamOp::reads_record_numbers);
-    let ordered = !order.mills || order.in_input_order.contains(&true) || numbered;
-    let noted = noted.map(|noted| Arc::new(noted.in_order(ordered)));
-    let files = match &noted {
-        Some(noted) => noted.files().to_vec(),
-        None => sorted.source.1.paths(),
-    };
-    Provenance::Told { files, noted }
 }
 
 /// Stages that fit each other and the headers of the inputs.

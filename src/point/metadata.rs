@@ -4,7 +4,7 @@ use std::any::Any;
 use std::sync::Arc;
 
 use super::column::ComputedDimension;
-use super::note::Note;
+use super::note::RunNote;
 use super::units::Units;
 
 /// What the values of `GpsTime` count.
@@ -31,7 +31,7 @@ pub struct Metadata {
     /// every record comes as it is.
     pub pipeline: Option<Arc<str>>,
     /// What the output says of the run that it comes out of, if it is to say it.
-    pub note: Option<Arc<Note>>,
+    pub note: Option<Arc<RunNote>>,
     /// The dimensions that stages computed and the output is to have.
     pub computed: Vec<ComputedDimension>,
     /// True if stages moved the points, so that offsets of the input are not theirs any more.

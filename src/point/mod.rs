@@ -20,7 +20,7 @@ pub(crate) use columns::COLUMN_ENDIAN;
 pub use columns::{Columns, TakenColumn};
 pub use mark::{Edit, Mark};
 pub use metadata::{GpsTime, Metadata};
-pub use note::Note;
+pub use note::RunNote;
 pub(crate) use note::Settle;
 pub use schema::{Bits, Dimension, Endian, Layout, Scalar, Schema, Value};
 pub use selection::Flag;

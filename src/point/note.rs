@@ -9,7 +9,7 @@ use crate::{Error, Result};
 /// A text of which only the length is known until the run has read all of its inputs: a sink makes
 /// room for the draft when it writes its header, and puts the settled text there when it finishes.
 #[derive(Clone)]
-pub struct Note {
+pub struct RunNote {
     draft: Arc<str>,
     settle: Arc<dyn Settle>,
     settled: OnceLock<Arc<str>>,
@@ -34,15 +34,15 @@ impl Settle for Known {
     }
 }
 
-impl Note {
+impl RunNote {
     /// The note that says `text`.
     pub fn new(text: &str) -> Self {
-        Note::drafted(text.into(), Arc::new(Known(text.into())))
+        RunNote::drafted(text.into(), Arc::new(Known(text.into())))
     }
 
     /// The note that is drafted as `draft` and says in the end what `settle` does.
     pub(crate) fn drafted(draft: Arc<str>, settle: Arc<dyn Settle>) -> Self {
-        Note { draft, settle, settled: OnceLock::new() }
+        RunNote { draft, settle, settled: OnceLock::new() }
     }
 
     /// A text of the same length, which stands in its place until it is settled.
@@ -68,9 +68,9 @@ impl Note {
     }
 }
 
-impl fmt::Debug for Note {
+impl fmt::Debug for RunNote {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Note").field(&self.settled.get().unwrap_or(&self.draft)).finish()
+        f.debug_tuple("RunNote").field(&self.settled.get().unwrap_or(&self.draft)).finish()
     }
 }
 
@@ -91,12 +91,12 @@ mod tests {
 
     #[test]
     fn a_note_is_of_the_length_of_its_draft_or_an_error() {
-        let of = |text| Note::drafted("000".into(), Arc::new(Settled(text)));
+        let of = |text| RunNote::drafted("000".into(), Arc::new(Settled(text)));
         let note = of(Ok("abc"));
         assert_eq!((note.draft(), note.text().unwrap()), ("000", "abc"));
         assert!(of(Ok("abcd")).text().unwrap_err().to_string().contains("length"));
         let told = of(Err(Error::internal("it changed"))).text().unwrap_err();
         assert!(told.to_string().contains("it changed"), "{told}");
-        assert_eq!(Note::new("as it is").text().unwrap(), "as it is");
+        assert_eq!(RunNote::new("as it is").text().unwrap(), "as it is");
     }
 }

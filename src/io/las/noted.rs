@@ -7,7 +7,7 @@ use std::path::Path;
 use super::file::InputFile;
 use super::header::Header;
 use super::vlr::{Vlr, read_vlrs};
-use crate::point::Note;
+use crate::point::RunNote;
 use crate::{Error, Result};
 
 /// User and number of these records, whose payloads are one text.
@@ -46,7 +46,7 @@ pub struct WrittenNote<'a> {
     /// Byte of the first of them.
     pub at: u64,
     /// What they say.
-    pub note: &'a Note,
+    pub note: &'a RunNote,
 }
 
 impl WrittenNote<'_> {

@@ -22,7 +22,7 @@ use super::native::Native;
 use super::noted;
 use super::noted::WrittenNote;
 use super::vlr::Vlr;
-use crate::point::{ComputedDimension, Metadata, Note, Schema};
+use crate::point::{ComputedDimension, Metadata, RunNote, Schema};
 use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -46,8 +46,8 @@ pub struct LasOptions {
 /// (see [`fresh`](super::fresh)). Recomputed are the counts of points, the box, the places of
 /// points, extended records and waveforms (where these are in the file), the LAZ bit and its
 /// record, the bit that says that the CRS is WKT, the generating software, with `computed` the
-/// record length and the descriptors of extra bytes; with `metadata.note` there are records that say
-/// how the file was made; and if the records went through stages
+/// record length and the descriptors of extra bytes; with `metadata.note` records say how the file
+/// was made; and if the records went through stages
 /// (`metadata.pipeline`), the system identifier, the ranges of extra bytes, and a record that names
 /// the stages.
 ///
@@ -169,7 +169,7 @@ struct LasSink {
     lo: [i64; 3],
     hi: [i64; 3],
     /// How it was made, and the byte of the first record that says it.
-    note: Option<(u64, Arc<Note>)>,
+    note: Option<(u64, Arc<RunNote>)>,
     notes: Vec<String>,
 }
 

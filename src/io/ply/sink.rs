@@ -14,7 +14,7 @@ use super::headings::Headings;
 use super::names::RECORDS;
 use super::noted;
 use super::source::PlyNative;
-use crate::point::{Metadata, Note, Schema};
+use crate::point::{Metadata, RunNote, Schema};
 use crate::stage::{Colors, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -62,7 +62,7 @@ struct PlySink {
     depth: Depth,
     rest: Option<Arc<PlyNative>>,
     /// How it was made.
-    note: Option<Arc<Note>>,
+    note: Option<Arc<RunNote>>,
     notes: Vec<String>,
     points: u64,
     bytes: u64,
