@@ -258,7 +258,7 @@ fn found_one(input: &ToldInput, candidates: &[PathBuf], watch: &dyn Watch) -> Re
     }
     Err(wrong.unwrap_or_else(|| {
         let told = format!("the input {} is not there", shown(Path::new(&input.path)));
-        Error::pipeline(told).help("say in which folder it is: `--inputs FOLDER`")
+        Error::pipeline(told).help("name the folder that the inputs are in")
     }))
 }
 
