@@ -90,7 +90,8 @@
 //! - [`Plan`]: a graph that is fitted to headers and memory. It runs, and tells a [`Watch`] how it
 //!   goes; [`Done`] has the report.
 //! - [`compare`]: [`verify`](compare::verify) says whether a scan is a reduction of another, and
-//!   how true it is.
+//!   how true it is; [`reproduce`](compare::reproduce), whether the run that made an output gives
+//!   it again.
 //! - [`cli`]: the command line. A program of yours with stages of its own calls [`cli::main`] with
 //!   its registry and has the same commands.
 //!

@@ -11,6 +11,8 @@ mod source;
 mod tile_op;
 mod unread;
 
+use std::path::PathBuf;
+
 use crate::Result;
 use crate::expression::KeyExpression;
 use crate::point::{PointBatch, Schema};
@@ -115,6 +117,12 @@ pub trait Transform: Send + Sync {
 
     /// The keys that say what it removes, each with its stage, as in `filter.keep_classes`.
     fn removes_by(&self) -> Vec<&'static str> {
+        Vec::new()
+    }
+
+    /// The files that say what it does, each with the key that names it: outputs note their hashes,
+    /// as those of the inputs.
+    fn files(&self) -> Vec<(&'static str, PathBuf)> {
         Vec::new()
     }
 

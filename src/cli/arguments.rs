@@ -4,6 +4,7 @@ mod cut;
 mod pipeline;
 mod plain;
 mod reduce;
+mod reproduce;
 mod shared;
 mod verify;
 
@@ -22,6 +23,7 @@ pub(super) use plain::{
     CompletionsArguments, InfoArguments, ManArguments, NewArguments, StagesArguments,
 };
 pub(super) use reduce::ReduceArguments;
+pub(super) use reproduce::ReproduceArguments;
 pub(super) use shared::{CommonArguments, FilterArguments, Progress, WrittenArguments};
 pub(super) use verify::VerifyArguments;
 
@@ -61,6 +63,8 @@ pub(super) enum Command {
     Cut(CutArguments),
     /// Check that a scan is a reduction of another, and how far removed points are from its surface
     Verify(Box<VerifyArguments>),
+    /// Run again what made a file, and say whether the bytes are the same
+    Reproduce(ReproduceArguments),
     /// Draw scans side by side, from above or from a side
     Picture(PictureArguments),
     /// Make a synthetic scan
@@ -89,6 +93,7 @@ impl Command {
             Command::Reduce(reduce) => Some(&reduce.common),
             Command::Verify(verify) => Some(&verify.common),
             Command::Cut(cut) => Some(&cut.common),
+            Command::Reproduce(reproduce) => Some(&reproduce.common),
             Command::Run(PlanArguments { common, .. })
             | Command::Plan(PredictArguments { planned: PlanArguments { common, .. }, .. })
             | Command::Check(PlanArguments { common, .. })

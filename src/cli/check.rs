@@ -81,7 +81,11 @@ fn read(arguments: &PlanArguments, registry: &Registry) -> Result<Graph> {
 
 /// Refuses flags about files that are written, for commands that write none.
 pub(super) fn refuse_outputs(common: &CommonArguments) -> Result<()> {
-    let flags = [("--report", common.report.is_some()), ("--no-clobber", common.no_clobber)];
+    let flags = [
+        ("--report", common.report.is_some()),
+        ("--no-clobber", common.no_clobber),
+        ("--no-provenance", common.no_provenance),
+    ];
     match flags.into_iter().find(|(_, is_given)| *is_given) {
         None => Ok(()),
         Some((flag, _)) => {

@@ -64,6 +64,7 @@ pub(super) fn given<const N: usize>(tables: [Vec<CommandFlag>; N]) -> Vec<Set> {
 
 /// The flags that stand for `[run]` settings.
 pub(super) fn common_flags(common: &CommonArguments) -> Vec<CommandFlag> {
+    let provenance = common.no_provenance.then(|| FlagValue::from(false));
     let existing = common.no_clobber.then(|| FlagValue::from("refuse"));
     flags([
         ("--memory", "run.memory", common.memory.clone().map(FlagValue::from)),
@@ -71,6 +72,7 @@ pub(super) fn common_flags(common: &CommonArguments) -> Vec<CommandFlag> {
         ("--scratch", "run.scratch", common.scratch.clone().map(FlagValue::from)),
         ("--report", "run.report", common.report.clone().map(FlagValue::from)),
         ("--no-clobber", "run.existing", existing),
+        ("--no-provenance", "run.provenance", provenance),
     ])
 }
 

@@ -65,7 +65,7 @@ const GROUPS: &[(&str, &str, &[&str])] = &[
 ];
 
 /// Commands with the flags of a run that write nothing: they refuse those about what is written.
-const WRITE_NOTHING: [&str; 3] = ["plan", "check", "verify"];
+const WRITE_NOTHING: [&str; 4] = ["plan", "check", "verify", "reproduce"];
 
 /// What stands below the help of a command.
 const EXAMPLES: &[(&str, &str)] = &[
@@ -122,6 +122,19 @@ Examples:
 
 The exit code is 1 if a record of the reduced scan is none of the original, or a point that was
 removed is farther away than it may be.",
+    ),
+    (
+        "reproduce",
+        "\
+Examples:
+  pointmill reproduce reduced.laz
+  pointmill reproduce reduced.laz --inputs survey
+
+Outputs say how they were made, unless that was not wanted (--no-provenance): by which pipeline and
+version, and of which inputs. These are looked for where they were from the folder of the output,
+and must have the SHA-256 that the output says. Nothing is written but scratch beside it.
+
+The exit code is 0 if the bytes are the same, 1 if they are not, and 2 if it cannot be tried.",
     ),
     ("info", "Examples:\n  pointmill info scan.laz\n  pointmill info --json survey/*.laz"),
     (
@@ -189,7 +202,9 @@ pub(super) fn command() -> Command {
     });
     let hidden = WRITE_NOTHING.iter().fold(grouped, |all, command| {
         let hide = |sub: Command, flag| sub.mut_arg(flag, |a| a.hide(true));
-        all.mut_subcommand(*command, |sub| ["report", "no_clobber"].into_iter().fold(sub, hide))
+        all.mut_subcommand(*command, |sub| {
+            ["report", "no_clobber", "no_provenance"].into_iter().fold(sub, hide)
+        })
     });
     EXAMPLES.iter().fold(hidden, |all, (command, examples)| {
         all.mut_subcommand(*command, |sub| sub.after_help(*examples))

@@ -27,6 +27,7 @@ impl Words {
             Command::Convert(convert) => convert_flags(convert, None, None),
             Command::Synth(synth) => synth_flags(synth),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => Vec::new(),
+            Command::Reproduce(_) => Vec::new(),
             Command::Graph(_) | Command::Explain(_) => Vec::new(),
             Command::New(_) | Command::Schema => Vec::new(),
             Command::Completions(_) | Command::Man(_) => Vec::new(),

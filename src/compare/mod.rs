@@ -1,4 +1,5 @@
-//! Two scans against each other: is one a reduction of the other, and how true is it?
+//! Two scans against each other: is one a reduction of the other, and how true is it? And an output
+//! against what the run that made it gives when it is made again.
 //!
 //! A check of what a run did must not believe the run. So it is made from the two files alone, by
 //! code that shares nothing with the stages that reduce but the search of nearest neighbours: every
@@ -8,9 +9,12 @@
 mod meet;
 mod records;
 mod reduced;
+mod reproduce;
 mod surface;
+mod told;
 mod verdict;
 mod verify;
 
+pub use reproduce::{FoundInput, ReproduceSettings, Reproduction, reproduce};
 pub use verdict::{DistanceFigures, ForeignRecord, Verification};
 pub use verify::{VerifySettings, verify};

@@ -12,6 +12,7 @@ use std::path::Path;
 
 use super::clock::Clock;
 use super::finished::{Finished, FinishedBranch};
+use super::hashing::InputHashes;
 use super::job::Job;
 use super::lines::TileLines;
 use super::pass::{Branch, StreamOp};
@@ -52,7 +53,7 @@ impl Task {
         });
         RunFigures {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            inputs: input_figures(&*self.source),
+            inputs: input_figures(&*self.source, job.hashes.as_deref()),
             outputs: outputs.collect(),
             machine: Machine::this(),
             threads: job.threads.count(),
@@ -198,10 +199,11 @@ pub(super) fn write_report(
     })
 }
 
-fn input_figures(source: &dyn Source) -> Vec<FileFigures> {
+fn input_figures(source: &dyn Source, hashes: Option<&InputHashes>) -> Vec<FileFigures> {
     let figures = |input: Input| {
         let bytes = fs::metadata(&input.path).ok().map(|about| about.len());
-        FileFigures::of(&input.path, input.points, bytes)
+        let sha256 = hashes.and_then(|hashes| hashes.of(&input.path));
+        FileFigures { sha256, ..FileFigures::of(&input.path, input.points, bytes) }
     };
     source.inputs().into_iter().map(figures).collect()
 }

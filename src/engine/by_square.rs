@@ -20,7 +20,7 @@ use super::publish::Staged;
 use super::row::RowLayout;
 use crate::budget::Bytes;
 use crate::host::lock;
-use crate::point::{Dimension, PointBatch, Schema};
+use crate::point::{Dimension, Metadata, PointBatch, Schema};
 use crate::stage::{ChunkSize, CreateSink, Encode, Encoded, Sink, SinkSummary};
 use crate::store::{RecordState, Spill, SpillArea, StoredStretch};
 use crate::{Error, Result};
@@ -205,7 +205,8 @@ impl BySquare {
         list: &SquareList,
     ) -> Result<SinkSummary> {
         let task = job.task;
-        let metadata = task.metadata(number, Some(task.pipeline(number)));
+        let note = job.note(number, create.path());
+        let metadata = Metadata { note, ..task.metadata(number, Some(task.pipeline(number))) };
         let mut sink = create.create(staged.file(), &self.schema, &metadata, false)?;
         let (points, encoder) = (sink.chunk_points(), sink.encoder());
         let in_chunks = task.mills && !task.in_input_order[number] && create.likes_time();

@@ -60,7 +60,8 @@ impl ByInput {
         let pipeline = Some(task.pipeline(number));
         let computed = task.computed[number].clone();
         let said = task.said(task.source.metadata_of(input)?);
-        let metadata = Metadata { pipeline, computed, ..said };
+        let note = job.note(number, create.path());
+        let metadata = Metadata { pipeline, note, computed, ..said };
         let mut sink = create.create(staged.file(), task.schema(), &metadata, false)?;
         let encoders = ChunkEncoders::of_one(job, tiles, number, &*sink, create.likes_time());
         let mut open = Open::new(0, sink.chunk_points(), &self.layout, false);

@@ -7,10 +7,12 @@
 //! makes it to the one that needs it, and is dropped there.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::Watch;
+use super::hashing::InputHashes;
 use super::pass::{StageOp, StreamOp};
 use super::publish::Staged;
 use super::row::RowLayout;
@@ -23,7 +25,7 @@ use crate::error::shown;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::graph::Headers;
 use crate::host::{PhaseItems, Threads, lock};
-use crate::point::PointBatch;
+use crate::point::{PointBatch, RunNote};
 use crate::report::{Grouped, Tally};
 use crate::stage::Part;
 use crate::store::SpillArea;
@@ -45,6 +47,8 @@ pub(crate) struct Job<'a> {
     pub area: Arc<SpillArea>,
     pub threads: Threads<'a>,
     pub watch: &'a dyn Watch,
+    /// Those of the files that are read, if outputs or the report are to say them.
+    pub hashes: Option<Arc<InputHashes>>,
     /// What the user was warned of before the end.
     warnings: Mutex<Vec<String>>,
     /// Set once a thread has failed.
@@ -89,6 +93,7 @@ impl<'a> Job<'a> {
             budget,
             threads,
             watch,
+            hashes: task.provenance.hashes(task.source.points()),
             warnings: Mutex::default(),
             failed: AtomicBool::new(false),
             _base: base,
@@ -122,6 +127,9 @@ impl<'a> Job<'a> {
             *next += read;
         }
         tally.work("read", read);
+        if let Some(hashes) = &self.hashes {
+            hashes.follow(read)?;
+        }
         self.classes.read(batch, tally);
         for (stage, leaves) in self.task.transforms.iter().zip(&self.task.schemas.left_by) {
             let before = batch.len();
@@ -140,6 +148,16 @@ impl<'a> Job<'a> {
             self.watch.warn(&message);
             warnings.push(message);
         }
+    }
+
+    /// What the output of a sink that is to be at `path` says of the run.
+    pub fn note(&self, sink: usize, path: &Path) -> Option<Arc<RunNote>> {
+        let is_several = self.task.sinks[sink].is_folder() || self.task.has_squares(sink);
+        let note = self.task.provenance.note(self.hashes.as_ref(), (sink, is_several), path);
+        note.unwrap_or_else(|told| {
+            self.warn(told);
+            None
+        })
     }
 
     /// What the user was warned of so far.

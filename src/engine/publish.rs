@@ -58,6 +58,11 @@ impl Staged {
         Ok(Staged { path: path.to_owned(), file, scratch, existing: self.existing })
     }
 
+    /// Where it is to appear.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Where the file grows.
     pub fn file(&self) -> &Path {
         &self.file

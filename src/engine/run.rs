@@ -18,6 +18,7 @@ use super::job::Job;
 use super::mill::mill;
 use super::pass::StageOp;
 use super::phase::RunPhase;
+use super::provenance::Provenance;
 use super::publish::{Staged, folder_of, make_folder, publish};
 use super::room;
 use super::room::Taken;
@@ -26,7 +27,9 @@ use super::scratch::{Scratch, Trouble, memory_warning};
 use super::shares::{Demands, Shares};
 use super::stream::stream;
 use super::task::Task;
+use crate::host::hashed::FileHash;
 use crate::host::{Threads, lock};
+use crate::point::Metadata;
 use crate::report::{FileFigures, Report, RunFigures, check_written};
 use crate::stage::Sink;
 use crate::{Error, Result};
@@ -98,6 +101,10 @@ impl Task {
             FileFigures::of(&copy.to, 0, bytes)
         }));
         clock.begin(RunPhase::Publish, None)?;
+        if staged_report.is_some() && matches!(self.provenance, Provenance::Told { .. }) {
+            let written = outputs.iter().flatten().chain(&squares).chain(&beside);
+            hash_outputs(&mut run, written.collect(), watch)?;
+        }
         let (report, tiles) = self.account(finished, run, clock)?;
         self.check_size(&report.run.outputs)?;
         if let Some(staged) = &staged_report {
@@ -157,10 +164,10 @@ impl Task {
     /// are known. Those of squares set their records down.
     fn create_sinks(
         &self,
-        outputs: &[Vec<Staged>],
+        job: &Job<'_>,
         squares: &[Option<Arc<BySquare>>],
     ) -> Result<Vec<Option<Box<dyn Sink>>>> {
-        let schema = self.schema();
+        let (schema, outputs) = (self.schema(), job.outputs);
         let whole = !self.mills && self.transforms.is_empty() && !self.drops_nonfinite();
         let mut sinks: Vec<Option<Box<dyn Sink>>> = Vec::new();
         for (n, (sink, staged)) in self.sinks.iter().zip(outputs).enumerate() {
@@ -170,6 +177,8 @@ impl Task {
                 sinks.push(Some(Box::new(SquareSink::new(squares.clone(), chunk))));
                 continue;
             }
+            let note = if sink.is_folder() { None } else { job.note(n, sink.path()) };
+            let metadata = Metadata { note, ..metadata };
             let file = match sink.is_file() {
                 true => staged.first().filter(|_| !sink.is_folder()).map(Staged::file),
                 false => Some(Path::new("")),
@@ -192,7 +201,7 @@ impl Task {
     ) -> Result<(Finished, RunFigures, Vec<Staged>)> {
         let mut job = Job::new(self, ops, outputs, scratch, threads, watch)?;
         let squares: Vec<_> = (0..self.sinks.len()).map(|n| self.by_square(&job, n)).collect();
-        let sinks = self.create_sinks(outputs, &squares)?;
+        let sinks = self.create_sinks(&job, &squares)?;
         let folder = scratch.parent();
         let doubts = self.check_room(&job, folder)?;
         self.warnings.iter().cloned().chain(doubts).for_each(|warning| job.warn(warning));
@@ -206,6 +215,9 @@ impl Task {
             }
         };
         let files = self.write_squares(&job, &squares, &mut finished, clock)?;
+        if let Some(hashes) = &job.hashes {
+            hashes.all()?;
+        }
         let mut run = self.figures(&finished, &job);
         run.warnings.extend(nothing_left(&finished, &job));
         run.warnings.extend(memory_warning(folder, job.area.written()));
@@ -273,6 +285,20 @@ impl Task {
         }
         room::check(all.into_iter())
     }
+}
+
+/// Enters the hashes of the files that were `written` and have no names yet.
+fn hash_outputs(run: &mut RunFigures, written: Vec<&Staged>, watch: &dyn Watch) -> Result<()> {
+    for staged in written {
+        let name = staged.path().to_string_lossy();
+        let Some(figures) = run.outputs.iter_mut().find(|output| output.path == name) else {
+            continue;
+        };
+        let go_on = || if watch.cancelled() { Err(Error::interrupted()) } else { Ok(()) };
+        let hash = FileHash::of(staged.file(), go_on).map_err(|error| staged.tell(error))?;
+        figures.sha256 = Some(hash.sha256);
+    }
+    Ok(())
 }
 
 impl Task {

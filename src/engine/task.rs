@@ -9,6 +9,7 @@ use std::sync::{Arc, OnceLock};
 
 use super::beside::Beside;
 use super::pass::{Branch, Pass, StreamOp};
+use super::provenance::Provenance;
 use super::shares::{Demands, Shares};
 use super::tagger::Tagger;
 use crate::geom::lattice::Lattice;
@@ -77,6 +78,8 @@ pub(crate) struct Task {
     /// Where points are; None for a stream that does not ask.
     pub lattice: Option<Lattice>,
     pub demands: Demands,
+    /// What outputs say of the run.
+    pub provenance: Provenance,
     /// What the user should know before the run.
     pub warnings: Vec<String>,
     /// None where outputs of any size are right.

@@ -7,6 +7,7 @@
 
 mod drawn;
 pub(crate) mod limits;
+pub(crate) mod noted;
 mod settings;
 mod size;
 mod toml;
@@ -67,6 +68,8 @@ pub struct Graph {
     pub stages: Vec<GraphStage>,
     /// The file that it was read from, which no output may replace.
     pub(crate) file: Option<PathBuf>,
+    /// What outputs are to say of the run, if it is made again: what they said.
+    pub(crate) note: Option<Arc<str>>,
     /// True if every tile is to see the whole scan, which changes no answer of a stage that looks
     /// no further than it says: whoever proves stages compares the two.
     pub(crate) whole_rims: bool,

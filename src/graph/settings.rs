@@ -13,8 +13,8 @@ use crate::quantity::{Whole, has_schema};
 use crate::{Error, Result};
 
 /// What a run may use and where it leaves things. No setting but `lattice`, `z_scale`, `nonfinite`,
-/// `withheld` and `noise` changes what is computed. All are optional; arguments of the same name
-/// take their place.
+/// `withheld` and `noise` changes what is computed, and none besides these but `provenance` changes
+/// a byte of an output. All are optional; arguments of the same name take their place.
 ///
 /// # Sizes
 ///
@@ -77,6 +77,10 @@ pub struct RunSettings {
     pub simd: SimdSetting,
     /// Whether points may stay in memory, for tests.
     pub spill: SpillSetting,
+    /// Whether outputs say how they were made: the pipeline, the version of pointmill, and the
+    /// SHA-256 of each input, by which `pointmill reproduce` makes them again; none: true. Then the
+    /// report has the SHA-256 of inputs and outputs, too.
+    pub provenance: Option<bool>,
 }
 
 /// What becomes of files that are already where an output or the report is to be.
@@ -236,6 +240,38 @@ impl RunSettings {
             report: over.report.or(self.report),
             ..self
         }
+    }
+}
+
+impl RunSettings {
+    /// Those of these settings alone that decide about the bytes of outputs.
+    pub(crate) fn deciding(&self) -> RunSettings {
+        // All are named: whoever adds one says here of which kind it is.
+        let RunSettings {
+            lattice,
+            z_scale,
+            units,
+            nonfinite,
+            headers,
+            withheld,
+            noise,
+            memory: _,
+            threads: _,
+            scratch: _,
+            report: _,
+            existing: _,
+            tile_points: _,
+            simd: _,
+            spill: _,
+            provenance: _,
+        } = *self;
+        let others = RunSettings::default();
+        RunSettings { lattice, z_scale, units, nonfinite, headers, withheld, noise, ..others }
+    }
+
+    /// True if outputs say how they were made.
+    pub(crate) fn has_provenance(&self) -> bool {
+        self.provenance != Some(false)
     }
 }
 

@@ -21,17 +21,8 @@ impl Graph {
     ///
     /// A stage that no text can name, such as a closure.
     pub fn to_toml(&self) -> Result<String> {
-        let names = self.names();
-        let mut stage = Vec::new();
-        let mut above: Option<usize> = None;
-        for (n, one) in self.stages.iter().enumerate() {
-            stage.push(table(one, &names, n, above)?);
-            if !matches!(one.role, Role::Sink(_)) {
-                above = Some(n);
-            }
-        }
-        let stage = stage.into_iter().map(literal_table).collect();
-        let document = Document { run: literal_table(settings(&self.settings)?), stage };
+        let run = literal_table(settings(&self.settings)?);
+        let document = Document { run, stage: tables(self)? };
         toml::to_string(&document)
             .map_err(|cause| Error::internal("the graph is no TOML").because(cause))
     }
@@ -55,6 +46,19 @@ impl Graph {
         };
         self.stages.iter().enumerate().map(name).collect()
     }
+}
+
+/// The stages as their tables, in whose texts a `${` stands for itself.
+pub(super) fn tables(graph: &Graph) -> Result<Vec<Map<String, Value>>> {
+    let (names, mut above) = (graph.names(), None);
+    let mut all = Vec::new();
+    for (n, one) in graph.stages.iter().enumerate() {
+        all.push(literal_table(table(one, &names, n, above)?));
+        if !matches!(one.role, Role::Sink(_)) {
+            above = Some(n);
+        }
+    }
+    Ok(all)
 }
 
 /// True if a text need not say what a stage takes from.
@@ -89,7 +93,7 @@ fn table(
 }
 
 /// The settings that are not as they are without being given.
-fn settings(settings: &RunSettings) -> Result<Map<String, Value>> {
+pub(super) fn settings(settings: &RunSettings) -> Result<Map<String, Value>> {
     let all = |settings: &RunSettings| match serde_json::to_value(settings) {
         Ok(Value::Object(all)) => Ok(all),
         _ => Err(Error::internal("the settings of a run are no table")),
@@ -100,7 +104,7 @@ fn settings(settings: &RunSettings) -> Result<Map<String, Value>> {
 }
 
 /// The same table with texts that refer to nothing: a `${` in them stands for itself.
-fn literal_table(table: Map<String, Value>) -> Map<String, Value> {
+pub(super) fn literal_table(table: Map<String, Value>) -> Map<String, Value> {
     table.into_iter().map(|(key, of)| (key, literal(of))).collect()
 }
 

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use crate::error::shown;
 
@@ -96,8 +96,18 @@ impl Identity {
     }
 }
 
+/// The way from `folder`, which is resolved, to the file at `path`: its folder is resolved, too,
+/// and its name stays as it is, link or not.
+pub fn relative(folder: &Path, path: &Path) -> PathBuf {
+    let Some(name) = path.file_name() else { return resolved(path) };
+    let above = resolved(path.parent().unwrap_or(Path::new("")));
+    let common = above.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
+    let up = folder.components().skip(common).map(|_| Component::ParentDir);
+    up.chain(above.components().skip(common)).collect::<PathBuf>().join(name)
+}
+
 /// The place that `path` means, links and dots resolved as far as it exists.
-fn resolved(path: &Path) -> PathBuf {
+pub fn resolved(path: &Path) -> PathBuf {
     for above in path.ancestors() {
         let there = if above == Path::new("") { Path::new(".") } else { above };
         if let (Ok(found), Ok(rest)) = (there.canonicalize(), path.strip_prefix(above)) {

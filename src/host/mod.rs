@@ -3,6 +3,7 @@
 
 pub(crate) mod disk;
 pub(crate) mod files;
+pub(crate) mod hashed;
 pub mod process;
 mod tallies;
 pub(crate) mod threads;

@@ -18,12 +18,30 @@ use crate::{Error, Result};
 pub fn describe(path: &Path, formats: &Formats) -> Result<serde_json::Value> {
     let first = sniff::first_bytes(path)?;
     match formats.sniffed(&first) {
-        Some(format) => format.describe(path),
+        Some(format) => {
+            let mut facts = format.describe(path)?;
+            if let (Some(facts), Some(told)) = (facts.as_object_mut(), format.note(path)?) {
+                // What is no JSON is shown as it is: whoever wrote it.
+                let told = serde_json::from_str(&told).unwrap_or(told.into());
+                facts.insert("provenance".to_owned(), told);
+            }
+            Ok(facts)
+        }
         None => {
             let known = listed(sniff::upper(formats), "or");
             Err(sniff::not(&format!("a {known} file"), path, &first, formats))
         }
     }
+}
+
+/// What the file at `path` says of how it was made; None if it says nothing.
+///
+/// # Errors
+///
+/// As [`describe`].
+pub(crate) fn note(path: &Path, formats: &Formats) -> Result<Option<String>> {
+    let first = sniff::first_bytes(path)?;
+    formats.sniffed(&first).map_or(Ok(None), |format| format.note(path))
 }
 
 /// A description as JSON.

@@ -14,6 +14,7 @@ mod wkt;
 
 pub use convert::{Projection, Rounding};
 pub use describe::describe;
+pub(crate) use describe::note;
 pub use ends::{Discard, OutputOrder, Read, Write};
-pub(crate) use origin::open_plain;
+pub(crate) use origin::{Origin, open_plain};
 pub use project::Projected;

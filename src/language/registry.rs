@@ -118,6 +118,11 @@ impl Registry {
         self.kinds.contains_key(kind)
     }
 
+    /// The role of that kind; none if there is no such kind.
+    pub(crate) fn role(&self, kind: &str) -> Option<RoleName> {
+        self.kinds.get(kind).map(|kind| kind.role)
+    }
+
     /// The key of a stage of that kind whose value a line of words may give without naming it.
     pub(crate) fn main(&self, kind: &str) -> Option<&'static str> {
         self.kinds.get(kind).and_then(|kind| kind.main)

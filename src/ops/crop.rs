@@ -73,6 +73,8 @@ struct Cropping {
     key: &'static str,
     shape: AreaShape,
     keep: CropSide,
+    /// The file that it is from.
+    file: Option<PathBuf>,
     /// True if the area is of GeoJSON.
     is_geojson: bool,
     /// The area in the steps of the records, once they are known.
@@ -87,7 +89,8 @@ impl Crop {
             (Some(bounds), None, None) => {
                 let shape = AreaShape::Box(bounds);
                 let fitted = OnceLock::new();
-                return Ok(Cropping { key: "box", shape, keep, is_geojson: false, fitted });
+                let (key, is_geojson) = ("box", false);
+                return Ok(Cropping { key, shape, keep, file, is_geojson, fitted });
             }
             (None, Some(text), None) => ("polygon", text),
             (None, None, Some(path)) => ("file", read(path).map_err(|error| ("file", error))?),
@@ -121,6 +124,7 @@ impl Crop {
             key,
             shape: AreaShape::Polygons(polygons),
             keep,
+            file,
             is_geojson,
             fitted: OnceLock::new(),
         })
@@ -147,6 +151,7 @@ impl StageKind for Crop {
     const ROLE: RoleName = RoleName::Transform;
     const EITHER: &'static [&'static str] = &["box", "polygon", "file"];
     const MAIN: Option<&'static str> = Some("file");
+    const PLACES: &'static [&'static str] = &["file"];
 
     fn build(self, at: &StagePlace) -> Result<Role> {
         // An area in a file that is not there yet.
@@ -243,6 +248,10 @@ impl Transform for Cropping {
     fn emptied(&self) -> Option<String> {
         let (extent, key, doubt) = (self.extent(), self.key, self.doubt());
         Some(format!("the area of `crop.{key}` is {extent}{doubt}"))
+    }
+
+    fn files(&self) -> Vec<(&'static str, PathBuf)> {
+        self.file.iter().map(|file| ("file", file.clone())).collect()
     }
 
     fn apply(&self, batch: &mut PointBatch, _tally: &mut Tally) -> Result<()> {

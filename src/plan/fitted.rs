@@ -13,6 +13,7 @@ use super::passes::{Passes, unroll};
 use super::places::{all_read, check_places, copies, each_input, square_sides};
 use super::sorted::{Sorted, blame};
 use super::stretch::Stretch;
+use super::told::ToldGraph;
 use super::transforms::{check_numbers, fit_transforms};
 use crate::engine::pass::{Pass, StageOp};
 use crate::engine::shares::Demands;
@@ -95,10 +96,10 @@ impl Graph {
     /// Stages that do not fit each other, inputs that disagree, an output that is an input or
     /// cannot appear where it should, and a memory that cannot do, with the size that would.
     pub fn plan(self, overrides: &Overrides) -> Result<Plan> {
-        let (origin, file) = (self.origin.clone(), self.file.clone());
+        let (origin, file, whole_rims) = (self.origin.clone(), self.file.clone(), self.whole_rims);
         let settings = self.settings.clone().with(overrides);
-        let whole_rims = self.whole_rims;
         let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
+        let told = ToldGraph::of(&self, &settings);
         let mut sorted = Sorted::new(self)?;
         let places = |read: &[PathBuf], sinks: &[Box<dyn CreateSink>]| {
             check_places(file.as_deref(), read, sinks, &settings)
@@ -124,6 +125,7 @@ impl Graph {
         let mut warnings = warnings(&*source, &sorted, &schemas, &settings)?;
         warnings.extend(doubt.into_iter().chain(wide));
         let task = Task {
+            provenance: told.provenance(&sorted, &order, &settings),
             warnings,
             simd,
             threads: demands.threads,

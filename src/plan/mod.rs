@@ -22,6 +22,7 @@ mod sorted;
 mod spots;
 mod streaming;
 mod stretch;
+mod told;
 mod transforms;
 mod trial;
 

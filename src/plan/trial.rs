@@ -184,6 +184,7 @@ impl Plan {
         let demands = &self.task.demands;
         let more = resident_now().unwrap_or(0).saturating_sub(demands.resident);
         settings.report = None;
+        settings.provenance = Some(false);
         settings.scratch = Some(scratch);
         settings.threads = NonZeroUsize::new(self.task.threads);
         settings.memory = Some(demands.limit.saturating_add(more));

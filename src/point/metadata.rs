@@ -4,6 +4,7 @@ use std::any::Any;
 use std::sync::Arc;
 
 use super::column::ComputedDimension;
+use super::note::RunNote;
 use super::units::Units;
 
 /// What the values of `GpsTime` count.
@@ -29,6 +30,8 @@ pub struct Metadata {
     /// What the records went through, as outputs say it: the stages as one line of JSON. None where
     /// every record comes as it is.
     pub pipeline: Option<Arc<str>>,
+    /// What the output says of the run that it comes out of, if it is to say it.
+    pub note: Option<Arc<RunNote>>,
     /// The dimensions that stages computed and the output is to have.
     pub computed: Vec<ComputedDimension>,
     /// True if stages moved the points, so that offsets of the input are not theirs any more.
@@ -46,6 +49,7 @@ impl std::fmt::Debug for Metadata {
             .field("units", &self.units)
             .field("gps_time", &self.gps_time)
             .field("pipeline", &self.pipeline)
+            .field("note", &self.note)
             .field("computed", &self.computed)
             .field("moved", &self.moved)
             .field("comments", &self.comments)

@@ -122,12 +122,14 @@ pub struct FileFigures {
     pub points: u64,
     /// Length; None where it is not known.
     pub bytes: Option<u64>,
+    /// Its SHA-256 in hexadecimal digits; None where the run takes no hashes.
+    pub sha256: Option<String>,
 }
 
 impl FileFigures {
     /// Those of a file: its path as it is, since the document's writer escapes it.
     pub(crate) fn of(path: &Path, points: u64, bytes: Option<u64>) -> Self {
-        FileFigures { path: path.display().to_string(), points, bytes }
+        FileFigures { path: path.display().to_string(), points, bytes, sha256: None }
     }
 }
 

@@ -70,6 +70,16 @@ pub trait Format: Send + Sync {
     /// [`foreign`].
     fn describe(&self, path: &Path) -> Result<serde_json::Value>;
 
+    /// What the file at `path` says of how it was made, as its sink wrote [`Metadata::note`]; None
+    /// if it says nothing.
+    ///
+    /// # Errors
+    ///
+    /// As [`describe`](Format::describe).
+    fn note(&self, _path: &Path) -> Result<Option<String>> {
+        Ok(None)
+    }
+
     /// A file that the records of the input at `path` refer to, and the extension that a copy has
     /// beside outputs ([`Input::beside`](super::Input::beside)).
     fn beside(&self, _path: &Path) -> Option<(PathBuf, &'static str)> {

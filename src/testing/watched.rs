@@ -1,5 +1,6 @@
 //! A stage in a role that passes every call on, and looks at what the stage does with it.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::allocator::measured;
@@ -85,6 +86,10 @@ impl Transform for WatchedStage<dyn Transform> {
 
     fn removes_by(&self) -> Vec<&'static str> {
         self.stage.removes_by()
+    }
+
+    fn files(&self) -> Vec<(&'static str, PathBuf)> {
+        self.stage.files()
     }
 
     fn apply(&self, batch: &mut PointBatch, tally: &mut Tally) -> Result<()> {

@@ -8,6 +8,7 @@ mod names;
 mod picture;
 mod plan;
 mod preview;
+mod reproduce;
 mod size;
 mod tools;
 mod values;

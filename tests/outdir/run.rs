@@ -96,7 +96,7 @@ const CUTS: [Cut; 3] = [
 fn run(inputs: &[PathBuf], write: &str, report: &Path, cut: Cut) -> Result<Done> {
     let Cut { threads, tile_points, spill } = cut;
     let text = format!(
-        "[run]\nthreads = {threads}\ntile_points = {tile_points}\n\
+        "[run]\nprovenance = false\nthreads = {threads}\ntile_points = {tile_points}\n\
          spill = {spill:?}\nreport = {report:?}\n\
          [[stage]]\nkind = 'read'\npath = {inputs:?}\n{STAGES}[[stage]]\nkind = 'write'\n{write}\n"
     );

@@ -20,7 +20,7 @@ const GROUND: &str = "[[stage]]\nkind = 'filter'\nkeep_classes = [2]\n";
 /// A chain from a scan of several classes to a file, in small tiles and through the spill.
 fn chain(folder: &Path, stages: &str, output: &str) -> Graph {
     let text = format!(
-        "[run]\ntile_points = 900\nspill = 'always'\nthreads = 2\nmemory = '400MiB'\nreport = '{}'\n\
+        "[run]\nprovenance = false\ntile_points = 900\nspill = 'always'\nthreads = 2\nmemory = '400MiB'\nreport = '{}'\n\
          [[stage]]\nkind = 'synth'\nscene = 'als'\npoints = 20_000\n{stages}\
          [[stage]]\nkind = 'write'\npath = '{}'\n",
         folder.join(format!("{output}.json")).display(),
@@ -158,7 +158,7 @@ fn what_streams_behind_tiles_removes_what_it_would_of_the_file_between() {
     run(chain(one.path(), &format!("{thin}{TREES}{thinner}"), "out.ply")).unwrap();
     run(chain(two.path(), thin, "between.las")).unwrap();
     let again = format!(
-        "[[stage]]\nkind = 'read'\npath = '{}'\n{TREES}{thinner}[[stage]]\nkind = 'write'\npath = '{}'\n",
+        "[run]\nprovenance = false\n[[stage]]\nkind = 'read'\npath = '{}'\n{TREES}{thinner}[[stage]]\nkind = 'write'\npath = '{}'\n",
         two.path().join("between.las").display(),
         two.path().join("out.ply").display()
     );

@@ -176,7 +176,7 @@ p.toml:2:10: `memory`: `2G` is no size such as 512MiB or 2GiB: write 2GiB (units
 p.toml:3:1: `[run]` has no key `thraeds`
   3 | thraeds = 4
     | ^^^^^^^
-    = did you mean `threads`? keys: existing, headers, lattice, memory, noise, nonfinite, report, scratch, simd, spill, threads, tile_points, units, withheld, z_scale
+    = did you mean `threads`? keys: existing, headers, lattice, memory, noise, nonfinite, provenance, report, scratch, simd, spill, threads, tile_points, units, withheld, z_scale
 p.toml:7:9: `scene` cannot be `alps`
   7 | scene = \"alps\"
     |         ^^^^^^

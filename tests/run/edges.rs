@@ -250,7 +250,7 @@ fn offsets_move_no_point_and_scales_tell_what_they_round() {
     let path = |name: &str| at.path().join(name).display().to_string();
     let write = |source: &str, keys: &str, name: &str| {
         let text = format!(
-            "[run]\nreport = '{}'\n[[stage]]\n{source}\n[[stage]]\nkind = 'write'\npath = '{}'\n{keys}\n",
+            "[run]\nprovenance = false\nreport = '{}'\n[[stage]]\n{source}\n[[stage]]\nkind = 'write'\npath = '{}'\n{keys}\n",
             path("report.json"),
             path(name)
         );

@@ -79,6 +79,7 @@ pub fn write_each(
 /// A run that converts `inputs` into one file.
 pub fn convert_one(inputs: &[PathBuf], output: &Path, keys: &str) {
     let text = text(inputs, &format!("path = '{}'\n{keys}", output.display()));
+    let text = format!("[run]\nprovenance = false\n{text}");
     execute(&text, &Overrides::default(), &Quiet).unwrap();
 }
 

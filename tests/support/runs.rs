@@ -43,12 +43,13 @@ impl Settings {
         simd: "auto",
     };
 
+    /// Outputs do not say how they were made: of which files matters here, too.
     fn text(&self, memory: u64, report: &Path) -> String {
         let Settings { threads, spill, simd, .. } = self;
         let tile_points =
             self.tile_points.map_or(String::new(), |points| format!("tile_points = {points}\n"));
         format!(
-            "[run]\nmemory = {memory}\nthreads = {threads}\nspill = {spill:?}\nsimd = {simd:?}\n\
+            "[run]\nprovenance = false\nmemory = {memory}\nthreads = {threads}\nspill = {spill:?}\nsimd = {simd:?}\n\
              report = {report:?}\n{tile_points}"
         )
     }

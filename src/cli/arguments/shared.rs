@@ -33,6 +33,10 @@ pub(crate) struct CommonArguments {
     /// Replace no file: refuse the run, with exit code 1, if an output or the report exists
     #[arg(long)]
     pub no_clobber: bool,
+    /// Outputs do not say how they were made: no pipeline and no hashes of inputs, by which
+    /// `reproduce` makes them again
+    #[arg(long)]
+    pub no_provenance: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

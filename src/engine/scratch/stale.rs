@@ -132,20 +132,32 @@ pub(crate) fn is_at(file: &File, at: impl AsFd, path: impl Arg) -> bool {
     }
 }
 
+/// Removes what is in a folder but `spared`, folders in it with all that they hold.
+fn empty(folder: &OwnedFd, spared: &[u8]) -> io::Result<()> {
+    let entries = Dir::read_from(folder)?.collect::<rustix::io::Result<Vec<_>>>()?;
+    for entry in &entries {
+        let name = entry.file_name();
+        if [b".".as_slice(), b"..", spared].contains(&name.to_bytes()) {
+            continue;
+        }
+        match unlinkat(folder, name, AtFlags::empty()) {
+            Ok(()) | Err(Errno::NOENT) => {}
+            // A folder: Linux says the one, others the other.
+            Err(cause @ (Errno::ISDIR | Errno::PERM)) => {
+                let inner = open_folder(folder, name).map_err(|_| cause)?;
+                empty(&inner, b"")?;
+                unlinkat(folder, name, AtFlags::REMOVEDIR)?;
+            }
+            Err(cause) => return Err(cause.into()),
+        }
+    }
+    Ok(())
+}
+
 /// Removes a scratch folder, open as `folder` and called `name`, its marker last. What was put in
 /// its place meanwhile is spared, unless it is an empty folder.
 pub(crate) fn remove(at: impl AsFd, name: impl Arg, folder: &OwnedFd) -> io::Result<()> {
-    let unlink = |file: &CStr| match unlinkat(folder, file, AtFlags::empty()) {
-        Err(Errno::NOENT) => Ok(()),
-        removed => removed,
-    };
-    let entries = Dir::read_from(folder)?.collect::<rustix::io::Result<Vec<_>>>()?;
-    for entry in &entries {
-        let file = entry.file_name();
-        if ![b".".as_slice(), b"..", MARKER.as_bytes()].contains(&file.to_bytes()) {
-            unlink(file)?;
-        }
-    }
+    empty(folder, MARKER.as_bytes())?;
     match unlinkat(folder, MARKER, AtFlags::empty()) {
         Ok(()) | Err(Errno::NOENT) => {}
         Err(cause) => return Err(cause.into()),

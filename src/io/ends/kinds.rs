@@ -79,6 +79,10 @@ pub struct Read {
 /// several variable length records. Waveforms in a `.wdp` file are copied beside the output, under
 /// its name. From PLY, EPSG codes become GeoTIFF keys. No date but those of the inputs is written.
 ///
+/// The file says how it was made, in a variable length record (`pointmill`, 2) or in comments of a
+/// PLY header: the pipeline, the version of pointmill and the SHA-256 of each input, by which
+/// `pointmill reproduce` makes it again; `run.provenance = false` leaves that out.
+///
 /// With `path` all inputs become one file. With `folder` each input becomes a file of its own
 /// there: under its name (a `.copc` in it left out, for COPC is not written), with its header, its
 /// records and its offset, holding those of its points that are kept, even if that is none. The

@@ -13,6 +13,7 @@ use super::file::InputFile;
 use super::format;
 use super::header::Header;
 use super::laz::{Compression, LASZIP};
+use super::noted::NOTE;
 use super::system::CrsRecords;
 use super::vlr::{Evlr, VLR_HEAD, Vlr, read_evlrs, read_vlrs};
 use super::waveforms::Waveforms;
@@ -28,9 +29,11 @@ fn is_index(user: &str, record: u16) -> bool {
     user == "copc" || (user == "LAStools" && record == 30)
 }
 
-/// True for a record that outputs carry: not one that describes how its file stores its points.
+/// True for a record that outputs carry: not one that describes how its file stores its points, or
+/// was made.
 pub fn is_carried(vlr: &Vlr) -> bool {
-    !vlr.is(LASZIP.0, LASZIP.1) && !is_index(&vlr.user(), vlr.record())
+    let is_own = vlr.is(LASZIP.0, LASZIP.1) || vlr.is(NOTE.0, NOTE.1);
+    !is_own && !is_index(&vlr.user(), vlr.record())
 }
 
 /// True for an extended record that outputs carry.

@@ -21,6 +21,7 @@ mod input;
 mod laz;
 mod merge;
 mod native;
+mod noted;
 mod own;
 mod read;
 mod registered;

@@ -8,6 +8,7 @@ use super::format::{FAMILY, layout};
 use super::header::{CALLED, SIGNATURE};
 use super::holding::las_schema;
 use super::native::{fresh, lost};
+use super::noted;
 use super::own::{Shifted, own_form};
 use super::sink::{self, LasOptions};
 use super::{describe, source, waveforms};
@@ -56,6 +57,10 @@ impl Format for LasFormat {
 
     fn describe(&self, path: &Path) -> Result<serde_json::Value> {
         json(&describe::describe(path)?)
+    }
+
+    fn note(&self, path: &Path) -> Result<Option<String>> {
+        noted::read(path)
     }
 
     fn beside(&self, path: &Path) -> Option<(PathBuf, &'static str)> {
@@ -227,6 +232,7 @@ impl Target {
         let metadata = Metadata {
             gps_time: metadata.gps_time.or((!is_timed).then_some(GpsTime::Week)),
             pipeline: metadata.pipeline.clone(),
+            note: metadata.note.clone(),
             ..fresh(&own, metadata.crs.as_deref())
         };
         Ok(Target { schema: own, metadata, projection })

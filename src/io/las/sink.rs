@@ -19,8 +19,10 @@ use super::format::{format_of, record_size};
 use super::header::{COMPRESSED, Header};
 use super::laz::{CHUNK_POINTS, Compression};
 use super::native::Native;
+use super::noted;
+use super::noted::WrittenNote;
 use super::vlr::Vlr;
-use crate::point::{ComputedDimension, Metadata, Schema};
+use crate::point::{ComputedDimension, Metadata, RunNote, Schema};
 use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -44,7 +46,8 @@ pub struct LasOptions {
 /// (see [`fresh`](super::fresh)). Recomputed are the counts of points, the box, the places of
 /// points, extended records and waveforms (where these are in the file), the LAZ bit and its
 /// record, the bit that says that the CRS is WKT, the generating software, with `computed` the
-/// record length and the descriptors of extra bytes; and if the records went through stages
+/// record length and the descriptors of extra bytes; with `metadata.note` records say how the file
+/// was made; and if the records went through stages
 /// (`metadata.pipeline`), the system identifier, the ranges of extra bytes, and a record that names
 /// the stages.
 ///
@@ -83,8 +86,14 @@ pub fn create(
     native.header.point_data_record_length = stride;
     let compressed = if laszip.is_some() { COMPRESSED } else { 0 };
     native.header.point_data_record_format = format | compressed;
+    let note = metadata.note.clone().map(|note| {
+        let before: usize = native.vlrs.iter().map(Vlr::len).sum();
+        native.vlrs.extend(noted::records(note.draft()));
+        (u64::from(native.header.header_size) + before as u64, note)
+    });
     native.vlrs.extend(laszip);
-    Ok(Box::new(LasSink::begin(staged, native, Arc::new(encoder), notes)?))
+    let sink = LasSink::begin(staged, native, Arc::new(encoder), notes)?;
+    Ok(Box::new(LasSink { note, ..sink }))
 }
 
 /// The chunks of the sink that [`create`] would open.
@@ -159,6 +168,8 @@ struct LasSink {
     returns: [u64; 15],
     lo: [i64; 3],
     hi: [i64; 3],
+    /// How it was made, and the byte of the first record that says it.
+    note: Option<(u64, Arc<RunNote>)>,
     notes: Vec<String>,
 }
 
@@ -189,6 +200,7 @@ impl LasSink {
             returns: [0; 15],
             lo: [i64::MAX; 3],
             hi: [i64::MIN; 3],
+            note: None,
             notes,
         };
         let mut head = sink.native.header.bytes()?;
@@ -329,6 +341,9 @@ impl Sink for LasSink {
         self.settle_header()?;
         let header = self.native.header.bytes()?;
         self.rewrite(0, &header)?;
+        if let Some((at, note)) = &self.note {
+            WrittenNote { at: *at, note }.settle(&mut self.file, &self.path)?;
+        }
         self.file.sync_all().map_err(|e| Error::io(&self.path, "write it to disk", e))?;
         Ok(SinkSummary { points: self.points, bytes: self.at, notes: self.notes })
     }

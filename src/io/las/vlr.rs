@@ -98,7 +98,7 @@ impl Vlr {
     }
 
     /// What it holds, read from its file if it is left there.
-    fn whole_payload(&self) -> Result<Cow<'_, [u8]>> {
+    pub fn whole_payload(&self) -> Result<Cow<'_, [u8]>> {
         match &self.payload {
             Payload::Held(bytes) => Ok(Cow::Borrowed(bytes)),
             Payload::Left(origin, at) => {

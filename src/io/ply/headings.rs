@@ -3,20 +3,19 @@
 
 use std::collections::BTreeMap;
 
-use super::comments::{CRS, CRS_MORE, GPS_TIME, GPS_TIMES, made};
+use super::comments::{CRS, CRS_MORE, GPS_TIME, GPS_TIMES, made, pieces};
 use super::header::{Element, Encoding, Property, PropertyKind};
 use super::names;
 use super::source::{PlyNative, Rest};
 use crate::point::{Metadata, Schema, names as point_names};
-
-/// Bytes of one piece of a long text: some readers refuse header lines of 1,024 bytes.
-const PIECE: usize = 900;
 
 /// The header, but for the count of vertices.
 pub(super) struct Headings {
     /// To the end of what comments say of the coordinates and times, which the comment of [`made`]
     /// ends.
     start: String,
+    /// The lines that say how the file was made.
+    pub note: String,
     comments: String,
     /// Elements before the vertices.
     before: String,
@@ -69,6 +68,7 @@ impl Headings {
             after: rest.map(|r| lines(&r.after)).unwrap_or_default(),
             vertex: Element { name: "vertex".into(), count: 0, properties },
             start,
+            note: String::new(),
             comments,
         }
     }
@@ -76,23 +76,10 @@ impl Headings {
     /// Always of one length: blanks behind a comment take what the count leaves.
     pub fn text(&self, points: u64) -> String {
         let vertex = Element { count: points, ..self.vertex.clone() };
-        let Headings { start, comments, before, after, .. } = self;
+        let Headings { start, note, comments, before, after, .. } = self;
         let (made, vertex) = (made(points), vertex.lines());
-        format!("{start}comment {made}\n{comments}{before}{vertex}{after}end_header\n")
+        format!("{start}comment {made}\n{note}{comments}{before}{vertex}{after}end_header\n")
     }
-}
-
-/// A text in pieces that fit a header line. Line ends become blanks, and no piece ends in a blank,
-/// which readers may take off.
-fn pieces(text: &str) -> Vec<String> {
-    let mut pieces = vec![String::new()];
-    for word in text.replace(['\n', '\r'], " ").split_inclusive(|c: char| !c.is_whitespace()) {
-        match pieces.last_mut() {
-            Some(last) if last.len() + word.len() <= PIECE || last.is_empty() => *last += word,
-            _ => pieces.push(word.to_owned()),
-        }
-    }
-    pieces
 }
 
 #[cfg(test)]
@@ -104,6 +91,7 @@ mod tests {
         let vertex = Element { name: "vertex".into(), count: 0, properties: Vec::new() };
         let header = Headings {
             start: "ply\n".into(),
+            note: String::new(),
             comments: String::new(),
             before: String::new(),
             vertex,
@@ -113,14 +101,5 @@ mod tests {
         assert!([1, 9, 10, 12_345, u64::MAX].iter().all(|&n| header.text(n).len() == length));
         assert!(header.text(u64::MAX).contains("comment made by pointmill\n"));
         assert!(!header.text(7).contains('.'));
-    }
-
-    #[test]
-    fn a_long_text_is_cut_where_no_blank_is_lost() {
-        let text = format!("A {}{} Ω end", "word ".repeat(400), " ".repeat(30));
-        let cut = pieces(&text);
-        assert!(cut.len() >= 3 && cut.iter().all(|p| p.len() <= PIECE), "{}", cut.len());
-        assert!(cut.iter().all(|p| p.trim_end() == p));
-        assert_eq!(cut.concat(), text);
     }
 }

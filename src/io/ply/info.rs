@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::comments;
 use super::header::{Encoding, PlyHeader, PropertyKind};
+use super::noted;
 use crate::Result;
 use crate::io::origin::Origin;
 
@@ -57,7 +58,9 @@ pub struct PropertyInfo {
 pub fn describe(path: &Path) -> Result<PlyInfo> {
     let (file, origin) = Origin::open(path)?;
     let bytes = origin.length();
-    let header = PlyHeader::read(&file, path, bytes)?;
+    let mut header = PlyHeader::read(&file, path, bytes)?;
+    // It is told besides.
+    noted::take(&mut header.comments);
     let points = header.vertex().map_or(0, |vertex| header.elements[vertex].count);
     let word = |kind: PropertyKind| kind.word();
     let elements = header

@@ -15,6 +15,7 @@ pub(crate) mod header;
 mod headings;
 pub(crate) mod info;
 mod names;
+mod noted;
 mod registered;
 pub(crate) mod sink;
 mod source;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::encode::PlyOptions;
 use super::header::{CALLED, Encoding};
 use super::names::FAMILY;
-use super::{info, sink, source};
+use super::{info, noted, sink, source};
 use crate::Result;
 use crate::io::describe::json;
 use crate::point::{Metadata, Schema};
@@ -47,6 +47,10 @@ impl Format for PlyFormat {
 
     fn describe(&self, path: &Path) -> Result<serde_json::Value> {
         json(&info::describe(path)?)
+    }
+
+    fn note(&self, path: &Path) -> Result<Option<String>> {
+        noted::read(path)
     }
 
     fn keys(&self) -> &'static [&'static str] {

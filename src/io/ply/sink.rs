@@ -12,8 +12,9 @@ use super::encode::{CHUNK_POINTS, FULL, PlyOptions, VertexPlan, WIDE};
 use super::header::Encoding;
 use super::headings::Headings;
 use super::names::RECORDS;
+use super::noted;
 use super::source::PlyNative;
-use crate::point::{Metadata, Schema};
+use crate::point::{Metadata, RunNote, Schema};
 use crate::stage::{Colors, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -60,6 +61,8 @@ struct PlySink {
     /// What the appended colours are.
     depth: Depth,
     rest: Option<Arc<PlyNative>>,
+    /// How it was made.
+    note: Option<Arc<RunNote>>,
     notes: Vec<String>,
     points: u64,
     bytes: u64,
@@ -74,9 +77,17 @@ impl PlySink {
     ) -> Result<PlySink> {
         let native = native_of(schema, metadata);
         let plan = VertexPlan::new(options, schema, native.as_deref())?;
-        let (rest, notes) = carried(options, &plan, native.as_ref());
+        let (rest, mut notes) = carried(options, &plan, native.as_ref());
+        let note = metadata.note.clone().filter(|note| note.draft().len() <= noted::LONGEST);
+        if metadata.note.is_some() && note.is_none() {
+            notes.push("how it was made is too long for a header and not in it".to_owned());
+        }
+        let draft = note.as_ref().map_or(String::new(), |note| noted::lines(note.draft()));
         let headings = |vertex: &Schema| {
-            Headings::of(vertex, plan.encoding, metadata, native.as_deref(), rest.as_deref())
+            let (native, rest) = (native.as_deref(), rest.as_deref());
+            let mut headings = Headings::of(vertex, plan.encoding, metadata, native, rest);
+            headings.note.clone_from(&draft);
+            headings
         };
         let full = headings(&plan.full.vertex);
         let (header, other) = match &plan.narrow {
@@ -96,6 +107,7 @@ impl PlySink {
             other,
             depth: Depth::default(),
             rest,
+            note,
             notes,
             points: 0,
             bytes: text.len() as u64,
@@ -261,6 +273,9 @@ impl Sink for PlySink {
                 )));
             }
             self.carry(&native, 1)?;
+        }
+        if let Some(note) = &self.note {
+            self.header.note = noted::lines(note.text()?);
         }
         let failed = |e| Error::io(&self.path, "write the header", e);
         self.file.seek(SeekFrom::Start(0)).map_err(failed)?;

@@ -10,6 +10,7 @@ use super::comments;
 use super::file::PlyFile;
 use super::header::{Element, Encoding, PropertyKind, shown};
 use super::names::{self, RECORDS};
+use super::noted;
 use crate::io::origin::Origin;
 use crate::point::names::{GPS_TIME, XYZ};
 use crate::point::{Dimension, GpsTime, Metadata, Scalar, Schema};
@@ -124,12 +125,15 @@ impl Texts {
         let header = &file.header;
         let dimensions = names::dimensions(&properties, &header.comments);
         let properties: BTreeSet<&str> = properties.into_iter().collect();
+        let mut all = header.comments.clone();
+        // How this file was made is not how others are made of it.
+        noted::take(&mut all);
         let mut crs: Option<String> = None;
         let mut gps_time = None;
         let mut comments = Vec::new();
         // Only pieces right behind the first belong to it: other comments are free to look alike.
         let mut more = false;
-        for comment in &header.comments {
+        for comment in &all {
             if let (Some(text), None) = (comment.strip_prefix(comments::CRS), &crs) {
                 crs = Some(text.to_owned());
                 more = true;

@@ -71,7 +71,7 @@ fn report(tiles: u64) -> Report {
 fn run_figures() -> RunFigures {
     RunFigures {
         version: "0.1.0".into(),
-        inputs: vec![FileFigures { path: "a.laz".into(), points: 2_000_000, bytes: Some(12) }],
+        inputs: vec![FileFigures::of("a.laz".as_ref(), 2_000_000, Some(12))],
         machine: Machine { system: "linux x86_64".into(), processor: None, cores: 2 },
         threads: 2,
         memory_bytes: 256 << 20,

@@ -1,0 +1,60 @@
+//! The comments in which a PLY file says how it was made.
+
+use std::path::Path;
+
+use super::comments::pieces;
+use super::header::PlyHeader;
+use crate::Result;
+use crate::io::origin::Origin;
+
+/// What begins the comment that holds the text, and its further pieces.
+const NOTE: &str = "pointmill: ";
+const NOTE_MORE: &str = "pointmill+ ";
+
+/// Bytes of the longest text: headers of 1 MiB are read, and some readers make room for less.
+pub(super) const LONGEST: usize = 256 << 10;
+
+/// The header lines that hold `text`. They are of one length for all texts of a length that have
+/// their blanks at the same places.
+pub(super) fn lines(text: &str) -> String {
+    let begin = |n: usize| if n == 0 { NOTE } else { NOTE_MORE };
+    let each = pieces(text).into_iter().enumerate();
+    each.map(|(n, piece)| format!("comment {}{piece}\n", begin(n))).collect()
+}
+
+/// Takes the text out of the comments of a header; None if they have none.
+pub(super) fn take(comments: &mut Vec<String>) -> Option<String> {
+    let first = comments.iter().position(|comment| comment.starts_with(NOTE))?;
+    let more = comments[first + 1..].iter().take_while(|c| c.starts_with(NOTE_MORE)).count();
+    let taken = comments.drain(first..=first + more);
+    let text = |comment: String| {
+        let rest = comment.strip_prefix(NOTE).or_else(|| comment.strip_prefix(NOTE_MORE));
+        rest.unwrap_or_default().to_owned()
+    };
+    Some(taken.map(text).collect())
+}
+
+/// What the file at `path` says of how it was made; None if it says nothing.
+pub(super) fn read(path: &Path) -> Result<Option<String>> {
+    let (file, origin) = Origin::open(path)?;
+    let mut header = PlyHeader::read(&file, path, origin.length())?;
+    Ok(take(&mut header.comments))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_is_taken_from_among_other_comments() {
+        let text = format!("{{\"a\": [{}]}}", "1 2, ".repeat(1000));
+        let lines = format!("comment before\n{}comment pointmill+ x\n", lines(&text));
+        let mut all: Vec<String> =
+            lines.lines().map(|line| line["comment ".len()..].to_owned()).collect();
+        // One that is no piece of it, as another comes between.
+        all.insert(all.len() - 1, "between".to_owned());
+        assert_eq!(take(&mut all).unwrap(), text);
+        assert_eq!(all, ["before", "between", "pointmill+ x"]);
+        assert_eq!(take(&mut all), None);
+    }
+}
