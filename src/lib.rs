@@ -89,6 +89,7 @@
 //!   a text's values.
 //! - [`Plan`]: a graph that is fitted to headers and memory. It runs, and tells a [`Watch`] how it
 //!   goes; [`Done`] has the report.
+//! - [`report::AcceptTable`]: rules that a result is held to; [`Done::accepted`] says if it does.
 //! - [`compare`]: [`verify`](compare::verify) says whether a scan is a reduction of another, and
 //!   how true it is.
 //! - [`cli`]: the command line. A program of yours with stages of its own calls [`cli::main`] with
@@ -118,6 +119,7 @@ pub mod io;
 mod language;
 pub mod memory;
 pub mod ops;
+mod page;
 pub mod picture;
 mod plan;
 pub mod point;

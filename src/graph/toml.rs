@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::{Graph, GraphStage, RunSettings};
+use super::{Graph, GraphStage};
 use crate::stage::Role;
 use crate::{Error, Result};
 
@@ -11,6 +11,8 @@ use crate::{Error, Result};
 struct Document {
     #[serde(skip_serializing_if = "Map::is_empty")]
     run: Map<String, Value>,
+    #[serde(skip_serializing_if = "Map::is_empty")]
+    accept: Map<String, Value>,
     stage: Vec<Map<String, Value>>,
 }
 
@@ -31,7 +33,8 @@ impl Graph {
             }
         }
         let stage = stage.into_iter().map(literal_table).collect();
-        let document = Document { run: literal_table(settings(&self.settings)?), stage };
+        let accept = literal_table(table_of(&self.accept)?);
+        let document = Document { run: literal_table(table_of(&self.settings)?), accept, stage };
         toml::to_string(&document)
             .map_err(|cause| Error::internal("the graph is no TOML").because(cause))
     }
@@ -88,13 +91,13 @@ fn table(
     Ok(table)
 }
 
-/// The settings that are not as they are without being given.
-fn settings(settings: &RunSettings) -> Result<Map<String, Value>> {
-    let all = |settings: &RunSettings| match serde_json::to_value(settings) {
+/// The keys of a table that are not as they are without being given.
+fn table_of<T: Serialize + Default>(given: &T) -> Result<Map<String, Value>> {
+    let all = |table: &T| match serde_json::to_value(table) {
         Ok(Value::Object(all)) => Ok(all),
-        _ => Err(Error::internal("the settings of a run are no table")),
+        _ => Err(Error::internal("the settings of a pipeline are no table")),
     };
-    let (given, default) = (all(settings)?, all(&RunSettings::default())?);
+    let (given, default) = (all(given)?, all(&T::default())?);
     let differs = |(key, value): &(String, Value)| default.get(key) != Some(value);
     Ok(given.into_iter().filter(differs).collect())
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use rayon::ThreadPool;
 
+use super::accepted::accepted;
 use super::demanded::{demands, lists_bytes};
 use super::limits::{check_limits, number_selections};
 use super::look::{Unfit, look, look_at_corners};
@@ -97,7 +98,7 @@ impl Graph {
     pub fn plan(self, overrides: &Overrides) -> Result<Plan> {
         let (origin, file) = (self.origin.clone(), self.file.clone());
         let settings = self.settings.clone().with(overrides);
-        let whole_rims = self.whole_rims;
+        let (whole_rims, rules) = (self.whole_rims, self.accept.clone());
         let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
         let mut sorted = Sorted::new(self)?;
         let places = |read: &[PathBuf], sinks: &[Box<dyn CreateSink>]| {
@@ -108,6 +109,8 @@ impl Graph {
             fit_stages(&mut sorted, wrong)?;
         let schema = &schemas.last;
         let read = all_read(&*sorted.source.1, &*source);
+        let units = source.metadata().units;
+        let accept = accepted(rules, &sorted, schema, &units).map_err(in_file)?;
         let (mut files, wrong) = places(&read, &sorted.sinks);
         Error::all(wrong)?;
         let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;
@@ -128,6 +131,7 @@ impl Graph {
             simd,
             threads: demands.threads,
             settings,
+            accept,
             whole_rims,
             source,
             source_kind: sorted.source.0,

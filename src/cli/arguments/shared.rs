@@ -30,6 +30,10 @@ pub(crate) struct CommonArguments {
     /// Write the report to this file
     #[arg(long, value_name = "FILE")]
     pub report: Option<String>,
+    /// What the result must be, such as "max <= 5mm, p99 <= 2mm, kept >= 10%, lossless": the exit
+    /// code is 3 if it is not; what is written is written all the same
+    #[arg(long, value_name = "RULES")]
+    pub accept: Option<String>,
     /// Replace no file: refuse the run, with exit code 1, if an output or the report exists
     #[arg(long)]
     pub no_clobber: bool,
