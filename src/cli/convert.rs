@@ -140,7 +140,8 @@ impl Total {
 
 /// Runs one pipeline after the other. One that fails is told at once and does not keep the others
 /// from running, as do `odd` names, of which there can be no pipeline; the error in the end is of
-/// the first failure's kind, rather than that a result is not accepted. Returned are those that are done and what became of all.
+/// the first failure's kind, rather than that a result is not accepted. Returned are those that are
+/// done and what became of all.
 fn run_all(
     runs: Vec<(PathBuf, Graph)>,
     odd: Vec<PathBuf>,

@@ -191,6 +191,8 @@ pub(super) fn command() -> Command {
         let hide = |sub: Command, flag| sub.mut_arg(flag, |a| a.hide(true));
         all.mut_subcommand(*command, |sub| ["report", "no_clobber"].into_iter().fold(sub, hide))
     });
+    let hide = |verify: Command| verify.mut_arg("accept", |a| a.hide(true));
+    let hidden = hidden.mut_subcommand("verify", hide);
     EXAMPLES.iter().fold(hidden, |all, (command, examples)| {
         all.mut_subcommand(*command, |sub| sub.after_help(*examples))
     })

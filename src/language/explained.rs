@@ -125,9 +125,9 @@ impl Explained {
         Ok(Explained { params, run, accept, stages: stages.collect() })
     }
 
-    /// The same for programs: `params`, `run`, `accept` and each of `stages` are lists of objects with a
-    /// `key`, its `value` (null where it has none) and its `origin`, as the comments of the text
-    /// have it.
+    /// The same for programs: `params`, `run`, `accept` and each of `stages` are lists of objects
+    /// with a `key`, its `value` (null where it has none) and its `origin`, as the comments of the
+    /// text have it.
     pub fn to_json(&self) -> Value {
         let key = |one: &ExplainedKey| {
             let ExplainedKey { key, value, origin, .. } = one;

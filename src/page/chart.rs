@@ -18,7 +18,7 @@ const TOP: f64 = 44.0;
 const FLOOR: f64 = 252.0;
 
 /// Bars on the axis of logarithms, each as wide as what it counts and as high as that is dense.
-struct Bars {
+struct DeviationBars {
     /// Binary logarithms of where each begins and ends, and its records; in ascending order.
     bars: Vec<(f64, f64, u64)>,
     /// Records that deviate less.
@@ -28,12 +28,12 @@ struct Bars {
     ends: [f64; 2],
 }
 
-impl Bars {
+impl DeviationBars {
     /// Of bins in eighths of powers of two of `step`.
-    fn of(bins: &[DeviationBin], step: f64) -> Option<Bars> {
+    fn of(bins: &[DeviationBin], step: f64) -> Option<DeviationBars> {
         let end = libm::log2(bins.last().filter(|bin| bin.to > 0.0)?.to);
         let all: u64 = bins.iter().map(|bin| bin.points).sum();
-        let mut out = Bars { bars: Vec::new(), less: 0, all, ends: [end; 2] };
+        let mut out = DeviationBars { bars: Vec::new(), less: 0, all, ends: [end; 2] };
         let most_less = (all as f64 * LEFT_OUT) as u64;
         for bin in bins {
             let from = if bin.to > 0.0 { libm::log2(begin(bin.to, step)) } else { f64::MIN };
@@ -78,7 +78,7 @@ pub(super) fn svg(
     totals: &DeviationTotals,
     unit: Option<&str>,
 ) -> String {
-    let Some(bars) = Bars::of(bins, step) else { return String::new() };
+    let Some(bars) = DeviationBars::of(bins, step) else { return String::new() };
     let [wide, high] = SIZE;
     let mut out = format!(
         "<svg viewBox=\"0 0 {wide} {high}\" role=\"img\" aria-label=\"Histogram of deviations and \
@@ -106,7 +106,7 @@ fn line(out: &mut String, [x, y, to_x, to_y]: [f64; 4], class: &str) {
 }
 
 /// Lines of the parts, and lengths in powers of ten below.
-fn axes(out: &mut String, bars: &Bars, unit: Option<&str>) {
+fn axes(out: &mut String, bars: &DeviationBars, unit: Option<&str>) {
     for part in [0, 25, 50, 75, 100] {
         let y = FLOOR - (FLOOR - TOP) * f64::from(part) / 100.0;
         line(out, [LEFT, y, RIGHT, y], "grid");
@@ -129,7 +129,7 @@ fn axes(out: &mut String, bars: &Bars, unit: Option<&str>) {
 }
 
 /// The bars, and the curve above them.
-fn columns(out: &mut String, bars: &Bars) {
+fn columns(out: &mut String, bars: &DeviationBars) {
     let density = |&(from, to, count): &(f64, f64, u64)| count as f64 / (to - from);
     let most = bars.bars.iter().map(density).fold(f64::MIN_POSITIVE, f64::max);
     let part = |seen: u64| FLOOR - (FLOOR - TOP) * seen as f64 / bars.all.max(1) as f64;
@@ -153,7 +153,7 @@ fn columns(out: &mut String, bars: &Bars) {
 }
 
 /// Lines at the percentiles; words beside each other do not cover each other.
-fn marks(out: &mut String, bars: &Bars, totals: &DeviationTotals, unit: Option<&str>) {
+fn marks(out: &mut String, bars: &DeviationBars, totals: &DeviationTotals, unit: Option<&str>) {
     let all = [("50 %", totals.p50), ("95 %", totals.p95), ("99 %", totals.p99)];
     let mut end = [f64::NEG_INFINITY; 2];
     for (name, length) in all.into_iter().chain([("max", totals.max)]) {
@@ -191,12 +191,12 @@ mod tests {
     #[test]
     fn bars_have_all_records_but_the_least_and_end_at_the_largest() {
         let figures = [(0.0, 2), (1e-9, 1), (0.25, 700), (0.5, 100), (1.0, 400), (2.0, 3)];
-        let bars = Bars::of(&bins(&figures), 1.0).unwrap();
+        let bars = DeviationBars::of(&bins(&figures), 1.0).unwrap();
         let counts: Vec<u64> = bars.bars.iter().map(|bar| bar.2).collect();
         assert_eq!((bars.less, counts, bars.all), (3, vec![700, 100, 400, 3], 1206));
         assert_eq!((bars.x(2.0), bars.x(1e-9), bars.x(0.0)), (Some(RIGHT), None, None));
         assert_eq!(bars.at(bars.bars[0].0), LEFT);
-        assert!(Bars::of(&bins(&[(0.0, 9)]), 1.0).is_none());
+        assert!(DeviationBars::of(&bins(&[(0.0, 9)]), 1.0).is_none());
     }
 
     #[test]

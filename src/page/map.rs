@@ -14,7 +14,7 @@ const COLUMNS: usize = 1 << 14;
 
 /// What the tiles of a column come to.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Column {
+struct TileColumn {
     left: u64,
     deviation: Option<f64>,
 }
@@ -27,7 +27,7 @@ pub(super) struct TileMap {
     origin: [f64; 2],
     /// A column is 2^`joined` tiles wide.
     joined: u32,
-    columns: BTreeMap<[i64; 2], Column>,
+    columns: BTreeMap<[i64; 2], TileColumn>,
     /// Smallest and largest column along x and y.
     extent: Option<[[i64; 2]; 2]>,
 }
@@ -58,7 +58,7 @@ impl TileMap {
             let steps = (tile.corner[axis] - self.origin[axis]) / self.side;
             steps.round() as i64 >> self.joined
         });
-        let column = Column {
+        let column = TileColumn {
             left: tile.points.after,
             deviation: tile.deviation.map(|deviation| deviation.max),
         };
@@ -68,7 +68,7 @@ impl TileMap {
         }
     }
 
-    fn put(&mut self, place: [i64; 2], with: Column) {
+    fn put(&mut self, place: [i64; 2], with: TileColumn) {
         let [low, high] = self.extent.unwrap_or([place; 2]);
         let least = [0, 1].map(|axis| low[axis].min(place[axis]));
         let most = [0, 1].map(|axis| high[axis].max(place[axis]));
@@ -122,7 +122,7 @@ impl TileMap {
     fn drawn(
         &self,
         colors: &[[u8; 3]],
-        of: impl Fn(&Column) -> Option<f64>,
+        of: impl Fn(&TileColumn) -> Option<f64>,
     ) -> Result<Option<DrawnMap>> {
         let mut figures: Vec<f64> = self.columns.values().filter_map(&of).collect();
         figures.sort_unstable_by(f64::total_cmp);
@@ -175,9 +175,9 @@ mod tests {
         map.add(&tile(0.25, 0.0, 0.0, Some(1.0)));
         map.add(&tile(0.25, 0.0, 0.5, Some(3.0)));
         map.add(&tile(-0.25, 0.5, 0.0, None));
-        let two = Column { left: 4, deviation: Some(3.0) };
+        let two = TileColumn { left: 4, deviation: Some(3.0) };
         assert_eq!(map.columns.get(&[0, 0]), Some(&two));
-        assert_eq!(map.columns.get(&[-1, 1]), Some(&Column { left: 2, deviation: None }));
+        assert_eq!(map.columns.get(&[-1, 1]), Some(&TileColumn { left: 2, deviation: None }));
         let drawn = map.deviations().unwrap().unwrap();
         assert_eq!((drawn.image.width, drawn.image.height, drawn.most), (2, 2, 3.0));
         assert_eq!(map.densities().unwrap().unwrap().most, 8.0);

@@ -3,8 +3,9 @@
 use askama::Template;
 
 use super::branch::{BranchView, Tiles};
-use super::scenes::{PlaceView, Scene, draw};
-use super::{PageSource, words};
+use super::scenes::{PlaceView, SceneView, draw};
+use super::source::PageSource;
+use super::words;
 use crate::Result;
 use crate::report::{FileFigures, Outcome};
 
@@ -17,7 +18,7 @@ pub(super) struct Page {
     /// True if all rules hold; None without rules.
     passed: Option<bool>,
     branches: Vec<BranchView>,
-    scenes: Vec<Scene>,
+    scenes: Vec<SceneView>,
     has_after: bool,
     places: Vec<PlaceView>,
     warnings: Vec<String>,
@@ -127,6 +128,15 @@ fn not_measured(results: &[&Outcome], missing: &mut Vec<String>) {
         removed && result.totals.is_some_and(|totals| totals.deviation.is_none())
     }) {
         say("How far removed points are off: no stage says what stands for them.");
+    }
+    for result in results {
+        let deviation = result.totals.and_then(|totals| totals.deviation);
+        let measured = deviation.map_or(0, |deviation| deviation.points);
+        let others = result.ledger.removed_records().saturating_sub(measured);
+        if measured > 0 && others > 0 {
+            let others = words::count(others);
+            say(&format!("How far {others} removed points are off: nothing stands for them."));
+        }
     }
     let has_baseline = |result: &Outcome| result.totals.is_some_and(|t| t.baseline.is_some());
     if any(|result| result.ledger.removed_records() > 0) && !results.iter().any(|r| has_baseline(r))

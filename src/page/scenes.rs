@@ -1,12 +1,12 @@
 //! What is drawn of the scans before and after: both from above and from a side, and the worst
 //! places.
 
-use super::PageSource;
 use super::bits::Image;
+use super::source::PageSource;
 use super::words;
 use super::worst::WorstPlace;
 use crate::Result;
-use crate::picture::{Place, View, draw_several};
+use crate::picture::{DrawnPlace, View, draw_several};
 use crate::report::{Coordinate, Outcome};
 use crate::stage::Source;
 
@@ -18,7 +18,7 @@ const SPACINGS: f64 = 5.0;
 const DEVIATIONS: f64 = 3.0;
 
 /// A picture of both scans.
-pub(super) struct Scene {
+pub(super) struct SceneView {
     pub title: &'static str,
     pub image: Image,
     pub told: String,
@@ -39,10 +39,10 @@ pub(super) fn draw(
     source: &PageSource<'_>,
     (worst, spacing): (&[WorstPlace], f64),
     missing: &mut Vec<String>,
-) -> (Vec<Scene>, Vec<PlaceView>) {
+) -> (Vec<SceneView>, Vec<PlaceView>) {
     let result = &source.report.result;
-    let places: Vec<Place> =
-        worst.iter().map(|w| Place { at: w.at, half: half_side(w, spacing) }).collect();
+    let places: Vec<DrawnPlace> =
+        worst.iter().map(|w| DrawnPlace { at: w.at, half: half_side(w, spacing) }).collect();
     let after = match &source.after {
         Ok(after) if after.points() > 0 => Some(&**after),
         Ok(_) => None,
@@ -82,8 +82,8 @@ fn half_side(worst: &WorstPlace, spacing: f64) -> f64 {
 fn both(
     source: &PageSource<'_>,
     after: Option<&dyn Source>,
-    places: &[Place],
-) -> Result<(Vec<Scene>, Vec<Vec<Image>>)> {
+    places: &[DrawnPlace],
+) -> Result<(Vec<SceneView>, Vec<Vec<Image>>)> {
     let views = [View::Above, View::South];
     let size = (WIDTH, source.threads);
     let (pictures, cut_outs) = draw_several(source.before, after, &views, places, size)?;
@@ -91,9 +91,9 @@ fn both(
     let scenes = pictures.iter().zip(titles).map(|(picture, title)| {
         let told = told(picture.range, picture.pixel, source.unit);
         let image = Image::of([picture.width, picture.height], &picture.pixels)?;
-        Ok(Scene { title, image, told })
+        Ok(SceneView { title, image, told })
     });
-    let scenes = scenes.collect::<Result<Vec<Scene>>>()?;
+    let scenes = scenes.collect::<Result<Vec<SceneView>>>()?;
     let images = |pixels: &[Vec<u8>; 2], size| -> Result<Vec<Image>> {
         pixels.iter().map(|pixels| Image::of(size, pixels)).collect()
     };

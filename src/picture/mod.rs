@@ -19,7 +19,7 @@ use look::{Frame, Look};
 use paint::Canvas;
 use settings::NARROWEST;
 pub use settings::{ColorBy, Settings, View, WIDEST};
-pub(crate) use several::{Place, draw_several};
+pub(crate) use several::{DrawnPlace, draw_several};
 
 /// Panels that are drawn side by side, at most.
 pub const MOST_PANELS: usize = 4;

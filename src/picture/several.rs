@@ -10,7 +10,7 @@ use crate::stage::Source;
 
 /// A place of a scan that is drawn by itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Place {
+pub(crate) struct DrawnPlace {
     /// World coordinates of its middle.
     pub at: [f64; 3],
     /// Half the side of the cube around it that is drawn, in the scan's unit.
@@ -40,12 +40,12 @@ const MIDDLE: (u32, (f32, [u8; 3])) = (8, (2e-4, [214, 62, 48]));
 
 /// A place while points come by.
 struct OpenPlace {
-    place: Place,
+    place: DrawnPlace,
     views: [(View, Frame, Canvas); 2],
 }
 
 impl OpenPlace {
-    fn new(place: Place) -> Self {
+    fn new(place: DrawnPlace) -> Self {
         let views = [View::Above, View::South].map(|view| {
             let pixel = 2.0 * place.half / f64::from(PLACE[1]);
             (view, Frame::around(view.seen(place.at), PLACE, pixel), Canvas::new(PLACE, 1))
@@ -56,7 +56,7 @@ impl OpenPlace {
     }
 
     fn draw(&self, point: [f64; 3], (wide, near): (u32, (f32, [u8; 3]))) {
-        let Place { at, half } = self.place;
+        let DrawnPlace { at, half } = self.place;
         // Pictures are wider than high.
         let reach = half * f64::from(PLACE[0]) / f64::from(PLACE[1]);
         let off: [f64; 3] = std::array::from_fn(|axis| (point[axis] - at[axis]).abs());
@@ -86,7 +86,7 @@ pub(crate) fn draw_several(
     before: &dyn Source,
     after: Option<&dyn Source>,
     views: &[View],
-    places: &[Place],
+    places: &[DrawnPlace],
     (width, threads): (u32, usize),
 ) -> Result<(Vec<Picture>, Vec<CutOut>)> {
     let by = ColorBy::Height;

@@ -2,25 +2,21 @@
 //! be so for every record, before anyone waits for it.
 
 use super::sorted::Sorted;
+use crate::Error;
 use crate::engine::pass::StreamOp;
 use crate::error::listed;
-use crate::point::{Schema, Units};
+use crate::point::Schema;
 use crate::report::{ACCEPT_RULES, AcceptFigure, AcceptTable};
-use crate::{Error, Result};
+use crate::stage::Source;
 
-/// The rules in the unit of the scan.
-///
-/// # Errors
-///
-/// All rules on what a run of these stages does not measure or keep, and lengths in units that the
-/// scan does not tell.
+/// The rules in the unit of the scan. Added to what is `wrong`: all rules on what a run of these
+/// stages does not measure or keep, and lengths in units that the scan does not tell.
 pub(super) fn accepted(
     table: AcceptTable,
     sorted: &Sorted,
-    schema: &Schema,
-    units: &Units,
-) -> Result<AcceptTable> {
-    let mut wrong = Vec::new();
+    (source, schema): (&dyn Source, &Schema),
+    wrong: &mut Vec<Error>,
+) -> AcceptTable {
     for rule in table.all() {
         let name = rule.figure.name();
         if rule.figure.is_deviation() && !sorted.ops.iter().any(|s| s.op.tile().needs().measures) {
@@ -34,8 +30,13 @@ pub(super) fn accepted(
             wrong.extend(losing(sorted, schema));
         }
     }
-    Error::all(wrong)?;
-    table.in_scan(units)
+    match table.in_scan(&source.metadata().units) {
+        Ok(table) => table,
+        Err(error) => {
+            wrong.push(error);
+            AcceptTable::default()
+        }
+    }
 }
 
 /// Why records are not written as they were read; None if they are.

@@ -28,6 +28,7 @@ use crate::graph::{Nonfinite, Overrides, RunSettings};
 use crate::host::Threads;
 use crate::point::{Schema, Units};
 use crate::quantity::Figure;
+use crate::report::AcceptTable;
 use crate::stage::{CreateSink, Source};
 use crate::store::CLASSED_INPUTS;
 use crate::{Error, Result};
@@ -105,12 +106,10 @@ impl Graph {
             check_places(file.as_deref(), read, sinks, &settings)
         };
         let (_, wrong) = places(&sorted.source.1.paths(), &sorted.sinks);
-        let FittedStages { source, schemas, choices, passes, given } =
-            fit_stages(&mut sorted, wrong)?;
+        let FittedStages { source, schemas, choices, passes, given, accept } =
+            fit_stages(&mut sorted, rules, wrong)?;
         let schema = &schemas.last;
         let read = all_read(&*sorted.source.1, &*source);
-        let units = source.metadata().units;
-        let accept = accepted(rules, &sorted, schema, &units).map_err(in_file)?;
         let (mut files, wrong) = places(&read, &sorted.sinks);
         Error::all(wrong)?;
         let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;
@@ -119,7 +118,6 @@ impl Graph {
         let tagger = tagger(&sorted.ops, &passes.passes, &choices, &ranks, schema, &settings)?;
         let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, (&*source, schema), &sorted.ops, order.mills)?;
-        let simd = settings.simd.resolve().map_err(in_file)?;
         let demands = demands(&sorted, &passes, (&*source, schema), &order, &settings)?;
         let lists = demands.lists + lists_bytes(&each, &sides, &ranks);
         let demands = Demands { lists, tagged: tagger.tags(), ..demands };
@@ -128,7 +126,7 @@ impl Graph {
         warnings.extend(doubt.into_iter().chain(wide));
         let task = Task {
             warnings,
-            simd,
+            simd: settings.simd.resolve().map_err(in_file)?,
             threads: demands.threads,
             settings,
             accept,
@@ -167,11 +165,16 @@ struct FittedStages {
     choices: Vec<Choice>,
     passes: Passes,
     given: Vec<GivenLengths>,
+    accept: AcceptTable,
 }
 
 /// Opens the inputs and fits the stages to them. What is `wrong` so far is told with what is found
 /// here.
-fn fit_stages(sorted: &mut Sorted, mut wrong: Vec<Error>) -> Result<FittedStages> {
+fn fit_stages(
+    sorted: &mut Sorted,
+    rules: AcceptTable,
+    mut wrong: Vec<Error>,
+) -> Result<FittedStages> {
     let source = match sorted.source.1.open() {
         Ok(source) => source,
         Err(error) => {
@@ -187,8 +190,9 @@ fn fit_stages(sorted: &mut Sorted, mut wrong: Vec<Error>) -> Result<FittedStages
     wrong.extend(unfit);
     let choices = number_selections(&mut sorted.ops)?;
     let passes = unroll(sorted, &schemas.last, &mut wrong)?;
+    let accept = accepted(rules, sorted, (&*source, &schemas.last), &mut wrong);
     Error::all(wrong)?;
-    Ok(FittedStages { source, schemas, choices, passes, given })
+    Ok(FittedStages { source, schemas, choices, passes, given, accept })
 }
 
 /// Fits tile stages to the units of the scan: lengths with a unit of their own are converted. What

@@ -22,7 +22,8 @@ use crate::{Error, Result};
 ///
 /// - `max`, `rms`, `p50`, `p95` and `p99` are how far removed points are from the surface of what
 ///   stands for them: the largest, the root of the mean square, and what 50, 95 and 99 of 100 are
-///   no farther than. A bound is a length: in the scan's unit, or such as `5mm`.
+///   no farther than; of the points for which something stands, as the report counts them. A bound
+///   is a length: in the scan's unit, or such as `5mm`.
 /// - `kept` is how many of the points that were read are written. A bound is a number such as
 ///   `250k`, or a part such as `10%`.
 /// - `lossless` has no bound: the records that are written are those that were read, byte for byte,

@@ -144,8 +144,8 @@ impl Histogram {
         }
     }
 
-    /// The records by eighths of a power of two: upper edge in lattice steps, 0 for the bin of zero,
-    /// and how many; in ascending order, without bins of no record.
+    /// The records by eighths of a power of two: upper edge in lattice steps, 0 for the bin of
+    /// zero, and how many; in ascending order, without bins of no record.
     pub fn eighths(&self) -> impl Iterator<Item = (f32, u64)> {
         let first = [(0.0, self.zero), (upper_edge(0), self.bins[0])];
         let joined = self.bins[1..].chunks(JOINED).enumerate();

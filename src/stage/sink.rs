@@ -206,8 +206,8 @@ pub trait CreateSink: Send + Sync {
     /// Where [`create`](CreateSink::create) would refuse the schema.
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize>;
 
-    /// True if it writes records of `schema` byte for byte as they come, but for what stages computed
-    /// and is written behind them.
+    /// True if it writes records of `schema` byte for byte as they come, but for what stages
+    /// computed and is written behind them.
     fn carries(&self, _schema: &Schema) -> bool {
         false
     }

@@ -8,14 +8,13 @@ use serde_json::Value;
 use crate::support::command::{done, fails, pointmill};
 
 /// A scan in the folder, and a pipeline that thins it out and writes a report.
-fn pipeline(at: &Path, accept: &str) -> Value {
+fn pipeline(at: &Path, accept: &str) {
     done(at, &["synth", "part", "-n", "4000", "-o", "scan.laz"]);
     let text = format!(
         "{accept}\n[run]\nreport = 'report.json'\n[[stage]]\nkind = 'read'\npath = 'scan.laz'\n\
-         [[stage]]\nkind = 'grid'\nside = 0.1\n[[stage]]\nkind = 'write'\npath = 'thin.laz'\n"
+         [[stage]]\nkind = 'grid'\nside = 5\n[[stage]]\nkind = 'write'\npath = 'thin.laz'\n"
     );
     fs::write(at.join("p.toml"), text).unwrap();
-    Value::Null
 }
 
 fn report(at: &Path) -> Value {
@@ -96,7 +95,7 @@ fn rules_that_a_run_cannot_answer_are_refused_before_it() {
         (&["run", "p.toml", "--accept", "max <= 5mm"], "has a unit, and the scan does not say"),
         (&["run", "p.toml", "--accept", "mxa <= 5"], "did you mean `max`?"),
         (
-            &["run", "read scan.laz ! assign UserData=1 ! write o.las", "--accept", "lossless"],
+            &["run", "read scan.laz ! assign 'UserData = 1' ! write o.las", "--accept", "lossless"],
             "`assign` changes records",
         ),
     ] {
@@ -114,9 +113,9 @@ fn each_branch_is_held_to_the_rules() {
     let at = folder.path();
     pipeline(at, "");
     let text = "[[stage]]\nkind = 'read'\npath = 'scan.laz'\n\
-                [[stage]]\nkind = 'grid'\nfrom = 'read'\nside = 0.05\n\
+                [[stage]]\nkind = 'grid'\nfrom = 'read'\nside = 5\n\
                 [[stage]]\nkind = 'write'\npath = 'fine.laz'\n\
-                [[stage]]\nkind = 'grid'\nfrom = 'read'\nside = 0.4\n\
+                [[stage]]\nkind = 'grid'\nfrom = 'read'\nside = 40\n\
                 [[stage]]\nkind = 'write'\npath = 'coarse.laz'\n";
     fs::write(
         at.join("two.toml"),

@@ -34,7 +34,7 @@ fn a_page_is_one_file_that_says_what_a_report_says() {
     for told in [
         "scan.laz: reduction report",
         ">FAIL<",
-        "<code>max &lt;= 1e-6</code>",
+        "<code>max &#60;= 1e-6</code>",
         "does not hold",
         "20,000",
         "From above",
@@ -96,21 +96,7 @@ fn names_and_texts_of_files_stand_in_a_page_as_text() {
 fn what_was_not_measured_or_drawn_is_said() {
     let folder = scan("3000");
     let at = folder.path();
-    done(
-        at,
-        &[
-            "convert",
-            "scan.laz",
-            "-o",
-            "o.ply",
-            "--report",
-            "p.html",
-            "--drop",
-            "GpsTime,\
-        ScanAngle,PointSourceId,UserData,Synthetic,KeyPoint,Withheld,Overlap,ScannerChannel,\
-        ScanDirection,EdgeOfFlightLine,NearInfrared",
-        ],
-    );
+    done(at, &["convert", "scan.laz", "-o", "o.las", "--report", "p.html"]);
     let html = fs::read_to_string(at.join("p.html")).unwrap();
     assert!(html.contains("a pipeline that streams has no tiles"));
     assert!(html.contains("nobody gave rules by which it is accepted"));
