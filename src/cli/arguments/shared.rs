@@ -27,7 +27,8 @@ pub(crate) struct CommonArguments {
     /// was for
     #[arg(short, long)]
     pub verbose: bool,
-    /// Write the report to this file
+    /// Write the report to this file: as JSON or, if its name ends in .html, as a page that people
+    /// hand on, with pictures, maps and curves
     #[arg(long, value_name = "FILE")]
     pub report: Option<String>,
     /// What the result must be, such as "max <= 5mm, p99 <= 2mm, kept >= 10%, lossless": the exit
