@@ -88,7 +88,7 @@ Examples:
   pointmill reduce survey/*.laz -o reduced.laz
   pointmill reduce survey/*.laz -o reduced.laz --keep 10% --report reduced.json
   pointmill reduce survey/*.laz -o reduced.laz --tolerance 5cm
-  pointmill reduce survey/*.laz -o reduced.laz --report reduced.html --accept "max <= 20cm, lossless"
+  pointmill reduce survey.laz -o reduced.laz --report reduced.html --accept 'max <= 20cm'
   pointmill reduce survey --outdir reduced --classes 2 --max-side 2
   pointmill reduce part.ply -o part-reduced.ply --preset part --max-angle 6deg
   pointmill reduce survey.laz -o marked.laz --mark key-point --order input
