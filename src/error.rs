@@ -95,6 +95,8 @@ pub enum ErrorKind {
     Pipeline,
     /// The memory budget or the disk is too small; the message names the number that would do.
     Memory,
+    /// The run is done and its outputs are written, but a rule of its pipeline does not hold.
+    NotAccepted,
     /// The user asked to stop.
     Interrupted,
     /// pointmill broke a promise of its own, such as a ledger that does not balance.

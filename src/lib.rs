@@ -89,6 +89,7 @@
 //!   a text's values.
 //! - [`Plan`]: a graph that is fitted to headers and memory. It runs, and tells a [`Watch`] how it
 //!   goes; [`Done`] has the report.
+//! - [`report::AcceptTable`]: rules that a result is held to; [`Done::accepted`] says if it does.
 //! - [`compare`]: [`verify`](compare::verify) says whether a scan is a reduction of another, and
 //!   how true it is; [`reproduce`](compare::reproduce), whether the run that made an output gives
 //!   it again.
@@ -119,6 +120,7 @@ pub mod io;
 mod language;
 pub mod memory;
 pub mod ops;
+mod page;
 pub mod picture;
 mod plan;
 pub mod point;

@@ -10,7 +10,7 @@ use super::console::Console;
 use super::flags::{common_flags, convert_flags, given};
 use super::mistyped::marked;
 use super::pipeline::{HIDDEN, with_stages};
-use super::run::mill;
+use super::run::{finish, mill};
 use crate::budget::Bytes;
 use crate::engine::{Done, make_folder, refuse_existing};
 use crate::error::{listed, shown};
@@ -36,7 +36,7 @@ pub(super) fn convert(
     let (folder, formats) = (Path::new(&arguments.output), registry.formats());
     if !(arguments.output.ends_with('/') || folder.is_dir()) {
         let one = pipeline(arguments, json!(arguments.inputs), json!(arguments.output), registry);
-        return console.result(mill(one?, console)?);
+        return finish(&mill(one?, console)?, console);
     }
     let (inputs, odd): (Vec<PathBuf>, Vec<PathBuf>) = expand_any(&arguments.inputs, formats)?
         .into_iter()
@@ -141,7 +141,8 @@ impl Total {
 
 /// Runs one pipeline after the other. One that fails is told at once and does not keep the others
 /// from running, as do `odd` names, of which there can be no pipeline; the error in the end is of
-/// the first failure's kind. Returned are those that are done and what became of all.
+/// the first failure's kind, rather than that a result is not accepted. Returned are those that are
+/// done and what became of all.
 fn run_all(
     runs: Vec<(PathBuf, Graph)>,
     odd: Vec<PathBuf>,
@@ -159,7 +160,13 @@ fn run_all(
             return (done, Err(Error::interrupted()));
         }
         match mill(pipeline, console) {
-            Ok(one) => done.push(one),
+            Ok(one) => {
+                if let Err(error) = one.accepted() {
+                    failures.push(error.kind());
+                    console.error(&error.at(input));
+                }
+                done.push(one);
+            }
             Err(error) if total == 1 || error.kind() == ErrorKind::Interrupted => {
                 return (done, Err(error));
             }
@@ -170,7 +177,9 @@ fn run_all(
         }
     }
     let told = format!("{} of {total} conversions failed", failures.len());
-    (done, failures.first().map_or(Ok(()), |kind| Err(Error::new(*kind, told))))
+    let is_worse = |kind: &&ErrorKind| **kind != ErrorKind::NotAccepted;
+    let kind = failures.iter().find(is_worse).or(failures.first());
+    (done, kind.map_or(Ok(()), |kind| Err(Error::new(*kind, told))))
 }
 
 fn pipeline(

@@ -61,6 +61,7 @@ impl Events {
                 "classes": result.classes,
                 "totals": result.totals,
                 "decisions": result.decisions,
+                "accept": result.accept,
                 "outputs": run.outputs,
                 "report": done.report_path.as_ref().map(|path| path.display().to_string()),
                 "memory_bytes": run.memory_bytes,
@@ -81,6 +82,7 @@ impl Events {
             ErrorKind::Data => "data",
             ErrorKind::Pipeline => "pipeline",
             ErrorKind::Memory => "memory",
+            ErrorKind::NotAccepted => "not accepted",
             ErrorKind::Interrupted => "interrupted",
             ErrorKind::Internal => "internal",
         };

@@ -8,6 +8,7 @@ Exit codes:
   0    done
   1    the run failed: I/O, bad data, over budget
   2    the command or the pipeline is wrong
+  3    the run is done, and the result is not accepted by its rules
   130  interrupted
 
 Results go to stdout, progress and messages to stderr.";
@@ -17,6 +18,7 @@ pub(super) fn exit_number(error: &Error) -> u8 {
     match error.kind() {
         ErrorKind::Io | ErrorKind::Data | ErrorKind::Memory | ErrorKind::Internal => 1,
         ErrorKind::Pipeline => 2,
+        ErrorKind::NotAccepted => 3,
         ErrorKind::Interrupted => 130,
     }
 }

@@ -11,6 +11,7 @@ use super::classes::Classes;
 use crate::language::Set;
 use crate::ops::KEEP_RANK;
 use crate::quantity::{Length, parse_count};
+use crate::report::ACCEPT_RULES;
 
 /// A flag of a command, the setting that it stands for, and its value if it was given.
 pub(super) struct CommandFlag {
@@ -62,7 +63,7 @@ pub(super) fn given<const N: usize>(tables: [Vec<CommandFlag>; N]) -> Vec<Set> {
     tables.into_iter().flatten().filter_map(set).collect()
 }
 
-/// The flags that stand for `[run]` settings.
+/// The flags that stand for settings of `[run]` and `[accept]`.
 pub(super) fn common_flags(common: &CommonArguments) -> Vec<CommandFlag> {
     let provenance = common.no_provenance.then(|| FlagValue::from(false));
     let existing = common.no_clobber.then(|| FlagValue::from("refuse"));
@@ -71,6 +72,7 @@ pub(super) fn common_flags(common: &CommonArguments) -> Vec<CommandFlag> {
         ("--threads", "run.threads", common.threads.as_deref().map(whole_or_text)),
         ("--scratch", "run.scratch", common.scratch.clone().map(FlagValue::from)),
         ("--report", "run.report", common.report.clone().map(FlagValue::from)),
+        ("--accept", ACCEPT_RULES, common.accept.clone().map(FlagValue::from)),
         ("--no-clobber", "run.existing", existing),
         ("--no-provenance", "run.provenance", provenance),
     ])

@@ -88,6 +88,7 @@ Examples:
   pointmill reduce survey/*.laz -o reduced.laz
   pointmill reduce survey/*.laz -o reduced.laz --keep 10% --report reduced.json
   pointmill reduce survey/*.laz -o reduced.laz --tolerance 5cm
+  pointmill reduce survey.laz -o reduced.laz --report reduced.html --accept 'max <= 20cm'
   pointmill reduce survey --outdir reduced --classes 2 --max-side 2
   pointmill reduce part.ply -o part-reduced.ply --preset part --max-angle 6deg
   pointmill reduce survey.laz -o marked.laz --mark key-point --order input
@@ -206,6 +207,8 @@ pub(super) fn command() -> Command {
             ["report", "no_clobber", "no_provenance"].into_iter().fold(sub, hide)
         })
     });
+    let hide = |verify: Command| verify.mut_arg("accept", |a| a.hide(true));
+    let hidden = hidden.mut_subcommand("verify", hide);
     EXAMPLES.iter().fold(hidden, |all, (command, examples)| {
         all.mut_subcommand(*command, |sub| sub.after_help(*examples))
     })

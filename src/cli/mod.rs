@@ -1,7 +1,8 @@
 //! The command line: arguments to pipelines, progress to stderr, results to stdout.
 //!
 //! Exit codes: 0 done; 1 the run failed (I/O, bad data, over budget); 2 the command or the pipeline
-//! is wrong; 130 interrupted (Ctrl-C, or asked to end by a signal).
+//! is wrong; 3 the result is not accepted by its rules; 130 interrupted (Ctrl-C, or asked to end by
+//! a signal).
 
 mod arguments;
 mod check;

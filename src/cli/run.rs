@@ -46,7 +46,7 @@ kind = \"write\"
 /// Runs a pipeline and prints its closing table.
 pub(super) fn run(arguments: &PlanArguments, registry: &Registry, console: &Console) -> Result<()> {
     let read = || pipeline::read(&arguments.pipeline, &arguments.common, registry);
-    console.result(mill_towards(&read, console)?)
+    finish(&mill_towards(&read, console)?, console)
 }
 
 /// Runs `pipelines/reduce.toml` or `pipelines/paper.toml` on other files and prints the closing
@@ -60,20 +60,20 @@ pub(super) fn reduce(
         return preview(arguments, registry, console);
     }
     if let Some(bytes) = arguments.size {
-        return console.result(reduce_to_size(arguments, bytes, registry, console)?);
+        return finish(&reduce_to_size(arguments, bytes, registry, console)?, console);
     }
     if arguments.preset.is_none() && arguments.by_cells() {
         // By options of cells, of which some may be left to the scan.
         console.hint(OTHERWISE);
     }
-    console.result(mill_towards(&|| reduction(arguments, registry), console)?)
+    finish(&mill_towards(&|| reduction(arguments, registry), console)?, console)
 }
 
 /// Cuts a coarser reduction off one with ranks and prints the closing table.
 pub(super) fn cut(arguments: &CutArguments, registry: &Registry, console: &Console) -> Result<()> {
     let sets = given([cut_flags(arguments), common_flags(&arguments.common)]);
     let pipeline = Graph::parse_with(CUT, HIDDEN, registry, &sets)?;
-    console.result(mill(pipeline, console)?)
+    finish(&mill(pipeline, console)?, console)
 }
 
 /// Writes a made-up scan and prints the closing table.
@@ -84,7 +84,7 @@ pub(super) fn synth(
 ) -> Result<()> {
     let sets = given([synth_flags(arguments), common_flags(&arguments.common)]);
     let pipeline = Graph::parse_with(SYNTH, HIDDEN, registry, &sets)?;
-    console.result(mill(pipeline, console)?)
+    finish(&mill(pipeline, console)?, console)
 }
 
 /// Plans and runs a pipeline; Ctrl-C asks it to stop.
@@ -103,4 +103,10 @@ fn mill_towards(read: &dyn Fn() -> Result<Graph>, console: &Console) -> Result<D
         warn_of_noise(tolerance, &plan, read, console)?;
     }
     console.run(plan)
+}
+
+/// Prints the closing table of a run; fails if its result is not accepted.
+pub(super) fn finish(done: &Done, console: &Console) -> Result<()> {
+    console.result(done)?;
+    done.accepted()
 }

@@ -11,12 +11,14 @@ use crate::{Error, Result};
 /// Columns of a terminal that text is wrapped to.
 const COLUMNS: usize = 96;
 
-/// Prints the `[run]` table and all kinds of stages, or one of them.
+/// Prints the tables `[run]` and `[accept]` and all kinds of stages, or one of them.
 pub(super) fn stages(arguments: &StagesArguments, registry: &Registry) -> Result<()> {
     let Some(kind) = &arguments.kind else {
         let kinds = registry.kinds().filter_map(|(kind, _)| registry.describe(kind));
-        let all: Vec<TableDescription> =
-            std::iter::once(registry.describe_run()).chain(kinds).collect();
+        let all: Vec<TableDescription> = [registry.describe_run(), registry.describe_accept()]
+            .into_iter()
+            .chain(kinds)
+            .collect();
         return match arguments.json {
             true => printed(&all.iter().map(as_json).collect()),
             false => print::result(all.iter().map(text).collect::<Vec<_>>().join("\n")),
@@ -24,6 +26,7 @@ pub(super) fn stages(arguments: &StagesArguments, registry: &Registry) -> Result
     };
     let described = match kind.as_str() {
         "run" => Some(registry.describe_run()),
+        "accept" => Some(registry.describe_accept()),
         kind => registry.describe(kind),
     };
     let described = described.ok_or_else(|| unknown(kind, registry))?;
@@ -40,7 +43,8 @@ pub(super) fn schema(registry: &Registry) -> Result<()> {
 
 fn unknown(kind: &str, registry: &Registry) -> Error {
     let kinds = registry.kinds().map(|(kind, _)| kind.to_owned());
-    let kinds: Vec<String> = std::iter::once("run".to_owned()).chain(kinds).collect();
+    let tables = ["run", "accept"].map(str::to_owned);
+    let kinds: Vec<String> = tables.into_iter().chain(kinds).collect();
     let near = nearest(kind, &kinds).map(|near| format!("did you mean `{near}`? "));
     let near = near.unwrap_or_default();
     Error::pipeline(format!("there is no stage `{kind}`"))
@@ -85,6 +89,7 @@ fn word_as_json(word: &WordDescription) -> Value {
 fn text(table: &TableDescription) -> String {
     let heading = match table.name.as_str() {
         "run" => "[run]",
+        "accept" => "[accept]",
         kind => kind,
     };
     let about = format!("{heading}\n{}", wrapped(&plain(&table.about), 2));

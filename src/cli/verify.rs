@@ -5,6 +5,7 @@ use super::check::refuse_outputs;
 use super::console::Console;
 use super::draw::{Nothing, watched};
 use super::flags::{common_flags, given, verify_flags};
+use super::mistyped::marked;
 use super::pipeline::HIDDEN;
 use super::print;
 use crate::compare::{VerifySettings, verify};
@@ -22,6 +23,10 @@ pub(super) fn check_reduction(
     console: &Console,
 ) -> Result<()> {
     refuse_outputs(&arguments.common)?;
+    if let Some(rules) = &arguments.common.accept {
+        let told = marked("--accept: is for commands that reduce or write", rules, "");
+        return Err(Error::pipeline(told).help("give --tolerance and --max-spacing here"));
+    }
     let (Some(reduced), original) = arguments.files() else {
         let told = "a reduced scan is compared with its original, and one file is given";
         let help = "give the original's files first, and the reduced one last";

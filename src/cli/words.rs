@@ -75,6 +75,7 @@ impl Words {
         let Some((table, key)) = address.split_once('.') else { return false };
         let described = match table {
             "run" => Some(self.registry.describe_run()),
+            "accept" => Some(self.registry.describe_accept()),
             kind => self.registry.describe(kind),
         };
         described.is_some_and(|table| table.all_keys().any(|known| known.name == key))

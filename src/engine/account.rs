@@ -6,8 +6,7 @@
 //! so a record that is lost or written twice fails the run instead of being hidden in a difference.
 
 use std::borrow::Cow;
-use std::fs::{self, File};
-use std::io::{BufRead, BufWriter};
+use std::fs;
 use std::path::Path;
 
 use super::clock::Clock;
@@ -16,12 +15,13 @@ use super::hashing::InputHashes;
 use super::job::Job;
 use super::lines::TileLines;
 use super::pass::{Branch, StreamOp};
+use super::survey::Measured;
 use super::tagger::{LEFT_OUT, NOT_FINITE};
 use super::task::Task;
 use crate::host::process::peak_memory;
 use crate::report::{
-    Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome, Removed, Report,
-    RunFigures, check_written,
+    AcceptVerdict, Decision, FileFigures, Grouped, LatticeFigures, Ledger, Machine, Outcome,
+    Removed, Report, RunFigures, check_written,
 };
 use crate::stage::{Input, SinkSummary, Source};
 use crate::{Error, Result};
@@ -103,11 +103,11 @@ impl Task {
     ) -> Result<(Outcome, Option<TileLines>)> {
         let ledger = Ledger::new(read, finished.kept, &finished.tally);
         ledger.check()?;
-        let (tile_side, totals, tiles) = match finished.measured {
-            Some(measured) => {
-                (Some(measured.tile_side), Some(measured.totals), Some(measured.tiles))
+        let (tile_side, totals, deviations, tiles) = match finished.measured {
+            Some(Measured { tile_side, totals, deviations, tiles }) => {
+                (Some(tile_side), Some(totals), deviations, Some(tiles))
             }
-            None => (None, None, None),
+            None => (None, None, Vec::new(), None),
         };
         let lattice = self.lattice.as_ref();
         let mut decisions = finished.decisions;
@@ -121,6 +121,7 @@ impl Task {
             let (stage, name) = ("write".to_owned(), "side".to_owned());
             Decision { stage, name, value: side.into() }
         }));
+        let accept = AcceptVerdict::of(&self.accept, &ledger, totals.as_ref());
         let outcome = Outcome {
             pipeline: branch.stages.clone(),
             lattice: lattice.map(|l| LatticeFigures { step: l.step, shift: l.shift }),
@@ -131,7 +132,9 @@ impl Task {
             passes: finished.passes,
             tile_side,
             totals,
+            deviations,
             classes: finished.classes,
+            accept,
         };
         Ok((outcome, tiles))
     }
@@ -171,32 +174,6 @@ pub(super) fn nothing_left(finished: &Finished, job: &Job<'_>) -> Vec<String> {
 
 fn named((name, count): (&Cow<'static, str>, &u64)) -> (String, u64) {
     (name.clone().into_owned(), *count)
-}
-
-/// The lines of a branch's report tiles; none if it has none.
-fn lines_of(tiles: &Option<TileLines>) -> Box<dyn BufRead + '_> {
-    match tiles {
-        Some(lines) => Box::new(lines.reader()),
-        None => Box::new(std::io::empty()),
-    }
-}
-
-/// Writes the report to `staged` and brings it to disk.
-pub(super) fn write_report(
-    staged: &Path,
-    report: &Report,
-    tiles: &[Option<TileLines>],
-) -> Result<()> {
-    let write = || {
-        let mut out = BufWriter::new(File::create(staged)?);
-        report.write(&mut out, tiles.iter().map(lines_of))?;
-        out.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()
-    };
-    // Lines that the spill cannot give back are its error, about its file.
-    write().map_err(|e| match e.downcast::<Error>() {
-        Ok(error) => error,
-        Err(e) => Error::io(staged, "write the report", e),
-    })
 }
 
 fn input_figures(source: &dyn Source, hashes: Option<&InputHashes>) -> Vec<FileFigures> {

@@ -46,6 +46,7 @@ mod stream;
 mod survey;
 pub(crate) mod tagger;
 pub(crate) mod task;
+mod told;
 mod watch;
 
 #[cfg(feature = "cli")]

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::Watch;
-use super::account::{nothing_left, write_report};
+use super::account::nothing_left;
 use super::by_rank::listed_bytes;
 use super::by_square::{BySquare, SquareFile, SquareSink};
 use super::clock::Clock;
@@ -32,7 +32,7 @@ use crate::host::{Threads, lock};
 use crate::point::Metadata;
 use crate::report::{FileFigures, Report, RunFigures, check_written};
 use crate::stage::Sink;
-use crate::{Error, Result};
+use crate::{Error, ErrorKind, Result};
 
 /// A run that is done. Displayed as a few lines for the terminal.
 #[derive(Debug)]
@@ -44,6 +44,27 @@ pub struct Done {
     pub report_path: Option<PathBuf>,
     /// The sign of the unit that lengths are in, where the scan says it.
     pub unit: Option<&'static str>,
+}
+
+impl Done {
+    /// Fails with [`ErrorKind::NotAccepted`](crate::ErrorKind::NotAccepted), naming the rules that
+    /// do not hold, if the result is not what the rules of the pipeline ask for. The outputs are
+    /// written in any case.
+    ///
+    /// # Errors
+    ///
+    /// That, and nothing else.
+    pub fn accepted(&self) -> Result<()> {
+        let results = std::iter::once(&self.report.result).chain(&self.report.further);
+        let rules = results.filter_map(|result| result.accept.as_ref()).flat_map(|all| &all.rules);
+        let failed = rules.filter(|rule| !rule.passed).map(|rule| rule.told(self.unit));
+        let failed: Vec<String> = failed.collect();
+        if failed.is_empty() {
+            return Ok(());
+        }
+        let told = format!("the result is not accepted: {}", failed.join(", "));
+        Err(Error::new(ErrorKind::NotAccepted, told))
+    }
 }
 
 impl std::fmt::Display for Done {
@@ -83,8 +104,8 @@ impl Task {
         let mut clock = Clock::new(watch, self.phases());
         let outputs = self.stage(trouble)?;
         let first = outputs.iter().flatten().next();
-        let report = self.settings.report.as_deref();
-        let staged_report = report.map(|path| self.place(first, path, trouble)).transpose()?;
+        let report_path = self.settings.report.as_deref();
+        let staged_report = report_path.map(|path| self.place(first, path, trouble)).transpose()?;
         let tell = |error| outputs.iter().flatten().fold(error, |error, output| output.tell(error));
         let scratch = match (&self.settings.scratch, first.or(staged_report.as_ref())) {
             (None, Some(first)) => first.scratch().clone(),
@@ -107,8 +128,12 @@ impl Task {
         }
         let (report, tiles) = self.account(finished, run, clock)?;
         self.check_size(&report.run.outputs)?;
-        if let Some(staged) = &staged_report {
-            write_report(staged.file(), &report, &tiles).map_err(|error| staged.tell(error))?;
+        if let (Some(path), Some(staged)) = (report_path, &staged_report) {
+            let sink = self.first_sink();
+            let written = if self.has_squares(sink) { &squares[..] } else { &outputs[sink][..] };
+            let places = (path, staged.file());
+            let told = self.write_report(places, &report, &tiles, written);
+            told.map_err(|error| staged.tell(error))?;
         }
         drop(tiles);
         // What an output refers to comes first, so that none refers to what is not there.

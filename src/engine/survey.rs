@@ -13,7 +13,7 @@ use super::lines::{LINES_AT_ONCE, RangeLines, TileLines};
 use crate::budget::Bytes;
 use crate::geom::lattice::Lattice;
 use crate::point::Position;
-use crate::report::{FittedScan, Lot, ScanSurvey, Totals, report_tile_level};
+use crate::report::{DeviationBin, FittedScan, Lot, ScanSurvey, Totals, report_tile_level};
 use crate::store::{
     BLOCK, FATE_BYTES, PIECE, Pieces, Reader, RecordState, SealedTiles, Spill, StoredStretch,
     TileKey,
@@ -68,6 +68,8 @@ pub(crate) struct Measured {
     pub tile_side: f64,
     /// Figures of the scan.
     pub totals: Totals,
+    /// Deviations of its removed records.
+    pub deviations: Vec<DeviationBin>,
     /// Lines of the report's tiles, in order.
     pub tiles: TileLines,
 }
@@ -97,9 +99,11 @@ pub(crate) fn survey(
     let _working = job.budget.lease(all_threads.0, "survey")?;
     let spill = Spill::new(&job.area, "report");
     let (scan, lines) = walk.tally(job, lattice, &spill)?;
+    let fitted = walk.measure(job, scan)?;
     Ok(Measured {
         tile_side: (level as f64).exp2() * lattice.step,
-        totals: walk.measure(job, scan)?.finish(lattice)?,
+        deviations: fitted.bins(lattice),
+        totals: fitted.finish(lattice)?,
         tiles: TileLines::new(spill, lines),
     })
 }

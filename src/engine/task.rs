@@ -16,6 +16,7 @@ use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
 use crate::graph::{Nonfinite, RunSettings, SpillSetting};
 use crate::point::{ComputedDimension, Metadata, Schema, names};
+use crate::report::AcceptTable;
 use crate::stage::{CreateSink, Source};
 
 /// The schemas of records on their way through the stages that stream in the decode.
@@ -40,6 +41,8 @@ pub(crate) struct WantedSize {
 /// A run that can begin.
 pub(crate) struct Task {
     pub settings: RunSettings,
+    /// What the result must be to be accepted, in the unit of the scan.
+    pub accept: AcceptTable,
     /// See [`Graph::whole_rims`](crate::Graph).
     pub whole_rims: bool,
     pub threads: usize,

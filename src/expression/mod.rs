@@ -48,5 +48,5 @@ pub(crate) use fault::ExpressionFault;
 pub use key::KeyExpression;
 pub(crate) use named::NamedField;
 pub use text::OneOrSeveral;
-pub(crate) use text::{FromText, ONE_OR_SEVERAL};
+pub(crate) use text::{FromText, ONE_OR_SEVERAL, deserialize as deserialize_text, is_its_text};
 pub use weight::Weight;

@@ -40,7 +40,7 @@ impl<'de, T: FromText> Visitor<'de> for TextVisitor<T> {
 }
 
 /// Reads an expression as the value of a key.
-pub(super) fn deserialize<'de, T: FromText, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
+pub(crate) fn deserialize<'de, T: FromText, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
     from.deserialize_newtype_struct(T::NAME, TextVisitor(PhantomData))
 }
 
@@ -122,7 +122,7 @@ macro_rules! is_its_text {
 
         impl<'de> serde::Deserialize<'de> for $type {
             fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-                $crate::expression::text::deserialize(from)
+                $crate::expression::deserialize_text(from)
             }
         }
 
@@ -139,4 +139,4 @@ macro_rules! is_its_text {
     };
 }
 
-pub(super) use is_its_text;
+pub(crate) use is_its_text;

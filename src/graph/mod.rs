@@ -18,6 +18,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::report::AcceptTable;
 use crate::stage::{Role, RoleName};
 use crate::{Error, Result};
 
@@ -64,6 +65,8 @@ pub struct Graph {
     pub origin: String,
     /// What the run may use and where it leaves things.
     pub settings: RunSettings,
+    /// What its result must be to be accepted.
+    pub accept: AcceptTable,
     /// The stages; none takes from one behind it.
     pub stages: Vec<GraphStage>,
     /// The file that it was read from, which no output may replace.

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 
-use super::toml::{literal, literal_table, settings, tables};
+use super::toml::{literal, literal_table, table_of, tables};
 use super::{Graph, RunSettings};
 use crate::host::files::{relative, resolved};
 use crate::host::hashed::FileHash;
@@ -46,7 +46,7 @@ impl NotedGraph {
     /// there cannot be run again by what a file says.
     pub fn of(graph: &Graph, run: &RunSettings) -> Option<NotedGraph> {
         let mut noted = NotedGraph {
-            run: literal_table(settings(&run.deciding()).ok()?),
+            run: literal_table(table_of(&run.deciding()).ok()?),
             stages: tables(graph).ok()?,
             places: Vec::new(),
             files: Vec::new(),

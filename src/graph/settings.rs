@@ -35,7 +35,8 @@ pub struct RunSettings {
     /// Folder for what does not fit in memory; none: beside the output.
     #[schemars(title = "a path")]
     pub scratch: Option<PathBuf>,
-    /// Where the report is written; none: nowhere.
+    /// Where the report is written; none: nowhere. As JSON or, if its name ends in `.html`, as a
+    /// page that people hand on, with pictures, maps and curves.
     #[schemars(title = "a path")]
     pub report: Option<PathBuf>,
     /// What becomes of files that are already where an output or the report is to be.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::{Graph, GraphStage, RunSettings};
+use super::{Graph, GraphStage};
 use crate::stage::Role;
 use crate::{Error, Result};
 
@@ -11,6 +11,8 @@ use crate::{Error, Result};
 struct Document {
     #[serde(skip_serializing_if = "Map::is_empty")]
     run: Map<String, Value>,
+    #[serde(skip_serializing_if = "Map::is_empty")]
+    accept: Map<String, Value>,
     stage: Vec<Map<String, Value>>,
 }
 
@@ -21,8 +23,9 @@ impl Graph {
     ///
     /// A stage that no text can name, such as a closure.
     pub fn to_toml(&self) -> Result<String> {
-        let run = literal_table(settings(&self.settings)?);
-        let document = Document { run, stage: tables(self)? };
+        let run = literal_table(table_of(&self.settings)?);
+        let accept = literal_table(table_of(&self.accept)?);
+        let document = Document { run, accept, stage: tables(self)? };
         toml::to_string(&document)
             .map_err(|cause| Error::internal("the graph is no TOML").because(cause))
     }
@@ -92,13 +95,13 @@ fn table(
     Ok(table)
 }
 
-/// The settings that are not as they are without being given.
-pub(super) fn settings(settings: &RunSettings) -> Result<Map<String, Value>> {
-    let all = |settings: &RunSettings| match serde_json::to_value(settings) {
+/// The keys of a table that are not as they are without being given.
+pub(super) fn table_of<T: Serialize + Default>(given: &T) -> Result<Map<String, Value>> {
+    let all = |table: &T| match serde_json::to_value(table) {
         Ok(Value::Object(all)) => Ok(all),
-        _ => Err(Error::internal("the settings of a run are no table")),
+        _ => Err(Error::internal("the settings of a pipeline are no table")),
     };
-    let (given, default) = (all(settings)?, all(&RunSettings::default())?);
+    let (given, default) = (all(given)?, all(&T::default())?);
     let differs = |(key, value): &(String, Value)| default.get(key) != Some(value);
     Ok(given.into_iter().filter(differs).collect())
 }

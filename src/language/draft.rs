@@ -11,11 +11,16 @@ use super::set::{PARAMETERS, Set};
 /// Stages of a pipeline at most: each sink has a file open and memory of its own.
 const MOST_STAGES: usize = 256;
 
+/// The tables that are about the whole pipeline, as addresses of values name them.
+const TABLES: [&str; 2] = ["run", "accept"];
+
 /// The tables of a pipeline file.
 pub(crate) struct Draft {
     form: TextForm,
     /// The `[run]` table.
     pub run: Node,
+    /// The `[accept]` table.
+    pub accept: Node,
     /// The `[params]` table.
     pub params: Node,
     /// What arguments give for parameters: their names and the texts of their values.
@@ -50,6 +55,7 @@ pub(crate) fn read(
     let mut draft = Draft {
         form,
         run: empty(),
+        accept: empty(),
         params: empty(),
         given: Vec::new(),
         stages: Vec::new(),
@@ -64,6 +70,7 @@ pub(crate) fn read(
     for KeyEntry { key, at, node } in entries {
         match key.as_str() {
             "run" => draft.run = draft.table("run", at, node),
+            "accept" => draft.accept = draft.table("accept", at, node),
             "params" => draft.params = draft.table("params", at, node),
             "stage" | "stages" => draft.add_stages(&key, at, node, registry),
             // By which editors know how to complete and check the file.
@@ -73,7 +80,7 @@ pub(crate) fn read(
                 format!("a pipeline file has no `{word}`"),
                 word,
                 "tables",
-                ["params", "run", "stage"],
+                ["accept", "params", "run", "stage"],
             )),
         }
     }
@@ -205,12 +212,14 @@ impl Draft {
 
     /// The values of settings and of the stages' keys.
     pub fn values(&self) -> impl Iterator<Item = &Node> {
-        std::iter::once(&self.run).chain(self.stages.iter().map(|stage| &stage.keys))
+        [&self.run, &self.accept].into_iter().chain(self.stages.iter().map(|stage| &stage.keys))
     }
 
     /// The same, to be changed.
     pub fn values_mut(&mut self) -> impl Iterator<Item = &mut Node> {
-        std::iter::once(&mut self.run).chain(self.stages.iter_mut().map(|stage| &mut stage.keys))
+        [&mut self.run, &mut self.accept]
+            .into_iter()
+            .chain(self.stages.iter_mut().map(|stage| &mut stage.keys))
     }
 
     /// Puts the value of `set`, which is text `source`, in its place.
@@ -237,7 +246,7 @@ impl Draft {
             self.given.push((name, set.text(source)));
             return Ok(());
         }
-        if stage != "run" && ["kind", "name", "from"].contains(&key) {
+        if !TABLES.contains(&stage) && ["kind", "name", "from"].contains(&key) {
             let told = format!("`{key}` is for the pipeline file alone");
             return Err(vec![Mistake::new(set.place(source, key), told)]);
         }
@@ -245,6 +254,7 @@ impl Draft {
         let at = set.place(source, key);
         let (table, kind) = match stage {
             "run" => (&mut self.run, "run"),
+            "accept" => (&mut self.accept, "accept"),
             _ => {
                 let addressed = self.addressed(stage).map_err(|(told, note)| {
                     vec![Mistake::new(set.place(source, stage), told).note(note)]
@@ -292,6 +302,6 @@ impl Draft {
     fn addresses(&self) -> Vec<String> {
         let kinds = self.stages.iter().filter_map(|s| Some(s.kind.as_ref()?.0.clone()));
         let names = self.stages.iter().filter_map(|s| Some(s.name.as_ref()?.0.clone()));
-        kinds.chain(names).chain(["run".to_owned()]).collect()
+        kinds.chain(names).chain(TABLES.map(str::to_owned)).collect()
     }
 }

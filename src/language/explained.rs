@@ -56,6 +56,8 @@ const WIDEST: usize = 48;
 pub struct Explained {
     params: Vec<ExplainedKey>,
     run: Vec<ExplainedKey>,
+    /// None where nothing says what is accepted.
+    accept: Vec<ExplainedKey>,
     /// The keys of each stage, `kind`, `name` and `from` among them.
     stages: Vec<Vec<ExplainedKey>>,
 }
@@ -74,6 +76,7 @@ struct ExplainedKey {
 /// The keys of a draft, each with the place where it is written.
 pub(super) struct WrittenKeys {
     run: BTreeMap<String, TextPlace>,
+    accept: BTreeMap<String, TextPlace>,
     stages: Vec<(StageDraft, BTreeMap<String, TextPlace>)>,
 }
 
@@ -83,7 +86,8 @@ impl WrittenKeys {
             table.entries().iter().map(|entry| (entry.key.clone(), entry.at.clone())).collect()
         };
         let stages = draft.stages.iter().map(|stage| (stage.clone(), keys(&stage.keys)));
-        WrittenKeys { run: keys(&draft.run), stages: stages.collect() }
+        let (run, accept) = (keys(&draft.run), keys(&draft.accept));
+        WrittenKeys { run, accept, stages: stages.collect() }
     }
 }
 
@@ -102,23 +106,28 @@ impl Explained {
             origin: origins.param(name).to_owned(),
             is_said: false,
         };
-        let Ok(Value::Object(settings)) = serde_json::to_value(&graph.settings) else {
-            return Err(Error::internal("the settings of a run are no table"));
+        let tables = (serde_json::to_value(&graph.settings), serde_json::to_value(&graph.accept));
+        let (Ok(Value::Object(settings)), Ok(Value::Object(rules))) = tables else {
+            return Err(Error::internal("the settings of a pipeline are no table"));
         };
         let run =
             table(&registry.describe_run(), &settings, |key| origin(&written.run, origins, key));
+        let mut accept =
+            table(&registry.describe_accept(), &rules, |key| origin(&written.accept, origins, key));
+        accept.retain(|key| key.is_said);
         let stages = graph.stages.iter().zip(&written.stages);
         let stages = stages.map(|(stage, (draft, keys))| {
             let mut all = heading(draft, origins);
             all.extend(stage_keys(stage, keys, origins, registry));
             all
         });
-        Ok(Explained { params: params.iter().map(param).collect(), run, stages: stages.collect() })
+        let params = params.iter().map(param).collect();
+        Ok(Explained { params, run, accept, stages: stages.collect() })
     }
 
-    /// The same for programs: `params`, `run` and each of `stages` are lists of objects with a
-    /// `key`, its `value` (null where it has none) and its `origin`, as the comments of the text
-    /// have it.
+    /// The same for programs: `params`, `run`, `accept` and each of `stages` are lists of objects
+    /// with a `key`, its `value` (null where it has none) and its `origin`, as the comments of the
+    /// text have it.
     pub fn to_json(&self) -> Value {
         let key = |one: &ExplainedKey| {
             let ExplainedKey { key, value, origin, .. } = one;
@@ -126,7 +135,8 @@ impl Explained {
         };
         let keys = |keys: &[ExplainedKey]| keys.iter().map(key).collect::<Value>();
         let stages: Value = self.stages.iter().map(|stage| keys(stage)).collect();
-        json!({ "params": keys(&self.params), "run": keys(&self.run), "stages": stages })
+        let (params, run, accept) = (keys(&self.params), keys(&self.run), keys(&self.accept));
+        json!({ "params": params, "run": run, "accept": accept, "stages": stages })
     }
 }
 
@@ -198,6 +208,10 @@ impl fmt::Display for Explained {
         }
         writeln!(f, "[run]")?;
         lines(f, &self.run)?;
+        if !self.accept.is_empty() {
+            writeln!(f, "\n[accept]")?;
+            lines(f, &self.accept)?;
+        }
         self.stages.iter().try_for_each(|stage| {
             writeln!(f, "\n[[stage]]")?;
             lines(f, stage)

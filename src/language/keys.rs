@@ -11,6 +11,7 @@ use super::node::{KeyEntry, Node, NodeValue};
 use crate::error::nearest;
 use crate::expression::{Assignment, Condition, FromText, ONE_OR_SEVERAL, Weight};
 use crate::quantity::parse_count;
+use crate::report::AcceptRules;
 
 /// Reads the table `keys` as a `T`, or tells every key that `subject` (a stage kind, `[run]`) does
 /// not have and every value that does not fit. `formats` are the names of those that are
@@ -204,6 +205,7 @@ impl<'de> Deserializer<'de> for NodeReader<'de> {
             Condition::NAME => self.expression::<Condition>(),
             Assignment::NAME => self.expression::<Assignment>(),
             Weight::NAME => self.expression::<Weight>(),
+            AcceptRules::NAME => self.expression::<AcceptRules>(),
             ONE_OR_SEVERAL => {
                 let reader = NodeReader { is_list: true, ..self };
                 return visitor.visit_newtype_struct(reader);

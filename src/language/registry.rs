@@ -157,15 +157,22 @@ impl Registry {
         TableDescription::of_docs("run", &run)
     }
 
+    /// What there is to know of the table `[accept]`.
+    pub fn describe_accept(&self) -> TableDescription {
+        let accept = schema::accept(&mut schema::generator(), &self.formats);
+        TableDescription::of_docs("accept", &accept)
+    }
+
     /// The JSON Schema (2020-12) of a pipeline file that may name these kinds and formats, for
     /// editors to complete and check by. What only a run can know it does not say: whether keys go
     /// together, or whether a file is there.
     pub fn schema(&self) -> Value {
         let mut generator = schema::generator();
         let run = schema::run(&mut generator, &self.formats);
+        let accept = schema::accept(&mut generator, &self.formats);
         let stages =
             self.kinds.iter().map(|(name, kind)| self.table(name, kind, &mut generator)).collect();
-        schema::pipeline(run, stages, generator.take_definitions(true))
+        schema::pipeline([run, accept], stages, generator.take_definitions(true))
     }
 
     fn table(

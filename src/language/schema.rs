@@ -11,6 +11,7 @@ use serde_json::{Map, Value, json};
 use super::parameter::ParameterType;
 use crate::graph::{LimitKeys, RunSettings};
 use crate::quantity::COUNT_TEXT;
+use crate::report::AcceptTable;
 use crate::stage::{Format, FormatName, Formats, RoleName};
 
 /// What a name is made of.
@@ -72,6 +73,11 @@ pub(crate) fn limits(
 /// The schema of the table `[run]`.
 pub(crate) fn run(generator: &mut SchemaGenerator, formats: &Formats) -> Map<String, Value> {
     table(RunSettings::json_schema(generator), Map::new(), formats)
+}
+
+/// The schema of the table `[accept]`.
+pub(crate) fn accept(generator: &mut SchemaGenerator, formats: &Formats) -> Map<String, Value> {
+    table(AcceptTable::json_schema(generator), Map::new(), formats)
 }
 
 /// Makes a schema one of what a file may say: no key is null there, and formats are those that are
@@ -146,9 +152,9 @@ fn for_readers(docs: &str) -> String {
     out + rest
 }
 
-/// The schema of a whole file; `definitions` are what the others refer to.
+/// The schema of a whole file with these tables; `definitions` are what the others refer to.
 pub(crate) fn pipeline(
-    run: Map<String, Value>,
+    [run, accept]: [Map<String, Value>; 2],
     stages: Vec<StageTable>,
     mut definitions: Map<String, Value>,
 ) -> Value {
@@ -168,6 +174,7 @@ pub(crate) fn pipeline(
         "properties": {
             "$schema": { "description": "This schema, for editors.", "type": "string" },
             "run": written(run),
+            "accept": written(accept),
             "params": parameters(),
             "stage": {
                 "description": "The stages. Each takes from the one above it, or from those that \

@@ -15,6 +15,7 @@ use super::tree;
 use super::written::WrittenText;
 use crate::graph::RunSettings;
 use crate::graph::{Graph, GraphStage, LimitKeys, Limits};
+use crate::report::AcceptTable;
 use crate::stage::Role;
 
 /// The graph that `draft` is, and what is wrong with it. It is read from `file` and `sources`.
@@ -30,6 +31,10 @@ pub(super) fn build(
         mistakes.extend(wrong);
         RunSettings::default()
     });
+    let accept = keys::read("[accept]", &draft.accept, &[]).unwrap_or_else(|wrong| {
+        mistakes.extend(wrong);
+        AcceptTable::default()
+    });
     let placed = draft.stages.iter().map(|stage| {
         let kind = stage.kind.as_ref()?;
         place(stage, kind, sources, registry).map_err(|wrong| mistakes.extend(wrong)).ok()
@@ -40,7 +45,8 @@ pub(super) fn build(
     outputs::check(file, &draft, &placed, &settings, &mut mistakes);
     let file = file.map(Path::to_owned);
     let stages = placed.into_iter().flatten().collect();
-    (Graph { origin: origin.clone(), settings, stages, file, ..Graph::default() }, mistakes)
+    let origin = origin.clone();
+    (Graph { origin, settings, accept, stages, file, ..Graph::default() }, mistakes)
 }
 
 fn place(

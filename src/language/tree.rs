@@ -15,7 +15,7 @@ pub(super) fn check_names(stages: &[StageDraft], registry: &Registry, mistakes: 
         let word = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
         let wrong = if name.is_empty() || !name.chars().all(word) {
             "a name is made of letters, digits, - and _".to_owned()
-        } else if ["run", "params"].contains(&name.as_str())
+        } else if ["run", "accept", "params"].contains(&name.as_str())
             || registry.has(name) && stage.kind.is_some()
         {
             // A stage without a kind is told that its name may be meant for one.

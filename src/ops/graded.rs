@@ -219,7 +219,8 @@ impl StageKind for Graded {
 
 impl TileOp for Graded {
     fn needs(&self) -> Needs {
-        let needs = Needs::none().looks_at(names::XYZ).bytes_per_point(BYTES).removes(None);
+        let needs =
+            Needs::none().looks_at(names::XYZ).bytes_per_point(BYTES).removes(None).measures();
         if self.ranks { needs.writes(&KEEP_RANK) } else { needs }
     }
 

@@ -99,7 +99,7 @@ impl TileOp for Grid {
     fn needs(&self) -> Needs {
         let side = self.settled.map_or(0, |settled| settled.steps);
         let looks = Needs::none().looks_at(names::XYZ);
-        looks.cells(side, side.count_ones() == 1).bytes_per_point(BYTES).removes(None)
+        looks.cells(side, side.count_ones() == 1).bytes_per_point(BYTES).removes(None).measures()
     }
 
     fn convert(&mut self, units: &Units) -> Result<()> {

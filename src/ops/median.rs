@@ -87,7 +87,7 @@ impl StageKind for Median {
 impl TileOp for Median {
     fn needs(&self) -> Needs {
         let needs = Needs::none().reads(&NORMAL).takes_cells().bytes_per_point(BYTES);
-        Needs { repeats: Some((NORMAL.kind(), self.passes)), ..needs.removes(self.mark) }
+        Needs { repeats: Some((NORMAL.kind(), self.passes)), ..needs.removes(self.mark).measures() }
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {

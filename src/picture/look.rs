@@ -3,7 +3,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::settings::{NARROWEST, Settings};
+use super::settings::{ColorBy, NARROWEST, Settings, View};
 use crate::host::{Threads, lock};
 use crate::point::{Dimension, PointBatch};
 use crate::stage::{Part, Source};
@@ -14,12 +14,13 @@ const SAMPLE: u64 = 100_000;
 /// Records read at once.
 const BATCH: usize = 8192;
 
-/// Calls `visit` with every point of `source` that is somewhere: its number in its part, the point
-/// as seen, and the values that it is coloured by; and `nowhere` for each of the others. Each
+/// Calls `visit` with every point of `source` that is somewhere: its number in its part, its world
+/// coordinates, and the values that it is coloured by; and `nowhere` for each of the others. Each
 /// thread has a state of its own; all are returned.
 pub(super) fn each_point<S: Send>(
     source: &dyn Source,
-    settings: &Settings,
+    by: ColorBy,
+    threads: usize,
     begin: impl Fn() -> S + Sync,
     visit: impl Fn(&mut S, u64, [f64; 3], &[f64]) + Sync,
     nowhere: impl Fn(&mut S) + Sync,
@@ -27,19 +28,19 @@ pub(super) fn each_point<S: Send>(
     let schema = source.schema();
     let no_place = || Error::pipeline("the scan has no coordinates");
     let axes = schema.coordinates().ok_or_else(no_place)?;
-    let fields: Vec<&Dimension> = settings.by.dimensions(schema)?;
+    let fields: Vec<&Dimension> = by.dimensions(schema)?;
     let begin = || (begin(), PointBatch::new(schema.clone(), BATCH), vec![0.0; fields.len()]);
     let draw = |(state, batch, values): &mut (S, PointBatch, Vec<f64>), index| {
         let mut part = source.part(index)?;
         let mut number = 0;
         while refill(&mut *part, batch)? {
             for record in batch.iter() {
-                let seen = settings.view.seen(axes.map(|a| a.world(record, schema.endian)));
-                if seen.iter().all(|v| v.is_finite()) {
+                let point = axes.map(|a| a.world(record, schema.endian));
+                if point.iter().all(|v| v.is_finite()) {
                     for (value, field) in values.iter_mut().zip(&fields) {
                         *value = field.world(record, schema.endian);
                     }
-                    visit(state, number, seen, values);
+                    visit(state, number, point, values);
                 } else {
                     nowhere(state);
                 }
@@ -53,7 +54,7 @@ pub(super) fn each_point<S: Send>(
         lock(&states).push(state);
         Ok(())
     };
-    Threads::start(settings.threads, |threads| {
+    Threads::start(threads, |threads| {
         threads.items(source.parts(), || {}).run(begin, draw, |()| {}, end)
     })?;
     Ok(states.into_inner().unwrap_or_else(PoisonError::into_inner))
@@ -89,22 +90,42 @@ impl Look {
 
     /// Looks at all points.
     pub fn at(source: &dyn Source, settings: &Settings) -> Result<Look> {
+        let looks = Look::from(source, &[settings.view], settings.by, settings.threads)?;
+        Ok(looks.into_iter().next().unwrap_or(Look::NOTHING))
+    }
+
+    /// Looks at all points from several sides at once: a look for each of the `views`.
+    pub fn from(
+        source: &dyn Source,
+        views: &[View],
+        by: ColorBy,
+        threads: usize,
+    ) -> Result<Vec<Look>> {
         let every = (source.points() / SAMPLE).max(1);
-        let visit = |look: &mut Look, number: u64, [right, up, _]: [f64; 3], values: &[f64]| {
-            look.points += 1;
-            for (range, at) in look.extent.iter_mut().zip([right, up]) {
-                *range = wider(*range, [at; 2]);
-            }
-            look.values = values.iter().fold(look.values, |range, &v| wider(range, [v; 2]));
-            if number.is_multiple_of(every) {
-                look.sample.push([right, up, values.first().copied().unwrap_or(0.0)]);
+        let nothing = || vec![Look::NOTHING; views.len()];
+        let visit = |looks: &mut Vec<Look>, number: u64, point: [f64; 3], values: &[f64]| {
+            for (look, view) in looks.iter_mut().zip(views) {
+                look.see(view.seen(point), values, number.is_multiple_of(every));
             }
         };
-        let mut looks =
-            each_point(source, settings, || Look::NOTHING, visit, |look| look.nowhere += 1)?;
-        let mut whole = looks.pop().unwrap_or(Look::NOTHING);
-        looks.into_iter().for_each(|look| whole.merge(look));
+        let nowhere = |looks: &mut Vec<Look>| looks.iter_mut().for_each(|look| look.nowhere += 1);
+        let all = each_point(source, by, threads, nothing, visit, nowhere)?;
+        let mut whole = nothing();
+        for looks in all {
+            whole.iter_mut().zip(looks).for_each(|(whole, look)| whole.merge(look));
+        }
         Ok(whole)
+    }
+
+    fn see(&mut self, [right, up, _]: [f64; 3], values: &[f64], is_sampled: bool) {
+        self.points += 1;
+        for (range, at) in self.extent.iter_mut().zip([right, up]) {
+            *range = wider(*range, [at; 2]);
+        }
+        self.values = values.iter().fold(self.values, |range, &v| wider(range, [v; 2]));
+        if is_sampled {
+            self.sample.push([right, up, values.first().copied().unwrap_or(0.0)]);
+        }
     }
 
     fn merge(&mut self, other: Look) {
@@ -148,6 +169,12 @@ pub(super) struct Frame {
 }
 
 impl Frame {
+    /// The frame of so many pixels around a point as seen, each so wide.
+    pub fn around([right, up, _]: [f64; 3], size: [u32; 2], pixel: f64) -> Frame {
+        let half = size.map(|pixels| f64::from(pixels) / 2.0 * pixel);
+        Frame { size, pixel, corner: [right - half[0], up + half[1]] }
+    }
+
     /// The frame of all that was looked at, in at most so many pixels, and in no fewer than
     /// [`NARROWEST`] where there is room: what has no width, as a line of points, is in the middle.
     /// A few points far from all others are left outside.

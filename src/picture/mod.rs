@@ -10,6 +10,7 @@ mod color;
 mod look;
 mod paint;
 mod settings;
+mod several;
 
 use crate::stage::Source;
 use crate::{Error, Result};
@@ -18,6 +19,7 @@ use look::{Frame, Look};
 use paint::Canvas;
 use settings::NARROWEST;
 pub use settings::{ColorBy, Settings, View, WIDEST};
+pub(crate) use several::{DrawnPlace, draw_several};
 
 /// Panels that are drawn side by side, at most.
 pub const MOST_PANELS: usize = 4;
@@ -73,17 +75,7 @@ impl Picture {
         let frame = Frame::of(&looks, [wide, settings.width])?;
         let range = settings.by.range(&looks);
         let dot = frame.dot(&looks);
-        let mut picture = Picture {
-            width: frame.size[0] * panels + GAP * (panels - 1),
-            height: frame.size[1],
-            pixels: Vec::new(),
-            pixel: frame.pixel,
-            range: settings.by.is_range().then_some(range),
-            panels: Vec::new(),
-            nowhere: looks.iter().map(|look| look.nowhere).collect(),
-            black: looks.iter().map(|look| settings.by.is_black(look)).collect(),
-        };
-        picture.pixels.resize(3 * picture.width as usize * picture.height as usize, 255);
+        let mut picture = Picture::blank(&frame, &looks, settings.by);
         for (n, source) in sources.iter().enumerate() {
             let canvas = Canvas::new(frame.size, dot);
             let outside = canvas.draw(*source, settings, &frame, range)?;
@@ -91,6 +83,23 @@ impl Picture {
             picture.place(&canvas, n as u32 * (frame.size[0] + GAP));
         }
         Ok(picture)
+    }
+
+    /// A picture with room for a panel for each of the `looks`.
+    fn blank(frame: &Frame, looks: &[Look], by: ColorBy) -> Picture {
+        let panels = looks.len() as u32;
+        let width = frame.size[0] * panels + GAP * (panels - 1);
+        let height = frame.size[1];
+        Picture {
+            width,
+            height,
+            pixels: vec![255; 3 * width as usize * height as usize],
+            pixel: frame.pixel,
+            range: by.is_range().then(|| by.range(looks)),
+            panels: Vec::new(),
+            nowhere: looks.iter().map(|look| look.nowhere).collect(),
+            black: looks.iter().map(|look| by.is_black(look)).collect(),
+        }
     }
 
     /// Copies a panel to the columns from `left` on.
@@ -110,16 +119,26 @@ impl Picture {
     ///
     /// Those of the encoder, which has none for a picture that was drawn.
     pub fn png(&self) -> Result<Vec<u8>> {
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        let wrong = |cause| Error::internal("the picture cannot be encoded").because(cause);
-        let mut writer = encoder.write_header().map_err(wrong)?;
-        writer.write_image_data(&self.pixels).map_err(wrong)?;
-        writer.finish().map_err(wrong)?;
-        Ok(bytes)
+        png_bytes([self.width, self.height], &self.pixels)
     }
+}
+
+/// A PNG file of so many pixels across and down: red, green and blue of each, row by row from the
+/// top.
+///
+/// # Errors
+///
+/// Those of the encoder: pixels that are not as many.
+pub(crate) fn png_bytes([width, height]: [u32; 2], pixels: &[u8]) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    let wrong = |cause| Error::internal("the picture cannot be encoded").because(cause);
+    let mut writer = encoder.write_header().map_err(wrong)?;
+    writer.write_image_data(pixels).map_err(wrong)?;
+    writer.finish().map_err(wrong)?;
+    Ok(bytes)
 }
 
 #[cfg(test)]

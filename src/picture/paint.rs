@@ -43,29 +43,35 @@ impl Canvas {
         frame: &Frame,
         range: [f64; 2],
     ) -> Result<u64> {
+        let by = settings.by;
         let outside = each_point(
             source,
-            settings,
+            by,
+            settings.threads,
             || 0u64,
-            |outside, _, seen, values| match frame.place(seen) {
-                Some(at) => {
-                    // Steps of a pixel, so that a single precision number holds what shading asks.
-                    let near = ((seen[2] / frame.pixel) as f32, settings.by.color(values, range));
-                    self.dot(at, near);
-                }
-                None => *outside += 1,
+            |outside, _, point, values| {
+                let seen = settings.view.seen(point);
+                *outside += u64::from(!self.point(seen, frame, by.color(values, range)));
             },
             |_| {},
         )?;
         Ok(outside.into_iter().sum())
     }
 
-    /// Draws a square of the dot's size around a pixel.
-    fn dot(&self, [x, y]: [u32; 2], (near, [r, g, b]): (f32, Shade)) {
+    /// Draws a point as seen; false if it lies outside of the frame.
+    pub fn point(&self, seen: [f64; 3], frame: &Frame, color: Shade) -> bool {
+        let Some(at) = frame.place(seen) else { return false };
+        // Steps of a pixel, so that a single precision number holds what shading asks.
+        self.dot(at, self.dot, ((seen[2] / frame.pixel) as f32, color));
+        true
+    }
+
+    /// Draws a square of so many pixels around a pixel.
+    pub fn dot(&self, [x, y]: [u32; 2], wide: u32, (near, [r, g, b]): (f32, Shade)) {
         let key = u64::from(ordered(near)) << 32 | u64::from(u32::from_be_bytes([0, r, g, b]));
         let span = |at: u32, end: u32| {
-            let from = at.saturating_sub((self.dot - 1) / 2);
-            from..(from + self.dot).min(end)
+            let from = at.saturating_sub((wide - 1) / 2);
+            from..(from + wide).min(end)
         };
         for row in span(y, self.size[1]) {
             for column in span(x, self.size[0]) {
@@ -73,6 +79,13 @@ impl Canvas {
                 self.cells[cell].fetch_max(key, Ordering::Relaxed);
             }
         }
+    }
+
+    /// Red, green and blue of each pixel, row by row from the top.
+    pub fn pixels(&self) -> Vec<u8> {
+        let [wide, high] = self.size;
+        let rows = (0..high).flat_map(|y| (0..wide).map(move |x| (x, y)));
+        rows.flat_map(|(x, y)| self.shaded(x, y)).collect()
     }
 
     /// The colour of a pixel, darker below its neighbours: that shows walls, trees and holes as a

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use rayon::ThreadPool;
 
+use super::accepted::accepted;
 use super::demanded::{demands, lists_bytes};
 use super::limits::{check_limits, number_selections};
 use super::look::{Unfit, look, look_at_corners};
@@ -28,6 +29,7 @@ use crate::graph::{Nonfinite, Overrides, RunSettings};
 use crate::host::Threads;
 use crate::point::{Schema, Units};
 use crate::quantity::Figure;
+use crate::report::AcceptTable;
 use crate::stage::{CreateSink, Source};
 use crate::store::CLASSED_INPUTS;
 use crate::{Error, Result};
@@ -98,6 +100,7 @@ impl Graph {
     pub fn plan(self, overrides: &Overrides) -> Result<Plan> {
         let (origin, file, whole_rims) = (self.origin.clone(), self.file.clone(), self.whole_rims);
         let settings = self.settings.clone().with(overrides);
+        let rules = self.accept.clone();
         let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
         let told = ToldGraph::of(&self, &settings);
         let mut sorted = Sorted::new(self)?;
@@ -105,8 +108,8 @@ impl Graph {
             check_places(file.as_deref(), read, sinks, &settings)
         };
         let (_, wrong) = places(&sorted.source.1.paths(), &sorted.sinks);
-        let FittedStages { source, schemas, choices, passes, given } =
-            fit_stages(&mut sorted, wrong)?;
+        let FittedStages { source, schemas, choices, passes, given, accept } =
+            fit_stages(&mut sorted, rules, wrong)?;
         let schema = &schemas.last;
         let read = all_read(&*sorted.source.1, &*source);
         let (mut files, wrong) = places(&read, &sorted.sinks);
@@ -117,7 +120,6 @@ impl Graph {
         let tagger = tagger(&sorted.ops, &passes.passes, &choices, &ranks, schema, &settings)?;
         let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, (&*source, schema), &sorted.ops, order.mills)?;
-        let simd = settings.simd.resolve().map_err(in_file)?;
         let demands = demands(&sorted, &passes, (&*source, schema), &order, &settings)?;
         let lists = demands.lists + lists_bytes(&each, &sides, &ranks);
         let demands = Demands { lists, tagged: tagger.tags(), ..demands };
@@ -127,9 +129,10 @@ impl Graph {
         let task = Task {
             provenance: told.provenance(&sorted, &order, &settings),
             warnings,
-            simd,
+            simd: settings.simd.resolve().map_err(in_file)?,
             threads: demands.threads,
             settings,
+            accept,
             whole_rims,
             source,
             source_kind: sorted.source.0,
@@ -165,11 +168,16 @@ struct FittedStages {
     choices: Vec<Choice>,
     passes: Passes,
     given: Vec<GivenLengths>,
+    accept: AcceptTable,
 }
 
 /// Opens the inputs and fits the stages to them. What is `wrong` so far is told with what is found
 /// here.
-fn fit_stages(sorted: &mut Sorted, mut wrong: Vec<Error>) -> Result<FittedStages> {
+fn fit_stages(
+    sorted: &mut Sorted,
+    rules: AcceptTable,
+    mut wrong: Vec<Error>,
+) -> Result<FittedStages> {
     let source = match sorted.source.1.open() {
         Ok(source) => source,
         Err(error) => {
@@ -185,8 +193,9 @@ fn fit_stages(sorted: &mut Sorted, mut wrong: Vec<Error>) -> Result<FittedStages
     wrong.extend(unfit);
     let choices = number_selections(&mut sorted.ops)?;
     let passes = unroll(sorted, &schemas.last, &mut wrong)?;
+    let accept = accepted(rules, sorted, (&*source, &schemas.last), &mut wrong);
     Error::all(wrong)?;
-    Ok(FittedStages { source, schemas, choices, passes, given })
+    Ok(FittedStages { source, schemas, choices, passes, given, accept })
 }
 
 /// Fits tile stages to the units of the scan: lengths with a unit of their own are converted. What

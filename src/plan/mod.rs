@@ -2,6 +2,7 @@
 //! other, the inputs and the memory? What will its run use? Knows no stage by name, and reads no
 //! point but a few that it looks at and those of a trial.
 
+mod accepted;
 mod columns;
 mod demanded;
 mod document;

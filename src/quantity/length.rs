@@ -78,6 +78,11 @@ impl Length {
         self.value
     }
 
+    /// In metres, if it has a unit of its own.
+    pub(crate) fn metres(self) -> Option<f64> {
+        self.unit.map(|unit| self.value * unit.metres())
+    }
+
     /// True if it has a unit of its own.
     pub fn has_unit(self) -> bool {
         self.unit.is_some()

@@ -94,6 +94,9 @@ impl Deviations {
     }
 }
 
+/// Bins that [`Histogram::eighths`] joins.
+const JOINED: usize = 16;
+
 /// Bits of an f32 below those that number its bin: 128 bins between a power of two and the next.
 const BELOW_BIN: u32 = 16;
 /// Number of the bin that ends at 2^-32 steps; everything smaller is in it too.
@@ -139,6 +142,15 @@ impl Histogram {
         for (mine, theirs) in self.bins.iter_mut().zip(other.bins.iter()) {
             *mine += theirs;
         }
+    }
+
+    /// The records by eighths of a power of two: upper edge in lattice steps, 0 for the bin of
+    /// zero, and how many; in ascending order, without bins of no record.
+    pub fn eighths(&self) -> impl Iterator<Item = (f32, u64)> {
+        let first = [(0.0, self.zero), (upper_edge(0), self.bins[0])];
+        let joined = self.bins[1..].chunks(JOINED).enumerate();
+        let joined = joined.map(|(n, bins)| (upper_edge((n + 1) * JOINED), bins.iter().sum()));
+        first.into_iter().chain(joined).filter(|(_, records)| *records > 0)
     }
 
     /// Records.
@@ -205,6 +217,18 @@ mod tests {
         assert_eq!(histogram.percentile(95), Some(0.0));
         assert_eq!(histogram.percentile(96), Some(1.0));
         assert_eq!(Histogram::default().percentile(50), None);
+    }
+
+    #[test]
+    fn eighths_of_powers_of_two_have_all_records() {
+        let mut histogram = Histogram::default();
+        for (figure, copies) in [(0.0, 3), (1.0, 4), (1.05, 1), (1.0905, 1), (1.2, 5), (2.0, 2)] {
+            histogram.add(figure, copies);
+        }
+        let eighths: Vec<(f32, u64)> = histogram.eighths().collect();
+        let edges = [0.0, 1.0, 1.125, 1.25, 2.0];
+        assert_eq!(eighths, std::iter::zip(edges, [3, 4, 2, 5, 2]).collect::<Vec<_>>());
+        assert_eq!(eighths.iter().map(|(_, n)| n).sum::<u64>(), histogram.count());
     }
 
     #[test]

@@ -6,10 +6,11 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::figures::{ClassFigures, PassFigures, Totals};
+use super::figures::{ClassFigures, DeviationBin, PassFigures, Totals};
 use super::ledger::Ledger;
 use super::machine::Machine;
 use super::stats::StatsFigures;
+use super::verdict::AcceptVerdict;
 use crate::budget::Holders;
 
 /// What a run says it did.
@@ -48,8 +49,13 @@ pub struct Outcome {
     pub tile_side: Option<f64>,
     /// Figures of the whole scan; None likewise.
     pub totals: Option<Totals>,
+    /// How far removed records are from the surface of what stands for them, in ascending order;
+    /// empty where nothing was measured.
+    pub deviations: Vec<DeviationBin>,
     /// Records by class, in ascending order; empty if they have none.
     pub classes: Vec<ClassFigures>,
+    /// What the rules of the pipeline come to; None if it has none.
+    pub accept: Option<AcceptVerdict>,
 }
 
 /// The lattice of a run.
@@ -192,8 +198,10 @@ impl Outcome {
         if !self.stats.is_empty() {
             object.entry("stats", &self.stats)?;
         }
+        object.entry("accept", &self.accept)?;
         object.entry("passes", &self.passes)?;
         object.entry("totals", &self.totals)?;
+        object.entry("deviations", &self.deviations)?;
         object.entry("classes", &self.classes)?;
         object.entry("tile_side", &self.tile_side)?;
         object.key("tiles")?;

@@ -17,7 +17,7 @@ pub struct Pair<T> {
 }
 
 /// How far records are from the plane fitted to them, in world units.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct PlaneFigures {
     /// sqrt(Σd²/n).
@@ -27,7 +27,7 @@ pub struct PlaneFigures {
 }
 
 /// How far removed records are from the plane of the point that stands for them, in world units.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct DeviationFigures {
     /// Removed records of which it was measured.
@@ -60,8 +60,19 @@ pub struct DeviationTotals {
     pub at: [f64; 3],
 }
 
-/// One report tile.
+/// The removed records of one stretch of deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct DeviationBin {
+    /// Its largest deviation, in world units; 0 for those that do not deviate. Others are eighths
+    /// of what is between two powers of two of lattice steps.
+    pub to: f64,
+    /// Removed records.
+    pub points: u64,
+}
+
+/// One report tile.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct TileFigures {
     /// World coordinates of the smallest corner of its cube.

@@ -1,5 +1,6 @@
 //! What a run says it did: the ledger, the errors of tiles and scan, and how they are merged.
 
+mod accept;
 mod baseline;
 mod classes;
 pub(crate) mod deviations;
@@ -16,19 +17,21 @@ pub(crate) mod survey;
 mod table;
 mod tally;
 mod towards;
+mod verdict;
 
 pub use crate::budget::{Bytes, Holder, Holders};
+pub(crate) use accept::AcceptFigure;
+pub(crate) use accept::RULES as ACCEPT_RULES;
+pub use accept::{AcceptRules, AcceptTable};
 pub(crate) use baseline::Baseline;
-pub(crate) use classes::ClassCounts;
-#[cfg(feature = "cli")]
-pub(crate) use digits::Coordinate;
-pub(crate) use digits::{Grouped, Short};
+pub(crate) use classes::{ClassCounts, class_name};
+pub(crate) use digits::{Coordinate, Grouped, Short};
 pub use document::{
     Decision, FileFigures, LatticeFigures, Outcome, Phase, Report, RunFigures, result_bytes,
 };
 pub use figures::{
-    BaselineFigures, ClassFigures, DeviationFigures, DeviationTotals, Pair, PassFigures,
-    PlaneFigures, TileFigures, Totals,
+    BaselineFigures, ClassFigures, DeviationBin, DeviationFigures, DeviationTotals, Pair,
+    PassFigures, PlaneFigures, TileFigures, Totals,
 };
 pub(crate) use ledger::check_written;
 pub use ledger::{Ledger, Removed};
@@ -40,3 +43,4 @@ pub(crate) use survey::{FittedScan, ScanSurvey, report_tile_level};
 pub use table::Table;
 pub use tally::Tally;
 pub(crate) use tally::{Apart, KEY_POINTS};
+pub use verdict::{AcceptVerdict, RuleVerdict};

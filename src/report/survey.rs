@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 
 use super::deviations::{Deviations, Histogram};
 use super::figures::{
-    DeviationFigures, DeviationTotals, Pair, PlaneFigures, TileFigures, Totals, world_length,
-    world_point,
+    DeviationBin, DeviationFigures, DeviationTotals, Pair, PlaneFigures, TileFigures, Totals,
+    world_length, world_point,
 };
 use super::lot::Lot;
 use super::moments::{Moments, Plane};
@@ -242,6 +242,12 @@ impl FittedScan {
     pub fn merge(&mut self, part: &Pair<Distances>) {
         self.distances.sums.before.merge(&part.before);
         self.distances.sums.after.merge(&part.after);
+    }
+
+    /// The deviations of all removed records in world units, in ascending order.
+    pub fn bins(&self, lattice: &Lattice) -> Vec<DeviationBin> {
+        let bin = |(to, points)| DeviationBin { to: world_length(to, lattice), points };
+        self.survey.histogram.eighths().map(bin).collect()
     }
 
     /// The totals in world units, but for the baseline, which a pass measures.

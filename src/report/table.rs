@@ -126,7 +126,7 @@ impl Table<'_> {
         if let Some(totals) = &result.totals {
             self.totals_lines(f, result, totals)?;
         }
-        Ok(())
+        self.accept_lines(f, result)
     }
 }
 
@@ -268,6 +268,16 @@ impl Table<'_> {
             )?;
         }
         Ok(())
+    }
+
+    /// A line for each rule of what is accepted.
+    fn accept_lines(&self, f: &mut fmt::Formatter<'_>, result: &Outcome) -> fmt::Result {
+        let rules = result.accept.iter().flat_map(|verdict| &verdict.rules);
+        rules.enumerate().try_for_each(|(i, rule)| {
+            let heading = if i == 0 { "accept" } else { "" };
+            let word = if rule.passed { "PASS" } else { "FAIL" };
+            write!(f, "\n{heading:9}  {word}  {}", rule.told(self.unit))
+        })
     }
 
     /// How far removed records are from the surface, and of how many that is known.

@@ -167,6 +167,11 @@ pub trait Format: Send + Sync {
         Ok([0; 2])
     }
 
+    /// See [`CreateSink::carries`](super::CreateSink::carries).
+    fn carries(&self, _keys: &WriteKeys, _schema: &Schema) -> bool {
+        false
+    }
+
     /// See [`CreateSink::likes_time`](super::CreateSink::likes_time).
     fn likes_time(&self) -> bool {
         false

@@ -53,6 +53,8 @@ pub struct Needs {
     pub whole_records: bool,
     /// True if it removes points.
     pub removes: bool,
+    /// True if it says of what it removes how far it is from the surface of what stands for it.
+    pub measures: bool,
     /// How it marks records instead of removing any, if it does.
     pub mark: Option<Mark>,
     /// How often the stages from the last that computed a column to this one are applied, each time
@@ -164,6 +166,14 @@ impl Needs {
     #[must_use]
     pub fn removes(mut self, mark: Option<Mark>) -> Self {
         (self.removes, self.mark) = (mark.is_none(), mark);
+        self
+    }
+
+    /// And it says of what it removes [how far](crate::tile::Fate::Represented) that is from what
+    /// stands for it.
+    #[must_use]
+    pub fn measures(mut self) -> Self {
+        self.measures = true;
         self
     }
 

@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::source::Input;
+use super::source::{Input, Source};
 use crate::point::{Metadata, PointBatch, Schema, Units};
 use crate::{Error, Result};
 
@@ -206,6 +206,12 @@ pub trait CreateSink: Send + Sync {
     /// Where [`create`](CreateSink::create) would refuse the schema.
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize>;
 
+    /// True if it writes records of `schema` byte for byte as they come, but for what stages
+    /// computed and is written behind them.
+    fn carries(&self, _schema: &Schema) -> bool {
+        false
+    }
+
     /// Bytes that each record takes on the disk at least while the output is written, and those
     /// that it may take besides, where a format writes a file anew; 0 where only the encoded
     /// records tell.
@@ -235,6 +241,16 @@ pub trait CreateSink: Send + Sync {
     /// True if [`check`](CreateSink::check) may fail for records of `schema`.
     fn checks(&self, _schema: &Schema) -> bool {
         false
+    }
+
+    /// Opens what was written, at the `staged` paths, to be looked at: for a report with pictures.
+    /// None where nobody can.
+    ///
+    /// # Errors
+    ///
+    /// Files that cannot be read.
+    fn reopen(&self, _staged: &[PathBuf]) -> Result<Option<Box<dyn Source>>> {
+        Ok(None)
     }
 
     /// Checks that the format holds every dimension (or that the user dropped it) and opens the

@@ -185,7 +185,9 @@ fn figures(outcome: &Outcome) -> Vec<(&'static str, String)> {
         passes,
         tile_side,
         totals,
+        deviations,
         classes,
+        accept: _,
     } = outcome;
     vec![
         ("ledger", format!("{ledger:?}")),
@@ -195,6 +197,7 @@ fn figures(outcome: &Outcome) -> Vec<(&'static str, String)> {
         ("passes", format!("{passes:?}")),
         ("tile_side", format!("{tile_side:?}")),
         ("totals", format!("{totals:?}")),
+        ("deviations", format!("{deviations:?}")),
         ("classes", format!("{classes:?}")),
     ]
 }

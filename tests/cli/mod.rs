@@ -1,10 +1,12 @@
 //! The command: its arguments, words and events.
 
+mod accept;
 mod check;
 mod errors;
 mod events;
 mod interrupt;
 mod names;
+mod page;
 mod picture;
 mod plan;
 mod preview;

@@ -135,6 +135,17 @@ fn the_run_table_has_a_page_that_says_what_the_code_does() {
     keep("docs/run.md", &text);
 }
 
+#[test]
+fn the_accept_table_has_a_page_that_says_what_the_code_does() {
+    let accept = Registry::builtin().describe_accept();
+    let keys = keys::markdown(&accept.keys);
+    let text = page(&accept, "The `[accept]` table") + "\n## Keys\n\n" + &keys;
+    keep(
+        "docs/accept.md",
+        &format!("{text}\nSee [what is accepted](pipeline.md#what-is-accepted).\n"),
+    );
+}
+
 fn help(command: Option<&str>) -> String {
     let arguments: Vec<&str> = ["help"].into_iter().chain(command).collect();
     let (code, text, _) = pointmill(root().as_path(), &arguments);

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use super::modules::Modules;
 
 /// The modules from the bottom up. Those of one layer do not import each other.
-const LAYERS: [&[&str]; 19] = [
+const LAYERS: [&[&str]; 20] = [
     &["error"],
     &["host", "point"],
     &["geom", "quantity", "budget"],
@@ -23,6 +23,7 @@ const LAYERS: [&[&str]; 19] = [
     &["ops", "io", "memory"],
     &["synth"],
     &["picture"],
+    &["page"],
     &["graph"],
     &["engine"],
     &["plan"],

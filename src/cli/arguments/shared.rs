@@ -27,9 +27,14 @@ pub(crate) struct CommonArguments {
     /// was for
     #[arg(short, long)]
     pub verbose: bool,
-    /// Write the report to this file
+    /// Write the report to this file: as JSON or, if its name ends in .html, as a page that people
+    /// hand on, with pictures, maps and curves
     #[arg(long, value_name = "FILE")]
     pub report: Option<String>,
+    /// What the result must be, such as "max <= 5mm, p99 <= 2mm, kept >= 10%, lossless": the exit
+    /// code is 3 if it is not; what is written is written all the same
+    #[arg(long, value_name = "RULES")]
+    pub accept: Option<String>,
     /// Replace no file: refuse the run, with exit code 1, if an output or the report exists
     #[arg(long)]
     pub no_clobber: bool,

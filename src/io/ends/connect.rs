@@ -103,6 +103,10 @@ impl CreateSink for OutputFile {
         self.format.disk_bytes(&self.keys, schema, metadata)
     }
 
+    fn carries(&self, schema: &Schema) -> bool {
+        self.format.carries(&self.keys, schema)
+    }
+
     fn warnings(&self, schema: &Schema, metadata: &Metadata) -> Vec<String> {
         let family = self.format.family();
         let from = self.from(schema).filter(|from| from.family() != family);
@@ -118,6 +122,10 @@ impl CreateSink for OutputFile {
 
     fn check(&self, metadata: &Metadata, records: &PointBatch) -> Result<()> {
         self.format.check(&self.keys, metadata, records)
+    }
+
+    fn reopen(&self, staged: &[PathBuf]) -> Result<Option<Box<dyn Source>>> {
+        self.format.open(staged).map(Some)
     }
 
     fn create(

@@ -45,6 +45,10 @@ impl CreateSink for Discard {
         Order::Auto
     }
 
+    fn carries(&self, _: &Schema) -> bool {
+        true
+    }
+
     fn chunk(&self, _: &Arc<Schema>, _: &Metadata) -> Result<ChunkSize> {
         Ok(ChunkSize { points: CHUNK, bytes: 0 })
     }

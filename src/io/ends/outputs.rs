@@ -9,7 +9,7 @@ use super::connect::OutputFile;
 use super::kinds::{check, unknown_extension};
 use crate::error::shown;
 use crate::point::{Metadata, PointBatch, Schema};
-use crate::stage::{ChunkSize, CreateSink, Format, Formats, Input, Order, Sink, WriteKeys};
+use crate::stage::{ChunkSize, CreateSink, Format, Formats, Input, Order, Sink, Source, WriteKeys};
 use crate::{Error, ErrorKind, Result};
 
 /// The sink that writes a file for each input.
@@ -140,8 +140,21 @@ impl CreateSink for Outputs {
         Ok(bytes.collect::<Result<Vec<_>>>()?.into_iter().min().unwrap_or_default())
     }
 
+    fn carries(&self, schema: &Schema) -> bool {
+        let possible = self.possible(schema);
+        !possible.is_empty() && possible.iter().all(|output| output.carries(schema))
+    }
+
     fn warnings(&self, schema: &Schema, metadata: &Metadata) -> Vec<String> {
         self.any(schema).map_or(Vec::new(), |output| output.warnings(schema, metadata))
+    }
+
+    fn reopen(&self, staged: &[PathBuf]) -> Result<Option<Box<dyn Source>>> {
+        // Files of one family are read together by any format of it.
+        let one = self.formats.iter().find(|format| {
+            staged.first().is_some_and(|file| format.open(std::slice::from_ref(file)).is_ok())
+        });
+        one.map(|format| format.open(staged)).transpose()
     }
 
     fn checks(&self, schema: &Schema) -> bool {

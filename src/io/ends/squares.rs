@@ -8,7 +8,7 @@ use super::outputs::check_folder;
 use crate::error::shown;
 use crate::point::{Metadata, PointBatch, Schema, Units};
 use crate::quantity::Length;
-use crate::stage::{ChunkSize, CreateSink, Order, Sink, WriteKeys};
+use crate::stage::{ChunkSize, CreateSink, Order, Sink, Source, WriteKeys};
 use crate::{Error, Result};
 
 /// What stands in a path for the corner of a square.
@@ -153,8 +153,16 @@ impl CreateSink for Squares {
         self.file.disk_bytes(schema, metadata)
     }
 
+    fn carries(&self, schema: &Schema) -> bool {
+        self.file.carries(schema)
+    }
+
     fn warnings(&self, schema: &Schema, metadata: &Metadata) -> Vec<String> {
         self.file.warnings(schema, metadata)
+    }
+
+    fn reopen(&self, staged: &[PathBuf]) -> Result<Option<Box<dyn Source>>> {
+        self.file.reopen(staged)
     }
 
     fn checks(&self, schema: &Schema) -> bool {

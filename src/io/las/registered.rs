@@ -146,6 +146,10 @@ impl Format for LasFormat {
         true
     }
 
+    fn carries(&self, keys: &WriteKeys, schema: &Schema) -> bool {
+        schema.layout.family == FAMILY && keys.scale.is_none() && keys.offset.is_none()
+    }
+
     fn likes_time(&self) -> bool {
         self.compressed
     }

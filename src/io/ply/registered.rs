@@ -86,6 +86,11 @@ impl Format for PlyFormat {
         Ok(sink::plan(&options(keys, metadata, false), schema, metadata)?.disk_bytes())
     }
 
+    fn carries(&self, keys: &WriteKeys, schema: &Schema) -> bool {
+        let is_asked = keys.encoding.is_some() || !keys.drop.is_empty();
+        schema.layout.family == FAMILY && !is_asked
+    }
+
     fn holds_computed(&self) -> bool {
         true
     }
