@@ -122,12 +122,12 @@ impl Task {
             FileFigures::of(&copy.to, 0, bytes)
         }));
         clock.begin(RunPhase::Publish, None)?;
+        self.check_size(&run.outputs)?;
         if staged_report.is_some() && matches!(self.provenance, Provenance::Told { .. }) {
             let written = outputs.iter().flatten().chain(&squares).chain(&beside);
             hash_outputs(&mut run, written.collect(), watch)?;
         }
         let (report, tiles) = self.account(finished, run, clock)?;
-        self.check_size(&report.run.outputs)?;
         if let (Some(path), Some(staged)) = (report_path, &staged_report) {
             let sink = self.first_sink();
             let written = if self.has_squares(sink) { &squares[..] } else { &outputs[sink][..] };

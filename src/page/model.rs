@@ -23,6 +23,8 @@ pub(super) struct Page {
     places: Vec<PlaceView>,
     warnings: Vec<String>,
     files: Vec<FileView>,
+    /// The command that makes the outputs again; None where they do not note how they were made.
+    again: Option<String>,
     missing: Vec<String>,
 }
 
@@ -32,6 +34,8 @@ struct FileView {
     path: String,
     points: String,
     bytes: String,
+    /// In hexadecimal; empty where it is not known.
+    sha256: String,
 }
 
 impl Page {
@@ -56,7 +60,8 @@ impl Page {
             branches.push(BranchView::of(result, tiles.as_ref(), place, source.unit)?);
         }
         let (scenes, places) = draw(&source, (&worst, spacing), &mut missing);
-        not_measured(&results, &mut missing);
+        let again = again(&report.run.outputs);
+        not_measured(&results, again.is_some(), &mut missing);
         let verdicts: Vec<bool> =
             results.iter().filter_map(|r| r.accept.as_ref()).map(|v| v.passed).collect();
         Ok(Page {
@@ -69,6 +74,7 @@ impl Page {
             places,
             warnings: report.run.warnings.clone(),
             files: files(&report.run.inputs, &report.run.outputs),
+            again,
             missing,
         })
     }
@@ -91,6 +97,18 @@ fn title(inputs: &[FileFigures]) -> String {
     }
 }
 
+/// The command that makes the outputs again, by the first of them that has a hash.
+fn again(outputs: &[FileFigures]) -> Option<String> {
+    let noted = outputs.iter().find(|file| file.sha256.is_some())?;
+    let path = crate::error::shown(std::path::Path::new(&noted.path)).to_string();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:".contains(c);
+    let quoted = match path.chars().all(is_plain) {
+        true => path,
+        false => format!("'{}'", path.replace('\'', "'\\''")),
+    };
+    Some(format!("pointmill reproduce {quoted}"))
+}
+
 /// Files of each role that a page lists.
 const MOST_FILES: usize = 60;
 
@@ -102,6 +120,7 @@ fn files(inputs: &[FileFigures], outputs: &[FileFigures]) -> Vec<FileView> {
             path: crate::error::shown(std::path::Path::new(&file.path)).to_string(),
             points: words::count(file.points),
             bytes: words::bytes(file.bytes),
+            sha256: file.sha256.clone().unwrap_or_default(),
         }));
         if let Some(others) = files.len().checked_sub(MOST_FILES).filter(|others| *others > 0) {
             all.push(FileView {
@@ -109,6 +128,7 @@ fn files(inputs: &[FileFigures], outputs: &[FileFigures]) -> Vec<FileView> {
                 path: format!("and {} more", words::count(others as u64)),
                 points: words::count(files[MOST_FILES..].iter().map(|file| file.points).sum()),
                 bytes: String::new(),
+                sha256: String::new(),
             });
         }
     }
@@ -116,7 +136,7 @@ fn files(inputs: &[FileFigures], outputs: &[FileFigures]) -> Vec<FileView> {
 }
 
 /// Adds what a reader may look for and nobody measured.
-fn not_measured(results: &[&Outcome], missing: &mut Vec<String>) {
+fn not_measured(results: &[&Outcome], has_hashes: bool, missing: &mut Vec<String>) {
     let any = |of: fn(&Outcome) -> bool| results.iter().any(|result| of(result));
     let mut say = |told: &str| missing.push(told.to_owned());
     if any(|result| result.totals.is_none()) {
@@ -147,7 +167,9 @@ fn not_measured(results: &[&Outcome], missing: &mut Vec<String>) {
     if any(|result| result.accept.is_none()) {
         say("Whether the result is good enough: nobody gave rules by which it is accepted.");
     }
-    say("Hashes of the inputs and outputs, and the command that makes the same again.");
+    if !has_hashes {
+        say("Hashes of the inputs and outputs: outputs do not note how they were made.");
+    }
     say("Errors of the scan itself: how far its points are from what was scanned.");
     say("How far each place is from the nearest point that was kept: `pointmill verify` measures \
          that, and checks that each kept record is one of the inputs.");
