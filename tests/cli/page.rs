@@ -46,6 +46,8 @@ fn a_page_is_one_file_that_says_what_a_report_says() {
         "What was not measured",
         "<polyline",
         "thin.laz",
+        "SHA-256 <code>",
+        "<code>pointmill reproduce thin.laz</code>",
     ] {
         assert!(html.contains(told), "{told}");
     }
@@ -59,7 +61,9 @@ fn a_page_is_one_file_that_says_what_a_report_says() {
 #[test]
 fn a_page_asks_for_nothing() {
     let folder = scan("5000");
-    let html = page(folder.path(), &["--keep", "10%"]);
+    let html = page(folder.path(), &["--keep", "10%", "--no-provenance"]);
+    assert!(html.contains("Hashes of the inputs and outputs: outputs do not note"));
+    assert!(!html.contains("SHA-256") && !html.contains("pointmill reproduce"));
     assert!(html.contains("content=\"default-src 'none'; img-src data:;"));
     for (begin, end) in [("src=\"", '"'), ("href=\"", '"'), ("url(", ')')] {
         for asked in html.split(begin).skip(1).filter_map(|rest| rest.split(end).next()) {
