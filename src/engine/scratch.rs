@@ -249,7 +249,7 @@ mod tests {
         let trouble = Trouble::default();
         let scratch = Scratch::below(parent.path(), &trouble);
         let folder = scratch.path("a").unwrap().parent().unwrap().to_owned();
-        fs::create_dir(folder.join("in the way")).unwrap();
+        fs::create_dir_all(folder.join("in the way/a/b/c/d")).unwrap();
         drop(scratch);
         let told = lock(&trouble).join("");
         assert!(told.starts_with(folder.to_str().unwrap()), "{told}");

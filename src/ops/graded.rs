@@ -57,9 +57,9 @@ use work::RoundWork;
 /// errors e and distances d; and of the worst cells of the whole scan the position of largest e · d
 /// is kept. No cut into tiles shows in what is kept.
 ///
-/// `keep = "auto"` looks for the number: of an eighth, a sixteenth and so on down to a 128th of the
-/// positions it takes the smallest of which twice as many would lower the mean error of a sample by
-/// less than a quarter, or else an eighth. The report has the errors that were measured.
+/// `keep = "auto"` looks for the number: of a 128th, a 64th, a 32nd of the positions it takes the
+/// smallest of which twice as many would lower the mean error of a sample by less than a quarter,
+/// or else an eighth. The report has the errors that were measured.
 ///
 /// With `tolerance` every removed position is within it of the surface: of the least-squares plane
 /// of its 8 nearest surface points, and all that are as near as the eighth, within four times

@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn bars_begin_where_the_bins_before_them_end() {
         let eighths = [1.0, 1.125, 1.25, 1.875, 2.0, 2.25, 4.0].map(|steps| begin(steps, 1.0));
-        assert_eq!(eighths, [0.9375, 1.0, 1.125, 1.75, 1.875, 2.0, 3.5]);
+        assert_eq!(eighths, [0.9375, 1.0, 1.125, 1.75, 1.875, 2.0, 3.75]);
         assert!((begin(1.125 * 0.001, 0.001) - 0.001).abs() < 1e-12);
         assert!((begin(2.0 * 0.1, 0.1) - 0.1875).abs() < 1e-12);
     }

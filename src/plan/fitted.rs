@@ -16,6 +16,7 @@ use super::sorted::{Sorted, blame};
 use super::stretch::Stretch;
 use super::told::ToldGraph;
 use super::transforms::{check_numbers, fit_transforms};
+use crate::budget::Bytes;
 use crate::engine::pass::{Pass, StageOp};
 use crate::engine::shares::Demands;
 use crate::engine::tagger::Tagger;
@@ -121,9 +122,7 @@ impl Graph {
         let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, (&*source, schema), &sorted.ops, order.mills)?;
         let demands = demands(&sorted, &passes, (&*source, schema), &order, &settings)?;
-        let lists = demands.lists + lists_bytes(&each, &sides, &ranks);
-        let demands = Demands { lists, tagged: tagger.tags(), ..demands };
-        demands.divide()?;
+        let demands = divided(demands, lists_bytes(&each, &sides, &ranks), tagger.tags())?;
         let mut warnings = warnings(&*source, &sorted, &schemas, &settings)?;
         warnings.extend(doubt.into_iter().chain(wide));
         let task = Task {
@@ -159,6 +158,13 @@ impl Graph {
         };
         Ok(Plan { task, ops: sorted.ops })
     }
+}
+
+/// The demands with these lists by input besides, if the memory does for them.
+fn divided(demands: Demands, lists: Bytes, tagged: bool) -> Result<Demands> {
+    let demands = Demands { lists: demands.lists + lists, tagged, ..demands };
+    demands.divide()?;
+    Ok(demands)
 }
 
 /// Stages that fit each other and the headers of the inputs.

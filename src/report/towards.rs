@@ -46,7 +46,7 @@ fn knee_line(
     tried: &[Value],
     unit: Option<&str>,
 ) -> fmt::Result {
-    write!(f, "\nchosen     {} points, the knee: mean errors are ", Grouped(keep))?;
+    write!(f, "\nchosen     {} points, by the shape: mean errors are ", Grouped(keep))?;
     for (n, one) in tried.iter().enumerate() {
         let (Some(points), Some(error)) = (one["points"].as_u64(), one["mean_error"].as_f64())
         else {

@@ -70,7 +70,7 @@ fn stages_lists_what_the_registry_has_and_the_keys_of_each() {
     let kinds: BTreeSet<&str> =
         all.as_array().unwrap().iter().map(|d| d["kind"].as_str().unwrap()).collect();
     let registry = Registry::builtin();
-    let expected = registry.kinds().map(|(kind, _)| kind).chain(["run"]).collect();
+    let expected = registry.kinds().map(|(kind, _)| kind).chain(["accept", "run"]).collect();
     assert_eq!(kinds, expected);
     let text = done(at.path(), &["stages"]);
     for described in all.as_array().unwrap() {

@@ -144,7 +144,7 @@ fn many_bytes_of_records_are_carried_and_not_held() {
     file(&input, 1_000, 65_000, false);
     let run = |inputs: &[&Path]| {
         let text = format!(
-            "[run]\nthreads = 1\n[[stage]]\nkind = \"read\"\npath = {inputs:?}\n\
+            "[run]\nthreads = 1\nprovenance = false\n[[stage]]\nkind = \"read\"\npath = {inputs:?}\n\
              [[stage]]\nkind = \"write\"\npath = {output:?}\n"
         );
         let go = |memory| {

@@ -132,8 +132,12 @@ pub(crate) fn is_at(file: &File, at: impl AsFd, path: impl Arg) -> bool {
     }
 }
 
-/// Removes what is in a folder but `spared`, folders in it with all that they hold.
-fn empty(folder: &OwnedFd, spared: &[u8]) -> io::Result<()> {
+/// Folders in a scratch folder are so deep at most: outputs that are made again in one are.
+const DEEPEST: u32 = 4;
+
+/// Removes what is in a folder but `spared`, folders in it with all that they hold, if these are no
+/// deeper than `depth`.
+fn empty(folder: &OwnedFd, spared: &[u8], depth: u32) -> io::Result<()> {
     let entries = Dir::read_from(folder)?.collect::<rustix::io::Result<Vec<_>>>()?;
     for entry in &entries {
         let name = entry.file_name();
@@ -143,9 +147,9 @@ fn empty(folder: &OwnedFd, spared: &[u8]) -> io::Result<()> {
         match unlinkat(folder, name, AtFlags::empty()) {
             Ok(()) | Err(Errno::NOENT) => {}
             // A folder: Linux says the one, others the other.
-            Err(cause @ (Errno::ISDIR | Errno::PERM)) => {
+            Err(cause @ (Errno::ISDIR | Errno::PERM)) if depth > 0 => {
                 let inner = open_folder(folder, name).map_err(|_| cause)?;
-                empty(&inner, b"")?;
+                empty(&inner, b"", depth - 1)?;
                 unlinkat(folder, name, AtFlags::REMOVEDIR)?;
             }
             Err(cause) => return Err(cause.into()),
@@ -157,7 +161,7 @@ fn empty(folder: &OwnedFd, spared: &[u8]) -> io::Result<()> {
 /// Removes a scratch folder, open as `folder` and called `name`, its marker last. What was put in
 /// its place meanwhile is spared, unless it is an empty folder.
 pub(crate) fn remove(at: impl AsFd, name: impl Arg, folder: &OwnedFd) -> io::Result<()> {
-    empty(folder, MARKER.as_bytes())?;
+    empty(folder, MARKER.as_bytes(), DEEPEST)?;
     match unlinkat(folder, MARKER, AtFlags::empty()) {
         Ok(()) | Err(Errno::NOENT) => {}
         Err(cause) => return Err(cause.into()),
@@ -297,13 +301,13 @@ mod tests {
     fn what_cannot_be_removed_is_told() {
         let at = tempfile::tempdir().unwrap();
         let folder = dead(at.path(), 0, None);
-        // A folder where files are expected.
-        fs::create_dir(folder.join("2-refuses")).unwrap();
+        // Folders deeper than any run makes them.
+        fs::create_dir_all(folder.join("2-refuses/a/b/c/d")).unwrap();
         let told = remove_stale(at.path());
         assert!(told.len() == 1 && told[0].contains("cannot be removed"), "{told:?}");
         assert!(told[0].starts_with(folder.to_str().unwrap()), "{told:?}");
         assert!(folder.join(MARKER).exists(), "the marker goes last");
-        fs::remove_dir(folder.join("2-refuses")).unwrap();
+        fs::remove_dir_all(folder.join("2-refuses")).unwrap();
         assert_eq!(remove_stale(at.path()), [""; 0]);
         assert!(!folder.exists());
         // Nobody's right to look is nobody's trouble.

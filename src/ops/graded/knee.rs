@@ -17,7 +17,10 @@ use super::work::{RoundWork, fill};
 
 /// The numbers that are tried are the positions through these powers of two.
 const FEWEST: u32 = 7;
-const MOST: u32 = 3;
+const LAST: u32 = 4;
+/// Where the last of them is worth it, twice as many are taken and not tried: that would take as
+/// long as all others together.
+const MOST: u32 = LAST - 1;
 /// No number is smaller.
 const LEAST: u64 = 64;
 /// Twice as many points are worth it if they lower the mean error below this part of it.
@@ -45,6 +48,7 @@ pub(super) struct Knee {
     unit: f64,
     /// Mean errors of the numbers that were tried, in lattice steps.
     pub tried: Vec<(u64, f64)>,
+    most: u64,
     work: Option<RoundWork>,
 }
 
@@ -66,11 +70,11 @@ impl Knee {
     pub fn new(so_far: &SoFar<'_>, seed: u64) -> Knee {
         let positions = so_far.levels.positions();
         let number = |power: u32| (positions >> power).max(LEAST).min(positions);
-        let mut numbers: Vec<u64> = (MOST..=FEWEST).rev().map(number).collect();
+        let mut numbers: Vec<u64> = (LAST..=FEWEST).rev().map(number).collect();
         numbers.dedup();
         let unit = (extent(&so_far.bounds) as f64 / PARTS).max(1.0 / 16.0);
-        let (at, step, radius) = (0, KneeStep::Fill, 1);
-        Knee { seed, numbers, at, step, radius, unit, tried: Vec::new(), work: None }
+        let (at, step, radius, most) = (0, KneeStep::Fill, 1, number(MOST));
+        Knee { seed, numbers, at, step, radius, unit, tried: Vec::new(), most, work: None }
     }
 
     /// What the round at hand does.
@@ -148,8 +152,11 @@ impl Knee {
         {
             return KneeNext::Found(number);
         }
-        if mean == 0.0 || self.at + 1 == self.numbers.len() {
+        if mean == 0.0 {
             return KneeNext::Found(self.numbers[self.at]);
+        }
+        if self.at + 1 == self.numbers.len() {
+            return KneeNext::Found(self.most);
         }
         self.at += 1;
         self.step = KneeStep::Fill;
