@@ -36,12 +36,21 @@ struct HashingWork {
 impl InputHashes {
     /// Those of the files at `paths`, which have so many points; None if one of them is no plain
     /// file: what cannot be read twice cannot be told again.
-    pub fn new(paths: &[PathBuf], points: u64) -> Option<Self> {
-        let open = |path: &PathBuf| Origin::open(path).ok().map(|(_, origin)| origin);
-        let files: Vec<Origin> = paths.iter().map(open).collect::<Option<_>>()?;
+    ///
+    /// # Errors
+    ///
+    /// A plain file that cannot be opened.
+    pub fn new(paths: &[PathBuf], points: u64) -> Result<Option<Self>> {
+        let open = |path: &PathBuf| Origin::open(path).map(|(_, origin)| origin);
+        let opened: Result<Vec<Origin>> = paths.iter().map(open).collect();
+        let files = match opened {
+            Ok(files) => files,
+            Err(_) if paths.iter().any(|path| !path.is_file()) => return Ok(None),
+            Err(error) => return Err(error),
+        };
         let bytes = files.iter().map(Origin::length).sum();
         let (read, work) = (AtomicU64::new(0), Mutex::default());
-        Some(InputHashes { files, bytes, points, read, work })
+        Ok(Some(InputHashes { files, bytes, points, read, work }))
     }
 
     /// What stands in the place of the hashes until they are known.
@@ -120,7 +129,7 @@ mod tests {
     fn hashes_follow_what_is_read_and_are_those_of_the_files() {
         let folder = tempfile::tempdir().unwrap();
         let paths = files(folder.path(), &[1 << 20, 0, 300_000]);
-        let hashes = InputHashes::new(&paths, 100).unwrap();
+        let hashes = InputHashes::new(&paths, 100).unwrap().unwrap();
         let done = || lock(&hashes.work).bytes;
         hashes.follow(10).unwrap();
         let tenth = done();
@@ -141,10 +150,10 @@ mod tests {
     fn a_file_that_changes_meanwhile_is_told() {
         let folder = tempfile::tempdir().unwrap();
         let paths = files(folder.path(), &[200_000]);
-        let hashes = InputHashes::new(&paths, 10).unwrap();
+        let hashes = InputHashes::new(&paths, 10).unwrap().unwrap();
         hashes.follow(5).unwrap();
         std::fs::write(&paths[0], "another").unwrap();
         assert!(hashes.all().unwrap_err().to_string().contains("changed while it was read"));
-        assert!(InputHashes::new(&[folder.path().to_owned()], 1).is_none(), "a folder");
+        assert!(InputHashes::new(&[folder.path().to_owned()], 1).unwrap().is_none(), "a folder");
     }
 }

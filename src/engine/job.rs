@@ -93,7 +93,7 @@ impl<'a> Job<'a> {
             budget,
             threads,
             watch,
-            hashes: task.provenance.hashes(task.source.points()),
+            hashes: task.provenance.hashes(task.source.points())?,
             warnings: Mutex::default(),
             failed: AtomicBool::new(false),
             _base: base,

@@ -30,10 +30,14 @@ pub(crate) enum Provenance {
 
 impl Provenance {
     /// Hashes to be taken while the run reads so many points.
-    pub fn hashes(&self, points: u64) -> Option<Arc<InputHashes>> {
+    ///
+    /// # Errors
+    ///
+    /// A file that cannot be opened any more.
+    pub fn hashes(&self, points: u64) -> Result<Option<Arc<InputHashes>>> {
         match self {
-            Provenance::Told { files, .. } => InputHashes::new(files, points).map(Arc::new),
-            _ => None,
+            Provenance::Told { files, .. } => Ok(InputHashes::new(files, points)?.map(Arc::new)),
+            _ => Ok(None),
         }
     }
 }

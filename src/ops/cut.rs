@@ -72,13 +72,14 @@ impl Cut {
         let rung = Rung::within(spacing * (1.0 + 1e-9));
         let rung = if rung.length() < spacing * (1.0 - 1e-9) { rung.coarser() } else { rung };
         let limit = least_of_rank(rung.last_rank());
-        let (mut stay, mut finer) = (0u64, false);
+        let (mut all, mut stay, mut finer) = (0, 0, false);
         gathered.each(&mut |tile| {
-            stay += tile.iter().filter(|order| **order >= limit).count() as u64;
+            all += tile.len();
+            stay += tile.iter().filter(|order| **order >= limit).count();
             finer |= tile.iter().any(|order| *order < limit && *order >= least_of_rank(LAST_RANK));
             Ok(())
         })?;
-        if stay == 0 {
+        if stay == 0 && all > 0 {
             let told = format!("no points were kept as far as `{SPACING} = {spacing}` from others");
             return Err(Error::new(ErrorKind::Data, told).help("give a shorter length"));
         }

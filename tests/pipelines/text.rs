@@ -477,7 +477,7 @@ fn mistakes_of_an_argument_point_into_it() {
 --set: this pipeline has no stage `thn`
    | thn.neighbors=3
    | ^^^
-   = did you mean `thin`? stages: run, synth, thin, write";
+   = did you mean `thin`? stages: accept, run, synth, thin, write";
     assert_eq!(told("thn.neighbors=3"), expected);
     for (set, expected) in [
         ("neighbors=3", "it is not said of which stage"),

@@ -105,7 +105,7 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
                 check::<Graded>(json!({ "keep": "20%" })),
                 check::<Graded>(json!({ "keep": "auto" })),
                 check::<Graded>(json!({
-                    "keep": "10%", "borders": true, "weight": "Classification == 2 ? 0.5 : Z > 0 ? 3 : 1"
+                    "keep": "10%", "borders": true, "weight": "Z > 0 ? 3 : 1"
                 })),
                 check::<Graded>(json!({ "tolerance": 0.3, "max_spacing": 2.0, "ranks": true })),
             ],
