@@ -261,7 +261,8 @@ fn outputs_name_the_program_and_what_it_did_to_the_points() {
     );
     let stages = |name: &str| -> serde_json::Value {
         let bytes = fs::read(bench.path(name)).unwrap();
-        let at = bytes.windows(10).rposition(|w| w == b"pointmill\0").unwrap() + 16;
+        let is_stages = |w: &[u8]| w.starts_with(b"pointmill\0") && w.ends_with(&[1, 0]);
+        let at = bytes.windows(18).rposition(is_stages).unwrap() + 16;
         let length = usize::from(u16::from_le_bytes([bytes[at + 2], bytes[at + 3]]));
         serde_json::from_slice(&bytes[at + 36..at + 36 + length]).unwrap()
     };
