@@ -231,6 +231,9 @@ fn a_tile_stage_that_reads_what_a_stage_above_changes_is_refused() {
     assert!(told.to_string().contains("`reclass` changes it"), "{told:?}");
 }
 
+/// Outputs of different pipelines are compared.
+const PLAIN: &str = "[run]\nprovenance = false\n";
+
 #[test]
 fn several_sources_are_one_scan() {
     let at = tempfile::tempdir().unwrap();
@@ -242,11 +245,14 @@ fn several_sources_are_one_scan() {
     let parse = |text: &str| Graph::parse(text, "test.toml", &Registry::builtin()).unwrap();
     let read = |name: &str| format!("[[stage]]\nkind = 'read'\npath = '{}'\n", path(name));
     let write = |name: &str| format!("[[stage]]\nkind = 'write'\npath = '{}'\n", path(name));
-    let both =
-        format!("[[stage]]\nkind = 'read'\npath = ['{}', '{}']\n", path("a.las"), path("b.laz"));
+    let both = format!(
+        "{PLAIN}[[stage]]\nkind = 'read'\npath = ['{}', '{}']\n",
+        path("a.las"),
+        path("b.laz")
+    );
     run(parse(&format!("{both}{REDUCE}{}", write("one.ply")))).unwrap();
     let merged = |first: &str, second: &str, output: &str| {
-        let mut graph = parse(&format!("{}{REDUCE}{}", read(first), write(output)));
+        let mut graph = parse(&format!("{PLAIN}{}{REDUCE}{}", read(first), write(output)));
         let other = parse(&format!("{}{}", second, write("none.ply"))).stages.remove(0);
         graph.stages.insert(1, other);
         for stage in &mut graph.stages[2..] {

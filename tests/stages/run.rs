@@ -14,7 +14,7 @@ use pointmill::{Graph, Overrides, Quiet, Registry, Set};
 use serde_json::Value;
 
 /// Small tiles on a lattice of whole numbers.
-const TILES: &str = "lattice = 1.0\ntile_points = 40\nthreads = 2";
+const TILES: &str = "provenance = false\nlattice = 1.0\ntile_points = 40\nthreads = 2";
 
 /// A rough sheet of 2,500 positions, and some far above and below it.
 fn scene() -> Vec<Position> {
