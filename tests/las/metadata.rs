@@ -244,7 +244,7 @@ fn outputs_name_the_program_and_what_it_did_to_the_points() {
     bytes[58..64].copy_from_slice(b"WRITER");
     fs::write(&input, bytes).unwrap();
     let written = |inputs: &[PathBuf], stages: &str, output: &str| {
-        bench.run(inputs, "", stages, output).unwrap();
+        bench.run(inputs, "provenance = false", stages, output).unwrap();
         let about =
             internals::las::describe(&bench.path(output.split('\n').next().unwrap())).unwrap();
         assert_eq!(about.generating_software, software);
