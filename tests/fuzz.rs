@@ -132,7 +132,7 @@ fn planted(_: &Path, data: &[u8]) -> Judgement {
     match data.first() {
         Some(0) if asked => panic!("planted"),
         Some(1) if asked => drop(std::hint::black_box(vec![0u8; 100 << 20])),
-        Some(2) if asked => (0..300_000_000u64).for_each(|i| {
+        Some(2) if asked => (0..700_000_000u64).for_each(|i| {
             std::hint::black_box(i);
         }),
         Some(3) if asked => {
