@@ -90,8 +90,13 @@ impl Trials<'_> {
         Ok([numbers, tolerances])
     }
 
+    /// A share is tried as the number that it is of the whole scan.
     fn number(&self, keep: &str) -> Result<PreviewRow> {
-        let (keep, label) = (Some(keep.to_owned()), keep.to_owned());
+        let share = keep.trim().strip_suffix('%').and_then(|percent| percent.trim().parse().ok());
+        let all = self.plan.outline().points as f64;
+        let number = share.map(|percent: f64| (all * percent / 100.0).round().max(1.0) as u64);
+        let of_all = number.map_or_else(|| keep.to_owned(), |number| number.to_string());
+        let (keep, label) = (Some(of_all), keep.to_owned());
         self.row(label, ReduceArguments { keep, tolerance: None, ..self.arguments.clone() })
     }
 
@@ -121,7 +126,7 @@ fn doubt(preview: &Preview) -> Option<String> {
     (trial.density < WHOLE_ENOUGH).then(|| {
         format!(
             "points of one place are all over the input, and the trial saw {:.0} % of those in its \
-             places: expect smaller errors than these, and fewer points for a tolerance",
+             places: expect errors and numbers somewhat other than these",
             100.0 * trial.density
         )
     })

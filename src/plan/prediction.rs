@@ -188,7 +188,8 @@ impl Extrapolation<'_> {
         let mut bytes = None;
         if let Some((tried, got)) = self.tried.ok().and_then(|t| Some((t, t.outputs.get(number)?)))
         {
-            let all = |part: u64| (part as f64 * self.times(tried)).round() as u64;
+            let times = self.times(tried) * tried.density;
+            let all = |part: u64| (part as f64 * times).round() as u64;
             points = points.or(Some(all(got.points)));
             bytes = sink.is_file().then(|| all(got.bytes));
         }

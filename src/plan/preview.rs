@@ -54,7 +54,9 @@ impl Plan {
 
     /// Tries `other` on these points: a pipeline of the same sources whose stages may differ from
     /// those of this plan. Keys that count records of the whole scan count those of the share that
-    /// is tried. What a run on the whole scan comes to differs by what is elsewhere in it.
+    /// is tried: give numbers and no shares, since of a scan whose points are not in the order of
+    /// their places the tried ones are a part of those that are there. What a run on the whole scan
+    /// comes to differs by what is elsewhere in it.
     ///
     /// # Errors
     ///
@@ -65,7 +67,8 @@ impl Plan {
         other: Graph,
         watch: &dyn Watch,
     ) -> Result<Preview> {
-        let tried = self.tried(points, other, watch)?;
+        let density = points.density();
+        let tried = self.tried_as(points, density, other, watch)?;
         let deviation = tried.outcome.totals.as_ref().and_then(|totals| totals.deviation);
         let (kept, counts) = (tried.outcome.ledger.kept, tried.outcome.counts.clone());
         let prediction = self.prediction(&Ok(tried))?;

@@ -70,6 +70,8 @@ pub(super) struct TrialRun {
     pub spilled: u64,
     /// What became of the points.
     pub outcome: Outcome,
+    /// Of the points in their places, the part that they are.
+    pub density: f64,
 }
 
 /// Some of the points of a scan, on which pipelines are tried: those that
@@ -81,6 +83,13 @@ pub struct TrialPoints {
     trial: Trial,
     /// CPU seconds of the reading.
     reading: f64,
+}
+
+impl TrialPoints {
+    /// Of the points in their places, the part that they are.
+    pub(super) fn density(&self) -> f64 {
+        if self.trial.density > 0.0 { self.trial.density } else { 1.0 }
+    }
 }
 
 /// What a trial came to, or why there was none.
@@ -155,13 +164,26 @@ impl Plan {
         again: Graph,
         watch: &dyn Watch,
     ) -> Result<TrialRun> {
+        self.tried_as(points, 1.0, again, watch)
+    }
+
+    /// The same, where the tried points stand for so many times as few of the scan as they are: if
+    /// not all of their places was read, for those that are there.
+    pub(super) fn tried_as(
+        &self,
+        points: &TrialPoints,
+        density: f64,
+        again: Graph,
+        watch: &dyn Watch,
+    ) -> Result<TrialRun> {
         let start = Instant::now();
         let TrialPoints { source, records, trial, reading } = points;
         let (trouble, written) = (Trouble::default(), WrittenFiles::default());
         let folder = self.task.settings.scratch.clone().unwrap_or_else(std::env::temp_dir);
         let scratch = Arc::new(Scratch::below(&folder, &trouble));
         let graph = on_records(again, records.clone());
-        let share = trial.points as f64 / source.points().max(trial.points).max(1) as f64;
+        let of_all = trial.points as f64 / source.points().max(trial.points).max(1) as f64;
+        let share = (of_all / density).min(1.0);
         let mut graph = rehearsed(graph, share, &**source, &scratch, &written)?;
         self.equip(&mut graph.settings, folder)?;
         let done = graph.plan(&Overrides::default())?.run(&Unheard(watch))?;
@@ -175,6 +197,7 @@ impl Plan {
             phases: done.report.run.cpu_by_phase,
             outputs,
             spilled: done.report.run.spill_bytes,
+            density,
             outcome: done.report.result,
         })
     }
