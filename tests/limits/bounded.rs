@@ -69,8 +69,8 @@ fn three_times_larger(points: u64, budget: u64, commands: &[&str]) {
 #[ignore = "takes minutes"]
 fn memory_of_128_mib_bounds_the_reduction_of_a_scan_three_times_larger() {
     let commands = [
-        "reduce scan.las -o reduced.laz --threads 1",
-        "reduce scan.las -o reduced.ply --threads 2",
+        "reduce scan.las -o reduced.laz --threads 1 --side spread",
+        "reduce scan.las -o reduced.ply --threads 2 --side spread",
         "convert scan.las -o scan.laz --threads 2",
         "convert scan.laz -o scan.ply --threads 2",
         "reduce scan.laz -o again.laz --threads 2 --method pca",
@@ -81,7 +81,11 @@ fn memory_of_128_mib_bounds_the_reduction_of_a_scan_three_times_larger() {
 #[test]
 #[ignore = "takes minutes"]
 fn memory_of_256_mib_bounds_the_reduction_of_a_scan_three_times_larger() {
-    three_times_larger(27_000_000, 256, &["reduce scan.las -o reduced.laz --threads 2"]);
+    three_times_larger(
+        27_000_000,
+        256,
+        &["reduce scan.las -o reduced.laz --threads 2 --side spread"],
+    );
 }
 
 /// Outliers of the scan, then a target for the ground and a grid for the rest, with an output
