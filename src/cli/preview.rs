@@ -96,8 +96,23 @@ impl Trials<'_> {
         let all = self.plan.outline().points as f64;
         let number = share.map(|percent: f64| (all * percent / 100.0).round().max(1.0) as u64);
         let of_all = number.map_or_else(|| keep.to_owned(), |number| number.to_string());
-        let (keep, label) = (Some(of_all), keep.to_owned());
-        self.row(label, ReduceArguments { keep, tolerance: None, ..self.arguments.clone() })
+        let label = keep.to_owned();
+        let row = |keep: String| {
+            let arguments = self.arguments.clone();
+            self.row(
+                label.clone(),
+                ReduceArguments { keep: Some(keep), tolerance: None, ..arguments },
+            )
+        };
+        let first = row(of_all)?;
+        // What is chosen by the shape is a share of the points that are tried.
+        match &first.preview.prediction.trial {
+            Some(trial) if keep == "auto" && trial.density < 1.0 => {
+                let share = first.preview.kept as f64 / trial.points.max(1) as f64;
+                row(((all * share).round().max(1.0) as u64).to_string())
+            }
+            _ => Ok(first),
+        }
     }
 
     fn tolerance(&self, length: &str) -> Result<PreviewRow> {
