@@ -10,7 +10,7 @@ use crate::plan::{Plan, TrialPoints};
 use crate::quantity::Length;
 use crate::report::Grouped;
 use crate::stage::{Role, StageKind};
-use crate::{Error, ErrorKind, Result};
+use crate::{Error, Result};
 
 /// Points that are tried.
 const TRIED: usize = 60_000;
@@ -34,11 +34,9 @@ pub(super) fn warn_of_noise(
     let first = again()?;
     let points = plan.outline().points;
     let warning = watched(&mut Nothing, &|| console.cancelled(), |watch| {
-        // What cannot be tried is for the run to tell, or to do without.
-        match plan.trial_points(&first, TRIED, watch) {
-            Ok(some) => NoiseTrials { plan, again, some, watch }.warning(tolerance, points),
-            Err(error) if error.kind() == ErrorKind::Interrupted => Err(error),
-            Err(_) => Ok(None),
+        match plan.trial_points_if_any(&first, TRIED, watch)? {
+            Some(some) => NoiseTrials { plan, again, some, watch }.warning(tolerance, points),
+            None => Ok(None),
         }
     })?;
     warning.iter().for_each(|warning| console.warn(warning));

@@ -23,8 +23,6 @@ const SHARES: [&str; 5] = ["1%", "2%", "5%", "10%", "20%"];
 const TOLERANCES_OF: [usize; 2] = [2, 4];
 /// The output that a preview without one is of: it is not written.
 const OUTPUT: &str = "preview.laz";
-/// A trial that saw a smaller part of the points where it looked tells little.
-const WHOLE_ENOUGH: f64 = 0.75;
 
 /// What is tried, and what it comes to.
 struct PreviewRow {
@@ -138,7 +136,7 @@ fn rounded(length: f64) -> Option<f64> {
 /// Why a preview tells little, if it does.
 fn doubt(preview: &Preview) -> Option<String> {
     let trial = preview.prediction.trial.as_ref()?;
-    (trial.density < WHOLE_ENOUGH).then(|| {
+    trial.is_thin().then(|| {
         format!(
             "points of one place are all over the input, and the trial saw {:.0} % of those in its \
              places: expect errors and numbers somewhat other than these",

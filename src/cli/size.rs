@@ -18,8 +18,10 @@ use crate::{Error, ErrorKind, Result};
 
 /// By how much of it a size may be missed.
 const WITHIN: f64 = 0.02;
-/// The number follows from two that were tried; the first is a guess at the second.
-const GUESSES: [f64; 2] = [0.1, 1.0];
+/// The share of the points that is tried first.
+const FIRST: f64 = 0.1;
+/// Trials, each with the number that follows from the one before.
+const TRIALS: usize = 2;
 /// Points that are tried.
 const TRIED: usize = 240_000;
 /// Runs at most.
@@ -103,11 +105,11 @@ impl SizedReduction<'_> {
         let guess = |number: u64| number.clamp(1, all);
         let again = reduction(&self.arguments(1), self.registry)?;
         watched(&mut Nothing, &|| self.console.cancelled(), |watch| {
-            let Ok(some) = plan.trial_points(&again, TRIED, watch) else {
-                return Ok(guess((all as f64 * GUESSES[0]) as u64));
+            let mut number = guess((all as f64 * FIRST) as u64);
+            let Some(some) = plan.trial_points_if_any(&again, TRIED, watch)? else {
+                return Ok(number);
             };
-            let mut number = guess((all as f64 * GUESSES[0]) as u64);
-            for _ in GUESSES {
+            for _ in 0..TRIALS {
                 let graph = reduction(&self.arguments(number), self.registry)?;
                 let preview = plan.preview(&some, graph, watch)?;
                 let output = preview.prediction.outputs.first();

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use super::bits::Image;
 use crate::Result;
+use crate::picture::mixed;
 use crate::report::TileFigures;
 
 /// Columns along x or y at most.
@@ -141,17 +142,6 @@ impl TileMap {
         }
         Ok(Some(DrawnMap { image: Image::of(size, &pixels)?, most }))
     }
-}
-
-/// A colour between those of `stops`, at `share` of the way.
-fn mixed(stops: &[[u8; 3]], share: f64) -> [u8; 3] {
-    let at = share * (stops.len() - 1) as f64;
-    let below = (at as usize).min(stops.len() - 2);
-    let part = at - below as f64;
-    std::array::from_fn(|i| {
-        let (a, b) = (f64::from(stops[below][i]), f64::from(stops[below + 1][i]));
-        (a + (b - a) * part).round() as u8
-    })
 }
 
 #[cfg(test)]

@@ -83,7 +83,7 @@ impl ColorBy {
 }
 
 /// A colour between those of `stops`, at `share` of the way.
-fn mixed(stops: &[Shade], share: f64) -> Shade {
+pub(crate) fn mixed(stops: &[Shade], share: f64) -> Shade {
     let at = share * (stops.len() - 1) as f64;
     let below = (at as usize).min(stops.len() - 2);
     let part = at - below as f64;

@@ -15,6 +15,7 @@ mod several;
 use crate::stage::Source;
 use crate::{Error, Result};
 
+pub(crate) use color::mixed;
 use look::{Frame, Look};
 use paint::Canvas;
 use settings::NARROWEST;

@@ -21,8 +21,6 @@ use crate::stage::CreateSink;
 
 /// The origin of what needs no trial.
 const HEADERS: &str = "headers and the division of the memory";
-/// A trial that saw a smaller part of the points where it looked tells little.
-const WHOLE_ENOUGH: f64 = 0.75;
 /// Threads that share the work of a run are busy for this part of its time, as measured.
 const BUSY: f64 = 0.95;
 /// Records for each of which a run looks at one of a sample, and how many it looks at in all, at
@@ -154,9 +152,10 @@ impl Extrapolation<'_> {
     fn words(&self) -> String {
         match self.tried {
             Err(why) => format!("not known: {why}"),
-            Ok(TrialRun { trial: Trial { points, of_points, density, seconds, .. }, .. }) => {
+            Ok(TrialRun { trial, .. }) => {
+                let Trial { points, of_points, density, seconds, .. } = trial;
                 let (points, of, took) = (Grouped(*points), Grouped(*of_points), Short(*seconds));
-                let doubt = match *density < WHOLE_ENOUGH {
+                let doubt = match trial.is_thin() {
                     true => format!(
                         "; points of one place are all over the input, and it saw {:.0} % of \
                          those in its places: expect otherwise",

@@ -52,6 +52,21 @@ impl Plan {
         }
     }
 
+    /// The same, or none where there can be no trial: why not is for the run to tell, or to do
+    /// without.
+    #[cfg(feature = "cli")]
+    pub(crate) fn trial_points_if_any(
+        &self,
+        again: &Graph,
+        about: usize,
+        watch: &dyn Watch,
+    ) -> Result<Option<TrialPoints>> {
+        match self.trial_points(again, about, watch) {
+            Err(error) if error.kind() == crate::ErrorKind::Interrupted => Err(error),
+            points => Ok(points.ok()),
+        }
+    }
+
     /// Tries `other` on these points: a pipeline of the same sources whose stages may differ from
     /// those of this plan. Keys that count records of the whole scan count those of the share that
     /// is tried: give numbers and no shares, since of a scan whose points are not in the order of

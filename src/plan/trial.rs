@@ -56,6 +56,16 @@ pub struct Trial {
     pub seconds: f64,
 }
 
+/// A trial that saw a smaller part of the points where it looked tells little.
+const WHOLE_ENOUGH: f64 = 0.75;
+
+impl Trial {
+    /// True if it tells little, as it saw too small a part of the points where it looked.
+    pub(crate) fn is_thin(&self) -> bool {
+        self.density < WHOLE_ENOUGH
+    }
+}
+
 /// What a trial came to.
 pub(super) struct TrialRun {
     /// How it went.

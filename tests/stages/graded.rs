@@ -13,17 +13,17 @@ use serde_json::{Value, json};
 const STEP: f64 = 1.0 / 1024.0;
 
 /// A position in steps.
-type At = [i64; 3];
+pub type At = [i64; 3];
 
 /// What a run leaves: each kept position with its rank, and the report's figures.
-struct Left {
-    kept: BTreeMap<At, u16>,
+pub struct Left {
+    pub kept: BTreeMap<At, u16>,
     deviation: f64,
     counts: BTreeMap<String, u64>,
     spacing: Option<f64>,
 }
 
-fn graded(scan: &[At], keys: Value, tile_points: Option<usize>) -> Left {
+pub fn graded(scan: &[At], keys: Value, tile_points: Option<usize>) -> Left {
     let stage: Graded = serde_json::from_value(keys).unwrap();
     let points: Vec<[f64; 3]> = scan.iter().map(|p| p.map(|v| v as f64 * STEP)).collect();
     let (sink, received) = channel(4, if stage.ranks { &["KeepRank"] } else { &[] });

@@ -3,41 +3,17 @@
 
 use std::collections::BTreeSet;
 
+use super::graded::{At, graded};
 use crate::support::random::Random;
-use pointmill::graph::RunSettings;
-use pointmill::memory::{Records, channel};
-use pointmill::ops::Graded;
-use pointmill::{Graph, Overrides, Quiet};
 use serde_json::{Value, json};
 
-/// Steps of the lattice that the scans are on.
-const STEP: f64 = 1.0 / 1024.0;
-
 /// The positions in steps that a run keeps.
-fn kept(scan: &[[i64; 3]], keys: Value, tile_points: Option<usize>) -> BTreeSet<[i64; 3]> {
-    let stage: Graded = serde_json::from_value(keys).unwrap();
-    let points: Vec<[f64; 3]> = scan.iter().map(|p| p.map(|v| v as f64 * STEP)).collect();
-    let (sink, received) = channel(4, &[]);
-    let settings = RunSettings {
-        lattice: Some(STEP),
-        tile_points: tile_points.and_then(std::num::NonZeroUsize::new),
-        ..RunSettings::default()
-    };
-    let graph = Graph::builder().settings(settings).source(Records::of_positions(&points));
-    let plan = graph.stage(stage).sink(sink).build().unwrap().plan(&Overrides::default()).unwrap();
-    let mut kept = BTreeSet::new();
-    for batch in plan.pull(received, Quiet) {
-        let batch = batch.unwrap();
-        let schema = batch.schema();
-        let axes = schema.coordinates().unwrap();
-        let at = |record| axes.map(|d| (d.world(record, schema.endian) / STEP).round() as i64);
-        kept.extend(batch.iter().map(at));
-    }
-    kept
+fn kept(scan: &[At], keys: Value, tile_points: Option<usize>) -> BTreeSet<At> {
+    graded(scan, keys, tile_points).kept.into_keys().collect()
 }
 
 /// A surface over a square of `side` points, as high as `height` says.
-fn surface(side: i64, mut height: impl FnMut(i64, i64) -> i64) -> Vec<[i64; 3]> {
+fn surface(side: i64, mut height: impl FnMut(i64, i64) -> i64) -> Vec<At> {
     let mut points = Vec::new();
     for x in 0..side {
         points.extend((0..side).map(|y| [16 * x, 16 * y, height(x, y)]));
@@ -50,7 +26,7 @@ fn points_that_weigh_more_draw_more_points() {
     // The same waves in both halves, which are parted at x = 1 in world units.
     let wave = |x: i64, y: i64| ((x as f64 / 3.0).sin() * (y as f64 / 4.0).cos() * 60.0) as i64;
     let scan = surface(128, |x, y| wave(x % 64, y));
-    let left = |kept: &BTreeSet<[i64; 3]>| kept.iter().filter(|p| p[0] < 1024).count();
+    let left = |kept: &BTreeSet<At>| kept.iter().filter(|p| p[0] < 1024).count();
     let even = kept(&scan, json!({ "keep": 1000 }), None);
     let half = left(&even);
     assert!(even.len() == 1000 && (400..600).contains(&half), "{half}");
@@ -63,12 +39,10 @@ fn points_that_weigh_more_draw_more_points() {
 }
 
 /// The area of the convex hull of what is seen from above.
-fn hull_area(points: &BTreeSet<[i64; 3]>) -> i64 {
-    let turn = |a: [i64; 3], b: [i64; 3], c: [i64; 3]| {
-        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-    };
-    let chain = |points: &mut dyn Iterator<Item = &[i64; 3]>| {
-        let mut hull: Vec<[i64; 3]> = Vec::new();
+fn hull_area(points: &BTreeSet<At>) -> i64 {
+    let turn = |a: At, b: At, c: At| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    let chain = |points: &mut dyn Iterator<Item = &At>| {
+        let mut hull: Vec<At> = Vec::new();
         for p in points {
             while hull.len() > 1 && turn(hull[hull.len() - 2], hull[hull.len() - 1], *p) <= 0 {
                 hull.pop();

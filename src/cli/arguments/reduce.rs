@@ -24,10 +24,6 @@ const OF_CELLS: [&str; 13] = [
     "mark",
 ];
 
-fn parse_size(text: &str) -> Result<u64, String> {
-    parse_bytes(text)
-}
-
 impl ReduceArguments {
     /// True if the published method is asked for: by a preset, or an option that is about cells.
     pub fn by_cells(&self) -> bool {
@@ -76,7 +72,7 @@ pub(crate) struct ReduceArguments {
     pub keep: Option<String>,
     /// How many bytes the output is to take, within 2 %: 200MB. As many points stay as that allows;
     /// packed ones differ in size, so a run is repeated until it comes out
-    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     #[arg(conflicts_with_all = OF_CELLS, conflicts_with_all = ["keep", "tolerance", "preview"])]
     pub size: Option<u64>,
     /// How far from the surface of the points that stay no removed point may be: in the scan's

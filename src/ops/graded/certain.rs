@@ -11,15 +11,12 @@ use super::correct::Correcting;
 use super::fill::Filling;
 use super::ladder::APART;
 use super::refine::Refining;
-use super::sides::occupied;
 use super::work::{RoundWork, fill};
 
 /// Rounds at most.
 const MOST_ROUNDS: u32 = 24;
 /// Rounds before it is asked whether they pay.
 const ALWAYS: u32 = 3;
-/// As for a ladder.
-const FILLED_FROM: f64 = 64.0;
 
 /// Where the rounds stand.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,9 +56,8 @@ impl Certain {
 
     /// What comes next.
     pub fn next(&mut self, so_far: &SoFar<'_>) -> NextRound {
-        let cubes = occupied(so_far.levels, self.radius as f64);
-        let share = (FILLED_FROM * cubes / so_far.levels.positions().max(1) as f64).min(1.0);
         let filling = Filling { apart: self.radius, seed: self.seed };
+        let share = filling.looks_at(so_far);
         match self.at {
             CertainStep::Fill => {
                 self.at =

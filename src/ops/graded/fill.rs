@@ -10,9 +10,10 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
+use super::sides::{occupied, share_of};
 use crate::geom::hash::{PlaceHashes, of_position};
 use crate::point::Position;
-use crate::stage::{RoundFound, RoundTile};
+use crate::stage::{RoundFound, RoundTile, SoFar};
 
 /// The order of colours: see `ops/sample/disc.rs`.
 const COLORS: [usize; 8] = [0b000, 0b010, 0b011, 0b111, 0b110, 0b100, 0b101, 0b001];
@@ -28,7 +29,16 @@ pub(super) struct Filling {
     pub seed: u64,
 }
 
+/// Positions that a filling looks at for each cube of its distance that is occupied; all where
+/// there are fewer.
+const FILLED_FROM: f64 = 64.0;
+
 impl Filling {
+    /// The part of all positions that it looks at.
+    pub fn looks_at(self, so_far: &SoFar<'_>) -> f64 {
+        share_of(FILLED_FROM * occupied(so_far.levels, self.apart as f64), so_far)
+    }
+
     /// Side of the cubes: the power of two that is no smaller than the distance.
     fn side(self) -> i64 {
         1 << self.level()

@@ -10,9 +10,9 @@
 use crate::stage::{Looks, NextRound, Round, RoundChoice, SoFar};
 
 use super::fill::Filling;
-use super::ladder::{APART, OF_VOXEL};
+use super::ladder::{APART, OF_VOXEL, PROBED_ABOVE};
 use super::refine::{Measuring, Refining};
-use super::sides::{extent, occupied, steps, voxel_side};
+use super::sides::{extent, share_of, steps, voxel_side};
 use super::work::{RoundWork, fill};
 
 /// The numbers that are tried are the positions through these powers of two.
@@ -27,9 +27,6 @@ const LEAST: u64 = 64;
 const WORTH: f64 = 0.75;
 /// Rounds that add points to what is filled.
 const ROUNDS: u32 = 2;
-/// As for a ladder.
-const FILLED_FROM: f64 = 64.0;
-const PROBED: f64 = 12.0;
 /// Positions that are measured at least.
 const MEASURED: f64 = 20_000.0;
 /// An error is told in so many parts of the scan's extent.
@@ -104,9 +101,8 @@ impl Knee {
     fn fill(&mut self, want: u64, so_far: &SoFar<'_>) -> NextRound {
         self.radius = steps(OF_VOXEL * voxel_side(so_far.levels, &so_far.bounds, want));
         self.step = KneeStep::Refine { round: 0 };
-        let cubes = occupied(so_far.levels, self.radius as f64);
-        let share = share_of(FILLED_FROM * cubes, so_far);
         let filling = Filling { apart: self.radius, seed: self.seed };
+        let share = filling.looks_at(so_far);
         self.work = Some(RoundWork::Fill(filling));
         fill(filling, Looks::sample(share, self.seed))
     }
@@ -114,7 +110,7 @@ impl Knee {
     fn refine(&mut self, want: u64, so_far: &SoFar<'_>) -> NextRound {
         let refining = self.refining();
         self.work = Some(RoundWork::Refine(refining));
-        let probed = share_of(PROBED * self.numbers[self.at] as f64, so_far);
+        let probed = share_of(PROBED_ABOVE * self.numbers[self.at] as f64, so_far);
         let choice = RoundChoice::Best { want, reach: refining.offer_reach() };
         self.round(refining, probed, choice)
     }
@@ -138,7 +134,7 @@ impl Knee {
 
     /// The share of all positions that is measured.
     fn measured(&self, so_far: &SoFar<'_>) -> f64 {
-        share_of((PROBED * self.numbers[self.at] as f64).max(MEASURED), so_far)
+        share_of((PROBED_ABOVE * self.numbers[self.at] as f64).max(MEASURED), so_far)
     }
 
     /// Whether the last number is worth it, beside the one before.
@@ -162,9 +158,4 @@ impl Knee {
         self.step = KneeStep::Fill;
         self.next(so_far)
     }
-}
-
-/// So many of all positions, as a share.
-fn share_of(positions: f64, so_far: &SoFar<'_>) -> f64 {
-    (positions / so_far.levels.positions().max(1) as f64).min(1.0)
 }

@@ -13,7 +13,7 @@ use super::fill::Filling;
 use super::rank::{Rung, rank_behind};
 use super::refine::Refining;
 use super::settings::Effort;
-use super::sides::{LONGEST, extent, occupied, steps, voxel_side};
+use super::sides::{LONGEST, extent, share_of, steps, voxel_side};
 use super::work::{RoundWork, fill};
 
 /// The last distance, as a part of the side of the voxel grid that keeps as many.
@@ -22,13 +22,10 @@ pub(super) const OF_VOXEL: f64 = 0.97;
 const GROWTH: f64 = 2.0 / 3.0;
 /// Kept points from which on a rung has rounds.
 const FEWEST: u64 = 200;
-/// Positions that a filling looks at for each cube of its distance that is occupied; all where
-/// there are fewer.
-const FILLED_FROM: f64 = 64.0;
 /// Positions that a round of the last rung looks at for each kept point, and of others, which only
 /// have to find about where points are missing.
 const PROBED: f64 = 32.0;
-const PROBED_ABOVE: f64 = 12.0;
+pub(super) const PROBED_ABOVE: f64 = 12.0;
 /// An offer stands aside for a better one within this share of its distance to a kept point.
 pub(super) const APART: f64 = 0.5;
 
@@ -195,7 +192,7 @@ impl Ladder {
     fn fill(&mut self, rung: usize, looks: Looks) -> NextRound {
         let is_first = matches!(looks, Looks::Sample { .. });
         self.rank(is_first.then_some(rung));
-        let filling = Filling { apart: self.rungs[rung], seed: self.manner.seed };
+        let filling = self.filling(rung);
         self.work = Some(RoundWork::Fill(filling));
         // A sample that is covered says nothing of the others.
         let looks_at_all = looks.share() >= 1.0 || matches!(looks, Looks::Uncovered { .. });
@@ -212,7 +209,7 @@ impl Ladder {
                 true => PROBED * self.want as f64,
                 false => PROBED_ABOVE * grown,
             };
-            self.probed = (of_rung / so_far.levels.positions().max(1) as f64).min(1.0);
+            self.probed = share_of(of_rung, so_far);
         }
         let (rounds, want) = match is_last_rung {
             true => {
@@ -254,10 +251,13 @@ impl Ladder {
         GROWTH / (f64::from(self.rounds.each) + f64::from(round) * GROWTH)
     }
 
+    fn filling(&self, rung: usize) -> Filling {
+        Filling { apart: self.rungs[rung], seed: self.manner.seed }
+    }
+
     /// The part of all positions that a rung fills from.
     fn filled_from(&self, rung: usize, so_far: &SoFar<'_>) -> f64 {
-        let cubes = occupied(so_far.levels, self.rungs[rung] as f64);
-        (FILLED_FROM * cubes / so_far.levels.positions().max(1) as f64).min(1.0)
+        self.filling(rung).looks_at(so_far)
     }
 }
 

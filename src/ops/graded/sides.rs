@@ -2,6 +2,7 @@
 //! knows: there numbers are straight lines over sides, both in logarithms.
 
 use crate::point::Bounds;
+use crate::stage::SoFar;
 use crate::store::Levels;
 
 /// No distance is larger, in steps.
@@ -30,6 +31,11 @@ pub(super) fn occupied(levels: &Levels, side: f64) -> f64 {
     let (below, part) = (level.floor() as u32, level.fract());
     let [more, fewer] = [below, below + 1].map(|level| levels.occupied(level).max(1) as f64);
     more * (fewer / more).powf(part)
+}
+
+/// So many positions as a share of all, 1 at most.
+pub(super) fn share_of(positions: f64, so_far: &SoFar<'_>) -> f64 {
+    (positions / so_far.levels.positions().max(1) as f64).min(1.0)
 }
 
 /// A distance as whole steps.
