@@ -26,6 +26,7 @@ mod stretch;
 mod told;
 mod transforms;
 mod trial;
+mod trial_reading;
 
 pub use fitted::Plan;
 pub use outline::Outline;

@@ -6,15 +6,18 @@ use serde::Serialize;
 
 use super::fitted::Plan;
 use super::prediction::Prediction;
-use super::trial::{TrialPoints, TrialSize};
+use super::trial::TrialPoints;
+use super::trial_reading::TrialSize;
 use crate::engine::Watch;
 use crate::graph::Graph;
 use crate::report::DeviationTotals;
 use crate::{Error, Result};
 
-/// Columns of space that pipelines are tried on: few, since kept points at the border of a column
-/// lack neighbours, which counts more the smaller it is.
-const SPOTS: usize = 3;
+/// Squares that pipelines are tried on: several, since a scan is not everywhere the same, each of
+/// so many records, since kept points at the border of a square lack neighbours, which counts more
+/// the smaller it is.
+const SPOTS: usize = 8;
+const RECORDS_OF_SPOT: usize = 20_000;
 
 /// What a pipeline is expected to come to, by a trial on some points of the scan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -33,8 +36,8 @@ pub struct Preview {
 
 impl Plan {
     /// Takes some points of the sources of `again`, which is the pipeline of this plan once more,
-    /// to try pipelines on: about so many, all those in a few columns of space, or all of a scan
-    /// that has hardly more.
+    /// to try pipelines on: about so many, all those in a few squares along its two widest axes,
+    /// of any height, or all of a scan that has hardly more.
     ///
     /// # Errors
     ///
@@ -48,7 +51,10 @@ impl Plan {
     ) -> Result<TrialPoints> {
         match self.no_trial() {
             Some(why) => Err(Error::pipeline(why)),
-            None => self.read_some(again, TrialSize { about, spots: SPOTS }, watch),
+            None => {
+                let spots = (about / RECORDS_OF_SPOT).clamp(1, SPOTS);
+                self.read_some(again, TrialSize::of(about, spots), watch)
+            }
         }
     }
 
@@ -69,9 +75,9 @@ impl Plan {
 
     /// Tries `other` on these points: a pipeline of the same sources whose stages may differ from
     /// those of this plan. Keys that count records of the whole scan count those of the share that
-    /// is tried: give numbers and no shares, since of a scan whose points are not in the order of
-    /// their places the tried ones are a part of those that are there. What a run on the whole scan
-    /// comes to differs by what is elsewhere in it.
+    /// is tried: give numbers and no shares, since of a scan whose points are in no order of places
+    /// the tried ones may be a part of those that are there. What a run on the whole scan comes to
+    /// differs by what is elsewhere in it.
     ///
     /// # Errors
     ///

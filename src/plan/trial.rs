@@ -1,43 +1,31 @@
 //! A trial: the stages of a pipeline on a part of its scan, by the road of every run.
 //!
-//! Where stages work on tiles, the records of a stretch of the input are read, and those in a few
-//! columns of space are taken, which have their neighbours. Where records stream, stretches spread
-//! over the input are taken as they are, since encoders live on the order of records.
+//! Which part that is, `trial_reading.rs` decides.
 
-use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
-use std::ops::Range;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Instant;
 
 use serde::Serialize;
 
 use super::fitted::Plan;
 use super::rehearsal::{WrittenFiles, on_records, rehearsed};
-use super::spots::Spots;
+use super::trial_reading::{TrialReading, TrialRecords, TrialSize};
 use crate::engine::Watch;
 use crate::engine::scratch::{Scratch, Trouble};
 use crate::graph::{Graph, Overrides, RunSettings, SpillSetting};
 use crate::host::process::{cpu_seconds, resident_now};
 use crate::host::{Threads, lock};
 use crate::memory::Records;
-use crate::point::PointBatch;
 use crate::report::Outcome;
 use crate::stage::{Role, SinkSummary, Source};
 use crate::{Error, ErrorKind, Result};
 
-/// Records that are read to choose from, at most, and the bytes that they take.
-const READ: u64 = 3_000_000;
-const READ_BYTES: u64 = 96 << 20;
+/// Bytes of records that are held, at most.
+const HELD_BYTES: u64 = 96 << 20;
 /// Where a run is foretold.
-const FORETOLD: TrialSize = TrialSize { about: 240_000, spots: 8 };
-/// A scan is tried as a whole if it has no more than so many fourths of what is tried of others.
-const WHOLE_FOURTHS: u64 = 5;
-/// Parts of the rest of the input that are looked at, a batch of each.
-const ELSEWHERE: usize = 32;
-/// Records that are read at once.
-const BATCH: usize = 4096;
+const FORETOLD: TrialSize = TrialSize::of(240_000, 8);
 
 /// A run of the same stages on a part of the scan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -49,8 +37,8 @@ pub struct Trial {
     pub points: u64,
     /// Records of the scan by its headers.
     pub of_points: u64,
-    /// Of the points that lie where those do, the part that was read, as far as a look at the rest
-    /// of the input tells: 1 where the points of a place are together in it.
+    /// Of the points that lie where those do, about the part that was read: less than 1 where they
+    /// are in so many parts of the input that not all were read.
     pub density: f64,
     /// Wall-clock seconds that it took, reading included.
     pub seconds: f64,
@@ -105,15 +93,6 @@ impl TrialPoints {
 /// What a trial came to, or why there was none.
 pub(super) type Tried = std::result::Result<TrialRun, String>;
 
-/// How much a trial works on.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct TrialSize {
-    /// Records, about.
-    pub about: usize,
-    /// The columns or stretches that these are in.
-    pub spots: usize,
-}
-
 impl Plan {
     /// Runs the stages of `again` on some of the points, or says why not.
     pub(super) fn try_on_some(&self, again: Graph, watch: &dyn Watch) -> Result<Tried> {
@@ -150,14 +129,13 @@ impl Plan {
         let (start, cpu_before) = (Instant::now(), cpu_seconds());
         // Parts are read from a source of their own: that of the plan counts what it gives.
         let source = opened(again)?;
-        let (schema, limit) = (source.schema(), READ_BYTES.min(self.task.demands.limit / 4));
+        let (schema, limit) = (source.schema(), HELD_BYTES.min(self.task.demands.limit / 4));
         let unread = &self.task.unread();
-        let (read, reading) = Threads::start(self.task.threads, |threads| {
+        let read = Threads::start(self.task.threads, |threads| {
             let from = TrialReading { source: &*source, unread, threads, watch, limit, size };
-            let read = from.records(self.task.mills)?;
-            let reading = cpu_seconds() - cpu_before;
-            Ok((from.chosen(read, self.task.mills)?, reading))
+            from.records(self.task.mills)
         })?;
+        let reading = cpu_seconds() - cpu_before;
         let TrialRecords { read: read_points, chosen, density } = read;
         let points = (chosen.len() / schema.stride) as u64;
         let records = Records::new((**schema).clone(), chosen)?;
@@ -238,117 +216,6 @@ fn opened(graph: &Graph) -> Result<Box<dyn Source>> {
     let Some(second) = sources.next() else { return first.open() };
     let merged = first.merged(&**second)?;
     sources.try_fold(merged, |merged, next| merged.merged(&**next))?.open()
-}
-
-/// Records of some parts.
-struct ReadParts {
-    parts: Range<usize>,
-    read: Vec<Vec<u8>>,
-}
-
-/// The records that a trial works on.
-struct TrialRecords {
-    /// How many were read to choose from.
-    read: u64,
-    chosen: Vec<u8>,
-    /// See [`Trial::density`].
-    density: f64,
-}
-
-/// The reading of some of a source's records.
-struct TrialReading<'a> {
-    source: &'a dyn Source,
-    unread: &'a [String],
-    threads: Threads<'a>,
-    watch: &'a dyn Watch,
-    /// Bytes of records, at most.
-    limit: u64,
-    size: TrialSize,
-}
-
-impl TrialReading<'_> {
-    /// Records up to which a scan is tried as a whole.
-    fn whole(&self) -> u64 {
-        self.size.about as u64 / 4 * WHOLE_FOURTHS
-    }
-
-    /// A stretch from the middle of the input, or several that are spread over it.
-    fn records(&self, in_one: bool) -> Result<ReadParts> {
-        let (parts, all) = (self.source.parts().max(1), self.source.points());
-        let most = READ.min(self.limit / self.source.schema().stride.max(1) as u64).max(1);
-        let whole = if in_one { most } else { self.whole().min(most) };
-        if all <= whole {
-            let parts = 0..self.source.parts();
-            return Ok(ReadParts { read: self.parts(parts.clone().collect(), most)?, parts });
-        }
-        if !in_one {
-            let TrialSize { about, spots } = self.size;
-            let mut some: Vec<usize> =
-                (0..spots).map(|n| parts * (2 * n + 1) / (2 * spots)).collect();
-            some.dedup();
-            let each = most.min(about as u64) / some.len() as u64;
-            return Ok(ReadParts { parts: 0..parts, read: self.parts(some, each)? });
-        }
-        let each = all.div_ceil(parts as u64).max(1);
-        let count = usize::try_from(most / each).unwrap_or(parts).clamp(1, parts);
-        let first = (parts - count) / 2;
-        let parts = first..first + count;
-        Ok(ReadParts { read: self.parts(parts.clone().collect(), most)?, parts })
-    }
-
-    /// Of records that were read those in a few columns of space, where they are to have their
-    /// neighbours and are not few.
-    fn chosen(&self, ReadParts { parts, read }: ReadParts, in_spots: bool) -> Result<TrialRecords> {
-        let (schema, stride) = (self.source.schema(), self.source.schema().stride);
-        let count = (read.iter().map(Vec::len).sum::<usize>() / stride) as u64;
-        let axes = schema.coordinates().filter(|_| in_spots && count > self.whole());
-        let Some(axes) = axes else {
-            return Ok(TrialRecords { read: count, chosen: read.concat(), density: 1.0 });
-        };
-        let at = |record: &[u8]| axes.map(|axis| axis.world(record, schema.endian));
-        let records = || read.iter().flat_map(|bytes| bytes.chunks_exact(stride));
-        let spots = Spots::of(records().map(at)).chosen(self.size.spots, self.size.about);
-        let mut chosen = Vec::new();
-        records().filter(|record| spots.hold(at(record))).for_each(|r| chosen.extend_from_slice(r));
-        let others: Vec<usize> =
-            (0..self.source.parts()).filter(|part| !parts.contains(part)).collect();
-        let step = others.len().div_ceil(ELSEWHERE).max(1);
-        let elsewhere = self.parts(others.into_iter().step_by(step).collect(), 1)?;
-        let elsewhere = || elsewhere.iter().flat_map(|bytes| bytes.chunks_exact(stride));
-        let there = elsewhere().filter(|record| spots.hold(at(record))).count() as f64;
-        let rest = self.source.points().saturating_sub(count) as f64;
-        let near = (chosen.len() / stride) as f64;
-        let missing = rest * there / elsewhere().count().max(1) as f64;
-        Ok(TrialRecords { read: count, chosen, density: near / (near + missing).max(1.0) })
-    }
-
-    /// The records of these parts, so many of each at most, in whole batches.
-    fn parts(&self, parts: Vec<usize>, most: u64) -> Result<Vec<Vec<u8>>> {
-        let (schema, read) = (self.source.schema(), Mutex::new(BTreeMap::new()));
-        let most = most.saturating_mul(schema.stride as u64);
-        self.threads.items(parts.len(), || {}).run(
-            || PointBatch::new(schema.clone(), BATCH),
-            |batch, item| {
-                let mut part = self.source.part_without(parts[item], self.unread)?;
-                let mut bytes = Vec::new();
-                while (bytes.len() as u64) < most {
-                    if self.watch.cancelled() {
-                        return Err(Error::interrupted());
-                    }
-                    part.read(batch)?;
-                    if batch.is_empty() {
-                        break;
-                    }
-                    bytes.extend_from_slice(batch.records());
-                }
-                lock(&read).insert(item, bytes);
-                Ok(())
-            },
-            |()| {},
-            |_| Ok(()),
-        )?;
-        Ok(std::mem::take(&mut *lock(&read)).into_values().collect())
-    }
 }
 
 /// Lets a trial be stopped, and tells nobody of it.

@@ -58,6 +58,20 @@ fn a_preview_of_a_scan_that_is_tried_as_a_whole_is_what_comes_out() {
 }
 
 #[test]
+fn a_preview_of_strips_over_each_other_sees_all_points_of_its_places() {
+    let at = scan("als", &["-n", "600k"]);
+    let at = at.path();
+    let (code, table, told) = pointmill(at, &["reduce", "scan.las", "--preview"]);
+    assert!(code == 0 && !told.contains("warning"), "{told}");
+    assert!(table.starts_with("180,000 of 600,000 points were tried"), "{table}");
+    let (foretold, result) = (row(&table, "10%"), reduced(at, &["--keep", "10%"]));
+    for (n, figure) in [(4, "rms"), (5, "p95"), (6, "p99")] {
+        let is = result["totals"]["deviation"][figure].as_f64().unwrap();
+        assert!((number(&foretold[n]) / is - 1.0).abs() < 0.15, "{figure} {is}: {table}");
+    }
+}
+
+#[test]
 fn a_preview_of_cells_has_numbers_alone() {
     let at = scan("part", &["-n", "10k"]);
     let table = done(at.path(), &["reduce", "scan.las", "--preview", "--preset", "paper"]);

@@ -18,7 +18,7 @@ use crate::stage::{Input, Part, Source};
 use crate::{Error, Result};
 
 /// Vertices of one part of a binary file.
-const PART_POINTS: u64 = 1_000_000;
+const PART_POINTS: u64 = 1 << 17;
 
 /// What PLY outputs carry on besides points and text: how the input was written.
 #[derive(Debug)]
