@@ -36,8 +36,8 @@ use tile::{RoundScan, RoundWorker};
 /// Rounds that can be undone.
 const UNDONE: usize = 2;
 
-/// Lets the stage `op` choose in rounds, over what `sieve` lets a pass see. What a voxel grid beside
-/// it would have left.
+/// Lets the stage `op` choose in rounds, over what `sieve` lets a pass see. What was measured of a
+/// voxel grid beside it.
 pub(super) fn choose(
     job: &mut Job<'_>,
     op: usize,

@@ -14,6 +14,7 @@ use super::deviations::{Deviations, Histogram};
 use super::figures::{BaselineFigures, world_length};
 use crate::geom::hash::of_position;
 use crate::geom::lattice::Lattice;
+use crate::geom::nearest::Nearest;
 use crate::geom::simd::Simd;
 use crate::geom::surface::{ASKED_RADII, ask_surface};
 use crate::point::{Bounds, Position, distance2};
@@ -142,7 +143,18 @@ pub struct VoxelNode {
     copies: Vec<u32>,
 }
 
+/// Cubes along each axis in a node and around it, at most: of the shortest side for the widest
+/// node, and one that a face cuts.
+const MOST_ACROSS: usize = (2.0 * ACROSS * CORRECTED) as usize + 2 * REACH as usize + 1;
+
 impl VoxelNode {
+    /// Bytes that it holds at most: for each cube a slot and a point, which grow by doubling, as
+    /// they are searched; and positions that wait.
+    pub const BYTES: usize = MOST_ACROSS.pow(3)
+        * (size_of::<u32>() + 3 * size_of::<Position>() / 2 + Nearest::BYTES_PER_POINT)
+        + TOGETHER * (2 * size_of::<Position>() + 4 * size_of::<u32>() + Nearest::BYTES_PER_POINT)
+        + Nearest::FIXED_BYTES;
+
     /// Begins with a node and the cubes of `side` steps of which it holds something, or those with
     /// what its positions ask if it `measures`. Where their positions are.
     pub fn begin(&mut self, node: &TileKey, side: i64, measures: bool) -> Bounds {

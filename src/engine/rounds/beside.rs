@@ -6,15 +6,23 @@
 //! around a node, however many positions these have, and is less than what an arena of the mill
 //! has, in whose place it is.
 
-use super::tile::RoundScan;
+use super::tile::{POSITION_BYTES, RoundScan};
 use crate::Result;
+use crate::engine::demands::FEWEST;
 use crate::engine::job::Job;
 use crate::geom::lattice::Lattice;
 use crate::point::Position;
+use crate::report::deviations::Histogram;
 use crate::report::{BaselineFigures, VoxelCounts, VoxelDeviations, VoxelNode, VoxelSample};
 use crate::stage::GridBeside;
 use crate::store::{BLOCK, Levels, Reader, TileKey};
 use crate::tile::{Loader, Tile};
+
+/// The arena of a thread has more than it takes to look at nodes, and what they come to.
+const _: () = assert!(
+    VoxelNode::BYTES + 2 * Histogram::BYTES as usize <= FEWEST * POSITION_BYTES,
+    "no memory is planned for looking at nodes"
+);
 
 /// Blocks of the scan that an item lists the nodes of.
 const BLOCKS: usize = 256;
