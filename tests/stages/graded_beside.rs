@@ -5,8 +5,11 @@ use std::collections::BTreeMap;
 
 use super::graded::{At, STEP, distinct, graded, off, scan};
 use crate::support::random::Random;
+use crate::support::runs::{Settings, run};
+use crate::support::scan::Scan;
 use pointmill::internals::morton_cmp;
 use pointmill::report::BaselineFigures;
+use pointmill::synth::Scene;
 use serde_json::json;
 
 /// Of each cube of `side` steps the position nearest to the centre, of equals the Morton-first.
@@ -111,4 +114,27 @@ fn where_nothing_is_removed_there_is_no_grid() {
     }
     assert_eq!(graded(&[[1, 2, 3]; 9], json!({ "keep": 1 }), None).baseline, None);
     assert_eq!(graded(&[], json!({ "keep": "5%" }), None).baseline, None);
+}
+
+#[test]
+fn it_is_beside_what_the_stage_decides_about_and_what_stays_in_the_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("in.las");
+    Scan::synthetic(Scene::Als, 20_000, 4).write(&input);
+    let of = |stages: &str| {
+        let inputs = std::slice::from_ref(&input);
+        let ran = run(folder.path(), inputs, stages, "las", Settings::PLAIN).unwrap();
+        let totals = ran.report.result.totals.unwrap();
+        assert!(totals.points.after < totals.points.before && totals.deviation.is_some());
+        totals.baseline
+    };
+    let graded = "[[stage]]\nkind = 'graded'\nkeep = '10%'\n";
+    let (all, ground) = (of(graded).unwrap(), of(&format!("{graded}classes = [2]\n")).unwrap());
+    assert!(ground.points > 10_000 && ground.points < all.points, "{ground:?} {all:?}");
+    // Trees are worse than the ground.
+    assert!(ground.rms < 0.7 * all.rms, "{ground:?} {all:?}");
+    let behind = "[[stage]]\nkind = 'grid'\nside = 0.7\n";
+    let thinned = of(&format!("{behind}{graded}")).unwrap();
+    assert!(thinned.points < all.points && thinned.points > 2000, "{thinned:?}");
+    assert_eq!(of(&format!("{graded}[[stage]]\nkind = 'grid'\nside = 9\n")), None, "fewer stay");
 }
