@@ -26,7 +26,8 @@ pub use format::{
 pub use kind::{StageKind, StagePlace};
 pub use needs::Needs;
 pub use rounds::{
-    Looks, NextRound, Offer, Round, RoundBefore, RoundChoice, RoundFound, RoundOp, RoundTile, SoFar,
+    GridBeside, Looks, NextRound, Offer, Round, RoundBefore, RoundChoice, RoundFound, RoundOp,
+    RoundTile, SoFar,
 };
 pub use scan::{AnyScanOp, Gathered, ScanOp, StoredSummaries, Summary};
 pub use sink::{ChunkSize, CreateSink, Encode, Encoded, Order, Sink, SinkSummary};

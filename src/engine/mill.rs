@@ -15,6 +15,7 @@ use super::by_input::ByInput;
 use super::by_rank::ByRank;
 use super::chunks::{Lists, StoredGathered};
 use super::clock::Clock;
+use super::compared::{Compared, ComparedGrid};
 use super::cut::{TileCut, cut_again, cut_all};
 use super::decode::decode;
 use super::finished::{Finished, FinishedBranch};
@@ -30,7 +31,7 @@ use super::task::Task;
 use crate::budget::{Bytes, Holders, Lease};
 use crate::geom::lattice::Lattice;
 use crate::point::{ColumnKind, NORMAL};
-use crate::report::{Baseline, BaselineFigures, Decision, PassFigures, Tally};
+use crate::report::{Decision, PassFigures, Tally};
 use crate::stage::{Sink, SinkSummary};
 use crate::store::{SealedTiles, seal};
 use crate::tile::Sieve;
@@ -87,29 +88,20 @@ struct Standing {
     alive: u64,
     kept: u64,
     passes: Vec<PassFigures>,
-    /// Grids to compare with, from the first pass that decided by normals.
+    /// Grids to compare with, from the first pass that decided by normals or in rounds.
     compared: Option<Arc<Compared>>,
     tally: Tally,
 }
 
-/// See [`Standing::compared`].
-struct Compared {
-    baseline: Baseline,
-    /// Records that the pass decided about, and that it found.
-    decided: u64,
-    found: u64,
-}
-
 impl Standing {
-    /// What a grid would have done that leaves as many of the records that the passes decided
-    /// about.
-    fn baseline(&self, lattice: &Lattice) -> Option<BaselineFigures> {
-        let Compared { baseline, decided, found } = self.compared.as_deref()?;
-        let removed = found.checked_sub(self.alive)?;
-        baseline.figures(decided.checked_sub(removed)?, *decided, lattice)
+    /// Enters what was measured of grids in a pass over what it leaves, if it is the first.
+    fn compare(&mut self, with: ComparedGrid) {
+        if self.compared.is_none() {
+            self.compared = Some(Arc::new(Compared::new(with, self.alive)));
+        }
     }
 
-    /// The same behind another pass, which came to `milled` and counted `tally`; and what a first
+    /// What it is behind another pass, which came to `milled` and counted `tally`; and what a first
     /// phase gathered in it.
     fn behind(
         mut self,
@@ -119,9 +111,8 @@ impl Standing {
         tally: &Tally,
     ) -> (Standing, StoredGathered) {
         self.tally.merge(tally);
-        if let (Some(baseline), None) = (milled.baseline, &self.compared) {
-            let (decided, found) = (milled.decided, self.alive);
-            self.compared = Some(Arc::new(Compared { baseline, decided, found }));
+        if let Some(baseline) = milled.baseline {
+            self.compare(ComparedGrid::Levels { baseline, decided: milled.decided });
         }
         let called = pass.calls.iter().map(|call| job.ops[call.op].kind.clone());
         let streamed = pass.filters.iter().map(|&filter| job.task.filters[filter].kind.clone());
@@ -219,7 +210,8 @@ impl Course<'_, '_> {
         let DecodedScan { lattice, tiles, .. } = field;
         self.clock.begin(RunPhase::Survey(number), Some(2 * tiles.positions()))?;
         let mut measured = survey(job, lattice, tiles, &after.sieve)?;
-        measured.totals.baseline = after.baseline(lattice);
+        let compared = after.compared.as_deref();
+        measured.totals.baseline = compared.and_then(|c| c.figures(after.alive, lattice));
         let mut tally = after.tally;
         Ok(FinishedBranch {
             kept: after.kept,
@@ -241,7 +233,7 @@ impl Course<'_, '_> {
         number: usize,
         cut: &Arc<TileCut>,
         working: &mut Vec<Lease>,
-        before: Standing,
+        mut before: Standing,
         field: &DecodedScan<'_>,
     ) -> Result<Standing> {
         let (tiles, pass) = (&field.tiles, &job.task.passes[number]);
@@ -259,7 +251,8 @@ impl Course<'_, '_> {
             self.clock.begin(RunPhase::Choose(number), None)?;
         }
         for &op in &pass.by_rounds {
-            choose(job, op, field, &sieve, cut.capacity)?;
+            let grid = choose(job, op, field, &sieve, cut.capacity)?;
+            grid.into_iter().for_each(|grid| before.compare(ComparedGrid::OfAsMany(grid)));
         }
         let phase = if pass.gathers().is_some() { RunPhase::Gather } else { RunPhase::Mill };
         self.clock.begin(phase(number), Some(tiles.positions()))?;

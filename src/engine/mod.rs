@@ -14,6 +14,7 @@ mod by_time;
 mod chunk;
 mod chunks;
 mod clock;
+mod compared;
 mod cut;
 mod decode;
 mod demands;

@@ -5,6 +5,7 @@
 //! best of the whole scan are kept. So a scan that is larger than memory is chosen from as a whole,
 //! as many times as the stage asks for, and each time only kept points and offers are written.
 
+mod beside;
 mod candidates;
 mod merged;
 mod offers;
@@ -24,6 +25,8 @@ use crate::store::{Block, KeptPoints, TileKey};
 use crate::tile::Sieve;
 use crate::{Error, Result};
 
+pub(super) use beside::MeasuredGrid;
+use beside::measure_beside;
 use candidates::candidates;
 use merged::MergedPoints;
 use offers::{OfferReader, Offers, accept};
@@ -33,20 +36,21 @@ use tile::{RoundScan, RoundWorker};
 /// Rounds that can be undone.
 const UNDONE: usize = 2;
 
-/// Lets the stage `op` choose in rounds, over what `sieve` lets a pass see.
+/// Lets the stage `op` choose in rounds, over what `sieve` lets a pass see. What was measured of a
+/// voxel grid beside it.
 pub(super) fn choose(
     job: &mut Job<'_>,
     op: usize,
     field: &DecodedScan<'_>,
     sieve: &Sieve,
     capacity: usize,
-) -> Result<()> {
+) -> Result<Option<MeasuredGrid>> {
     let (levels, records) = candidates(job, op, field, sieve, capacity)?;
     let mut kept = KeptPoints::new(&job.area);
     let mut last: VecDeque<KeptPoints> = VecDeque::new();
     let (mut number, mut added, mut counted, mut least) = (0, 0, 0, 0.0);
     let mut before = None;
-    loop {
+    let grid = loop {
         let bounds = field.tiles.bounds();
         let kept_now = kept.count();
         let so_far =
@@ -83,12 +87,15 @@ pub(super) fn choose(
                 kept = KeptPoints::new(&job.area);
                 (number, added, counted) = (0, 0, 0);
             }
-            NextRound::Done => break,
+            NextRound::Done => break stage(job, op)?.beside(&so_far),
         }
-    }
-    drop(last);
+    };
+    drop((last, before));
+    let scan = RoundScan { op, number, field, sieve, capacity };
+    let beside = grid.map(|grid| measure_beside(job, &scan, (&levels, records), grid));
+    let beside = beside.transpose()?.flatten();
     stage(job, op)?.chosen(Arc::new(kept));
-    Ok(())
+    Ok(beside)
 }
 
 /// The stage that chooses.

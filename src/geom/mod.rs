@@ -14,4 +14,5 @@ pub mod rows;
 pub mod select;
 pub mod simd;
 pub mod star;
+pub mod surface;
 pub mod wide;

@@ -11,7 +11,6 @@ mod rank;
 mod refine;
 mod settings;
 mod sides;
-mod surface;
 mod work;
 
 use std::sync::Arc;
@@ -26,8 +25,8 @@ use crate::point::{Units, names};
 use crate::quantity::Length;
 use crate::report::{Grouped, Tally};
 use crate::stage::{
-    Lattice, Needs, NextRound, Role, RoleName, RoundFound, RoundOp, RoundTile, ScanFacts, SoFar,
-    StageKind, StagePlace, TileOp,
+    GridBeside, Lattice, Needs, NextRound, Role, RoleName, RoundFound, RoundOp, RoundTile,
+    ScanFacts, SoFar, StageKind, StagePlace, TileOp,
 };
 use crate::store::KeptPoints;
 use crate::tile::Tile;
@@ -41,7 +40,7 @@ use ladder::{Ladder, Manner};
 pub use rank::KEEP_RANK;
 pub(super) use rank::Rung;
 pub use settings::Effort;
-use sides::{steps, voxel_side};
+use sides::{grid_beside, steps, voxel_side};
 use work::RoundWork;
 
 /// Keeps the points that say most of the surface: so many of them, or as many as a tolerance asks
@@ -72,7 +71,8 @@ use work::RoundWork;
 /// With both, the tolerance is kept where it needs no more points than `keep`; else so many points
 /// are kept, and the report says which came first.
 ///
-/// The report's deviations are distances to that surface.
+/// The report's deviations are distances to that surface. Beside them stand those that a voxel grid
+/// of as many points would leave, to the surface of its points.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Graded {
@@ -371,6 +371,14 @@ impl RoundOp for Graded {
 
     fn weight(&self) -> Option<(&'static str, &Weight)> {
         self.weight.as_ref().map(|weight| ("weight", weight))
+    }
+
+    fn beside(&self, so_far: &SoFar<'_>) -> Option<GridBeside> {
+        let exceptions = match &self.course {
+            Some(RoundsCourse::Tolerance(certain)) => certain.exceptions,
+            _ => 0,
+        };
+        grid_beside(so_far.kept + exceptions, so_far)
     }
 
     fn chosen(&mut self, kept: Arc<KeptPoints>) {

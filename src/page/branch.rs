@@ -192,9 +192,9 @@ fn deviations(
     };
     vec![
         row("root of the mean square", of.rms, grid(|grid| grid.rms)),
-        row("half deviate no more than", of.p50, String::new()),
+        row("half deviate no more than", of.p50, grid(|grid| grid.p50)),
         row("95 % deviate no more than", of.p95, grid(|grid| grid.p95)),
-        row("99 % deviate no more than", of.p99, String::new()),
+        row("99 % deviate no more than", of.p99, grid(|grid| grid.p99)),
         row("the largest", of.max, String::new()),
     ]
 }

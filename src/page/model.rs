@@ -161,8 +161,10 @@ fn not_measured(results: &[&Outcome], has_hashes: bool, missing: &mut Vec<String
     let has_baseline = |result: &Outcome| result.totals.is_some_and(|t| t.baseline.is_some());
     if any(|result| result.ledger.removed_records() > 0) && !results.iter().any(|r| has_baseline(r))
     {
-        say("A voxel grid of as many points: it is measured where stages decide by normals, and \
-             keep neither almost all nor almost none.");
+        say(
+            "A voxel grid of as many points: it is measured where stages choose points by normals \
+             or in rounds (`cells`, `graded`), and remove some of them.",
+        );
     }
     if any(|result| result.accept.is_none()) {
         say("Whether the result is good enough: nobody gave rules by which it is accepted.");

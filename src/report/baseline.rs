@@ -120,12 +120,17 @@ impl Baseline {
             true => a * libm::pow(b / a, share),
             false => a + (b - a) * share,
         };
-        let p95 = |level: &GridLevel| Some(world_length(level.histogram.percentile(95)?, lattice));
+        let percentile = |percent: u32| {
+            let of = |level: &GridLevel| level.histogram.percentile(percent);
+            Some(between(world_length(of(coarse)?, lattice), world_length(of(fine)?, lattice)))
+        };
         Some(BaselineFigures {
             side: libm::exp2(f64::from(self.top - at as u32) - share) * lattice.step,
             points: coarse.deviations.count().min(fine.deviations.count()),
             rms: between(coarse.deviations.rms()?, fine.deviations.rms()?) * lattice.step,
-            p95: between(p95(coarse)?, p95(fine)?),
+            p50: percentile(50)?,
+            p95: percentile(95)?,
+            p99: percentile(99)?,
         })
     }
 }

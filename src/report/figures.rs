@@ -106,10 +106,14 @@ pub struct BaselineFigures {
     pub side: f64,
     /// Removed records whose deviation was measured for it.
     pub points: u64,
-    /// sqrt(Σd²/n), between those of two octree levels.
+    /// sqrt(Σd²/n).
     pub rms: f64,
-    /// 95 % deviate no more, likewise.
+    /// Half of the records deviate no more.
+    pub p50: f64,
+    /// 95 % deviate no more.
     pub p95: f64,
+    /// 99 % deviate no more.
+    pub p99: f64,
 }
 
 /// The whole scan.
@@ -126,7 +130,8 @@ pub struct Totals {
     pub scan_plane: Pair<Option<PlaneFigures>>,
     /// Of the removed records; None where there are none.
     pub deviation: Option<DeviationTotals>,
-    /// That of a voxel grid of as many points; None where no pass decides by normals.
+    /// That of a voxel grid of as many points; None where no pass decides by normals and no stage
+    /// says how many it keeps.
     pub baseline: Option<BaselineFigures>,
 }
 

@@ -18,6 +18,7 @@ mod table;
 mod tally;
 mod towards;
 mod verdict;
+mod voxels;
 
 pub use crate::budget::{Bytes, Holder, Holders};
 pub(crate) use accept::AcceptFigure;
@@ -44,3 +45,4 @@ pub use table::Table;
 pub use tally::Tally;
 pub(crate) use tally::{Apart, KEY_POINTS};
 pub use verdict::{AcceptVerdict, RuleVerdict};
+pub(crate) use voxels::{VoxelCounts, VoxelDeviations, VoxelNode, VoxelSample};

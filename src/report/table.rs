@@ -302,8 +302,8 @@ impl Table<'_> {
         }
     }
 
-    /// What a voxel grid of as many points would have done, where points were reduced by their
-    /// normals; or why that is not known.
+    /// What a voxel grid of as many points would have done, where that was measured; or why it was
+    /// not, where points were reduced by their normals.
     fn baseline_line(
         &self,
         f: &mut fmt::Formatter<'_>,

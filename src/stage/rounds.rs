@@ -35,6 +35,13 @@ pub trait RoundOp: TileOp {
         None
     }
 
+    /// Called behind the last round: which voxel grid the report shows beside what is kept. It is
+    /// for stages that [measure](crate::stage::Needs::measures) what they remove by the surface of
+    /// the eight nearest kept points; none for others.
+    fn beside(&self, _so_far: &SoFar<'_>) -> Option<GridBeside> {
+        None
+    }
+
     /// Called once behind the last round, with all that is kept.
     fn chosen(&mut self, kept: Arc<KeptPoints>);
 }
@@ -56,6 +63,15 @@ pub struct SoFar<'a> {
     pub counted: u64,
     /// The lowest score of the offers that had the first say in it; 0 if it had none.
     pub least: f64,
+}
+
+/// A voxel grid that is compared with what a stage keeps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GridBeside {
+    /// How many positions stay, of the stage and of the grid.
+    pub keeps: u64,
+    /// About the side of such a grid in lattice steps.
+    pub side: f64,
 }
 
 /// What comes next.

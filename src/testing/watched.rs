@@ -15,8 +15,8 @@ use crate::point::{PointBatch, Schema, Units};
 use crate::quantity::Length;
 use crate::report::Tally;
 use crate::stage::{
-    AnyScanOp, Forecast, Needs, NextRound, Role, RoundFound, RoundOp, RoundTile, ScanFacts, SoFar,
-    StoredSummaries, TileOp, Transform,
+    AnyScanOp, Forecast, GridBeside, Needs, NextRound, Role, RoundFound, RoundOp, RoundTile,
+    ScanFacts, SoFar, StoredSummaries, TileOp, Transform,
 };
 use crate::store::KeptPoints;
 use crate::tile::Tile;
@@ -243,6 +243,10 @@ impl RoundOp for WatchedStage<dyn RoundOp> {
 
     fn weight(&self) -> Option<(&'static str, &Weight)> {
         self.stage.weight()
+    }
+
+    fn beside(&self, so_far: &SoFar<'_>) -> Option<GridBeside> {
+        self.stage.beside(so_far)
     }
 
     fn chosen(&mut self, kept: Arc<KeptPoints>) {

@@ -5,6 +5,8 @@
 //! number of neighbours in spacings of the points: a wider one loads positions in vain, a narrower
 //! one leaves more of them to be searched for one by one.
 
+mod blocks;
+
 use std::sync::Arc;
 
 use super::only::Only;

@@ -44,6 +44,7 @@ fn a_page_is_one_file_that_says_what_a_report_says() {
         "Where every point went",
         "By class",
         "What was not measured",
+        "The baseline is what a voxel grid of as many points would have left",
         "<polyline",
         "thin.laz",
         "SHA-256 <code>",
@@ -51,6 +52,7 @@ fn a_page_is_one_file_that_says_what_a_report_says() {
     ] {
         assert!(html.contains(told), "{told}");
     }
+    assert!(!html.contains("A voxel grid of as many points: it is"), "it was measured");
     assert!(!html.contains("Pictures:") && !html.contains("Pictures of"), "all was drawn");
     let places = html.matches(" high</figcaption>").count();
     assert!((2..=10).contains(&places) && html.contains(&format!("The worst {places} places")));

@@ -6,11 +6,12 @@ use crate::support::random::Random;
 use pointmill::graph::RunSettings;
 use pointmill::memory::{Records, channel};
 use pointmill::ops::{Graded, KEEP_RANK};
+use pointmill::report::BaselineFigures;
 use pointmill::{Graph, Overrides, Quiet};
 use serde_json::{Value, json};
 
 /// Steps of the lattice that the scans are on: all coordinates are whole multiples.
-const STEP: f64 = 1.0 / 1024.0;
+pub const STEP: f64 = 1.0 / 1024.0;
 
 /// A position in steps.
 pub type At = [i64; 3];
@@ -21,6 +22,7 @@ pub struct Left {
     deviation: f64,
     counts: BTreeMap<String, u64>,
     spacing: Option<f64>,
+    pub baseline: Option<BaselineFigures>,
 }
 
 pub fn graded(scan: &[At], keys: Value, tile_points: Option<usize>) -> Left {
@@ -54,11 +56,12 @@ pub fn graded(scan: &[At], keys: Value, tile_points: Option<usize>) -> Left {
     let spacing = result.decisions.iter().find(|decision| decision.name == "spacing");
     let spacing = spacing.map(|spacing| spacing.value.as_f64().unwrap());
     let deviation = result.totals.and_then(|totals| totals.deviation).map_or(0.0, |d| d.max);
-    Left { kept, deviation, counts: result.counts, spacing }
+    let baseline = result.totals.and_then(|totals| totals.baseline);
+    Left { kept, deviation, counts: result.counts, spacing, baseline }
 }
 
 /// A rough surface with a step in it, some points twice and, in some scans, everything on a grid.
-fn scan(random: &mut Random, count: usize) -> Vec<At> {
+pub fn scan(random: &mut Random, count: usize) -> Vec<At> {
     let side = 200 + random.below(4000) as i64;
     let grid = [1, 1, 40][random.below(3)];
     let mut scan: Vec<At> = (0..count)
@@ -72,7 +75,7 @@ fn scan(random: &mut Random, count: usize) -> Vec<At> {
     scan
 }
 
-fn distinct(scan: &[At]) -> Vec<At> {
+pub fn distinct(scan: &[At]) -> Vec<At> {
     let mut all = scan.to_vec();
     all.sort_unstable();
     all.dedup();
@@ -84,7 +87,7 @@ fn squared(a: At, b: At) -> i64 {
 }
 
 /// How far `p` is from the surface, by all distances and a decomposition of a whole matrix.
-fn off(p: At, surface: &[At], within2: f64) -> f64 {
+pub fn off(p: At, surface: &[At], within2: f64) -> f64 {
     let mut near: Vec<i64> = surface.iter().map(|q| squared(*q, p)).collect();
     near.sort_unstable();
     let last = near.get(7).copied().unwrap_or(i64::MAX);

@@ -6,6 +6,7 @@ mod crop;
 mod exact;
 mod extremes;
 mod graded;
+mod graded_beside;
 mod graded_choices;
 mod grid;
 mod orders;

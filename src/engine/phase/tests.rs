@@ -14,7 +14,7 @@ use crate::host::{lock, written};
 use crate::io::ends::{Read, Write};
 use crate::io::las::{LAS, LAZ};
 use crate::ops::normals::Normals;
-use crate::ops::{Cells, Filter, Grid, Median};
+use crate::ops::{Cells, Filter, Graded, Grid, Median};
 use crate::stage::{Formats, Role, StageKind, StagePlace};
 use crate::synth::Synth;
 
@@ -97,6 +97,15 @@ fn chain(at: &Path) -> Graph {
     chain
 }
 
+/// A stage that chooses in rounds.
+fn rounds(at: &Path) -> Graph {
+    let mut rounds = graph();
+    rounds.add("synth", scan(4), &[]);
+    rounds.add("graded", role::<Graded>(json!({ "keep": "10%", "effort": "low" })), &[0]);
+    rounds.add("write", role::<Write>(json!({ "path": at.join("g.las") })), &[1]);
+    rounds
+}
+
 /// A stage of two phases on one branch, a stage that streams behind tiles on another.
 fn branches(at: &Path) -> Graph {
     let mut branches = graph();
@@ -118,6 +127,7 @@ fn a_report_has_the_phases_of_the_list_and_items_come_to_what_text_can_hold() {
     let listed = has(chain(at.path()), &["decode", "merge", "mill", "write", "write", "survey"]);
     let looks = [RunPhase::Look(0), RunPhase::Mill(0), RunPhase::Write(2), RunPhase::Write(1)];
     assert_eq!(listed[2..6], looks);
+    has(rounds(at.path()), &["decode", "merge", "choose", "mill", "survey"]);
     let (listed, names) = phases(branches(at.path()));
     let named: Vec<&str> = listed.iter().filter_map(|phase| phase.name()).collect();
     assert_eq!(names, named);
@@ -133,6 +143,8 @@ fn a_report_has_the_phases_of_the_list_and_items_come_to_what_text_can_hold() {
         ("TileTally", 60),
         ("SinkSummary", 20),
         ("Option<pointmill::report::baseline::Baseline>", 1_000),
+        ("VoxelCounts", 20),
+        ("VoxelDeviations", 1_000),
         ("StoredStretch", 20),
         ("ScanSurvey", 1_000),
         ("Pair<pointmill::report::sums::Distances>", 60),

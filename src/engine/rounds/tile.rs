@@ -58,7 +58,7 @@ pub(super) struct FoundInTile<'w> {
 
 /// Bytes of a position in a tile of a round: in its place, among those that are chosen and touched,
 /// in what it says and in what is searched.
-const POSITION_BYTES: usize = Loader::BYTES_PER_POINT + 2 * size_of::<Position>() + 72;
+pub(super) const POSITION_BYTES: usize = Loader::BYTES_PER_POINT + 2 * size_of::<Position>() + 72;
 /// The same of a kept point, with its cell and its offers of this round and the one before.
 const KEPT_BYTES: usize = 2 * size_of::<Position>() + 2 * size_of::<Offer>() + 72;
 

@@ -1,10 +1,8 @@
 //! Rounds towards a tolerance: where is what is removed farther from the surface than it may be?
 
+use crate::geom::surface::{ASKED_RADII, ask_surface};
 use crate::point::Position;
 use crate::stage::{Offer, RoundFound, RoundTile};
-
-use super::refine::ASKED_RADII;
-use super::surface::ask_surface;
 
 /// How a round corrects.
 #[derive(Debug, Clone, Copy, PartialEq)]

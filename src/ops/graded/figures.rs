@@ -3,10 +3,8 @@
 use super::super::removal::{keep_once, remove};
 use super::correct::is_beyond;
 use super::rank::{EXCEPTION, KEEP_RANK, rank_of};
-use super::refine::ASKED_RADII;
-use super::surface::{SurfaceTold, ask_surface};
-
 use crate::Result;
+use crate::geom::surface::{ASKED_RADII, SurfaceTold, ask_surface};
 use crate::report::Tally;
 use crate::store::{KeptPoints, KeptReader};
 use crate::tile::{Fate, Tile};

@@ -12,6 +12,7 @@ use std::collections::HashSet;
 use crate::geom::hash::PlaceHashes;
 use crate::geom::nearest::NearestAmong;
 use crate::geom::planes::{NEAREST, PlaneErrors};
+use crate::geom::surface::ASKED_RADII;
 use crate::point::Position;
 use crate::stage::{Offer, RoundFound, RoundTile};
 
@@ -51,8 +52,6 @@ impl Measuring {
     }
 }
 
-/// Kept points within so many radii are asked.
-pub(super) const ASKED_RADII: i64 = 4;
 /// The part of the squared distance to the nearest kept point that is added to the squared error:
 /// where nothing is wrong, the farthest is the worst.
 const OF_DISTANCE: f64 = 1e-12;

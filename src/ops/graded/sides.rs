@@ -2,7 +2,7 @@
 //! knows: there numbers are straight lines over sides, both in logarithms.
 
 use crate::point::Bounds;
-use crate::stage::SoFar;
+use crate::stage::{GridBeside, SoFar};
 use crate::store::Levels;
 
 /// No distance is larger, in steps.
@@ -23,6 +23,13 @@ pub(super) fn voxel_side(levels: &Levels, bounds: &Bounds, count: u64) -> f64 {
         }
         _ => side,
     }
+}
+
+/// The voxel grid that keeps as many positions; none where all stay.
+pub(super) fn grid_beside(keeps: u64, so_far: &SoFar<'_>) -> Option<GridBeside> {
+    let is_some = keeps > 0 && keeps < so_far.levels.positions();
+    let side = || voxel_side(so_far.levels, &so_far.bounds, keeps).clamp(1.0, LONGEST);
+    is_some.then(|| GridBeside { keeps, side: side() })
 }
 
 /// Occupied cubes of a side in steps.

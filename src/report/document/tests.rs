@@ -43,7 +43,14 @@ fn report(tiles: u64) -> Report {
             max: 0.08,
             at: [1.5, 2.5, 3.25],
         }),
-        baseline: Some(BaselineFigures { side: 0.25, points: 9_000, rms: 0.005, p95: 0.0123 }),
+        baseline: Some(BaselineFigures {
+            side: 0.25,
+            points: 9_000,
+            rms: 0.005,
+            p50: 0.004,
+            p95: 0.0123,
+            p99: 0.02,
+        }),
     };
     let result = Outcome {
         pipeline: json!({"stage": [{"kind": "read", "path": ["line\n,\n\"run\": "]}]}),

@@ -1,17 +1,21 @@
 //! How far positions are from the surface that kept points say.
 
-use crate::geom::nearest::NearestAmong;
-use crate::geom::planes::{SURFACE, surface_distance};
-use crate::geom::simd::Simd;
+use super::nearest::NearestAmong;
+use super::planes::{SURFACE, surface_distance};
+use super::simd::Simd;
 use crate::point::{Position, distance2};
 
 /// Kept points that are asked first. Whether others are as near as the last of those whose plane is
 /// the surface is known by one more than these; where some are, more are asked.
 const ASKED: usize = SURFACE + 1;
 
+/// Kept points farther from a position than so many times as far as any is from its nearest one are
+/// not asked.
+pub const ASKED_RADII: i64 = 4;
+
 /// What a position is told by the surface.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SurfaceTold {
+pub struct SurfaceTold {
     /// Index of the nearest kept point.
     pub nearest: u32,
     /// Squared distance to it in steps.
@@ -22,7 +26,7 @@ pub(super) struct SurfaceTold {
 
 /// Calls `visit` for each of the positions `at` that has a kept point of `surface` within `within`
 /// steps, which nobody is asked beyond. Both are in Morton order.
-pub(super) fn ask_surface(
+pub fn ask_surface(
     simd: Simd,
     surface: &[Position],
     at: &[Position],
