@@ -16,11 +16,11 @@ use crate::plan::{Plan, Preview, TrialPoints};
 use crate::report::{DeviationTotals, Grouped, Short};
 
 /// Points that are tried, about.
-const TRIED: usize = 180_000;
+const TRIED: usize = 150_000;
 /// The shares that are tried, besides what is asked for.
-const SHARES: [&str; 5] = ["1%", "2%", "5%", "10%", "20%"];
+const SHARES: [&str; 4] = ["1%", "5%", "10%", "20%"];
 /// The percentiles of the errors of these are the tolerances that are tried: what is rounded.
-const TOLERANCES_OF: [usize; 2] = [2, 4];
+const TOLERANCES_OF: [usize; 2] = [1, 3];
 /// The output that a preview without one is of: it is not written.
 const OUTPUT: &str = "preview.laz";
 

@@ -16,8 +16,8 @@ use crate::{Error, Result};
 /// Squares that pipelines are tried on: several, since a scan is not everywhere the same, each of
 /// so many records, since kept points at the border of a square lack neighbours, which counts more
 /// the smaller it is.
-const SPOTS: usize = 8;
-const RECORDS_OF_SPOT: usize = 20_000;
+const SPOTS: usize = 6;
+const RECORDS_OF_SPOT: usize = 25_000;
 
 /// What a pipeline is expected to come to, by a trial on some points of the scan.
 #[derive(Debug, Clone, PartialEq, Serialize)]

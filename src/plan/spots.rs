@@ -15,7 +15,7 @@ const BITS: u32 = 16;
 /// A footprint without extent is so wide, as a part of the scan's width.
 const NARROWEST: f64 = 1e-6;
 /// Squares hold so many times as many records by their footprints as are wanted.
-const SLACK: f64 = 2.0;
+const SLACK: f64 = 1.5;
 /// Squares are made wider by this factor until they do.
 const WIDER: f64 = 1.25;
 /// Steps from the narrowest square to one that holds any scan.
