@@ -2,7 +2,7 @@
 //!
 //! On each rung positions are kept until none is farther than a distance from a kept one; then a
 //! few rounds add points where the surface is told worst. The distances fall by √2. For one number
-//! of points the last distance follows from that number, and four rungs above it are enough: what
+//! of points the last distance follows from that number, and twelve rungs above it are enough: what
 //! they keep, they keep with little to look at. For an order in which any number can be cut off
 //! (`ranks`), rungs are powers of √2 of the scan's unit and begin at its width, so that they are
 //! the same whatever the number is.
@@ -26,6 +26,9 @@ const FEWEST: u64 = 200;
 /// have to find about where points are missing.
 const PROBED: f64 = 32.0;
 pub(super) const PROBED_ABOVE: f64 = 12.0;
+/// Rounds of the last rung keep so many times as many points as if all kept the same number: what
+/// is kept early is seen by more rounds.
+const EARLY: f64 = 1.4;
 /// An offer stands aside for a better one within this share of its distance to a kept point.
 pub(super) const APART: f64 = 0.5;
 
@@ -53,7 +56,7 @@ impl Rounds {
     fn of(effort: Effort) -> Rounds {
         match effort {
             Effort::Low => Rounds { above: 0, each: 0, last: 3 },
-            Effort::Normal => Rounds { above: 4, each: 2, last: 8 },
+            Effort::Normal => Rounds { above: 12, each: 2, last: 8 },
         }
     }
 }
@@ -214,7 +217,8 @@ impl Ladder {
         let (rounds, want) = match is_last_rung {
             true => {
                 let left = self.rounds.last.saturating_sub(round).max(1);
-                (self.rounds.last, missing / u64::from(left))
+                let each = EARLY * missing as f64 / f64::from(left);
+                (self.rounds.last, missing.min(each as u64))
             }
             false => (self.rounds.each, (so_far.kept as f64 * self.grown(round)) as u64),
         };

@@ -5,7 +5,8 @@
 //! points would be there, whatever it is that they do. The positions that have the same nearest
 //! kept point are a cell, and the worst cells of the scan each offer the position that would help
 //! most. Neither normals nor a model of the noise are asked: a plane through noisy points is off by
-//! as much everywhere, so the worst cells are those of shape.
+//! as much everywhere, so the worst cells are those of shape; and of a cell no position counts more
+//! for being much farther off than the others, as those of the most noise are.
 
 use std::collections::HashSet;
 
@@ -73,6 +74,11 @@ struct AskedPosition {
 /// is added to the squared error: at a border a distance along the surface counts a fourth.
 const OF_BORDER: f64 = 1.0 / 16.0;
 
+/// Where a cell chooses, a squared error counts no more than so many times the mean of those of the
+/// cell. What is farther off than all around it is of noise rather than of shape, and kept, it would
+/// bend the planes of its neighbours. Where noise is normal, one position in six is such.
+const MOST_OF_MEAN: f64 = 2.0;
+
 /// No cell.
 const NONE: u32 = u32::MAX;
 
@@ -80,14 +86,47 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Copy, Default)]
 struct Cell {
     positions: u32,
-    /// The largest product of squared error and squared distance, and whose it is.
+    /// The largest product of what counts of a squared error and squared distance, and whose it is.
     at: u32,
     best: f64,
-    /// Sums of the squares of squared errors, and of squared distances.
+    /// Sums of squared errors, of the squares of those with their weights, and of squared distances.
+    error2: f64,
     error4: f64,
     distance2: f64,
     /// How far from the kept point another one changes anything.
     reach: f64,
+}
+
+impl Cell {
+    /// The cells of so many kept points, by what positions say and weigh.
+    fn all(asked: &[AskedPosition], weights: &[f64], kept: usize) -> Vec<Cell> {
+        let mut cells = vec![Cell::default(); kept];
+        let weighed = |i: usize, error2: f64| {
+            let weight = weights.get(i).copied().unwrap_or(1.0);
+            weight * error2 + OF_DISTANCE * asked[i].distance2
+        };
+        // In Morton order, on which what the sums round to depends.
+        for (i, asked) in asked.iter().enumerate() {
+            let Some(cell) = cells.get_mut(asked.cell as usize) else { continue };
+            let error2 = weighed(i, asked.error2);
+            cell.positions += 1;
+            cell.error2 += asked.error2;
+            cell.error4 += error2 * error2;
+            cell.distance2 += asked.distance2;
+            let reach = asked.distance2.sqrt() + asked.asked2.sqrt();
+            cell.reach = f64::max(cell.reach, reach * ROUNDED_UP);
+        }
+        for (i, asked) in asked.iter().enumerate() {
+            let Some(cell) = cells.get_mut(asked.cell as usize) else { continue };
+            let most = MOST_OF_MEAN * cell.error2 / f64::from(cell.positions);
+            let counts = weighed(i, asked.error2.min(most)) * asked.distance2;
+            if counts > cell.best {
+                cell.best = counts;
+                cell.at = i as u32;
+            }
+        }
+        cells
+    }
 }
 
 impl Refining {
@@ -117,22 +156,8 @@ impl Refining {
                 (&touched.0[..], &touched.1[..])
             }
         };
-        let mut cells = vec![Cell::default(); tile.kept.len()];
-        // In Morton order, on which what the sums round to depends.
-        for (i, asked) in self.asked(tile, positions).into_iter().enumerate() {
-            let Some(cell) = cells.get_mut(asked.cell as usize) else { continue };
-            let weight = weights.get(i).copied().unwrap_or(1.0);
-            let error2 = weight * asked.error2 + OF_DISTANCE * asked.distance2;
-            cell.positions += 1;
-            cell.error4 += error2 * error2;
-            cell.distance2 += asked.distance2;
-            let reach = asked.distance2.sqrt() + asked.asked2.sqrt();
-            cell.reach = f64::max(cell.reach, reach * ROUNDED_UP);
-            if error2 * asked.distance2 > cell.best {
-                cell.best = error2 * asked.distance2;
-                cell.at = i as u32;
-            }
-        }
+        let asked = self.asked(tile, positions);
+        let cells = Cell::all(&asked, weights, tile.kept.len());
         for (i, &of) in tile.kept.iter().enumerate().filter(|(_, p)| tile.cube.contains(**p)) {
             let same = unchanged.as_ref().and_then(|unchanged| unchanged.offers[i]);
             let mut offer = same.unwrap_or_else(|| Refining::offer(&cells[i], of, positions));
