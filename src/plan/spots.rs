@@ -61,7 +61,7 @@ pub(super) struct Footprint {
 
 impl Footprint {
     /// The part of it that a square covers: of one that is thin along an axis, as if it was spread.
-    fn within(&self, square: &Square) -> f64 {
+    fn within(&self, square: &SpotSquare) -> f64 {
         (0..2)
             .map(|axis| {
                 let [lo, hi] =
@@ -74,7 +74,7 @@ impl Footprint {
 
     /// True if records of it may be in a square. Looks do not see all of a part, so it is taken to
     /// be twice as wide as they tell.
-    fn meets(&self, square: &Square) -> bool {
+    fn meets(&self, square: &SpotSquare) -> bool {
         (0..2).all(|axis| {
             let more = (self.hi[axis] - self.lo[axis]) / 2.0 + square.half;
             self.lo[axis] - more <= square.middle[axis]
@@ -85,7 +85,7 @@ impl Footprint {
 
 /// A square along two axes, of any height.
 #[derive(Debug, Clone, Copy)]
-struct Square {
+struct SpotSquare {
     middle: [f64; 2],
     half: f64,
 }
@@ -94,7 +94,7 @@ struct Square {
 #[derive(Debug, Clone)]
 pub(super) struct Spots {
     axes: [usize; 2],
-    squares: Vec<Square>,
+    squares: Vec<SpotSquare>,
 }
 
 /// The plane of the two widest axes of a scan, with what looks tell of it.
@@ -191,14 +191,14 @@ impl Overview {
     pub fn spots(&self, footprints: &[Footprint], count: usize, records: f64) -> Spots {
         let enough = SLACK * records;
         let square = |middle| {
-            let wide = |n| Square { middle, half: self.width * WIDER.powi(n - WIDTHS) };
-            let held = |square: &Square| -> f64 {
+            let wide = |n| SpotSquare { middle, half: self.width * WIDER.powi(n - WIDTHS) };
+            let held = |square: &SpotSquare| -> f64 {
                 footprints
                     .iter()
                     .map(|footprint| footprint.records * footprint.within(square))
                     .sum()
             };
-            let is_enough = |square: &Square| held(square) >= enough;
+            let is_enough = |square: &SpotSquare| held(square) >= enough;
             (0..WIDTHS).map(wide).find(is_enough).unwrap_or(wide(WIDTHS))
         };
         let squares = self.middles(footprints, count).into_iter().map(square).collect();
@@ -221,7 +221,7 @@ impl Spots {
     /// The first square that holds a place, and how far from its middle that is: 1 at its edge.
     pub fn holding(&self, at: [f64; 3]) -> Option<(usize, f64)> {
         let at = self.axes.map(|axis| at[axis]);
-        let away = |square: &Square| {
+        let away = |square: &SpotSquare| {
             let [x, y] = [0, 1].map(|n| (at[n] - square.middle[n]).abs() / square.half);
             // What is no number is in none.
             if x <= 1.0 && y <= 1.0 { Some(x.max(y)) } else { None }

@@ -75,7 +75,7 @@ struct AskedPosition {
 const OF_BORDER: f64 = 1.0 / 16.0;
 
 /// Where a cell chooses, a squared error counts no more than so many times the mean of those of the
-/// cell. What is farther off than all around it is of noise rather than of shape, and kept, it would
+/// cell. What is farther off than all around it is of noise rather than of shape: kept, it would
 /// bend the planes of its neighbours. Where noise is normal, one position in six is such.
 const MOST_OF_MEAN: f64 = 2.0;
 
@@ -89,7 +89,7 @@ struct Cell {
     /// The largest product of what counts of a squared error and squared distance, and whose it is.
     at: u32,
     best: f64,
-    /// Sums of squared errors, of the squares of those with their weights, and of squared distances.
+    /// Sums of squared errors, of their squares with weights, and of squared distances.
     error2: f64,
     error4: f64,
     distance2: f64,
