@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::report::deviations::{Deviations, Histogram};
+use crate::report::deviations::MeasuredDeviations;
 use crate::report::{Grouped, Short};
 use crate::stage::Lattice;
 
@@ -71,24 +71,17 @@ pub struct DistanceFigures {
 }
 
 impl DistanceFigures {
-    pub(super) fn of(
-        deviations: &Deviations,
-        histogram: &Histogram,
-        lattice: &Lattice,
-    ) -> Option<DistanceFigures> {
+    pub(super) fn of(measured: &MeasuredDeviations, lattice: &Lattice) -> Option<DistanceFigures> {
+        let deviations = &measured.deviations;
         let (max, at) = deviations.largest()?;
         let length = |steps: f64| steps * lattice.step;
-        // No percentile is beyond the largest.
-        let percentile = |percent: u32| {
-            let edge = histogram.percentile(percent).unwrap_or(max);
-            length(f64::from(edge.min(max)))
-        };
+        let percentile = |percent: u32| Some(length(f64::from(measured.percentile(percent)?)));
         Some(DistanceFigures {
             positions: deviations.count(),
             rms: length(deviations.rms()?),
-            p50: percentile(50),
-            p95: percentile(95),
-            p99: percentile(99),
+            p50: percentile(50)?,
+            p95: percentile(95)?,
+            p99: percentile(99)?,
             max: length(f64::from(max)),
             at: lattice.world(at),
         })

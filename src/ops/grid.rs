@@ -11,7 +11,7 @@ use super::removal::{RemovalAccount, keep_once, remove, represent};
 use crate::geom::angle::is_known;
 use crate::geom::lattice::Lattice;
 use crate::geom::plane::{Covariance, smallest};
-use crate::point::{Bounds, NORMAL, Position, Units, distance2, names};
+use crate::point::{Bounds, NORMAL, Position, Units, center_distance2, distance2, names};
 use crate::quantity::Length;
 use crate::report::Tally;
 use crate::stage::{Needs, Role, RoleName, ScanFacts, StageKind, StagePlace, TileOp};
@@ -262,11 +262,7 @@ impl Pick {
         };
         match self {
             Pick::First => Some(*first as usize),
-            // In half steps from the cube's corner: the centre of an odd side is between two steps.
-            Pick::Center => nearest(&|p| {
-                let halves = std::array::from_fn(|axis| 2 * (p[axis] - cube[axis] * side));
-                distance2(halves, [side; 3])
-            }),
+            Pick::Center => nearest(&|p| center_distance2(p, cube.map(|v| v * side), side)),
             Pick::Median => {
                 let mut median = [0; 3];
                 for (i, median) in median.iter_mut().enumerate() {

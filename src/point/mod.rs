@@ -14,6 +14,7 @@ mod spare;
 mod units;
 
 pub use batch::PointBatch;
+pub(crate) use bounds::center_distance2;
 pub use bounds::{Bounds, Position, distance2};
 pub use column::{Column, ColumnKind, ColumnValue, ComputedDimension, NORMAL};
 pub(crate) use columns::COLUMN_ENDIAN;

@@ -14,7 +14,7 @@ use super::deviations::{Deviations, Histogram};
 use super::figures::{BaselineFigures, world_length};
 use crate::geom::angle::is_known;
 use crate::geom::lattice::Lattice;
-use crate::point::{NORMAL, Position, distance2};
+use crate::point::{NORMAL, Position, center_distance2};
 use crate::store::{Levels, TileKey};
 use crate::tile::Tile;
 
@@ -158,11 +158,7 @@ impl GridLevel {
         level: u32,
     ) {
         let corner = TileKey::around(tile.positions[cube.start], level).corner;
-        // In half steps from the corner, as in `grid`.
-        let from_center = |i: usize| {
-            let p = tile.positions[i];
-            distance2(std::array::from_fn(|axis| 2 * (p[axis] - corner[axis])), [1 << level; 3])
-        };
+        let from_center = |i: usize| center_distance2(tile.positions[i], corner, 1 << level);
         let chosen = || cube.clone().filter(|&i| tile.is_chosen(i));
         let Some(kept) = chosen().min_by_key(|&i| (from_center(i), i)) else { return };
         self.cubes += 1;

@@ -184,6 +184,36 @@ fn upper_edge(bin: usize) -> f32 {
     f32::from_bits((bin as u32 + FIRST) << BELOW_BIN)
 }
 
+/// Deviations with their histogram. Merged in any order and by any split they are the same.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeasuredDeviations {
+    pub deviations: Deviations,
+    pub histogram: Histogram,
+}
+
+impl MeasuredDeviations {
+    /// Adds `records` at `position`, `deviation` (any sign) from the surface.
+    pub fn add(&mut self, deviation: f32, position: Position, records: u32) {
+        if records > 0 {
+            self.deviations.add(deviation, position, records);
+            self.histogram.add(deviation, records);
+        }
+    }
+
+    /// Adds other deviations.
+    pub fn merge(&mut self, other: &MeasuredDeviations) {
+        self.deviations.merge(&other.deviations);
+        self.histogram.merge(&other.histogram);
+    }
+
+    /// What `percent` of the records deviate no more than, in lattice steps; no bin's edge is told
+    /// that is beyond the largest. None without records.
+    pub fn percentile(&self, percent: u32) -> Option<f32> {
+        let (largest, _) = self.deviations.largest()?;
+        Some(self.histogram.percentile(percent).unwrap_or(largest).min(largest))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

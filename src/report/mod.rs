@@ -45,4 +45,4 @@ pub use table::Table;
 pub use tally::Tally;
 pub(crate) use tally::{Apart, KEY_POINTS};
 pub use verdict::{AcceptVerdict, RuleVerdict};
-pub(crate) use voxels::{VoxelCounts, VoxelDeviations, VoxelNode, VoxelSample};
+pub(crate) use voxels::{VoxelCounts, VoxelNode, VoxelSample, grid_figures};

@@ -10,14 +10,14 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::deviations::{Deviations, Histogram};
+use super::deviations::MeasuredDeviations;
 use super::figures::{BaselineFigures, world_length};
 use crate::geom::hash::of_position;
 use crate::geom::lattice::Lattice;
 use crate::geom::nearest::Nearest;
 use crate::geom::simd::Simd;
 use crate::geom::surface::{ASKED_RADII, ask_surface};
-use crate::point::{Bounds, Position, distance2};
+use crate::point::{Bounds, Position, center_distance2};
 use crate::store::{Levels, TileKey, morton_cmp};
 
 /// Sides of the grid that a node is wide at least; less than twice as many at most.
@@ -177,11 +177,8 @@ impl VoxelNode {
         let cube: [i64; 3] = p.map(|v| v.div_euclid(self.side));
         let [x, y, z] = [0, 1, 2].map(|axis| (cube[axis] - self.first[axis]) as usize);
         let slot = &mut self.slots[(z * self.across[1] + y) * self.across[0] + x];
-        // In half steps from the corner, as in `grid`: the centre may be between two.
-        let from_center = |p: Position| {
-            let halves = std::array::from_fn(|axis| 2 * (p[axis] - cube[axis] * self.side));
-            distance2(halves, [self.side; 3])
-        };
+        let corner = cube.map(|v| v * self.side);
+        let from_center = |p: Position| center_distance2(p, corner, self.side);
         match slot.checked_sub(1) {
             None => {
                 self.points.push(p);
@@ -209,7 +206,7 @@ impl VoxelNode {
         sample: &VoxelSample,
         (p, copies): (Position, u32),
         simd: Simd,
-        sum: &mut VoxelDeviations,
+        sum: &mut MeasuredDeviations,
     ) {
         if of_position(SEEDS.1, p) <= sample.positions {
             self.asking.push(p);
@@ -221,7 +218,7 @@ impl VoxelNode {
     }
 
     /// Measures those that wait.
-    pub fn flush(&mut self, simd: Simd, sum: &mut VoxelDeviations) {
+    pub fn flush(&mut self, simd: Simd, sum: &mut MeasuredDeviations) {
         let within = self.side.saturating_mul(ASKED_RADII);
         ask_surface(simd, &self.points, &self.asking, within, |i, told| {
             // Copies of what is kept are on it.
@@ -233,40 +230,19 @@ impl VoxelNode {
     }
 }
 
-/// How far what a grid removes is from its surface. Merged in any order they are the same.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct VoxelDeviations {
-    deviations: Deviations,
-    histogram: Histogram,
-}
-
-impl VoxelDeviations {
-    fn add(&mut self, off: f32, p: Position, records: u32) {
-        if records > 0 {
-            self.deviations.add(off, p, records);
-            self.histogram.add(off, records);
-        }
-    }
-
-    /// Adds what was measured elsewhere.
-    pub fn merge(&mut self, other: &VoxelDeviations) {
-        self.deviations.merge(&other.deviations);
-        self.histogram.merge(&other.histogram);
-    }
-
-    /// The figures of a grid of `side` steps; none if nothing was measured.
-    pub fn figures(&self, side: i64, lattice: &Lattice) -> Option<BaselineFigures> {
-        let largest = world_length(self.deviations.largest()?.0, lattice);
-        let percentile = |percent: u32| {
-            Some(world_length(self.histogram.percentile(percent)?, lattice).min(largest))
-        };
-        Some(BaselineFigures {
-            side: side as f64 * lattice.step,
-            points: self.deviations.count(),
-            rms: self.deviations.rms()? * lattice.step,
-            p50: percentile(50)?,
-            p95: percentile(95)?,
-            p99: percentile(99)?,
-        })
-    }
+/// The figures of a grid of `side` steps, of what it removes; none if nothing was measured.
+pub fn grid_figures(
+    measured: &MeasuredDeviations,
+    side: i64,
+    lattice: &Lattice,
+) -> Option<BaselineFigures> {
+    let percentile = |percent: u32| Some(world_length(measured.percentile(percent)?, lattice));
+    Some(BaselineFigures {
+        side: side as f64 * lattice.step,
+        points: measured.deviations.count(),
+        rms: measured.deviations.rms()? * lattice.step,
+        p50: percentile(50)?,
+        p95: percentile(95)?,
+        p99: percentile(99)?,
+    })
 }

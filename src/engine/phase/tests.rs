@@ -144,7 +144,7 @@ fn a_report_has_the_phases_of_the_list_and_items_come_to_what_text_can_hold() {
         ("SinkSummary", 20),
         ("Option<pointmill::report::baseline::Baseline>", 1_000),
         ("VoxelCounts", 20),
-        ("VoxelDeviations", 1_000),
+        ("MeasuredDeviations", 1_000),
         ("StoredStretch", 20),
         ("ScanSurvey", 1_000),
         ("Pair<pointmill::report::sums::Distances>", 60),

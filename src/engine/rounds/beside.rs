@@ -12,8 +12,8 @@ use crate::engine::demands::FEWEST;
 use crate::engine::job::Job;
 use crate::geom::lattice::Lattice;
 use crate::point::Position;
-use crate::report::deviations::Histogram;
-use crate::report::{BaselineFigures, VoxelCounts, VoxelDeviations, VoxelNode, VoxelSample};
+use crate::report::deviations::{Histogram, MeasuredDeviations};
+use crate::report::{BaselineFigures, VoxelCounts, VoxelNode, VoxelSample, grid_figures};
 use crate::stage::GridBeside;
 use crate::store::{BLOCK, Levels, Reader, TileKey};
 use crate::tile::{Loader, Tile};
@@ -33,13 +33,13 @@ pub(in crate::engine) struct MeasuredGrid {
     side: i64,
     /// Records that the stage removes.
     pub removes: u64,
-    deviations: VoxelDeviations,
+    deviations: MeasuredDeviations,
 }
 
 impl MeasuredGrid {
     /// The figures of the grid in world units; none if nothing was measured.
     pub fn figures(&self, lattice: &Lattice) -> Option<BaselineFigures> {
-        self.deviations.figures(self.side, lattice)
+        grid_figures(&self.deviations, self.side, lattice)
     }
 }
 
@@ -164,10 +164,10 @@ fn deviations(
     nodes: &[TileKey],
     side: i64,
     sample: &VoxelSample,
-) -> Result<VoxelDeviations> {
+) -> Result<MeasuredDeviations> {
     let simd = job.task.simd;
     let of_threads = job.items(nodes.len()).run(
-        || (NodeWorker::new(job, scan), VoxelDeviations::default()),
+        || (NodeWorker::new(job, scan), MeasuredDeviations::default()),
         |(worker, sum), index| {
             job.advance(0)?;
             worker.find(&nodes[index], side, true)?;
@@ -181,7 +181,7 @@ fn deviations(
         |()| {},
         |(_, sum)| Ok(sum),
     )?;
-    let mut sum = VoxelDeviations::default();
+    let mut sum = MeasuredDeviations::default();
     of_threads.iter().for_each(|of_thread| sum.merge(of_thread));
     Ok(sum)
 }
