@@ -72,7 +72,7 @@ impl Page {
             scenes,
             has_after: source.after.as_ref().is_ok_and(|after| after.points() > 0),
             places,
-            warnings: report.run.warnings.clone(),
+            warnings: warnings(&report.run.warnings),
             files: files(&report.run.inputs, &report.run.outputs),
             again,
             missing,
@@ -107,6 +107,19 @@ fn again(outputs: &[FileFigures]) -> Option<String> {
         false => format!("'{}'", path.replace('\'', "'\\''")),
     };
     Some(format!("pointmill reproduce {quoted}"))
+}
+
+/// Warnings that a page lists.
+const MOST_WARNINGS: usize = 60;
+
+/// The first of them, and how many more there are.
+fn warnings(all: &[String]) -> Vec<String> {
+    let mut told = all.to_vec();
+    if let Some(more) = all.len().checked_sub(MOST_WARNINGS).filter(|more| *more > 0) {
+        told.truncate(MOST_WARNINGS);
+        told.push(format!("and {} more, which a report as JSON has", words::count(more as u64)));
+    }
+    told
 }
 
 /// Files of each role that a page lists.
@@ -189,6 +202,11 @@ mod tests {
             bytes: None,
             sha256: None,
         };
+        let many: Vec<String> = (0..MOST_WARNINGS + 2).map(|n| format!("file {n}")).collect();
+        let told = warnings(&many);
+        assert_eq!(told.len(), MOST_WARNINGS + 1);
+        assert_eq!(told[MOST_WARNINGS], "and 2 more, which a report as JSON has");
+        assert_eq!(warnings(&many[..MOST_WARNINGS]), many[..MOST_WARNINGS]);
         let inputs: Vec<FileFigures> = (0..MOST_FILES + 3).map(file).collect();
         let rows = files(&inputs, &inputs[..1]);
         assert_eq!(rows.len(), MOST_FILES + 2);
