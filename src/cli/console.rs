@@ -113,7 +113,7 @@ impl Console {
     }
 
     /// What `run` comes to, telling what it does in lengths of this unit.
-    fn watched<T>(
+    pub fn watched<T>(
         &self,
         unit: Option<&'static str>,
         run: impl FnOnce(&dyn Watch) -> Result<T>,

@@ -3,7 +3,6 @@
 use super::arguments::VerifyArguments;
 use super::check::refuse_outputs;
 use super::console::Console;
-use super::draw::{Nothing, watched};
 use super::flags::{common_flags, given, verify_flags};
 use super::mistyped::marked;
 use super::pipeline::HIDDEN;
@@ -39,9 +38,8 @@ pub(super) fn check_reduction(
         run: Graph::parse_with(SETTINGS, HIDDEN, registry, &sets)?.settings,
     };
     console.hear_interrupts();
-    let verdict = watched(&mut Nothing, &|| console.cancelled(), |watch| {
-        verify(original, reduced, &settings, registry, watch)
-    })?;
+    let verdict =
+        console.watched(None, |watch| verify(original, reduced, &settings, registry, watch))?;
     if arguments.json {
         let failed = |e| Error::internal("a verdict could not be written as JSON").because(e);
         let told = serde_json::to_value(&verdict).map_err(failed)?;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::records::Comparison;
+use super::records::RecordKeys;
 use super::reduced::Reduced;
 use crate::Result;
 use crate::point::PointBatch;
@@ -12,7 +12,8 @@ use crate::stage::{Needs, Transform};
 /// Meets every record of the original.
 pub(super) struct MeetRecords {
     pub reduced: Arc<Reduced>,
-    pub comparison: Comparison,
+    /// What records of the original are known by.
+    pub original: RecordKeys,
 }
 
 impl Transform for MeetRecords {
@@ -21,9 +22,7 @@ impl Transform for MeetRecords {
     }
 
     fn apply(&self, batch: &mut PointBatch, _: &mut Tally) -> Result<()> {
-        for record in batch.iter() {
-            self.reduced.meet(self.comparison.of_original(record));
-        }
+        self.reduced.meet(&self.original, batch.iter());
         Ok(())
     }
 }

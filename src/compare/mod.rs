@@ -7,6 +7,7 @@
 //! the original it is measured how far it is from the surface that the kept points say.
 
 mod meet;
+mod planes;
 mod records;
 mod reduced;
 mod reproduce;

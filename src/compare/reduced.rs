@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use super::records::Comparison;
+use super::records::{Beginnings, Comparison, RecordKeys};
 use crate::budget::{Bytes, whole_mebibytes};
 use crate::geom::hash::PlaceHashes;
 use crate::point::{PointBatch, Scalar, Schema};
@@ -17,8 +17,8 @@ const EXCEPTION: f64 = 65535.0;
 /// Records that are read at once.
 const BATCH: usize = 8192;
 /// Bytes of a record while it is looked at: its place, its positions as they are searched, and its
-/// entry in a table that is at most half empty.
-const BYTES: usize = size_of::<[f64; 3]>() + 3 * size_of::<[i64; 3]>() + 80;
+/// entry in a table that is at most half empty, and its first bits.
+const BYTES: usize = size_of::<[f64; 3]>() + 3 * size_of::<[i64; 3]>() + 90;
 
 /// How often a record is in the reduced scan, and how often it was met in the original.
 #[derive(Debug, Default)]
@@ -33,6 +33,8 @@ pub(super) struct Reduced {
     /// World coordinates, and whether the point is a part of the surface.
     pub points: Vec<([f64; 3], bool)>,
     records: HashMap<u128, Occurrences, PlaceHashes>,
+    /// What they begin with.
+    beginnings: Beginnings,
 }
 
 /// A record by its number in the file and where it is.
@@ -60,22 +62,36 @@ impl Reduced {
 
     /// Reads all records.
     pub fn read(source: &dyn Source, comparison: &Comparison) -> Result<Reduced> {
-        let mut reduced = Reduced { points: Vec::new(), records: HashMap::default() };
+        let (mut points, mut beginnings) = (Vec::new(), Beginnings::of(source.points()));
+        let mut records = HashMap::<u128, Occurrences, PlaceHashes>::default();
+        let keys = &comparison.reduced;
         let schema = source.schema();
         let rank = schema.find(KEEP_RANK).filter(|rank| rank.scalar == Scalar::U16);
         each_record(source, |_, world, record| {
             let is_surface = rank.is_none_or(|d| d.world(record, schema.endian) != EXCEPTION);
-            reduced.points.push((world, is_surface));
-            reduced.records.entry(comparison.of_reduced(record)).or_default().kept += 1;
+            points.push((world, is_surface));
+            beginnings.enter(keys, record);
+            records.entry(keys.key(record)).or_default().kept += 1;
             Ok(())
         })?;
-        Ok(reduced)
+        Ok(Reduced { points, records, beginnings })
     }
 
-    /// Enters a record of the original; from several threads at once.
-    pub fn meet(&self, record: u128) {
-        if let Some(occurrences) = self.records.get(&record) {
-            occurrences.met.fetch_add(1, Ordering::Relaxed);
+    /// Enters records of the original, known by `keys`; from several threads at once.
+    pub fn meet<'a>(
+        &self,
+        keys: &RecordKeys,
+        records: impl ExactSizeIterator<Item = &'a [u8]> + Clone,
+    ) {
+        let mut found = Vec::new();
+        self.beginnings.find(keys, records.clone(), &mut found);
+        let (mut records, mut next) = (records, 0);
+        for number in found {
+            let Some(record) = records.nth((number - next) as usize) else { return };
+            next = number + 1;
+            if let Some(occurrences) = self.records.get(&keys.key(record)) {
+                occurrences.met.fetch_add(1, Ordering::Relaxed);
+            }
         }
     }
 
@@ -93,7 +109,7 @@ impl Reduced {
         }
         let (mut first, mut seen) = (None, HashMap::<u128, u32>::new());
         each_record(source, |number, world, record| {
-            let hash = comparison.of_reduced(record);
+            let hash = comparison.reduced.key(record);
             let met = self.records.get(&hash).map_or(0, |of| of.met.load(Ordering::Relaxed));
             let times = seen.entry(hash).or_default();
             *times += 1;

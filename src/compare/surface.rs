@@ -6,19 +6,23 @@
 
 use std::sync::{Arc, Mutex};
 
+use super::planes::{Asked, PlaneDistances};
 use super::reduced::Reduced;
 use crate::geom::morton::morton_cmp;
 use crate::geom::nearest::NearestAmong;
-use crate::geom::planes::{SURFACE, surface_distance};
+use crate::geom::simd::Simd;
 use crate::host::lock;
 use crate::point::{Bounds, Position, distance2, names};
 use crate::quantity::Length;
 use crate::report::Tally;
-use crate::report::deviations::{Deviations, Histogram};
+use crate::report::deviations::MeasuredDeviations;
 use crate::stage::{Lattice, Needs, ScanFacts, TileOp};
 use crate::tile::Tile;
 use crate::{Error, Result};
 
+/// The surface at a position is the plane of so many surface points, the nearest; those that are as
+/// near as the last are among them.
+const SURFACE: usize = 8;
 /// Surface points that are asked first: one more than those whose plane is the surface tells
 /// whether others are as near as the last.
 const ASKED: usize = SURFACE + 1;
@@ -32,10 +36,8 @@ const SPACINGS: f64 = 4.0;
 /// DistanceFigures of removed positions, in lattice steps.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SurfaceMeasured {
-    pub surface: Deviations,
-    pub surface_histogram: Histogram,
-    pub nearest: Deviations,
-    pub nearest_histogram: Histogram,
+    pub surface: MeasuredDeviations,
+    pub nearest: MeasuredDeviations,
     /// Positions that are farther from the surface than the tolerance, or from the nearest point
     /// than the largest spacing.
     pub beyond: u64,
@@ -50,9 +52,7 @@ pub(super) struct SurfaceMeasured {
 impl SurfaceMeasured {
     fn merge(&mut self, other: &SurfaceMeasured) {
         self.surface.merge(&other.surface);
-        self.surface_histogram.merge(&other.surface_histogram);
         self.nearest.merge(&other.nearest);
-        self.nearest_histogram.merge(&other.nearest_histogram);
         self.beyond += other.beyond;
         self.apart += other.apart;
     }
@@ -147,54 +147,63 @@ impl KnownSurface {
     }
 
     /// Measures positions around `cube`.
-    fn measure(&self, cube: &Bounds, mut asking: Vec<Position>, measured: &mut SurfaceMeasured) {
+    fn measure(
+        &self,
+        cube: &Bounds,
+        mut asking: Vec<Position>,
+        simd: Simd,
+        measured: &mut SurfaceMeasured,
+    ) {
         let (mut around, mut asked) = (self.spacing.saturating_mul(4), ASKED);
-        let within2 = (SPACINGS * self.max_spacing).powi(2);
-        let (mut near, mut nearest) = (Vec::new(), NearestAmong::default());
+        let within = SPACINGS * self.max_spacing;
+        let (mut near, mut nearest) = (Vec::new(), NearestAmong::with(simd));
+        let mut planes = PlaneDistances::with(simd);
+        let mut enter = |asked: Asked, off: f64| self.enter(asked, off, measured);
         while !asking.is_empty() {
             let region = cube.grown(around);
             self.near(&region, &mut near);
             let is_all = region.holds(&self.bounds);
+            let to_edge = (around.unsigned_abs() as u128).pow(2);
+            let enough = asked.min(self.surface.len());
             let mut open = Vec::new();
             nearest.search(&near, &asking, asked, |i, found| {
                 let p = asking[i];
-                let far = |j: &u32| distance2(near[*j as usize], p);
-                let to_edge = (around.unsigned_abs() as u128).pow(2);
-                let enough = found.len() == asked.min(self.surface.len());
-                let last = found.last().map_or(u128::MAX, far);
-                let tied = enough && asked < self.surface.len() && last == far(&found[SURFACE - 1]);
-                let is_proven = is_all || enough && last < to_edge;
-                if tied || !is_proven {
+                let at = |j: &u32| near[*j as usize];
+                let last = found.last().map_or(u128::MAX, |j| distance2(at(j), p));
+                let is_proven = is_all || found.len() == enough && last < to_edge;
+                // As near as the last of those whose plane it is.
+                let tied = found
+                    .iter()
+                    .skip(SURFACE)
+                    .take_while(|j| distance2(at(j), p) == distance2(at(&found[SURFACE - 1]), p));
+                let used = found.len().min(SURFACE + tied.count());
+                let may_be_more = used == asked && asked < self.surface.len();
+                if may_be_more || !is_proven {
                     open.push(p);
                     return;
                 }
-                let seen = found.partition_point(|j| far(j) as f64 <= within2);
-                self.enter(p, &found[..seen], found.first().map(far), &near, measured);
+                let far = |j: &u32| (distance2(at(j), p) as f64).sqrt();
+                let to_nearest = found.first().map_or(f64::INFINITY, far);
+                let used = match within.is_finite() {
+                    true => found[..used].partition_point(|j| far(j) <= within),
+                    false => used,
+                };
+                planes.push((p, to_nearest), found[..used].iter().map(at), &mut enter);
             });
             open.sort_unstable_by(morton_cmp);
             asking = open;
             (around, asked) = (around.saturating_mul(3), 4 * asked);
         }
+        planes.flush(enter);
     }
 
-    /// Enters the distances of a position.
-    fn enter(
-        &self,
-        p: Position,
-        found: &[u32],
-        nearest2: Option<u128>,
-        near: &[Position],
-        measured: &mut SurfaceMeasured,
-    ) {
-        let nearest = nearest2.map_or(f64::INFINITY, |squared| (squared as f64).sqrt());
-        let off = if found.is_empty() { nearest } else { surface_distance(p, found, near) };
+    /// Enters how far a position is from the surface.
+    fn enter(&self, (p, nearest): Asked, off: f64, measured: &mut SurfaceMeasured) {
         measured.beyond += u64::from(off > self.tolerance);
         measured.apart += u64::from(nearest > self.max_spacing);
-        if nearest2.is_some() {
+        if nearest.is_finite() {
             measured.surface.add(off as f32, p, 1);
-            measured.surface_histogram.add(off as f32, 1);
             measured.nearest.add(nearest as f32, p, 1);
-            measured.nearest_histogram.add(nearest as f32, 1);
         }
     }
 }
@@ -228,7 +237,7 @@ impl TileOp for MeasureSurface {
         let known = self.known.as_ref().ok_or_else(early)?;
         let mut measured = SurfaceMeasured::default();
         let removed = known.removed(&tile.positions[tile.core.clone()]);
-        known.measure(&tile.cube, removed, &mut measured);
+        known.measure(&tile.cube, removed, tile.simd(), &mut measured);
         lock(&self.measured).merge(&measured);
         Ok(())
     }

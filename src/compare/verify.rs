@@ -90,10 +90,11 @@ pub fn verify(
         measured: measured.clone(),
         known: None,
     };
-    let met = MeetRecords { reduced: kept.clone(), comparison: comparison.clone() };
+    let met = MeetRecords { reduced: kept.clone(), original: comparison.original.clone() };
     let held = Reduced::bytes(thin.points()).0;
     let run = RunSettings { memory: Some(memory - held), ..settings.run.clone() };
     let mut graph = Graph::new(run);
+    graph.skips_survey = true;
     let source = graph.add("read", Role::Source(open), &[]);
     let records = graph.add("records", Role::Transform(Box::new(met)), &[source]);
     let stage = graph.add("verify", Role::TileOp(Box::new(surface)), &[records]);
@@ -110,12 +111,9 @@ pub fn verify(
         exceptions,
         foreign,
         first_foreign: first.map(|(number, at)| ForeignRecord { number, at }),
-        not_compared: match comparison {
-            Comparison::Bytes(_) => Vec::new(),
-            Comparison::Values { left_out, .. } => left_out,
-        },
-        surface: DistanceFigures::of(&measured.surface, &measured.surface_histogram, lattice),
-        coverage: DistanceFigures::of(&measured.nearest, &measured.nearest_histogram, lattice),
+        not_compared: comparison.left_out,
+        surface: DistanceFigures::of(&measured.surface, lattice),
+        coverage: DistanceFigures::of(&measured.nearest, lattice),
         tolerance: measured.tolerance,
         beyond_tolerance: measured.beyond,
         max_spacing: measured.max_spacing,

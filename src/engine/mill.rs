@@ -208,10 +208,13 @@ impl Course<'_, '_> {
         field: &DecodedScan<'_>,
     ) -> Result<FinishedBranch> {
         let DecodedScan { lattice, tiles, .. } = field;
-        self.clock.begin(RunPhase::Survey(number), Some(2 * tiles.positions()))?;
-        let mut measured = survey(job, lattice, tiles, &after.sieve)?;
-        let compared = after.compared.as_deref();
-        measured.totals.baseline = compared.and_then(|c| c.figures(after.alive, lattice));
+        let mut measured = None;
+        if !job.task.skips_survey {
+            self.clock.begin(RunPhase::Survey(number), Some(2 * tiles.positions()))?;
+            let measured = measured.insert(survey(job, lattice, tiles, &after.sieve)?);
+            let compared = after.compared.as_deref();
+            measured.totals.baseline = compared.and_then(|c| c.figures(after.alive, lattice));
+        }
         let mut tally = after.tally;
         Ok(FinishedBranch {
             kept: after.kept,
@@ -222,7 +225,7 @@ impl Course<'_, '_> {
             classes: tally.classes.take().map_or(Vec::new(), |classes| classes.figures()),
             passes: after.passes,
             tally,
-            measured: Some(measured),
+            measured,
         })
     }
 

@@ -45,6 +45,8 @@ pub(crate) struct Task {
     pub accept: AcceptTable,
     /// See [`Graph::whole_rims`](crate::Graph).
     pub whole_rims: bool,
+    /// See [`Graph::skips_survey`](crate::Graph).
+    pub skips_survey: bool,
     pub threads: usize,
     pub simd: Simd,
     pub source: Box<dyn Source>,

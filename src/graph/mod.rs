@@ -76,6 +76,9 @@ pub struct Graph {
     /// True if every tile is to see the whole scan, which changes no answer of a stage that looks
     /// no further than it says: whoever proves stages compares the two.
     pub(crate) whole_rims: bool,
+    /// True if nobody reads what a report says of tiles and deviations, so that the last walk over
+    /// the scan is left out.
+    pub(crate) skips_survey: bool,
 }
 
 /// A stage and where it stands.

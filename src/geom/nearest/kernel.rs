@@ -99,8 +99,8 @@ fn begin<L: Lanes>(lanes: L, batch: &mut Batch, rows: &mut [Row; LANES], wanted:
 #[inline(always)]
 fn keys(distances: &[f32; LANES], rank: u32) -> Row {
     let mut keys = [0.0; LANES];
-    for (key, &distance) in keys.iter_mut().zip(distances) {
-        *key = smaller(joined(distance, rank), NONE);
+    for lane in 0..LANES {
+        keys[lane] = smaller(joined(distances[lane], rank), NONE);
     }
     keys
 }
