@@ -54,8 +54,8 @@ use work::RoundWork;
 /// nearest kept ones how far it is from the plane of the nearest 5, 8 and 12 of them; the positions
 /// that have the same nearest kept point are a cell, with the score mean(e⁴) · mean(d²) of their
 /// errors e and distances d; and of the worst cells of the whole scan the position of largest e · d
-/// is kept, where e² counts no more than twice the mean of the cell, since what is much farther off
-/// than all around it is noise. No cut into tiles shows in what is kept.
+/// is kept, where e² counts no more than three times the mean of the cell, since what is much
+/// farther off than all around it is noise. No cut into tiles shows in what is kept.
 ///
 /// `keep = "auto"` looks for the number: of a 128th, a 64th, a 32nd of the positions it takes the
 /// smallest of which twice as many would lower the mean error of a sample by less than a quarter,

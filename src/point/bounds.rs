@@ -17,8 +17,8 @@ pub fn distance2(a: Position, b: Position) -> u128 {
         .fold(0u128, |sum, d| sum.saturating_add(u128::from(d).saturating_mul(u128::from(d))))
 }
 
-/// Exact squared distance of a position of a cube to its centre, in half steps squared: the centre of
-/// an odd `side` is between two steps.
+/// Exact squared distance of a position of a cube to its centre, in half steps squared: the centre
+/// of an odd `side` is between two steps.
 pub fn center_distance2(p: Position, corner: Position, side: i64) -> u128 {
     distance2(std::array::from_fn(|axis| 2 * (p[axis] - corner[axis])), [side; 3])
 }

@@ -12,8 +12,8 @@ pub enum Effort {
     /// 99th percentile of their surface error is 3 to 80 % larger (six scenes at 10 %; a quarter
     /// more in the middle).
     Low,
-    /// Four coarser distances with two rounds each, then one with eight rounds. More of them gain
-    /// nothing that could be measured.
+    /// Twelve coarser distances, with two rounds each from 200 points on, then one with eight
+    /// rounds. More of them gain nothing that could be measured.
     #[default]
     Normal,
 }
