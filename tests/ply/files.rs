@@ -254,6 +254,19 @@ fn comments_crs_and_names_are_carried() {
 }
 
 #[test]
+fn a_return_within_a_comment_says_the_same_before_and_after_it_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = b"ply\nformat ascii 1.0\ncomment crs:\r WGS 84\nelement vertex 1\n\
+        property float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n";
+    let (schema, metadata, all) = read(&file(folder.path(), "a.ply", text), 9).unwrap();
+    let out = folder.path().join("b.ply");
+    write(&out, &PlyOptions::default(), (&schema, &metadata, &all), None, 9).unwrap();
+    let (_, again, _) = read(&out, 9).unwrap();
+    assert_eq!(metadata.crs.as_deref(), Some(" WGS 84"));
+    assert_eq!((again.crs, again.comments), (metadata.crs, metadata.comments));
+}
+
+#[test]
 fn normals_are_appended_or_overwritten_in_place() {
     let folder = tempfile::tempdir().unwrap();
     let normals = [[0.5f32, -0.25, 1.0], [f32::NAN, f32::NAN, f32::NAN]];

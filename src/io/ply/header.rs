@@ -270,14 +270,16 @@ impl Partial {
         let (keyword, rest) =
             line.split_once(|c: char| c.is_ascii_whitespace()).unwrap_or((line, ""));
         let words: Vec<&str> = rest.split_ascii_whitespace().collect();
+        // The other line ends are none here; written, they are spaces, and say the same as these.
+        let told = || rest.replace(['\n', '\r'], " ");
         match (keyword, words.as_slice()) {
             ("", _) => Ok(()),
             ("comment", _) => {
-                self.comments.push(rest.to_owned());
+                self.comments.push(told());
                 Ok(())
             }
             ("obj_info", _) => {
-                self.obj_info.push(rest.to_owned());
+                self.obj_info.push(told());
                 Ok(())
             }
             ("format", words) => self.format(words),
