@@ -1,10 +1,10 @@
 //! Distances to the planes of kept points, eight positions side by side.
 //!
-//! A check that computed as the stages do would repeat their mistakes, so the planes of `verify` are
-//! its own: where stages have eigenvectors in closed form, here Jacobi rotations make them, which
-//! are slower and hard to get wrong (Golub and Van Loan, Matrix Computations, section 8.5). Five
-//! times around the three off-diagonal entries leave none of them larger than rounding, since each
-//! time about squares what is left. Nothing branches, so that eight go side by side.
+//! A check that computed as the stages do would repeat their mistakes, so the planes of `verify`
+//! are its own: where stages have eigenvectors in closed form, here Jacobi rotations make them,
+//! which are slower and hard to get wrong (Golub and Van Loan, Matrix Computations, section 8.5).
+//! Five times around the three off-diagonal entries leave none of them larger than rounding, since
+//! each time about squares what is left. Nothing branches, so that eight go side by side.
 
 use crate::geom::simd::{EIGHT, Kernel, Lanes, Real, Simd};
 use crate::point::Position;
@@ -20,13 +20,13 @@ const SWEEPS: usize = 5;
 const SUMS: usize = 9;
 
 /// A removed position, and how far it is from the nearest kept point in steps.
-pub(super) type Asked = (Position, f64);
+pub(super) type RemovedPoint = (Position, f64);
 
 /// Distances to planes, eight at a time.
 #[derive(Debug)]
-pub(super) struct PlaneDistances {
+pub(super) struct SurfacePlanes {
     simd: Simd,
-    asked: [Asked; EIGHT],
+    asked: [RemovedPoint; EIGHT],
     planes: Box<EightPlanes>,
     used: usize,
 }
@@ -40,20 +40,20 @@ struct EightPlanes {
     distance: [f64; EIGHT],
 }
 
-impl PlaneDistances {
+impl SurfacePlanes {
     /// None yet, to be computed by the given instruction set; all give the same bits.
-    pub fn with(simd: Simd) -> PlaneDistances {
+    pub fn with(simd: Simd) -> SurfacePlanes {
         let asked = [([0; 3], 0.0); EIGHT];
-        PlaneDistances { simd, asked, planes: Box::default(), used: 0 }
+        SurfacePlanes { simd, asked, planes: Box::default(), used: 0 }
     }
 
     /// Takes a position with the kept points whose plane is the surface there. Calls `done` for
     /// positions that are measured, with their distance to the surface in steps.
     pub fn push(
         &mut self,
-        asked: Asked,
+        asked: RemovedPoint,
         points: impl ExactSizeIterator<Item = Position>,
-        mut done: impl FnMut(Asked, f64),
+        mut done: impl FnMut(RemovedPoint, f64),
     ) {
         let count = points.len();
         if count < FEWEST {
@@ -80,7 +80,7 @@ impl PlaneDistances {
     }
 
     /// Calls `done` for all that it was not called for yet.
-    pub fn flush(&mut self, mut done: impl FnMut(Asked, f64)) {
+    pub fn flush(&mut self, mut done: impl FnMut(RemovedPoint, f64)) {
         self.simd.run(MeasureEight(&mut self.planes));
         for (&asked, &distance) in self.asked.iter().zip(&self.planes.distance).take(self.used) {
             done(asked, if distance < 0.0 { asked.1 } else { distance });
@@ -134,8 +134,8 @@ impl Kernel for MeasureEight<'_> {
     }
 }
 
-/// Turns the axes P and Q so that their entry is 0; R is the third axis. Each entry off the diagonal
-/// stands at the axis that it does not belong to.
+/// Turns the axes P and Q so that their entry is 0; R is the third axis. Each entry off the
+/// diagonal stands at the axis that it does not belong to.
 #[inline(always)]
 fn rotate<T: Real, const P: usize, const Q: usize, const R: usize>(
     diagonal: &mut [T; 3],
@@ -170,9 +170,9 @@ mod tests {
 
     /// Distances of the origin to the planes of sets of offsets, on one instruction set.
     fn distances(simd: Simd, sets: &[Vec<Position>]) -> Vec<f64> {
-        let mut planes = PlaneDistances::with(simd);
+        let mut planes = SurfacePlanes::with(simd);
         let mut all = vec![f64::NAN; sets.len()];
-        let mut done = |asked: Asked, off: f64| all[asked.1 as usize] = off;
+        let mut done = |asked: RemovedPoint, off: f64| all[asked.1 as usize] = off;
         for (n, set) in sets.iter().enumerate() {
             planes.push(([0; 3], n as f64), set.iter().copied(), &mut done);
         }

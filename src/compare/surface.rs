@@ -6,7 +6,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use super::planes::{Asked, PlaneDistances};
+use super::planes::{RemovedPoint, SurfacePlanes};
 use super::reduced::Reduced;
 use crate::geom::morton::morton_cmp;
 use crate::geom::nearest::NearestAmong;
@@ -157,8 +157,8 @@ impl KnownSurface {
         let (mut around, mut asked) = (self.spacing.saturating_mul(4), ASKED);
         let within = SPACINGS * self.max_spacing;
         let (mut near, mut nearest) = (Vec::new(), NearestAmong::with(simd));
-        let mut planes = PlaneDistances::with(simd);
-        let mut enter = |asked: Asked, off: f64| self.enter(asked, off, measured);
+        let mut planes = SurfacePlanes::with(simd);
+        let mut enter = |asked: RemovedPoint, off: f64| self.enter(asked, off, measured);
         while !asking.is_empty() {
             let region = cube.grown(around);
             self.near(&region, &mut near);
@@ -198,7 +198,7 @@ impl KnownSurface {
     }
 
     /// Enters how far a position is from the surface.
-    fn enter(&self, (p, nearest): Asked, off: f64, measured: &mut SurfaceMeasured) {
+    fn enter(&self, (p, nearest): RemovedPoint, off: f64, measured: &mut SurfaceMeasured) {
         measured.beyond += u64::from(off > self.tolerance);
         measured.apart += u64::from(nearest > self.max_spacing);
         if nearest.is_finite() {

@@ -94,7 +94,7 @@ pub fn verify(
     let held = Reduced::bytes(thin.points()).0;
     let run = RunSettings { memory: Some(memory - held), ..settings.run.clone() };
     let mut graph = Graph::new(run);
-    graph.skips_survey = true;
+    graph.traits.skips_survey = true;
     let source = graph.add("read", Role::Source(open), &[]);
     let records = graph.add("records", Role::Transform(Box::new(met)), &[source]);
     let stage = graph.add("verify", Role::TileOp(Box::new(surface)), &[records]);

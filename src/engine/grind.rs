@@ -192,7 +192,7 @@ impl<'a> Worker<'a> {
             // Half for the zone, half for the rim, as where memory decides.
             loader.limit_rim(points.saturating_mul(2));
         }
-        if job.task.whole_rims {
+        if job.task.traits.whole_rims {
             loader.see_all();
         }
         let tile = loader.tile().0;

@@ -209,7 +209,7 @@ impl Course<'_, '_> {
     ) -> Result<FinishedBranch> {
         let DecodedScan { lattice, tiles, .. } = field;
         let mut measured = None;
-        if !job.task.skips_survey {
+        if !job.task.traits.skips_survey {
             self.clock.begin(RunPhase::Survey(number), Some(2 * tiles.positions()))?;
             let measured = measured.insert(survey(job, lattice, tiles, &after.sieve)?);
             let compared = after.compared.as_deref();

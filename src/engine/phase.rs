@@ -87,7 +87,7 @@ impl Task {
             let is_ranked = |sink: &usize| self.in_input_order[*sink] && !is_folder(sink);
             phases.extend(sinks().filter(is_ranked).map(RunPhase::Write));
             let branch = self.branches.iter().position(|branch| branch.pass == n);
-            phases.extend(branch.filter(|_| !self.skips_survey).map(RunPhase::Survey));
+            phases.extend(branch.filter(|_| !self.traits.skips_survey).map(RunPhase::Survey));
         }
         phases.extend(end);
         phases

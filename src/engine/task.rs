@@ -14,7 +14,7 @@ use super::shares::{Demands, Shares};
 use super::tagger::Tagger;
 use crate::geom::lattice::Lattice;
 use crate::geom::simd::Simd;
-use crate::graph::{Nonfinite, RunSettings, SpillSetting};
+use crate::graph::{Nonfinite, RunSettings, RunTraits, SpillSetting};
 use crate::point::{ComputedDimension, Metadata, Schema, names};
 use crate::report::AcceptTable;
 use crate::stage::{CreateSink, Source};
@@ -43,10 +43,7 @@ pub(crate) struct Task {
     pub settings: RunSettings,
     /// What the result must be to be accepted, in the unit of the scan.
     pub accept: AcceptTable,
-    /// See [`Graph::whole_rims`](crate::Graph).
-    pub whole_rims: bool,
-    /// See [`Graph::skips_survey`](crate::Graph).
-    pub skips_survey: bool,
+    pub traits: RunTraits,
     pub threads: usize,
     pub simd: Simd,
     pub source: Box<dyn Source>,

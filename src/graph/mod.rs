@@ -73,12 +73,19 @@ pub struct Graph {
     pub(crate) file: Option<PathBuf>,
     /// What outputs are to say of the run, if it is made again: what they said.
     pub(crate) note: Option<Arc<str>>,
+    /// How it runs, where no text can say so.
+    pub(crate) traits: RunTraits,
+}
+
+/// How a graph runs that the library makes for itself.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct RunTraits {
     /// True if every tile is to see the whole scan, which changes no answer of a stage that looks
     /// no further than it says: whoever proves stages compares the two.
-    pub(crate) whole_rims: bool,
+    pub whole_rims: bool,
     /// True if nobody reads what a report says of tiles and deviations, so that the last walk over
     /// the scan is left out.
-    pub(crate) skips_survey: bool,
+    pub skips_survey: bool,
 }
 
 /// A stage and where it stands.

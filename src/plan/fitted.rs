@@ -99,8 +99,7 @@ impl Graph {
     /// Stages that do not fit each other, inputs that disagree, an output that is an input or
     /// cannot appear where it should, and a memory that cannot do, with the size that would.
     pub fn plan(self, overrides: &Overrides) -> Result<Plan> {
-        let (origin, file) = (self.origin.clone(), self.file.clone());
-        let (whole_rims, skips_survey) = (self.whole_rims, self.skips_survey);
+        let (origin, file, traits) = (self.origin.clone(), self.file.clone(), self.traits);
         let settings = self.settings.clone().with(overrides);
         let rules = self.accept.clone();
         let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
@@ -133,8 +132,7 @@ impl Graph {
             threads: demands.threads,
             settings,
             accept,
-            whole_rims,
-            skips_survey,
+            traits,
             source,
             source_kind: sorted.source.0,
             transforms: sorted.transforms,

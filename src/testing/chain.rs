@@ -135,7 +135,7 @@ impl Chain {
         witness: &Arc<Witness>,
     ) -> Result<Graph> {
         let mut graph = Graph::new(settings);
-        graph.whole_rims = setup.whole_rims;
+        graph.traits.whole_rims = setup.whole_rims;
         let mut last = graph.add("points", Role::Source(Box::new(source)), &[]);
         if setup.behind_tiles {
             last = graph.add("nothing", Role::TileOp(Box::new(Idle)), &[last]);

@@ -70,7 +70,7 @@ impl<'a> RoundWorker<'a> {
         capacity: usize,
     ) -> RoundWorker<'a> {
         let mut loader = Loader::new(&scan.field.tiles, scan.sieve, capacity);
-        if job.task.whole_rims {
+        if job.task.traits.whole_rims {
             loader.see_all();
         }
         if let Looks::Sample { most, seed } = round.looks {
@@ -99,7 +99,7 @@ impl<'a> RoundWorker<'a> {
     /// Loads the positions of a tile that the stage decides about, and leaves the kept points
     /// around it in the reader. How many records they have.
     pub fn load(&mut self, key: TileKey, kept: &KeptPoints) -> Result<u64> {
-        let whole = |reach: i64| match self.job.task.whole_rims {
+        let whole = |reach: i64| match self.job.task.traits.whole_rims {
             true => key.cube().union(&self.loader.tiles().bounds()).grown(reach),
             false => key.cube().grown(reach),
         };
