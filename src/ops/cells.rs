@@ -1,6 +1,7 @@
 //! The stage `cells`: cubes of points, divided until the normals of each part agree.
 
 mod auto;
+mod dirichlet;
 mod division;
 mod entry;
 mod gather;
@@ -8,6 +9,7 @@ mod grouping;
 mod keys;
 mod limit;
 mod noise;
+mod octants;
 mod outlook;
 mod settings;
 mod target;
@@ -36,6 +38,8 @@ use threshold::Threshold;
 const BYTES: usize = 4 + 1 + 4 + 4 + 4;
 /// Bytes a position where positions are sorted by cell.
 const SORTING_BYTES: usize = 32;
+/// Bytes a position where those of a part are sorted by angle.
+const ANGLE_BYTES: usize = 16;
 
 impl StageKind for Cells {
     const KIND: &'static str = "cells";
@@ -60,7 +64,9 @@ impl TileOp for Cells {
         };
         let class = self.by.contains(&By::Classification).then_some(names::CLASSIFICATION);
         let side = self.settled.map_or(0, |settled| settled.steps);
-        let bytes = if aligned { BYTES } else { BYTES + SORTING_BYTES };
+        let bytes = BYTES
+            + if aligned { 0 } else { SORTING_BYTES }
+            + if self.split == Split::Dirichlet { ANGLE_BYTES } else { 0 };
         let needs = Needs::none().looks_at(class).reads(&NORMAL).makes_cells();
         needs.cells(side, aligned).bytes_per_point(bytes)
     }

@@ -79,7 +79,7 @@ fn refines(fine: &[Vec<Position>], coarse: &[Vec<Position>]) -> bool {
 
 fn any_stage() -> impl Strategy<Value = Cells> {
     let side = prop::sample::select(vec![5i64, 7, 8, 13, 16, 40]);
-    let split = prop::sample::select(vec![Split::Voronoi, Split::Octant]);
+    let split = prop::sample::select(vec![Split::Voronoi, Split::Octant, Split::Dirichlet]);
     let measure = prop::sample::select(vec![Measure::Axis, Measure::Cone]);
     let bounds =
         prop::sample::select(vec![(None, None), (Some(2.0), Some(6.0)), (None, Some(4.0))]);
@@ -114,6 +114,10 @@ proptest! {
             let kept = whole.kept().len() as u64;
             match stage.split {
                 Split::Voronoi => prop_assert_eq!(kept, k),
+                // Four sites make three parts more.
+                Split::Dirichlet => {
+                    prop_assert!(kept <= k && k < kept + 3, "{} for {}", kept, k);
+                }
                 Split::Octant => prop_assert!(kept <= k && k < kept + 7, "{} for {}", kept, k),
             }
             prop_assert_eq!(decided(&one, "kept"), Some(kept as f64));

@@ -17,7 +17,7 @@ fn sorted(mut groups: Vec<Vec<Position>>) -> Vec<Vec<Position>> {
 }
 
 fn any_split() -> impl Strategy<Value = Split> {
-    prop::sample::select(vec![Split::Voronoi, Split::Octant])
+    prop::sample::select(vec![Split::Voronoi, Split::Octant, Split::Dirichlet])
 }
 
 fn any_measure() -> impl Strategy<Value = Measure> {

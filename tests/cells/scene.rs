@@ -235,6 +235,34 @@ fn plain_divide(
             plain_divide(near, cube, stage, groups);
             plain_divide(rest, cube, stage, groups);
         }
+        Split::Dirichlet => {
+            // By angle, of equal ones in Morton order, which is that of the cell.
+            let mut sorted: Vec<usize> = (0..cell.len()).collect();
+            sorted.sort_by(|&a, &b| angles[b].0.total_cmp(&angles[a].0));
+            let count = stage.seeds.unwrap_or(4).min(cell.len());
+            let mut sites: Vec<usize> = Vec::new();
+            for n in 0..count {
+                let quantile = sorted[n * (cell.len() - 1) / (count - 1).max(1)];
+                let is_first = |i: &&usize| angles[**i].0 == angles[quantile].0;
+                let first = *sorted.iter().find(is_first).unwrap();
+                if !sites.contains(&first) {
+                    sites.push(first);
+                }
+            }
+            let nearest = |p: &Point| {
+                let far = |site: &usize| -> i128 {
+                    let q = cell[*site].at;
+                    (0..3).map(|i| (i128::from(p.at[i]) - i128::from(q[i])).pow(2)).sum()
+                };
+                let least = sites.iter().map(far).min().unwrap();
+                sites.iter().position(|site| far(site) == least).unwrap()
+            };
+            for site in 0..sites.len() {
+                let part: Vec<Point> =
+                    cell.iter().filter(|p| nearest(p) == site).copied().collect();
+                plain_divide(part, cube, stage, groups);
+            }
+        }
         Split::Octant => {
             let (corner, sides) = cube;
             for octant in 0..8 {

@@ -33,7 +33,7 @@ proptest! {
         ],
         side in prop::sample::select(vec![3i64, 5, 6, 7, 11, 13, 20]),
         most in 5usize..60,
-        split in prop::sample::select(vec![Split::Voronoi, Split::Octant]),
+        split in prop::sample::select(vec![Split::Voronoi, Split::Octant, Split::Dirichlet]),
         delta in prop::sample::select(vec![0.0, 0.1, 0.8]),
         measure in prop::sample::select(vec![Measure::Axis, Measure::Cone]),
         bounds in prop::sample::select(vec![None, Some((1.0, 3.0)), Some((2.0, 2.0))]),

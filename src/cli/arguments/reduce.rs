@@ -132,10 +132,10 @@ pub(crate) struct ReduceArguments {
     /// The direction of `--measure axis`: x, y, z or a vector such as 0,0,1 [default: x]
     #[arg(long, value_name = "AXIS")]
     pub reference: Option<String>,
-    /// How a cell is split: voronoi or octant [default: voronoi]
+    /// How a cell is split: voronoi, dirichlet or octant [default: voronoi]
     #[arg(long, value_name = "HOW")]
     pub split: Option<String>,
-    /// How a normal is computed: varady or pca [default: varady]
+    /// How a normal is computed: varady, delaunay, pca, quadric or cubic [default: varady]
     #[arg(long, value_name = "HOW")]
     pub method: Option<String>,
     /// Remove points that are far from all others before anything else, as a stage `outliers` does

@@ -29,6 +29,8 @@ pub(super) struct DivisionRule {
     /// A part of so many steps or fewer is not divided; 0 for no such bound.
     pub(super) min_spacing: u64,
     pub(super) split: Split,
+    /// Sites of a division, where there are several.
+    pub(super) seeds: usize,
     /// Side of the initial cells in steps, and a corner of one of them.
     pub(super) side: i64,
     pub(super) origin: Position,
@@ -36,7 +38,7 @@ pub(super) struct DivisionRule {
 
 /// Members `start..end` of a cell, cut off by `depth` divisions by angle, the narrowest of which
 /// was of the range `narrowest` (see [`range`]).
-struct CellPart {
+pub(super) struct CellPart {
     start: usize,
     end: usize,
     depth: u32,
@@ -86,9 +88,9 @@ pub(super) struct DivisionCounts {
 
 /// Divides cells of one tile, one after the other, in memory that it keeps.
 pub(super) struct Division<'a> {
-    rule: DivisionRule,
-    positions: &'a [Position],
-    normals: &'a [[f32; 3]],
+    pub(super) rule: DivisionRule,
+    pub(super) positions: &'a [Position],
+    pub(super) normals: &'a [[f32; 3]],
     core: Range<usize>,
     counts: DivisionCounts,
     stack: Vec<CellPart>,
@@ -156,10 +158,11 @@ impl<'a> Division<'a> {
                 }
                 Verdict::ByAngle => {
                     let child = |range| part.child(range, narrowest, 1);
-                    let is_deep = part.depth >= deepest && self.rule.split == Split::Voronoi;
+                    let is_deep = part.depth >= deepest && self.rule.split != Split::Octant;
                     cut_deep |= is_deep;
                     match self.rule.split {
                         Split::Voronoi if !is_deep => self.bisect(members, turned, &survey, child),
+                        Split::Dirichlet if !is_deep => self.part_among(members, turned, child),
                         _ => self.cut_in_eight(members, child),
                     }
                     let parts = self.stack.len() - pushed;
@@ -209,7 +212,8 @@ impl<'a> Division<'a> {
             self.counts.by_max_side += mine * u64::from(!is_wide);
             Verdict::ByLength
         } else if is_wide && length <= min_spacing {
-            self.counts.by_min_spacing += mine;
+            // One of exactly the last range may be among those that stay whole in any case.
+            self.counts.by_min_spacing += mine * u64::from(!limit.is_tie(narrowest));
             Verdict::Kept
         } else {
             by_angle
@@ -327,71 +331,29 @@ impl<'a> Division<'a> {
         front
     }
 
-    /// Parts the members by the octants of the smallest octant of the initial cell that holds them.
-    fn cut_in_eight(&mut self, part: &mut [u32], child: impl Fn(Range<usize>) -> CellPart) {
-        let positions = self.positions;
-        let tight = Bounds::of(part.iter().map(|&i| positions[i as usize]));
-        let Some(middle) = middle(&tight, self.rule.origin, self.rule.side) else { return };
-        let octant = |i: u32| {
-            let p = positions[i as usize];
-            (0..3).fold(0, |octant, axis| octant | usize::from(p[axis] >= middle[axis]) << axis)
-        };
-        let mut bounds = [0; 9];
-        part.iter().for_each(|&i| bounds[octant(i) + 1] += 1);
-        for i in 0..8 {
+    /// Parts the members by which of `kinds` each is of, both in the order they had.
+    pub(super) fn distribute(
+        &mut self,
+        part: &mut [u32],
+        kinds: usize,
+        kind: impl Fn(u32) -> usize,
+        child: impl Fn(Range<usize>) -> CellPart,
+    ) {
+        let mut bounds = vec![0; kinds + 1];
+        part.iter().for_each(|&i| bounds[kind(i) + 1] += 1);
+        for i in 0..kinds {
             bounds[i + 1] += bounds[i];
         }
-        let mut next = bounds;
+        let mut next = bounds.clone();
         let spare = &mut self.spare[..part.len()];
         spare.copy_from_slice(part);
         for &mut i in spare {
-            let octant = octant(i);
-            part[next[octant]] = i;
-            next[octant] += 1;
+            let kind = kind(i);
+            part[next[kind]] = i;
+            next[kind] += 1;
         }
-        for octant in bounds.windows(2).rev().filter(|octant| octant[0] < octant[1]) {
-            self.stack.push(child(octant[0]..octant[1]));
+        for range in bounds.windows(2).rev().filter(|range| range[0] < range[1]) {
+            self.stack.push(child(range[0]..range[1]));
         }
-    }
-}
-
-/// Smallest corner of the last octant of the smallest octant of a cell that holds `bounds`; the
-/// lower half of an odd side is the longer one. None if `bounds` is a single position.
-fn middle(bounds: &Bounds, origin: Position, side: i64) -> Option<Position> {
-    let corner =
-        |axis: usize| origin[axis] + (bounds.lo[axis] - origin[axis]).div_euclid(side) * side;
-    let mut corner: Position = std::array::from_fn(corner);
-    let mut sides = [side; 3];
-    while sides != [1; 3] {
-        let middle = std::array::from_fn(|axis| corner[axis] + (sides[axis] - sides[axis] / 2));
-        if (0..3).any(|axis| bounds.lo[axis] < middle[axis] && middle[axis] <= bounds.hi[axis]) {
-            return Some(middle);
-        }
-        for axis in 0..3 {
-            let half = sides[axis] / 2;
-            if bounds.lo[axis] >= middle[axis] {
-                corner[axis] = middle[axis];
-                sides[axis] = half;
-            } else {
-                sides[axis] -= half;
-            }
-        }
-    }
-    None
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_middle_is_that_of_the_smallest_octant() {
-        let bounds = |lo, hi| Bounds { lo, hi };
-        assert_eq!(middle(&bounds([0; 3], [7; 3]), [0; 3], 8), Some([4; 3]));
-        assert_eq!(middle(&bounds([4; 3], [5, 4, 4]), [0; 3], 8), Some([5; 3]));
-        assert_eq!(middle(&bounds([-7; 3], [-1; 3]), [-14, 0, 7], 7), Some([-3; 3]));
-        assert_eq!(middle(&bounds([3; 3], [3; 3]), [-14, 0, 7], 7), None);
-        // A side of 3 is halved into 2 and 1: octants need not be cubes.
-        assert_eq!(middle(&bounds([0, 2, 0], [1, 2, 0]), [0; 3], 3), Some([1, 3, 1]));
     }
 }

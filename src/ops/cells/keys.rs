@@ -23,6 +23,10 @@ pub(super) const MAX_ANGLE: f64 = 0.1;
 const POSITIONS_PER_CUBE: u64 = 32;
 /// Cubes of this side, anchored at world 0, are the octants of the lattice: no larger side differs.
 pub(super) const LARGEST_SIDE: i64 = 1 << 62;
+/// Sites of a division where nothing is said, and at most.
+const SEEDS: usize = 4;
+const MOST_SEEDS: usize = 64;
+
 /// Partitions the tile into cells of agreeing normals (the paper's second step).
 ///
 /// The initial cells are cubes of side `side`, anchored at world 0. Normals have no meaningful
@@ -34,8 +38,8 @@ pub(super) const LARGEST_SIDE: i64 = 1 << 62;
 ///
 /// It counts distinct positions, never records: copies of a point weigh as one.
 ///
-/// `split = "voronoi"` needs at most m − 1 divisions for m positions, but where each division
-/// separates only a few their cost is quadratic. No surface does that; to bound the time of data
+/// `split = "voronoi"` (and `"dirichlet"`) needs at most m − 1 divisions for m positions, but where
+/// each division separates only a few their cost is quadratic. No surface does that; to bound the time of data
 /// that does, parts more than 64 + 2 log₂ m divisions deep are cut in eight instead
 /// (`cells_cut_deep` of the report counts the initial cells with such parts).
 ///
@@ -50,7 +54,8 @@ pub(super) const LARGEST_SIDE: i64 = 1 << 62;
 /// Morton-first position; each part before its own parts): as many as leave the number of records
 /// asked for. A position without a normal keeps a record and is among them. With
 /// `split = "voronoi"` the number is met exactly, as each division adds one record; a cut in eight
-/// adds up to seven, and the first in that order that would exceed the number ends it. If all
+/// adds up to seven, one among several sites up to one less than there are, and the first in that
+/// order that would exceed the number ends it. If all
 /// divisions leave fewer, all are made. A division needs angles that differ: of a perfect plane no
 /// more can be kept than its initial cells.
 ///
@@ -98,6 +103,10 @@ pub struct Cells {
     pub by: Vec<By>,
     /// How a cell is divided.
     pub split: Split,
+    /// Of `split = "dirichlet"`: how many sites a division is among, 2 to 64, or as many as there
+    /// are positions; 4 where nothing is said.
+    #[schemars(range(min = 2, max = 64))]
+    pub seeds: Option<usize>,
     /// What the range of angles of a cell is.
     pub measure: Measure,
     /// Direction N that `measure = "axis"` takes angles to: an axis, or a vector of any length. Not
@@ -145,6 +154,7 @@ impl Default for Cells {
             min_spacing: None,
             by: Vec::new(),
             split: Split::Voronoi,
+            seeds: None,
             measure: Measure::Axis,
             reference: None,
             settled: None,
@@ -157,7 +167,7 @@ impl Default for Cells {
 /// The keys; `max_angle` and `reference` as what they are where they were not given.
 impl Serialize for Cells {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut keys = serializer.serialize_struct("Cells", 10)?;
+        let mut keys = serializer.serialize_struct("Cells", 11)?;
         keys.serialize_field("side", &self.side)?;
         keys.serialize_field("max_angle", &self.angle())?;
         keys.serialize_field("keep", &self.keep)?;
@@ -166,6 +176,8 @@ impl Serialize for Cells {
         keys.serialize_field("min_spacing", &self.min_spacing)?;
         keys.serialize_field("by", &self.by)?;
         keys.serialize_field("split", &self.split)?;
+        let seeds = (self.split == Split::Dirichlet).then(|| self.seeds());
+        keys.serialize_field("seeds", &seeds)?;
         keys.serialize_field("measure", &self.measure)?;
         keys.serialize_field("reference", &self.direction())?;
         keys.end()
@@ -173,6 +185,11 @@ impl Serialize for Cells {
 }
 
 impl Cells {
+    /// Sites of a division among several.
+    pub(super) fn seeds(&self) -> usize {
+        self.seeds.unwrap_or(SEEDS)
+    }
+
     /// Refuses keys that do not go together, naming one of them.
     pub(crate) fn check(&self) -> Result<(), (&'static str, Error)> {
         if self.keep.is_some() && self.max_angle.is_some() {
@@ -180,6 +197,18 @@ impl Cells {
                 "`cells.keep` finds the largest angle, and `cells.max_angle` gives it",
             );
             return Err(("keep", error.help("give one of them")));
+        }
+        match self.seeds {
+            Some(_) if self.split != Split::Dirichlet => {
+                let told = "`cells.seeds` belongs to `cells.split = \"dirichlet\"`";
+                let error = Error::pipeline(told).help("give that too, or leave `cells.seeds` out");
+                return Err(("seeds", error));
+            }
+            Some(seeds) if !(2..=MOST_SEEDS).contains(&seeds) => {
+                let told = format!("seeds must be 2 to {MOST_SEEDS}, not {seeds}");
+                return Err(("seeds", Error::pipeline(told)));
+            }
+            _ => {}
         }
         match (self.max_side, self.min_spacing) {
             (Some(most), Some(Setting::Given(least))) if most.is_less_than(least) => {
@@ -263,6 +292,7 @@ impl Cells {
             max_side,
             min_spacing,
             split,
+            seeds: self.seeds(),
             side,
             origin: [0; 3],
         })

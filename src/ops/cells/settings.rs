@@ -30,6 +30,11 @@ pub enum Split {
     /// Between the position with the smallest angle and that with the largest: each position goes
     /// with the nearer one, with the former if equally far (the paper's Algorithm 2).
     Voronoi,
+    /// Among several sites at once, the positions at the quantiles of the angles, as many as
+    /// `seeds`: each position goes with the nearest, of equally near ones with that of the smallest
+    /// angle (the other reading of the paper's "Voronoi regions of points"). Two seeds are
+    /// `"voronoi"` with `measure = "axis"`.
+    Dirichlet,
     /// The cube in eight, down to one lattice position.
     Octant,
 }
