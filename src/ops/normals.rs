@@ -4,29 +4,33 @@ mod bundle;
 pub(crate) mod estimate;
 pub(crate) mod estimator;
 mod fan;
+mod height;
 mod noise;
 mod orient;
+mod shape;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::lengths::Square;
 use super::scatter::{scatter, typical};
 use crate::geom::angle::is_known;
-use crate::point::{NORMAL, names};
-use crate::quantity::{Setting, Whole};
+use crate::point::{NORMAL, Units, names};
+use crate::quantity::{Length, Setting, Whole};
 use crate::report::Tally;
 use crate::stage::{Forecast, Needs, Role, RoleName, ScanFacts, StageKind, StagePlace, TileOp};
 use crate::tile::Tile;
 use crate::{Error, Result};
 
+use bundle::in_morton_order;
+use estimate::MIN_NEIGHBORS;
 pub use estimate::Method;
 pub(crate) use estimate::{Estimate, EstimateOutcome, Fallback};
 pub(crate) use estimator::Estimator;
 pub use orient::Orient;
 use orient::SignRule;
+use shape::AskedShapes;
 
-/// Fewest neighbours that the stage takes; two make a plane, but no estimate of a surface.
-const MIN_NEIGHBORS: usize = 3;
 /// Most neighbours that the stage takes.
 const MAX_NEIGHBORS: usize = 64;
 
@@ -42,6 +46,15 @@ const MAX_NEIGHBORS: usize = 64;
 /// With `neighbors = "auto"` it looks at a sample of the scan first: `scatter_of_10` of the report
 /// is how far, in radians, normals of 10 neighbours are off their linear trend where the scan is
 /// planar, which is what noise does. Up to 0.01 it takes 10 neighbours, beyond 20.
+///
+/// The report counts where the method asked for could not be: `no_normal`, and of those that
+/// another method stood in for `fallback_no_triangle` and `fallback_perpendicular` (`"pca"`) and
+/// `fallback_ill_conditioned` (`"varady"`, where neighbours are too few for a height function of
+/// degree 2 or 3, or lie so that they do not determine it).
+///
+/// Height functions of degree 2 and 3 follow a surface that bends; of noise, too, they follow more
+/// than a plane does. Both, and `curvature` and `residual`, are computed point by point, which
+/// takes a multiple of the time of the other methods.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Normals {
@@ -51,8 +64,19 @@ pub struct Normals {
     #[serde(deserialize_with = "checked_neighbors")]
     #[schemars(with = "Setting<Whole<{ MIN_NEIGHBORS as u64 }, { MAX_NEIGHBORS as u64 }>>")]
     pub neighbors: Setting<usize>,
+    /// Neighbours farther away than this are none: of the nearest `neighbors`, those within this
+    /// length are used.
+    pub within: Option<Length>,
     /// How a normal is estimated.
     pub method: Method,
+    /// Whether the column `Curvature` is computed, the surface variation: the least eigenvalue of
+    /// the covariance of the position and its neighbours, divided by the sum of all three. 0 on a
+    /// plane, 1/3 at most.
+    pub curvature: bool,
+    /// Whether the column `Residual` is computed: the root mean square of the distances of the
+    /// position and its neighbours to the fitted surface, in world units (of height functions of
+    /// degree 2 and 3 along the first estimate).
+    pub residual: bool,
     /// To which side normals point.
     pub orient: Orient,
     /// What normals point to with `orient = "viewpoint"`, and only then: x, y, z in world units.
@@ -65,18 +89,29 @@ pub struct Normals {
     /// Side of the cubes of 32 positions on average, for samples.
     #[serde(skip)]
     sample_side: i64,
+    /// The square of `within` in steps.
+    #[serde(skip)]
+    square: Option<u128>,
+    /// Length of a step of the lattice.
+    #[serde(skip)]
+    step: f64,
 }
 
 impl Default for Normals {
     fn default() -> Self {
         Normals {
             neighbors: Setting::Given(10),
+            within: None,
             method: Method::default(),
+            curvature: false,
+            residual: false,
             orient: Orient::None,
             viewpoint: None,
             side: None,
             found: None,
             sample_side: 0,
+            square: None,
+            step: 1.0,
         }
     }
 }
@@ -87,6 +122,13 @@ impl Normals {
     pub(crate) fn check(&self) -> Result<(), (&'static str, Error)> {
         let given = self.neighbors.given().unwrap_or(MIN_NEIGHBORS);
         check_neighbors(given as u64).map_err(|told| ("neighbors", Error::pipeline(told)))?;
+        let (fewest, method) = (self.method.fewest(), self.method.name());
+        if self.neighbors.given().is_some_and(|given| given < fewest) {
+            let told = format!(
+                "`normals.method = \"{method}\"` needs {fewest} neighbours or more, not {given}"
+            );
+            return Err(("neighbors", Error::pipeline(told)));
+        }
         let (key, error) = match (self.orient, self.viewpoint) {
             (Orient::Viewpoint, None) => (
                 "orient",
@@ -112,6 +154,23 @@ impl Normals {
         Err((key, error))
     }
 
+    /// The columns that are computed besides normals.
+    fn shapes(&self) -> AskedShapes {
+        AskedShapes { curvature: self.curvature, residual: self.residual }
+    }
+
+    /// To which side normals are turned.
+    fn sign_rule(&self) -> Result<SignRule> {
+        match (self.orient, self.side) {
+            (Orient::None, _) => Ok(SignRule::Any),
+            (Orient::Up, _) => Ok(SignRule::Up),
+            (Orient::Viewpoint, Some(side)) => Ok(side),
+            (Orient::Viewpoint, None) => {
+                Err(Error::internal("normals ran before their viewpoint was settled"))
+            }
+        }
+    }
+
     /// The neighbours of the fit; the most that may be chosen until they are.
     fn count(&self) -> usize {
         self.neighbors.given().or(self.found).unwrap_or(noise::MOST)
@@ -134,31 +193,33 @@ impl TileOp for Normals {
     fn needs(&self) -> Needs {
         Needs {
             fewer_neighbors: self.neighbors.given().or(self.found).is_none(),
-            ..Needs::none().looks_at(names::XYZ).writes(&NORMAL).neighbors(self.count())
+            ..self.shapes().needs(Needs::none().looks_at(names::XYZ).writes(&NORMAL))
         }
+        .neighbors(self.count())
+    }
+
+    fn convert(&mut self, units: &Units) -> Result<()> {
+        let within = self.within.map(|length| length.in_scan(units, "normals.within"));
+        self.within = within.transpose()?;
+        Ok(())
     }
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
         self.check().map_err(|(_, error)| error)?;
         self.side = self.viewpoint.map(|at| SignRule::towards(at, scan.lattice));
+        self.step = scan.lattice.step;
+        self.square = self.within.map(|length| Square::of(length.value() / self.step).at_most());
         self.sample_side = 1 << scan.levels.smallest_side(noise::POSITIONS_PER_CUBE);
         Ok(())
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
-        let side = match (self.orient, self.side) {
-            (Orient::None, _) => SignRule::Any,
-            (Orient::Up, _) => SignRule::Up,
-            (Orient::Viewpoint, Some(side)) => side,
-            (Orient::Viewpoint, None) => {
-                return Err(Error::internal("normals ran before their viewpoint was settled"));
-            }
-        };
+        let side = self.sign_rule()?;
         let mut estimator = Estimator::with(self.method, tile.simd());
         let mut normals = tile.columns.take(&NORMAL)?;
         let copies = std::mem::take(&mut tile.copies);
         let core = tile.core.clone();
-        let (mut without, mut no_triangle, mut perpendicular) = (0, 0, 0);
+        let (mut without, mut no_triangle, mut perpendicular, mut ill) = (0, 0, 0, 0);
         let mut settle = |i: usize, (estimate, fallback): EstimateOutcome| {
             let counted = u64::from(core.contains(&i) && copies[i] > 0);
             match estimate {
@@ -168,13 +229,33 @@ impl TileOp for Normals {
             match fallback {
                 Some(Fallback::NoTriangle) => no_triangle += counted,
                 Some(Fallback::Perpendicular) => perpendicular += counted,
+                Some(Fallback::IllConditioned) => ill += counted,
                 None => {}
             }
         };
+        let mut shapes = self.shapes().take(tile)?;
         let outcome = tile.each_neighborhood(self.count(), |i, neighborhood| {
-            estimator.take(i, neighborhood, &mut settle);
+            let neighborhood = match self.square {
+                Some(square) => &neighborhood.within(square),
+                None => neighborhood,
+            };
+            match &mut shapes {
+                Some(shapes) => {
+                    let offsets = in_morton_order(
+                        neighborhood.offsets().iter().copied(),
+                        neighborhood.ranks(),
+                    );
+                    let (outcome, shape) = estimator.estimate_with_shape(&offsets);
+                    settle(i, outcome);
+                    shapes.enter(i, shape, self.step);
+                }
+                None => estimator.take(i, neighborhood, &mut settle),
+            }
         });
         estimator.finish(&mut settle);
+        if let Some(shapes) = shapes {
+            shapes.put(tile);
+        }
         tile.oriented = side != SignRule::Any;
         for (normal, position) in normals.iter_mut().zip(&tile.positions) {
             if tile.oriented && is_known(*normal) {
@@ -186,6 +267,7 @@ impl TileOp for Normals {
         tally.count("no_normal", without);
         tally.count("fallback_no_triangle", no_triangle);
         tally.count("fallback_perpendicular", perpendicular);
+        tally.count("fallback_ill_conditioned", ill);
         outcome
     }
 
@@ -252,7 +334,7 @@ mod tests {
         }
         assert!(toml::from_str::<Normals>("neighbors = -1").is_err());
         assert!(toml::from_str::<Normals>("neighbours = 10").is_err());
-        assert!(toml::from_str::<Normals>("method = \"quadric\"").is_err());
+        assert!(toml::from_str::<Normals>("method = \"quartic\"").is_err());
         let (key, error) =
             Normals { neighbors: Setting::Given(2), ..Normals::default() }.check().unwrap_err();
         assert_eq!((key, &*error.to_string()), ("neighbors", "neighbors must be 3 to 64, not 2"));

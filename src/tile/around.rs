@@ -190,6 +190,15 @@ impl<'a> Neighborhood<'a> {
         self.ranks
     }
 
+    /// Those that are no farther than the root of `square`.
+    #[must_use]
+    pub fn within(&self, square: u128) -> Neighborhood<'a> {
+        let count = self.offsets.partition_point(|&o| distance2([0; 3], o) <= square);
+        let (offsets, ranks) = (&self.offsets[..count], &self.ranks[..count]);
+        let found = self.found.map(|found| &found[..count]);
+        Neighborhood { found, ..Neighborhood::of_offsets(offsets, ranks) }
+    }
+
     /// Where the neighbours are in the scan, if they had to be searched for there; else their ranks
     /// are their indices in the tile.
     pub(super) fn found(&self) -> Option<&'a [FoundPosition]> {

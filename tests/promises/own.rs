@@ -83,12 +83,26 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
                 check::<Outliers>(json!({ "method": "radius", "radius": 1.5, "min_neighbors": 3 })),
             ],
         ),
-        ("normals", vec![check::<Normals>(json!({ "neighbors": 6 })), check::<Normals>(json!({}))]),
+        (
+            "normals",
+            vec![
+                check::<Normals>(json!({ "neighbors": 6 })),
+                check::<Normals>(json!({})),
+                check::<Normals>(json!({ "neighbors": 8, "method": "delaunay" })),
+                check::<Normals>(json!({
+                    "neighbors": 12, "method": "cubic", "within": 3.0,
+                    "curvature": true, "residual": true,
+                })),
+            ],
+        ),
         (
             "cells",
             vec![
                 check::<Cells>(json!({ "side": 2.0 })).after(normals()).before(Median::default()),
                 check::<Cells>(json!({})).after(normals()).before(Median::default()),
+                check::<Cells>(json!({ "side": 4.0, "split": "dirichlet", "seeds": 5 }))
+                    .after(normals())
+                    .before(Median::default()),
             ],
         ),
         (

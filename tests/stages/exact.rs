@@ -155,7 +155,12 @@ fn normals_written_by_a_tiled_run_are_those_of_brute_force_to_the_bit() {
         spill: "always",
         ..Settings::PLAIN
     };
-    for (k, method, name) in [(10, Method::Varady, "varady"), (17, Method::Pca, "pca")] {
+    for (k, method, name) in [
+        (10, Method::Varady, "varady"),
+        (17, Method::Pca, "pca"),
+        (10, Method::Delaunay, "delaunay"),
+        (12, Method::Cubic, "cubic"),
+    ] {
         let stage =
             format!("[[stage]]\nkind = \"normals\"\nneighbors = {k}\nmethod = \"{name}\"\n");
         let write = "laz\ndimensions = [\"NormalX\", \"NormalY\", \"NormalZ\"]";

@@ -15,6 +15,7 @@ mod reduce_auto;
 mod run;
 mod same_bytes;
 mod sample;
+mod shapes;
 mod stats;
 mod tiles;
 mod transform;

@@ -91,11 +91,16 @@ impl Bundle {
             let outcome = match estimates.of(lane) {
                 LaneResult::Outcome(outcome) => outcome,
                 LaneResult::NoFan { flat, adjugate } => {
-                    varady(&adjugate, flat, star.normal_of_short(&offsets(), flat))
+                    let first = star.normal_of_short(&offsets(), flat);
+                    let (normal, fallback) = match (method, first) {
+                        (Method::Delaunay, Some(first)) => (first, None),
+                        _ => varady(&adjugate, flat, first),
+                    };
+                    (settled(normal), fallback)
                 }
                 LaneResult::Nothing => {
                     let whole = |offset: [f64; 3]| offset.map(|v| v as i64);
-                    alone(method, star, &offsets().into_iter().map(whole).collect::<Vec<_>>())
+                    alone(method, star, &offsets().into_iter().map(whole).collect::<Vec<_>>()).0
                 }
             };
             settle(owner, outcome);
@@ -188,10 +193,14 @@ impl Kernel for Together<'_> {
             (adjugates, lines) = adjugate(&scatter, at.len() + 1);
             let (first, clear) = fan.mean_normals(lanes, at, ranks, flat);
             doubtful = !(clear & first[0].equals(first[0]).bits());
-            let fitted = fitted(lanes, &adjugates, first);
-            let is_fitted = fitted[0].equals(fitted[0]);
-            normal = plane::choose(is_fitted, fitted, flat);
-            perpendicular = !is_fitted.bits();
+            if method == Method::Delaunay {
+                normal = first;
+            } else {
+                let fitted = fitted(lanes, &adjugates, first);
+                let is_fitted = fitted[0].equals(fitted[0]);
+                normal = plane::choose(is_fitted, fitted, flat);
+                perpendicular = !is_fitted.bits();
+            }
         }
         Estimates {
             normal: store(lanes, normal),

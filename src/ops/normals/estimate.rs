@@ -1,10 +1,14 @@
-//! The normal of one neighbourhood, by either method.
+//! The normal of one neighbourhood, by each method.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::height;
 use crate::geom::plane::{self, Covariance};
 use crate::geom::star::Star;
+
+/// Fewest neighbours that the stage takes; two make a plane, but no estimate of a surface.
+pub(super) const MIN_NEIGHBORS: usize = 3;
 
 /// How a normal is estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -15,8 +19,38 @@ pub enum Method {
     /// Delaunay triangles around the point (the paper's Algorithm 1, after Várady).
     #[default]
     Varady,
-    /// The plane of regression: the eigenvector of the smallest eigenvalue of the covariance.
+    /// That first estimate alone (Vančo's second method).
+    Delaunay,
+    /// The plane of regression: the eigenvector of the smallest eigenvalue of the covariance
+    /// (Vančo's first method).
     Pca,
+    /// A height function of degree 2 over the first estimate of `varady`, and its normal at the
+    /// point (Vančo's third method): for 5 neighbours or more.
+    Quadric,
+    /// The same of degree 3: for 9 neighbours or more.
+    Cubic,
+}
+
+impl Method {
+    /// Fewest neighbours that it makes sense with.
+    pub(super) fn fewest(self) -> usize {
+        match self {
+            Method::Varady | Method::Delaunay | Method::Pca => MIN_NEIGHBORS,
+            Method::Quadric => 5,
+            Method::Cubic => 9,
+        }
+    }
+
+    /// As in `normals.method`.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Method::Varady => "varady",
+            Method::Delaunay => "delaunay",
+            Method::Pca => "pca",
+            Method::Quadric => "quadric",
+            Method::Cubic => "cubic",
+        }
+    }
 }
 
 /// The outcome for one position.
@@ -28,29 +62,76 @@ pub enum Estimate {
     None,
 }
 
-/// Why `pca` stood in for the method asked for.
+/// Why another method stood in for the one asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fallback {
-    /// No Delaunay triangle around the point has an area in the plane of regression.
+    /// No Delaunay triangle around the point has an area in the plane of regression: `pca`.
     NoTriangle,
-    /// The first estimate lies in the plane that it should be normal to.
+    /// The first estimate lies in the plane that it should be normal to: `pca`.
     Perpendicular,
+    /// The positions do not determine the height function, or hardly: `varady`.
+    IllConditioned,
 }
 
 /// What came of a neighbourhood.
 pub type EstimateOutcome = (Estimate, Option<Fallback>);
 
+/// How a neighbourhood lies about its surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SurfaceShape {
+    /// The least eigenvalue of the covariance, as a part of their sum: 0 to 1/3.
+    pub curvature: f64,
+    /// Root mean square of the distances to the fitted surface, in steps.
+    pub residual: f64,
+}
+
+impl SurfaceShape {
+    /// Nothing is known.
+    const NONE: SurfaceShape = SurfaceShape { curvature: f64::NAN, residual: f64::NAN };
+}
+
 /// The normal at a position whose neighbours are at `offsets` from it.
-pub(super) fn alone(method: Method, star: &mut Star, offsets: &[[i64; 3]]) -> EstimateOutcome {
+pub(super) fn alone(
+    method: Method,
+    star: &mut Star,
+    offsets: &[[i64; 3]],
+) -> (EstimateOutcome, SurfaceShape) {
     if offsets.len() < 2 || plane::collinear(offsets) {
-        return (Estimate::None, None);
+        return ((Estimate::None, None), SurfaceShape::NONE);
     }
     let covariance = Covariance::of(offsets);
-    let (_, flat) = plane::smallest(covariance.matrix());
-    match method {
-        Method::Pca => (settled(flat), None),
-        Method::Varady => varady(&covariance.adjugate(), flat, star.normal(offsets, flat)),
+    let matrix = covariance.matrix();
+    let (least, flat) = plane::smallest(matrix);
+    let (mut normal, mut fallback, mut residual) = (flat, None, None);
+    if method != Method::Pca {
+        match star.normal(offsets, flat) {
+            None => fallback = Some(Fallback::NoTriangle),
+            Some(first) if method == Method::Delaunay => normal = first,
+            Some(first) => {
+                let fitted = match method {
+                    Method::Quadric => height::fitted(height::quadric, offsets, first),
+                    Method::Cubic => height::fitted(height::cubic, offsets, first),
+                    Method::Varady | Method::Delaunay | Method::Pca => None,
+                };
+                if let Some(fitted) = fitted {
+                    (normal, residual) = (fitted.normal, Some(fitted.residual));
+                } else {
+                    (normal, fallback) = varady(&covariance.adjugate(), flat, Some(first));
+                    if method != Method::Varady && fallback.is_none() {
+                        fallback = Some(Fallback::IllConditioned);
+                    }
+                }
+            }
+        }
     }
+    let trace = matrix[0] + matrix[3] + matrix[5];
+    // Distances to the plane through the centre of mass.
+    let off = || plane::dot(normal, plane::product(&matrix, normal)).max(0.0).sqrt();
+    let shape = SurfaceShape {
+        curvature: (least / trace).clamp(0.0, 1.0 / 3.0),
+        residual: residual.unwrap_or_else(off),
+    };
+    ((settled(normal), fallback), shape)
 }
 
 /// adj(C)·n_f, which is (−a, −b, 1) of the height function over the first estimate n_f, turned back
@@ -59,11 +140,11 @@ pub(super) fn varady(
     adjugate: &[f64; 6],
     flat: [f64; 3],
     first: Option<[f64; 3]>,
-) -> EstimateOutcome {
-    let Some(first) = first else { return (settled(flat), Some(Fallback::NoTriangle)) };
+) -> ([f64; 3], Option<Fallback>) {
+    let Some(first) = first else { return (flat, Some(Fallback::NoTriangle)) };
     match plane::unit(plane::product(adjugate, first)) {
-        Some(normal) => (settled(normal), None),
-        None => (settled(flat), Some(Fallback::Perpendicular)),
+        Some(normal) => (normal, None),
+        None => (flat, Some(Fallback::Perpendicular)),
     }
 }
 

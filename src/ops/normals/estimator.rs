@@ -1,7 +1,7 @@
 //! Estimating the normals of many neighbourhoods: several side by side, the others alone.
 
 use super::bundle::{Bundle, in_morton_order};
-use super::estimate::{EstimateOutcome, Method, alone};
+use super::estimate::{EstimateOutcome, Method, SurfaceShape, alone};
 use crate::geom::simd::Simd;
 use crate::geom::star::Star;
 use crate::tile::Neighborhood;
@@ -31,6 +31,14 @@ impl Estimator {
     ///
     /// The result is a function of `offsets` alone, the same bits on every platform.
     pub fn estimate(&mut self, offsets: &[[i64; 3]]) -> EstimateOutcome {
+        self.estimate_with_shape(offsets).0
+    }
+
+    /// The same, and how the neighbourhood lies about its surface.
+    pub(crate) fn estimate_with_shape(
+        &mut self,
+        offsets: &[[i64; 3]],
+    ) -> (EstimateOutcome, SurfaceShape) {
         alone(self.method, &mut self.star, offsets)
     }
 
@@ -42,7 +50,8 @@ impl Estimator {
         neighborhood: &Neighborhood<'_>,
         settle: &mut impl FnMut(usize, EstimateOutcome),
     ) {
-        if !self.bundle.take(owner, neighborhood) {
+        let is_alone = matches!(self.method, Method::Quadric | Method::Cubic);
+        if is_alone || !self.bundle.take(owner, neighborhood) {
             let offsets =
                 in_morton_order(neighborhood.offsets().iter().copied(), neighborhood.ranks());
             settle(owner, self.estimate(&offsets));
@@ -96,9 +105,11 @@ mod tests {
     proptest! {
         #[test]
         fn normals_estimated_together_are_those_estimated_alone(
-            neighborhoods in neighborhoods(), pca: bool,
+            neighborhoods in neighborhoods(),
+            method in prop::sample::select(vec![
+                Method::Pca, Method::Varady, Method::Delaunay, Method::Quadric, Method::Cubic,
+            ]),
         ) {
-            let method = if pca { Method::Pca } else { Method::Varady };
             for simd in Simd::all() {
                 let mut estimator = Estimator::with(method, simd);
                 let mut together = vec![None; neighborhoods.len()];
