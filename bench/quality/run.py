@@ -17,7 +17,7 @@ import draw
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-SYSTEM = ["g++", "libcgal-dev", "libtbb-dev"]
+SYSTEM = ["g++", "libcgal-dev", "libeigen3-dev", "libtbb-dev"]
 
 
 def options() -> argparse.Namespace:
@@ -51,17 +51,18 @@ def python(cache: Path) -> Path:
     return folder / "bin/python"
 
 
-def cgal(cache: Path) -> Path:
-    """The driver of CGAL, built; its packages are installed where apt and the rights are there."""
-    program = cache / "cgal"
-    if program.exists() and program.stat().st_mtime > (HERE / "cgal.cpp").stat().st_mtime:
+def cgal(cache: Path, source: Path = HERE / "cgal.cpp") -> Path:
+    """A driver of CGAL, built; its packages are installed where apt and the rights are there."""
+    program = cache / source.stem
+    if program.exists() and program.stat().st_mtime > source.stat().st_mtime:
         return program
     there = subprocess.run(["dpkg", "-s", *SYSTEM], capture_output=True).returncode == 0
     if not there and shutil.which("apt-get") and os.geteuid() == 0:
         called("apt-get", "update", "-q")
         called("apt-get", "install", "-y", "-q", "--no-install-recommends", *SYSTEM)
-    called("g++", "-O3", "-march=native", "-DNDEBUG", "-DCGAL_LINKED_WITH_TBB", "-std=c++17", "-w",
-           HERE / "cgal.cpp", "-o", program, "-ltbb", "-lgmp")
+    called("g++", "-O3", "-march=native", "-DNDEBUG", "-DCGAL_LINKED_WITH_TBB",
+           "-DCGAL_EIGEN3_ENABLED", "-I/usr/include/eigen3", "-std=c++17", "-w",
+           source, "-o", program, "-ltbb", "-lgmp")
     return program
 
 
