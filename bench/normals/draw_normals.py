@@ -11,7 +11,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 DOCS = HERE.parent.parent / "docs"
-BEGIN = "<!-- written by bench/normals/draw_normals.py; do not edit -->\n"
+BEGIN = "<!-- drawn by bench/normals/draw_normals.py; do not edit -->\n"
 END = "<!-- end of the accuracy of normals -->\n"
 K = 10
 LINES = {"varady": "#3b8fd9", "delaunay": "#8a8f98", "pca": "#2fa36b", "quadric": "#e08a1e",

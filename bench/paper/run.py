@@ -15,7 +15,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 PAGE = ROOT / "docs/paper.md"
-BEGIN = "<!-- written by bench/paper/run.py; do not edit -->\n"
+BEGIN = "<!-- drawn by bench/paper/run.py; do not edit -->\n"
 END = "<!-- end of the thirty seeds -->\n"
 SEEDS = 30
 # Pattern, points; what the paper prints: points after, RMS before and after.

@@ -27,6 +27,8 @@ pub const MAX_PASSES: usize = 16;
 /// at index (m − 1) / 2. Among positions of exactly that angle it is the one nearest to the centre
 /// of mass of the cell's positions, then the first in Morton order. Copies weigh as one position
 /// and are removed as coincident. A position without a normal is in no cell and keeps one record.
+/// With `pick = "center"` the angles only divide: of each cell the position nearest to its centre
+/// of mass stays.
 ///
 /// With `passes` above 1, what one pass leaves is the scan of the next: normals, cells and
 /// selection again, with the same keys. A cell's side, once chosen, stays.
@@ -43,13 +45,27 @@ pub struct Median {
     #[serde(deserialize_with = "checked_passes")]
     #[schemars(with = "Whole<1, { MAX_PASSES as u64 }>")]
     pub passes: usize,
+    /// Which position of a cell stays.
+    pub pick: Representative,
     /// How records are marked, instead of removing any.
     pub mark: Option<Mark>,
 }
 
+/// Which position of a cell stays; of equally good ones the first in Morton order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Representative {
+    /// That of the median angle (the paper's).
+    #[default]
+    Median,
+    /// The nearest to the centre of mass of the cell's positions.
+    Center,
+}
+
 impl Default for Median {
     fn default() -> Self {
-        Median { passes: 1, mark: None }
+        Median { passes: 1, pick: Representative::Median, mark: None }
     }
 }
 
@@ -107,7 +123,10 @@ impl TileOp for Median {
             if !tile.cells.members[group.clone()].iter().any(|&i| core.contains(&(i as usize))) {
                 continue;
             }
-            let found = median(tile, &normals, group.clone(), &mut angles);
+            let found = match self.pick {
+                Representative::Median => median(tile, &normals, group.clone(), &mut angles),
+                Representative::Center => central(tile, group.clone()),
+            };
             let Some(kept) = found else { continue };
             let normal = normals[kept].map(f64::from);
             for at in group {
@@ -169,6 +188,15 @@ fn median(
     first.map(|(_, i)| *i as usize)
 }
 
+/// The position of `group` nearest to the centre of mass among those that the stage decides about;
+/// none if there are none.
+fn central(tile: &Tile, group: Range<usize>) -> Option<usize> {
+    let members = || tile.cells.members[group.clone()].iter().map(|&i| i as usize);
+    let decided = || members().filter(|&i| tile.is_chosen(i));
+    let center = Center::of(decided().map(|i| tile.positions[i]));
+    decided().min_by_key(|&i| (center.distance2(tile.positions[i]), i))
+}
+
 /// The centre of mass of a group, in whole numbers: n·x − Σx instead of x − Σx / n.
 struct Center {
     count: i128,
@@ -216,7 +244,7 @@ mod tests {
 
     #[test]
     fn passes_are_1_to_16() {
-        assert_eq!(toml::from_str::<Median>("").unwrap(), Median { passes: 1, mark: None });
+        assert_eq!(toml::from_str::<Median>("").unwrap(), Median::default());
         let stage: Median = toml::from_str("passes = 16").unwrap();
         assert_eq!(stage.needs().repeats, Some((NORMAL.kind(), 16)));
         for wrong in ["passes = 0", "passes = 17", "passes = -1", "keep = 2", "mark = 6"] {
@@ -225,12 +253,12 @@ mod tests {
         for text in ["passes = 2", "mark = 7", "passes = 2\nmark = 'withheld'"] {
             assert!(toml::from_str::<Median>(text).unwrap().check().is_ok(), "{text}");
         }
-        assert!(Median { passes: 17, mark: None }.check().is_err());
+        assert!(Median { passes: 17, ..Median::default() }.check().is_err());
     }
 
     #[test]
     fn a_mark_removes_nothing() {
-        let needs = Median { passes: 1, mark: Some(Mark::KeyPoint) }.needs();
+        let needs = Median { mark: Some(Mark::KeyPoint), ..Median::default() }.needs();
         assert!(!needs.removes && needs.mark == Some(Mark::KeyPoint));
         let needs = Median::default().needs();
         assert!(needs.removes && needs.mark.is_none());

@@ -28,7 +28,7 @@ pub use drop::Drop;
 pub use filter::Filter;
 pub use graded::{Effort, Graded, KEEP_RANK};
 pub use grid::{Grid, Pick};
-pub use median::Median;
+pub use median::{Median, Representative};
 pub use merge::Merge;
 pub use outliers::{OutlierMethod, Outliers};
 pub use sample::Sample;

@@ -204,6 +204,10 @@ impl TileOp for Normals {
         Ok(())
     }
 
+    fn lengths(&self) -> Vec<(&'static str, Length)> {
+        self.within.map(|within| ("normals.within", within)).into_iter().collect()
+    }
+
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
         self.check().map_err(|(_, error)| error)?;
         self.side = self.viewpoint.map(|at| SignRule::towards(at, scan.lattice));

@@ -126,3 +126,27 @@ fn a_second_median_removes_nothing_more() {
     assert_eq!(records, kept + first.removed.values().sum::<u64>(), "the ledger balances");
     assert!(kept < records / 2);
 }
+
+#[test]
+fn by_option_the_nearest_to_the_center_of_mass_stays_whatever_the_angles() {
+    for far in [0, 1 << 60, -(1 << 61)] {
+        let xs = [0i64, 1, 2, 3, 100];
+        // The median angle is that of the first.
+        let tilts = [0.3, 0.5, 0.4, 0.1, 0.2];
+        let scan = scan(xs.iter().zip(tilts).map(|(&x, t)| ([far + x, 0, 0], tilted(t), 1)));
+        let stage = settle(one_cell(), &scan);
+        let kept = |pick: &str| {
+            let median: Median =
+                serde_json::from_value(serde_json::json!({ "pick": pick })).unwrap();
+            let mut tile = tile(&scan, whole(&scan).cube(), 5);
+            let mut tally = Tally::default();
+            stage.run(&mut tile, &mut tally).unwrap();
+            median.run(&mut tile, &mut tally).unwrap();
+            let is_kept = |fate: &Fate| matches!(fate, Fate::Kept | Fate::KeptOnce);
+            let at = tile.fates.iter().position(is_kept).unwrap();
+            (tile.positions[at][0] - far, tile.fates.iter().filter(|f| is_kept(f)).count())
+        };
+        assert_eq!(kept("median"), (0, 1));
+        assert_eq!(kept("center"), (3, 1), "the mean is 21.2");
+    }
+}

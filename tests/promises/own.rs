@@ -112,7 +112,13 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
                 check::<Cut>(json!({ "spacing": 0.5 })).after(Ranks {}),
             ],
         ),
-        ("median", vec![check::<Median>(json!({})).after(normals()).after(cells())]),
+        (
+            "median",
+            vec![
+                check::<Median>(json!({})).after(normals()).after(cells()),
+                check::<Median>(json!({ "pick": "center" })).after(normals()).after(cells()),
+            ],
+        ),
         (
             "graded",
             vec![

@@ -39,8 +39,8 @@ const MOST_SEEDS: usize = 64;
 /// It counts distinct positions, never records: copies of a point weigh as one.
 ///
 /// `split = "voronoi"` (and `"dirichlet"`) needs at most m − 1 divisions for m positions, but where
-/// each division separates only a few their cost is quadratic. No surface does that; to bound the time of data
-/// that does, parts more than 64 + 2 log₂ m divisions deep are cut in eight instead
+/// each division separates only a few their cost is quadratic. No surface does that; to bound the
+/// time of data that does, parts more than 64 + 2 log₂ m divisions deep are cut in eight instead
 /// (`cells_cut_deep` of the report counts the initial cells with such parts).
 ///
 /// Two lengths bound the density. A part whose tight box is longer than `max_side` is cut in eight
