@@ -165,7 +165,8 @@ impl KnownSurface {
             let is_all = region.holds(&self.bounds);
             let to_edge = (around.unsigned_abs() as u128).pow(2);
             let enough = asked.min(self.surface.len());
-            let mut open = Vec::new();
+            // What was too little: as many points, or how far around they were looked for.
+            let (mut open, mut is_tied, mut is_near) = (Vec::new(), false, false);
             nearest.search(&near, &asking, asked, |i, found| {
                 let p = asking[i];
                 let at = |j: &u32| near[*j as usize];
@@ -179,6 +180,8 @@ impl KnownSurface {
                 let used = found.len().min(SURFACE + tied.count());
                 let may_be_more = used == asked && asked < self.surface.len();
                 if may_be_more || !is_proven {
+                    is_tied |= may_be_more;
+                    is_near |= !is_proven;
                     open.push(p);
                     return;
                 }
@@ -192,7 +195,8 @@ impl KnownSurface {
             });
             open.sort_unstable_by(morton_cmp);
             asking = open;
-            (around, asked) = (around.saturating_mul(3), 4 * asked);
+            around = if is_near { around.saturating_mul(3) } else { around };
+            asked = if is_tied { 4 * asked } else { asked };
         }
         planes.flush(enter);
     }

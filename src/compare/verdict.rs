@@ -140,6 +140,11 @@ impl fmt::Display for Verification {
             let (beyond, asked) = (Grouped(beyond), Short(asked));
             writeln!(f, "beyond     {beyond} removed positions are more than {asked} {of}")?;
         }
-        f.write_str(if self.holds() { "holds" } else { "does not hold" })
+        let is_bounded = self.tolerance.is_some() || self.max_spacing.is_some();
+        f.write_str(match (self.holds(), is_bounded) {
+            (true, true) => "holds",
+            (true, false) => "holds: the records, since no tolerance or spacing was asked for",
+            (false, _) => "does not hold",
+        })
     }
 }

@@ -36,7 +36,7 @@ use certain::Certain;
 use figures::Judgement;
 use knee::{Knee, KneeNext};
 pub(super) use ladder::SHORTENED_BY;
-use ladder::{Ladder, Manner};
+use ladder::{Ladder, Manner, too_few};
 pub use rank::KEEP_RANK;
 pub(super) use rank::Rung;
 pub use settings::Effort;
@@ -170,6 +170,21 @@ impl Graded {
         length.value() / self.step
     }
 
+    /// The whole steps of a length.
+    fn whole(&self, length: Length) -> i64 {
+        steps(self.in_steps(length).floor())
+    }
+
+    /// Twice as many points where that is free, since `spacing` takes more than `most`.
+    fn spaced(&mut self, spacing: Length, most: u64, so_far: &SoFar<'_>) -> Result<NextRound> {
+        if self.keep == Some(Keep::Auto) {
+            let more = most.saturating_mul(2).min(so_far.levels.positions());
+            (self.most, self.course) = (Some(more), Some(self.count(more, so_far)));
+            return Ok(NextRound::Again);
+        }
+        Err(too_few(spacing.value(), most))
+    }
+
     /// The rounds to begin with.
     fn begin(&mut self, so_far: &SoFar<'_>) -> RoundsCourse {
         let positions = so_far.levels.positions();
@@ -192,17 +207,12 @@ impl Graded {
 
     /// The rounds towards a number.
     fn count(&self, want: u64, so_far: &SoFar<'_>) -> RoundsCourse {
-        let spacing = self.max_spacing.map(|length| steps(self.in_steps(length).floor()));
+        let spacing = self.max_spacing.map(|length| self.whole(length));
         let with = Manner { effort: self.effort, seed: self.seed, borders: self.borders };
         RoundsCourse::Count(match self.ranks && spacing.is_none() {
             true => Ladder::ranked(want, so_far, with, self.step),
             false => Ladder::new(want, so_far, with, spacing),
         })
-    }
-
-    /// True if the points that are kept are too many for the number, so that they are chosen anew.
-    fn is_too_many(&self, kept: u64, exceptions: u64) -> bool {
-        self.most.is_some_and(|most| kept + exceptions > most)
     }
 }
 
@@ -332,22 +342,22 @@ impl RoundOp for Graded {
         };
         if let (NextRound::Done, RoundsCourse::Tolerance(_), Some(most)) =
             (next, &course, self.most)
-            && self.is_too_many(so_far.kept, exceptions)
+            && so_far.kept + exceptions > most
         {
             self.course = Some(self.count(most, so_far));
             return Ok(NextRound::Again);
         }
-        if let (NextRound::Shorten { to, .. }, Some(spacing)) = (next, self.max_spacing)
-            && !self.ranks
-        {
-            let kept = Grouped(so_far.kept);
-            let told = format!(
-                "`graded.max_spacing = {}` takes {kept} points, and `graded.keep` allows {}",
-                spacing.value(),
-                Grouped(to)
-            );
-            let help = "keep more points, or give a longer `graded.max_spacing`, or none";
-            return Err(Error::new(crate::ErrorKind::Data, told).help(help));
+        if let Some(spacing) = self.max_spacing.filter(|_| self.tolerance.is_none()) {
+            let short = match (next, &course) {
+                (NextRound::Shorten { to, .. }, _) => Some(to),
+                (NextRound::Done, RoundsCourse::Count(ladder)) => {
+                    ladder.leaves_apart(self.whole(spacing), so_far).then_some(so_far.kept)
+                }
+                _ => None,
+            };
+            if let Some(most) = short {
+                return self.spaced(spacing, most, so_far);
+            }
         }
         self.course = Some(course);
         Ok(next)

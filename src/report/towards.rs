@@ -46,7 +46,14 @@ fn knee_line(
     tried: &[Value],
     unit: Option<&str>,
 ) -> fmt::Result {
-    write!(f, "\nchosen     {} points, by the shape: mean errors are ", Grouped(keep))?;
+    let errors = || tried.iter().filter_map(|one| one["mean_error"].as_f64());
+    let still_falls = errors().nth_back(1).zip(errors().next_back()).is_some_and(|(a, b)| b < a);
+    let why = match tried.iter().any(|one| one["points"].as_u64() == Some(keep)) {
+        true => "by the shape: mean errors are ",
+        false if still_falls => "the most that are chosen: mean errors still fall, ",
+        false => "as many as the spacing takes: mean errors are ",
+    };
+    write!(f, "\nchosen     {} points, {why}", Grouped(keep))?;
     for (n, one) in tried.iter().enumerate() {
         let (Some(points), Some(error)) = (one["points"].as_u64(), one["mean_error"].as_f64())
         else {

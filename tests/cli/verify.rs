@@ -47,7 +47,47 @@ fn a_reduction_to_a_tolerance_holds() {
     let told = of(&[]);
     assert_eq!(of(&["--memory", "80MiB", "--threads", "1"]), told);
     let said = done(at.path(), &["verify", "scan.las", "thin.las"]);
-    assert!(said.contains("all are of the original") && said.ends_with("holds\n"), "{said}");
+    assert!(said.contains("all are of the original") && said.contains("\nholds: "), "{said}");
+    let said = done(at.path(), &["verify", "scan.las", "thin.las", "--tolerance", "0.3", "-q"]);
+    assert_eq!(said, "");
+}
+
+#[test]
+fn a_scan_that_is_not_the_original_is_told_at_once_however_far_away_it_is() {
+    let at = reduced();
+    let at = at.path();
+    done(at, &["synth", "als", "-n", "20k", "-o", "far.las"]);
+    done(at, &["synth", "part", "-n", "20k", "--seed", "9", "-o", "near.las"]);
+    done(at, &["reduce", "scan.las", "-o", "few.las", "--keep", "300"]);
+    for original in ["far.las", "near.las"] {
+        for thin in ["thin.las", "few.las"] {
+            let (code, told, error) = pointmill(at, &["verify", original, thin, "--json"]);
+            let told: Value = serde_json::from_str(&told).unwrap();
+            assert!(code == 1 && error.contains("does not hold"), "{error}");
+            assert_eq!(told["foreign"], told["reduced"]);
+            assert_eq!(told["surface"]["positions"], 20_000, "{told:#}");
+        }
+    }
+}
+
+#[test]
+fn a_spacing_that_is_asked_for_holds_or_is_refused() {
+    let at = reduced();
+    let at = at.path();
+    for spacing in ["3", "0.5", "0.001"] {
+        let asked = ["reduce", "scan.las", "-o", "o.las", "--keep", "1%", "--max-spacing", spacing];
+        let (code, _, error) = pointmill(at, &asked);
+        assert!(code != 0 && error.contains("takes more than the 300 points"), "{error}");
+        assert!(error.contains("--max-spacing") && error.contains("--keep"), "{error}");
+    }
+    // Where the number is free it follows.
+    for spacing in ["8", "2"] {
+        let said = done(at, &["reduce", "scan.las", "-o", "o.las", "--max-spacing", spacing]);
+        assert!(said.contains("chosen "), "{said}");
+        done(at, &["verify", "scan.las", "o.las", "--max-spacing", spacing]);
+    }
+    done(at, &["reduce", "scan.las", "-o", "o.las", "--keep", "20%", "--max-spacing", "4"]);
+    done(at, &["verify", "scan.las", "o.las", "--max-spacing", "4"]);
 }
 
 #[test]

@@ -243,7 +243,7 @@ fn values_of_flags_are_told_what_is_right() {
             "error: --keep: takes a share of up to 100% such as \"10%\", a number of points",
         ),
         ("--withheld", "drp", "error: --withheld: cannot be `drp`\n"),
-        ("--method", "pcb", "= did you mean `pca`? valid: pca, varady"),
+        ("--method", "pcb", "= did you mean `pca`? valid: cubic, delaunay, pca, quadric, varady"),
     ] {
         let one = reduce(flag, value);
         assert!(one.contains(expected), "{flag} {value}: {one}");

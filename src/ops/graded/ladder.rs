@@ -7,7 +7,9 @@
 //! (`ranks`), rungs are powers of √2 of the scan's unit and begin at its width, so that they are
 //! the same whatever the number is.
 
+use crate::report::Grouped;
 use crate::stage::{Looks, NextRound, Round, RoundChoice, SoFar};
+use crate::{Error, ErrorKind};
 
 use super::fill::Filling;
 use super::rank::{Rung, rank_behind};
@@ -151,6 +153,12 @@ impl Ladder {
         self.covered
     }
 
+    /// True if a position that is not kept may be farther than `spacing` steps from all that are.
+    pub fn leaves_apart(&self, spacing: i64, so_far: &SoFar<'_>) -> bool {
+        let is_covered = self.covered.is_some_and(|covered| covered <= spacing);
+        !is_covered && so_far.kept < so_far.levels.positions()
+    }
+
     /// What comes next.
     pub fn next(&mut self, so_far: &SoFar<'_>) -> NextRound {
         if so_far.kept > self.want {
@@ -263,6 +271,16 @@ impl Ladder {
     fn filled_from(&self, rung: usize, so_far: &SoFar<'_>) -> f64 {
         self.filling(rung).looks_at(so_far)
     }
+}
+
+/// More points are needed for a spacing than may stay.
+pub(super) fn too_few(spacing: f64, most: u64) -> Error {
+    let told = format!(
+        "`graded.max_spacing = {spacing}` takes more than the {} points that `graded.keep` allows",
+        Grouped(most)
+    );
+    let help = "keep more points, or give a longer `graded.max_spacing`, or none";
+    Error::new(ErrorKind::Data, told).help(help)
 }
 
 /// By which hash some are left of what a round kept: whoever cuts a number off what is written can
