@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::division::{CellPart, Division};
+use super::settings::MOST_SEEDS;
 use crate::geom::angle::{cosine, dominant_axis, outer_sum, sine2};
 use crate::point::{Position, distance2};
 
@@ -20,7 +21,7 @@ impl Division<'_> {
             let far = |n: &usize| distance2(positions[i as usize], sites[*n]);
             (0..sites.len()).min_by_key(far).unwrap_or(0)
         };
-        self.distribute(part, sites.len(), nearest, child);
+        self.distribute::<{ MOST_SEEDS + 1 }>(part, nearest, child);
     }
 
     /// The members at the quantiles of the angles, smallest and largest among them, by ascending

@@ -331,20 +331,19 @@ impl<'a> Division<'a> {
         front
     }
 
-    /// Parts the members by which of `kinds` each is of, both in the order they had.
-    pub(super) fn distribute(
+    /// Parts the members by the kind that each is of, below `ENDS` − 1, all in the order they had.
+    pub(super) fn distribute<const ENDS: usize>(
         &mut self,
         part: &mut [u32],
-        kinds: usize,
         kind: impl Fn(u32) -> usize,
         child: impl Fn(Range<usize>) -> CellPart,
     ) {
-        let mut bounds = vec![0; kinds + 1];
+        let mut bounds = [0; ENDS];
         part.iter().for_each(|&i| bounds[kind(i) + 1] += 1);
-        for i in 0..kinds {
-            bounds[i + 1] += bounds[i];
+        for i in 1..ENDS {
+            bounds[i] += bounds[i - 1];
         }
-        let mut next = bounds.clone();
+        let mut next = bounds;
         let spare = &mut self.spare[..part.len()];
         spare.copy_from_slice(part);
         for &mut i in spare {

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use super::division::DivisionRule;
 use super::limit::Limit;
 use super::outlook::Outlook;
-use super::settings::{By, Measure, Reference, Side, Split};
+use super::settings::{By, MOST_SEEDS, Measure, Reference, Side, Split};
 use super::target::Keep;
 use super::threshold::Threshold;
 use crate::geom::angle::MaxAngle;
@@ -23,9 +23,8 @@ pub(super) const MAX_ANGLE: f64 = 0.1;
 const POSITIONS_PER_CUBE: u64 = 32;
 /// Cubes of this side, anchored at world 0, are the octants of the lattice: no larger side differs.
 pub(super) const LARGEST_SIDE: i64 = 1 << 62;
-/// Sites of a division where nothing is said, and at most.
+/// Sites of a division where nothing is said.
 const SEEDS: usize = 4;
-const MOST_SEEDS: usize = 64;
 
 /// Partitions the tile into cells of agreeing normals (the paper's second step).
 ///
@@ -55,9 +54,9 @@ const MOST_SEEDS: usize = 64;
 /// asked for. A position without a normal keeps a record and is among them. With
 /// `split = "voronoi"` the number is met exactly, as each division adds one record; a cut in eight
 /// adds up to seven, one among several sites up to one less than there are, and the first in that
-/// order that would exceed the number ends it. If all
-/// divisions leave fewer, all are made. A division needs angles that differ: of a perfect plane no
-/// more can be kept than its initial cells.
+/// order that would exceed the number ends it. If all divisions leave fewer, all are made. A
+/// division needs angles that differ: of a perfect plane no more can be kept than its initial
+/// cells.
 ///
 /// Before a run it looks at a sample of the scan: `normal_scatter` of the report is how far, in
 /// radians, normals are off their linear trend where the scan is planar (root of the mean square,

@@ -19,7 +19,7 @@ impl Division<'_> {
             let p = positions[i as usize];
             (0..3).fold(0, |octant, axis| octant | usize::from(p[axis] >= middle[axis]) << axis)
         };
-        self.distribute(part, 8, octant, child);
+        self.distribute::<9>(part, octant, child);
     }
 }
 

@@ -23,6 +23,9 @@ pub enum Side {
     Length(Length),
 }
 
+/// Most sites of a division among several.
+pub(super) const MOST_SEEDS: usize = 64;
+
 /// How a cell is divided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]

@@ -1,7 +1,7 @@
 //! Neighbourhoods estimated side by side: every lane does what
 //! [`Estimator::estimate`](super::Estimator::estimate) does, to the last bit.
 
-use super::estimate::{Estimate, EstimateOutcome, Fallback, Method, alone, settled, varady};
+use super::estimate::{Estimate, EstimateOutcome, Fallback, Method, alone, over_first, settled};
 use super::fan::{Fan, LaneRow, MOST, load};
 use crate::geom::plane::{self, Covariance};
 use crate::geom::simd::{EIGHT, Kernel, Lanes, Mask, Real, Simd};
@@ -92,10 +92,7 @@ impl Bundle {
                 LaneResult::Outcome(outcome) => outcome,
                 LaneResult::NoFan { flat, adjugate } => {
                     let first = star.normal_of_short(&offsets(), flat);
-                    let (normal, fallback) = match (method, first) {
-                        (Method::Delaunay, Some(first)) => (first, None),
-                        _ => varady(&adjugate, flat, first),
-                    };
+                    let (normal, fallback) = over_first(method, &adjugate, flat, first);
                     (settled(normal), fallback)
                 }
                 LaneResult::Nothing => {

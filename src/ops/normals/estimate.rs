@@ -41,6 +41,11 @@ impl Method {
         }
     }
 
+    /// True if it is a height function of degree 2 or 3, which is fitted point by point.
+    pub(super) fn is_height(self) -> bool {
+        matches!(self, Method::Quadric | Method::Cubic)
+    }
+
     /// As in `normals.method`.
     pub(super) fn name(self) -> &'static str {
         match self {
@@ -102,48 +107,43 @@ pub(super) fn alone(
     let covariance = Covariance::of(offsets);
     let matrix = covariance.matrix();
     let (least, flat) = plane::smallest(matrix);
-    let (mut normal, mut fallback, mut residual) = (flat, None, None);
-    if method != Method::Pca {
-        match star.normal(offsets, flat) {
-            None => fallback = Some(Fallback::NoTriangle),
-            Some(first) if method == Method::Delaunay => normal = first,
-            Some(first) => {
-                let fitted = match method {
-                    Method::Quadric => height::fitted(height::quadric, offsets, first),
-                    Method::Cubic => height::fitted(height::cubic, offsets, first),
-                    Method::Varady | Method::Delaunay | Method::Pca => None,
-                };
-                if let Some(fitted) = fitted {
-                    (normal, residual) = (fitted.normal, Some(fitted.residual));
-                } else {
-                    (normal, fallback) = varady(&covariance.adjugate(), flat, Some(first));
-                    if method != Method::Varady && fallback.is_none() {
-                        fallback = Some(Fallback::IllConditioned);
-                    }
-                }
-            }
-        }
-    }
+    let first = (method != Method::Pca).then(|| star.normal(offsets, flat)).flatten();
+    let height = first.and_then(|first| match method {
+        Method::Quadric => height::fitted(height::quadric, offsets, first),
+        Method::Cubic => height::fitted(height::cubic, offsets, first),
+        Method::Varady | Method::Delaunay | Method::Pca => None,
+    });
+    let (normal, fallback) = match (method, height) {
+        (Method::Pca, _) => (flat, None),
+        (_, Some(height)) => (height.normal, None),
+        (_, None) => over_first(method, &covariance.adjugate(), flat, first),
+    };
     let trace = matrix[0] + matrix[3] + matrix[5];
     // Distances to the plane through the centre of mass.
     let off = || plane::dot(normal, plane::product(&matrix, normal)).max(0.0).sqrt();
     let shape = SurfaceShape {
         curvature: (least / trace).clamp(0.0, 1.0 / 3.0),
-        residual: residual.unwrap_or_else(off),
+        residual: height.map_or_else(off, |height| height.residual),
     };
     ((settled(normal), fallback), shape)
 }
 
-/// adj(C)·n_f, which is (−a, −b, 1) of the height function over the first estimate n_f, turned back
-/// from its frame; `flat`, the normal of the plane of regression, where that fails.
-pub(super) fn varady(
+/// The normal over the first estimate n_f, where no height function of degree 2 or 3 is asked for
+/// or determined: n_f itself by `delaunay`, else adj(C)·n_f, which is (−a, −b, 1) of the height
+/// function over it, turned back from its frame; `flat`, the normal of the plane of regression,
+/// where that fails.
+pub(super) fn over_first(
+    method: Method,
     adjugate: &[f64; 6],
     flat: [f64; 3],
     first: Option<[f64; 3]>,
 ) -> ([f64; 3], Option<Fallback>) {
     let Some(first) = first else { return (flat, Some(Fallback::NoTriangle)) };
+    if method == Method::Delaunay {
+        return (first, None);
+    }
     match plane::unit(plane::product(adjugate, first)) {
-        Some(normal) => (normal, None),
+        Some(normal) => (normal, method.is_height().then_some(Fallback::IllConditioned)),
         None => (flat, Some(Fallback::Perpendicular)),
     }
 }

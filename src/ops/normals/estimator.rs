@@ -50,8 +50,7 @@ impl Estimator {
         neighborhood: &Neighborhood<'_>,
         settle: &mut impl FnMut(usize, EstimateOutcome),
     ) {
-        let is_alone = matches!(self.method, Method::Quadric | Method::Cubic);
-        if is_alone || !self.bundle.take(owner, neighborhood) {
+        if self.method.is_height() || !self.bundle.take(owner, neighborhood) {
             let offsets =
                 in_morton_order(neighborhood.offsets().iter().copied(), neighborhood.ranks());
             settle(owner, self.estimate(&offsets));
