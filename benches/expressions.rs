@@ -43,7 +43,13 @@ fn transform<K: StageKind>(keys: serde_json::Value) -> Box<dyn Transform> {
 fn main() {
     let given = std::env::args().skip(1).find_map(|word| word.parse().ok());
     let points: usize = given.unwrap_or(100_000_000);
-    let scan = Synthetic { scene: Scene::Als, points: BATCH as u64, seed: 1, noise: None };
+    let scan = Synthetic {
+        scene: Scene::Als,
+        points: BATCH as u64,
+        seed: 1,
+        noise: None,
+        ..Synthetic::default()
+    };
     let source = scan.open().unwrap();
     let mut batch = PointBatch::new(source.schema().clone(), BATCH);
     source.part(0).unwrap().read(&mut batch).unwrap();

@@ -148,7 +148,14 @@ fn sealed(positions: &[Position]) -> Arc<SealedTiles> {
 
 fn read(scan: Option<&Path>) -> Vec<Position> {
     let source: Box<dyn Source> = match scan {
-        None => Synthetic { scene: Scene::Als, points: 2_000_000, seed: 1, noise: None }.open(),
+        None => Synthetic {
+            scene: Scene::Als,
+            points: 2_000_000,
+            seed: 1,
+            noise: None,
+            ..Synthetic::default()
+        }
+        .open(),
         Some(path) if path.extension().is_some_and(|e| e == "ply") => ply::open(&[path.into()]),
         Some(path) => las::open(&[path.into()]),
     }

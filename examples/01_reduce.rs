@@ -12,7 +12,13 @@ use pointmill::{Graph, Overrides, Quiet};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;
-    let scan = Synthetic { scene: Scene::Part, points: 100_000, seed: 0, noise: None };
+    let scan = Synthetic {
+        scene: Scene::Part,
+        points: 100_000,
+        seed: 0,
+        noise: None,
+        ..Synthetic::default()
+    };
     let stages = Graph::builder().source(scan).stage(Normals::default()).stage(Cells::default());
     let graph = stages.stage(Median::default()).write(folder.path().join("reduced.laz")).build()?;
     let done = graph.plan(&Overrides::default())?.run(&Quiet)?;

@@ -17,7 +17,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let settings = RunSettings { report: Some(file.clone()), ..RunSettings::default() };
     let done = Graph::builder()
         .settings(settings)
-        .source(Synthetic { scene: Scene::Als, points: 100_000, seed: 0, noise: None })
+        .source(Synthetic {
+            scene: Scene::Als,
+            points: 100_000,
+            seed: 0,
+            noise: None,
+            ..Synthetic::default()
+        })
         .stage(Stats { dimensions: vec!["Z".into(), "Intensity".into()], by_class: false })
         .stage(Normals::default())
         .stage(Cells::default())

@@ -49,7 +49,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let side = Length::of(0.01).ok_or("a length above 0")?;
     let thinned = |name: &str| -> GraphBuilder {
         Graph::builder()
-            .source(Synthetic { scene: Scene::Part, points: 300_000, seed: 0, noise: None })
+            .source(Synthetic {
+                scene: Scene::Part,
+                points: 300_000,
+                seed: 0,
+                noise: None,
+                ..Synthetic::default()
+            })
             .stage(Grid::new(side, Pick::Center))
             .write(folder.path().join(name))
     };

@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let out = |name: &str| folder.path().join(name);
     let length = |length: f64| Length::of(length).ok_or("a length above 0");
     let built = Graph::builder()
-        .stage(Synth { scene: Scene::Als, points: 60_000, seed: 0, noise: None })
+        .stage(Synth { scene: Scene::Als, points: 60_000, ..Synth::default() })
         .stage(Drop { classes: vec![7, 18], ..Drop::default() })
         .named("clean")
         // One branch: buildings and trees are thinned, the ground stays as it is.

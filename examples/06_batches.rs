@@ -14,7 +14,8 @@ use pointmill::synth::{Scene, Synthetic};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let points = std::env::args().nth(1).map_or(Ok(200_000), |n| n.parse())?;
-    let scan = Synthetic { scene: Scene::Als, points, seed: 0, noise: None };
+    let scan =
+        Synthetic { scene: Scene::Als, points, seed: 0, noise: None, ..Synthetic::default() };
     // Opening reads headers (here: none), no point.
     let source = scan.open()?;
     let schema = source.schema().clone();

@@ -23,7 +23,13 @@ fn main() -> Result<(), Box<dyn Error>> {
             (positions(&*scan?)?, positions(&*reduced?)?, "reduced")
         }
         [] | [_] => {
-            let scan = Synthetic { scene: Scene::Als, points: 20_000, seed: 1, noise: None };
+            let scan = Synthetic {
+                scene: Scene::Als,
+                points: 20_000,
+                seed: 1,
+                noise: None,
+                ..Synthetic::default()
+            };
             let scan = positions(&*scan.open()?)?;
             let kept = scan.iter().step_by(6).copied().collect();
             (scan, kept, "every sixth point")

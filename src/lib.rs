@@ -79,9 +79,9 @@
 //! - [`memory`]: points from and into a program's own memory; [`Plan::pull`] gives results as an
 //!   iterator.
 //! - [`synth`]: synthetic scans, and the stage `synth`.
-//! - [`ops`]: the stages that compute, select or look: `filter`, `drop`, `crop`, `sample`,
-//!   `assign`, `transform`, `stats`, `tap`, `merge`, `outliers`, `normals`, `cells`, `median`,
-//!   `graded`, `cut` and `grid`.
+//! - [`ops`]: the stages that compute, select, move or look: `filter`, `drop`, `crop`, `sample`,
+//!   `assign`, `transform`, `stats`, `tap`, `merge`, `outliers`, `smooth`, `normals`, `cells`,
+//!   `gaussian-image`, `median`, `graded`, `cut`, `grid`, `scanline`, `wavelet` and `fourier`.
 //! - [`picture`]: scans drawn from above or from a side, side by side.
 //! - [`graph`]: what a pipeline is, whoever wrote it: a [`Graph`] of stages.
 //! - [`PipelineText`]: a pipeline as it is written, in TOML, JSON or one line, with [`Parameter`]s.
@@ -91,8 +91,8 @@
 //!   goes; [`Done`] has the report.
 //! - [`report::AcceptTable`]: rules that a result is held to; [`Done::accepted`] says if it does.
 //! - [`compare`]: [`verify`](compare::verify) says whether a scan is a reduction of another, and
-//!   how true it is; [`reproduce`](compare::reproduce), whether the run that made an output gives
-//!   it again.
+//!   how true it is; [`depth_errors`](compare::depth_errors), what two scans differ by as depth
+//!   images; [`reproduce`](compare::reproduce), whether the run that made an output gives it again.
 //! - [`cli`]: the command line. A program of yours with stages of its own calls [`cli::main`] with
 //!   its registry and has the same commands.
 //!

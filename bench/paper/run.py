@@ -1,84 +1,172 @@
 #!/usr/bin/env python3
-"""The paper's experiment, 30 seeds a row, beside the figures that it printed; README.md says more.
+"""The paper's experiment, 30 seeds a row, and what its claims come to; README.md says more.
 
 Standard library only, and a pointmill program.
 """
 
 import argparse
+import itertools
 import json
+import resource
 import statistics
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+import draw_paper
+from plane import far_from_plane, read_points, write_points
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-PAGE = ROOT / "docs/paper.md"
-BEGIN = "<!-- drawn by bench/paper/run.py; do not edit -->\n"
-END = "<!-- end of the thirty seeds -->\n"
 SEEDS = 30
-# Pattern, points; what the paper prints: points after, RMS before and after.
-ROWS = [
-    ("random", 500, "430", "0.761 → 0.521"),
-    ("random", 2100, "1820", "0.896 → 0.630"),
-    ("random", 5500, "5012", "1.89 → 0.932"),
-    ("uniform", 500, "492", "0.855 → 0.567"),
-    ("uniform", 2100, "2062", "0.923 → 0.698"),
-    ("uniform", 5500, "5446", "1.982 → 0.997"),
-]
+PATTERNS = ("random", "uniform")
+COUNTS = (500, 2100, 5500)
 ANGLES = ("0.1deg", "0.1rad")
+FRONTS = ("plane", "cap", "step", "freeform")
+# Points of the far noise, and standard deviations beyond which it goes.
+OUTLIERS, MULTIPLIER = 0.02, 2.0
+# Runs of a time: the median counts.
+TIMES, MANY = 5, 1_000_000
 
 
-def reduced(program: Path, folder: Path, pattern: str, points: int, angle: str, seed: int) -> dict:
-    """What a run came to: records kept, and RMS of the distances to the scan's plane."""
-    report = folder / "report.json"
-    line = (f"synth scene=squares-{pattern} points={points} seed={seed} ! normals "
-            f"! cells max_angle={angle} ! median ! discard")
-    command = [program, "run", line, "--report", report, "--no-provenance", "--quiet"]
-    subprocess.run([str(word) for word in command], check=True)
-    result = json.loads(report.read_text(encoding="utf-8"))["result"]
-    plane = result["totals"]["scan_plane"]
-    return {"kept": result["ledger"]["kept"],
-            "before": plane["before"]["rms"], "after": plane["after"]["rms"]}
+class Runs:
+    """Runs of one program in one folder."""
+
+    def __init__(self, program: Path, folder: Path):
+        self.program, self.folder = program, folder
+        self.report = folder / "report.json"
+
+    def result(self, line: str) -> dict:
+        """The result of a pipeline in one line."""
+        command = [self.program, "run", line, "--report", self.report, "--no-provenance", "--quiet"]
+        subprocess.run([str(word) for word in command], check=True)
+        return json.loads(self.report.read_text(encoding="utf-8"))["result"]
+
+    def figures(self, line: str) -> dict:
+        """Points kept, RMS of distances to the scan's plane, and that of what was removed."""
+        result = self.result(line)
+        plane, removed = result["totals"]["scan_plane"], result["totals"]["deviation"]
+        return {"kept": result["ledger"]["kept"], "before": plane["before"]["rms"],
+                "after": plane["after"]["rms"], "removed": removed["rms"] if removed else 0.0}
+
+    def seconds(self, line: str) -> float:
+        """CPU seconds of a pipeline in one line."""
+        def used() -> float:
+            usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+            return usage.ru_utime + usage.ru_stime
+        before = used()
+        command = [self.program, "run", line, "--no-provenance", "--quiet"]
+        subprocess.run([str(word) for word in command], check=True)
+        return used() - before
 
 
-def measured(program: Path) -> list[dict]:
+def scene(pattern: str, points: int, seed: int, **keys) -> str:
+    told = "".join(f" {key}={value}" for key, value in keys.items())
+    return f"synth scene=squares-{pattern} points={points} seed={seed}{told}"
+
+
+def reduction(angle: str, neighbors: int = 10, passes: int = 1) -> str:
+    return (f"normals neighbors={neighbors} ! cells max_angle={angle} "
+            f"! median passes={passes} ! discard")
+
+
+def summary(row: dict, runs: list[dict]) -> dict:
+    """A row with mean and standard deviation of each figure of its runs."""
+    for name in runs[0]:
+        values = [run[name] for run in runs]
+        row[name] = round(statistics.mean(values), 4)
+        row[f"{name}_deviation"] = round(statistics.stdev(values), 4)
+    return row
+
+
+def seeds(runs: Runs) -> list[dict]:
+    """The tables as printed, with α in degrees and in radians, and noise in depth and in space."""
     rows = []
-    with tempfile.TemporaryDirectory() as folder:
-        for pattern, points, *_ in ROWS:
-            for angle in ANGLES:
-                runs = [reduced(program, Path(folder), pattern, points, angle, seed)
-                        for seed in range(SEEDS)]
-                row = {"pattern": pattern, "points": points, "angle": angle}
-                for name in ("kept", "before", "after"):
-                    values = [run[name] for run in runs]
-                    row[name] = round(statistics.mean(values), 4)
-                    row[f"{name}_deviation"] = round(statistics.stdev(values), 4)
-                rows.append(row)
+    settings = [("0.1deg", "depth"), ("0.1rad", "depth"), ("0.1deg", "space")]
+    for pattern, points, (angle, noise) in itertools.product(PATTERNS, COUNTS, settings):
+        found = [runs.figures(f"{scene(pattern, points, seed, noise_in=noise)} ! {reduction(angle)}")
+                 for seed in range(SEEDS)]
+        row = {"table": "seeds", "pattern": pattern, "points": points, "angle": angle,
+               "noise_in": noise}
+        rows.append(summary(row, found))
     return rows
 
 
-def table(rows: list[dict]) -> str:
-    text = ("| pattern | points | paper: after | RMS | α = 0.1°: after | RMS | α = 0.1 rad: after "
-            "| RMS |\n|---|--:|--:|--:|--:|--:|--:|--:|\n")
-    for pattern, points, after, rms in ROWS:
-        cells = [pattern, str(points), after, rms]
-        for angle in ANGLES:
-            row = next(row for row in rows if (row["pattern"], row["points"], row["angle"])
-                       == (pattern, points, angle))
-            cells += [f"{row['kept']:.0f} ± {row['kept_deviation']:.0f}",
-                      f"{row['before']:.3f} ± {row['before_deviation']:.3f} → "
-                      f"{row['after']:.3f} ± {row['after_deviation']:.3f}"]
-        text += f"| {' | '.join(cells)} |\n"
-    return text
+def fronts(runs: Runs) -> list[dict]:
+    """2100 random squares on each object."""
+    rows = []
+    for front, angle in itertools.product(FRONTS, ANGLES):
+        found = [runs.figures(f"{scene('random', 2100, seed, front=front)} ! {reduction(angle)}")
+                 for seed in range(SEEDS)]
+        rows.append(summary({"table": "fronts", "front": front, "angle": angle}, found))
+    return rows
 
 
-def drawn() -> str:
-    lines = (HERE / "results.jsonl").read_text(encoding="utf-8").splitlines()
-    before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN, 1)
-    behind = rest.split(END, 1)[1]
-    return f"{before}{BEGIN}\n{table([json.loads(line) for line in lines])}\n{END}{behind}"
+def readings(runs: Runs) -> list[dict]:
+    """Far noise that goes first: by its neighbours, and by the plane through all points."""
+    rows, scan, clean = [], runs.folder / "scan.ply", runs.folder / "clean.ply"
+    for pattern, angle in itertools.product(PATTERNS, ANGLES):
+        found = {"neighbours": [], "plane": []}
+        for seed in range(SEEDS):
+            made = f"{scene(pattern, 2100, seed, outliers=OUTLIERS)} ! write {scan} encoding=ascii"
+            command = [str(runs.program), "run", made, "--no-provenance", "--quiet"]
+            subprocess.run(command, check=True)
+            points = read_points(scan)
+            all_rms, gone = far_from_plane(points, MULTIPLIER)
+            write_points(clean, [p for p, far in zip(points, gone) if not far])
+            by_neighbours = f"read {scan} ! outliers multiplier={MULTIPLIER} ! write {clean}2.ply"
+            subprocess.run([str(runs.program), "run", by_neighbours, "--no-provenance", "--quiet"],
+                           check=True)
+            for name, path in (("plane", clean), ("neighbours", f"{clean}2.ply")):
+                after = runs.figures(f"read {path} ! {reduction(angle)}")
+                found[name].append({"all": all_rms, **after})
+        for name, each in found.items():
+            row = {"table": "readings", "pattern": pattern, "angle": angle, "removal": name}
+            rows.append(summary(row, each))
+    return rows
+
+
+def passes(runs: Runs) -> list[dict]:
+    """One to four reductions, one behind the other."""
+    rows = []
+    for angle, degree in itertools.product(ANGLES, (1, 2, 3, 4)):
+        line = reduction(angle, passes=degree)
+        found = [runs.figures(f"{scene('random', 5500, seed)} ! {line}") for seed in range(SEEDS)]
+        rows.append(summary({"table": "passes", "angle": angle, "passes": degree}, found))
+    return rows
+
+
+def neighbors(runs: Runs) -> list[dict]:
+    """6, 10 and 20 neighbours."""
+    rows = []
+    for pattern, k in itertools.product(PATTERNS, (6, 10, 20, 40)):
+        line = reduction("0.1deg", neighbors=k)
+        found = [runs.figures(f"{scene(pattern, 5500, seed)} ! {line}") for seed in range(SEEDS)]
+        rows.append(summary({"table": "neighbors", "pattern": pattern, "neighbors": k}, found))
+    return rows
+
+
+def times(runs: Runs) -> list[dict]:
+    """CPU seconds of a million squares: reading alone, normals, and the whole reduction."""
+    rows = []
+    for pattern in PATTERNS:
+        start = scene(pattern, MANY, 0)
+        lines = {"scan": f"{start} ! tap ! grid side=1e-4 pick=first ! discard",
+                 "normals": f"{start} ! normals ! discard",
+                 "all": f"{start} ! {reduction('0.1deg')}"}
+        row = {"table": "times", "pattern": pattern, "points": MANY}
+        for name, line in lines.items():
+            row[name] = round(statistics.median(runs.seconds(line) for _ in range(TIMES)), 3)
+        rows.append(row)
+    return rows
+
+
+def measured(program: Path) -> list[dict]:
+    with tempfile.TemporaryDirectory() as folder:
+        runs = Runs(program, Path(folder))
+        tables = (seeds, fronts, readings, passes, neighbors, times)
+        return [row for table in tables for row in table(runs)]
 
 
 def main() -> None:
@@ -89,13 +177,12 @@ def main() -> None:
                         help="measure nothing; whether docs/paper.md is what results.jsonl says")
     given = parser.parse_args()
     if given.check:
-        if drawn() != PAGE.read_text(encoding="utf-8"):
-            sys.exit("docs/paper.md is not what the results say: python3 bench/paper/run.py")
+        if wrong := draw_paper.differing():
+            sys.exit(f"{wrong} is not what the results say: python3 bench/paper/run.py")
         return
     rows = measured(given.pointmill.resolve())
-    (HERE / "results.jsonl").write_text(
-        "".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
-    PAGE.write_text(drawn(), encoding="utf-8")
+    draw_paper.RESULTS.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+    draw_paper.write()
 
 
 if __name__ == "__main__":

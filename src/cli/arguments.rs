@@ -1,5 +1,6 @@
 //! What can be typed.
 
+mod compare;
 mod cut;
 mod pipeline;
 mod plain;
@@ -17,6 +18,7 @@ use crate::graph::MOST_THREADS;
 use crate::picture::{ColorBy, View};
 use crate::quantity::parse_count;
 
+pub(super) use compare::CompareArguments;
 pub(super) use cut::CutArguments;
 pub(super) use pipeline::{Drawing, ExplainArguments, GraphArguments, PipelineArguments};
 pub(super) use plain::{
@@ -63,6 +65,8 @@ pub(super) enum Command {
     Cut(CutArguments),
     /// Check that a scan is a reduction of another, and how far removed points are from its surface
     Verify(Box<VerifyArguments>),
+    /// Compare two scans as depth images: sum of squared differences and their RMS
+    Compare(Box<CompareArguments>),
     /// Run again what made a file, and say whether the bytes are the same
     Reproduce(ReproduceArguments),
     /// Draw scans side by side, from above or from a side
@@ -92,6 +96,7 @@ impl Command {
         match self {
             Command::Reduce(reduce) => Some(&reduce.common),
             Command::Verify(verify) => Some(&verify.common),
+            Command::Compare(compare) => Some(&compare.common),
             Command::Cut(cut) => Some(&cut.common),
             Command::Reproduce(reproduce) => Some(&reproduce.common),
             Command::Run(PlanArguments { common, .. })
@@ -210,6 +215,15 @@ pub(super) struct SynthArguments {
     /// Standard deviation of the noise in world units [default: the scene's own]
     #[arg(long, value_name = "NUMBER")]
     pub noise: Option<String>,
+    /// What squares are projected on: relief, plane, cap, step or freeform [default: relief]
+    #[arg(long, value_name = "OBJECT")]
+    pub front: Option<String>,
+    /// Where the noise of squares goes: depth, or space for all three directions [default: depth]
+    #[arg(long, value_name = "WHERE")]
+    pub noise_in: Option<String>,
+    /// The share of squares that are far from the object, 0 to 1 [default: 0]
+    #[arg(long, value_name = "SHARE")]
+    pub outliers: Option<String>,
     #[command(flatten)]
     pub common: CommonArguments,
 }

@@ -4,8 +4,8 @@
 use serde_json::{Value, json};
 
 use super::arguments::{
-    CommonArguments, ConvertArguments, CutArguments, FilterArguments, ReduceArguments,
-    SynthArguments, VerifyArguments, WrittenArguments,
+    CommonArguments, CompareArguments, ConvertArguments, CutArguments, FilterArguments,
+    ReduceArguments, SynthArguments, VerifyArguments, WrittenArguments,
 };
 use super::classes::Classes;
 use crate::language::Set;
@@ -223,6 +223,17 @@ pub(super) fn verify_flags(arguments: &VerifyArguments) -> Vec<CommandFlag> {
     ])
 }
 
+/// The flags of `compare`, as those of `verify`.
+pub(super) fn compare_flags(arguments: &CompareArguments) -> Vec<CommandFlag> {
+    flags([
+        ("FIRST", "read.path", Some(json!([arguments.first]).into())),
+        ("--pixels", "compare.pixels", None),
+        ("--noise", "run.noise", Some(arguments.noise.as_deref().unwrap_or("drop").into())),
+        ("--withheld", "run.withheld", arguments.withheld.clone().map(FlagValue::from)),
+        ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(FlagValue::from)),
+    ])
+}
+
 /// The flags of `synth`.
 pub(super) fn synth_flags(arguments: &SynthArguments) -> Vec<CommandFlag> {
     flags([
@@ -231,6 +242,9 @@ pub(super) fn synth_flags(arguments: &SynthArguments) -> Vec<CommandFlag> {
         ("-o", "write.path", Some(arguments.output.clone().into())),
         ("--seed", "synth.seed", arguments.seed.as_deref().map(whole_or_text)),
         ("--noise", "synth.noise", arguments.noise.as_deref().map(number_or_text)),
+        ("--front", "synth.front", arguments.front.clone().map(FlagValue::from)),
+        ("--noise-in", "synth.noise_in", arguments.noise_in.clone().map(FlagValue::from)),
+        ("--outliers", "synth.outliers", arguments.outliers.as_deref().map(number_or_text)),
     ])
 }
 

@@ -65,7 +65,7 @@ const GROUPS: &[(&str, &str, &[&str])] = &[
 ];
 
 /// Commands with the flags of a run that write nothing: they refuse those about what is written.
-const WRITE_NOTHING: [&str; 4] = ["plan", "check", "verify", "reproduce"];
+const WRITE_NOTHING: [&str; 5] = ["plan", "check", "verify", "compare", "reproduce"];
 
 /// What stands below the help of a command.
 const EXAMPLES: &[(&str, &str)] = &[
@@ -123,6 +123,15 @@ Examples:
 
 The exit code is 1 if a record of the reduced scan is none of the original, or a point that was
 removed is farther away than it may be.",
+    ),
+    (
+        "compare",
+        "\
+Examples:
+  pointmill compare before.laz after.laz
+  pointmill compare front.ply reduced.ply --axis x --pixels 512 --json
+
+Pixels that have points of one scan alone are counted and not compared.",
     ),
     (
         "reproduce",
@@ -207,8 +216,8 @@ pub(super) fn command() -> Command {
             ["report", "no_clobber", "no_provenance"].into_iter().fold(sub, hide)
         })
     });
-    let hide = |verify: Command| verify.mut_arg("accept", |a| a.hide(true));
-    let hidden = hidden.mut_subcommand("verify", hide);
+    let hide = |of: Command| of.mut_arg("accept", |a| a.hide(true));
+    let hidden = hidden.mut_subcommand("verify", hide).mut_subcommand("compare", hide);
     EXAMPLES.iter().fold(hidden, |all, (command, examples)| {
         all.mut_subcommand(*command, |sub| sub.after_help(*examples))
     })

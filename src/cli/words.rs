@@ -3,7 +3,7 @@
 
 use super::arguments::Command;
 use super::flags::{
-    common_flags, convert_flags, cut_flags, reduce_flags, synth_flags, verify_flags,
+    common_flags, compare_flags, convert_flags, cut_flags, reduce_flags, synth_flags, verify_flags,
 };
 use crate::Error;
 use crate::language::Registry;
@@ -23,6 +23,7 @@ impl Words {
             Command::Run(_) | Command::Plan(_) | Command::Check(_) => Vec::new(),
             Command::Reduce(reduce) => reduce_flags(reduce),
             Command::Verify(verify) => verify_flags(verify),
+            Command::Compare(compare) => compare_flags(compare),
             Command::Cut(cut) => cut_flags(cut),
             Command::Convert(convert) => convert_flags(convert, None, None),
             Command::Synth(synth) => synth_flags(synth),

@@ -35,6 +35,14 @@ const ENCODED: u64 = 4;
 /// Fifths of a stream's queues that are in use.
 const STREAMED: u64 = 3;
 
+/// What is leased for what stages hold of the whole scan.
+pub(super) const HELD_OF_SCAN: &str = "stages that need the whole scan";
+
+/// Bytes that a stage that needs this holds of a scan of so many positions.
+pub(super) fn held_of_scan(needs: &Needs, positions: u64) -> Bytes {
+    Bytes::of(positions, needs.of_scan) + Bytes(needs.of_any_scan)
+}
+
 impl Demands {
     /// What the program holds whatever it does.
     pub fn base(&self) -> Holders {
@@ -49,14 +57,18 @@ impl Demands {
     pub(super) fn index(&self) -> Holders {
         // That of the runs and that of the merged scan exist side by side for a moment.
         let index = SealedTiles::index_bytes(self.points);
-        match self.mills {
-            true => Holders::of([
-                ("index of the sorted runs", index),
-                ("index of the scan", index),
-                ("table of stored pieces", self.tables()),
-            ]),
-            false => Holders::default(),
+        if !self.mills {
+            return Holders::default();
         }
+        let needs = self.passes.iter().flatten();
+        let held: Bytes = needs.map(|needs| held_of_scan(needs, self.points)).sum();
+        let held = (held > Bytes(0)).then_some((HELD_OF_SCAN, held));
+        let index = [
+            ("index of the sorted runs", index),
+            ("index of the scan", index),
+            ("table of stored pieces", self.tables()),
+        ];
+        Holders::of(index.into_iter().chain(held))
     }
 
     /// Bytes of the tables of all that is stored by number; that of the order has gaps.

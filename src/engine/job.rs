@@ -53,6 +53,8 @@ pub(crate) struct Job<'a> {
     warnings: Mutex<Vec<String>>,
     /// Set once a thread has failed.
     failed: AtomicBool,
+    /// What stages hold of the whole scan.
+    pub held: Vec<Lease>,
     _base: Vec<Lease>,
 }
 
@@ -96,6 +98,7 @@ impl<'a> Job<'a> {
             hashes: task.provenance.hashes(task.source.points())?,
             warnings: Mutex::default(),
             failed: AtomicBool::new(false),
+            held: Vec::new(),
             _base: base,
         })
     }

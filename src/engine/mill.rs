@@ -26,11 +26,11 @@ use super::pass::{Call, Pass};
 use super::phase::RunPhase;
 use super::rounds::choose;
 use super::settled::{conclude, decisions, rounding, settle};
-use super::survey::survey;
+use super::survey::{Measured, survey};
 use super::task::Task;
 use crate::budget::{Bytes, Holders, Lease};
 use crate::geom::lattice::Lattice;
-use crate::point::{ColumnKind, NORMAL};
+use crate::point::{ColumnKind, NORMAL, SHIFT};
 use crate::report::{Decision, PassFigures, Tally};
 use crate::stage::{Sink, SinkSummary};
 use crate::store::{SealedTiles, seal};
@@ -101,6 +101,13 @@ impl Standing {
         }
     }
 
+    /// Enters what planes of what its last pass left were measured.
+    fn tell_planes(&mut self, measured: &Measured) {
+        let Some(pass) = self.passes.last_mut() else { return };
+        pass.tile_plane = measured.totals.tile_plane.after;
+        pass.scan_plane = measured.totals.scan_plane.after;
+    }
+
     /// What it is behind another pass, which came to `milled` and counted `tally`; and what a first
     /// phase gathered in it.
     fn behind(
@@ -118,7 +125,9 @@ impl Standing {
         let streamed = pass.filters.iter().map(|&filter| job.task.filters[filter].kind.clone());
         let chosen = pass.chooses.map(|op| format!("{}.where", job.ops[op].kind));
         let (stages, after) = (called.chain(streamed).chain(chosen), milled.counts.alive);
-        self.passes.push(PassFigures { stages: stages.collect(), before: self.alive, after });
+        let (tile_plane, scan_plane) = (None, None);
+        let (stages, before) = (stages.collect(), self.alive);
+        self.passes.push(PassFigures { stages, before, after, tile_plane, scan_plane });
         self.sieve.states = Some(milled.stored.states);
         self.sieve.fates = Some(milled.stored.fates);
         let columns = milled.stored.columns;
@@ -181,10 +190,19 @@ impl Course<'_, '_> {
                 None => job.budget.lease_all(&most, "mill")?,
             };
             let mut after = self.run(job, n, &cut, &mut held, before, field)?;
-            let is_loaded =
-                |kind: &ColumnKind| passes[n + 1..].iter().any(|pass| pass.loads.contains(kind));
+            // How far points were moved is asked for where the branch is measured.
+            let is_loaded = |kind: &ColumnKind| {
+                *kind == SHIFT.kind()
+                    || passes[n + 1..].iter().any(|pass| pass.loads.contains(kind))
+            };
             after.sieve.columns.retain(|(kind, _)| is_loaded(kind));
             match branches.iter().position(|branch| branch.pass == n) {
+                None if pass.is_repeated && !job.task.traits.skips_survey => {
+                    drop((held, cut));
+                    self.clock.begin(RunPhase::Measure(n), Some(2 * field.tiles.positions()))?;
+                    after.tell_planes(&survey(job, field.lattice, &field.tiles, &after.sieve)?);
+                    left.push(Some(after));
+                }
                 None => {
                     working = Some(held);
                     left.push(Some(after));
@@ -204,7 +222,7 @@ impl Course<'_, '_> {
         &mut self,
         job: &Job<'_>,
         number: usize,
-        after: Standing,
+        mut after: Standing,
         field: &DecodedScan<'_>,
     ) -> Result<FinishedBranch> {
         let DecodedScan { lattice, tiles, .. } = field;
@@ -212,6 +230,9 @@ impl Course<'_, '_> {
         if !job.task.traits.skips_survey {
             self.clock.begin(RunPhase::Survey(number), Some(2 * tiles.positions()))?;
             let measured = measured.insert(survey(job, lattice, tiles, &after.sieve)?);
+            if job.task.passes[job.task.branches[number].pass].is_repeated {
+                after.tell_planes(measured);
+            }
             let compared = after.compared.as_deref();
             measured.totals.baseline = compared.and_then(|c| c.figures(after.alive, lattice));
         }

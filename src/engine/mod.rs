@@ -28,6 +28,7 @@ mod hashing;
 pub(crate) mod job;
 mod lines;
 mod mill;
+pub(crate) mod moved;
 mod outlet;
 pub(crate) mod pass;
 pub(crate) mod phase;

@@ -31,6 +31,8 @@ pub(crate) struct StageOp {
     pub selection: u8,
     /// The selections of the conditions by which it weighs positions.
     pub weighed: Vec<u8>,
+    /// What streams behind it and moves the records as it said, if it moves any.
+    pub mover: Option<usize>,
 }
 
 impl StageOp {
@@ -94,17 +96,21 @@ pub(crate) struct StreamOp {
     pub choice: Choice,
     /// The columns that stages above it compute.
     pub above: Vec<ColumnKind>,
+    /// True if it is a part of a stage that works on tiles: see [`Moved`](super::moved::Moved).
+    pub of_tiles: bool,
 }
 
 impl StreamOp {
-    /// The columns that its expressions and what it is limited to name.
+    /// The columns that it looks at, by its expressions and what it is limited to among others.
     pub fn reads(&self) -> Vec<ColumnKind> {
         let expressions = self.transform.expressions();
         let own = expressions.iter().flat_map(|(_, expression)| expression.names());
         let condition = self.choice.condition.as_ref();
         let names: Vec<&str> =
             own.chain(condition.into_iter().flat_map(Condition::names)).collect();
-        named_columns(&names, &self.above)
+        let mut reads = named_columns(&names, &self.above);
+        reads.extend(self.transform.needs().reads);
+        reads
     }
 
     /// The dimensions of the records that it changes.
@@ -181,6 +187,8 @@ pub(crate) struct Pass {
     pub by_rounds: Vec<usize>,
     /// How often the stages were applied before, where they are repeated.
     pub round: usize,
+    /// True if one is that reduces, and is repeated.
+    pub is_repeated: bool,
     /// True if a stage reads the class of positions.
     pub reads_classes: bool,
     /// Selections of the records that are seen as neighbours, and of those that are decided about.

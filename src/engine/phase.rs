@@ -26,6 +26,8 @@ pub(crate) enum RunPhase {
     /// Files of this sink, or stretches of it, which are written behind the tiles of a pass, or
     /// behind all points where they are squares.
     Write(usize),
+    /// Ranges of blocks, for the figures of what this pass left of a reduction that is repeated.
+    Measure(usize),
     /// Ranges of blocks, for the figures of this branch.
     Survey(usize),
     /// Ledgers balance, and files get their names one after the other.
@@ -44,7 +46,7 @@ impl RunPhase {
             RunPhase::Gather(_) => Some("gather"),
             RunPhase::Mill(_) => Some("mill"),
             RunPhase::Write(_) => Some("write"),
-            RunPhase::Survey(_) => Some("survey"),
+            RunPhase::Measure(_) | RunPhase::Survey(_) => Some("survey"),
             RunPhase::Look(_) | RunPhase::Publish => None,
         }
     }
@@ -87,7 +89,11 @@ impl Task {
             let is_ranked = |sink: &usize| self.in_input_order[*sink] && !is_folder(sink);
             phases.extend(sinks().filter(is_ranked).map(RunPhase::Write));
             let branch = self.branches.iter().position(|branch| branch.pass == n);
-            phases.extend(branch.filter(|_| !self.traits.skips_survey).map(RunPhase::Survey));
+            let figures = match branch {
+                Some(branch) => Some(RunPhase::Survey(branch)),
+                None => pass.is_repeated.then_some(RunPhase::Measure(n)),
+            };
+            phases.extend(figures.filter(|_| !self.traits.skips_survey));
         }
         phases.extend(end);
         phases

@@ -10,8 +10,9 @@ use std::collections::BTreeSet;
 use serde_json::Value;
 
 use super::chunks::StoredGathered;
+use super::demands::{HELD_OF_SCAN, held_of_scan};
 use super::job::Job;
-use super::pass::{Branch, Op};
+use super::pass::{Branch, Call, Op, needs};
 use super::task::GivenLengths;
 use crate::geom::lattice::Lattice;
 use crate::point::Bounds;
@@ -44,6 +45,11 @@ pub(crate) fn conclude(
     gathered: StoredGathered,
     records: u64,
 ) -> Result<()> {
+    let holds = needs(&job.ops, Call { op, gathers: true });
+    let bytes = held_of_scan(&holds, records).0;
+    if bytes > 0 {
+        job.held.push(job.budget.lease(bytes, HELD_OF_SCAN)?);
+    }
     let warning = match &mut job.ops[op].op {
         Op::Scan(op) => op.conclude_from(&GatheredSummaries { gathered, records })?,
         Op::Tile(_) | Op::Round(_) => {

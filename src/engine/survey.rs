@@ -8,12 +8,15 @@
 //! The walk is made in two phases, since distances to a plane can be summed only when the plane is
 //! fitted. Their items are ranges of blocks; a report tile belongs to the range that it begins in.
 
+use bytemuck::pod_read_unaligned;
+
 use super::job::Job;
 use super::lines::{LINES_AT_ONCE, RangeLines, TileLines};
+use super::moved::is_still;
 use crate::budget::Bytes;
 use crate::geom::lattice::Lattice;
-use crate::point::Position;
-use crate::report::{DeviationBin, FittedScan, Lot, ScanSurvey, Totals, report_tile_level};
+use crate::point::{Position, SHIFT};
+use crate::report::{DeviationBin, FittedScan, Lot, ScanSurvey, Totals, Walked, report_tile_level};
 use crate::store::{
     BLOCK, FATE_BYTES, PIECE, Pieces, Reader, RecordState, SealedTiles, Spill, StoredStretch,
     TileKey,
@@ -89,10 +92,13 @@ pub(crate) fn survey(
 ) -> Result<Measured> {
     let level = report_tile_level(tiles.levels());
     let missing = || Error::internal("a scan is surveyed that no pass went over");
+    let shifts = sieve.columns.iter().find(|(kind, _)| *kind == SHIFT.kind());
     let walk = ScanWalk {
         tiles,
         fates: sieve.fates.as_ref().ok_or_else(missing)?,
         states: sieve.states.as_ref().ok_or_else(missing)?,
+        shifts: shifts.map(|(_, pieces)| &**pieces),
+        step: lattice.step,
         level,
     };
     let all_threads = survey_bytes() * job.threads.count() as u64;
@@ -112,6 +118,10 @@ struct ScanWalk<'a> {
     tiles: &'a SealedTiles,
     fates: &'a Pieces,
     states: &'a Pieces,
+    /// How far stages moved each position, if any does.
+    shifts: Option<&'a Pieces>,
+    /// World units of a lattice step.
+    step: f64,
     level: u32,
 }
 
@@ -121,17 +131,31 @@ struct Seen {
     block: Option<usize>,
     reader: Reader,
     lots: Vec<Lot>,
+    /// Where stages moved the positions; empty if none does.
+    moved: Vec<Position>,
 }
 
 impl Seen {
+    fn walked(&self) -> Walked<'_> {
+        let before = self.reader.positions();
+        let after = if self.moved.is_empty() { before } else { &self.moved };
+        Walked { before, after, lots: &self.lots }
+    }
+
     fn load(&mut self, walk: &ScanWalk<'_>, block: usize, columns: &mut StoredFates) -> Result<()> {
         self.block = None;
         let (positions, copies) = walk.tiles.read(block, &mut self.reader)?;
         let records = copies.iter().map(|&n| u64::from(n)).sum::<u64>();
-        let StoredFates { fates, states, buffer } = columns;
+        let StoredFates { fates, states, shifts, buffer } = columns;
         let first = walk.tiles.block(block).first_position;
         walk.fates.collect(first, positions.len() as u64, buffer, fates)?;
         let fates = fates.as_chunks().0.iter().copied().map(deviation_of);
+        self.moved.clear();
+        if let Some(pieces) = walk.shifts {
+            pieces.collect(first, positions.len() as u64, buffer, shifts)?;
+            let each = shifts.chunks_exact(size_of::<[f64; 3]>()).map(pod_read_unaligned);
+            self.moved.extend(positions.iter().zip(each).map(|(&p, by)| walk.moved(p, by)));
+        }
         let rank = walk.tiles.rank_of_block(block);
         self.lots.clear();
         if records == positions.len() as u64 {
@@ -168,6 +192,7 @@ impl Seen {
 struct StoredFates {
     fates: Vec<u8>,
     states: Vec<u8>,
+    shifts: Vec<u8>,
     buffer: Vec<u8>,
 }
 
@@ -182,27 +207,38 @@ struct KeptBlocks {
 
 impl KeptBlocks {
     /// Bytes that they hold.
-    const BYTES: u64 = (KEPT_BLOCKS * BLOCK * (2 * size_of::<Position>() + size_of::<Lot>() + 4)
+    const BYTES: u64 = (KEPT_BLOCKS * BLOCK * (3 * size_of::<Position>() + size_of::<Lot>() + 4)
         + 3 * PIECE
-        + BLOCK * FATE_BYTES) as u64;
+        + BLOCK * (FATE_BYTES + size_of::<[f64; 3]>())) as u64;
 
     fn new(blocks: usize) -> Self {
         let kept = (0..blocks).map(|_| Seen::default()).collect();
         KeptBlocks { kept, columns: StoredFates::default() }
     }
 
-    /// The positions of a block and their lots.
-    fn of(&mut self, walk: &ScanWalk<'_>, block: usize) -> Result<(&[Position], &[Lot])> {
+    /// The positions of a block and what became of them.
+    fn of(&mut self, walk: &ScanWalk<'_>, block: usize) -> Result<Walked<'_>> {
         let slot = block % self.kept.len();
         let stretch = &mut self.kept[slot];
         if stretch.block != Some(block) {
             stretch.load(walk, block, &mut self.columns)?;
         }
-        Ok((stretch.reader.positions(), &stretch.lots))
+        Ok(stretch.walked())
     }
 }
 
 impl ScanWalk<'_> {
+    /// Where a position that is moved by so many world units comes to lie.
+    fn moved(&self, position: Position, shift: [f64; 3]) -> Position {
+        let shift = if is_still(shift) { [0.0; 3] } else { shift };
+        let steps = shift.map(|v| (v / self.step).round_ties_even() as i64);
+        let scan = self.tiles.bounds();
+        std::array::from_fn(|axis| {
+            let moved = position[axis].saturating_add(steps[axis]);
+            moved.clamp(scan.lo[axis], scan.hi[axis])
+        })
+    }
+
     /// Ranges of blocks, the items of both phases.
     fn ranges(&self) -> usize {
         self.tiles.blocks().div_ceil(BLOCKS)
@@ -241,9 +277,9 @@ impl ScanWalk<'_> {
             |(part, stretches), range| {
                 let mut positions = 0;
                 for block in range * BLOCKS..((range + 1) * BLOCKS).min(self.tiles.blocks()) {
-                    let (these, lots) = stretches.of(self, block)?;
-                    part.measure_all(these, lots);
-                    positions += these.len() as u64;
+                    let walked = stretches.of(self, block)?;
+                    part.measure_all(walked);
+                    positions += walked.before.len() as u64;
                 }
                 job.advance(positions)
             },
@@ -267,23 +303,21 @@ impl ScanWalk<'_> {
         let end = ((range + 1) * BLOCKS).min(self.tiles.blocks());
         let mut at = (range * BLOCKS, 0);
         if let Some(before) = at.0.checked_sub(1)
-            && let Some(&last) = stretches.of(self, before)?.0.last()
+            && let Some(&last) = stretches.of(self, before)?.before.last()
         {
             // The tile that reaches into this range belongs to the one before.
             at = self.end_of(TileKey::around(last, self.level), at.0, stretches)?;
         }
         let mut positions = 0;
         while at.0 < end {
-            let key = TileKey::around(stretches.of(self, at.0)?.0[at.1], self.level);
-            let mut tile = scan.tile(key);
-            let (next, seen) = self.visit(stretches, at, key, |positions, lots| {
-                tile.add_all(positions, lots);
-                scan.add_all(positions, lots);
+            let key = TileKey::around(stretches.of(self, at.0)?.before[at.1], self.level);
+            let mut tile = scan.tile(key, self.shifts.is_some());
+            let (next, seen) = self.visit(stretches, at, key, |walked| {
+                tile.add_all(walked);
+                scan.add_all(walked);
             })?;
             let mut fitted = tile.fit();
-            self.visit(stretches, at, key, |positions, lots| {
-                fitted.measure_all(positions, lots);
-            })?;
+            self.visit(stretches, at, key, |walked| fitted.measure_all(walked))?;
             lines.add(&fitted.finish(lattice, scan)?)?;
             positions += seen;
             at = next;
@@ -312,7 +346,7 @@ impl ScanWalk<'_> {
             return Ok((from, 0));
         }
         // The last block that begins in the cube may end behind it.
-        let (positions, _) = stretches.of(self, inside - 1)?;
+        let positions = stretches.of(self, inside - 1)?.before;
         let end = positions.partition_point(|p| cube.contains(*p));
         let whole = end == positions.len();
         Ok(if whole { (inside, 0) } else { (inside - 1, end) })
@@ -325,18 +359,23 @@ impl ScanWalk<'_> {
         stretches: &mut KeptBlocks,
         mut at: (usize, usize),
         key: TileKey,
-        mut visit: impl FnMut(&[Position], &[Lot]),
+        mut visit: impl FnMut(Walked<'_>),
     ) -> Result<((usize, usize), u64)> {
         let cube = key.cube();
         let mut seen = 0;
         while at.0 < self.tiles.blocks() {
-            let (positions, lots) = stretches.of(self, at.0)?;
-            let rest = &positions[at.1..];
+            let Walked { before, after, lots } = stretches.of(self, at.0)?;
+            let rest = &before[at.1..];
             let count = match rest.last() {
                 Some(&last) if cube.contains(last) => rest.len(),
                 _ => rest.partition_point(|p| cube.contains(*p)),
             };
-            visit(&rest[..count], &lots[at.1..at.1 + count]);
+            let these = at.1..at.1 + count;
+            visit(Walked {
+                before: &rest[..count],
+                after: &after[these.clone()],
+                lots: &lots[these],
+            });
             seen += count as u64;
             if count < rest.len() {
                 return Ok(((at.0, at.1 + count), seen));

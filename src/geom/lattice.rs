@@ -15,7 +15,7 @@ const SMALLEST_STEP: f64 = 1e-9;
 /// use pointmill::stage::{Lattice, OpenSource};
 /// use pointmill::synth::{Scene, Synthetic};
 ///
-/// let scan = Synthetic { scene: Scene::Plane, points: 10, seed: 0, noise: None }.open()?;
+/// let scan = Synthetic { scene: Scene::Plane, points: 10, ..Synthetic::default() }.open()?;
 /// // Steps of a quarter of the scan's unit; where none are given, those of its records.
 /// let lattice = Lattice::of(scan.schema(), Some(0.25))?;
 /// assert_eq!(lattice.world([4, 8, -2]), [1.0, 2.0, -0.5]);

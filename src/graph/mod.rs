@@ -48,7 +48,7 @@ pub(crate) use written::Written;
 /// use pointmill::synth::{Scene, Synthetic};
 ///
 /// let mut graph = Graph::new(RunSettings::default());
-/// let scan = Synthetic { scene: Scene::Plane, points: 1000, seed: 0, noise: None };
+/// let scan = Synthetic { scene: Scene::Plane, points: 1000, ..Synthetic::default() };
 /// let scan = graph.add("synth", Role::Source(Box::new(scan)), &[]);
 /// let side = Length::of(0.5).expect("a length above 0");
 /// let grid = Role::TileOp(Box::new(Grid::new(side, Pick::Center)));

@@ -26,7 +26,7 @@ use crate::{Error, Result};
 /// # let folder = tempfile::tempdir().expect("a folder");
 /// # let out = folder.path().join("reduced.laz");
 /// let graph = Graph::builder()
-///     .source(Synthetic { scene: Scene::Part, points: 20_000, seed: 0, noise: None })
+///     .source(Synthetic { scene: Scene::Part, points: 20_000, ..Synthetic::default() })
 ///     .keep(|record, schema| record[schema.stride - 1] % 3 != 1)
 ///     .stage(Normals::default())
 ///     .stage(Cells::default())

@@ -6,8 +6,8 @@ use crate::io::las::{LAS, LAZ};
 use crate::io::ply::PLY;
 use crate::ops::normals::Normals;
 use crate::ops::{
-    Assign, Cells, Crop, Cut, Drop, Filter, Graded, Grid, Median, Merge, Outliers, Sample, Stats,
-    Tap, Transformation,
+    Assign, Cells, Crop, Cut, Drop, Filter, Fourier, GaussianImage, Graded, Grid, Median, Merge,
+    Outliers, Sample, Scanline, Smooth, Stats, Tap, Transformation, Wavelet,
 };
 use crate::synth::Synth;
 
@@ -28,13 +28,18 @@ impl Registry {
             .with::<Stats>()
             .with::<Tap>()
             .with::<Outliers>()
+            .with::<Smooth>()
             .with::<Normals>()
             .with::<Cells>()
+            .with::<GaussianImage>()
             .with::<Median>()
             .with::<Graded>()
             .with::<Cut>()
             .with::<Grid>()
             .with::<Sample>()
+            .with::<Scanline>()
+            .with::<Wavelet>()
+            .with::<Fourier>()
             .with_format(LAS)
             .with_format(LAZ)
             .with_format(PLY)

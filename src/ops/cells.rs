@@ -27,6 +27,7 @@ use crate::stage::{Forecast, Needs, Role, RoleName, ScanFacts, StageKind, StageP
 use crate::tile::Tile;
 
 use division::{Division, DivisionCounts};
+pub(super) use grouping::Grouping;
 pub use keys::Cells;
 use keys::{LARGEST_SIDE, SettledCells};
 use outlook::Outlook;

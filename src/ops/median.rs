@@ -5,13 +5,14 @@ use std::ops::Range;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::removal::{RemovalAccount, keep_once, represent};
+use super::removal::{RemovalAccount, keep_once, represent_by};
+use super::smooth::rounded_mean;
 use crate::geom::angle::{cosine, dominant_axis, is_known, outer_sum, sine2};
 use crate::geom::wide::Wide;
-use crate::point::{Mark, NORMAL, Position};
+use crate::point::{Mark, NORMAL, Position, SHIFT};
 use crate::quantity::Whole;
 use crate::report::Tally;
-use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, TileOp};
+use crate::stage::{Needs, Role, RoleName, ScanFacts, StageKind, StagePlace, TileOp};
 use crate::tile::{Partition, Tile};
 use crate::{Error, Result};
 
@@ -28,7 +29,12 @@ pub const MAX_PASSES: usize = 16;
 /// of mass of the cell's positions, then the first in Morton order. Copies weigh as one position
 /// and are removed as coincident. A position without a normal is in no cell and keeps one record.
 /// With `pick = "center"` the angles only divide: of each cell the position nearest to its centre
-/// of mass stays.
+/// of mass stays. With `pick = "centroid"` that record is moved to the centre of mass itself,
+/// rounded to whole steps of the lattice: a point that no scanner saw. Such a record has its
+/// synthetic flag set where the format has one, the report counts it as `median_moved`, and
+/// `ShiftX`, `ShiftY` and `ShiftZ` in `write.dimensions` tell by how much. Deviations are measured
+/// from where it has gone. No stage that works on tiles stands behind such a one, and `passes` is
+/// 1: stages work on the positions that were read.
 ///
 /// With `passes` above 1, what one pass leaves is the scan of the next: normals, cells and
 /// selection again, with the same keys. A cell's side, once chosen, stays.
@@ -37,7 +43,7 @@ pub const MAX_PASSES: usize = 16;
 /// key-point flag of those that stay and clears it of the others, `"withheld"` sets the withheld
 /// flag of the others, 7 and 18 make that their class. The report counts the others as
 /// `median_marked`, and those that got the key-point flag as `key_points`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Median {
     /// How often the stages from the last `normals` to this one are applied (the paper's degree of
@@ -49,6 +55,9 @@ pub struct Median {
     pub pick: Representative,
     /// How records are marked, instead of removing any.
     pub mark: Option<Mark>,
+    /// World units of a lattice step, once that is known.
+    #[serde(skip)]
+    step: f64,
 }
 
 /// Which position of a cell stays; of equally good ones the first in Morton order.
@@ -61,11 +70,13 @@ pub enum Representative {
     Median,
     /// The nearest to the centre of mass of the cell's positions.
     Center,
+    /// That one, moved to the centre of mass.
+    Centroid,
 }
 
 impl Default for Median {
     fn default() -> Self {
-        Median { passes: 1, pick: Representative::Median, mark: None }
+        Median { passes: 1, pick: Representative::Median, mark: None, step: 1.0 }
     }
 }
 
@@ -73,7 +84,19 @@ impl Median {
     /// Refuses passes outside 1 to 16; names the key to blame.
     pub(crate) fn check(&self) -> Result<(), (&'static str, Error)> {
         let wrong = |told: String| ("passes", Error::pipeline(told));
-        check_passes(self.passes as u64).map_err(wrong)
+        check_passes(self.passes as u64).map_err(wrong)?;
+        if self.pick == Representative::Centroid && self.passes > 1 {
+            let told = "`median.pick = \"centroid\"` moves points, and a further pass of \
+                        `median.passes` would work on where they were";
+            let help = "leave one of the two out, or run the pipeline once for each pass";
+            return Err(("passes", Error::pipeline(told).help(help)));
+        }
+        if let (Representative::Centroid, Some(_)) = (self.pick, self.mark) {
+            let told = "`median.pick = \"centroid\"` moves the records that stay, and \
+                        `median.mark` changes no other byte of any";
+            return Err(("mark", Error::pipeline(told).help("leave one of the two out")));
+        }
+        Ok(())
     }
 }
 
@@ -103,18 +126,30 @@ impl StageKind for Median {
 impl TileOp for Median {
     fn needs(&self) -> Needs {
         let needs = Needs::none().reads(&NORMAL).takes_cells().bytes_per_point(BYTES);
-        Needs { repeats: Some((NORMAL.kind(), self.passes)), ..needs.removes(self.mark).measures() }
+        let needs = needs.removes(self.mark).measures();
+        let needs = if self.pick == Representative::Centroid { needs.moves() } else { needs };
+        Needs { repeats: Some((NORMAL.kind(), self.passes)), ..needs }
+    }
+
+    fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
+        self.step = scan.lattice.step;
+        Ok(())
     }
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let core = tile.core.clone();
-        let (mut coincident, mut represented) = (0, 0);
+        let mut counts = MedianCounts::default();
         let normals = tile.columns.take(&NORMAL)?;
         for i in core.clone() {
             if !is_known(normals[i]) && tile.is_chosen(i) {
-                coincident += keep_once(tile, i);
+                counts.coincident += keep_once(tile, i);
             }
         }
+        let mut shifts = match self.pick {
+            Representative::Centroid => Some(tile.columns.take(&SHIFT)?),
+            Representative::Median | Representative::Center => None,
+        };
+        shifts.iter_mut().for_each(|shifts| shifts.fill([0.0; 3]));
         let mut angles = Vec::new();
         let mut start = 0;
         for g in 0..tile.cells.ends.len() {
@@ -124,27 +159,60 @@ impl TileOp for Median {
                 continue;
             }
             let found = match self.pick {
-                Representative::Median => median(tile, &normals, group.clone(), &mut angles),
-                Representative::Center => central(tile, group.clone()),
-            };
-            let Some(kept) = found else { continue };
-            let normal = normals[kept].map(f64::from);
-            for at in group {
-                let i = tile.cells.members[at] as usize;
-                if !core.contains(&i) || !tile.is_chosen(i) {
-                    continue;
-                } else if i == kept {
-                    coincident += keep_once(tile, i);
-                } else {
-                    represented += represent(tile, i, kept, normal);
+                Representative::Median => median(tile, &normals, group.clone(), &mut angles)
+                    .map(|kept| (kept, tile.positions[kept])),
+                Representative::Center => {
+                    central(tile, group.clone()).map(|(kept, _)| (kept, tile.positions[kept]))
                 }
+                Representative::Centroid => central(tile, group.clone()),
+            };
+            let Some((kept, place)) = found else { continue };
+            if let Some(shifts) = &mut shifts {
+                let by = |axis: usize| (place[axis] - tile.positions[kept][axis]) as f64;
+                shifts[kept] = std::array::from_fn(|axis| by(axis) * self.step);
+                counts.moved += u64::from(core.contains(&kept) && shifts[kept] != [0.0; 3]);
             }
+            counts.decide(tile, group, (kept, place), normals[kept].map(f64::from));
         }
+        shifts.into_iter().for_each(|shifts| tile.columns.put(shifts));
         tile.columns.put(normals);
         let account = RemovalAccount { stage: "median", marked: "median_marked", mark: self.mark };
-        account.enter(tally, "coincident", coincident);
-        account.enter(tally, "represented", represented);
+        account.enter(tally, "coincident", counts.coincident);
+        account.enter(tally, "represented", counts.represented);
+        if self.pick == Representative::Centroid {
+            tally.count("median_moved", counts.moved);
+        }
         Ok(())
+    }
+}
+
+/// What became of the positions of a tile's core.
+#[derive(Default)]
+struct MedianCounts {
+    coincident: u64,
+    represented: u64,
+    moved: u64,
+}
+
+impl MedianCounts {
+    /// Removes all of a group but the position that is kept and comes to lie at a place.
+    fn decide(
+        &mut self,
+        tile: &mut Tile,
+        group: Range<usize>,
+        (kept, place): (usize, Position),
+        normal: [f64; 3],
+    ) {
+        for at in group {
+            let i = tile.cells.members[at] as usize;
+            if !tile.core.contains(&i) || !tile.is_chosen(i) {
+                continue;
+            } else if i == kept {
+                self.coincident += keep_once(tile, i);
+            } else {
+                self.represented += represent_by(tile, i, place, normal);
+            }
+        }
     }
 }
 
@@ -188,13 +256,14 @@ fn median(
     first.map(|(_, i)| *i as usize)
 }
 
-/// The position of `group` nearest to the centre of mass among those that the stage decides about;
-/// none if there are none.
-fn central(tile: &Tile, group: Range<usize>) -> Option<usize> {
+/// The position of `group` nearest to the centre of mass among those that the stage decides about,
+/// and that centre in whole steps; none if there are none.
+fn central(tile: &Tile, group: Range<usize>) -> Option<(usize, Position)> {
     let members = || tile.cells.members[group.clone()].iter().map(|&i| i as usize);
     let decided = || members().filter(|&i| tile.is_chosen(i));
     let center = Center::of(decided().map(|i| tile.positions[i]));
-    decided().min_by_key(|&i| (center.distance2(tile.positions[i]), i))
+    let nearest = decided().min_by_key(|&i| (center.distance2(tile.positions[i]), i))?;
+    Some((nearest, center.place()))
 }
 
 /// The centre of mass of a group, in whole numbers: n·x − Σx instead of x − Σx / n.
@@ -213,6 +282,11 @@ impl Center {
             }
         }
         center
+    }
+
+    /// Where it is, in whole steps.
+    fn place(&self) -> Position {
+        self.sum.map(|sum| rounded_mean(sum, self.count.max(1)))
     }
 
     /// Exact squared distance of `p`, times n².

@@ -16,7 +16,7 @@
 //! assert_eq!(removal::remove(&mut tile, 1), 0);
 //! ```
 
-use crate::point::Mark;
+use crate::point::{Mark, Position};
 use crate::report::Tally;
 use crate::tile::{Fate, Tile};
 
@@ -43,12 +43,23 @@ pub fn remove(tile: &mut Tile, i: usize) -> u64 {
 /// The deviation is measured in lattice steps along `normal`, the unit normal of the plane through
 /// `kept`.
 pub fn represent(tile: &mut Tile, i: usize, kept: usize, normal: [f64; 3]) -> u64 {
+    represent_by(tile, i, tile.positions[kept], normal)
+}
+
+/// Lets a point that was moved to `place` stand for position `i`, as [`represent`] does.
+pub fn represent_by(tile: &mut Tile, i: usize, place: Position, normal: [f64; 3]) -> u64 {
+    let p = tile.positions[i];
+    let [x, y, z]: [f64; 3] =
+        std::array::from_fn(|axis| p[axis].saturating_sub(place[axis]) as f64 * normal[axis]);
+    represent_at(tile, i, (x + y + z).abs() as f32)
+}
+
+/// Lets points that stay stand for position `i`, which is so many lattice steps from the surface
+/// that they tell; returns how many records that removes.
+pub fn represent_at(tile: &mut Tile, i: usize, deviation: f32) -> u64 {
     let records = records(tile, i);
     if records > 0 {
-        let (p, q) = (tile.positions[i], tile.positions[kept]);
-        let [x, y, z]: [f64; 3] =
-            std::array::from_fn(|axis| p[axis].saturating_sub(q[axis]) as f64 * normal[axis]);
-        tile.fates[i] = Fate::Represented { deviation: (x + y + z).abs() as f32 };
+        tile.fates[i] = Fate::Represented { deviation };
     }
     records
 }

@@ -9,7 +9,9 @@ fn settings(view: View, by: ColorBy, threads: usize) -> Settings {
 }
 
 fn landscape(points: u64) -> Box<dyn Source> {
-    Synthetic { scene: Scene::Als, points, seed: 3, noise: None }.open().unwrap()
+    Synthetic { scene: Scene::Als, points, seed: 3, noise: None, ..Synthetic::default() }
+        .open()
+        .unwrap()
 }
 
 /// Records in parts of its own choice.
@@ -172,7 +174,11 @@ fn what_has_no_width_is_in_the_middle_of_a_picture_that_can_be_seen() {
 
 #[test]
 fn a_scan_whose_colours_are_all_0_is_known_to_be_black() {
-    let scene = |scene| Synthetic { scene, points: 2000, seed: 3, noise: None }.open().unwrap();
+    let scene = |scene| {
+        Synthetic { scene, points: 2000, seed: 3, noise: None, ..Synthetic::default() }
+            .open()
+            .unwrap()
+    };
     let black = |by, scan: &dyn Source| {
         Picture::draw(&[scan], &settings(View::Above, by, 1)).unwrap().black
     };

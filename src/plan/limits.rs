@@ -14,7 +14,8 @@ use super::sorted::Sorted;
 /// above have, and with expressions that name it.
 pub(super) fn check_limits(sorted: &Sorted, schema: &Schema) -> Vec<Error> {
     let mut wrong = Vec::new();
-    for stage in sorted.transforms.iter().chain(&sorted.filters) {
+    let own = sorted.filters.iter().filter(|stage| !stage.of_tiles);
+    for stage in sorted.transforms.iter().chain(own) {
         let StreamOp { kind, written, transform, choice, above, .. } = stage;
         let names = Names { schema, columns: above };
         for (key, expression) in transform.expressions() {

@@ -6,7 +6,7 @@ use super::limits::seen_by;
 use super::sorted::{Sorted, StageWork};
 use crate::engine::pass::{Branch, Call, Op, Pass, StageOp, decides, needs};
 use crate::error::listed;
-use crate::point::{ColumnKind, ComputedDimension, Scalar, Schema, names};
+use crate::point::{ColumnKind, ComputedDimension, SHIFT, Scalar, Schema, names};
 use crate::stage::Needs;
 use crate::tile::Partition;
 use crate::{Error, Result};
@@ -146,7 +146,21 @@ impl PassLayout<'_> {
             }
         }
         self.at.decides = decides(&needs);
+        if let Some(mover) = self.ops[op].mover {
+            self.at.filters.push(mover);
+            self.keep_shifts();
+        }
         Ok(())
+    }
+
+    /// Keeps how far points are moved until the branch is measured.
+    fn keep_shifts(&mut self) {
+        if let Some(from) = self.at.columns.read(SHIFT.kind()) {
+            let stores = &mut self.out.passes[from].stores;
+            if !stores.contains(&SHIFT.kind()) {
+                stores.push(SHIFT.kind());
+            }
+        }
     }
 
     /// The stages that are repeated with `op`, from the last above that computes `column` on.
@@ -194,6 +208,7 @@ impl PassLayout<'_> {
         }
         let pass = &mut self.out.passes[at];
         pass.round = round;
+        pass.is_repeated |= needs.repeats.is_some_and(|(_, times)| times > 1);
         if let Op::Round(_) = &stage.op {
             pass.by_rounds.push(call.op);
         }

@@ -4,8 +4,9 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use crate::engine::moved::Moved;
 use crate::engine::pass::{Op, StageOp, StreamOp};
-use crate::graph::{Graph, GraphStage, Written};
+use crate::graph::{Graph, GraphStage, Limits, Written};
 use crate::point::ColumnKind;
 use crate::stage::{CreateSink, OpenSource, Role};
 use crate::{Error, ErrorKind, Result};
@@ -83,14 +84,18 @@ impl Sorted {
                         transform,
                         choice: limits.choice,
                         above,
+                        of_tiles: false,
                     });
                 }
                 Role::Sink(sink) => sinks.push(sink),
                 Role::Merge => {}
                 Role::TileOp(_) | Role::ScanOp(_) | Role::RoundOp(_) => {
-                    let op = on_tiles(role)?;
-                    let (selection, weighed) = (0, Vec::new());
-                    ops.push(StageOp { kind, written, op, limits, above, selection, weighed });
+                    let mut stage = stage_op(kind, written, on_tiles(role)?, limits, above);
+                    if stage.op.tile().needs().moves {
+                        stage.mover = Some(filters.len());
+                        filters.push(moved(&stage));
+                    }
+                    ops.push(stage);
                 }
             }
         }
@@ -151,6 +156,31 @@ fn on_tiles(role: Role) -> Result<Op> {
         Role::ScanOp(op) => Ok(Op::Scan(op)),
         Role::RoundOp(op) => Ok(Op::Round(op)),
         _ => Err(Error::internal("a stage does not work on tiles and is to")),
+    }
+}
+
+/// A tile stage before the plan has looked at what it is limited to.
+fn stage_op(
+    kind: String,
+    written: Arc<dyn Written>,
+    op: Op,
+    limits: Limits,
+    above: Vec<ColumnKind>,
+) -> StageOp {
+    let (selection, weighed, mover) = (0, Vec::new(), None);
+    StageOp { kind, written, op, limits, above, selection, weighed, mover }
+}
+
+/// What writes where a stage moves records.
+fn moved(stage: &StageOp) -> StreamOp {
+    StreamOp {
+        kind: stage.kind.clone(),
+        label: stage.kind.as_str().into(),
+        written: stage.written.clone(),
+        transform: Box::new(Moved),
+        choice: stage.limits.choice.clone(),
+        above: stage.above.clone(),
+        of_tiles: true,
     }
 }
 

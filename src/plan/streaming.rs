@@ -81,7 +81,7 @@ impl PassLayout<'_> {
         for filter in &self.at.filters {
             let stream = &self.sorted.filters[*filter];
             let above = &stream.kind;
-            if let Some(column) = rewritten(stream, &needs.writes) {
+            if let Some(column) = rewritten(stream, &needs.writes).filter(|_| !stream.of_tiles) {
                 let name = column.name();
                 let told = format!("`{kind}` computes {name} anew, which `{above}` looks at");
                 let help = format!("put `{above}` behind `{kind}`");
@@ -90,9 +90,12 @@ impl PassLayout<'_> {
             if let Some(name) = stream.changes().iter().find(|name| is_read(name)) {
                 let told =
                     format!("`{kind}` works by {name} as it is read, and `{above}` changes it");
-                let help = format!(
-                    "put `{above}` above all stages that work on tiles, or behind `{kind}`"
-                );
+                let help = match stream.of_tiles {
+                    true => format!("let a second run read what `{above}` leaves"),
+                    false => format!(
+                        "put `{above}` above all stages that work on tiles, or behind `{kind}`"
+                    ),
+                };
                 return Err(written.wrong(told).help(help));
             }
         }

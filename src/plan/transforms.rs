@@ -28,7 +28,7 @@ pub(super) fn fit_transforms(sorted: &Sorted, schema: &Arc<Schema>) -> (Schemas,
     }
     for stage in &sorted.filters {
         wrong.extend(fit(stage, &last, &mut written));
-        if stage.moves() {
+        if stage.moves() && !stage.of_tiles {
             let told = format!(
                 "`{}` moves points, and stands behind stages that looked at where they are, or on \
                  one of several branches",

@@ -89,6 +89,10 @@ impl<T: ColumnValue> Column<T> {
 /// Unit surface normals; NaN where there is none.
 pub const NORMAL: Column<[f32; 3]> = Column::new("Normal", &names::NORMAL).computed_by("normals");
 
+/// How far a stage [moves](crate::stage::Needs::moves) the records of each position, in world
+/// units: whole steps of the lattice. All zero where they stay.
+pub const SHIFT: Column<[f64; 3]> = Column::new("Shift", &["ShiftX", "ShiftY", "ShiftZ"]);
+
 /// What a column is, for those that do not know its type.
 #[derive(Debug, Clone, Copy)]
 pub struct ColumnKind {

@@ -16,7 +16,7 @@ mod units;
 pub use batch::PointBatch;
 pub(crate) use bounds::center_distance2;
 pub use bounds::{Bounds, Position, distance2};
-pub use column::{Column, ColumnKind, ColumnValue, ComputedDimension, NORMAL};
+pub use column::{Column, ColumnKind, ColumnValue, ComputedDimension, NORMAL, SHIFT};
 pub(crate) use columns::COLUMN_ENDIAN;
 pub use columns::{Columns, TakenColumn};
 pub use mark::{Edit, Mark};

@@ -15,6 +15,12 @@ use super::parse_count;
 pub struct Whole<const LEAST: u64, const MOST: u64>(u64);
 
 impl<const LEAST: u64, const MOST: u64> Whole<LEAST, MOST> {
+    /// This number, which is one of them; a constant that is not does not compile.
+    pub(crate) const fn of(number: u64) -> Self {
+        assert!(LEAST <= number && number <= MOST, "a number out of bounds");
+        Whole(number)
+    }
+
     /// The number.
     pub fn get(self) -> u64 {
         self.0

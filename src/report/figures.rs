@@ -136,7 +136,7 @@ pub struct Totals {
 }
 
 /// What a pass over the scan left.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct PassFigures {
     /// Kinds of its stages, in order.
@@ -145,6 +145,13 @@ pub struct PassFigures {
     pub before: u64,
     /// Records that it left for the next: neither removed nor marked as what would be removed.
     pub after: u64,
+    /// Distances of these to planes fitted to them, as in [`Totals`]: each in its report tile.
+    /// Measured where a reduction is repeated, behind each time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tile_plane: Option<PlaneFigures>,
+    /// The same to one plane.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scan_plane: Option<PlaneFigures>,
 }
 
 /// The records of one class.

@@ -1,5 +1,6 @@
 //! What became of the records of a position. Knows no sums.
 
+use crate::point::Position;
 use crate::tile::Fate;
 
 /// What became of the records of a position.
@@ -28,5 +29,23 @@ impl Lot {
 
     pub(super) fn removed(self) -> u32 {
         self.copies.saturating_sub(self.kept)
+    }
+}
+
+/// Positions that a walk came by, and what became of them.
+#[derive(Debug, Clone, Copy)]
+pub struct Walked<'a> {
+    /// As they were read.
+    pub before: &'a [Position],
+    /// Where stages moved those that are kept, in the box of the scan; the same where none did.
+    pub after: &'a [Position],
+    /// What became of the records of each.
+    pub lots: &'a [Lot],
+}
+
+impl<'a> Walked<'a> {
+    /// Positions that nothing moved.
+    pub fn still(positions: &'a [Position], lots: &'a [Lot]) -> Self {
+        Walked { before: positions, after: positions, lots }
     }
 }

@@ -36,7 +36,7 @@ pub use figures::{
 };
 pub(crate) use ledger::check_written;
 pub use ledger::{Ledger, Removed};
-pub(crate) use lot::Lot;
+pub(crate) use lot::{Lot, Walked};
 pub use machine::Machine;
 pub use stats::{DimensionFigures, DimensionHistogram, StatsFigures};
 pub(crate) use stats::{StatsTally, StoredNumbers};

@@ -17,7 +17,7 @@ use super::figures::{
     DeviationBin, DeviationFigures, DeviationTotals, Pair, PlaneFigures, TileFigures, Totals,
     world_length, world_point,
 };
-use super::lot::Lot;
+use super::lot::{Lot, Walked};
 use super::moments::{Moments, Plane};
 use super::sums::Distances;
 use crate::geom::lattice::Lattice;
@@ -45,9 +45,10 @@ fn no_moments(bounds: &Bounds) -> Pair<Moments> {
     Pair { before: moments.clone(), after: moments }
 }
 
-fn add_moments(moments: &mut Pair<Moments>, positions: &[Position], lots: &[Lot]) {
-    moments.before.add_all(positions, |i| lots[i].copies);
-    moments.after.add_all(positions, |i| lots[i].kept);
+fn add_moments(moments: &mut Pair<Moments>, walked: Walked<'_>) {
+    let Walked { before, after, lots } = walked;
+    moments.before.add_all(before, |i| lots[i].copies);
+    moments.after.add_all(after, |i| lots[i].kept);
 }
 
 /// The first walk over a report tile: moments of its records before and after the reduction.
@@ -65,13 +66,13 @@ impl TileSurvey {
 
     /// Adds the records at `position`, which is in the cube.
     pub fn add(&mut self, position: Position, lot: Lot) {
-        self.add_all(&[position], &[lot]);
+        self.add_all(Walked::still(&[position], &[lot]));
     }
 
     /// Adds the records at `positions`, which are in the cube, each with its lot.
-    pub fn add_all(&mut self, positions: &[Position], lots: &[Lot]) {
-        add_moments(&mut self.moments, positions, lots);
-        self.deviations.add_all(positions, lots);
+    pub fn add_all(&mut self, walked: Walked<'_>) {
+        add_moments(&mut self.moments, walked);
+        self.deviations.add_all(walked.before, walked.lots);
     }
 
     /// Adds what another walk over other records of the same tile saw.
@@ -104,12 +105,12 @@ pub struct FittedTile {
 impl FittedTile {
     /// Adds the records at `position`, as in the first walk.
     pub fn measure(&mut self, position: Position, lot: Lot) {
-        self.measure_all(&[position], &[lot]);
+        self.measure_all(Walked::still(&[position], &[lot]));
     }
 
     /// Adds the records at `positions`, as in the first walk.
-    pub fn measure_all(&mut self, positions: &[Position], lots: &[Lot]) {
-        self.distances.measure_all(positions, lots);
+    pub fn measure_all(&mut self, walked: Walked<'_>) {
+        self.distances.measure_all(walked);
     }
 
     /// The tile's figures in world units; its sums go into the totals of `scan`.
@@ -169,9 +170,9 @@ impl ScanSurvey {
         }
     }
 
-    /// A survey of the report tile `key`.
-    pub fn tile(&self, key: TileKey) -> TileSurvey {
-        let mut bounds = key.cube();
+    /// A survey of the report tile `key`; where stages `moved` points, some may have left it.
+    pub fn tile(&self, key: TileKey, moved: bool) -> TileSurvey {
+        let mut bounds = if moved { self.bounds } else { key.cube() };
         for axis in 0..3 {
             bounds.lo[axis] = bounds.lo[axis].max(self.bounds.lo[axis]);
             bounds.hi[axis] = bounds.hi[axis].min(self.bounds.hi[axis]);
@@ -181,15 +182,15 @@ impl ScanSurvey {
 
     /// Adds the records at `position`, which is in the bounds and also added to its tile.
     pub fn add(&mut self, position: Position, lot: Lot) {
-        self.add_all(&[position], &[lot]);
+        self.add_all(Walked::still(&[position], &[lot]));
     }
 
     /// Adds the records at `positions`, which are in the bounds and also added to their tile.
-    pub fn add_all(&mut self, positions: &[Position], lots: &[Lot]) {
+    pub fn add_all(&mut self, walked: Walked<'_>) {
         if !self.takes_moments_from_tiles() {
-            add_moments(&mut self.moments, positions, lots);
+            add_moments(&mut self.moments, walked);
         }
-        for lot in lots {
+        for lot in walked.lots {
             match (lot.removed(), lot.deviation) {
                 (0, _) => {}
                 (removed, None) => self.unrepresented += u64::from(removed),
@@ -293,19 +294,20 @@ impl PlaneDistances {
 
     /// Adds the records at `position`, as in the first walk.
     pub fn measure(&mut self, position: Position, lot: Lot) {
-        self.measure_all(&[position], &[lot]);
+        self.measure_all(Walked::still(&[position], &[lot]));
     }
 
     /// Adds the records at `positions`, as in the first walk.
-    pub fn measure_all(&mut self, positions: &[Position], lots: &[Lot]) {
-        for (positions, lots) in positions.chunks(AT_ONCE).zip(lots.chunks(AT_ONCE)) {
-            let each = || positions.iter().zip(lots);
+    pub fn measure_all(&mut self, walked: Walked<'_>) {
+        let lots = walked.lots.chunks(AT_ONCE);
+        let places = walked.before.chunks(AT_ONCE).zip(walked.after.chunks(AT_ONCE));
+        for ((before, after), lots) in places.zip(lots) {
             if let Some(plane) = &self.planes.before {
-                let before = each().map(|(&p, lot)| (plane.distance(p), lot.copies));
-                self.sums.before.add_all(before);
+                let each = before.iter().zip(lots);
+                self.sums.before.add_all(each.map(|(&p, lot)| (plane.distance(p), lot.copies)));
             }
             if let Some(plane) = &self.planes.after {
-                let kept = each().filter(|(_, lot)| lot.kept > 0);
+                let kept = after.iter().zip(lots).filter(|(_, lot)| lot.kept > 0);
                 self.sums.after.add_all(kept.map(|(&p, lot)| (plane.distance(p), lot.kept)));
             }
         }

@@ -1,6 +1,6 @@
 //! What a stage needs and gives, in the words of a plan.
 
-use crate::point::{Column, ColumnKind, ColumnValue, Mark};
+use crate::point::{Column, ColumnKind, ColumnValue, Mark, SHIFT};
 
 /// Everything a plan can check before a run.
 ///
@@ -46,6 +46,10 @@ pub struct Needs {
     pub cell_aligned: bool,
     /// Working memory per position of the tile, rim included.
     pub bytes_per_point: usize,
+    /// Bytes that it holds for each position of the scan, from the end of its first phase on.
+    pub of_scan: usize,
+    /// Bytes that it holds then besides, whatever the scan.
+    pub of_any_scan: u64,
     /// True if it reads the [numbers](crate::point::PointBatch::record_numbers) that records have
     /// in the input.
     pub record_numbers: bool,
@@ -57,6 +61,8 @@ pub struct Needs {
     pub measures: bool,
     /// How it marks records instead of removing any, if it does.
     pub mark: Option<Mark>,
+    /// True if it moves points by the column [`SHIFT`], which it computes.
+    pub moves: bool,
     /// How often the stages from the last that computed a column to this one are applied, each time
     /// to what the time before left, and which column; none is once.
     pub repeats: Option<(ColumnKind, usize)>,
@@ -125,6 +131,22 @@ impl Needs {
         self
     }
 
+    /// And it holds so many bytes for each position of the scan, from the end of its first phase
+    /// on; the plan refuses scans for which the memory does not do. Said by what the [first
+    /// phase](crate::stage::ScanOp::gather_needs) needs.
+    #[must_use]
+    pub fn holds(mut self, bytes: usize) -> Self {
+        self.of_scan += bytes;
+        self
+    }
+
+    /// And it holds so many bytes then besides, whatever the scan.
+    #[must_use]
+    pub fn holds_besides(mut self, bytes: u64) -> Self {
+        self.of_any_scan = self.of_any_scan.saturating_add(bytes);
+        self
+    }
+
     /// And it decides about the points of cells together, of a side of so many lattice steps (0
     /// while that is not settled); `aligned` if they are octree nodes.
     #[must_use]
@@ -175,6 +197,15 @@ impl Needs {
     pub fn measures(mut self) -> Self {
         self.measures = true;
         self
+    }
+
+    /// And it moves points: each record that it decides about is written, and measured in the
+    /// report, where the column [`SHIFT`] that it computes takes it. Positions go to whole steps of
+    /// the lattice within the box of the scan. No stage that works on tiles can stand behind it,
+    /// since all of them work on the positions that were read.
+    #[must_use]
+    pub fn moves(self) -> Self {
+        Needs { moves: true, ..self.writes(&SHIFT) }
     }
 
     /// The names of all that it reads, for a plan that is shown.

@@ -43,7 +43,7 @@ pub trait OpenSource: Send + Sync {
 /// use pointmill::stage::OpenSource;
 /// use pointmill::synth::{Scene, Synthetic};
 ///
-/// let scan = Synthetic { scene: Scene::Plane, points: 10_000, seed: 0, noise: None };
+/// let scan = Synthetic { scene: Scene::Plane, points: 10_000, ..Synthetic::default() };
 /// let source = scan.open()?;
 /// let (mut batch, mut count) = (PointBatch::new(source.schema().clone(), 4096), 0);
 /// // Parts are independent of each other: threads may share them out.

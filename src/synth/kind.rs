@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, de};
 
+use super::front::{Front, NoiseIn, SquaresProjection};
 use super::scene::Scene;
 use super::synthetic::Synthetic;
 use crate::Result;
@@ -24,6 +25,26 @@ pub struct Synth {
     #[serde(default, deserialize_with = "some_length")]
     #[schemars(range(min = 0))]
     pub noise: Option<f64>,
+    /// What squares are projected on.
+    #[serde(default)]
+    pub front: Front,
+    /// Of projected squares: where their noise goes.
+    #[serde(default)]
+    pub noise_in: NoiseIn,
+    /// Of projected squares: the share of points that are far from the front, 0 to 1: 10 to 60 mm
+    /// above or below it. Their `UserData` is 255.
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 1))]
+    pub outliers: f64,
+}
+
+/// A plane without points: what is not said of a scan.
+impl Default for Synth {
+    fn default() -> Self {
+        let Synthetic { scene, points, seed, noise, projection } = Synthetic::default();
+        let SquaresProjection { front, noise_in, outliers } = projection;
+        Synth { scene, points, seed, noise, front, noise_in, outliers }
+    }
 }
 
 impl StageKind for Synth {
@@ -34,8 +55,9 @@ impl StageKind for Synth {
     const MAIN: Option<&'static str> = Some("scene");
 
     fn build(self, _at: &StagePlace) -> Result<Role> {
-        let Synth { scene, points, seed, noise } = self;
-        Ok(Role::Source(Box::new(Synthetic { scene, points, seed, noise })))
+        let Synth { scene, points, seed, noise, front, noise_in, outliers } = self;
+        let projection = SquaresProjection { front, noise_in, outliers };
+        Ok(Role::Source(Box::new(Synthetic { scene, points, seed, noise, projection })))
     }
 }
 

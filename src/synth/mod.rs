@@ -3,6 +3,7 @@
 //! which part. Knows no files.
 
 mod als;
+mod front;
 mod kind;
 mod landscape;
 mod part;
@@ -16,6 +17,7 @@ mod squares;
 mod synthetic;
 mod truth;
 
+pub use front::{Front, NoiseIn, SquaresProjection};
 pub use kind::Synth;
 #[cfg(feature = "testing")]
 pub(crate) use random::Random;

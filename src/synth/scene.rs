@@ -24,9 +24,8 @@ pub enum Scene {
     /// number of the octant: 1, 2 and 4 for negative x, y and z.
     Sphere,
     /// The paper's experiment: squares of 60 × 60 pixels at random places of a window of 1200 ×
-    /// 1600, projected on the front of an object, a point for each. The object is ours, the paper
-    /// names none: 120 × 160 mm with two planes that meet in an edge, and a dome. `UserData` is the
-    /// number of the face.
+    /// 1600, projected on the `front` of an object of 120 × 160 mm, a point for each. The objects
+    /// are ours, the paper names none. `UserData` is the number of the face.
     SquaresRandom,
     /// The same with the squares on a grid, 60 pixels apart and 520 a run, each run 2 pixels
     /// further in x; after 30 runs also 2 pixels lower. `PointSourceId` is the number of the run.
@@ -72,7 +71,7 @@ impl Scene {
     }
 
     /// The true surface nearest to the world coordinates `p`, where it has a closed form (all
-    /// but `als`).
+    /// but `als`); of projected squares that of the front `relief`.
     pub fn truth(self, p: [f64; 3]) -> Option<Truth> {
         match self {
             Scene::Plane => Some(plane::truth(p)),

@@ -1,10 +1,10 @@
 //! The experiment of the paper that the method comes from: squares projected on the front of a test
 //! object, one point for the centre of each. Of the object and the noise the paper says nothing;
-//! the object is [`relief`], a pixel a tenth of a millimetre, and the noise is in depth.
+//! what they are says a [`SquaresProjection`]. A pixel is a tenth of a millimetre.
 
+use super::front::SquaresProjection;
 use super::random::{Random, key};
 use super::record::{STRIDE, SceneRecord, stored};
-use super::relief;
 
 /// World units (millimetres) of a stored step, and of a pixel.
 pub const SCALE: f64 = 1e-4;
@@ -35,11 +35,12 @@ pub struct SquaresScene {
     pattern: Pattern,
     key: u64,
     noise: f64,
+    projection: SquaresProjection,
 }
 
 impl SquaresScene {
-    pub fn new(pattern: Pattern, seed: u64, noise: f64) -> Self {
-        SquaresScene { pattern, key: key(seed, 0x72), noise }
+    pub fn new(pattern: Pattern, seed: u64, noise: f64, projection: SquaresProjection) -> Self {
+        SquaresScene { pattern, key: key(seed, 0x72), noise, projection }
     }
 
     /// Makes the points from number `first` on.
@@ -51,11 +52,10 @@ impl SquaresScene {
                 Pattern::Uniform => on_the_grid(index),
             };
             let plan = pixels.map(|v| v * PIXEL);
-            let (face, height) = relief::height(plan);
-            let position = [plan[0], plan[1], height + self.noise * random.gaussians()[0]];
+            let (face, position) = self.projection.point(plan, self.noise, &mut random);
             SceneRecord {
                 intensity: 1000,
-                user_data: face as u8,
+                user_data: face,
                 point_source_id: run + 1,
                 ..SceneRecord::single(stored(position, PER_UNIT), index as f64 * 1e-6)
             }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use super::front::SquaresProjection;
 use super::scene::Scene;
 use super::{als, part, plane, record, sphere, squares};
 use crate::io::las;
@@ -28,6 +29,16 @@ pub struct Synthetic {
     pub seed: u64,
     /// Standard deviation of the noise in world units, 0 to 1000; the scene's own if None.
     pub noise: Option<f64>,
+    /// Of projected squares: on what they are projected, and how they are seen.
+    pub projection: SquaresProjection,
+}
+
+/// A plane without points: what is not said of a scan.
+impl Default for Synthetic {
+    fn default() -> Self {
+        let (scene, projection) = (Scene::Plane, SquaresProjection::default());
+        Synthetic { scene, points: 0, seed: 0, noise: None, projection }
+    }
 }
 
 impl OpenSource for Synthetic {
@@ -43,6 +54,7 @@ impl OpenSource for Synthetic {
                 format!("the noise of a synthetic scan is 0 to {MOST_NOISE}, not {noise}");
             return Err(Error::pipeline(message));
         }
+        self.check_projection()?;
         let (surface, scale, origin) = Surface::of(self, noise);
         let schema = las::layout(record::FORMAT, &[], [scale; 3], origin);
         Ok(Box::new(Scan {
@@ -51,6 +63,27 @@ impl OpenSource for Synthetic {
             points: self.points,
             surface,
         }))
+    }
+}
+
+impl Synthetic {
+    /// Refuses what is said of a projection where there is none, and shares that are none.
+    fn check_projection(&self) -> Result<()> {
+        let SquaresProjection { outliers, .. } = self.projection;
+        if !(0.0..=1.0).contains(&outliers) {
+            let told = format!("`synth.outliers` is a share of the points, 0 to 1, not {outliers}");
+            return Err(Error::pipeline(told));
+        }
+        let is_projected = matches!(self.scene, Scene::SquaresRandom | Scene::SquaresUniform);
+        if is_projected || self.projection == SquaresProjection::default() {
+            return Ok(());
+        }
+        let told = format!(
+            "`synth.front`, `synth.noise_in` and `synth.outliers` are of projected squares, and \
+             the scene is `{}`",
+            self.scene
+        );
+        Err(Error::pipeline(told).help("take squares-random or squares-uniform, or leave them out"))
     }
 }
 
@@ -76,7 +109,7 @@ impl Surface {
     fn of(scan: &Synthetic, noise: f64) -> (Surface, f64, [f64; 3]) {
         let (points, seed) = (scan.points, scan.seed);
         let squares = |pattern| {
-            let squares = squares::SquaresScene::new(pattern, seed, noise);
+            let squares = squares::SquaresScene::new(pattern, seed, noise, scan.projection);
             (Surface::Squares(squares), squares::SCALE, [0.0; 3])
         };
         match scan.scene {

@@ -6,7 +6,7 @@ use crate::point::{PointBatch, names};
 use crate::stage::{OpenSource, Source};
 
 fn synthetic(scene: Scene, points: u64) -> Synthetic {
-    Synthetic { scene, points, seed: 7, noise: None }
+    Synthetic { scene, points, seed: 7, noise: None, ..Synthetic::default() }
 }
 
 /// All records, part after part, by batches of `capacity`.

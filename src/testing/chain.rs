@@ -7,7 +7,7 @@ use super::watched::watched;
 use super::witness::Witness;
 use crate::graph::{Graph, RunSettings};
 use crate::language::Registry;
-use crate::point::{ColumnKind, Mark};
+use crate::point::{ColumnKind, Mark, names};
 use crate::report::Tally;
 use crate::stage::{CreateSink, Needs, OpenSource, Role, RoleName, StageKind, StagePlace, TileOp};
 use crate::tile::Tile;
@@ -157,8 +157,11 @@ impl DeclaredNeeds {
         let mark = needs.mark.map(Mark::dimension).map(str::to_owned);
         self.looked_at.extend(needs.dimensions.iter().chain(&needs.if_there).cloned());
         self.looked_at.extend(needs.reads.iter().map(|kind| kind.name().to_owned()));
-        self.looked_at.extend(needs.changes.iter().chain(&mark).cloned());
-        self.changed.extend(needs.changes.iter().chain(&mark).cloned());
+        let moved = names::XYZ.iter().chain([&names::SYNTHETIC]).filter(|_| needs.moves);
+        let moved: Vec<String> = moved.map(|name| (*name).to_owned()).collect();
+        let changed = || needs.changes.iter().chain(&mark).chain(&moved).cloned();
+        self.looked_at.extend(changed());
+        self.changed.extend(changed());
         self.record_numbers |= needs.record_numbers;
         self.whole_records |= needs.whole_records;
     }

@@ -266,7 +266,11 @@ impl AnyScanOp for WatchedStage<dyn AnyScanOp> {
     }
 
     fn conclude_from(&mut self, stored: &dyn StoredSummaries) -> Result<Option<String>> {
-        let concluded = measured(|| self.stage.conclude_from(stored));
-        self.besides(concluded)
+        let Needs { of_scan, of_any_scan, bytes_per_point, .. } = self.stage.gather_needs();
+        // What tiles take is free by then, and does for reading what was gathered of one.
+        let of_scan = of_scan + bytes_per_point;
+        let (outcome, bytes) = measured(|| self.stage.conclude_from(stored));
+        self.witness.took_of_scan(stored.records(), (of_scan, of_any_scan), bytes);
+        outcome
     }
 }

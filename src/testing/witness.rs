@@ -63,6 +63,13 @@ impl Witness {
         self.enter(taken, FREE_OF_STREAM);
     }
 
+    /// Enters what a call took that concludes about `points`, and whose stage declares so many
+    /// bytes for each of them and besides.
+    pub fn took_of_scan(&self, points: u64, (each, besides): (usize, u64), taken_bytes: u64) {
+        let declared_bytes = points.saturating_mul(each as u64).saturating_add(besides);
+        self.enter(MemoryTaken { points, declared_bytes, taken_bytes }, FREE_OF_STREAM);
+    }
+
     fn enter(&self, taken: MemoryTaken, free: u64) {
         if !self.measures {
             return;

@@ -12,7 +12,7 @@ const LARGEST: u64 = 60 << 10;
 
 /// A stage, what its example shows, and the pipeline behind `read scan.laz ! `. Those with a
 /// picture write `after.laz`.
-const EXAMPLES: [(&str, &str, &str); 20] = [
+const EXAMPLES: [(&str, &str, &str); 25] = [
     ("read", "Two files become one.", "write copy.laz"),
     ("synth", "A made-up scan of 5,000 points.", "synth als points=5k ! write made.laz"),
     ("merge", "Two sources are one scan.", "merge from=[a,b] ! write both.laz"),
@@ -79,6 +79,31 @@ const EXAMPLES: [(&str, &str, &str); 20] = [
         "sample",
         "What stays is at least 2 from all else that stays.",
         "sample distance=2 ! write after.laz",
+    ),
+    (
+        "smooth",
+        "Every point goes to the mean of its neighbourhood, unless that is more than a metre away.",
+        "smooth max_distance=1 ! write smooth.laz",
+    ),
+    (
+        "gaussian-image",
+        "Where normals agree a point stays, in the middle of those that it stands for.",
+        "normals ! gaussian-image side=4 ! median pick=centroid ! write after.laz",
+    ),
+    (
+        "scanline",
+        "Of each scan line those points stay that tell the others within 20 cm.",
+        "scanline max_distance=0.2 ! write after.laz",
+    ),
+    (
+        "wavelet",
+        "A tenth of the points stays, more of them where depths change.",
+        "wavelet keep=10% pixels=128 ! write after.laz",
+    ),
+    (
+        "fourier",
+        "A tenth of the points stays, in rows, at the depths of the low waves.",
+        "fourier keep=10% pixels=128 ! write after.laz",
     ),
     ("write", "A LAZ file becomes a PLY text.", "write copy.ply encoding=ascii"),
 ];

@@ -142,7 +142,8 @@ fn in_one_row(points: &[[f64; 3]], k: usize) -> f64 {
 
 #[test]
 fn ten_neighbours_of_many_uniform_squares_lie_in_one_row_and_forty_do_not() {
-    let scan = |scene| Synthetic { scene, points: 5500, seed: 0, noise: None };
+    let scan =
+        |scene| Synthetic { scene, points: 5500, seed: 0, noise: None, ..Synthetic::default() };
     let uniform = positions(&scan(Scene::SquaresUniform));
     assert!(in_one_row(&uniform, 10) > 0.99);
     assert_eq!(in_one_row(&uniform, 40), 0.0);

@@ -5,4 +5,5 @@ mod columns;
 mod exact;
 mod limits;
 mod lossless;
+mod measured;
 mod same_bytes;

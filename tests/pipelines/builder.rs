@@ -22,7 +22,13 @@ fn grid(side: f64) -> Grid {
 
 fn scan(folder: &Path) -> String {
     let scan = folder.join("in.las");
-    let source = Synthetic { scene: Scene::Als, points: 20_000, seed: 1, noise: None };
+    let source = Synthetic {
+        scene: Scene::Als,
+        points: 20_000,
+        seed: 1,
+        noise: None,
+        ..Synthetic::default()
+    };
     run(Graph::builder().source(source).write(&scan));
     scan.display().to_string()
 }

@@ -21,7 +21,13 @@ pub(super) fn pipelines() -> Vec<PathBuf> {
 /// A small airborne scan in `folder`, as LAZ; and an area that cuts it.
 pub(super) fn inputs(folder: &Path) -> (String, String) {
     let scan = folder.join("scan.laz");
-    let source = Synthetic { scene: Scene::Als, points: 12_000, seed: 2, noise: None };
+    let source = Synthetic {
+        scene: Scene::Als,
+        points: 12_000,
+        seed: 2,
+        noise: None,
+        ..Synthetic::default()
+    };
     let graph = Graph::builder().source(source).write(&scan).build().unwrap();
     graph.plan(&Overrides::default()).unwrap().run(&Quiet).unwrap();
     let about = pointmill::io::describe(&scan, Registry::builtin().formats()).unwrap();

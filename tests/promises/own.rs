@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pointmill::ops::normals::Normals;
 use pointmill::ops::{
-    Assign, Cells, Crop, Cut, Drop, Filter, Graded, Grid, Median, Outliers, Sample, Stats, Tap,
-    Transformation,
+    Assign, Cells, Crop, Cut, Drop, Filter, Fourier, GaussianImage, Graded, Grid, Median, Outliers,
+    Sample, Scanline, Smooth, Stats, Tap, Transformation, Wavelet,
 };
 use pointmill::point::Column;
 use pointmill::report::Tally;
@@ -84,6 +84,15 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
             ],
         ),
         (
+            "smooth",
+            vec![
+                check::<Smooth>(json!({ "neighbors": 6 })),
+                check::<Smooth>(json!({
+                    "neighbors": 9, "pick": "median", "within": 3.0, "max_distance": 0.5,
+                })),
+            ],
+        ),
+        (
             "normals",
             vec![
                 check::<Normals>(json!({ "neighbors": 6 })),
@@ -106,6 +115,43 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
             ],
         ),
         (
+            "gaussian-image",
+            vec![
+                check::<GaussianImage>(json!({ "side": 2.0, "parts": 3 }))
+                    .after(normals())
+                    .before(Median::default()),
+                check::<GaussianImage>(json!({}))
+                    .after(of::<Normals>(json!({ "neighbors": 6, "orient": "up" })))
+                    .before(Median::default()),
+            ],
+        ),
+        (
+            "wavelet",
+            vec![
+                check::<Wavelet>(json!({ "keep": "20%", "pixels": 16 })),
+                check::<Wavelet>(json!({
+                    "keep": 30, "pixels": 64, "axis": "x", "moves": false
+                })),
+            ],
+        ),
+        (
+            "fourier",
+            vec![
+                check::<Fourier>(json!({ "keep": "20%", "pixels": 16, "axis": "y" })),
+                check::<Fourier>(json!({ "keep": 30, "pixels": 64, "moves": false })),
+            ],
+        ),
+        (
+            "scanline",
+            vec![
+                check::<Scanline>(json!({ "max_distance": 0.3 })),
+                check::<Scanline>(json!({
+                    "max_distance": 2.0, "max_angle": "40deg", "gap": 1.5,
+                    "lines": ["source", "channel"],
+                })),
+            ],
+        ),
+        (
             "cut",
             vec![
                 check::<Cut>(json!({ "keep": "30%" })).after(Ranks {}),
@@ -117,6 +163,7 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
             vec![
                 check::<Median>(json!({})).after(normals()).after(cells()),
                 check::<Median>(json!({ "pick": "center" })).after(normals()).after(cells()),
+                check::<Median>(json!({ "pick": "centroid" })).after(normals()).after(cells()),
             ],
         ),
         (
@@ -178,8 +225,9 @@ fn assert_kept(kinds: &[&str]) {
 }
 
 const STREAM: [&str; 7] = ["assign", "crop", "drop", "filter", "stats", "tap", "transform"];
-const SELECT: [&str; 3] = ["grid", "outliers", "sample"];
-const REDUCE: [&str; 5] = ["cells", "cut", "graded", "median", "normals"];
+const SELECT: [&str; 7] =
+    ["fourier", "grid", "outliers", "sample", "scanline", "smooth", "wavelet"];
+const REDUCE: [&str; 6] = ["cells", "cut", "gaussian-image", "graded", "median", "normals"];
 const ENDS: [&str; 5] = ["discard", "merge", "read", "synth", "write"];
 
 #[test]

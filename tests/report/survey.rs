@@ -44,7 +44,7 @@ fn survey(records: &[Record], level: u32, threads: usize) -> Result<(Vec<TileFig
     let same = |a: &Record, b: &Record| TileKey::around(a.0, level) == TileKey::around(b.0, level);
     for (i, tile) in records.chunk_by(same).enumerate() {
         let part = &mut parts[i % threads];
-        let mut survey = part.tile(TileKey::around(tile[0].0, level));
+        let mut survey = part.tile(TileKey::around(tile[0].0, level), false);
         tile.iter().for_each(|&(p, n, fate)| survey.add(p, Lot::of(n, fate)));
         tile.iter().for_each(|&(p, n, fate)| part.add(p, Lot::of(n, fate)));
         let mut fitted = survey.fit();
@@ -187,7 +187,7 @@ fn nothing_surveyed_is_nothing_reported() {
 #[test]
 fn a_second_walk_that_misses_records_is_told() {
     let mut scan = ScanSurvey::new(&Bounds::of([[1, 2, 3]]));
-    let mut tile = scan.tile(TileKey::around([0; 3], 4));
+    let mut tile = scan.tile(TileKey::around([0; 3], 4), false);
     tile.add([1, 2, 3], Lot::of(5, Fate::KeptOnce));
     let error = tile.fit().finish(&lattice(1.0), &mut scan).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Internal);
@@ -198,7 +198,7 @@ fn a_second_walk_that_misses_records_is_told() {
 fn a_scan_that_misses_what_its_tiles_saw_is_told() {
     let (p, fate) = ([1, 2, 3], represented(1.0));
     let mut scan = ScanSurvey::new(&Bounds::of([p]));
-    let mut tile = scan.tile(TileKey::around(p, 4));
+    let mut tile = scan.tile(TileKey::around(p, 4), false);
     tile.add(p, Lot::of(5, fate));
     let mut tile = tile.fit();
     tile.measure(p, Lot::of(5, fate));

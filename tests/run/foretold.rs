@@ -13,7 +13,7 @@ use pointmill::synth::{Scene, Synthetic};
 use pointmill::{ErrorKind, Graph, GraphBuilder, Overrides, Plan, Quiet, Watch};
 
 fn scan() -> Synthetic {
-    Synthetic { scene: Scene::Als, points: 30_000, seed: 4, noise: None }
+    Synthetic { scene: Scene::Als, points: 30_000, seed: 4, noise: None, ..Synthetic::default() }
 }
 
 fn planned(builder: GraphBuilder) -> Plan {

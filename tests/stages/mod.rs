@@ -9,6 +9,7 @@ mod graded;
 mod graded_beside;
 mod graded_choices;
 mod grid;
+mod moved;
 mod orders;
 mod outliers;
 mod reduce_auto;

@@ -21,7 +21,8 @@ pub struct Scan {
 impl Scan {
     /// A scan that is made up.
     pub fn synthetic(scene: Scene, points: u64, seed: u64) -> Scan {
-        let source = Synthetic { scene, points, seed, noise: None }.open().unwrap();
+        let source =
+            Synthetic { scene, points, seed, noise: None, ..Synthetic::default() }.open().unwrap();
         Scan::of(&*source, usize::MAX)
     }
 

@@ -32,19 +32,19 @@ impl Cells {
 }
 
 /// A tile's positions, to be grouped by the cube of side `side` that they are in.
-pub(super) struct Grouping<'a> {
-    pub(super) tile: &'a Tile,
-    pub(super) normals: &'a [[f32; 3]],
-    pub(super) side: i64,
+pub(in crate::ops) struct Grouping<'a> {
+    pub(in crate::ops) tile: &'a Tile,
+    pub(in crate::ops) normals: &'a [[f32; 3]],
+    pub(in crate::ops) side: i64,
     /// True if positions of different classes are in different cells.
-    pub(super) by_class: bool,
+    pub(in crate::ops) by_class: bool,
 }
 
 impl Grouping<'_> {
     /// Makes each cell with a core position a group of `cells`: the chosen positions of it that
     /// have a normal, in Morton order. Returns how many groups have positions on both sides of a
     /// face of the tile.
-    pub(super) fn run(&self, cells: &mut Partition) -> u64 {
+    pub(in crate::ops) fn run(&self, cells: &mut Partition) -> u64 {
         if self.tile.core.is_empty() {
             return 0;
         }
