@@ -171,6 +171,18 @@ pub enum Role {
 }
 
 impl Role {
+    /// The files that say what it does, each with the key that names it; those that a source reads
+    /// and a sink writes are theirs to tell.
+    pub(crate) fn files(&self) -> Vec<(&'static str, PathBuf)> {
+        match self {
+            Role::Transform(stage) => stage.files(),
+            Role::TileOp(stage) => stage.files(),
+            Role::ScanOp(stage) => stage.files(),
+            Role::RoundOp(stage) => stage.files(),
+            Role::Source(_) | Role::Sink(_) | Role::Merge => Vec::new(),
+        }
+    }
+
     /// Which it is.
     pub fn name(&self) -> RoleName {
         match self {

@@ -20,7 +20,6 @@ use crate::host::lock;
 use crate::io::note;
 use crate::language::{PipelineText, Registry};
 use crate::report::Grouped;
-use crate::stage::Role;
 use crate::{Error, ErrorKind, Result};
 
 /// The version of this program.
@@ -177,11 +176,7 @@ fn again(
     let made = run.made(&folder).map_err(|error| error.at(output))?;
     let graph = PipelineText::new(pipeline, "").graph(registry, &[]).and_then(|graph| {
         let known = |(_, file): &(_, PathBuf)| found.values().any(|found| found == file);
-        let files = |role: &Role| match role {
-            Role::Transform(transform) => transform.files(),
-            _ => Vec::new(),
-        };
-        let untold = graph.stages.iter().flat_map(|stage| files(&stage.role)).find(|f| !known(f));
+        let untold = graph.stages.iter().flat_map(|stage| stage.role.files()).find(|f| !known(f));
         untold.map_or(Ok(graph), |_| Err(Error::pipeline("it reads what it does not say")))
     });
     let graph = graph.map_err(|error| untried(of_version(error, run).at(output)))?;

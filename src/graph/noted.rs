@@ -61,13 +61,12 @@ impl NotedGraph {
                         noted.reads(n, "path", &paths)?;
                     }
                 }
-                Role::Transform(transform) => {
-                    for (key, path) in transform.files() {
+                Role::Sink(sink) => noted.writes(n, &**sink)?,
+                role => {
+                    for (key, path) in role.files() {
                         noted.reads(n, key, &[path])?;
                     }
                 }
-                Role::Sink(sink) => noted.writes(n, &**sink)?,
-                _ => {}
             }
         }
         Some(noted)

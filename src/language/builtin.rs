@@ -7,7 +7,7 @@ use crate::io::ply::PLY;
 use crate::ops::normals::Normals;
 use crate::ops::{
     Assign, Cells, Crop, Cut, Drop, Filter, Fourier, GaussianImage, Graded, Grid, Median, Merge,
-    Outliers, Sample, Scanline, Smooth, Stats, Tap, Transformation, Wavelet,
+    Orientation, Outliers, Sample, Scanline, Smooth, Stats, Tap, Transformation, Wavelet,
 };
 use crate::synth::Synth;
 
@@ -30,6 +30,7 @@ impl Registry {
             .with::<Outliers>()
             .with::<Smooth>()
             .with::<Normals>()
+            .with::<Orientation>()
             .with::<Cells>()
             .with::<GaussianImage>()
             .with::<Median>()

@@ -32,8 +32,9 @@ const MOST_PIXELS: u64 = 8192;
 const PIXELS: Pixels = Whole::of(1024);
 /// Bytes that a position of the scan takes while the image is looked at, and then.
 const HELD_BYTES: usize = size_of::<Position>() + size_of::<Decided>();
-/// Bytes of a pixel besides: depths before and after, its block, and the point of that.
-const PIXEL_BYTES: usize = 2 * size_of::<f64>() + 2 * size_of::<u32>();
+/// Bytes of a pixel while the most is held of it: its depth, whether it has points, and the means
+/// of the squares around it, a third more than pixels.
+const PIXEL_BYTES: usize = 32;
 
 /// How many pixels an image has along its side.
 pub type Pixels = Whole<FEWEST_PIXELS, MOST_PIXELS>;
@@ -42,11 +43,11 @@ pub type Pixels = Whole<FEWEST_PIXELS, MOST_PIXELS>;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Axis {
-    /// x
+    /// Along x: the image has y and z.
     X,
-    /// y
+    /// Along y: the image has z and x.
     Y,
-    /// z
+    /// Along z: the image has x and y.
     #[default]
     Z,
 }
@@ -56,8 +57,6 @@ trait Transformed: Send + Sync {
     const KIND: &'static str;
     /// The count of records that it moves, in the report.
     const MOVED: &'static str;
-    /// Bytes that it takes for a pixel.
-    const PIXEL_BYTES: usize;
 
     /// Transforms an image, of whose pixels those that `is_there` have points; drops of the
     /// transform what must go for `most` blocks with points, and transforms it back.
@@ -176,10 +175,9 @@ impl<T: Transformed> ScanOp for ImageReduction<T> {
     type Summary = Rows<()>;
 
     fn gather_needs(&self) -> Needs {
-        let pixels = (self.side * self.side) as u64;
-        let each = DepthSums::BYTES + PIXEL_BYTES + T::PIXEL_BYTES;
+        let pixels = (self.side * self.side * PIXEL_BYTES) as u64;
         let needs = Needs::none().looks_at(names::XYZ).bytes_per_point(2 * Rows::<()>::BYTES);
-        needs.holds(HELD_BYTES).holds_besides(pixels * each as u64)
+        needs.holds(HELD_BYTES).holds_besides(pixels)
     }
 
     fn gather(&self, tile: &mut Tile, _: &mut Tally) -> Result<Rows<()>> {

@@ -28,7 +28,7 @@ pub use estimate::Method;
 pub(crate) use estimate::{Estimate, EstimateOutcome, Fallback};
 pub(crate) use estimator::Estimator;
 pub use orient::Orient;
-use orient::SignRule;
+pub(in crate::ops) use orient::SignRule;
 use shape::AskedShapes;
 
 /// Most neighbours that the stage takes.

@@ -33,10 +33,19 @@ impl<T: Pod> Rows<T> {
 
     /// Those of a tile's core that the stage decides about, with their values.
     pub fn of_core(tile: &Tile, value: impl Fn(usize) -> T) -> Self {
+        Rows::of_core_where(tile, |_| true, value)
+    }
+
+    /// Those of them for which a condition holds.
+    pub fn of_core_where(
+        tile: &Tile,
+        holds: impl Fn(usize) -> bool,
+        value: impl Fn(usize) -> T,
+    ) -> Self {
         let mut rows = Rows::default();
-        let count = tile.core.clone().filter(|&i| tile.is_chosen(i)).count();
-        rows.reserve(count);
-        for i in tile.core.clone().filter(|&i| tile.is_chosen(i)) {
+        let chosen = || tile.core.clone().filter(|&i| tile.is_chosen(i) && holds(i));
+        rows.reserve(chosen().count());
+        for i in chosen() {
             rows.positions.push(tile.positions[i]);
             rows.values.push(value(i));
         }
@@ -89,6 +98,12 @@ impl<T: Pod> Rows<T> {
             next = Some(at + 1);
         }
         Ok(())
+    }
+
+    /// The value of a position, if it has one.
+    pub fn value(&self, p: Position) -> Option<T> {
+        let at = self.positions.partition_point(|q| morton_cmp(q, &p).is_lt());
+        (self.positions.get(at) == Some(&p)).then(|| self.values[at])
     }
 
     /// The same positions with other values, one for each.

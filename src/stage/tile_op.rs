@@ -1,5 +1,7 @@
 //! Stages that work on tiles.
 
+use std::path::PathBuf;
+
 use super::needs::Needs;
 use crate::Result;
 use crate::geom::lattice::Lattice;
@@ -61,6 +63,12 @@ pub trait TileOp: Send + Sync {
     /// The lengths that it was given, each with its key as in `grid.side`: those that the lattice
     /// cannot hold are refused before the work, and the report says what others were converted to.
     fn lengths(&self) -> Vec<(&'static str, Length)> {
+        Vec::new()
+    }
+
+    /// The files that say what it does, each with the key that names it: outputs note their hashes,
+    /// as those of the inputs.
+    fn files(&self) -> Vec<(&'static str, PathBuf)> {
         Vec::new()
     }
 

@@ -188,6 +188,10 @@ impl<S: TileOp + ?Sized> TileOp for WatchedStage<S> {
         self.stage.lengths()
     }
 
+    fn files(&self) -> Vec<(&'static str, PathBuf)> {
+        self.stage.files()
+    }
+
     fn for_share(&mut self, share: f64) {
         self.stage.for_share(share);
     }

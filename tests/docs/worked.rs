@@ -12,7 +12,7 @@ const LARGEST: u64 = 60 << 10;
 
 /// A stage, what its example shows, and the pipeline behind `read scan.laz ! `. Those with a
 /// picture write `after.laz`.
-const EXAMPLES: [(&str, &str, &str); 25] = [
+const EXAMPLES: [(&str, &str, &str); 26] = [
     ("read", "Two files become one.", "write copy.laz"),
     ("synth", "A made-up scan of 5,000 points.", "synth als points=5k ! write made.laz"),
     ("merge", "Two sources are one scan.", "merge from=[a,b] ! write both.laz"),
@@ -84,6 +84,11 @@ const EXAMPLES: [(&str, &str, &str); 25] = [
         "smooth",
         "Every point goes to the mean of its neighbourhood, unless that is more than a metre away.",
         "smooth max_distance=1 ! write smooth.laz",
+    ),
+    (
+        "orient",
+        "Normals look to where the sensor was, by the scan angle.",
+        "normals ! orient by=scan-angle ! write seen.laz dimensions=[NormalX,NormalY,NormalZ]",
     ),
     (
         "gaussian-image",

@@ -1,11 +1,12 @@
 //! The stages that pointmill has, each by some of its keys.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 
 use pointmill::ops::normals::Normals;
 use pointmill::ops::{
-    Assign, Cells, Crop, Cut, Drop, Filter, Fourier, GaussianImage, Graded, Grid, Median, Outliers,
-    Sample, Scanline, Smooth, Stats, Tap, Transformation, Wavelet,
+    Assign, Cells, Crop, Cut, Drop, Filter, Fourier, GaussianImage, Graded, Grid, Median,
+    Orientation, Outliers, Sample, Scanline, Smooth, Stats, Tap, Transformation, Wavelet,
 };
 use pointmill::point::Column;
 use pointmill::report::Tally;
@@ -46,6 +47,13 @@ impl StageKind for Ranks {
     fn build(self, _: &StagePlace) -> Result<Role> {
         Ok(Role::TileOp(Box::new(self)))
     }
+}
+
+/// A file of where a sensor was, for the time of the tests.
+fn trajectory() -> PathBuf {
+    let path = std::env::temp_dir().join(format!("pointmill-flight-{}.csv", std::process::id()));
+    std::fs::write(&path, "time,x,y,z\n-1e9,-9,0,30\n0.5,1,1,2\n1e9,40,7,-3\n").unwrap();
+    path
 }
 
 /// Scans that each stage is checked on.
@@ -112,6 +120,20 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
                 check::<Cells>(json!({ "side": 4.0, "split": "dirichlet", "seeds": 5 }))
                     .after(normals())
                     .before(Median::default()),
+            ],
+        ),
+        (
+            "orient",
+            vec![
+                check::<Orientation>(json!({ "by": "propagation", "neighbors": 4 }))
+                    .after(normals()),
+                check::<Orientation>(json!({ "by": "propagation" }))
+                    .after(normals())
+                    .before(cells())
+                    .before(Median::default()),
+                check::<Orientation>(json!({ "by": "scan-angle" })).after(normals()),
+                check::<Orientation>(json!({ "by": "trajectory", "file": trajectory() }))
+                    .after(normals()),
             ],
         ),
         (
@@ -227,7 +249,8 @@ fn assert_kept(kinds: &[&str]) {
 const STREAM: [&str; 7] = ["assign", "crop", "drop", "filter", "stats", "tap", "transform"];
 const SELECT: [&str; 7] =
     ["fourier", "grid", "outliers", "sample", "scanline", "smooth", "wavelet"];
-const REDUCE: [&str; 6] = ["cells", "cut", "gaussian-image", "graded", "median", "normals"];
+const REDUCE: [&str; 7] =
+    ["cells", "cut", "gaussian-image", "graded", "median", "normals", "orient"];
 const ENDS: [&str; 5] = ["discard", "merge", "read", "synth", "write"];
 
 #[test]

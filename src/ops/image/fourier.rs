@@ -26,7 +26,7 @@ use crate::stage::{Role, RoleName, StageKind, StagePlace};
 /// synthetic flag set where the format has one, the report counts them as `fourier_moved`, and no
 /// stage that works on tiles can stand behind this one, as behind `smooth`.
 ///
-/// Image and positions are in memory at once, 78 bytes a pixel and 40 a position; a scan that is
+/// Image and positions are in memory at once, 32 bytes a pixel and 40 a position; a scan that is
 /// too large for the run's memory is refused before any work.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -60,8 +60,6 @@ struct LowWaves;
 impl Transformed for LowWaves {
     const KIND: &'static str = "fourier";
     const MOVED: &'static str = "fourier_moved";
-    // Complex numbers of the image, and the cells that have points.
-    const PIXEL_BYTES: usize = size_of::<[f64; 2]>() + size_of::<u32>() + size_of::<bool>();
 
     fn reduce(image: &mut [f64], side: usize, is_there: &[bool], most: u64) -> Blocks {
         let cells = cells(side, is_there, most);

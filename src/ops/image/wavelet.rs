@@ -28,7 +28,7 @@ use crate::stage::{Role, RoleName, StageKind, StagePlace};
 /// stage that works on tiles can stand behind this one, as behind `smooth`.
 ///
 /// One looks at a surface from one side: what lies behind other points becomes one depth with them.
-/// Image and positions are in memory at once, 84 bytes a pixel and 40 a position; a scan that is
+/// Image and positions are in memory at once, 32 bytes a pixel and 40 a position; a scan that is
 /// too large for the run's memory is refused before any work.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -79,8 +79,6 @@ struct Quad {
 impl Transformed for Haar {
     const KIND: &'static str = "wavelet";
     const MOVED: &'static str = "wavelet_moved";
-    // Squares, a third as many as pixels, and those that have points in an order.
-    const PIXEL_BYTES: usize = size_of::<Quad>() + size_of::<(f64, u64)>();
 
     fn reduce(image: &mut [f64], side: usize, is_there: &[bool], most: u64) -> Blocks {
         haar(image, side, false);

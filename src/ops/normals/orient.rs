@@ -24,7 +24,7 @@ pub enum Orient {
 
 /// The rule by which signs are settled, on the lattice.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum SignRule {
+pub(in crate::ops) enum SignRule {
     /// Any.
     Any,
     /// Upwards.
@@ -35,7 +35,7 @@ pub(super) enum SignRule {
 
 impl SignRule {
     /// Towards `viewpoint`, in world units.
-    pub(super) fn towards(viewpoint: [f64; 3], lattice: &Lattice) -> SignRule {
+    pub(in crate::ops) fn towards(viewpoint: [f64; 3], lattice: &Lattice) -> SignRule {
         let stretched = [1.0, 1.0, lattice.z_scale()];
         let steps: [f64; 3] = std::array::from_fn(|axis| {
             (viewpoint[axis] - lattice.shift[axis]) * stretched[axis] / lattice.step
@@ -48,7 +48,7 @@ impl SignRule {
 
     /// `normal`, at position `p`, turned to the side. Comes with its canonical sign, which it keeps
     /// where it lies on the border.
-    pub(super) fn settled(&self, normal: [f32; 3], p: Position) -> [f32; 3] {
+    pub(in crate::ops) fn settled(&self, normal: [f32; 3], p: Position) -> [f32; 3] {
         let turned = match self {
             SignRule::Any => false,
             SignRule::Up => {
