@@ -81,7 +81,8 @@
 //! - [`synth`]: synthetic scans, and the stage `synth`.
 //! - [`ops`]: the stages that compute, select, move or look: `filter`, `drop`, `crop`, `sample`,
 //!   `assign`, `transform`, `stats`, `tap`, `merge`, `outliers`, `smooth`, `normals`, `orient`,
-//!   `cells`, `gaussian-image`, `median`, `graded`, `cut`, `grid`, `scanline`, `wavelet` and `fourier`.
+//!   `cells`, `gaussian-image`, `median`, `graded`, `cut`, `grid`, `scanline`,
+//!   `triangles`, `wavelet` and `fourier`.
 //! - [`picture`]: scans drawn from above or from a side, side by side.
 //! - [`graph`]: what a pipeline is, whoever wrote it: a [`Graph`] of stages.
 //! - [`PipelineText`]: a pipeline as it is written, in TOML, JSON or one line, with [`Parameter`]s.

@@ -76,6 +76,25 @@ def reduce(*options: str):
     return keep
 
 
+def read_positions(path: Path) -> np.ndarray:
+    import plyfile
+
+    vertex = plyfile.PlyData.read(path)["vertex"]
+    return np.stack([np.asarray(vertex[axis], np.float64) for axis in "xyz"], 1)
+
+
+def stages(job: Job, line: str, moved: bool = True) -> np.ndarray:
+    """What stages in one line leave: positions where points are moved, else places in the scene."""
+    scan, kept = job.file("in.ply"), job.file("out.ply")
+    write_ply(scan, job.points)
+    pipeline = f"read {scan} ! {line} ! write {kept}"
+    subprocess.run([str(job.pointmill), "run", pipeline, "--quiet"], check=True)
+    found = read_positions(kept) if moved else read_ids(kept)
+    scan.unlink()
+    kept.unlink()
+    return found
+
+
 # ---- what takes a few lines
 
 
@@ -182,7 +201,50 @@ def farthest(job: Job) -> np.ndarray:
     return job.tree.query(np.asarray(cloud.farthest_point_down_sample(job.count).points))[1]
 
 
+# ---- the methods that the paper is beside, and its own, as pointmill has them
+
+
+def by_side(line: str, moved: bool):
+    """Stages that keep the fewer the larger a side is."""
+
+    def keep(job: Job) -> np.ndarray:
+        def kept(side: float) -> np.ndarray:
+            return stages(job, line.format(side=side), moved=moved)
+
+        return matched(kept, job.count, 0.2 * job.side, 8 * job.side, 14, 0.005)[0]
+
+    return keep
+
+
+def averaged(job: Job) -> np.ndarray:
+    """Neighbourhood averaging, then a uniform grid."""
+    smooth = stages(job, "smooth neighbors=20")
+    return smooth[voxel_kept(smooth, voxel_side(smooth, job.count))]
+
+
+def by_count(line: str, moved: bool):
+    """Stages that take a number of points."""
+    return lambda job: stages(job, line.format(count=job.count), moved=moved)
+
+
+def every(job: Job) -> np.ndarray:
+    number = round(len(job.points) / job.count)
+    return stages(job, f"sample every={number}", moved=False)
+
+
 OURS = "graded"
+METHODS = {
+    "every nth": every,
+    "grid and median": by_side("grid side={side} pick=median", False),
+    "averaging, then grid": averaged,
+    "Gaussian image": by_side("normals ! gaussian-image side={side} ! median pick=centroid", True),
+    "paper, centre of mass": by_count(
+        "normals ! cells keep={count} ! median pick=centroid", True),
+    "paper, Dirichlet": by_count(
+        "normals ! cells keep={count} split=dirichlet ! median", False),
+    "wavelet": by_count("wavelet keep={count}", True),
+    "fourier": by_count("fourier keep={count}", True),
+}
 CONTENDERS = {
     OURS: reduce(),
     "pointmill paper": reduce("--preset", "paper"),
@@ -198,5 +260,9 @@ CONTENDERS = {
     "Open3D farthest": farthest,
     "CGAL WLOP": wlop,
 }
+# Measured at five shares, in results of their own: methods.jsonl.
+BESIDE_METHODS = (OURS, "pointmill paper", "voxel", "random", "CGAL hierarchy 0.03",
+                  "MeshLab simplify", "CGAL WLOP")
+ALL = CONTENDERS | METHODS
 # Time grows with the square of what is kept, or the point: not run above so many points.
 MOST = {"Open3D farthest": 3_000, "CGAL WLOP": 8_000}

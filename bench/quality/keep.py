@@ -7,11 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from contenders import CONTENDERS, MOST, Job
+from contenders import ALL, MOST, Job
 from scenes import Maker
 
 SHARES = (0.01, 0.03, 0.1)
 SEEDS = (0, 1)
+# Of the methods of the paper and who is beside them.
+METHOD_SHARES = (0.01, 0.02, 0.05, 0.1, 0.2)
+METHOD_SEEDS = (0,)
+METHOD_SCENES = ("part_clean", "part_noisy", "freeform", "roofs", "als", "village", "city")
 
 
 @dataclass
@@ -49,7 +53,7 @@ def keep_scene(bench: Bench, scene: str, seed: int, share: float, names: list[st
             continue
         start = time.monotonic()
         try:
-            kept = CONTENDERS[name](job)
+            kept = ALL[name](job)
         except Exception as error:
             print(f"{scene} {seed} {share:.0%} {name}: failed: {error!r:.300}", flush=True)
             continue

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from contenders import CONTENDERS
+from contenders import ALL, BESIDE_METHODS, CONTENDERS, METHODS
 from figures import Judge
-from keep import SEEDS, SHARES, Bench, keep_scene
+from keep import METHOD_SCENES, METHOD_SEEDS, METHOD_SHARES, SEEDS, SHARES, Bench, keep_scene
 from results import equal
 from scenes import SCENES, Maker
 
@@ -27,7 +27,7 @@ def rows(path: Path) -> dict[Cell, dict]:
 
 def write(path: Path, measured: dict[Cell, dict]) -> None:
     """A line a cell, in the order of the tables."""
-    scenes, names = list(SCENES), list(CONTENDERS)
+    scenes, names = list(SCENES), list(ALL)
     order = sorted(measured, key=lambda c: (scenes.index(c[0]), c[1], c[2], names.index(c[3])))
     part = path.with_suffix(".part")
     part.write_text("".join(json.dumps(measured[cell]) + "\n" for cell in order), encoding="utf-8")
@@ -56,10 +56,11 @@ def row(judge: Judge, points: np.ndarray, cell: Cell, found: dict) -> dict:
     return head | counts | {"seconds": round(found["seconds"], 1)} | short
 
 
-def measure_scene(bench: Bench, scene: str, seed: int, names: list[str], results: Path) -> None:
+def measure_scene(bench: Bench, scene: str, seed: int, shares: tuple[float, ...],
+                  names: list[str], results: Path) -> None:
     """Measures what is kept of a scene and not measured yet."""
     done = rows(results)
-    missing = [cell for share in SHARES for name in names
+    missing = [cell for share in shares for name in names
                if (cell := (scene, seed, share, name)) not in done]
     made = bench.maker.scene(scene, seed)
     kept = {cell: found for cell in missing if (found := kept_of(bench, cell, made.points))}
@@ -79,22 +80,24 @@ def options() -> argparse.Namespace:
     parser.add_argument("--scans", type=Path)
     parser.add_argument("--results", type=Path, required=True)
     parser.add_argument("--again", action="store_true")
-    parser.add_argument("--scenes", default=",".join(SCENES))
-    parser.add_argument("--contenders", default=",".join(CONTENDERS))
+    parser.add_argument("--methods", action="store_true")
+    parser.add_argument("--scenes")
+    parser.add_argument("--contenders")
     return parser.parse_args()
 
 
-def forget(bench: Bench, scenes: list[str], names: list[str], results: Path) -> None:
+def forget(bench: Bench, asked: tuple, results: Path) -> None:
     """Removes what is kept and measured of the chosen scenes by the chosen contenders."""
+    scenes, _, _, names = asked
     done = rows(results)
     for cell in [c for c in done if c[0] in scenes and c[3] in names]:
         del done[cell]
     write(results, done)
-    for cell in itertools.product(scenes, SEEDS, SHARES, names):
+    for cell in itertools.product(*asked):
         bench.kept_file(*cell).unlink(missing_ok=True)
 
 
-def chosen(text: str, known: dict) -> list[str]:
+def chosen(text: str, known) -> list[str]:
     names = text.split(",")
     if unknown := [name for name in names if name not in known]:
         sys.exit(f"{', '.join(unknown)}: not among {', '.join(known)}")
@@ -106,14 +109,17 @@ def main() -> None:
     (given.folder / "kept").mkdir(parents=True, exist_ok=True)
     maker = Maker(given.pointmill, given.scans, given.folder / "scenes")
     bench = Bench(given.pointmill, given.cgal, maker, given.folder)
-    names, scenes = chosen(given.contenders, CONTENDERS), chosen(given.scenes, SCENES)
+    shares, seeds = (METHOD_SHARES, METHOD_SEEDS) if given.methods else (SHARES, SEEDS)
+    names = (*BESIDE_METHODS, *METHODS) if given.methods else CONTENDERS
+    scenes = METHOD_SCENES if given.methods else SCENES
+    names = chosen(given.contenders, names) if given.contenders else list(names)
+    scenes = chosen(given.scenes, scenes) if given.scenes else list(scenes)
     if given.again:
-        forget(bench, scenes, names, given.results)
-    for scene in scenes:
-        for seed in SEEDS:
-            for share in SHARES:
-                keep_scene(bench, scene, seed, share, names)
-            measure_scene(bench, scene, seed, names, given.results)
+        forget(bench, (scenes, seeds, shares, names), given.results)
+    for scene, seed in itertools.product(scenes, seeds):
+        for share in shares:
+            keep_scene(bench, scene, seed, share, names)
+        measure_scene(bench, scene, seed, shares, names, given.results)
 
 
 if __name__ == "__main__":

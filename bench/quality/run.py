@@ -26,6 +26,8 @@ def options() -> argparse.Namespace:
     parser.add_argument("--contenders", help="only these, as a,b")
     parser.add_argument("--again", action="store_true",
                         help="run and measure what is chosen again, as after a change of graded")
+    parser.add_argument("--methods", action="store_true",
+                        help="the paper's method and those that it is beside, at five shares")
     parser.add_argument("--pointmill", type=Path, help="this program instead of one that is built")
     parser.add_argument("--cache", type=Path, default=ROOT / "target/quality",
                         help="where packages, scenes and what is kept of them go")
@@ -83,8 +85,9 @@ def main() -> None:
            cwd=HERE, env=environment)
     command = [interpreter, HERE / "measure.py", "--folder", cache, "--cgal", cgal(cache),
                "--pointmill", (given.pointmill or built()).resolve(),
-               "--results", HERE / "results.jsonl"]
+               "--results", HERE / ("methods.jsonl" if given.methods else "results.jsonl")]
     command += ["--again"] if given.again else []
+    command += ["--methods"] if given.methods else []
     for option, value in (("--scenes", given.scenes), ("--contenders", given.contenders),
                           ("--scans", os.environ.get("POINTMILL_SCANS"))):
         command += [option, value] if value else []

@@ -83,6 +83,19 @@ class Pages(unittest.TestCase):
         self.assertIn("in 1 cells: sphere at 3%, seed 0 (3.000)", text)
         self.assertNotIn("### 3% kept", text)
 
+    def test_where_the_paper_loses_is_said(self):
+        beside = self.folder / "methods.jsonl"
+        shares = (0.05, 0.1)
+        rows = [row(name, p99 * (1 + share), share=share) for share in shares
+                for name, p99 in (("pointmill paper", 2.0), ("voxel", 1.0), ("graded", 0.5),
+                                  ("every nth", 3.0), ("wavelet", 1.0))]
+        beside.write_text("".join(json.dumps(each) + "\n" for each in rows), encoding="utf-8")
+        files = self.files([row("graded", 1.0), row("voxel", 2.0)])
+        texts = draw.drawn(*files, beside)
+        self.assertIn("- sphere: at 5% (voxel); 10% (voxel)", texts["quality.md"])
+        self.assertIn("| every nth | 1.50 |", texts["quality.md"])
+        self.assertIn("<svg", texts["images/quality/methods.svg"])
+
     def test_the_check_finds_a_page_that_was_edited_or_is_missing(self):
         texts = draw.drawn(*self.files([row("graded", 1.0), row("voxel", 2.0)]))
         for name, text in texts.items():

@@ -7,7 +7,8 @@ use crate::io::ply::PLY;
 use crate::ops::normals::Normals;
 use crate::ops::{
     Assign, Cells, Crop, Cut, Drop, Filter, Fourier, GaussianImage, Graded, Grid, Median, Merge,
-    Orientation, Outliers, Sample, Scanline, Smooth, Stats, Tap, Transformation, Wavelet,
+    Orientation, Outliers, Sample, Scanline, Smooth, Stats, Tap, Transformation, Triangles,
+    Wavelet,
 };
 use crate::synth::Synth;
 
@@ -39,6 +40,7 @@ impl Registry {
             .with::<Grid>()
             .with::<Sample>()
             .with::<Scanline>()
+            .with::<Triangles>()
             .with::<Wavelet>()
             .with::<Fourier>()
             .with_format(LAS)

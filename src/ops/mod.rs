@@ -24,6 +24,7 @@ mod smooth;
 mod stats;
 mod tap;
 mod transform;
+mod triangles;
 mod whole;
 
 pub use assign::Assign;
@@ -46,3 +47,4 @@ pub use smooth::{Average, Smooth};
 pub use stats::Stats;
 pub use tap::Tap;
 pub use transform::{MatrixRows, Rotation, RotationAxis, ScaleFactors, Transformation};
+pub use triangles::Triangles;

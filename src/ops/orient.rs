@@ -2,6 +2,7 @@
 
 mod angle;
 mod propagation;
+mod sign;
 mod trajectory;
 
 use std::path::PathBuf;
@@ -9,7 +10,6 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::point::{Column, names};
 use crate::quantity::Whole;
 use crate::stage::{Role, RoleName, StageKind, StagePlace};
 use crate::{Error, Result};
@@ -18,20 +18,20 @@ use angle::AngleOrientation;
 use propagation::Propagation;
 use trajectory::{Trajectory, TrajectoryOrientation};
 
-const TIME: Column<f64> = Column::new(names::GPS_TIME, &[]);
 /// Most neighbours that a normal is compared with.
 const MOST: u64 = 64;
 const NEIGHBORS: Whole<1, MOST> = Whole::of(10);
 
-/// Turns normals to the side from which they were seen, or to agree with their neighbours; behind
-/// `normals`, whose own `orient` does for what one rule tells: up, or towards a fixed place.
+/// A fitted normal has no side of its own. This stage turns normals to where they were seen from,
+/// or to agree with their neighbours. It stands behind `normals`, whose own `orient` does for what
+/// one rule tells: up, or towards a fixed place.
 ///
 /// With `by = "trajectory"` a normal looks to where the sensor was at the point's GPS time, which
 /// `file` tells: a text of lines of time, x, y and z, in any order of times, separated by commas,
-/// semicolons, tabs or spaces; further columns are not looked at. If its first line is no numbers it
-/// names them: `time` (or `gpstime`), `x`, `y` and `z`, whatever the letters' case and the order.
-/// Between two times the sensor moves straight on. A point before the first time or behind the last
-/// keeps its normal as it is.
+/// semicolons, tabs or spaces; further columns are not looked at. If its first line is no numbers,
+/// it names them: `time` (or `gpstime`), `x`, `y` and `z`, whatever the letters' case and the
+/// order. Between two times the sensor moves straight on. A point before the first time or behind
+/// the last keeps its normal as it is.
 ///
 /// With `by = "scan-angle"` it looks to where the scan angle says, to the left or to the right of
 /// the way of flight and up: x and y against GPS time, of all points of one `PointSourceId`
@@ -123,12 +123,6 @@ impl StageKind for Orientation {
     fn build(self, at: &StagePlace) -> Result<Role> {
         self.role(at).map_err(|(key, error)| at.blame(key, error))
     }
-}
-
-/// A normal with the other sign.
-fn turned(normal: [f32; 3]) -> [f32; 3] {
-    // −0 + 0 = 0
-    normal.map(|c| -c + 0.0)
 }
 
 #[cfg(test)]

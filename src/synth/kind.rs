@@ -26,14 +26,14 @@ pub struct Synth {
     #[schemars(range(min = 0))]
     pub noise: Option<f64>,
     /// What squares are projected on.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub front: Front,
     /// Of projected squares: where their noise goes.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub noise_in: NoiseIn,
     /// Of projected squares: the share of points that are far from the front, 0 to 1: 10 to 60 mm
     /// above or below it. Their `UserData` is 255.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     #[schemars(range(min = 0, max = 1))]
     pub outliers: f64,
 }
@@ -59,6 +59,11 @@ impl StageKind for Synth {
         let projection = SquaresProjection { front, noise_in, outliers };
         Ok(Role::Source(Box::new(Synthetic { scene, points, seed, noise, projection })))
     }
+}
+
+/// True for what most scenes have no use for: reports name it where it is given.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 fn some_length<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {

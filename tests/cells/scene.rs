@@ -224,7 +224,12 @@ fn plain_divide(
         groups.push(cell);
         return;
     }
-    let split = if is_long { Split::Octant } else { stage.split };
+    let is_one_angle = angles.iter().all(|a| a.0 == angles[0].0);
+    let split = match stage.split {
+        _ if is_long => Split::Octant,
+        Split::Dirichlet if is_one_angle => Split::Voronoi,
+        split => split,
+    };
     match split {
         Split::Voronoi => {
             let (a, b) = plain_sites(&cell, &angles, stage);

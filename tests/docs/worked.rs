@@ -12,7 +12,7 @@ const LARGEST: u64 = 60 << 10;
 
 /// A stage, what its example shows, and the pipeline behind `read scan.laz ! `. Those with a
 /// picture write `after.laz`.
-const EXAMPLES: [(&str, &str, &str); 26] = [
+const EXAMPLES: [(&str, &str, &str); 27] = [
     ("read", "Two files become one.", "write copy.laz"),
     ("synth", "A made-up scan of 5,000 points.", "synth als points=5k ! write made.laz"),
     ("merge", "Two sources are one scan.", "merge from=[a,b] ! write both.laz"),
@@ -99,6 +99,11 @@ const EXAMPLES: [(&str, &str, &str); 26] = [
         "scanline",
         "Of each scan line those points stay that tell the others within 20 cm.",
         "scanline max_distance=0.2 ! write after.laz",
+    ),
+    (
+        "triangles",
+        "A tenth of the points stays, those of the mesh that is left.",
+        "triangles keep=10% ! write after.laz",
     ),
     (
         "wavelet",

@@ -2,6 +2,7 @@
 
 mod orient;
 mod plane;
+mod seen;
 mod solvers;
 mod star;
 mod truth;

@@ -184,7 +184,7 @@ p.toml:7:9: `scene` cannot be `alps`
 p.toml:8:1: `synth` has no key `pionts`
   8 | pionts = 1_000
     | ^^^^^^
-    = did you mean `points`? keys: noise, points, scene, seed
+    = did you mean `points`? keys: front, noise, noise_in, outliers, points, scene, seed
 p.toml:11:8: there is no stage `thinn`
   11 | kind = \"thinn\"
      |        ^^^^^^^

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use pointmill::ops::normals::Normals;
 use pointmill::ops::{
     Assign, Cells, Crop, Cut, Drop, Filter, Fourier, GaussianImage, Graded, Grid, Median,
-    Orientation, Outliers, Sample, Scanline, Smooth, Stats, Tap, Transformation, Wavelet,
+    Orientation, Outliers, Sample, Scanline, Smooth, Stats, Tap, Transformation, Triangles,
+    Wavelet,
 };
 use pointmill::point::Column;
 use pointmill::report::Tally;
@@ -148,6 +149,13 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
             ],
         ),
         (
+            "triangles",
+            vec![
+                check::<Triangles>(json!({ "keep": "30%" })),
+                check::<Triangles>(json!({ "keep": 40, "axis": "x" })),
+            ],
+        ),
+        (
             "wavelet",
             vec![
                 check::<Wavelet>(json!({ "keep": "20%", "pixels": 16 })),
@@ -247,8 +255,8 @@ fn assert_kept(kinds: &[&str]) {
 }
 
 const STREAM: [&str; 7] = ["assign", "crop", "drop", "filter", "stats", "tap", "transform"];
-const SELECT: [&str; 7] =
-    ["fourier", "grid", "outliers", "sample", "scanline", "smooth", "wavelet"];
+const SELECT: [&str; 8] =
+    ["fourier", "grid", "outliers", "sample", "scanline", "smooth", "triangles", "wavelet"];
 const REDUCE: [&str; 7] =
     ["cells", "cut", "gaussian-image", "graded", "median", "normals", "orient"];
 const ENDS: [&str; 5] = ["discard", "merge", "read", "synth", "write"];

@@ -2,21 +2,26 @@
 
 use std::ops::Range;
 
-use super::division::{CellPart, Division};
+use super::division::{CellPart, Division, Survey};
 use super::settings::MOST_SEEDS;
 use crate::geom::angle::{cosine, dominant_axis, outer_sum, sine2};
 use crate::point::{Position, distance2};
 
 impl Division<'_> {
     /// Parts the members by which of the sites is nearest; equally near ones go to the first, which
-    /// has the smaller angle.
+    /// has the smaller angle. Normals on one cone about the axis have one angle, and one site: they
+    /// are bisected.
     pub(super) fn part_among(
         &mut self,
         part: &mut [u32],
         turned: &[bool],
+        survey: &Survey,
         child: impl Fn(Range<usize>) -> CellPart,
     ) {
         let (positions, sites) = (self.positions, self.sites(part, turned));
+        if sites.len() < 2 {
+            return self.bisect(part, turned, survey, child);
+        }
         let nearest = |i: u32| {
             let far = |n: &usize| distance2(positions[i as usize], sites[*n]);
             (0..sites.len()).min_by_key(far).unwrap_or(0)

@@ -55,7 +55,7 @@ impl CellPart {
 
 /// The range of a part's angles, and the members with the smallest and the largest, of equal ones
 /// the first.
-struct Survey {
+pub(super) struct Survey {
     range: f64,
     nearest: u32,
     farthest: u32,
@@ -162,7 +162,9 @@ impl<'a> Division<'a> {
                     cut_deep |= is_deep;
                     match self.rule.split {
                         Split::Voronoi if !is_deep => self.bisect(members, turned, &survey, child),
-                        Split::Dirichlet if !is_deep => self.part_among(members, turned, child),
+                        Split::Dirichlet if !is_deep => {
+                            self.part_among(members, turned, &survey, child)
+                        }
                         _ => self.cut_in_eight(members, child),
                     }
                     let parts = self.stack.len() - pushed;
@@ -278,7 +280,7 @@ impl<'a> Division<'a> {
 
     /// Parts the members by the bisector of the two sites; equally far ones go to the smallest
     /// angle's, or, where angles are those to the part's own axis, to that of the second site.
-    fn bisect(
+    pub(super) fn bisect(
         &mut self,
         part: &mut [u32],
         turned: &[bool],

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{TIME, turned};
+use super::sign::{TIME, turned};
 use crate::geom::angle::is_known;
 use crate::geom::plane::dot;
 use crate::point::{Column, NORMAL, Position, names};

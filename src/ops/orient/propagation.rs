@@ -6,7 +6,7 @@
 //! its sign is that of its set's root. So a walk along the tree is not needed, and equal weights,
 //! which come in the order of their positions, leave nothing to chance.
 
-use super::turned;
+use super::sign::turned;
 use crate::geom::angle::is_known;
 use crate::geom::nearest::Nearest;
 use crate::geom::plane::dot;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{TIME, turned};
+use super::sign::{TIME, turned};
 use crate::geom::angle::is_known;
 use crate::geom::lattice::Lattice;
 use crate::ops::normals::SignRule;

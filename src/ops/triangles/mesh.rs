@@ -1,0 +1,335 @@
+//! A mesh of positions over a plane, which loses triangles one after the other.
+//!
+//! Triangles wait in a heap by their weight. When one goes, those around it are others, and join
+//! the heap; what waited there and is no triangle any more is told from what is by looking for its
+//! three corners in the mesh. So nothing needs to be found in the heap.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use spade::handles::{FixedVertexHandle, VertexHandle};
+use spade::{DelaunayTriangulation, HasPosition, Point2, PositionInTriangulation, Triangulation};
+
+use super::weights::{curvature, from_to, normal, size};
+use crate::point::Position;
+use crate::{Error, Result};
+
+/// No corner.
+const NONE: u32 = u32::MAX;
+
+/// A corner of the mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct MeshCorner {
+    /// Two axes across, then along the one that is looked along; steps from the scan's corner.
+    at: [f64; 3],
+    curvature: f64,
+    /// Which position it is.
+    position: u32,
+}
+
+impl HasPosition for MeshCorner {
+    type Scalar = f64;
+
+    fn position(&self) -> Point2<f64> {
+        Point2::new(self.at[0], self.at[1])
+    }
+}
+
+/// A triangle that waits: its weight as bits, which compare as it does, and its positions, the
+/// smallest first, counter-clockwise.
+type Waiting = Reverse<(u64, [u32; 3])>;
+
+/// A mesh that is thinned.
+pub(super) struct ThinnedMesh {
+    mesh: DelaunayTriangulation<MeshCorner>,
+    /// For each position its corner, if it is one that is left.
+    handles: Vec<u32>,
+    waiting: BinaryHeap<Waiting>,
+    /// What counts of the curvature of a triangle wherever it is.
+    least: f64,
+    lo: Position,
+    axis: usize,
+}
+
+impl ThinnedMesh {
+    /// Bytes of a position: its corner, six half edges, two faces, and six triangles that wait.
+    pub const BYTES: usize = 48 + 6 * 16 + 2 * 8 + 8 + 6 * size_of::<Waiting>() + 44;
+
+    /// The mesh of positions, which are in Morton order, across an axis.
+    pub fn of(positions: &[Position], lo: Position, axis: usize) -> Result<ThinnedMesh> {
+        let mut places: Vec<([u64; 2], u32)> =
+            (0..positions.len()).map(|i| (across(positions[i], lo, axis), i as u32)).collect();
+        places.sort_unstable();
+        places.dedup_by_key(|place| place.0);
+        let mut first: Vec<u32> = places.into_iter().map(|place| place.1).collect();
+        first.sort_unstable();
+        let mut handles = vec![NONE; positions.len()];
+        let corner = |(n, &position): (usize, &u32)| {
+            handles[position as usize] = n as u32;
+            let at = place(positions[position as usize], lo, axis);
+            MeshCorner { at, curvature: 0.0, position }
+        };
+        let corners = first.iter().enumerate().map(corner).collect();
+        let mesh = DelaunayTriangulation::bulk_load_stable(corners)
+            .map_err(|e| Error::internal("positions cannot be triangulated").because(e))?;
+        let waiting = BinaryHeap::new();
+        let mut mesh = ThinnedMesh { mesh, handles, waiting, least: 0.0, lo, axis };
+        mesh.bend();
+        mesh.wait_for_all();
+        Ok(mesh)
+    }
+
+    /// Corners that are left.
+    pub fn corners(&self) -> u64 {
+        self.mesh.num_vertices() as u64
+    }
+
+    /// Corners on the border.
+    pub fn border(&self) -> u64 {
+        self.mesh.vertices().filter(is_on_border).count() as u64
+    }
+
+    /// Gives each corner its curvature.
+    fn bend(&mut self) {
+        let curvatures: Vec<f64> = self.mesh.vertices().map(|corner| bend_of(&corner)).collect();
+        let triangles = 3.0 * curvatures.iter().sum::<f64>() / (curvatures.len() as f64).max(1.0);
+        self.least = if triangles > 0.0 { triangles / 1000.0 } else { 1.0 };
+        for (n, curvature) in curvatures.into_iter().enumerate() {
+            self.mesh.vertex_data_mut(FixedVertexHandle::from_index(n)).curvature = curvature;
+        }
+    }
+
+    fn wait_for_all(&mut self) {
+        let all: Vec<Waiting> = self
+            .mesh
+            .inner_faces()
+            .map(|face| self.waiting(face.vertices().map(|corner| *corner.data())))
+            .collect();
+        self.waiting = all.into();
+    }
+
+    fn waiting(&self, corners: [MeshCorner; 3]) -> Waiting {
+        let bends: f64 = corners.iter().map(|corner| corner.curvature).sum();
+        let weight = (bends + self.least) * size(corners.map(|corner| corner.at));
+        let mut positions = corners.map(|corner| corner.position);
+        let first = (0..3).min_by_key(|&n| positions[n]).unwrap_or_default();
+        positions.rotate_left(first);
+        Reverse((weight.to_bits(), positions))
+    }
+
+    /// Removes triangles until no more than `most` corners are left, or none can go.
+    pub fn thin(&mut self, most: u64) {
+        while self.corners() > most {
+            let Some(Reverse((_, positions))) = self.waiting.pop() else { return };
+            if !self.is_triangle(positions) {
+                continue;
+            }
+            let mut by_bend = positions.map(|position| (self.corner(position).curvature, position));
+            by_bend.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            for (_, position) in &by_bend[1..] {
+                if self.corners() > most {
+                    self.remove(*position);
+                }
+            }
+        }
+    }
+
+    fn handle(&self, position: u32) -> Option<FixedVertexHandle> {
+        let handle = self.handles[position as usize];
+        (handle != NONE).then(|| FixedVertexHandle::from_index(handle as usize))
+    }
+
+    fn corner(&self, position: u32) -> MeshCorner {
+        let handle = self.handle(position).unwrap_or(FixedVertexHandle::from_index(0));
+        *self.mesh.vertex(handle).data()
+    }
+
+    /// True if these are the corners of a triangle of the mesh, counter-clockwise.
+    fn is_triangle(&self, positions: [u32; 3]) -> bool {
+        let [Some(a), Some(b), Some(c)] = positions.map(|position| self.handle(position)) else {
+            return false;
+        };
+        let edge = self.mesh.get_edge_from_neighbors(a, b);
+        let opposite = edge.and_then(|edge| edge.opposite_vertex());
+        opposite.is_some_and(|opposite| opposite.fix() == c)
+    }
+
+    /// Removes a corner, unless it is on the border, and lets the triangles in its place wait.
+    fn remove(&mut self, position: u32) {
+        let Some(handle) = self.handle(position) else { return };
+        let corner = self.mesh.vertex(handle);
+        if is_on_border(&corner) {
+            return;
+        }
+        let ring: Vec<u32> = corner.out_edges().map(|edge| edge.to().data().position).collect();
+        self.mesh.remove(handle);
+        self.handles[position as usize] = NONE;
+        // The last corner has the place of the one that went.
+        if handle.index() < self.mesh.num_vertices() {
+            let moved = self.mesh.vertex(handle).data().position;
+            self.handles[moved as usize] = handle.index() as u32;
+        }
+        let mut new = Vec::new();
+        for (n, &from) in ring.iter().enumerate() {
+            let Some(from) = self.handle(from) else { continue };
+            for edge in self.mesh.vertex(from).out_edges() {
+                let Some(face) = edge.face().as_inner() else { continue };
+                let corners = face.vertices().map(|corner| *corner.data());
+                let place = |corner: &MeshCorner| ring.iter().position(|p| *p == corner.position);
+                let places = [place(&corners[0]), place(&corners[1]), place(&corners[2])];
+                // Once, at the corner that is first in the ring.
+                if places.iter().all(|place| place.is_some_and(|place| place >= n)) {
+                    new.push(self.waiting(corners));
+                }
+            }
+        }
+        self.waiting.extend(new);
+    }
+
+    /// How far each position is along the axis from the mesh that is left; NaN for its corners.
+    pub fn distances(&self, positions: &[Position]) -> Vec<f32> {
+        let mut hint = FixedVertexHandle::from_index(0);
+        let mut distance = |(i, &p): (usize, &Position)| {
+            if self.handles[i] != NONE {
+                return f32::NAN;
+            }
+            let at = place(p, self.lo, self.axis);
+            let found = self.mesh.locate_with_hint(Point2::new(at[0], at[1]), hint);
+            let depth = match found {
+                PositionInTriangulation::OnVertex(corner) => {
+                    hint = corner;
+                    self.mesh.vertex(corner).data().at[2]
+                }
+                PositionInTriangulation::OnEdge(edge) => {
+                    let [a, b] = self.mesh.directed_edge(edge).vertices();
+                    hint = a.fix();
+                    along_edge(a.data().at, b.data().at, at)
+                }
+                PositionInTriangulation::OnFace(face) => {
+                    let corners = self.mesh.face(face).vertices();
+                    hint = corners[0].fix();
+                    in_face(corners.map(|corner| corner.data().at), at)
+                }
+                // The border stays, so what is outside is on it but for rounding.
+                PositionInTriangulation::OutsideOfConvexHull(edge) => {
+                    let [a, b] = self.mesh.directed_edge(edge).vertices();
+                    along_edge(a.data().at, b.data().at, at)
+                }
+                PositionInTriangulation::NoTriangulation => at[2],
+            };
+            (depth - at[2]).abs() as f32
+        };
+        positions.iter().enumerate().map(&mut distance).collect()
+    }
+}
+
+/// Steps across the axis from the scan's corner.
+fn across(p: Position, lo: Position, axis: usize) -> [u64; 2] {
+    [1, 2].map(|by| {
+        let axis = (axis + by) % 3;
+        p[axis].wrapping_sub(lo[axis]) as u64
+    })
+}
+
+/// Steps across the axis, and along it.
+fn place(p: Position, lo: Position, axis: usize) -> [f64; 3] {
+    let [u, v] = across(p, lo, axis);
+    [u as f64, v as f64, p[axis].wrapping_sub(lo[axis]) as u64 as f64]
+}
+
+fn is_on_border(corner: &VertexHandle<'_, MeshCorner>) -> bool {
+    corner.out_edges().any(|edge| edge.is_part_of_convex_hull())
+}
+
+fn bend_of(corner: &VertexHandle<'_, MeshCorner>) -> f64 {
+    let at = corner.data().at;
+    let mut sum = [0.0; 3];
+    for edge in corner.out_edges() {
+        if let Some(face) = edge.face().as_inner() {
+            let [a, b, c] = face.vertices().map(|corner| corner.data().at);
+            let normal = normal(a, b, c);
+            sum = [sum[0] + normal[0], sum[1] + normal[1], sum[2] + normal[2]];
+        }
+    }
+    curvature(at, sum, corner.out_edges().map(|edge| edge.to().data().at))
+}
+
+/// The depth at a place on an edge.
+fn along_edge(a: [f64; 3], b: [f64; 3], at: [f64; 3]) -> f64 {
+    let (edge, off) = (from_to(a, b), from_to(a, at));
+    let length2 = edge[0] * edge[0] + edge[1] * edge[1];
+    let part = ((off[0] * edge[0] + off[1] * edge[1]) / length2).clamp(0.0, 1.0);
+    a[2] + part * edge[2]
+}
+
+/// The depth at a place in a triangle.
+fn in_face([a, b, c]: [[f64; 3]; 3], at: [f64; 3]) -> f64 {
+    let n = normal(a, b, c);
+    let off = from_to(a, at);
+    a[2] - (n[0] * off[0] + n[1] * off[1]) / n[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::hash::of_position;
+    use crate::geom::morton::morton_cmp;
+
+    /// Positions of a surface over 0 to 10,000, in Morton order.
+    fn surface(count: u64, depth: impl Fn(f64, f64) -> f64) -> Vec<Position> {
+        let at = |seed: u64, n: u64| (of_position(seed, [n as i64, 0, 0]) % 10_000) as i64;
+        let mut all: Vec<Position> = (0..count)
+            .map(|n| {
+                let (x, y) = (at(1, n), at(2, n));
+                [x, y, depth(x as f64, y as f64) as i64]
+            })
+            .collect();
+        all.sort_by(morton_cmp);
+        all.dedup();
+        all
+    }
+
+    fn thinned(positions: &[Position], most: u64) -> (ThinnedMesh, Vec<f32>) {
+        let lo = [0, 1, 2].map(|axis| positions.iter().map(|p| p[axis]).min().unwrap());
+        let mut mesh = ThinnedMesh::of(positions, lo, 2).unwrap();
+        mesh.thin(most);
+        let distances = mesh.distances(positions);
+        (mesh, distances)
+    }
+
+    #[test]
+    fn so_many_corners_are_left_and_the_rest_is_near_the_mesh() {
+        let positions = surface(3000, |x, y| 0.2 * x + 0.1 * y);
+        let (mesh, distances) = thinned(&positions, 300);
+        assert_eq!(mesh.corners(), 300);
+        assert_eq!(distances.iter().filter(|d| d.is_nan()).count(), 300);
+        let largest = distances.iter().copied().fold(0.0, f32::max);
+        assert!(largest <= 2.0, "a plane stays one but for rounding: {largest}");
+        // Flat parts thin out evenly: each quarter keeps its share.
+        let kept = positions.iter().zip(&distances).filter(|(_, d)| d.is_nan());
+        let left = kept.filter(|(p, _)| p[0] < 5000 && p[1] < 5000).count();
+        assert!((50..100).contains(&left), "{left} of 300 are in a quarter");
+    }
+
+    #[test]
+    fn more_corners_stay_where_a_surface_bends() {
+        let ridge = |x: f64, _: f64| 3.0 * (x - 5000.0).abs();
+        let positions = surface(4000, ridge);
+        let (_, distances) = thinned(&positions, 400);
+        let kept: Vec<&Position> =
+            positions.iter().zip(&distances).filter(|(_, d)| d.is_nan()).map(|(p, _)| p).collect();
+        let near = |p: &Position| (p[0] - 5000).abs() < 400;
+        let share = kept.iter().filter(|p| near(p)).count() as f64 / kept.len() as f64;
+        assert!(share > 0.2, "{share} of the kept points lie along the ridge, of all 0.08");
+    }
+
+    #[test]
+    fn positions_of_one_place_have_one_corner_and_lines_none_that_can_go() {
+        let (mesh, distances) = thinned(&[[0, 0, 0], [0, 0, 7], [9, 0, 0], [0, 9, 0]], 1);
+        assert_eq!(mesh.corners(), 3, "the border stays");
+        assert!(distances[1] == 7.0 && distances.iter().filter(|d| d.is_nan()).count() == 3);
+        let line: Vec<Position> = (0..10).map(|x| [x, 0, 0]).collect();
+        assert_eq!(thinned(&line, 3).0.corners(), 10);
+        assert_eq!(thinned(&[[4, 4, 4]], 1).0.corners(), 1);
+    }
+}
