@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::engine::Watch;
 use crate::geom::depth::{DepthSums, Raster};
-use crate::graph::{Graph, Overrides, RunSettings};
+use crate::graph::{Graph, Nonfinite, Overrides, RunSettings};
 use crate::host::lock;
 use crate::host::process::default_memory;
 use crate::io::ends::{Discard, Read};
@@ -54,12 +54,12 @@ pub struct DepthErrors {
     pub both: u64,
     /// Sum of the squared differences of their mean depths (equation 4).
     pub ssd: f64,
-    /// √(SSD / XY) (equation 5); none where no pixel has points of both.
-    pub rms: Option<f64>,
+    /// √(SSD / XY) (equation 5).
+    pub rms: f64,
     /// Mean of the differences without their signs.
-    pub mean: Option<f64>,
+    pub mean: f64,
     /// The largest of these.
-    pub max: Option<f64>,
+    pub max: f64,
 }
 
 /// What there is of one image.
@@ -98,7 +98,7 @@ pub struct DepthCounts {
 /// }
 /// let settings = DepthSettings { axis: Axis::Z, pixels: 64, run: Default::default() };
 /// let errors = depth_errors(&[scan], &[up], &settings, &registry, &Quiet)?;
-/// assert!((errors.rms.unwrap() - 2.0).abs() < 1e-6);
+/// assert!((errors.rms - 2.0).abs() < 1e-6);
 /// assert_eq!(errors.both, errors.first.pixels);
 /// std::fs::remove_dir_all(&at)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -126,7 +126,7 @@ pub fn depth_errors(
         let open = Read { path: paths.to_vec(), format: None }.source(registry.formats())?;
         let mut graph = Graph::new(run.clone());
         let source = graph.add("read", Role::Source(open), &[]);
-        let stage = See { seen: seen.clone(), pass };
+        let stage = See { seen: seen.clone(), pass, nonfinite: run.nonfinite };
         let stage = graph.add("compare", Role::Transform(Box::new(stage)), &[source]);
         graph.add("discard", Role::Sink(Box::new(Discard {})), &[stage]);
         graph.plan(&Overrides::default())?.run(watch)?;
@@ -138,7 +138,10 @@ pub fn depth_errors(
     let bounds = Bounds::of(corners.flat_map(|seen| [seen.bounds.lo, seen.bounds.hi]));
     let raster = Raster::over(&bounds, settings.axis as usize, side);
     let images = [see(first, DepthPass::At(raster))?, see(second, DepthPass::At(raster))?];
-    Ok(difference(&images, &raster, settings.axis))
+    difference(&images, &raster, settings.axis).ok_or_else(|| {
+        let told = "no pixel has points of both scans: there is nothing to compare";
+        Error::new(ErrorKind::Data, told).help("give two scans of one place, or fewer pixels")
+    })
 }
 
 /// The settings of the runs, with the memory that two images leave.
@@ -181,6 +184,8 @@ impl SeenDepths {
 struct See {
     seen: Arc<Mutex<SeenDepths>>,
     pass: DepthPass,
+    /// What becomes of points that are not finite.
+    nonfinite: Nonfinite,
 }
 
 impl Transform for See {
@@ -194,7 +199,13 @@ impl Transform for See {
         let mut positions: Vec<Position> = Vec::with_capacity(batch.len());
         for record in batch.iter() {
             let world = axes.map(|axis| axis.world(record, schema.endian));
-            positions.push(rounded(world)?);
+            if world.iter().all(|v| v.is_finite()) {
+                positions.push(rounded(world)?);
+            } else if self.nonfinite == Nonfinite::Refuse {
+                let told = format!("the point {world:?} is not finite");
+                let help = "`run.nonfinite = \"drop\"` leaves such points out";
+                return Err(Error::new(ErrorKind::Data, told).help(help));
+            }
         }
         let mut seen = lock(&self.seen);
         seen.points += positions.len() as u64;
@@ -220,7 +231,12 @@ fn rounded(world: [f64; 3]) -> Result<Position> {
     }
 }
 
-fn difference([first, second]: &[SeenDepths; 2], raster: &Raster, axis: Axis) -> DepthErrors {
+/// None where no pixel has points of both.
+fn difference(
+    [first, second]: &[SeenDepths; 2],
+    raster: &Raster,
+    axis: Axis,
+) -> Option<DepthErrors> {
     let means = |seen: &SeenDepths| seen.depths.as_ref().map_or(Vec::new(), DepthSums::means);
     let (f, g) = (means(first), means(second));
     let pixels = |of: &[f64]| of.iter().filter(|v| !v.is_nan()).count() as u64;
@@ -232,18 +248,17 @@ fn difference([first, second]: &[SeenDepths; 2], raster: &Raster, axis: Axis) ->
         sum += far;
         max = max.max(far);
     }
-    let some = |value: f64| (both > 0).then_some(value);
-    DepthErrors {
+    (both > 0).then(|| DepthErrors {
         axis,
         pixel: raster.pixel as f64 / PARTS,
         first: DepthCounts { points: first.points, pixels: pixels(&f) },
         second: DepthCounts { points: second.points, pixels: pixels(&g) },
         both,
         ssd,
-        rms: some((ssd / both as f64).sqrt()),
-        mean: some(sum / both as f64),
-        max: some(max),
-    }
+        rms: (ssd / both as f64).sqrt(),
+        mean: sum / both as f64,
+        max,
+    })
 }
 
 impl fmt::Display for DepthErrors {
@@ -255,17 +270,8 @@ impl fmt::Display for DepthErrors {
             writeln!(f, "{name}     {points} points in {pixels} pixels")?;
         }
         writeln!(f, "both       {} pixels have points of both", Grouped(self.both))?;
-        match (self.rms, self.mean, self.max) {
-            (Some(rms), Some(mean), Some(max)) => write!(
-                f,
-                "depth      SSD {}, RMS {}, mean {}, max {}",
-                Short(self.ssd),
-                Short(rms),
-                Short(mean),
-                Short(max)
-            ),
-            _ => f.write_str("depth      nothing to compare"),
-        }
+        let [ssd, rms, mean, max] = [self.ssd, self.rms, self.mean, self.max].map(Short);
+        write!(f, "depth      SSD {ssd}, RMS {rms}, mean {mean}, max {max}")
     }
 }
 
@@ -289,20 +295,18 @@ mod tests {
         let at = |x: i64, z: i64| [x * unit, 0, z * unit];
         let first = seen(raster, &[at(0, 1), at(0, 3), at(1, 5), at(2, 9)]);
         let second = seen(raster, &[at(0, 5), at(1, 1), at(3, 7)]);
-        let errors = difference(&[first, second], &raster, Axis::Z);
+        let errors = difference(&[first, second], &raster, Axis::Z).unwrap();
         // (2 - 5)² + (5 - 1)² over two pixels.
-        assert_eq!((errors.both, errors.ssd, errors.max), (2, 25.0, Some(4.0)));
-        assert_eq!(errors.rms, Some(12.5f64.sqrt()));
+        assert_eq!((errors.both, errors.ssd, errors.max), (2, 25.0, 4.0));
+        assert_eq!(errors.rms, 12.5f64.sqrt());
         assert_eq!((errors.first.pixels, errors.second.pixels), (3, 3));
         let none = difference(&[seen(raster, &[at(0, 1)]), seen(raster, &[])], &raster, Axis::Z);
-        assert_eq!((none.both, none.rms), (0, None));
-        assert!(none.to_string().ends_with("nothing to compare"), "{none}");
+        assert_eq!(none, None);
     }
 
     #[test]
     fn what_lies_too_far_away_is_told() {
         assert!(rounded([0.0, 2f64.powi(38), 0.0]).is_err());
-        assert!(rounded([f64::NAN, 0.0, 0.0]).is_err());
         assert_eq!(rounded([1.0, -0.5, 0.0]).unwrap(), [1 << 24, -(1 << 23), 0]);
     }
 }

@@ -17,7 +17,7 @@ use super::whole::Rows;
 use crate::geom::depth::{DepthSums, Raster, fill};
 use crate::point::{Bounds, Position, SHIFT, names};
 use crate::quantity::Whole;
-use crate::report::Tally;
+use crate::report::{Grouped, Tally};
 use crate::stage::{Gathered, Needs, Role, ScanFacts, ScanOp, StagePlace, TileOp};
 use crate::tile::Tile;
 use crate::{Error, Result};
@@ -195,8 +195,16 @@ impl<T: Transformed> ScanOp for ImageReduction<T> {
         self.decisions = vec![("pixel".into(), (raster.pixel as f64 * self.step).into())];
         self.decisions.extend(blocks.decisions.iter().cloned());
         let decided = decide(&raster, &rows.positions, &image, &blocks, self.moves);
+        let kept = decided.iter().filter(|decided| decided.deviation.is_nan()).count() as u64;
+        let (kind, pixels) = (T::KIND, is_there.iter().filter(|there| **there).count() as u64);
         self.found = Some(rows.with(decided));
-        Ok(None)
+        Ok((pixels < most).then(|| {
+            let (kept, most, pixels) = (Grouped(kept), Grouped(most), Grouped(pixels));
+            format!(
+                "`{kind}` keeps {kept} points, and not {most}: its image has {pixels} pixels with \
+                 points; raise `{kind}.pixels`"
+            )
+        }))
     }
 }
 

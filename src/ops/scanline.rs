@@ -77,7 +77,8 @@ pub enum LineEnd {
     Channel,
     /// `ScanDirectionFlag`: the mirror turns back.
     Direction,
-    /// `EdgeOfFlightLine`: the last point before it does.
+    /// `EdgeOfFlightLine`, the last point before it does: a line ends behind a point that has it,
+    /// unless it began with that point.
     Edge,
 }
 
@@ -230,16 +231,24 @@ impl ScanOp for Scanline {
             let [one, two] = [a, b].map(|i| &rows.values[i as usize]);
             divided(one).cmp(&divided(two)).then(one.time.total_cmp(&two.time)).then(a.cmp(&b))
         });
-        let is_one_line = |a: &u32, b: &u32| {
-            let [a, b] = [*a as usize, *b as usize];
-            rows.values[a].ends == rows.values[b].ends
-                && distance2(rows.positions[a], rows.positions[b]) < tolerance.gap2
-        };
         let mut distances = vec![f32::NAN; order.len()];
-        let mut lines = 0;
-        for line in order.chunk_by(is_one_line) {
-            lines += 1;
-            tolerance.follow(line, &rows.positions, &mut distances);
+        let (mut lines, mut start) = (0, 0);
+        for n in 1..=order.len() {
+            let before = order[n - 1] as usize;
+            let is_end = order.get(n).is_none_or(|&next| {
+                let next = next as usize;
+                let [one, two] = [before, next].map(|i| rows.values[i].ends);
+                let differs = |end: LineEnd| one[end as usize] != two[end as usize];
+                let at_edge = one[LineEnd::Edge as usize] != 0 && n - 1 > start;
+                LineEnd::ALL.into_iter().any(|end| end != LineEnd::Edge && differs(end))
+                    || at_edge
+                    || distance2(rows.positions[before], rows.positions[next]) >= tolerance.gap2
+            });
+            if is_end {
+                lines += 1;
+                tolerance.follow(&order[start..n], &rows.positions, &mut distances);
+                start = n;
+            }
         }
         self.found = Some(FoundLines { lines, rows: rows.with(distances) });
         Ok(None)
@@ -300,72 +309,4 @@ fn chord_distance2(from: Position, to: Position, p: Position) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn follow(tolerance: Tolerance, line: &[Position]) -> Vec<f32> {
-        let order: Vec<u32> = (0..line.len() as u32).collect();
-        let mut distances = vec![f32::NAN; line.len()];
-        tolerance.follow(&order, line, &mut distances);
-        distances
-    }
-
-    fn within(distance: f64, cosine: Option<f64>) -> Tolerance {
-        Tolerance { distance2: distance * distance, cosine, gap2: u128::MAX }
-    }
-
-    fn kept(distances: &[f32]) -> Vec<usize> {
-        (0..distances.len()).filter(|&n| distances[n].is_nan()).collect()
-    }
-
-    #[test]
-    fn a_straight_line_keeps_its_ends_and_a_corner_stays() {
-        let straight: Vec<Position> = (0..100).map(|x| [10 * x, 0, 0]).collect();
-        assert_eq!(kept(&follow(within(0.1, None), &straight)), [0, 99]);
-        let corner: Vec<Position> =
-            (0..100).map(|n: i64| [10 * n.min(50), 10 * (n - 50).max(0), 0]).collect();
-        assert_eq!(kept(&follow(within(3.0, None), &corner)), [0, 50, 99]);
-        let long: Vec<Position> = (0..1000).map(|x| [10 * x, 0, 0]).collect();
-        assert_eq!(kept(&follow(within(0.1, None), &long)), [0, 256, 512, 768, 999]);
-        assert_eq!(kept(&follow(within(1.0, None), &straight[..1])), [0]);
-        assert_eq!(kept(&follow(within(1.0, None), &straight[..2])), [0, 1]);
-    }
-
-    #[test]
-    fn what_goes_is_within_the_tolerance_of_its_chord() {
-        let wave = |n: i64| [10 * n, (300.0 * (n as f64 / 9.0).sin()) as i64, 0];
-        let line: Vec<Position> = (0..400).map(wave).collect();
-        for most in [1.0, 5.0, 40.0] {
-            let distances = follow(within(most, None), &line);
-            assert!(distances.iter().all(|d| d.is_nan() || f64::from(*d) <= most));
-            assert!(kept(&distances).len() < 300, "{most}");
-        }
-        let fewer = kept(&follow(within(40.0, None), &line)).len();
-        let by_angle = kept(&follow(within(40.0, Some(libm::cos(0.2))), &line)).len();
-        assert!(by_angle > fewer, "an angle keeps {by_angle}, none {fewer}");
-    }
-
-    #[test]
-    fn a_chord_that_turns_back_measures_to_its_ends() {
-        assert_eq!(chord_distance2([0; 3], [10, 0, 0], [-3, 4, 0]), 25.0);
-        assert_eq!(chord_distance2([0; 3], [10, 0, 0], [13, 4, 0]), 25.0);
-        assert_eq!(chord_distance2([0; 3], [10, 0, 0], [5, 4, 0]), 16.0);
-    }
-
-    #[test]
-    fn keys_that_mean_nothing_are_refused() {
-        let read = toml::from_str::<Scanline>;
-        assert_eq!(read("max_distance = 0.1").unwrap().lines, ends_of_las());
-        assert!(read("max_distance = '2 cm'\nmax_angle = '5deg'\nlines = []\ngap = 1").is_ok());
-        for wrong in [
-            "",
-            "max_distance = 0",
-            "max_distance = 1\ngap = -1",
-            "max_distance = 1\nlines = ['z']",
-        ] {
-            assert!(read(wrong).is_err(), "{wrong}");
-        }
-        let twice = read("max_distance = 1\nlines = ['edge', 'edge']").unwrap();
-        assert!(twice.build(&StagePlace::new("test", 1)).is_err());
-    }
-}
+mod tests;

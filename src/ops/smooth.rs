@@ -28,10 +28,10 @@ const NEIGHBORS: Whole<1, { MOST as u64 }> = Whole::of(10);
 /// `smooth_moved`, by records. Means are rounded to whole steps of the lattice, half to even.
 ///
 /// Moved records have their synthetic flag set where the format has one, and the columns `ShiftX`,
-/// `ShiftY` and `ShiftZ`, which outputs can have by `write.dimensions`, tell how far they went. The
-/// report measures planes after the reduction where points have gone. Stages that work on tiles
-/// work by the positions that were read, so none stands behind this one: what it leaves is written,
-/// and a second run goes on from there.
+/// `ShiftY` and `ShiftZ`, which outputs can have by `write.dimensions`, tell how far they went (NaN
+/// for points that the stage is not limited to). The report measures planes after the reduction
+/// where points have gone. Stages that work on tiles work by the positions that were read, so none
+/// stands behind this one: what it leaves is written, and a second run goes on from there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Smooth {
@@ -133,8 +133,10 @@ impl TileOp for Smooth {
         tile.each_neighborhood(self.neighbors.get() as usize, |i, found| {
             hood.clear();
             hood.push([0; 3]);
-            let near = |offset: &&Position| distance2([0; 3], **offset) <= within;
-            hood.extend(found.offsets().iter().filter(near));
+            match within {
+                u128::MAX => hood.extend_from_slice(found.offsets()),
+                within => hood.extend_from_slice(found.within(within).offsets()),
+            }
             let shift = self.pick.of(&mut hood);
             shifts[i] = match distance2([0; 3], shift) > max_distance {
                 true => TOO_FAR,
@@ -182,6 +184,12 @@ impl Average {
 
 /// A sum of positions over their number, rounded half to even.
 pub(super) fn rounded_mean(sum: i128, count: i128) -> i64 {
+    // Hardly any sum needs more than 64 bits, and those divide many times as fast.
+    if let (Ok(sum), Ok(count)) = (i64::try_from(sum), i64::try_from(count)) {
+        let (whole, rest) = (sum.div_euclid(count), sum.rem_euclid(count));
+        let up = rest > count - rest || rest == count - rest && whole % 2 != 0;
+        return whole + i64::from(up);
+    }
     let (whole, twice) = (sum.div_euclid(count), 2 * sum.rem_euclid(count));
     let up = twice > count || twice == count && whole % 2 != 0;
     (whole + i128::from(up)) as i64
@@ -209,6 +217,8 @@ mod tests {
             [(5, 2, 2), (7, 2, 4), (-5, 2, -2), (-7, 2, -4), (8, 3, 3), (-8, 3, -3), (0, 7, 0)]
         {
             assert_eq!(rounded_mean(sum, count), mean, "{sum} / {count}");
+            // The same with both so much larger that 64 bits do not hold them.
+            assert_eq!(rounded_mean(sum << 70, count << 70), mean, "{sum} / {count}");
         }
     }
 

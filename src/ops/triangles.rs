@@ -139,16 +139,19 @@ impl ScanOp for Triangles {
         let most = self.keep.of(gathered.records()).max(1);
         let rows = Rows::of_scan(gathered)?;
         let mut mesh = ThinnedMesh::of(&rows.positions, bounds.lo, self.axis as usize)?;
+        let positions = rows.positions.len() as u64;
         let (corners, border) = (mesh.corners(), mesh.border());
         mesh.thin(most);
         let left = mesh.corners();
         let distances = mesh.distances(&rows.positions);
         self.found = Some(ThinnedScan { rows: rows.with(distances), corners, border });
-        Ok((left > most).then(|| {
-            let (left, most, border) = (Grouped(left), Grouped(most), Grouped(border));
+        let most = most.min(positions);
+        Ok((left != most).then(|| {
+            let (left, most) = (Grouped(left), Grouped(most));
+            let (border, covered) = (Grouped(border), Grouped(positions - corners));
             format!(
-                "`triangles` keeps {left} points, and not {most}: of its mesh {border} corners are \
-                 on the border and stay"
+                "`triangles` keeps {left} points, and not {most}: {border} corners are on the \
+                 border of its mesh and stay, and {covered} positions lie above or below a corner"
             )
         }))
     }

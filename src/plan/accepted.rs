@@ -23,7 +23,8 @@ pub(super) fn accepted(
             let told =
                 format!("`{ACCEPT_RULES}`: a run of this pipeline does not measure `{name}`");
             let help = "it measures `kept` and `lossless`; how far removed points are from what \
-                        stands for them is measured where `median`, `grid` or `graded` reduces";
+                        stands for them is measured where `median`, `graded`, `grid`, `scanline`, \
+                        `triangles`, `wavelet` or `fourier` reduces";
             wrong.push(Error::pipeline(told).help(help));
         }
         if rule.figure == AcceptFigure::Lossless {

@@ -88,12 +88,19 @@ impl PassLayout<'_> {
                 return Err(written.wrong(told).help(help));
             }
             if let Some(name) = stream.changes().iter().find(|name| is_read(name)) {
-                let told =
-                    format!("`{kind}` works by {name} as it is read, and `{above}` changes it");
-                let help = match stream.of_tiles {
-                    true => format!("let a second run read what `{above}` leaves"),
-                    false => format!(
-                        "put `{above}` above all stages that work on tiles, or behind `{kind}`"
+                let (told, help) = match stream.of_tiles {
+                    true => (
+                        format!(
+                            "`{kind}` works on the positions that were read, and `{above}` moves \
+                             points"
+                        ),
+                        format!("let a second run read what `{above}` leaves"),
+                    ),
+                    false => (
+                        format!("`{kind}` works by {name} as it is read, and `{above}` changes it"),
+                        format!(
+                            "put `{above}` above all stages that work on tiles, or behind `{kind}`"
+                        ),
                     ),
                 };
                 return Err(written.wrong(told).help(help));

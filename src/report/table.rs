@@ -105,6 +105,7 @@ impl Table<'_> {
         class_lines(f, &result.classes, marked)?;
         marked_lines(f, result)?;
         stats_lines(f, &result.stats)?;
+        moved_lines(f, result)?;
         if let Some(&cells) = result.counts.get("cells") {
             write!(f, "\ncells      {}", Grouped(cells))?;
             // Passes that compute normals again count the same points again.
@@ -154,6 +155,25 @@ fn stats_lines(f: &mut fmt::Formatter<'_>, stats: &[StatsFigures]) -> fmt::Resul
         }
     }
     Ok(())
+}
+
+/// Points that stages moved, and normals that no stage knows a side of.
+fn moved_lines(f: &mut fmt::Formatter<'_>, result: &Outcome) -> fmt::Result {
+    for (name, moved) in &result.counts {
+        let Some(stage) = name.strip_suffix("_moved") else { continue };
+        write!(f, "\nmoved      {} points ({stage})", Grouped(*moved))?;
+        if let Some(&held @ 1..) = result.counts.get(format!("{stage}_too_far").as_str()) {
+            write!(f, ", and {} stay where they are: they would go farther", Grouped(held))?;
+        }
+    }
+    match result.counts.get("orient_unknown") {
+        None | Some(0) => Ok(()),
+        Some(&unknown) => write!(
+            f,
+            "\nnormals    {} stay as they were: nothing tells `orient` their side",
+            Grouped(unknown)
+        ),
+    }
 }
 
 /// True if a number of points to keep was asked for.
@@ -260,7 +280,7 @@ impl Table<'_> {
                 heading = "";
             }
         }
-        if rises {
+        if rises && result.ledger.removed_records() > 0 {
             write!(
                 f,
                 "\n           \

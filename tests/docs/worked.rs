@@ -87,8 +87,8 @@ const EXAMPLES: [(&str, &str, &str); 27] = [
     ),
     (
         "orient",
-        "Normals look to where the sensor was, by the scan angle.",
-        "normals ! orient by=scan-angle ! write seen.laz dimensions=[NormalX,NormalY,NormalZ]",
+        "Normals agree with those of their neighbours, and look up at the highest point.",
+        "normals ! orient by=propagation ! write seen.laz dimensions=[NormalX,NormalY,NormalZ]",
     ),
     (
         "gaussian-image",

@@ -208,7 +208,7 @@ fn what_works_on_tiles_cannot_stand_behind_what_moves_points() {
     for below in ["grid\"\nside = 1", "smooth\"", "outliers\""] {
         let stages = format!("[[stage]]\nkind = \"smooth\"\n[[stage]]\nkind = \"{below}\n");
         let told = case.run("", &stages, "").unwrap_err();
-        assert!(told.to_string().contains("and `smooth` changes it"), "{told}");
+        assert!(told.to_string().contains("and `smooth` moves points"), "{told}");
         assert_eq!(told.remedy(), Some("let a second run read what `smooth` leaves"));
     }
 }

@@ -13,9 +13,10 @@ use crate::stage::{Role, RoleName, StageKind, StagePlace};
 /// is calculated, "the coefficients that are smaller than a certain value are removed", and the
 /// rest is transformed back.
 ///
-/// The scan is seen along `axis`, as a square image of `pixels` times `pixels` over its box; a
-/// pixel's depth is the mean of the positions in it, and pixels without any take that of the
-/// smallest square of the quadtree that has one. The transform is Haar's, orthonormal in the plane.
+/// The scan is seen along `axis`, as a square image of `pixels` times `pixels` from the smallest
+/// corner of its box on; a pixel's depth is the mean of the positions in it. A square of the
+/// quadtree has the mean of its quarters that have a depth, and pixels without any take that of the
+/// smallest square around them that has one. The transform is Haar's, orthonormal in the plane.
 /// Without a coefficient in it a square of the image is flat, so one number tells all of it: of
 /// each largest such square one point stays, the nearest to its centre, moved along the axis to the
 /// depth that the image has there. The certain value is the smallest for which no more than `keep`

@@ -126,10 +126,15 @@ impl ThinnedMesh {
             }
             let mut by_bend = positions.map(|position| (self.corner(position).curvature, position));
             by_bend.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            let before = self.corners();
             for (_, position) in &by_bend[1..] {
                 if self.corners() > most {
                     self.remove(*position);
                 }
+            }
+            // The other two are on the border.
+            if self.corners() == before {
+                self.remove(by_bend[0].1);
             }
         }
     }
