@@ -124,7 +124,7 @@ fn normals_of_a_closed_surface_look_outwards_by_propagation() {
 fn what_propagation_holds_is_refused_with_the_memory_that_does() {
     let folder = tempfile::tempdir().unwrap();
     let input = folder.path().join("scan.las");
-    Scan::synthetic(Scene::Sphere, 40_000, 1).write(&input);
+    Scan::synthetic(Scene::Sphere, 20_000, 1).write(&input);
     let run = |memory: u64, orient: &str| {
         let text = format!(
             "[run]\nmemory = {memory}\nthreads = 1\n[[stage]]\nkind = \"read\"\npath = {input:?}\n\
@@ -134,8 +134,8 @@ fn what_propagation_holds_is_refused_with_the_memory_that_does() {
     };
     let propagate = "[[stage]]\nkind = \"orient\"\nby = \"propagation\"\nneighbors = 64\n";
     let told = run(1 << 20, propagate).unwrap_err();
-    // 40,000 positions of 71 bytes and 64 edges of 12.
-    let held = "32.0 MiB for the stages that need the whole scan";
+    // 20,000 positions of 71 bytes and 64 edges of 12.
+    let held = "16.0 MiB for the stages that need the whole scan";
     assert!(told.to_string().contains(held), "{told}");
     let plain = run(1 << 20, "").unwrap_err();
     assert!(!plain.to_string().contains("the whole scan"), "{plain}");

@@ -20,7 +20,7 @@ const GROUND: &str = "[[stage]]\nkind = 'filter'\nkeep_classes = [2]\n";
 /// A chain from a scan of several classes to a file, in small tiles and through the spill.
 fn chain(folder: &Path, stages: &str, output: &str) -> Graph {
     let text = format!(
-        "[run]\nprovenance = false\ntile_points = 900\nspill = 'always'\nthreads = 2\nmemory = '400MiB'\nreport = '{}'\n\
+        "[run]\nprovenance = false\ntile_points = 900\nspill = 'always'\nthreads = 2\nmemory = '800MiB'\nreport = '{}'\n\
          [[stage]]\nkind = 'synth'\nscene = 'als'\npoints = 20_000\n{stages}\
          [[stage]]\nkind = 'write'\npath = '{}'\n",
         folder.join(format!("{output}.json")).display(),

@@ -123,7 +123,7 @@ fn registry() -> Registry {
 }
 
 const TILED: &str =
-    "withheld = 'keep'\ntile_points = 100\nspill = 'always'\nthreads = 2\nmemory = '400MiB'\n";
+    "withheld = 'keep'\ntile_points = 100\nspill = 'always'\nthreads = 2\nmemory = '800MiB'\n";
 const WHOLE: &str = "withheld = 'keep'\nthreads = 1\n";
 
 fn run(folder: &Path, run: &str, stages: &str, write: &str, output: &str) -> Result<Done> {

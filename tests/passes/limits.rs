@@ -10,7 +10,7 @@ use crate::support::case::Case;
 use crate::support::random::Random;
 
 const TILED: &str =
-    "tile_points = 100\nspill = 'always'\nthreads = 2\nmemory = '400MiB'\nlattice = 0.001\n";
+    "tile_points = 100\nspill = 'always'\nthreads = 2\nmemory = '800MiB'\nlattice = 0.001\n";
 const WHOLE: &str = "threads = 1\nlattice = 0.001\n";
 const NORMALS: &str = "[[stage]]\nkind = 'normals'\nneighbors = 8\n";
 

@@ -17,7 +17,7 @@ fn write(folder: &Path, name: &str, keys: &str) -> String {
 
 /// A scan of several classes, in small tiles and through the spill.
 fn synth(name: &str) -> String {
-    let run = "[run]\ntile_points = 900\nspill = 'always'\nthreads = 2\nmemory = '400MiB'\n";
+    let run = "[run]\ntile_points = 900\nspill = 'always'\nthreads = 2\nmemory = '800MiB'\n";
     format!("{run}{}", stage("synth", &format!("{name}\nscene = 'als'\npoints = 20_000")))
 }
 

@@ -171,7 +171,7 @@ fn two_runs_go_side_by_side_each_within_its_budget() {
         graph.add("channel", Role::Sink(Box::new(sink)), &[grid]);
         graph.plan(&Overrides::default()).unwrap().pull(received, Quiet)
     };
-    let (mut one, mut other) = (run(400 << 20), run(600 << 20));
+    let (mut one, mut other) = (run(800 << 20), run(1000 << 20));
     let mut sets = [BTreeSet::new(), BTreeSet::new()];
     loop {
         let next = [one.next(), other.next()];
@@ -184,7 +184,7 @@ fn two_runs_go_side_by_side_each_within_its_budget() {
     }
     assert!(!sets[0].is_empty() && sets[0] == sets[1]);
     let budgets = [one, other].map(|run| run.finish().unwrap().report.run.memory_bytes);
-    assert_eq!(budgets, [400 << 20, 600 << 20]);
+    assert_eq!(budgets, [800 << 20, 1000 << 20]);
 }
 
 #[test]

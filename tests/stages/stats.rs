@@ -27,7 +27,7 @@ fn named<'a>(stats: &'a [StatsFigures], name: &str) -> &'a StatsFigures {
     stats.iter().find(|stats| stats.name == name).unwrap()
 }
 
-const TILED: &str = "tile_points = 100\nspill = 'always'\nthreads = 2\nmemory = '400MiB'\n";
+const TILED: &str = "tile_points = 100\nspill = 'always'\nthreads = 2\nmemory = '800MiB'\n";
 
 #[test]
 fn figures_are_those_of_the_points_that_come_by() {
