@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use super::arguments::{CommonArguments, PlanArguments, PredictArguments};
 use super::console::Console;
 use super::draw::{Nothing, watched};
+use super::flags::{CommandFlag, common_flags, given};
 use super::mistyped::marked;
 use super::pipeline;
 use super::print;
 use crate::error::shown;
-use crate::graph::Graph;
-use crate::graph::Overrides;
+use crate::graph::{Graph, Overrides, RunSettings};
 use crate::language::Registry;
 use crate::plan::Outline;
 use crate::report::Grouped;
@@ -93,6 +93,27 @@ pub(super) fn refuse_outputs(common: &CommonArguments) -> Result<()> {
             Err(Error::pipeline(told).help("give it to `run`"))
         }
     }
+}
+
+/// Refuses flags about what is written or judged, for commands that read scans and tell figures;
+/// `instead` is what to do about rules.
+pub(super) fn refuse_rules(common: &CommonArguments, instead: &str) -> Result<()> {
+    refuse_outputs(common)?;
+    let Some(rules) = &common.accept else { return Ok(()) };
+    let told = marked("--accept: is for commands that reduce or write", rules, "");
+    Err(Error::pipeline(told).help(instead))
+}
+
+/// The settings of the runs that read the scans of such a command, of its own flags and those that
+/// all commands have.
+pub(super) fn reading(
+    common: &CommonArguments,
+    own: Vec<CommandFlag>,
+    registry: &Registry,
+) -> Result<RunSettings> {
+    let text = "[[stage]]\nkind = \"read\"\n\n[[stage]]\nkind = \"discard\"\n";
+    let sets = given([own, common_flags(common)]);
+    Ok(Graph::parse_with(text, pipeline::HIDDEN, registry, &sets)?.settings)
 }
 
 fn inputs(pipeline: &Graph) -> Vec<PathBuf> {

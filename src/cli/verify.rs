@@ -1,19 +1,13 @@
 //! `verify`: is a scan a reduction of another, and how true is it?
 
 use super::arguments::VerifyArguments;
-use super::check::refuse_outputs;
+use super::check::{reading, refuse_rules};
 use super::console::Console;
-use super::flags::{common_flags, given, verify_flags};
-use super::mistyped::marked;
-use super::pipeline::HIDDEN;
+use super::flags::verify_flags;
 use super::print;
 use crate::compare::{VerifySettings, verify};
-use crate::graph::Graph;
 use crate::language::Registry;
 use crate::{Error, ErrorKind, Result};
-
-/// What the settings of a run are read with.
-const SETTINGS: &str = "[[stage]]\nkind = \"read\"\n\n[[stage]]\nkind = \"discard\"\n";
 
 /// Checks a reduced scan beside its original and prints what came of it; fails if it does not hold.
 pub(super) fn check_reduction(
@@ -21,21 +15,16 @@ pub(super) fn check_reduction(
     registry: &Registry,
     console: &Console,
 ) -> Result<()> {
-    refuse_outputs(&arguments.common)?;
-    if let Some(rules) = &arguments.common.accept {
-        let told = marked("--accept: is for commands that reduce or write", rules, "");
-        return Err(Error::pipeline(told).help("give --tolerance and --max-spacing here"));
-    }
+    refuse_rules(&arguments.common, "give --tolerance and --max-spacing here")?;
     let (Some(reduced), original) = arguments.files() else {
         let told = "a reduced scan is compared with its original, and one file is given";
         let help = "give the original's files first, and the reduced one last";
         return Err(Error::pipeline(told).help(help));
     };
-    let sets = given([verify_flags(arguments), common_flags(&arguments.common)]);
     let settings = VerifySettings {
         tolerance: arguments.tolerance,
         max_spacing: arguments.max_spacing,
-        run: Graph::parse_with(SETTINGS, HIDDEN, registry, &sets)?.settings,
+        run: reading(&arguments.common, verify_flags(arguments), registry)?,
     };
     console.hear_interrupts();
     let verdict =

@@ -17,7 +17,7 @@ mod threshold;
 
 use serde_json::Value;
 
-use super::lengths::rounded;
+use super::lengths::{LARGEST_SIDE, rounded};
 use crate::Result;
 use crate::geom::lattice::Lattice;
 use crate::point::{NORMAL, Units, names};
@@ -29,7 +29,8 @@ use crate::tile::Tile;
 use division::{Division, DivisionCounts};
 pub(super) use grouping::Grouping;
 pub use keys::Cells;
-use keys::{LARGEST_SIDE, SettledCells};
+pub(super) use keys::POSITIONS_PER_CUBE;
+use keys::SettledCells;
 use outlook::Outlook;
 pub use settings::{By, Measure, Reference, Side, Split};
 pub use target::Keep;
@@ -73,9 +74,7 @@ impl TileOp for Cells {
     }
 
     fn for_share(&mut self, share: f64) {
-        if let Some(Keep::Records(count)) = &mut self.keep {
-            *count = ((*count as f64 * share).round() as u64).max(1);
-        }
+        self.keep.iter_mut().for_each(|keep| keep.for_share(share));
     }
 
     fn convert(&mut self, units: &Units) -> Result<()> {

@@ -123,9 +123,7 @@ impl TileOp for Cut {
     }
 
     fn for_share(&mut self, share: f64) {
-        if let Some(Keep::Records(count)) = &mut self.keep {
-            *count = ((*count as f64 * share).round() as u64).max(1);
-        }
+        self.keep.iter_mut().for_each(|keep| keep.for_share(share));
     }
 
     fn convert(&mut self, units: &Units) -> Result<()> {

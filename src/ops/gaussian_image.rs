@@ -1,11 +1,13 @@
 //! The stage `gaussian-image`: positions whose normals fall into one part of a sphere are a cell.
 
+use std::ops::Range;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::cells::Grouping;
-use super::lengths::rounded;
+use super::cells::{Grouping, POSITIONS_PER_CUBE};
+use super::lengths::{LARGEST_SIDE, rounded};
 use crate::geom::lattice::Lattice;
 use crate::point::{NORMAL, Units};
 use crate::quantity::{Length, Setting, Whole};
@@ -14,16 +16,12 @@ use crate::stage::{Needs, Role, RoleName, ScanFacts, StageKind, StagePlace, Tile
 use crate::tile::{Partition, Tile};
 use crate::{Error, Result};
 
-/// Positions that an occupied cube holds on average, at least, where the side is chosen by itself.
-const POSITIONS_PER_CUBE: u64 = 32;
-/// Cubes of this side, anchored at world 0, are the octants of the lattice: no larger side differs.
-const LARGEST_SIDE: i64 = 1 << 62;
 /// Most parts along an edge of a face.
 const MOST_PARTS: u64 = 64;
 const PARTS: Whole<1, MOST_PARTS> = Whole::of(8);
-/// Bytes a position: member, turned, end of a group, and its part of the sphere to sort by; where
-/// positions are sorted by cube 32 more.
-const BYTES: usize = 4 + 1 + 4 + 8 + 4;
+/// Bytes a position: member, turned, end of a group and of an initial one, and what it is sorted
+/// by; where positions are sorted by cube 32 more.
+const BYTES: usize = 4 + 1 + 4 + 4 + 8;
 const SORTING_BYTES: usize = 32;
 
 /// The Gaussian image of Zanaty et al., with which the paper compares: normals are put on the unit
@@ -114,11 +112,14 @@ impl TileOp for GaussianImage {
         let normals = tile.columns.get(&NORMAL)?;
         let crossing = Grouping { tile, normals, side, by_class: false }.run(&mut cells);
         let part = |i: u32| SpherePart::of(normals[i as usize], self.parts.get(), tile.oriented);
-        let initial = self.divide(&mut cells, part);
-        let owns = |first: usize| tile.core.contains(&(cells.members[first] as usize));
-        let owned = |firsts: &mut dyn Iterator<Item = usize>| firsts.filter(|f| owns(*f)).count();
-        let all = owned(&mut cells.groups().map(|group| group.start)) as u64;
-        let initial = owned(&mut initial.iter().map(|&first| first as usize)) as u64;
+        // A cell counts in the tile whose core has its Morton-first position.
+        let owned = |cells: &Partition| {
+            let first = |group: Range<usize>| cells.members[group.start] as usize;
+            cells.groups().filter(|group| tile.core.contains(&first(group.clone()))).count() as u64
+        };
+        let initial = owned(&cells);
+        divide(&mut cells, part);
+        let all = owned(&cells);
         tally.work("crossing_cells", crossing);
         tally.count("cells_initial", initial);
         tally.count("cells", all);
@@ -133,33 +134,25 @@ impl TileOp for GaussianImage {
     }
 }
 
-impl GaussianImage {
-    /// Divides each group of `cells` by the part of the sphere that its normals are in; returns the
-    /// Morton-first member of each group that there was, as an index into the members.
-    fn divide(&self, cells: &mut Partition, part: impl Fn(u32) -> SpherePart) -> Vec<u32> {
-        let ends = std::mem::take(&mut cells.ends);
-        cells.ends.reserve_exact(cells.members.len());
-        cells.turned.resize(cells.members.len(), false);
-        let (mut start, mut keyed, mut firsts) = (0, Vec::new(), Vec::with_capacity(ends.len()));
-        for end in ends {
-            let members = &mut cells.members[start..end as usize];
-            let first = members.first().copied();
-            keyed.clear();
-            keyed.reserve_exact(members.len());
-            keyed.extend(members.iter().map(|&i| (part(i).number, i)));
-            keyed.sort_unstable();
-            for (at, (number, i)) in keyed.iter().enumerate() {
-                members[at] = *i;
-                cells.turned[start + at] = part(*i).turned;
-                if keyed.get(at + 1).is_none_or(|next| next.0 != *number) {
-                    cells.ends.push((start + at + 1) as u32);
-                }
+/// Divides each group of `cells` by the part of the sphere that its normals are in.
+fn divide(cells: &mut Partition, part: impl Fn(u32) -> SpherePart) {
+    let ends = std::mem::take(&mut cells.ends);
+    cells.ends.reserve_exact(cells.members.len());
+    cells.turned.resize(cells.members.len(), false);
+    let (mut start, mut keyed) = (0, Vec::new());
+    for end in ends {
+        let members = &mut cells.members[start..end as usize];
+        keyed.clear();
+        keyed.reserve_exact(members.len());
+        keyed.extend(members.iter().map(|&i| part(i).before(i)));
+        keyed.sort_unstable();
+        for (at, key) in keyed.iter().enumerate() {
+            (members[at], cells.turned[start + at]) = ((key >> 1) as u32, key & 1 == 1);
+            if keyed.get(at + 1).is_none_or(|next| next >> MEMBER_BITS != key >> MEMBER_BITS) {
+                cells.ends.push((start + at + 1) as u32);
             }
-            let is_first = |i: &u32| Some(*i) == first;
-            firsts.extend(members.iter().position(is_first).map(|at| (start + at) as u32));
-            start = end as usize;
         }
-        firsts
+        start = end as usize;
     }
 }
 
@@ -171,7 +164,15 @@ struct SpherePart {
     turned: bool,
 }
 
+/// Bits below the number of a part: a member, and whether its normal is turned.
+const MEMBER_BITS: u32 = u32::BITS + 1;
+
 impl SpherePart {
+    /// What sorts members by their parts, and those of one part in their order.
+    fn before(self, member: u32) -> u64 {
+        u64::from(self.number) << MEMBER_BITS | u64::from(member) << 1 | u64::from(self.turned)
+    }
+
     /// That of a unit normal; where its sign means nothing, that of the one of the two whose
     /// largest component is positive.
     fn of(normal: [f32; 3], parts: u64, oriented: bool) -> SpherePart {

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::lengths::rounded;
+use super::lengths::{LARGEST_SIDE, rounded};
 use super::removal::{RemovalAccount, keep_once, remove, represent};
 use crate::geom::angle::is_known;
 use crate::geom::lattice::Lattice;
@@ -18,8 +18,6 @@ use crate::stage::{Needs, Role, RoleName, ScanFacts, StageKind, StagePlace, Tile
 use crate::tile::Tile;
 use crate::{Error, Result};
 
-/// Cubes of this side, anchored at world 0, are the octants of the lattice: no larger side differs.
-const LARGEST_SIDE: i64 = 1 << 62;
 /// Bytes a position: its key, its cube and its index, coordinates to take a median of, and an
 /// offset. All positions may share one key.
 const BYTES: usize =

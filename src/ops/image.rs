@@ -103,10 +103,7 @@ fn build<T: Transformed + 'static>(
     (keep, axis, pixels, moves): (Keep, Axis, Pixels, bool),
 ) -> Result<Role> {
     let kind = T::KIND;
-    if keep == Keep::Auto {
-        let error = Error::pipeline(format!("`{kind}.keep` is a number of points or a share"));
-        return Err(at.blame("keep", error.help(format!("for example `{kind}.keep = \"10%\"`"))));
-    }
+    keep.check_given(kind, at)?;
     let side = pixels.get() as usize;
     if !side.is_power_of_two() {
         let told = format!("`{kind}.pixels` must be a power of two, not {side}");
@@ -129,9 +126,7 @@ impl<T: Transformed> TileOp for ImageReduction<T> {
     }
 
     fn for_share(&mut self, share: f64) {
-        if let Keep::Records(count) = &mut self.keep {
-            *count = ((*count as f64 * share).round() as u64).max(1);
-        }
+        self.keep.for_share(share);
     }
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {

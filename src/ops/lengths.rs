@@ -3,6 +3,9 @@
 use crate::geom::lattice::Lattice;
 use crate::quantity::Figure;
 
+/// Cubes of this side, anchored at world 0, are the octants of the lattice: no larger side differs.
+pub(super) const LARGEST_SIDE: i64 = 1 << 62;
+
 /// What to tell of a length, given as the key `address`, that is not what it was given as.
 pub(super) fn rounded(lattice: &Lattice, address: &str, length: f64) -> Option<String> {
     let held = Figure(lattice.rounded(length)?);

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::lengths::Square;
-use super::removal::{keep_once, represent_at};
 use super::whole::Rows;
+use crate::geom::plane::dot;
 use crate::point::{Column, Position, Units, distance2, names};
 use crate::quantity::{Angle, Length};
 use crate::report::Tally;
@@ -179,14 +179,7 @@ impl TileOp for Scanline {
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let unfound = || Error::internal("the stage scanline ran before lines were followed");
         let rows = &self.found.as_ref().ok_or_else(unfound)?.rows;
-        let (mut coincident, mut represented) = (0, 0);
-        rows.each_of_core(tile, |tile, i, at| match rows.values[at] {
-            deviation if deviation.is_nan() => coincident += keep_once(tile, i),
-            deviation => represented += represent_at(tile, i, deviation),
-        })?;
-        tally.remove("scanline", "coincident", coincident);
-        tally.remove("scanline", "represented", represented);
-        Ok(())
+        rows.thin(tile, Self::KIND, tally)
     }
 
     fn decisions(&self) -> Vec<(String, Value)> {
@@ -294,10 +287,6 @@ impl Tolerance {
 
 fn offset(from: Position, to: Position) -> [f64; 3] {
     [0, 1, 2].map(|axis| to[axis].saturating_sub(from[axis]) as f64)
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// The squared distance of a position to a chord, in steps.

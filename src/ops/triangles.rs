@@ -9,7 +9,6 @@ use serde_json::Value;
 
 use super::Axis;
 use super::cells::Keep;
-use super::removal::{keep_once, represent_at};
 use super::whole::Rows;
 use crate::point::{Bounds, names};
 use crate::report::{Grouped, Tally};
@@ -77,10 +76,7 @@ impl StageKind for Triangles {
         "Removes triangles of a mesh of the points, those that tell least first.";
 
     fn build(self, at: &StagePlace) -> Result<Role> {
-        if self.keep == Keep::Auto {
-            let error = Error::pipeline("`triangles.keep` is a number of points or a share");
-            return Err(at.blame("keep", error.help("for example `triangles.keep = \"10%\"`")));
-        }
+        self.keep.check_given(Self::KIND, at)?;
         Ok(Role::ScanOp(Box::new(self)))
     }
 }
@@ -91,9 +87,7 @@ impl TileOp for Triangles {
     }
 
     fn for_share(&mut self, share: f64) {
-        if let Keep::Records(count) = &mut self.keep {
-            *count = ((*count as f64 * share).round() as u64).max(1);
-        }
+        self.keep.for_share(share);
     }
 
     fn settle(&mut self, scan: &ScanFacts) -> Result<()> {
@@ -104,14 +98,7 @@ impl TileOp for Triangles {
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let unfound = || Error::internal("the stage triangles ran before its mesh was thinned");
         let rows = &self.found.as_ref().ok_or_else(unfound)?.rows;
-        let (mut coincident, mut represented) = (0, 0);
-        rows.each_of_core(tile, |tile, i, at| match rows.values[at] {
-            deviation if deviation.is_nan() => coincident += keep_once(tile, i),
-            deviation => represented += represent_at(tile, i, deviation),
-        })?;
-        tally.remove("triangles", "coincident", coincident);
-        tally.remove("triangles", "represented", represented);
-        Ok(())
+        rows.thin(tile, Self::KIND, tally)
     }
 
     fn decisions(&self) -> Vec<(String, Value)> {

@@ -8,8 +8,10 @@
 
 use bytemuck::Pod;
 
+use super::removal::{keep_once, represent_at};
 use crate::geom::morton::morton_cmp;
 use crate::point::Position;
+use crate::report::Tally;
 use crate::stage::{Gathered, Summary};
 use crate::tile::Tile;
 use crate::{Error, Result};
@@ -64,10 +66,10 @@ impl<T: Pod> Rows<T> {
         })?;
         match u32::try_from(all.positions.len()) {
             Ok(_) => Ok(all),
-            Err(_) => Err(Error::memory(
-                "a stage that works on the whole scan at once takes no \
-                                         more than 2^32 positions",
-            )),
+            Err(_) => {
+                let told = "a stage that needs the whole scan takes no more than 2^32 positions";
+                Err(Error::memory(told))
+            }
         }
     }
 
@@ -110,6 +112,21 @@ impl<T: Pod> Rows<T> {
     pub fn with<U>(self, values: Vec<U>) -> Rows<U> {
         debug_assert_eq!(self.positions.len(), values.len(), "a value for each position");
         Rows { positions: self.positions, values }
+    }
+}
+
+impl Rows<f32> {
+    /// Removes from the core of a tile what goes, as `stage`: a value is how far a position is from
+    /// what stands for it, in steps, and NaN where it stays.
+    pub fn thin(&self, tile: &mut Tile, stage: &'static str, tally: &mut Tally) -> Result<()> {
+        let (mut coincident, mut represented) = (0, 0);
+        self.each_of_core(tile, |tile, i, at| match self.values[at] {
+            deviation if deviation.is_nan() => coincident += keep_once(tile, i),
+            deviation => represented += represent_at(tile, i, deviation),
+        })?;
+        tally.remove(stage, "coincident", coincident);
+        tally.remove(stage, "represented", represented);
+        Ok(())
     }
 }
 

@@ -3,9 +3,10 @@
 
 use serde_json::Value;
 
-use super::keys::{Cells, LARGEST_SIDE, MAX_ANGLE};
+use super::keys::{Cells, MAX_ANGLE};
 use super::settings::Side;
 use super::target::Keep;
+use crate::ops::lengths::LARGEST_SIDE;
 use crate::ops::scatter::SMOOTH;
 use crate::quantity::Setting;
 

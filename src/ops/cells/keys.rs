@@ -20,9 +20,7 @@ use crate::{Error, Result};
 /// Largest range of angles where nothing is said, in radians.
 pub(super) const MAX_ANGLE: f64 = 0.1;
 /// Positions that an occupied cube holds on average, at least, where the side is chosen by itself.
-const POSITIONS_PER_CUBE: u64 = 32;
-/// Cubes of this side, anchored at world 0, are the octants of the lattice: no larger side differs.
-pub(super) const LARGEST_SIDE: i64 = 1 << 62;
+pub(in crate::ops) const POSITIONS_PER_CUBE: u64 = 32;
 /// Sites of a division where nothing is said.
 const SEEDS: usize = 4;
 

@@ -2,10 +2,12 @@
 
 use std::fmt;
 
-use serde::de::{Deserializer, Error, Unexpected, Visitor};
+use serde::de::{self, Deserializer, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 
+use crate::Error;
 use crate::quantity::{COUNT_TEXT, has_schema, parse_count};
+use crate::stage::StagePlace;
 
 /// How many records are to stay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,6 +40,24 @@ impl Keep {
                 u64::try_from((2 * parts + all) / (2 * all)).unwrap_or(u64::MAX).max(1)
             }
         }
+    }
+}
+
+impl Keep {
+    /// The same of a trial on a share of the scan: a number is that share of it, one at least.
+    pub(in crate::ops) fn for_share(&mut self, share: f64) {
+        if let Keep::Records(count) = self {
+            *count = ((*count as f64 * share).round() as u64).max(1);
+        }
+    }
+
+    /// Refuses what leaves the number to the scan, for the stage `kind`, which does not find one.
+    pub(in crate::ops) fn check_given(self, kind: &str, at: &StagePlace) -> Result<(), Error> {
+        if self != Keep::Auto {
+            return Ok(());
+        }
+        let error = Error::pipeline(format!("`{kind}.keep` is a number of points or a share"));
+        Err(at.blame("keep", error.help(format!("for example `{kind}.keep = \"10%\"`"))))
     }
 }
 
@@ -105,21 +125,21 @@ impl Visitor<'_> for KeepVisitor {
         )
     }
 
-    fn visit_u64<E: Error>(self, count: u64) -> Result<Keep, E> {
+    fn visit_u64<E: de::Error>(self, count: u64) -> Result<Keep, E> {
         match count {
             0 => Err(E::invalid_value(Unexpected::Unsigned(0), &self)),
             _ => Ok(Keep::Records(count)),
         }
     }
 
-    fn visit_i64<E: Error>(self, count: i64) -> Result<Keep, E> {
+    fn visit_i64<E: de::Error>(self, count: i64) -> Result<Keep, E> {
         match u64::try_from(count) {
             Ok(count) => self.visit_u64(count),
             Err(_) => Err(E::invalid_value(Unexpected::Signed(count), &self)),
         }
     }
 
-    fn visit_f64<E: Error>(self, count: f64) -> Result<Keep, E> {
+    fn visit_f64<E: de::Error>(self, count: f64) -> Result<Keep, E> {
         if 0.0 < count && count < 1.0 {
             return Err(E::custom(format!(
                 "{count} is no number of points; did you mean \"{}%\", that share of them?",
@@ -133,7 +153,7 @@ impl Visitor<'_> for KeepVisitor {
         }
     }
 
-    fn visit_str<E: Error>(self, text: &str) -> Result<Keep, E> {
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<Keep, E> {
         if text.trim() == "auto" {
             return Ok(Keep::Auto);
         }

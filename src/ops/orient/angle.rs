@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::sign::{TIME, turned};
-use crate::geom::angle::is_known;
+use super::sign::{TIME, turn};
 use crate::geom::plane::dot;
 use crate::point::{Column, NORMAL, Position, names};
 use crate::report::Tally;
@@ -75,32 +74,17 @@ impl TileOp for AngleOrientation {
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let unfound = || Error::internal("the stage orient ran before ways were known");
         let rights = self.rights.as_ref().ok_or_else(unfound)?;
-        let mut normals = tile.columns.take(&NORMAL)?;
-        let (angles, sources) = (tile.columns.get(&ANGLE)?, tile.columns.get(&SOURCE)?);
-        let (mut changed, mut unknown) = (0, 0);
-        for (i, normal) in normals.iter_mut().enumerate() {
-            if !is_known(*normal) || !tile.is_chosen(i) {
-                continue;
-            }
-            let counted = u64::from(tile.core.contains(&i));
-            let right = rights.get(&(sources[i] as u16)).copied().flatten();
-            let Some([right_x, right_y]) = right.filter(|_| angles[i].is_finite()) else {
-                unknown += counted;
-                continue;
-            };
+        let (angles, sources) = (tile.columns.take(&ANGLE)?, tile.columns.take(&SOURCE)?);
+        turn(tile, tally, |_, i, normal| {
+            let [right_x, right_y] = rights.get(&(sources[i] as u16)).copied().flatten()?;
             // LAS 1.4 R15, 2.6: negative to the left of the way of flight, 0 below the sensor.
-            let angle = angles[i].to_radians();
+            let angle = Some(angles[i].to_radians()).filter(|angle| angle.is_finite())?;
             let (sin, cos) = (libm::sin(angle), libm::cos(angle));
             let sight = [-right_x * sin, -right_y * sin, cos];
-            if dot(normal.map(f64::from), sight) < 0.0 {
-                *normal = turned(*normal);
-                changed += counted;
-            }
-        }
-        tile.columns.put(normals);
-        tile.oriented = true;
-        tally.count("orient_turned", changed);
-        tally.count("orient_unknown", unknown);
+            Some(dot(normal.map(f64::from), sight) < 0.0)
+        })?;
+        tile.columns.put(angles);
+        tile.columns.put(sources);
         Ok(())
     }
 }

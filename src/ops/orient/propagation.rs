@@ -6,7 +6,7 @@
 //! its sign is that of its set's root. So a walk along the tree is not needed, and equal weights,
 //! which come in the order of their positions, leave nothing to chance.
 
-use super::sign::turned;
+use super::sign::turn;
 use crate::geom::angle::is_known;
 use crate::geom::nearest::Nearest;
 use crate::geom::plane::dot;
@@ -48,23 +48,7 @@ impl TileOp for Propagation {
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let unfound = || Error::internal("the stage orient ran before signs were known");
         let found = self.found.as_ref().ok_or_else(unfound)?;
-        let mut normals = tile.columns.take(&NORMAL)?;
-        let mut changed = 0;
-        // Those of the rim, too: cells that reach into the tile are decided by them.
-        for (i, normal) in normals.iter_mut().enumerate() {
-            let is_turned = is_known(*normal)
-                && tile.is_chosen(i)
-                && found.value(tile.positions[i]).is_some_and(|turn| turn != 0);
-            if is_turned {
-                *normal = turned(*normal);
-                changed += u64::from(tile.core.contains(&i));
-            }
-        }
-        tile.columns.put(normals);
-        tile.oriented = true;
-        tally.count("orient_turned", changed);
-        tally.count("orient_unknown", 0);
-        Ok(())
+        turn(tile, tally, |tile, i, _| Some(found.value(tile.positions[i]).is_some_and(|t| t != 0)))
     }
 }
 

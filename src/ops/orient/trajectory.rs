@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::sign::{TIME, turned};
-use crate::geom::angle::is_known;
+use super::sign::{TIME, turn};
 use crate::geom::lattice::Lattice;
 use crate::ops::normals::SignRule;
 use crate::point::{NORMAL, names};
@@ -140,28 +139,12 @@ impl TileOp for TrajectoryOrientation {
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let unsettled = || Error::internal("the stage orient ran before it was settled");
         let lattice = self.lattice.as_ref().ok_or_else(unsettled)?;
-        let mut normals = tile.columns.take(&NORMAL)?;
-        let times = tile.columns.get(&TIME)?;
-        let (mut changed, mut unknown) = (0, 0);
-        for (i, normal) in normals.iter_mut().enumerate() {
-            if !is_known(*normal) || !tile.is_chosen(i) {
-                continue;
-            }
-            let counted = u64::from(tile.core.contains(&i));
-            let Some(sensor) = self.trajectory.at(times[i]) else {
-                unknown += counted;
-                continue;
-            };
-            let seen = SignRule::towards(sensor, lattice).settled(*normal, tile.positions[i]);
-            if seen != *normal {
-                *normal = turned(*normal);
-                changed += counted;
-            }
-        }
-        tile.columns.put(normals);
-        tile.oriented = true;
-        tally.count("orient_turned", changed);
-        tally.count("orient_unknown", unknown);
+        let times = tile.columns.take(&TIME)?;
+        turn(tile, tally, |tile, i, normal| {
+            let side = SignRule::towards(self.trajectory.at(times[i])?, lattice);
+            Some(side.settled(normal, tile.positions[i]) != normal)
+        })?;
+        tile.columns.put(times);
         Ok(())
     }
 }
