@@ -30,7 +30,10 @@ pub use rounds::{
     RoundTile, SoFar,
 };
 pub use scan::{AnyScanOp, Gathered, ScanOp, StoredSummaries, Summary};
-pub use sink::{ChunkSize, CreateSink, Encode, Encoded, Order, Sink, SinkSummary};
+pub use sink::{
+    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Order, Sink, SinkSummary, Triangle,
+    Triangulation,
+};
 pub use source::{Contradiction, Input, OpenSource, Part, Source};
 pub use tile_op::{Forecast, ScanFacts, TileOp};
 pub use unread::Unread;

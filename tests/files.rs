@@ -7,6 +7,7 @@ mod convert;
 mod las;
 mod laz;
 mod lossless;
+mod mesh;
 mod outdir;
 mod ply;
 mod support;

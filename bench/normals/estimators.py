@@ -16,6 +16,7 @@ class Tools:
 
     pointmill: Path
     cgal: Path
+    pcl: Path
     folder: Path
 
 
@@ -41,14 +42,23 @@ def pointmill(method: str):
     return estimate
 
 
+def driven(program: Path, folder: Path, points: np.ndarray, *arguments: str) -> np.ndarray:
+    """What a driver of a C++ library writes."""
+    scan, out = folder / "in.bin", folder / "out.bin"
+    np.ascontiguousarray(points, np.float64).tofile(scan)
+    subprocess.run([program, scan, out, *arguments], check=True)
+    return np.fromfile(out, np.float64).reshape(-1, 3)
+
+
 def cgal(kind: str, *more: str):
     def estimate(tools: Tools, points: np.ndarray, k: int) -> np.ndarray:
-        scan, out = tools.folder / "in.bin", tools.folder / "out.bin"
-        np.ascontiguousarray(points, np.float64).tofile(scan)
-        subprocess.run([tools.cgal, scan, out, kind, str(k), *more], check=True)
-        return np.fromfile(out, np.float64).reshape(-1, 3)
+        return driven(tools.cgal, tools.folder, points, kind, str(k), *more)
 
     return estimate
+
+
+def pcl(tools: Tools, points: np.ndarray, k: int) -> np.ndarray:
+    return driven(tools.pcl, tools.folder, points, "normals", str(k))
 
 
 def open3d(tools: Tools, points: np.ndarray, k: int) -> np.ndarray:
@@ -69,5 +79,6 @@ ESTIMATORS = {
     "CGAL pca": (cgal("pca"), 3),
     "CGAL jet 2": (cgal("jet", "2"), 6),
     "CGAL jet 3": (cgal("jet", "3"), 10),
+    "PCL": (pcl, 3),
     "Open3D": (open3d, 3),
 }

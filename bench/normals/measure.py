@@ -24,15 +24,17 @@ def angles(found: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    for name in ("pointmill", "cgal", "folder", "results"):
+    for name in ("pointmill", "cgal", "pcl", "folder", "results"):
         parser.add_argument(f"--{name}", type=Path, required=True)
     given = parser.parse_args()
-    tools = Tools(given.pointmill, given.cgal, given.folder)
+    tools = Tools(given.pointmill, given.cgal, given.pcl, given.folder)
     rows = []
     for surface in SHAPES:
         for noise in NOISES:
             points, normals = shape(surface, COUNT, noise, SEED)
             for name, (estimate, fewest) in ESTIMATORS.items():
+                if name == "PCL" and not tools.pcl.exists():
+                    continue
                 for k in (k for k in NEIGHBORS if k >= fewest):
                     off = angles(estimate(tools, points, k), normals)
                     rows.append({"surface": surface, "noise": noise, "by": name, "k": k,

@@ -9,7 +9,7 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "quality"))
-from run import ROOT, built, called, cgal, python
+from run import ROOT, built, called, cgal, pcl, python
 
 sys.path.insert(0, str(HERE))
 import draw_normals
@@ -24,7 +24,7 @@ def main() -> None:
     cache = given.cache.resolve()
     cache.mkdir(parents=True, exist_ok=True)
     command = [python(cache), HERE / "measure.py", "--folder", cache,
-               "--cgal", cgal(cache, HERE / "normals.cpp"),
+               "--cgal", cgal(cache, HERE / "normals.cpp"), "--pcl", pcl(cache),
                "--pointmill", (given.pointmill or built()).resolve(),
                "--results", HERE / "results.jsonl"]
     called(*command, env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"})

@@ -97,6 +97,13 @@ def neighbors(rows: list[dict]) -> str:
     return table(["pattern", "k", "after", "RMS after", "deviation"], lines)
 
 
+def circles(rows: list[dict]) -> str:
+    lines = [[row["pattern"], "0.1°" if row["angle"] == "0.1deg" else "0.1 rad", row["circles"],
+              count(row), figure(row, "after"), figure(row, "removed")]
+             for row in rows_of(rows, "circles")]
+    return table(["pattern", "α", "cocircular", "after", "RMS after", "deviation"], lines, 3)
+
+
 def times(rows: list[dict]) -> str:
     lines = []
     for row in rows_of(rows, "times"):
@@ -109,7 +116,7 @@ def times(rows: list[dict]) -> str:
 
 
 TABLES = {"seeds": seeds, "fronts": fronts, "readings": readings, "passes": passes,
-          "neighbors": neighbors, "times": times}
+          "neighbors": neighbors, "circles": circles, "times": times}
 
 
 def bars(rows: list[dict], pattern: str, left: int, top: int) -> list[str]:
@@ -152,9 +159,12 @@ def plot(rows: list[dict]) -> str:
     return "\n".join(drawn) + "\n</svg>\n"
 
 
+def results() -> list[dict]:
+    return [json.loads(line) for line in RESULTS.read_text(encoding="utf-8").splitlines()]
+
+
 def drawn() -> dict[Path, str]:
-    lines = RESULTS.read_text(encoding="utf-8").splitlines()
-    rows = [json.loads(line) for line in lines]
+    rows = results()
     text = PAGE.read_text(encoding="utf-8")
     for name, make in TABLES.items():
         before, rest = text.split(begin(name), 1)

@@ -66,8 +66,8 @@ def scene(pattern: str, points: int, seed: int, **keys) -> str:
     return f"synth scene=squares-{pattern} points={points} seed={seed}{told}"
 
 
-def reduction(angle: str, neighbors: int = 10, passes: int = 1) -> str:
-    return (f"normals neighbors={neighbors} ! cells max_angle={angle} "
+def reduction(angle: str, neighbors: int = 10, passes: int = 1, circles: str = "out") -> str:
+    return (f"normals neighbors={neighbors} cocircular={circles} ! cells max_angle={angle} "
             f"! median passes={passes} ! discard")
 
 
@@ -147,6 +147,17 @@ def neighbors(runs: Runs) -> list[dict]:
     return rows
 
 
+def circles(runs: Runs) -> list[dict]:
+    """Neighbours on the circle of a triangle as no corners of it, and as corners."""
+    rows = []
+    for pattern, angle, reading in itertools.product(PATTERNS, ANGLES, ("out", "in")):
+        line = reduction(angle, circles=reading)
+        found = [runs.figures(f"{scene(pattern, 5500, seed)} ! {line}") for seed in range(SEEDS)]
+        row = {"table": "circles", "pattern": pattern, "angle": angle, "circles": reading}
+        rows.append(summary(row, found))
+    return rows
+
+
 def times(runs: Runs) -> list[dict]:
     """CPU seconds of a million squares: reading alone, normals, and the whole reduction."""
     rows = []
@@ -162,11 +173,19 @@ def times(runs: Runs) -> list[dict]:
     return rows
 
 
-def measured(program: Path) -> list[dict]:
+TABLES = (seeds, fronts, readings, passes, neighbors, circles, times)
+
+
+def measured(program: Path, asked: list[str]) -> list[dict]:
+    """The rows of all tables: those that are asked for anew, the others as they are."""
+    known = draw_paper.results()
     with tempfile.TemporaryDirectory() as folder:
         runs = Runs(program, Path(folder))
-        tables = (seeds, fronts, readings, passes, neighbors, times)
-        return [row for table in tables for row in table(runs)]
+        rows = []
+        for table in TABLES:
+            name = table.__name__
+            rows += table(runs) if name in asked else draw_paper.rows_of(known, name)
+        return rows
 
 
 def main() -> None:
@@ -175,12 +194,16 @@ def main() -> None:
                         help="the program that is measured")
     parser.add_argument("--check", action="store_true",
                         help="measure nothing; whether docs/paper.md is what results.jsonl says")
+    names = [table.__name__ for table in TABLES]
+    parser.add_argument("--tables", default=",".join(names), help="only these, as a,b")
     given = parser.parse_args()
+    if unknown := set(given.tables.split(",")) - set(names):
+        sys.exit(f"{', '.join(unknown)}: not among {', '.join(names)}")
     if given.check:
         if wrong := draw_paper.differing():
             sys.exit(f"{wrong} is not what the results say: python3 bench/paper/run.py")
         return
-    rows = measured(given.pointmill.resolve())
+    rows = measured(given.pointmill.resolve(), given.tables.split(","))
     draw_paper.RESULTS.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
     draw_paper.write()
 

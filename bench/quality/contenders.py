@@ -25,6 +25,7 @@ class Job:
     count: int
     pointmill: Path
     cgal: Path
+    pcl: Path
     folder: Path
 
     @cached_property
@@ -122,13 +123,14 @@ def poisson(job: Job) -> np.ndarray:
     return matched(thrown, job.count, 0.3 * job.side, 1.6 * job.side, 10, 0.005)[0]
 
 
-# ---- CGAL, by cgal.cpp
+# ---- CGAL and PCL, by cgal.cpp and pcl.cpp
 
 
-def cgal(job: Job, kind: type, *arguments: str | float) -> np.ndarray:
+def driven(job: Job, program: Path, kind: type, *arguments: str | float) -> np.ndarray:
+    """What a driver writes of the points."""
     scan, kept = job.file("in.bin"), job.file("out.bin")
     job.points.astype("<f8").tofile(scan)
-    command = [job.cgal, scan, kept, *arguments]
+    command = [program, scan, kept, *arguments]
     subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
     values = np.fromfile(kept, kind)
     scan.unlink()
@@ -138,12 +140,18 @@ def cgal(job: Job, kind: type, *arguments: str | float) -> np.ndarray:
 
 def hierarchy(variation: float):
     """Clusters split until their variation is below a bound; their size gives the number."""
-    return lambda job: cgal(job, np.int32, "hierarchy", job.count, variation).astype(np.int64)
+    return lambda job: driven(
+        job, job.cgal, np.int32, "hierarchy", job.count, variation).astype(np.int64)
 
 
 def wlop(job: Job) -> np.ndarray:
     """Weighted locally optimal projection: new positions, 20 iterations."""
-    return cgal(job, np.float64, "wlop", job.count, 20).reshape(-1, 3)
+    return driven(job, job.cgal, np.float64, "wlop", job.count, 20).reshape(-1, 3)
+
+
+def pcl(kind: str):
+    """PCL's sampling in the space of normals, or by the covariance of what it constrains."""
+    return lambda job: driven(job, job.pcl, np.int32, kind, job.count).astype(np.int64)
 
 
 # ---- MeshLab and Open3D
@@ -242,8 +250,11 @@ METHODS = {
         "normals ! cells keep={count} ! median pick=centroid", True),
     "paper, Dirichlet": by_count(
         "normals ! cells keep={count} split=dirichlet ! median", False),
+    "triangle removal": by_count("triangles keep={count}", False),
     "wavelet": by_count("wavelet keep={count}", True),
     "fourier": by_count("fourier keep={count}", True),
+    "PCL normal space": pcl("normal-space"),
+    "PCL covariance": pcl("covariance"),
 }
 CONTENDERS = {
     OURS: reduce(),
@@ -261,8 +272,8 @@ CONTENDERS = {
     "CGAL WLOP": wlop,
 }
 # Measured at five shares, in results of their own: methods.jsonl.
-BESIDE_METHODS = (OURS, "pointmill paper", "voxel", "random", "CGAL hierarchy 0.03",
-                  "MeshLab simplify", "CGAL WLOP")
+BESIDE_METHODS = (OURS, "pointmill paper", "voxel", "random", "Poisson disk",
+                  "CGAL hierarchy 0.03", "MeshLab simplify", "Open3D farthest", "CGAL WLOP")
 ALL = CONTENDERS | METHODS
 # Time grows with the square of what is kept, or the point: not run above so many points.
 MOST = {"Open3D farthest": 3_000, "CGAL WLOP": 8_000}

@@ -24,6 +24,7 @@ class Bench:
 
     pointmill: Path
     cgal: Path
+    pcl: Path
     maker: Maker
     folder: Path
 
@@ -33,7 +34,7 @@ class Bench:
 
     def job(self, points: np.ndarray, share: float) -> Job:
         count = round(share * len(points))
-        return Job(points, count, self.pointmill, self.cgal, self.folder)
+        return Job(points, count, self.pointmill, self.cgal, self.pcl, self.folder)
 
 
 def store(path: Path, kept: np.ndarray, seconds: float) -> None:

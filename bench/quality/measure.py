@@ -76,6 +76,7 @@ def options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--pointmill", type=Path, required=True)
     parser.add_argument("--cgal", type=Path, required=True)
+    parser.add_argument("--pcl", type=Path, required=True)
     parser.add_argument("--folder", type=Path, required=True)
     parser.add_argument("--scans", type=Path)
     parser.add_argument("--results", type=Path, required=True)
@@ -108,7 +109,7 @@ def main() -> None:
     given = options()
     (given.folder / "kept").mkdir(parents=True, exist_ok=True)
     maker = Maker(given.pointmill, given.scans, given.folder / "scenes")
-    bench = Bench(given.pointmill, given.cgal, maker, given.folder)
+    bench = Bench(given.pointmill, given.cgal, given.pcl, maker, given.folder)
     shares, seeds = (METHOD_SHARES, METHOD_SEEDS) if given.methods else (SHARES, SEEDS)
     names = (*BESIDE_METHODS, *METHODS) if given.methods else CONTENDERS
     scenes = METHOD_SCENES if given.methods else SCENES

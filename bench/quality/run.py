@@ -6,6 +6,7 @@ results.jsonl does not have yet, and draws docs/quality.md.
 """
 
 import argparse
+import glob
 import os
 import shutil
 import subprocess
@@ -18,6 +19,7 @@ import draw
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 SYSTEM = ["g++", "libcgal-dev", "libeigen3-dev", "libtbb-dev"]
+PCL = ["g++", "libpcl-dev", "libeigen3-dev"]
 
 
 def options() -> argparse.Namespace:
@@ -53,19 +55,43 @@ def python(cache: Path) -> Path:
     return folder / "bin/python"
 
 
-def cgal(cache: Path, source: Path = HERE / "cgal.cpp") -> Path:
-    """A driver of CGAL, built; its packages are installed where apt and the rights are there."""
-    program = cache / source.stem
-    if program.exists() and program.stat().st_mtime > source.stat().st_mtime:
-        return program
-    there = subprocess.run(["dpkg", "-s", *SYSTEM], capture_output=True).returncode == 0
-    if not there and shutil.which("apt-get") and os.geteuid() == 0:
+def installed(packages: list[str]) -> bool:
+    """Whether system packages are there, after installing them where apt and the rights are."""
+    def there() -> bool:
+        return subprocess.run(["dpkg", "-s", *packages], capture_output=True).returncode == 0
+
+    if not there() and shutil.which("apt-get") and os.geteuid() == 0:
         called("apt-get", "update", "-q")
-        called("apt-get", "install", "-y", "-q", "--no-install-recommends", *SYSTEM)
-    called("g++", "-O3", "-march=native", "-DNDEBUG", "-DCGAL_LINKED_WITH_TBB",
-           "-DCGAL_EIGEN3_ENABLED", "-I/usr/include/eigen3", "-std=c++17", "-w",
-           source, "-o", program, "-ltbb", "-lgmp")
+        called("apt-get", "install", "-y", "-q", "--no-install-recommends", *packages)
+    return there()
+
+
+def driver(cache: Path, source: Path, packages: list[str], flags: list[str]) -> Path:
+    """A driver of a C++ library, built unless it is fresh."""
+    program = cache / source.stem
+    if not (program.exists() and program.stat().st_mtime > source.stat().st_mtime):
+        installed(packages)
+        called("g++", "-O3", "-DNDEBUG", "-I/usr/include/eigen3", "-std=c++17",
+               "-w", source, "-o", program, *flags)
     return program
+
+
+def cgal(cache: Path, source: Path = HERE / "cgal.cpp") -> Path:
+    return driver(cache, source, SYSTEM, ["-march=native", "-DCGAL_LINKED_WITH_TBB", "-DCGAL_EIGEN3_ENABLED",
+                                          "-ltbb", "-lgmp"])
+
+
+def pcl(cache: Path) -> Path:
+    """PCL's driver; where its packages cannot be had there is none, and its contenders fail.
+
+    Not for this very processor: Eigen would align its vectors otherwise than in PCL's libraries.
+    """
+    if not installed(PCL):
+        print("PCL is not there: libpcl-dev is not installed")
+        return cache / "pcl"
+    paths = [f"-I{path}" for path in glob.glob("/usr/include/pcl-*")]
+    parts = ("filters", "features", "search", "kdtree", "octree", "common")
+    return driver(cache, HERE / "pcl.cpp", PCL, [*paths, *(f"-lpcl_{part}" for part in parts)])
 
 
 def built() -> Path:
@@ -83,7 +109,7 @@ def main() -> None:
                                 "PYTHONDONTWRITEBYTECODE": "1"}
     called(interpreter, "-m", "unittest", "-q", "test_counts", "test_figures",
            cwd=HERE, env=environment)
-    command = [interpreter, HERE / "measure.py", "--folder", cache, "--cgal", cgal(cache),
+    command = [interpreter, HERE / "measure.py", "--folder", cache, "--cgal", cgal(cache), "--pcl", pcl(cache),
                "--pointmill", (given.pointmill or built()).resolve(),
                "--results", HERE / ("methods.jsonl" if given.methods else "results.jsonl")]
     command += ["--again"] if given.again else []

@@ -38,14 +38,14 @@ class Counts(unittest.TestCase):
 
 class Contenders(unittest.TestCase):
     def test_they_keep_different_points_of_the_scan_near_the_number(self):
-        job = Job(square(5_000), 250, Path("-"), Path("-"), Path("-"))
+        job = Job(square(5_000), 250, *[Path("-")] * 4)
         for keep in (voxel, random, poisson):
             kept = keep(job)
             self.assertEqual(len(np.unique(kept)), len(kept))
             self.assertAlmostEqual(len(kept), 250, delta=8)
 
     def test_no_poisson_disk_has_another_point_within_its_radius(self):
-        job = Job(square(5_000), 250, Path("-"), Path("-"), Path("-"))
+        job = Job(square(5_000), 250, *[Path("-")] * 4)
         kept = job.points[poisson(job)]
         apart = np.linalg.norm(kept[:, None] - kept[None], axis=2)
         nearest = np.sort(apart, axis=1)[:, 1]
@@ -56,7 +56,7 @@ class Contenders(unittest.TestCase):
 class Cells(unittest.TestCase):
     def test_only_who_keeps_the_number_is_judged(self):
         with tempfile.TemporaryDirectory() as folder:
-            bench = Bench(Path("-"), Path("-"), None, Path(folder))
+            bench = Bench(*[Path("-")] * 3, None, Path(folder))
             (bench.folder / "kept").mkdir()
             points = square(1_000)
             for contender, count in (("voxel", 98), ("random", 96)):

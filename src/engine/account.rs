@@ -121,6 +121,12 @@ impl Task {
             let (stage, name) = ("write".to_owned(), "side".to_owned());
             Decision { stage, name, value: side.into() }
         }));
+        let meshes = self.meshes.iter().zip(&self.branch_of);
+        let meshes = meshes.filter(|(_, of)| std::ptr::eq(&self.branches[**of], branch));
+        decisions.extend(meshes.filter_map(|(mesh, _)| mesh.as_ref()?.max_radius).map(|radius| {
+            let (stage, name) = ("mesh".to_owned(), "max_radius".to_owned());
+            Decision { stage, name, value: radius.into() }
+        }));
         let accept = AcceptVerdict::of(&self.accept, &ledger, totals.as_ref());
         let outcome = Outcome {
             pipeline: branch.stages.clone(),

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 use super::chunk::{Open, OutputChunk};
 use super::encoding::ChunkEncoders;
 use super::job::Job;
-use super::outlet::Outlet;
+use super::outlet::{Outlet, finished};
 use super::product::RecordEntry;
 use super::row::RowLayout;
 use crate::budget::Bytes;
@@ -235,7 +235,7 @@ impl ByRank {
         )?;
         let rest = lock(&open).rest().into_iter().collect();
         let mut encoder = encoders.one();
-        let said = outlet.close(rest, &mut |chunk| encoder.encode(&encoders, &chunk))?;
+        let said = finished(outlet.close(rest, &mut |chunk| encoder.encode(&encoders, &chunk))?)?;
         let mut total = encoder.tally;
         tallies.iter().for_each(|tally| total.merge(tally));
         let summary = said.into_iter().next();

@@ -68,7 +68,8 @@ impl Demands {
             ("index of the scan", index),
             ("table of stored pieces", self.tables()),
         ];
-        Holders::of(index.into_iter().chain(held))
+        let mesh = (self.connected > Bytes(0)).then_some(("triangulation", self.connected));
+        Holders::of(index.into_iter().chain(held).chain(mesh))
     }
 
     /// Bytes of the tables of all that is stored by number; that of the order has gaps.

@@ -29,7 +29,7 @@ use super::row::RowLayout;
 use crate::geom::lattice::Lattice;
 use crate::host::{Threads, lock};
 use crate::report::{Baseline, Tally};
-use crate::stage::{Sink, SinkSummary};
+use crate::stage::Sink;
 use crate::store::{Fetch, SealedTiles, TileKey};
 use crate::tile::{Loader, RecordRun, Sieve, Tile};
 use crate::{Error, Result};
@@ -47,8 +47,8 @@ pub(crate) struct Milled {
     pub tally: Tally,
     pub stored: Stored,
     pub counts: Counts,
-    /// For each sink of the pass, what it said.
-    pub written: Vec<SinkSummary>,
+    /// The sinks of the pass, which have all their points.
+    pub written: Vec<Numbered>,
     pub lists: Lists,
     /// Records that the pass's stages decide about.
     pub decided: u64,
@@ -85,7 +85,7 @@ pub(crate) fn grind(
         None => Err(Error::internal("a tile came behind the last")),
     };
     let encoders = ChunkEncoders::new(job, tiles, &sinks);
-    let sinks = sinks.into_iter().map(|(_, sink)| sink).collect();
+    let (which, sinks): (Vec<usize>, _) = sinks.into_iter().unzip();
     let threads = job.threads.at_most(cut.millers);
     let outlet = Outlet::new(sinks, threads.count(), &commit);
     let side = pass.compares(&job.ops);
@@ -98,7 +98,8 @@ pub(crate) fn grind(
     let unfinished = || Error::internal("a pass was finished twice");
     let (rest, stored, lists, counts) = lock(&cutter).take().ok_or_else(unfinished)?.finish()?;
     let mut encoder = encoders.one();
-    let written = outlet.close(rest, &mut |chunk| encoder.encode(&encoders, &chunk))?;
+    let sinks = outlet.close(rest, &mut |chunk| encoder.encode(&encoders, &chunk))?;
+    let written = which.into_iter().zip(sinks).collect();
     tally.merge(&encoder.tally);
     Ok(Milled { tally, stored, counts, written, lists, decided, oriented, baseline })
 }

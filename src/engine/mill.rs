@@ -13,27 +13,29 @@ use serde_json::Value;
 
 use super::by_input::ByInput;
 use super::by_rank::ByRank;
-use super::chunks::{Lists, StoredGathered};
+use super::chunks::Lists;
 use super::clock::Clock;
-use super::compared::{Compared, ComparedGrid};
+use super::compared::ComparedGrid;
 use super::cut::{TileCut, cut_again, cut_all};
 use super::decode::decode;
 use super::finished::{Finished, FinishedBranch};
 use super::forecast::{forecast, samples_capacity};
-use super::grind::{DecodedScan, Milled, Numbered, grind};
+use super::grind::{DecodedScan, Numbered, grind};
 use super::job::Job;
+use super::mesh::connect;
 use super::pass::{Call, Pass};
 use super::phase::RunPhase;
 use super::rounds::choose;
 use super::settled::{conclude, decisions, rounding, settle};
-use super::survey::{Measured, survey};
+use super::standing::Standing;
+use super::survey::survey;
 use super::task::Task;
 use crate::budget::{Bytes, Holders, Lease};
 use crate::geom::lattice::Lattice;
-use crate::point::{ColumnKind, NORMAL, SHIFT};
-use crate::report::{Decision, PassFigures, Tally};
+use crate::point::{ColumnKind, SHIFT};
+use crate::report::{Decision, Tally};
 use crate::stage::{Sink, SinkSummary};
-use crate::store::{SealedTiles, seal};
+use crate::store::{Pieces, SealedTiles, seal};
 use crate::tile::Sieve;
 use crate::{Error, Result};
 
@@ -78,67 +80,6 @@ pub(crate) fn mill(
         tally,
         branches,
     })
-}
-
-/// What a pass leaves, and those before it on its branch.
-#[derive(Clone, Default)]
-struct Standing {
-    sieve: Sieve,
-    /// Records that the next pass finds, and that are written if none follows.
-    alive: u64,
-    kept: u64,
-    passes: Vec<PassFigures>,
-    /// Grids to compare with, from the first pass that decided by normals or in rounds.
-    compared: Option<Arc<Compared>>,
-    tally: Tally,
-}
-
-impl Standing {
-    /// Enters what was measured of grids in a pass over what it leaves, if it is the first.
-    fn compare(&mut self, with: ComparedGrid) {
-        if self.compared.is_none() {
-            self.compared = Some(Arc::new(Compared::new(with, self.alive)));
-        }
-    }
-
-    /// Enters what planes of what its last pass left were measured.
-    fn tell_planes(&mut self, measured: &Measured) {
-        let Some(pass) = self.passes.last_mut() else { return };
-        pass.tile_plane = measured.totals.tile_plane.after;
-        pass.scan_plane = measured.totals.scan_plane.after;
-    }
-
-    /// What it is behind another pass, which came to `milled` and counted `tally`; and what a first
-    /// phase gathered in it.
-    fn behind(
-        mut self,
-        job: &Job<'_>,
-        pass: &Pass,
-        milled: Milled,
-        tally: &Tally,
-    ) -> (Standing, StoredGathered) {
-        self.tally.merge(tally);
-        if let Some(baseline) = milled.baseline {
-            self.compare(ComparedGrid::Levels { baseline, decided: milled.decided });
-        }
-        let called = pass.calls.iter().map(|call| job.ops[call.op].kind.clone());
-        let streamed = pass.filters.iter().map(|&filter| job.task.filters[filter].kind.clone());
-        let chosen = pass.chooses.map(|op| format!("{}.where", job.ops[op].kind));
-        let (stages, after) = (called.chain(streamed).chain(chosen), milled.counts.alive);
-        let (tile_plane, scan_plane) = (None, None);
-        let (stages, before) = (stages.collect(), self.alive);
-        self.passes.push(PassFigures { stages, before, after, tile_plane, scan_plane });
-        self.sieve.states = Some(milled.stored.states);
-        self.sieve.fates = Some(milled.stored.fates);
-        let columns = milled.stored.columns;
-        if columns.iter().any(|(kind, _)| *kind == NORMAL.kind()) {
-            self.sieve.oriented = milled.oriented;
-        }
-        self.sieve.columns.retain(|(kind, _)| columns.iter().all(|(newer, _)| newer != kind));
-        self.sieve.columns.extend(columns);
-        (self.alive, self.kept) = (after, milled.counts.written);
-        (self, milled.stored.gathered)
-    }
 }
 
 /// What a mill holds beside what its passes leave.
@@ -285,7 +226,6 @@ impl Course<'_, '_> {
         let levels: BTreeSet<u32> = cut.keys.iter().map(|key| key.level).collect();
         tally.work("tile_levels", levels.len() as u64);
         let PassOutputs { growing, lists, ordered } = self.outputs(job, pass, field)?;
-        let which: Vec<usize> = growing.iter().map(|(sink, _)| *sink).collect();
         let mut milled = grind(job, pass, &cut, field, &sieve, growing, lists)?;
         drop(sieve);
         tally.merge(&milled.tally);
@@ -295,10 +235,14 @@ impl Course<'_, '_> {
             *working = job.budget.lease_all(&job.task.demands.ordering(), "ordering")?;
         }
         self.write_lists(job, tiles, &milled.lists, ordered, &mut tally)?;
-        let said = std::mem::take(&mut milled.written);
-        let outcomes = milled.counts.outputs.iter().copied().zip(said);
-        for (sink, outcome) in which.into_iter().zip(outcomes) {
-            self.written[sink] = Some(vec![outcome]);
+        let written = std::mem::take(&mut milled.written);
+        for ((sink, open), given) in written.into_iter().zip(milled.counts.outputs.clone()) {
+            let is_before = pass.before.contains(&sink);
+            let now = Some(milled.stored.states.clone());
+            let states = if is_before { before.sieve.states.clone() } else { now };
+            let said =
+                self.close((sink, open), given, (job, field, states), working, &mut tally)?;
+            self.written[sink] = Some(vec![(given, said)]);
         }
         self.tally.merge(&tally);
         let decided = milled.decided;
@@ -307,6 +251,25 @@ impl Course<'_, '_> {
             conclude(job, op, gathered, decided)?;
         }
         Ok(after)
+    }
+
+    /// Finishes a sink that was given so many records, of which `left` says what stands behind the
+    /// pass by these states; first connects them, if it is a mesh.
+    fn close(
+        &mut self,
+        (sink, open): Numbered,
+        given: u64,
+        (job, field, left): (&Job<'_>, &DecodedScan<'_>, Option<Arc<Pieces>>),
+        working: &mut Vec<Lease>,
+        tally: &mut Tally,
+    ) -> Result<SinkSummary> {
+        let Some(shape) = job.task.meshes[sink] else { return open.finish() };
+        // The arenas of the tiles are gone.
+        working.clear();
+        self.clock.begin(RunPhase::Connect(sink), Some(given))?;
+        let (said, counted) = connect(job, field, left, shape, open)?;
+        tally.merge(&counted);
+        Ok(said)
     }
 
     /// Lets stages of a pass that want to look at samples do so, and tells what they chose.

@@ -37,6 +37,11 @@ pub type Commit<'a, R, P> = dyn Fn(R) -> Result<Vec<P>> + Sync + 'a;
 /// Encodes a chunk and says for which of the sinks; each thread has its own.
 pub type EncodeChunk<'a, P> = dyn FnMut(P) -> Result<(usize, Encoded)> + 'a;
 
+/// What sinks say when they are finished.
+pub fn finished(sinks: Vec<Box<dyn Sink>>) -> Result<Vec<SinkSummary>> {
+    sinks.into_iter().map(|sink| sink.finish()).collect()
+}
+
 /// What threads share while they deliver products `R`, which are cut into chunks `P`.
 pub struct Outlet<'a, R, P> {
     commit: &'a Commit<'a, R, P>,
@@ -127,8 +132,12 @@ impl<'a, R, P> Outlet<'a, R, P> {
         }
     }
 
-    /// Adds the chunks that are left when all products are committed.
-    pub fn close(&self, rest: Vec<P>, encode: &mut EncodeChunk<'_, P>) -> Result<Vec<SinkSummary>> {
+    /// Adds the chunks that are left when all products are committed; the sinks, to be finished.
+    pub fn close(
+        &self,
+        rest: Vec<P>,
+        encode: &mut EncodeChunk<'_, P>,
+    ) -> Result<Vec<Box<dyn Sink>>> {
         let mut state = lock(&self.state);
         state.queue(rest);
         loop {
@@ -138,10 +147,7 @@ impl<'a, R, P> Outlet<'a, R, P> {
                 break;
             }
         }
-        match state.sinks.take() {
-            Some(sinks) => sinks.into_iter().map(|sink| sink.finish()).collect(),
-            None => Err(Error::internal("an output was closed twice")),
-        }
+        state.sinks.take().ok_or_else(|| Error::internal("an output was closed twice"))
     }
 
     /// Wakes every thread and makes it give up; for the thread that met an error.

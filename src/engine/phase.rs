@@ -26,6 +26,8 @@ pub(crate) enum RunPhase {
     /// Files of this sink, or stretches of it, which are written behind the tiles of a pass, or
     /// behind all points where they are squares.
     Write(usize),
+    /// Squares of the plane, in which the points of this sink are connected.
+    Connect(usize),
     /// Ranges of blocks, for the figures of what this pass left of a reduction that is repeated.
     Measure(usize),
     /// Ranges of blocks, for the figures of this branch.
@@ -46,6 +48,7 @@ impl RunPhase {
             RunPhase::Gather(_) => Some("gather"),
             RunPhase::Mill(_) => Some("mill"),
             RunPhase::Write(_) => Some("write"),
+            RunPhase::Connect(_) => Some("mesh"),
             RunPhase::Measure(_) | RunPhase::Survey(_) => Some("survey"),
             RunPhase::Look(_) | RunPhase::Publish => None,
         }
@@ -88,6 +91,8 @@ impl Task {
             phases.extend(sinks().filter(is_folder).map(RunPhase::Write));
             let is_ranked = |sink: &usize| self.in_input_order[*sink] && !is_folder(sink);
             phases.extend(sinks().filter(is_ranked).map(RunPhase::Write));
+            let is_mesh = |sink: &usize| self.meshes[*sink].is_some();
+            phases.extend(sinks().filter(is_mesh).map(RunPhase::Connect));
             let branch = self.branches.iter().position(|branch| branch.pass == n);
             let figures = match branch {
                 Some(branch) => Some(RunPhase::Survey(branch)),

@@ -9,6 +9,7 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 
+use super::Watch;
 use super::chunks::StoredGathered;
 use super::demands::{HELD_OF_SCAN, held_of_scan};
 use super::job::Job;
@@ -23,18 +24,23 @@ use crate::store::SealedTiles;
 use crate::{Error, Result};
 
 /// What a first phase gathered, for its stage.
-struct GatheredSummaries {
+struct GatheredSummaries<'a> {
     gathered: StoredGathered,
     records: u64,
+    watch: &'a dyn Watch,
 }
 
-impl StoredSummaries for GatheredSummaries {
+impl StoredSummaries for GatheredSummaries<'_> {
     fn each(&self, visit: &mut dyn FnMut(&[u8]) -> Result<()>) -> Result<()> {
         self.gathered.each(visit)
     }
 
     fn records(&self) -> u64 {
         self.records
+    }
+
+    fn go_on(&self) -> Result<()> {
+        if self.watch.cancelled() { Err(Error::interrupted()) } else { Ok(()) }
     }
 }
 
@@ -50,8 +56,9 @@ pub(crate) fn conclude(
     if bytes > 0 {
         job.held.push(job.budget.lease(bytes, HELD_OF_SCAN)?);
     }
+    let stored = GatheredSummaries { gathered, records, watch: job.watch };
     let warning = match &mut job.ops[op].op {
-        Op::Scan(op) => op.conclude_from(&GatheredSummaries { gathered, records })?,
+        Op::Scan(op) => op.conclude_from(&stored)?,
         Op::Tile(_) | Op::Round(_) => {
             return Err(Error::internal("a stage gathered that has one phase"));
         }

@@ -49,6 +49,8 @@ pub struct Demands {
     pub tagged: bool,
     /// True if an output wants the order of the inputs.
     pub ranked: bool,
+    /// Bytes of the largest mesh that is drawn at once and whose points no stage removes.
+    pub connected: Bytes,
     /// Records that a run has at most, if something other than the memory bounds it.
     pub run_most: Option<u64>,
     /// True if stages stream behind stages that work on tiles.
@@ -106,6 +108,7 @@ impl Demands {
             mills: false,
             tagged: false,
             ranked: false,
+            connected: Bytes(0),
             run_most: None,
             standings: 2,
             filters: false,
@@ -120,7 +123,11 @@ impl Demands {
     /// The least limit in whole mebibytes with which `millers` of the threads have tiles of
     /// `positions` positions, rim included, whatever of the scan is kept in memory by then.
     pub fn limit_for_tile(&self, millers: usize, positions: u64) -> u64 {
-        let needed = self.mill(millers, positions).sum();
+        self.limit_for(self.mill(millers, positions).sum())
+    }
+
+    /// The least limit in whole mebibytes that leaves so much to what works on the sealed scan.
+    pub fn limit_for(&self, needed: Bytes) -> u64 {
         let does = |mebibytes: u64| {
             let demands = Demands { limit: mebibytes << 20, ..self.clone() };
             demands.divide().is_ok_and(|shares| needed.fit(demands.free(&shares)))

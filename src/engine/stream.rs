@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 
 use super::finished::{Finished, FinishedBranch};
 use super::job::Job;
-use super::outlet::Outlet;
+use super::outlet::{Outlet, finished};
 use super::placed::BATCH;
 use super::tagger::NOT_FINITE;
 use crate::geom::lattice::{Lattice, Misplaced};
@@ -37,7 +37,7 @@ pub(crate) fn stream(
     )?;
     job.check_headers()?;
     let (rest, kept) = chunks.rest();
-    let written = outlet.close(rest, &mut |chunk| encode(chunk))?;
+    let written = finished(outlet.close(rest, &mut |chunk| encode(chunk))?)?;
     job.tell_idle(&tally);
     let read = tally.work.remove("read").unwrap_or(0);
     let branch = FinishedBranch {

@@ -17,7 +17,7 @@ use crate::geom::simd::Simd;
 use crate::graph::{Nonfinite, RunSettings, RunTraits, SpillSetting};
 use crate::point::{ComputedDimension, Metadata, Schema, names};
 use crate::report::AcceptTable;
-use crate::stage::{CreateSink, Source};
+use crate::stage::{CreateSink, Source, Triangulation};
 
 /// The schemas of records on their way through the stages that stream in the decode.
 pub(crate) struct Schemas {
@@ -62,6 +62,8 @@ pub(crate) struct Task {
     pub given: Vec<GivenLengths>,
     /// For each sink, the side of the squares that it is cut into.
     pub sides: Vec<Option<f64>>,
+    /// For each sink, how its points are connected, if they are.
+    pub meshes: Vec<Option<Triangulation>>,
     /// What is to be copied beside outputs.
     pub beside: Vec<Beside>,
     /// See [`ranks`].

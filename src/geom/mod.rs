@@ -3,6 +3,7 @@
 
 pub mod angle;
 mod decimal;
+pub mod delaunay;
 pub mod depth;
 pub mod hash;
 pub mod lattice;

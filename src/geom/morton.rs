@@ -22,6 +22,14 @@ pub fn morton_cmp(a: &Position, b: &Position) -> Ordering {
     deciding.0.cmp(&deciding.1)
 }
 
+/// Morton order of places in a plane, the second coordinate above the first on every level.
+pub fn plane_morton_cmp(a: [i64; 2], b: [i64; 2]) -> Ordering {
+    let [x, y] = [0, 1].map(|axis| (a[axis] ^ b[axis]) as u64);
+    let is_x = (y < x) & (y < (y ^ x));
+    let (a, b) = if is_x { (a[0], b[0]) } else { (a[1], b[1]) };
+    a.cmp(&b)
+}
+
 /// One of two, without a branch.
 fn select<T>(condition: bool, yes: T, no: T) -> T {
     std::hint::select_unpredictable(condition, yes, no)

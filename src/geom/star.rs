@@ -22,6 +22,8 @@ const PLACE: u64 = (1 << 18) - 1;
 /// which ends with a polygon around p whatever the rounding does.
 #[derive(Debug, Default)]
 pub struct Star {
+    /// True if a neighbour on the circle of a triangle is a corner, too.
+    takes_circles: bool,
     /// In Morton order.
     projected: Vec<Inverted>,
     /// Direction, then place in `projected`.
@@ -83,13 +85,20 @@ impl Inverted {
 }
 
 impl Star {
+    /// One of which neighbours that are cocircular with a triangle are corners, too: of a square
+    /// three triangles instead of one.
+    pub fn with_circles() -> Star {
+        Star { takes_circles: true, ..Star::default() }
+    }
+
     /// The mean of the unit normals of the Delaunay triangles around p, at length 1, on the side of
     /// `normal`, the unit normal of the plane to project to. None if there is no triangle.
     ///
     /// `offsets` are the neighbours relative to p, in steps, in Morton order, none of them 0 and
     /// all smaller than 2^63; no more than the first 2^18 count. Normals are summed
     /// counter-clockwise from the vertex of smallest rank. Points cocircular with a triangle are
-    /// left out, as are triangles that the projection turns into lines.
+    /// left out, unless it is a star [with circles](Star::with_circles), as are triangles that the
+    /// projection turns into lines.
     pub fn normal(&mut self, offsets: &[[i64; 3]], normal: [f64; 3]) -> Option<[f64; 3]> {
         let rounded = offsets.iter().map(|offset| offset.map(|c| c as f64));
         let closed = self.around(rounded, normal);
@@ -170,7 +179,9 @@ impl Star {
     /// the place of the `nearest` neighbour is told, which is a vertex whatever the others are.
     /// Otherwise the first and last vertices are 0's neighbours on the hull.
     fn hull(&mut self, nearest: Option<usize>) {
-        let Star { points, vertices, .. } = self;
+        let Star { points, vertices, takes_circles, .. } = self;
+        // By how much the path must turn left: by more than rounding, or not to the right by more.
+        let least = if *takes_circles { -ROUNDING } else { ROUNDING };
         vertices.clear();
         let count = points.len();
         let start = nearest.unwrap_or_else(|| {
@@ -179,11 +190,11 @@ impl Star {
             before.map_or(0, |before| (before + 1) % count)
         });
         for next in points[start..].iter().chain(&points[..start]) {
-            drop_right_turns(vertices, next);
+            drop_right_turns(vertices, next, least);
             vertices.push(*next);
         }
         if let (Some(_), Some(&first)) = (nearest, vertices.first()) {
-            drop_right_turns(vertices, &first);
+            drop_right_turns(vertices, &first, least);
         }
     }
 
@@ -221,9 +232,9 @@ impl Star {
 
 /// Drops the last vertices until the path turns left to `next`.
 #[inline(always)]
-fn drop_right_turns(vertices: &mut Vec<Inverted>, next: &Inverted) {
+fn drop_right_turns(vertices: &mut Vec<Inverted>, next: &Inverted, least: f64) {
     while let [.., a, b] = &vertices[..]
-        && !left_turn(a, b, next)
+        && !left_turn(a, b, next, least)
     {
         vertices.pop();
     }
@@ -251,10 +262,10 @@ impl Inverted {
     }
 }
 
-/// True if the path a, b, c turns left at b by more than rounding can.
-fn left_turn(a: &Inverted, b: &Inverted, c: &Inverted) -> bool {
+/// True if the path a, b, c turns left at b by more than `least`, relative to its sizes.
+fn left_turn(a: &Inverted, b: &Inverted, c: &Inverted, least: f64) -> bool {
     let turn = (b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x);
-    turn > ROUNDING * (a.size + b.size) * (b.size + c.size)
+    turn > least * (a.size + b.size) * (b.size + c.size)
 }
 
 /// The vector product.

@@ -1,7 +1,7 @@
 //! The stage kinds and formats that pointmill has.
 
 use super::registry::Registry;
-use crate::io::ends::{Discard, Read, Write};
+use crate::io::ends::{Discard, Mesh, Read, Write};
 use crate::io::las::{LAS, LAZ};
 use crate::io::ply::PLY;
 use crate::ops::normals::Normals;
@@ -20,6 +20,7 @@ impl Registry {
             .with::<Synth>()
             .with::<Merge>()
             .with::<Write>()
+            .with::<Mesh>()
             .with::<Discard>()
             .with::<Filter>()
             .with::<Drop>()

@@ -7,8 +7,6 @@
 mod fourier;
 mod wavelet;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::cells::Keep;
@@ -16,7 +14,7 @@ use super::removal::{keep_once, represent_at};
 use super::whole::Rows;
 use crate::geom::depth::{DepthSums, Raster, fill};
 use crate::point::{Bounds, Position, SHIFT, names};
-use crate::quantity::Whole;
+use crate::quantity::{Axis, Whole};
 use crate::report::{Grouped, Tally};
 use crate::stage::{Gathered, Needs, Role, ScanFacts, ScanOp, StagePlace, TileOp};
 use crate::tile::Tile;
@@ -38,19 +36,6 @@ const PIXEL_BYTES: usize = 32;
 
 /// How many pixels an image has along its side.
 pub type Pixels = Whole<FEWEST_PIXELS, MOST_PIXELS>;
-
-/// The axis that one looks along.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Axis {
-    /// Along x: the image has y and z.
-    X,
-    /// Along y: the image has z and x.
-    Y,
-    /// Along z: the image has x and y.
-    #[default]
-    Z,
-}
 
 /// A transform of a depth image, which says what of it is left.
 trait Transformed: Send + Sync {

@@ -27,6 +27,7 @@ mod transform;
 mod triangles;
 mod whole;
 
+pub use crate::quantity::Axis;
 pub use assign::Assign;
 pub use cells::{By, Cells, Keep, Measure, Reference, Side, Split};
 pub use crop::{Crop, CropBox, CropSide};
@@ -36,7 +37,7 @@ pub use filter::Filter;
 pub use gaussian_image::GaussianImage;
 pub use graded::{Effort, Graded, KEEP_RANK};
 pub use grid::{Grid, Pick};
-pub use image::{Axis, Fourier, Wavelet};
+pub use image::{Fourier, Wavelet};
 pub use median::{Median, Representative};
 pub use merge::Merge;
 pub use orient::{Orientation, SideTold};

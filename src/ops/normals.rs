@@ -24,7 +24,7 @@ use crate::{Error, Result};
 
 use bundle::in_morton_order;
 use estimate::MIN_NEIGHBORS;
-pub use estimate::Method;
+pub use estimate::{Cocircular, Method};
 pub(crate) use estimate::{Estimate, EstimateOutcome, Fallback};
 pub(crate) use estimator::Estimator;
 pub use orient::Orient;
@@ -69,6 +69,10 @@ pub struct Normals {
     pub within: Option<Length>,
     /// How a normal is estimated.
     pub method: Method,
+    /// What becomes of a neighbour on the circle of a Delaunay triangle of the point, as on grids:
+    /// the triangulation is not unique there, and the paper does not say. Not for `"pca"`, which
+    /// has no triangles.
+    pub cocircular: Cocircular,
     /// Whether the column `Curvature` is computed, the surface variation: the least eigenvalue of
     /// the covariance of the position and its neighbours, divided by the sum of all three. 0 on a
     /// plane, 1/3 at most.
@@ -103,6 +107,7 @@ impl Default for Normals {
             neighbors: Setting::Given(10),
             within: None,
             method: Method::default(),
+            cocircular: Cocircular::default(),
             curvature: false,
             residual: false,
             orient: Orient::None,
@@ -128,6 +133,11 @@ impl Normals {
                 "`normals.method = \"{method}\"` needs {fewest} neighbours or more, not {given}"
             );
             return Err(("neighbors", Error::pipeline(told)));
+        }
+        if self.method == Method::Pca && self.cocircular == Cocircular::In {
+            let told = "`normals.cocircular` is about triangles, and `normals.method = \"pca\"` \
+                        has none";
+            return Err(("cocircular", Error::pipeline(told)));
         }
         let (key, error) = match (self.orient, self.viewpoint) {
             (Orient::Viewpoint, None) => (
@@ -219,7 +229,8 @@ impl TileOp for Normals {
 
     fn run(&self, tile: &mut Tile, tally: &mut Tally) -> Result<()> {
         let side = self.sign_rule()?;
-        let mut estimator = Estimator::with(self.method, tile.simd());
+        let estimator = Estimator::with(self.method, tile.simd());
+        let mut estimator = estimator.taking(self.cocircular);
         let mut normals = tile.columns.take(&NORMAL)?;
         let copies = std::mem::take(&mut tile.copies);
         let core = tile.core.clone();

@@ -21,6 +21,7 @@ use crate::tile::Tile;
 use crate::{Error, Result};
 
 const TIME: Column<f64> = Column::new(names::GPS_TIME, &[]);
+const COLUMN: Column<f64> = Column::new(names::COLUMN, &[]);
 /// Points that one chord spans at most: what a chord costs grows with the square of it.
 const MOST: usize = 256;
 /// Bytes that a position of the scan takes while lines are followed: what was gathered of it, its
@@ -38,12 +39,14 @@ const HELD_BYTES: usize = Rows::<LinePoint>::BYTES + size_of::<u32>() + size_of:
 /// tells as deviation how far each point that went is from its chord.
 ///
 /// A line is made of points in the order of their GPS time; `lines` says what else divides them,
-/// and `gap` how far apart two points are that are not on one line. Nothing depends on the order of
-/// the file. Of several returns of one pulse, which have one time, the first in canonical order
-/// comes first: where there are such, `where = "ReturnNumber == 1"` lets the stage work on first
-/// returns alone. Copies of a point count as one, and one record of a position stays.
+/// and `gap` how far apart two points are that are not on one line. An organised scan, whose points
+/// have the dimensions `Row` and `Column`, has no need of times: with `lines = ["row"]` each of its
+/// rows is a line, in the order of its columns. Nothing depends on the order of the file. Of
+/// several returns of one pulse, which have one time, the first in canonical order comes first:
+/// where there are such, `where = "ReturnNumber == 1"` lets the stage work on first returns alone.
+/// Copies of a point count as one, and one record of a position stays.
 ///
-/// Lines cross the whole scan, so that all positions are in memory at once, with 48 bytes each; a
+/// Lines cross the whole scan, so that all positions are in memory at once, with 64 bytes each; a
 /// scan that is too large for the run's memory is refused before any work.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -80,11 +83,13 @@ pub enum LineEnd {
     /// `EdgeOfFlightLine`, the last point before it does: a line ends behind a point that has it,
     /// unless it began with that point.
     Edge,
+    /// `Row` of an organised scan, as `source`; its points are in the order of `Column`.
+    Row,
 }
 
 impl LineEnd {
-    const ALL: [LineEnd; 4] =
-        [LineEnd::Source, LineEnd::Channel, LineEnd::Direction, LineEnd::Edge];
+    const ALL: [LineEnd; 5] =
+        [LineEnd::Source, LineEnd::Channel, LineEnd::Direction, LineEnd::Edge, LineEnd::Row];
 
     fn column(self) -> Column<f64> {
         match self {
@@ -92,12 +97,13 @@ impl LineEnd {
             LineEnd::Channel => const { Column::new(names::SCANNER_CHANNEL, &[]) },
             LineEnd::Direction => const { Column::new(names::SCAN_DIRECTION_FLAG, &[]) },
             LineEnd::Edge => const { Column::new(names::EDGE_OF_FLIGHT_LINE, &[]) },
+            LineEnd::Row => const { Column::new(names::ROW, &[]) },
         }
     }
 
-    /// True if points of different values are no neighbours in time.
+    /// True if points of different values are no neighbours in order.
     fn divides(self) -> bool {
-        matches!(self, LineEnd::Source | LineEnd::Channel)
+        matches!(self, LineEnd::Source | LineEnd::Channel | LineEnd::Row)
     }
 }
 
@@ -109,9 +115,12 @@ fn ends_of_las() -> Vec<LineEnd> {
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct LinePoint {
-    time: f64,
-    /// Source, channel, direction and edge; 0 where nobody asks for it.
-    ends: [u16; 4],
+    /// Its time, or its column.
+    along: f64,
+    /// Source, channel, direction, edge and row; 0 where nobody asks for it.
+    ends: [u32; LineEnd::ALL.len()],
+    /// What makes it whole words.
+    unused: u32,
 }
 
 /// What a chord must hold to, in steps of the lattice.
@@ -145,6 +154,13 @@ impl StageKind for Scanline {
             return Err(at.blame("lines", error.help("leave it out once")));
         }
         Ok(Role::ScanOp(Box::new(self)))
+    }
+}
+
+impl Scanline {
+    /// What points of a line are in the order of.
+    fn along(&self) -> &'static Column<f64> {
+        if self.lines.contains(&LineEnd::Row) { &COLUMN } else { &TIME }
     }
 }
 
@@ -191,14 +207,14 @@ impl ScanOp for Scanline {
     type Summary = Rows<LinePoint>;
 
     fn gather_needs(&self) -> Needs {
-        let needs = Needs::none().looks_at(names::XYZ).reads(&TIME);
+        let needs = Needs::none().looks_at(names::XYZ).reads(self.along());
         let needs = self.lines.iter().fold(needs, |needs, end| needs.reads(&end.column()));
         // As they are gathered, and as they are stored.
         needs.bytes_per_point(2 * Rows::<LinePoint>::BYTES).holds(HELD_BYTES)
     }
 
     fn gather(&self, tile: &mut Tile, _: &mut Tally) -> Result<Rows<LinePoint>> {
-        let times = tile.columns.get(&TIME)?;
+        let along = tile.columns.get(self.along())?;
         let mut columns = [None; LineEnd::ALL.len()];
         for (column, end) in columns.iter_mut().zip(LineEnd::ALL) {
             if self.lines.contains(&end) {
@@ -206,8 +222,9 @@ impl ScanOp for Scanline {
             }
         }
         Ok(Rows::of_core(tile, |i| LinePoint {
-            time: times[i],
-            ends: columns.map(|column| column.map_or(0, |values| values[i] as u16)),
+            along: along[i],
+            ends: columns.map(|column| column.map_or(0, |values| values[i] as u32)),
+            unused: 0,
         }))
     }
 
@@ -222,7 +239,7 @@ impl ScanOp for Scanline {
         };
         order.sort_unstable_by(|&a, &b| {
             let [one, two] = [a, b].map(|i| &rows.values[i as usize]);
-            divided(one).cmp(&divided(two)).then(one.time.total_cmp(&two.time)).then(a.cmp(&b))
+            divided(one).cmp(&divided(two)).then(one.along.total_cmp(&two.along)).then(a.cmp(&b))
         });
         let mut distances = vec![f32::NAN; order.len()];
         let (mut lines, mut start) = (0, 0);

@@ -36,7 +36,7 @@ const HELD_BYTES: usize = Rows::<()>::BYTES + ThinnedMesh::BYTES + size_of::<f32
 /// evenly (of the sum a thousandth of its mean counts where nothing bends). Of the triangle of the
 /// smallest weight the corner of the largest curvature stays, the others go, the hole is
 /// triangulated anew, and so on until `keep` points are left. Corners on the border of the mesh
-/// stay.
+/// stay, and so does one with more than 512 corners around it.
 ///
 /// The report tells as deviation how far along the axis a point that went is from the mesh that is
 /// left. No point is moved: of Hamann's method, which puts a new point in the place of a triangle,
@@ -128,7 +128,7 @@ impl ScanOp for Triangles {
         let mut mesh = ThinnedMesh::of(&rows.positions, bounds.lo, self.axis as usize)?;
         let positions = rows.positions.len() as u64;
         let (corners, border) = (mesh.corners(), mesh.border());
-        mesh.thin(most);
+        mesh.thin(most, || gathered.go_on())?;
         let left = mesh.corners();
         let distances = mesh.distances(&rows.positions);
         self.found = Some(ThinnedScan { rows: rows.with(distances), corners, border });
@@ -138,7 +138,8 @@ impl ScanOp for Triangles {
             let (border, covered) = (Grouped(border), Grouped(positions - corners));
             format!(
                 "`triangles` keeps {left} points, and not {most}: {border} corners are on the \
-                 border of its mesh and stay, and {covered} positions lie above or below a corner"
+                 border of its mesh and stay, as do those with hundreds around them, and {covered} \
+                 positions lie above or below a corner"
             )
         }))
     }

@@ -9,6 +9,7 @@ use super::accepted::accepted;
 use super::demanded::{demands, lists_bytes};
 use super::limits::{check_limits, number_selections};
 use super::look::{Unfit, look, look_at_corners};
+use super::meshes::{connected, triangulations};
 use super::order::WriteOrder;
 use super::passes::{Passes, unroll};
 use super::places::{all_read, check_places, copies, each_input, square_sides};
@@ -102,7 +103,6 @@ impl Graph {
         let (origin, file, traits) = (self.origin.clone(), self.file.clone(), self.traits);
         let settings = self.settings.clone().with(overrides);
         let rules = self.accept.clone();
-        let in_file = |error: Error| if origin.is_empty() { error } else { error.at(&origin) };
         let told = ToldGraph::of(&self, &settings);
         let mut sorted = Sorted::new(self)?;
         let places = |read: &[PathBuf], sinks: &[Box<dyn CreateSink>]| {
@@ -113,8 +113,7 @@ impl Graph {
             fit_stages(&mut sorted, rules, wrong)?;
         let schema = &schemas.last;
         let read = all_read(&*sorted.source.1, &*source);
-        let (mut files, wrong) = places(&read, &sorted.sinks);
-        Error::all(wrong)?;
+        let mut files = right(places(&read, &sorted.sinks))?;
         let (each, ranks) = each_input(&*source, &sorted.sinks, &settings, &mut files)?;
         let (sides, wide) = square_sides(&*source, &sorted.sinks, &settings, &read)?;
         let beside = copies(&*source, &sorted.sinks, &each, &settings, &mut files)?;
@@ -122,13 +121,15 @@ impl Graph {
         let order = WriteOrder::new(&sorted, &*source)?;
         let (lattice, doubt) = lattice(&settings, (&*source, schema), &sorted.ops, order.mills)?;
         let demands = demands(&sorted, &passes, (&*source, schema), &order, &settings)?;
-        let demands = divided(demands, lists_bytes(&each, &sides, &ranks), tagger.tags())?;
+        let besides = (lists_bytes(&each, &sides, &ranks), connected(&sorted, &*source));
+        let demands = divided(demands, besides, tagger.tags())?;
         let mut warnings = warnings(&*source, &sorted, &schemas, &settings)?;
         warnings.extend(doubt.into_iter().chain(wide));
         let task = Task {
+            meshes: triangulations(&*source, &sorted, &passes.changed_by)?,
             provenance: told.provenance(&sorted, &order, &settings),
             warnings,
-            simd: settings.simd.resolve().map_err(in_file)?,
+            simd: settings.simd.resolve().map_err(|error| located(error, &origin))?,
             threads: demands.threads,
             settings,
             accept,
@@ -160,9 +161,20 @@ impl Graph {
     }
 }
 
-/// The demands with these lists by input besides, if the memory does for them.
-fn divided(demands: Demands, lists: Bytes, tagged: bool) -> Result<Demands> {
-    let demands = Demands { lists: demands.lists + lists, tagged, ..demands };
+/// An error of what the file `origin` says.
+fn located(error: Error, origin: &str) -> Error {
+    if origin.is_empty() { error } else { error.at(origin) }
+}
+
+/// What was looked at, unless something is wrong with it.
+fn right<T>((found, wrong): (T, Vec<Error>)) -> Result<T> {
+    Error::all(wrong)?;
+    Ok(found)
+}
+
+/// The demands with these lists by input and such a mesh besides, if the memory does for them.
+fn divided(demands: Demands, (lists, connected): (Bytes, Bytes), tagged: bool) -> Result<Demands> {
+    let demands = Demands { lists: demands.lists + lists, tagged, connected, ..demands };
     demands.divide()?;
     Ok(demands)
 }

@@ -9,6 +9,7 @@ mod document;
 mod fitted;
 mod limits;
 mod look;
+mod meshes;
 mod order;
 mod outline;
 mod passes;

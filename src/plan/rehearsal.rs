@@ -11,9 +11,10 @@ use crate::graph::{Graph, GraphStage};
 use crate::host::lock;
 use crate::io::ends::CountedSink;
 use crate::memory::Records;
-use crate::point::{Metadata, Schema};
+use crate::point::{Metadata, Schema, Units};
 use crate::stage::{
-    ChunkSize, CreateSink, Encode, Encoded, Order, Role, Sink, SinkSummary, Source,
+    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Order, Role, Sink, SinkSummary,
+    Source, Triangulation,
 };
 
 /// What each sink was given, by its number among the sinks.
@@ -114,6 +115,10 @@ impl CreateSink for RehearsedSink {
         if self.sink.is_folder() { Order::Canonical } else { self.sink.order() }
     }
 
+    fn triangulation(&self, units: &Units) -> Result<Option<Triangulation>> {
+        if self.sink.is_file() { self.sink.triangulation(units) } else { Ok(None) }
+    }
+
     fn likes_time(&self) -> bool {
         self.one().likes_time()
     }
@@ -169,6 +174,10 @@ impl Sink for Rehearsed {
 
     fn append(&mut self, chunk: Encoded) -> Result<()> {
         self.sink.append(chunk)
+    }
+
+    fn triangles(&mut self) -> Result<Arc<dyn EncodeTriangles>> {
+        self.sink.triangles()
     }
 
     fn finish(self: Box<Self>) -> Result<SinkSummary> {

@@ -72,6 +72,14 @@ impl Bounds {
         all
     }
 
+    /// What both boxes have in common.
+    pub fn common(&self, other: &Bounds) -> Bounds {
+        let axis =
+            |axis: usize| (self.lo[axis].max(other.lo[axis]), self.hi[axis].min(other.hi[axis]));
+        let [x, y, z] = [axis(0), axis(1), axis(2)];
+        Bounds { lo: [x.0, y.0, z.0], hi: [x.1, y.1, z.1] }
+    }
+
     /// This box with `steps` more on every side, cut off at the ends of i64.
     pub fn grown(&self, steps: i64) -> Bounds {
         Bounds {

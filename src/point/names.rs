@@ -24,6 +24,10 @@ pub const SCAN_ANGLE: &str = "ScanAngle";
 pub const USER_DATA: &str = "UserData";
 pub const POINT_SOURCE_ID: &str = "PointSourceId";
 pub const GPS_TIME: &str = "GpsTime";
+/// Row of an organised scan, such as the pixels of a depth camera.
+pub const ROW: &str = "Row";
+/// Column of an organised scan.
+pub const COLUMN: &str = "Column";
 pub const RED: &str = "Red";
 pub const GREEN: &str = "Green";
 pub const BLUE: &str = "Blue";

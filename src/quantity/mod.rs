@@ -2,6 +2,7 @@
 //! instead of given. Reads, checks and shows them; knows no stage and no file.
 
 mod angle;
+mod axis;
 mod count;
 mod figure;
 mod fraction;
@@ -12,6 +13,7 @@ mod turn;
 mod whole;
 
 pub use angle::Angle;
+pub use axis::Axis;
 pub use count::parse_count;
 pub(crate) use figure::Figure;
 pub use fraction::Fraction;

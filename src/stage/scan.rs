@@ -78,6 +78,15 @@ pub trait Gathered<S> {
 
     /// Records that the stage decides about.
     fn records(&self) -> u64;
+
+    /// To be asked now and then by what takes more than a second.
+    ///
+    /// # Errors
+    ///
+    /// If the run is to end.
+    fn go_on(&self) -> Result<()> {
+        Ok(())
+    }
 }
 
 /// A [`ScanOp`] for an engine, which does not know its summaries. Every `ScanOp` is one.
@@ -111,6 +120,15 @@ pub trait StoredSummaries {
 
     /// As [`Gathered::records`].
     fn records(&self) -> u64;
+
+    /// As [`Gathered::go_on`].
+    ///
+    /// # Errors
+    ///
+    /// If the run is to end.
+    fn go_on(&self) -> Result<()> {
+        Ok(())
+    }
 }
 
 impl<S: ScanOp> AnyScanOp for S {
@@ -141,5 +159,9 @@ impl<S: Summary> Gathered<S> for Loaded<'_, S> {
 
     fn records(&self) -> u64 {
         self.stored.records()
+    }
+
+    fn go_on(&self) -> Result<()> {
+        self.stored.go_on()
     }
 }

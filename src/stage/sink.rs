@@ -28,6 +28,17 @@ pub trait Sink: Send {
     /// What the system refuses to write; the output is given up then.
     fn append(&mut self, chunk: Encoded) -> Result<()>;
 
+    /// Called once, behind the last chunk of points, where the output
+    /// [connects](CreateSink::triangulation) them: what encodes triangles, shared by all threads.
+    /// Their chunks are appended as those of points are, in an order that the points alone decide.
+    ///
+    /// # Errors
+    ///
+    /// An output that holds no triangles, and what the system refuses to write.
+    fn triangles(&mut self) -> Result<Arc<dyn EncodeTriangles>> {
+        Err(Error::internal("triangles are for an output that holds none"))
+    }
+
     /// Writes what depends on all points (header counts, chunk table) and flushes to disk.
     ///
     /// # Errors
@@ -46,6 +57,35 @@ pub trait Encode: Send + Sync {
     fn encode(&self, batch: &PointBatch) -> Result<Encoded>;
 }
 
+/// A triangle of a mesh over a plane, counter-clockwise as it is seen from the side that the axis
+/// across the plane points to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Triangle {
+    /// The numbers of its corners among the points of the output, from 0.
+    pub corners: [u64; 3],
+    /// Where these are, in world units.
+    pub places: [[f64; 3]; 3],
+}
+
+/// The part of a sink that writes triangles and runs on several threads at once.
+pub trait EncodeTriangles: Send + Sync {
+    /// Encodes triangles.
+    ///
+    /// # Errors
+    ///
+    /// A corner that the format cannot refer to.
+    fn encode(&self, triangles: &[Triangle]) -> Result<Encoded>;
+}
+
+/// How the points of an output are connected: their Delaunay triangulation in a plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Triangulation {
+    /// The axis across the plane: 0, 1 or 2.
+    pub axis: usize,
+    /// The largest radius of a triangle's circle, in the unit of the scan; none: any.
+    pub max_radius: Option<f64>,
+}
+
 /// An encoded chunk and the figures that a header needs.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
@@ -54,6 +94,8 @@ pub struct Encoded {
     pub bytes: Vec<u8>,
     /// Points in them.
     pub points: u64,
+    /// Triangles in them.
+    pub triangles: u64,
     /// Smallest stored X, Y, Z (formats with integer coordinates).
     pub lo: [i64; 3],
     /// Largest stored X, Y, Z.
@@ -170,6 +212,16 @@ pub trait CreateSink: Send + Sync {
     /// True if a file of one of its squares could have this path.
     fn may_name(&self, _path: &Path) -> bool {
         false
+    }
+
+    /// How its points are connected, if it writes them as a mesh. Such an output has the canonical
+    /// [order](CreateSink::order).
+    ///
+    /// # Errors
+    ///
+    /// A length in a unit of its own where that of the scan is not known.
+    fn triangulation(&self, _units: &Units) -> Result<Option<Triangulation>> {
+        Ok(None)
     }
 
     /// The order in which records are wanted.

@@ -8,6 +8,7 @@
 
 mod around;
 pub(crate) mod load;
+mod numbered;
 mod only;
 mod remote;
 pub(crate) mod sieve;
@@ -16,6 +17,7 @@ mod values;
 pub(crate) use around::Around;
 pub use around::Neighborhood;
 pub(crate) use load::{Core, Loader};
+pub(crate) use numbered::{NumberedPositions, NumberedReader};
 pub(crate) use only::{Cover, Only};
 pub(crate) use remote::Remote;
 pub(crate) use sieve::{ReadDimensions, RecordRun, Sieve};

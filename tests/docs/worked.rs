@@ -12,7 +12,7 @@ const LARGEST: u64 = 60 << 10;
 
 /// A stage, what its example shows, and the pipeline behind `read scan.laz ! `. Those with a
 /// picture write `after.laz`.
-const EXAMPLES: [(&str, &str, &str); 27] = [
+const EXAMPLES: [(&str, &str, &str); 28] = [
     ("read", "Two files become one.", "write copy.laz"),
     ("synth", "A made-up scan of 5,000 points.", "synth als points=5k ! write made.laz"),
     ("merge", "Two sources are one scan.", "merge from=[a,b] ! write both.laz"),
@@ -114,6 +114,11 @@ const EXAMPLES: [(&str, &str, &str); 27] = [
         "fourier",
         "A tenth of the points stays, in rows, at the depths of the low waves.",
         "fourier keep=10% pixels=128 ! write after.laz",
+    ),
+    (
+        "mesh",
+        "The points that tell most of the surface become triangles.",
+        "graded keep=20% ! mesh surface.ply max_radius=8",
     ),
     ("write", "A LAZ file becomes a PLY text.", "write copy.ply encoding=ascii"),
 ];

@@ -178,6 +178,53 @@ fn a_square_grid_has_four_triangles() {
 }
 
 #[test]
+fn with_circles_a_square_grid_has_eight_triangles() {
+    // A gable over a grid whose diagonal corners are lifted by different amounts: with them as
+    // corners eight triangles, each by hand, tell the mean.
+    let mut random = Random(9);
+    for _ in 0..200 {
+        let ring = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
+        let at: Vec<[i64; 3]> =
+            ring.iter().map(|&(x, y)| [10 * x, 10 * y, random.coordinate(9) - 4]).collect();
+        let mean = |corners: &[[i64; 3]]| {
+            let mut sum = [0.0; 3];
+            for (n, a) in corners.iter().enumerate() {
+                let b = corners[(n + 1) % corners.len()];
+                let cross = [
+                    a[1] * b[2] - a[2] * b[1],
+                    a[2] * b[0] - a[0] * b[2],
+                    a[0] * b[1] - a[1] * b[0],
+                ];
+                let unit = normalised(cross.map(|v| v as f64));
+                (0..3).for_each(|axis| sum[axis] += unit[axis]);
+            }
+            normalised(sum)
+        };
+        let nearest: Vec<[i64; 3]> = at.iter().copied().step_by(2).collect();
+        let mut offsets = at.clone();
+        offsets.sort_unstable();
+        let up = [0.0, 0.0, 1.0];
+        let out = Star::default().normal(&offsets, up).unwrap();
+        let taken = Star::with_circles().normal(&offsets, up).unwrap();
+        assert!(angle(out, mean(&nearest)) < 1e-14);
+        assert!(angle(taken, mean(&at)) < 1e-14);
+    }
+    // Where no four are on a circle both are one.
+    let mut compared = 0;
+    for _ in 0..500 {
+        let offsets: Vec<[i64; 3]> = (0..10)
+            .map(|_| [0; 3].map(|_: i32| random.coordinate(2_000_000) - 1_000_000))
+            .collect();
+        let up = [0.0, 0.0, 1.0];
+        let [out, taken] =
+            [Star::default(), Star::with_circles()].map(|mut star| star.normal(&offsets, up));
+        assert_eq!(out, taken);
+        compared += usize::from(out.is_some());
+    }
+    assert!(compared > 400, "{compared}");
+}
+
+#[test]
 fn cocircular_points_are_left_out_however_the_plane_lies() {
     // Eight points of a square grid, the diagonal ones lifted: with strict turns only the four
     // nearest count, whose triangles are flat.

@@ -78,6 +78,7 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
         ("merge", vec![]),
         ("write", vec![]),
         ("discard", vec![]),
+        ("mesh", vec![]),
         ("filter", vec![check::<Filter>(json!({ "where": "Intensity > 6 and X > 0.1" }))]),
         ("drop", vec![check::<Drop>(json!({ "classes": [2, 7] }))]),
         ("crop", vec![check::<Crop>(json!({ "box": [0, 0, 0, 2, 3, 1] }))]),
@@ -259,7 +260,7 @@ const SELECT: [&str; 8] =
     ["fourier", "grid", "outliers", "sample", "scanline", "smooth", "triangles", "wavelet"];
 const REDUCE: [&str; 7] =
     ["cells", "cut", "gaussian-image", "graded", "median", "normals", "orient"];
-const ENDS: [&str; 5] = ["discard", "merge", "read", "synth", "write"];
+const ENDS: [&str; 6] = ["discard", "merge", "mesh", "read", "synth", "write"];
 
 #[test]
 fn every_stage_of_ours_is_checked() {

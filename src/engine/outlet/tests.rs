@@ -120,6 +120,7 @@ fn run(threads: usize, tiles: &[u8], each: usize, trouble: Trouble) -> Outcome {
         )
     });
     let result = result.and_then(|_| outlet.close(vec![255], &mut |chunk| encode(chunk)));
+    let result = result.and_then(finished);
     let listed = lock(&listed).clone();
     let result = result.map(|mut all| all.pop().unwrap_or_default());
     Outcome { result, listed, most_held: most_held.into_inner() }

@@ -22,6 +22,7 @@ fn demands(limit: u64) -> Demands {
         mills: true,
         tagged: false,
         ranked: false,
+        connected: Bytes(0),
         run_most: None,
         gathers: false,
         has_cells: true,

@@ -291,7 +291,9 @@ fn some_scale<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D:
     from.deserialize_any(Scale).map(Some)
 }
 
-fn some_offset<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D::Error> {
+pub(super) fn some_offset<'de, D: Deserializer<'de>>(
+    from: D,
+) -> Result<Option<[f64; 3]>, D::Error> {
     let offset = <[f64; 3]>::deserialize(from)?;
     match offset.iter().find(|v| !v.is_finite()) {
         Some(&v) => Err(de::Error::invalid_value(de::Unexpected::Float(v), &"finite numbers")),
@@ -316,7 +318,7 @@ impl<'de> Deserialize<'de> for Positive {
 }
 
 /// Names, each once.
-fn names_once<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+pub(super) fn names_once<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
     let given: Vec<String> = Vec::deserialize(from)?;
     let twice = given.iter().enumerate().find(|(n, name)| given[..*n].contains(name));
     match twice {

@@ -5,6 +5,7 @@ mod connect;
 mod discard;
 mod inputs;
 mod kinds;
+mod mesh;
 mod outputs;
 mod roles;
 mod squares;
@@ -14,3 +15,4 @@ pub use discard::Discard;
 #[cfg(feature = "cli")]
 pub(crate) use inputs::{expand, expand_any, unreadable};
 pub use kinds::{OutputOrder, Read, Write};
+pub use mesh::Mesh;

@@ -15,11 +15,12 @@ pub const GPS_TIMES: [(GpsTime, &str); 2] = [
 ];
 
 /// What says who wrote a file, and with blanks behind it brings every header of one file to one
-/// length, whatever its count of vertices.
+/// length, whatever the counts of its elements.
 pub const MADE: &str = "made by pointmill";
 
-pub fn made(points: u64) -> String {
-    format!("{MADE}{}", " ".repeat(20 - points.to_string().len()))
+pub fn made(counts: &[u64]) -> String {
+    let left = counts.iter().map(|count| 20 - count.to_string().len()).sum();
+    format!("{MADE}{}", " ".repeat(left))
 }
 
 /// True for a comment of [`made`], or for what earlier versions had in its place.

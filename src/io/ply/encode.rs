@@ -29,6 +29,8 @@ pub struct PlyOptions {
     /// Carries the other elements (faces) of a single binary input whose encoding is kept. To be
     /// set only where no vertex is removed, added or moved: it fails on a count that differs.
     pub carry_rest: bool,
+    /// Has triangles behind the vertices.
+    pub triangles: bool,
 }
 
 /// Records of one encoded chunk.

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::comments::{CRS, CRS_MORE, GPS_TIME, GPS_TIMES, made, pieces};
+use super::faces;
 use super::header::{Element, Encoding, Property, PropertyKind};
 use super::names;
 use super::source::{PlyNative, Rest};
@@ -20,6 +21,8 @@ pub(super) struct Headings {
     /// Elements before the vertices.
     before: String,
     vertex: Element,
+    /// True if triangles stand behind the vertices.
+    pub has_faces: bool,
     after: String,
 }
 
@@ -67,18 +70,22 @@ impl Headings {
             before: rest.map(|r| lines(&r.before)).unwrap_or_default(),
             after: rest.map(|r| lines(&r.after)).unwrap_or_default(),
             vertex: Element { name: "vertex".into(), count: 0, properties },
+            has_faces: false,
             start,
             note: String::new(),
             comments,
         }
     }
 
-    /// Always of one length: blanks behind a comment take what the count leaves.
-    pub fn text(&self, points: u64) -> String {
+    /// Always of one length: blanks behind a comment take what the counts leave.
+    pub fn text(&self, points: u64, triangles: u64) -> String {
         let vertex = Element { count: points, ..self.vertex.clone() };
         let Headings { start, note, comments, before, after, .. } = self;
-        let (made, vertex) = (made(points), vertex.lines());
-        format!("{start}comment {made}\n{note}{comments}{before}{vertex}{after}end_header\n")
+        let (vertex, counts) = (vertex.lines(), [points, triangles]);
+        let faces = if self.has_faces { faces::lines(triangles) } else { String::new() };
+        let made = made(if self.has_faces { &counts } else { &counts[..1] });
+        let elements = format!("{before}{vertex}{faces}{after}");
+        format!("{start}comment {made}\n{note}{comments}{elements}end_header\n")
     }
 }
 
@@ -95,11 +102,17 @@ mod tests {
             comments: String::new(),
             before: String::new(),
             vertex,
+            has_faces: false,
             after: String::new(),
         };
-        let length = header.text(0).len();
-        assert!([1, 9, 10, 12_345, u64::MAX].iter().all(|&n| header.text(n).len() == length));
-        assert!(header.text(u64::MAX).contains("comment made by pointmill\n"));
-        assert!(!header.text(7).contains('.'));
+        let length = header.text(0, 0).len();
+        let counts = [1, 9, 10, 12_345, u64::MAX];
+        assert!(counts.iter().all(|&n| header.text(n, 5).len() == length));
+        assert!(header.text(u64::MAX, 0).contains("comment made by pointmill\n"));
+        assert!(!header.text(7, 0).contains('.'));
+        let header = Headings { has_faces: true, ..header };
+        let length = header.text(0, 0).len();
+        assert!(counts.iter().all(|&n| header.text(n, 3).len() == length));
+        assert!(counts.iter().all(|&n| header.text(3, n).len() == length));
     }
 }

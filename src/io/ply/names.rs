@@ -39,6 +39,8 @@ const TABLE: &[(&str, &str, &[&str])] = &[
     (n::SCAN_DIRECTION_FLAG, "scan_direction_flag", &["scandirectionflag"]),
     (n::EDGE_OF_FLIGHT_LINE, "edge_of_flight_line", &["edgeofflightline"]),
     (n::SCANNER_CHANNEL, "scanner_channel", &["scanchannel"]),
+    (n::ROW, "row", &["row_index", "rowindex"]),
+    (n::COLUMN, "column", &["column_index", "columnindex"]),
     (n::WAVE_DESCRIPTOR, "wave_packet_descriptor_index", &[]),
     (n::WAVE_OFFSET, "wave_packet_byte_offset", &[]),
     (n::WAVE_SIZE, "wave_packet_size", &[]),

@@ -63,7 +63,7 @@ impl Format for PlyFormat {
         schema: &Arc<Schema>,
         metadata: &Metadata,
     ) -> Result<ChunkSize> {
-        Ok(sink::plan(&options(keys, metadata, false), schema, metadata)?.chunk())
+        sink::chunk(&options(keys, metadata, false), schema, metadata)
     }
 
     fn create(
@@ -100,7 +100,8 @@ impl Format for PlyFormat {
     }
 }
 
-fn options(keys: &WriteKeys, metadata: &Metadata, whole: bool) -> PlyOptions {
+/// How a PLY output of these keys is written.
+pub(crate) fn options(keys: &WriteKeys, metadata: &Metadata, whole: bool) -> PlyOptions {
     let encoding = keys.encoding.map(|encoding| match encoding {
         OutputEncoding::Ascii => Encoding::Ascii,
         OutputEncoding::Binary => Encoding::BinaryLittleEndian,
@@ -111,5 +112,6 @@ fn options(keys: &WriteKeys, metadata: &Metadata, whole: bool) -> PlyOptions {
         drop: keys.drop.clone(),
         colors: keys.colors,
         carry_rest: whole,
+        triangles: false,
     }
 }

@@ -9,13 +9,14 @@ use std::sync::atomic::Ordering;
 
 use super::colors::{Depth, Recoloring, WrittenColors, note};
 use super::encode::{CHUNK_POINTS, FULL, PlyOptions, VertexPlan, WIDE};
+use super::faces::FaceEncoder;
 use super::header::Encoding;
 use super::headings::Headings;
 use super::names::RECORDS;
 use super::noted;
 use super::source::PlyNative;
 use crate::point::{Metadata, RunNote, Schema};
-use crate::stage::{Colors, Encode, Encoded, Sink, SinkSummary};
+use crate::stage::{ChunkSize, Colors, Encode, EncodeTriangles, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
 /// Bytes carried at once.
@@ -35,6 +36,15 @@ pub fn create(
     metadata: &Metadata,
 ) -> Result<Box<dyn Sink>> {
     Ok(Box::new(PlySink::create(staged, options, schema, metadata)?))
+}
+
+/// The chunks of the sink that [`create`] would open, and what it would refuse.
+///
+/// # Errors
+///
+/// As [`create`], but for the file.
+pub fn chunk(options: &PlyOptions, schema: &Schema, metadata: &Metadata) -> Result<ChunkSize> {
+    Ok(plan(options, schema, metadata)?.chunk())
 }
 
 /// How the records of the sink that [`create`] would open are written. Fails on what it would
@@ -65,6 +75,7 @@ struct PlySink {
     note: Option<Arc<RunNote>>,
     notes: Vec<String>,
     points: u64,
+    triangles: u64,
     bytes: u64,
 }
 
@@ -87,6 +98,7 @@ impl PlySink {
             let (native, rest) = (native.as_deref(), rest.as_deref());
             let mut headings = Headings::of(vertex, plan.encoding, metadata, native, rest);
             headings.note.clone_from(&draft);
+            headings.has_faces = options.triangles;
             headings
         };
         let full = headings(&plan.full.vertex);
@@ -95,7 +107,7 @@ impl PlySink {
             None => (full, None),
         };
         let mut file = File::create(staged).map_err(|e| Error::io(staged, "create", e))?;
-        let text = header.text(0);
+        let text = header.text(0, 0);
         let failed = |e| Error::io(staged, "write the header", e);
         file.write_all(text.as_bytes()).map_err(failed)?;
         let mut sink = PlySink {
@@ -110,6 +122,7 @@ impl PlySink {
             note,
             notes,
             points: 0,
+            triangles: 0,
             bytes: text.len() as u64,
         };
         if let Some(rest) = sink.carries() {
@@ -154,10 +167,10 @@ impl PlySink {
         let path = self.path.with_extension("colors");
         let failed = |e| Error::io(&self.path, "write its colours anew", e);
         let mut file = File::create(&path).map_err(failed)?;
-        file.write_all(other.text(0).as_bytes()).map_err(failed)?;
+        file.write_all(other.text(0, 0).as_bytes()).map_err(failed)?;
         let written = File::open(&self.path).map_err(failed)?;
-        let (mut at, end) = (self.header.text(0).len() as u64, self.bytes);
-        let mut bytes = other.text(0).len() as u64;
+        let (mut at, end) = (self.header.text(0, 0).len() as u64, self.bytes);
+        let mut bytes = other.text(0, 0).len() as u64;
         let (mut buffer, mut anew) = (vec![0; CARRY.max(self.plan.vertex_bytes())], Vec::new());
         while at < end {
             let piece = (end - at).min(buffer.len() as u64) as usize;
@@ -174,6 +187,13 @@ impl PlySink {
         std::mem::swap(&mut self.header, other);
         (self.file, self.bytes, self.wide) = (file, bytes, !self.wide);
         Ok(())
+    }
+
+    /// Gives the file colours of 8 bits, if it has those of 16 and they need not be.
+    fn narrow(&mut self) -> Result<()> {
+        let plan = self.plan.clone();
+        let is_mixed = self.wide && self.depth == Depth::Mixed;
+        if is_mixed { self.rewrite(plan.narrowing()) } else { Ok(()) }
     }
 
     fn carries(&self) -> Option<Arc<PlyNative>> {
@@ -247,22 +267,30 @@ impl Sink for PlySink {
     }
 
     fn append(&mut self, mut chunk: Encoded) -> Result<()> {
-        self.fit_colors(&mut chunk)?;
-        self.file
-            .write_all(&chunk.bytes)
-            .map_err(|e| Error::io(&self.path, "write vertices", e))?;
+        let is_of_points = chunk.points > 0;
+        if is_of_points {
+            self.fit_colors(&mut chunk)?;
+        }
+        let what = if is_of_points { "write vertices" } else { "write faces" };
+        self.file.write_all(&chunk.bytes).map_err(|e| Error::io(&self.path, what, e))?;
         self.points += chunk.points;
+        self.triangles += chunk.triangles;
         self.bytes += chunk.bytes.len() as u64;
-        if self.plan.encoding != Encoding::Ascii {
+        if is_of_points && self.plan.encoding != Encoding::Ascii {
             self.plan.spare.put(chunk.bytes);
         }
         Ok(())
     }
 
+    fn triangles(&mut self) -> Result<Arc<dyn EncodeTriangles>> {
+        // What stands behind the vertices cannot be rewritten with them.
+        self.narrow()?;
+        Ok(Arc::new(FaceEncoder(self.plan.encoding)))
+    }
+
     fn finish(mut self: Box<Self>) -> Result<SinkSummary> {
-        if self.wide && self.depth == Depth::Mixed {
-            let plan = self.plan.clone();
-            self.rewrite(plan.narrowing())?;
+        if !self.header.has_faces {
+            self.narrow()?;
         }
         if let Some(native) = self.carries() {
             let expected = native.rest.as_ref().map_or(0, |rest| rest.points);
@@ -277,9 +305,10 @@ impl Sink for PlySink {
         if let Some(note) = &self.note {
             self.header.note = noted::lines(note.text()?);
         }
+        let text = self.header.text(self.points, self.triangles);
         let failed = |e| Error::io(&self.path, "write the header", e);
         self.file.seek(SeekFrom::Start(0)).map_err(failed)?;
-        self.file.write_all(self.header.text(self.points).as_bytes()).map_err(failed)?;
+        self.file.write_all(text.as_bytes()).map_err(failed)?;
         self.file.sync_all().map_err(|e| Error::io(&self.path, "flush", e))?;
         if let Some(narrow) = &self.plan.narrow {
             self.notes.extend(note(narrow.asked, self.depth));

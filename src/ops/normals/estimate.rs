@@ -31,6 +31,17 @@ pub enum Method {
     Cubic,
 }
 
+/// What a neighbour is that lies on the circle through the point and the two others of a triangle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Cocircular {
+    /// No corner: of a square the point has one triangle, with its two nearer corners.
+    #[default]
+    Out,
+    /// A corner: of a square the point has two triangles.
+    In,
+}
+
 impl Method {
     /// Fewest neighbours that it makes sense with.
     pub(super) fn fewest(self) -> usize {

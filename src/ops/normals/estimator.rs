@@ -1,7 +1,7 @@
 //! Estimating the normals of many neighbourhoods: several side by side, the others alone.
 
 use super::bundle::{Bundle, in_morton_order};
-use super::estimate::{EstimateOutcome, Method, SurfaceShape, alone};
+use super::estimate::{Cocircular, EstimateOutcome, Method, SurfaceShape, alone};
 use crate::geom::simd::Simd;
 use crate::geom::star::Star;
 use crate::tile::Neighborhood;
@@ -24,6 +24,15 @@ impl Estimator {
     /// The same by the given instruction set; all give the same normals.
     pub fn with(method: Method, simd: Simd) -> Self {
         Estimator { method, simd, ..Estimator::default() }
+    }
+
+    /// The same with neighbours on the circle of a triangle as corners.
+    #[must_use]
+    pub fn taking(self, cocircular: Cocircular) -> Self {
+        match cocircular {
+            Cocircular::Out => self,
+            Cocircular::In => Estimator { star: Star::with_circles(), ..self },
+        }
     }
 
     /// The normal at a position whose neighbours are at `offsets` from it, in lattice steps: none

@@ -69,7 +69,7 @@ impl ScanOp for Propagation {
     fn conclude(&mut self, gathered: &dyn Gathered<Rows<[f32; 3]>>) -> Result<Option<String>> {
         let rows = Rows::of_scan(gathered)?;
         let edges = edges(&rows.positions, &rows.values, self.neighbors);
-        let turns = turns(&rows.positions, &rows.values, &edges);
+        let turns = turns(&rows.positions, &rows.values, &edges, || gathered.go_on())?;
         drop(edges);
         self.found = Some(rows.with(turns));
         Ok(None)
@@ -105,12 +105,20 @@ fn cosine(a: [f32; 3], b: [f32; 3]) -> f64 {
     dot(a.map(f64::from), b.map(f64::from))
 }
 
-/// For each position 1 if its normal is to be turned.
-fn turns(positions: &[Position], normals: &[[f32; 3]], edges: &[Edge]) -> Vec<u8> {
+/// For each position 1 if its normal is to be turned; asks now and then whether to go on.
+fn turns(
+    positions: &[Position],
+    normals: &[[f32; 3]],
+    edges: &[Edge],
+    go_on: impl Fn() -> Result<()>,
+) -> Result<Vec<u8>> {
     let mut sets = SignedSets::of(positions.len());
-    for &(_, a, b) in edges {
-        let differ = cosine(normals[a as usize], normals[b as usize]) < 0.0;
-        sets.join(a, b, differ);
+    for edges in edges.chunks(1 << 16) {
+        go_on()?;
+        for &(_, a, b) in edges {
+            let differ = cosine(normals[a as usize], normals[b as usize]) < 0.0;
+            sets.join(a, b, differ);
+        }
     }
     // The highest of each set; of equally high ones the first, as positions are in order.
     let mut highest = vec![u32::MAX; positions.len()];
@@ -128,7 +136,7 @@ fn turns(positions: &[Position], normals: &[[f32; 3]], edges: &[Edge]) -> Vec<u8
         let looks_down = normals[top as usize][2] < 0.0;
         u8::from(differs ^ top_differs ^ looks_down)
     };
-    (0..positions.len() as u32).map(turn).collect()
+    Ok((0..positions.len() as u32).map(turn).collect())
 }
 
 /// Sets of positions that are joined, each position with its sign beside that of another of its
@@ -199,7 +207,8 @@ mod tests {
     #[test]
     fn all_normals_of_a_ball_look_outwards() {
         let (positions, normals) = ball(2000);
-        let turns = turns(&positions, &normals, &edges(&positions, &normals, 8));
+        let edges = edges(&positions, &normals, 8);
+        let turns = turns(&positions, &normals, &edges, || Ok(())).unwrap();
         for ((p, n), turn) in positions.iter().zip(&normals).zip(&turns) {
             let sign = if *turn == 1 { -1.0 } else { 1.0 };
             let outwards = dot(p.map(|v| v as f64), n.map(|v| f64::from(v) * sign));
@@ -213,7 +222,8 @@ mod tests {
         let positions: Vec<Position> = vec![[0, 0, 0], [1, 0, 0], [1 << 40, 0, 9], [1 << 40, 1, 9]];
         let down = [0.0, 0.0, -1.0];
         let normals = [down, [0.0, 0.0, 1.0], down, down];
-        let turns = turns(&positions, &normals, &edges(&positions, &normals, 1));
+        let edges = edges(&positions, &normals, 1);
+        let turns = turns(&positions, &normals, &edges, || Ok(())).unwrap();
         assert_eq!(turns, [1, 0, 1, 1]);
     }
 }

@@ -63,7 +63,7 @@ fn lines_end_behind_their_edges_whether_the_first_point_is_one_or_not() {
         // Three sweeps of ten points, side by side, that all go one way.
         let point = |n: i64| {
             let is_edge = n % 10 == 9 || begins_with_edge && n % 10 == 0;
-            LinePoint { time: n as f64, ends: [7, 0, 0, u16::from(is_edge)] }
+            LinePoint { along: n as f64, ends: [7, 0, 0, u32::from(is_edge), 0], unused: 0 }
         };
         let mut all: Vec<(Position, LinePoint)> =
             (0..30).map(|n| ([n % 10 * 5, n / 10 * 9, 0], point(n))).collect();
@@ -98,4 +98,29 @@ fn keys_that_mean_nothing_are_refused() {
     }
     let twice = read("max_distance = 1\nlines = ['edge', 'edge']").unwrap();
     assert!(twice.build(&StagePlace::new("test", 1)).is_err());
+}
+
+#[test]
+fn rows_of_an_organised_scan_are_lines_in_the_order_of_columns() {
+    // Four rows of 20 columns, of which some are missing; times would tell nothing.
+    let mut all: Vec<(Position, LinePoint)> = Vec::new();
+    for row in 0..4 {
+        for column in (0..20).filter(|column| (row * 7 + column) % 6 != 3) {
+            let bend = if column > 9 { 3 * (column - 9) } else { 0 };
+            let point =
+                LinePoint { along: column as f64, ends: [0, 0, 0, 0, row as u32], unused: 0 };
+            all.push(([column * 5, row * 9, bend], point));
+        }
+    }
+    all.sort_by(|a, b| crate::geom::morton::morton_cmp(&a.0, &b.0));
+    let (positions, values) = all.into_iter().unzip();
+    let mut stage: Scanline = toml::from_str("max_distance = 1\nlines = ['row']").unwrap();
+    let needs = stage.gather_needs();
+    assert!(needs.does_read(&COLUMN) && !needs.does_read(&TIME));
+    stage.settled = Some(within(1.0, None));
+    stage.conclude(&OneTile(Rows { positions, values })).unwrap();
+    let found = stage.found.unwrap();
+    assert_eq!(found.lines, 4);
+    let kept = kept(&found.rows.values).len();
+    assert!((12..=16).contains(&kept), "two ends of each row and its bend: {kept}");
 }

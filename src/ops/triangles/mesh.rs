@@ -16,6 +16,9 @@ use crate::{Error, Result};
 
 /// No corner.
 const NONE: u32 = u32::MAX;
+/// Corners around one that goes, at most: what filling its hole costs grows with their square, and
+/// where a border that stays is dense, the last corners within it have all of it around them.
+const MOST_AROUND: usize = 512;
 
 /// A corner of the mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -117,10 +120,16 @@ impl ThinnedMesh {
         Reverse((weight.to_bits(), positions))
     }
 
-    /// Removes triangles until no more than `most` corners are left, or none can go.
-    pub fn thin(&mut self, most: u64) {
+    /// Removes triangles until no more than `most` corners are left, or none can go; asks now and
+    /// then whether to go on.
+    pub fn thin(&mut self, most: u64, go_on: impl Fn() -> Result<()>) -> Result<()> {
+        let mut seen = 0u64;
         while self.corners() > most {
-            let Some(Reverse((_, positions))) = self.waiting.pop() else { return };
+            let Some(Reverse((_, positions))) = self.waiting.pop() else { break };
+            seen += 1;
+            if seen.is_multiple_of(1024) {
+                go_on()?;
+            }
             if !self.is_triangle(positions) {
                 continue;
             }
@@ -137,6 +146,7 @@ impl ThinnedMesh {
                 self.remove(by_bend[0].1);
             }
         }
+        Ok(())
     }
 
     fn handle(&self, position: u32) -> Option<FixedVertexHandle> {
@@ -159,7 +169,8 @@ impl ThinnedMesh {
         opposite.is_some_and(|opposite| opposite.fix() == c)
     }
 
-    /// Removes a corner, unless it is on the border, and lets the triangles in its place wait.
+    /// Removes a corner and lets the triangles in its place wait, unless it is on the border or has
+    /// too many others around it.
     fn remove(&mut self, position: u32) {
         let Some(handle) = self.handle(position) else { return };
         let corner = self.mesh.vertex(handle);
@@ -167,6 +178,9 @@ impl ThinnedMesh {
             return;
         }
         let ring: Vec<u32> = corner.out_edges().map(|edge| edge.to().data().position).collect();
+        if ring.len() > MOST_AROUND {
+            return;
+        }
         self.mesh.remove(handle);
         self.handles[position as usize] = NONE;
         // The last corner has the place of the one that went.
@@ -174,21 +188,36 @@ impl ThinnedMesh {
             let moved = self.mesh.vertex(handle).data().position;
             self.handles[moved as usize] = handle.index() as u32;
         }
-        let mut new = Vec::new();
-        for (n, &from) in ring.iter().enumerate() {
-            let Some(from) = self.handle(from) else { continue };
-            for edge in self.mesh.vertex(from).out_edges() {
-                let Some(face) = edge.face().as_inner() else { continue };
-                let corners = face.vertices().map(|corner| *corner.data());
-                let place = |corner: &MeshCorner| ring.iter().position(|p| *p == corner.position);
-                let places = [place(&corners[0]), place(&corners[1]), place(&corners[2])];
-                // Once, at the corner that is first in the ring.
-                if places.iter().all(|place| place.is_some_and(|place| place >= n)) {
-                    new.push(self.waiting(corners));
+        let new = self.within(&ring);
+        self.waiting.extend(new);
+    }
+
+    /// The triangles within a ring of corners, counter-clockwise, that has no corner inside. They
+    /// hang together as a tree, which is walked from the first edge of the ring inwards: corners of
+    /// a border may have thousands of others around them, so each triangle is looked at once.
+    fn within(&self, ring: &[u32]) -> Vec<Waiting> {
+        let mut next: Vec<(u32, u32)> =
+            ring.iter().copied().zip(ring.iter().cycle().skip(1).copied()).collect();
+        let Some(ends) = next.first().map(|(from, to)| [self.handle(*from), self.handle(*to)])
+        else {
+            return Vec::new();
+        };
+        next.sort_unstable();
+        let is_ring = |from: u32, to: u32| next.binary_search(&(from, to)).is_ok();
+        let [Some(from), Some(to)] = ends else { return Vec::new() };
+        let mut open: Vec<_> = self.mesh.get_edge_from_neighbors(from, to).into_iter().collect();
+        let mut found = Vec::new();
+        while let Some(edge) = open.pop() {
+            let Some(face) = edge.face().as_inner() else { continue };
+            found.push(self.waiting(face.vertices().map(|corner| *corner.data())));
+            for side in [edge.next(), edge.prev()] {
+                let [from, to] = side.vertices().map(|corner| corner.data().position);
+                if !is_ring(from, to) {
+                    open.push(side.rev());
                 }
             }
         }
-        self.waiting.extend(new);
+        found
     }
 
     /// How far each position is along the axis from the mesh that is left; NaN for its corners.
@@ -297,7 +326,7 @@ mod tests {
     fn thinned(positions: &[Position], most: u64) -> (ThinnedMesh, Vec<f32>) {
         let lo = [0, 1, 2].map(|axis| positions.iter().map(|p| p[axis]).min().unwrap());
         let mut mesh = ThinnedMesh::of(positions, lo, 2).unwrap();
-        mesh.thin(most);
+        mesh.thin(most, || Ok(())).unwrap();
         let distances = mesh.distances(positions);
         (mesh, distances)
     }
@@ -326,6 +355,29 @@ mod tests {
         let near = |p: &Position| (p[0] - 5000).abs() < 400;
         let share = kept.iter().filter(|p| near(p)).count() as f64 / kept.len() as f64;
         assert!(share > 0.2, "{share} of the kept points lie along the ridge, of all 0.08");
+    }
+
+    #[test]
+    fn what_waits_is_every_triangle_of_the_mesh_at_any_time() {
+        // A border of hundreds of corners on lines, around which a few are left.
+        let mut positions = surface(900, |x, y| (x * y) / 9000.0);
+        positions
+            .extend((0..400).flat_map(|n| [[25 * n, 0, 3], [0, 25 * n, 9], [25 * n, 9999, 0]]));
+        positions.sort_by(morton_cmp);
+        positions.dedup();
+        let lo = [0, 0, 0];
+        for most in [1900, 1500, 1250] {
+            let mut mesh = ThinnedMesh::of(&positions, lo, 2).unwrap();
+            mesh.thin(most, || Ok(())).unwrap();
+            let waiting: std::collections::BTreeSet<[u32; 3]> =
+                mesh.waiting.iter().map(|Reverse((_, positions))| *positions).collect();
+            for face in mesh.mesh.inner_faces() {
+                let Reverse((_, positions)) =
+                    mesh.waiting(face.vertices().map(|corner| *corner.data()));
+                let border = face.vertices().iter().all(is_on_border);
+                assert!(border || waiting.contains(&positions), "{positions:?} of {most}");
+            }
+        }
     }
 
     #[test]
