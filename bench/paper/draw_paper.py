@@ -97,13 +97,6 @@ def neighbors(rows: list[dict]) -> str:
     return table(["pattern", "k", "after", "RMS after", "deviation"], lines)
 
 
-def circles(rows: list[dict]) -> str:
-    lines = [[row["pattern"], "0.1°" if row["angle"] == "0.1deg" else "0.1 rad", row["circles"],
-              count(row), figure(row, "after"), figure(row, "removed")]
-             for row in rows_of(rows, "circles")]
-    return table(["pattern", "α", "cocircular", "after", "RMS after", "deviation"], lines, 3)
-
-
 def times(rows: list[dict]) -> str:
     lines = []
     for row in rows_of(rows, "times"):
@@ -116,7 +109,7 @@ def times(rows: list[dict]) -> str:
 
 
 TABLES = {"seeds": seeds, "fronts": fronts, "readings": readings, "passes": passes,
-          "neighbors": neighbors, "circles": circles, "times": times}
+          "neighbors": neighbors, "times": times}
 
 
 def bars(rows: list[dict], pattern: str, left: int, top: int) -> list[str]:

@@ -66,8 +66,8 @@ def scene(pattern: str, points: int, seed: int, **keys) -> str:
     return f"synth scene=squares-{pattern} points={points} seed={seed}{told}"
 
 
-def reduction(angle: str, neighbors: int = 10, passes: int = 1, circles: str = "out") -> str:
-    return (f"normals neighbors={neighbors} cocircular={circles} ! cells max_angle={angle} "
+def reduction(angle: str, neighbors: int = 10, passes: int = 1) -> str:
+    return (f"normals neighbors={neighbors} ! cells max_angle={angle} "
             f"! median passes={passes} ! discard")
 
 
@@ -147,17 +147,6 @@ def neighbors(runs: Runs) -> list[dict]:
     return rows
 
 
-def circles(runs: Runs) -> list[dict]:
-    """Neighbours on the circle of a triangle as no corners of it, and as corners."""
-    rows = []
-    for pattern, angle, reading in itertools.product(PATTERNS, ANGLES, ("out", "in")):
-        line = reduction(angle, circles=reading)
-        found = [runs.figures(f"{scene(pattern, 5500, seed)} ! {line}") for seed in range(SEEDS)]
-        row = {"table": "circles", "pattern": pattern, "angle": angle, "circles": reading}
-        rows.append(summary(row, found))
-    return rows
-
-
 def times(runs: Runs) -> list[dict]:
     """CPU seconds of a million squares: reading alone, normals, and the whole reduction."""
     rows = []
@@ -173,7 +162,7 @@ def times(runs: Runs) -> list[dict]:
     return rows
 
 
-TABLES = (seeds, fronts, readings, passes, neighbors, circles, times)
+TABLES = (seeds, fronts, readings, passes, neighbors, times)
 
 
 def measured(program: Path, asked: list[str]) -> list[dict]:

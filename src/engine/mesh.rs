@@ -224,7 +224,9 @@ impl<'a> SquareWorker<'a> {
         let relative = |place: &PlanePlace| [0, 1].map(|n| place.at[n].abs_diff(corner[n]) as f64);
         let fans = &mut self.fans;
         fans.clear();
-        Delaunay::of(self.places.iter().map(relative))?.each_polygon(
+        let job = self.mesh.job;
+        let places = self.places.iter().map(relative);
+        Delaunay::of(places, || job.advance(0))?.each_polygon(
             &(start..end),
             self.mesh.radius(),
             |ring| {

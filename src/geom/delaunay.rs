@@ -34,17 +34,23 @@ impl Delaunay {
     /// whether these were seen.
     pub const BYTES: usize = 24 + 3 * 32 + 2 * 8 + 2;
 
-    /// Triangulates places that are whole numbers below [`WIDEST`], each once; fastest where those
-    /// that follow one another are near, since a place is looked for from the one before.
+    /// Triangulates places that are whole numbers below [`WIDEST`], each once; fastest where one is
+    /// near the one before, from which it is looked for. `go_on` is asked now and then.
     ///
     /// # Errors
     ///
-    /// Places that are no numbers.
-    pub fn of(places: impl ExactSizeIterator<Item = [f64; 2]>) -> Result<Delaunay> {
+    /// Places that are no numbers, and those of `go_on`.
+    pub fn of(
+        places: impl ExactSizeIterator<Item = [f64; 2]>,
+        go_on: impl Fn() -> Result<()>,
+    ) -> Result<Delaunay> {
         let count = places.len();
         let mut mesh = PlaneMesh::with_capacity(count, 3 * count, 2 * count);
         let mut last = None;
-        for [x, y] in places {
+        for (n, [x, y]) in places.enumerate() {
+            if n.is_multiple_of(1 << 16) {
+                go_on()?;
+            }
             let place = Point2::new(x, y);
             let added = match last {
                 None => mesh.insert(place),
@@ -129,7 +135,9 @@ mod tests {
     fn polygons(places: &[[i64; 2]], mine: Range<usize>, most: Option<f64>) -> Vec<Vec<u32>> {
         let numbers = places.iter().map(|p| p.map(|v| v as f64));
         let mut all = Vec::new();
-        Delaunay::of(numbers).unwrap().each_polygon(&mine, most, |ring| all.push(ring.to_vec()));
+        Delaunay::of(numbers, || Ok(()))
+            .unwrap()
+            .each_polygon(&mine, most, |ring| all.push(ring.to_vec()));
         all.sort();
         all
     }

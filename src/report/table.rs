@@ -157,13 +157,20 @@ fn stats_lines(f: &mut fmt::Formatter<'_>, stats: &[StatsFigures]) -> fmt::Resul
     Ok(())
 }
 
-/// Points that stages moved, and normals that no stage knows a side of.
+/// Points that stages moved or connected, and normals that no stage knows a side of.
 fn moved_lines(f: &mut fmt::Formatter<'_>, result: &Outcome) -> fmt::Result {
     for (name, moved) in &result.counts {
         let Some(stage) = name.strip_suffix("_moved") else { continue };
         write!(f, "\nmoved      {} points ({stage})", Grouped(*moved))?;
         if let Some(&held @ 1..) = result.counts.get(format!("{stage}_too_far").as_str()) {
             write!(f, ", and {} stay where they are: they would go farther", Grouped(held))?;
+        }
+    }
+    if let Some(&triangles) = result.counts.get("triangles") {
+        let count = |name: &str| Grouped(result.counts.get(name).copied().unwrap_or(0));
+        write!(f, "\nmesh       {} triangles, {} corners", Grouped(triangles), count("corners"))?;
+        if let Some(&covered @ 1..) = result.counts.get("covered") {
+            write!(f, ", {} points in none: they lie above a corner", Grouped(covered))?;
         }
     }
     match result.counts.get("orient_unknown") {

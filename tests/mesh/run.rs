@@ -96,6 +96,8 @@ fn formats_have_the_same_triangles() {
         let length: f32 = normal.iter().map(|v| v * v).sum();
         assert!((length - 1.0).abs() < 1e-5 && normal[2] >= 0.0, "{normal:?}");
     }
+    let table = report.table(None).to_string();
+    assert!(table.lines().any(|line| line.starts_with("mesh ")), "{table}");
     // Four meshes of one branch are counted together.
     assert_eq!(counts(&report)[2], 4 * binary.faces.len() as u64);
     // Pointmill reads its meshes as the points that they are.

@@ -334,3 +334,32 @@ fn neighbours_straight_above_and_lines_make_no_triangle() {
     assert_eq!(star.normal(&[[1, 0, 5], [-1, 0, 5], [2, 0, 0], [-7, 0, 1]], up), None);
     assert_eq!(star.normal(&[[1, 0, 0], [0, 1, 0], [0, 0, 9]], up), Some(up));
 }
+
+#[test]
+fn a_pipeline_says_what_is_on_a_circle() {
+    // Nine points whose plane of regression is level; the middle of the far row of heights turns
+    // the normal of the point in the middle, its nearest four by more than all eight.
+    let heights = [[1, 0, -1], [-2, 0, 2], [1, 0, -1]];
+    let points: Vec<([f64; 3], u32)> = (0..9u32)
+        .map(|n| {
+            let (x, y) = ((n % 3) as usize, (n / 3) as usize);
+            ([10.0 * x as f64, 10.0 * y as f64, f64::from(heights[y][x])], n)
+        })
+        .collect();
+    let normal = |keys: &str| {
+        let case = crate::support::case::Case::new();
+        case.ply(&points);
+        let keys = format!("[[stage]]\nkind = 'normals'\nneighbors = 8\n{keys}\n");
+        let names = "dimensions = ['NormalX', 'NormalY', 'NormalZ']\nencoding = 'ascii'";
+        case.run("", &keys, names).unwrap();
+        let text = std::fs::read_to_string(case.path("out.ply")).unwrap();
+        let line = text.lines().find(|line| line.starts_with("10 10 ")).unwrap().to_owned();
+        line.split(' ').skip(4).map(|v| v.parse().unwrap()).collect::<Vec<f64>>()
+    };
+    for method in ["delaunay", "varady"] {
+        let of = |circles: &str| normal(&format!("method = '{method}'\n{circles}"));
+        let (default, out, taken) = (of(""), of("cocircular = 'out'"), of("cocircular = 'in'"));
+        assert_eq!(default, out);
+        assert!(out[0] != taken[0], "{method}: {out:?} {taken:?}");
+    }
+}

@@ -108,6 +108,7 @@ fn checks() -> BTreeMap<&'static str, Vec<Conformance>> {
                 check::<Normals>(json!({ "neighbors": 6 })),
                 check::<Normals>(json!({})),
                 check::<Normals>(json!({ "neighbors": 8, "method": "delaunay" })),
+                check::<Normals>(json!({ "neighbors": 8, "cocircular": "in" })),
                 check::<Normals>(json!({
                     "neighbors": 12, "method": "cubic", "within": 3.0,
                     "curvature": true, "residual": true,

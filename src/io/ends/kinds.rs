@@ -216,6 +216,9 @@ pub(super) fn unknown_extension(path: &Path, setting: &str, formats: &Formats) -
             let known = listed(upper(formats), "or");
             Error::pipeline(told).help(match is_read {
                 true => format!("convert it to {known} with another program first"),
+                false if ["OBJ", "STL"].contains(&format) => {
+                    format!("name it {dotted}; the stage `mesh` writes {format}, of triangles")
+                }
                 false => format!("name it {dotted}"),
             })
         }
