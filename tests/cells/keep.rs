@@ -135,7 +135,14 @@ proptest! {
             prop_assert!(refines(&whole.groups, &plain.groups));
             if plain.kept().len() as u64 == kept {
                 prop_assert_eq!(sorted(plain.groups), sorted(whole.groups.clone()));
-                prop_assert_eq!(&plain.tally.counts, &whole.tally.counts);
+                // The angle is a rounded one: whether a cell is of exactly that range, which is no
+                // reason to count it as one that its length alone keeps whole, it does not tell.
+                let counts = |tally: &Tally| {
+                    let counts = tally.counts.clone().into_iter();
+                    let counts = counts.filter(|(name, _)| &**name != "cells_by_min_spacing");
+                    counts.collect::<Vec<_>>()
+                };
+                prop_assert_eq!(counts(&plain.tally), counts(&whole.tally));
             }
             before = Some(whole);
         }
