@@ -11,21 +11,25 @@ PAPER = "pointmill paper"
 NAMES = {PAPER: "paper, median angle"}
 LINES = {"graded": "#111827", PAPER: "#d9534f", "voxel": "#3b8fd9", "random": "#8a8f98",
          "grid and median": "#6cb4ee", "averaging, then grid": "#2fa36b", "Gaussian image": "#e08a1e",
-         "wavelet": "#b06fd0", "fourier": "#c9a227", "MeshLab simplify": "#4c9a9a"}
+         "wavelet": "#b06fd0", "fourier": "#c9a227", "triangle removal": "#7d6b5d",
+         "Poisson disk": "#5b6ee1", "MeshLab simplify": "#4c9a9a"}
 STYLE = """text { font: 11px sans-serif; fill: #6a737d } .grid { stroke: #999; stroke-width: 0.4 }
 path { fill: none } @media (prefers-color-scheme: dark) { text { fill: #ddd }
 .graded { stroke: #eee } }"""
-WIDTH, HEIGHT, LEFT, TOP, GAP = 190, 150, 50, 74, 46
+WIDTH, HEIGHT, LEFT, TOP, GAP = 190, 150, 50, 90, 46
 
 TEXT = """## The paper's method, and those that it is beside
 
 The published method with its number given (`reduce --preset paper --keep N`), with the centre of mass
 or several sites at once, and the methods that the paper compares with ([paper](paper.md)), as
-pointmill's stages have them, beside `graded`, a voxel grid, random points and every nth, CGAL and
-MeshLab, at 1, 2, 5, 10 and 20 % of seven scenes (one seed). Points of averaging, Gaussian image, centre
-of mass, wavelet, Fourier transform and WLOP are moved; the others are of the scan. Depth images see a
-closed part from one side, and merge what is behind with what is in front. Of scan lines these scenes
-have no times.
+pointmill's stages have them, beside `graded`, a voxel grid, random points and every nth, Poisson disks,
+CGAL, PCL, MeshLab and Open3D, at 1, 2, 5, 10 and 20 % of seven scenes (one seed), of which village and
+city are crops of real scans. Points of averaging, Gaussian image, centre of mass, wavelet, Fourier
+transform and WLOP are moved; the others are of the scan. Depth images see a closed part from one side,
+and merge what is behind with what is in front. A mesh over a plane does so too, and keeps its border,
+which on the part without noise is a third of the points: there is no row of triangle removal for it.
+PCL's samplings keep what normals or a registration need most, and leave flat parts empty. Of scan lines
+these scenes have no times.
 """
 
 
@@ -131,11 +135,14 @@ def plot(found: list[dict]) -> str:
              f"<style>{STYLE}</style>",
              '<text x="8" y="18">Surface error (99 %, logarithmic) against the share of points kept'
              "</text>"]
-    x = 8
+    x, y = 8, 36
     for name, colour in LINES.items():
         text = NAMES.get(name, name)
-        drawn.append(f'<path class="{name if name == "graded" else ""}" d="M{x} 36h16" '
-                     f'stroke="{colour}" stroke-width="2"/><text x="{x + 20}" y="40">{text}</text>')
+        if x + 32 + 6 * len(text) > wide:
+            x, y = 8, y + 16
+        drawn.append(f'<path class="{name if name == "graded" else ""}" d="M{x} {y}h16" '
+                     f'stroke="{colour}" stroke-width="2"/>'
+                     f'<text x="{x + 20}" y="{y + 4}">{text}</text>')
         x += 32 + 6 * len(text)
     for number, scene in enumerate(scenes):
         drawn += panel(found, scene, shares, LEFT + number % across * (WIDTH + GAP),
