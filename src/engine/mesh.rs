@@ -29,6 +29,7 @@ use super::shares::MILL_SPARE;
 use crate::budget::{Bytes, Lease, whole_mebibytes};
 use crate::geom::delaunay::{Delaunay, WIDEST};
 use crate::geom::morton::plane_morton_cmp;
+use crate::host::process::resident_now;
 use crate::point::{Bounds, Position};
 use crate::report::{Grouped, Tally};
 use crate::stage::{EncodeTriangles, Encoded, Lattice, Sink, SinkSummary, Triangle, Triangulation};
@@ -117,6 +118,7 @@ pub(crate) fn connect(
         |connected: Connected| all.add(&connected),
         |_| outlet.drain(squares.len(), &mut { encode }),
     )?;
+    mesh.tell_empty(&all);
     let said = finished(outlet.close(Vec::new(), &mut { encode })?)?;
     let mut tally = Tally::default();
     tally.count("corners", all.corners);
@@ -145,14 +147,31 @@ impl MeshScan<'_> {
         self.radius().map(|radius| (2.0 * radius * (1.0 + 1e-9)).min(4e18) as i64 + 2)
     }
 
+    /// Warns of a mesh without a triangle.
+    fn tell_empty(&self, all: &Connected) {
+        if all.triangles > 0 || all.corners == 0 {
+            return;
+        }
+        self.job.warn(match self.shape.max_radius {
+            Some(radius) if all.corners > 2 => format!(
+                "the mesh is empty: no triangle has a circle within `mesh.max_radius = {radius}`"
+            ),
+            _ => "the mesh is empty: all points lie on one line across its axis".to_owned(),
+        });
+    }
+
     /// The squares, and how many threads have memory for one.
     fn cut(&self) -> Result<(Vec<PlaneSquare>, usize, Vec<Lease>)> {
         let job = self.job;
         let wanted = job.task.tile_points().map_or(SQUARE, |points| points as u64);
+        // Arenas that are given back stay with the process for a while, in pieces that are too
+        // small for what is allocated here.
+        let held = resident_now().map_or(0, |now| now.saturating_sub(job.budget.used()));
+        let retained = Bytes(held.min(job.task.demands.retained(&job.shares).0));
         let mut heaviest = 0;
         for threads in (1..=job.threads.count()).rev() {
             let besides = besides() * threads as u64 + MILL_SPARE;
-            let free = job.budget.free().saturating_sub(besides.0);
+            let free = job.budget.free().saturating_sub((besides + retained).0);
             let most = free / threads as u64 / EACH as u64;
             let (axis, numbers) = (self.shape.axis, [wanted.min(most), most]);
             let SquareCut { squares, heaviest: found } =
@@ -167,7 +186,8 @@ impl MeshScan<'_> {
                 return Ok((squares, threads, leases.into_iter().collect::<Result<_>>()?));
             }
         }
-        let enough = whole_mebibytes(job.task.demands.limit_for(whole_mesh_bytes(heaviest)));
+        let enough =
+            whole_mebibytes(job.task.demands.limit_behind_mill(whole_mesh_bytes(heaviest)));
         let positions = Grouped(heaviest);
         Err(match self.shape.max_radius {
             None => Error::memory(format!(

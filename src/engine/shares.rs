@@ -123,14 +123,28 @@ impl Demands {
     /// The least limit in whole mebibytes with which `millers` of the threads have tiles of
     /// `positions` positions, rim included, whatever of the scan is kept in memory by then.
     pub fn limit_for_tile(&self, millers: usize, positions: u64) -> u64 {
-        self.limit_for(self.mill(millers, positions).sum())
+        let needed = self.mill(millers, positions).sum();
+        self.limit_where(|demands, shares| needed.fit(demands.free(shares)))
     }
 
-    /// The least limit in whole mebibytes that leaves so much to what works on the sealed scan.
-    pub fn limit_for(&self, needed: Bytes) -> u64 {
+    /// The least limit in whole mebibytes that leaves so much behind the mill, though the system
+    /// may not have its memory back yet.
+    pub fn limit_behind_mill(&self, needed: Bytes) -> u64 {
+        self.limit_where(|demands, shares| {
+            (needed + demands.retained(shares)).fit(demands.free(shares))
+        })
+    }
+
+    /// What the mill held at most, if all of the scan were in its tiles.
+    pub fn retained(&self, shares: &Shares) -> Bytes {
+        let positions = (shares.tile_positions as u64).min(self.points);
+        self.mill(self.threads, positions).sum()
+    }
+
+    fn limit_where(&self, does_by: impl Fn(&Demands, &Shares) -> bool) -> u64 {
         let does = |mebibytes: u64| {
             let demands = Demands { limit: mebibytes << 20, ..self.clone() };
-            demands.divide().is_ok_and(|shares| needed.fit(demands.free(&shares)))
+            demands.divide().is_ok_and(|shares| does_by(&demands, &shares))
         };
         // More of a limit never leaves the mill less.
         let (mut less, mut enough) = (0, 1 << 43);

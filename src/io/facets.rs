@@ -9,7 +9,7 @@ mod obj;
 mod stl;
 
 pub(crate) use obj::ObjSink;
-pub(crate) use stl::{StlSink, rounding};
+pub(crate) use stl::{SinglePlaces, StlSink};
 
 /// Points of one chunk.
 pub(crate) const CHUNK_POINTS: usize = 65_536;

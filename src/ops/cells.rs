@@ -34,6 +34,7 @@ use keys::SettledCells;
 use outlook::Outlook;
 pub use settings::{By, Measure, Reference, Side, Split};
 pub use target::Keep;
+pub(in crate::ops) use target::KeepGiven;
 use threshold::Threshold;
 
 /// Bytes a position: member, turned, end of a group, end of an initial cell, room to divide.

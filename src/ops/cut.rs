@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Keep;
+use super::cells::KeepGiven;
 use super::graded::{Rung, SHORTENED_BY};
 use super::removal::{keep_once, remove};
 use crate::geom::hash::of_position;
@@ -29,6 +30,7 @@ const RANK: Column<f64> = Column::new("KeepRank", &[]);
 pub struct Cut {
     /// How many positions stay: a share of those that there are ("10%"), or a number (500000,
     /// "250k", "5M").
+    #[schemars(with = "Option<KeepGiven>")]
     pub keep: Option<Keep>,
     /// Instead: about how far from each other points are that stay, a length. They are those that
     /// were kept at this distance or a longer one.

@@ -69,9 +69,10 @@ pub struct Normals {
     pub within: Option<Length>,
     /// How a normal is estimated.
     pub method: Method,
-    /// What becomes of a neighbour on the circle of a Delaunay triangle of the point, as on grids:
-    /// the triangulation is not unique there, and the paper does not say. Not for `"pca"`, which
-    /// has no triangles.
+    /// What becomes of a neighbour on the circle of a Delaunay triangle of the point, where the
+    /// triangulation is not unique, and the paper does not say. Projected on their plane of
+    /// regression points hardly ever are on one, to 2^-40: it shows where a grid is level as a
+    /// whole and its heights are not. Not for `"pca"`, which has no triangles.
     pub cocircular: Cocircular,
     /// Whether the column `Curvature` is computed, the surface variation: the least eigenvalue of
     /// the covariance of the position and its neighbours, divided by the sum of all three. 0 on a

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::Axis;
-use super::cells::Keep;
+use super::cells::{Keep, KeepGiven};
 use super::whole::Rows;
 use crate::point::{Bounds, names};
 use crate::report::{Grouped, Tally};
@@ -49,6 +49,7 @@ const HELD_BYTES: usize = Rows::<()>::BYTES + ThinnedMesh::BYTES + size_of::<f32
 #[serde(deny_unknown_fields)]
 pub struct Triangles {
     /// How many points stay: a number, or a share of those there are, such as "10%".
+    #[schemars(with = "KeepGiven")]
     pub keep: Keep,
     /// The axis across which the points are triangulated.
     #[serde(default)]
@@ -125,7 +126,10 @@ impl ScanOp for Triangles {
         let bounds = self.bounds.ok_or_else(unsettled)?;
         let most = self.keep.of(gathered.records()).max(1);
         let rows = Rows::of_scan(gathered)?;
-        let mut mesh = ThinnedMesh::of(&rows.positions, bounds.lo, self.axis as usize)?;
+        let mut mesh = {
+            let axis = self.axis as usize;
+            ThinnedMesh::of(&rows.positions, bounds.lo, axis, || gathered.go_on())?
+        };
         let positions = rows.positions.len() as u64;
         let (corners, border) = (mesh.corners(), mesh.border());
         mesh.thin(most, || gathered.go_on())?;

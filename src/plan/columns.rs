@@ -78,7 +78,7 @@ impl NewestColumns {
             let (name, parts) = (newest.kind.name(), listed(newest.kind.parts(), "and"));
             return format!("the numbers of {name} are {parts}");
         }
-        let leave = format!("leave {} out of `write.dimensions`", listed(names, "and"));
+        let leave = format!("leave {} out of `dimensions`", listed(names, "and"));
         match (names.iter().find_map(|name| giver(name)), all().next()) {
             (Some(stage), _) => format!("put a `{stage}` stage before it, or {leave}"),
             (None, Some(_)) => {

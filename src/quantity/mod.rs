@@ -18,7 +18,7 @@ pub use count::parse_count;
 pub(crate) use figure::Figure;
 pub use fraction::Fraction;
 pub use length::Length;
-pub(crate) use schema::{COUNT_TEXT, OrNone, has_schema};
+pub(crate) use schema::{COUNT_TEXT, OrNone, has_schema, or_word};
 pub use setting::Setting;
 pub use turn::Turn;
 pub(crate) use whole::Whole;

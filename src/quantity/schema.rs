@@ -42,6 +42,6 @@ impl<T: JsonSchema> JsonSchema for OrNone<T> {
 }
 
 /// What `schema` takes, or a word.
-pub(super) fn or_word(schema: Schema, word: &str) -> Schema {
+pub(crate) fn or_word(schema: Schema, word: &str) -> Schema {
     json_schema!({ "anyOf": [schema, { "const": word }] })
 }

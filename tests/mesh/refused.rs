@@ -33,8 +33,12 @@ fn mesh(case: &Case, name: &str, keys: &str) -> String {
 fn within(case: &Case, mebibytes: u64, line: &str) -> (i32, String) {
     let line = format!("read in.laz ! {line}");
     let memory = format!("{mebibytes}MiB");
-    let arguments = ["run", &line, "--memory", &memory, "--quiet"];
+    let arguments = ["run", &line, "--memory", &memory, "--quiet", "--report", "report.json"];
     let (code, _, told) = pointmill(case.at.path(), &arguments);
+    if code == 0 {
+        let peak = case.report()["run"]["peak_memory_bytes"].as_u64().unwrap();
+        assert!(peak <= mebibytes << 20, "{line}: {peak} bytes in {memory}");
+    }
     (code, told)
 }
 
@@ -52,11 +56,24 @@ fn a_memory_that_does_not_do_is_refused_with_the_one_that_does() {
         assert!((85..400).contains(&enough), "{told}");
         let (code, told) = within(&case, enough, line);
         assert_eq!(code, 0, "{told}");
-        std::fs::remove_file(case.path("m.obj")).unwrap();
     }
     // A radius does, too.
     let (code, told) = within(&case, 84, "mesh m.obj max_radius=3");
     assert_eq!(code, 0, "{told}");
+}
+
+#[test]
+fn a_mesh_without_a_triangle_is_told() {
+    let case = scan(500);
+    for (line, part) in [
+        ("mesh m.ply max_radius=0.001", "no triangle has a circle within `mesh.max_radius"),
+        ("crop box=[0,0,1e9,1e9] ! sample every=499 ! mesh m.ply", "all points lie on one line"),
+    ] {
+        let line = format!("read in.laz ! {line}");
+        let (code, _, told) = pointmill(case.at.path(), &["run", &line]);
+        assert_eq!(code, 0, "{told}");
+        assert!(told.contains(part), "{told}");
+    }
 }
 
 #[test]
@@ -91,7 +108,8 @@ fn keys_are_held_against_the_format() {
     let case = scan(50);
     for (name, keys, told) in [
         ("m.obj", "encoding = 'ascii'", "`mesh.encoding` is for ply, the output is obj"),
-        ("m.ply", "offset = [0, 0, 0]", "`mesh.offset` is for stl, the output is ply"),
+        ("m.ply", "offset = [0, 0, 0]", "`mesh.offset` is for obj and stl, the output is ply"),
+        ("m.ply", "drop = ['Foo']", "`mesh.drop`"),
         ("m.laz", "", "names no format of meshes"),
         ("m.ply", "max_radius = 0", "max_radius"),
         ("m.ply", "axis = 'w'", "axis"),

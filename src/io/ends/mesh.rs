@@ -8,11 +8,10 @@ use serde::{Deserialize, Serialize};
 
 use super::kinds::{names_once, some_offset};
 use crate::error::{listed, shown};
-use crate::io::facets::{ObjSink, StlSink, rounding};
+use crate::io::facets::{ObjSink, SinglePlaces, StlSink};
 use crate::io::ply;
-use crate::point::{Metadata, PointBatch, Schema, Units, names};
+use crate::point::{Dimension, Metadata, PointBatch, Schema, Units, names};
 use crate::quantity::{Axis, Length};
-use crate::report::Short;
 use crate::stage::{
     ChunkSize, Colors, CreateSink, Format, Order, OutputEncoding, Role, RoleName, Sink, Source,
     StageKind, StagePlace, Triangulation, WriteKeys,
@@ -57,10 +56,11 @@ pub struct Mesh {
     /// The largest radius of a circle through the corners of a triangle; none: any, in memory.
     #[serde(default)]
     pub max_radius: Option<Length>,
-    /// What is taken off the places of an STL file, whose 32-bit floats hold seven digits.
+    /// What is taken off the places of an OBJ file, of which what is left has nine decimals, or of
+    /// an STL file.
     #[serde(default, deserialize_with = "some_offset")]
     pub offset: Option<[f64; 3]>,
-    /// Dimensions that a PLY file need not hold.
+    /// Dimensions that a PLY file is to be without.
     #[serde(default)]
     pub drop: Vec<String>,
     /// Computed dimensions that a PLY file has besides those of the input: `NormalX`, `NormalY` and
@@ -113,16 +113,18 @@ impl StageKind for Mesh {
             let told = format!("the extension of `{path}` names no format of meshes");
             return Err(at.blame("path", Error::pipeline(told).help(format!("name it {dotted}"))));
         };
+        const PLY: &[&str] = &["ply"];
+        const OTHERS: &[&str] = &["obj", "stl"];
         let given = [
-            ("offset", self.offset.is_some(), MeshFormat::Stl),
-            ("drop", !self.drop.is_empty(), MeshFormat::Ply),
-            ("dimensions", !self.dimensions.is_empty(), MeshFormat::Ply),
-            ("encoding", self.encoding.is_some(), MeshFormat::Ply),
-            ("colors", self.colors.is_some(), MeshFormat::Ply),
+            ("offset", self.offset.is_some(), OTHERS),
+            ("drop", !self.drop.is_empty(), PLY),
+            ("dimensions", !self.dimensions.is_empty(), PLY),
+            ("encoding", self.encoding.is_some(), PLY),
+            ("colors", self.colors.is_some(), PLY),
         ];
-        if let Some((key, _, of)) = given.into_iter().find(|(_, given, of)| *given && *of != format)
-        {
-            let having = if of == MeshFormat::Ply { "ply" } else { "stl" };
+        let mut wrong = given.into_iter().filter(|(_, given, of)| *given && !of.contains(&name));
+        if let Some((key, _, having)) = wrong.next() {
+            let having = listed(having, "and");
             let told = format!("`mesh.{key}` is for {having}, the output is {name}");
             return Err(at.blame(key, Error::pipeline(told)));
         }
@@ -147,6 +149,15 @@ impl MeshFile {
 
     fn offset(&self) -> [f64; 3] {
         self.keys.offset.unwrap_or_default()
+    }
+
+    /// Places of an STL file: a step of the records is the most that they may move, a thousandth
+    /// where coordinates have no steps.
+    fn places(&self, schema: &Schema) -> SinglePlaces {
+        let step = |axis: &Dimension| if axis.scalar.is_float() { 1e-3 } else { axis.scale.abs() };
+        let steps = schema.coordinates().map(|axes| axes.map(step));
+        let most = steps.unwrap_or([1e-3; 3]).into_iter().fold(0.0, f64::max);
+        SinglePlaces { offset: self.offset(), most }
     }
 }
 
@@ -175,7 +186,9 @@ impl CreateSink for MeshFile {
 
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize> {
         match self.format {
-            MeshFormat::Ply => ply::sink::chunk(&self.ply(metadata), schema, metadata),
+            MeshFormat::Ply => {
+                ply::sink::chunk(&self.ply(metadata), schema, metadata).map_err(of_mesh)
+            }
             MeshFormat::Obj => Ok(ObjSink::CHUNK),
             MeshFormat::Stl => Ok(StlSink::CHUNK),
         }
@@ -197,9 +210,8 @@ impl CreateSink for MeshFile {
         let path = shown(self.path());
         match others.count() {
             0 => Vec::new(),
-            count => vec![format!(
-                "{path}: a mesh of this format holds places alone, and none of the {count} other \
-                 dimensions; PLY holds them"
+            _ => vec![format!(
+                "{path}: this format holds places, and no other dimensions; PLY holds them all"
             )],
         }
     }
@@ -213,22 +225,10 @@ impl CreateSink for MeshFile {
         let Some(axes) = schema.coordinates().filter(|_| self.format == MeshFormat::Stl) else {
             return Ok(());
         };
-        // A thousandth where coordinates have no steps of their own.
-        let steps = axes.map(|axis| if axis.scalar.is_float() { 1e-3 } else { axis.scale.abs() });
-        let most = steps.into_iter().fold(0.0, f64::max);
+        let places = self.places(schema);
         for record in records.iter() {
             let place = axes.map(|axis| axis.world(record, schema.endian));
-            let by = rounding(place, self.offset());
-            if by > most {
-                let round = place.map(|v| (v / 1000.0).floor() * 1000.0);
-                let told = format!(
-                    "STL holds places as 32-bit floats, which would move the point at {place:?} by \
-                     {}",
-                    Short(by)
-                );
-                let help = format!("take something off all places: `mesh.offset = {round:?}`");
-                return Err(Error::pipeline(told).at(self.path()).help(help));
-            }
+            places.rounding(place).map_err(|error| error.at(self.path()))?;
         }
         Ok(())
     }
@@ -252,14 +252,25 @@ impl CreateSink for MeshFile {
             MeshFormat::Obj => {
                 let crs = metadata.crs.iter().map(|crs| format!("crs: {crs}"));
                 let comments: Vec<String> = crs.collect();
-                Ok(Box::new(ObjSink::create(staged, &comments)?))
+                Ok(Box::new(ObjSink::create(staged, self.offset(), &comments)?))
             }
-            MeshFormat::Stl => Ok(Box::new(StlSink::create(staged, self.offset())?)),
+            MeshFormat::Stl => Ok(Box::new(StlSink::create(staged, self.places(schema))?)),
         };
         created.map_err(|error| match error.path() {
             Some(path) if path == staged => error,
             _ => error.at(self.path()),
         })
+    }
+}
+
+/// An error of `write`'s keys, which are those of a mesh.
+fn of_mesh(error: Error) -> Error {
+    let named = |text: &str| text.replace("`write.", "`mesh.");
+    let told = error.to_string();
+    match (told.contains("`write."), error.remedy().map(named)) {
+        (false, _) => error,
+        (true, None) => Error::new(error.kind(), named(&told)),
+        (true, Some(help)) => Error::new(error.kind(), named(&told)).help(help),
     }
 }
 
@@ -274,7 +285,7 @@ mod tests {
         assert!(built("path = 'a.PLY'\ncolors = '8bit'\ndimensions = ['NormalX']").is_ok());
         assert!(built("path = 'a.stl'\noffset = [1, 2, 3]").is_ok());
         assert!(built("path = 'a.obj'\naxis = 'x'\nmax_radius = '2 m'").is_ok());
-        for wrong in ["path = 'a.laz'", "path = 'a'", "path = 'a.obj'\noffset = [1, 2, 3]"] {
+        for wrong in ["path = 'a.laz'", "path = 'a'", "path = 'a.ply'\noffset = [1, 2, 3]"] {
             assert!(built(wrong).is_err(), "{wrong}");
         }
         let told = built("path = 'a.obj'\nencoding = 'ascii'").err().unwrap().to_string();

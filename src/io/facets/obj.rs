@@ -17,6 +17,8 @@ const LINE: usize = 3 * 26 + 3;
 pub(crate) struct ObjSink {
     file: File,
     path: PathBuf,
+    /// What is taken off each place.
+    offset: [f64; 3],
     points: u64,
     bytes: u64,
 }
@@ -26,12 +28,13 @@ impl ObjSink {
     pub const CHUNK: ChunkSize =
         ChunkSize { points: CHUNK_POINTS, bytes: (CHUNK_POINTS * LINE) as u64 };
 
-    /// Creates the file at `staged`, of which `comments` say something.
+    /// Creates the file at `staged`, whose places are less `offset`, and of which `comments` say
+    /// something.
     ///
     /// # Errors
     ///
     /// A file that the system refuses to create or to write.
-    pub fn create(staged: &Path, comments: &[String]) -> Result<ObjSink> {
+    pub fn create(staged: &Path, offset: [f64; 3], comments: &[String]) -> Result<ObjSink> {
         let mut text = "# made by pointmill\n".to_owned();
         for comment in comments {
             text += &format!("# {}\n", comment.replace(['\n', '\r'], " "));
@@ -39,7 +42,8 @@ impl ObjSink {
         let mut file = File::create(staged).map_err(|e| Error::io(staged, "create", e))?;
         let failed = |e| Error::io(staged, "write its first lines", e);
         file.write_all(text.as_bytes()).map_err(failed)?;
-        Ok(ObjSink { file, path: staged.to_owned(), points: 0, bytes: text.len() as u64 })
+        let (path, bytes) = (staged.to_owned(), text.len() as u64);
+        Ok(ObjSink { file, path, offset, points: 0, bytes })
     }
 }
 
@@ -53,7 +57,7 @@ impl Sink for ObjSink {
     }
 
     fn encoder(&self) -> Arc<dyn Encode> {
-        Arc::new(VertexLines)
+        Arc::new(VertexLines { offset: self.offset })
     }
 
     fn append(&mut self, chunk: Encoded) -> Result<()> {
@@ -73,8 +77,22 @@ impl Sink for ObjSink {
     }
 }
 
-/// Prints places, each number as the shortest text that reads back equal.
-struct VertexLines;
+/// Prints places, each number as the shortest text that reads back equal, or with nine decimals
+/// where something is taken off it: a difference has the noise of binary fractions.
+struct VertexLines {
+    offset: [f64; 3],
+}
+
+impl VertexLines {
+    fn shown(&self, place: [f64; 3], axis: usize) -> String {
+        let (v, offset) = (place[axis], self.offset[axis]);
+        if offset == 0.0 {
+            return v.to_string();
+        }
+        let text = format!("{:.9}", v - offset);
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    }
+}
 
 impl Encode for VertexLines {
     fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
@@ -83,7 +101,8 @@ impl Encode for VertexLines {
         let axes = schema.coordinates().ok_or_else(missing)?;
         let mut bytes = Vec::with_capacity(batch.len() * LINE);
         for record in batch.iter() {
-            let [x, y, z] = axes.map(|axis| axis.world(record, schema.endian));
+            let place = axes.map(|axis| axis.world(record, schema.endian));
+            let [x, y, z] = [0, 1, 2].map(|axis| self.shown(place, axis));
             let failed = |e| Error::internal("a number has no text").because(e);
             writeln!(bytes, "v {x} {y} {z}").map_err(failed)?;
         }

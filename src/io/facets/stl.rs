@@ -16,21 +16,43 @@ const HEADER: usize = 80;
 /// Bytes of a triangle: four vectors of 32-bit floats and 16 bits that mean nothing.
 const TRIANGLE: usize = 4 * 3 * 4 + 2;
 
-/// By how much a place moves at most on an axis where a 32-bit float holds it, less the offset.
-pub(crate) fn rounding(place: [f64; 3], offset: [f64; 3]) -> f64 {
-    let axis = |axis: usize| {
-        let exact = place[axis] - offset[axis];
-        (f64::from(exact as f32) - exact).abs()
-    };
-    axis(0).max(axis(1)).max(axis(2))
+/// What is taken off places, and by how much 32-bit floats may then move them on an axis.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SinglePlaces {
+    pub offset: [f64; 3],
+    pub most: f64,
+}
+
+impl SinglePlaces {
+    /// By how much a place is moved.
+    ///
+    /// # Errors
+    ///
+    /// If that is too much.
+    pub fn rounding(&self, place: [f64; 3]) -> Result<f64> {
+        let axis = |axis: usize| {
+            let exact = place[axis] - self.offset[axis];
+            (f64::from(exact as f32) - exact).abs()
+        };
+        let by = axis(0).max(axis(1)).max(axis(2));
+        if by <= self.most {
+            return Ok(by);
+        }
+        let round = place.map(|v| (v / 1000.0).floor() * 1000.0);
+        let told = format!(
+            "STL holds places as 32-bit floats, which would move the point at {place:?} by {}",
+            Short(by)
+        );
+        let help = format!("take something off all places: `mesh.offset = {round:?}`");
+        Err(Error::pipeline(told).help(help))
+    }
 }
 
 /// An STL file that grows.
 pub(crate) struct StlSink {
     file: File,
     path: PathBuf,
-    /// What is taken off each place.
-    offset: [f64; 3],
+    places: SinglePlaces,
     points: u64,
     triangles: u64,
     rounded: f64,
@@ -40,19 +62,19 @@ impl StlSink {
     /// Chunks of such a file: nothing is written of points.
     pub const CHUNK: ChunkSize = ChunkSize { points: CHUNK_POINTS, bytes: 0 };
 
-    /// Creates the file at `staged`, whose places are less `offset`.
+    /// Creates the file at `staged`, with such places.
     ///
     /// # Errors
     ///
     /// A file that the system refuses to create or to write.
-    pub fn create(staged: &Path, offset: [f64; 3]) -> Result<StlSink> {
+    pub fn create(staged: &Path, places: SinglePlaces) -> Result<StlSink> {
         let mut header = [b' '; HEADER + size_of::<u32>()];
         let made = b"made by pointmill";
         header[..made.len()].copy_from_slice(made);
         let mut file = File::create(staged).map_err(|e| Error::io(staged, "create", e))?;
         file.write_all(&header).map_err(|e| Error::io(staged, "write the header", e))?;
         let path = staged.to_owned();
-        Ok(StlSink { file, path, offset, points: 0, triangles: 0, rounded: 0.0 })
+        Ok(StlSink { file, path, places, points: 0, triangles: 0, rounded: 0.0 })
     }
 }
 
@@ -78,7 +100,7 @@ impl Sink for StlSink {
     }
 
     fn triangles(&mut self) -> Result<Arc<dyn EncodeTriangles>> {
-        Ok(Arc::new(FacetEncoder { offset: self.offset }))
+        Ok(Arc::new(FacetEncoder(self.places)))
     }
 
     fn finish(mut self: Box<Self>) -> Result<SinkSummary> {
@@ -110,23 +132,21 @@ impl Encode for NoVertices {
     }
 }
 
-struct FacetEncoder {
-    offset: [f64; 3],
-}
+struct FacetEncoder(SinglePlaces);
 
 impl EncodeTriangles for FacetEncoder {
     fn encode(&self, triangles: &[Triangle]) -> Result<Encoded> {
         let mut bytes = Vec::with_capacity(triangles.len() * TRIANGLE);
         let mut rounded = 0f64;
         for Triangle { places, .. } in triangles {
-            let [a, b, c] = places.map(|place| [0, 1, 2].map(|n| place[n] - self.offset[n]));
+            let [a, b, c] = places.map(|place| [0, 1, 2].map(|n| place[n] - self.0.offset[n]));
             let across = normal(a, b, c);
             for vector in [across, a, b, c] {
                 vector.into_iter().for_each(|v| bytes.extend((v as f32).to_le_bytes()));
             }
             bytes.extend([0; 2]);
             for place in places {
-                rounded = rounded.max(rounding(*place, self.offset));
+                rounded = rounded.max(self.0.rounding(*place)?);
             }
         }
         let (rounded, triangles) = (Some((0, rounded)), triangles.len() as u64);

@@ -1,12 +1,14 @@
 //! How many records are to stay, in words of a pipeline file.
 
+use std::borrow::Cow;
 use std::fmt;
 
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{self, Deserializer, Unexpected, Visitor};
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::quantity::{COUNT_TEXT, has_schema, parse_count};
+use crate::quantity::{COUNT_TEXT, has_schema, or_word, parse_count};
 use crate::stage::StagePlace;
 
 /// How many records are to stay.
@@ -99,7 +101,10 @@ impl fmt::Display for Percent {
     }
 }
 
-has_schema!(Keep, "Keep", {
+/// What the key of a stage takes that does not find a number by itself.
+pub(in crate::ops) struct KeepGiven;
+
+has_schema!(KeepGiven, "KeepGiven", {
     "anyOf": [
         { "title": "a share such as `\"10%\"`", "type": "string", "pattern": r"^[-+.0-9eE\s]+%$" },
         {
@@ -109,9 +114,18 @@ has_schema!(Keep, "Keep", {
                 { "type": "string", "pattern": COUNT_TEXT },
             ],
         },
-        { "const": "auto" },
     ],
 });
+
+impl JsonSchema for Keep {
+    fn schema_name() -> Cow<'static, str> {
+        "Keep".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        or_word(KeepGiven::json_schema(generator), "auto")
+    }
+}
 
 struct KeepVisitor;
 

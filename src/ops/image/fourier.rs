@@ -7,7 +7,7 @@ use super::wavelet::{moves, pixels};
 use super::{Axis, Blocks, Pixels, Transformed, build};
 use crate::Result;
 use crate::geom::depth::low_pass;
-use crate::ops::cells::Keep;
+use crate::ops::cells::{Keep, KeepGiven};
 use crate::stage::{Role, RoleName, StageKind, StagePlace};
 
 /// Reduction by the discrete Fourier transform, as the paper describes it: the high frequencies of
@@ -32,6 +32,7 @@ use crate::stage::{Role, RoleName, StageKind, StagePlace};
 #[serde(deny_unknown_fields)]
 pub struct Fourier {
     /// How many points stay at most: a number, or a share of those there are, such as "10%".
+    #[schemars(with = "KeepGiven")]
     pub keep: Keep,
     /// The axis that one looks along.
     #[serde(default)]

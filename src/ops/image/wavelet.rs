@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{Axis, Blocks, PIXELS, Pixels, Transformed, build};
 use crate::Result;
 use crate::geom::depth::{haar, square};
-use crate::ops::cells::Keep;
+use crate::ops::cells::{Keep, KeepGiven};
 use crate::stage::{Role, RoleName, StageKind, StagePlace};
 
 /// Thresholding of wavelet coefficients, as the paper describes it: the transform of a depth image
@@ -35,6 +35,7 @@ use crate::stage::{Role, RoleName, StageKind, StagePlace};
 #[serde(deny_unknown_fields)]
 pub struct Wavelet {
     /// How many points stay at most: a number, or a share of those there are, such as "10%".
+    #[schemars(with = "KeepGiven")]
     pub keep: Keep,
     /// The axis that one looks along.
     #[serde(default)]
