@@ -135,10 +135,11 @@ impl Demands {
         })
     }
 
-    /// What the mill held at most, if all of the scan were in its tiles.
+    /// What the mill held at most: all of the scan in the tiles of its threads, and half as many
+    /// positions in their rims.
     pub fn retained(&self, shares: &Shares) -> Bytes {
-        let positions = (shares.tile_positions as u64).min(self.points);
-        self.mill(self.threads, positions).sum()
+        let share = (self.points / self.threads.max(1) as u64).saturating_mul(3) / 2;
+        self.mill(self.threads, share.min(shares.tile_positions as u64)).sum()
     }
 
     fn limit_where(&self, does_by: impl Fn(&Demands, &Shares) -> bool) -> u64 {
