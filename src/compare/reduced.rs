@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use super::records::{Beginnings, Comparison, RecordKeys};
 use crate::budget::{Bytes, whole_mebibytes};
 use crate::geom::hash::PlaceHashes;
-use crate::point::{PointBatch, Scalar, Schema};
+use crate::point::{PointBatch, Scalar, Schema, names};
 use crate::stage::Source;
 use crate::{Error, ErrorKind, Result};
 
@@ -37,8 +37,15 @@ pub(super) struct Reduced {
     beginnings: Beginnings,
 }
 
-/// A record by its number in the file and where it is.
-pub(super) type NumberedRecord = (u64, [f64; 3]);
+/// Records that the original does not have, or not as often.
+#[derive(Debug, Default)]
+pub(super) struct ForeignRecords {
+    pub count: u64,
+    /// Those with the synthetic flag, which a stage sets that moves them.
+    pub synthetic: u64,
+    /// The first by its number in the file, and where it is.
+    pub first: Option<(u64, [f64; 3])>,
+}
 
 impl Reduced {
     /// Bytes that a reduced scan of so many records takes.
@@ -95,30 +102,31 @@ impl Reduced {
         }
     }
 
-    /// How many records are not in the original, or more often than there, and the first of them.
-    pub fn foreign(
-        &self,
-        source: &dyn Source,
-        comparison: &Comparison,
-    ) -> Result<(u64, Option<NumberedRecord>)> {
+    /// The records that are not in the original, or more often than there.
+    pub fn foreign(&self, source: &dyn Source, comparison: &Comparison) -> Result<ForeignRecords> {
         let more =
             |of: &Occurrences| u64::from(of.kept.saturating_sub(of.met.load(Ordering::Relaxed)));
-        let foreign = self.records.values().map(more).sum();
-        if foreign == 0 {
-            return Ok((0, None));
+        let count = self.records.values().map(more).sum();
+        let mut found = ForeignRecords { count, ..ForeignRecords::default() };
+        if count == 0 {
+            return Ok(found);
         }
-        let (mut first, mut seen) = (None, HashMap::<u128, u32>::new());
+        let schema = source.schema();
+        let flag = schema.find(names::SYNTHETIC);
+        let mut seen = HashMap::<u128, u32>::new();
         each_record(source, |number, world, record| {
             let hash = comparison.reduced.key(record);
             let met = self.records.get(&hash).map_or(0, |of| of.met.load(Ordering::Relaxed));
             let times = seen.entry(hash).or_default();
             *times += 1;
-            if *times > met && first.is_none() {
-                first = Some((number, world));
+            if *times > met {
+                found.first.get_or_insert((number, world));
+                let is_set = flag.is_some_and(|flag| flag.world(record, schema.endian) != 0.0);
+                found.synthetic += u64::from(is_set);
             }
             Ok(())
         })?;
-        Ok((foreign, first))
+        Ok(found)
     }
 }
 

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::report::deviations::MeasuredDeviations;
-use crate::report::{Grouped, Short};
+use crate::report::{Coordinate, Grouped, Long};
 use crate::stage::Lattice;
 
 /// What is known of a reduced scan beside its original.
@@ -20,6 +20,8 @@ pub struct Verification {
     pub exceptions: u64,
     /// Records of the reduced scan that the original does not have, or not as often.
     pub foreign: u64,
+    /// Those of them that have the synthetic flag, as points have that a stage moved.
+    pub foreign_synthetic: u64,
     /// The first of them in the file.
     pub first_foreign: Option<ForeignRecord>,
     /// Dimensions that were not compared, as the reduced scan does not have them.
@@ -38,6 +40,11 @@ pub struct Verification {
     pub max_spacing: Option<f64>,
     /// How many are.
     pub beyond_spacing: u64,
+    /// The sign of the unit of all lengths, where the scan says it.
+    pub unit: Option<&'static str>,
+    /// Step of the lattice: coordinates are told to it.
+    #[serde(skip)]
+    pub(super) step: f64,
 }
 
 /// A record that is in the reduced scan alone.
@@ -96,6 +103,34 @@ impl Verification {
     }
 }
 
+impl Verification {
+    /// A place in the digits that tell it from others.
+    fn place(&self, at: [f64; 3]) -> String {
+        let [x, y, z] = at.map(|at| Coordinate { at, step: self.step });
+        format!("({x}, {y}, {z})")
+    }
+
+    fn record_lines(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.first_foreign {
+            None => writeln!(f, "records    all are of the original")?,
+            Some(first) => {
+                let (foreign, at) = (Grouped(self.foreign), self.place(first.at));
+                let number = first.number;
+                write!(f, "records    {foreign} are not of the original")?;
+                if self.foreign_synthetic > 0 {
+                    let moved = Grouped(self.foreign_synthetic);
+                    write!(f, ", {moved} of them synthetic, as points that a stage moved")?;
+                }
+                writeln!(f, "; the first is number {number} at {at}")?;
+            }
+        }
+        match self.not_compared.is_empty() {
+            true => Ok(()),
+            false => writeln!(f, "           not compared: {}", self.not_compared.join(", ")),
+        }
+    }
+}
+
 impl fmt::Display for Verification {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let share = 100.0 * self.reduced as f64 / self.original.max(1) as f64;
@@ -106,30 +141,19 @@ impl fmt::Display for Verification {
             Grouped(self.original),
             Grouped(self.exceptions)
         )?;
-        match &self.first_foreign {
-            None => writeln!(f, "records    all are of the original")?,
-            Some(first) => writeln!(
-                f,
-                "records    {} are not of the original, the first is number {} at {:?}",
-                Grouped(self.foreign),
-                first.number,
-                first.at
-            )?,
-        }
-        if !self.not_compared.is_empty() {
-            writeln!(f, "           not compared: {}", self.not_compared.join(", "))?;
-        }
+        self.record_lines(f)?;
+        let long = |length: f64| Long(length, self.unit);
         for (name, distances) in [("surface ", &self.surface), ("coverage", &self.coverage)] {
             let Some(d) = distances else { continue };
             writeln!(
                 f,
-                "{name}   RMS {}, 50 % ≤ {}, 95 % ≤ {}, 99 % ≤ {}, max {} at {:?}",
-                Short(d.rms),
-                Short(d.p50),
-                Short(d.p95),
-                Short(d.p99),
-                Short(d.max),
-                d.at
+                "{name}   RMS {}, 50 % ≤ {}, 95 % ≤ {}, 99 % ≤ {}, max {} at {}",
+                long(d.rms),
+                long(d.p50),
+                long(d.p95),
+                long(d.p99),
+                long(d.max),
+                self.place(d.at)
             )?;
         }
         for (asked, beyond, of) in [
@@ -137,7 +161,7 @@ impl fmt::Display for Verification {
             (self.max_spacing, self.beyond_spacing, "from the nearest kept point"),
         ] {
             let Some(asked) = asked else { continue };
-            let (beyond, asked) = (Grouped(beyond), Short(asked));
+            let (beyond, asked) = (Grouped(beyond), long(asked));
             writeln!(f, "beyond     {beyond} removed positions are more than {asked} {of}")?;
         }
         let is_bounded = self.tolerance.is_some() || self.max_spacing.is_some();

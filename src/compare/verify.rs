@@ -100,7 +100,7 @@ pub fn verify(
     let stage = graph.add("verify", Role::TileOp(Box::new(surface)), &[records]);
     graph.add("discard", Role::Sink(Box::new(Discard {})), &[stage]);
     let done = graph.plan(&Overrides::default())?.run(watch)?;
-    let (foreign, first) = kept.foreign(&*thin, &comparison)?;
+    let foreign = kept.foreign(&*thin, &comparison)?;
     let measured = lock(&measured).clone();
     let unplaced = || Error::internal("a check ended before it began");
     let lattice = measured.lattice.as_ref().ok_or_else(unplaced)?;
@@ -109,8 +109,9 @@ pub fn verify(
         original: done.report.result.ledger.kept,
         reduced: thin.points(),
         exceptions,
-        foreign,
-        first_foreign: first.map(|(number, at)| ForeignRecord { number, at }),
+        foreign: foreign.count,
+        foreign_synthetic: foreign.synthetic,
+        first_foreign: foreign.first.map(|(number, at)| ForeignRecord { number, at }),
         not_compared: comparison.left_out,
         surface: DistanceFigures::of(&measured.surface, lattice),
         coverage: DistanceFigures::of(&measured.nearest, lattice),
@@ -118,5 +119,7 @@ pub fn verify(
         beyond_tolerance: measured.beyond,
         max_spacing: measured.max_spacing,
         beyond_spacing: measured.apart,
+        unit: thin.metadata().units.sign(),
+        step: lattice.step,
     })
 }

@@ -95,6 +95,21 @@ pub(super) fn missing(stage: &StageOp, name: &str, help: &str) -> Error {
     stage.written.wrong(told).help(help.to_owned())
 }
 
+/// The error of a stage that reads what no stage computes and no record has, if it does.
+pub(super) fn lacks(stage: &StageOp, names: &[&str]) -> Option<Error> {
+    let names = (!names.is_empty()).then(|| listed(names, "and"))?;
+    let help = format!("no stage computes {names}, and the records of the input have none");
+    Some(missing(stage, &names, &help))
+}
+
+/// The error of a stage that makes a partition where nothing has taken the one `before`.
+pub(super) fn replaced(before: &StageOp, stage: &StageOp) -> Error {
+    let (kind, before) = (&stage.kind, &before.kind);
+    let told = format!("`{kind}` replaces the cells that `{before}` made, which nothing has taken");
+    let help = "leave one of the two out, or put a `median` stage between them";
+    stage.written.wrong(told).help(help)
+}
+
 /// The stage that computes the normals, if that is the name of one of their numbers.
 fn giver(name: &str) -> Option<&'static str> {
     NORMAL.kind().part(name).and_then(|dimension| dimension.column.computed_by())

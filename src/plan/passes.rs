@@ -1,7 +1,7 @@
 //! The tile stages of a pipeline as passes over the scan: a pass ends where points are removed, or
 //! where a stage must have seen all tiles before it decides.
 
-use super::columns::{NewestColumns, missing};
+use super::columns::{NewestColumns, lacks, missing, replaced};
 use super::limits::seen_by;
 use super::sorted::{Sorted, StageWork};
 use crate::engine::pass::{Branch, Call, Op, Pass, StageOp, decides, needs};
@@ -72,6 +72,8 @@ pub(super) struct BranchCursor {
     pub filters: Vec<usize>,
     /// True if the last stage takes records away.
     pub decides: bool,
+    /// The tile stage that made the partition which nothing has taken yet.
+    untaken: Option<usize>,
 }
 
 impl PassLayout<'_> {
@@ -203,9 +205,12 @@ impl PassLayout<'_> {
             let told = self.no_cells(stage);
             self.wrong.push(told);
         }
+        self.check_partition(call.op, &needs);
+        let mut lacking = Vec::new();
         for column in &needs.reads {
-            self.provide(at, *column, stage)?;
+            lacking.extend(self.provide(at, *column, stage)?);
         }
+        self.wrong.extend(lacks(stage, &lacking));
         let pass = &mut self.out.passes[at];
         pass.round = round;
         pass.is_repeated |= needs.repeats.is_some_and(|(_, times)| times > 1);
@@ -228,6 +233,19 @@ impl PassLayout<'_> {
             self.at.is_open = false;
         }
         Ok(())
+    }
+
+    /// Tells of a partition that another replaces before anything takes it.
+    fn check_partition(&mut self, op: usize, needs: &Needs) {
+        if needs.takes_cells {
+            self.at.untaken = None;
+        }
+        if !needs.makes_cells {
+            return;
+        }
+        if let Some(before) = self.at.untaken.replace(op).filter(|before| *before != op) {
+            self.wrong.push(replaced(&self.ops[before], &self.ops[op]));
+        }
     }
 
     /// The pass of a stage that needs this: the one that the branch is at, or one that begins.
@@ -275,10 +293,15 @@ impl PassLayout<'_> {
     }
 
     /// Sees to it that `column` is there for a stage of pass `at`: as a stage above computed it, or
-    /// as the records have it.
-    fn provide(&mut self, at: usize, column: ColumnKind, stage: &StageOp) -> Result<()> {
+    /// as the records have it. Returns its name where nothing has it.
+    fn provide(
+        &mut self,
+        at: usize,
+        column: ColumnKind,
+        stage: &StageOp,
+    ) -> Result<Option<&'static str>> {
         if self.bring(at, column) {
-            return Ok(());
+            return Ok(None);
         }
         let name = column.name();
         if self.at.columns.have_named(name) {
@@ -286,15 +309,12 @@ impl PassLayout<'_> {
             return Err(Error::internal(told));
         }
         if self.schema.find(name).is_none() {
-            let help = column.computed_by().map_or_else(
-                || format!("no stage computes {name}, and the records of the input have none"),
-                |stage| format!("put a `{stage}` stage before it"),
-            );
-            self.wrong.push(missing(stage, name, &help));
             // It is one mistake, however many stages below need the column, too.
             self.at.columns.write(column, at);
             self.at.columns.read(column);
-            return Ok(());
+            let Some(by) = column.computed_by() else { return Ok(Some(name)) };
+            self.wrong.push(missing(stage, name, &format!("put a `{by}` stage before it")));
+            return Ok(None);
         }
         if column.scalar() != Scalar::F64 || column.parts().len() > 1 {
             let told = format!("`{}` reads {name} as another type than f64", stage.kind);
@@ -304,7 +324,7 @@ impl PassLayout<'_> {
         if !dimensions.contains(&column) {
             dimensions.push(column);
         }
-        Ok(())
+        Ok(None)
     }
 
     /// Brings the newest values of a column to pass `at`; false if no stage computed any.

@@ -81,7 +81,7 @@ impl fmt::Display for Short {
 }
 
 /// A length in short, with its unit where that is known.
-pub(super) struct Long<'a>(pub f64, pub Option<&'a str>);
+pub struct Long<'a>(pub f64, pub Option<&'a str>);
 
 impl fmt::Display for Long<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

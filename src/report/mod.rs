@@ -26,7 +26,7 @@ pub(crate) use accept::RULES as ACCEPT_RULES;
 pub use accept::{AcceptRules, AcceptTable};
 pub(crate) use baseline::Baseline;
 pub(crate) use classes::{ClassCounts, class_name};
-pub(crate) use digits::{Coordinate, Grouped, Short};
+pub(crate) use digits::{Coordinate, Grouped, Long, Short};
 pub use document::{
     Decision, FileFigures, LatticeFigures, Outcome, Phase, Report, RunFigures, result_bytes,
 };

@@ -120,6 +120,28 @@ fn what_was_tampered_with_does_not_hold() {
 }
 
 #[test]
+fn points_that_a_stage_moved_are_told_from_others() {
+    let at = reduced();
+    let at = at.path();
+    done(at, &["run", "read scan.las ! smooth neighbors=8 ! sample every=10 ! write moved.las"]);
+    let (code, told) = verified(at, "moved.las");
+    let [foreign, synthetic] =
+        ["foreign", "foreign_synthetic"].map(|name| told[name].as_u64().unwrap());
+    assert!(code == 1 && foreign > 2_000 && synthetic == foreign, "{told:#}");
+    let (_, said, _) = pointmill(at, &["verify", "scan.las", "moved.las"]);
+    let line = said.lines().find(|line| line.starts_with("records ")).unwrap();
+    assert!(line.contains(" synthetic, as points that a stage moved; the first is"), "{line}");
+    // Places have the digits of the lattice, and no noise of binary fractions.
+    for line in said.lines().filter(|line| line.contains(" at (")) {
+        let (_, place) = line.rsplit_once(" at (").unwrap();
+        assert!(place.len() < 40, "{line}");
+    }
+    // Of records that were changed otherwise none is synthetic.
+    let (_, told) = tampered(at, "assign set=\"Intensity = 4321\"");
+    assert_eq!(told["foreign_synthetic"], 0);
+}
+
+#[test]
 fn other_formats_are_compared_by_what_they_have() {
     let at = reduced();
     let at = at.path();

@@ -320,3 +320,37 @@ fn what_no_stage_gives_is_refused_by_name() {
     assert!(told.contains("longer than the 32 bytes that LAS has for the name"), "{told}");
     assert!(!folder.path().join("out.las").exists());
 }
+
+#[test]
+fn what_a_stage_lacks_is_one_mistake() {
+    let case = crate::support::case::Case::new();
+    case.ply(&[([0.0, 0.0, 0.0], 1), ([1.0, 0.0, 0.0], 2)]);
+    let error = case.run("", "[[stage]]\nkind = 'scanline'\nmax_distance = 1\n", "").unwrap_err();
+    let told = error.to_string();
+    let names = "GpsTime, PointSourceId, ScanDirectionFlag and EdgeOfFlightLine";
+    assert!(told.contains(&format!("`scanline` needs {names}, which nothing before")), "{told}");
+    assert!(!told.contains("mistakes"), "{told}");
+}
+
+#[test]
+fn a_partition_that_another_replaces_is_refused() {
+    let case = crate::support::case::Case::new();
+    let points: Vec<([f64; 3], u32)> =
+        (0..60u32).map(|n| ([f64::from(n % 8), f64::from(n / 8), 0.0], n)).collect();
+    case.ply(&points);
+    let stage = |text: &str| format!("[[stage]]\nkind = {text}\n");
+    let [normals, image, cells, median] = [
+        "'normals'\nneighbors = 5",
+        "'gaussian-image'\nside = 4",
+        "'cells'\nside = 4\nmax_angle = 0.2",
+        "'median'",
+    ]
+    .map(stage);
+    for (first, second) in [(&image, &cells), (&cells, &image), (&cells, &cells)] {
+        let stages = format!("{normals}{first}{second}{median}");
+        let told = case.run("", &stages, "").unwrap_err().to_string();
+        assert!(told.contains("which nothing has taken"), "{told}");
+        let stages = format!("{normals}{first}{median}{normals}{second}{median}");
+        case.run("", &stages, "").unwrap();
+    }
+}
