@@ -123,7 +123,7 @@ fn what_was_tampered_with_does_not_hold() {
 fn points_that_a_stage_moved_are_told_from_others() {
     let at = reduced();
     let at = at.path();
-    done(at, &["run", "read scan.las ! smooth neighbors=8 ! sample every=10 ! write moved.las"]);
+    done(at, &["run", "read scan.las ! sample every=10 ! smooth neighbors=8 ! write moved.las"]);
     let (code, told) = verified(at, "moved.las");
     let [foreign, synthetic] =
         ["foreign", "foreign_synthetic"].map(|name| told[name].as_u64().unwrap());
