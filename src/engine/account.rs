@@ -115,17 +115,15 @@ impl Task {
             let (stage, name) = ("run".to_owned(), "z_scale".to_owned());
             decisions.insert(0, Decision { stage, name, value: lattice.z_scale().into() });
         }
-        let on_branch = self.branch_of.iter().map(|&of| std::ptr::eq(&self.branches[of], branch));
-        let sides = self.sides.iter().zip(on_branch).filter(|(_, is_on)| *is_on);
-        decisions.extend(sides.filter_map(|(side, _)| *side).map(|side| {
-            let (stage, name) = ("write".to_owned(), "side".to_owned());
-            Decision { stage, name, value: side.into() }
-        }));
-        let meshes = self.meshes.iter().zip(&self.branch_of);
-        let meshes = meshes.filter(|(_, of)| std::ptr::eq(&self.branches[**of], branch));
-        decisions.extend(meshes.filter_map(|(mesh, _)| mesh.as_ref()?.max_radius).map(|radius| {
-            let (stage, name) = ("mesh".to_owned(), "max_radius".to_owned());
-            Decision { stage, name, value: radius.into() }
+        let is_on = |sink: &usize| std::ptr::eq(&self.branches[self.branch_of[*sink]], branch);
+        let on_branch = || (0..self.sinks.len()).filter(is_on);
+        let sides = on_branch().filter_map(|sink| self.sides[sink]);
+        let radii = on_branch().filter_map(|sink| self.meshes[sink]?.max_radius);
+        let lengths = sides.map(|side| ("write", "side", side));
+        let lengths = lengths.chain(radii.map(|radius| ("mesh", "max_radius", radius)));
+        decisions.extend(lengths.map(|(stage, name, value)| {
+            let (stage, name) = (stage.to_owned(), name.to_owned());
+            Decision { stage, name, value: value.into() }
         }));
         let accept = AcceptVerdict::of(&self.accept, &ledger, totals.as_ref());
         let outcome = Outcome {

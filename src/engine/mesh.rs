@@ -236,24 +236,19 @@ impl<'a> SquareWorker<'a> {
         mut deliver: impl FnMut(u64, Encoded, bool) -> Result<()>,
     ) -> Result<Connected> {
         let region = self.load(square)?;
-        let loaded = self.places.iter().filter(|place| square.side_of(place.at).is_eq()).count();
+        let loaded = square.stretch_of(&self.places, |place| place.at).len();
         self.places.dedup_by_key(|place| place.at);
-        let start = self.places.partition_point(|place| square.side_of(place.at).is_lt());
-        let end = self.places.partition_point(|place| square.side_of(place.at).is_le());
+        let mine = square.stretch_of(&self.places, |place| place.at);
         let corner = across(region.lo, self.mesh.shape.axis);
         let relative = |place: &PlanePlace| [0, 1].map(|n| place.at[n].abs_diff(corner[n]) as f64);
         let fans = &mut self.fans;
         fans.clear();
         let job = self.mesh.job;
         let places = self.places.iter().map(relative);
-        Delaunay::of(places, || job.advance(0))?.each_polygon(
-            &(start..end),
-            self.mesh.radius(),
-            |ring| {
-                let [first, rest @ ..] = ring else { return };
-                fans.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
-            },
-        );
+        Delaunay::of(places, || job.advance(0))?.each_polygon(&mine, self.mesh.radius(), |ring| {
+            let [first, rest @ ..] = ring else { return };
+            fans.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+        });
         // Polygons come as the triangulation has them; this is the order of their corners.
         fans.sort_unstable();
         let parts = self.fans.len().div_ceil(AT_ONCE).max(1);
@@ -268,7 +263,7 @@ impl<'a> SquareWorker<'a> {
             }
             deliver(part as u64, self.encoder.encode(&self.triangles)?, part + 1 == parts)?;
         }
-        let corners = (end - start) as u64;
+        let corners = mine.len() as u64;
         let covered = loaded as u64 - corners;
         Ok(Connected { corners, covered, triangles: self.fans.len() as u64 })
     }

@@ -16,7 +16,7 @@ use std::ops::Range;
 
 use robust::{Coord, incircle};
 use spade::handles::{DirectedEdgeHandle, FixedVertexHandle};
-use spade::{DelaunayTriangulation, Point2, Triangulation};
+use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
 
 use crate::{Error, Result};
 
@@ -34,8 +34,7 @@ impl Delaunay {
     /// whether these were seen.
     pub const BYTES: usize = 24 + 3 * 32 + 2 * 8 + 2;
 
-    /// Triangulates places that are whole numbers below [`WIDEST`], each once; fastest where one is
-    /// near the one before, from which it is looked for. `go_on` is asked now and then.
+    /// [Triangulates](triangulated) places that are whole numbers below [`WIDEST`], each once.
     ///
     /// # Errors
     ///
@@ -45,20 +44,7 @@ impl Delaunay {
         go_on: impl Fn() -> Result<()>,
     ) -> Result<Delaunay> {
         let count = places.len();
-        let mut mesh = PlaneMesh::with_capacity(count, 3 * count, 2 * count);
-        let mut last = None;
-        for (n, [x, y]) in places.enumerate() {
-            if n.is_multiple_of(1 << 16) {
-                go_on()?;
-            }
-            let place = Point2::new(x, y);
-            let added = match last {
-                None => mesh.insert(place),
-                Some(near) => mesh.insert_with_hint(place, near),
-            };
-            let failed = |e| Error::internal("a place cannot be triangulated").because(e);
-            last = Some(added.map_err(failed)?);
-        }
+        let mesh = triangulated(places.map(|[x, y]| Point2::new(x, y)), go_on)?;
         match mesh.num_vertices() == count {
             true => Ok(Delaunay(mesh)),
             false => Err(Error::internal("a place came to be triangulated twice")),
@@ -116,6 +102,33 @@ impl Delaunay {
         let twice = (ab[0] * bc[1] - ab[1] * bc[0]) * most;
         square(ab) * square(bc) * square(ca) <= 4.0 * twice * twice
     }
+}
+
+/// The triangulation of corners in their order; fastest where one is near the one before, from
+/// which it is looked for. `go_on` is asked now and then.
+///
+/// # Errors
+///
+/// Corners that are nowhere, and those of `go_on`.
+pub fn triangulated<V: HasPosition<Scalar = f64>>(
+    corners: impl ExactSizeIterator<Item = V>,
+    go_on: impl Fn() -> Result<()>,
+) -> Result<DelaunayTriangulation<V>> {
+    let count = corners.len();
+    let mut mesh = DelaunayTriangulation::with_capacity(count, 3 * count, 2 * count);
+    let mut last = None;
+    for (n, corner) in corners.enumerate() {
+        if n.is_multiple_of(1 << 14) {
+            go_on()?;
+        }
+        let added = match last {
+            None => mesh.insert(corner),
+            Some(near) => mesh.insert_with_hint(corner, near),
+        };
+        let failed = |e| Error::internal("a corner cannot be triangulated").because(e);
+        last = Some(added.map_err(failed)?);
+    }
+    Ok(mesh)
 }
 
 /// The other half of an edge, if the triangle there has the circle of the one here.

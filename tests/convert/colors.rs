@@ -1,26 +1,11 @@
 //! Colours keep what they mean between LAS, where white is 65535, and PLY, where it is 255.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use crate::support::case_file;
 use crate::support::runs::{Settings, run};
 use crate::support::scan::Scan;
-use pointmill::io::las;
 use pointmill::point::{Scalar, Value};
-
-/// A LAS scan of point format 2 whose points have these colours, all three alike, along x.
-fn colored(colors: &[u16]) -> Scan {
-    let schema = Arc::new(las::layout(2, &[], [0.01; 3], [0.0; 3]));
-    let mut records = vec![0; colors.len() * schema.stride];
-    for (i, (record, color)) in records.chunks_mut(schema.stride).zip(colors).enumerate() {
-        record[..4].copy_from_slice(&(i as i32).to_le_bytes());
-        for channel in 0..3 {
-            record[20 + 2 * channel..][..2].copy_from_slice(&color.to_le_bytes());
-        }
-    }
-    Scan { metadata: las::fresh(&schema, None), schema, records }
-}
 
 /// The input's conversion by a `write` with these keys, and what the run warned of.
 fn converted(folder: &Path, input: &Path, write: &str) -> (PathBuf, Vec<String>) {
@@ -69,7 +54,7 @@ fn colors_that_eight_bits_hold_are_eight_bits_in_ply() {
     ];
     for (colors, scalar, values, told) in cases {
         let input = folder.path().join("in.las");
-        colored(colors).write(&input);
+        Scan::colored(colors).write(&input);
         for encoding in ["binary", "ascii"] {
             let write = format!("ply\nencoding = {encoding:?}");
             let (output, warnings) = converted(folder.path(), &input, &write);
@@ -90,10 +75,10 @@ fn a_color_of_sixteen_bits_late_in_the_scan_widens_what_is_written_already() {
         let mut colors: Vec<u16> = (0..points).map(|i| (i % 256) as u16 * factor).collect();
         colors[200_000] = 12_345;
         let input = folder.path().join("in.las");
-        colored(&colors).write(&input);
+        Scan::colored(&colors).write(&input);
         colors.rotate_left(200_000);
         let first = folder.path().join("first.las");
-        colored(&colors).write(&first);
+        Scan::colored(&colors).write(&first);
         for encoding in ["binary", "ascii"] {
             let keys = format!("ply\nencoding = {encoding:?}");
             let read = |input: &Path, keys: &str| {
@@ -116,7 +101,7 @@ fn multiples_of_256_and_of_257_in_different_chunks_are_eight_bits_all_the_same()
     let input = folder.path().join("in.las");
     let colors: Vec<u16> =
         (0..200_000).map(|i| (i % 256) as u16 * if i < 100_000 { 257 } else { 256 }).collect();
-    colored(&colors).write(&input);
+    Scan::colored(&colors).write(&input);
     for encoding in ["binary", "ascii"] {
         let write = format!("ply\nencoding = {encoding:?}");
         let (output, _) = converted(folder.path(), &input, &write);
@@ -148,11 +133,11 @@ fn reduced_colors_have_the_type_that_all_kept_ones_ask_for() {
 fn the_number_of_bits_can_be_asked_for_where_las_becomes_ply_and_nowhere_else() {
     let folder = tempfile::tempdir().unwrap();
     let input = folder.path().join("in.las");
-    colored(&[0, 257, 1000, 65_535]).write(&input);
+    Scan::colored(&[0, 257, 1000, 65_535]).write(&input);
     let (output, warnings) = converted(folder.path(), &input, "ply\ncolors = '8bit'");
     assert_eq!(red(&output), (Scalar::U8, vec![0, 1, 3, 255]));
     assert!(warnings.iter().any(|w| w.contains("cut to their upper 8 bits")), "{warnings:?}");
-    colored(&[0, 257]).write(&input);
+    Scan::colored(&[0, 257]).write(&input);
     let (output, _) = converted(folder.path(), &input, "ply\ncolors = '16bit'");
     assert_eq!(red(&output), (Scalar::U16, vec![0, 257]));
     let again = folder.path().join("again.ply");

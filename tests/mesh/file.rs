@@ -15,12 +15,26 @@ fn count(header: &str, element: &str) -> usize {
     line.unwrap_or_else(|| panic!("no {element} in {header}")).parse().unwrap()
 }
 
-/// Reads a PLY file whose vertices begin with three doubles and have `stride` bytes.
-pub fn read_ply(path: &Path, stride: usize) -> MeshRead {
+/// Bytes of a vertex, by the header.
+fn stride(header: &str) -> usize {
+    let (vertex, _) = header.split_once("element face").unwrap();
+    let types = vertex.lines().filter_map(|line| line.strip_prefix("property "));
+    let size = |property: &str| match property.split(' ').next().unwrap() {
+        "double" => 8,
+        "float" | "int" | "uint" => 4,
+        "short" | "ushort" => 2,
+        _ => 1,
+    };
+    types.map(size).sum()
+}
+
+/// Reads a PLY file whose vertices begin with three doubles.
+pub fn read_ply(path: &Path) -> MeshRead {
     let bytes = fs::read(path).unwrap();
     let end = b"end_header\n";
     let body = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
     let header = std::str::from_utf8(&bytes[..body]).unwrap();
+    let stride = stride(header);
     let (points, faces) = (count(header, "vertex"), count(header, "face"));
     let (vertices, rest) = bytes[body..].split_at(points * stride);
     let number = |at: &[u8]| f64::from_le_bytes(at.try_into().unwrap());

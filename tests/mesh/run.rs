@@ -72,18 +72,7 @@ fn formats_have_the_same_triangles() {
     let stages: String =
         all.map(|(name, more)| mesh(&case.path(name), &format!("{keys}{more}"))).concat();
     let report = run(&case, "", &stages);
-    let text = fs::read_to_string(case.path("a.ply")).unwrap();
-    let (header, _) = text.split_once("end_header").unwrap();
-    let size = |word: &str| match word {
-        "double" => 8,
-        "float" | "int" | "uint" => 4,
-        "short" | "ushort" => 2,
-        _ => 1,
-    };
-    let (vertex, _) = header.split_once("element face").unwrap();
-    let properties = vertex.lines().filter_map(|line| line.strip_prefix("property "));
-    let stride = properties.map(|line| size(line.split(' ').next().unwrap())).sum();
-    let binary = read_ply(&case.path("b.ply"), stride);
+    let binary = read_ply(&case.path("b.ply"));
     assert_eq!(read_ascii_ply(&case.path("a.ply")), binary);
     assert_eq!(read_obj(&case.path("m.obj")), binary);
     let facets = read_stl(&case.path("m.stl"));
@@ -160,4 +149,21 @@ fn normals_go_along_and_colours_are_fitted_before_the_faces() {
     let text = fs::read_to_string(case.path("m.ply")).unwrap();
     assert!(text.contains("property float nx\n") || text.contains("property double nx\n"));
     assert!(read_ascii_ply(&case.path("m.ply")).faces.len() > 3_000);
+    // Colours that are narrowed, and those that are widened, when much is written.
+    let of = |i: usize| (i % 256) as u16 * if i < 100_000 { 257 } else { 256 };
+    for (late, scalar) in [(None, "uchar"), (Some(12_345), "ushort")] {
+        let mut colors: Vec<u16> = (0..200_000).map(of).collect();
+        late.iter().for_each(|&color| colors[199_000] = color);
+        let scan = Scan::colored(&colors);
+        let scan = scan.moved(|i, _| [i as i32 % 500, i as i32 / 500 * 3, 0]);
+        scan.write(&case.path("in.laz"));
+        let meshes = ["auto.ply", "wide.ply"].map(|name| case.path(name));
+        let keys = ["", "colors = '16bit'"].map(|more| format!("max_radius = 0.03\n{more}"));
+        run(&case, "", &format!("{}{}", mesh(&meshes[0], &keys[0]), mesh(&meshes[1], &keys[1])));
+        let bytes = fs::read(&meshes[0]).unwrap();
+        let red = format!("property {scalar} red\n");
+        assert!(String::from_utf8_lossy(&bytes[..2000]).contains(&red), "{scalar}");
+        let [auto, wide] = meshes.map(|path| read_ply(&path));
+        assert!(auto == wide && auto.faces.len() > 300_000, "{}", auto.faces.len());
+    }
 }

@@ -47,7 +47,7 @@ fn mesh(points: &[[i64; 3]], run: &str, keys: &str) -> MeshRead {
         case.path("out.ply").display()
     );
     execute(&text, &Overrides::default(), &Quiet).unwrap_or_else(|e| panic!("{e}: {text}"));
-    read_ply(&case.path("out.ply"), 28)
+    read_ply(&case.path("out.ply"))
 }
 
 /// Holds a mesh against what it is to be; how many triangles it has.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use pointmill::io::las;
 use pointmill::point::{Layout, Metadata, Position, Schema, Value};
 use pointmill::stage::{Lattice, OpenSource, Source};
 use pointmill::synth::{Scene, Synthetic};
@@ -24,6 +25,19 @@ impl Scan {
         let source =
             Synthetic { scene, points, seed, noise: None, ..Synthetic::default() }.open().unwrap();
         Scan::of(&*source, usize::MAX)
+    }
+
+    /// A LAS scan of point format 2 whose points have these colours, all three alike, along x.
+    pub fn colored(colors: &[u16]) -> Scan {
+        let schema = Arc::new(las::layout(2, &[], [0.01; 3], [0.0; 3]));
+        let mut records = vec![0; colors.len() * schema.stride];
+        for (i, (record, color)) in records.chunks_mut(schema.stride).zip(colors).enumerate() {
+            record[..4].copy_from_slice(&(i as i32).to_le_bytes());
+            for channel in 0..3 {
+                record[20 + 2 * channel..][..2].copy_from_slice(&color.to_le_bytes());
+            }
+        }
+        Scan { metadata: las::fresh(&schema, None), schema, records }
     }
 
     /// A copy whose records lie elsewhere in stored coordinates: `to` gets the number of each and

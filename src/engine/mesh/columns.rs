@@ -10,6 +10,7 @@
 //! where squares are cut shows in nothing that is written.
 
 use std::cmp::Ordering;
+use std::ops::Range;
 
 use crate::Result;
 use crate::geom::morton::plane_morton_cmp;
@@ -66,8 +67,14 @@ impl PlaneSquare {
         column
     }
 
+    /// Which of some places in Morton order are in the square.
+    pub(super) fn stretch_of<T>(&self, places: &[T], at: impl Fn(&T) -> [i64; 2]) -> Range<usize> {
+        let start = places.partition_point(|place| self.side_of(at(place)).is_lt());
+        start..places.partition_point(|place| self.side_of(at(place)).is_le())
+    }
+
     /// Where a place is: before the square, in it or behind it on the Morton curve.
-    pub(super) fn side_of(&self, place: [i64; 2]) -> Ordering {
+    fn side_of(&self, place: [i64; 2]) -> Ordering {
         match plane_morton_cmp(place, self.corner) {
             Ordering::Less => Ordering::Less,
             _ if plane_morton_cmp(place, self.last()).is_gt() => Ordering::Greater,

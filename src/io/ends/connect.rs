@@ -141,10 +141,15 @@ impl CreateSink for OutputFile {
             Some(from) => from.of_one(staged, schema, metadata, &create),
             None => create(schema),
         };
-        created.map_err(|error| match error.path() {
-            Some(path) if path == staged => error,
-            _ => error.at(&self.keys.path),
-        })
+        created.map_err(|error| of_output(error, staged, &self.keys.path))
+    }
+}
+
+/// An error of creating the output that is to be at `path` and grows at `staged`.
+pub(super) fn of_output(error: Error, staged: &Path, path: &Path) -> Error {
+    match error.path() {
+        Some(at) if at == staged => error,
+        _ => error.at(path),
     }
 }
 

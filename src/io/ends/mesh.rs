@@ -6,6 +6,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::connect::of_output;
 use super::kinds::{names_once, some_offset};
 use crate::error::{listed, shown};
 use crate::io::facets::{ObjSink, SinglePlaces, StlSink};
@@ -256,21 +257,17 @@ impl CreateSink for MeshFile {
             }
             MeshFormat::Stl => Ok(Box::new(StlSink::create(staged, self.places(schema))?)),
         };
-        created.map_err(|error| match error.path() {
-            Some(path) if path == staged => error,
-            _ => error.at(self.path()),
-        })
+        created.map_err(|error| of_output(error, staged, self.path()))
     }
 }
 
 /// An error of `write`'s keys, which are those of a mesh.
 fn of_mesh(error: Error) -> Error {
     let named = |text: &str| text.replace("`write.", "`mesh.");
-    let told = error.to_string();
-    match (told.contains("`write."), error.remedy().map(named)) {
-        (false, _) => error,
-        (true, None) => Error::new(error.kind(), named(&told)),
-        (true, Some(help)) => Error::new(error.kind(), named(&told)).help(help),
+    let told = Error::new(error.kind(), named(&error.to_string()));
+    match error.remedy() {
+        None => told,
+        Some(help) => told.help(named(help)),
     }
 }
 

@@ -11,8 +11,9 @@ use spade::handles::{FixedVertexHandle, VertexHandle};
 use spade::{DelaunayTriangulation, HasPosition, Point2, PositionInTriangulation, Triangulation};
 
 use super::weights::{curvature, from_to, normal, size};
+use crate::Result;
+use crate::geom::delaunay::triangulated;
 use crate::point::Position;
-use crate::{Error, Result};
 
 /// No corner.
 const NONE: u32 = u32::MAX;
@@ -78,22 +79,8 @@ impl ThinnedMesh {
             let at = place(positions[position as usize], lo, axis);
             MeshCorner { at, curvature: 0.0, position }
         };
-        let corners: Vec<MeshCorner> = first.iter().enumerate().map(corner).collect();
-        let count = corners.len();
-        let mut mesh = DelaunayTriangulation::with_capacity(count, 3 * count, 2 * count);
-        let mut last = None;
-        // Neighbours in Morton order are near each other, and one is found from the other.
-        for (n, corner) in corners.into_iter().enumerate() {
-            if n.is_multiple_of(1 << 14) {
-                go_on()?;
-            }
-            let added = match last {
-                None => mesh.insert(corner),
-                Some(near) => mesh.insert_with_hint(corner, near),
-            };
-            let failed = |e| Error::internal("positions cannot be triangulated").because(e);
-            last = Some(added.map_err(failed)?);
-        }
+        // Neighbours in Morton order are near each other.
+        let mesh = triangulated(first.iter().enumerate().map(corner), go_on)?;
         let waiting = BinaryHeap::new();
         let mut mesh = ThinnedMesh { mesh, handles, waiting, least: 0.0, lo, axis };
         mesh.bend();
