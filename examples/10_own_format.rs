@@ -15,7 +15,8 @@ use std::sync::Arc;
 use pointmill::io::{Projected, Projection};
 use pointmill::point::{Dimension, Endian, Layout, Metadata, PointBatch, Scalar, Schema, names};
 use pointmill::stage::{
-    ChunkSize, Encode, Encoded, Format, Input, Part, Sink, SinkSummary, Source, WriteKeys, foreign,
+    ChunkSize, Encode, Encoded, Format, Input, Part, ReadKeys, Sink, SinkSummary, Source,
+    WriteKeys, foreign,
 };
 use pointmill::{Error, Graph, Overrides, Quiet, Registry, Result};
 use serde_json::{Value, json};
@@ -59,7 +60,7 @@ impl Format for Toy {
     }
 
     // Errors of formats say where: the file, and the byte where it can be named.
-    fn open(&self, files: &[PathBuf]) -> Result<Box<dyn Source>> {
+    fn open(&self, files: &[PathBuf], _: &ReadKeys) -> Result<Box<dyn Source>> {
         let mut inputs = Vec::new();
         for path in files {
             let lines = lines(path)?.count();

@@ -43,11 +43,11 @@ pub mod las {
 
 /// PLY without a run around it.
 pub mod ply {
-    pub use crate::io::ply::encode::PlyOptions;
-    pub use crate::io::ply::header::Encoding;
     pub use crate::io::ply::info::describe;
+    pub use crate::io::ply::sink::PlyOptions;
     pub use crate::io::ply::sink::create;
-    pub use crate::io::ply::vertex::ply_schema;
+    pub use crate::io::ply::sink::ply_schema;
+    pub use crate::io::rows::Encoding;
 }
 
 /// How many neighbourhoods of a tile had to be searched for beyond it since this was asked last.

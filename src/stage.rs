@@ -21,7 +21,8 @@ use crate::report::Tally;
 pub use crate::geom::lattice::{Lattice, Misplaced};
 pub use crate::store::{KeptPoints, KeptReader, Levels};
 pub use format::{
-    Colors, CreateFor, Format, FormatName, Formats, OutputEncoding, WriteKeys, foreign,
+    Colors, CreateFor, Format, FormatName, Formats, OutputEncoding, ReadKeys, Separator, WriteKeys,
+    foreign,
 };
 pub use kind::{StageKind, StagePlace};
 pub use needs::Needs;

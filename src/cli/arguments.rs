@@ -26,7 +26,9 @@ pub(super) use plain::{
 };
 pub(super) use reduce::ReduceArguments;
 pub(super) use reproduce::ReproduceArguments;
-pub(super) use shared::{CommonArguments, FilterArguments, Progress, WrittenArguments};
+pub(super) use shared::{
+    CommonArguments, FilterArguments, Progress, ReadArguments, WrittenArguments,
+};
 pub(super) use verify::VerifyArguments;
 
 /// Reduces laser scans that do not fit in memory to the points that matter.
@@ -44,7 +46,7 @@ pub(super) enum Command {
     /// Reduce scans to the points that matter
     Reduce(Box<ReduceArguments>),
     /// Convert between LAS, LAZ and PLY
-    Convert(ConvertArguments),
+    Convert(Box<ConvertArguments>),
     /// Show what files contain, from their headers
     Info(InfoArguments),
     /// Show how a pipeline would be run and what the run would use, without running it
@@ -95,6 +97,7 @@ impl Command {
     pub fn common(&self) -> Option<&CommonArguments> {
         match self {
             Command::Reduce(reduce) => Some(&reduce.common),
+            Command::Convert(convert) => Some(&convert.common),
             Command::Verify(verify) => Some(&verify.common),
             Command::Compare(compare) => Some(&compare.common),
             Command::Cut(cut) => Some(&cut.common),
@@ -102,7 +105,6 @@ impl Command {
             Command::Run(PlanArguments { common, .. })
             | Command::Plan(PredictArguments { planned: PlanArguments { common, .. }, .. })
             | Command::Check(PlanArguments { common, .. })
-            | Command::Convert(ConvertArguments { common, .. })
             | Command::Synth(SynthArguments { common, .. }) => Some(common),
             Command::Info(_) | Command::Picture(_) | Command::Stages(_) => None,
             Command::Graph(_) | Command::Explain(_) | Command::New(_) | Command::Schema => None,
@@ -165,6 +167,8 @@ pub(super) struct ConvertArguments {
     pub headers: Option<String>,
     #[command(flatten)]
     pub filter: FilterArguments,
+    #[command(flatten)]
+    pub read: ReadArguments,
     #[command(flatten)]
     pub written: WrittenArguments,
     #[command(flatten)]

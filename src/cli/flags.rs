@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::arguments::{
     CommonArguments, CompareArguments, ConvertArguments, CutArguments, FilterArguments,
-    ReduceArguments, SynthArguments, VerifyArguments, WrittenArguments,
+    ReadArguments, ReduceArguments, SynthArguments, VerifyArguments, WrittenArguments,
 };
 use super::classes::Classes;
 use crate::language::Set;
@@ -161,7 +161,9 @@ pub(super) fn reduce_flags(arguments: &ReduceArguments) -> Vec<CommandFlag> {
         let dimensions = Some(json!([KEEP_RANK.kind().name()]).into());
         all.extend(flags([("--ranks", "write.dimensions", dimensions)]));
     }
+    all.extend(read(&arguments.read));
     all.extend(filtered(&arguments.filter));
+    all.extend(read(&arguments.read));
     all.extend(written(&arguments.written));
     all
 }
@@ -193,6 +195,7 @@ pub(super) fn convert_flags(
         ("--headers", "run.headers", arguments.headers.clone().map(FlagValue::from)),
         ("--nonfinite", "run.nonfinite", arguments.nonfinite.clone().map(FlagValue::from)),
     ]);
+    all.extend(read(&arguments.read));
     all.extend(filtered(&arguments.filter));
     all.extend(written(&arguments.written));
     all
@@ -248,6 +251,19 @@ pub(super) fn synth_flags(arguments: &SynthArguments) -> Vec<CommandFlag> {
     ])
 }
 
+/// How the inputs are read, as the keys of `read`.
+fn read(arguments: &ReadArguments) -> Vec<CommandFlag> {
+    let columns = arguments.columns.clone().map(FlagValue::from);
+    let numbers: Vec<Value> = arguments.scans.iter().map(|text| plain(text)).collect();
+    let scans =
+        (!numbers.is_empty()).then(|| FlagValue::of(&arguments.scans.join(","), json!(numbers)));
+    flags([
+        ("--from", "read.format", arguments.from.clone().map(FlagValue::from)),
+        ("--columns", "read.columns", columns),
+        ("--scans", "read.scans", scans),
+    ])
+}
+
 /// How the output is written, as the keys of `write`.
 fn written(arguments: &WrittenArguments) -> Vec<CommandFlag> {
     let names = (!arguments.drop.is_empty()).then(|| json!(arguments.drop).into());
@@ -257,6 +273,9 @@ fn written(arguments: &WrittenArguments) -> Vec<CommandFlag> {
         ("--drop", "write.drop", names),
         ("--encoding", "write.encoding", arguments.encoding.clone().map(FlagValue::from)),
         ("--colors", "write.colors", arguments.colors.clone().map(FlagValue::from)),
+        ("--separator", "write.separator", arguments.separator.clone().map(FlagValue::from)),
+        ("--decimals", "write.decimals", arguments.decimals.as_deref().map(whole_or_text)),
+        ("--header", "write.header", arguments.header.map(|is| json!(is).into())),
     ])
 }
 

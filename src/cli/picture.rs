@@ -29,8 +29,9 @@ pub(super) fn picture(arguments: &PictureArguments, formats: &Formats) -> Result
     }
     let (mut sources, mut files): (Vec<Box<dyn Source>>, Vec<PathBuf>) = Default::default();
     for input in &arguments.inputs {
-        let open =
-            Read { path: vec![input.clone()], format: None }.source(formats).map_err(renamed)?;
+        let open = Read { path: vec![input.clone()], ..Read::default() }
+            .source(formats)
+            .map_err(renamed)?;
         files.extend(open.paths());
         sources.push(open.open().map_err(renamed)?);
     }

@@ -123,7 +123,7 @@ pub fn depth_errors(
     let run = leftover(&settings.run, side)?;
     let see = |paths: &[String], pass: DepthPass| -> Result<SeenDepths> {
         let seen = Arc::new(Mutex::new(SeenDepths::new(pass)));
-        let open = Read { path: paths.to_vec(), format: None }.source(registry.formats())?;
+        let open = Read { path: paths.to_vec(), ..Read::default() }.source(registry.formats())?;
         let mut graph = Graph::new(run.clone());
         let source = graph.add("read", Role::Source(open), &[]);
         let stage = See { seen: seen.clone(), pass, nonfinite: run.nonfinite };

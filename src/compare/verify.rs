@@ -74,8 +74,9 @@ pub fn verify(
     registry: &Registry,
     watch: &dyn Watch,
 ) -> Result<Verification> {
-    let read =
-        |path: &[String]| Read { path: path.to_vec(), format: None }.source(registry.formats());
+    let read = |path: &[String]| {
+        Read { path: path.to_vec(), ..Read::default() }.source(registry.formats())
+    };
     let (open, thin) = (read(original)?, read(&[reduced.to_owned()])?.open()?);
     let schema = open.open()?.schema().clone();
     let comparison = Comparison::of(&schema, thin.schema());

@@ -1,12 +1,13 @@
 //! What a file's header says, for `info`.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use serde::Serialize;
 
 use super::sniff;
 use crate::error::listed;
-use crate::stage::Formats;
+use crate::stage::{Format, Formats};
 use crate::{Error, Result};
 
 /// What the header of the file at `path` says, as JSON; which of `formats` it is, its first bytes
@@ -17,9 +18,10 @@ use crate::{Error, Result};
 /// Files of no format among them, and headers that their format does not allow.
 pub fn describe(path: &Path, formats: &Formats) -> Result<serde_json::Value> {
     let first = sniff::first_bytes(path)?;
-    match formats.sniffed(&first) {
+    match found(path, &first, formats) {
         Some(format) => {
-            let mut facts = format.describe(path)?;
+            let told = |error| sniff::told(error, &**format, formats);
+            let mut facts = format.describe(path).map_err(told)?;
             if let (Some(facts), Some(told)) = (facts.as_object_mut(), format.note(path)?) {
                 // What is no JSON is shown as it is: whoever wrote it.
                 let told = serde_json::from_str(&told).unwrap_or(told.into());
@@ -34,6 +36,14 @@ pub fn describe(path: &Path, formats: &Formats) -> Result<serde_json::Value> {
     }
 }
 
+/// The format of a file that begins with `first`: among those that begin so, that of its extension;
+/// where none does, that of its extension all the same, for some have nothing to know them by.
+fn found<'a>(path: &Path, first: &[u8], formats: &'a Formats) -> Option<&'a Arc<dyn Format>> {
+    let named = formats.of(path);
+    let begins = named.filter(|format| format.sniff(first));
+    begins.or_else(|| formats.sniffed(first)).or(named)
+}
+
 /// What the file at `path` says of how it was made; None if it says nothing.
 ///
 /// # Errors
@@ -41,7 +51,7 @@ pub fn describe(path: &Path, formats: &Formats) -> Result<serde_json::Value> {
 /// As [`describe`].
 pub(crate) fn note(path: &Path, formats: &Formats) -> Result<Option<String>> {
     let first = sniff::first_bytes(path)?;
-    formats.sniffed(&first).map_or(Ok(None), |format| format.note(path))
+    found(path, &first, formats).map_or(Ok(None), |format| format.note(path))
 }
 
 /// A description as JSON.

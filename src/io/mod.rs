@@ -3,14 +3,19 @@
 
 pub(crate) mod convert;
 mod describe;
+pub mod e57;
 pub(crate) mod ends;
 mod epsg;
 mod facets;
 pub mod las;
 mod origin;
+pub mod pcd;
 pub mod ply;
 mod project;
+pub(crate) mod rows;
 pub(crate) mod sniff;
+pub mod text;
+pub mod vertices;
 mod wkt;
 
 pub use convert::{Projection, Rounding};

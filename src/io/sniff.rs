@@ -190,16 +190,11 @@ pub fn upper(formats: &Formats) -> impl Iterator<Item = String> {
 /// neither read nor written.
 pub fn of_extension(extension: &str) -> Option<&'static str> {
     Some(match extension {
-        "e57" => "E57",
-        "pcd" => "PCD",
-        "xyz" | "txt" | "csv" | "asc" | "pts" | "ptx" | "neu" => "a text of numbers",
+        "neu" => "a text of numbers",
         "zlas" => "Esri's zLAS",
         "rcp" | "rcs" => "Autodesk ReCap",
         "fls" | "lsproj" => "FARO",
         "rxp" | "rdbx" => "RIEGL",
-        "obj" => "OBJ",
-        "off" => "OFF",
-        "stl" => "STL",
         "drc" => "Draco",
         "glb" | "gltf" => "glTF",
         "pnts" => "3D Tiles",

@@ -78,7 +78,7 @@ impl GraphBuilder {
     /// Reads a file, the files of a folder or of a pattern: a stage `read`.
     #[must_use]
     pub fn read(self, path: impl Into<String>) -> Self {
-        self.stage(Read { path: vec![path.into()], format: None })
+        self.stage(Read { path: vec![path.into()], ..Read::default() })
     }
 
     /// Writes a file, in the format that its extension says: a stage `write`.

@@ -1,9 +1,13 @@
 //! The stage kinds and formats that pointmill has.
 
 use super::registry::Registry;
+use crate::io::e57::E57;
 use crate::io::ends::{Discard, Mesh, Read, Write};
 use crate::io::las::{LAS, LAZ};
+use crate::io::pcd::PCD;
 use crate::io::ply::PLY;
+use crate::io::text::{ASC, CSV, PTS, PTX, TXT, XYZ};
+use crate::io::vertices::{OBJ, OFF, STL};
 use crate::ops::normals::Normals;
 use crate::ops::{
     Assign, Cells, Crop, Cut, Drop, Filter, Fourier, GaussianImage, Graded, Grid, Median, Merge,
@@ -47,5 +51,16 @@ impl Registry {
             .with_format(LAS)
             .with_format(LAZ)
             .with_format(PLY)
+            .with_format(PCD)
+            .with_format(E57)
+            .with_format(OBJ)
+            .with_format(OFF)
+            .with_format(STL)
+            .with_format(PTX)
+            .with_format(PTS)
+            .with_format(XYZ)
+            .with_format(TXT)
+            .with_format(CSV)
+            .with_format(ASC)
     }
 }

@@ -60,7 +60,18 @@ pub trait Format: Send + Sync {
     ///
     /// Files that cannot be read, that do not fit together, or whose headers their lengths refute.
     /// A file that does not begin as one of the family is [`foreign`]: the caller tells what it is.
-    fn open(&self, files: &[PathBuf]) -> Result<Box<dyn Source>>;
+    fn open(&self, files: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>>;
+
+    /// The keys of [`ReadKeys`] that `read` takes for it.
+    fn read_keys(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// True if files of its extension are points wherever they are, so that `read` takes them out of
+    /// a folder; false for an extension that other files have, too.
+    fn owns_extension(&self) -> bool {
+        true
+    }
 
     /// What the header of a file says, as `info` shows it: a table with `format` and `points`.
     ///
@@ -121,7 +132,18 @@ pub trait Format: Send + Sync {
         false
     }
 
-    /// The keys among `scale`, `offset`, `encoding` and `colors` that `write` takes for it.
+    /// True if its files say of which coordinate reference system the coordinates are.
+    fn holds_crs(&self) -> bool {
+        true
+    }
+
+    /// What to do instead where `write` does not write it; None if it does.
+    fn unwritten(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// The keys among `scale`, `offset`, `encoding`, `colors`, `separator`, `decimals` and `header`
+    /// that `write` takes for it.
     fn keys(&self) -> &'static [&'static str] {
         &[]
     }
@@ -207,6 +229,24 @@ pub fn foreign(path: &Path, called: &str) -> Error {
     Error::data(path, format!("this is not {called}, by its first bytes")).at_byte(0)
 }
 
+/// How inputs are to be read, as far as formats need to know: keys of `read`.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ReadKeys {
+    /// What the columns of a text are, in order; `_` for one that is not read.
+    pub columns: Option<Vec<String>>,
+    /// Which scans of each file are read, by their numbers from 1.
+    pub scans: Option<Vec<u64>>,
+}
+
+impl ReadKeys {
+    /// The keys that are given.
+    pub fn given(&self) -> impl Iterator<Item = &'static str> {
+        let all = [("columns", self.columns.is_some()), ("scans", self.scans.is_some())];
+        all.into_iter().filter(|(_, is_given)| *is_given).map(|(key, _)| key)
+    }
+}
+
 /// What an output is to be, as far as formats need to know: keys of `write`.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
@@ -226,6 +266,12 @@ pub struct WriteKeys {
     pub encoding: Option<OutputEncoding>,
     /// Bits of a colour.
     pub colors: Option<Colors>,
+    /// What stands between two numbers of a text.
+    pub separator: Option<Separator>,
+    /// Decimals of coordinates in a text.
+    pub decimals: Option<u8>,
+    /// True for a text whose first line names the columns.
+    pub header: Option<bool>,
 }
 
 impl WriteKeys {
@@ -236,6 +282,9 @@ impl WriteKeys {
             ("offset", self.offset.is_some()),
             ("encoding", self.encoding.is_some()),
             ("colors", self.colors.is_some()),
+            ("separator", self.separator.is_some()),
+            ("decimals", self.decimals.is_some()),
+            ("header", self.header.is_some()),
         ];
         all.into_iter().filter(|(_, is_given)| *is_given).map(|(key, _)| key)
     }
@@ -266,6 +315,21 @@ pub enum Colors {
     /// All 16 bits, as `ushort`.
     #[serde(rename = "16bit")]
     Sixteen,
+}
+
+/// What stands between two numbers of a text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Separator {
+    /// A blank.
+    Blank,
+    /// `,`
+    Comma,
+    /// `;`
+    Semicolon,
+    /// A tab.
+    Tab,
 }
 
 /// The name of a registered format, as a key of a stage takes it.

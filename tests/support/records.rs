@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use pointmill::point::{Metadata, NORMAL, PointBatch, Schema};
-use pointmill::stage::{Sink, SinkSummary, Source, WriteKeys};
+use pointmill::stage::{ReadKeys, Sink, SinkSummary, Source, WriteKeys};
 use pointmill::{Done, Registry, Result};
 
 /// Points of a batch: a prime, so that no chunk is a whole number of them.
@@ -12,7 +12,11 @@ const BATCH: usize = 7_001;
 
 /// Opens files of one kind, by their extension.
 pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
-    Registry::builtin().formats().of(&paths[0]).expect("a known extension").open(paths)
+    Registry::builtin()
+        .formats()
+        .of(&paths[0])
+        .expect("a known extension")
+        .open(paths, &ReadKeys::default())
 }
 
 /// The first `limit` records of a source.

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::shared::{CommonArguments, FilterArguments, WrittenArguments};
+use super::shared::{CommonArguments, FilterArguments, ReadArguments, WrittenArguments};
 use crate::cli::classes::{Classes, parse_classes};
 use crate::cli::preset::Preset;
 use crate::graph::parse_bytes;
@@ -183,6 +183,8 @@ pub(crate) struct ReduceArguments {
     /// refused]
     #[arg(long, value_name = "FACTOR")]
     pub z_scale: Option<String>,
+    #[command(flatten)]
+    pub read: ReadArguments,
     #[command(flatten)]
     pub written: WrittenArguments,
     #[command(flatten)]

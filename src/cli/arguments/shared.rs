@@ -62,6 +62,21 @@ pub(crate) struct FilterArguments {
     pub drop_classes: Vec<Classes>,
 }
 
+/// How the inputs are read.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ReadArguments {
+    /// What the columns of a text are, such as x,y,z,intensity; _ for one that is not read
+    /// [default: as a heading names them]
+    #[arg(long, value_name = "NAMES")]
+    pub columns: Option<String>,
+    /// Scans of E57 files that are read, by their numbers from 1, such as 1,3 [default: all]
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',')]
+    pub scans: Vec<String>,
+    /// Format of the inputs, such as txt [default: by extension, else by their first bytes]
+    #[arg(long, value_name = "FORMAT")]
+    pub from: Option<String>,
+}
+
 /// How the output is written.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct WrittenArguments {
@@ -78,8 +93,19 @@ pub(crate) struct WrittenArguments {
     /// Encoding of PLY: ascii or binary [default: the input's]
     #[arg(long, value_name = "HOW")]
     pub encoding: Option<String>,
-    /// Bits of a colour where LAS becomes PLY: 8bit, 16bit, or auto: 8 where that loses nothing
-    /// [default: auto]
+    /// Bits of a colour where LAS becomes another format: 8bit, 16bit, or auto: 8 where that loses
+    /// nothing [default: auto]
     #[arg(long, value_name = "BITS")]
     pub colors: Option<String>,
+    /// What stands between two numbers of a text: blank, comma, semicolon or tab [default: blank,
+    /// comma in CSV]
+    #[arg(long, value_name = "MARK")]
+    pub separator: Option<String>,
+    /// Decimals of coordinates in a text [default: as many as read back equal]
+    #[arg(long, value_name = "N")]
+    pub decimals: Option<String>,
+    /// Whether a text begins with the names of its columns: true or false [default: true where they
+    /// are more than coordinates, or CSV]
+    #[arg(long, value_name = "BOOL")]
+    pub header: Option<bool>,
 }

@@ -8,7 +8,7 @@ use crate::error::shown;
 use crate::io::sniff;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{
-    ChunkSize, CreateSink, Format, Formats, OpenSource, Order, Sink, Source, WriteKeys,
+    ChunkSize, CreateSink, Format, Formats, OpenSource, Order, ReadKeys, Sink, Source, WriteKeys,
 };
 use crate::{Error, Result};
 
@@ -18,6 +18,8 @@ pub struct InputFiles {
     pub files: Vec<PathBuf>,
     /// A format of the family.
     pub format: Arc<dyn Format>,
+    /// How they are read.
+    pub keys: ReadKeys,
     /// All formats, for what a file is that is none of these.
     pub formats: Formats,
 }
@@ -25,7 +27,7 @@ pub struct InputFiles {
 impl OpenSource for InputFiles {
     fn open(&self) -> Result<Box<dyn Source>> {
         let told = |error| sniff::told(error, &*self.format, &self.formats);
-        self.format.open(&self.files).map_err(told)
+        self.format.open(&self.files, &self.keys).map_err(told)
     }
 
     fn paths(&self) -> Vec<PathBuf> {
@@ -49,7 +51,8 @@ impl OpenSource for InputFiles {
         }
         files.extend(more);
         let (format, formats) = (self.format.clone(), self.formats.clone());
-        Ok(Box::new(InputFiles { files, format, formats }))
+        let keys = self.keys.clone();
+        Ok(Box::new(InputFiles { files, format, keys, formats }))
     }
 }
 
@@ -110,7 +113,10 @@ impl CreateSink for OutputFile {
     fn warnings(&self, schema: &Schema, metadata: &Metadata) -> Vec<String> {
         let family = self.format.family();
         let from = self.from(schema).filter(|from| from.family() != family);
-        let lost = from.map_or(Vec::new(), |from| from.lost(metadata));
+        let mut lost = from.map_or(Vec::new(), |from| from.lost(metadata));
+        if metadata.crs.is_some() && !self.format.holds_crs() {
+            lost.push("the coordinate reference system".to_owned());
+        }
         let path = shown(&self.keys.path);
         let told = |lost| format!("{path}: {family} does not hold {lost}");
         self.misnamed().into_iter().chain(lost.into_iter().map(told)).collect()
@@ -125,7 +131,7 @@ impl CreateSink for OutputFile {
     }
 
     fn reopen(&self, staged: &[PathBuf]) -> Result<Option<Box<dyn Source>>> {
-        self.format.open(staged).map(Some)
+        self.format.open(staged, &ReadKeys::default()).map(Some)
     }
 
     fn create(

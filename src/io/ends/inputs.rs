@@ -207,13 +207,15 @@ fn folder(path: &Path, formats: &Formats) -> Result<Vec<PathBuf>> {
         let entry = entry.map_err(failed)?;
         let hidden = entry.file_name().as_bytes().starts_with(b".");
         let file = entry.path();
-        if !hidden && formats.of(&file).is_some() && !file.is_dir() {
+        let is_of_points = formats.of(&file).is_some_and(|format| format.owns_extension());
+        if !hidden && is_of_points && !file.is_dir() {
             files.push(file);
         }
     }
     if files.is_empty() {
         let path = shown(path);
-        let known = listed(formats.names(), "or");
+        let owned = formats.iter().filter(|format| format.owns_extension());
+        let known = listed(owned.map(|format| format.name()), "or");
         let told = format!("the folder `{path}` has no {known} file");
         return Err(Error::new(ErrorKind::Io, told));
     }

@@ -1,15 +1,19 @@
 //! The stage kinds at both ends of a pipeline, `read`, `synth` and `write`: their keys.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::{Deserialize, Deserializer, Serialize, de};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+use super::values::{
+    names_once, one_or_more, one_or_three, some_columns, some_offset, some_scale, some_scans, texts,
+};
 use crate::error::{listed, shown};
 use crate::io::sniff::{of_extension, upper};
-use crate::quantity::Length;
-use crate::stage::{Colors, Format, FormatName, Formats, Order, OutputEncoding, WriteKeys};
+use crate::quantity::{Length, Whole};
+use crate::stage::{
+    Colors, Format, FormatName, Formats, Order, OutputEncoding, ReadKeys, Separator, WriteKeys,
+};
 use crate::{Error, Result};
 
 /// The source of most pipelines. Several files are one scan; all are LAS or LAZ, or all are PLY.
@@ -43,7 +47,7 @@ use crate::{Error, Result};
 ///
 /// Upper and lower case differ, and `*` and `?` do not match a dot at the beginning of a name, as
 /// in a shell. A file meant twice, by whatever names, is an error: its points would be read twice.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Read {
     /// A file, a pattern, a folder, or a list of them.
@@ -53,7 +57,18 @@ pub struct Read {
     /// Format of all of them; none: as their extensions say, else as their first bytes do.
     #[serde(default)]
     pub format: Option<FormatName>,
+    /// What the columns of a text are, in order: `"x,y,z,intensity"`, or a list of names. A column
+    /// called `_` is not read; none: as a heading names them, or as their number tells.
+    #[serde(default, deserialize_with = "some_columns")]
+    #[schemars(schema_with = "texts")]
+    pub columns: Option<Vec<String>>,
+    /// Numbers of the scans of an E57 file that are read, from 1; none: all of them.
+    #[serde(default, deserialize_with = "some_scans")]
+    pub scans: Option<Vec<ScanNumber>>,
 }
+
+/// The number of a scan in a file.
+pub type ScanNumber = Whole<1, 65_535>;
 
 /// The end of every pipeline. The file grows in a scratch folder beside its place and appears under
 /// its name when it is complete; it never replaces an input.
@@ -135,10 +150,25 @@ pub struct Write {
     /// Encoding of a PLY file; none: the input's.
     #[serde(default)]
     pub encoding: Option<OutputEncoding>,
-    /// Bits of a colour in a PLY file of LAS points; none: `"auto"`.
+    /// Bits of a colour in a file that is not LAS, of points from one of another format; none:
+    /// `"auto"`.
     #[serde(default)]
     pub colors: Option<Colors>,
+    /// What stands between two numbers of a text; none: a comma in CSV, else a blank.
+    #[serde(default)]
+    pub separator: Option<Separator>,
+    /// Decimals of the coordinates in a text, which may round them; none: as many as it takes to
+    /// read them back equal.
+    #[serde(default)]
+    pub decimals: Option<Decimals>,
+    /// Whether a text begins with a line that names its columns; none: if it is CSV, or has more
+    /// than coordinates and is not PTS.
+    #[serde(default)]
+    pub header: Option<bool>,
 }
+
+/// How many decimals a coordinate is written with.
+pub type Decimals = Whole<0, 17>;
 
 /// Order of the records of an output, as a file names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -175,8 +205,37 @@ impl Write {
             offset: self.offset,
             encoding: self.encoding,
             colors: self.colors,
+            separator: self.separator,
+            decimals: self.decimals.map(|decimals| decimals.get() as u8),
+            header: self.header,
         }
     }
+}
+
+impl Read {
+    /// What formats know of it.
+    pub(super) fn keys(&self) -> ReadKeys {
+        let mut keys = ReadKeys::default();
+        keys.columns.clone_from(&self.columns);
+        let scans = self.scans.as_ref();
+        keys.scans = scans.map(|scans| scans.iter().map(|number| number.get()).collect());
+        keys
+    }
+}
+
+/// Refuses keys that inputs of `format` do not have; tells which.
+pub(super) fn check_read(
+    keys: &ReadKeys,
+    format: &dyn Format,
+    formats: &Formats,
+) -> Result<(), (&'static str, Error)> {
+    let Some(key) = keys.given().find(|key| !format.read_keys().contains(key)) else {
+        return Ok(());
+    };
+    let having = formats.iter().filter(|format| format.read_keys().contains(&key));
+    let having = listed(having.map(|format| format.name()), "and");
+    let told = format!("`read.{key}` is for {having}, the input is {}", format.name());
+    Err((key, Error::pipeline(told)))
 }
 
 /// Refuses keys that an output of `format` does not have; tells which.
@@ -185,6 +244,10 @@ pub(super) fn check(
     format: &dyn Format,
     formats: &Formats,
 ) -> Result<(), (&'static str, Error)> {
+    if let Some(help) = format.unwritten() {
+        let told = format!("{} files are read and not written", format.name().to_uppercase());
+        return Err(("path", Error::pipeline(told).help(help)));
+    }
     if let Some(key) = keys.given().find(|key| !format.keys().contains(key)) {
         let having = formats.iter().filter(|format| format.keys().contains(&key));
         let having = listed(having.map(|format| format.name()), "and");
@@ -209,123 +272,18 @@ pub(super) fn unknown_extension(path: &Path, setting: &str, formats: &Formats) -
     let name = shown(path);
     let is_read = setting.starts_with("read");
     let can = if is_read { "read" } else { "written" };
-    let dotted = listed(formats.names().iter().map(|name| format!(".{name}")), "or");
+    let known = formats.iter().filter(|format| is_read || format.unwritten().is_none());
+    let dotted = listed(known.map(|format| format!(".{}", format.name())), "or");
     match of_extension(&extension) {
         Some(format) => {
             let told = format!("by its extension `{name}` is {format}, which is not {can}");
             let known = listed(upper(formats), "or");
             Error::pipeline(told).help(match is_read {
                 true => format!("convert it to {known} with another program first"),
-                false if ["OBJ", "STL"].contains(&format) => {
-                    format!("name it {dotted}; the stage `mesh` writes {format}, of triangles")
-                }
                 false => format!("name it {dotted}"),
             })
         }
         None => Error::pipeline(format!("the extension of `{name}` names no format"))
             .help(format!("name it {dotted}, or give `{setting}`")),
-    }
-}
-
-fn texts(_: &mut SchemaGenerator) -> Schema {
-    let text = json_schema!({ "type": "string" });
-    json_schema!({ "anyOf": [text, { "type": "array", "items": text }] })
-}
-
-fn one_or_three(_: &mut SchemaGenerator) -> Schema {
-    let above_0 = json_schema!({ "type": "number", "exclusiveMinimum": 0 });
-    let three = json_schema!({ "type": "array", "items": above_0, "minItems": 3, "maxItems": 3 });
-    json_schema!({ "anyOf": [above_0, three] })
-}
-
-fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
-    struct Paths;
-    impl<'de> de::Visitor<'de> for Paths {
-        type Value = Vec<String>;
-
-        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("a path or a list of paths")
-        }
-
-        fn visit_str<E: de::Error>(self, path: &str) -> Result<Self::Value, E> {
-            Ok(vec![path.to_owned()])
-        }
-
-        fn visit_seq<A: de::SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
-            let mut paths = Vec::new();
-            while let Some(path) = list.next_element()? {
-                paths.push(path);
-            }
-            Ok(paths)
-        }
-    }
-    from.deserialize_any(Paths)
-}
-
-fn some_scale<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D::Error> {
-    struct Scale;
-    impl<'de> de::Visitor<'de> for Scale {
-        type Value = [f64; 3];
-
-        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("a number above 0 without a unit, or three of them")
-        }
-
-        fn visit_i64<E: de::Error>(self, scale: i64) -> Result<Self::Value, E> {
-            self.visit_f64(scale as f64)
-        }
-
-        fn visit_f64<E: de::Error>(self, scale: f64) -> Result<Self::Value, E> {
-            match scale.is_finite() && scale > 0.0 {
-                true => Ok([scale; 3]),
-                false => Err(E::invalid_value(de::Unexpected::Float(scale), &self)),
-            }
-        }
-
-        fn visit_seq<A: de::SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
-            let mut scale = [0.0; 3];
-            for (i, axis) in scale.iter_mut().enumerate() {
-                let next: Option<Positive> = list.next_element()?;
-                *axis = next.ok_or_else(|| de::Error::invalid_length(i, &Scale))?.0;
-            }
-            Ok(scale)
-        }
-    }
-    from.deserialize_any(Scale).map(Some)
-}
-
-pub(super) fn some_offset<'de, D: Deserializer<'de>>(
-    from: D,
-) -> Result<Option<[f64; 3]>, D::Error> {
-    let offset = <[f64; 3]>::deserialize(from)?;
-    match offset.iter().find(|v| !v.is_finite()) {
-        Some(&v) => Err(de::Error::invalid_value(de::Unexpected::Float(v), &"finite numbers")),
-        None => Ok(Some(offset)),
-    }
-}
-
-/// A number above 0, refused at its own place.
-struct Positive(f64);
-
-impl<'de> Deserialize<'de> for Positive {
-    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let number = f64::deserialize(from)?;
-        match number.is_finite() && number > 0.0 {
-            true => Ok(Positive(number)),
-            false => {
-                let found = de::Unexpected::Float(number);
-                Err(de::Error::invalid_value(found, &"a number above 0"))
-            }
-        }
-    }
-}
-
-/// Names, each once.
-pub(super) fn names_once<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
-    let given: Vec<String> = Vec::deserialize(from)?;
-    let twice = given.iter().enumerate().find(|(n, name)| given[..*n].contains(name));
-    match twice {
-        None => Ok(given),
-        Some((_, name)) => Err(de::Error::custom(format!("has {name} twice"))),
     }
 }

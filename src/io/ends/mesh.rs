@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::connect::of_output;
-use super::kinds::{names_once, some_offset};
+use super::values::{names_once, some_offset};
 use crate::error::{listed, shown};
 use crate::io::facets::{ObjSink, SinglePlaces, StlSink};
 use crate::io::ply;
@@ -140,12 +140,21 @@ struct MeshFile {
 }
 
 impl MeshFile {
-    fn ply(&self, metadata: &Metadata) -> ply::encode::PlyOptions {
+    fn ply(&self, metadata: &Metadata) -> ply::sink::PlyOptions {
         let Mesh { path, drop, dimensions, encoding, colors, .. } = self.keys.clone();
         let (scale, offset, computed) = (None, None, dimensions);
-        let keys = WriteKeys { path, computed, drop, scale, offset, encoding, colors };
+        let keys = WriteKeys {
+            path,
+            computed,
+            drop,
+            scale,
+            offset,
+            encoding,
+            colors,
+            ..WriteKeys::default()
+        };
         let options = ply::registered::options(&keys, metadata, false);
-        ply::encode::PlyOptions { triangles: true, ..options }
+        ply::sink::PlyOptions { triangles: true, ..options }
     }
 
     fn offset(&self) -> [f64; 3] {

@@ -9,6 +9,7 @@ mod mesh;
 mod outputs;
 mod roles;
 mod squares;
+mod values;
 
 pub(crate) use discard::CountedSink;
 pub use discard::Discard;

@@ -9,7 +9,9 @@ use super::connect::OutputFile;
 use super::kinds::{check, unknown_extension};
 use crate::error::shown;
 use crate::point::{Metadata, PointBatch, Schema};
-use crate::stage::{ChunkSize, CreateSink, Format, Formats, Input, Order, Sink, Source, WriteKeys};
+use crate::stage::{
+    ChunkSize, CreateSink, Format, Formats, Input, Order, ReadKeys, Sink, Source, WriteKeys,
+};
 use crate::{Error, ErrorKind, Result};
 
 /// The sink that writes a file for each input.
@@ -152,9 +154,10 @@ impl CreateSink for Outputs {
     fn reopen(&self, staged: &[PathBuf]) -> Result<Option<Box<dyn Source>>> {
         // Files of one family are read together by any format of it.
         let one = self.formats.iter().find(|format| {
-            staged.first().is_some_and(|file| format.open(std::slice::from_ref(file)).is_ok())
+            let first = staged.first().map(std::slice::from_ref);
+            first.is_some_and(|file| format.open(file, &ReadKeys::default()).is_ok())
         });
-        one.map(|format| format.open(staged)).transpose()
+        one.map(|format| format.open(staged, &ReadKeys::default())).transpose()
     }
 
     fn checks(&self, schema: &Schema) -> bool {

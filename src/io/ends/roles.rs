@@ -2,6 +2,7 @@
 
 use std::os::unix::ffi::OsStrExt;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::kinds::{Read, Write, unknown_extension};
 use super::outputs::Outputs;
@@ -9,7 +10,7 @@ use super::squares::Squares;
 use super::{connect, inputs, kinds};
 use crate::error::shown;
 use crate::io::sniff::first_bytes;
-use crate::stage::{Formats, OpenSource, Role, RoleName, StageKind, StagePlace, Unread};
+use crate::stage::{Format, Formats, OpenSource, Role, RoleName, StageKind, StagePlace, Unread};
 use crate::{Error, Result};
 
 impl Read {
@@ -20,6 +21,22 @@ impl Read {
     /// A path that names no file, a file of which neither name nor first bytes tell a format, and
     /// files of which the records are not alike.
     pub fn source(&self, formats: &Formats) -> Result<Box<dyn OpenSource>> {
+        let format = self.files(formats)?;
+        kinds::check_read(&self.keys(), &*format.1, formats).map_err(|(_, error)| error)?;
+        Ok(self.opened(format, formats))
+    }
+
+    fn opened(
+        &self,
+        (files, format): (Vec<PathBuf>, Arc<dyn Format>),
+        formats: &Formats,
+    ) -> Box<dyn OpenSource> {
+        let (keys, formats) = (self.keys(), formats.clone());
+        Box::new(connect::InputFiles { files, format, keys, formats })
+    }
+
+    /// The files, and a format of theirs.
+    fn files(&self, formats: &Formats) -> Result<(Vec<PathBuf>, Arc<dyn Format>)> {
         let files = inputs::expand(&self.path, formats)?;
         let asked = self.format.as_ref().map(|name| formats.named(name)).transpose()?;
         let sniffed = |file: &PathBuf| formats.sniffed(&first_bytes(file).ok()?);
@@ -45,7 +62,7 @@ impl Read {
             return Err(Error::pipeline(told).help(help));
         }
         let format = all[0].clone();
-        Ok(Box::new(connect::InputFiles { files, format, formats: formats.clone() }))
+        Ok((files, format))
     }
 }
 
@@ -61,7 +78,11 @@ impl StageKind for Read {
             let paths = self.path.iter().map(PathBuf::from).collect();
             return Ok(Role::Source(Box::new(Unread { paths })));
         }
-        Ok(Role::Source(self.source(at.formats()).map_err(|error| at.blame("path", error))?))
+        let formats = at.formats();
+        let found = self.files(formats).map_err(|error| at.blame("path", error))?;
+        let checked = kinds::check_read(&self.keys(), &*found.1, formats);
+        checked.map_err(|(key, error)| at.blame(key, error))?;
+        Ok(Role::Source(self.opened(found, formats)))
     }
 }
 

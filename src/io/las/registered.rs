@@ -16,7 +16,7 @@ use crate::io::convert::Projection;
 use crate::io::describe::json;
 use crate::io::project::Projected;
 use crate::point::{GpsTime, Metadata, PointBatch, Schema, names};
-use crate::stage::{ChunkSize, Format, Sink, Source, WriteKeys};
+use crate::stage::{ChunkSize, Format, ReadKeys, Sink, Source, WriteKeys};
 use crate::{Error, Result};
 
 /// One of the two formats of LAS records.
@@ -51,7 +51,7 @@ impl Format for LasFormat {
         first.starts_with(SIGNATURE)
     }
 
-    fn open(&self, files: &[PathBuf]) -> Result<Box<dyn Source>> {
+    fn open(&self, files: &[PathBuf], _: &ReadKeys) -> Result<Box<dyn Source>> {
         source::open(files)
     }
 

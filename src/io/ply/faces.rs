@@ -1,7 +1,6 @@
 //! Triangles as the faces of a PLY file.
 
-use super::header::Encoding;
-use super::text;
+use crate::io::rows::{Encoding, number};
 use crate::point::{Endian, Value};
 use crate::report::Grouped;
 use crate::stage::{EncodeTriangles, Encoded, Triangle};
@@ -28,7 +27,7 @@ impl EncodeTriangles for FaceEncoder {
                     bytes.push(b'3');
                     for corner in corners {
                         bytes.push(b' ');
-                        text::print(Value::Signed(i64::from(corner)), &mut bytes);
+                        number::print(Value::Signed(i64::from(corner)), &mut bytes);
                     }
                     bytes.push(b'\n');
                 }

@@ -5,9 +5,12 @@ use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use super::header::{Element, Encoding, PlyHeader, Property, PropertyKind, shown};
-use super::{names, walk};
+use super::header::{Element, PlyHeader, Property, PropertyKind};
+use super::walk;
 use crate::io::origin::Origin;
+use crate::io::rows::Encoding;
+use crate::io::rows::lines::shown;
+use crate::io::rows::names::dimension_of;
 use crate::{Error, Result};
 
 /// One file, its header read.
@@ -173,7 +176,7 @@ fn check(path: &Path, vertex: &Element) -> Result<()> {
     let missing: Vec<&str> = ["x", "y", "z"]
         .into_iter()
         .filter(|axis| {
-            let dimension = names::dimension_of(axis);
+            let dimension = dimension_of(axis);
             !vertex.properties.iter().any(|p| p.name == *axis || p.name == dimension)
         })
         .collect();

@@ -5,9 +5,9 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
-
-use crate::point::{Endian, Scalar};
+use crate::io::rows::Encoding;
+use crate::io::rows::lines::shown;
+use crate::point::Scalar;
 use crate::stage::foreign;
 use crate::{Error, Result};
 
@@ -17,41 +17,19 @@ pub(super) const CALLED: &str = "a PLY file";
 /// The longest header that is read, in bytes.
 const LONGEST: u64 = 1 << 20;
 
-/// How the values of a PLY file are written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Encoding {
-    /// Numbers as text, one vertex a line.
-    Ascii,
-    /// Numbers as bytes, lowest first.
-    BinaryLittleEndian,
-    /// Numbers as bytes, highest first.
-    BinaryBigEndian,
+/// The word for an encoding in the header's `format` line.
+pub(super) fn word(encoding: Encoding) -> &'static str {
+    match encoding {
+        Encoding::Ascii => "ascii",
+        Encoding::BinaryLittleEndian => "binary_little_endian",
+        Encoding::BinaryBigEndian => "binary_big_endian",
+    }
 }
 
-impl Encoding {
-    /// The word in the header's `format` line.
-    pub fn word(self) -> &'static str {
-        match self {
-            Encoding::Ascii => "ascii",
-            Encoding::BinaryLittleEndian => "binary_little_endian",
-            Encoding::BinaryBigEndian => "binary_big_endian",
-        }
-    }
-
-    /// Byte order in which records of such a file are held.
-    pub fn endian(self) -> Endian {
-        match self {
-            Encoding::Ascii | Encoding::BinaryLittleEndian => Endian::Little,
-            Encoding::BinaryBigEndian => Endian::Big,
-        }
-    }
-
-    fn of(word: &str) -> Option<Encoding> {
-        [Encoding::Ascii, Encoding::BinaryLittleEndian, Encoding::BinaryBigEndian]
-            .into_iter()
-            .find(|e| e.word() == word)
-    }
+fn encoding_of(text: &str) -> Option<Encoding> {
+    [Encoding::Ascii, Encoding::BinaryLittleEndian, Encoding::BinaryBigEndian]
+        .into_iter()
+        .find(|&encoding| word(encoding) == text)
 }
 
 /// What a header says.
@@ -303,7 +281,7 @@ impl Partial {
         if version != "1.0" {
             return Err(format!("PLY version {} is not known; 1.0 is", shown(version)));
         }
-        self.encoding = Some(Encoding::of(encoding).ok_or_else(|| {
+        self.encoding = Some(encoding_of(encoding).ok_or_else(|| {
             format!(
                 "encoding `{}` is not known (ascii, binary_little_endian, binary_big_endian)",
                 shown(encoding)
@@ -370,13 +348,4 @@ fn text(line: &[u8]) -> String {
         Ok(text) => text.to_owned(),
         Err(_) => line.iter().map(|&b| char::from(b)).collect(),
     }
-}
-
-/// A word of a file, short and printable, for a message.
-pub(super) fn shown(word: &str) -> String {
-    let mut short: String = word.chars().take(40).flat_map(char::escape_debug).collect();
-    if word.chars().count() > 40 {
-        short.push('…');
-    }
-    short
 }

@@ -3,14 +3,16 @@
 
 use std::collections::BTreeMap;
 
-use super::comments::{CRS, CRS_MORE, GPS_TIME, GPS_TIMES, made, pieces};
 use super::faces;
-use super::header::{Element, Encoding, Property, PropertyKind};
+use super::header::{Element, Property, PropertyKind, word};
 use super::names;
 use super::source::{PlyNative, Rest};
+use crate::io::rows::Encoding;
+use crate::io::rows::comments::{line, lines, made};
 use crate::point::{Metadata, Schema, names as point_names};
 
 /// The header, but for the count of vertices.
+#[derive(Clone)]
 pub(super) struct Headings {
     /// To the end of what comments say of the coordinates and times, which the comment of [`made`]
     /// ends.
@@ -23,6 +25,8 @@ pub(super) struct Headings {
     vertex: Element,
     /// True if triangles stand behind the vertices.
     pub has_faces: bool,
+    /// How many there are so far.
+    pub faces: u64,
     after: String,
 }
 
@@ -40,26 +44,18 @@ impl Headings {
         let kept = native.iter().flat_map(|native| &native.properties);
         let kept: BTreeMap<&str, &String> = kept.map(|(d, p)| (d.as_str(), p)).collect();
         let properties = names::properties(&dimensions, |name| kept.get(name).copied().cloned());
-        // A line end within a text would begin a line of its own.
-        let line =
-            |keyword: &str, text: &str| format!("{keyword} {}\n", text.replace(['\n', '\r'], " "));
-        let mut start = format!("ply\nformat {} 1.0\n", encoding.word());
-        for (n, piece) in metadata.crs.iter().flat_map(|crs| pieces(crs)).enumerate() {
-            start += &line("comment", &format!("{}{piece}", if n == 0 { CRS } else { CRS_MORE }));
-        }
-        let told = metadata.gps_time.filter(|_| dimensions.contains(&point_names::GPS_TIME));
-        for (_, text) in GPS_TIMES.iter().filter(|(kind, _)| Some(*kind) == told) {
-            start += &line("comment", &format!("{GPS_TIME}{text}"));
-        }
+        let mut start = format!("ply\nformat {} 1.0\n", word(encoding));
+        start += &lines("comment ", metadata, dimensions.contains(&point_names::GPS_TIME));
         let mut comments: String = properties
             .iter()
             .zip(&dimensions)
             .filter_map(|(property, dimension)| names::comment(property, dimension))
-            .map(|comment| line("comment", &comment))
+            .map(|comment| line("comment ", &comment))
             .collect();
-        comments.extend(metadata.comments.iter().map(|comment| line("comment", comment)));
-        comments.extend(native.iter().flat_map(|n| &n.obj_info).map(|info| line("obj_info", info)));
-        let lines = |elements: &[Element]| elements.iter().map(Element::lines).collect::<String>();
+        comments.extend(metadata.comments.iter().map(|comment| line("comment ", comment)));
+        comments
+            .extend(native.iter().flat_map(|n| &n.obj_info).map(|info| line("obj_info ", info)));
+        let of = |elements: &[Element]| elements.iter().map(Element::lines).collect::<String>();
         let rest: Option<&Rest> = rest.and_then(|native| native.rest.as_ref());
         let properties = properties
             .into_iter()
@@ -67,10 +63,11 @@ impl Headings {
             .map(|(name, d)| Property { name, kind: PropertyKind::Scalar(d.scalar) })
             .collect();
         Headings {
-            before: rest.map(|r| lines(&r.before)).unwrap_or_default(),
-            after: rest.map(|r| lines(&r.after)).unwrap_or_default(),
+            before: rest.map(|r| of(&r.before)).unwrap_or_default(),
+            after: rest.map(|r| of(&r.after)).unwrap_or_default(),
             vertex: Element { name: "vertex".into(), count: 0, properties },
             has_faces: false,
+            faces: 0,
             start,
             note: String::new(),
             comments,
@@ -78,7 +75,8 @@ impl Headings {
     }
 
     /// Always of one length: blanks behind a comment take what the counts leave.
-    pub fn text(&self, points: u64, triangles: u64) -> String {
+    pub fn text(&self, points: u64) -> String {
+        let triangles = self.faces;
         let vertex = Element { count: points, ..self.vertex.clone() };
         let Headings { start, note, comments, before, after, .. } = self;
         let (vertex, counts) = (vertex.lines(), [points, triangles]);
@@ -103,16 +101,17 @@ mod tests {
             before: String::new(),
             vertex,
             has_faces: false,
+            faces: 0,
             after: String::new(),
         };
-        let length = header.text(0, 0).len();
+        let length = header.text(0).len();
         let counts = [1, 9, 10, 12_345, u64::MAX];
-        assert!(counts.iter().all(|&n| header.text(n, 5).len() == length));
-        assert!(header.text(u64::MAX, 0).contains("comment made by pointmill\n"));
-        assert!(!header.text(7, 0).contains('.'));
-        let header = Headings { has_faces: true, ..header };
-        let length = header.text(0, 0).len();
-        assert!(counts.iter().all(|&n| header.text(n, 3).len() == length));
-        assert!(counts.iter().all(|&n| header.text(3, n).len() == length));
+        assert!(counts.iter().all(|&n| header.text(n).len() == length));
+        assert!(header.text(u64::MAX).contains("comment made by pointmill\n"));
+        assert!(!header.text(7).contains('.'));
+        let header = |faces| Headings { has_faces: true, faces, ..header.clone() };
+        let length = header(0).text(0).len();
+        assert!(counts.iter().all(|&n| header(3).text(n).len() == length));
+        assert!(counts.iter().all(|&n| header(n).text(3).len() == length));
     }
 }

@@ -4,11 +4,10 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::comments;
-use super::header::{Encoding, PlyHeader, PropertyKind};
-use super::noted;
+use super::header::{PlyHeader, PropertyKind};
 use crate::Result;
 use crate::io::origin::Origin;
+use crate::io::rows::{Encoding, comments, noted};
 
 /// What the header of a PLY file says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -91,4 +90,11 @@ pub fn describe(path: &Path) -> Result<PlyInfo> {
         comments,
         obj_info,
     })
+}
+
+/// What the file at `path` says of how it was made; None if it says nothing.
+pub(super) fn note(path: &Path) -> Result<Option<String>> {
+    let (file, origin) = Origin::open(path)?;
+    let mut header = PlyHeader::read(&file, path, origin.length())?;
+    Ok(noted::take(&mut header.comments))
 }

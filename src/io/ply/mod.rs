@@ -7,21 +7,15 @@
 
 mod ascii;
 mod binary;
-mod colors;
-mod comments;
-pub(crate) mod encode;
 mod faces;
 mod file;
 pub(crate) mod header;
 mod headings;
 pub(crate) mod info;
 mod names;
-mod noted;
 pub(crate) mod registered;
 pub(crate) mod sink;
 mod source;
-mod text;
-pub(crate) mod vertex;
 mod walk;
 
 pub use registered::{PLY, PlyFormat};

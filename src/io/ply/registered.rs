@@ -3,14 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::encode::PlyOptions;
-use super::header::{CALLED, Encoding};
+use super::header::CALLED;
 use super::names::FAMILY;
-use super::{info, noted, sink, source};
+use super::sink::PlyOptions;
+use super::{info, sink, source};
 use crate::Result;
 use crate::io::describe::json;
+use crate::io::rows::Encoding;
 use crate::point::{Metadata, Schema};
-use crate::stage::{ChunkSize, Format, OutputEncoding, Sink, Source, WriteKeys};
+use crate::stage::{ChunkSize, Format, OutputEncoding, ReadKeys, Sink, Source, WriteKeys};
 
 /// The format of PLY files.
 #[derive(Debug, Clone, Copy)]
@@ -41,7 +42,7 @@ impl Format for PlyFormat {
         first.starts_with(b"ply")
     }
 
-    fn open(&self, files: &[PathBuf]) -> Result<Box<dyn Source>> {
+    fn open(&self, files: &[PathBuf], _: &ReadKeys) -> Result<Box<dyn Source>> {
         source::open(files)
     }
 
@@ -50,7 +51,7 @@ impl Format for PlyFormat {
     }
 
     fn note(&self, path: &Path) -> Result<Option<String>> {
-        noted::read(path)
+        info::note(path)
     }
 
     fn keys(&self) -> &'static [&'static str] {

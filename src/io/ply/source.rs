@@ -6,12 +6,13 @@ use std::sync::Arc;
 
 use super::ascii::AsciiPart;
 use super::binary::BinaryPart;
-use super::comments;
 use super::file::PlyFile;
-use super::header::{Element, Encoding, PropertyKind, shown};
+use super::header::{Element, PropertyKind};
 use super::names::{self, RECORDS};
-use super::noted;
 use crate::io::origin::Origin;
+use crate::io::rows::Encoding;
+use crate::io::rows::comments::{self, Said};
+use crate::io::rows::lines::shown;
 use crate::point::names::{GPS_TIME, XYZ};
 use crate::point::{Dimension, GpsTime, Metadata, Scalar, Schema};
 use crate::stage::{Input, Part, Source};
@@ -125,42 +126,15 @@ impl Texts {
         let header = &file.header;
         let dimensions = names::dimensions(&properties, &header.comments);
         let properties: BTreeSet<&str> = properties.into_iter().collect();
-        let mut all = header.comments.clone();
         // How this file was made is not how others are made of it.
-        noted::take(&mut all);
-        let mut crs: Option<String> = None;
-        let mut gps_time = None;
-        let mut comments = Vec::new();
-        // Only pieces right behind the first belong to it: other comments are free to look alike.
-        let mut more = false;
-        for comment in &all {
-            if let (Some(text), None) = (comment.strip_prefix(comments::CRS), &crs) {
-                crs = Some(text.to_owned());
-                more = true;
-                continue;
-            }
-            if let (Some(text), true) = (comment.strip_prefix(comments::CRS_MORE), more) {
-                crs.get_or_insert_default().push_str(text);
-                continue;
-            }
-            more = false;
-            if let (Some(kind), None) = (gps_time_told(comment), gps_time) {
-                gps_time = Some(kind);
-                continue;
-            }
-            let of_ours = names::property_told(comment).is_some_and(|p| properties.contains(p));
-            if !of_ours && !comments::is_made(comment, file.points) {
-                comments.push(comment.clone());
-            }
-        }
+        let Said { crs, gps_time, note: _, others } = Said::of(header.comments.clone());
+        let is_ours = |comment: &String| {
+            names::property_told(comment).is_some_and(|p| properties.contains(p))
+                || comments::is_made(comment, file.points)
+        };
+        let comments = others.into_iter().filter(|comment| !is_ours(comment)).collect();
         Texts { crs, gps_time, dimensions, comments }
     }
-}
-
-/// What GPS times count, if `comment` is the one that says it.
-fn gps_time_told(comment: &str) -> Option<GpsTime> {
-    let text = comment.strip_prefix(comments::GPS_TIME)?;
-    comments::GPS_TIMES.iter().find(|(_, told)| *told == text).map(|(kind, _)| *kind)
 }
 
 /// Refuses two files whose vertices differ but for the types of properties.

@@ -4,7 +4,9 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-use super::header::{Element, Encoding, PropertyKind, shown};
+use super::header::{Element, PropertyKind};
+use crate::io::rows::Encoding;
+use crate::io::rows::lines::shown;
 use crate::point::{Dimension, Endian, Scalar, Value};
 use crate::{Error, Result};
 

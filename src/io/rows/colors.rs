@@ -1,15 +1,15 @@
-//! Colours of LAS records, which have 16 bits, as the 8 bits that readers of PLY expect.
+//! Colours of 16 bits, as LAS records have them, as the 8 bits that readers of PLY, PCD and texts
+//! expect.
 //!
 //! Nothing is lost by 8 bits where 16 of them hold no more: where each colour is a multiple of 257
 //! or of 256, or all are below 256, as three kinds of writers leave them. Whether they are only all
-//! points together say, long after the first are written; so vertices are written with 8 bits until
+//! points together say, long after the first are written; so rows are written with 8 bits until
 //! a colour needs more, and the file is written anew when one does. Where it was needed for no more
 //! than telling multiples of 257 from those of 256, it is written with 8 bits again in the end. So
 //! the type in a finished file depends on the colours alone.
 
-use super::header::Encoding;
-use super::names::FAMILY;
-use super::text;
+use super::schema::{ALPHA, PACKED, RowShape};
+use super::{Encoding, RowForm, number};
 use crate::point::names::{BLUE, GREEN, RED};
 use crate::point::{Dimension, Endian, Scalar, Schema, Value};
 use crate::stage::Colors;
@@ -17,7 +17,7 @@ use crate::{Error, Result};
 
 /// What the 16-bit colours of some points are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Depth {
+pub(crate) enum Depth {
     /// Nothing but 0, which all the others have too.
     #[default]
     Black,
@@ -121,9 +121,10 @@ fn is_color(dimension: &Dimension) -> bool {
     [RED, GREEN, BLUE].contains(&dimension.name.as_str()) && dimension.scalar == Scalar::U16
 }
 
-/// Byte offsets of the colours of LAS records of `schema`, but for those of `drop`; none in others.
-pub(super) fn fields(schema: &Schema, drop: &[String]) -> Vec<usize> {
-    let others = schema.layout.family != FAMILY && schema.endian == Endian::Little;
+/// Byte offsets of the colours of 16 bits in records of `schema`, but for those of `drop`; none in
+/// those of the format itself.
+pub(super) fn fields(schema: &Schema, form: &RowForm, drop: &[String]) -> Vec<usize> {
+    let others = schema.layout.family != form.layout.family && schema.endian == Endian::Little;
     let held =
         schema.dimensions.iter().filter(|d| others && is_color(d) && !drop.contains(&d.name));
     held.map(|d| d.offset).collect()
@@ -140,16 +141,17 @@ pub(super) fn bytes_of(schema: &Schema, place: usize) -> Schema {
     narrow
 }
 
-/// Makes vertices with colours of 16 bits of those with 8, or the other way round.
-pub(super) struct Recoloring<'a> {
+/// Makes rows with colours of 16 bits of those with 8, or the other way round.
+pub(crate) struct Recoloring<'a> {
     pub encoding: Encoding,
-    pub from: &'a Schema,
-    pub to: &'a Schema,
+    pub separator: u8,
+    pub from: &'a RowShape,
+    pub to: &'a RowShape,
     pub depth: Depth,
 }
 
 impl Recoloring<'_> {
-    /// Appends to `out` what the whole vertices that `written` begins with become; returns how many
+    /// Appends to `out` what the whole rows that `written` begins with become; returns how many
     /// bytes of it they are.
     pub fn append(&self, written: &[u8], out: &mut Vec<u8>) -> Result<usize> {
         match self.encoding {
@@ -158,49 +160,64 @@ impl Recoloring<'_> {
         }
     }
 
+    /// The other number of bits of the same colour.
+    fn other(&self, color: u64, from: Scalar) -> u64 {
+        match from {
+            Scalar::U8 => u64::from(self.depth.widened(color as u8)),
+            _ => color >> 8,
+        }
+    }
+
     fn append_binary(&self, written: &[u8], out: &mut Vec<u8>) -> usize {
-        let vertices = written.chunks_exact(self.from.stride.max(1));
-        let taken = written.len() - vertices.remainder().len();
-        for vertex in vertices {
-            for (from, to) in self.from.dimensions.iter().zip(&self.to.dimensions) {
-                let field = &vertex[from.offset..from.offset + from.scalar.size()];
-                let endian = self.encoding.endian();
-                match (field, from.scalar == to.scalar, endian) {
-                    (&[bits], false, Endian::Little) => {
-                        out.extend(self.depth.widened(bits).to_le_bytes());
-                    }
-                    (&[bits], false, Endian::Big) => {
-                        out.extend(self.depth.widened(bits).to_be_bytes());
-                    }
-                    (&[_, upper], false, Endian::Little) => out.push(upper),
-                    (&[upper, _], false, Endian::Big) => out.push(upper),
-                    _ => out.extend_from_slice(field),
+        let (from, to) = (&self.from.row, &self.to.row);
+        let rows = written.chunks_exact(from.stride.max(1));
+        let taken = written.len() - rows.remainder().len();
+        for row in rows {
+            let start = out.len();
+            out.resize(start + to.stride, 0);
+            let target = &mut out[start..];
+            for (one, two) in from.dimensions.iter().zip(&to.dimensions) {
+                let size = one.scalar.size();
+                if one.scalar == two.scalar {
+                    let field = &row[one.offset..one.offset + size];
+                    target[two.offset..two.offset + size].copy_from_slice(field);
+                } else if let Value::Unsigned(color) = one.get(row, from.endian) {
+                    let color = Value::Unsigned(self.other(color, one.scalar));
+                    let held = two.put(target, to.endian, color);
+                    debug_assert!(held, "8 bits of 16, or 16");
                 }
             }
         }
         taken
     }
 
+    /// As [`append_binary`](Self::append_binary), through the values of each line: colours that
+    /// share a number are three in the other rows.
     fn append_lines(&self, written: &[u8], out: &mut Vec<u8>) -> Result<usize> {
         let own = || Error::internal("a text that was just written does not read back");
         let taken = written.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1);
+        let is_color =
+            |column: &Dimension| PACKED.iter().chain(&COLORS).any(|name| column.name == *name);
+        let mut row = vec![0; self.from.row.stride];
         for line in written[..taken].split_inclusive(|&b| b == b'\n') {
-            let words = line.trim_ascii_end().split(|&b| b == b' ');
-            for ((word, from), to) in words.zip(&self.from.dimensions).zip(&self.to.dimensions) {
-                if from.scalar == to.scalar {
-                    out.extend_from_slice(word);
-                } else {
-                    let mut bits = [0; 2];
-                    if !text::parse(word, from.scalar, &mut bits) {
-                        return Err(own());
-                    }
-                    let color = match from.scalar {
-                        Scalar::U8 => u64::from(self.depth.widened(bits[0])),
-                        _ => u64::from(bits[1]),
-                    };
-                    text::print(Value::Unsigned(color), out);
+            let mut others = Vec::new();
+            for (word, column) in
+                line.trim_ascii_end().split(|&b| b == self.separator).zip(&self.from.columns)
+            {
+                if !is_color(column) {
+                    others.push(word);
+                } else if !number::parse(word, column.scalar, &mut row[column.offset..]) {
+                    return Err(own());
                 }
-                out.push(b' ');
+            }
+            let (mut recolored, mut others) = (Vec::new(), others.into_iter());
+            self.append_binary(&row, &mut recolored);
+            for column in &self.to.columns {
+                match is_color(column) {
+                    true => number::print(column.get(&recolored, Endian::Little), out),
+                    false => out.extend_from_slice(others.next().ok_or_else(own)?),
+                }
+                out.push(self.separator);
             }
             out.pop();
             out.push(b'\n');
@@ -209,18 +226,24 @@ impl Recoloring<'_> {
     }
 }
 
+/// What is written otherwise in the other rows.
+const COLORS: [&str; 4] = [RED, GREEN, BLUE, ALPHA];
+
 /// What to tell of colours in a finished file.
-pub(super) fn note(asked: Colors, depth: Depth) -> Option<String> {
+pub(super) fn note(asked: Colors, depth: Depth, family: &str) -> Option<String> {
     let told = match (asked, depth) {
         (Colors::Auto, Depth::Full) => {
-            "colours have 16 bits here, which many viewers of PLY do not read: \
-             `write.colors = \"8bit\"` writes their upper 8"
+            let told = format!(
+                "colours have 16 bits here, which many viewers of {family} do not read: \
+                 `write.colors = \"8bit\"` writes their upper 8"
+            );
+            return Some(told);
         }
         (Colors::Auto, Depth::Mixed) => {
             "some colours are multiples of 256 and others of 257: both are taken for 8 bits"
         }
         (Colors::Auto, Depth::Unscaled) => {
-            "colours are 0 to 255 in the input, though LAS means 0 to 65535: they are taken for 8 \
+            "colours are 0 to 255 in the input, though 16 bits mean 0 to 65535: they are taken for 8 \
              bits that its writer did not scale"
         }
         (Colors::Eight, Depth::Full) => "colours are cut to their upper 8 bits of 16",

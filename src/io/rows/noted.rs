@@ -1,29 +1,24 @@
-//! The comments in which a PLY file says how it was made.
-
-use std::path::Path;
+//! The comments in which a header says how its file was made.
 
 use super::comments::pieces;
-use super::header::PlyHeader;
-use crate::Result;
-use crate::io::origin::Origin;
 
 /// What begins the comment that holds the text, and its further pieces.
 const NOTE: &str = "pointmill: ";
 const NOTE_MORE: &str = "pointmill+ ";
 
 /// Bytes of the longest text: headers of 1 MiB are read, and some readers make room for less.
-pub(super) const LONGEST: usize = 256 << 10;
+pub(crate) const LONGEST: usize = 256 << 10;
 
-/// The header lines that hold `text`. They are of one length for all texts of a length that have
+/// The header lines that hold `text` behind what begins a comment. They are of one length for all texts of a length that have
 /// their blanks at the same places.
-pub(super) fn lines(text: &str) -> String {
+pub(crate) fn lines(begins: &str, text: &str) -> String {
     let begin = |n: usize| if n == 0 { NOTE } else { NOTE_MORE };
     let each = pieces(text).into_iter().enumerate();
-    each.map(|(n, piece)| format!("comment {}{piece}\n", begin(n))).collect()
+    each.map(|(n, piece)| format!("{begins}{}{piece}\n", begin(n))).collect()
 }
 
 /// Takes the text out of the comments of a header; None if they have none.
-pub(super) fn take(comments: &mut Vec<String>) -> Option<String> {
+pub(crate) fn take(comments: &mut Vec<String>) -> Option<String> {
     let first = comments.iter().position(|comment| comment.starts_with(NOTE))?;
     let more = comments[first + 1..].iter().take_while(|c| c.starts_with(NOTE_MORE)).count();
     let taken = comments.drain(first..=first + more);
@@ -34,13 +29,6 @@ pub(super) fn take(comments: &mut Vec<String>) -> Option<String> {
     Some(taken.map(text).collect())
 }
 
-/// What the file at `path` says of how it was made; None if it says nothing.
-pub(super) fn read(path: &Path) -> Result<Option<String>> {
-    let (file, origin) = Origin::open(path)?;
-    let mut header = PlyHeader::read(&file, path, origin.length())?;
-    Ok(take(&mut header.comments))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -48,7 +36,7 @@ mod tests {
     #[test]
     fn a_text_is_taken_from_among_other_comments() {
         let text = format!("{{\"a\": [{}]}}", "1 2, ".repeat(1000));
-        let lines = format!("comment before\n{}comment pointmill+ x\n", lines(&text));
+        let lines = format!("comment before\n{}comment pointmill+ x\n", lines("comment ", &text));
         let mut all: Vec<String> =
             lines.lines().map(|line| line["comment ".len()..].to_owned()).collect();
         // One that is no piece of it, as another comes between.

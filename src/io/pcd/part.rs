@@ -1,0 +1,198 @@
+//! Reads the points of a part of a PCD file, however they are written.
+
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::sync::atomic::Ordering;
+
+use super::file::PcdFile;
+use super::lzf::Unpacker;
+use crate::io::rows::fields::{Delimiter, Fields};
+use crate::io::rows::lines::{Lines, shown};
+use crate::io::rows::number;
+use crate::point::{Dimension, Endian, PointBatch, Scalar, Schema};
+use crate::stage::Part;
+use crate::{Error, Result};
+
+/// Points one after the other, as records but for rows and columns.
+pub(super) enum Points<'a> {
+    /// At this byte of the file.
+    Binary(File, u64),
+    /// On lines.
+    Ascii(AsciiPoints<'a>),
+    /// Each field where its values are unpacked.
+    Packed(Vec<Unpacker<'a>>),
+}
+
+/// Points on lines.
+pub(super) struct AsciiPoints<'a> {
+    pub lines: Lines<'a>,
+    /// Where the numbers of a line go; None for padding.
+    pub numbers: Vec<Option<(Scalar, usize)>>,
+}
+
+/// The points of a part.
+pub(super) struct PcdPart<'a> {
+    pub file: &'a PcdFile,
+    pub points: Points<'a>,
+    pub schema: &'a Schema,
+    /// Bytes of a record without row and column.
+    pub own: usize,
+    /// The cell of the next point, and how many are left.
+    pub cell: u64,
+    pub left: u64,
+    pub source: u32,
+    /// The points of a grid before they get their rows and columns; or the values of one field.
+    pub buffer: Vec<u8>,
+}
+
+impl Part for PcdPart<'_> {
+    fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
+        batch.source = self.source;
+        batch.clear();
+        let outcome = loop {
+            let outcome = self.fill(batch);
+            // Cells without a point may have been all.
+            if outcome.is_err() || !batch.is_empty() || self.left == 0 {
+                break outcome;
+            }
+        };
+        self.file.origin.vouch(outcome, batch.is_empty())
+    }
+}
+
+impl PcdPart<'_> {
+    fn fill(&mut self, batch: &mut PointBatch) -> Result<()> {
+        let points = self.left.min(batch.capacity() as u64) as usize;
+        let (own, stride) = (self.own, self.schema.stride);
+        let records = batch.refill(points);
+        match &mut self.points {
+            Points::Binary(file, at) if own == stride => read_at(self.file, file, at, records)?,
+            Points::Binary(file, at) => {
+                self.buffer.resize(points * own, 0);
+                read_at(self.file, file, at, &mut self.buffer)?;
+                for (point, record) in
+                    self.buffer.chunks_exact(own).zip(records.chunks_exact_mut(stride))
+                {
+                    record[..own].copy_from_slice(point);
+                }
+            }
+            Points::Ascii(ascii) => {
+                for (n, record) in records.chunks_exact_mut(stride).enumerate() {
+                    ascii.point(self.file, self.cell + n as u64, record)?;
+                }
+            }
+            Points::Packed(fields) => {
+                let mut place = 0;
+                for (unpacker, field) in fields.iter_mut().zip(&self.file.header.fields) {
+                    let bytes = field.bytes();
+                    self.buffer.resize(points * bytes, 0);
+                    unpacker.read(&mut self.buffer)?;
+                    let values = self.buffer.chunks_exact(bytes);
+                    for (value, record) in values.zip(records.chunks_exact_mut(stride)) {
+                        record[place..place + bytes].copy_from_slice(value);
+                    }
+                    place += bytes;
+                }
+            }
+        }
+        if self.file.is_grid() {
+            let width = self.file.header.width;
+            for (cell, record) in (self.cell..).zip(records.chunks_exact_mut(stride)) {
+                let place = [(cell / width) as u32, (cell % width) as u32];
+                let bytes = place.map(u32::to_le_bytes);
+                record[own..own + 8].copy_from_slice(bytes.as_flattened());
+            }
+        }
+        self.cell += points as u64;
+        self.left -= points as u64;
+        self.leave_out(batch);
+        Ok(())
+    }
+
+    /// Leaves cells out that have no point.
+    fn leave_out(&self, batch: &mut PointBatch) {
+        let Some(axes) = self.schema.coordinates() else { return };
+        let floats: Vec<&Dimension> = axes.into_iter().filter(|d| d.scalar.is_float()).collect();
+        let is_empty = |record: &[u8]| {
+            floats.iter().any(|axis| axis.get(record, Endian::Little).as_f64().is_nan())
+        };
+        let empty = batch.iter().filter(|record| is_empty(record)).count() as u64;
+        if empty > 0 {
+            self.file.empty.fetch_add(empty, Ordering::Relaxed);
+            batch.retain(|_, record| !is_empty(record));
+        }
+    }
+}
+
+/// Reads points at a byte, which moves behind them.
+fn read_at(pcd: &PcdFile, file: &File, at: &mut u64, into: &mut [u8]) -> Result<()> {
+    let read = file.read_exact_at(into, *at);
+    read.map_err(|e| Error::io(&pcd.path, "read points", e).at_byte(*at))?;
+    *at += into.len() as u64;
+    Ok(())
+}
+
+impl AsciiPoints<'_> {
+    /// Reads the next line, which is that of a cell, into a record.
+    fn point(&mut self, file: &PcdFile, cell: u64, record: &mut [u8]) -> Result<()> {
+        let path = &file.path;
+        let Some((start, end)) = self.lines.next()? else {
+            let told = format!("the file ends after {cell} of {} points", file.header.points);
+            return Err(Error::data(path, told)
+                .at_byte(self.lines.length())
+                .help("the file is cut short, or its header is wrong"));
+        };
+        let line = self.lines.text(start, end);
+        // Some programs write commas.
+        let between = if line.contains(&b',') { Delimiter::Mark(b',') } else { Delimiter::Blanks };
+        let number = self.lines.number();
+        let fail = |told: String, place: usize| {
+            Error::data(path, format!("line {number}: {told}"))
+                .at_byte(self.lines.byte(start + place))
+                .help(
+                    "correct the line, or write the file again: each has the numbers of its point",
+                )
+        };
+        let mut fields = Fields::new(line, between);
+        for (n, target) in self.numbers.iter().enumerate() {
+            let Some(field) = fields.next() else {
+                let told = format!("{n} numbers, the header has {}", self.numbers.len());
+                return Err(fail(told, 0));
+            };
+            let Some((scalar, offset)) = target else { continue };
+            if !number::parse(field, *scalar, &mut record[*offset..]) {
+                let place = fields.place() - field.len();
+                let shown = shown(&String::from_utf8_lossy(field));
+                return Err(fail(format!("`{shown}` is no number of the header's type"), place));
+            }
+            if *scalar == Scalar::F32 && number::loses_digits(field) {
+                file.rounded.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        match fields.next() {
+            None => Ok(()),
+            Some(_) => {
+                let told = format!("more numbers than the header's {}", self.numbers.len());
+                Err(fail(told, fields.place()))
+            }
+        }
+    }
+
+    /// True if a coordinate has more digits than the 4 bytes of its type hold. What is wrong with a
+    /// line is told when it is read.
+    pub fn outgrow_float(mut self, axes: &[usize]) -> Result<bool> {
+        while let Some((start, end)) = self.lines.next()? {
+            let line = self.lines.text(start, end);
+            let between =
+                if line.contains(&b',') { Delimiter::Mark(b',') } else { Delimiter::Blanks };
+            let mut fields = Fields::new(line, between);
+            for n in 0..=axes.last().copied().unwrap_or(0) {
+                let Some(field) = fields.next() else { break };
+                if axes.contains(&n) && number::loses_digits(field) {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
+}

@@ -1,0 +1,360 @@
+//! Reads texts as one scan, stretch by stretch.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::RECORDS;
+use super::columns::{dimensions, guessed, placed, scalar};
+use super::head::{LONGEST_LINE, TextHead, without_mark};
+use super::ptx::{self, PtxScan, PtxText};
+use super::survey::{CORRECT, Stretch, Survey, few, no_number, survey};
+use crate::error::shown;
+use crate::io::origin::Origin;
+use crate::io::rows::facts::ColumnFacts;
+use crate::io::rows::fields::{Delimiter, Fields, is_comment, is_count};
+use crate::io::rows::lines::Lines;
+use crate::io::rows::number;
+use crate::point::names::{BLUE, COLUMN, GREEN, INTENSITY, POINT_SOURCE_ID, RED, ROW, XYZ};
+use crate::point::{Dimension, Endian, Layout, Metadata, PointBatch, Scalar, Schema};
+use crate::stage::{Input, Part, ReadKeys, Source};
+use crate::{Error, Result};
+
+/// Kinds of texts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum TextKind {
+    /// A point a line.
+    Lines,
+    /// The same, of known columns.
+    Pts,
+    /// Scans with grids and poses.
+    Ptx,
+}
+
+/// One text that was looked through.
+struct TextFile {
+    path: PathBuf,
+    origin: Origin,
+    separator: Delimiter,
+    /// What the columns are; None for those that are not read.
+    columns: Vec<Option<String>>,
+    scans: Vec<PtxScan>,
+    found: Survey,
+    warnings: Vec<String>,
+}
+
+impl TextFile {
+    fn open(path: &Path, kind: TextKind, keys: &ReadKeys) -> Result<TextFile> {
+        let (file, origin) = Origin::open(path)?;
+        let opened = match kind {
+            TextKind::Ptx => Self::ptx(file, path, &origin),
+            _ => Self::lines(file, path, &origin, kind, keys),
+        }?;
+        origin.unchanged()?;
+        if opened.columns.iter().flatten().count() > DIMENSIONS_MOST {
+            let told = format!("it has more than {DIMENSIONS_MOST} columns");
+            return Err(Error::data(path, told).help("name those that are read in `read.columns`"));
+        }
+        Ok(opened)
+    }
+
+    fn lines(
+        file: File,
+        path: &Path,
+        origin: &Origin,
+        kind: TextKind,
+        keys: &ReadKeys,
+    ) -> Result<TextFile> {
+        let length = origin.length();
+        let head = TextHead::read(file, path, length)?;
+        let named = match &keys.columns {
+            Some(names) if names.len() != head.columns => {
+                let told = format!(
+                    "`read.columns` names {} columns, and the first point has {} numbers",
+                    names.len(),
+                    head.columns
+                );
+                return Err(Error::pipeline(told).at(path).help("name a column `_` to skip it"));
+            }
+            given => given.as_ref().or(head.names.as_ref()),
+        };
+        let named = named.map(|names| dimensions(names)).transpose().map_err(|told| {
+            let help = "`read.columns = [\"x\", \"y\", \"z\"]` would say what the columns are";
+            Error::data(path, told).help(help)
+        })?;
+        let looks = |n: usize| match &named {
+            None => n >= 3,
+            Some(named) => named[n].as_deref().is_some_and(|name| !XYZ.contains(&name)),
+        };
+        let looks = (0..head.columns).map(looks).collect();
+        let found = survey(origin.reopen()?, path, length, &head, looks)?;
+        let mut warnings = Vec::new();
+        let columns = match named {
+            Some(named) => named,
+            None => {
+                let (names, told) = guessed(path, &found.facts, kind == TextKind::Pts)?;
+                warnings.extend(told);
+                names.into_iter().map(|name| Some(name.to_owned())).collect()
+            }
+        };
+        let (points, claimed) = (found.points, found.claimed.unwrap_or(found.points));
+        if claimed > points {
+            let told = format!("it says that it has {claimed} points, and ends after {points}");
+            return Err(Error::data(path, told)
+                .at_byte(length)
+                .help("the file is cut short, or the number is wrong: correct it"));
+        }
+        if claimed < points {
+            let said = "it says that it has";
+            warnings.push(format!("{}: {said} {claimed} points, and has {points}", shown(path)));
+        }
+        let (path, origin) = (path.to_owned(), origin.clone());
+        let separator = head.separator;
+        Ok(TextFile { path, origin, separator, columns, scans: Vec::new(), found, warnings })
+    }
+
+    fn ptx(file: File, path: &Path, origin: &Origin) -> Result<TextFile> {
+        let (PtxText { scans, columns }, found) = ptx::survey(file, path, origin.length())?;
+        let further: &[&str] = match columns {
+            3 => &[],
+            4 => &[INTENSITY],
+            6 => &[RED, GREEN, BLUE],
+            7 => &[INTENSITY, RED, GREEN, BLUE],
+            _ => {
+                let told = format!("a cell of PTX has 3, 4, 6 or 7 numbers, not {columns}");
+                return Err(Error::data(path, told));
+            }
+        };
+        let names = XYZ.iter().chain(further);
+        let columns = names.map(|&name| Some(name.to_owned())).collect();
+        let cells: u64 = scans.iter().map(|scan| scan.columns * scan.rows).sum();
+        let empty = cells - found.points;
+        let told = format!("{}: {empty} of {cells} cells have no point", shown(path));
+        let warnings = if empty > 0 { vec![told] } else { Vec::new() };
+        let (path, origin) = (path.to_owned(), origin.clone());
+        Ok(TextFile { path, origin, separator: Delimiter::Blanks, columns, scans, found, warnings })
+    }
+}
+
+/// The most columns that are read.
+const DIMENSIONS_MOST: usize = 256;
+
+/// Opens texts whose columns are the same.
+///
+/// # Errors
+///
+/// A file that is no such text, columns of which nobody says what they are, a line that is not like
+/// the others, and files whose columns differ.
+pub(super) fn open(paths: &[PathBuf], kind: TextKind, keys: &ReadKeys) -> Result<Box<dyn Source>> {
+    let files = paths.iter().map(|path| TextFile::open(path, kind, keys));
+    let files = files.collect::<Result<Vec<_>>>()?;
+    let Some(first) = files.first() else {
+        return Err(Error::pipeline("no text to read"));
+    };
+    if let Some(other) = files.iter().find(|file| file.columns != first.columns) {
+        let told = format!("its columns are not those of {}", shown(&first.path));
+        return Err(Error::data(&other.path, told).help("convert one of them first"));
+    }
+    let mut facts = first.found.facts.clone();
+    for file in &files[1..] {
+        facts.iter_mut().zip(&file.found.facts).for_each(|(all, one)| all.join(one));
+    }
+    let schema = Arc::new(schema(&first.columns, &facts, kind == TextKind::Ptx));
+    let mut ends = Vec::new();
+    let mut parts = 0usize;
+    for file in &files {
+        parts += file.found.stretches.len();
+        ends.push(parts);
+    }
+    Ok(Box::new(TextSource { schema, metadata: Metadata::default(), files, ends }))
+}
+
+fn schema(columns: &[Option<String>], facts: &[ColumnFacts], is_ptx: bool) -> Schema {
+    let read = columns.iter().zip(facts);
+    let read =
+        read.filter_map(|(name, facts)| Some((name.clone()?, scalar(name.as_ref()?, facts))));
+    let of_grid = [(ROW, Scalar::U32), (COLUMN, Scalar::U32), (POINT_SOURCE_ID, Scalar::U16)];
+    let of_grid = of_grid.into_iter().filter(|_| is_ptx);
+    let of_grid = of_grid.map(|(name, scalar)| (name.to_owned(), scalar));
+    let (dimensions, stride) = placed(read.chain(of_grid));
+    let layout = if is_ptx { Layout::plain(ptx::FAMILY) } else { RECORDS };
+    Schema { layout, endian: Endian::Little, stride, dimensions }
+}
+
+/// The points of one or several texts.
+struct TextSource {
+    schema: Arc<Schema>,
+    metadata: Metadata,
+    files: Vec<TextFile>,
+    /// For each file, the number of parts up to its end.
+    ends: Vec<usize>,
+}
+
+impl TextSource {
+    /// The file of a part, and its stretch.
+    fn place(&self, index: usize) -> Option<(usize, &TextFile, Stretch)> {
+        let number = self.ends.partition_point(|&end| end <= index);
+        let before = number.checked_sub(1).map_or(0, |before| self.ends[before]);
+        let file = self.files.get(number)?;
+        Some((number, file, *file.found.stretches.get(index - before)?))
+    }
+}
+
+impl Source for TextSource {
+    fn schema(&self) -> &Arc<Schema> {
+        &self.schema
+    }
+
+    fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    fn inputs(&self) -> Vec<Input> {
+        self.files.iter().map(|file| Input::new(&file.path, file.found.points)).collect()
+    }
+
+    fn points(&self) -> u64 {
+        self.files.iter().map(|file| file.found.points).sum()
+    }
+
+    fn part_bytes(&self) -> u64 {
+        let fields = self.schema.dimensions.len() * size_of::<Option<Dimension>>();
+        (Lines::bytes(LONGEST_LINE) + fields + self.schema.stride) as u64
+    }
+
+    fn parts(&self) -> usize {
+        self.ends.last().copied().unwrap_or(0)
+    }
+
+    fn first_record(&self, index: usize) -> Option<u64> {
+        let (number, _, stretch) = self.place(index)?;
+        let before: u64 = self.files[..number].iter().map(|file| file.found.points).sum();
+        Some(before + stretch.first)
+    }
+
+    fn part(&self, index: usize) -> Result<Box<dyn Part + '_>> {
+        let Some((number, file, stretch)) = self.place(index) else {
+            return Err(Error::internal(format!("part {index} of {}", self.parts())));
+        };
+        let handle = file.origin.reopen()?;
+        let lines = Lines::new(handle, &file.path, stretch.span, stretch.before, LONGEST_LINE);
+        let field = |name: &String| self.schema.find(name).cloned();
+        let fields = file.columns.iter().map(|name| name.as_ref().and_then(field)).collect();
+        let grid = file.scans.get(stretch.scan).map(|&scan| Grid {
+            scan,
+            number: stretch.scan as u64 + 1,
+            cell: stretch.cells,
+        });
+        let (left, source) = (stretch.points, number as u32);
+        Ok(Box::new(TextPart { file, lines, fields, schema: &self.schema, grid, left, source }))
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.files.iter().flat_map(|file| file.warnings.clone()).collect()
+    }
+}
+
+/// Where a part of PTX is in its scan.
+struct Grid {
+    scan: PtxScan,
+    number: u64,
+    cell: u64,
+}
+
+/// The points of one stretch.
+struct TextPart<'a> {
+    file: &'a TextFile,
+    lines: Lines<'a>,
+    /// Of every column, where its numbers go.
+    fields: Vec<Option<Dimension>>,
+    schema: &'a Schema,
+    grid: Option<Grid>,
+    left: u64,
+    source: u32,
+}
+
+impl Part for TextPart<'_> {
+    fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
+        let outcome = self.fill(batch);
+        self.file.origin.vouch(outcome, batch.is_empty())
+    }
+}
+
+impl TextPart<'_> {
+    fn fill(&mut self, batch: &mut PointBatch) -> Result<()> {
+        batch.source = self.source;
+        batch.clear();
+        let points = self.left.min(batch.capacity() as u64) as usize;
+        let stride = self.schema.stride;
+        for record in batch.refill(points).chunks_exact_mut(stride) {
+            self.point(record)?;
+            self.left -= 1;
+        }
+        Ok(())
+    }
+
+    /// Reads the next point.
+    fn point(&mut self, record: &mut [u8]) -> Result<()> {
+        loop {
+            let Some((start, end)) = self.lines.next()? else {
+                let told = "the file has fewer points than when it was looked through";
+                return Err(Error::data(&self.file.path, told).at_byte(self.lines.length()));
+            };
+            let at = self.lines.byte(start);
+            let line = without_mark(self.lines.text(start, end), at);
+            let Some(grid) = &mut self.grid else {
+                if is_comment(line).is_some() || is_count(line) {
+                    continue;
+                }
+                return self.numbers(line, at, record);
+            };
+            let cell = grid.cell;
+            grid.cell += 1;
+            let mut fields = Fields::new(line, Delimiter::Blanks);
+            let mut next = || fields.next().unwrap_or_default();
+            if !ptx::is_empty([next(), next(), next()]) {
+                self.numbers(line, at, record)?;
+                return self.of_grid(cell, record);
+            }
+        }
+    }
+
+    /// Reads the numbers of a line that begins at byte `at`.
+    fn numbers(&self, line: &[u8], at: u64, record: &mut [u8]) -> Result<()> {
+        let (path, number) = (&self.file.path, self.lines.number());
+        let mut fields = Fields::new(line, self.file.separator);
+        for (n, target) in self.fields.iter().enumerate() {
+            let Some(field) = fields.next() else {
+                return Err(few(path, number, n, self.fields.len()).at_byte(at));
+            };
+            let Some(target) = target else { continue };
+            if !number::parse(field, target.scalar, &mut record[target.offset..]) {
+                let at = at + (fields.place() - field.len()) as u64;
+                return Err(no_number(path, number, n, field).at_byte(at));
+            }
+        }
+        match fields.next() {
+            None => Ok(()),
+            Some(_) => {
+                let told = format!("line {number} has more than {} numbers", self.fields.len());
+                Err(Error::data(path, told).at_byte(at).help(CORRECT))
+            }
+        }
+    }
+
+    /// Brings a point of PTX to the coordinates of all scans, and says which cell it is of.
+    fn of_grid(&self, cell: u64, record: &mut [u8]) -> Result<()> {
+        let missing = || Error::internal("a PTX record lacks a dimension");
+        let grid = self.grid.as_ref().ok_or_else(missing)?;
+        let axes = self.schema.coordinates().ok_or_else(missing)?;
+        let own = axes.map(|axis| axis.world(record, Endian::Little));
+        let all = grid.scan.placed(own).map(crate::point::Value::Double);
+        let mut held = axes.iter().zip(all).all(|(axis, v)| axis.put(record, Endian::Little, v));
+        let (row, column) = (cell % grid.scan.rows, cell / grid.scan.rows);
+        for (name, number) in [(ROW, row), (COLUMN, column), (POINT_SOURCE_ID, grid.number)] {
+            let field = self.schema.find(name).ok_or_else(missing)?;
+            held &= field.put(record, Endian::Little, crate::point::Value::Unsigned(number));
+        }
+        if held { Ok(()) } else { Err(Error::internal("a number of PTX does not fit its field")) }
+    }
+}

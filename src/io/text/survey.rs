@@ -1,0 +1,164 @@
+//! What is in a text, found by looking through it once: points, types, and where threads may begin.
+
+use std::fs::File;
+use std::path::Path;
+
+use super::head::{LONGEST_LINE, TextHead};
+use crate::io::rows::facts::ColumnFacts;
+use crate::io::rows::fields::{Delimiter, Fields, is_comment, is_count};
+use crate::io::rows::lines::{Lines, shown};
+use crate::{Error, Result};
+
+/// Bytes of text that one part reads at least.
+const PART_BYTES: u64 = 1 << 22;
+
+/// Lines that one part reads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Stretch {
+    /// Bytes from where to where.
+    pub span: [u64; 2],
+    /// Lines before it.
+    pub before: u64,
+    /// Points before it in the file, and in it.
+    pub first: u64,
+    pub points: u64,
+    /// In PTX: which scan of the file it is of, and cells of that scan before it.
+    pub scan: usize,
+    pub cells: u64,
+}
+
+/// What a survey finds.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Survey {
+    /// Of every column.
+    pub facts: Vec<ColumnFacts>,
+    /// In the order of the file.
+    pub stretches: Vec<Stretch>,
+    pub points: u64,
+    /// How many points lines with one number say that there are.
+    pub claimed: Option<u64>,
+}
+
+/// Collects the facts and stretches of a text.
+pub(super) struct Surveyor<'a> {
+    path: &'a Path,
+    separator: Delimiter,
+    facts: Vec<ColumnFacts>,
+    /// Columns of which the numbers are looked at; the others are only counted.
+    looks: Vec<bool>,
+    stretches: Vec<Stretch>,
+    points: u64,
+}
+
+impl<'a> Surveyor<'a> {
+    pub fn new(path: &'a Path, separator: Delimiter, looks: Vec<bool>) -> Self {
+        let facts = vec![ColumnFacts::NONE; looks.len()];
+        Surveyor { path, separator, facts, looks, stretches: Vec::new(), points: 0 }
+    }
+
+    /// Adds the line `text`, number `line`, which begins at byte `at`.
+    pub fn add(&mut self, text: &[u8], line: u64, at: u64) -> Result<()> {
+        let mut fields = Fields::new(text, self.separator);
+        for (n, (looks, facts)) in self.looks.iter().zip(&mut self.facts).enumerate() {
+            let Some(field) = fields.next() else {
+                return Err(few(self.path, line, n, self.looks.len()).at_byte(at));
+            };
+            if *looks && !facts.add(field) {
+                let at = at + (fields.place() - field.len()) as u64;
+                return Err(no_number(self.path, line, n, field).at_byte(at));
+            }
+        }
+        if fields.next().is_some() {
+            let told = format!("line {line} has more than the {} numbers", self.looks.len());
+            return Err(Error::data(self.path, format!("{told} of the first point"))
+                .at_byte(at)
+                .help(CORRECT));
+        }
+        self.points += 1;
+        Ok(())
+    }
+
+    /// Begins a new stretch at byte `at` if the last one is long enough, or `must` end.
+    pub fn begin(&mut self, at: u64, before: u64, scan: usize, cells: u64, must: bool) {
+        if let Some(last) = self.stretches.last_mut() {
+            if !must && at - last.span[0] < PART_BYTES {
+                return;
+            }
+            last.span[1] = last.span[1].min(at);
+            last.points = self.points - last.first;
+        }
+        let (span, first) = ([at, u64::MAX], self.points);
+        self.stretches.push(Stretch { span, before, first, points: 0, scan, cells });
+    }
+
+    /// Says that the stretch ends at byte `at`.
+    pub fn end(&mut self, at: u64) {
+        if let Some(last) = self.stretches.last_mut() {
+            last.span[1] = last.span[1].min(at);
+            last.points = self.points - last.first;
+        }
+    }
+
+    /// As [`add`](Self::add), for a line that is no point.
+    pub fn pass(&mut self, text: &[u8], line: u64, at: u64) -> Result<()> {
+        self.add(text, line, at)?;
+        self.points -= 1;
+        Ok(())
+    }
+
+    pub fn finish(mut self, end: u64, claimed: Option<u64>) -> Survey {
+        self.end(end);
+        self.stretches.retain(|stretch| stretch.points > 0);
+        let Surveyor { facts, stretches, points, .. } = self;
+        Survey { facts, stretches, points, claimed }
+    }
+}
+
+/// What helps where a line is wrong.
+pub(super) const CORRECT: &str =
+    "correct the line, or write the file again: each line has as many numbers as the first";
+
+/// The error of a line with too few numbers.
+pub(super) fn few(path: &Path, line: u64, found: usize, columns: usize) -> Error {
+    let told = format!("line {line} has {found} numbers, the first point has {columns}");
+    Error::data(path, told).help(CORRECT)
+}
+
+/// The error of a field that is no number.
+pub(super) fn no_number(path: &Path, line: u64, column: usize, field: &[u8]) -> Error {
+    let field = shown(&String::from_utf8_lossy(field));
+    let told = format!("line {line}: `{field}` in column {} is no number", column + 1);
+    Error::data(path, told).help(CORRECT)
+}
+
+/// Looks through a text that begins with `head`; `looks` says at which of its columns.
+///
+/// # Errors
+///
+/// The first line that has more or fewer numbers than the first point, or something else.
+pub(super) fn survey(
+    file: File,
+    path: &Path,
+    length: u64,
+    head: &TextHead,
+    looks: Vec<bool>,
+) -> Result<Survey> {
+    let mut lines = Lines::new(file, path, [head.body, length], head.lines, LONGEST_LINE);
+    let mut surveyor = Surveyor::new(path, head.separator, looks);
+    let mut claimed: Option<u64> = None;
+    while let Some((start, end)) = lines.next()? {
+        let (text, at) = (lines.text(start, end), lines.byte(start));
+        let text = super::head::without_mark(text, at);
+        if is_comment(text).is_some() {
+            continue;
+        }
+        if is_count(text) {
+            let count = std::str::from_utf8(text.trim_ascii()).ok().and_then(|t| t.parse().ok());
+            claimed = Some(claimed.unwrap_or(0).saturating_add(count.unwrap_or(u64::MAX)));
+            continue;
+        }
+        surveyor.begin(at, lines.number() - 1, 0, 0, false);
+        surveyor.add(text, lines.number(), at)?;
+    }
+    Ok(surveyor.finish(length, claimed))
+}
