@@ -13,7 +13,7 @@ use std::time::Duration;
 use fuzzing::campaign::Campaign;
 use fuzzing::harness::Harness;
 use fuzzing::judge::{Judgement, Outcome, refused};
-use fuzzing::{TARGETS, Target, las, las_seeds, laz, mutate, pipeline, ply, text};
+use fuzzing::{TARGETS, Target, formats, las, las_seeds, laz, mutate, pipeline, ply, text};
 use support::allocator;
 
 #[global_allocator]
@@ -65,6 +65,29 @@ fn compressed_points_of_any_bytes_fail_or_read() {
 #[test]
 fn ply_files_of_any_bytes_fail_or_read() {
     bounded(ply::TARGET, 20_000, 200);
+}
+
+#[test]
+fn texts_of_points_of_any_bytes_fail_or_read() {
+    bounded(formats::XYZ, 8000, 60);
+    bounded(formats::PTX, 8000, 25);
+}
+
+#[test]
+fn pcd_files_of_any_bytes_fail_or_read() {
+    bounded(formats::PCD, 8000, 60);
+}
+
+#[test]
+fn meshes_of_any_bytes_fail_or_read() {
+    bounded(formats::OBJ, 4000, 15);
+    bounded(formats::OFF, 4000, 20);
+    bounded(formats::STL, 4000, 10);
+}
+
+#[test]
+fn e57_files_of_any_bytes_fail_or_read() {
+    bounded(formats::E57, 4000, 25);
 }
 
 #[test]

@@ -149,7 +149,8 @@ pub fn first_bytes(path: &Path) -> Result<Vec<u8>> {
 /// The error of the file at `path`, which begins with `first` and was to be `wanted`.
 pub fn not(wanted: &str, path: &Path, first: &[u8], formats: &Formats) -> Error {
     let registered = formats.sniffed(first).filter(|format| format.called() != wanted);
-    match (registered, Sniffed::of(first)) {
+    let found = Some(Sniffed::of(first)).filter(|found| found.name() != wanted);
+    match (registered, found.unwrap_or(Sniffed::Unknown)) {
         (Some(format), _) => {
             Error::data(path, format!("this is {}, not {wanted}", format.called()))
                 .at_byte(0)

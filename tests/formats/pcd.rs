@@ -121,7 +121,7 @@ fn others_ways_to_write_pcd_are_read() {
         "F F F U F F F U",
         "1 1 1 1 1 1 1 1",
     ];
-    write(at, "rgba.pcd", &header(fields, 1, 1, "ascii"), b"1 2 3 4278255873 0 0 1 9\n");
+    write(at, "rgba.pcd", &header(fields, 1, 1, "ascii"), b"1 2 3 4278255361 0 0 1 9\n");
     let lines = [
         "X,Y,Z,NormalX,NormalY,NormalZ,Intensity,Red,Green,Blue,Alpha",
         "1,2,3,0,0,1,9,0,255,1,255",

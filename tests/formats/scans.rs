@@ -59,8 +59,9 @@ fn every_scan_is_read_or_refused_for_what_is_wrong() {
                 // What we write of it is the same again.
                 let csv = std::fs::read(at.path().join("o.csv")).unwrap();
                 for to in ["p.pcd", "p.e57", "p.txt"] {
-                    let (code, _, told) =
-                        pointmill(at.path(), &["convert", "o.csv", "-o", to, "--quiet"]);
+                    let header = if to == "p.txt" { &["--header", "true"][..] } else { &[] };
+                    let arguments = [&["convert", "o.csv", "-o", to, "--quiet"], header].concat();
+                    let (code, _, told) = pointmill(at.path(), &arguments);
                     assert_eq!(code, 0, "{name} {to}: {told}");
                     let (code, _, told) =
                         pointmill(at.path(), &["convert", to, "-o", "q.csv", "--quiet"]);

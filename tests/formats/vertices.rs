@@ -33,13 +33,13 @@ fn vertices_of_off_are_read_with_what_its_first_word_says() {
         ("a.off", b"OFF\n# two\n2 1 0\n\n1 2 3\n4 5 6 # last\n3 0 1 0\n"),
         ("b.off", b"COFF 1 0 0\n1 2 3 255 0 7 255\n"),
         ("c.off", b"NOFF\n1 0 0\n1 2 3 0 0 1\n"),
-        ("d.off", b"OFF\n1 0 0\n1 2 3 0.5 0 1\n"),
+        ("d.off", b"OFF\n1 0 0\n1 2 3 0.123 0 1\n"),
     ]);
     let at = at.path();
     assert_eq!(points(at, "a.off"), ["X,Y,Z", "1,2,3", "4,5,6"]);
     assert_eq!(points(at, "b.off"), ["X,Y,Z,Red,Green,Blue", "1,2,3,255,0,7"]);
     assert_eq!(points(at, "c.off"), ["X,Y,Z,NormalX,NormalY,NormalZ", "1,2,3,0,0,1"]);
-    assert_eq!(points(at, "d.off"), ["X,Y,Z,Red,Green,Blue", "1,2,3,32768,0,65535"]);
+    assert_eq!(points(at, "d.off"), ["X,Y,Z,Red,Green,Blue", "1,2,3,8061,0,65535"]);
 }
 
 /// A binary STL of so many facets.

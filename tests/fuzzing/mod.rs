@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a harness may panic: not on inputs")]
 
 pub mod campaign;
+pub mod formats;
 pub mod harness;
 pub mod judge;
 pub mod las;
@@ -37,5 +38,17 @@ pub struct Target {
 }
 
 /// Every target.
-pub const TARGETS: [Target; 5] =
-    [las::TARGET, laz::TARGET, ply::TARGET, pipeline::TARGET, text::TARGET];
+pub const TARGETS: [Target; 12] = [
+    las::TARGET,
+    laz::TARGET,
+    ply::TARGET,
+    pipeline::TARGET,
+    text::TARGET,
+    formats::XYZ,
+    formats::PTX,
+    formats::PCD,
+    formats::OBJ,
+    formats::OFF,
+    formats::STL,
+    formats::E57,
+];

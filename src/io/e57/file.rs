@@ -2,7 +2,7 @@
 
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use e57::{E57Reader, PointCloud, RecordDataType};
 
@@ -27,6 +27,8 @@ pub(super) struct E57Scan {
     pub number: u64,
     /// Bits of a point.
     pub bits: u64,
+    /// Points that the file says are invalid and that were met so far.
+    pub invalid: AtomicU64,
 }
 
 /// One file.
@@ -35,8 +37,6 @@ pub(super) struct E57File {
     pub origin: Origin,
     pub scans: Vec<E57Scan>,
     pub crs: Option<String>,
-    /// Points that the file says are invalid and that were met so far.
-    pub invalid: AtomicU64,
     pub warnings: Vec<String>,
 }
 
@@ -87,8 +87,12 @@ impl E57File {
         let scans = (1..).zip(all).filter(|(n, _)| is_chosen(n));
         let scans = scans.map(|(number, cloud)| scan(path, origin.length(), number, cloud));
         let scans = scans.collect::<Result<Vec<_>>>()?;
-        let (path, invalid) = (path.to_owned(), AtomicU64::new(0));
-        Ok(E57File { path, origin, scans, crs, invalid, warnings })
+        Ok(E57File { path: path.to_owned(), origin, scans, crs, warnings })
+    }
+
+    /// Points that were met so far and have no coordinates.
+    pub fn invalid(&self) -> u64 {
+        self.scans.iter().map(|scan| scan.invalid.load(Ordering::Relaxed)).sum()
     }
 
     /// Points that its scans claim.
@@ -116,7 +120,7 @@ fn scan(path: &Path, length: u64, number: u64, cloud: PointCloud) -> Result<E57S
     if pose.is_some_and(|pose| !pose.is_finite()) {
         return Err(fail("its pose is no turn and shift".to_owned()));
     }
-    Ok(E57Scan { cloud, pose, meanings, number, bits })
+    Ok(E57Scan { cloud, pose, meanings, number, bits, invalid: AtomicU64::new(0) })
 }
 
 /// Bits of a value.

@@ -51,6 +51,8 @@ pub(super) struct E57Part<'a> {
     numbered: Option<(Dimension, u64)>,
     source: u32,
     stride: usize,
+    /// Points without coordinates so far.
+    invalid: u64,
 }
 
 impl<'a> E57Part<'a> {
@@ -95,7 +97,18 @@ impl<'a> E57Part<'a> {
         let has_own = scan.meanings.contains(&Meaning::Of(POINT_SOURCE_ID.to_owned()));
         let numbered = find(POINT_SOURCE_ID).zip(number.filter(|_| !has_own));
         let stride = schema.stride;
-        Ok(E57Part { file, scan, points, targets, axes, normal, numbered, source, stride })
+        Ok(E57Part {
+            file,
+            scan,
+            points,
+            targets,
+            axes,
+            normal,
+            numbered,
+            source,
+            stride,
+            invalid: 0,
+        })
     }
 
     fn fill(&mut self, batch: &mut PointBatch) -> Result<()> {
@@ -113,7 +126,8 @@ impl<'a> E57Part<'a> {
             match self.point(&values, &mut record)? {
                 true => batch.extend(&record),
                 false => {
-                    self.file.invalid.fetch_add(1, Ordering::Relaxed);
+                    self.invalid += 1;
+                    self.scan.invalid.fetch_max(self.invalid, Ordering::Relaxed);
                 }
             }
         }

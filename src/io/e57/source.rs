@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use e57::RecordDataType;
 
@@ -138,7 +137,7 @@ impl Source for E57Source {
     }
 
     fn inputs(&self) -> Vec<Input> {
-        let found = |file: &E57File| file.points() - file.invalid.load(Ordering::Relaxed);
+        let found = |file: &E57File| file.points().saturating_sub(file.invalid());
         self.files.iter().map(|file| Input::new(&file.path, found(file))).collect()
     }
 
@@ -177,7 +176,7 @@ impl Source for E57Source {
 
     fn warnings(&self) -> Vec<String> {
         let invalid = |file: &E57File| {
-            let invalid = file.invalid.load(Ordering::Relaxed);
+            let invalid = file.invalid();
             let (points, path) = (Grouped(file.points()), shown(&file.path));
             let told =
                 |n| format!("{path}: {n} of {points} points are said to have no coordinates");

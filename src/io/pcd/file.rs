@@ -18,6 +18,9 @@ use crate::point::{Dimension, Endian, Scalar, Schema};
 use crate::report::Grouped;
 use crate::{Error, Result};
 
+/// Points of one part of a binary file.
+pub(super) const PART_POINTS: u64 = 1 << 17;
+
 /// One file, its header read.
 pub(super) struct PcdFile {
     pub path: PathBuf,
@@ -25,8 +28,8 @@ pub(super) struct PcdFile {
     pub header: PcdHeader,
     /// What its packed bytes are; None for files that are not packed.
     pub packed: Option<Packed>,
-    /// Cells without a point that were met so far.
-    pub empty: AtomicU64,
+    /// Cells without a point that were met so far, of each part: a part may be read again.
+    pub empty: Vec<AtomicU64>,
     /// Numbers of a text that have more digits than the `float` that holds them.
     pub rounded: AtomicU64,
     /// Where packed values may be read from, once somebody has looked.
@@ -43,12 +46,12 @@ impl PcdFile {
             PcdData::Compressed => Some(Packed::read(&file, path, &header, length)?),
             _ => None,
         };
-        let opened = PcdFile {
+        let mut opened = PcdFile {
             path: path.to_owned(),
             origin,
             packed,
             header,
-            empty: AtomicU64::new(0),
+            empty: Vec::new(),
             rounded: AtomicU64::new(0),
             marks: Mutex::new(None),
         };
@@ -60,7 +63,24 @@ impl PcdFile {
             return Err(Error::data(path, told));
         }
         opened.bound()?;
+        opened.empty = (0..opened.parts()).map(|_| AtomicU64::new(0)).collect();
         Ok(opened)
+    }
+
+    /// How many parts it is read in.
+    pub fn parts(&self) -> usize {
+        let points = self.header.points;
+        let parts = match (&self.packed, self.header.data) {
+            (Some(packed), _) => packed.parts(&self.header),
+            (_, PcdData::Ascii) => u64::from(points > 0),
+            _ => points.div_ceil(PART_POINTS),
+        };
+        usize::try_from(parts).unwrap_or(usize::MAX)
+    }
+
+    /// Cells without a point that were met so far.
+    pub fn empty(&self) -> u64 {
+        self.empty.iter().map(|of_part| of_part.load(Ordering::Relaxed)).sum()
     }
 
     /// True if its points are a grid.
@@ -157,7 +177,7 @@ impl PcdFile {
     /// What was found while it was read.
     pub fn warnings(&self) -> Vec<String> {
         let path = shown(&self.path);
-        let empty = self.empty.load(Ordering::Relaxed);
+        let empty = self.empty();
         let rounded = self.rounded.load(Ordering::Relaxed);
         let points = self.header.points;
         let of_cells = (empty > 0).then(|| {

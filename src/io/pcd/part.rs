@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::os::unix::fs::FileExt;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::file::PcdFile;
 use super::lzf::Unpacker;
@@ -28,6 +28,8 @@ pub(super) struct AsciiPoints<'a> {
     pub lines: Lines<'a>,
     /// Where the numbers of a line go; None for padding.
     pub numbers: Vec<Option<(Scalar, usize)>>,
+    /// Numbers that lost digits.
+    pub rounded: u64,
 }
 
 /// The points of a part.
@@ -41,6 +43,8 @@ pub(super) struct PcdPart<'a> {
     pub cell: u64,
     pub left: u64,
     pub source: u32,
+    /// Where it says how many cells have no point, and how many had none so far.
+    pub empty: (&'a AtomicU64, u64),
     /// The points of a grid before they get their rows and columns; or the values of one field.
     pub buffer: Vec<u8>,
 }
@@ -80,6 +84,7 @@ impl PcdPart<'_> {
                 for (n, record) in records.chunks_exact_mut(stride).enumerate() {
                     ascii.point(self.file, self.cell + n as u64, record)?;
                 }
+                self.file.rounded.fetch_max(ascii.rounded, Ordering::Relaxed);
             }
             Points::Packed(fields) => {
                 let mut place = 0;
@@ -110,7 +115,7 @@ impl PcdPart<'_> {
     }
 
     /// Leaves cells out that have no point.
-    fn leave_out(&self, batch: &mut PointBatch) {
+    fn leave_out(&mut self, batch: &mut PointBatch) {
         let Some(axes) = self.schema.coordinates() else { return };
         let floats: Vec<&Dimension> = axes.into_iter().filter(|d| d.scalar.is_float()).collect();
         let is_empty = |record: &[u8]| {
@@ -118,7 +123,8 @@ impl PcdPart<'_> {
         };
         let empty = batch.iter().filter(|record| is_empty(record)).count() as u64;
         if empty > 0 {
-            self.file.empty.fetch_add(empty, Ordering::Relaxed);
+            self.empty.1 += empty;
+            self.empty.0.fetch_max(self.empty.1, Ordering::Relaxed);
             batch.retain(|_, record| !is_empty(record));
         }
     }
@@ -166,7 +172,7 @@ impl AsciiPoints<'_> {
                 return Err(fail(format!("`{shown}` is no number of the header's type"), place));
             }
             if *scalar == Scalar::F32 && number::loses_digits(field) {
-                file.rounded.fetch_add(1, Ordering::Relaxed);
+                self.rounded += 1;
             }
         }
         match fields.next() {

@@ -44,7 +44,9 @@ fn field_name(dimension: &str) -> String {
         return ["normal_x", "normal_y", "normal_z"][axis].to_owned();
     }
     let name = property(dimension).unwrap_or(dimension);
-    name.chars().map(|c| if c.is_ascii_graphic() { c } else { '_' }).collect()
+    let name: String = name.chars().map(|c| if c.is_ascii_graphic() { c } else { '_' }).collect();
+    // A field of this name is padding.
+    if name.is_empty() || name == "_" { "unnamed".to_owned() } else { name }
 }
 
 /// What stands above the points.

@@ -2,9 +2,8 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
-use super::file::PcdFile;
+use super::file::{PART_POINTS, PcdFile};
 use super::header::{LONGEST_LINE, PcdData, PcdField};
 use super::lzf::Unpacker;
 use super::part::{AsciiPoints, PcdPart, Points};
@@ -15,9 +14,6 @@ use crate::point::names::XYZ;
 use crate::point::{Metadata, Scalar, Schema};
 use crate::stage::{Input, Part, Source};
 use crate::{Error, Result};
-
-/// Points of one part of a binary file.
-const PART_POINTS: u64 = 1 << 17;
 
 /// What PCD outputs carry on besides points and text.
 #[derive(Debug)]
@@ -55,7 +51,7 @@ pub(super) fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
     let metadata = metadata(first, said.into_iter().next().unwrap_or_default());
     let (mut ends, mut parts) = (Vec::new(), 0);
     for file in &files {
-        parts += parts_of(file);
+        parts += file.parts();
         ends.push(parts);
     }
     Ok(Box::new(PcdSource { schema: Arc::new(schema), metadata, files, ends, wide }))
@@ -109,17 +105,7 @@ fn ascii(file: &PcdFile, wide: bool) -> Result<AsciiPoints<'_>> {
     let span = [header.body, file.origin.length()];
     let handle = file.origin.reopen()?;
     let lines = Lines::new(handle, &file.path, span, header.lines, LONGEST_LINE);
-    Ok(AsciiPoints { lines, numbers: file.schema(wide).1 })
-}
-
-fn parts_of(file: &PcdFile) -> usize {
-    let points = file.header.points;
-    let parts = match (&file.packed, file.header.data) {
-        (Some(packed), _) => packed.parts(&file.header),
-        (_, PcdData::Ascii) => u64::from(points > 0),
-        _ => points.div_ceil(PART_POINTS),
-    };
-    usize::try_from(parts).unwrap_or(usize::MAX)
+    Ok(AsciiPoints { lines, numbers: file.schema(wide).1, rounded: 0 })
 }
 
 /// The points of one or several PCD files.
@@ -161,7 +147,7 @@ impl Source for PcdSource {
     }
 
     fn inputs(&self) -> Vec<Input> {
-        let found = |file: &PcdFile| file.header.points - file.empty.load(Ordering::Relaxed);
+        let found = |file: &PcdFile| file.header.points.saturating_sub(file.empty());
         self.files.iter().map(|file| Input::new(&file.path, found(file))).collect()
     }
 
@@ -225,7 +211,8 @@ impl Source for PcdSource {
         };
         let (source, buffer) = (number as u32, Vec::new());
         let schema = &*self.schema;
-        Ok(Box::new(PcdPart { file, points, schema, own, cell, left, source, buffer }))
+        let empty = (&file.empty[within], 0);
+        Ok(Box::new(PcdPart { file, points, schema, own, cell, left, source, empty, buffer }))
     }
 
     fn warnings(&self) -> Vec<String> {

@@ -32,9 +32,9 @@ impl ColumnFacts {
         self.is_whole && self.least >= 0 && self.most <= 255
     }
 
-    /// True if all may be cosines, and not all of them are whole.
+    /// True if all may be cosines.
     pub fn is_cosine(&self) -> bool {
-        self.is_small && !self.is_whole
+        self.is_small
     }
 
     /// True if all are from 0 to 1.

@@ -21,8 +21,12 @@ pub(super) const SKIPPED: &str = "_";
 /// In words, what is wrong with them: one that is named twice, and coordinates that are missing.
 pub(super) fn dimensions(names: &[String]) -> Result<Vec<Option<String>>, String> {
     let mut all: Vec<Option<String>> = Vec::new();
-    for name in names {
-        let dimension = heading(name).map_or_else(|| name.clone(), str::to_owned);
+    for (n, name) in names.iter().enumerate() {
+        let dimension = match heading(name) {
+            Some(known) => known.to_owned(),
+            None if name.is_empty() => format!("column_{}", n + 1),
+            None => name.clone(),
+        };
         let dimension = (name != SKIPPED).then_some(dimension);
         if let Some(twice) = dimension.as_ref().filter(|_| all.contains(&dimension)) {
             return Err(format!("two columns are `{twice}`"));
@@ -66,7 +70,11 @@ pub(super) fn guessed(
             ([&[INTENSITY][..], &colors].concat(), false)
         }
         rgb if rgb.len() == 3 && rgb.iter().all(ColumnFacts::is_byte) => (colors.into(), !is_pts),
-        normal if normal.len() == 3 && normal.iter().all(ColumnFacts::is_cosine) => {
+        normal
+            if normal.len() == 3
+                && normal.iter().all(ColumnFacts::is_cosine)
+                && normal.iter().any(|axis| !axis.is_whole) =>
+        {
             (NORMAL.into(), true)
         }
         _ => return Err(unnamed(path, facts.len())),

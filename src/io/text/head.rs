@@ -82,7 +82,7 @@ impl TextHead {
                 };
                 return Ok(TextHead { separator, columns, names, lines: before, body, claimed });
             }
-            if heading.is_some() || body.is_some() || names(line).len() < 3 {
+            if heading.is_some() || body.is_some() || names(line).len() < 3 || has_commas(line) {
                 return Err(odd(path, line, lines.number(), lines.byte(start)));
             }
             heading = Some((line.to_vec(), lines.number()));
@@ -145,14 +145,19 @@ fn unlike(path: &Path, line: u64, names: usize, columns: usize) -> Error {
     Error::data(path, told).help("correct the line, or say with `read.columns` what they are")
 }
 
-/// The error of a line that should be a point and is none.
-fn odd(path: &Path, line: &[u8], number: u64, byte: u64) -> Error {
-    let has_comma = |word: &[u8]| {
+/// True for numbers with commas before their decimals.
+fn has_commas(line: &[u8]) -> bool {
+    let is_number = |word: &[u8]| {
         let dotted: Vec<u8> = word.iter().map(|&b| if b == b',' { b'.' } else { b }).collect();
         is_number(&dotted)
     };
     let words = || line.split(|b| b.is_ascii_whitespace() || *b == b';').filter(|w| !w.is_empty());
-    if words().count() >= 3 && words().all(has_comma) {
+    words().count() >= 3 && words().all(is_number)
+}
+
+/// The error of a line that should be a point and is none.
+fn odd(path: &Path, line: &[u8], number: u64, byte: u64) -> Error {
+    if has_commas(line) {
         return Error::data(path, format!("line {number} has decimal commas"))
             .at_byte(byte)
             .help("write the file again with decimal points");
