@@ -2,6 +2,7 @@
 //! embedding program adds its own by implementing one of these traits.
 
 mod format;
+mod keys;
 mod kind;
 mod needs;
 mod rounds;
@@ -20,10 +21,8 @@ use crate::report::Tally;
 
 pub use crate::geom::lattice::{Lattice, Misplaced};
 pub use crate::store::{KeptPoints, KeptReader, Levels};
-pub use format::{
-    Colors, CreateFor, Format, FormatName, Formats, OutputEncoding, ReadKeys, Separator, WriteKeys,
-    foreign,
-};
+pub use format::{CreateFor, Format, FormatName, Formats, foreign};
+pub use keys::{Colors, OutputEncoding, ReadKeys, Separator, WriteKeys};
 pub use kind::{StageKind, StagePlace};
 pub use needs::Needs;
 pub use rounds::{

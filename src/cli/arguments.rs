@@ -45,7 +45,7 @@ pub(super) enum Command {
     Run(PlanArguments),
     /// Reduce scans to the points that matter
     Reduce(Box<ReduceArguments>),
-    /// Convert between LAS, LAZ and PLY
+    /// Convert between LAS, LAZ, PLY, PCD, E57 and texts
     Convert(Box<ConvertArguments>),
     /// Show what files contain, from their headers
     Info(InfoArguments),
@@ -147,14 +147,14 @@ pub(super) struct PredictArguments {
 
 #[derive(Debug, Args)]
 pub(super) struct ConvertArguments {
-    /// LAS, LAZ or PLY files, patterns or folders
+    /// Files of points, patterns or folders
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
     /// A file, which takes all inputs, or a folder (that exists, or with a slash behind), which
     /// takes one output an input
     #[arg(short, long, value_name = "OUT|DIR")]
     pub output: String,
-    /// Format: las, laz or ply [default: by extension; in a folder, the input's]
+    /// Format, such as laz, ply or csv [default: by extension; in a folder, the input's]
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
     /// Points whose coordinates are not finite: drop them, or refuse to write them where the output
@@ -177,7 +177,7 @@ pub(super) struct ConvertArguments {
 
 #[derive(Debug, Args)]
 pub(super) struct PictureArguments {
-    /// LAS, LAZ or PLY files, patterns or folders: a scan each, drawn side by side, 4 at most.
+    /// Files of points, patterns or folders: a scan each, drawn side by side, 4 at most.
     /// Quote a pattern, so that its files are one scan
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,

@@ -51,7 +51,8 @@ fn found<'a>(path: &Path, first: &[u8], formats: &'a Formats) -> Option<&'a Arc<
 /// As [`describe`].
 pub(crate) fn note(path: &Path, formats: &Formats) -> Result<Option<String>> {
     let first = sniff::first_bytes(path)?;
-    found(path, &first, formats).map_or(Ok(None), |format| format.note(path))
+    let begins = found(path, &first, formats).filter(|format| format.sniff(&first));
+    begins.map_or(Ok(None), |format| format.note(path))
 }
 
 /// A description as JSON.

@@ -87,7 +87,7 @@ pub(super) fn told(kind: &str, keys: &Node) -> Option<(String, String)> {
     if let Some((ends @ ("readers" | "writers"), format)) = lower.split_once('.') {
         let does = if ends == "readers" { "read" } else { "write" };
         let told = format!("there is no stage `{kind}`: pointmill does not {does} {format} files");
-        return Some((told, "it reads and writes LAS, LAZ and PLY".to_owned()));
+        return Some((told, "it reads and writes LAS, LAZ, PLY, PCD, E57 and texts".to_owned()));
     }
     let (_, here) = ELSEWHERE.iter().find(|(names, _)| names.contains(&name))?;
     // What is mistyped by a letter is told as such.

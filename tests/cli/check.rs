@@ -39,7 +39,7 @@ fn a_pipeline_that_is_right_is_said_to_be_and_nothing_is_written() {
 fn every_mistake_of_a_pipeline_is_told_at_once() {
     let at = scans(&["a.laz"]);
     let text = "[run]\nthreads = 0\n[[stage]]\nkind = 'read'\npth = 'a.laz'\n\
-                [[stage]]\nkind = 'cels'\n[[stage]]\nkind = 'write'\npath = 'o.xyz'\n";
+                [[stage]]\nkind = 'cels'\n[[stage]]\nkind = 'write'\npath = 'o.zlas'\n";
     fs::write(at.path().join("p.toml"), text).unwrap();
     let places = ["p.toml:2:", "p.toml:5:", "p.toml:7:", "p.toml:10:", "did you mean `cells`?"];
     fails(at.path(), &["check", "p.toml"], 2, &places);

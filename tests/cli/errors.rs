@@ -136,7 +136,7 @@ fn inputs_that_are_not_there_exit_with_1_however_they_are_named() {
     for (input, told) in [
         ("no.laz", "no.laz: cannot open"),
         ("*.las", "IN: no file matches `*.las`"),
-        ("empty", "IN: the folder `empty` has no las, laz or ply file"),
+        ("empty", "IN: the folder `empty` has no las, laz, ply, pcd, e57, ptx, pts or xyz file"),
     ] {
         for command in ["reduce", "convert"] {
             let outcome = pointmill(at.path(), &[command, input, "-o", "b.laz"]);
@@ -157,7 +157,7 @@ fn inputs_that_are_not_there_exit_with_1_however_they_are_named() {
 #[test]
 fn conversions_into_a_folder_are_checked_before_the_first() {
     let at = here();
-    for name in ["a.las", "a.laz", "b.las", "c.txt"] {
+    for name in ["a.las", "a.laz", "b.las", "c.dat"] {
         fs::write(at.path().join(name), b"").unwrap();
     }
     let convert = |arguments: &[&str], parts: &[&str]| {
@@ -165,7 +165,7 @@ fn conversions_into_a_folder_are_checked_before_the_first() {
         assert!(!at.path().join("out").exists());
     };
     convert(&["a.las", "a.laz", "-o", "out/", "--to", "ply"], &["would both become out/a.ply"]);
-    convert(&["c.txt", "-o", "out/"], &["c.txt: its name says no format"]);
+    convert(&["c.dat", "-o", "out/"], &["c.dat: its name says no format"]);
     convert(&["a.las", "b.las", "-o", "out/", "--report", "r.json"], &["--report: is for one"]);
     convert(&["a.las", "b.las", "-o", "out/", "--to", "lax"], &["--to: ", "did you mean `las`?"]);
     convert(&["a.las", "b.las", "-o", "."], &["-o: ./a.las is the input a.las: it cannot be"]);

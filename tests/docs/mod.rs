@@ -224,11 +224,20 @@ fn the_formats_that_are_documented_are_those_that_are_written() {
         assert_eq!(code, 0, "{told}");
         agree(&serde_json::from_str(&printed).unwrap(), command);
     }
-    reduce(folder.path(), "reduced.ply");
-    agree(
-        &pointmill::io::describe(&folder.path().join("reduced.ply"), registry.formats()).unwrap(),
-        "info: PLY",
-    );
+    for (output, section) in [
+        ("reduced.ply", "info: PLY"),
+        ("reduced.pcd", "info: PCD"),
+        ("reduced.e57", "info: E57"),
+        ("reduced.csv", "info: texts"),
+    ] {
+        reduce(folder.path(), output);
+        let output = folder.path().join(output);
+        agree(&pointmill::io::describe(&output, registry.formats()).unwrap(), section);
+    }
+    let obj = folder.path().join("a.obj");
+    fs::write(&obj, "v 1 2 3\n").unwrap();
+    let described = pointmill::io::describe(&obj, registry.formats()).unwrap();
+    agree(&described, "info: OBJ, OFF and STL");
 }
 
 /// Where the links of a page lead, anchors and web addresses left out.

@@ -46,7 +46,9 @@ fn other_formats_under_a_known_name_are_called_what_they_are() {
 
 #[test]
 fn extensions_of_formats_that_are_not_read_are_told_by_name() {
-    for (name, what) in [("x.e57", "E57"), ("x.pcd", "PCD"), ("x.csv", "a text of numbers")] {
+    for (name, what) in
+        [("x.zlas", "Esri's zLAS"), ("x.drc", "Draco"), ("x.neu", "a text of numbers")]
+    {
         let folder = tempfile::tempdir().unwrap();
         let input = folder.path().join(name);
         std::fs::write(&input, b"").unwrap();

@@ -9,7 +9,7 @@ use crate::quantity::parse_count;
 
 #[derive(Debug, Args)]
 pub(crate) struct CompareArguments {
-    /// A scan: a LAS, LAZ or PLY file, a pattern or a folder
+    /// A scan: a file of points, a pattern or a folder
     #[arg(value_name = "FIRST")]
     pub first: String,
     /// Another, over the same place

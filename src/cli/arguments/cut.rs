@@ -6,7 +6,7 @@ use super::shared::CommonArguments;
 
 #[derive(Debug, Args)]
 pub(crate) struct CutArguments {
-    /// A reduction that was made with `--ranks`: a LAS, LAZ or PLY file
+    /// A reduction that was made with `--ranks`: a file of points
     #[arg(value_name = "IN")]
     pub input: String,
     /// The coarser reduction: .las, .laz or .ply

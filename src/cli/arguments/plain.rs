@@ -41,7 +41,7 @@ pub(crate) struct ManArguments {
 
 #[derive(Debug, Args)]
 pub(crate) struct InfoArguments {
-    /// LAS, LAZ or PLY files, patterns or folders
+    /// Files of points, patterns or folders
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<String>,
     /// Print a JSON list with one object a file

@@ -47,7 +47,7 @@ impl ReduceArguments {
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ReduceArguments {
-    /// LAS, LAZ or PLY files, patterns or folders
+    /// Files of points, patterns or folders
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
     /// The reduced file: .las, .laz or .ply
@@ -57,7 +57,7 @@ pub(crate) struct ReduceArguments {
     /// neighbours are found across the inputs
     #[arg(long, value_name = "DIR", conflicts_with = "output")]
     pub outdir: Option<String>,
-    /// Format: las, laz or ply [default: by extension; in a folder, that of each input]
+    /// Format, such as laz, ply or csv [default: by extension; in a folder, that of each input]
     #[arg(long, value_name = "FORMAT")]
     pub to: Option<String>,
     /// Settings of the published method of cells for a kind of scan, or as it is printed (paper);

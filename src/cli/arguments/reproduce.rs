@@ -8,7 +8,7 @@ use super::shared::CommonArguments;
 
 #[derive(Debug, Args)]
 pub(crate) struct ReproduceArguments {
-    /// The output of a run: a LAS, LAZ or PLY file that pointmill wrote
+    /// The output of a run: a file that pointmill wrote
     #[arg(value_name = "OUT")]
     pub output: PathBuf,
     /// Folder where the inputs are [default: where they were from the output's folder]

@@ -7,7 +7,7 @@ use crate::quantity::Length;
 
 #[derive(Debug, Args)]
 pub(crate) struct VerifyArguments {
-    /// The original: LAS, LAZ or PLY files, patterns or folders; and last the reduced scan, one
+    /// The original: files of points, patterns or folders; and last the reduced scan, one
     /// file
     #[arg(value_name = "ORIGINAL... REDUCED", required = true)]
     pub inputs: Vec<String>,

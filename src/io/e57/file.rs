@@ -109,7 +109,8 @@ fn scan(path: &Path, length: u64, number: u64, cloud: PointCloud) -> Result<E57S
         return Err(fail("its points have no coordinates".to_owned()));
     }
     let bits: u64 = cloud.prototype.iter().map(|record| bits(&record.data_type)).sum();
-    // A value takes its bits, so the file's length bounds the points; of none it would bound nothing.
+    // A value takes its bits, so the file's length bounds the points; of none it would bound
+    // nothing.
     let holds = (length * 8).checked_div(bits).unwrap_or(0);
     if cloud.records > holds {
         let (points, holds) = (Grouped(cloud.records), Grouped(holds));

@@ -14,20 +14,20 @@ use crate::point::{Dimension, Endian, PointBatch, Schema, Value};
 use crate::stage::Part;
 use crate::{Error, Result};
 
-type Opened = MutBorrow<E57Reader<Windowed>>;
+type OpenedE57 = MutBorrow<E57Reader<Windowed>>;
 type RawPoints<'a> = PointCloudReaderRaw<'a, Windowed>;
 
 self_cell!(
     /// The crate's iterator, and what it borrows.
     struct ScanReader {
-        owner: Opened,
+        owner: OpenedE57,
         #[not_covariant]
         dependent: RawPoints,
     }
 );
 
 /// Where a value goes.
-pub(super) enum Target {
+pub(super) enum E57Target {
     Cartesian(usize),
     Spherical(usize),
     CartesianState,
@@ -44,7 +44,7 @@ pub(super) struct E57Part<'a> {
     file: &'a E57File,
     scan: &'a E57Scan,
     points: ScanReader,
-    targets: Vec<Target>,
+    targets: Vec<E57Target>,
     axes: [Dimension; 3],
     normal: Option<[Dimension; 3]>,
     /// Where the number of the scan goes.
@@ -76,18 +76,20 @@ impl<'a> E57Part<'a> {
         let axes = [x.clone(), y.clone(), z.clone()];
         let targets = scan.meanings.iter().map(|meaning| {
             Ok(match meaning {
-                Meaning::Cartesian(axis) => Target::Cartesian(*axis),
-                Meaning::Spherical(axis) => Target::Spherical(*axis),
-                Meaning::CartesianState => Target::CartesianState,
-                Meaning::SphericalState => Target::SphericalState,
-                Meaning::Color(name, scale) => Target::Color(find(name).ok_or_else(lacks)?, *scale),
-                Meaning::NoValue(names) => {
-                    Target::NoValue(names.iter().filter_map(|name| find(name)).collect())
+                Meaning::Cartesian(axis) => E57Target::Cartesian(*axis),
+                Meaning::Spherical(axis) => E57Target::Spherical(*axis),
+                Meaning::CartesianState => E57Target::CartesianState,
+                Meaning::SphericalState => E57Target::SphericalState,
+                Meaning::Color(name, scale) => {
+                    E57Target::Color(find(name).ok_or_else(lacks)?, *scale)
                 }
-                Meaning::FromZero(name) => Target::FromZero(find(name).ok_or_else(lacks)?),
+                Meaning::NoValue(names) => {
+                    E57Target::NoValue(names.iter().filter_map(|name| find(name)).collect())
+                }
+                Meaning::FromZero(name) => E57Target::FromZero(find(name).ok_or_else(lacks)?),
                 Meaning::Of(name) => match NORMAL.iter().position(|axis| axis == name) {
-                    Some(axis) => Target::Normal(axis),
-                    None => Target::Of(find(name).ok_or_else(lacks)?),
+                    Some(axis) => E57Target::Normal(axis),
+                    None => E57Target::Of(find(name).ok_or_else(lacks)?),
                 },
             })
         });
@@ -143,20 +145,22 @@ impl<'a> E57Part<'a> {
         for ((value, field), target) in fields {
             let number = plain(value, &field.data_type);
             match target {
-                Target::Cartesian(axis) => own[*axis] = Some(number),
-                Target::Spherical(axis) => polar[*axis] = Some(number),
-                Target::CartesianState => is_valid[0] = number == 0.0,
-                Target::SphericalState => is_valid[1] = number == 0.0,
-                Target::Normal(axis) => normal[*axis] = number,
-                Target::NoValue(of) if number != 0.0 => no_value = of,
-                Target::NoValue(_) => {}
-                Target::Color(field, None) => self.put(field, Value::Double(number), record)?,
-                Target::Color(field, Some([less, times])) => {
+                E57Target::Cartesian(axis) => own[*axis] = Some(number),
+                E57Target::Spherical(axis) => polar[*axis] = Some(number),
+                E57Target::CartesianState => is_valid[0] = number == 0.0,
+                E57Target::SphericalState => is_valid[1] = number == 0.0,
+                E57Target::Normal(axis) => normal[*axis] = number,
+                E57Target::NoValue(of) if number != 0.0 => no_value = of,
+                E57Target::NoValue(_) => {}
+                E57Target::Color(field, None) => self.put(field, Value::Double(number), record)?,
+                E57Target::Color(field, Some([less, times])) => {
                     let color = ((number - less) * times).round_ties_even().clamp(0.0, 65_535.0);
                     self.put(field, Value::Double(color), record)?;
                 }
-                Target::FromZero(field) => self.put(field, Value::Double(number + 1.0), record)?,
-                Target::Of(to) => self.put(to, stored(value, &field.data_type), record)?,
+                E57Target::FromZero(field) => {
+                    self.put(field, Value::Double(number + 1.0), record)?
+                }
+                E57Target::Of(to) => self.put(to, stored(value, &field.data_type), record)?,
             }
         }
         let own = whole(own).filter(|_| is_valid[0]);

@@ -1,8 +1,8 @@
 //! Writes points to an E57 file, as one scan.
 //!
-//! The crate's writer wants to know types before the first point, and whether colours have 8 bits or
-//! 16 is known in the end; and its point cloud borrows the file. So rows grow in a file of their own,
-//! as those of PLY do, and become E57 when all are there.
+//! The crate's writer wants to know types before the first point, and whether colours have 8 bits
+//! or 16 is known in the end; and its point cloud borrows the file. So rows grow in a file of their
+//! own, as those of PLY do, and become E57 when all are there.
 
 use std::fs::File;
 use std::os::unix::fs::FileExt;
@@ -224,8 +224,11 @@ impl E57Sink {
         let mut writer = E57Writer::from_file(&self.path, &file).map_err(failed)?;
         writer.set_coordinate_metadata(self.crs.clone());
         let uses = |space: &str| {
-            let of = |r: &Record| matches!(&r.name, RecordName::Unknown { namespace, .. } if namespace == space);
-            prototype.iter().any(of)
+            let mut names = prototype.iter().map(|record| &record.name);
+            names.any(|name| match name {
+                RecordName::Unknown { namespace, .. } => namespace == space,
+                _ => false,
+            })
         };
         for [space, url] in [NORMALS, OWN] {
             if uses(space) {

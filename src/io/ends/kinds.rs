@@ -16,14 +16,16 @@ use crate::stage::{
 };
 use crate::{Error, Result};
 
-/// The source of most pipelines. Several files are one scan; all are LAS or LAZ, or all are PLY.
+/// The source of most pipelines. Several files are one scan, all of one format; LAS and LAZ count
+/// as one, and so do texts.
 ///
 /// Headers are read, compared and held against the files' lengths before any point is. Files that
-/// do not fit together are refused by name: LAS inputs agree in point format, record length, extra
-/// bytes, scales, GPS time type and coordinate reference system, PLY inputs in encoding, vertex
-/// properties, GPS time type and coordinate reference system. LAS systems agree if they mean the
-/// same: in WKT of one wording, spaces and zeros aside, or by equal EPSG codes; the output has the
-/// WKT. LAS offsets may differ by whole steps; the output has the smallest.
+/// do not fit together are refused by name: their points hold the same. LAS inputs agree in point
+/// format, record length, extra bytes, scales, GPS time type and coordinate reference system, PLY
+/// inputs in encoding, vertex properties, GPS time type and coordinate reference system. LAS
+/// systems agree if they mean the same: in WKT of one wording, spaces and zeros aside, or by equal
+/// EPSG codes; the output has the WKT. LAS offsets may differ by whole steps; the output has the
+/// smallest.
 ///
 /// A number of a PLY text is held in the type that its header says, but coordinates and GPS times
 /// are held as `double` where one of them has more digits than the `float` of its header has room
@@ -31,13 +33,37 @@ use crate::{Error, Result};
 /// fields, as CloudCompare writes them, are the dimensions that they are named after. A text that
 /// ends within a line is told, since its last number may be cut short.
 ///
+/// # Formats
+///
+/// - LAS 1.0 to 1.4, and LAZ; COPC is read whole, as the LAZ that it is.
+/// - PLY, whatever its vertices hold but lists.
+/// - PCD as text, as bytes or packed (`binary_compressed`). A cell of a grid (`HEIGHT` above 1) has
+///   its `Row` and `Column`. A point of which a coordinate is NaN is none, as the library has it:
+///   it is left out, and how many there were is told.
+/// - E57: all scans of a file, or those that `scans` names, each brought by its pose to the
+///   coordinates that all share. Where there are several, `PointSourceId` has the number of the
+///   scan. Points that the file says are invalid are left out and counted; what one scan lacks and
+///   another has is 0 there. Colours are scaled by the limits that the scan gives. Images are
+///   dropped, and it is said.
+/// - Texts with a point a line (`.xyz`, `.txt`, `.csv`, `.asc`, `.pts`): numbers between blanks,
+///   tabs, commas or semicolons, below a heading or not; lines that begin with `#` or `//` are
+///   comments. `columns` says what the columns are, else a heading does, in any spelling; a text of
+///   three columns without one has coordinates, and one of six whose last three are whole numbers
+///   up to 255, or cosines, has colours or normals, which is told. Others are refused: nothing says
+///   what their columns are. PTS has them by format. A text is looked through before it is read:
+///   numbers of a column are held in the smallest integer that holds all of them, or as `f64`.
+/// - PTX: scans with a pose each, as in E57; a cell `0 0 0` has no point.
+/// - The vertices of OBJ and OFF, with their colours and normals; the corners of the facets of STL,
+///   with the facets' normals, each as often as facets share it.
+///
 /// # What a path means
 ///
 /// Paths mean files, in their order. Each path:
 ///
 /// - a file that exists means itself, whatever characters its name has;
-/// - a folder means every LAS, LAZ and PLY file in it, sorted by the bytes of their names, hidden
-///   ones left out;
+/// - a folder means every file of points in it, by its extension, sorted by the bytes of their
+///   names, hidden ones left out; `.txt`, `.csv`, `.asc`, `.obj`, `.off` and `.stl` are not taken
+///   out of folders, for what else may have them;
 /// - else `*`, `?`, `[…]` and `**` make it a pattern: the files that match, sorted by the bytes of
 ///   their paths; one that matches none is an error, like a file that is not there;
 /// - else it is a file that does not exist (yet): opening it will tell.
@@ -73,16 +99,25 @@ pub type ScanNumber = Whole<1, 65_535>;
 /// The end of every pipeline. The file grows in a scratch folder beside its place and appears under
 /// its name when it is complete; it never replaces an input.
 ///
-/// A record that is kept is the input's, byte for byte, wherever the format can hold it. From LAS
-/// to PLY or back every field keeps its name; one that cannot be held is an error unless `drop`
-/// names it. A point of which a PLY file tells no returns is return 1 of 1 in LAS. Variable length
-/// records that PLY does not hold are named in a warning.
+/// A record that is kept is the input's, byte for byte, wherever the format can hold it. From one
+/// format to another every field keeps its name; one that cannot be held is an error unless `drop`
+/// names it. A point of which a file tells no returns is return 1 of 1 in LAS. Variable length
+/// records that other formats do not hold are named in a warning, and so is a coordinate reference
+/// system that a text does not hold.
 ///
-/// Colours keep their meaning: 255 of 8 bits in PLY is 65535 in LAS. From LAS to PLY they become
-/// `uchar` where that loses nothing: where each is a multiple of 257 or of 256, or all are below
-/// 256, as writers leave them that do not scale. Else they stay `ushort`, which many viewers do not
-/// read; a warning says so, and `colors` can ask for either. The type depends on all colours of the
-/// output, and on nothing else. From LAS to LAS and from PLY to PLY colours are not touched.
+/// Colours keep their meaning: 255 of 8 bits in PLY is 65535 in LAS. From LAS to other formats they
+/// become 8 bits where that loses nothing: where each is a multiple of 257 or of 256, or all are
+/// below 256, as writers leave them that do not scale. Else they stay 16 bits, which many viewers
+/// do not read; a warning says so, and `colors` can ask for either. The type depends on all colours
+/// of the output, and on nothing else. Within one format colours are not touched.
+///
+/// PCD has colours of 8 bits in one number `rgb`, as the library's own points do. In E57
+/// coordinates that are steps of a scale stay steps, normals are `nor:normalX` and so on, and what
+/// the standard has no name for is an extension, `pm`; the points are one scan. Texts have
+/// coordinates with the decimals that the scale has, other numbers with as few as read back equal;
+/// a line that names the columns is there where they are more than coordinates (`header`). PTS has
+/// coordinates, intensity and colours and nothing else, below their count. PTX, OBJ, OFF and STL
+/// are not written; the stage `mesh` writes triangles.
 ///
 /// LAS header fields that depend on the points are computed again. The generating software is
 /// pointmill and its version. Where records went through stages, the system identifier is
@@ -258,7 +293,7 @@ pub(super) fn check(
     if let Some(name) = keys.computed.first().filter(|_| !format.holds_computed()) {
         let is = format.name();
         let told = format!("`write.dimensions` asks for {name}, and {is} holds nothing computed");
-        return Err(("dimensions", Error::pipeline(told).help("write LAS, LAZ or PLY")));
+        return Err(("dimensions", Error::pipeline(told).help("write LAS, PLY or another")));
     }
     match keys.offset.is_some_and(|offset| offset.iter().any(|v| !v.is_finite())) {
         true => Err(("offset", Error::pipeline("an offset is three finite numbers"))),

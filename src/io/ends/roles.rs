@@ -69,7 +69,7 @@ impl Read {
 impl StageKind for Read {
     const KIND: &'static str = "read";
     const ROLE: RoleName = RoleName::Source;
-    const ABOUT: &'static str = "Reads LAS, LAZ or PLY files.";
+    const ABOUT: &'static str = "Reads LAS, LAZ, PLY, PCD, E57, texts and others.";
     const MAIN: Option<&'static str> = Some("path");
     const PLACES: &'static [&'static str] = &["path", "format"];
 
@@ -90,7 +90,7 @@ impl StageKind for Write {
     const KIND: &'static str = "write";
     const ROLE: RoleName = RoleName::Sink;
     const ABOUT: &'static str =
-        "Writes a LAS, LAZ or PLY file, or one for each input or square of the plane.";
+        "Writes a file of points, or one for each input or square of the plane.";
     const MAIN: Option<&'static str> = Some("path");
     const PLACES: &'static [&'static str] = &["path", "folder"];
     const EITHER: &'static [&'static str] = &["path", "folder"];

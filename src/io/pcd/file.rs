@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::RECORDS;
 use super::header::{PcdData, PcdField, PcdHeader};
-use super::lzf::Mark;
+use super::lzf::LzfMark;
 use super::packed::Packed;
 use crate::error::shown;
 use crate::io::origin::Origin;
@@ -33,7 +33,7 @@ pub(super) struct PcdFile {
     /// Numbers of a text that have more digits than the `float` that holds them.
     pub rounded: AtomicU64,
     /// Where packed values may be read from, once somebody has looked.
-    pub marks: Mutex<Option<Arc<Vec<Mark>>>>,
+    pub marks: Mutex<Option<Arc<Vec<LzfMark>>>>,
 }
 
 impl PcdFile {
@@ -195,7 +195,7 @@ impl PcdFile {
     }
 
     /// The marks of its packed values, found by one walk.
-    pub fn marks(&self) -> Result<Arc<Vec<Mark>>> {
+    pub fn marks(&self) -> Result<Arc<Vec<LzfMark>>> {
         let mut known = self.marks.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(marks) = &*known {
             return Ok(marks.clone());

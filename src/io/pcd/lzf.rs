@@ -1,10 +1,10 @@
 //! LZF, which packs `binary_compressed` PCD, unpacked as a stream.
 //!
-//! All values of a field stand together there, so a point is spread over the whole file, and LZF can
-//! be unpacked from its beginning alone. But it refers back 8 KiB at most: who keeps these and the
-//! place of the next packed byte can go on from there. One walk over the file leaves such marks
-//! where the values of each part of each field begin; parts are then read by all threads, each field
-//! from its mark, and none holds more than windows.
+//! All values of a field stand together there, so a point is spread over the whole file, and LZF
+//! can be unpacked from its beginning alone. But it refers back 8 KiB at most: who keeps these and
+//! the place of the next packed byte can go on from there. One walk over the file leaves such marks
+//! where the values of each part of each field begin; parts are then read by all threads, each
+//! field from its mark, and none holds more than windows.
 //!
 //! Source: the format of Marc Lehmann's liblzf: a control byte below 32 is followed by so many + 1
 //! literal bytes; else its upper 3 bits are the length less 2 of a copy (7: one more byte adds to
@@ -26,7 +26,7 @@ const WINDOW: usize = 1 << 16;
 
 /// Where unpacking may go on.
 #[derive(Debug, Clone)]
-pub(super) struct Mark {
+pub(super) struct LzfMark {
     /// Byte of the file of the next control byte.
     packed: u64,
     /// The last bytes before it, unpacked.
@@ -35,9 +35,9 @@ pub(super) struct Mark {
     given: usize,
 }
 
-impl Mark {
+impl LzfMark {
     /// Bytes that a mark holds at most.
-    pub const BYTES: usize = size_of::<Mark>() + REACH + LONGEST_COPY;
+    pub const BYTES: usize = size_of::<LzfMark>() + REACH + LONGEST_COPY;
 }
 
 /// Unpacks a stretch of a file.
@@ -66,7 +66,7 @@ impl<'a> Unpacker<'a> {
     }
 
     /// From a mark on.
-    pub fn at(file: Arc<File>, path: &'a Path, mark: &Mark, end: u64) -> Self {
+    pub fn at(file: Arc<File>, path: &'a Path, mark: &LzfMark, end: u64) -> Self {
         let mut unpacker = Self::new(file, path, [mark.packed, end]);
         unpacker.out.extend_from_slice(&mark.back);
         unpacker.given = mark.given;
@@ -74,10 +74,10 @@ impl<'a> Unpacker<'a> {
     }
 
     /// A mark for what comes next.
-    pub fn mark(&self) -> Mark {
+    pub fn mark(&self) -> LzfMark {
         let start = self.out.len().saturating_sub(REACH).min(self.given);
         let packed = self.from + self.next as u64;
-        Mark { packed, back: self.out[start..].into(), given: self.given - start }
+        LzfMark { packed, back: self.out[start..].into(), given: self.given - start }
     }
 
     fn fail(&self, told: &str) -> Error {
@@ -226,7 +226,7 @@ mod tests {
         }
         assert_eq!(back, bytes);
         for (at, mark) in marks {
-            assert!(mark.back.len() <= Mark::BYTES);
+            assert!(mark.back.len() <= LzfMark::BYTES);
             let mut from = Unpacker::at(file.clone(), &path, &mark, end);
             from.pass(3.min(bytes.len() - at) as u64).unwrap();
             let mut rest = vec![0; bytes.len() - at - 3.min(bytes.len() - at)];

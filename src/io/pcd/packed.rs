@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::header::PcdHeader;
-use super::lzf::{Mark, Unpacker};
+use super::lzf::{LzfMark, Unpacker};
 use crate::{Error, Result};
 
 /// Points of a part at least.
@@ -27,7 +27,7 @@ impl Packed {
     /// Reads how many bytes are packed, and holds that against header and length.
     pub fn read(file: &File, path: &Path, header: &PcdHeader, length: u64) -> Result<Packed> {
         let fields = header.fields.len() as u64;
-        let at_once = header.points.saturating_mul(fields * Mark::BYTES as u64) / MARKS;
+        let at_once = header.points.saturating_mul(fields * LzfMark::BYTES as u64) / MARKS;
         let part_points = PART_POINTS.max(at_once);
         if header.points == 0 {
             return Ok(Packed { span: [header.body; 2], part_points });
@@ -59,14 +59,14 @@ impl Packed {
 
     /// Bytes that the marks take.
     pub fn bytes(&self, header: &PcdHeader) -> u64 {
-        self.parts(header).saturating_mul(header.fields.len() as u64 * Mark::BYTES as u64)
+        self.parts(header).saturating_mul(header.fields.len() as u64 * LzfMark::BYTES as u64)
     }
 
     /// Marks for the values of every field in every part: those of a part side by side.
-    pub fn walk(&self, file: File, path: &Path, header: &PcdHeader) -> Result<Vec<Mark>> {
+    pub fn walk(&self, file: File, path: &Path, header: &PcdHeader) -> Result<Vec<LzfMark>> {
         let parts = self.parts(header);
         let mut unpacker = Unpacker::new(Arc::new(file), path, self.span);
-        let mut by_field: Vec<Vec<Mark>> = Vec::new();
+        let mut by_field: Vec<Vec<LzfMark>> = Vec::new();
         for field in &header.fields {
             let mut of_field = Vec::new();
             for part in 0..parts {

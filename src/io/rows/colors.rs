@@ -243,8 +243,8 @@ pub(super) fn note(asked: Colors, depth: Depth, family: &str) -> Option<String> 
             "some colours are multiples of 256 and others of 257: both are taken for 8 bits"
         }
         (Colors::Auto, Depth::Unscaled) => {
-            "colours are 0 to 255 in the input, though 16 bits mean 0 to 65535: they are taken for 8 \
-             bits that its writer did not scale"
+            "colours are 0 to 255 in the input, though 16 bits mean 0 to 65535: they are taken for \
+             8 bits that its writer did not scale"
         }
         (Colors::Eight, Depth::Full) => "colours are cut to their upper 8 bits of 16",
         (Colors::Eight, Depth::Unscaled) => {

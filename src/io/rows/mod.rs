@@ -1,5 +1,5 @@
-//! Rows: a record as numbers side by side, in binary or in text, below a header that says which they
-//! are. PLY, PCD and texts are written and named by it; how their headers look is theirs.
+//! Rows: a record as numbers side by side, in binary or in text, below a header that says which
+//! they are. PLY, PCD and texts are written and named by it; how their headers look is theirs.
 
 pub(crate) mod colors;
 pub(crate) mod comments;
@@ -49,7 +49,7 @@ pub(crate) struct RowForm {
     pub holds_long: bool,
     /// True if colours of 8 bits are one number of 32: blue in its lowest byte, then green and red.
     pub packs_colors: bool,
-    /// True if numbers that are steps of a scale stay what they are, to be printed with the decimals
-    /// that the scale has.
+    /// True if numbers that are steps of a scale stay what they are, to be printed with the
+    /// decimals that the scale has.
     pub keeps_steps: bool,
 }

@@ -70,8 +70,8 @@ fn field_of(property: &str) -> Option<&'static str> {
     named.next().map(|row| row.0)
 }
 
-/// The dimension that a word of a heading means, if it is one that formats share: its name or one of
-/// its spellings, whatever their case, blanks, underscores and hyphens aside.
+/// The dimension that a word of a heading means, if it is one that formats share: its name or one
+/// of its spellings, whatever their case, blanks, underscores and hyphens aside.
 pub(crate) fn heading(word: &str) -> Option<&'static str> {
     let plain = |name: &str| -> String {
         let kept = name.chars().filter(|c| !" _-".contains(*c));

@@ -1,7 +1,5 @@
 //! The comments in which a header says how its file was made.
 
-use super::comments::pieces;
-
 /// What begins the comment that holds the text, and its further pieces.
 const NOTE: &str = "pointmill: ";
 const NOTE_MORE: &str = "pointmill+ ";
@@ -9,8 +7,8 @@ const NOTE_MORE: &str = "pointmill+ ";
 /// Bytes of the longest text: headers of 1 MiB are read, and some readers make room for less.
 pub(crate) const LONGEST: usize = 256 << 10;
 
-/// The header lines that hold `text` behind what begins a comment. They are of one length for all texts of a length that have
-/// their blanks at the same places.
+/// The header lines that hold `text` behind what begins a comment. They are of one length for all
+/// texts of a length that have their blanks at the same places.
 pub(crate) fn lines(begins: &str, text: &str) -> String {
     let begin = |n: usize| if n == 0 { NOTE } else { NOTE_MORE };
     let each = pieces(text).into_iter().enumerate();
@@ -29,6 +27,22 @@ pub(crate) fn take(comments: &mut Vec<String>) -> Option<String> {
     Some(taken.map(text).collect())
 }
 
+/// Bytes of one piece of a long text: some readers refuse header lines of 1,024 bytes.
+const PIECE: usize = 900;
+
+/// A text in pieces that fit a header line. Line ends become blanks, and no piece ends in a blank,
+/// which readers may take off.
+pub fn pieces(text: &str) -> Vec<String> {
+    let mut pieces = vec![String::new()];
+    for word in text.replace(['\n', '\r'], " ").split_inclusive(|c: char| !c.is_whitespace()) {
+        match pieces.last_mut() {
+            Some(last) if last.len() + word.len() <= PIECE || last.is_empty() => *last += word,
+            _ => pieces.push(word.to_owned()),
+        }
+    }
+    pieces
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -44,5 +58,14 @@ mod tests {
         assert_eq!(take(&mut all).unwrap(), text);
         assert_eq!(all, ["before", "between", "pointmill+ x"]);
         assert_eq!(take(&mut all), None);
+    }
+
+    #[test]
+    fn a_long_text_is_cut_where_no_blank_is_lost() {
+        let text = format!("A {}{} Ω end", "word ".repeat(400), " ".repeat(30));
+        let cut = pieces(&text);
+        assert!(cut.len() >= 3 && cut.iter().all(|p| p.len() <= PIECE), "{}", cut.len());
+        assert!(cut.iter().all(|p| p.trim_end() == p));
+        assert_eq!(cut.concat(), text);
     }
 }

@@ -45,7 +45,7 @@ pub(crate) struct RowPlan {
     pub form: RowForm,
     pub style: TextStyle,
     /// With colours as the records have them.
-    pub full: Rows,
+    pub full: RowKind,
     /// With colours of 8 bits, where the records are of another format and have colours of 16.
     pub narrow: Option<Narrow>,
     /// [`WIDE`] once the file has colours of 16 bits, so that no chunk needs to have 8, and
@@ -56,7 +56,7 @@ pub(crate) struct RowPlan {
 }
 
 /// One kind of rows.
-pub(crate) struct Rows {
+pub(crate) struct RowKind {
     /// What a row holds; text is printed from its little-endian form.
     pub shape: RowShape,
     printers: Vec<Printer>,
@@ -66,11 +66,11 @@ pub(crate) struct Rows {
     computed: Vec<(ComputedDimension, Dimension)>,
 }
 
-/// Rows with colours of 8 bits.
+/// RowKind with colours of 8 bits.
 pub(crate) struct Narrow {
     pub asked: Colors,
     /// Of the lower and of the upper byte of the records' colours; the rows are alike.
-    pub rows: [Rows; 2],
+    pub rows: [RowKind; 2],
     /// Byte offsets of the colours in a record.
     fields: Vec<usize>,
 }
@@ -81,13 +81,13 @@ impl Narrow {
         if fields.is_empty() || options.colors == Some(Colors::Sixteen) {
             return Ok(None);
         }
-        let rows = |place| Rows::new(options, form, &colors::bytes_of(schema, place));
+        let rows = |place| RowKind::new(options, form, &colors::bytes_of(schema, place));
         let asked = options.colors.unwrap_or_default();
         Ok(Some(Narrow { asked, rows: [rows(0)?, rows(1)?], fields }))
     }
 
     /// The rows with 8 bits that lose nothing, or that were asked for.
-    fn rows(&self, depth: Depth) -> Option<&Rows> {
+    fn rows(&self, depth: Depth) -> Option<&RowKind> {
         let [lower, upper] = &self.rows;
         match (self.asked, depth) {
             (Colors::Auto, Depth::Full | Depth::Mixed) => None,
@@ -97,13 +97,13 @@ impl Narrow {
     }
 
     /// The rows with colours of 8 bits, of whichever bytes.
-    pub fn any(&self) -> &Rows {
+    pub fn any(&self) -> &RowKind {
         &self.rows[0]
     }
 }
 
-impl Rows {
-    fn new(options: &RowOptions, form: &RowForm, schema: &Schema) -> Result<Rows> {
+impl RowKind {
+    fn new(options: &RowOptions, form: &RowForm, schema: &Schema) -> Result<RowKind> {
         let mut row = row_schema(schema, form);
         row.endian = options.encoding.endian();
         row.dimensions.retain(|d| !options.drop.contains(&d.name));
@@ -116,7 +116,7 @@ impl Rows {
         let projection = (!projection.is_copy()).then_some(projection);
         let shape = RowShape::of(row, form);
         let printers = shape.columns.iter().map(|column| options.style.printer(column)).collect();
-        Ok(Rows { shape, printers, projection, computed })
+        Ok(RowKind { shape, printers, projection, computed })
     }
 
     fn put_computed(&self, batch: &PointBatch, rows: &mut [u8]) -> Result<()> {
@@ -175,7 +175,7 @@ impl RowPlan {
             encoding: options.encoding,
             form,
             style: options.style,
-            full: Rows::new(options, &form, schema)?,
+            full: RowKind::new(options, &form, schema)?,
             narrow: Narrow::of(options, &form, schema)?,
             widened: AtomicU8::new(0),
             spare: Spare::default(),
@@ -203,7 +203,7 @@ impl RowPlan {
     /// the first is there.
     pub fn disk_bytes(&self) -> [u64; 2] {
         // A number in text has a digit and what ends it.
-        let bytes = |rows: &Rows| match self.encoding {
+        let bytes = |rows: &RowKind| match self.encoding {
             Encoding::Ascii => 2 * rows.shape.columns.len() as u64,
             _ => rows.shape.row.stride as u64,
         };
@@ -239,7 +239,7 @@ impl RowPlan {
     }
 
     /// The rows as which a chunk is written, and what its colours are; full where nobody asked.
-    fn rows(&self, batch: &PointBatch) -> (&Rows, WrittenColors) {
+    fn rows(&self, batch: &PointBatch) -> (&RowKind, WrittenColors) {
         let full = |depth| (&self.full, WrittenColors { depth, wide: true });
         let Some(narrow) = &self.narrow else { return full(Depth::Full) };
         let widened = self.widened.load(Ordering::Relaxed);

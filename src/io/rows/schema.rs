@@ -6,10 +6,11 @@ use crate::point::names::{BLUE, GREEN, RED, XYZ};
 use crate::point::{Dimension, Endian, Scalar, Schema};
 
 /// The row that holds every dimension of `from`, little-endian: coordinates of whole numbers as
-/// `f64`, exactly stored · scale + origin; bit fields each as a byte; other scaled dimensions (the scan angle of
-/// point formats 6 to 10, in degrees) as `f64`; 64-bit integers as `f64` too where the format has
-/// none, and a value that rounds is refused; all others in their own type. Known dimensions come
-/// first, in the order of their names. That of a record of the format itself is its own.
+/// `f64`, exactly stored · scale + origin; bit fields each as a byte; other scaled dimensions (the
+/// scan angle of point formats 6 to 10, in degrees) as `f64`; 64-bit integers as `f64` too where
+/// the format has none, and a value that rounds is refused; all others in their own type. Known
+/// dimensions come first, in the order of their names. That of a record of the format itself is its
+/// own.
 pub(crate) fn row_schema(from: &Schema, form: &RowForm) -> Schema {
     if from.layout == form.layout {
         return from.clone();

@@ -1,14 +1,15 @@
 //! PTX: scans of a terrestrial scanner, each a grid of cells below ten lines of its own.
 //!
 //! These say how many columns and rows the grid has, where the scanner stood, and a matrix that
-//! brings the points of this scan, as row vectors with a 1, to the coordinates that all scans share.
-//! Cells follow column by column; one of which no light came back is `0 0 0`, and is no point.
+//! brings the points of this scan, as row vectors with a 1, to the coordinates that all scans
+//! share. Cells follow column by column; one of which no light came back is `0 0 0`, and is no
+//! point.
 
 use std::fs::File;
 use std::path::Path;
 
 use super::head::LONGEST_LINE;
-use super::survey::{Survey, Surveyor};
+use super::survey::{Surveyor, TextSurvey};
 use crate::io::rows::fields::{Delimiter, Fields};
 use crate::io::rows::lines::Lines;
 use crate::io::rows::number;
@@ -76,8 +77,8 @@ struct PtxReader<'a> {
 impl PtxReader<'_> {
     fn fail(&self, told: String, at: u64) -> Error {
         Error::data(self.path, told).at_byte(at).help(
-            "each scan of PTX has two lines of counts, four of three numbers, four of four, and then \
-             a line for each cell",
+            "each scan of PTX has two lines of counts, four of three numbers, four of four, and \
+             then a line for each cell",
         )
     }
 
@@ -161,7 +162,7 @@ pub(super) fn first_cell(file: File, path: &Path, length: u64) -> Result<(usize,
 /// # Errors
 ///
 /// The first line that is not what it should be, and a file that ends before its cells do.
-pub(super) fn survey(file: File, path: &Path, length: u64) -> Result<(PtxText, Survey)> {
+pub(super) fn survey(file: File, path: &Path, length: u64) -> Result<(PtxText, TextSurvey)> {
     let mut reader = begin(file, path, length)?;
     let mut scans: Vec<PtxScan> = Vec::new();
     let mut surveyor: Option<Surveyor<'_>> = None;
@@ -213,7 +214,7 @@ mod tests {
 
     const HEAD: &str = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
 
-    fn surveyed(text: &str) -> Result<(PtxText, Survey)> {
+    fn surveyed(text: &str) -> Result<(PtxText, TextSurvey)> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.ptx");
         std::fs::write(&path, text).unwrap();

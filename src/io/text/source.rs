@@ -8,7 +8,7 @@ use super::RECORDS;
 use super::columns::{dimensions, guessed, placed, scalar};
 use super::head::{LONGEST_LINE, TextHead, without_mark};
 use super::ptx::{self, PtxScan, PtxText};
-use super::survey::{CORRECT, Stretch, Survey, few, no_number, survey};
+use super::survey::{CORRECT, TextStretch, TextSurvey, few, no_number, survey};
 use crate::error::shown;
 use crate::io::origin::Origin;
 use crate::io::rows::facts::ColumnFacts;
@@ -39,7 +39,7 @@ struct TextFile {
     /// What the columns are; None for those that are not read.
     columns: Vec<Option<String>>,
     scans: Vec<PtxScan>,
-    found: Survey,
+    found: TextSurvey,
     warnings: Vec<String>,
 }
 
@@ -192,7 +192,7 @@ struct TextSource {
 
 impl TextSource {
     /// The file of a part, and its stretch.
-    fn place(&self, index: usize) -> Option<(usize, &TextFile, Stretch)> {
+    fn place(&self, index: usize) -> Option<(usize, &TextFile, TextStretch)> {
         let number = self.ends.partition_point(|&end| end <= index);
         let before = number.checked_sub(1).map_or(0, |before| self.ends[before]);
         let file = self.files.get(number)?;
@@ -240,7 +240,7 @@ impl Source for TextSource {
         let lines = Lines::new(handle, &file.path, stretch.span, stretch.before, LONGEST_LINE);
         let field = |name: &String| self.schema.find(name).cloned();
         let fields = file.columns.iter().map(|name| name.as_ref().and_then(field)).collect();
-        let grid = file.scans.get(stretch.scan).map(|&scan| Grid {
+        let grid = file.scans.get(stretch.scan).map(|&scan| PtxGrid {
             scan,
             number: stretch.scan as u64 + 1,
             cell: stretch.cells,
@@ -255,7 +255,7 @@ impl Source for TextSource {
 }
 
 /// Where a part of PTX is in its scan.
-struct Grid {
+struct PtxGrid {
     scan: PtxScan,
     number: u64,
     cell: u64,
@@ -268,7 +268,7 @@ struct TextPart<'a> {
     /// Of every column, where its numbers go.
     fields: Vec<Option<Dimension>>,
     schema: &'a Schema,
-    grid: Option<Grid>,
+    grid: Option<PtxGrid>,
     left: u64,
     source: u32,
 }

@@ -14,7 +14,7 @@ const PART_BYTES: u64 = 1 << 22;
 
 /// Lines that one part reads.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Stretch {
+pub(super) struct TextStretch {
     /// Bytes from where to where.
     pub span: [u64; 2],
     /// Lines before it.
@@ -29,11 +29,11 @@ pub(super) struct Stretch {
 
 /// What a survey finds.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Survey {
+pub(super) struct TextSurvey {
     /// Of every column.
     pub facts: Vec<ColumnFacts>,
     /// In the order of the file.
-    pub stretches: Vec<Stretch>,
+    pub stretches: Vec<TextStretch>,
     pub points: u64,
     /// How many points lines with one number say that there are.
     pub claimed: Option<u64>,
@@ -46,7 +46,7 @@ pub(super) struct Surveyor<'a> {
     facts: Vec<ColumnFacts>,
     /// Columns of which the numbers are looked at; the others are only counted.
     looks: Vec<bool>,
-    stretches: Vec<Stretch>,
+    stretches: Vec<TextStretch>,
     points: u64,
 }
 
@@ -88,7 +88,7 @@ impl<'a> Surveyor<'a> {
             last.points = self.points - last.first;
         }
         let (span, first) = ([at, u64::MAX], self.points);
-        self.stretches.push(Stretch { span, before, first, points: 0, scan, cells });
+        self.stretches.push(TextStretch { span, before, first, points: 0, scan, cells });
     }
 
     /// Says that the stretch ends at byte `at`.
@@ -106,11 +106,11 @@ impl<'a> Surveyor<'a> {
         Ok(())
     }
 
-    pub fn finish(mut self, end: u64, claimed: Option<u64>) -> Survey {
+    pub fn finish(mut self, end: u64, claimed: Option<u64>) -> TextSurvey {
         self.end(end);
         self.stretches.retain(|stretch| stretch.points > 0);
         let Surveyor { facts, stretches, points, .. } = self;
-        Survey { facts, stretches, points, claimed }
+        TextSurvey { facts, stretches, points, claimed }
     }
 }
 
@@ -142,7 +142,7 @@ pub(super) fn survey(
     length: u64,
     head: &TextHead,
     looks: Vec<bool>,
-) -> Result<Survey> {
+) -> Result<TextSurvey> {
     let mut lines = Lines::new(file, path, [head.body, length], head.lines, LONGEST_LINE);
     let mut surveyor = Surveyor::new(path, head.separator, looks);
     let mut claimed: Option<u64> = None;

@@ -22,7 +22,7 @@ pub(super) struct OffHead {
 }
 
 /// The vertices of a text, one after the other.
-pub(super) struct VertexLines<'a> {
+pub(super) struct VertexTexts<'a> {
     lines: Lines<'a>,
     path: &'a Path,
     kind: VerticesKind,
@@ -42,7 +42,7 @@ pub(super) struct VertexLine {
     pub byte: u64,
 }
 
-impl<'a> VertexLines<'a> {
+impl<'a> VertexTexts<'a> {
     /// The vertices of a file of `length` bytes; reads what OFF has before them.
     ///
     /// # Errors
@@ -51,7 +51,7 @@ impl<'a> VertexLines<'a> {
     pub fn new(file: File, path: &'a Path, length: u64, kind: VerticesKind) -> Result<Self> {
         let lines = Lines::new(file, path, [0, length], 0, LONGEST_LINE);
         let head = OffHead::default();
-        let mut all = VertexLines { lines, path, kind, head, given: 0, normal: Vec::new() };
+        let mut all = VertexTexts { lines, path, kind, head, given: 0, normal: Vec::new() };
         if kind == VerticesKind::Off {
             all.head = all.off_head()?;
         }

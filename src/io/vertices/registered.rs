@@ -77,6 +77,11 @@ impl Format for VerticesFormat {
         Ok(json!({ "kind": kind, "bytes": bytes, "points": points, "dimensions": dimensions }))
     }
 
+    // A folder of points may well have meshes beside them.
+    fn owns_extension(&self) -> bool {
+        false
+    }
+
     fn unwritten(&self) -> Option<&'static str> {
         Some(self.help())
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::VerticesKind;
-use super::lines::{LONGEST_LINE, VertexLine, VertexLines, sniff};
+use super::lines::{LONGEST_LINE, VertexLine, VertexTexts, sniff};
 use super::stl::{self, StlPart};
 use crate::error::shown;
 use crate::io::origin::Origin;
@@ -22,7 +22,7 @@ const PART_FACETS: u64 = 1 << 16;
 
 /// What the numbers of a vertex are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Number {
+enum VertexNumber {
     /// This dimension.
     Of(&'static str),
     /// A colour.
@@ -33,7 +33,7 @@ enum Number {
 
 /// How colours are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Shade {
+enum VertexShade {
     /// 0 to 255.
     Bytes,
     /// 0 to 1; held as 16 bits.
@@ -47,8 +47,8 @@ struct VerticesFile {
     points: u64,
     /// Facets of a binary STL.
     facets: Option<u64>,
-    numbers: Vec<Number>,
-    shade: Shade,
+    numbers: Vec<VertexNumber>,
+    shade: VertexShade,
     warnings: Vec<String>,
 }
 
@@ -68,7 +68,7 @@ impl VerticesFile {
         if !is_text {
             return Err(foreign(path, kind.names()[1]));
         }
-        let mut lines = VertexLines::new(file, path, length, kind)?;
+        let mut lines = VertexTexts::new(file, path, length, kind)?;
         let (mut facts, mut points) = (Vec::<ColumnFacts>::new(), 0);
         while let Some(line) = lines.next()? {
             let mut count = 0;
@@ -91,9 +91,9 @@ impl VerticesFile {
         let numbers = meaning(path, &lines, kind, facts.len())?;
         let shade = shade(path, &numbers, &facts, kind)?;
         let mut warnings = Vec::new();
-        if numbers.contains(&Number::Skipped) {
-            let told = "numbers of its vertices that are no coordinates, normals or colours are not \
-                        read";
+        if numbers.contains(&VertexNumber::Skipped) {
+            let told = "numbers of its vertices that are no coordinates, normals or colours are \
+                        not read";
             warnings.push(format!("{}: {told}", shown(path)));
         }
         if kind == VerticesKind::Stl {
@@ -108,7 +108,7 @@ impl VerticesFile {
             return Err(foreign(path, VerticesKind::Stl.names()[1]));
         };
         let warnings = corners(path, facets).into_iter().collect();
-        let (path, shade) = (path.to_owned(), Shade::Bytes);
+        let (path, shade) = (path.to_owned(), VertexShade::Bytes);
         let (points, facets) = (facets * 3, Some(facets));
         Ok(VerticesFile { path, origin, points, facets, numbers: Vec::new(), shade, warnings })
     }
@@ -122,10 +122,10 @@ impl VerticesFile {
         }
         for number in &self.numbers {
             let (name, scalar) = match (number, self.shade) {
-                (Number::Of(name), _) => (name, Scalar::F64),
-                (Number::Color(name), Shade::Bytes) => (name, Scalar::U8),
-                (Number::Color(name), Shade::Fractions) => (name, Scalar::U16),
-                (Number::Skipped, _) => continue,
+                (VertexNumber::Of(name), _) => (name, Scalar::F64),
+                (VertexNumber::Color(name), VertexShade::Bytes) => (name, Scalar::U8),
+                (VertexNumber::Color(name), VertexShade::Fractions) => (name, Scalar::U16),
+                (VertexNumber::Skipped, _) => continue,
             };
             all.push(Dimension::new(*name, scalar, stride));
             stride += scalar.size();
@@ -137,8 +137,8 @@ impl VerticesFile {
 fn corners(path: &Path, facets: u64) -> Option<String> {
     let told = |facets| {
         format!(
-            "{}: its points are the corners of {facets} facets: one that facets share comes as often \
-             as they do",
+            "{}: its points are the corners of {facets} facets: one that facets share comes as \
+             often as they do",
             shown(path)
         )
     };
@@ -148,19 +148,19 @@ fn corners(path: &Path, facets: u64) -> Option<String> {
 /// What the numbers of a vertex are, by their count and what the file says of them.
 fn meaning(
     path: &Path,
-    lines: &VertexLines<'_>,
+    lines: &VertexTexts<'_>,
     kind: VerticesKind,
     count: usize,
-) -> Result<Vec<Number>> {
-    let mut all: Vec<Number> = XYZ.into_iter().map(Number::Of).collect();
+) -> Result<Vec<VertexNumber>> {
+    let mut all: Vec<VertexNumber> = XYZ.into_iter().map(VertexNumber::Of).collect();
     if count == 0 {
         return Ok(all);
     }
-    let colors = COLORS.into_iter().map(Number::Color);
-    let normal = NORMAL.into_iter().map(Number::Of);
+    let colors = COLORS.into_iter().map(VertexNumber::Color);
+    let normal = NORMAL.into_iter().map(VertexNumber::Of);
     match (kind, count) {
         (_, 3) => {}
-        (VerticesKind::Obj, 4) => all.push(Number::Skipped),
+        (VerticesKind::Obj, 4) => all.push(VertexNumber::Skipped),
         (VerticesKind::Obj, 6) => all.extend(colors),
         (VerticesKind::Stl, 6) => all.extend(normal),
         (VerticesKind::Off, _) => {
@@ -176,7 +176,7 @@ fn meaning(
             if !is_known || all.len() > count {
                 return Err(unknown(path, count));
             }
-            all.resize(count, Number::Skipped);
+            all.resize(count, VertexNumber::Skipped);
         }
         _ => return Err(unknown(path, count)),
     }
@@ -190,19 +190,19 @@ fn unknown(path: &Path, count: usize) -> Error {
 
 fn shade(
     path: &Path,
-    numbers: &[Number],
+    numbers: &[VertexNumber],
     facts: &[ColumnFacts],
     kind: VerticesKind,
-) -> Result<Shade> {
-    let colors = numbers.iter().zip(facts).filter(|(n, _)| matches!(n, Number::Color(_)));
+) -> Result<VertexShade> {
+    let colors = numbers.iter().zip(facts).filter(|(n, _)| matches!(n, VertexNumber::Color(_)));
     let colors: Vec<&ColumnFacts> = colors.map(|(_, facts)| facts).collect();
     let are_bytes = colors.iter().all(|facts| facts.is_byte());
     let are_fractions = colors.iter().all(|facts| facts.is_fraction());
     match (are_bytes, are_fractions) {
         // Colours of 0 and 1 alone are what the format's are as a rule.
-        (true, true) if kind == VerticesKind::Obj => Ok(Shade::Fractions),
-        (true, _) => Ok(Shade::Bytes),
-        (_, true) => Ok(Shade::Fractions),
+        (true, true) if kind == VerticesKind::Obj => Ok(VertexShade::Fractions),
+        (true, _) => Ok(VertexShade::Bytes),
+        (_, true) => Ok(VertexShade::Fractions),
         _ => {
             let told = "its colours are neither whole numbers up to 255 nor fractions from 0 to 1";
             Err(Error::data(path, told))
@@ -300,7 +300,7 @@ impl Source for VerticesSource {
             let file = handle;
             return Ok(Box::new(StlPart { file, origin, next, left, source, corners, taken }));
         }
-        let lines = VertexLines::new(handle, &file.path, file.origin.length(), self.kind)?;
+        let lines = VertexTexts::new(handle, &file.path, file.origin.length(), self.kind)?;
         Ok(Box::new(LinesPart { file, lines, schema: &self.schema, left: file.points, source }))
     }
 
@@ -312,7 +312,7 @@ impl Source for VerticesSource {
 /// The vertices of a text.
 struct LinesPart<'a> {
     file: &'a VerticesFile,
-    lines: VertexLines<'a>,
+    lines: VertexTexts<'a>,
     schema: &'a Schema,
     left: u64,
     source: u32,
@@ -346,13 +346,13 @@ impl LinesPart<'_> {
         let mut words = self.lines.numbers(line);
         for number in &self.file.numbers {
             let word = words.next().unwrap_or_default();
-            if *number == Number::Skipped {
+            if *number == VertexNumber::Skipped {
                 continue;
             }
             let Some(field) = fields.next() else { break };
-            let is_fraction = self.file.shade == Shade::Fractions;
+            let is_fraction = self.file.shade == VertexShade::Fractions;
             let held = match number {
-                Number::Color(_) if is_fraction => {
+                VertexNumber::Color(_) if is_fraction => {
                     let mut bytes = [0; 8];
                     let is_number = number::parse(word, Scalar::F64, &mut bytes);
                     let color = (f64::from_le_bytes(bytes) * 65_535.0).round_ties_even();
