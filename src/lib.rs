@@ -74,7 +74,7 @@
 //! - [`report`]: what a run counts and measures, merged so that no order and no cut changes a byte.
 //! - [`stage`]: the roles that a stage can play and what it tells the plan. Implement one to add a
 //!   stage of your own, or [`Format`](stage::Format) to add a format.
-//! - [`io`]: LAS, LAZ, PLY, PCD, E57, texts, conversion between their records, and the stages `read`, `write`,
+//! - [`io`]: formats, conversion between their records, and the stages `read`, `write`,
 //!   `mesh` and `discard`.
 //! - [`memory`]: points from and into a program's own memory; [`Plan::pull`] gives results as an
 //!   iterator.

@@ -52,5 +52,5 @@ pub fn agree(value: &Value, section: &str) {
     let missing: Vec<&String> =
         must.map(|(key, _)| key).filter(|key| !there.contains(*key)).collect();
     assert!(missing.is_empty(), "there are no {missing:?}, which docs/formats.md names");
-    assert!(there.len() >= 8, "{section}: too few keys to prove anything");
+    assert!(there.len() >= 4, "{section}: too few keys to prove anything");
 }

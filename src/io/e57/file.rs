@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use e57::{E57Reader, PointCloud, RecordDataType};
 
 use super::fields::{Meaning, meaning};
+use super::names::{CALLED, MAGIC};
 use super::pose::Pose;
 use super::reading::Windowed;
-use super::{CALLED, MAGIC};
 use crate::error::shown;
 use crate::io::origin::Origin;
 use crate::report::Grouped;

@@ -7,6 +7,7 @@
 mod fields;
 mod file;
 mod info;
+mod names;
 mod part;
 mod pose;
 mod reading;
@@ -15,17 +16,3 @@ mod sink;
 mod source;
 
 pub use registered::{E57, E57Format};
-
-use crate::point::Layout;
-
-/// The family of E57 records.
-const FAMILY: &str = "E57";
-
-/// Numbers of a point.
-const RECORDS: Layout = Layout::plain(FAMILY);
-
-/// What messages call an E57 file.
-const CALLED: &str = "an E57 file";
-
-/// The first bytes of a file.
-const MAGIC: &[u8] = b"ASTM-E57";

@@ -5,9 +5,9 @@ use std::sync::atomic::Ordering;
 use e57::{E57Reader, PointCloudReaderRaw, RecordDataType, RecordValue};
 use self_cell::{MutBorrow, self_cell};
 
-use super::RECORDS;
 use super::fields::{Meaning, plain};
 use super::file::{E57File, E57Scan, reader, unreadable};
+use super::names::RECORDS;
 use super::reading::Windowed;
 use crate::point::names::{NORMAL, POINT_SOURCE_ID};
 use crate::point::{Dimension, Endian, PointBatch, Schema, Value};

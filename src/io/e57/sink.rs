@@ -12,9 +12,9 @@ use std::sync::Arc;
 use e57::{E57Writer, Extension, Record, RecordDataType, RecordName, RecordValue};
 use sha2::{Digest, Sha256};
 
-use super::RECORDS;
 use super::fields::TIME_STAMP;
 use super::info::NOTE;
+use super::names::RECORDS;
 use crate::io::rows::file::{Heading, RowFile};
 use crate::io::rows::plan::{RowOptions, RowPlan};
 use crate::io::rows::schema::RowShape;

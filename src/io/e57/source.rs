@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use e57::RecordDataType;
 
-use super::RECORDS;
 use super::fields::{Meaning, both, scalar};
 use super::file::{E57File, E57Scan};
+use super::names::RECORDS;
 use super::part::E57Part;
 use super::reading::Windowed;
 use crate::error::shown;

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::RECORDS;
 use super::header::{PcdData, PcdField, PcdHeader};
 use super::lzf::LzfMark;
+use super::names::RECORDS;
 use super::packed::Packed;
 use crate::error::shown;
 use crate::io::origin::Origin;

@@ -5,7 +5,7 @@
 use std::fs::File;
 use std::path::Path;
 
-use super::CALLED;
+use super::names::CALLED;
 use crate::io::rows::lines::{Lines, shown};
 use crate::point::Scalar;
 use crate::stage::foreign;

@@ -9,6 +9,7 @@ mod file;
 mod header;
 mod info;
 mod lzf;
+mod names;
 mod packed;
 mod part;
 mod registered;
@@ -16,19 +17,3 @@ mod sink;
 mod source;
 
 pub use registered::{PCD, PcdFormat};
-
-use crate::io::rows::RowForm;
-use crate::point::Layout;
-
-/// The family of PCD records.
-const FAMILY: &str = "PCD";
-
-/// Points, and rows and columns behind them.
-const RECORDS: Layout = Layout::plain(FAMILY);
-
-/// What a point takes.
-const FORM: RowForm =
-    RowForm { layout: RECORDS, holds_long: true, packs_colors: true, keeps_steps: false };
-
-/// What messages call a PCD file.
-const CALLED: &str = "a PCD file";

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{CALLED, FAMILY, RECORDS, info, sink, source};
+use super::names::{CALLED, FAMILY, RECORDS};
+use super::{info, sink, source};
 use crate::Result;
 use crate::point::{Metadata, Schema};
 use crate::stage::{ChunkSize, Format, ReadKeys, Sink, Source, WriteKeys};

@@ -5,8 +5,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::header::{PcdData, PcdField};
+use super::names::{FORM, RECORDS};
 use super::source::PcdNative;
-use super::{FORM, RECORDS};
 use crate::io::rows::comments::{line, lines};
 use crate::io::rows::file::{Heading, RowFile};
 use crate::io::rows::names::property;

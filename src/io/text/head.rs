@@ -4,8 +4,8 @@
 use std::fs::File;
 use std::path::Path;
 
-use super::CALLED;
 use super::columns::dimensions;
+use super::names::CALLED;
 use crate::io::rows::fields::{Delimiter, is_comment, is_count, is_number};
 use crate::io::rows::lines::Lines;
 use crate::stage::foreign;

@@ -8,6 +8,7 @@
 mod columns;
 mod head;
 mod info;
+mod names;
 mod ptx;
 mod registered;
 mod sink;
@@ -16,14 +17,3 @@ mod survey;
 
 pub(crate) use columns::check_columns;
 pub use registered::{ASC, CSV, PTS, PTX, TXT, TextFormat, XYZ};
-
-use crate::point::Layout;
-
-/// The family of texts.
-const FAMILY: &str = "text";
-
-/// Numbers of a line in the order of the columns, little-endian.
-const RECORDS: Layout = Layout::plain(FAMILY);
-
-/// What messages call such a file.
-const CALLED: &str = "a text of numbers";

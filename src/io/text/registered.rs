@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::head::sniff;
+use super::names::{CALLED, FAMILY, RECORDS};
 use super::sink::Habit;
 use super::source::TextKind;
-use super::{CALLED, FAMILY, RECORDS, info, ptx, sink, source};
+use super::{info, ptx, sink, source};
 use crate::Result;
 use crate::point::{Metadata, Schema};
 use crate::stage::{ChunkSize, Format, ReadKeys, Separator, Sink, Source, WriteKeys};

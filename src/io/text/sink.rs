@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::RECORDS;
+use super::names::RECORDS;
 use super::source::TextKind;
 use crate::io::rows::file::{Heading, RowFile};
 use crate::io::rows::plan::{Narrow, RowOptions, RowPlan};

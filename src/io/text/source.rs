@@ -4,9 +4,9 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::RECORDS;
 use super::columns::{dimensions, guessed, placed, scalar};
 use super::head::{LONGEST_LINE, TextHead, without_mark};
+use super::names::RECORDS;
 use super::ptx::{self, PtxScan, PtxText};
 use super::survey::{CORRECT, TextStretch, TextSurvey, few, no_number, survey};
 use crate::error::shown;

@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::path::Path;
 
-use super::VerticesKind;
+use super::kind::VerticesKind;
 use crate::io::rows::fields::{Delimiter, Fields};
 use crate::io::rows::lines::{Lines, shown};
 use crate::stage::foreign;

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use serde_json::json;
 
+use super::kind::VerticesKind;
 use super::lines::sniff;
-use super::{VerticesKind, source};
+use super::source;
 use crate::point::{Metadata, Schema};
 use crate::stage::{ChunkSize, Format, ReadKeys, Sink, Source, WriteKeys};
 use crate::{Error, Result};

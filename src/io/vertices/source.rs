@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::VerticesKind;
+use super::kind::VerticesKind;
 use super::lines::{LONGEST_LINE, VertexLine, VertexTexts, sniff};
 use super::stl::{self, StlPart};
 use crate::error::shown;
