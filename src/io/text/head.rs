@@ -5,14 +5,12 @@ use std::fs::File;
 use std::path::Path;
 
 use super::columns::dimensions;
-use super::names::CALLED;
+use super::names::{CALLED, LONGEST_LINE};
 use crate::io::rows::fields::{Delimiter, is_comment, is_count, is_number};
 use crate::io::rows::lines::Lines;
 use crate::stage::foreign;
 use crate::{Error, Result};
 
-/// The longest line that is read.
-pub(super) const LONGEST_LINE: usize = 1 << 14;
 /// Lines that are looked at for the first point.
 const LINES_MOST: usize = 1000;
 
@@ -106,9 +104,6 @@ impl TextHead {
 /// True if a file that begins so may be a text of numbers: a point is on its first line, or behind
 /// one that may name columns.
 pub(super) fn sniff(first: &[u8]) -> bool {
-    if super::ptx::sniff(first) {
-        return false;
-    }
     let first = without_mark(first, 0);
     let end = first.iter().rposition(|b| *b == b'\n' || *b == b'\r').unwrap_or(first.len());
     let is_said = |line: &&[u8]| {

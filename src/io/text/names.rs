@@ -10,3 +10,6 @@ pub(super) const RECORDS: Layout = Layout::plain(FAMILY);
 
 /// What messages call such a file.
 pub(super) const CALLED: &str = "a text of numbers";
+
+/// The longest line that is read.
+pub(super) const LONGEST_LINE: usize = 1 << 14;

@@ -8,7 +8,7 @@
 use std::fs::File;
 use std::path::Path;
 
-use super::head::LONGEST_LINE;
+use super::names::LONGEST_LINE;
 use super::survey::{Surveyor, TextSurvey};
 use crate::io::rows::fields::{Delimiter, Fields};
 use crate::io::rows::lines::Lines;

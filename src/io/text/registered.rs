@@ -85,7 +85,7 @@ impl Format for TextFormat {
     fn sniff(&self, first: &[u8]) -> bool {
         match self.habit.kind {
             TextKind::Ptx => ptx::sniff(first),
-            _ => sniff(first),
+            _ => sniff(first) && !ptx::sniff(first),
         }
     }
 

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::columns::{dimensions, guessed, placed, scalar};
-use super::head::{LONGEST_LINE, TextHead, without_mark};
+use super::head::{TextHead, without_mark};
+use super::names::LONGEST_LINE;
 use super::names::RECORDS;
 use super::ptx::{self, PtxScan, PtxText};
 use super::survey::{CORRECT, TextStretch, TextSurvey, few, no_number, survey};

@@ -3,7 +3,8 @@
 use std::fs::File;
 use std::path::Path;
 
-use super::head::{LONGEST_LINE, TextHead};
+use super::head::TextHead;
+use super::names::LONGEST_LINE;
 use crate::io::rows::facts::ColumnFacts;
 use crate::io::rows::fields::{Delimiter, Fields, is_comment, is_count};
 use crate::io::rows::lines::{Lines, shown};
