@@ -147,7 +147,7 @@ pub(super) struct PredictArguments {
 
 #[derive(Debug, Args)]
 pub(super) struct ConvertArguments {
-    /// Files of points, patterns or folders
+    /// Files of points, patterns or folders, or @LIST: a text with one of them a line
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
     /// A file, which takes all inputs, or a folder (that exists, or with a slash behind), which

@@ -385,7 +385,7 @@ fn what_is_no_scan_or_no_pipeline_is_called_what_it_is() {
     assert!(one.contains("this is a LAS or LAZ file, not a pipeline file"), "{one}");
     assert!(one.contains("`pointmill reduce a.laz -o OUT`"), "{one}");
     for name in ["a.rcp", "a.drc"] {
-        fs::write(at.join(name), b"1 2 3\n").unwrap();
+        fs::write(at.join(name), b"\0\x01\x02").unwrap();
         let one = told(at, &["reduce", name, "-o", "o.laz"], 2);
         assert!(one.contains("which is not read") && !one.contains("read.format"), "{one}");
     }

@@ -76,7 +76,7 @@ fn a_format_from_outside_is_named_in_messages() {
     refused("named.las'", "o.toy'", "this is a TOY file, not a LAS or LAZ file");
     refused("named.las'", "o.toy'", "name it .toy, or give `read.format = \"toy\"`");
     refused("b.toy'", "o.las'", "this is a text of numbers, not a TOY file");
-    refused("a.toy'\nformat = 'toys'", "o.las'", "did you mean `toy`? valid: las, laz, ply, pcd");
+    refused("a.toy'\nformat = 'toys'", "o.las'", "did you mean `toy`? valid: asc, csv, e57");
     refused("a.toy'\nformat = 5", "o.las'", "`format`: takes one of las, laz, ply, pcd");
     refused("a.toy'", "o.las'", "a TOY scan written as LAS needs a scale");
     refused("a.toy'", "o.toy'\ndimensions = ['NormalX']", "and toy holds nothing computed");

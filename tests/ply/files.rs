@@ -327,6 +327,67 @@ fn faces_are_carried_only_by_an_unchanged_binary_conversion() {
     assert_eq!(internals::ply::describe(&out).unwrap().elements.len(), 1);
 }
 
+/// A vertex with a list of so many numbers between its coordinates, in one of the encodings.
+fn listed_vertex(n: u32, encoding: Encoding) -> Vec<u8> {
+    let items: Vec<f32> = (0..n % 5).map(|i| i as f32).collect();
+    let [x, y, z] = [n as f32, 0.5, -1.0];
+    if encoding == Encoding::Ascii {
+        let list: String = items.iter().map(|v| format!(" {v}")).collect();
+        return format!("{x} {y} {}{list} {z} {n}\n", items.len()).into_bytes();
+    }
+    let is_big = encoding == Encoding::BinaryBigEndian;
+    let float = |v: f32| if is_big { v.to_be_bytes() } else { v.to_le_bytes() };
+    let count = items.len() as u16;
+    let count = if is_big { count.to_be_bytes() } else { count.to_le_bytes() };
+    let number = if is_big { n.to_be_bytes() } else { n.to_le_bytes() };
+    let list: Vec<u8> = items.into_iter().flat_map(float).collect();
+    [&float(x)[..], &float(y), &count, &list, &float(z), &number].concat()
+}
+
+#[test]
+fn lists_of_vertices_are_passed_over_and_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let count = 20_000u32;
+    for encoding in ENCODINGS {
+        let word = match encoding {
+            Encoding::Ascii => "ascii",
+            Encoding::BinaryLittleEndian => "binary_little_endian",
+            Encoding::BinaryBigEndian => "binary_big_endian",
+        };
+        let head = format!(
+            "ply\nformat {word} 1.0\nelement vertex {count}\nproperty float x\nproperty float y\n\
+             property list ushort float uv\nproperty float z\nproperty uint n\nend_header\n"
+        );
+        let body: Vec<u8> = (0..count).flat_map(|n| listed_vertex(n, encoding)).collect();
+        let path = file(folder.path(), "in.ply", [head.as_bytes(), &body].concat());
+        let (schema, _, all) = read(&path, 999).unwrap();
+        let names: Vec<&str> = schema.dimensions.iter().map(|d| d.name.as_str()).collect();
+        assert_eq!(names, ["X", "Y", "Z", "n"]);
+        for (n, record) in (0..count).zip(all.chunks_exact(schema.stride)) {
+            let values = schema.dimensions.iter().map(|d| d.get(record, schema.endian).as_f64());
+            assert!(values.eq([f64::from(n), 0.5, -1.0, f64::from(n)]), "{word} {n}");
+        }
+        let warnings = ply::open(std::slice::from_ref(&path)).unwrap().warnings();
+        assert!(warnings[0].contains("lists of its vertices are not read: `uv`"), "{warnings:?}");
+        // Cut within the last vertex, and a list that claims more than there is.
+        if encoding != Encoding::Ascii {
+            let cut =
+                file(folder.path(), "cut.ply", [head.as_bytes(), &body[..body.len() - 5]].concat());
+            assert!(
+                read(&cut, 999).unwrap_err().to_string().contains("the file ends within"),
+                "{word}"
+            );
+            let mut long = body.clone();
+            long[8..10].fill(0xff);
+            let few = head.replace(&count.to_string(), "1");
+            let long = file(folder.path(), "long.ply", [few.as_bytes(), &long[..20]].concat());
+            assert!(read(&long, 9).unwrap_err().to_string().contains("longer than the file"));
+        }
+    }
+    let case = crate::support::case_file("33-vertex-list.ply");
+    assert_eq!(values(&case).len(), 2);
+}
+
 #[test]
 fn dimensions_can_be_dropped_by_name() {
     let folder = tempfile::tempdir().unwrap();

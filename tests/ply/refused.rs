@@ -45,10 +45,10 @@ fn what_is_wrong_is_named_with_its_byte() {
         ),
         (
             format!(
-                "{ascii}element vertex 1\n{XYZ}property list uchar int of\nend_header\n1 2 3 0\n"
+                "{ascii}element vertex 1\n{XYZ}property list uchar int of\nend_header\n1 2 3 4 5\n"
             ),
-            "`of`",
-            None,
+            "the list `of` is not as long as it says",
+            Some(127),
         ),
         (
             format!("{ascii}element vertex 0\nelement vertex 1\n{XYZ}end_header\n1 2 3\n"),

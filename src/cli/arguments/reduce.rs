@@ -47,7 +47,7 @@ impl ReduceArguments {
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ReduceArguments {
-    /// Files of points, patterns or folders
+    /// Files of points, patterns or folders, or @LIST: a text with one of them a line
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<String>,
     /// The reduced file: .las, .laz or .ply

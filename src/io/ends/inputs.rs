@@ -6,6 +6,7 @@ use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
+use super::list::paths_in;
 use crate::error::{listed, shown, whereabouts};
 use crate::stage::Formats;
 use crate::{Error, ErrorKind, Result};
@@ -52,8 +53,23 @@ pub fn expand_any<P: AsRef<str>>(paths: &[P], formats: &Formats) -> Result<Vec<P
     Ok(files)
 }
 
+/// What the lines of the list at `list` mean.
+fn listed_in(list: &Path, formats: &Formats) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for (line, path) in paths_in(list)? {
+        files.extend(one(&path, formats).map_err(|error| match error.path() {
+            Some(_) => error,
+            None => Error::data(list, format!("line {line}: {error}")),
+        })?);
+    }
+    Ok(files)
+}
+
 fn one(path: &str, formats: &Formats) -> Result<Vec<PathBuf>> {
     let literal = Path::new(path);
+    if let Some(list) = path.strip_prefix('@').filter(|_| !literal.exists()) {
+        return listed_in(Path::new(list), formats);
+    }
     if literal.is_dir() {
         return folder(literal, formats);
     }
@@ -315,6 +331,32 @@ mod tests {
         assert!(start.elapsed() < std::time::Duration::from_secs(5), "{:?}", start.elapsed());
         let long = names(at.path(), &[&("*/".repeat(3000) + "x")]).unwrap_err();
         assert!(long.to_string().contains("longer than any path"), "{long}");
+    }
+
+    #[test]
+    fn a_list_means_what_its_lines_mean() {
+        let at = folder_of(&["a.laz", "b.laz", "c.laz", "@odd.laz"]);
+        let path = |name: &str| at.path().join(name).to_str().unwrap().to_owned();
+        let list = path("list.txt");
+        let of = |paths: &[String]| {
+            let name = |p: PathBuf| p.file_name().unwrap().to_str().unwrap().to_owned();
+            let files = expand(paths, &formats())?;
+            Ok::<_, Error>(files.into_iter().map(name).collect::<Vec<_>>())
+        };
+        let lines = format!("# two\n{}\n\n  {}\r\n", path("c.laz"), path("[ab].laz"));
+        fs::write(&list, lines).unwrap();
+        let at_list = format!("@{list}");
+        assert_eq!(of(std::slice::from_ref(&at_list)).unwrap(), ["c.laz", "a.laz", "b.laz"]);
+        assert_eq!(of(&[path("@odd.laz")]).unwrap(), ["@odd.laz"], "a file that exists is itself");
+        let told = |text: &str| {
+            fs::write(&list, text).unwrap();
+            of(std::slice::from_ref(&at_list)).unwrap_err().to_string()
+        };
+        assert!(told(&path("none*.laz")).contains("list.txt: line 1: no file matches"));
+        assert!(told("@other.txt").contains("a list in a list is not read"));
+        assert!(told("# nothing").contains("no input is named"));
+        fs::remove_file(&list).unwrap();
+        assert_eq!(of(&[at_list]).unwrap_err().path(), Some(Path::new(&list)));
     }
 
     #[test]

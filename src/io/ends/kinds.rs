@@ -36,7 +36,7 @@ use crate::{Error, Result};
 /// # Formats
 ///
 /// - LAS 1.0 to 1.4, and LAZ; COPC is read whole, as the LAZ that it is.
-/// - PLY, whatever its vertices hold but lists.
+/// - PLY, whatever its vertices hold; lists of theirs are passed over, and told.
 /// - PCD as text, as bytes or packed (`binary_compressed`). A cell of a grid (`HEIGHT` above 1) has
 ///   its `Row` and `Column`. A point of which a coordinate is NaN is none, as the library has it:
 ///   it is left out, and how many there were is told.
@@ -66,6 +66,8 @@ use crate::{Error, Result};
 ///   out of folders, for what else may have them;
 /// - else `*`, `?`, `[…]` and `**` make it a pattern: the files that match, sorted by the bytes of
 ///   their paths; one that matches none is an error, like a file that is not there;
+/// - else `@` and a name mean what each line of that text means: thousands of paths in a file, from
+///   the folder that you are in; blank lines and those that begin with `#` mean nothing;
 /// - else it is a file that does not exist (yet): opening it will tell.
 ///
 /// Names that are not UTF-8 text are refused, however they are meant. A pattern

@@ -5,6 +5,7 @@ mod connect;
 mod discard;
 mod inputs;
 mod kinds;
+mod list;
 mod mesh;
 mod outputs;
 mod roles;

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use super::file::PlyFile;
+use super::header::{Property, PropertyKind};
 use crate::io::rows::lines::{Lines, shown, word};
 use crate::io::rows::number;
 use crate::point::{PointBatch, Scalar, Schema};
@@ -22,8 +23,8 @@ pub(super) struct AsciiPart<'a> {
     path: &'a Path,
     file: &'a PlyFile,
     lines: Lines<'a>,
-    /// Names (as the file has them), types and byte offsets in the record.
-    fields: Vec<(&'a str, Scalar, usize)>,
+    /// Names (as the file has them), types and byte offsets in the record; no place for lists.
+    fields: Vec<(&'a str, Option<(Scalar, usize)>)>,
     stride: usize,
     /// Lines to pass over before the first vertex.
     skip: u64,
@@ -37,12 +38,17 @@ pub(super) struct AsciiPart<'a> {
 impl<'a> AsciiPart<'a> {
     /// Bytes that reading holds besides the batch.
     pub fn bytes(schema: &Schema) -> u64 {
-        let fields = schema.dimensions.len() * size_of::<(&str, Scalar, usize)>();
+        let fields = schema.dimensions.len() * size_of::<(&str, Option<(Scalar, usize)>)>();
         (Lines::bytes(longest_line(schema)) + fields) as u64
     }
 
     pub fn new(handle: File, file: &'a PlyFile, schema: &'a Schema, source: u32) -> Self {
-        let properties = file.properties();
+        let mut dimensions = schema.dimensions.iter();
+        let mut field = |property: &Property| match property.kind {
+            PropertyKind::Scalar(_) => dimensions.next().map(|d| (d.scalar, d.offset)),
+            PropertyKind::List { .. } => None,
+        };
+        let fields = file.properties().iter().map(|p| (p.name.as_str(), field(p))).collect();
         AsciiPart {
             path: &file.path,
             file,
@@ -53,11 +59,7 @@ impl<'a> AsciiPart<'a> {
                 file.header.lines,
                 longest_line(schema),
             ),
-            fields: properties
-                .iter()
-                .zip(&schema.dimensions)
-                .map(|(p, d)| (p.name.as_str(), d.scalar, d.offset))
-                .collect(),
+            fields,
             stride: schema.stride,
             skip: file.skipped_lines,
             points: file.points,
@@ -98,10 +100,17 @@ impl<'a> AsciiPart<'a> {
                 )
         };
         let mut place = 0;
-        for (n, (name, scalar, offset)) in self.fields.iter().enumerate() {
+        for (n, (name, target)) in self.fields.iter().enumerate() {
             let Some(token) = word(line, &mut place) else {
                 let message = format!("{n} values, but {} vertex properties", self.fields.len());
                 return Err(fail(start, message));
+            };
+            let Some((scalar, offset)) = target else {
+                if !pass_list(token, line, &mut place) {
+                    let message = format!("the list `{name}` is not as long as it says");
+                    return Err(fail(start, message));
+                }
+                continue;
             };
             let at = start + place - token.len();
             if !number::parse(token, *scalar, &mut record[*offset..]) {
@@ -125,6 +134,12 @@ impl<'a> AsciiPart<'a> {
     }
 }
 
+/// Passes over the values of a list whose count is `token`; false if there are not as many.
+fn pass_list(token: &[u8], line: &[u8], place: &mut usize) -> bool {
+    let count = std::str::from_utf8(token).ok().and_then(|text| text.parse::<u64>().ok());
+    count.is_some_and(|count| (0..count).all(|_| word(line, place).is_some()))
+}
+
 impl Part for AsciiPart<'_> {
     fn read(&mut self, batch: &mut PointBatch) -> Result<()> {
         let outcome = self.fill(batch);
@@ -143,8 +158,12 @@ impl AsciiPart<'_> {
             let mut place = 0;
             for n in 0..=columns.last().copied().unwrap_or(0) {
                 let Some(token) = word(line, &mut place) else { break };
-                if columns.contains(&n) && number::loses_digits(token) {
-                    return Ok(true);
+                match self.fields.get(n) {
+                    Some((_, None)) => {
+                        pass_list(token, line, &mut place);
+                    }
+                    _ if columns.contains(&n) && number::loses_digits(token) => return Ok(true),
+                    _ => {}
                 }
             }
         }

@@ -76,6 +76,12 @@ impl PlyFile {
         Ok(file)
     }
 
+    /// The names of the lists that its vertices have, which are not read.
+    pub fn lists(&self) -> Vec<&str> {
+        let is_list = |p: &&Property| matches!(p.kind, PropertyKind::List { .. });
+        self.properties().iter().filter(is_list).map(|p| p.name.as_str()).collect()
+    }
+
     /// The properties of its vertices.
     pub fn properties(&self) -> &[Property] {
         &self.header.elements[self.vertex].properties
@@ -124,6 +130,13 @@ impl PlyFile {
         let room = self.length.saturating_sub(self.body);
         let holds = match self.header.elements[self.vertex].size() {
             Some(size) if self.header.encoding != Encoding::Ascii => room / size.max(1),
+            None if self.header.encoding != Encoding::Ascii => {
+                let least = |p: &Property| match p.kind {
+                    PropertyKind::Scalar(scalar) => scalar.size() as u64,
+                    PropertyKind::List { count, .. } => count.size() as u64,
+                };
+                room / self.properties().iter().map(least).sum::<u64>().max(1)
+            }
             // A value takes a digit and a separator, which the last may lack.
             _ => (room + 1) / (2 * self.properties().len().max(1) as u64),
         };
@@ -159,25 +172,15 @@ fn text_lines(elements: &[Element]) -> u64 {
         .fold(0, |lines, e| lines.saturating_add(e.count))
 }
 
-/// Refuses a vertex element that has lists or lacks a coordinate.
+/// Refuses a vertex element that lacks a coordinate.
 fn check(path: &Path, vertex: &Element) -> Result<()> {
-    if let Some(list) =
-        vertex.properties.iter().find(|p| matches!(p.kind, PropertyKind::List { .. }))
-    {
-        return Err(Error::data(
-            path,
-            format!(
-                "element `vertex` has a list, `{}`: vertices of varying size are not read",
-                shown(&list.name)
-            ),
-        )
-        .help("write the file without that list; elements beside `vertex` may have lists"));
-    }
     let missing: Vec<&str> = ["x", "y", "z"]
         .into_iter()
         .filter(|axis| {
             let dimension = dimension_of(axis);
-            !vertex.properties.iter().any(|p| p.name == *axis || p.name == dimension)
+            let is_it = |p: &Property| p.name == *axis || p.name == dimension;
+            let is_number = |p: &&Property| matches!(p.kind, PropertyKind::Scalar(_));
+            !vertex.properties.iter().filter(is_number).any(is_it)
         })
         .collect();
     if missing.is_empty() {

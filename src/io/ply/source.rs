@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::ascii::AsciiPart;
-use super::binary::BinaryPart;
+use super::binary::{BinaryPart, ListedPart};
 use super::file::PlyFile;
 use super::header::{Element, PropertyKind};
 use super::names::{self, RECORDS};
@@ -91,6 +91,7 @@ impl PlySource {
             .iter()
             .map(|file| {
                 let own = match file.header.encoding {
+                    _ if !file.lists().is_empty() => u64::from(file.points > 0),
                     Encoding::Ascii => u64::from(file.points > 0),
                     _ => file.points.div_ceil(PART_POINTS),
                 };
@@ -98,7 +99,8 @@ impl PlySource {
                 parts
             })
             .collect();
-        let warnings = files.iter().flat_map(|file| dropped(file).into_iter().chain(cut(file)));
+        let told = |file| [listed(file), dropped(file), cut(file)].into_iter().flatten();
+        let warnings = files.iter().flat_map(told);
         let warnings = warnings.collect();
         Ok(PlySource { schema, metadata, files, ends, warnings })
     }
@@ -288,6 +290,15 @@ fn dropped(file: &PlyFile) -> Option<String> {
     })
 }
 
+/// A warning for lists that vertices have.
+fn listed(file: &PlyFile) -> Option<String> {
+    let lists: Vec<String> = file.lists().iter().map(|name| format!("`{}`", shown(name))).collect();
+    (!lists.is_empty()).then(|| {
+        let path = crate::error::shown(&file.path);
+        format!("{path}: lists of its vertices are not read: {}", lists.join(", "))
+    })
+}
+
 /// A warning for a text that ends within a line.
 fn cut(file: &PlyFile) -> Option<String> {
     file.ends_in_a_number.then(|| {
@@ -326,6 +337,7 @@ impl Source for PlySource {
     fn part_bytes(&self) -> u64 {
         match self.files[0].header.encoding {
             Encoding::Ascii => AsciiPart::bytes(&self.schema),
+            _ if self.files.iter().any(|file| !file.lists().is_empty()) => ListedPart::BYTES,
             _ => 0,
         }
     }
@@ -349,6 +361,12 @@ impl Source for PlySource {
         let source = number as u32;
         if file.header.encoding == Encoding::Ascii {
             return Ok(Box::new(AsciiPart::new(handle, file, &self.schema, source)));
+        }
+        if !file.lists().is_empty() {
+            let properties = (file.properties(), self.schema.endian);
+            let (at, left) = (file.body, file.points);
+            let part = ListedPart::new((handle, &file.origin), properties, at, left, source);
+            return Ok(Box::new(part));
         }
         let start = within as u64 * PART_POINTS;
         Ok(Box::new(BinaryPart {
