@@ -36,7 +36,7 @@ pub use crate::tile::sieve::Sieve;
 /// LAS and LAZ without a run around them.
 pub mod las {
     pub use crate::io::las::describe::{Description, Record, describe};
-    pub use crate::io::las::format::records;
+    pub use crate::io::las::format::{layout, records};
     pub use crate::io::las::holding::las_schema;
     pub use crate::io::las::sink::{LasOptions, create};
 }
@@ -48,6 +48,32 @@ pub mod ply {
     pub use crate::io::ply::sink::create;
     pub use crate::io::ply::sink::ply_schema;
     pub use crate::io::rows::Encoding;
+}
+
+/// What the dimensions that formats share are called.
+#[derive(Debug, Clone)]
+pub struct SharedName {
+    /// The dimension.
+    pub dimension: &'static str,
+    /// In PLY, PCD and E57.
+    pub written: [String; 3],
+    /// Other spellings that headings and properties may have.
+    pub spellings: Vec<&'static str>,
+    /// What it is, with range and unit.
+    pub about: &'static str,
+}
+
+/// The dimensions that formats share, in the order in which they are written.
+pub fn shared_names() -> Vec<SharedName> {
+    let table = crate::io::rows::names::TABLE;
+    let dimensions: Vec<&str> = table.iter().map(|row| row.0).collect();
+    let in_e57 = crate::io::e57::sink::value_names(&dimensions);
+    let named = |(row, e57): (&(&'static str, &str, &[&'static str], &'static str), String)| {
+        let pcd = crate::io::pcd::sink::field_name(row.0);
+        let written = [row.1.to_owned(), pcd, e57];
+        SharedName { dimension: row.0, written, spellings: row.2.to_vec(), about: row.3 }
+    };
+    table.iter().zip(in_e57).map(named).collect()
 }
 
 /// How many neighbourhoods of a tile had to be searched for beyond it since this was asked last.

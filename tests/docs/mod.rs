@@ -3,6 +3,7 @@
 //!
 //! `POINTMILL_WRITE_DOCS=1 cargo test --test repository` writes the generated pages again.
 
+mod dimensions;
 pub mod examples;
 mod formats;
 mod keys;

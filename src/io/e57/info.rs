@@ -36,7 +36,7 @@ struct E57ScanFacts {
 }
 
 /// What a value is called.
-fn name(name: &RecordName) -> String {
+pub(super) fn name(name: &RecordName) -> String {
     match name {
         RecordName::Unknown { namespace, name } => format!("{namespace}:{name}"),
         known => format!("{known:?}"),

@@ -12,7 +12,7 @@ mod part;
 mod pose;
 mod reading;
 mod registered;
-mod sink;
+pub(crate) mod sink;
 mod source;
 
 pub use registered::{E57, E57Format};

@@ -13,7 +13,7 @@ use e57::{E57Writer, Extension, Record, RecordDataType, RecordName, RecordValue}
 use sha2::{Digest, Sha256};
 
 use super::fields::TIME_STAMP;
-use super::info::NOTE;
+use super::info::{NOTE, name};
 use super::names::RECORDS;
 use crate::io::rows::file::{Heading, RowFile};
 use crate::io::rows::plan::{RowOptions, RowPlan};
@@ -122,6 +122,15 @@ fn prototype(shape: &RowShape) -> Vec<Record> {
         Record { name, data_type }
     };
     shape.columns.iter().map(one).collect()
+}
+
+/// What dimensions are called where all of them are there.
+pub(crate) fn value_names(dimensions: &[&str]) -> Vec<String> {
+    let field = |name: &&str| Dimension::new(*name, Scalar::U16, 0);
+    let dimensions: Vec<Dimension> = dimensions.iter().map(field).collect();
+    let row = Schema { layout: RECORDS, endian: Endian::Little, stride: 2, dimensions };
+    let named = prototype(&RowShape::of(row, &FORM));
+    named.iter().map(|record| name(&record.name)).collect()
 }
 
 /// The name of a value that the standard does not have.

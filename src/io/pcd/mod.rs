@@ -13,7 +13,7 @@ mod names;
 mod packed;
 mod part;
 mod registered;
-mod sink;
+pub(crate) mod sink;
 mod source;
 
 pub use registered::{PCD, PcdFormat};

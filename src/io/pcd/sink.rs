@@ -39,7 +39,7 @@ pub(super) fn plan(keys: &WriteKeys, schema: &Schema, metadata: &Metadata) -> Re
 }
 
 /// The name of a dimension as a field.
-fn field_name(dimension: &str) -> String {
+pub(crate) fn field_name(dimension: &str) -> String {
     if let Some(axis) = NORMAL.iter().position(|name| *name == dimension) {
         return ["normal_x", "normal_y", "normal_z"][axis].to_owned();
     }

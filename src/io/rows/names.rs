@@ -2,44 +2,77 @@
 
 use crate::point::names as n;
 
-/// Dimension, the property it is written as, and other spellings that are read as it. Known
-/// dimensions are written in this order.
-pub(crate) const TABLE: &[(&str, &str, &[&str])] = &[
-    (n::XYZ[0], "x", &[]),
-    (n::XYZ[1], "y", &[]),
-    (n::XYZ[2], "z", &[]),
-    (n::NORMAL[0], "nx", &["normal_x", "normalx"]),
-    (n::NORMAL[1], "ny", &["normal_y", "normaly"]),
-    (n::NORMAL[2], "nz", &["normal_z", "normalz"]),
-    (n::INTENSITY, "intensity", &[]),
-    (n::RED, "red", &["r", "diffuse_red"]),
-    (n::GREEN, "green", &["g", "diffuse_green"]),
-    (n::BLUE, "blue", &["b", "diffuse_blue"]),
-    (n::NIR, "nir", &[]),
-    (n::CLASSIFICATION, "classification", &[]),
-    (n::GPS_TIME, "gps_time", &["gpstime"]),
-    (n::RETURN_NUMBER, "return_number", &["returnnumber"]),
-    (n::NUMBER_OF_RETURNS, "number_of_returns", &["numberofreturns"]),
-    (n::SCAN_ANGLE, "scan_angle", &["scan_angle_rank", "scananglerank"]),
-    (n::USER_DATA, "user_data", &["userdata"]),
-    (n::POINT_SOURCE_ID, "point_source_id", &["pointsourceid"]),
-    (n::SYNTHETIC, "synthetic", &[]),
-    (n::KEY_POINT, "key_point", &["keypoint"]),
-    (n::WITHHELD, "withheld", &[]),
-    (n::OVERLAP, "overlap", &[]),
-    (n::SCAN_DIRECTION_FLAG, "scan_direction_flag", &["scandirectionflag"]),
-    (n::EDGE_OF_FLIGHT_LINE, "edge_of_flight_line", &["edgeofflightline"]),
-    (n::SCANNER_CHANNEL, "scanner_channel", &["scanchannel"]),
-    (n::ROW, "row", &["row_index", "rowindex"]),
-    (n::COLUMN, "column", &["column_index", "columnindex"]),
-    (n::WAVE_DESCRIPTOR, "wave_packet_descriptor_index", &[]),
-    (n::WAVE_OFFSET, "wave_packet_byte_offset", &[]),
-    (n::WAVE_SIZE, "wave_packet_size", &[]),
-    (n::WAVE_RETURN, "wave_return_point", &[]),
-    (n::WAVE_DIRECTION[0], "wave_xt", &[]),
-    (n::WAVE_DIRECTION[1], "wave_yt", &[]),
-    (n::WAVE_DIRECTION[2], "wave_zt", &[]),
+/// Dimension, the property it is written as, other spellings that are read as it, and what it is.
+/// Known dimensions are written in this order.
+pub(crate) const TABLE: &[NamedDimension] = &[
+    (n::XYZ[0], "x", &[], "coordinate, in the unit of the reference system"),
+    (n::XYZ[1], "y", &[], "coordinate, in the unit of the reference system"),
+    (n::XYZ[2], "z", &[], "height or third coordinate, in its unit"),
+    (n::NORMAL[0], "nx", &["normal_x", "normalx"], "component of the unit normal, -1 to 1"),
+    (n::NORMAL[1], "ny", &["normal_y", "normaly"], "component of the unit normal, -1 to 1"),
+    (n::NORMAL[2], "nz", &["normal_z", "normalz"], "component of the unit normal, -1 to 1"),
+    (n::INTENSITY, "intensity", &[], "strength of the return, in no unit"),
+    (n::RED, "red", &["r", "diffuse_red"], "colour; the most is 65535 of 16 bits, 255 of 8"),
+    (n::GREEN, "green", &["g", "diffuse_green"], "likewise"),
+    (n::BLUE, "blue", &["b", "diffuse_blue"], "likewise"),
+    (n::NIR, "nir", &[], "near infrared, as a colour"),
+    (n::CLASSIFICATION, "classification", &[], "class, 0 to 255 (LAS 1.4 R15, table 17)"),
+    (
+        n::GPS_TIME,
+        "gps_time",
+        &["gpstime"],
+        "seconds; the header says of the GPS week or of GPS time minus 1e9",
+    ),
+    (
+        n::RETURN_NUMBER,
+        "return_number",
+        &["returnnumber"],
+        "number of the return of its pulse, from 1",
+    ),
+    (n::NUMBER_OF_RETURNS, "number_of_returns", &["numberofreturns"], "returns of the pulse"),
+    (
+        n::SCAN_ANGLE,
+        "scan_angle",
+        &["scan_angle_rank", "scananglerank"],
+        "degrees from straight down",
+    ),
+    (n::USER_DATA, "user_data", &["userdata"], "free"),
+    (
+        n::POINT_SOURCE_ID,
+        "point_source_id",
+        &["pointsourceid"],
+        "flight line, or scan of several, 0 to 65535",
+    ),
+    (n::SYNTHETIC, "synthetic", &[], "1 for a point that was not measured"),
+    (n::KEY_POINT, "key_point", &["keypoint"], "1 for a point that is to stay"),
+    (n::WITHHELD, "withheld", &[], "1 for a point that counts as deleted"),
+    (n::OVERLAP, "overlap", &[], "1 where flight lines overlap"),
+    (
+        n::SCAN_DIRECTION_FLAG,
+        "scan_direction_flag",
+        &["scandirectionflag"],
+        "1 where the mirror moved from left to right",
+    ),
+    (
+        n::EDGE_OF_FLIGHT_LINE,
+        "edge_of_flight_line",
+        &["edgeofflightline"],
+        "1 for the last point of a scan line",
+    ),
+    (n::SCANNER_CHANNEL, "scanner_channel", &["scanchannel"], "head of the scanner, 0 to 3"),
+    (n::ROW, "row", &["row_index", "rowindex"], "row of an organised scan, from 0"),
+    (n::COLUMN, "column", &["column_index", "columnindex"], "column of an organised scan, from 0"),
+    (n::WAVE_DESCRIPTOR, "wave_packet_descriptor_index", &[], "record that describes the waveform"),
+    (n::WAVE_OFFSET, "wave_packet_byte_offset", &[], "byte where the waveform begins"),
+    (n::WAVE_SIZE, "wave_packet_size", &[], "bytes of the waveform"),
+    (n::WAVE_RETURN, "wave_return_point", &[], "picoseconds from the first sample to the return"),
+    (n::WAVE_DIRECTION[0], "wave_xt", &[], "direction of the waveform, per picosecond"),
+    (n::WAVE_DIRECTION[1], "wave_yt", &[], "likewise"),
+    (n::WAVE_DIRECTION[2], "wave_zt", &[], "likewise"),
 ];
+
+/// A row of [`TABLE`].
+type NamedDimension = (&'static str, &'static str, &'static [&'static str], &'static str);
 
 /// Place of a dimension in the order in which known dimensions are written; None for the others.
 pub(crate) fn rank(dimension: &str) -> Option<usize> {
@@ -108,7 +141,7 @@ mod tests {
 
     #[test]
     fn every_known_dimension_reads_back_from_its_property() {
-        for (dimension, property, spellings) in TABLE {
+        for (dimension, property, spellings, _) in TABLE {
             assert_eq!(dimension_of(property), *dimension);
             assert!(spellings.iter().all(|s| dimension_of(s) == *dimension));
         }
