@@ -235,7 +235,9 @@ impl HeaderReader<'_> {
         let fields = self.fields()?;
         let (value, at) = self.get("DATA").unwrap_or_default();
         let all = [PcdData::Ascii, PcdData::Binary, PcdData::Compressed];
-        let Some(data) = all.into_iter().find(|data| data.word() == value) else {
+        // As some versions of pypcd4 misspell it.
+        let said = if value == "binaryscompressed" { PcdData::Compressed.word() } else { value };
+        let Some(data) = all.into_iter().find(|data| data.word() == said) else {
             return Err(self.fail(format!("`DATA {}` is not known", shown(value)), at));
         };
         let (width, height) = (self.number("WIDTH")?, self.number("HEIGHT")?);

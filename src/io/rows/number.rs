@@ -154,15 +154,21 @@ fn print_short(v: f64, out: &mut Vec<u8>) -> bool {
     if v == 0.0 || !plain(v) {
         return false;
     }
+    let size = v.abs();
     for (decimals, unit) in UNITS.iter().enumerate() {
-        let units = (v * unit).round();
-        if units.abs() >= SHORT {
+        let units = size * unit;
+        if units >= SHORT {
             return false;
         }
+        // The nearest whole number, by a conversion that costs less than rounding does.
+        let units = (units + 0.5) as u64;
         // Two such numbers of neighbouring units are more than a step of f64 apart, and division
         // rounds correctly: only one reads back as `v`, and with fewer decimals none does.
-        if units / unit == v {
-            print_decimal(units as i128, decimals as u32, out);
+        if units as f64 / unit == size {
+            if v < 0.0 {
+                out.push(b'-');
+            }
+            print_units(units, decimals, out);
             return true;
         }
     }
@@ -180,22 +186,42 @@ pub(crate) fn print_decimal(units: i128, decimals: u32, out: &mut Vec<u8>) {
     if units < 0 {
         out.push(b'-');
     }
+    if let Ok(units) = u64::try_from(units.unsigned_abs()) {
+        return print_units(units, decimals as usize, out);
+    }
     let mut digits = [b'0'; 40];
     let (mut left, mut start) = (units.unsigned_abs(), digits.len());
     let least = digits.len() - 1 - decimals as usize;
-    // Arithmetic of 128 bits is slow, and rarely needed.
-    while left > u128::from(u64::MAX) {
-        start -= 1;
-        digits[start] = b'0' + (left % 10) as u8;
-        left /= 10;
-    }
-    let mut left = left as u64;
     while left > 0 || start > least {
         start -= 1;
         digits[start] = b'0' + (left % 10) as u8;
         left /= 10;
     }
     let point = digits.len() - decimals as usize;
+    out.extend_from_slice(&digits[start..point]);
+    if decimals > 0 {
+        out.push(b'.');
+        out.extend_from_slice(&digits[point..]);
+    }
+}
+
+/// As [`print_decimal`], of what 64 bits hold: arithmetic of 128 is slow, and rarely needed.
+fn print_units(mut left: u64, decimals: usize, out: &mut Vec<u8>) {
+    let mut digits = [b'0'; 24];
+    let (mut start, point) = (digits.len(), digits.len() - decimals);
+    // Two digits a division.
+    while left >= 100 {
+        let pair = (left % 100) as u8;
+        left /= 100;
+        start -= 2;
+        (digits[start], digits[start + 1]) = (b'0' + pair / 10, b'0' + pair % 10);
+    }
+    while left > 0 {
+        start -= 1;
+        digits[start] = b'0' + (left % 10) as u8;
+        left /= 10;
+    }
+    let start = start.min(point - 1);
     out.extend_from_slice(&digits[start..point]);
     if decimals > 0 {
         out.push(b'.');
