@@ -138,6 +138,11 @@ pub trait Format: Send + Sync {
         true
     }
 
+    /// True if its files say what GPS times count.
+    fn holds_gps_time_kind(&self) -> bool {
+        true
+    }
+
     /// What to do instead where `write` does not write it; None if it does.
     fn unwritten(&self) -> Option<&'static str> {
         None

@@ -91,6 +91,10 @@ impl Format for E57Format {
         schema.layout == RECORDS && keys.drop.is_empty()
     }
 
+    fn holds_gps_time_kind(&self) -> bool {
+        false
+    }
+
     fn holds_computed(&self) -> bool {
         true
     }

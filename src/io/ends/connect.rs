@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::error::shown;
 use crate::io::sniff;
+use crate::point::names::GPS_TIME;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{
     ChunkSize, CreateSink, Format, Formats, OpenSource, Order, ReadKeys, Sink, Source, WriteKeys,
@@ -116,6 +117,10 @@ impl CreateSink for OutputFile {
         let mut lost = from.map_or(Vec::new(), |from| from.lost(metadata));
         if metadata.crs.is_some() && !self.format.holds_crs() {
             lost.push("the coordinate reference system".to_owned());
+        }
+        let has_times = schema.find(GPS_TIME).is_some() && !self.keys.drop.contains(&GPS_TIME.into());
+        if has_times && metadata.gps_time.is_some() && !self.format.holds_gps_time_kind() {
+            lost.push("what GPS times count".to_owned());
         }
         let path = shown(&self.keys.path);
         let told = |lost| format!("{path}: {family} does not hold {lost}");

@@ -158,6 +158,10 @@ impl Format for TextFormat {
         false
     }
 
+    fn holds_gps_time_kind(&self) -> bool {
+        false
+    }
+
     fn holds_computed(&self) -> bool {
         true
     }
