@@ -58,8 +58,7 @@ pub fn create(
     Ok(Box::new(PlySink::create(staged, options, schema, metadata)?))
 }
 
-/// The vertex that holds what a record of `schema` holds, as
-/// [`row_schema`](crate::io::rows::schema::row_schema) says.
+/// The vertex that holds what a record of `schema` holds, as `rows/schema.rs` says.
 pub fn ply_schema(schema: &Schema) -> Schema {
     row_schema(schema, &FORM)
 }

@@ -2,7 +2,7 @@
 //!
 //! No specification says what is on a line, so nothing is guessed in silence: the user says it, or
 //! a heading, or the number of columns where it can be only one thing. Before a text is read it is
-//! looked through once ([`survey`]): how many points it has, which types hold its numbers, and
+//! looked through once (`survey.rs`): how many points it has, which types hold its numbers, and
 //! where its lines begin that threads may share out.
 
 mod columns;
