@@ -9,7 +9,7 @@ use crate::support::las_file::{LasFile, STRIDES};
 use crate::support::random::Random;
 
 /// Values by name: a list for each.
-fn table(lines: &[String]) -> BTreeMap<String, Vec<f64>> {
+pub(super) fn table(lines: &[String]) -> BTreeMap<String, Vec<f64>> {
     let names: Vec<&str> = lines[0].split(',').collect();
     let mut table: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for line in &lines[1..] {
@@ -21,7 +21,11 @@ fn table(lines: &[String]) -> BTreeMap<String, Vec<f64>> {
     table
 }
 
-fn assert_same(what: &str, one: &BTreeMap<String, Vec<f64>>, two: &BTreeMap<String, Vec<f64>>) {
+pub(super) fn assert_same(
+    what: &str,
+    one: &BTreeMap<String, Vec<f64>>,
+    two: &BTreeMap<String, Vec<f64>>,
+) {
     assert_eq!(one.keys().collect::<Vec<_>>(), two.keys().collect::<Vec<_>>(), "{what}");
     for (name, values) in one {
         for (n, (a, b)) in values.iter().zip(&two[name]).enumerate() {

@@ -150,7 +150,7 @@ fn ptx_scans_are_brought_together_by_their_poses() {
 fn texts_are_written_as_asked() {
     let at = scans(&["a.las"]);
     let at = at.path();
-    done(at, &["convert", "a.las", "-o", "a.csv"]);
+    done(at, &["convert", "a.las", "-o", "a.csv", "--quiet"]);
     let csv = fs::read_to_string(at.join("a.csv")).unwrap();
     let names: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
     assert_eq!(names[..3], ["X", "Y", "Z"]);

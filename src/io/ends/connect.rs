@@ -118,7 +118,8 @@ impl CreateSink for OutputFile {
         if metadata.crs.is_some() && !self.format.holds_crs() {
             lost.push("the coordinate reference system".to_owned());
         }
-        let has_times = schema.find(GPS_TIME).is_some() && !self.keys.drop.contains(&GPS_TIME.into());
+        let has_times =
+            schema.find(GPS_TIME).is_some() && !self.keys.drop.contains(&GPS_TIME.into());
         if has_times && metadata.gps_time.is_some() && !self.format.holds_gps_time_kind() {
             lost.push("what GPS times count".to_owned());
         }
