@@ -248,6 +248,6 @@ mod tests {
     fn outputs_of_one_name_or_no_format_are_refused() {
         let told = of(&["a/x.las", "b/x.laz"], Some("ply")).unwrap_err().to_string();
         assert_eq!(told, "a/x.las and b/x.laz would both become out/x.ply");
-        assert!(of(&["x.txt"], None).is_err());
+        assert!(of(&["x.dat"], None).is_err());
     }
 }

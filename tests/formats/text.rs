@@ -38,8 +38,10 @@ fn columns_are_what_the_user_says_or_what_their_number_leaves_no_doubt_of() {
         ("normals.xyz", "1 2 3 0 0.6 0.8\n5 6 7 1 0 -0.5\n"),
         ("seven.pts", "2\n1 2 3 -5 255 0 7\n5 6 7 2047 9 10 11\n"),
         ("named.txt", "X Y Z Intensity\n1 2 3 4\n"),
+        ("swapped.csv", "y,x,z\n200,100,3\n"),
     ]);
     let at = at.path();
+    fails(at, &["convert", "swapped.csv", "-o", "o.pts"], 2, &["another order than Y, X, Z"]);
     fails(at, &["convert", "four.xyz", "-o", "o.las"], 1, &["4 columns", "--columns x,y,z,i"]);
     let (lines, _) = converted(at, "four.xyz", &["--columns", "z,_,x,y"]);
     assert_eq!(lines, ["Z,X,Y", "1,3,4", "5,7,8"]);

@@ -200,7 +200,7 @@ mod tests {
         let mut bytes = Vec::new();
         for n in 0..60_000u32 {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let is_new = n % 5 == 0 || n < 9000;
+            let is_new = n % 50 == 0 || n < 9000;
             bytes.push(if is_new { (seed >> 24) as u8 } else { bytes[n as usize - REACH] });
         }
         bytes

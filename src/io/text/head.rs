@@ -8,6 +8,7 @@ use super::columns::dimensions;
 use super::names::{CALLED, LONGEST_LINE};
 use crate::io::rows::fields::{Delimiter, is_comment, is_count, is_number};
 use crate::io::rows::lines::Lines;
+use crate::io::sniff;
 use crate::stage::foreign;
 use crate::{Error, Result};
 
@@ -105,7 +106,9 @@ impl TextHead {
 /// one that may name columns.
 pub(super) fn sniff(first: &[u8]) -> bool {
     let first = without_mark(first, 0);
-    let end = first.iter().rposition(|b| *b == b'\n' || *b == b'\r').unwrap_or(first.len());
+    // Where there is more than what is looked at, the last line may be cut.
+    let whole = first.iter().rposition(|b| *b == b'\n' || *b == b'\r');
+    let end = whole.filter(|_| first.len() >= sniff::BYTES).unwrap_or(first.len());
     let is_said = |line: &&[u8]| {
         !line.trim_ascii().is_empty() && is_comment(line).is_none() && !is_count(line)
     };

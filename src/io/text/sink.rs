@@ -68,6 +68,11 @@ fn check_pts(columns: &[Dimension]) -> Result<()> {
         let told = format!("PTS cannot hold {}", quoted(&lost));
         return Err(Error::pipeline(told).help(format!("`write.drop = {lost:?}` leaves them out")));
     }
+    let place = |name: &&str| all.iter().position(|known| known == name);
+    if !names.is_sorted_by_key(|name| place(name)) {
+        let told = format!("PTS has its numbers in another order than {}", names.join(", "));
+        return Err(Error::pipeline(told).help("name it .csv or .txt, which say what they are"));
+    }
     match names.iter().filter(|name| colors.contains(name)).count() {
         0 | 3 => Ok(()),
         _ => Err(Error::pipeline("PTS has all three colours or none")
