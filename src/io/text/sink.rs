@@ -69,7 +69,7 @@ fn check_pts(columns: &[Dimension]) -> Result<()> {
         return Err(Error::pipeline(told).help(format!("`write.drop = {lost:?}` leaves them out")));
     }
     let place = |name: &&str| all.iter().position(|known| known == name);
-    if !names.is_sorted_by_key(|name| place(name)) {
+    if !names.is_sorted_by_key(place) {
         let told = format!("PTS has its numbers in another order than {}", names.join(", "));
         return Err(Error::pipeline(told).help("name it .csv or .txt, which say what they are"));
     }
