@@ -117,6 +117,32 @@ fn invalid_points_are_left_out_and_values_that_are_none_are_0() {
 }
 
 #[test]
+fn a_point_may_have_neither_intensity_nor_colour() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let flag = RecordDataType::Integer { min: 0, max: 1 };
+    let byte = RecordDataType::Integer { min: 0, max: 255 };
+    let mut prototype = cartesian(&DOUBLE);
+    prototype.push(record(RecordName::IsIntensityInvalid, flag.clone()));
+    prototype.push(record(RecordName::Intensity, SINGLE));
+    let colors = [RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue];
+    prototype.extend(colors.into_iter().map(|name| record(name, byte.clone())));
+    prototype.push(record(RecordName::IsColorInvalid, flag));
+    let point = |x: f64, none: [i64; 2]| {
+        let mut values = [x, 0.0, 0.0].map(RecordValue::Double).to_vec();
+        values.extend([RecordValue::Integer(none[0]), RecordValue::Single(0.5)]);
+        values.extend([255, 0, 7].map(RecordValue::Integer));
+        values.push(RecordValue::Integer(none[1]));
+        values
+    };
+    let all = vec![point(1.0, [0, 0]), point(2.0, [1, 0]), point(3.0, [0, 1]), point(4.0, [1, 1])];
+    file(&at.join("a.e57"), vec![(prototype, all, None)]);
+    let (lines, _) = converted(at, "a.e57", &[]);
+    let expected = ["1,0,0,0.5,255,0,7", "2,0,0,0,255,0,7", "3,0,0,0.5,0,0,0", "4,0,0,0,0,0,0"];
+    assert_eq!(lines[1..], expected);
+}
+
+#[test]
 fn spherical_coordinates_and_scaled_integers_are_read() {
     let at = tempfile::tempdir().unwrap();
     let at = at.path();

@@ -6,7 +6,6 @@ use std::path::Path;
 use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue};
 use pointmill::ErrorKind::{self, Data, Io, Pipeline};
 use pointmill::Registry;
-use pointmill::point::PointBatch;
 use pointmill::stage::{Format, FormatName, ReadKeys, Source, WriteKeys};
 
 use super::judge::{self, Judgement, Outcome, magnitude, shape};
@@ -96,21 +95,8 @@ fn cause(error: &pointmill::Error) -> Option<String> {
 
 fn copied(copy: &Path, format: &dyn Format, source: &dyn Source) -> pointmill::Result<()> {
     let schema = source.schema();
-    let mut sink = format.create(copy, &WriteKeys::default(), schema, source.metadata(), false)?;
-    let encoder = sink.encoder();
-    let mut batch = PointBatch::new(schema.clone(), sink.chunk_points().min(512));
-    for index in 0..source.parts() {
-        let mut part = source.part(index)?;
-        loop {
-            batch.clear();
-            part.read(&mut batch)?;
-            if batch.is_empty() {
-                break;
-            }
-            sink.append(encoder.encode(&batch)?)?;
-        }
-    }
-    sink.finish().map(drop)
+    let sink = format.create(copy, &WriteKeys::default(), schema, source.metadata(), false)?;
+    judge::pour(source, sink)
 }
 
 const WORDS: &[&[u8]] = &[

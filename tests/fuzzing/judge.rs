@@ -3,7 +3,7 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use pointmill::point::PointBatch;
-use pointmill::stage::Source;
+use pointmill::stage::{Sink, Source};
 use pointmill::{Error, ErrorKind};
 
 use crate::support::allocator;
@@ -200,4 +200,23 @@ fn read_part(
         records += batch.len();
     }
     Ok((records, false))
+}
+
+/// Writes all the points of a source.
+pub fn pour(source: &dyn Source, mut sink: Box<dyn Sink>) -> pointmill::Result<()> {
+    let schema = source.schema();
+    let encoder = sink.encoder();
+    let mut batch = PointBatch::new(schema.clone(), sink.chunk_points().min(512));
+    for index in 0..source.parts() {
+        let mut part = source.part(index)?;
+        loop {
+            batch.clear();
+            part.read(&mut batch)?;
+            if batch.is_empty() {
+                break;
+            }
+            sink.append(encoder.encode(&batch)?)?;
+        }
+    }
+    sink.finish().map(drop)
 }

@@ -5,7 +5,6 @@ use std::path::Path;
 use pointmill::ErrorKind::{self, Data, Pipeline};
 use pointmill::internals::ply::{PlyOptions, create, describe};
 use pointmill::io::ply::open;
-use pointmill::point::PointBatch;
 use pointmill::stage::Source;
 
 use super::judge::{self, Judgement, Outcome, magnitude, shape};
@@ -92,21 +91,8 @@ fn written(
 fn copy_of(copy: &Path, source: &dyn Source, carry_rest: bool) -> pointmill::Result<()> {
     let schema = source.schema();
     let options = PlyOptions { carry_rest, ..PlyOptions::default() };
-    let mut sink = create(copy, &options, schema, source.metadata())?;
-    let encoder = sink.encoder();
-    let mut batch = PointBatch::new(schema.clone(), sink.chunk_points().min(512));
-    for index in 0..source.parts() {
-        let mut part = source.part(index)?;
-        loop {
-            batch.clear();
-            part.read(&mut batch)?;
-            if batch.is_empty() {
-                break;
-            }
-            sink.append(encoder.encode(&batch)?)?;
-        }
-    }
-    sink.finish().map(drop)
+    let sink = create(copy, &options, schema, source.metadata())?;
+    judge::pour(source, sink)
 }
 
 const WORDS: &[&[u8]] = &[

@@ -139,7 +139,7 @@ impl<'a> E57Part<'a> {
     /// Makes a record of a point; false if it has no coordinates.
     fn point(&self, values: &[RecordValue], record: &mut [u8]) -> Result<bool> {
         let (mut own, mut polar, mut normal) = ([None; 3], [None; 3], [0.0; 3]);
-        let mut no_value: &[Dimension] = &[];
+        let mut lacks = false;
         let mut is_valid = [true; 2];
         let fields = values.iter().zip(&self.scan.cloud.prototype).zip(&self.targets);
         for ((value, field), target) in fields {
@@ -150,8 +150,7 @@ impl<'a> E57Part<'a> {
                 E57Target::CartesianState => is_valid[0] = number == 0.0,
                 E57Target::SphericalState => is_valid[1] = number == 0.0,
                 E57Target::Normal(axis) => normal[*axis] = number,
-                E57Target::NoValue(of) if number != 0.0 => no_value = of,
-                E57Target::NoValue(_) => {}
+                E57Target::NoValue(_) => lacks |= number != 0.0,
                 E57Target::Color(field, None) => self.put(field, Value::Double(number), record)?,
                 E57Target::Color(field, Some([less, times])) => {
                     let color = ((number - less) * times).round_ties_even().clamp(0.0, 65_535.0);
@@ -183,13 +182,25 @@ impl<'a> E57Part<'a> {
             };
             self.put(axis, v, record)?;
         }
-        for field in no_value {
-            self.put(field, Value::Unsigned(0), record)?;
+        if lacks {
+            self.empty_what_is_none(values, record)?;
         }
         if let Some((field, number)) = &self.numbered {
             self.put(field, Value::Unsigned(*number), record)?;
         }
         Ok(true)
+    }
+
+    /// Puts 0 where a flag of the point says that there is no value: the flag may come before it.
+    fn empty_what_is_none(&self, values: &[RecordValue], record: &mut [u8]) -> Result<()> {
+        let fields = values.iter().zip(&self.scan.cloud.prototype).zip(&self.targets);
+        for ((value, field), target) in fields {
+            let E57Target::NoValue(of) = target else { continue };
+            if plain(value, &field.data_type) != 0.0 {
+                of.iter().try_for_each(|to| self.put(to, Value::Unsigned(0), record))?;
+            }
+        }
+        Ok(())
     }
 
     fn put(&self, field: &Dimension, value: Value, record: &mut [u8]) -> Result<()> {

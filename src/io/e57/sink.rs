@@ -74,7 +74,7 @@ pub(super) fn create(
 ) -> Result<Box<dyn Sink>> {
     let plan = plan(keys, schema, metadata)?;
     check_names(&prototype(&plan.full.shape))?;
-    let rows = RowFile::create(&staged.with_extension("rows"), plan, |_, _| NoHeading)?;
+    let rows = RowFile::create(&staged.with_extension("rows"), plan, |_| NoHeading)?;
     let (path, crs, note) = (staged.to_owned(), metadata.crs.clone(), metadata.note.clone());
     Ok(Box::new(E57Sink { rows, path, crs, note }))
 }
@@ -185,7 +185,7 @@ impl Sink for E57Sink {
 
     fn finish(mut self: Box<Self>) -> Result<SinkSummary> {
         self.rows.narrow()?;
-        let told = self.rows.finish()?;
+        let summary = self.rows.finish()?;
         self.write()?;
         let rows = &self.rows.path;
         std::fs::remove_file(rows).map_err(|e| Error::io(rows, "remove it", e))?;
@@ -193,7 +193,7 @@ impl Sink for E57Sink {
         let file = File::open(&self.path).map_err(failed)?;
         file.sync_all().map_err(failed)?;
         let bytes = file.metadata().map_err(failed)?.len();
-        Ok(SinkSummary { points: self.rows.points, bytes, notes: told.into_iter().collect() })
+        Ok(SinkSummary { bytes, ..summary })
     }
 }
 

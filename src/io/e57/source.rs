@@ -11,8 +11,9 @@ use super::names::RECORDS;
 use super::part::E57Part;
 use super::reading::Windowed;
 use crate::error::shown;
+use crate::io::rows::schema::placed;
 use crate::point::names::{POINT_SOURCE_ID, XYZ};
-use crate::point::{Dimension, Endian, Metadata, Scalar, Schema};
+use crate::point::{Endian, Metadata, Scalar, Schema};
 use crate::report::Grouped;
 use crate::stage::{Input, Part, ReadKeys, Source};
 use crate::{Error, Result};
@@ -107,13 +108,7 @@ fn schema(scans: &[&E57Scan]) -> (Schema, Vec<String>) {
     if numbered && !all.iter().any(|(name, _)| name == POINT_SOURCE_ID) {
         all.push((POINT_SOURCE_ID.to_owned(), Scalar::U16));
     }
-    let mut stride = 0;
-    let dimensions = all.into_iter().map(|(name, scalar)| {
-        let field = Dimension::new(name, scalar, stride);
-        stride += scalar.size();
-        field
-    });
-    let dimensions = dimensions.collect();
+    let (dimensions, stride) = placed(all);
     (Schema { layout: RECORDS, endian: Endian::Little, stride, dimensions }, warnings)
 }
 

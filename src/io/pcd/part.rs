@@ -149,8 +149,6 @@ impl AsciiPoints<'_> {
                 .help("the file is cut short, or its header is wrong"));
         };
         let line = self.lines.text(start, end);
-        // Some programs write commas.
-        let between = if line.contains(&b',') { Delimiter::Mark(b',') } else { Delimiter::Blanks };
         let number = self.lines.number();
         let fail = |told: String, place: usize| {
             Error::data(path, format!("line {number}: {told}"))
@@ -159,7 +157,7 @@ impl AsciiPoints<'_> {
                     "correct the line, or write the file again: each has the numbers of its point",
                 )
         };
-        let mut fields = Fields::new(line, between);
+        let mut fields = Fields::new(line, Delimiter::blanks_or_commas(line));
         for (n, target) in self.numbers.iter().enumerate() {
             let Some(field) = fields.next() else {
                 let told = format!("{n} numbers, the header has {}", self.numbers.len());
@@ -189,9 +187,7 @@ impl AsciiPoints<'_> {
     pub fn outgrow_float(mut self, axes: &[usize]) -> Result<bool> {
         while let Some((start, end)) = self.lines.next()? {
             let line = self.lines.text(start, end);
-            let between =
-                if line.contains(&b',') { Delimiter::Mark(b',') } else { Delimiter::Blanks };
-            let mut fields = Fields::new(line, between);
+            let mut fields = Fields::new(line, Delimiter::blanks_or_commas(line));
             for n in 0..=axes.last().copied().unwrap_or(0) {
                 let Some(field) = fields.next() else { break };
                 if axes.contains(&n) && number::loses_digits(field) {

@@ -7,14 +7,15 @@ use std::sync::Arc;
 use super::header::{PcdData, PcdField};
 use super::names::{FORM, RECORDS};
 use super::source::PcdNative;
+use crate::io::rows::Encoding;
 use crate::io::rows::comments::{line, lines};
 use crate::io::rows::file::{Heading, RowFile};
 use crate::io::rows::names::property;
-use crate::io::rows::plan::{Narrow, RowOptions, RowPlan};
-use crate::io::rows::schema::PACKED;
-use crate::io::rows::{Encoding, noted};
+use crate::io::rows::noted::NotedLines;
+use crate::io::rows::plan::{RowOptions, RowPlan};
+use crate::io::rows::schema::{PACKED, RowShape};
 use crate::point::names::{GPS_TIME, NORMAL};
-use crate::point::{Dimension, Metadata, RunNote, Scalar, Schema};
+use crate::point::{Dimension, Metadata, Scalar, Schema};
 use crate::stage::{OutputEncoding, Sink, WriteKeys};
 use crate::{Error, Result};
 
@@ -52,9 +53,7 @@ pub(crate) fn field_name(dimension: &str) -> String {
 /// What stands above the points.
 struct PcdHeadings {
     comments: String,
-    note: Option<Arc<RunNote>>,
-    /// The lines that hold it, or as many as will.
-    noted: String,
+    note: NotedLines,
     fields: Vec<PcdField>,
     viewpoint: [f64; 7],
     data: PcdData,
@@ -62,16 +61,16 @@ struct PcdHeadings {
 
 impl PcdHeadings {
     fn of(
-        plan: &RowPlan,
         columns: &[Dimension],
+        encoding: Encoding,
         metadata: &Metadata,
         native: Option<&PcdNative>,
-        note: Option<Arc<RunNote>>,
+        note: NotedLines,
     ) -> PcdHeadings {
         let kept = native.iter().flat_map(|native| &native.names);
         let kept: BTreeMap<&str, &String> = kept.map(|(d, name)| (d.as_str(), name)).collect();
         let mut fields = Vec::new();
-        let is_binary = plan.encoding != Encoding::Ascii;
+        let is_binary = encoding != Encoding::Ascii;
         for column in columns {
             let own = column.name.as_str();
             let name = match kept.get(own) {
@@ -90,8 +89,7 @@ impl PcdHeadings {
         let upright = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
         let viewpoint = native.and_then(|native| native.viewpoint).unwrap_or(upright);
         let data = if is_binary { PcdData::Binary } else { PcdData::Ascii };
-        let noted = note.as_ref().map_or(String::new(), |note| noted::lines("# ", note.draft()));
-        PcdHeadings { comments, note, noted, fields, viewpoint, data }
+        PcdHeadings { comments, note, fields, viewpoint, data }
     }
 }
 
@@ -107,7 +105,7 @@ impl Heading for PcdHeadings {
             "# .PCD v0.7 - Point Cloud Data file format{left}\n{}{}VERSION 0.7\nFIELDS{}\n\
              SIZE{}\nTYPE{}\nCOUNT{}\nWIDTH {rows}\nHEIGHT 1\nVIEWPOINT{viewpoint}\n\
              POINTS {rows}\nDATA {}\n",
-            self.noted,
+            self.note.text,
             self.comments,
             each(&|field| field.name.clone()),
             each(&|field| field.size.to_string()),
@@ -119,10 +117,7 @@ impl Heading for PcdHeadings {
     }
 
     fn settle(&mut self) -> Result<()> {
-        if let Some(note) = &self.note {
-            self.noted = noted::lines("# ", note.text()?);
-        }
-        Ok(())
+        self.note.settle()
     }
 }
 
@@ -140,13 +135,14 @@ pub(super) fn create(
     let native = native_of(schema, metadata);
     let plan = plan(keys, schema, metadata)?;
     check_names(&plan)?;
-    let note = metadata.note.clone().filter(|note| note.draft().len() <= noted::LONGEST);
-    let heading = |plan: &RowPlan, is_wide: bool| {
-        let narrow = plan.narrow.as_ref().filter(|_| !is_wide).map(Narrow::any);
-        let columns = &narrow.unwrap_or(&plan.full).shape.columns;
-        PcdHeadings::of(plan, columns, metadata, native.as_deref(), note.clone())
+    let encoding = plan.encoding;
+    let (note, left_out) = NotedLines::of(metadata, "# ");
+    let heading = |shape: &RowShape| {
+        PcdHeadings::of(&shape.columns, encoding, metadata, native.as_deref(), note.clone())
     };
-    Ok(Box::new(RowFile::create(staged, plan, heading)?))
+    let mut file = RowFile::create(staged, plan, heading)?;
+    file.notes.extend(left_out);
+    Ok(Box::new(file))
 }
 
 /// Refuses dimensions that would be fields of one name.

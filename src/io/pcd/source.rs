@@ -10,6 +10,7 @@ use super::part::{AsciiPoints, PcdPart, Points};
 use crate::error::shown;
 use crate::io::rows::comments::Said;
 use crate::io::rows::lines::Lines;
+use crate::io::rows::parts::PartEnds;
 use crate::point::names::XYZ;
 use crate::point::{Metadata, Scalar, Schema};
 use crate::stage::{Input, Part, Source};
@@ -49,11 +50,7 @@ pub(super) fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
         return Err(Error::data(&files[n].path, told).help("convert one of them first"));
     }
     let metadata = metadata(first, said.into_iter().next().unwrap_or_default());
-    let (mut ends, mut parts) = (Vec::new(), 0);
-    for file in &files {
-        parts += file.parts();
-        ends.push(parts);
-    }
+    let ends = PartEnds::of(files.iter().map(PcdFile::parts));
     Ok(Box::new(PcdSource { schema: Arc::new(schema), metadata, files, ends, wide }))
 }
 
@@ -113,8 +110,7 @@ struct PcdSource {
     schema: Arc<Schema>,
     metadata: Metadata,
     files: Vec<PcdFile>,
-    /// For each file, the number of parts up to its end.
-    ends: Vec<usize>,
+    ends: PartEnds,
     /// True if coordinates of texts are held as `double`.
     wide: bool,
 }
@@ -122,9 +118,8 @@ struct PcdSource {
 impl PcdSource {
     /// The number of the file of a part, the file, and the number of the part in it.
     fn place(&self, index: usize) -> Option<(usize, &PcdFile, usize)> {
-        let number = self.ends.partition_point(|&end| end <= index);
-        let before = number.checked_sub(1).map_or(0, |before| self.ends[before]);
-        Some((number, self.files.get(number)?, index - before))
+        let (number, within) = self.ends.place(index);
+        Some((number, self.files.get(number)?, within))
     }
 
     fn points_at(&self, file: &PcdFile, within: usize) -> Result<(u64, u64)> {
@@ -177,7 +172,7 @@ impl Source for PcdSource {
     }
 
     fn parts(&self) -> usize {
-        self.ends.last().copied().unwrap_or(0)
+        self.ends.parts()
     }
 
     fn first_record(&self, index: usize) -> Option<u64> {

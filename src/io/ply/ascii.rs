@@ -6,7 +6,8 @@ use std::sync::atomic::Ordering;
 
 use super::file::PlyFile;
 use super::header::{Property, PropertyKind};
-use crate::io::rows::lines::{Lines, shown, word};
+use crate::io::rows::fields::{Delimiter, Fields};
+use crate::io::rows::lines::{Lines, shown};
 use crate::io::rows::number;
 use crate::point::{PointBatch, Scalar, Schema};
 use crate::stage::Part;
@@ -99,20 +100,20 @@ impl<'a> AsciiPart<'a> {
                      vertex",
                 )
         };
-        let mut place = 0;
+        let mut words = Fields::new(line, Delimiter::Blanks);
         for (n, (name, target)) in self.fields.iter().enumerate() {
-            let Some(token) = word(line, &mut place) else {
+            let Some(token) = words.next() else {
                 let message = format!("{n} values, but {} vertex properties", self.fields.len());
                 return Err(fail(start, message));
             };
             let Some((scalar, offset)) = target else {
-                if !pass_list(token, line, &mut place) {
+                if !pass_list(token, &mut words) {
                     let message = format!("the list `{name}` is not as long as it says");
                     return Err(fail(start, message));
                 }
                 continue;
             };
-            let at = start + place - token.len();
+            let at = start + words.place() - token.len();
             if !number::parse(token, *scalar, &mut record[*offset..]) {
                 let shown = shown(&String::from_utf8_lossy(token));
                 let kind = self.file.properties()[n].kind.word();
@@ -123,21 +124,21 @@ impl<'a> AsciiPart<'a> {
                 self.rounded += 1;
             }
         }
-        match word(line, &mut place) {
+        match words.next() {
             None => Ok(()),
             Some(token) => {
                 let message =
                     format!("more values than the {} vertex properties", self.fields.len());
-                Err(fail(start + place - token.len(), message))
+                Err(fail(start + words.place() - token.len(), message))
             }
         }
     }
 }
 
 /// Passes over the values of a list whose count is `token`; false if there are not as many.
-fn pass_list(token: &[u8], line: &[u8], place: &mut usize) -> bool {
+fn pass_list(token: &[u8], words: &mut Fields<'_>) -> bool {
     let count = std::str::from_utf8(token).ok().and_then(|text| text.parse::<u64>().ok());
-    count.is_some_and(|count| (0..count).all(|_| word(line, place).is_some()))
+    count.is_some_and(|count| (0..count).all(|_| words.next().is_some()))
 }
 
 impl Part for AsciiPart<'_> {
@@ -155,12 +156,12 @@ impl AsciiPart<'_> {
         for _ in 0..self.points {
             let Some((start, end)) = self.lines.next()? else { return Ok(false) };
             let line = self.lines.text(start, end);
-            let mut place = 0;
+            let mut words = Fields::new(line, Delimiter::Blanks);
             for n in 0..=columns.last().copied().unwrap_or(0) {
-                let Some(token) = word(line, &mut place) else { break };
+                let Some(token) = words.next() else { break };
                 match self.fields.get(n) {
                     Some((_, None)) => {
-                        pass_list(token, line, &mut place);
+                        pass_list(token, &mut words);
                     }
                     _ if columns.contains(&n) && number::loses_digits(token) => return Ok(true),
                     _ => {}

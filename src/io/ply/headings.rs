@@ -9,6 +9,7 @@ use super::names;
 use super::source::{PlyNative, Rest};
 use crate::io::rows::Encoding;
 use crate::io::rows::comments::{line, lines, made};
+use crate::io::rows::noted::NotedLines;
 use crate::point::{Metadata, Schema, names as point_names};
 
 /// The header, but for the count of vertices.
@@ -17,8 +18,8 @@ pub(super) struct Headings {
     /// To the end of what comments say of the coordinates and times, which the comment of [`made`]
     /// ends.
     start: String,
-    /// The lines that say how the file was made.
-    pub note: String,
+    /// How the file was made.
+    pub note: NotedLines,
     comments: String,
     /// Elements before the vertices.
     before: String,
@@ -69,7 +70,7 @@ impl Headings {
             has_faces: false,
             faces: 0,
             start,
-            note: String::new(),
+            note: NotedLines::default(),
             comments,
         }
     }
@@ -83,6 +84,7 @@ impl Headings {
         let faces = if self.has_faces { faces::lines(triangles) } else { String::new() };
         let made = made(if self.has_faces { &counts } else { &counts[..1] });
         let elements = format!("{before}{vertex}{faces}{after}");
+        let note = &note.text;
         format!("{start}comment {made}\n{note}{comments}{elements}end_header\n")
     }
 }
@@ -96,7 +98,7 @@ mod tests {
         let vertex = Element { name: "vertex".into(), count: 0, properties: Vec::new() };
         let header = Headings {
             start: "ply\n".into(),
-            note: String::new(),
+            note: NotedLines::default(),
             comments: String::new(),
             before: String::new(),
             vertex,

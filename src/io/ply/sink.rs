@@ -11,11 +11,11 @@ use super::names::{FORM, RECORDS};
 use super::source::PlyNative;
 use crate::io::rows::Encoding;
 use crate::io::rows::file::{Heading, RowFile};
-use crate::io::rows::noted;
-use crate::io::rows::plan::{Narrow, RowOptions, RowPlan};
+use crate::io::rows::noted::NotedLines;
+use crate::io::rows::plan::{RowOptions, RowPlan};
 use crate::io::rows::print::TextStyle;
-use crate::io::rows::schema::row_schema;
-use crate::point::{ComputedDimension, Endian, Metadata, RunNote, Schema};
+use crate::io::rows::schema::{RowShape, row_schema};
+use crate::point::{ComputedDimension, Endian, Metadata, Schema};
 use crate::stage::{ChunkSize, Colors, Encode, EncodeTriangles, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -99,14 +99,15 @@ fn row_plan(options: &PlyOptions, schema: &Schema, native: Option<&PlyNative>) -
 struct PlySink {
     rows: RowFile<Headings>,
     rest: Option<Arc<PlyNative>>,
-    /// How it was made.
-    note: Option<Arc<RunNote>>,
-    notes: Vec<String>,
 }
 
 impl Heading for Headings {
     fn text(&self, rows: u64) -> Vec<u8> {
         Headings::text(self, rows).into_bytes()
+    }
+
+    fn settle(&mut self) -> Result<()> {
+        self.note.settle()
     }
 }
 
@@ -119,24 +120,19 @@ impl PlySink {
     ) -> Result<PlySink> {
         let native = native_of(schema, metadata);
         let plan = row_plan(options, schema, native.as_deref())?;
-        let (rest, mut notes) = carried(options, &plan, native.as_ref());
-        let note = metadata.note.clone().filter(|note| note.draft().len() <= noted::LONGEST);
-        if metadata.note.is_some() && note.is_none() {
-            notes.push("how it was made is too long for a header and not in it".to_owned());
-        }
-        let draft =
-            note.as_ref().map_or(String::new(), |note| noted::lines("comment ", note.draft()));
-        let heading = |plan: &RowPlan, is_wide: bool| {
-            let narrow = plan.narrow.as_ref().filter(|_| !is_wide).map(Narrow::any);
-            let vertex = &narrow.unwrap_or(&plan.full).shape.row;
+        let encoding = plan.encoding;
+        let (rest, notes) = carried(options, &plan, native.as_ref());
+        let (note, left_out) = NotedLines::of(metadata, "comment ");
+        let heading = |shape: &RowShape| {
             let (native, rest) = (native.as_deref(), rest.as_deref());
-            let mut headings = Headings::of(vertex, plan.encoding, metadata, native, rest);
-            headings.note.clone_from(&draft);
+            let mut headings = Headings::of(&shape.row, encoding, metadata, native, rest);
+            headings.note = note.clone();
             headings.has_faces = options.triangles;
             headings
         };
-        let rows = RowFile::create(staged, plan, heading)?;
-        let mut sink = PlySink { rows, rest, note, notes };
+        let mut rows = RowFile::create(staged, plan, heading)?;
+        rows.notes.extend(notes.into_iter().chain(left_out));
+        let mut sink = PlySink { rows, rest };
         if let Some(rest) = sink.carries() {
             sink.carry(&rest, 0)?;
         }
@@ -245,11 +241,6 @@ impl Sink for PlySink {
             }
             self.carry(&native, 1)?;
         }
-        if let Some(note) = &self.note {
-            self.rows.header.note = noted::lines("comment ", note.text()?);
-        }
-        let told = self.rows.finish()?;
-        let notes = self.notes.into_iter().chain(told).collect();
-        Ok(SinkSummary { points, bytes: self.rows.bytes, notes })
+        self.rows.finish()
     }
 }

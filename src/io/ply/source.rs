@@ -13,8 +13,10 @@ use crate::io::origin::Origin;
 use crate::io::rows::Encoding;
 use crate::io::rows::comments::{self, Said};
 use crate::io::rows::lines::shown;
+use crate::io::rows::parts::PartEnds;
+use crate::io::rows::schema::placed;
 use crate::point::names::{GPS_TIME, XYZ};
-use crate::point::{Dimension, GpsTime, Metadata, Scalar, Schema};
+use crate::point::{GpsTime, Metadata, Scalar, Schema};
 use crate::stage::{Input, Part, Source};
 use crate::{Error, Result};
 
@@ -60,8 +62,7 @@ struct PlySource {
     schema: Arc<Schema>,
     metadata: Metadata,
     files: Vec<PlyFile>,
-    /// For each file, the number of parts up to its end.
-    ends: Vec<usize>,
+    ends: PartEnds,
     warnings: Vec<String>,
 }
 
@@ -86,31 +87,19 @@ impl PlySource {
             return Err(Error::data(&first.path, "a comment gives x, y or z another dimension"));
         }
         let metadata = metadata(&files, texts);
-        let mut parts = 0usize;
-        let ends = files
-            .iter()
-            .map(|file| {
-                let own = match file.header.encoding {
-                    _ if !file.lists().is_empty() => u64::from(file.points > 0),
-                    Encoding::Ascii => u64::from(file.points > 0),
-                    _ => file.points.div_ceil(PART_POINTS),
-                };
-                parts = parts.saturating_add(usize::try_from(own).unwrap_or(usize::MAX));
-                parts
-            })
-            .collect();
+        let parts = |file: &PlyFile| {
+            let own = match file.header.encoding {
+                _ if !file.lists().is_empty() => u64::from(file.points > 0),
+                Encoding::Ascii => u64::from(file.points > 0),
+                _ => file.points.div_ceil(PART_POINTS),
+            };
+            usize::try_from(own).unwrap_or(usize::MAX)
+        };
+        let ends = PartEnds::of(files.iter().map(parts));
         let told = |file| [listed(file), dropped(file), cut(file)].into_iter().flatten();
         let warnings = files.iter().flat_map(told);
         let warnings = warnings.collect();
         Ok(PlySource { schema, metadata, files, ends, warnings })
-    }
-}
-
-impl PlySource {
-    /// The file of a part, and the number of the part in it.
-    fn place(&self, index: usize) -> (usize, usize) {
-        let number = self.ends.partition_point(|&end| end <= index);
-        (number, index - number.checked_sub(1).map_or(0, |before| self.ends[before]))
     }
 }
 
@@ -199,20 +188,12 @@ fn needs_double(files: &[PlyFile], texts: &Texts) -> Result<bool> {
 
 /// Coordinates and times that a file calls `float` are `double` if they are to be `wide`.
 fn schema(file: &PlyFile, dimensions: &[String], wide: bool) -> Schema {
-    let mut stride = 0;
-    let dimensions = file
-        .properties()
-        .iter()
-        .zip(dimensions)
-        .filter_map(|(property, name)| {
-            let PropertyKind::Scalar(scalar) = property.kind else { return None };
-            let widens = wide && scalar == Scalar::F32 && is_long(name);
-            let scalar = if widens { Scalar::F64 } else { scalar };
-            let dimension = Dimension::new(name, scalar, stride);
-            stride += scalar.size();
-            Some(dimension)
-        })
-        .collect();
+    let fields = file.properties().iter().zip(dimensions).filter_map(|(property, name)| {
+        let PropertyKind::Scalar(scalar) = property.kind else { return None };
+        let widens = wide && scalar == Scalar::F32 && is_long(name);
+        Some((name.clone(), if widens { Scalar::F64 } else { scalar }))
+    });
+    let (dimensions, stride) = placed(fields);
     Schema { layout: RECORDS, endian: file.header.encoding.endian(), stride, dimensions }
 }
 
@@ -343,17 +324,17 @@ impl Source for PlySource {
     }
 
     fn parts(&self) -> usize {
-        self.ends.last().copied().unwrap_or(0)
+        self.ends.parts()
     }
 
     fn first_record(&self, index: usize) -> Option<u64> {
-        let (number, within) = self.place(index);
+        let (number, within) = self.ends.place(index);
         let before = self.files.get(..number)?.iter().map(|file| file.points).sum::<u64>();
         Some(before + within as u64 * PART_POINTS)
     }
 
     fn part(&self, index: usize) -> Result<Box<dyn Part + '_>> {
-        let (number, within) = self.place(index);
+        let (number, within) = self.ends.place(index);
         let Some(file) = self.files.get(number) else {
             return Err(Error::internal(format!("part {index} of {}", self.parts())));
         };

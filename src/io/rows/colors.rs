@@ -198,7 +198,7 @@ impl Recoloring<'_> {
         let taken = written.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1);
         let is_color =
             |column: &Dimension| PACKED.iter().chain(&COLORS).any(|name| column.name == *name);
-        let mut row = vec![0; self.from.row.stride];
+        let (mut row, mut recolored) = (vec![0; self.from.row.stride], Vec::new());
         for line in written[..taken].split_inclusive(|&b| b == b'\n') {
             let mut others = Vec::new();
             for (word, column) in
@@ -210,7 +210,8 @@ impl Recoloring<'_> {
                     return Err(own());
                 }
             }
-            let (mut recolored, mut others) = (Vec::new(), others.into_iter());
+            let mut others = others.into_iter();
+            recolored.clear();
             self.append_binary(&row, &mut recolored);
             for column in &self.to.columns {
                 match is_color(column) {

@@ -1,6 +1,6 @@
 //! What numbers of a text are, all together.
 
-use super::number;
+use super::number::{self, EXACT};
 use crate::point::Scalar;
 
 /// What is in a column.
@@ -107,6 +107,3 @@ pub(crate) fn whole(least: i128, most: i128) -> Option<Scalar> {
     let found = all.into_iter().find(|(_, low, high)| *low <= least && most <= *high);
     found.map(|(scalar, ..)| scalar)
 }
-
-/// Whole numbers below it are what they are in f64.
-const EXACT: f64 = (1u64 << 53) as f64;

@@ -21,6 +21,12 @@ impl Delimiter {
         all.into_iter().find_map(|s| Some((s, count(s)?)))
     }
 
+    /// What separates the numbers of a line that should have blanks between them: some programs
+    /// write commas.
+    pub fn blanks_or_commas(line: &[u8]) -> Delimiter {
+        if line.contains(&b',') { Delimiter::Mark(b',') } else { Delimiter::Blanks }
+    }
+
     /// How many numbers a line has; None if it has anything else.
     pub fn numbers(self, line: &[u8]) -> Option<usize> {
         let mut fields = Fields::new(line, self);

@@ -13,7 +13,7 @@ use std::sync::atomic::Ordering;
 
 use super::Encoding;
 use super::colors::{Depth, Recoloring, WrittenColors, note};
-use super::plan::{CHUNK_POINTS, FULL, Narrow, RowPlan, WIDE};
+use super::plan::{CHUNK_POINTS, FULL, RowPlan, WIDE};
 use super::schema::RowShape;
 use crate::stage::{Colors, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
@@ -51,18 +51,21 @@ pub(crate) struct RowFile<H> {
     depth: Depth,
     pub points: u64,
     pub bytes: u64,
+    /// What the user should know of it.
+    pub notes: Vec<String>,
 }
 
 impl<H: Heading> RowFile<H> {
-    /// Creates it at `staged`; `heading` makes its header for rows that are `wide` or not.
+    /// Creates it at `staged`; `heading` makes its header for rows of a shape.
     pub fn create(
         staged: &Path,
         plan: RowPlan,
-        heading: impl Fn(&RowPlan, bool) -> H,
+        heading: impl Fn(&RowShape) -> H,
     ) -> Result<RowFile<H>> {
+        let full = heading(plan.shape(true));
         let (header, other) = match plan.narrow.is_some() {
-            true => (heading(&plan, false), Some(heading(&plan, true))),
-            false => (heading(&plan, true), None),
+            true => (heading(plan.shape(false)), Some(full)),
+            false => (full, None),
         };
         let mut file = File::create(staged).map_err(|e| Error::io(staged, "create", e))?;
         let text = header.text(0);
@@ -77,13 +80,13 @@ impl<H: Heading> RowFile<H> {
             depth: Depth::default(),
             points: 0,
             bytes: text.len() as u64,
+            notes: Vec::new(),
         })
     }
 
     /// What the rows of the file so far are.
     pub fn shape(&self) -> &RowShape {
-        let narrow = self.plan.narrow.as_ref().filter(|_| !self.wide).map(Narrow::any);
-        &narrow.unwrap_or(&self.plan.full).shape
+        self.plan.shape(self.wide)
     }
 
     /// Appends encoded rows.
@@ -164,8 +167,8 @@ impl<H: Heading> RowFile<H> {
         if is_mixed { self.rewrite(plan.narrowing()) } else { Ok(()) }
     }
 
-    /// Writes the header with the count, and brings all to disk; returns what to tell of colours.
-    pub fn finish(&mut self) -> Result<Option<String>> {
+    /// Writes the header with the count, and brings all to disk.
+    pub fn finish(&mut self) -> Result<SinkSummary> {
         self.header.settle()?;
         let text = self.header.text(self.points);
         let failed = |e| Error::io(&self.path, "write the header", e);
@@ -174,7 +177,9 @@ impl<H: Heading> RowFile<H> {
         self.file.sync_all().map_err(|e| Error::io(&self.path, "flush", e))?;
         let family = self.plan.form.layout.family;
         let narrow = self.plan.narrow.as_ref();
-        Ok(narrow.and_then(|narrow| note(narrow.asked, self.depth, family)))
+        self.notes.extend(narrow.and_then(|narrow| note(narrow.asked, self.depth, family)));
+        let notes = std::mem::take(&mut self.notes);
+        Ok(SinkSummary { points: self.points, bytes: self.bytes, notes })
     }
 }
 
@@ -198,8 +203,6 @@ impl<H: Heading> Sink for RowFile<H> {
 
     fn finish(mut self: Box<Self>) -> Result<SinkSummary> {
         self.narrow()?;
-        let notes = RowFile::finish(&mut self)?.into_iter().collect();
-        let (points, bytes) = (self.points, self.bytes);
-        Ok(SinkSummary { points, bytes, notes })
+        RowFile::finish(&mut self)
     }
 }

@@ -1,4 +1,4 @@
-//! Lines of a text and the words on them.
+//! Lines of a text.
 
 use std::fs::File;
 use std::os::unix::fs::FileExt;
@@ -18,16 +18,6 @@ pub(crate) fn shown(word: &str) -> String {
         short.push('…');
     }
     short
-}
-
-/// The next word of `line` from `place` on, which is moved behind it.
-pub(crate) fn word<'a>(line: &'a [u8], place: &mut usize) -> Option<&'a [u8]> {
-    let rest = &line[*place..];
-    let start = rest.iter().position(|b| !b.is_ascii_whitespace())?;
-    let length =
-        rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
-    *place += start + length;
-    Some(&rest[start..start + length])
 }
 
 /// Lines of a file through a window that never grows. Lines end with a line feed, a carriage return

@@ -10,6 +10,7 @@ pub(crate) mod lines;
 pub(crate) mod names;
 pub(crate) mod noted;
 pub(crate) mod number;
+pub(crate) mod parts;
 pub(crate) mod plan;
 pub(crate) mod print;
 pub(crate) mod schema;

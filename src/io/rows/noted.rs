@@ -1,15 +1,50 @@
 //! The comments in which a header says how its file was made.
 
+use std::sync::Arc;
+
+use crate::Result;
+use crate::point::{Metadata, RunNote};
+
 /// What begins the comment that holds the text, and its further pieces.
 const NOTE: &str = "pointmill: ";
 const NOTE_MORE: &str = "pointmill+ ";
 
+/// The lines of a header that say how its file was made: a draft of the same length until that is
+/// known.
+#[derive(Clone, Default)]
+pub(crate) struct NotedLines {
+    note: Option<Arc<RunNote>>,
+    begins: &'static str,
+    /// The lines.
+    pub text: String,
+}
+
+impl NotedLines {
+    /// Those of a file of `metadata`, where this begins a comment; and what is to be told if they
+    /// are too long for a header.
+    pub fn of(metadata: &Metadata, begins: &'static str) -> (NotedLines, Option<String>) {
+        let note = metadata.note.clone().filter(|note| note.draft().len() <= LONGEST);
+        let is_left_out = metadata.note.is_some() && note.is_none();
+        let told = "how it was made is too long for a header and not in it";
+        let text = note.as_ref().map_or(String::new(), |note| lines(begins, note.draft()));
+        (NotedLines { note, begins, text }, is_left_out.then(|| told.to_owned()))
+    }
+
+    /// Puts what is known now in the place of the draft.
+    pub fn settle(&mut self) -> Result<()> {
+        if let Some(note) = &self.note {
+            self.text = lines(self.begins, note.text()?);
+        }
+        Ok(())
+    }
+}
+
 /// Bytes of the longest text: headers of 1 MiB are read, and some readers make room for less.
-pub(crate) const LONGEST: usize = 256 << 10;
+const LONGEST: usize = 256 << 10;
 
 /// The header lines that hold `text` behind what begins a comment. They are of one length for all
 /// texts of a length that have their blanks at the same places.
-pub(crate) fn lines(begins: &str, text: &str) -> String {
+fn lines(begins: &str, text: &str) -> String {
     let begin = |n: usize| if n == 0 { NOTE } else { NOTE_MORE };
     let each = pieces(text).into_iter().enumerate();
     each.map(|(n, piece)| format!("{begins}{}{piece}\n", begin(n))).collect()

@@ -108,7 +108,7 @@ pub(crate) fn loses_digits(token: &[u8]) -> bool {
 const SURE_DIGITS: usize = 6;
 
 /// Beyond it a decimal text may stand for an integer that f64 rounds.
-const EXACT: f64 = (1u64 << 53) as f64;
+pub(crate) const EXACT: f64 = (1u64 << 53) as f64;
 
 fn write(record: &mut [u8], bytes: &[u8]) -> bool {
     record[..bytes.len()].copy_from_slice(bytes);
@@ -189,19 +189,13 @@ pub(crate) fn print_decimal(units: i128, decimals: u32, out: &mut Vec<u8>) {
     if let Ok(units) = u64::try_from(units.unsigned_abs()) {
         return print_units(units, decimals as usize, out);
     }
-    let mut digits = [b'0'; 40];
-    let (mut left, mut start) = (units.unsigned_abs(), digits.len());
-    let least = digits.len() - 1 - decimals as usize;
-    while left > 0 || start > least {
-        start -= 1;
-        digits[start] = b'0' + (left % 10) as u8;
-        left /= 10;
-    }
-    let point = digits.len() - decimals as usize;
-    out.extend_from_slice(&digits[start..point]);
+    // Of more digits than there are decimals.
+    let text = units.unsigned_abs().to_string();
+    let (whole, part) = text.split_at(text.len() - decimals as usize);
+    out.extend_from_slice(whole.as_bytes());
     if decimals > 0 {
         out.push(b'.');
-        out.extend_from_slice(&digits[point..]);
+        out.extend_from_slice(part.as_bytes());
     }
 }
 

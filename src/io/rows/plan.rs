@@ -66,7 +66,7 @@ pub(crate) struct RowKind {
     computed: Vec<(ComputedDimension, Dimension)>,
 }
 
-/// RowKind with colours of 8 bits.
+/// Rows with colours of 8 bits.
 pub(crate) struct Narrow {
     pub asked: Colors,
     /// Of the lower and of the upper byte of the records' colours; the rows are alike.
@@ -97,7 +97,7 @@ impl Narrow {
     }
 
     /// The rows with colours of 8 bits, of whichever bytes.
-    pub fn any(&self) -> &RowKind {
+    fn any(&self) -> &RowKind {
         &self.rows[0]
     }
 }
@@ -223,14 +223,22 @@ impl RowPlan {
         }
     }
 
+    /// The rows of a file whose colours have 16 bits if they are `wide`.
+    pub fn shape(&self, wide: bool) -> &RowShape {
+        let narrow = self.narrow.as_ref().filter(|_| !wide).map(Narrow::any);
+        &narrow.unwrap_or(&self.full).shape
+    }
+
     /// From rows with colours of 8 bits, of this depth, to those with 16.
     pub fn widening(&self, depth: Depth) -> Option<Recoloring<'_>> {
-        Some(self.recoloring(&self.narrow.as_ref()?.any().shape, &self.full.shape, depth))
+        self.narrow.as_ref()?;
+        Some(self.recoloring(self.shape(false), self.shape(true), depth))
     }
 
     /// From rows with colours of 16 bits to those with the upper 8.
     pub fn narrowing(&self) -> Option<Recoloring<'_>> {
-        Some(self.recoloring(&self.full.shape, &self.narrow.as_ref()?.any().shape, Depth::Mixed))
+        self.narrow.as_ref()?;
+        Some(self.recoloring(self.shape(true), self.shape(false), Depth::Mixed))
     }
 
     fn recoloring<'a>(&self, from: &'a RowShape, to: &'a RowShape, depth: Depth) -> Recoloring<'a> {

@@ -38,6 +38,19 @@ pub(crate) fn row_schema(from: &Schema, form: &RowForm) -> Schema {
     row
 }
 
+/// Fields one behind the other.
+pub(crate) fn placed(
+    fields: impl IntoIterator<Item = (String, Scalar)>,
+) -> (Vec<Dimension>, usize) {
+    let mut stride = 0;
+    let mut all = Vec::new();
+    for (name, scalar) in fields {
+        all.push(Dimension::new(name, scalar, stride));
+        stride += scalar.size();
+    }
+    (all, stride)
+}
+
 /// Gives each field of a row its place: one behind the other, but for colours that share a number.
 pub(super) fn place(row: &mut Schema, form: &RowForm) {
     let is_packed = form.packs_colors && packs(&row.dimensions);

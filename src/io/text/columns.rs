@@ -6,8 +6,8 @@ use std::path::Path;
 use crate::error::{listed, shown};
 use crate::io::rows::facts::{ColumnFacts, whole};
 use crate::io::rows::names::heading;
+use crate::point::Scalar;
 use crate::point::names::{BLUE, GREEN, INTENSITY, NORMAL, POINT_SOURCE_ID, RED, XYZ};
-use crate::point::{Dimension, Scalar};
 use crate::{Error, Result};
 
 /// What a column is called that is not read.
@@ -115,17 +115,4 @@ pub(super) fn scalar(dimension: &str, facts: &ColumnFacts) -> Scalar {
         Some(Scalar::U8) if is_wide => Scalar::U16,
         found => found.unwrap_or(Scalar::F64),
     }
-}
-
-/// Fields one behind the other.
-pub(super) fn placed(
-    fields: impl IntoIterator<Item = (String, Scalar)>,
-) -> (Vec<Dimension>, usize) {
-    let mut stride = 0;
-    let mut all = Vec::new();
-    for (name, scalar) in fields {
-        all.push(Dimension::new(name, scalar, stride));
-        stride += scalar.size();
-    }
-    (all, stride)
 }

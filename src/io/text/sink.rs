@@ -5,8 +5,10 @@ use std::sync::Arc;
 
 use super::names::RECORDS;
 use super::source::TextKind;
+use crate::io::convert::quoted;
 use crate::io::rows::file::{Heading, RowFile};
-use crate::io::rows::plan::{Narrow, RowOptions, RowPlan};
+use crate::io::rows::plan::{RowOptions, RowPlan};
+use crate::io::rows::schema::RowShape;
 use crate::io::rows::{Encoding, RowForm};
 use crate::point::names::{BLUE, GREEN, INTENSITY, RED, XYZ};
 use crate::point::{Dimension, Metadata, Schema};
@@ -80,10 +82,6 @@ fn check_pts(columns: &[Dimension]) -> Result<()> {
     }
 }
 
-fn quoted(names: &[&&str]) -> String {
-    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
-}
-
 /// What stands above the points.
 struct Titles {
     /// The line that names the columns; empty if there is none.
@@ -131,10 +129,7 @@ pub(super) fn create(
     metadata: &Metadata,
 ) -> Result<Box<dyn Sink>> {
     let plan = plan(habit, keys, schema, metadata)?;
-    let titles = |plan: &RowPlan, is_wide: bool| {
-        let narrow = plan.narrow.as_ref().filter(|_| !is_wide).map(Narrow::any);
-        let columns = &narrow.unwrap_or(&plan.full).shape.columns;
-        Titles::of(habit, keys, columns, plan.style.separator)
-    };
+    let separator = plan.style.separator;
+    let titles = |shape: &RowShape| Titles::of(habit, keys, &shape.columns, separator);
     Ok(Box::new(RowFile::create(staged, plan, titles)?))
 }

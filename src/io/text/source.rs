@@ -4,10 +4,9 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::columns::{dimensions, guessed, placed, scalar};
+use super::columns::{dimensions, guessed, scalar};
 use super::head::{TextHead, without_mark};
-use super::names::LONGEST_LINE;
-use super::names::RECORDS;
+use super::names::{LONGEST_LINE, RECORDS};
 use super::ptx::{self, PtxScan, PtxText};
 use super::survey::{CORRECT, TextStretch, TextSurvey, few, no_number, survey};
 use crate::error::shown;
@@ -16,6 +15,8 @@ use crate::io::rows::facts::ColumnFacts;
 use crate::io::rows::fields::{Delimiter, Fields, is_comment, is_count};
 use crate::io::rows::lines::Lines;
 use crate::io::rows::number;
+use crate::io::rows::parts::PartEnds;
+use crate::io::rows::schema::placed;
 use crate::point::names::{BLUE, COLUMN, GREEN, INTENSITY, POINT_SOURCE_ID, RED, ROW, XYZ};
 use crate::point::{Dimension, Endian, Layout, Metadata, PointBatch, Scalar, Schema};
 use crate::stage::{Input, Part, ReadKeys, Source};
@@ -161,12 +162,7 @@ pub(super) fn open(paths: &[PathBuf], kind: TextKind, keys: &ReadKeys) -> Result
         facts.iter_mut().zip(&file.found.facts).for_each(|(all, one)| all.join(one));
     }
     let schema = Arc::new(schema(&first.columns, &facts, kind == TextKind::Ptx));
-    let mut ends = Vec::new();
-    let mut parts = 0usize;
-    for file in &files {
-        parts += file.found.stretches.len();
-        ends.push(parts);
-    }
+    let ends = PartEnds::of(files.iter().map(|file| file.found.stretches.len()));
     Ok(Box::new(TextSource { schema, metadata: Metadata::default(), files, ends }))
 }
 
@@ -187,17 +183,15 @@ struct TextSource {
     schema: Arc<Schema>,
     metadata: Metadata,
     files: Vec<TextFile>,
-    /// For each file, the number of parts up to its end.
-    ends: Vec<usize>,
+    ends: PartEnds,
 }
 
 impl TextSource {
     /// The file of a part, and its stretch.
     fn place(&self, index: usize) -> Option<(usize, &TextFile, TextStretch)> {
-        let number = self.ends.partition_point(|&end| end <= index);
-        let before = number.checked_sub(1).map_or(0, |before| self.ends[before]);
+        let (number, within) = self.ends.place(index);
         let file = self.files.get(number)?;
-        Some((number, file, *file.found.stretches.get(index - before)?))
+        Some((number, file, *file.found.stretches.get(within)?))
     }
 }
 
@@ -224,7 +218,7 @@ impl Source for TextSource {
     }
 
     fn parts(&self) -> usize {
-        self.ends.last().copied().unwrap_or(0)
+        self.ends.parts()
     }
 
     fn first_record(&self, index: usize) -> Option<u64> {

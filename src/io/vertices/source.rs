@@ -11,6 +11,8 @@ use crate::io::origin::Origin;
 use crate::io::rows::facts::ColumnFacts;
 use crate::io::rows::lines::Lines;
 use crate::io::rows::number;
+use crate::io::rows::parts::PartEnds;
+use crate::io::rows::schema::placed;
 use crate::point::names::{BLUE, GREEN, NORMAL, RED, XYZ};
 use crate::point::{Dimension, Endian, Layout, Metadata, PointBatch, Scalar, Schema, Value};
 use crate::report::Grouped;
@@ -114,23 +116,19 @@ impl VerticesFile {
     }
 
     fn dimensions(&self) -> (Vec<Dimension>, usize) {
-        let (mut all, mut stride) = (Vec::new(), 0);
         if self.facets.is_some() {
-            let names = XYZ.into_iter().chain(NORMAL).enumerate();
-            let fields = names.map(|(n, name)| Dimension::new(name, Scalar::F32, 4 * n));
-            return (fields.collect(), stl::RECORD);
+            let names = XYZ.into_iter().chain(NORMAL);
+            return placed(names.map(|name| (name.to_owned(), Scalar::F32)));
         }
-        for number in &self.numbers {
+        placed(self.numbers.iter().filter_map(|number| {
             let (name, scalar) = match (number, self.shade) {
                 (VertexNumber::Of(name), _) => (name, Scalar::F64),
                 (VertexNumber::Color(name), VertexShade::Bytes) => (name, Scalar::U8),
                 (VertexNumber::Color(name), VertexShade::Fractions) => (name, Scalar::U16),
-                (VertexNumber::Skipped, _) => continue,
+                (VertexNumber::Skipped, _) => return None,
             };
-            all.push(Dimension::new(*name, scalar, stride));
-            stride += scalar.size();
-        }
-        (all, stride)
+            Some(((*name).to_owned(), scalar))
+        }))
     }
 }
 
@@ -228,14 +226,11 @@ pub(super) fn open(paths: &[PathBuf], kind: VerticesKind) -> Result<Box<dyn Sour
     }
     let layout = Layout::plain(kind.names()[0]);
     let schema = Arc::new(Schema { layout, endian: Endian::Little, stride, dimensions });
-    let (mut ends, mut parts) = (Vec::new(), 0);
-    for file in &files {
-        parts += match file.facets {
-            Some(facets) => facets.div_ceil(PART_FACETS) as usize,
-            None => usize::from(file.points > 0),
-        };
-        ends.push(parts);
-    }
+    let parts = |file: &VerticesFile| match file.facets {
+        Some(facets) => facets.div_ceil(PART_FACETS) as usize,
+        None => usize::from(file.points > 0),
+    };
+    let ends = PartEnds::of(files.iter().map(parts));
     Ok(Box::new(VerticesSource { schema, metadata: Metadata::default(), kind, files, ends }))
 }
 
@@ -244,15 +239,13 @@ struct VerticesSource {
     metadata: Metadata,
     kind: VerticesKind,
     files: Vec<VerticesFile>,
-    /// For each file, the number of parts up to its end.
-    ends: Vec<usize>,
+    ends: PartEnds,
 }
 
 impl VerticesSource {
     fn place(&self, index: usize) -> Option<(usize, &VerticesFile, u64)> {
-        let number = self.ends.partition_point(|&end| end <= index);
-        let before = number.checked_sub(1).map_or(0, |before| self.ends[before]);
-        Some((number, self.files.get(number)?, (index - before) as u64))
+        let (number, within) = self.ends.place(index);
+        Some((number, self.files.get(number)?, within as u64))
     }
 }
 
@@ -278,7 +271,7 @@ impl Source for VerticesSource {
     }
 
     fn parts(&self) -> usize {
-        self.ends.last().copied().unwrap_or(0)
+        self.ends.parts()
     }
 
     fn first_record(&self, index: usize) -> Option<u64> {

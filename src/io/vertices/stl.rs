@@ -16,7 +16,7 @@ const FACET: usize = 50;
 /// Facets read at once.
 const FACETS: usize = 4096;
 /// Bytes of a record: a corner and the normal.
-pub(super) const RECORD: usize = 24;
+const RECORD: usize = 24;
 
 /// How many facets a file of `length` bytes has, if it is binary STL: the format has no other mark
 /// than that its count and its length agree. Some writers leave bytes behind.
