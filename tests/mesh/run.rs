@@ -44,7 +44,7 @@ fn bytes_do_not_depend_on_tiles_threads_and_memory() {
             "threads = 1",
             "threads = 3\ntile_points = 500",
             "tile_points = 3000\nspill = 'always'",
-            "memory = '256 MiB'",
+            "memory = '400 MiB'",
         ] {
             let case = Case::new();
             scan.write(&case.path("in.laz"));
