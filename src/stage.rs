@@ -31,8 +31,8 @@ pub use rounds::{
 };
 pub use scan::{AnyScanOp, Gathered, ScanOp, StoredSummaries, Summary};
 pub use sink::{
-    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Order, Sink, SinkSummary, Triangle,
-    Triangulation,
+    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Extent, Order, Sink, SinkSummary,
+    Triangle, Triangulation,
 };
 pub use source::{Contradiction, Input, OpenSource, Part, Source};
 pub use tile_op::{Forecast, ScanFacts, TileOp};

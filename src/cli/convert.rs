@@ -1,6 +1,7 @@
 //! `convert`: all inputs to one file, or each to its own.
 
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
@@ -197,7 +198,7 @@ fn pipeline(
 }
 
 /// The output in `folder` of every input: its name, with the extension of the format that is asked
-/// for, or its own; without `.copc`, which outputs are not. No two may be the same.
+/// for, or its own. No two may be the same.
 fn outputs(
     inputs: &[PathBuf],
     folder: &Path,
@@ -207,15 +208,16 @@ fn outputs(
     let mut taken: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     let mut all = Vec::new();
     for input in inputs {
-        let own = || formats.of(input).map(|format| format.name());
-        let plain = formats.plain(input);
-        let name = plain.file_name().map(Path::new);
-        let (Some(name), Some(extension)) = (name, to.or_else(own)) else {
+        let own = || formats.of(input).map(|format| format.extension());
+        let asked = |to| formats.iter().find(|f| f.name() == to).map_or(to, |f| f.extension());
+        let (Some(stem), Some(extension)) = (formats.stem(input), to.map(asked).or_else(own))
+        else {
             let told = format!("{}: its name says no format", shown(input));
             let known = listed(formats.names(), "or");
             return Err(Error::pipeline(told).help(format!("add --to {known}")));
         };
-        let output = folder.join(name.with_extension(extension));
+        let name: OsString = [stem, ".".as_ref(), extension.as_ref()].into_iter().collect();
+        let output = folder.join(name);
         if let Some(other) = taken.insert(output.clone(), input) {
             let (a, b, output) = (shown(other), shown(input), shown(&output));
             return Err(Error::pipeline(format!("{a} and {b} would both become {output}")));
@@ -240,8 +242,9 @@ mod tests {
         assert_eq!(of(&["a/x.y.las", "b.PLY"], Some("laz")).unwrap(), ["out/x.y.laz", "out/b.laz"]);
         assert_eq!(of(&["a/x.LAS", "b.ply"], None).unwrap(), ["out/x.las", "out/b.ply"]);
         let copc = ["a.copc.laz", "b.COPC.LAZ", "copc.laz"];
-        assert_eq!(of(&copc, None).unwrap(), ["out/a.laz", "out/b.laz", "out/copc.laz"]);
+        assert_eq!(of(&copc, None).unwrap(), ["out/a.copc.laz", "out/b.copc.laz", "out/copc.laz"]);
         assert_eq!(of(&["a.copc.laz"], Some("las")).unwrap(), ["out/a.las"]);
+        assert_eq!(of(&["a.b.las"], Some("copc")).unwrap(), ["out/a.b.copc.laz"]);
     }
 
     #[test]

@@ -270,6 +270,11 @@ fn written(arguments: &WrittenArguments) -> Vec<CommandFlag> {
     flags([
         ("--scale", "write.scale", arguments.scale.as_deref().map(numbers_or_text)),
         ("--offset", "write.offset", arguments.offset.as_deref().map(numbers_or_text)),
+        (
+            "--point-format",
+            "write.point_format",
+            arguments.point_format.as_deref().map(whole_or_text),
+        ),
         ("--drop", "write.drop", names),
         ("--encoding", "write.encoding", arguments.encoding.clone().map(FlagValue::from)),
         ("--colors", "write.colors", arguments.colors.clone().map(FlagValue::from)),

@@ -34,7 +34,7 @@ use crate::budget::{Bytes, Holders, Lease};
 use crate::geom::lattice::Lattice;
 use crate::point::{ColumnKind, SHIFT};
 use crate::report::{Decision, Tally};
-use crate::stage::{Sink, SinkSummary};
+use crate::stage::{Extent, Sink, SinkSummary};
 use crate::store::{Pieces, SealedTiles, seal};
 use crate::tile::Sieve;
 use crate::{Error, Result};
@@ -58,6 +58,9 @@ pub(crate) fn mill(
     clock.begin(RunPhase::Merge, Some(tally.work.get("placed").copied().unwrap_or(0)))?;
     let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
     tally.count("positions", tiles.positions());
+    let extent = Extent::new(lattice.clone(), tiles.bounds());
+    let mut sinks = sinks;
+    sinks.iter_mut().flatten().try_for_each(|sink| sink.arrange(&extent))?;
     settle(job, lattice, &tiles)?;
     let field = DecodedScan { lattice, tiles: tiles.clone(), starts: Arc::new(starts) };
     let mut course = Course {

@@ -110,7 +110,7 @@ impl NotedGraph {
         let path = sink.path();
         if sink.has_squares() {
             name = format!("{name}/{}", path.file_name().and_then(OsStr::to_str)?);
-        } else if let Some(extension) = path.extension().filter(|_| !sink.is_folder()) {
+        } else if let Some(extension) = sink.extension().filter(|_| !sink.is_folder()) {
             name = format!("{name}.{}", extension.to_str()?.to_ascii_lowercase());
         }
         *place = literal(name.as_str().into());

@@ -7,7 +7,7 @@ mod step;
 use std::collections::{BTreeMap, BTreeSet};
 
 use columns::{BLOCK, ColumnStep, RecordBytes, TargetBytes};
-use step::{Move, push, step};
+use step::{Move, push, slack, step};
 
 use crate::point::names::{BLUE, GREEN, NIR, RED, XYZ};
 use crate::point::{Dimension, Endian, Scalar, Schema, Value};
@@ -325,7 +325,7 @@ fn nearest(to: &Dimension, world: f64) -> (Value, f64) {
 /// the same f32 where the source is one.
 fn same(from: &Dimension, to: &Dimension, world: f64, back: f64) -> bool {
     let single = from.scalar == Scalar::F32 && from.scale == 1.0 && from.origin == 0.0;
-    let near = 1e-9 * world.abs().max(to.scale.abs());
+    let near = f64::max(1e-9 * world.abs().max(to.scale.abs()), slack(from, to));
     (single && back as f32 == world as f32) || (back - world).abs() <= near
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::convert::Projection;
 use crate::point::{PointBatch, Schema, Spare};
 use crate::report::{Grouped, Short};
-use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
+use crate::stage::{ChunkSize, Encode, Encoded, Extent, Sink, SinkSummary};
 use crate::{Error, Result};
 
 /// Projects every record before `inner` takes it, and tells at the end what that rounded.
@@ -71,6 +71,10 @@ impl Sink for Projected {
 
     fn encoder(&self) -> Arc<dyn Encode> {
         self.encoder.clone()
+    }
+
+    fn arrange(&mut self, extent: &Extent) -> Result<()> {
+        self.inner.arrange(extent)
     }
 
     fn append(&mut self, chunk: Encoded) -> Result<()> {

@@ -165,9 +165,10 @@ pub fn not(wanted: &str, path: &Path, first: &[u8], formats: &Formats) -> Error 
 
 /// How a file is named so that it is read as one of the family of `format`.
 fn name_it(format: &dyn Format, formats: &Formats) -> String {
-    let names: Vec<&str> = formats.of_family(format.family()).map(|f| f.name()).collect();
-    let dotted = listed(names.iter().map(|name| format!(".{name}")), "or");
-    format!("name it {dotted}, or give `read.format = \"{}\"`", names[0])
+    let family: Vec<_> = formats.of_family(format.family()).collect();
+    let dotted = listed(family.iter().map(|f| format!(".{}", f.extension())), "or");
+    let first = family.first().map_or(format.name(), |first| first.name());
+    format!("name it {dotted}, or give `read.format = \"{first}\"`")
 }
 
 /// The error of files that could not be opened as those of `format`: of one that does not begin as

@@ -3,7 +3,7 @@
 use super::registry::Registry;
 use crate::io::e57::E57;
 use crate::io::ends::{Discard, Mesh, Read, Write};
-use crate::io::las::{LAS, LAZ};
+use crate::io::las::{COPC, LAS, LAZ};
 use crate::io::pcd::PCD;
 use crate::io::ply::PLY;
 use crate::io::text::{ASC, CSV, PTS, PTX, TXT, XYZ};
@@ -50,6 +50,7 @@ impl Registry {
             .with::<Fourier>()
             .with_format(LAS)
             .with_format(LAZ)
+            .with_format(COPC)
             .with_format(PLY)
             .with_format(PCD)
             .with_format(E57)

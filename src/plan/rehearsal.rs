@@ -2,6 +2,7 @@
 //! where nobody looks.
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
@@ -13,8 +14,8 @@ use crate::io::ends::CountedSink;
 use crate::memory::Records;
 use crate::point::{Metadata, Schema, Units};
 use crate::stage::{
-    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Order, Role, Sink, SinkSummary,
-    Source, Triangulation,
+    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Extent, Order, Role, Sink,
+    SinkSummary, Source, Triangulation,
 };
 
 /// What each sink was given, by its number among the sinks.
@@ -107,6 +108,10 @@ impl CreateSink for RehearsedSink {
         self.sink.path()
     }
 
+    fn extension(&self) -> Option<&OsStr> {
+        self.sink.extension()
+    }
+
     fn is_file(&self) -> bool {
         false
     }
@@ -170,6 +175,10 @@ impl Sink for Rehearsed {
 
     fn encoder(&self) -> Arc<dyn Encode> {
         self.sink.encoder()
+    }
+
+    fn arrange(&mut self, extent: &Extent) -> Result<()> {
+        self.sink.arrange(extent)
     }
 
     fn append(&mut self, chunk: Encoded) -> Result<()> {

@@ -6,6 +6,7 @@
 //! all of them.
 
 use std::borrow::Cow;
+use std::ffi::OsStr;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -36,9 +37,14 @@ pub type CreateFor<'a> = dyn Fn(&Arc<Schema>) -> Result<Box<dyn Sink>> + 'a;
 /// assert!(!format.sniff(b"ply\nformat ascii 1.0\n"));
 /// ```
 pub trait Format: Send + Sync {
-    /// Its name, which `read.format` and `write.format` take: the extension of its files, in lower
-    /// case and without the dot.
+    /// Its name, which `read.format` and `write.format` take.
     fn name(&self) -> &'static str;
+
+    /// What the names of its files end with, in lower case and without the dot before it; it may
+    /// have dots in it. Of several formats the longest that fits decides.
+    fn extension(&self) -> &'static str {
+        self.name()
+    }
 
     /// The family of its records, as [`Layout::family`](crate::point::Layout::family) has it. Files
     /// of formats of one family are read together, and records go from one to the other as they
@@ -98,9 +104,10 @@ pub trait Format: Send + Sync {
         None
     }
 
-    /// Where a file's name promises more than the format writes (`a.copc.laz`): what it promises,
-    /// and the name without that.
-    fn promises(&self, _path: &Path) -> Option<(&'static str, PathBuf)> {
+    /// True if an output of it is one file whose points are arranged in space: it comes in canonical
+    /// order, and its sink is told where the points are ([`Sink::arrange`]). The name of a format of
+    /// the same family that holds the same where that cannot be.
+    fn arranged(&self) -> Option<&'static str> {
         None
     }
 
@@ -148,8 +155,8 @@ pub trait Format: Send + Sync {
         None
     }
 
-    /// The keys among `scale`, `offset`, `encoding`, `colors`, `separator`, `decimals` and `header`
-    /// that `write` takes for it.
+    /// The keys among `scale`, `offset`, `point_format`, `encoding`, `colors`, `separator`,
+    /// `decimals` and `header` that `write` takes for it.
     fn keys(&self) -> &'static [&'static str] {
         &[]
     }
@@ -292,8 +299,25 @@ impl Formats {
 
     /// The format that the extension of `path` names, its case aside.
     pub fn of(&self, path: &Path) -> Option<&Arc<dyn Format>> {
-        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
-        self.iter().find(|format| format.name() == extension)
+        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+        let is_of = |format: &&Arc<dyn Format>| stem(&name, format.extension()).is_some();
+        self.iter().filter(is_of).max_by_key(|format| format.extension().len())
+    }
+
+    /// The name of the file at `path` without its extension, which may be that of a format and have
+    /// dots in it.
+    pub fn stem<'a>(&self, path: &'a Path) -> Option<&'a OsStr> {
+        let own = self.of(path).and_then(|format| {
+            let name = path.file_name()?.to_str()?;
+            stem(name, format.extension()).map(OsStr::new)
+        });
+        own.or(path.file_stem())
+    }
+
+    /// `format`, or the one that takes its place where points are not [arranged](Format::arranged).
+    pub fn unarranged<'a>(&'a self, format: &'a Arc<dyn Format>) -> &'a Arc<dyn Format> {
+        let other = format.arranged().and_then(|other| self.iter().find(|f| f.name() == other));
+        other.unwrap_or(format)
     }
 
     /// A format of the family whose files begin with these bytes.
@@ -305,14 +329,13 @@ impl Formats {
     pub fn of_family<'a>(&'a self, family: &'a str) -> impl Iterator<Item = &'a Arc<dyn Format>> {
         self.iter().filter(move |format| format.family() == family)
     }
+}
 
-    /// `path` without what it promises beyond its format ([`Format::promises`]).
-    pub fn plain<'a>(&self, path: &'a Path) -> std::borrow::Cow<'a, Path> {
-        match self.of(path).and_then(|format| format.promises(path)) {
-            Some((_, plain)) => plain.into(),
-            None => path.into(),
-        }
-    }
+/// `name` without `extension` and the dot before it; None if it ends with another or is no more.
+fn stem<'a>(name: &'a str, extension: &str) -> Option<&'a str> {
+    let dot = name.len().checked_sub(extension.len() + 1).filter(|dot| *dot > 0)?;
+    let end = name.get(dot..)?.strip_prefix('.')?;
+    end.eq_ignore_ascii_case(extension).then(|| &name[..dot])
 }
 
 impl fmt::Debug for Formats {

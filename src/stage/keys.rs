@@ -38,6 +38,8 @@ pub struct WriteKeys {
     pub scale: Option<[f64; 3]>,
     /// Offset of stored coordinates.
     pub offset: Option<[f64; 3]>,
+    /// Point data record format of LAS.
+    pub point_format: Option<u8>,
     /// Text or bytes.
     pub encoding: Option<OutputEncoding>,
     /// Bits of a colour.
@@ -56,6 +58,7 @@ impl WriteKeys {
         let all = [
             ("scale", self.scale.is_some()),
             ("offset", self.offset.is_some()),
+            ("point_format", self.point_format.is_some()),
             ("encoding", self.encoding.is_some()),
             ("colors", self.colors.is_some()),
             ("separator", self.separator.is_some()),

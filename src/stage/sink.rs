@@ -2,11 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::source::{Input, Source};
-use crate::point::{Metadata, PointBatch, Schema, Units};
+use crate::geom::lattice::Lattice;
+use crate::point::{Bounds, Metadata, PointBatch, Schema, Units};
 use crate::{Error, Result};
 
 /// Where records go. A sink writes below the path it is given; the run puts the finished file in
@@ -20,6 +22,16 @@ pub trait Sink: Send {
 
     /// The encoder, shared by all threads.
     fn encoder(&self) -> Arc<dyn Encode>;
+
+    /// Told once, before the first chunk, where the points are, if the output is the only one of all
+    /// inputs and its records come in [canonical order](Order::Canonical).
+    ///
+    /// # Errors
+    ///
+    /// Where the format has no place for them.
+    fn arrange(&mut self, _extent: &Extent) -> Result<()> {
+        Ok(())
+    }
 
     /// Writes one chunk; called in canonical order, from one thread at a time.
     ///
@@ -45,6 +57,23 @@ pub trait Sink: Send {
     ///
     /// As [`append`](Sink::append), and counts that the format cannot hold.
     fn finish(self: Box<Self>) -> Result<SinkSummary>;
+}
+
+/// Where the points of a scan are, for outputs that arrange them in space.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Extent {
+    /// The lattice: records come in Morton order of their positions on it.
+    pub lattice: Lattice,
+    /// The box of the positions of all points that were read; empty if there are none.
+    pub bounds: Bounds,
+}
+
+impl Extent {
+    /// Points on `lattice` within `bounds`.
+    pub fn new(lattice: Lattice, bounds: Bounds) -> Self {
+        Extent { lattice, bounds }
+    }
 }
 
 /// The part of a sink that runs on several threads at once.
@@ -155,6 +184,11 @@ impl ChunkSize {
 pub trait CreateSink: Send + Sync {
     /// The final path of the output; the folder where there is one output for each input.
     fn path(&self) -> &Path;
+
+    /// What the name of its file ends with, behind a dot: with it the format is known.
+    fn extension(&self) -> Option<&OsStr> {
+        self.path().extension()
+    }
 
     /// False if it writes no file: then [`path`](CreateSink::path) is what reports and messages
     /// call it, and it is created with an empty path.

@@ -33,7 +33,7 @@ pub use cutting::CutError;
 pub use fetch::Fetch;
 pub use intake::{Intake, TileStore};
 pub use kept::{KeptPoints, KeptReader};
-pub use key::TileKey;
+pub use key::{TileKey, split_level};
 pub use levels::Levels;
 pub use merge::{merge_bytes, seal};
 pub use pieces::{PIECE, Pieces};

@@ -2,5 +2,6 @@
 
 mod colors;
 mod fields;
+mod point_formats;
 mod runs;
 mod units;

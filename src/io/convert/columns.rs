@@ -2,7 +2,7 @@
 //! strided loads and stores. What a step finds unfit it leaves to the road that goes record by
 //! record.
 
-use super::step::Move;
+use super::step::{Move, slack};
 use crate::point::{Dimension, Endian, Scalar};
 
 /// Records that the steps take at once: with their targets and a column of numbers they stay in the
@@ -33,6 +33,7 @@ pub(super) struct Number {
     to: Dimension,
     to_endian: Endian,
     rule: NumberRule,
+    slack: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,8 +96,8 @@ impl ColumnStep {
         let wide = |d: &Dimension| matches!(d.scalar, Scalar::U64 | Scalar::I64);
         let plain = from.bits.is_none() && to.bits.is_none();
         (plain && !wide(from) && !wide(to)).then(|| {
-            let (from, to) = (from.clone(), to.clone());
-            ColumnStep::Number(Box::new(Number { from, from_endian, to, to_endian, rule }))
+            let (from, to, slack) = (from.clone(), to.clone(), slack(from, to));
+            ColumnStep::Number(Box::new(Number { from, from_endian, to, to_endian, rule, slack }))
         })
     }
 
@@ -260,7 +261,7 @@ impl Number {
             let (stored, fits) = to_stored((world - to.origin) / to.scale);
             let back = stored * to.scale + to.origin;
             let largest = if world.abs() > least { world.abs() } else { least };
-            let near = (back - world).abs() <= 1e-9 * largest;
+            let near = (back - world).abs() <= f64::max(1e-9 * largest, self.slack);
             let same = near | (SINGLE && back as f32 == world as f32);
             *value = stored;
             unfit |= u64::from(!(fits & same));

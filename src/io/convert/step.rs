@@ -1,6 +1,6 @@
 //! The steps that records are projected by, and which of them a pair of dimensions needs.
 
-use crate::point::names::XYZ;
+use crate::point::names::{SCAN_ANGLE, XYZ};
 use crate::point::{Dimension, Endian, Scalar};
 
 /// One step of a projection.
@@ -42,6 +42,17 @@ pub(super) fn step(
         return Move::Rounded { from: from.clone(), to: to.clone() };
     }
     Move::Exact { from: from.clone(), to: to.clone() }
+}
+
+/// How far the target's value may be from the source's where the target must hold it: half a step
+/// for scan angles, whose whole degrees are steps of 0.006° in newer point formats of LAS and none
+/// of them exactly. They are the same whole degrees again when they come back.
+pub(super) fn slack(from: &Dimension, to: &Dimension) -> f64 {
+    let are_steps = !from.scalar.is_float() && !to.scalar.is_float();
+    match to.name == SCAN_ANGLE && are_steps {
+        true => from.scale.abs().min(to.scale.abs()) / 2.0,
+        false => 0.0,
+    }
 }
 
 fn stored(from: &Dimension, to: &Dimension) -> Move {

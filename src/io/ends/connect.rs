@@ -1,6 +1,7 @@
 //! From checked keys to sources and sinks of registered formats: what is alike for all of them.
 
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -75,6 +76,11 @@ pub struct OutputFile {
 impl CreateSink for OutputFile {
     fn path(&self) -> &Path {
         &self.keys.path
+    }
+
+    fn extension(&self) -> Option<&OsStr> {
+        let format = self.formats.of(&self.keys.path);
+        format.map(|format| OsStr::new(format.extension())).or(self.keys.path.extension())
     }
 
     fn order(&self) -> Order {

@@ -231,7 +231,7 @@ fn folder(path: &Path, formats: &Formats) -> Result<Vec<PathBuf>> {
     if files.is_empty() {
         let path = shown(path);
         let owned = formats.iter().filter(|format| format.owns_extension());
-        let known = listed(owned.map(|format| format.name()), "or");
+        let known = listed(owned.map(|format| format.extension()), "or");
         let told = format!("the folder `{path}` has no {known} file");
         return Err(Error::new(ErrorKind::Io, told));
     }

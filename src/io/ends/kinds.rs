@@ -176,6 +176,12 @@ pub struct Write {
     /// Offset of LAS coordinates per axis, in world units; none: the input's, or 0.
     #[serde(default, deserialize_with = "some_offset")]
     pub offset: Option<[f64; 3]>,
+    /// Point data record format of LAS, 0 to 10; none: the input's, or the smallest that holds the
+    /// dimensions of an input that is not LAS. Fields that it lacks must be named in `drop`, and
+    /// values that it has no room for are refused; whole degrees of a scan angle become the nearest
+    /// of 0.006°, which read back as the same whole degrees.
+    #[serde(default)]
+    pub point_format: Option<PointFormat>,
     /// Order of the records; none: canonical, in the chunks of LAZ (50,000 records) by GPS time and
     /// return number, which compresses better; or the input's where the pipeline streams.
     #[serde(default)]
@@ -203,6 +209,9 @@ pub struct Write {
     #[serde(default)]
     pub header: Option<bool>,
 }
+
+/// The number of a point data record format.
+pub type PointFormat = Whole<0, 10>;
 
 /// How many decimals a coordinate is written with.
 pub type Decimals = Whole<0, 17>;
@@ -240,6 +249,7 @@ impl Write {
             drop: self.drop.clone(),
             scale: self.scale,
             offset: self.offset,
+            point_format: self.point_format.map(|format| format.get() as u8),
             encoding: self.encoding,
             colors: self.colors,
             separator: self.separator,
@@ -310,7 +320,7 @@ pub(super) fn unknown_extension(path: &Path, setting: &str, formats: &Formats) -
     let is_read = setting.starts_with("read");
     let can = if is_read { "read" } else { "written" };
     let known = formats.iter().filter(|format| is_read || format.unwritten().is_none());
-    let dotted = listed(known.map(|format| format!(".{}", format.name())), "or");
+    let dotted = listed(known.map(|format| format!(".{}", format.extension())), "or");
     match of_extension(&extension) {
         Some(format) => {
             let told = format!("by its extension `{name}` is {format}, which is not {can}");

@@ -1,7 +1,7 @@
 //! One output for each input, in a folder: their names, and that no two are alike.
 
 use std::collections::BTreeMap;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -54,7 +54,11 @@ impl Outputs {
     fn possible(&self, schema: &Schema) -> Vec<OutputFile> {
         let formats: Vec<_> = match &self.format {
             Some(format) => vec![format],
-            None => self.formats.of_family(schema.layout.family).collect(),
+            // Those that the outputs may have: see `of`.
+            None => {
+                let family = self.formats.of_family(schema.layout.family);
+                family.filter(|format| format.arranged().is_none()).collect()
+            }
         };
         formats.into_iter().map(|format| self.output(self.keys.path.clone(), format)).collect()
     }
@@ -67,18 +71,21 @@ impl Outputs {
     /// The output of the input at `path`: its name, with the extension of the format that is asked
     /// for unless it says that already.
     fn of(&self, input: &Path) -> Result<OutputFile> {
-        let path = &*self.formats.plain(input);
-        let told = self.formats.of(path);
-        let unknown = || unknown_extension(path, "write.format", &self.formats);
+        let told = self.formats.of(input);
+        let unknown = || unknown_extension(input, "write.format", &self.formats);
         let format = self.format.as_ref().or(told).ok_or_else(unknown)?;
-        let Some(name) = path.file_name() else {
-            return Err(Error::pipeline("the input has no name for its output").at(path));
+        let format = self.formats.unarranged(format);
+        let (Some(name), Some(stem)) = (input.file_name(), self.formats.stem(input)) else {
+            return Err(Error::pipeline("the input has no name for its output").at(input));
+        };
+        let extended = |stem: &OsStr| {
+            [stem, ".".as_ref(), format.extension().as_ref()].into_iter().collect::<OsString>()
         };
         let name = match told {
             Some(told) if told.name() == format.name() => name.to_owned(),
-            Some(_) => Path::new(name).with_extension(format.name()).into_os_string(),
+            Some(_) => extended(stem),
             // Behind a dot that is part of the name, such as that of `tile.12`.
-            None => [name, ".".as_ref(), format.name().as_ref()].into_iter().collect::<OsString>(),
+            None => extended(name),
         };
         let output = self.output(self.keys.path.join(name), format);
         let checked = check(&output.keys, &**format, &self.formats);

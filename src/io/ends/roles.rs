@@ -4,13 +4,15 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::kinds::{Read, Write, unknown_extension};
+use super::kinds::{OutputOrder, Read, Write, unknown_extension};
 use super::outputs::Outputs;
 use super::squares::Squares;
 use super::{connect, inputs, kinds};
 use crate::error::shown;
 use crate::io::sniff::first_bytes;
-use crate::stage::{Format, Formats, OpenSource, Role, RoleName, StageKind, StagePlace, Unread};
+use crate::stage::{
+    Format, Formats, OpenSource, Order, Role, RoleName, StageKind, StagePlace, Unread,
+};
 use crate::{Error, Result};
 
 impl Read {
@@ -128,19 +130,26 @@ impl Write {
             let unknown = unknown_extension(&path, "write.format", formats);
             return Err(at.blame("path", unknown));
         };
-        let named = formats.of(&path);
-        if let Some((what, plain)) = named.and_then(|named| named.promises(&path)) {
-            let path = shown(&path);
-            let told = format!("`{path}` is named as {what}, which is not written");
-            let is = named.map_or("", |named| named.name()).to_uppercase();
-            let help = format!("name it `{}`: it is plain {is}", shown(&plain));
-            return Err(at.blame("path", Error::pipeline(told).help(help)));
+        if let Some(other) = format.arranged() {
+            let is = format.name().to_uppercase();
+            if self.order == Some(OutputOrder::Input) {
+                let told = format!("{is} has an order of its own, not that of the input");
+                return Err(at.blame("order", Error::pipeline(told)));
+            }
+            if self.side.is_some() {
+                let told = format!("{is} is written as one file, not as squares");
+                let help = format!("write `{other}`, and convert the squares");
+                return Err(at.blame("side", Error::pipeline(told).help(help)));
+            }
         }
         let keys = self.keys(path);
         let checked = kinds::check(&keys, &**format, formats);
         checked.map_err(|(key, error)| at.blame(key, error))?;
         let (format, formats) = (format.clone(), formats.clone());
-        let order = self.stage_order();
+        let order = match format.arranged() {
+            Some(_) => Order::Canonical,
+            None => self.stage_order(),
+        };
         let file = connect::OutputFile { keys, order, format, formats, of_one: false };
         match self.side {
             Some(side) => {
@@ -168,6 +177,12 @@ impl Write {
         }
         let asked = self.format.as_ref().map(|name| formats.named(name)).transpose()?;
         let keys = self.keys(folder);
+        if let Some(other) = asked.and_then(|format| format.arranged()) {
+            let is = asked.map_or("", |format| format.name()).to_uppercase();
+            let told = format!("{is} is written as one file, not as one for each input");
+            let help = format!("write `{other}`, or one file after the other by `convert`");
+            return Err(at.blame("folder", Error::pipeline(told).help(help)));
+        }
         if let Some(format) = asked {
             let checked = kinds::check(&keys, &**format, formats);
             checked.map_err(|(key, error)| at.blame(key, error))?;

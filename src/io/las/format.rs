@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::extra::Descriptor;
 use super::laz::Layers;
 use crate::point::{Dimension, Endian, Layout, Scalar, Schema, names};
+use crate::{Error, Result};
 
 /// Bytes of a record of `format` without extra bytes; None for formats that do not exist.
 pub fn record_size(format: u8) -> Option<u16> {
@@ -91,6 +92,34 @@ pub fn schema(
         add(Dimension::new(name, Scalar::U8, base + byte), &mut dimensions);
     }
     Schema { layout: records(format), endian: Endian::Little, stride: base + extra, dimensions }
+}
+
+/// The schema of records like those of `from` in another point format: its fields, and the extra
+/// bytes of `from` behind them.
+///
+/// # Errors
+///
+/// Extra bytes that have the name of one of its fields.
+pub fn reformed(from: &Schema, format: u8) -> Result<Schema> {
+    let [scale, offset] = match from.coordinates() {
+        Some(axes) => [axes.map(|d| d.scale), axes.map(|d| d.origin)],
+        None => [[1.0; 3], [0.0; 3]],
+    };
+    let own = format_of(from).and_then(record_size).unwrap_or(0);
+    let (own, base) = (usize::from(own), usize::from(record_size(format).unwrap_or(0)));
+    let mut dimensions = standard(format, scale, offset);
+    for dimension in from.dimensions.iter().filter(|d| d.offset >= own) {
+        if dimensions.iter().any(|field| field.name == dimension.name) {
+            let name = &dimension.name;
+            let told = format!("the extra bytes `{name}` have the name of a field of LAS point");
+            return Err(Error::pipeline(format!("{told} format {format}"))
+                .help("write another point format, or convert by way of PLY"));
+        }
+        let offset = dimension.offset - own + base;
+        dimensions.push(Dimension { offset, ..dimension.clone() });
+    }
+    let stride = from.stride.saturating_sub(own) + base;
+    Ok(Schema { layout: records(format), endian: Endian::Little, stride, dimensions })
 }
 
 /// The layers of compressed records of `schema` that are to be decoded if nobody looks at the

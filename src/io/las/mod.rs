@@ -1,10 +1,11 @@
 //! LAS 1.0 to 1.4 and LAZ, every point format: records byte for byte, headers and variable length
 //! records carried. Knows no tiles and no stages but the two roles it plays.
 //!
-//! [`open`] reads one or several files as a source; [`LAS`] and [`LAZ`] are the formats as a
-//! registry takes them. A COPC file is read as the LAZ it is.
+//! [`open`] reads one or several files as a source; [`LAS`], [`LAZ`] and [`COPC`] are the
+//! formats as a registry takes them. A COPC file is read as the LAZ it is.
 
 mod chunks;
+mod copc;
 mod credit;
 mod crs;
 pub(crate) mod describe;
@@ -29,6 +30,7 @@ pub(crate) mod sink;
 mod source;
 mod system;
 mod table;
+mod target;
 mod text;
 mod union;
 mod verify;
@@ -37,5 +39,5 @@ mod waveforms;
 
 pub use format::layout;
 pub use native::fresh;
-pub use registered::{LAS, LAZ, LasFormat};
+pub use registered::{COPC, LAS, LAZ, LasFormat};
 pub use source::open;

@@ -7,7 +7,7 @@ use super::described::{Described, EXTRA_BYTES, describe};
 use super::extra::Descriptor;
 use super::fields::encoding;
 use super::file::InputFile;
-use super::format::{format_of, record_size};
+use super::format::{format_of, has_waveforms, record_size};
 use super::header::Header;
 use super::input::{LasInput, extra_len, is_carried, is_carried_extended};
 use super::text::field;
@@ -73,6 +73,38 @@ impl Native {
             && schema.stride == usize::from(self.header.point_data_record_length)
     }
 
+    /// The same for records of `schema`, in whatever point format that is: a version of LAS that has
+    /// it (LAS 1.4 R15, section 2.6, and the versions before).
+    pub fn reformed(mut self, schema: &Schema) -> Self {
+        let format = format_of(schema).unwrap_or(0);
+        let least = match format {
+            0 | 1 => 0,
+            2 | 3 => 2,
+            4 | 5 => 3,
+            _ => 4,
+        };
+        if self.header.minor() < least {
+            let encoding = self.header.encoding();
+            self.header = self.header.resized(least, &self.header.padding);
+            self.header.global_encoding = encoding;
+        }
+        self.header.point_data_record_format = format;
+        self.header.point_data_record_length = u16::try_from(schema.stride).unwrap_or(u16::MAX);
+        if format >= 6 {
+            // Section 2.4: formats 6 to 10 always say WKT.
+            self.header.put_encoding(encoding::WKT, true);
+        }
+        if !has_waveforms(format) {
+            self.header.put_encoding(encoding::WAVEFORM_INTERNAL, false);
+            self.header.put_encoding(encoding::WAVEFORM_EXTERNAL, false);
+            self.header.start_of_waveform_data_packet_record = None;
+            self.vlrs.retain(|vlr| !is_of_waveforms(&vlr.user(), vlr.record()));
+            self.evlrs.retain(|evlr| !is_of_waveforms(&evlr.user(), evlr.record()));
+            self.waveforms = None;
+        }
+        self
+    }
+
     /// A header for points that come from no LAS file: LAS 1.4, records in `schema`'s LAS layout,
     /// its extra dimensions described, `crs` carried if it is WKT or EPSG codes.
     pub fn fresh(schema: &Schema, crs: Option<&str>) -> Self {
@@ -96,6 +128,11 @@ impl Native {
         describe(&mut vlrs, &mut evlrs, &descriptors);
         Native { header, vlrs, gap: Vec::new(), evlrs, waveforms: None, made: true }
     }
+}
+
+/// True for the records of waveforms: what packets are like, and the packets.
+fn is_of_waveforms(user: &str, record: u16) -> bool {
+    user == "LASF_Spec" && matches!(record, 100..=354 | 65_535)
 }
 
 /// Metadata for points in a LAS layout that come from no LAS file (see `Native::fresh`).

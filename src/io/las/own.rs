@@ -7,7 +7,7 @@ use super::merge::whole_steps;
 use super::native::Native;
 use super::read::Shift;
 use crate::point::{Metadata, PointBatch, Schema, names};
-use crate::stage::{ChunkSize, Encode, Encoded, Sink, SinkSummary};
+use crate::stage::{ChunkSize, Encode, Encoded, Extent, Sink, SinkSummary};
 use crate::{Error, Result};
 
 /// The form that records of `schema` have in the file that `metadata` is of: where its offset is
@@ -106,6 +106,10 @@ impl Sink for Shifted {
 
     fn encoder(&self) -> Arc<dyn Encode> {
         self.encoder.clone()
+    }
+
+    fn arrange(&mut self, extent: &Extent) -> Result<()> {
+        self.inner.arrange(extent)
     }
 
     fn append(&mut self, chunk: Encoded) -> Result<()> {

@@ -4,35 +4,52 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::format::{FAMILY, layout};
+use super::copc;
+use super::format::{FAMILY, format_of};
 use super::header::{CALLED, SIGNATURE};
-use super::holding::las_schema;
-use super::native::{fresh, lost};
+use super::native::lost;
 use super::noted;
 use super::own::{Shifted, own_form};
 use super::sink::{self, LasOptions};
+use super::target::Target;
 use super::{describe, source, waveforms};
-use crate::io::convert::Projection;
+use crate::Result;
 use crate::io::describe::json;
 use crate::io::project::Projected;
-use crate::point::{GpsTime, Metadata, PointBatch, Schema, names};
+use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{ChunkSize, Format, ReadKeys, Sink, Source, WriteKeys};
-use crate::{Error, Result};
 
-/// One of the two formats of LAS records.
+/// One of the formats of LAS records.
 #[derive(Debug, Clone, Copy)]
 pub struct LasFormat {
-    compressed: bool,
+    form: Form,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Form {
+    Plain,
+    Compressed,
+    Octree,
 }
 
 /// LAS, whose records are as they are.
-pub const LAS: LasFormat = LasFormat { compressed: false };
+pub const LAS: LasFormat = LasFormat { form: Form::Plain };
 /// LAZ, whose records are compressed.
-pub const LAZ: LasFormat = LasFormat { compressed: true };
+pub const LAZ: LasFormat = LasFormat { form: Form::Compressed };
+/// COPC: LAZ in the chunks of an octree.
+pub const COPC: LasFormat = LasFormat { form: Form::Octree };
 
 impl Format for LasFormat {
     fn name(&self) -> &'static str {
-        if self.compressed { "laz" } else { "las" }
+        match self.form {
+            Form::Plain => "las",
+            Form::Compressed => "laz",
+            Form::Octree => "copc",
+        }
+    }
+
+    fn extension(&self) -> &'static str {
+        if self.form == Form::Octree { copc::EXTENSION } else { self.name() }
     }
 
     fn family(&self) -> &'static str {
@@ -40,7 +57,11 @@ impl Format for LasFormat {
     }
 
     fn about(&self) -> &'static str {
-        if self.compressed { "LAS compressed by LASzip." } else { "ASPRS LAS, uncompressed." }
+        match self.form {
+            Form::Plain => "ASPRS LAS, uncompressed.",
+            Form::Compressed => "LAS compressed by LASzip.",
+            Form::Octree => "COPC 1.0: LAZ in the chunks of an octree.",
+        }
     }
 
     fn called(&self) -> &'static str {
@@ -67,15 +88,8 @@ impl Format for LasFormat {
         waveforms::beside(path)
     }
 
-    /// COPC is read as the LAZ that it is, and not written: readers of COPC refuse plain LAZ under
-    /// its name.
-    fn promises(&self, path: &Path) -> Option<(&'static str, PathBuf)> {
-        let stem = Path::new(path.file_stem()?);
-        let is_copc = stem.extension().is_some_and(|e| e.eq_ignore_ascii_case("copc"));
-        let mut plain = stem.file_stem().filter(|_| is_copc && self.compressed)?.to_owned();
-        plain.push(".");
-        plain.push(path.extension()?);
-        Some(("COPC", path.with_file_name(plain)))
+    fn arranged(&self) -> Option<&'static str> {
+        (self.form == Form::Octree).then(|| LAZ.name())
     }
 
     fn lost(&self, metadata: &Metadata) -> Vec<String> {
@@ -96,7 +110,7 @@ impl Format for LasFormat {
     }
 
     fn keys(&self) -> &'static [&'static str] {
-        &["scale", "offset"]
+        &["scale", "offset", "point_format"]
     }
 
     fn chunk(
@@ -105,8 +119,12 @@ impl Format for LasFormat {
         schema: &Arc<Schema>,
         metadata: &Metadata,
     ) -> Result<ChunkSize> {
-        let target = Target::of(keys, schema, metadata)?;
-        let chunk = sink::chunk(&self.options(metadata), &target.schema)?;
+        let target = self.target(keys, schema, metadata)?;
+        let options = self.options(metadata);
+        let chunk = match self.form {
+            Form::Octree => copc::sink::chunk(&options, &target.schema)?,
+            _ => sink::chunk(&options, &target.schema)?,
+        };
         Ok(match target.projection {
             Some(_) => Projected::chunk(chunk, &target.schema),
             None => chunk,
@@ -122,8 +140,11 @@ impl Format for LasFormat {
         _whole: bool,
     ) -> Result<Box<dyn Sink>> {
         let options = self.options(metadata);
-        let Target { schema, metadata, projection } = Target::of(keys, schema, metadata)?;
-        let sink = sink::create(staged, &options, &schema, &metadata)?;
+        let Target { schema, metadata, projection } = self.target(keys, schema, metadata)?;
+        let sink = match self.form {
+            Form::Octree => copc::sink::create(staged, &options, &schema, &metadata)?,
+            _ => sink::create(staged, &options, &schema, &metadata)?,
+        };
         Ok(match projection {
             Some(projection) => Box::new(Projected::new(sink, projection, schema, &keys.path)),
             None => sink,
@@ -136,9 +157,9 @@ impl Format for LasFormat {
         schema: &Arc<Schema>,
         metadata: &Metadata,
     ) -> Result<[u64; 2]> {
-        Ok(match self.compressed {
-            true => [0; 2],
-            false => [Target::of(keys, schema, metadata)?.schema.stride as u64, 0],
+        Ok(match self.form {
+            Form::Plain => [self.target(keys, schema, metadata)?.schema.stride as u64, 0],
+            _ => [0; 2],
         })
     }
 
@@ -147,23 +168,23 @@ impl Format for LasFormat {
     }
 
     fn carries(&self, keys: &WriteKeys, schema: &Schema) -> bool {
-        schema.layout.family == FAMILY && keys.scale.is_none() && keys.offset.is_none()
+        schema.layout.family == FAMILY && !self.changes(keys, schema)
     }
 
     fn likes_time(&self) -> bool {
-        self.compressed
+        self.form == Form::Compressed
     }
 
     fn wants_beside(&self) -> bool {
-        true
+        self.form != Form::Octree
     }
 
     fn checks(&self, keys: &WriteKeys, schema: &Schema) -> bool {
-        schema.layout.family != FAMILY || keys.scale.is_some() || keys.offset.is_some()
+        schema.layout.family != FAMILY || self.changes(keys, schema)
     }
 
     fn check(&self, keys: &WriteKeys, metadata: &Metadata, records: &PointBatch) -> Result<()> {
-        if let Some(projection) = Target::of(keys, records.schema(), metadata)?.projection {
+        if let Some(projection) = self.target(keys, records.schema(), metadata)?.projection {
             projection.project(records.records(), &mut Vec::new())?;
         }
         Ok(())
@@ -172,93 +193,32 @@ impl Format for LasFormat {
 
 impl LasFormat {
     fn options(&self, metadata: &Metadata) -> LasOptions {
-        LasOptions { compressed: self.compressed, computed: metadata.computed.clone() }
-    }
-}
-
-/// What a LAS output's records are, and how the input's become them.
-struct Target {
-    schema: Arc<Schema>,
-    metadata: Metadata,
-    projection: Option<Projection>,
-}
-
-impl Target {
-    fn of(keys: &WriteKeys, schema: &Arc<Schema>, metadata: &Metadata) -> Result<Target> {
-        match schema.layout.family {
-            FAMILY => Target::of_las(keys, schema, metadata),
-            _ => Target::of_others(keys, schema, metadata),
-        }
+        let compressed = self.form != Form::Plain;
+        LasOptions { compressed, computed: metadata.computed.clone() }
     }
 
-    /// LAS records stay as they are, unless another scale is asked for.
-    fn of_las(keys: &WriteKeys, schema: &Arc<Schema>, metadata: &Metadata) -> Result<Target> {
-        if !keys.drop.is_empty() {
-            return Err(Error::pipeline("`write.drop` is for conversions between LAS and PLY")
-                .help(
-                    "a LAS output holds every dimension of a LAS input: leave `write.drop` out",
-                ));
-        }
-        let mut scaled = (**schema).clone();
-        for (axis, name) in names::XYZ.into_iter().enumerate() {
-            if let Some(dimension) = scaled.dimensions.iter_mut().find(|d| d.name == name) {
-                dimension.scale = keys.scale.map_or(dimension.scale, |scale| scale[axis]);
-                dimension.origin = keys.offset.map_or(dimension.origin, |offset| offset[axis]);
-            }
-        }
-        let metadata = metadata.clone();
-        if scaled == **schema {
-            return Ok(Target { schema: schema.clone(), metadata, projection: None });
-        }
-        let projection = Some(Projection::new(schema, &scaled, &[])?);
-        Ok(Target { schema: Arc::new(scaled), metadata, projection })
-    }
-
-    fn of_others(keys: &WriteKeys, schema: &Schema, metadata: &Metadata) -> Result<Target> {
-        let scale = keys.scale.ok_or_else(|| {
-            let told = format!(
-                "a {} scan written as LAS needs a scale for its coordinates",
-                schema.layout.family
-            );
-            Error::pipeline(told).help(
-                "give `write.scale = 0.001`, or what the scan's precision is, in its own unit",
-            )
-        })?;
-        let (format, extra) = las_schema(schema, &keys.drop)?;
-        let offset = keys.offset.unwrap_or([0.0; 3]);
-        let own = Arc::new(layout(format, &extra, scale, offset));
-        let mut projection = Projection::new(schema, &own, &keys.drop)?;
-        number_returns(schema, &own, &keys.drop, &mut projection)?;
-        let projection = Some(projection);
-        // Times that are all 0, since the input has none, count nothing that were to be told.
-        let is_timed = schema.find(names::GPS_TIME).is_some();
-        let is_timed = is_timed && !keys.drop.iter().any(|name| name == names::GPS_TIME);
-        let metadata = Metadata {
-            gps_time: metadata.gps_time.or((!is_timed).then_some(GpsTime::Week)),
-            pipeline: metadata.pipeline.clone(),
-            note: metadata.note.clone(),
-            ..fresh(&own, metadata.crs.as_deref())
+    /// The point format of records of `schema` in an output, if it is not their own.
+    fn format(&self, keys: &WriteKeys, schema: &Schema) -> Result<Option<u8>> {
+        let asked = keys.point_format;
+        let format = match self.form {
+            Form::Octree => Some(copc::point_format(asked, schema, &keys.drop)?),
+            _ => asked,
         };
-        Ok(Target { schema: own, metadata, projection })
+        Ok(format.filter(|format| Some(*format) != format_of(schema)))
     }
-}
 
-/// Points of which nothing is known of returns are the first and only one of their pulse: LAS has
-/// no return 0 of 0.
-fn number_returns(
-    from: &Schema,
-    to: &Schema,
-    drop: &[String],
-    projection: &mut Projection,
-) -> Result<()> {
-    let both = [names::RETURN_NUMBER, names::NUMBER_OF_RETURNS];
-    if both.iter().any(|name| from.find(name).is_some() && !drop.iter().any(|d| d == name)) {
-        return Ok(());
+    fn target(
+        &self,
+        keys: &WriteKeys,
+        schema: &Arc<Schema>,
+        metadata: &Metadata,
+    ) -> Result<Target> {
+        Target::of(keys, self.format(keys, schema)?, schema, metadata)
     }
-    for field in both.iter().filter_map(|name| to.find(name)) {
-        if !projection.preset(field, 1) {
-            return Err(Error::internal("a number of returns does not hold 1"));
-        }
+
+    /// True if records of LAS are not written as they come.
+    fn changes(&self, keys: &WriteKeys, schema: &Schema) -> bool {
+        let reforms = !matches!(self.format(keys, schema), Ok(None));
+        keys.scale.is_some() || keys.offset.is_some() || reforms
     }
-    Ok(())
 }

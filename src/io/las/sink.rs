@@ -2,7 +2,8 @@
 //! byte. What depends on the points is recomputed, all else is carried.
 
 use std::fs::File;
-use std::io::{Seek, SeekFrom, Write};
+use std::io::Write;
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -61,8 +62,25 @@ pub fn create(
     schema: &Arc<Schema>,
     metadata: &Metadata,
 ) -> Result<Box<dyn Sink>> {
-    let format = form(schema)?;
     let (encoder, laszip) = encoder(options, schema)?;
+    let form = LasForm { encoder: Arc::new(encoder), laszip, copc: None };
+    Ok(Box::new(LasSink::open(staged, schema, metadata, form)?))
+}
+
+/// How the points of an output are stored.
+pub struct LasForm {
+    /// What encodes records.
+    pub encoder: Arc<LasEncoder>,
+    /// The laszip record, if they are compressed.
+    pub laszip: Option<Vlr>,
+    /// The record that makes it COPC: the first of all.
+    pub copc: Option<Vlr>,
+}
+
+/// Header and records of an output of records of `schema`, but for the laszip record; and what is
+/// to be told of them.
+fn head(schema: &Schema, metadata: &Metadata, form: &LasForm) -> Result<(Native, Vec<String>)> {
+    let (format, encoder) = (point_format(schema)?, &form.encoder);
     let carried = metadata.native.as_ref().and_then(|n| n.downcast_ref::<Native>());
     let mut notes = Vec::new();
     let mut native = match carried.filter(|native| native.fits(schema)) {
@@ -84,16 +102,13 @@ pub fn create(
     }
     let stride = record_length(schema, &encoder.computed)?;
     native.header.point_data_record_length = stride;
-    let compressed = if laszip.is_some() { COMPRESSED } else { 0 };
+    let compressed = if form.laszip.is_some() { COMPRESSED } else { 0 };
     native.header.point_data_record_format = format | compressed;
-    let note = metadata.note.clone().map(|note| {
-        let before: usize = native.vlrs.iter().map(Vlr::len).sum();
-        native.vlrs.extend(noted::records(note.draft()));
-        (u64::from(native.header.header_size) + before as u64, note)
-    });
-    native.vlrs.extend(laszip);
-    let sink = LasSink::begin(staged, native, Arc::new(encoder), notes)?;
-    Ok(Box::new(LasSink { note, ..sink }))
+    if let Some(copc) = &form.copc {
+        native.header = native.header.resized(4, &[]);
+        native.vlrs.insert(0, copc.clone());
+    }
+    Ok((native, notes))
 }
 
 /// The chunks of the sink that [`create`] would open.
@@ -104,7 +119,7 @@ pub fn chunk(options: &LasOptions, schema: &Schema) -> Result<ChunkSize> {
 
 /// The encoder of records of `schema`, and the laszip record that tells how it compresses.
 fn encoder(options: &LasOptions, schema: &Schema) -> Result<(LasEncoder, Option<Vlr>)> {
-    let format = form(schema)?;
+    let format = point_format(schema)?;
     let computed = ComputedFields::of(schema, &options.computed);
     let (mut compression, mut laszip) = (None, None);
     if options.compressed {
@@ -114,13 +129,13 @@ fn encoder(options: &LasOptions, schema: &Schema) -> Result<(LasEncoder, Option<
     Ok((LasEncoder::new(format, schema, computed, compression), laszip))
 }
 
-fn form(schema: &Schema) -> Result<u8> {
+fn point_format(schema: &Schema) -> Result<u8> {
     format_of(schema)
         .ok_or_else(|| Error::internal("records are to be converted to a LAS layout first"))
 }
 
 /// Bytes of a record as written.
-fn record_length(schema: &Schema, computed: &ComputedFields) -> Result<u16> {
+pub fn record_length(schema: &Schema, computed: &ComputedFields) -> Result<u16> {
     u16::try_from(schema.stride + computed.appended_bytes())
         .map_err(|_| too_long("a record of point format ", format_of(schema).unwrap_or_default()))
 }
@@ -155,14 +170,17 @@ fn describe_computed(
 }
 
 /// A LAS or LAZ file being written.
-struct LasSink {
+pub struct LasSink {
     path: PathBuf,
     file: File,
     /// Bytes written.
     at: u64,
     native: Native,
     encoder: Arc<LasEncoder>,
-    table: ChunkTable,
+    /// The chunks, if the points are compressed.
+    table: Option<ChunkTable>,
+    /// True if chunks have as many points as they like.
+    varies: bool,
     last_was_short: bool,
     points: u64,
     returns: [u64; 15],
@@ -174,12 +192,17 @@ struct LasSink {
 }
 
 impl LasSink {
-    fn begin(
-        path: &Path,
-        mut native: Native,
-        encoder: Arc<LasEncoder>,
-        notes: Vec<String>,
-    ) -> Result<Self> {
+    /// Opens it at `path` for records of `schema`: writes all that stands before the points.
+    pub fn open(path: &Path, schema: &Schema, metadata: &Metadata, form: LasForm) -> Result<Self> {
+        let (mut native, notes) = head(schema, metadata, &form)?;
+        let note = metadata.note.clone().map(|note| {
+            let before: usize = native.vlrs.iter().map(Vlr::len).sum();
+            native.vlrs.extend(noted::records(note.draft()));
+            (u64::from(native.header.header_size) + before as u64, note)
+        });
+        let LasForm { encoder, laszip, copc } = form;
+        let (is_packed, varies) = (laszip.is_some(), copc.is_some());
+        native.vlrs.extend(laszip);
         let records: usize = native.vlrs.iter().map(Vlr::len).sum();
         let start = usize::from(native.header.header_size) + records + native.gap.len();
         let (Ok(start), Ok(vlrs)) = (u32::try_from(start), u32::try_from(native.vlrs.len())) else {
@@ -194,13 +217,14 @@ impl LasSink {
             at: 0,
             native,
             encoder,
-            table: ChunkTable::default(),
+            table: is_packed.then(ChunkTable::default),
+            varies,
             last_was_short: false,
             points: 0,
             returns: [0; 15],
             lo: [i64::MAX; 3],
             hi: [i64::MIN; 3],
-            note: None,
+            note,
             notes,
         };
         let mut head = sink.native.header.bytes()?;
@@ -212,7 +236,7 @@ impl LasSink {
             }
         }
         head.extend_from_slice(&sink.native.gap);
-        if sink.encoder.compression.is_some() {
+        if sink.table.is_some() {
             head.extend((-1i64).to_le_bytes()); // the chunk table's place, set when it is known
         }
         sink.write(&head)?;
@@ -225,44 +249,43 @@ impl LasSink {
         Ok(())
     }
 
-    fn rewrite(&mut self, at: u64, bytes: &[u8]) -> Result<()> {
-        self.file
-            .seek(SeekFrom::Start(at))
-            .and_then(|_| self.file.write_all(bytes))
-            .map_err(|e| Error::io(&self.path, "write it", e))
+    /// Writes over what stands at byte `at`.
+    pub fn rewrite(&self, at: u64, bytes: &[u8]) -> Result<()> {
+        self.file.write_all_at(bytes, at).map_err(|e| Error::io(&self.path, "write it", e))
     }
 
     /// The chunk table at the end of the points, and its place in front of them.
     fn write_table(&mut self) -> Result<()> {
+        let Some(table) = self.table.take() else { return Ok(()) };
         let start = u64::from(self.native.header.offset_to_point_data);
         let place = self.at;
-        let vlr: LazVlr = LazVlrBuilder::default()
+        let vlr = LazVlrBuilder::default()
             .with_point_format(0, 0)
-            .map_err(|e| Error::internal("the chunk table cannot be made").because(e))?
-            .with_fixed_chunk_size(CHUNK_POINTS)
-            .build();
+            .map_err(|e| Error::internal("the chunk table cannot be made").because(e))?;
+        let vlr: LazVlr = match self.varies {
+            true => vlr.with_variable_chunk_size().build(),
+            false => vlr.with_fixed_chunk_size(CHUNK_POINTS).build(),
+        };
         let mut bytes = Vec::new();
-        self.table
+        table
             .write_to(&mut bytes, &vlr)
             .map_err(|e| Error::internal("the chunk table cannot be made").because(e))?;
         self.write(&bytes)?;
-        self.rewrite(start, &place.to_le_bytes())?;
-        self.file
-            .seek(SeekFrom::Start(self.at))
-            .map(drop)
-            .map_err(|e| Error::io(&self.path, "write it", e))
+        self.rewrite(start, &place.to_le_bytes())
     }
 
-    /// The extended records at the end of the file. Where the header says that the waveforms are
-    /// one of them, it says so of its new place.
-    fn write_evlrs(&mut self) -> Result<()> {
+    /// The extended records at the end of the file, first these `own` ones. Where the header says
+    /// that the waveforms are one of them, it says so of its new place.
+    fn write_evlrs(&mut self, own: &[Vec<u8>]) -> Result<()> {
         let evlrs = std::mem::take(&mut self.native.evlrs);
         let header = &self.native.header;
         let internal = header.encoding() & encoding::WAVEFORM_INTERNAL != 0;
         let waveforms = header.waveform_start();
-        let start = if evlrs.is_empty() { 0 } else { self.at };
-        let count = u32::try_from(evlrs.len())
+        let count = evlrs.len() + own.len();
+        let start = if count == 0 { 0 } else { self.at };
+        let count = u32::try_from(count)
             .map_err(|_| Error::pipeline("there are more than 4,294,967,295 extended records"))?;
+        own.iter().try_for_each(|bytes| self.write(bytes))?;
         for evlr in &evlrs {
             let is_waveforms = evlr.position() == waveforms || evlr.is("LASF_Spec", 65535);
             if internal && is_waveforms && self.native.header.minor() >= 3 {
@@ -310,14 +333,25 @@ impl Sink for LasSink {
         if chunk.points == 0 {
             return Ok(());
         }
-        if self.last_was_short && self.encoder.compression.is_some() {
+        if self.last_was_short && self.table.is_some() {
             return Err(Error::internal("only the last chunk may have fewer points"));
         }
         self.last_was_short = chunk.points < u64::from(CHUNK_POINTS);
-        self.table.push(ChunkTableEntry {
-            point_count: chunk.points,
-            byte_count: chunk.bytes.len() as u64,
-        });
+        self.count(&chunk)?;
+        self.put_chunk(&chunk.bytes, chunk.points)?;
+        self.encoder.spare.put(chunk.bytes);
+        Ok(())
+    }
+
+    fn finish(mut self: Box<Self>) -> Result<SinkSummary> {
+        self.end_points()?;
+        self.close(&[])
+    }
+}
+
+impl LasSink {
+    /// Counts the points of a chunk.
+    pub fn count(&mut self, chunk: &Encoded) -> Result<()> {
         self.points += chunk.points;
         for (sum, count) in self.returns.iter_mut().zip(chunk.returns) {
             *sum += count;
@@ -328,16 +362,29 @@ impl Sink for LasSink {
             self.lo[axis] = self.lo[axis].min(chunk.lo[axis]);
             self.hi[axis] = self.hi[axis].max(chunk.hi[axis]);
         }
-        self.write(&chunk.bytes)?;
-        self.encoder.spare.put(chunk.bytes);
         Ok(())
     }
 
-    fn finish(mut self: Box<Self>) -> Result<SinkSummary> {
-        if self.encoder.compression.is_some() {
-            self.write_table()?;
+    /// Writes the bytes of a chunk of so many points; the first one's place.
+    pub fn put_chunk(&mut self, bytes: &[u8], points: u64) -> Result<u64> {
+        let at = self.at;
+        if let Some(table) = &mut self.table {
+            let byte_count = bytes.len() as u64;
+            table.push(ChunkTableEntry { point_count: points, byte_count });
         }
-        self.write_evlrs()?;
+        self.write(bytes)?;
+        Ok(at)
+    }
+
+    /// All points are written; the byte behind them, where extended records begin.
+    pub fn end_points(&mut self) -> Result<u64> {
+        self.write_table()?;
+        Ok(self.at)
+    }
+
+    /// Writes the extended records, these `own` ones first, and what depends on all points.
+    pub fn close(mut self, own: &[Vec<u8>]) -> Result<SinkSummary> {
+        self.write_evlrs(own)?;
         self.settle_header()?;
         let header = self.native.header.bytes()?;
         self.rewrite(0, &header)?;

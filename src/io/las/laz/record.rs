@@ -110,12 +110,21 @@ impl Compression {
 
     /// The compression that we write for `format` with `stride` bytes a record, and its record.
     pub fn write(format: u8, stride: u16) -> Result<(Self, Vlr)> {
+        Compression::of_chunks(format, stride, CHUNK_POINTS)
+    }
+
+    /// The same for chunks whose points the chunk table tells one by one.
+    pub fn write_varying(format: u8, stride: u16) -> Result<(Self, Vlr)> {
+        Compression::of_chunks(format, stride, VARIABLE)
+    }
+
+    fn of_chunks(format: u8, stride: u16, chunk_points: u32) -> Result<(Self, Vlr)> {
         let items = default_items(format, stride);
         let compressor = if format < 6 { Compressor::Chunked } else { Compressor::Layered };
-        let payload = payload(compressor, &items);
+        let payload = payload(compressor, &items, chunk_points);
         let compression = Compression {
             compressor,
-            chunk_points: Some(CHUNK_POINTS),
+            chunk_points: (chunk_points != VARIABLE).then_some(chunk_points),
             layers: layers(&items),
             stride: usize::from(stride),
             items,
@@ -130,16 +139,26 @@ impl Compression {
 
     /// Compresses records, a whole number of them, as one chunk behind what `out` holds.
     pub fn encode(&self, records: &[u8], out: Vec<u8>) -> Result<Vec<u8>> {
+        self.encode_each(std::iter::once(Ok(Cow::Borrowed(records))), out)
+    }
+
+    /// The same for records that come in pieces, each a whole number of them.
+    pub fn encode_each<'a>(
+        &self,
+        pieces: impl Iterator<Item = Result<Cow<'a, [u8]>>>,
+        out: Vec<u8>,
+    ) -> Result<Vec<u8>> {
         let failed = || Error::internal("the LAZ encoder failed");
         let mut encoder: Box<dyn RecordCompressor<Vec<u8>>> = match self.compressor {
             Compressor::Layered => Box::new(LayeredPointRecordCompressor::new(out)),
             _ => Box::new(SequentialPointRecordCompressor::new(out)),
         };
-        let records = self.without_signs_of_zero(records);
-        let records = &*records;
         unpanicked(move || {
             encoder.set_fields_from(&self.encoded_items()?).map_err(|e| failed().because(e))?;
-            encoder.compress_many(records).map_err(|e| failed().because(e))?;
+            for records in pieces {
+                let records = self.without_signs_of_zero(records?);
+                encoder.compress_many(&records).map_err(|e| failed().because(e))?;
+            }
             encoder.done().map_err(|e| failed().because(e))?;
             Ok(encoder.box_into_inner())
         })
@@ -148,15 +167,15 @@ impl Compression {
 
     /// The encoder compares the GPS times of layered records as numbers and would take -0 for the 0
     /// before it, at random as chunks are cut: here all of them are 0, which is the same time.
-    fn without_signs_of_zero<'a>(&self, records: &'a [u8]) -> Cow<'a, [u8]> {
+    fn without_signs_of_zero<'a>(&self, records: Cow<'a, [u8]>) -> Cow<'a, [u8]> {
         const TIME: std::ops::Range<usize> = 22..30;
         let negative = (-0.0f64).to_le_bytes();
         let is_signed = |record: &[u8]| record.get(TIME) == Some(&negative[..]);
         let layered = self.compressor == Compressor::Layered;
         if !layered || !records.chunks_exact(self.stride).any(is_signed) {
-            return Cow::Borrowed(records);
+            return records;
         }
-        let mut records = records.to_vec();
+        let mut records = records.into_owned();
         for record in records.chunks_exact_mut(self.stride).filter(|record| is_signed(record)) {
             record[TIME].fill(0);
         }
@@ -165,7 +184,7 @@ impl Compression {
 
     /// The items as the encoder takes them.
     fn encoded_items(&self) -> Result<Vec<LazItem>> {
-        let record: Vec<u8> = payload(self.compressor, &self.items);
+        let record: Vec<u8> = payload(self.compressor, &self.items, CHUNK_POINTS);
         let parsed = LazVlr::from_buffer(&record)
             .map_err(|e| Error::internal("our own laszip record is wrong").because(e))?;
         Ok(parsed.items().clone())
@@ -185,13 +204,13 @@ impl Compression {
 }
 
 /// The laszip record that we write.
-fn payload(compressor: Compressor, items: &[Item]) -> Vec<u8> {
+fn payload(compressor: Compressor, items: &[Item], chunk_points: u32) -> Vec<u8> {
     let kind: u16 = if compressor == Compressor::Layered { 3 } else { 2 };
     let mut payload = Vec::new();
     payload.extend(kind.to_le_bytes());
     payload.extend([0, 0, 2, 2, 0, 0]); // coder 0, LASzip 2.2 revision 0
     payload.extend(0u32.to_le_bytes());
-    payload.extend(CHUNK_POINTS.to_le_bytes());
+    payload.extend(chunk_points.to_le_bytes());
     payload.extend([0xff; 16]); // no special extended records
     payload.extend((items.len() as u16).to_le_bytes());
     for Item { kind, size, version } in items {

@@ -1,0 +1,292 @@
+//! From points in Morton order to the nodes of an octree whose every level is a picture of the
+//! whole, in one pass and little memory.
+//!
+//! A node of COPC has points of its own: those that a viewer draws which goes no deeper. They are to
+//! be spread evenly, and what is drawn by some levels together, too. The obvious way holds a grid of
+//! occupied cells for every node, or goes over the scan once for each level.
+//!
+//! Here cells hold a contest. A node has 2^7 cells a side; of the points in a cell the one of the
+//! smallest rank (a hash of its position) stands for it. Of the eight cells that make a cell of the
+//! next level their winners meet again, so that whoever wins there has won in all cells below. A
+//! point belongs to the level whose cells are the largest that it wins. So the levels down to any
+//! one together have exactly one point in each occupied cell of that level.
+//!
+//! In Morton order a cell of any size is a stretch without gaps: it is settled as soon as a point
+//! lies outside, so one winner for each size is held, besides the points of the nodes around the
+//! present one. Nothing depends on tiles, threads or memory.
+//!
+//! Small nodes cost bytes and requests. A node whose subtree has few points is one leaf, and what
+//! would be a node of very few points goes to the one above it.
+
+use super::hierarchy::VoxelKey;
+use super::overflow::{Overflow, Piece};
+use crate::Result;
+use crate::point::{Bounds, Position};
+use crate::store::split_level;
+
+/// Cells along a side of a node, as a power of two: the resolution of viewers.
+const CELLS: u32 = 7;
+/// Levels below the root at most: places of nodes are counted in 32 bits. Points that are nearer to
+/// each other share a node.
+const DEEPEST: u32 = 24;
+/// A subtree of so many points is one node.
+pub const LEAF_POINTS: usize = 1 << 16;
+/// A node of fewer points below another is part of that.
+const FEWEST_POINTS: usize = 1 << 11;
+
+/// The cube of the root.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RootCube {
+    /// Its smallest corner.
+    pub corner: Position,
+    /// Its side is two to this power, in steps of the lattice.
+    pub exponent: u32,
+}
+
+impl RootCube {
+    /// The cube around `bounds`. Its eight children are cubes of Morton order: one cube of the
+    /// order around all points might be billions of times as large as they need.
+    pub fn around(bounds: &Bounds) -> RootCube {
+        let spans =
+            |half: u32| (0..3).all(|a| (bounds.hi[a] >> half) - (bounds.lo[a] >> half) <= 1);
+        let half = (CELLS..62).find(|half| spans(*half)).unwrap_or(62);
+        let corner = bounds.lo.map(|at| (at >> half) << half);
+        RootCube { corner, exponent: half + 1 }
+    }
+
+    /// The node of side two to the power `exponent` that holds `position`.
+    fn key(&self, exponent: u32, position: Position) -> VoxelKey {
+        let at = |axis: usize| ((position[axis] - self.corner[axis]) >> exponent) as i32;
+        VoxelKey { level: (self.exponent - exponent) as i32, at: [at(0), at(1), at(2)] }
+    }
+
+    /// Steps between the cells of the root.
+    pub fn spacing(&self) -> i64 {
+        1 << (self.exponent - CELLS)
+    }
+}
+
+/// A node whose points are known.
+#[derive(Debug)]
+pub struct RipeNode {
+    /// Which node it is.
+    pub key: VoxelKey,
+    /// Its records, in pieces: all but the last have [`LEAF_POINTS`].
+    pub pieces: Vec<Piece>,
+}
+
+/// The winner of a cell.
+#[derive(Debug, Clone, Copy)]
+struct Winner {
+    rank: u64,
+    slot: usize,
+}
+
+/// A node that may still get points.
+#[derive(Debug, Default)]
+struct OpenNode {
+    /// Its own points.
+    own: Vec<u8>,
+    /// Earlier ones, in whole pieces.
+    full: Vec<Piece>,
+    /// Nodes below it that become part of it if they are few.
+    children: Vec<(VoxelKey, Vec<u8>)>,
+    /// Bytes of these.
+    below: usize,
+    /// True if there are nodes below it.
+    is_inner: bool,
+}
+
+/// An octree that grows by points in Morton order.
+pub struct Octree {
+    root: RootCube,
+    stride: usize,
+    last: Option<Position>,
+    /// Winners of the open cells, by the exponents of their sides.
+    winners: Vec<Option<Winner>>,
+    slots: Vec<u8>,
+    free: Vec<usize>,
+    /// The exponent of the side of the smallest node.
+    smallest: u32,
+    /// The nodes around the last point, by the exponents of their sides from the smallest on.
+    open: Vec<OpenNode>,
+    ripe: Vec<RipeNode>,
+    overflow: Overflow,
+}
+
+impl Octree {
+    /// Without a point; records have `stride` bytes, and what is not held goes to `overflow`.
+    pub fn new(root: RootCube, stride: usize, overflow: Overflow) -> Self {
+        let smallest = root.exponent.saturating_sub(DEEPEST).max(CELLS);
+        let nodes = root.exponent - smallest + 1;
+        Octree {
+            root,
+            stride,
+            last: None,
+            winners: vec![None; (root.exponent - CELLS + 1) as usize],
+            slots: Vec::new(),
+            free: Vec::new(),
+            smallest,
+            open: (0..nodes).map(|_| OpenNode::default()).collect(),
+            ripe: Vec::new(),
+            overflow,
+        }
+    }
+
+    /// Adds a point; it must not come before the last in Morton order.
+    pub fn push(&mut self, position: Position, record: &[u8]) -> Result<()> {
+        if let Some(last) = self.last {
+            self.close(split_level(last, position).map_or(0, |bit| bit + 1))?;
+        }
+        self.last = Some(position);
+        let slot = self.free.pop().unwrap_or_else(|| {
+            self.slots.resize(self.slots.len() + self.stride, 0);
+            self.slots.len() / self.stride - 1
+        });
+        self.slots[slot * self.stride..(slot + 1) * self.stride].copy_from_slice(record);
+        self.contest(0, Winner { rank: rank(position), slot }, 0)
+    }
+
+    /// The last point.
+    pub fn last(&self) -> Option<Position> {
+        self.last
+    }
+
+    /// The nodes that became ripe since this was asked last, in an order that the points decide.
+    pub fn ripe(&mut self) -> Vec<RipeNode> {
+        std::mem::take(&mut self.ripe)
+    }
+
+    /// Closes all nodes.
+    pub fn finish(&mut self) -> Result<()> {
+        self.close(u64::BITS)?;
+        self.close_node(self.open.len() - 1)
+    }
+
+    /// Settles cells and nodes with a side below two to the power `bits`: the next point lies
+    /// outside.
+    fn close(&mut self, bits: u32) -> Result<()> {
+        let top = self.winners.len() - 1;
+        for cell in 0..(bits as usize).min(top + 1) {
+            let Some(winner) = self.winners[cell].take() else { continue };
+            let exponent = cell as u32 + CELLS;
+            match cell == top {
+                true => self.give(winner, exponent)?,
+                false => self.contest(cell + 1, winner, exponent)?,
+            }
+        }
+        let closed = bits.saturating_sub(self.smallest) as usize;
+        let below_root = self.open.len() - 1;
+        (0..closed.min(below_root)).try_for_each(|node| self.close_node(node))
+    }
+
+    /// A winner comes to a cell; who loses goes to the node of side two to the power `exponent`.
+    fn contest(&mut self, cell: usize, winner: Winner, exponent: u32) -> Result<()> {
+        match self.winners[cell] {
+            None => {
+                self.winners[cell] = Some(winner);
+                Ok(())
+            }
+            // The earlier one where both have a position.
+            Some(other) if other.rank <= winner.rank => self.give(winner, exponent),
+            Some(other) => {
+                self.winners[cell] = Some(winner);
+                self.give(other, exponent)
+            }
+        }
+    }
+
+    /// Gives a point to the open node of side two to the power `exponent`.
+    fn give(&mut self, winner: Winner, exponent: u32) -> Result<()> {
+        let at = winner.slot * self.stride;
+        let number = exponent.saturating_sub(self.smallest) as usize;
+        // Taken out for a moment: the node is of the same octree.
+        let slots = std::mem::take(&mut self.slots);
+        let added = self.add(number, &slots[at..at + self.stride]);
+        self.slots = slots;
+        self.free.push(winner.slot);
+        added
+    }
+
+    /// Closes the open node of this number.
+    fn close_node(&mut self, number: usize) -> Result<()> {
+        let Some(last) = self.last else { return Ok(()) };
+        let key = self.root.key(number as u32 + self.smallest, last);
+        let is_root = number + 1 == self.open.len();
+        let node = &self.open[number];
+        let bytes = node.own.len() + node.below;
+        let is_leaf = !node.is_inner && node.full.is_empty() && bytes <= LEAF_POINTS * self.stride;
+        if !is_leaf {
+            self.become_inner(number)?;
+        }
+        let OpenNode { own, mut full, children, .. } = std::mem::take(&mut self.open[number]);
+        let records = children.into_iter().fold(own, |mut all, (_, below)| {
+            all.extend(below);
+            all
+        });
+        if is_leaf && !is_root {
+            return match records.is_empty() {
+                true => Ok(()),
+                false => self.hand_up(number + 1, key, records),
+            };
+        }
+        if !records.is_empty() || full.is_empty() {
+            full.push(Piece::Held(records));
+        }
+        self.ripe.push(RipeNode { key, pieces: full });
+        if is_root { Ok(()) } else { self.become_inner(number + 1) }
+    }
+
+    /// Hands a leaf to the node above, which may take it for its own.
+    fn hand_up(&mut self, number: usize, key: VoxelKey, records: Vec<u8>) -> Result<()> {
+        let stride = self.stride;
+        let node = &mut self.open[number];
+        if !node.is_inner {
+            node.below += records.len();
+            node.children.push((key, records));
+            let is_full = node.below + node.own.len() > LEAF_POINTS * stride;
+            return if is_full { self.become_inner(number) } else { Ok(()) };
+        }
+        if records.len() < FEWEST_POINTS * stride {
+            return records.chunks_exact(stride).try_for_each(|record| self.add(number, record));
+        }
+        self.ripe.push(RipeNode { key, pieces: vec![Piece::Held(records)] });
+        Ok(())
+    }
+
+    /// The open node of this number has nodes below it: those that waited are such, but for those
+    /// of very few points.
+    fn become_inner(&mut self, number: usize) -> Result<()> {
+        let node = &mut self.open[number];
+        node.is_inner = true;
+        node.below = 0;
+        let children = std::mem::take(&mut node.children);
+        children.into_iter().try_for_each(|(key, records)| self.hand_up(number, key, records))
+    }
+
+    /// Adds a point to the open node of this number.
+    fn add(&mut self, number: usize, record: &[u8]) -> Result<()> {
+        let node = &mut self.open[number];
+        node.own.extend_from_slice(record);
+        if node.own.len() >= LEAF_POINTS * self.stride {
+            node.full.push(self.overflow.store(&node.own)?);
+            node.own.clear();
+        }
+        Ok(())
+    }
+}
+
+/// What decides contests: as good as random, and of a position alone.
+fn rank(position: Position) -> u64 {
+    let mut z = 0u64;
+    for at in position {
+        z = (z ^ at as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^= z >> 31;
+    }
+    z
+}
+
+#[cfg(test)]
+mod tests;
