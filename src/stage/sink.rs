@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::source::{Input, Source};
 use crate::geom::lattice::Lattice;
-use crate::point::{Bounds, Metadata, PointBatch, Schema, Units};
+use crate::point::{Bounds, Metadata, PointBatch, Position, Schema, Units};
 use crate::{Error, Result};
 
 /// Where records go. A sink writes below the path it is given; the run puts the finished file in
@@ -133,6 +133,8 @@ pub struct Encoded {
     pub returns: [u64; 15],
     /// Points that a conversion rounded, and by how much at most, in world units.
     pub rounded: Option<(u64, f64)>,
+    /// Positions of the records on the lattice (outputs that arrange their points).
+    pub places: Vec<Position>,
     /// In which of its forms a format wrote the chunk; 0 where it has one.
     pub form: u8,
 }

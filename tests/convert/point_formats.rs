@@ -15,18 +15,24 @@ Synthetic,KeyPoint,Withheld,ScanAngle,UserData,PointSourceId,GpsTime,Red,Green,B
 ";
 
 /// The columns of a scan as a text.
-fn columns(at: &Path, scan: &str) -> BTreeMap<String, Vec<String>> {
+fn columns(at: &Path, scan: &str) -> BTreeMap<String, Vec<f64>> {
     done(at, &["convert", scan, "-o", "told.csv", "--quiet"]);
     let text = std::fs::read_to_string(at.join("told.csv")).unwrap();
     let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let names = lines.next().unwrap();
     let rows: Vec<_> = lines.collect();
-    let column = |n: usize| rows.iter().map(|row| row[n].to_owned()).collect();
+    let column = |n: usize| rows.iter().map(|row| row[n].parse().unwrap()).collect();
     names.iter().enumerate().map(|(n, name)| ((*name).to_owned(), column(n))).collect()
 }
 
+/// True if two columns are the same: scan angles as far as the steps of newer formats tell them.
+fn alike(name: &str, a: &[f64], b: &[f64]) -> bool {
+    let most = if name == "ScanAngle" { 0.003 + 1e-9 } else { 0.0 };
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= most)
+}
+
 /// What records of `from` have and those of `to` do not.
-fn lacking(from: &BTreeMap<String, Vec<String>>, to: u8) -> Vec<&str> {
+fn lacking(from: &BTreeMap<String, Vec<f64>>, to: u8) -> Vec<&str> {
     let waves = [4, 5, 9, 10].contains(&to);
     let lacks = |name: &str| match name {
         "GpsTime" => [0, 2].contains(&to),
@@ -44,7 +50,7 @@ fn every_point_format_becomes_every_other() {
     let at = at.path();
     std::fs::write(at.join("base.csv"), BASE).unwrap();
     let base = columns(at, "base.csv");
-    let into = |from: &str, columns: &BTreeMap<String, Vec<String>>, to: u8, name: &str| {
+    let into = |from: &str, columns: &BTreeMap<String, Vec<f64>>, to: u8, name: &str| {
         let format = to.to_string();
         let mut arguments = vec!["convert", from, "-o", name, "--point-format", &format, "--quiet"];
         let lost = lacking(columns, to).join(",");
@@ -53,24 +59,22 @@ fn every_point_format_becomes_every_other() {
             arguments.extend(["--drop", &lost]);
         }
         done(at, &arguments_with_scale(&arguments));
-        let said = done(at, &["info", name]);
-        assert!(said.contains("3 points") || said.contains("points"), "{said}");
     };
     for from in 0..=10 {
         into("base.csv", &base, from, "from.las");
         let one = columns(at, "from.las");
         for (name, values) in &base {
-            assert!(one.get(name).is_none_or(|v| v == values), "{from} {name}: {one:?}");
+            assert!(one.get(name).is_none_or(|v| alike(name, v, values)), "{from} {name}: {one:?}");
         }
         for to in (0..=10).filter(|to| *to != from) {
             into("from.las", &one, to, "to.laz");
             let two = columns(at, "to.laz");
             let shared: Vec<_> = base.iter().filter(|(name, _)| one.contains_key(*name)).collect();
             for (name, values) in shared {
-                assert!(two.get(name).is_none_or(|v| v == values), "{from} {to} {name}: {two:?}");
+                let same = two.get(name).is_none_or(|v| alike(name, v, values));
+                assert!(same, "{from} {to} {name}: {two:?}");
             }
             assert_eq!(two["quality"], base["quality"], "extra bytes");
-            assert!(!two.contains_key("NaN"));
         }
     }
 }
@@ -128,6 +132,6 @@ fn the_header_is_one_of_a_version_that_has_the_point_format() {
     let own = columns(at, old);
     let now = columns(at, "a.laz");
     own.iter().filter(|(name, _)| now.contains_key(*name)).for_each(|(name, values)| {
-        assert!(now[name] == *values, "{name}");
+        assert!(alike(name, &now[name], values), "{name}");
     });
 }

@@ -18,6 +18,7 @@ import numpy as np
 import plyfile
 import pye57
 import trimesh
+from laspy.copc import Bounds, CopcReader
 from pypcd4 import Encoding, PointCloud
 
 POINTS = 5000
@@ -83,6 +84,35 @@ def check_las(at: Path, points: dict[str, np.ndarray]) -> None:
         same(f"laspy {name} class", las.classification, points["Classification"])
         same(f"laspy {name} red", las.red, points["Red"] * 257)
         same(f"laspy {name} normal", las["NormalZ"], points["NormalZ"])
+
+
+def check_copc(at: Path) -> None:
+    """Every point is in the node that holds it, and each level is read by itself."""
+    pointmill("synth", "als", "-n", 200_000, "-o", at / "a.laz")
+    pointmill("convert", at / "a.laz", "-o", at / "a.copc.laz")
+    plain = laspy.read(at / "a.laz")
+    with CopcReader.open(at / "a.copc.laz") as reader:
+        info, levels = reader.copc_info, []
+        side = 2 * info.halfsize
+        lowest = np.asarray(info.center) - info.halfsize
+        while len(part := reader.query(level=len(levels))) > 0:
+            levels.append(part)
+        for key, entry in reader.root_page.entries.items():
+            node = side / 2**key.level
+            corner = lowest + node * np.asarray([key.x, key.y, key.z])
+            inside = reader.query(Bounds(corner + node / 4, corner + 3 * node / 4), level=key.level)
+            same(f"node {key.level}", len(inside) <= entry.point_count, np.asarray(1.0))
+        half = Bounds(lowest, lowest + np.asarray([info.halfsize, side, side]))
+        west = len(reader.query(half))
+    if len(levels) < 2:
+        sys.exit(f"COPC has {len(levels)} levels")
+    same("COPC box", west, np.asarray(np.sum(plain.x <= lowest[0] + info.halfsize)))
+    order = np.lexsort((plain.Z, plain.Y, plain.X, plain.gps_time))
+    for name in ("X", "Y", "Z", "gps_time", "return_number", "classification"):
+        found = np.concatenate([np.asarray(level[name]) for level in levels])
+        axes = [np.concatenate([np.asarray(level[axis]) for level in levels]) for axis in "ZYX"]
+        times = np.concatenate([np.asarray(level["gps_time"]) for level in levels])
+        same(f"COPC {name}", found[np.lexsort((*axes, times))], np.asarray(plain[name])[order])
 
 
 def check_ply(at: Path, points: dict[str, np.ndarray]) -> None:
@@ -160,6 +190,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         at = Path(folder)
         write_csv(at / "in.csv", points)
+        check_copc(at)
         for check in (check_las, check_ply, check_pcd, check_e57, check_others):
             check(at, points)
     print(f"interop: {checked} comparisons with other programs agree")

@@ -1,5 +1,6 @@
 //! LAS and LAZ files.
 
+mod copc;
 mod formats;
 mod holes;
 mod merge;

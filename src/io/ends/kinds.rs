@@ -35,7 +35,7 @@ use crate::{Error, Result};
 ///
 /// # Formats
 ///
-/// - LAS 1.0 to 1.4, and LAZ; COPC is read whole, as the LAZ that it is.
+/// - LAS 1.0 to 1.4, and LAZ; COPC (`.copc.laz`) is read whole, as the LAZ that it is.
 /// - PLY, whatever its vertices hold; lists of theirs are passed over, and told.
 /// - PCD as text, as bytes or packed (`binary_compressed`). A cell of a grid (`HEIGHT` above 1) has
 ///   its `Row` and `Column`. A point of which a coordinate is NaN is none, as the library has it:
@@ -121,6 +121,13 @@ pub type ScanNumber = Whole<1, 65_535>;
 /// coordinates, intensity and colours and nothing else, below their count. PTX, OBJ, OFF and STL
 /// are not written; the stage `mesh` writes triangles.
 ///
+/// COPC 1.0 (`.copc.laz`) is written from any pipeline that does not move points behind its tiles:
+/// as one file, in point format 6, 7 or 8 (older ones become these; waveforms must be dropped). Each
+/// level of its octree is a picture of the whole: of the points of a cell, of which a node has 128 a
+/// side, one that a hash of the positions chooses stands for the cell in the node or above it. A
+/// subtree of up to 65,536 points is one node. The bytes are a function of the points alone, and
+/// records within a node are ordered by GPS time.
+///
 /// LAS header fields that depend on the points are computed again. The generating software is
 /// pointmill and its version. Where records went through stages, the system identifier is
 /// `EXTRACTION`, a variable length record (`pointmill`, 1) names the stages as JSON in the place of
@@ -136,7 +143,7 @@ pub type ScanNumber = Whole<1, 65_535>;
 /// `pointmill reproduce` makes it again; `run.provenance = false` leaves that out.
 ///
 /// With `path` all inputs become one file. With `folder` each input becomes a file of its own
-/// there: under its name (a `.copc` in it left out, for COPC is not written), with its header, its
+/// there: under its name (`.copc.laz` becoming `.laz`, for COPC is one file), with its header, its
 /// records and its offset, holding those of its points that are kept, even if that is none. The
 /// inputs are one scan all the same: neighbourhoods and cells go on from file to file, and the
 /// outputs together have the points that the one file would have.

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::copc;
+use super::copc::{self, PlacedSink};
 use super::format::{FAMILY, format_of};
 use super::header::{CALLED, SIGNATURE};
 use super::native::lost;
@@ -145,9 +145,13 @@ impl Format for LasFormat {
             Form::Octree => copc::sink::create(staged, &options, &schema, &metadata)?,
             _ => sink::create(staged, &options, &schema, &metadata)?,
         };
-        Ok(match projection {
+        let sink: Box<dyn Sink> = match projection {
             Some(projection) => Box::new(Projected::new(sink, projection, schema, &keys.path)),
             None => sink,
+        };
+        Ok(match self.form {
+            Form::Octree => Box::new(PlacedSink::new(sink)),
+            _ => sink,
         })
     }
 

@@ -17,7 +17,7 @@ use crate::io::rows::lines::Lines;
 use crate::io::rows::number;
 use crate::io::rows::parts::PartEnds;
 use crate::io::rows::schema::placed;
-use crate::point::names::{BLUE, COLUMN, GREEN, INTENSITY, POINT_SOURCE_ID, RED, ROW, XYZ};
+use crate::point::names::{BLUE, COLUMN, GREEN, INTENSITY, NIR, POINT_SOURCE_ID, RED, ROW, XYZ};
 use crate::point::{Dimension, Endian, Layout, Metadata, PointBatch, Scalar, Schema};
 use crate::stage::{Input, Part, ReadKeys, Source};
 use crate::{Error, Result};
@@ -170,10 +170,18 @@ fn schema(columns: &[Option<String>], facts: &[ColumnFacts], is_ptx: bool) -> Sc
     let read = columns.iter().zip(facts);
     let read =
         read.filter_map(|(name, facts)| Some((name.clone()?, scalar(name.as_ref()?, facts))));
+    let mut read: Vec<(String, Scalar)> = read.collect();
+    // Colours have one depth: a channel whose numbers are all small is of 16 bits if another is.
+    let is_color = |name: &str| [RED, GREEN, BLUE, NIR].contains(&name);
+    if read.iter().any(|(name, scalar)| is_color(name) && *scalar == Scalar::U16) {
+        let bytes =
+            read.iter_mut().filter(|(name, scalar)| is_color(name) && *scalar == Scalar::U8);
+        bytes.for_each(|(_, scalar)| *scalar = Scalar::U16);
+    }
     let of_grid = [(ROW, Scalar::U32), (COLUMN, Scalar::U32), (POINT_SOURCE_ID, Scalar::U16)];
     let of_grid = of_grid.into_iter().filter(|_| is_ptx);
     let of_grid = of_grid.map(|(name, scalar)| (name.to_owned(), scalar));
-    let (dimensions, stride) = placed(read.chain(of_grid));
+    let (dimensions, stride) = placed(read.into_iter().chain(of_grid));
     let layout = if is_ptx { Layout::plain(ptx::FAMILY) } else { RECORDS };
     Schema { layout, endian: Endian::Little, stride, dimensions }
 }

@@ -6,9 +6,11 @@ mod names;
 mod octree;
 mod overflow;
 mod packing;
+mod placed;
 pub mod sink;
 
 pub use names::{EXTENSION, POINT_FORMATS};
+pub use placed::PlacedSink;
 
 use super::format::FAMILY;
 use super::holding::las_schema;

@@ -21,6 +21,7 @@
 use super::hierarchy::VoxelKey;
 use super::overflow::{Overflow, Piece};
 use crate::Result;
+use crate::geom::morton::morton_cmp;
 use crate::point::{Bounds, Position};
 use crate::store::split_level;
 
@@ -52,6 +53,12 @@ impl RootCube {
         let half = (CELLS..62).find(|half| spans(*half)).unwrap_or(62);
         let corner = bounds.lo.map(|at| (at >> half) << half);
         RootCube { corner, exponent: half + 1 }
+    }
+
+    /// True if `position` is inside.
+    fn holds(&self, position: Position) -> bool {
+        let inside = |axis: usize| (position[axis] - self.corner[axis]) >> self.exponent == 0;
+        (0..3).all(inside)
     }
 
     /// The node of side two to the power `exponent` that holds `position`.
@@ -147,9 +154,15 @@ impl Octree {
         self.contest(0, Winner { rank: rank(position), slot }, 0)
     }
 
-    /// The last point.
-    pub fn last(&self) -> Option<Position> {
-        self.last
+    /// True if no point was added.
+    pub fn is_empty(&self) -> bool {
+        self.last.is_none()
+    }
+
+    /// True if a point may come here: inside of the root, and not before the last.
+    pub fn takes(&self, position: Position) -> bool {
+        let inside = self.root.holds(position);
+        inside && self.last.is_none_or(|last| morton_cmp(&last, &position).is_le())
     }
 
     /// The nodes that became ripe since this was asked last, in an order that the points decide.
@@ -200,24 +213,25 @@ impl Octree {
     fn give(&mut self, winner: Winner, exponent: u32) -> Result<()> {
         let at = winner.slot * self.stride;
         let number = exponent.saturating_sub(self.smallest) as usize;
-        // Taken out for a moment: the node is of the same octree.
-        let slots = std::mem::take(&mut self.slots);
-        let added = self.add(number, &slots[at..at + self.stride]);
-        self.slots = slots;
+        self.open[number].own.extend_from_slice(&self.slots[at..at + self.stride]);
         self.free.push(winner.slot);
-        added
+        self.store_full(number)
     }
 
     /// Closes the open node of this number.
     fn close_node(&mut self, number: usize) -> Result<()> {
-        let Some(last) = self.last else { return Ok(()) };
-        let key = self.root.key(number as u32 + self.smallest, last);
-        let is_root = number + 1 == self.open.len();
         let node = &self.open[number];
+        let is_root = number + 1 == self.open.len();
         let bytes = node.own.len() + node.below;
         let is_leaf = !node.is_inner && node.full.is_empty() && bytes <= LEAF_POINTS * self.stride;
+        if is_leaf && !is_root && bytes < FEWEST_POINTS * self.stride {
+            // The children of so small a node are smaller, and in it already.
+            return if bytes == 0 { Ok(()) } else { self.merge_up(number) };
+        }
+        let Some(last) = self.last else { return Ok(()) };
+        let key = self.root.key(number as u32 + self.smallest, last);
         if !is_leaf {
-            self.become_inner(number)?;
+            self.become_inner(number);
         }
         let OpenNode { own, mut full, children, .. } = std::mem::take(&mut self.open[number]);
         let records = children.into_iter().fold(own, |mut all, (_, below)| {
@@ -225,49 +239,67 @@ impl Octree {
             all
         });
         if is_leaf && !is_root {
-            return match records.is_empty() {
-                true => Ok(()),
-                false => self.hand_up(number + 1, key, records),
-            };
+            self.hand_up(number + 1, key, records);
+            return Ok(());
         }
         if !records.is_empty() || full.is_empty() {
             full.push(Piece::Held(records));
         }
         self.ripe.push(RipeNode { key, pieces: full });
-        if is_root { Ok(()) } else { self.become_inner(number + 1) }
-    }
-
-    /// Hands a leaf to the node above, which may take it for its own.
-    fn hand_up(&mut self, number: usize, key: VoxelKey, records: Vec<u8>) -> Result<()> {
-        let stride = self.stride;
-        let node = &mut self.open[number];
-        if !node.is_inner {
-            node.below += records.len();
-            node.children.push((key, records));
-            let is_full = node.below + node.own.len() > LEAF_POINTS * stride;
-            return if is_full { self.become_inner(number) } else { Ok(()) };
+        if !is_root {
+            self.become_inner(number + 1);
         }
-        if records.len() < FEWEST_POINTS * stride {
-            return records.chunks_exact(stride).try_for_each(|record| self.add(number, record));
-        }
-        self.ripe.push(RipeNode { key, pieces: vec![Piece::Held(records)] });
         Ok(())
     }
 
-    /// The open node of this number has nodes below it: those that waited are such, but for those
-    /// of very few points.
-    fn become_inner(&mut self, number: usize) -> Result<()> {
+    /// Gives the points of a small leaf to the node above, whose own they become: as a node of
+    /// theirs they would cost more than they tell.
+    fn merge_up(&mut self, number: usize) -> Result<()> {
+        let mut own = std::mem::take(&mut self.open[number].own);
+        let above = &mut self.open[number + 1].own;
+        match above.is_empty() {
+            true => std::mem::swap(above, &mut own),
+            false => {
+                let room = LEAF_POINTS * self.stride - above.len();
+                let (first, rest) = own.split_at(own.len().min(room));
+                above.extend_from_slice(first);
+                self.store_full(number + 1)?;
+                self.open[number + 1].own.extend_from_slice(rest);
+            }
+        }
+        own.clear();
+        // Keeps its memory for the next.
+        self.open[number].own = own;
+        Ok(())
+    }
+
+    /// Hands a leaf to the node above, which may take it for its own.
+    fn hand_up(&mut self, number: usize, key: VoxelKey, records: Vec<u8>) {
+        let node = &mut self.open[number];
+        if node.is_inner {
+            self.ripe.push(RipeNode { key, pieces: vec![Piece::Held(records)] });
+            return;
+        }
+        node.below += records.len();
+        node.children.push((key, records));
+        if node.below + node.own.len() > LEAF_POINTS * self.stride {
+            self.become_inner(number);
+        }
+    }
+
+    /// The open node of this number has nodes below it: those that waited are such.
+    fn become_inner(&mut self, number: usize) {
         let node = &mut self.open[number];
         node.is_inner = true;
         node.below = 0;
-        let children = std::mem::take(&mut node.children);
-        children.into_iter().try_for_each(|(key, records)| self.hand_up(number, key, records))
+        let children = std::mem::take(&mut node.children).into_iter();
+        let nodes = children.map(|(key, below)| RipeNode { key, pieces: vec![Piece::Held(below)] });
+        self.ripe.extend(nodes);
     }
 
-    /// Adds a point to the open node of this number.
-    fn add(&mut self, number: usize, record: &[u8]) -> Result<()> {
+    /// Stores the points of an open node that has as many as are held.
+    fn store_full(&mut self, number: usize) -> Result<()> {
         let node = &mut self.open[number];
-        node.own.extend_from_slice(record);
         if node.own.len() >= LEAF_POINTS * self.stride {
             node.full.push(self.overflow.store(&node.own)?);
             node.own.clear();

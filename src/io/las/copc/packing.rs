@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex};
 
 use super::hierarchy::VoxelKey;
-use super::octree::RipeNode;
+use super::octree::{LEAF_POINTS, RipeNode};
 use crate::host::lock;
 use crate::io::las::encode::LasEncoder;
 use crate::io::las::laz::Compression;
@@ -21,6 +21,9 @@ const WAITING: usize = 4;
 /// Byte of the GPS time of a record of point formats 6 to 10, and of its return number.
 const TIME: usize = 22;
 const RETURN: usize = 14;
+/// Bits that the place of a record in its piece takes.
+const PLACE_BITS: u32 = 28;
+const _: () = assert!(LEAF_POINTS < 1 << PLACE_BITS);
 
 /// A compressed node.
 #[derive(Debug)]
@@ -117,14 +120,14 @@ fn in_time(records: &[u8], stride: usize) -> Vec<u8> {
         let time = record.get(TIME..).and_then(<[u8]>::first_chunk);
         let bits = u64::from_le_bytes(time.copied().unwrap_or_default());
         let ascending = if bits >> 63 == 0 { bits | 1 << 63 } else { !bits };
-        (ascending, record[RETURN] & 0b1111)
+        (ascending, u32::from(record[RETURN] & 0b1111) << PLACE_BITS)
     };
-    let keys = records.chunks_exact(stride).map(key);
-    let mut order: Vec<((u64, u8), u32)> = keys.zip(0u32..).collect();
+    let keys = records.chunks_exact(stride).map(key).zip(0u32..);
+    let mut order: Vec<(u64, u32)> = keys.map(|((time, of), at)| (time, of | at)).collect();
     order.sort_unstable();
     let mut sorted = Vec::with_capacity(records.len());
     for (_, at) in order {
-        let at = at as usize * stride;
+        let at = (at & ((1 << PLACE_BITS) - 1)) as usize * stride;
         sorted.extend_from_slice(&records[at..at + stride]);
     }
     sorted

@@ -9,13 +9,12 @@ use super::octree::{LEAF_POINTS, Octree, RootCube};
 use super::overflow::Overflow;
 use super::packing::{CopcEncoder, PackedNode, Packing};
 use crate::geom::lattice::Lattice;
-use crate::geom::morton::morton_cmp;
 use crate::io::las::encode::{ComputedFields, LasEncoder};
 use crate::io::las::format::format_of;
 use crate::io::las::laz::{CHUNK_POINTS, Compression};
 use crate::io::las::sink::{LasForm, LasOptions, LasSink, record_length};
 use crate::io::las::vlr::{EVLR_HEAD, Vlr, extended};
-use crate::point::{Bounds, Metadata, Position, Schema};
+use crate::point::{Metadata, Schema};
 use crate::stage::{ChunkSize, Encode, Encoded, Extent, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -41,7 +40,6 @@ pub fn create(
     Ok(Box::new(CopcSink {
         inner,
         encoder: Arc::new(encoder),
-        schema: schema.clone(),
         path: staged.to_owned(),
         stride,
         ground: None,
@@ -72,7 +70,6 @@ fn encoder(options: &LasOptions, schema: &Schema) -> Result<(CopcEncoder, Vlr)> 
 /// Where points are, as the octree needs it.
 struct Ground {
     lattice: Lattice,
-    bounds: Bounds,
     root: RootCube,
     octree: Octree,
 }
@@ -81,7 +78,6 @@ struct Ground {
 struct CopcSink {
     inner: LasSink,
     encoder: Arc<CopcEncoder>,
-    schema: Arc<Schema>,
     path: PathBuf,
     stride: usize,
     ground: Option<Ground>,
@@ -123,27 +119,6 @@ impl CopcSink {
     }
 }
 
-impl Ground {
-    /// Where a record is: its own position, or one beside it that the rounding of its coordinates
-    /// may have come from, where it would else come before the last.
-    fn place(&self, own: Position, reach: i64) -> Option<Position> {
-        let last = self.octree.last();
-        let fits = |at: &Position| {
-            self.bounds.contains(*at) && last.is_none_or(|last| morton_cmp(&last, at).is_le())
-        };
-        if fits(&own) {
-            return Some(own);
-        }
-        let Bounds { lo, hi } = self.bounds;
-        let beside = |n: usize| {
-            let way = |axis: usize| [0, -reach, reach][n / [1, 3, 9][axis] % 3];
-            std::array::from_fn(|axis| (own[axis] + way(axis)).clamp(lo[axis], hi[axis]))
-        };
-        let near = |at: &Position| (0..3).all(|axis| (at[axis] - own[axis]).abs() <= reach);
-        (0..27).map(beside).filter(|at| near(at) && fits(at)).min_by(morton_cmp)
-    }
-}
-
 impl Sink for CopcSink {
     fn chunk_points(&self) -> usize {
         CHUNK_POINTS as usize
@@ -167,8 +142,7 @@ impl Sink for CopcSink {
             let root = RootCube::around(&extent.bounds);
             let overflow = Overflow::at(&self.path.with_extension("nodes"));
             let octree = Octree::new(root, self.stride, overflow);
-            let (lattice, bounds) = (extent.lattice.clone(), extent.bounds);
-            self.ground = Some(Ground { lattice, bounds, root, octree });
+            self.ground = Some(Ground { lattice: extent.lattice.clone(), root, octree });
         }
         Ok(())
     }
@@ -180,14 +154,14 @@ impl Sink for CopcSink {
         self.inner.count(&chunk)?;
         let untold = || Error::internal("records came before it was told where they are");
         let ground = self.ground.as_mut().ok_or_else(untold)?;
-        let axes = self.schema.coordinates().ok_or_else(untold)?;
-        let scale = axes.iter().fold(0.0, |all: f64, axis| all.max(axis.scale.abs()));
-        let reach = (scale / ground.lattice.step / 2.0).ceil() as i64 + 1;
-        for record in chunk.bytes.chunks_exact(self.stride) {
-            let world = axes.map(|axis| axis.world(record, self.schema.endian));
-            let own = ground.lattice.nearest(world);
-            let place = own.and_then(|own| ground.place(own, reach));
-            ground.octree.push(place.ok_or_else(|| misplaced(world))?, record)?;
+        if chunk.places.len() as u64 != chunk.points {
+            return Err(untold());
+        }
+        for (record, &place) in chunk.bytes.chunks_exact(self.stride).zip(&chunk.places) {
+            if !ground.octree.takes(place) {
+                return Err(misplaced(ground.lattice.world(place)));
+            }
+            ground.octree.push(place, record)?;
             if let Some(bytes) = record.get(TIME..).and_then(<[u8]>::first_chunk) {
                 let time = f64::from_le_bytes(*bytes);
                 self.times = [self.times[0].min(time), self.times[1].max(time)];
@@ -202,7 +176,7 @@ impl Sink for CopcSink {
 
     fn finish(mut self: Box<Self>) -> Result<SinkSummary> {
         match self.ground.as_mut() {
-            Some(ground) if ground.octree.last().is_some() => {
+            Some(ground) if !ground.octree.is_empty() => {
                 ground.octree.finish()?;
                 for node in ground.octree.ripe() {
                     self.encoder.packing.add(node)?;
