@@ -8,6 +8,7 @@
 use std::borrow::Cow;
 use std::ffi::OsStr;
 use std::fmt;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -104,9 +105,9 @@ pub trait Format: Send + Sync {
         None
     }
 
-    /// True if an output of it is one file whose points are arranged in space: it comes in canonical
-    /// order, and its sink is told where the points are ([`Sink::arrange`]). The name of a format of
-    /// the same family that holds the same where that cannot be.
+    /// True if an output of it is one file whose points are arranged in space: it comes in
+    /// canonical order, and its sink is told where the points are ([`Sink::arrange`]). The name of
+    /// a format of the same family that holds the same where that cannot be.
     fn arranged(&self) -> Option<&'static str> {
         None
     }
@@ -299,18 +300,15 @@ impl Formats {
 
     /// The format that the extension of `path` names, its case aside.
     pub fn of(&self, path: &Path) -> Option<&Arc<dyn Format>> {
-        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
-        let is_of = |format: &&Arc<dyn Format>| stem(&name, format.extension()).is_some();
+        let name = path.file_name()?;
+        let is_of = |format: &&Arc<dyn Format>| stem(name, format.extension()).is_some();
         self.iter().filter(is_of).max_by_key(|format| format.extension().len())
     }
 
     /// The name of the file at `path` without its extension, which may be that of a format and have
     /// dots in it.
     pub fn stem<'a>(&self, path: &'a Path) -> Option<&'a OsStr> {
-        let own = self.of(path).and_then(|format| {
-            let name = path.file_name()?.to_str()?;
-            stem(name, format.extension()).map(OsStr::new)
-        });
+        let own = self.of(path).and_then(|format| stem(path.file_name()?, format.extension()));
         own.or(path.file_stem())
     }
 
@@ -332,10 +330,12 @@ impl Formats {
 }
 
 /// `name` without `extension` and the dot before it; None if it ends with another or is no more.
-fn stem<'a>(name: &'a str, extension: &str) -> Option<&'a str> {
+fn stem<'a>(name: &'a OsStr, extension: &str) -> Option<&'a OsStr> {
+    let name = name.as_bytes();
     let dot = name.len().checked_sub(extension.len() + 1).filter(|dot| *dot > 0)?;
-    let end = name.get(dot..)?.strip_prefix('.')?;
-    end.eq_ignore_ascii_case(extension).then(|| &name[..dot])
+    let (stem, end) = name.split_at(dot);
+    let is_its = end.strip_prefix(b".")?.eq_ignore_ascii_case(extension.as_bytes());
+    is_its.then(|| OsStr::from_bytes(stem))
 }
 
 impl fmt::Debug for Formats {

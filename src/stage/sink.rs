@@ -23,8 +23,8 @@ pub trait Sink: Send {
     /// The encoder, shared by all threads.
     fn encoder(&self) -> Arc<dyn Encode>;
 
-    /// Told once, before the first chunk, where the points are, if the output is the only one of all
-    /// inputs and its records come in [canonical order](Order::Canonical).
+    /// Told once, before the first chunk, where the points are, if the output is the only one of
+    /// all inputs and its records come in [canonical order](Order::Canonical).
     ///
     /// # Errors
     ///

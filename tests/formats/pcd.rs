@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::{points, warned};
-use crate::support::command::{done, fails};
+use crate::support::command::{done, fails, pointmill};
 
 /// A header of fields of these names, sizes, types and counts.
 fn header(fields: [&str; 4], width: usize, height: usize, data: &str) -> String {
@@ -179,4 +179,21 @@ fn damage_is_told_with_its_place() {
         "no field x, y, z",
     );
     told("VERSION .7\nDATA ascii\n", b"", "no line `FIELDS`");
+}
+
+#[test]
+fn a_point_that_would_be_none_is_refused_or_left_out_and_counted() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    std::fs::write(at.join("a.csv"), "x,y,z\n1,2,3\nnan,2,3\n4,5,6\n").unwrap();
+    for out in ["o.pcd", "o.e57"] {
+        let convert = ["convert", "a.csv", "-o", out];
+        fails(at, &convert, 1, &["(NaN, 2, 3)", "is none", "--nonfinite drop"]);
+        let (code, _, told) = pointmill(at, &[&convert[..], &["--nonfinite", "drop"]].concat());
+        assert!(code == 0, "{told}");
+        assert_eq!(points(at, out), ["X,Y,Z", "1,2,3", "4,5,6"]);
+    }
+    // Others hold it.
+    done(at, &["convert", "a.csv", "-o", "o.ply", "--quiet"]);
+    assert_eq!(points(at, "o.ply"), ["X,Y,Z", "1,2,3", "nan,2,3", "4,5,6"]);
 }

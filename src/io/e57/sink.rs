@@ -24,8 +24,13 @@ use crate::point::{Dimension, Endian, Metadata, RunNote, Scalar, Schema, Value};
 use crate::stage::{Encode, Encoded, Sink, SinkSummary, WriteKeys};
 use crate::{Error, Result};
 
-const FORM: RowForm =
-    RowForm { layout: RECORDS, holds_long: true, packs_colors: false, keeps_steps: true };
+const FORM: RowForm = RowForm {
+    layout: RECORDS,
+    holds_long: true,
+    packs_colors: false,
+    keeps_steps: true,
+    holds_nan: false,
+};
 
 /// Where surface normals are described, and where what has no name in E57 is.
 const NORMALS: [&str; 2] = ["nor", "http://www.libe57.org/E57_NOR_surface_normals.txt"];

@@ -122,11 +122,11 @@ pub type ScanNumber = Whole<1, 65_535>;
 /// are not written; the stage `mesh` writes triangles.
 ///
 /// COPC 1.0 (`.copc.laz`) is written from any pipeline that does not move points behind its tiles:
-/// as one file, in point format 6, 7 or 8 (older ones become these; waveforms must be dropped). Each
-/// level of its octree is a picture of the whole: of the points of a cell, of which a node has 128 a
-/// side, one that a hash of the positions chooses stands for the cell in the node or above it. A
-/// subtree of up to 65,536 points is one node. The bytes are a function of the points alone, and
-/// records within a node are ordered by GPS time.
+/// as one file, in point format 6, 7 or 8 (older ones become these; waveforms must be dropped).
+/// Each level of its octree is a picture of the whole: of the points of a cell, of which a node has
+/// 128 a side, one that a hash of the positions chooses stands for the cell in the node or above
+/// it. A subtree of up to 65,536 points is one node. The bytes are a function of the points alone,
+/// and records within a node are ordered by GPS time.
 ///
 /// LAS header fields that depend on the points are computed again. The generating software is
 /// pointmill and its version. Where records went through stages, the system identifier is

@@ -73,8 +73,8 @@ impl Native {
             && schema.stride == usize::from(self.header.point_data_record_length)
     }
 
-    /// The same for records of `schema`, in whatever point format that is: a version of LAS that has
-    /// it (LAS 1.4 R15, section 2.6, and the versions before).
+    /// The same for records of `schema`, in whatever point format that is: a version of LAS that
+    /// has it (LAS 1.4 R15, section 2.6, and the versions before).
     pub fn reformed(mut self, schema: &Schema) -> Self {
         let format = format_of(schema).unwrap_or(0);
         let least = match format {

@@ -245,17 +245,6 @@ impl Evlr {
     }
 }
 
-/// Head and payload of a new extended record.
-pub fn extended(user: &str, record: u16, description: &str, payload: &[u8]) -> Vec<u8> {
-    let mut bytes = vec![0; EVLR_HEAD];
-    bytes[2..18].copy_from_slice(&field::<16>(user));
-    bytes[18..20].copy_from_slice(&record.to_le_bytes());
-    bytes[20..28].copy_from_slice(&(payload.len() as u64).to_le_bytes());
-    bytes[28..].copy_from_slice(&field::<32>(description));
-    bytes.extend_from_slice(payload);
-    bytes
-}
-
 /// The variable length records of a file and the bytes between them and the points (a point start
 /// signature in LAS 1.0). The second value is a warning, if there is one.
 pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>, Option<String>)> {

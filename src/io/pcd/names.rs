@@ -10,8 +10,13 @@ pub(super) const FAMILY: &str = "PCD";
 pub(super) const RECORDS: Layout = Layout::plain(FAMILY);
 
 /// What a point takes.
-pub(super) const FORM: RowForm =
-    RowForm { layout: RECORDS, holds_long: true, packs_colors: true, keeps_steps: false };
+pub(super) const FORM: RowForm = RowForm {
+    layout: RECORDS,
+    holds_long: true,
+    packs_colors: true,
+    keeps_steps: false,
+    holds_nan: false,
+};
 
 /// What messages call a PCD file.
 pub(super) const CALLED: &str = "a PCD file";

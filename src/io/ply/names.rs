@@ -14,8 +14,13 @@ pub(super) const FAMILY: &str = "PLY";
 pub const RECORDS: Layout = Layout::plain(FAMILY);
 
 /// What a vertex takes.
-pub(super) const FORM: RowForm =
-    RowForm { layout: RECORDS, holds_long: false, packs_colors: false, keeps_steps: false };
+pub(super) const FORM: RowForm = RowForm {
+    layout: RECORDS,
+    holds_long: false,
+    packs_colors: false,
+    keeps_steps: false,
+    holds_nan: true,
+};
 
 /// What a comment begins with that gives a property the name of its dimension where the property's
 /// own name does not tell it.

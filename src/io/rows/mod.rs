@@ -53,4 +53,6 @@ pub(crate) struct RowForm {
     /// True if numbers that are steps of a scale stay what they are, to be printed with the
     /// decimals that the scale has.
     pub keeps_steps: bool,
+    /// True if a point of which a coordinate is no number is a point for those who read it.
+    pub holds_nan: bool,
 }

@@ -9,7 +9,7 @@ use super::{Encoding, RowForm};
 use crate::io::convert::{Projection, Rounding};
 use crate::point::{ComputedDimension, Dimension, PointBatch, Scalar, Schema, Spare, Value};
 use crate::stage::{ChunkSize, Colors, Encode, Encoded, WriteKeys};
-use crate::{Error, Result};
+use crate::{Error, ErrorKind, Result};
 
 /// How the rows of an output are written.
 #[derive(Debug, Clone)]
@@ -290,9 +290,30 @@ fn add_computed(
     Ok(added)
 }
 
+/// Refuses a point of which a coordinate is no number, where readers would take it for none.
+fn refuse_nan(batch: &PointBatch, family: &str) -> Result<()> {
+    let Some(axes) = batch.schema().coordinates() else { return Ok(()) };
+    if axes.iter().all(|axis| !axis.scalar.is_float()) {
+        return Ok(());
+    }
+    for record in batch.iter() {
+        let [x, y, z] = axes.map(|axis| axis.world(record, batch.schema().endian));
+        if x.is_nan() || y.is_nan() || z.is_nan() {
+            let told =
+                format!("the point at ({x}, {y}, {z}) is none in {family}, where NaN means so");
+            return Err(Error::new(ErrorKind::Data, told)
+                .help("`run.nonfinite = \"drop\"` leaves such points out"));
+        }
+    }
+    Ok(())
+}
+
 impl Encode for RowPlan {
     fn encode(&self, batch: &PointBatch) -> Result<Encoded> {
         let mut rounding = Rounding::default();
+        if !self.form.holds_nan {
+            refuse_nan(batch, self.form.layout.family)?;
+        }
         let mut bytes = self.spare.take(Vec::new);
         let (rows, written) = self.rows(batch);
         if let Some(projection) = &rows.projection {

@@ -16,8 +16,13 @@ use crate::stage::{Separator, Sink, WriteKeys};
 use crate::{Error, Result};
 
 /// What a line takes.
-const FORM: RowForm =
-    RowForm { layout: RECORDS, holds_long: true, packs_colors: false, keeps_steps: true };
+const FORM: RowForm = RowForm {
+    layout: RECORDS,
+    holds_long: true,
+    packs_colors: false,
+    keeps_steps: true,
+    holds_nan: true,
+};
 
 /// How a text of one format is written where the user does not say it.
 #[derive(Debug, Clone, Copy)]

@@ -6,10 +6,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::io::las::text::field;
+use crate::io::las::vlr::EVLR_HEAD;
+
 /// Bytes of an entry.
 pub const ENTRY_BYTES: usize = 32;
 /// Nodes that one page holds without being cut.
-const PAGE_NODES: usize = 4096;
+const PAGE_NODES: usize = 1024;
 /// Levels of a page where it is cut.
 const PAGE_LEVELS: i32 = 5;
 
@@ -120,6 +123,17 @@ fn put(out: &mut Vec<u8>, key: VoxelKey, chunk: NodeChunk) {
     out.extend(chunk.start.to_le_bytes());
     out.extend(chunk.bytes.to_le_bytes());
     out.extend(chunk.points.to_le_bytes());
+}
+
+/// Head and payload of a new extended record.
+pub fn extended(user: &str, record: u16, description: &str, payload: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![0; EVLR_HEAD];
+    bytes[2..18].copy_from_slice(&field::<16>(user));
+    bytes[18..20].copy_from_slice(&record.to_le_bytes());
+    bytes[20..28].copy_from_slice(&(payload.len() as u64).to_le_bytes());
+    bytes[28..].copy_from_slice(&field::<32>(description));
+    bytes.extend_from_slice(payload);
+    bytes
 }
 
 #[cfg(test)]

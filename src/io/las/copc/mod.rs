@@ -1,5 +1,5 @@
-//! COPC 1.0 (copc.io): LAZ whose chunks are the nodes of an octree, so that a viewer fetches what it
-//! draws. It is read as the LAZ that it is.
+//! COPC 1.0 (copc.io): LAZ whose chunks are the nodes of an octree, so that a viewer fetches what
+//! it draws. It is read as the LAZ that it is.
 
 mod hierarchy;
 mod names;

@@ -1,9 +1,9 @@
 //! From points in Morton order to the nodes of an octree whose every level is a picture of the
 //! whole, in one pass and little memory.
 //!
-//! A node of COPC has points of its own: those that a viewer draws which goes no deeper. They are to
-//! be spread evenly, and what is drawn by some levels together, too. The obvious way holds a grid of
-//! occupied cells for every node, or goes over the scan once for each level.
+//! A node of COPC has points of its own: those that a viewer draws which goes no deeper. They are
+//! to be spread evenly, and what is drawn by some levels together, too. The obvious way holds a
+//! grid of occupied cells for every node, or goes over the scan once for each level.
 //!
 //! Here cells hold a contest. A node has 2^7 cells a side; of the points in a cell the one of the
 //! smallest rank (a hash of its position) stands for it. Of the eight cells that make a cell of the
@@ -19,7 +19,7 @@
 //! would be a node of very few points goes to the one above it.
 
 use super::hierarchy::VoxelKey;
-use super::overflow::{Overflow, Piece};
+use super::overflow::{NodePiece, Overflow};
 use crate::Result;
 use crate::geom::morton::morton_cmp;
 use crate::point::{Bounds, Position};
@@ -79,7 +79,7 @@ pub struct RipeNode {
     /// Which node it is.
     pub key: VoxelKey,
     /// Its records, in pieces: all but the last have [`LEAF_POINTS`].
-    pub pieces: Vec<Piece>,
+    pub pieces: Vec<NodePiece>,
 }
 
 /// The winner of a cell.
@@ -95,7 +95,7 @@ struct OpenNode {
     /// Its own points.
     own: Vec<u8>,
     /// Earlier ones, in whole pieces.
-    full: Vec<Piece>,
+    full: Vec<NodePiece>,
     /// Nodes below it that become part of it if they are few.
     children: Vec<(VoxelKey, Vec<u8>)>,
     /// Bytes of these.
@@ -243,7 +243,7 @@ impl Octree {
             return Ok(());
         }
         if !records.is_empty() || full.is_empty() {
-            full.push(Piece::Held(records));
+            full.push(NodePiece::Held(records));
         }
         self.ripe.push(RipeNode { key, pieces: full });
         if !is_root {
@@ -277,7 +277,7 @@ impl Octree {
     fn hand_up(&mut self, number: usize, key: VoxelKey, records: Vec<u8>) {
         let node = &mut self.open[number];
         if node.is_inner {
-            self.ripe.push(RipeNode { key, pieces: vec![Piece::Held(records)] });
+            self.ripe.push(RipeNode { key, pieces: vec![NodePiece::Held(records)] });
             return;
         }
         node.below += records.len();
@@ -293,7 +293,8 @@ impl Octree {
         node.is_inner = true;
         node.below = 0;
         let children = std::mem::take(&mut node.children).into_iter();
-        let nodes = children.map(|(key, below)| RipeNode { key, pieces: vec![Piece::Held(below)] });
+        let nodes =
+            children.map(|(key, below)| RipeNode { key, pieces: vec![NodePiece::Held(below)] });
         self.ripe.extend(nodes);
     }
 

@@ -11,7 +11,7 @@ use crate::{Error, Result};
 
 /// Records of a node.
 #[derive(Debug)]
-pub enum Piece {
+pub enum NodePiece {
     /// In memory.
     Held(Vec<u8>),
     /// So many bytes from this one of the file on.
@@ -25,20 +25,20 @@ pub struct StoredFile {
     file: File,
 }
 
-impl Piece {
+impl NodePiece {
     /// Bytes of its records.
     pub fn len(&self) -> usize {
         match self {
-            Piece::Held(records) => records.len(),
-            Piece::Stored(_, _, bytes) => *bytes,
+            NodePiece::Held(records) => records.len(),
+            NodePiece::Stored(_, _, bytes) => *bytes,
         }
     }
 
     /// Its records.
     pub fn records(self) -> Result<Vec<u8>> {
         match self {
-            Piece::Held(records) => Ok(records),
-            Piece::Stored(stored, at, bytes) => {
+            NodePiece::Held(records) => Ok(records),
+            NodePiece::Stored(stored, at, bytes) => {
                 let mut records = vec![0; bytes];
                 let read = stored.file.read_exact_at(&mut records, at);
                 read.map_err(|e| Error::io(&stored.path, "read it", e))?;
@@ -63,7 +63,7 @@ impl Overflow {
     }
 
     /// Stores records.
-    pub fn store(&mut self, records: &[u8]) -> Result<Piece> {
+    pub fn store(&mut self, records: &[u8]) -> Result<NodePiece> {
         let stored = match &self.stored {
             Some(stored) => stored.clone(),
             None => {
@@ -79,7 +79,7 @@ impl Overflow {
         written.map_err(|e| Error::io(&self.path, "write it", e))?;
         let at = self.bytes;
         self.bytes += records.len() as u64;
-        Ok(Piece::Stored(stored, at, records.len()))
+        Ok(NodePiece::Stored(stored, at, records.len()))
     }
 }
 

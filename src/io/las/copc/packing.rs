@@ -1,7 +1,7 @@
 //! Compressing nodes on any thread. Nodes become ripe one by one, where points are put in order,
 //! which one thread does at a time; compressing them takes far longer. So a thread that comes to
-//! encode a batch of records first compresses a node that waits, and chunks are written in the order
-//! in which their nodes became ripe.
+//! encode a batch of records first compresses a node that waits, and chunks are written in the
+//! order in which their nodes became ripe.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::hierarchy::{Hierarchy, NodeChunk, ROOT};
+use super::hierarchy::{Hierarchy, NodeChunk, ROOT, extended};
 use super::names::{HIERARCHY, INFO, INFO_AT, INFO_BYTES, POINT_FORMATS, USER};
 use super::octree::{LEAF_POINTS, Octree, RootCube};
 use super::overflow::Overflow;
@@ -13,7 +13,7 @@ use crate::io::las::encode::{ComputedFields, LasEncoder};
 use crate::io::las::format::format_of;
 use crate::io::las::laz::{CHUNK_POINTS, Compression};
 use crate::io::las::sink::{LasForm, LasOptions, LasSink, record_length};
-use crate::io::las::vlr::{EVLR_HEAD, Vlr, extended};
+use crate::io::las::vlr::{EVLR_HEAD, Vlr};
 use crate::point::{Metadata, Schema};
 use crate::stage::{ChunkSize, Encode, Encoded, Extent, Sink, SinkSummary};
 use crate::{Error, Result};
