@@ -45,7 +45,7 @@ pub(super) enum Command {
     Run(PlanArguments),
     /// Reduce scans to the points that matter
     Reduce(Box<ReduceArguments>),
-    /// Convert between LAS, LAZ, PLY, PCD, E57 and texts
+    /// Convert between LAS, LAZ, COPC, PLY, PCD, E57 and texts
     Convert(Box<ConvertArguments>),
     /// Show what files contain, from their headers
     Info(InfoArguments),

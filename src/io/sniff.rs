@@ -165,7 +165,8 @@ pub fn not(wanted: &str, path: &Path, first: &[u8], formats: &Formats) -> Error 
 
 /// How a file is named so that it is read as one of the family of `format`.
 fn name_it(format: &dyn Format, formats: &Formats) -> String {
-    let family: Vec<_> = formats.of_family(format.family()).collect();
+    let family = formats.of_family(format.family()).filter(|f| f.arranged().is_none());
+    let family: Vec<_> = family.collect();
     let dotted = listed(family.iter().map(|f| format!(".{}", f.extension())), "or");
     let first = family.first().map_or(format.name(), |first| first.name());
     format!("name it {dotted}, or give `read.format = \"{first}\"`")

@@ -74,20 +74,27 @@ pub(super) fn told(kind: &str, keys: &Node) -> Option<(String, String)> {
         let told = format!("there is no stage `{kind}`: pointmill does not {what}");
         return Some((told, (*help).to_owned()));
     }
-    let of_files = [
-        ("readers.las", "`read` with the `path`"),
-        ("readers.ply", "`read` with the `path`"),
-        ("writers.las", "`write` with the `path`"),
-        ("writers.ply", "`write` with the `path`"),
-        ("writers.null", "`discard`"),
-    ];
-    if let Some((_, here)) = of_files.iter().find(|(name, _)| lower == *name) {
-        return Some(is_here(kind, here));
+    if lower == "writers.null" {
+        return Some(is_here(kind, "`discard`"));
     }
     if let Some((ends @ ("readers" | "writers"), format)) = lower.split_once('.') {
+        let both = ["las", "copc", "ply", "pcd", "e57", "text"];
+        let read = ["pts", "ptx", "obj"];
+        match ends {
+            "readers" if both.contains(&format) || read.contains(&format) => {
+                return Some(is_here(kind, "`read` with the `path`"));
+            }
+            "writers" if both.contains(&format) => {
+                return Some(is_here(kind, "`write` with the `path`"));
+            }
+            _ => {}
+        }
         let does = if ends == "readers" { "read" } else { "write" };
         let told = format!("there is no stage `{kind}`: pointmill does not {does} {format} files");
-        return Some((told, "it reads and writes LAS, LAZ, PLY, PCD, E57 and texts".to_owned()));
+        return Some((
+            told,
+            "it reads and writes LAS, LAZ, COPC, PLY, PCD, E57 and texts".to_owned(),
+        ));
     }
     let (_, here) = ELSEWHERE.iter().find(|(names, _)| names.contains(&name))?;
     // What is mistyped by a letter is told as such.
@@ -154,6 +161,11 @@ mod tests {
         assert!(text.contains("pdal translate scan.laz ground.laz smrf"), "{text}");
         let text = told("kind = 'readers.las', filename = 'a.las'");
         assert!(text.contains("is here `read` with the `path`"), "{text}");
+        for kind in ["readers.copc", "readers.e57", "readers.ptx", "writers.copc", "writers.text"] {
+            let text = told(&format!("kind = '{kind}', filename = 'a'"));
+            assert!(text.contains("with the `path`"), "{text}");
+        }
+        assert!(told("kind = 'writers.ptx'").contains("does not write ptx files"));
         let text = told("kind = 'writers.gdal', filename = 'a.tif'");
         assert!(text.contains("pointmill does not write gdal files"), "{text}");
         assert!(told("kind = 'writers.null'").contains("is here `discard`"));

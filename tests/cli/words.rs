@@ -785,8 +785,8 @@ fn files_of_unclear_format_are_told_what_helps_the_command() {
     let las = told(at, &["convert", "160-las-named.ply", "-o", "o.laz"], 1);
     assert!(las.ends_with("help: name it .las or .laz, or give `--from las`\n"), "{las}");
     let bin = told(at, &["convert", "a.bin", "-o", "o.laz"], 2);
-    let names =
-        ".las, .laz, .ply, .pcd, .e57, .obj, .off, .stl, .ptx, .pts, .xyz, .txt, .csv or .asc";
+    let names = ".las, .laz, .copc.laz, .ply, .pcd, .e57, .obj, .off, .stl, .ptx, .pts, .xyz, \
+                 .txt, .csv or .asc";
     assert!(bin.ends_with(&format!("= name it {names}, or give `--from`\n")), "{bin}");
     // No pipeline draws a picture.
     let las = told(at, &["picture", "160-las-named.ply", "-o", "o.png"], 1);

@@ -218,3 +218,18 @@ fn folders_hold_texts_of_points_by_extension_and_no_others() {
     let (lines, _) = converted(at.path(), "in/a.xyz", &["--from", "txt"]);
     assert_eq!(lines[1], "1,2,3");
 }
+
+#[test]
+fn columns_of_words_are_passed_over_where_the_user_says_so() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    let text = "name,x,y,z,remark\nwall,1,2,3,\"dry\"\n12,4,5,6,7\nroof,7,8,9,wet\n";
+    fs::write(at.join("a.csv"), text).unwrap();
+    let (lines, _) = converted(at, "a.csv", &["--columns", "_,x,y,z,_"]);
+    assert_eq!(lines, ["X,Y,Z", "1,2,3", "4,5,6", "7,8,9"]);
+    let wrong = ["convert", "a.csv", "-o", "o.csv", "--columns", "_,x,y,_,z"];
+    fails(at, &wrong, 1, &["a.csv"]);
+    fs::write(at.join("b.txt"), "tree 1 2 3\npole 4 5 6\n").unwrap();
+    let (lines, _) = converted(at, "b.txt", &["--columns", "_,x,y,z"]);
+    assert_eq!(lines, ["X,Y,Z", "1,2,3", "4,5,6"]);
+}

@@ -76,11 +76,15 @@ fn a_format_from_outside_is_named_in_messages() {
     refused("named.las'", "o.toy'", "this is a TOY file, not a LAS or LAZ file");
     refused("named.las'", "o.toy'", "name it .toy, or give `read.format = \"toy\"`");
     refused("b.toy'", "o.las'", "this is a text of numbers, not a TOY file");
-    refused("a.toy'\nformat = 'toys'", "o.las'", "did you mean `toy`? valid: asc, csv, e57");
-    refused("a.toy'\nformat = 5", "o.las'", "`format`: takes one of las, laz, ply, pcd");
+    refused("a.toy'\nformat = 'toys'", "o.las'", "did you mean `toy`? valid: asc, copc, csv, e57");
+    refused("a.toy'\nformat = 5", "o.las'", "`format`: takes one of las, laz, copc, ply, pcd");
     refused("a.toy'", "o.las'", "a TOY scan written as LAS needs a scale");
     refused("a.toy'", "o.toy'\ndimensions = ['NormalX']", "and toy holds nothing computed");
-    refused("a.toy'", "o.toy'\nscale = 1.0", "`write.scale` is for las and laz, the output is toy");
+    refused(
+        "a.toy'",
+        "o.toy'\nscale = 1.0",
+        "`write.scale` is for las, laz and copc, the output is toy",
+    );
     let both = format!("a.toy', '{}/c.ply", at.display());
     let both = pipeline(at, &both, "o.las'").replacen("path = '", "path = ['", 1);
     let both = both.replacen("c.ply", "c.ply']", 1);
@@ -92,7 +96,7 @@ fn a_format_from_outside_is_named_in_messages() {
     let error = Graph::parse(&pipeline(at, "a.toy'", "o.las'"), "p.toml", &known).unwrap_err();
     assert!(told(&error).contains("the extension of `"), "{error}");
     let error = io::describe(&at.join("a.toy"), known.formats()).unwrap_err();
-    assert!(error.to_string().contains("not a LAS, LAZ, PLY, PCD"), "{error}");
+    assert!(error.to_string().contains("not a LAS, LAZ, COPC, PLY, PCD"), "{error}");
     assert!(
         Graph::read(&at.join("a.toy"), &registry(), &[]).unwrap_err().to_string().contains("TOY")
     );

@@ -230,7 +230,8 @@ fn folder(path: &Path, formats: &Formats) -> Result<Vec<PathBuf>> {
     }
     if files.is_empty() {
         let path = shown(path);
-        let owned = formats.iter().filter(|format| format.owns_extension());
+        // What is arranged is of another's extension, too.
+        let owned = formats.iter().filter(|f| f.owns_extension() && f.arranged().is_none());
         let known = listed(owned.map(|format| format.extension()), "or");
         let told = format!("the folder `{path}` has no {known} file");
         return Err(Error::new(ErrorKind::Io, told));

@@ -86,7 +86,8 @@ pub struct Read {
     #[serde(default)]
     pub format: Option<FormatName>,
     /// What the columns of a text are, in order: `"x,y,z,intensity"`, or a list of names. A column
-    /// called `_` is not read; none: as a heading names them, or as their number tells.
+    /// called `_` is not read and may hold words; none: as a heading names them, or as their number
+    /// tells.
     #[serde(default, deserialize_with = "some_columns")]
     #[schemars(schema_with = "texts")]
     pub columns: Option<Vec<String>>,

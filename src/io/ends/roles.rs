@@ -71,7 +71,7 @@ impl Read {
 impl StageKind for Read {
     const KIND: &'static str = "read";
     const ROLE: RoleName = RoleName::Source;
-    const ABOUT: &'static str = "Reads LAS, LAZ, PLY, PCD, E57, texts and others.";
+    const ABOUT: &'static str = "Reads LAS, LAZ, COPC, PLY, PCD, E57, texts and others.";
     const MAIN: Option<&'static str> = Some("path");
     const PLACES: &'static [&'static str] = &["path", "format"];
 

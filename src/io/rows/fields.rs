@@ -13,12 +13,27 @@ pub(crate) enum Delimiter {
 }
 
 impl Delimiter {
+    /// In the order in which they are tried.
+    const ALL: [Delimiter; 3] = [Delimiter::Mark(b','), Delimiter::Mark(b';'), Delimiter::Blanks];
+
     /// What separates the numbers of `line`, and how many they are; None if it is not one of
     /// numbers alone, or of fewer than three.
     pub fn of(line: &[u8]) -> Option<(Delimiter, usize)> {
-        let all = [Delimiter::Mark(b','), Delimiter::Mark(b';'), Delimiter::Blanks];
         let count = |s: Delimiter| s.numbers(line).filter(|&count| count >= 3);
-        all.into_iter().find_map(|s| Some((s, count(s)?)))
+        Delimiter::ALL.into_iter().find_map(|s| Some((s, count(s)?)))
+    }
+
+    /// What separates the fields of `line`, if there are as many as `reads` has, and numbers where
+    /// that is true.
+    pub fn of_columns(line: &[u8], reads: &[bool]) -> Option<Delimiter> {
+        let fits = |separator: &Delimiter| {
+            let mut fields = Fields::new(line, *separator);
+            let read = reads
+                .iter()
+                .all(|reads| fields.next().is_some_and(|field| !reads || is_number(field)));
+            read && fields.next().is_none()
+        };
+        Delimiter::ALL.into_iter().find(fits)
     }
 
     /// What separates the numbers of a line that should have blanks between them: some programs

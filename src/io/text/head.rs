@@ -33,13 +33,14 @@ pub(super) struct TextHead {
 }
 
 impl TextHead {
-    /// Reads the beginning of a text of `length` bytes.
+    /// Reads the beginning of a text of `length` bytes; `reads` says which of its columns are read,
+    /// where the user does: others may hold words.
     ///
     /// # Errors
     ///
     /// A file that is [`foreign`], and one whose heading names more or fewer columns than its first
     /// point has.
-    pub fn read(file: File, path: &Path, length: u64) -> Result<TextHead> {
+    pub fn read(file: File, path: &Path, length: u64, reads: Option<&[bool]>) -> Result<TextHead> {
         let mut lines = Lines::new(file, path, [0, length], 0, LONGEST_LINE);
         let (mut comment, mut heading, mut body, mut claimed) = (None, None, None, None);
         for _ in 0..LINES_MOST {
@@ -66,12 +67,14 @@ impl TextHead {
                 claimed = claimed.or(count.and_then(|count| count.parse().ok()));
                 continue;
             }
-            if let Some((separator, columns)) = Delimiter::of(line) {
+            let told =
+                reads.and_then(|reads| Some((Delimiter::of_columns(line, reads)?, reads.len())));
+            if let Some((separator, columns)) = told.or_else(|| Delimiter::of(line)) {
                 let (body, before) = body.unwrap_or(here);
                 let names = match (&heading, &comment) {
                     (Some((text, number)), _) => {
                         let names = names(text);
-                        if names.len() != columns {
+                        if names.len() != columns && told.is_none() {
                             return Err(unlike(path, *number, names.len(), columns));
                         }
                         Some(names)
@@ -171,7 +174,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.txt");
         std::fs::write(&path, text).unwrap();
-        TextHead::read(File::open(&path).unwrap(), &path, text.len() as u64)
+        TextHead::read(File::open(&path).unwrap(), &path, text.len() as u64, None)
     }
 
     #[test]

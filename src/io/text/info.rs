@@ -50,7 +50,7 @@ pub(super) fn describe(path: &Path, kind: TextKind, name: &str) -> Result<serde_
             body,
         });
     }
-    let head = TextHead::read(file, path, bytes)?;
+    let head = TextHead::read(file, path, bytes, None)?;
     let named = head.names.as_ref().and_then(|names| dimensions(names).ok());
     json(&TextDescription {
         kind: upper(name),

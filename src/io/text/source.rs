@@ -68,7 +68,10 @@ impl TextFile {
         keys: &ReadKeys,
     ) -> Result<TextFile> {
         let length = origin.length();
-        let head = TextHead::read(file, path, length)?;
+        let asked = keys.columns.as_ref();
+        let reads: Option<Vec<bool>> =
+            asked.map(|names| names.iter().map(|name| name != "_").collect());
+        let head = TextHead::read(file, path, length, reads.as_deref())?;
         let named = match &keys.columns {
             Some(names) if names.len() != head.columns => {
                 let told = format!(

@@ -14,3 +14,7 @@ pub const INFO_BYTES: usize = 160;
 pub const INFO_AT: u64 = 375 + 54;
 /// Point formats that COPC has.
 pub const POINT_FORMATS: [u8; 3] = [6, 7, 8];
+/// Byte of the GPS time of a record of these, and of its return number.
+pub const TIME: usize = 22;
+/// See [`TIME`].
+pub const RETURN: usize = 14;

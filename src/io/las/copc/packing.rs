@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex};
 
 use super::hierarchy::VoxelKey;
+use super::names::{RETURN, TIME};
 use super::octree::{LEAF_POINTS, RipeNode};
 use crate::host::lock;
 use crate::io::las::encode::LasEncoder;
@@ -18,9 +19,6 @@ use crate::{Error, Result};
 
 /// Nodes that wait at most, before the thread that adds one compresses one.
 const WAITING: usize = 4;
-/// Byte of the GPS time of a record of point formats 6 to 10, and of its return number.
-const TIME: usize = 22;
-const RETURN: usize = 14;
 /// Bits that the place of a record in its piece takes.
 const PLACE_BITS: u32 = 28;
 const _: () = assert!(LEAF_POINTS < 1 << PLACE_BITS);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::hierarchy::{Hierarchy, NodeChunk, ROOT, extended};
-use super::names::{HIERARCHY, INFO, INFO_AT, INFO_BYTES, POINT_FORMATS, USER};
+use super::names::{HIERARCHY, INFO, INFO_AT, INFO_BYTES, POINT_FORMATS, TIME, USER};
 use super::octree::{LEAF_POINTS, Octree, RootCube};
 use super::overflow::Overflow;
 use super::packing::{CopcEncoder, PackedNode, Packing};
@@ -17,9 +17,6 @@ use crate::io::las::vlr::{EVLR_HEAD, Vlr};
 use crate::point::{Metadata, Schema};
 use crate::stage::{ChunkSize, Encode, Encoded, Extent, Sink, SinkSummary};
 use crate::{Error, Result};
-
-/// Byte of the GPS time of a record.
-const TIME: usize = 22;
 
 /// Opens a COPC output at `staged` for records of `schema`, which are of point format 6, 7 or 8.
 ///
