@@ -383,7 +383,7 @@ fn keys_of_write_fit_its_format() {
     let told_of = |keys: &str| told(&GOOD.replace("path = \"out.laz\"", keys));
     for (keys, expected) in [
         ("path = \"out.abc\"", "p.toml:12:8: the extension of `out.abc` names no format"),
-        ("path = \"a.ply\"\nscale = 1", "p.toml:13:9: `write.scale` is for las, laz and copc"),
+        ("path = \"a.ply\"\nscale = 1", "p.toml:13:9: `write.scale` is for las and laz"),
         ("path = \"a.laz\"\nencoding = \"ascii\"", "p.toml:13:12: `write.encoding` is for ply"),
         (
             "path = \"a.laz\"\nscale = [1, 2]",
