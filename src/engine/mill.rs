@@ -44,7 +44,7 @@ use crate::{Error, Result};
 pub(crate) fn mill(
     job: &mut Job<'_>,
     lattice: &Lattice,
-    sinks: Vec<Option<Box<dyn Sink>>>,
+    mut sinks: Vec<Option<Box<dyn Sink>>>,
     clock: &mut Clock<'_>,
 ) -> Result<Finished> {
     clock.begin(RunPhase::Decode, Some(job.task.source.points()))?;
@@ -59,7 +59,6 @@ pub(crate) fn mill(
     let tiles = Arc::new(seal(store, job.threads, &|n| job.advance(n))?);
     tally.count("positions", tiles.positions());
     let extent = Extent::new(lattice.clone(), tiles.bounds());
-    let mut sinks = sinks;
     sinks.iter_mut().flatten().try_for_each(|sink| sink.arrange(&extent))?;
     settle(job, lattice, &tiles)?;
     let field = DecodedScan { lattice, tiles: tiles.clone(), starts: Arc::new(starts) };

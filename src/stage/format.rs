@@ -105,7 +105,7 @@ pub trait Format: Send + Sync {
         None
     }
 
-    /// True if an output of it is one file whose points are arranged in space: it comes in
+    /// Given if an output of it is one file whose points are arranged in space: it comes in
     /// canonical order, and its sink is told where the points are ([`Sink::arrange`]). The name of
     /// a format of the same family that holds the same where that cannot be.
     fn arranged(&self) -> Option<&'static str> {

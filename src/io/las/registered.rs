@@ -125,10 +125,11 @@ impl Format for LasFormat {
             Form::Octree => copc::sink::chunk(&options, &target.schema)?,
             _ => sink::chunk(&options, &target.schema)?,
         };
-        Ok(match target.projection {
+        let chunk = match target.projection {
             Some(_) => Projected::chunk(chunk, &target.schema),
             None => chunk,
-        })
+        };
+        Ok(if self.form == Form::Octree { PlacedSink::chunk(chunk) } else { chunk })
     }
 
     fn create(

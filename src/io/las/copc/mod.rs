@@ -12,8 +12,6 @@ pub mod sink;
 pub use names::{EXTENSION, POINT_FORMATS};
 pub use placed::PlacedSink;
 
-use super::format::FAMILY;
-use super::holding::las_schema;
 use crate::point::{Schema, names as n};
 use crate::{Error, Result};
 
@@ -21,7 +19,7 @@ use crate::{Error, Result};
 ///
 /// # Errors
 ///
-/// A point format that COPC does not have, and waveforms that are not dropped.
+/// A point format that COPC does not have.
 pub fn point_format(asked: Option<u8>, schema: &Schema, drop: &[String]) -> Result<u8> {
     if let Some(asked) = asked {
         return match POINT_FORMATS.contains(&asked) {
@@ -33,10 +31,6 @@ pub fn point_format(asked: Option<u8>, schema: &Schema, drop: &[String]) -> Resu
         };
     }
     let has = |name: &str| schema.find(name).is_some() && !drop.iter().any(|d| d == name);
-    if schema.layout.family != FAMILY {
-        // Names that LAS cannot hold are told there.
-        las_schema(schema, drop)?;
-    }
     Ok(match () {
         () if has(n::NIR) => 8,
         () if [n::RED, n::GREEN, n::BLUE].iter().any(|name| has(name)) => 7,

@@ -13,7 +13,7 @@ use super::octree::{LEAF_POINTS, RipeNode};
 use crate::host::lock;
 use crate::io::las::encode::LasEncoder;
 use crate::io::las::laz::Compression;
-use crate::point::PointBatch;
+use crate::point::{PointBatch, ascending};
 use crate::stage::{Encode, Encoded};
 use crate::{Error, Result};
 
@@ -116,9 +116,8 @@ impl Packing {
 fn in_time(records: &[u8], stride: usize) -> Vec<u8> {
     let key = |record: &[u8]| {
         let time = record.get(TIME..).and_then(<[u8]>::first_chunk);
-        let bits = u64::from_le_bytes(time.copied().unwrap_or_default());
-        let ascending = if bits >> 63 == 0 { bits | 1 << 63 } else { !bits };
-        (ascending, u32::from(record[RETURN] & 0b1111) << PLACE_BITS)
+        let time = f64::from_le_bytes(time.copied().unwrap_or_default());
+        (ascending(time), u32::from(record[RETURN] & 0b1111) << PLACE_BITS)
     };
     let keys = records.chunks_exact(stride).map(key).zip(0u32..);
     let mut order: Vec<(u64, u32)> = keys.map(|((time, of), at)| (time, of | at)).collect();

@@ -5,8 +5,8 @@
 use std::sync::{Arc, OnceLock};
 
 use crate::geom::lattice::Lattice;
-use crate::point::PointBatch;
-use crate::stage::{Encode, Encoded, Extent, Sink, SinkSummary};
+use crate::point::{PointBatch, Position};
+use crate::stage::{ChunkSize, Encode, Encoded, Extent, Sink, SinkSummary};
 use crate::{Error, Result};
 
 /// Adds positions to the chunks of `inner`.
@@ -25,6 +25,11 @@ impl PlacedSink {
     pub fn new(inner: Box<dyn Sink>) -> Self {
         let encoder = PlacingEncoder { inner: inner.encoder(), lattice: OnceLock::new() };
         PlacedSink { inner, encoder: Arc::new(encoder) }
+    }
+
+    /// The chunks of such a sink around one of the chunks `inner`.
+    pub fn chunk(inner: ChunkSize) -> ChunkSize {
+        inner.and_records(size_of::<Position>())
     }
 }
 
@@ -52,8 +57,8 @@ impl Sink for PlacedSink {
     }
 
     fn chunk_bytes(&self) -> u64 {
-        let places = self.inner.chunk_points() * size_of::<crate::point::Position>();
-        self.inner.chunk_bytes() + places as u64
+        let (points, bytes) = (self.inner.chunk_points(), self.inner.chunk_bytes());
+        PlacedSink::chunk(ChunkSize { points, bytes }).bytes
     }
 
     fn encoder(&self) -> Arc<dyn Encode> {
