@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::arguments::ConvertArguments;
 use super::console::Console;
-use super::flags::{common_flags, convert_flags, given};
+use super::flags::{common_flags, convert_flags, given, one_form};
 use super::mistyped::marked;
 use super::pipeline::{HIDDEN, with_stages};
 use super::run::{finish, mill};
@@ -189,12 +189,23 @@ fn pipeline(
     output: Value,
     registry: &Registry,
 ) -> Result<Graph> {
+    let from = arguments.read.from.as_deref();
     let sets = given([
-        convert_flags(arguments, Some(inputs), Some(output)),
+        convert_flags(arguments, Some(inputs.clone()), Some(output)),
+        one_form(&paths(&inputs), from, &arguments.written, registry),
         common_flags(&arguments.common),
     ]);
     let filter = arguments.filter.is_given().then_some("filter");
     Graph::parse_with(&with_stages(CONVERT, filter.into_iter()), HIDDEN, registry, &sets)
+}
+
+/// The inputs of one pipeline, as they were typed.
+fn paths(inputs: &Value) -> Vec<String> {
+    let text = |value: &Value| value.as_str().map(str::to_owned);
+    match inputs {
+        Value::Array(all) => all.iter().filter_map(text).collect(),
+        one => text(one).into_iter().collect(),
+    }
 }
 
 /// The output in `folder` of every input: its name, with the extension of the format that is asked

@@ -1,6 +1,8 @@
 //! Flags and the settings that they stand for, in one table a command. Pipelines take their values
 //! from it, and messages their words.
 
+use std::path::PathBuf;
+
 use serde_json::{Value, json};
 
 use super::arguments::{
@@ -8,7 +10,8 @@ use super::arguments::{
     ReadArguments, ReduceArguments, SynthArguments, VerifyArguments, WrittenArguments,
 };
 use super::classes::Classes;
-use crate::language::Set;
+use crate::io::ends::expand;
+use crate::language::{Registry, Set};
 use crate::ops::KEEP_RANK;
 use crate::quantity::{Length, parse_count};
 use crate::report::ACCEPT_RULES;
@@ -163,7 +166,6 @@ pub(super) fn reduce_flags(arguments: &ReduceArguments) -> Vec<CommandFlag> {
     }
     all.extend(read(&arguments.read));
     all.extend(filtered(&arguments.filter));
-    all.extend(read(&arguments.read));
     all.extend(written(&arguments.written));
     all
 }
@@ -257,11 +259,49 @@ fn read(arguments: &ReadArguments) -> Vec<CommandFlag> {
     let numbers: Vec<Value> = arguments.scans.iter().map(|text| plain(text)).collect();
     let scans =
         (!numbers.is_empty()).then(|| FlagValue::of(&arguments.scans.join(","), json!(numbers)));
+    let assumed = !arguments.assume.is_empty();
     flags([
         ("--from", "read.format", arguments.from.clone().map(FlagValue::from)),
         ("--columns", "read.columns", columns),
         ("--scans", "read.scans", scans),
+        ("--crs", "read.crs", arguments.crs.clone().map(FlagValue::from)),
+        ("--assume", "read.assume", assumed.then(|| json!(arguments.assume).into())),
     ])
+}
+
+/// [`united`] where `inputs` are several LAS files; other inputs are not brought to such a form.
+pub(super) fn one_form(
+    inputs: &[String],
+    from: Option<&str>,
+    arguments: &WrittenArguments,
+    registry: &Registry,
+) -> Vec<CommandFlag> {
+    let formats = registry.formats();
+    let named = from.and_then(|name| formats.iter().find(|format| format.name() == name));
+    let has_scale = |file: &PathBuf| {
+        let format = named.or_else(|| formats.of(file));
+        format.is_some_and(|format| format.read_keys().contains(&"scale"))
+    };
+    // What is wrong with the names, the run tells.
+    let files = expand(inputs, formats).unwrap_or_default();
+    match files.len() > 1 && files.iter().all(has_scale) {
+        true => united(arguments),
+        false => Vec::new(),
+    }
+}
+
+/// The one form that several LAS inputs are brought to, as keys of `read`: that of the output.
+pub(super) fn united(arguments: &WrittenArguments) -> Vec<CommandFlag> {
+    let form = ["--scale", "--offset", "--point-format"];
+    let mut all = written(arguments);
+    all.retain(|flag| form.contains(&flag.name));
+    let address = |name| match name {
+        "--scale" => "read.scale",
+        "--offset" => "read.offset",
+        _ => "read.point_format",
+    };
+    all.iter_mut().for_each(|flag| flag.address = address(flag.name));
+    all
 }
 
 /// How the output is written, as the keys of `write`.

@@ -1,7 +1,7 @@
 //! The pipeline of `reduce`: one of two that users copy, with values of arguments.
 
 use super::arguments::ReduceArguments;
-use super::flags::{common_flags, given, reduce_flags};
+use super::flags::{common_flags, given, one_form, reduce_flags};
 use super::pipeline::{HIDDEN, with_stages};
 use super::preset::Preset;
 use crate::Result;
@@ -18,7 +18,10 @@ const ITS_NUMBER: &str = "keep = \"10%\"";
 /// The pipeline of `reduce`.
 pub(super) fn reduction(arguments: &ReduceArguments, registry: &Registry) -> Result<Graph> {
     let preset = arguments.preset.map_or(Vec::new(), Preset::sets);
-    let sets = [preset, given([reduce_flags(arguments), common_flags(&arguments.common)])].concat();
+    let from = arguments.read.from.as_deref();
+    let form = one_form(&arguments.inputs, from, &arguments.written, registry);
+    let sets = given([reduce_flags(arguments), form, common_flags(&arguments.common)]);
+    let sets = [preset, sets].concat();
     let outliers = arguments.outliers.then_some("outliers");
     let filter = arguments.filter.is_given().then_some("filter");
     let text = match (arguments.by_cells(), &arguments.tolerance) {

@@ -3,7 +3,8 @@
 
 use super::arguments::Command;
 use super::flags::{
-    common_flags, compare_flags, convert_flags, cut_flags, reduce_flags, synth_flags, verify_flags,
+    common_flags, compare_flags, convert_flags, cut_flags, reduce_flags, synth_flags, united,
+    verify_flags,
 };
 use crate::Error;
 use crate::language::Registry;
@@ -33,8 +34,14 @@ impl Words {
             Command::New(_) | Command::Schema => Vec::new(),
             Command::Completions(_) | Command::Man(_) => Vec::new(),
         };
+        let written = match command {
+            Command::Reduce(reduce) => united(&reduce.written),
+            Command::Convert(convert) => united(&convert.written),
+            _ => Vec::new(),
+        };
+        let flags = flags.into_iter().chain(written);
         let common = command.common().map(common_flags).unwrap_or_default();
-        let flags = flags.into_iter().chain(common).map(|flag| (flag.address, flag.name));
+        let flags = flags.chain(common).map(|flag| (flag.address, flag.name));
         Words {
             flags: flags.collect(),
             has_file: matches!(

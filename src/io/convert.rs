@@ -3,15 +3,17 @@
 
 mod columns;
 mod step;
+mod told;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use columns::{BLOCK, ColumnStep, RecordBytes, TargetBytes};
 use step::{Move, push, slack, step};
+pub(super) use told::{check_drop, quoted};
+use told::{placed, room};
 
 use crate::point::names::{BLUE, GREEN, NIR, RED, XYZ};
 use crate::point::{Dimension, Endian, Scalar, Schema, Value};
-use crate::report::Short;
 use crate::{Error, ErrorKind, Result};
 
 /// What a conversion of coordinates rounded.
@@ -35,6 +37,8 @@ pub struct Projection {
     blank: Vec<u8>,
     /// The same steps over columns, for those that have such a form.
     columns: Vec<Option<ColumnStep>>,
+    /// The stage whose keys messages advise.
+    stage: &'static str,
 }
 
 impl Projection {
@@ -82,7 +86,13 @@ impl Projection {
         let columns = over_columns.collect();
         let (to_endian, to_stride) = (to.endian, to.stride);
         let blank = vec![0; to_stride];
-        Ok(Projection { from: from.clone(), to_endian, to_stride, moves, blank, columns })
+        let (from, stage) = (from.clone(), "write");
+        Ok(Projection { from, to_endian, to_stride, moves, blank, columns, stage })
+    }
+
+    /// The same for records that are brought to another form as they are read.
+    pub(crate) fn reading(from: &Schema, to: &Schema) -> Result<Projection> {
+        Ok(Projection { stage: "read", ..Projection::new(from, to, &[])? })
     }
 
     /// Leaves room behind each record: records become `stride` bytes long, the new ones 0.
@@ -276,9 +286,12 @@ impl Projection {
                 .from
                 .coordinates()
                 .map(|axes| axes.map(|axis| axis.world(record, self.from.endian)));
-            return error.help(placed(world, to, value.as_f64()));
+            return error.help(placed(self.stage, world, to, value.as_f64()));
         }
-        error.help(format!("`write.drop = [{name:?}]` leaves the dimension out"))
+        match self.stage {
+            "write" => error.help(format!("`write.drop = [{name:?}]` leaves the dimension out")),
+            _ => error.help("give a point format that has room for it, or convert it by itself"),
+        }
     }
 }
 
@@ -286,30 +299,6 @@ impl Projection {
 struct UnfitValue<'a> {
     to: &'a Dimension,
     value: Value,
-}
-
-/// What helps where the coordinate `value` of the point at `world` does not fit `to`: an offset, if
-/// there is one that does, and a larger scale.
-fn placed(world: Option<[f64; 3]>, to: &Dimension, value: f64) -> String {
-    let reach = to.scale * f64::from(1 << 30) * 2.0;
-    // Whole thousands near the point: a scan around it fits, and its digits stay readable. Where
-    // these are out of reach, what is in reach; no scan is so small that less than 1 would do.
-    let unit = [1000.0, 100.0, 10.0, 1.0].into_iter().find(|unit| 2.0 * unit <= reach);
-    let round = |at: f64| unit.map_or(at, |unit| (at / unit).round() * unit);
-    match world.map(|world| world.map(round)) {
-        Some(near) if near.iter().any(|at| !at.is_finite()) => {
-            "give a larger `write.scale`, or a `write.offset` nearer to the points".to_owned()
-        }
-        Some([x, y, z]) if unit.is_some() && round(value) != to.origin => format!(
-            "give an offset near the points, `write.offset = [{x:?}, {y:?}, {z:?}]`, or a larger \
-             `write.scale`"
-        ),
-        _ => format!(
-            "give a larger `write.scale`: with this one coordinates reach {} from the offset, and \
-             no farther",
-            Short(reach)
-        ),
-    }
 }
 
 /// The stored number whose world value is nearest to `world` (halves to the even one), and that
@@ -339,51 +328,6 @@ fn small(value: Value) -> Option<u8> {
             (v.fract() == 0.0 && (0.0..256.0).contains(&v)).then_some(v as u8)
         }
     }
-}
-
-/// What a field holds, for a message.
-fn room(to: &Dimension) -> String {
-    let kind = match to.scalar {
-        Scalar::U8 => "an unsigned 8-bit integer",
-        Scalar::I8 => "a signed 8-bit integer",
-        Scalar::U16 => "an unsigned 16-bit integer",
-        Scalar::I16 => "a signed 16-bit integer",
-        Scalar::U32 => "an unsigned 32-bit integer",
-        Scalar::I32 => "a signed 32-bit integer",
-        Scalar::U64 => "an unsigned 64-bit integer",
-        Scalar::I64 => "a signed 64-bit integer",
-        Scalar::F32 => "a 32-bit float",
-        Scalar::F64 => "a 64-bit float",
-    };
-    match to.bits {
-        Some(bits) => format!("{} bit(s)", bits.width),
-        None if to.scale != 1.0 || to.origin != 0.0 => {
-            format!("steps of {} from {} as {kind}", to.scale, to.origin)
-        }
-        None => kind.to_owned(),
-    }
-}
-
-pub(super) fn quoted(names: &[impl std::fmt::Display]) -> String {
-    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
-}
-
-/// Refuses names that cannot be left out of records of `from`.
-pub(super) fn check_drop(from: &Schema, drop: &[String]) -> Result<()> {
-    for name in drop {
-        if XYZ.contains(&name.as_str()) {
-            return Err(Error::pipeline(format!("`write.drop` names `{name}`: coordinates stay")));
-        }
-        if from.find(name).is_none() {
-            let all: Vec<String> = from.dimensions.iter().map(|d| d.name.clone()).collect();
-            let told = format!("`write.drop` names `{name}`, which the input does not have");
-            let near =
-                crate::error::nearest(name, &all).map(|near| format!("did you mean `{near}`? "));
-            let help = format!("{}it has {}", near.unwrap_or_default(), quoted(&all));
-            return Err(Error::pipeline(told).help(help));
-        }
-    }
-    Ok(())
 }
 
 /// True if `target` holds 257 times the `source`: colours, of which 255 is the most in 8 bits, as

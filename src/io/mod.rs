@@ -14,7 +14,9 @@ pub mod ply;
 mod project;
 pub(crate) mod rows;
 pub(crate) mod sniff;
+mod systems;
 pub mod text;
+mod united;
 pub mod vertices;
 mod wkt;
 

@@ -6,21 +6,47 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How inputs are to be read, as far as formats need to know: keys of `read`.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct ReadKeys {
     /// What the columns of a text are, in order; `_` for one that is not read.
     pub columns: Option<Vec<String>>,
     /// Which scans of each file are read, by their numbers from 1.
     pub scans: Option<Vec<u64>>,
+    /// The coordinate reference system of all inputs, whatever they say: WKT, or `EPSG:code` with a
+    /// vertical code behind `+`.
+    pub crs: Option<String>,
+    /// What is taken for granted of inputs that do not say it.
+    pub assume: Vec<Assumption>,
+    /// Scale that LAS inputs of different scales or offsets are brought to.
+    pub scale: Option<[f64; 3]>,
+    /// Offset that they are brought to.
+    pub offset: Option<[f64; 3]>,
+    /// Point data record format that LAS inputs of different ones are brought to.
+    pub point_format: Option<u8>,
 }
 
 impl ReadKeys {
-    /// The keys that are given.
+    /// The keys that are given and that not every format has.
     pub fn given(&self) -> impl Iterator<Item = &'static str> {
-        let all = [("columns", self.columns.is_some()), ("scans", self.scans.is_some())];
+        let all = [
+            ("columns", self.columns.is_some()),
+            ("scans", self.scans.is_some()),
+            ("scale", self.scale.is_some()),
+            ("offset", self.offset.is_some()),
+            ("point_format", self.point_format.is_some()),
+        ];
         all.into_iter().filter(|(_, is_given)| *is_given).map(|(key, _)| key)
     }
+}
+
+/// What is taken for granted of inputs that do not say it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Assumption {
+    /// They are in the coordinate reference system that the other inputs name.
+    Crs,
 }
 
 /// What an output is to be, as far as formats need to know: keys of `write`.

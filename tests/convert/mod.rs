@@ -2,6 +2,7 @@
 
 mod colors;
 mod fields;
+mod inputs;
 mod point_formats;
 mod runs;
 mod units;

@@ -130,7 +130,8 @@ fn several_files_agree_or_both_are_named() {
     };
     file(folder.path(), "a.ply", text("comment one\n", "float", "1 2 3\n"));
     file(folder.path(), "b.ply", text("comment two\n", "float32", "4 5 6\n"));
-    file(folder.path(), "int.ply", text("", "int", "1 2 3\n"));
+    let more = text("", "float", "1 2 3 4\n").replace("end_header", "property int n\nend_header");
+    file(folder.path(), "more.ply", more);
     file(folder.path(), "crs.ply", text("comment crs: EPSG:2056\n", "float", "1 2 3\n"));
 
     let both = open(&["b.ply", "a.ply"]).unwrap();
@@ -141,7 +142,7 @@ fn several_files_agree_or_both_are_named() {
         both.part(index).unwrap().read(&mut batch).unwrap();
         assert_eq!((batch.source, &batch.records()[..4]), (index as u32, &x.to_le_bytes()[..]));
     }
-    for other in ["int.ply", "crs.ply"] {
+    for other in ["more.ply", "crs.ply"] {
         let error = open(&["a.ply", other]).err().expect("they disagree");
         let told = error.to_string();
         assert!(told.contains("a.ply") && told.contains(other), "{told}");

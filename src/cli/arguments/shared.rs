@@ -75,20 +75,29 @@ pub(crate) struct ReadArguments {
     /// Format of the inputs, such as txt [default: by extension, else by their first bytes]
     #[arg(long, value_name = "FORMAT")]
     pub from: Option<String>,
+    /// Coordinate reference system that all inputs are in, whatever they say: EPSG:25832, with a
+    /// vertical one EPSG:25832+7837, or WKT; nothing is reprojected [default: as they say]
+    #[arg(long, value_name = "CRS")]
+    pub crs: Option<String>,
+    /// What is taken for granted: crs, that inputs which name no coordinate reference system are in
+    /// the one that the others name
+    #[arg(long, value_name = "WHAT", value_delimiter = ',')]
+    pub assume: Vec<String>,
 }
 
 /// How the output is written.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct WrittenArguments {
-    /// Scale of LAS coordinates, or three for X, Y and Z [default: the input's; PLY to LAS must say
-    /// it]
+    /// Scale of LAS coordinates, or three for X, Y and Z; LAS inputs that differ are brought to it
+    /// [default: the input's; PLY to LAS must say it]
     #[arg(long, value_name = "SCALE")]
     pub scale: Option<String>,
-    /// Offset of LAS coordinates on each axis [default: the input's, or 0]
+    /// Offset of LAS coordinates on each axis, to which LAS inputs that differ are brought, too
+    /// [default: the input's, or 0]
     #[arg(long, value_name = "X,Y,Z")]
     pub offset: Option<String>,
-    /// Point format of LAS, 0 to 10 [default: the input's, or the smallest that holds what there
-    /// is]
+    /// Point format of LAS, 0 to 10; LAS inputs that differ are brought to it [default: the input's,
+    /// or the smallest that holds what there is]
     #[arg(long, value_name = "N")]
     pub point_format: Option<String>,
     /// Dimensions that may get lost, such as GpsTime,UserData

@@ -2,7 +2,7 @@
 
 use e57::{PointCloud, Record, RecordDataType, RecordName, RecordValue};
 
-use crate::io::rows::facts::whole;
+use crate::io::rows::facts::{holding, whole};
 use crate::io::rows::names::heading;
 use crate::point::Scalar;
 use crate::point::names as n;
@@ -110,28 +110,9 @@ pub(super) fn scalar(kind: &RecordDataType) -> Scalar {
     }
 }
 
-/// The least and the most that a type of whole numbers holds.
-fn range(scalar: Scalar) -> Option<[i128; 2]> {
-    Some(match scalar {
-        Scalar::U8 => [0, u8::MAX.into()],
-        Scalar::I8 => [i8::MIN.into(), i8::MAX.into()],
-        Scalar::U16 => [0, u16::MAX.into()],
-        Scalar::I16 => [i16::MIN.into(), i16::MAX.into()],
-        Scalar::U32 => [0, u32::MAX.into()],
-        Scalar::I32 => [i32::MIN.into(), i32::MAX.into()],
-        Scalar::U64 => [0, u64::MAX.into()],
-        Scalar::I64 => [i64::MIN.into(), i64::MAX.into()],
-        Scalar::F32 | Scalar::F64 => return None,
-    })
-}
-
-/// A type that holds the values of both.
+/// A type that holds the values of both, or nearly: of 64-bit integers the first 53 bits.
 pub(super) fn both(one: Scalar, two: Scalar) -> Scalar {
-    match (range(one), range(two)) {
-        _ if one == two => one,
-        (Some([a, b]), Some([c, d])) => whole(a.min(c), b.max(d)).unwrap_or(Scalar::F64),
-        _ => Scalar::F64,
-    }
+    holding(one, two).unwrap_or(Scalar::F64)
 }
 
 #[cfg(test)]
@@ -143,7 +124,8 @@ mod tests {
         assert_eq!(both(Scalar::U8, Scalar::U8), Scalar::U8);
         assert_eq!(both(Scalar::U8, Scalar::I8), Scalar::I16);
         assert_eq!(both(Scalar::U32, Scalar::I32), Scalar::I64);
-        assert_eq!(both(Scalar::F32, Scalar::U8), Scalar::F64);
+        assert_eq!(both(Scalar::F32, Scalar::U8), Scalar::F32);
+        assert_eq!(both(Scalar::F32, Scalar::U64), Scalar::F64);
     }
 
     #[test]

@@ -12,6 +12,7 @@ use super::part::E57Part;
 use super::reading::Windowed;
 use crate::error::shown;
 use crate::io::rows::schema::placed;
+use crate::io::systems;
 use crate::point::names::{POINT_SOURCE_ID, XYZ};
 use crate::point::{Endian, Metadata, Scalar, Schema};
 use crate::report::Grouped;
@@ -33,11 +34,8 @@ pub(super) fn open(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>
     let Some(first) = files.first() else {
         return Err(Error::pipeline("no E57 file to read"));
     };
-    if let Some(other) = files.iter().find(|file| file.crs != first.crs) {
-        let told = "its coordinate reference system is not that of";
-        let told = format!("{told} {}", shown(&first.path));
-        return Err(Error::data(&other.path, told).help("convert one of them first"));
-    }
+    let said: Vec<_> = files.iter().map(|file| (&*file.path, file.crs.clone())).collect();
+    let crs = systems::of_all(keys, &said)?;
     let (mut places, mut warnings) = (Vec::new(), Vec::new());
     for (n, file) in files.iter().enumerate() {
         places.extend((0..file.scans.len()).map(|scan| (n, scan)));
@@ -51,7 +49,6 @@ pub(super) fn open(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>
     let scans: Vec<&E57Scan> = files.iter().flat_map(|file| &file.scans).collect();
     let (schema, told) = schema(&scans);
     warnings.extend(told);
-    let crs = first.crs.clone();
     let units = crs.as_deref().map(crate::io::wkt::units).unwrap_or_default();
     let metadata = Metadata { crs, units, ..Metadata::default() };
     Ok(Box::new(E57Source { schema: Arc::new(schema), metadata, files, places, warnings }))

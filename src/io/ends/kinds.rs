@@ -6,13 +6,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::values::{
-    names_once, one_or_more, one_or_three, some_columns, some_offset, some_scale, some_scans, texts,
+    names_once, one_or_more, one_or_three, some_columns, some_crs, some_offset, some_scale,
+    some_scans, texts,
 };
 use crate::error::{listed, shown};
 use crate::io::sniff::{of_extension, upper};
 use crate::quantity::{Length, Whole};
 use crate::stage::{
-    Colors, Format, FormatName, Formats, Order, OutputEncoding, ReadKeys, Separator, WriteKeys,
+    Assumption, Colors, Format, FormatName, Formats, Order, OutputEncoding, ReadKeys, Separator,
+    WriteKeys,
 };
 use crate::{Error, Result};
 
@@ -22,10 +24,14 @@ use crate::{Error, Result};
 /// Headers are read, compared and held against the files' lengths before any point is. Files that
 /// do not fit together are refused by name: their points hold the same. LAS inputs agree in point
 /// format, record length, extra bytes, scales, GPS time type and coordinate reference system, PLY
-/// inputs in encoding, vertex properties, GPS time type and coordinate reference system. LAS
-/// systems agree if they mean the same: in WKT of one wording, spaces and zeros aside, or by equal
-/// EPSG codes; the output has the WKT. LAS offsets may differ by whole steps; the output has the
-/// smallest.
+/// inputs in vertex properties, GPS time type and coordinate reference system. Systems agree if
+/// they mean the same: in WKT of one wording, spaces and zeros aside, or by equal EPSG codes; the
+/// output has the WKT. LAS offsets may differ by whole steps; the output has the smallest. PLY
+/// properties may differ in type, where one of two types holds all numbers of the other.
+///
+/// What differs is brought to one form where that is asked for: point formats by `point_format`,
+/// scales and offsets by `scale` and `offset` (coordinates that these round are told), systems by
+/// `crs` or `assume`.
 ///
 /// A number of a PLY text is held in the type that its header says, but coordinates and GPS times
 /// are held as `double` where one of them has more digits than the `float` of its header has room
@@ -94,6 +100,27 @@ pub struct Read {
     /// Numbers of the scans of an E57 file that are read, from 1; none: all of them.
     #[serde(default, deserialize_with = "some_scans")]
     pub scans: Option<Vec<ScanNumber>>,
+    /// The coordinate reference system that all inputs are in, whatever they say of it: WKT, or
+    /// `"EPSG:25832"`, or `"EPSG:25832+7837"` with that of the heights; none: as they say. Nothing
+    /// is reprojected.
+    #[serde(default, deserialize_with = "some_crs")]
+    pub crs: Option<String>,
+    /// What is taken for granted: `["crs"]`, that inputs which name no coordinate reference system
+    /// are in the one that the others name.
+    #[serde(default)]
+    pub assume: Vec<Assumption>,
+    /// Scale that LAS inputs are brought to as they are read, where their scales differ or their
+    /// offsets are not whole steps apart; none: such inputs are refused.
+    #[serde(default, deserialize_with = "some_scale")]
+    #[schemars(schema_with = "one_or_three")]
+    pub scale: Option<[f64; 3]>,
+    /// Offset that they are brought to; none: the smallest of theirs.
+    #[serde(default, deserialize_with = "some_offset")]
+    pub offset: Option<[f64; 3]>,
+    /// Point data record format that LAS inputs are brought to as they are read, where theirs
+    /// differ: one that has the fields of all; none: such inputs are refused.
+    #[serde(default)]
+    pub point_format: Option<PointFormat>,
 }
 
 /// The number of a scan in a file.
@@ -274,6 +301,10 @@ impl Read {
         keys.columns.clone_from(&self.columns);
         let scans = self.scans.as_ref();
         keys.scans = scans.map(|scans| scans.iter().map(|number| number.get()).collect());
+        keys.crs.clone_from(&self.crs);
+        keys.assume.clone_from(&self.assume);
+        (keys.scale, keys.offset) = (self.scale, self.offset);
+        keys.point_format = self.point_format.map(|format| format.get() as u8);
         keys
     }
 }

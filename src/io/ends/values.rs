@@ -5,12 +5,19 @@ use std::fmt;
 use schemars::{Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, de};
 
+use crate::io::systems;
 use crate::io::text::check_columns;
 use crate::quantity::Whole;
 
 pub(super) fn texts(_: &mut SchemaGenerator) -> Schema {
     let text = json_schema!({ "type": "string" });
     json_schema!({ "anyOf": [text, { "type": "array", "items": text }] })
+}
+
+/// WKT, or EPSG codes that are known.
+pub(super) fn some_crs<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {
+    let given = String::deserialize(from)?;
+    systems::checked(&given).map(Some).map_err(de::Error::custom)
 }
 
 /// Numbers of scans, at least one.

@@ -57,8 +57,10 @@ pub struct LasInput {
     pub path: PathBuf,
     /// What the file was when it was opened.
     pub origin: Origin,
-    /// Its public header block.
+    /// Its public header block, or that of the form that its records are brought to.
     pub header: Header,
+    /// Its own, where the records are brought to another form as they are read.
+    pub own: Option<Box<Header>>,
     /// Its variable length records, all of them.
     pub vlrs: Vec<Vlr>,
     /// Bytes between them and the points.
@@ -108,6 +110,7 @@ impl LasInput {
             path,
             origin,
             header,
+            own: None,
             vlrs,
             gap,
             evlrs,
@@ -144,9 +147,17 @@ impl LasInput {
         extra_len(&self.header)
     }
 
-    /// What records hold.
+    /// What records hold, in the form that they are brought to.
     pub fn schema(&self) -> Schema {
-        let header = &self.header;
+        self.schema_of(&self.header)
+    }
+
+    /// What the file's own records hold.
+    pub fn own_schema(&self) -> Schema {
+        self.schema_of(self.own_header())
+    }
+
+    fn schema_of(&self, header: &Header) -> Schema {
         format::schema(
             header.format(),
             self.descriptors(),
@@ -154,6 +165,11 @@ impl LasInput {
             header.scale(),
             header.offset(),
         )
+    }
+
+    /// The header as it is in the file.
+    pub fn own_header(&self) -> &Header {
+        self.own.as_deref().unwrap_or(&self.header)
     }
 
     /// The descriptors of the extra bytes.

@@ -2,39 +2,67 @@
 //! depends on the order of the inputs.
 
 use super::fields::encoding;
+use super::form::{Form, help, holding, smallest, whole_steps};
 use super::format::{has_gps_time, has_waveforms};
 use super::header::Header;
 use super::input::LasInput;
 use super::native::Native;
 use super::read::Shift;
-use super::text::{field, split_at_room};
+use super::system::CrsRecords;
+use super::text::field;
 use super::union::{UnionRecords, described};
 use super::vlr::Evlr;
 use crate::error::shown;
+use crate::io::systems::{remedy, told_apart};
 use crate::{Error, Result};
-
-/// Offsets whose distance is this close to whole steps differ by whole steps: decimal offsets are
-/// seldom exact in binary.
-const WHOLE: f64 = 1e-6;
 
 /// Files that are to be read as one scan, taken in one by one: of each only its header is kept, and
 /// of their records the union.
 pub struct LasMerge {
     /// The first, with its records: the others are compared with it.
     first: LasInput,
+    /// The first that names a system, and how, where others need not name it.
+    named: Option<(LasInput, CrsRecords)>,
+    form: Form,
     records: UnionRecords,
 }
 
 impl LasMerge {
-    /// Begins with one file.
-    pub fn of(first: LasInput) -> Result<Self> {
-        Ok(LasMerge { records: UnionRecords::of(&first)?, first })
+    /// Begins with one file, which is in the form already.
+    pub fn of(first: LasInput, form: &Form) -> Result<Self> {
+        let (records, form) = (UnionRecords::of(&first)?, form.clone());
+        let mut merge = LasMerge { records, named: None, form, first };
+        merge.named = merge.naming(&merge.first)?;
+        Ok(merge)
     }
 
-    /// Adds a file; fails if the two cannot be one.
+    /// Adds a file, which is in the form; fails if the two cannot be one.
     pub fn add(&mut self, other: &LasInput) -> Result<()> {
         agree(&self.first, other)?;
+        self.agree_on_crs(other)?;
         self.records.add(other)
+    }
+
+    /// The file and its records, if it names a system.
+    fn naming(&self, input: &LasInput) -> Result<Option<(LasInput, CrsRecords)>> {
+        let records = input.crs_records()?;
+        let is_named = !self.form.assumes_crs || records.text()?.is_some();
+        Ok(is_named.then(|| (input.clone().without_records(), records)))
+    }
+
+    fn agree_on_crs(&mut self, other: &LasInput) -> Result<()> {
+        let Some((input, records)) = self.naming(other)? else { return Ok(()) };
+        let Some((first, named)) = &self.named else {
+            self.named = Some((input, records));
+            return Ok(());
+        };
+        if named.same_system(&records)? {
+            return Ok(());
+        }
+        let (one, two) = (named.text()?, records.text()?);
+        let both = told_apart(one.as_deref(), two.as_deref());
+        let error = refuse(first, other, format!("their CRS differ: {both}"));
+        Err(error.help(remedy(one.is_none() || two.is_none())))
     }
 
     /// One header and one list of records for all `inputs`, which are the files taken in, and how
@@ -43,7 +71,7 @@ impl LasMerge {
         if inputs.len() <= 1 {
             return Ok((Native::of(&self.first), vec![Shift::default()]));
         }
-        let (offset, shifts) = shifts(inputs)?;
+        let (offset, shifts) = shifts(inputs, self.form.offset())?;
         let (vlrs, gap, evlrs) = self.records.finish()?;
         waveforms(inputs, &evlrs)?;
         external(inputs)?;
@@ -57,9 +85,18 @@ impl LasMerge {
 /// Refuses two files that cannot be one.
 fn agree(a: &LasInput, b: &LasInput) -> Result<()> {
     let (one, two) = (&a.header, &b.header);
-    same(a, b, "point format", one.format(), two.format())?;
+    if one.format() != two.format() {
+        let error = differ(a, b, "point format", one.format(), two.format());
+        return Err(match holding(one.format(), two.format()) {
+            Some(both) => error
+                .help(format!("give `read.point_format = {both}`, which has the fields of both")),
+            None => error,
+        });
+    }
     same(a, b, "record length", one.point_data_record_length, two.point_data_record_length)?;
-    same(a, b, "scale", one.scale(), two.scale())?;
+    if one.scale() != two.scale() {
+        return Err(differ(a, b, "scale", one.scale(), two.scale()).help(help(a, b)));
+    }
     if has_gps_time(one.format()) {
         let kind = |h: &Header| match h.encoding() & encoding::GPS_STANDARD {
             0 => "GPS week time",
@@ -70,35 +107,7 @@ fn agree(a: &LasInput, b: &LasInput) -> Result<()> {
     if described(a) != described(b) {
         return Err(refuse(a, b, "their extra bytes are described differently".to_owned()));
     }
-    let (one, two) = (a.crs_records()?, b.crs_records()?);
-    if one.same_system(&two)? {
-        return Ok(());
-    }
-    let (one, two) = told_apart(one.text()?, two.text()?);
-    Err(refuse(a, b, format!("their CRS differ: {one} and {two}")))
-}
-
-/// Two texts of systems as a message shows them: from the beginning if that tells them apart, else
-/// from shortly before they differ.
-fn told_apart(one: Option<String>, two: Option<String>) -> (String, String) {
-    let (Some(one), Some(two)) = (&one, &two) else {
-        return (
-            one.map_or("none".into(), |text| short(&text)),
-            two.map_or("none".into(), |text| short(&text)),
-        );
-    };
-    if one == two {
-        let shown = format!("{}, with other parameters", short(one));
-        return (short(one), shown);
-    }
-    if short(one) != short(two) {
-        return (short(one), short(two));
-    }
-    let alike = one.chars().zip(two.chars()).take_while(|(a, b)| a == b).count();
-    let end = |text: &str| {
-        format!("…{}", short(&text.chars().skip(alike.saturating_sub(20)).collect::<String>()))
-    };
-    (end(one), end(two))
+    Ok(())
 }
 
 fn same<T: PartialEq + std::fmt::Debug>(
@@ -108,10 +117,11 @@ fn same<T: PartialEq + std::fmt::Debug>(
     one: T,
     two: T,
 ) -> Result<()> {
-    if one == two {
-        return Ok(());
-    }
-    Err(refuse(a, b, format!("their {what} differs: {one:?} and {two:?}")))
+    if one == two { Ok(()) } else { Err(differ(a, b, what, one, two)) }
+}
+
+fn differ<T: std::fmt::Debug>(a: &LasInput, b: &LasInput, what: &str, one: T, two: T) -> Error {
+    refuse(a, b, format!("their {what} differs: {one:?} and {two:?}"))
 }
 
 fn refuse(a: &LasInput, b: &LasInput, why: String) -> Error {
@@ -120,51 +130,35 @@ fn refuse(a: &LasInput, b: &LasInput, why: String) -> Error {
         .help("bring the files to one form first, or run them one by one")
 }
 
-fn short(text: &str) -> String {
-    let (head, tail) = split_at_room(text, 60);
-    if tail.is_empty() { head.to_owned() } else { format!("{head}…") }
-}
-
-/// The smallest offset of all inputs per axis, and each input's whole steps to it.
-fn shifts(inputs: &[LasInput]) -> Result<([f64; 3], Vec<Shift>)> {
+/// The offset of all inputs, which is the smallest per axis where no other is wanted, and each
+/// input's whole steps to it.
+fn shifts(inputs: &[LasInput], wanted: Option<[f64; 3]>) -> Result<([f64; 3], Vec<Shift>)> {
     let first = &inputs[0];
     let scale = first.header.scale();
-    let smallest: [f64; 3] = std::array::from_fn(|axis| {
-        inputs.iter().map(|i| i.header.offset()[axis]).min_by(f64::total_cmp).unwrap_or(0.0)
-    });
+    let least = smallest(inputs.iter().map(|input| &input.header));
+    let all = wanted.unwrap_or(least);
     let mut shifts = Vec::new();
     for input in inputs {
         let mut shift = [0; 3];
         for axis in 0..3 {
             let offset = input.header.offset()[axis];
-            shift[axis] = whole_steps(smallest[axis], offset, scale[axis]).ok_or_else(|| {
-                let other = inputs.iter().find(|i| i.header.offset()[axis] == smallest[axis]);
+            shift[axis] = whole_steps(all[axis], offset, scale[axis]).ok_or_else(|| {
+                let other = inputs.iter().find(|i| i.header.offset()[axis] == all[axis]);
+                let other = other.unwrap_or(first);
                 let why = format!(
                     "their offsets {:?} and {offset:?} on axis {} do not differ by whole steps \
                      of {:?}, or by too many",
-                    smallest[axis],
+                    all[axis],
                     ["x", "y", "z"][axis],
                     scale[axis]
                 );
-                refuse(other.unwrap_or(first), input, why)
+                refuse(other, input, why).help(help(other, input))
             })?;
         }
-        shifts.push(Shift(shift));
+        // Records that are projected move as they are.
+        shifts.push(if input.own.is_some() { Shift::default() } else { Shift(shift) });
     }
-    Ok((smallest, shifts))
-}
-
-/// The steps of `scale` from one offset to another, if they are whole and stored coordinates, which
-/// are i32, can move by them.
-pub fn whole_steps(from: f64, to: f64, scale: f64) -> Option<i64> {
-    if from == to {
-        return Some(0);
-    }
-    let steps = (to - from) / scale;
-    let whole = steps.round();
-    let rounding = 4.0 * f64::EPSILON * (from.abs().max(to.abs()) / scale).abs();
-    let near = (steps - whole).abs() <= WHOLE + rounding && whole.abs() < 2f64.powi(32);
-    near.then_some(whole as i64)
+    Ok((all, shifts))
 }
 
 /// Fields that all inputs share are carried; the others become neutral, the version and the date
@@ -219,22 +213,4 @@ fn waveforms(inputs: &[LasInput], evlrs: &[Evlr]) -> Result<()> {
     }
     let other = other.or_else(|| inputs.iter().find(|i| i.path != one.path)).unwrap_or(one);
     Err(refuse(one, other, "each has waveforms of its own".to_owned()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn two_texts_are_shown_where_they_differ() {
-        let long = |end: &str| Some(format!("PROJCS[\"{}\",{end}]", "name ".repeat(30)));
-        let (one, two) = told_apart(long("UNIT[1]"), long("UNIT[2]"));
-        assert!(
-            one.starts_with('…') && one.contains("UNIT[1]") && two.contains("UNIT[2]"),
-            "{one}"
-        );
-        assert_eq!(told_apart(None, Some("a".into())), ("none".into(), "a".into()));
-        let (one, two) = told_apart(Some("Here".into()), Some("Here".into()));
-        assert_ne!(one, two);
-    }
 }

@@ -14,6 +14,7 @@ mod encode;
 mod extra;
 mod fields;
 mod file;
+mod form;
 pub(crate) mod format;
 mod guard;
 mod header;

@@ -7,7 +7,8 @@ use super::described::{Described, EXTRA_BYTES, describe};
 use super::extra::Descriptor;
 use super::fields::encoding;
 use super::file::InputFile;
-use super::format::{format_of, has_waveforms, record_size};
+use super::form::{Form, reform};
+use super::format::{self, format_of, has_waveforms, record_size};
 use super::header::Header;
 use super::input::{LasInput, extra_len, is_carried, is_carried_extended};
 use super::text::field;
@@ -49,10 +50,10 @@ impl Native {
         }
     }
 
-    /// Of a file that was opened before with `header`, read again.
+    /// Of a file that was opened before with `header`, read again and brought to `form`.
     ///
     /// Fails if the file is another by now.
-    pub fn again(file: &InputFile, header: &Header) -> Result<Self> {
+    pub fn again(file: &InputFile, header: &Header, form: &Form) -> Result<Self> {
         let now = Header::read(file)?;
         if now.bytes()? != header.bytes()? {
             return Err(file.wrong(0, "the header changed while the file was read"));
@@ -63,8 +64,17 @@ impl Native {
         vlrs.retain(is_carried);
         evlrs.retain(is_carried_extended);
         described.carried(&mut vlrs, &mut evlrs);
+        form.put_crs(&mut vlrs, &mut evlrs);
+        let schema = format::schema(
+            header.format(),
+            &described.descriptors,
+            extra_len(header),
+            header.scale(),
+            header.offset(),
+        );
         let waveforms = Waveforms::of(file.path(), header).there;
-        Ok(Native { header: now, vlrs, gap, evlrs, waveforms, made: false })
+        let header = form.header(&now, &schema)?;
+        Ok(Native { header, vlrs, gap, evlrs, waveforms, made: false })
     }
 
     /// True if it belongs to records of this schema.
@@ -73,31 +83,11 @@ impl Native {
             && schema.stride == usize::from(self.header.point_data_record_length)
     }
 
-    /// The same for records of `schema`, in whatever point format that is: a version of LAS that
-    /// has it (LAS 1.4 R15, section 2.6, and the versions before).
+    /// The same for records of `schema`, in whatever point format that is.
     pub fn reformed(mut self, schema: &Schema) -> Self {
         let format = format_of(schema).unwrap_or(0);
-        let least = match format {
-            0 | 1 => 0,
-            2 | 3 => 2,
-            4 | 5 => 3,
-            _ => 4,
-        };
-        if self.header.minor() < least {
-            let encoding = self.header.encoding();
-            self.header = self.header.resized(least, &self.header.padding);
-            self.header.global_encoding = encoding;
-        }
-        self.header.point_data_record_format = format;
-        self.header.point_data_record_length = u16::try_from(schema.stride).unwrap_or(u16::MAX);
-        if format >= 6 {
-            // Section 2.4: formats 6 to 10 always say WKT.
-            self.header.put_encoding(encoding::WKT, true);
-        }
+        reform(&mut self.header, format, schema.stride);
         if !has_waveforms(format) {
-            self.header.put_encoding(encoding::WAVEFORM_INTERNAL, false);
-            self.header.put_encoding(encoding::WAVEFORM_EXTERNAL, false);
-            self.header.start_of_waveform_data_packet_record = None;
             self.vlrs.retain(|vlr| !is_of_waveforms(&vlr.user(), vlr.record()));
             self.evlrs.retain(|evlr| !is_of_waveforms(&evlr.user(), evlr.record()));
             self.waveforms = None;

@@ -72,8 +72,12 @@ impl Format for LasFormat {
         first.starts_with(SIGNATURE)
     }
 
-    fn open(&self, files: &[PathBuf], _: &ReadKeys) -> Result<Box<dyn Source>> {
-        source::open(files)
+    fn read_keys(&self) -> &'static [&'static str] {
+        &["scale", "offset", "point_format"]
+    }
+
+    fn open(&self, files: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
+        source::open_with(files, keys)
     }
 
     fn describe(&self, path: &Path) -> Result<serde_json::Value> {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::chunks::{Chunk, Chunks};
 use super::crs;
+use super::form::Form;
 use super::format::{has_gps_time, selection};
 use super::input::{LasInput, Storage};
 use super::laz::Layers;
@@ -14,8 +15,9 @@ use super::read::{LazPart, PlainPart, Shift};
 use super::table::is_held;
 use super::verify::{Evidence, Watched};
 use super::waveforms;
+use crate::io::united::{LARGEST_BATCH, ToOneForm};
 use crate::point::{Metadata, Schema};
-use crate::stage::{self, Part, Source};
+use crate::stage::{self, Part, ReadKeys, Source};
 use crate::{Error, Result};
 
 /// Plain records of one part.
@@ -29,16 +31,24 @@ const PLAIN_POINTS: u64 = 1 << 18;
 /// byte; files that do not agree (point format, record length, extra bytes, scale, GPS time type,
 /// CRS; offsets apart from whole steps) are named both.
 pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
+    open_with(paths, &ReadKeys::default())
+}
+
+/// The same as `keys` want it: inputs that differ may be brought to one form.
+pub(super) fn open_with(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
     let Some((first, others)) = paths.split_first() else {
         return Err(Error::pipeline("there is no input file"));
     };
-    let first = LasInput::open(first)?;
+    let form = Form::of(keys, paths)?;
+    let first = form.bring(LasInput::open(first)?)?;
     let mut schema = first.schema();
+    let mut own = vec![first.own.as_ref().map(|_| first.own_schema())];
     let mut inputs = vec![first.clone().without_records()];
     let (mut tables, mut points) = (first.table_bytes(), first.points());
-    let mut merge = LasMerge::of(first)?;
+    let mut merge = LasMerge::of(first, &form)?;
     for path in others {
-        let input = LasInput::open(path)?;
+        let input = form.bring(LasInput::open(path)?)?;
+        own.push(input.own.as_ref().map(|_| input.own_schema()));
         tables = tables.saturating_add(input.table_bytes());
         points = points.saturating_add(input.points());
         if !is_held(tables, points) {
@@ -58,10 +68,12 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
     let gps_time = has_gps_time(native.header.format()).then(|| native.header.gps_time());
     let native = Some(Arc::new(native) as Arc<_>);
     let metadata = Metadata { crs, units, gps_time, native, ..Metadata::default() };
-    let files: Vec<Opened> = inputs.into_iter().zip(shifts).map(Opened::new).collect();
+    let each = inputs.into_iter().zip(shifts).zip(own);
+    let open = |((input, shift), own)| Opened::new(input, shift, own, &schema);
+    let files = each.map(open).collect::<Result<Vec<Opened>>>()?;
     let mut start = 0;
     let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i, &mut start)).collect();
-    Ok(Box::new(LasSource { files, parts, schema: Arc::new(schema), metadata, warnings }))
+    Ok(Box::new(LasSource { files, parts, schema: Arc::new(schema), metadata, form, warnings }))
 }
 
 /// LAS and LAZ files opened together.
@@ -70,12 +82,15 @@ struct LasSource {
     parts: Vec<PartPlace>,
     schema: Arc<Schema>,
     metadata: Metadata,
+    form: Form,
     warnings: Vec<String>,
 }
 
 struct Opened {
     input: LasInput,
     shift: Shift,
+    /// How its records become those of all inputs, where they are others.
+    to_one_form: Option<ToOneForm>,
     compression: Option<Arc<super::laz::Compression>>,
     evidence: Arc<Evidence>,
 }
@@ -92,13 +107,16 @@ struct PartPlace {
 }
 
 impl Opened {
-    fn new((input, shift): (LasInput, Shift)) -> Self {
+    /// `own` is what its records are, where they must become such of `schema`.
+    fn new(input: LasInput, shift: Shift, own: Option<Schema>, schema: &Schema) -> Result<Self> {
         let compression = match &input.storage {
             Storage::Plain => None,
             Storage::Laz(compression, _) => Some(Arc::new(compression.clone())),
         };
-        let evidence = Arc::new(Evidence::new(&input.header, stretches(&input).len()));
-        Opened { input, shift, compression, evidence }
+        let evidence = Arc::new(Evidence::new(input.own_header(), stretches(&input).len()));
+        let formed = own.map(|own| ToOneForm::of(own, schema)).transpose();
+        let to_one_form = formed.map_err(|error| error.at(&input.path))?.flatten();
+        Ok(Opened { input, shift, to_one_form, compression, evidence })
     }
 
     /// The parts of this file, the number `file` of all; `start` counts the records before each.
@@ -123,19 +141,25 @@ impl Opened {
     }
 
     fn part_bytes(&self) -> u64 {
-        let Some(compression) = &self.compression else { return 0 };
+        let batch = |form: &ToOneForm| form.bytes(LARGEST_BATCH);
+        let formed = self.to_one_form.as_ref().map_or(0, batch);
+        let Some(compression) = &self.compression else { return formed };
         let list = match &self.input.storage {
             Storage::Laz(_, Chunks::Known(chunks)) => chunks.part_bytes(),
             _ => 0,
         };
-        list + compression.state_bytes()
+        list + compression.state_bytes() + formed
     }
 
     /// Opens a part, its points looked at. Coordinates and returns are in layers that are always
     /// decoded.
-    fn open(&self, place: &PartPlace, selection: Layers) -> Result<Box<dyn Part>> {
+    fn open(&self, place: &PartPlace, selection: Layers) -> Result<Box<dyn Part + '_>> {
         let part = self.unwatched(place, selection)?;
-        Ok(Box::new(Watched::new(part, self.evidence.clone(), place.number, self.shift.0)))
+        let part = Watched::new(part, self.evidence.clone(), place.number, self.shift.0);
+        Ok(match &self.to_one_form {
+            Some(form) => form.part(Box::new(part), &self.input.path),
+            None => Box::new(part),
+        })
     }
 
     fn unwatched(&self, place: &PartPlace, selection: Layers) -> Result<Box<dyn Part>> {
@@ -143,7 +167,7 @@ impl Opened {
         let (shift, source) = (self.shift, place.file as u32);
         let (before, chunks, in_a_row): (u64, Vec<Chunk>, _) = match &self.input.storage {
             Storage::Plain => {
-                let header = &self.input.header;
+                let header = self.input.own_header();
                 let each = u64::from(header.point_data_record_length);
                 let at = u64::from(header.offset_to_point_data) + place.first * each;
                 return Ok(Box::new(PlainPart { file, source, at, left: place.count, shift }));
@@ -215,7 +239,7 @@ impl Source for LasSource {
         let Some(Opened { input, .. }) = self.files.get(input) else {
             return Err(Error::internal(format!("input {input} of {}", self.files.len())));
         };
-        let native = Native::again(&input.reopen()?, &input.header)?;
+        let native = Native::again(&input.reopen()?, input.own_header(), &self.form)?;
         // The CRS is that of all inputs, or they would have been refused.
         Ok(Metadata { native: Some(Arc::new(native)), ..self.metadata.clone() })
     }
@@ -246,12 +270,14 @@ impl Source for LasSource {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let found = self.files.iter().flat_map(|file| file.evidence.warnings());
-        self.warnings.iter().cloned().chain(found).collect()
+        let rounded = |file: &Opened| file.to_one_form.as_ref()?.told(&file.input.path);
+        let told = |file: &Opened| file.evidence.warnings().into_iter().chain(rounded(file));
+        self.warnings.iter().cloned().chain(self.files.iter().flat_map(told)).collect()
     }
 
     fn contradictions(&self) -> Vec<stage::Contradiction> {
-        let of = |file: &Opened| file.evidence.contradictions(&file.input.path, &file.input.header);
+        let of =
+            |file: &Opened| file.evidence.contradictions(&file.input.path, file.input.own_header());
         self.files.iter().flat_map(of).collect()
     }
 }

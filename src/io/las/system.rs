@@ -11,7 +11,7 @@ use crate::io::wkt;
 /// The records that say in which system a file's points are.
 #[derive(Clone)]
 pub struct CrsRecords {
-    /// 0 with WKT, which is to be preferred, else 1.
+    /// 0 with WKT, which is to be preferred, 1 without, 2 where there is nothing.
     rank: u8,
     /// Their payloads by number, whether extended or not.
     payloads: Vec<(u16, Vec<u8>)>,
@@ -35,7 +35,11 @@ impl CrsRecords {
         }
         payloads.sort();
         payloads.dedup();
-        Ok(CrsRecords { rank: u8::from(!has_wkt(&vlrs, &evlrs)?), payloads, vlrs, evlrs })
+        let rank = match has_wkt(&vlrs, &evlrs)? {
+            true => 0,
+            false => 1 + u8::from(text(&vlrs, &evlrs)?.is_none()),
+        };
+        Ok(CrsRecords { rank, payloads, vlrs, evlrs })
     }
 
     /// True if both files have them byte for byte, at one place.

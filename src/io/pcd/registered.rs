@@ -38,8 +38,8 @@ impl Format for PcdFormat {
         ["# .PCD", "VERSION .", "VERSION 0.", "FIELDS ", "COLUMNS "].into_iter().any(begins)
     }
 
-    fn open(&self, files: &[PathBuf], _: &ReadKeys) -> Result<Box<dyn Source>> {
-        source::open(files)
+    fn open(&self, files: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
+        source::open(files, keys)
     }
 
     fn describe(&self, path: &Path) -> Result<serde_json::Value> {

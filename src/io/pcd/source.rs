@@ -11,9 +11,10 @@ use crate::error::shown;
 use crate::io::rows::comments::Said;
 use crate::io::rows::lines::Lines;
 use crate::io::rows::parts::PartEnds;
+use crate::io::systems;
 use crate::point::names::XYZ;
 use crate::point::{Metadata, Scalar, Schema};
-use crate::stage::{Input, Part, Source};
+use crate::stage::{Input, Part, ReadKeys, Source};
 use crate::{Error, Result};
 
 /// What PCD outputs carry on besides points and text.
@@ -32,7 +33,7 @@ pub(super) struct PcdNative {
 ///
 /// A file that is no PCD, has no `x`, `y` and `z`, or is too short for the count that it claims;
 /// files whose fields differ.
-pub(super) fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
+pub(super) fn open(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
     let files = paths.iter().map(|path| PcdFile::open(path)).collect::<Result<Vec<_>>>()?;
     let Some(first) = files.first() else {
         return Err(Error::pipeline("no PCD file to read"));
@@ -44,17 +45,19 @@ pub(super) fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
         return Err(Error::data(&other.path, told).help("convert one of them first"));
     }
     let said: Vec<Said> = files.iter().map(|file| Said::of(file.header.comments.clone())).collect();
-    let told = |one: &Said| (one.crs.clone(), one.gps_time);
-    if let Some(n) = said.iter().position(|one| told(one) != told(&said[0])) {
-        let told = format!("its coordinates or times are not of those of {}", shown(&first.path));
+    if let Some(n) = said.iter().position(|one| one.gps_time != said[0].gps_time) {
+        let told = format!("its times do not count what those of {} do", shown(&first.path));
         return Err(Error::data(&files[n].path, told).help("convert one of them first"));
     }
-    let metadata = metadata(first, said.into_iter().next().unwrap_or_default());
+    let systems: Vec<_> =
+        files.iter().zip(&said).map(|(file, said)| (&*file.path, said.crs.clone())).collect();
+    let crs = systems::of_all(keys, &systems)?;
+    let metadata = metadata(first, said.into_iter().next().unwrap_or_default(), crs);
     let ends = PartEnds::of(files.iter().map(PcdFile::parts));
     Ok(Box::new(PcdSource { schema: Arc::new(schema), metadata, files, ends, wide }))
 }
 
-fn metadata(file: &PcdFile, said: Said) -> Metadata {
+fn metadata(file: &PcdFile, said: Said, crs: Option<String>) -> Metadata {
     let fields = file.header.fields.iter();
     let names = file.names().into_iter().zip(fields.flat_map(|f| std::iter::repeat_n(f, f.count)));
     let of_one = |(dimension, field): (String, &PcdField)| {
@@ -64,8 +67,8 @@ fn metadata(file: &PcdFile, said: Said) -> Metadata {
     let native =
         PcdNative { names: names.filter_map(of_one).collect(), data: file.header.data, viewpoint };
     Metadata {
-        units: said.crs.as_deref().map(crate::io::wkt::units).unwrap_or_default(),
-        crs: said.crs,
+        units: crs.as_deref().map(crate::io::wkt::units).unwrap_or_default(),
+        crs,
         gps_time: said.gps_time,
         comments: said.others.into_iter().filter(|text| !text.starts_with(".PCD")).collect(),
         native: Some(Arc::new(native)),
@@ -150,7 +153,7 @@ impl Source for PcdSource {
         let Some(file) = self.files.get(input) else {
             return Err(Error::internal(format!("input {input} of {}", self.files.len())));
         };
-        Ok(metadata(file, Said::of(file.header.comments.clone())))
+        Ok(metadata(file, Said::of(file.header.comments.clone()), self.metadata.crs.clone()))
     }
 
     fn points(&self) -> u64 {

@@ -5,6 +5,7 @@
 //! that formats do not share is kept as it is. Format: Greg Turk, "The PLY Polygon File Format",
 //! 1994.
 
+mod agree;
 mod ascii;
 mod binary;
 mod faces;

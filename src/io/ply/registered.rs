@@ -42,8 +42,8 @@ impl Format for PlyFormat {
         first.starts_with(b"ply")
     }
 
-    fn open(&self, files: &[PathBuf], _: &ReadKeys) -> Result<Box<dyn Source>> {
-        source::open(files)
+    fn open(&self, files: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
+        source::open_with(files, keys)
     }
 
     fn describe(&self, path: &Path) -> Result<serde_json::Value> {

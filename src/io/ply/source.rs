@@ -1,23 +1,21 @@
 //! Reads the vertices of PLY files.
 
-use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::agree::{Agreed, Texts, agreed};
 use super::ascii::AsciiPart;
 use super::binary::{BinaryPart, ListedPart};
 use super::file::PlyFile;
-use super::header::{Element, PropertyKind};
-use super::names::{self, RECORDS};
+use super::header::Element;
 use crate::io::origin::Origin;
 use crate::io::rows::Encoding;
-use crate::io::rows::comments::{self, Said};
 use crate::io::rows::lines::shown;
 use crate::io::rows::parts::PartEnds;
-use crate::io::rows::schema::placed;
-use crate::point::names::{GPS_TIME, XYZ};
-use crate::point::{GpsTime, Metadata, Scalar, Schema};
-use crate::stage::{Input, Part, Source};
+use crate::io::systems;
+use crate::io::united::{LARGEST_BATCH, ToOneForm};
+use crate::point::{Metadata, Schema};
+use crate::stage::{Input, Part, ReadKeys, Source};
 use crate::{Error, Result};
 
 /// Vertices of one part of a binary file.
@@ -46,47 +44,54 @@ pub(super) struct Rest {
     pub points: u64,
 }
 
-/// Opens PLY files that agree in encoding, vertex properties and coordinate reference system: their
-/// headers, and what stands before the vertices.
+/// Opens PLY files that agree in vertex properties and coordinate reference system: their headers,
+/// and what stands before the vertices. Where encodings, the order of properties or their types
+/// differ, records are brought to one form.
 ///
 /// # Errors
 ///
 /// A file that is no PLY, has no vertices with `x`, `y` and `z`, has lists in them, or is too short
 /// for the count it claims; files that do not agree.
 pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
-    Ok(Box::new(PlySource::open(paths)?))
+    open_with(paths, &ReadKeys::default())
+}
+
+/// The same, where `keys` may say in which system all are.
+pub(super) fn open_with(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
+    Ok(Box::new(PlySource::open(paths, keys)?))
 }
 
 /// The vertices of one or several PLY files.
 struct PlySource {
     schema: Arc<Schema>,
+    /// What the records of each file are, and how they become those of all where they are others.
+    own: Vec<Arc<Schema>>,
+    forms: Vec<Option<ToOneForm>>,
     metadata: Metadata,
+    crs: Option<String>,
     files: Vec<PlyFile>,
     ends: PartEnds,
     warnings: Vec<String>,
 }
 
 impl PlySource {
-    pub fn open(paths: &[PathBuf]) -> Result<PlySource> {
+    pub fn open(paths: &[PathBuf], keys: &ReadKeys) -> Result<PlySource> {
         let files = paths.iter().map(|path| PlyFile::open(path)).collect::<Result<Vec<_>>>()?;
         let Some(first) = files.first() else {
             return Err(Error::pipeline("no PLY file to read"));
         };
         let texts: Vec<Texts> = files.iter().map(Texts::of).collect();
-        for (file, text) in files.iter().zip(&texts).skip(1) {
-            agree((first, &texts[0]), (file, text))?;
-        }
-        let wide = first.header.encoding == Encoding::Ascii && needs_double(&files, &texts[0])?;
-        let all: Vec<Schema> =
-            files.iter().map(|file| schema(file, &texts[0].dimensions, wide)).collect();
-        if let Some(other) = all.iter().position(|schema| *schema != all[0]) {
-            return Err(disagree(first, &files[other], "types of vertex properties are"));
-        }
-        let schema = Arc::new(schema(first, &texts[0].dimensions, wide));
+        let Agreed { schema, own } = agreed(&files, &texts)?;
         if schema.coordinates().is_none() {
             return Err(Error::data(&first.path, "a comment gives x, y or z another dimension"));
         }
-        let metadata = metadata(&files, texts);
+        let said = files.iter().zip(&texts).map(|(file, text)| (&*file.path, text.crs.clone()));
+        let crs = systems::of_all(keys, &said.collect::<Vec<_>>())?;
+        let form = |(own, file): (&Arc<Schema>, &PlyFile)| {
+            ToOneForm::of((**own).clone(), &schema).map_err(|error| error.at(&file.path))
+        };
+        let forms = own.iter().zip(&files).map(form).collect::<Result<Vec<_>>>()?;
+        let metadata = metadata(&files, texts, crs.clone());
         let parts = |file: &PlyFile| {
             let own = match file.header.encoding {
                 _ if !file.lists().is_empty() => u64::from(file.points > 0),
@@ -99,102 +104,36 @@ impl PlySource {
         let told = |file| [listed(file), dropped(file), cut(file)].into_iter().flatten();
         let warnings = files.iter().flat_map(told);
         let warnings = warnings.collect();
-        Ok(PlySource { schema, metadata, files, ends, warnings })
+        Ok(PlySource { schema, own, forms, metadata, crs, files, ends, warnings })
     }
 }
 
-/// What the comments of a file say to us, and the others.
-struct Texts {
-    crs: Option<String>,
-    gps_time: Option<GpsTime>,
-    dimensions: Vec<String>,
-    comments: Vec<String>,
-}
-
-impl Texts {
-    fn of(file: &PlyFile) -> Texts {
-        let properties: Vec<&str> = file.properties().iter().map(|p| p.name.as_str()).collect();
-        let header = &file.header;
-        let dimensions = names::dimensions(&properties, &header.comments);
-        let properties: BTreeSet<&str> = properties.into_iter().collect();
-        // How this file was made is not how others are made of it.
-        let Said { crs, gps_time, note: _, others } = Said::of(header.comments.clone());
-        let is_ours = |comment: &String| {
-            names::property_told(comment).is_some_and(|p| properties.contains(p))
-                || comments::is_made(comment, file.points)
+impl PlySource {
+    /// The part `within` the file `number`, with records as the file has them.
+    fn own_part(&self, number: usize, within: usize) -> Result<Box<dyn Part + '_>> {
+        let (Some(file), Some(schema)) = (self.files.get(number), self.own.get(number)) else {
+            return Err(Error::internal(format!("file {number} of {}", self.files.len())));
         };
-        let comments = others.into_iter().filter(|comment| !is_ours(comment)).collect();
-        Texts { crs, gps_time, dimensions, comments }
-    }
-}
-
-/// Refuses two files whose vertices differ but for the types of properties.
-fn agree((first, texts): (&PlyFile, &Texts), (other, of_other): (&PlyFile, &Texts)) -> Result<()> {
-    let names = |file: &PlyFile| -> Vec<String> {
-        file.properties().iter().map(|p| p.name.clone()).collect()
-    };
-    let differ = if first.header.encoding != other.header.encoding {
-        "encoding is"
-    } else if names(first) != names(other) {
-        "vertex properties are"
-    } else if texts.gps_time != of_other.gps_time {
-        "GPS time type is"
-    } else if texts.crs != of_other.crs {
-        "coordinate reference system is"
-    } else if texts.dimensions != of_other.dimensions {
-        "dimension names are"
-    } else {
-        return Ok(());
-    };
-    Err(disagree(first, other, differ))
-}
-
-fn disagree(first: &PlyFile, other: &PlyFile, what: &str) -> Error {
-    let told = format!("its {what} not the same as in {}", crate::error::shown(&first.path));
-    Error::data(&other.path, told).help(
-        "files that are read together agree in encoding, vertex properties and coordinate \
-         reference system; convert one of them first",
-    )
-}
-
-/// True for dimensions that many programs print with all digits into texts whose headers call them
-/// `float`, which has room for seven.
-fn is_long(dimension: &str) -> bool {
-    XYZ.contains(&dimension) || dimension == GPS_TIME
-}
-
-/// True if coordinates and times of these texts are to be held as `double`, so that none loses a
-/// digit: where one has more than a `float` holds, or where another file calls them `double`.
-fn needs_double(files: &[PlyFile], texts: &Texts) -> Result<bool> {
-    let kind = |file: &PlyFile, n: usize| file.properties()[n].kind;
-    let long: Vec<usize> = (0..texts.dimensions.len())
-        .filter(|&n| is_long(&texts.dimensions[n]))
-        .filter(|&n| files.iter().any(|file| kind(file, n) == PropertyKind::Scalar(Scalar::F32)))
-        .collect();
-    let double =
-        |file: &PlyFile| long.iter().any(|&n| kind(file, n) == PropertyKind::Scalar(Scalar::F64));
-    if long.is_empty() || files.iter().any(double) {
-        return Ok(!long.is_empty());
-    }
-    for file in files {
-        let narrow = schema(file, &texts.dimensions, false);
-        let part = AsciiPart::new(file.origin.reopen()?, file, &narrow, 0);
-        if part.outgrows_float(&long)? {
-            return Ok(true);
+        let handle = file.origin.reopen()?;
+        let source = number as u32;
+        if file.header.encoding == Encoding::Ascii {
+            return Ok(Box::new(AsciiPart::new(handle, file, schema, source)));
         }
+        if !file.lists().is_empty() {
+            let properties = (file.properties(), schema.endian);
+            let (at, left) = (file.body, file.points);
+            let part = ListedPart::new((handle, &file.origin), properties, at, left, source);
+            return Ok(Box::new(part));
+        }
+        let start = within as u64 * PART_POINTS;
+        Ok(Box::new(BinaryPart {
+            file: handle,
+            origin: &file.origin,
+            at: file.body + start * schema.stride as u64,
+            left: PART_POINTS.min(file.points - start),
+            source,
+        }))
     }
-    Ok(false)
-}
-
-/// Coordinates and times that a file calls `float` are `double` if they are to be `wide`.
-fn schema(file: &PlyFile, dimensions: &[String], wide: bool) -> Schema {
-    let fields = file.properties().iter().zip(dimensions).filter_map(|(property, name)| {
-        let PropertyKind::Scalar(scalar) = property.kind else { return None };
-        let widens = wide && scalar == Scalar::F32 && is_long(name);
-        Some((name.clone(), if widens { Scalar::F64 } else { scalar }))
-    });
-    let (dimensions, stride) = placed(fields);
-    Schema { layout: RECORDS, endian: file.header.encoding.endian(), stride, dimensions }
 }
 
 /// Texts equal in all files are carried as they are, else the union, sorted: the order of the
@@ -209,8 +148,10 @@ fn union(lists: Vec<Vec<String>>) -> Vec<String> {
     all
 }
 
-fn metadata(files: &[PlyFile], mut texts: Vec<Texts>) -> Metadata {
+fn metadata(files: &[PlyFile], texts: Vec<Texts>, crs: Option<String>) -> Metadata {
     let first = &files[0];
+    let encoding = first.header.encoding;
+    let is_one = files.iter().all(|file| file.header.encoding == encoding);
     let properties = first
         .properties()
         .iter()
@@ -218,12 +159,11 @@ fn metadata(files: &[PlyFile], mut texts: Vec<Texts>) -> Metadata {
         .map(|(property, dimension)| (dimension.clone(), property.name.clone()))
         .collect();
     let native = PlyNative {
-        encoding: first.header.encoding,
+        encoding: if is_one { encoding } else { Encoding::BinaryLittleEndian },
         properties,
         obj_info: union(files.iter().map(|f| f.header.obj_info.clone()).collect()),
         rest: rest(files),
     };
-    let crs = texts[0].crs.take();
     Metadata {
         units: crs.as_deref().map(crate::io::wkt::units).unwrap_or_default(),
         crs,
@@ -308,7 +248,7 @@ impl Source for PlySource {
         let Some(file) = self.files.get(input) else {
             return Err(Error::internal(format!("input {input} of {}", self.files.len())));
         };
-        Ok(metadata(std::slice::from_ref(file), vec![Texts::of(file)]))
+        Ok(metadata(std::slice::from_ref(file), vec![Texts::of(file)], self.crs.clone()))
     }
 
     fn points(&self) -> u64 {
@@ -316,11 +256,16 @@ impl Source for PlySource {
     }
 
     fn part_bytes(&self) -> u64 {
-        match self.files[0].header.encoding {
-            Encoding::Ascii => AsciiPart::bytes(&self.schema),
-            _ if self.files.iter().any(|file| !file.lists().is_empty()) => ListedPart::BYTES,
-            _ => 0,
-        }
+        let of = |((file, own), form): ((&PlyFile, &Arc<Schema>), &Option<ToOneForm>)| {
+            let formed = form.as_ref().map_or(0, |form| form.bytes(LARGEST_BATCH));
+            formed
+                + match file.header.encoding {
+                    Encoding::Ascii => AsciiPart::bytes(own),
+                    _ if !file.lists().is_empty() => ListedPart::BYTES,
+                    _ => 0,
+                }
+        };
+        self.files.iter().zip(&self.own).zip(&self.forms).map(of).max().unwrap_or(0)
     }
 
     fn parts(&self) -> usize {
@@ -335,28 +280,11 @@ impl Source for PlySource {
 
     fn part(&self, index: usize) -> Result<Box<dyn Part + '_>> {
         let (number, within) = self.ends.place(index);
-        let Some(file) = self.files.get(number) else {
-            return Err(Error::internal(format!("part {index} of {}", self.parts())));
-        };
-        let handle = file.origin.reopen()?;
-        let source = number as u32;
-        if file.header.encoding == Encoding::Ascii {
-            return Ok(Box::new(AsciiPart::new(handle, file, &self.schema, source)));
-        }
-        if !file.lists().is_empty() {
-            let properties = (file.properties(), self.schema.endian);
-            let (at, left) = (file.body, file.points);
-            let part = ListedPart::new((handle, &file.origin), properties, at, left, source);
-            return Ok(Box::new(part));
-        }
-        let start = within as u64 * PART_POINTS;
-        Ok(Box::new(BinaryPart {
-            file: handle,
-            origin: &file.origin,
-            at: file.body + start * self.schema.stride as u64,
-            left: PART_POINTS.min(file.points - start),
-            source,
-        }))
+        let part = self.own_part(number, within)?;
+        Ok(match self.forms.get(number).and_then(Option::as_ref) {
+            Some(form) => form.part(part, &self.files[number].path),
+            None => part,
+        })
     }
 
     fn warnings(&self) -> Vec<String> {

@@ -92,6 +92,35 @@ impl ColumnFacts {
     }
 }
 
+/// A type that holds all numbers of both; None if there is none.
+pub(crate) fn holding(one: Scalar, two: Scalar) -> Option<Scalar> {
+    let range = |scalar: Scalar| match scalar {
+        Scalar::U8 => Some([0, i128::from(u8::MAX)]),
+        Scalar::I8 => Some([i128::from(i8::MIN), i128::from(i8::MAX)]),
+        Scalar::U16 => Some([0, i128::from(u16::MAX)]),
+        Scalar::I16 => Some([i128::from(i16::MIN), i128::from(i16::MAX)]),
+        Scalar::U32 => Some([0, i128::from(u32::MAX)]),
+        Scalar::I32 => Some([i128::from(i32::MIN), i128::from(i32::MAX)]),
+        Scalar::U64 => Some([0, i128::from(u64::MAX)]),
+        Scalar::I64 => Some([i128::from(i64::MIN), i128::from(i64::MAX)]),
+        Scalar::F32 | Scalar::F64 => None,
+    };
+    match (range(one), range(two)) {
+        _ if one == two => Some(one),
+        (Some([a, b]), Some([c, d])) => whole(a.min(c), b.max(d)),
+        (None, None) => Some(Scalar::F64),
+        // A double holds whole numbers of 32 bits, a float those of 16.
+        (of_one, _) => {
+            let (whole, float) = if of_one.is_some() { (one, two) } else { (two, one) };
+            match whole.size() {
+                8 => None,
+                4 => Some(Scalar::F64),
+                _ => Some(float),
+            }
+        }
+    }
+}
+
 /// The smallest type of whole numbers from the one to the other; None if no type holds them.
 pub(crate) fn whole(least: i128, most: i128) -> Option<Scalar> {
     let all = [

@@ -17,6 +17,7 @@ use crate::io::rows::lines::Lines;
 use crate::io::rows::number;
 use crate::io::rows::parts::PartEnds;
 use crate::io::rows::schema::placed;
+use crate::io::systems;
 use crate::point::names::{BLUE, COLUMN, GREEN, INTENSITY, NIR, POINT_SOURCE_ID, RED, ROW, XYZ};
 use crate::point::{Dimension, Endian, Layout, Metadata, PointBatch, Scalar, Schema};
 use crate::stage::{Input, Part, ReadKeys, Source};
@@ -166,7 +167,8 @@ pub(super) fn open(paths: &[PathBuf], kind: TextKind, keys: &ReadKeys) -> Result
     }
     let schema = Arc::new(schema(&first.columns, &facts, kind == TextKind::Ptx));
     let ends = PartEnds::of(files.iter().map(|file| file.found.stretches.len()));
-    Ok(Box::new(TextSource { schema, metadata: Metadata::default(), files, ends }))
+    let metadata = systems::said(keys);
+    Ok(Box::new(TextSource { schema, metadata, files, ends }))
 }
 
 fn schema(columns: &[Option<String>], facts: &[ColumnFacts], is_ptx: bool) -> Schema {

@@ -65,12 +65,12 @@ impl Format for VerticesFormat {
         sniff(first, self.0)
     }
 
-    fn open(&self, files: &[PathBuf], _: &ReadKeys) -> Result<Box<dyn Source>> {
-        source::open(files, self.0)
+    fn open(&self, files: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
+        source::open(files, self.0, keys)
     }
 
     fn describe(&self, path: &Path) -> Result<serde_json::Value> {
-        let opened = source::open(&[path.to_owned()], self.0)?;
+        let opened = source::open(&[path.to_owned()], self.0, &ReadKeys::default())?;
         let dimensions: Vec<&str> =
             opened.schema().dimensions.iter().map(|d| d.name.as_str()).collect();
         let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "look at it", e))?.len();

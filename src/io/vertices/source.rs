@@ -13,10 +13,11 @@ use crate::io::rows::lines::Lines;
 use crate::io::rows::number;
 use crate::io::rows::parts::PartEnds;
 use crate::io::rows::schema::placed;
+use crate::io::systems;
 use crate::point::names::{BLUE, GREEN, NORMAL, RED, XYZ};
 use crate::point::{Dimension, Endian, Layout, Metadata, PointBatch, Scalar, Schema, Value};
 use crate::report::Grouped;
-use crate::stage::{Input, Part, Source, foreign};
+use crate::stage::{Input, Part, ReadKeys, Source, foreign};
 use crate::{Error, Result};
 
 /// Facets of one part of a binary file.
@@ -213,7 +214,11 @@ fn shade(
 /// # Errors
 ///
 /// A file that is none of the kind, a line that is not like the others, and files that differ.
-pub(super) fn open(paths: &[PathBuf], kind: VerticesKind) -> Result<Box<dyn Source>> {
+pub(super) fn open(
+    paths: &[PathBuf],
+    kind: VerticesKind,
+    keys: &ReadKeys,
+) -> Result<Box<dyn Source>> {
     let files = paths.iter().map(|path| VerticesFile::open(path, kind));
     let files = files.collect::<Result<Vec<_>>>()?;
     let Some(first) = files.first() else {
@@ -231,7 +236,8 @@ pub(super) fn open(paths: &[PathBuf], kind: VerticesKind) -> Result<Box<dyn Sour
         None => usize::from(file.points > 0),
     };
     let ends = PartEnds::of(files.iter().map(parts));
-    Ok(Box::new(VerticesSource { schema, metadata: Metadata::default(), kind, files, ends }))
+    let metadata = systems::said(keys);
+    Ok(Box::new(VerticesSource { schema, metadata, kind, files, ends }))
 }
 
 struct VerticesSource {

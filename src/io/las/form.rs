@@ -1,0 +1,214 @@
+//! The one form that LAS inputs which differ are brought to as they are read: point format, scale,
+//! offset, and the system that they are in.
+//!
+//! What all inputs share is left as it is, whatever is asked for: a record that need not change
+//! stays the input's, byte for byte.
+
+use std::path::PathBuf;
+
+use super::crs;
+use super::fields::encoding;
+use super::file::InputFile;
+use super::format::{has_waveforms, reformed};
+use super::header::Header;
+use super::input::LasInput;
+use super::vlr::{Evlr, Vlr};
+use crate::point::Schema;
+use crate::stage::{Assumption, ReadKeys};
+use crate::{Error, Result};
+
+/// Offsets whose distance is this close to whole steps differ by whole steps: decimal offsets are
+/// seldom exact in binary.
+const WHOLE: f64 = 1e-6;
+
+/// What inputs are brought to, where they differ.
+#[derive(Debug, Clone, Default)]
+pub struct Form {
+    format: Option<u8>,
+    scale: Option<[f64; 3]>,
+    offset: Option<[f64; 3]>,
+    crs: Option<Vlr>,
+    /// True if inputs that name no system are in that of the others.
+    pub assumes_crs: bool,
+}
+
+impl Form {
+    /// The form that `keys` ask for, for these files: their headers are read if it depends on them.
+    pub fn of(keys: &ReadKeys, paths: &[PathBuf]) -> Result<Form> {
+        let record = keys.crs.as_ref().map(|text| crs::record(text)).transpose();
+        let crs = record.map_err(|why| Error::pipeline(format!("`read.crs`: {why}")))?;
+        let assumes_crs = keys.assume.contains(&Assumption::Crs);
+        let mut form = Form { crs, assumes_crs, ..Form::default() };
+        let places = keys.scale.is_some() || keys.offset.is_some();
+        if paths.len() < 2 || !places && keys.point_format.is_none() {
+            return Ok(form);
+        }
+        let read = |path: &PathBuf| Header::read(&InputFile::open(path)?);
+        let headers = paths.iter().map(read).collect::<Result<Vec<_>>>()?;
+        let first = &headers[0];
+        if headers.iter().any(|header| header.format() != first.format()) {
+            form.format = keys.point_format;
+        }
+        let smallest = smallest(headers.iter());
+        let differ = |header: &Header| {
+            header.scale() != first.scale() || !are_whole_steps(smallest, header, first.scale())
+        };
+        if places && headers.iter().any(differ) {
+            let scale = keys.scale.or_else(|| same_scale(&headers));
+            form.scale = scale;
+            form.offset = scale.and(keys.offset.or(Some(smallest)));
+        }
+        Ok(form)
+    }
+
+    /// The offset of all inputs, where it is not simply the smallest.
+    pub fn offset(&self) -> Option<[f64; 3]> {
+        self.offset
+    }
+
+    /// `input` in this form: with the header that it has in it, and its own beside it where its
+    /// records must change.
+    pub fn bring(&self, mut input: LasInput) -> Result<LasInput> {
+        self.put_crs(&mut input.vlrs, &mut input.evlrs);
+        let formed = self.header(&input.header, &input.schema())?;
+        let is_other = (formed.format(), formed.scale(), formed.offset())
+            != (input.header.format(), input.header.scale(), input.header.offset());
+        if is_other {
+            input.own = Some(Box::new(std::mem::replace(&mut input.header, formed)));
+        }
+        Ok(input)
+    }
+
+    /// The header that a file with this one, and records of `schema`, has in this form.
+    pub fn header(&self, input: &Header, schema: &Schema) -> Result<Header> {
+        let mut header = input.clone();
+        if let Some(format) = self.format.filter(|format| *format != input.format()) {
+            let stride = reformed(schema, format)?.stride;
+            reform(&mut header, format, stride);
+        }
+        if let (Some(scale), Some(offset)) = (self.scale, self.offset)
+            && !(header.scale() == scale && are_whole_steps(offset, &header, scale))
+        {
+            header.put_scale(scale);
+            header.put_offset(offset);
+        }
+        Ok(header)
+    }
+
+    /// Gives records the system that all inputs are said to be in.
+    pub fn put_crs(&self, vlrs: &mut Vec<Vlr>, evlrs: &mut Vec<Evlr>) {
+        let Some(record) = &self.crs else { return };
+        vlrs.retain(|vlr| !crs::is_record(&vlr.user(), vlr.record()));
+        evlrs.retain(|evlr| !crs::is_record(&evlr.user(), evlr.record()));
+        vlrs.push(record.clone());
+    }
+}
+
+/// The steps of `scale` from one offset to another, if they are whole and stored coordinates, which
+/// are i32, can move by them.
+pub fn whole_steps(from: f64, to: f64, scale: f64) -> Option<i64> {
+    if from == to {
+        return Some(0);
+    }
+    let steps = (to - from) / scale;
+    let whole = steps.round();
+    let rounding = 4.0 * f64::EPSILON * (from.abs().max(to.abs()) / scale).abs();
+    let near = (steps - whole).abs() <= WHOLE + rounding && whole.abs() < 2f64.powi(32);
+    near.then_some(whole as i64)
+}
+
+/// Makes `header` one of records of `format`, `stride` bytes long: a version of LAS that has it
+/// (LAS 1.4 R15, section 2.6, and the versions before).
+pub fn reform(header: &mut Header, format: u8, stride: usize) {
+    let least = match format {
+        0 | 1 => 0,
+        2 | 3 => 2,
+        4 | 5 => 3,
+        _ => 4,
+    };
+    if header.minor() < least {
+        let encoding = header.encoding();
+        *header = header.resized(least, &header.padding);
+        header.global_encoding = encoding;
+    }
+    header.point_data_record_format = format;
+    header.point_data_record_length = u16::try_from(stride).unwrap_or(u16::MAX);
+    if format >= 6 {
+        // Section 2.4: formats 6 to 10 always say WKT.
+        header.put_encoding(encoding::WKT, true);
+    }
+    if !has_waveforms(format) {
+        header.put_encoding(encoding::WAVEFORM_INTERNAL, false);
+        header.put_encoding(encoding::WAVEFORM_EXTERNAL, false);
+        header.start_of_waveform_data_packet_record = None;
+    }
+}
+
+/// The smallest offset of all on each axis.
+pub fn smallest<'a>(headers: impl Iterator<Item = &'a Header>) -> [f64; 3] {
+    let least = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|axis| a[axis].min(b[axis]));
+    headers.map(Header::offset).reduce(least).unwrap_or_default()
+}
+
+fn are_whole_steps(from: [f64; 3], header: &Header, scale: [f64; 3]) -> bool {
+    let offset = header.offset();
+    (0..3).all(|axis| whole_steps(from[axis], offset[axis], scale[axis]).is_some())
+}
+
+/// The scale of all, if they have one.
+fn same_scale(headers: &[Header]) -> Option<[f64; 3]> {
+    let scale = headers[0].scale();
+    headers.iter().all(|header| header.scale() == scale).then_some(scale)
+}
+
+/// The smallest point format that has the fields of both, if there is one.
+pub fn holding(one: u8, two: u8) -> Option<u8> {
+    let fields = |format: u8| -> Vec<String> {
+        let schema = super::format::schema(format, &[], 0, [1.0; 3], [0.0; 3]);
+        schema.dimensions.into_iter().map(|dimension| dimension.name).collect()
+    };
+    let (one, two) = (fields(one), fields(two));
+    (0..=10).find(|&format| {
+        let own = fields(format);
+        one.iter().chain(&two).all(|name| own.contains(name))
+    })
+}
+
+/// What helps where the scales or offsets of two inputs differ.
+pub fn help(one: &LasInput, two: &LasInput) -> String {
+    let (a, b) = (one.header.scale(), two.header.scale());
+    let finer: [f64; 3] = std::array::from_fn(|axis| a[axis].min(b[axis]));
+    match a == b {
+        true => {
+            let offset = smallest([&one.header, &two.header].into_iter());
+            format!(
+                "give `read.offset = {offset:?}`: coordinates that are no steps from there are \
+                 rounded, which is told; a finer `read.scale` rounds less"
+            )
+        }
+        false if finer.iter().all(|scale| *scale == finer[0]) => {
+            format!("give `read.scale = {:?}`, the finer of both", finer[0])
+        }
+        false => format!("give `read.scale = {finer:?}`, the finer of both"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_smallest_format_that_holds_two() {
+        for (one, two, both) in [
+            (0, 1, Some(1)),
+            (1, 2, Some(3)),
+            (3, 3, Some(3)),
+            (6, 7, Some(7)),
+            (8, 6, Some(8)),
+            (4, 2, Some(5)),
+            (9, 8, Some(10)),
+        ] {
+            assert_eq!((holding(one, two), holding(two, one)), (both, both), "{one} {two}");
+        }
+    }
+}
