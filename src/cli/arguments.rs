@@ -27,7 +27,7 @@ pub(super) use plain::{
 pub(super) use reduce::ReduceArguments;
 pub(super) use reproduce::ReproduceArguments;
 pub(super) use shared::{
-    CommonArguments, FilterArguments, Progress, ReadArguments, WrittenArguments,
+    BulkArguments, CommonArguments, FilterArguments, Progress, ReadArguments, WrittenArguments,
 };
 pub(super) use verify::VerifyArguments;
 
@@ -171,6 +171,8 @@ pub(super) struct ConvertArguments {
     pub read: ReadArguments,
     #[command(flatten)]
     pub written: WrittenArguments,
+    #[command(flatten)]
+    pub bulk: BulkArguments,
     #[command(flatten)]
     pub common: CommonArguments,
 }

@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
@@ -9,8 +10,8 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::arguments::{Command, Progress};
-use super::draw::{Draw, Nothing, watched};
-use super::events::{Events, RunEvents};
+use super::draw::{Draw, Nothing, of_input, watched};
+use super::events::{Events, RunEvents, error_keys};
 use super::progress::Bars;
 use super::words::{Told, Words};
 use super::{interrupt, print};
@@ -31,6 +32,8 @@ pub(super) struct Console {
     interrupted: OnceLock<Arc<AtomicBool>>,
     /// Said behind what a run chose by itself.
     hint: OnceLock<&'static str>,
+    /// True while several runs work at once: of each only warnings and errors are told.
+    several: AtomicBool,
 }
 
 enum Voice {
@@ -56,7 +59,18 @@ impl Console {
             verbose: common.is_some_and(|common| common.verbose),
             interrupted: OnceLock::new(),
             hint: OnceLock::new(),
+            several: AtomicBool::new(false),
         }
+    }
+
+    /// From now on several runs work at once: no bars, no phases.
+    pub fn tell_several(&self) {
+        self.several.store(true, Ordering::Relaxed);
+    }
+
+    /// An error as JSON, in the words of the command.
+    pub fn in_words(&self, error: &Error) -> Value {
+        error_keys(&Told::of(error, &self.words))
     }
 
     /// From now on Ctrl-C asks the run to stop, rather than ending the process.
@@ -89,9 +103,14 @@ impl Console {
 
     /// Runs a plan and tells what it does, until it is told to stop.
     pub fn run(&self, plan: Plan) -> Result<Done> {
+        self.run_of(None, plan)
+    }
+
+    /// The same for one `input` of many, which warnings name.
+    pub fn run_of(&self, input: Option<&Path>, plan: Plan) -> Result<Done> {
         self.planned(&plan);
         let unit = plan.unit();
-        self.watched(unit, |watch| plan.run(watch)).inspect(|done| self.done(done))
+        self.watched_of(input, unit, |watch| plan.run(watch)).inspect(|done| self.done(done))
     }
 
     /// The same, for outputs that are to take so many bytes.
@@ -118,15 +137,28 @@ impl Console {
         unit: Option<&'static str>,
         run: impl FnOnce(&dyn Watch) -> Result<T>,
     ) -> Result<T> {
+        self.watched_of(None, unit, run)
+    }
+
+    fn watched_of<T>(
+        &self,
+        input: Option<&Path>,
+        unit: Option<&'static str>,
+        run: impl FnOnce(&dyn Watch) -> Result<T>,
+    ) -> Result<T> {
+        let input = input.map(|input| shown(input).to_string());
         let cancelled = || self.cancelled();
         match &self.voice {
             _ if self.quiet => watched(&mut Nothing, &cancelled, run),
+            _ if self.several.load(Ordering::Relaxed) => {
+                watched(&mut WarningsAlone { console: self, input }, &cancelled, run)
+            }
             Voice::Json(events) => {
-                watched(&mut RunEvents::new(events, &self.words), &cancelled, run)
+                watched(&mut RunEvents::new(events, &self.words, input), &cancelled, run)
             }
             Voice::Text(bars) => {
                 let bars = Bars::new(*bars, self.verbose);
-                let mut text = RunText { console: self, unit, bars };
+                let mut text = RunText { console: self, input, unit, bars };
                 let done = watched(&mut text, &cancelled, run);
                 text.bars.end();
                 done
@@ -173,9 +205,22 @@ impl Console {
     }
 }
 
+/// Tells what a run warns of, and nothing else.
+struct WarningsAlone<'a> {
+    console: &'a Console,
+    input: Option<String>,
+}
+
+impl Draw for WarningsAlone<'_> {
+    fn warn(&mut self, message: &str) {
+        self.console.warn(&of_input(self.input.as_deref(), message));
+    }
+}
+
 /// Tells what a run does as text.
 struct RunText<'a> {
     console: &'a Console,
+    input: Option<String>,
     /// The sign of the unit that lengths are in.
     unit: Option<&'static str>,
     bars: Bars,
@@ -199,7 +244,8 @@ impl Draw for RunText<'_> {
     }
 
     fn warn(&mut self, message: &str) {
-        self.bars.beside(|| self.console.warn(message));
+        let message = of_input(self.input.as_deref(), message);
+        self.bars.beside(|| self.console.warn(&message));
     }
 
     fn chose(&mut self, values: &[Decision]) {

@@ -1,28 +1,28 @@
 //! `convert`: all inputs to one file, or each to its own.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::arguments::ConvertArguments;
+use super::arguments::{BulkArguments, ConvertArguments};
+use super::batch::{BatchRun, BatchWork, jobs_for, run_all, threads_of};
 use super::console::Console;
 use super::flags::{common_flags, convert_flags, given, one_form};
 use super::mistyped::marked;
 use super::pipeline::{HIDDEN, with_stages};
 use super::run::{finish, mill};
-use crate::budget::Bytes;
-use crate::engine::{Done, make_folder, refuse_existing};
+use crate::compare::is_current;
+use crate::engine::{make_folder, refuse_existing};
 use crate::error::{listed, shown};
 use crate::graph::Existing;
 use crate::graph::Graph;
 use crate::host::{Clash, Files, Use};
-use crate::io::ends::{expand_any, unreadable};
+use crate::io::ends::{MirroredFile, expand_mirrored, unreadable};
 use crate::language::Registry;
-use crate::report::Grouped;
 use crate::stage::Formats;
-use crate::{Error, ErrorKind, Result};
+use crate::{Error, Result};
 
 /// The pipeline of `convert`, which users copy.
 const CONVERT: &str = include_str!("../../pipelines/convert.toml");
@@ -36,64 +36,117 @@ pub(super) fn convert(
 ) -> Result<()> {
     let (folder, formats) = (Path::new(&arguments.output), registry.formats());
     if !(arguments.output.ends_with('/') || folder.is_dir()) {
+        refuse_bulk(&arguments.bulk, &arguments.output)?;
         let one = pipeline(arguments, json!(arguments.inputs), json!(arguments.output), registry);
         return finish(&mill(one?, console)?, console);
     }
-    let (inputs, odd): (Vec<PathBuf>, Vec<PathBuf>) = expand_any(&arguments.inputs, formats)?
-        .into_iter()
-        .partition(|input| input.to_str().is_some());
+    let (inputs, odd): (Vec<MirroredFile>, Vec<MirroredFile>) =
+        expand_mirrored(&arguments.inputs, formats)?
+            .into_iter()
+            .partition(|input| input.file.to_str().is_some());
     if let ([], [first, ..]) = (&inputs[..], &odd[..]) {
-        return Err(unreadable(first));
+        return Err(unreadable(&first.file));
     }
     if inputs.len() > 1 && arguments.common.report.is_some() {
         let told = "--report: is for one output, and this makes several";
         let report = arguments.common.report.as_deref().unwrap_or_default();
-        let note = "leave --report out, or convert the files one by one";
+        let note = "leave --report out, or convert the files one by one; --summary tells of all";
         return Err(Error::pipeline(marked(told, report, note)));
     }
     let pairs = outputs(&inputs, folder, arguments.to.as_deref(), formats)?;
-    check_files(&pairs, arguments, formats)?;
     // Every pipeline is checked before the first is run.
-    let mut runs = Vec::new();
+    let mut runs: Vec<BatchRun> = odd.into_iter().map(|odd| refused(odd.file)).collect();
     for (input, output) in pairs {
         // Names of inputs are text, and so is what is added to them.
         let text = |path: &Path| json!(path.to_string_lossy());
-        let one = pipeline(arguments, text(&input), text(&output), registry)?;
-        runs.push((input, one));
+        let graph = pipeline(arguments, text(&input), text(&output), registry)?;
+        let is_current = arguments.bulk.resume && is_current(&graph, &output, formats);
+        let work = if is_current { BatchWork::Current } else { BatchWork::Convert(graph) };
+        runs.push(BatchRun { input, output: Some(output), work });
     }
-    let made = make_folder(folder)?;
-    let (done, outcome) = run_all(runs, odd, console);
-    if done.is_empty() {
-        // Left behind if any output is in it, which is as it should be.
-        made.iter().rev().for_each(|made| drop(std::fs::remove_dir(made)));
-    } else {
-        console.result(Total::of(&done).told(&arguments.output, outcome.as_ref().err()))?;
+    check_files(&runs, arguments, formats)?;
+    run_batch(runs, arguments, folder, console)
+}
+
+/// Runs all conversions and tells what became of them.
+fn run_batch(
+    runs: Vec<BatchRun>,
+    arguments: &ConvertArguments,
+    folder: &Path,
+    console: &Console,
+) -> Result<()> {
+    let graph = |run: &BatchRun| match &run.work {
+        BatchWork::Convert(graph) => Some(threads_of(&graph.settings)),
+        _ => None,
+    };
+    let threads = runs.iter().find_map(graph).unwrap_or(1);
+    let inputs: Vec<PathBuf> = runs.iter().map(|run| run.input.clone()).collect();
+    let jobs = match arguments.bulk.jobs {
+        Some(jobs) => jobs.get(),
+        None => jobs_for(&inputs, threads),
+    };
+    let mut made = make_folder(folder)?;
+    let parents = runs.iter().filter_map(|run| run.output.as_ref()?.parent());
+    for parent in parents.collect::<BTreeSet<_>>() {
+        made.extend(make_folder(parent)?);
     }
-    outcome
+    let all = run_all(runs, jobs, console);
+    // Left behind if any output is in one, which is as it should be.
+    made.iter().rev().for_each(|made| drop(std::fs::remove_dir(made)));
+    if let Some(path) = &arguments.bulk.summary {
+        all.write_summary(path, console)?;
+    }
+    if all.has_outputs() {
+        console.result(all.told(&arguments.output))?;
+    }
+    all.outcome()
+}
+
+/// An input of whose name there can be no pipeline.
+fn refused(input: PathBuf) -> BatchRun {
+    let error = unreadable(&input);
+    BatchRun { input, output: None, work: BatchWork::Refused(error) }
+}
+
+/// Refuses what is for several outputs where there is one.
+fn refuse_bulk(bulk: &BulkArguments, output: &str) -> Result<()> {
+    let given = [
+        ("--jobs", bulk.jobs.is_some()),
+        ("--resume", bulk.resume),
+        ("--summary", bulk.summary.is_some()),
+    ];
+    match given.into_iter().find(|(_, is_given)| *is_given) {
+        None => Ok(()),
+        Some((flag, _)) => {
+            let told = format!("{flag}: is for a folder of outputs, and this makes one file");
+            Err(Error::pipeline(told).help(format!(
+                "leave {flag} out, or give a folder: `-o {}/`",
+                shown(&Path::new(output).with_extension(""))
+            )))
+        }
+    }
 }
 
 /// No output of the whole batch may replace an input of it, be it one of another conversion that is
 /// reached through a link, nor another output.
-fn check_files(
-    pairs: &[(PathBuf, PathBuf)],
-    arguments: &ConvertArguments,
-    formats: &Formats,
-) -> Result<()> {
+fn check_files(runs: &[BatchRun], arguments: &ConvertArguments, formats: &Formats) -> Result<()> {
     let mut files = Files::default();
-    let beside = |input| formats.of(input).and_then(|format| format.beside(input));
-    let beside: Vec<_> = pairs.iter().map(|(input, _)| beside(input)).collect();
-    pairs.iter().for_each(|(input, _)| files.read(input, Use::Input));
+    let beside = |input: &Path| formats.of(input).and_then(|format| format.beside(input));
+    let beside: Vec<_> = runs.iter().map(|run| beside(&run.input)).collect();
+    runs.iter().for_each(|run| files.read(&run.input, Use::Input));
     beside.iter().flatten().for_each(|(file, _)| files.read(file, Use::Input));
-    let existing = if arguments.common.no_clobber { Existing::Refuse } else { Existing::Replace };
+    let refuses = arguments.common.no_clobber;
     let refuse = |clash: Clash, output: &Path| {
         Error::pipeline(format!("-o: {} {clash}", shown(output)))
             .help("convert into another folder")
     };
-    for (_, output) in pairs {
+    for (run, beside) in runs.iter().zip(&beside) {
+        let Some(output) = &run.output else { continue };
         files.write(output).map_err(|clash| refuse(clash, output))?;
+        // What stands is not written again.
+        let stands = matches!(run.work, BatchWork::Current);
+        let existing = if refuses && !stands { Existing::Refuse } else { Existing::Replace };
         refuse_existing(output, existing)?;
-    }
-    for ((_, output), beside) in pairs.iter().zip(&beside) {
         let wanted = formats.of(output).is_none_or(|format| format.wants_beside());
         let Some((from, extension)) = beside.as_ref().filter(|_| wanted) else { continue };
         let to = output.with_extension(extension);
@@ -101,86 +154,15 @@ fn check_files(
             refuse_existing(&to, existing)?;
         }
     }
+    if let Some(summary) = &arguments.bulk.summary {
+        let refuse = |clash: Clash| {
+            Error::pipeline(format!("--summary: {} {clash}", shown(summary)))
+                .help("give it another name")
+        };
+        files.write(summary).map_err(refuse)?;
+        refuse_existing(summary, if refuses { Existing::Refuse } else { Existing::Replace })?;
+    }
     Ok(())
-}
-
-/// What several conversions came to.
-struct Total {
-    files: usize,
-    points: u64,
-    bytes: u64,
-    peak_bytes: Option<u64>,
-    seconds: f64,
-}
-
-impl Total {
-    fn of(all: &[Done]) -> Total {
-        let outputs = || all.iter().flat_map(|done| &done.report.run.outputs);
-        Total {
-            files: all.len(),
-            points: all.iter().map(|done| done.report.result.ledger.kept).sum(),
-            bytes: outputs().filter_map(|output| output.bytes).sum(),
-            peak_bytes: all.iter().filter_map(|done| done.report.run.peak_memory_bytes).max(),
-            seconds: all.iter().map(|done| done.report.run.seconds).sum(),
-        }
-    }
-
-    /// The closing table; `failed` tells what became of the others.
-    fn told(&self, folder: &str, failed: Option<&Error>) -> String {
-        let Total { files, points, bytes, peak_bytes, seconds } = self;
-        let mut told = format!("files      {files}\n");
-        if let Some(failed) = failed {
-            told += &format!("incomplete {failed}\n");
-        }
-        told += &format!("points     {}\n", Grouped(*points));
-        if let Some(peak) = peak_bytes {
-            told += &format!("memory     {} at most\n", Bytes(*peak));
-        }
-        told + &format!("time       {seconds:.1} s\noutput     {folder}, {}\n", Bytes(*bytes))
-    }
-}
-
-/// Runs one pipeline after the other. One that fails is told at once and does not keep the others
-/// from running, as do `odd` names, of which there can be no pipeline; the error in the end is of
-/// the first failure's kind, rather than that a result is not accepted. Returned are those that are
-/// done and what became of all.
-fn run_all(
-    runs: Vec<(PathBuf, Graph)>,
-    odd: Vec<PathBuf>,
-    console: &Console,
-) -> (Vec<Done>, Result<()>) {
-    let total = runs.len() + odd.len();
-    let mut done = Vec::new();
-    let mut failures: Vec<ErrorKind> = Vec::new();
-    for error in odd.iter().map(|name| unreadable(name)) {
-        failures.push(error.kind());
-        console.error(&error);
-    }
-    for (input, pipeline) in runs {
-        if console.cancelled() {
-            return (done, Err(Error::interrupted()));
-        }
-        match mill(pipeline, console) {
-            Ok(one) => {
-                if let Err(error) = one.accepted() {
-                    failures.push(error.kind());
-                    console.error(&error.at(input));
-                }
-                done.push(one);
-            }
-            Err(error) if total == 1 || error.kind() == ErrorKind::Interrupted => {
-                return (done, Err(error));
-            }
-            Err(error) => {
-                failures.push(error.kind());
-                console.error(&error.at(input));
-            }
-        }
-    }
-    let told = format!("{} of {total} conversions failed", failures.len());
-    let is_worse = |kind: &&ErrorKind| **kind != ErrorKind::NotAccepted;
-    let kind = failures.iter().find(is_worse).or(failures.first());
-    (done, kind.map_or(Ok(()), |kind| Err(Error::new(*kind, told))))
 }
 
 fn pipeline(
@@ -208,17 +190,17 @@ fn paths(inputs: &Value) -> Vec<String> {
     }
 }
 
-/// The output in `folder` of every input: its name, with the extension of the format that is asked
-/// for, or its own. No two may be the same.
+/// The output in `folder` of every input: its way from the folder that was named, with the extension
+/// of the format that is asked for, or its own. No two may be the same.
 fn outputs(
-    inputs: &[PathBuf],
+    inputs: &[MirroredFile],
     folder: &Path,
     to: Option<&str>,
     formats: &Formats,
 ) -> Result<Vec<(PathBuf, PathBuf)>> {
     let mut taken: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     let mut all = Vec::new();
-    for input in inputs {
+    for MirroredFile { file: input, way } in inputs {
         let own = || formats.of(input).map(|format| format.extension());
         let asked = |to| formats.iter().find(|f| f.name() == to).map_or(to, |f| f.extension());
         let (Some(stem), Some(extension)) = (formats.stem(input), to.map(asked).or_else(own))
@@ -228,10 +210,13 @@ fn outputs(
             return Err(Error::pipeline(told).help(format!("add --to {known}")));
         };
         let name: OsString = [stem, ".".as_ref(), extension.as_ref()].into_iter().collect();
-        let output = folder.join(name);
+        let output = folder.join(way).with_file_name(name);
         if let Some(other) = taken.insert(output.clone(), input) {
             let (a, b, output) = (shown(other), shown(input), shown(&output));
-            return Err(Error::pipeline(format!("{a} and {b} would both become {output}")));
+            let told = format!("{a} and {b} would both become {output}");
+            return Err(Error::pipeline(told).help(
+                "a quoted pattern, such as 'survey/**/*.laz', keeps folders apart; so does @LIST",
+            ));
         }
         all.push((input.clone(), output));
     }
@@ -243,7 +228,12 @@ mod tests {
     use super::*;
 
     fn of(inputs: &[&str], to: Option<&str>) -> Result<Vec<String>> {
-        let inputs: Vec<PathBuf> = inputs.iter().map(PathBuf::from).collect();
+        let file = |file: &PathBuf| MirroredFile {
+            way: file.file_name().map(PathBuf::from).unwrap_or_default(),
+            file: file.clone(),
+        };
+        let inputs: Vec<MirroredFile> =
+            inputs.iter().map(PathBuf::from).map(|p| file(&p)).collect();
         let outputs = outputs(&inputs, Path::new("out"), to, Registry::builtin().formats())?;
         Ok(outputs.into_iter().map(|(_, output)| output.display().to_string()).collect())
     }

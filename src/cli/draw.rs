@@ -7,6 +7,7 @@
 //! second. A terminal that takes nothing (Ctrl-S) therefore holds a run up only when the channel is
 //! full.
 
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
@@ -47,6 +48,14 @@ pub(super) trait Draw: Send {
 pub(super) struct Nothing;
 
 impl Draw for Nothing {}
+
+/// A warning of one input of many: it names it.
+pub(super) fn of_input<'a>(input: Option<&str>, message: &'a str) -> Cow<'a, str> {
+    match input.filter(|input| !message.contains(input)) {
+        Some(input) => format!("{input}: {message}").into(),
+        None => message.into(),
+    }
+}
 
 /// What is said to the drawing thread.
 enum Event {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use super::draw::Draw;
+use super::draw::{Draw, of_input};
 use super::exit::exit_number;
 use super::print;
 use super::words::{Told, Words};
@@ -76,28 +76,7 @@ impl Events {
 
     /// A failure, with the exit code that it leads to.
     pub fn error(&self, told: &Told<'_>) {
-        let error = told.error;
-        let kind = match error.kind() {
-            ErrorKind::Io => "io",
-            ErrorKind::Data => "data",
-            ErrorKind::Pipeline => "pipeline",
-            ErrorKind::Memory => "memory",
-            ErrorKind::NotAccepted => "not accepted",
-            ErrorKind::Interrupted => "interrupted",
-            ErrorKind::Internal => "internal",
-        };
-        self.tell(
-            "error",
-            json!({
-                "kind": kind,
-                "message": told.message,
-                "causes": told.causes,
-                "file": error.path().map(|path| path.display().to_string()),
-                "byte": error.byte(),
-                "help": told.help,
-                "exit_code": exit_number(error),
-            }),
-        );
+        self.tell("error", error_keys(told));
     }
 
     /// Prints an event with its name and time before its own keys.
@@ -113,18 +92,43 @@ impl Events {
     }
 }
 
+/// What is told of an error, in the words of a command.
+pub(super) fn error_keys(told: &Told<'_>) -> Value {
+    let error = told.error;
+    let kind = match error.kind() {
+        ErrorKind::Io => "io",
+        ErrorKind::Data => "data",
+        ErrorKind::Pipeline => "pipeline",
+        ErrorKind::Memory => "memory",
+        ErrorKind::NotAccepted => "not accepted",
+        ErrorKind::Interrupted => "interrupted",
+        ErrorKind::Internal => "internal",
+    };
+    json!({
+        "kind": kind,
+        "message": told.message,
+        "causes": told.causes,
+        "file": error.path().map(|path| path.display().to_string()),
+        "byte": error.byte(),
+        "help": told.help,
+        "exit_code": exit_number(error),
+    })
+}
+
 /// Tells what a run does as events, in the words of a command.
 pub(super) struct RunEvents<'a> {
     events: &'a Events,
     words: &'a Words,
     /// The phase that it is in, its points, and how many of them were told to be done.
     phase: Option<(&'static str, Option<u64>, u64)>,
+    /// The input, where it is one of many.
+    input: Option<String>,
 }
 
 impl<'a> RunEvents<'a> {
     /// Of a run that has no phase yet.
-    pub fn new(events: &'a Events, words: &'a Words) -> Self {
-        RunEvents { events, words, phase: None }
+    pub fn new(events: &'a Events, words: &'a Words, input: Option<String>) -> Self {
+        RunEvents { events, words, phase: None, input }
     }
 
     fn progress(&mut self, done: u64) {
@@ -158,7 +162,8 @@ impl Draw for RunEvents<'_> {
     }
 
     fn warn(&mut self, message: &str) {
-        self.events.warn(&self.words.told(message));
+        let message = of_input(self.input.as_deref(), message);
+        self.events.warn(&self.words.told(&message));
     }
 
     fn chose(&mut self, values: &[Decision]) {

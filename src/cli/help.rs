@@ -46,6 +46,8 @@ const GROUPS: &[(&str, &str, &[&str])] = &[
             "from",
             "columns",
             "scans",
+            "crs",
+            "assume",
             "classes",
             "keep_classes",
             "drop_classes",
@@ -78,8 +80,19 @@ const GROUPS: &[(&str, &str, &[&str])] = &[
     (
         "convert",
         "Which points",
-        &["from", "columns", "scans", "keep_classes", "drop_classes", "nonfinite", "headers"],
+        &[
+            "from",
+            "columns",
+            "scans",
+            "crs",
+            "assume",
+            "keep_classes",
+            "drop_classes",
+            "nonfinite",
+            "headers",
+        ],
     ),
+    ("convert", "Many files", &["jobs", "resume", "summary"]),
     (
         "convert",
         "Output",
@@ -137,6 +150,7 @@ can be copied and changed.",
 Examples:
   pointmill convert survey/*.las -o survey.laz
   pointmill convert survey/*.las -o compressed/ --to laz
+  pointmill convert 'survey/**/*.las' -o compressed/ --to laz --resume --summary done.json
   pointmill convert scan.ply -o scan.laz --scale 0.001 --drop confidence",
     ),
     (

@@ -5,6 +5,7 @@
 //! a signal).
 
 mod arguments;
+mod batch;
 mod check;
 mod classes;
 mod compare;

@@ -62,7 +62,7 @@ pub(super) fn escaped(text: &str) -> String {
 
 /// The same JSON: such characters stand in its texts alone, as far as they are not escaped there
 /// already, and are escaped as JSON escapes.
-fn json_escaped(json: &str) -> String {
+pub(super) fn json_escaped(json: &str) -> String {
     let mut out = String::with_capacity(json.len());
     for c in json.chars() {
         match is_control(c) && c != '\n' {

@@ -7,6 +7,8 @@
 //! record that was kept is looked for among those of the original, and of every other position of
 //! the original it is measured how far it is from the surface that the kept points say.
 
+#[cfg(feature = "cli")]
+mod current;
 mod depth;
 mod meet;
 mod planes;
@@ -18,6 +20,8 @@ mod told;
 mod verdict;
 mod verify;
 
+#[cfg(feature = "cli")]
+pub(crate) use current::is_current;
 pub use depth::{DepthCounts, DepthErrors, DepthSettings, MOST_PIXELS, depth_errors};
 pub use reproduce::{FoundInput, ReproduceSettings, Reproduction, reproduce};
 pub use verdict::{DistanceFigures, ForeignRecord, Verification};

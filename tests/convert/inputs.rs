@@ -145,7 +145,10 @@ fn a_missing_system_is_assumed_and_a_wrong_one_replaced() {
     // It is what a text of coordinates is said to be in, too.
     done(at, &["convert", none, "-o", "o.xyz", "--quiet"]);
     done(at, &["convert", "o.xyz", "-o", "o.ply", "--crs", "EPSG:25832+7837", "--quiet"]);
-    assert!(std::fs::read_to_string(at.join("o.ply")).unwrap().contains("crs: EPSG:25832+7837"));
+    assert!({
+        let bytes = std::fs::read(at.join("o.ply")).unwrap();
+        String::from_utf8_lossy(&bytes).contains("crs: EPSG:25832+7837")
+    });
     done(at, &["convert", "o.ply", "-o", "p.laz", "--scale", "0.01", "--quiet"]);
     assert_eq!(info(at, "p.laz")["crs"], "EPSG:25832+7837");
 }

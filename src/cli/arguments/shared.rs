@@ -1,8 +1,12 @@
 //! The arguments that several commands have.
 
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
 use clap::{Args, ValueEnum};
 
 use crate::cli::classes::{Classes, parse_classes};
+use crate::quantity::parse_count;
 
 /// Common to all commands that run a pipeline.
 #[derive(Debug, Clone, Args)]
@@ -121,4 +125,28 @@ pub(crate) struct WrittenArguments {
     /// are more than coordinates, or CSV]
     #[arg(long, value_name = "BOOL")]
     pub header: Option<bool>,
+}
+
+/// How many files are converted, each by itself.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Many files")]
+pub(crate) struct BulkArguments {
+    /// Files that are converted at once, which share memory and threads [default: as many as
+    /// threads where there are many small files, else 1]
+    #[arg(long, value_name = "N", value_parser = parse_jobs)]
+    pub jobs: Option<NonZeroUsize>,
+    /// Leave outputs that say that they were made so, of inputs that have not changed since; those
+    /// of another version, or that do not say how they were made (texts), are made again
+    #[arg(long, conflicts_with = "no_provenance")]
+    pub resume: bool,
+    /// Write what became of each file to this one, as JSON
+    #[arg(long, value_name = "FILE")]
+    pub summary: Option<PathBuf>,
+}
+
+fn parse_jobs(text: &str) -> Result<NonZeroUsize, String> {
+    match parse_count(text).ok().and_then(|jobs| NonZeroUsize::new(usize::try_from(jobs).ok()?)) {
+        Some(jobs) if jobs.get() <= 256 => Ok(jobs),
+        _ => Err("is a whole number from 1 to 256".to_owned()),
+    }
 }

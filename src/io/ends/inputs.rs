@@ -31,26 +31,39 @@ pub fn unreadable(file: &Path) -> Error {
 ///
 /// # Errors
 /// Those of [`expand`] but for such names.
-pub fn expand_any<P: AsRef<str>>(paths: &[P], formats: &Formats) -> Result<Vec<PathBuf>> {
-    let mut files: Vec<PathBuf> = Vec::new();
+fn expand_any<P: AsRef<str>>(paths: &[P], formats: &Formats) -> Result<Vec<PathBuf>> {
+    let means = each(paths, formats)?;
+    once(&means)?;
+    Ok(means.into_iter().flat_map(|(_, files)| files).collect())
+}
+
+/// Each path with the files that it means.
+pub(super) fn each<'a, P: AsRef<str>>(
+    paths: &'a [P],
+    formats: &Formats,
+) -> Result<Vec<(&'a str, Vec<PathBuf>)>> {
+    let paths = paths.iter().map(AsRef::as_ref);
+    paths.map(|path| Ok((path, one(path, formats)?))).collect()
+}
+
+/// Refuses a file that is meant twice, and paths that mean none.
+pub(super) fn once(means: &[(&str, Vec<PathBuf>)]) -> Result<()> {
     let mut named = BTreeSet::new();
-    for path in paths.iter().map(AsRef::as_ref) {
-        for file in one(path, formats)? {
-            if !named.insert(file.canonicalize().unwrap_or_else(|_| file.clone())) {
-                let (twice, path) = (shown(&file).to_string(), shown(Path::new(path)).to_string());
-                let told = match twice == path {
-                    true => format!("`{path}` is a file that is named before it"),
-                    false => format!("`{path}` means {twice}, which is named before it"),
-                };
-                return Err(Error::pipeline(told));
-            }
-            files.push(file);
+    for (path, file) in means.iter().flat_map(|(path, files)| files.iter().map(move |f| (path, f)))
+    {
+        if !named.insert(file.canonicalize().unwrap_or_else(|_| file.clone())) {
+            let (twice, path) = (shown(file).to_string(), shown(Path::new(path)).to_string());
+            let told = match twice == path {
+                true => format!("`{path}` is a file that is named before it"),
+                false => format!("`{path}` means {twice}, which is named before it"),
+            };
+            return Err(Error::pipeline(told));
         }
     }
-    if files.is_empty() {
-        return Err(Error::pipeline("no input is named"));
+    match named.is_empty() {
+        true => Err(Error::pipeline("no input is named")),
+        false => Ok(()),
     }
-    Ok(files)
 }
 
 /// What the lines of the list at `list` mean.

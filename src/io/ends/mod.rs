@@ -7,6 +7,8 @@ mod inputs;
 mod kinds;
 mod list;
 mod mesh;
+#[cfg(feature = "cli")]
+mod mirror;
 mod outputs;
 mod roles;
 mod squares;
@@ -15,6 +17,8 @@ mod values;
 pub(crate) use discard::CountedSink;
 pub use discard::Discard;
 #[cfg(feature = "cli")]
-pub(crate) use inputs::{expand, expand_any, unreadable};
+pub(crate) use inputs::{expand, unreadable};
 pub use kinds::{OutputOrder, Read, Write};
 pub use mesh::Mesh;
+#[cfg(feature = "cli")]
+pub(crate) use mirror::{MirroredFile, expand_mirrored};
