@@ -305,6 +305,11 @@ impl Error {
         self.0.offset
     }
 
+    /// What is wrong, without the place.
+    pub(crate) fn message(&self) -> &str {
+        &self.0.message
+    }
+
     /// What the user can do, where something can be done.
     pub fn remedy(&self) -> Option<&str> {
         self.0.help.as_deref()

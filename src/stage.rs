@@ -22,7 +22,7 @@ use crate::report::Tally;
 pub use crate::geom::lattice::{Lattice, Misplaced};
 pub use crate::store::{KeptPoints, KeptReader, Levels};
 pub use format::{CreateFor, Format, FormatName, Formats, foreign};
-pub use keys::{Assumption, Colors, OutputEncoding, ReadKeys, Separator, WriteKeys};
+pub use keys::{Assumption, Colors, OnError, OutputEncoding, ReadKeys, Separator, WriteKeys};
 pub use kind::{StageKind, StagePlace};
 pub use needs::Needs;
 pub use rounds::{

@@ -265,6 +265,7 @@ fn read(arguments: &ReadArguments) -> Vec<CommandFlag> {
         ("--columns", "read.columns", columns),
         ("--scans", "read.scans", scans),
         ("--crs", "read.crs", arguments.crs.clone().map(FlagValue::from)),
+        ("--on-error", "read.on_error", arguments.on_error.clone().map(FlagValue::from)),
         ("--assume", "read.assume", assumed.then(|| json!(arguments.assume).into())),
     ])
 }

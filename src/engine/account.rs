@@ -62,6 +62,7 @@ impl Task {
             memory_holders: job.budget.at_peak(),
             spill_bytes: job.area.written(),
             warnings,
+            lost: self.source.lost(),
             ..RunFigures::default()
         }
     }

@@ -116,6 +116,22 @@ pub struct RunFigures {
     pub work: BTreeMap<String, u64>,
     /// What the user was warned of.
     pub warnings: Vec<String>,
+    /// Points of damaged inputs that were not read; not written where there are none.
+    pub lost: Vec<LostPoints>,
+}
+
+/// Points of a damaged input that are lost.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct LostPoints {
+    /// The file.
+    pub path: String,
+    /// The byte from which on they are not read.
+    pub byte: u64,
+    /// How many.
+    pub points: u64,
+    /// Why.
+    pub why: String,
 }
 
 /// A file and the records in it.
@@ -249,6 +265,9 @@ impl RunFigures {
         object.entry("phases", &self.phases)?;
         object.entry("work", &self.work)?;
         object.entry("warnings", &self.warnings)?;
+        if !self.lost.is_empty() {
+            object.entry("lost", &self.lost)?;
+        }
         object.close()
     }
 }

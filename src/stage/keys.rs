@@ -18,6 +18,8 @@ pub struct ReadKeys {
     pub crs: Option<String>,
     /// What is taken for granted of inputs that do not say it.
     pub assume: Vec<Assumption>,
+    /// What is done about damage.
+    pub on_error: OnError,
     /// Scale that LAS inputs of different scales or offsets are brought to.
     pub scale: Option<[f64; 3]>,
     /// Offset that they are brought to.
@@ -32,6 +34,7 @@ impl ReadKeys {
         let all = [
             ("columns", self.columns.is_some()),
             ("scans", self.scans.is_some()),
+            ("on_error", self.on_error != OnError::Fail),
             ("scale", self.scale.is_some()),
             ("offset", self.offset.is_some()),
             ("point_format", self.point_format.is_some()),
@@ -47,6 +50,21 @@ impl ReadKeys {
 pub enum Assumption {
     /// They are in the coordinate reference system that the other inputs name.
     Crs,
+}
+
+/// What is done about damage in an input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum OnError {
+    /// The run fails.
+    #[default]
+    Fail,
+    /// What is damaged is left out, of LAZ whole chunks; what is lost is told.
+    Skip,
+    /// What can be read of it is read, of a damaged chunk the points before the damage shows, of
+    /// which the last may be wrong; what is lost is told.
+    Salvage,
 }
 
 /// What an output is to be, as far as formats need to know: keys of `write`.

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::point::{Metadata, PointBatch, Schema};
+use crate::report::LostPoints;
 use crate::{Error, Result};
 
 /// Opens the inputs of a source: headers only, no point.
@@ -132,6 +133,12 @@ pub trait Source: Send + Sync {
 
     /// Warnings for the user that opening or reading gave rise to (dropped faces, odd headers).
     fn warnings(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Points of damaged inputs that were not read, as the user wanted. Asked when every part was
+    /// read to its end.
+    fn lost(&self) -> Vec<LostPoints> {
         Vec::new()
     }
 

@@ -2,6 +2,7 @@
 
 mod bulk;
 mod colors;
+mod damage;
 mod fields;
 mod inputs;
 mod point_formats;

@@ -83,6 +83,10 @@ pub(crate) struct ReadArguments {
     /// vertical one EPSG:25832+7837, or WKT; nothing is reprojected [default: as they say]
     #[arg(long, value_name = "CRS")]
     pub crs: Option<String>,
+    /// What is done about damaged LAS and LAZ: fail; skip what is damaged, of LAZ whole chunks; or
+    /// salvage what can be read, also of damaged chunks. What is lost is told [default: fail]
+    #[arg(long, value_name = "HOW")]
+    pub on_error: Option<String>,
     /// What is taken for granted: crs, that inputs which name no coordinate reference system are in
     /// the one that the others name
     #[arg(long, value_name = "WHAT", value_delimiter = ',')]

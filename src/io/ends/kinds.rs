@@ -13,8 +13,8 @@ use crate::error::{listed, shown};
 use crate::io::sniff::{of_extension, upper};
 use crate::quantity::{Length, Whole};
 use crate::stage::{
-    Assumption, Colors, Format, FormatName, Formats, Order, OutputEncoding, ReadKeys, Separator,
-    WriteKeys,
+    Assumption, Colors, Format, FormatName, Formats, OnError, Order, OutputEncoding, ReadKeys,
+    Separator, WriteKeys,
 };
 use crate::{Error, Result};
 
@@ -109,6 +109,14 @@ pub struct Read {
     /// are in the one that the others name.
     #[serde(default)]
     pub assume: Vec<Assumption>,
+    /// What is done about damage in LAS and LAZ: `"fail"`; `"skip"`, which leaves out what is
+    /// damaged, of LAZ whole chunks; `"salvage"`, which reads what can be read, also of a damaged
+    /// chunk the points before the damage shows, of which the last may be wrong. A file that ends
+    /// too early has as many points as it holds, one whose header counts too few has those behind
+    /// them as well, and variable length records that are cut off are left out. What is lost is
+    /// told, and counted in the report.
+    #[serde(default)]
+    pub on_error: OnError,
     /// Scale that LAS inputs are brought to as they are read, where their scales differ or their
     /// offsets are not whole steps apart; none: such inputs are refused.
     #[serde(default, deserialize_with = "some_scale")]
@@ -303,6 +311,7 @@ impl Read {
         keys.scans = scans.map(|scans| scans.iter().map(|number| number.get()).collect());
         keys.crs.clone_from(&self.crs);
         keys.assume.clone_from(&self.assume);
+        keys.on_error = self.on_error;
         (keys.scale, keys.offset) = (self.scale, self.offset);
         keys.point_format = self.point_format.map(|format| format.get() as u8);
         keys

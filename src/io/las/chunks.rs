@@ -1,6 +1,7 @@
 //! Where the chunks of a LAZ file are. Every claim is held against the file's length before it
 //! costs memory.
 
+use super::damage::Mending;
 use super::file::InputFile;
 use super::header::Header;
 use super::laz::{Compression, Compressor, Damage, Numbers, Why};
@@ -30,46 +31,50 @@ pub enum Chunks {
 }
 
 impl Chunks {
-    /// Finds the chunks of `file`, whose points end before byte `end`. The second value is a
-    /// warning, if there is one.
+    /// Finds the chunks of `file`, whose points end before byte `end`; those that are not there are
+    /// lost, if damage is mended.
     pub fn read(
         file: &InputFile,
         header: &Header,
         compression: &Compression,
         end: u64,
-    ) -> Result<(Self, Option<String>)> {
+        mending: &mut Mending,
+    ) -> Result<Self> {
         let points = header.points();
         let start = u64::from(header.offset_to_point_data);
         if points == 0 {
-            return Ok((Chunks::Known(ChunkList::default()), None));
+            return Ok(Chunks::Known(ChunkList::default()));
         }
         if compression.compressor == Compressor::PointWise {
             let all = Chunk { start, end, points, whole: true };
-            plausible(file, all)?;
-            return Ok((Chunks::Known(ChunkList::of(all)), None));
+            let all = plausible(file, all, mending)?;
+            return Ok(Chunks::Known(ChunkList::of(all)));
         }
         let first = start + TABLE_OFFSET_BYTES;
         if first > file.len() {
-            return Err(file
+            let error = file
                 .wrong(file.len(), "the file ends before its first point")
-                .help("the copy or download is incomplete"));
+                .help("the copy or download is incomplete");
+            mending.lose(file, file.len(), points, error)?;
+            return Ok(Chunks::Known(ChunkList::default()));
         }
-        let why = match table(file, start, points, compression) {
+        let why = match table(file, start, points, compression, mending) {
             Ok(found) => return Ok(found),
             Err(Unusable::Because(why)) => why,
             Err(Unusable::Failed(error)) => return Err(error),
         };
         match (compression.compressor, compression.chunk_points) {
             (Compressor::Layered, _) => {
-                let chunks = walk(file, first, points, compression)?;
-                Ok((Chunks::Known(chunks), Some(format!("{}: {why}", shown(file.path())))))
+                mending.warnings.push(format!("{}: {why}", shown(file.path())));
+                walk(file, first, points, compression, mending).map(Chunks::Known)
             }
             (_, Some(chunk_points)) => {
                 let all = Chunk { start: first, end: file.len(), points, whole: false };
-                plausible(file, all)?;
+                let all = plausible(file, all, mending)?;
                 let chunk_points = u64::from(chunk_points);
                 let warning = format!("{}: {why}; it is read by one thread", shown(file.path()));
-                Ok((Chunks::InARow { all, chunk_points }, Some(warning)))
+                mending.warnings.push(warning);
+                Ok(Chunks::InARow { all, chunk_points })
             }
             (_, None) => Err(file
                 .wrong(start, format!("{why}, and chunks of varying size need one"))
@@ -86,14 +91,17 @@ impl Chunks {
     }
 }
 
-fn plausible(file: &InputFile, all: Chunk) -> Result<()> {
+/// `all`, whose points can be in its bytes.
+fn plausible(file: &InputFile, all: Chunk, mending: &mut Mending) -> Result<Chunk> {
     let most = all.end.saturating_sub(all.start).saturating_mul(POINTS_PER_BYTE);
     if all.points <= most {
-        return Ok(());
+        return Ok(all);
     }
-    Err(file
+    let error = file
         .wrong(all.start, format!("{} points cannot be in the bytes left from here", all.points))
-        .help("the file is cut off, or its header's count is damaged"))
+        .help("the file is cut off, or its header's count is damaged");
+    mending.lose(file, all.end, all.points - most, error)?;
+    Ok(Chunk { points: most, ..all })
 }
 
 /// Bytes of compressed points where the header counts none; None if there are none, or it counts
@@ -146,7 +154,8 @@ fn table(
     start: u64,
     points: u64,
     compression: &Compression,
-) -> Result<(Chunks, Option<String>), Unusable> {
+    mending: &mut Mending,
+) -> Result<Chunks, Unusable> {
     let at = table_start(file, start).map_err(Unusable::Failed)?;
     let at = at.ok_or("the file has no chunk table where it says")?;
     let variable = compression.chunk_points.is_none();
@@ -174,16 +183,20 @@ fn table(
     let room = at - start - TABLE_OFFSET_BYTES;
     entries(file, at, room, compression, entry)?;
     if left > 0 {
-        return Err("the chunk table holds fewer points than the header claims".into());
+        let why = "the chunk table holds fewer points than the header claims";
+        if !mending.mends() {
+            return Err(why.into());
+        }
+        mending.lose(file, at, left, file.wrong(at, why)).map_err(Unusable::Failed)?;
     }
-    let warning = (unread > 0).then(|| {
+    if unread > 0 {
         let what = if variable { "points" } else { "chunks" };
-        format!(
+        mending.warnings.push(format!(
             "{}: {unread} {what} behind the {points} points of the header are not read",
             shown(file.path())
-        )
-    });
-    Ok((Chunks::Known(chunks.closed()), warning))
+        ));
+    }
+    Ok(Chunks::Known(chunks.closed()))
 }
 
 /// Where the chunk table is: told in front of the first chunk, or, by writers that could not go
@@ -260,11 +273,23 @@ fn entries(
 }
 
 /// The chunks of a layered file without a usable table: each says how long its layers are.
-fn walk(file: &InputFile, first: u64, points: u64, compression: &Compression) -> Result<ChunkList> {
+fn walk(
+    file: &InputFile,
+    first: u64,
+    points: u64,
+    compression: &Compression,
+    mending: &mut Mending,
+) -> Result<ChunkList> {
     let (mut start, mut left) = (first, points);
     let mut chunks = ChunkList::default();
     while left > 0 {
-        let head = layered_head(file, start, file.len(), compression)?;
+        let head = match layered_head(file, start, file.len(), compression) {
+            Ok(head) => head,
+            Err(error) => {
+                mending.lose(file, start, left, error)?;
+                break;
+            }
+        };
         let held = head.points.min(left);
         let end = start + head.bytes;
         if !chunks.push(Chunk { start, end, points: held, whole: held == head.points }) {

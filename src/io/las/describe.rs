@@ -12,6 +12,7 @@ use super::laz::Compressor;
 use super::text::text;
 use crate::Result;
 use crate::point::GpsTime;
+use crate::stage::OnError;
 
 /// A LAS or LAZ file as its header and records describe it; no point is read.
 #[derive(Debug, Clone, Serialize)]
@@ -98,7 +99,7 @@ pub struct Record {
 ///
 /// As [`open`](super::open).
 pub fn describe(path: &Path) -> Result<Description> {
-    let input = LasInput::open(path)?;
+    let input = LasInput::open(path, OnError::Fail)?;
     let (header, schema) = (&input.header, input.schema());
     let [min, max] = header.bounds();
     let (compressor, chunk_points, chunks) = storage(&input.storage);

@@ -14,7 +14,7 @@ use super::header::Header;
 use super::input::LasInput;
 use super::vlr::{Evlr, Vlr};
 use crate::point::Schema;
-use crate::stage::{Assumption, ReadKeys};
+use crate::stage::{Assumption, OnError, ReadKeys};
 use crate::{Error, Result};
 
 /// Offsets whose distance is this close to whole steps differ by whole steps: decimal offsets are
@@ -28,6 +28,8 @@ pub struct Form {
     scale: Option<[f64; 3]>,
     offset: Option<[f64; 3]>,
     crs: Option<Vlr>,
+    /// What is done about damage.
+    pub on_error: OnError,
     /// True if inputs that name no system are in that of the others.
     pub assumes_crs: bool,
 }
@@ -38,7 +40,8 @@ impl Form {
         let record = keys.crs.as_ref().map(|text| crs::record(text)).transpose();
         let crs = record.map_err(|why| Error::pipeline(format!("`read.crs`: {why}")))?;
         let assumes_crs = keys.assume.contains(&Assumption::Crs);
-        let mut form = Form { crs, assumes_crs, ..Form::default() };
+        let on_error = keys.on_error;
+        let mut form = Form { crs, assumes_crs, on_error, ..Form::default() };
         let places = keys.scale.is_some() || keys.offset.is_some();
         if paths.len() < 2 || !places && keys.point_format.is_none() {
             return Ok(form);

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::chunks;
 use super::chunks::Chunks;
 use super::crs;
+use super::damage::{Mending, advised};
 use super::described::Described;
 use super::extra::Descriptor;
 use super::fields::encoding;
@@ -14,13 +15,15 @@ use super::format;
 use super::header::Header;
 use super::laz::{Compression, LASZIP};
 use super::noted::NOTE;
+use super::records::{read_evlrs, read_vlrs};
 use super::system::CrsRecords;
-use super::vlr::{Evlr, VLR_HEAD, Vlr, read_evlrs, read_vlrs};
+use super::vlr::{Evlr, VLR_HEAD, Vlr};
 use super::waveforms::Waveforms;
 use crate::error::shown;
 use crate::io::origin::Origin;
 use crate::point::Schema;
-use crate::report::Grouped;
+use crate::report::{Grouped, LostPoints};
+use crate::stage::OnError;
 use crate::{Error, Result};
 
 /// True for records that index the points of one file by their order: COPC's, and the LAX index of
@@ -44,8 +47,8 @@ pub fn is_carried_extended(evlr: &Evlr) -> bool {
 /// How the points are stored.
 #[derive(Debug, Clone)]
 pub enum Storage {
-    /// As they are.
-    Plain,
+    /// As they are: so many of them.
+    Plain(u64),
     /// As LAZ.
     Laz(Compression, Chunks),
 }
@@ -75,18 +78,21 @@ pub struct LasInput {
     pub storage: Storage,
     /// What the user should know.
     pub warnings: Vec<String>,
+    /// What of its points is lost.
+    pub lost: Vec<LostPoints>,
 }
 
 impl LasInput {
-    /// Reads everything but the points of `path`.
-    pub fn open(path: &Path) -> Result<Self> {
+    /// Reads everything but the points of `path`; what is done about damage, `on_error` says.
+    pub fn open(path: &Path, on_error: OnError) -> Result<Self> {
         let file = InputFile::open(path)?;
         let header = Header::read(&file)?;
-        let (vlrs, gap, warning) = read_vlrs(&file, &header)?;
-        let mut warnings: Vec<String> = warning.into_iter().collect();
-        let evlrs = read_evlrs(&file, &header)?;
+        let mut mending = Mending::new(on_error);
+        let (vlrs, gap) = read_vlrs(&file, &header, &mut mending)?;
+        let evlrs = read_evlrs(&file, &header, &mut mending)?;
         let behind = evlrs.iter().map(Evlr::position).min();
-        let storage = storage(&file, &header, &vlrs, behind, &mut warnings)?;
+        let storage = storage(&file, &header, &vlrs, behind, &mut mending)?;
+        let Mending { mut warnings, lost, .. } = mending;
         let path_said = |odd: String| format!("{}: {odd}", shown(path));
         warnings.extend(header.odd_scales().into_iter().chain(header.odd_counts()).map(path_said));
         let named = vlrs.iter().map(|v| (v.user(), v.record()));
@@ -118,6 +124,7 @@ impl LasInput {
             waveforms: waveforms.there,
             storage,
             warnings,
+            lost,
         })
     }
 
@@ -129,7 +136,7 @@ impl LasInput {
     /// Points to read.
     pub fn points(&self) -> u64 {
         match &self.storage {
-            Storage::Plain => self.header.points(),
+            Storage::Plain(points) => *points,
             Storage::Laz(_, chunks) => chunks.points(),
         }
     }
@@ -220,12 +227,11 @@ fn storage(
     header: &Header,
     vlrs: &[Vlr],
     evlrs_start: Option<u64>,
-    warnings: &mut Vec<String>,
+    mending: &mut Mending,
 ) -> Result<Storage> {
     let record = vlrs.iter().position(|v| v.is(LASZIP.0, LASZIP.1));
     if !header.compressed() {
-        warnings.extend(plain(file, header, evlrs_start)?);
-        return Ok(Storage::Plain);
+        return plain(file, header, evlrs_start, mending).map(Storage::Plain);
     }
     let Some(record) = record else {
         return Err(file
@@ -243,19 +249,24 @@ fn storage(
         return Err(uncounted(file, bytes));
     }
     let end = behind_points(file, header, evlrs_start, u64::from(header.offset_to_point_data));
-    let (mut chunks, warning) = Chunks::read(file, header, &compression, end)?;
-    warnings.extend(warning);
-    check_last(file, &compression, &mut chunks, warnings)?;
+    let mut chunks = Chunks::read(file, header, &compression, end, mending)?;
+    check_last(file, &compression, &mut chunks, mending)?;
     Ok(Storage::Laz(compression, chunks))
 }
 
-/// The bytes of plain points must be there; a warning if there are more.
-fn plain(file: &InputFile, header: &Header, evlrs_start: Option<u64>) -> Result<Option<String>> {
+/// How many plain points there are: those of the header, whose bytes must be there, or as many as
+/// there are, if damage is mended; a warning if there are more.
+fn plain(
+    file: &InputFile,
+    header: &Header,
+    evlrs_start: Option<u64>,
+    mending: &mut Mending,
+) -> Result<u64> {
     let start = u64::from(header.offset_to_point_data);
     let (points, each) = (header.points(), u64::from(header.point_data_record_length));
     let held = (file.len() - start) / each;
     if points > held {
-        return Err(file
+        let error = file
             .wrong(
                 file.len(),
                 format!(
@@ -265,21 +276,34 @@ fn plain(file: &InputFile, header: &Header, evlrs_start: Option<u64>) -> Result<
                     Grouped(points)
                 ),
             )
-            .help("the copy or download is incomplete, or the header's count is damaged"));
+            .help("the copy or download is incomplete, or the header's count is damaged");
+        mending.lose(file, start + held * each, points - held, error)?;
+        return Ok(held);
     }
     let end = start + points * each;
     let behind = behind_points(file, header, evlrs_start, end) - end;
-    if points == 0 && behind >= each {
-        return Err(uncounted(file, behind));
+    if mending.on_error == OnError::Salvage && behind >= each {
+        let more = behind / each;
+        mending.warnings.push(format!(
+            "{}: {} points behind the {} that the header counts are read, too",
+            shown(file.path()),
+            Grouped(more),
+            Grouped(points)
+        ));
+        return Ok(points + more);
     }
-    Ok((behind >= each).then(|| {
-        format!(
+    if points == 0 && behind >= each {
+        return Err(advised(uncounted(file, behind)));
+    }
+    if behind >= each {
+        mending.warnings.push(format!(
             "{}: {} bytes behind the {} points that the header counts are not read",
             shown(file.path()),
             Grouped(behind),
             Grouped(points)
-        )
-    }))
+        ));
+    }
+    Ok(points)
 }
 
 /// Where the next thing behind the points begins, which end at byte `end` or later, or the file
@@ -303,13 +327,16 @@ fn check_last(
     file: &InputFile,
     compression: &Compression,
     chunks: &mut Chunks,
-    warnings: &mut Vec<String>,
+    mending: &mut Mending,
 ) -> Result<()> {
     let Chunks::Known(chunks) = chunks else { return Ok(()) };
     let Some(last) = chunks.last().filter(|_| compression.layers > 0) else { return Ok(()) };
-    let head = chunks::layered_head(file, last.start, last.end, compression)?;
+    let Ok(head) = chunks::layered_head(file, last.start, last.end, compression) else {
+        // It is told where it is read.
+        return Ok(());
+    };
     if head.points < last.points {
-        return Err(file
+        let error = file
             .wrong(
                 last.start + compression.stride as u64,
                 format!(
@@ -317,11 +344,14 @@ fn check_last(
                     head.points, last.points
                 ),
             )
-            .help("the header's count of points is damaged, or the file is cut off"));
+            .help("the header's count of points is damaged, or the file is cut off");
+        mending.lose(file, last.end, last.points - head.points, error)?;
+        chunks.shorten_last(head.points);
+        return Ok(());
     }
     if head.points > last.points && last.whole {
         last.whole = false;
-        warnings.push(format!(
+        mending.warnings.push(format!(
             "{}: {} points behind those that the header counts are not read",
             shown(file.path()),
             head.points - last.points

@@ -4,10 +4,12 @@
 //! [`open`] reads one or several files as a source; [`LAS`], [`LAZ`] and [`COPC`] are the
 //! formats as a registry takes them. A COPC file is read as the LAZ it is.
 
+mod chunked;
 mod chunks;
 mod copc;
 mod credit;
 mod crs;
+mod damage;
 pub(crate) mod describe;
 mod described;
 mod encode;
@@ -26,6 +28,7 @@ mod native;
 mod noted;
 mod own;
 mod read;
+mod records;
 mod registered;
 pub(crate) mod sink;
 mod source;

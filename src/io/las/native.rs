@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::crs;
+use super::damage::Mending;
 use super::described::{Described, EXTRA_BYTES, describe};
 use super::extra::Descriptor;
 use super::fields::encoding;
@@ -11,8 +12,9 @@ use super::form::{Form, reform};
 use super::format::{self, format_of, has_waveforms, record_size};
 use super::header::Header;
 use super::input::{LasInput, extra_len, is_carried, is_carried_extended};
+use super::records::{read_evlrs, read_vlrs};
 use super::text::field;
-use super::vlr::{Evlr, Vlr, read_evlrs, read_vlrs};
+use super::vlr::{Evlr, Vlr};
 use super::waveforms::Waveforms;
 use crate::Result;
 use crate::error::shown;
@@ -58,8 +60,9 @@ impl Native {
         if now.bytes()? != header.bytes()? {
             return Err(file.wrong(0, "the header changed while the file was read"));
         }
-        let (mut vlrs, gap, _) = read_vlrs(file, header)?;
-        let mut evlrs = read_evlrs(file, header)?;
+        let mut mending = Mending::new(form.on_error);
+        let (mut vlrs, gap) = read_vlrs(file, header, &mut mending)?;
+        let mut evlrs = read_evlrs(file, header, &mut mending)?;
         let described = Described::of(&vlrs, &evlrs, extra_len(header))?;
         vlrs.retain(is_carried);
         evlrs.retain(is_carried_extended);

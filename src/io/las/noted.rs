@@ -4,9 +4,11 @@ use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
+use super::damage::Mending;
 use super::file::InputFile;
 use super::header::Header;
-use super::vlr::{Vlr, read_vlrs};
+use super::records::read_vlrs;
+use super::vlr::Vlr;
 use crate::point::RunNote;
 use crate::{Error, Result};
 
@@ -28,7 +30,7 @@ pub fn records(text: &str) -> Vec<Vlr> {
 pub fn read(path: &Path) -> Result<Option<String>> {
     let file = InputFile::open(path)?;
     let header = Header::read(&file)?;
-    let (vlrs, _, _) = read_vlrs(&file, &header)?;
+    let (vlrs, _) = read_vlrs(&file, &header, &mut Mending::default())?;
     let ours: Vec<&Vlr> = vlrs.iter().filter(|vlr| vlr.is(NOTE.0, NOTE.1)).collect();
     let length: usize = ours.iter().map(|vlr| usize::from(vlr.payload_len())).sum();
     if !(1..=LONGEST).contains(&length) {

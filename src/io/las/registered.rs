@@ -73,7 +73,7 @@ impl Format for LasFormat {
     }
 
     fn read_keys(&self) -> &'static [&'static str] {
-        &["scale", "offset", "point_format"]
+        &["on_error", "scale", "offset", "point_format"]
     }
 
     fn open(&self, files: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {

@@ -3,21 +3,24 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::chunked::LazPart;
 use super::chunks::{Chunk, Chunks};
 use super::crs;
+use super::damage;
 use super::form::Form;
 use super::format::{has_gps_time, selection};
 use super::input::{LasInput, Storage};
 use super::laz::Layers;
 use super::merge::LasMerge;
 use super::native::Native;
-use super::read::{LazPart, PlainPart, Shift};
+use super::read::{PlainPart, Shift};
 use super::table::is_held;
 use super::verify::{Evidence, Watched};
 use super::waveforms;
 use crate::io::united::{LARGEST_BATCH, ToOneForm};
 use crate::point::{Metadata, Schema};
-use crate::stage::{self, Part, ReadKeys, Source};
+use crate::report::LostPoints;
+use crate::stage::{self, OnError, Part, ReadKeys, Source};
 use crate::{Error, Result};
 
 /// Plain records of one part.
@@ -40,14 +43,14 @@ pub(super) fn open_with(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn So
         return Err(Error::pipeline("there is no input file"));
     };
     let form = Form::of(keys, paths)?;
-    let first = form.bring(LasInput::open(first)?)?;
+    let first = form.bring(LasInput::open(first, form.on_error)?)?;
     let mut schema = first.schema();
     let mut own = vec![first.own.as_ref().map(|_| first.own_schema())];
     let mut inputs = vec![first.clone().without_records()];
     let (mut tables, mut points) = (first.table_bytes(), first.points());
     let mut merge = LasMerge::of(first, &form)?;
     for path in others {
-        let input = form.bring(LasInput::open(path)?)?;
+        let input = form.bring(LasInput::open(path, form.on_error)?)?;
         own.push(input.own.as_ref().map(|_| input.own_schema()));
         tables = tables.saturating_add(input.table_bytes());
         points = points.saturating_add(input.points());
@@ -69,7 +72,7 @@ pub(super) fn open_with(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn So
     let native = Some(Arc::new(native) as Arc<_>);
     let metadata = Metadata { crs, units, gps_time, native, ..Metadata::default() };
     let each = inputs.into_iter().zip(shifts).zip(own);
-    let open = |((input, shift), own)| Opened::new(input, shift, own, &schema);
+    let open = |((input, shift), own)| Opened::new(input, shift, own, &schema, form.on_error);
     let files = each.map(open).collect::<Result<Vec<Opened>>>()?;
     let mut start = 0;
     let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i, &mut start)).collect();
@@ -93,6 +96,7 @@ struct Opened {
     to_one_form: Option<ToOneForm>,
     compression: Option<Arc<super::laz::Compression>>,
     evidence: Arc<Evidence>,
+    on_error: OnError,
 }
 
 /// Which file a part is of, and its stretch there: records of a plain file, or a part of a LAZ.
@@ -108,15 +112,23 @@ struct PartPlace {
 
 impl Opened {
     /// `own` is what its records are, where they must become such of `schema`.
-    fn new(input: LasInput, shift: Shift, own: Option<Schema>, schema: &Schema) -> Result<Self> {
+    fn new(
+        input: LasInput,
+        shift: Shift,
+        own: Option<Schema>,
+        schema: &Schema,
+        on_error: OnError,
+    ) -> Result<Self> {
         let compression = match &input.storage {
-            Storage::Plain => None,
+            Storage::Plain(_) => None,
             Storage::Laz(compression, _) => Some(Arc::new(compression.clone())),
         };
-        let evidence = Arc::new(Evidence::new(input.own_header(), stretches(&input).len()));
+        let evidence = Evidence::new(input.own_header(), stretches(&input).len());
+        input.lost.iter().cloned().for_each(|lost| evidence.lose(lost));
+        let evidence = Arc::new(evidence);
         let formed = own.map(|own| ToOneForm::of(own, schema)).transpose();
         let to_one_form = formed.map_err(|error| error.at(&input.path))?.flatten();
-        Ok(Opened { input, shift, to_one_form, compression, evidence })
+        Ok(Opened { input, shift, to_one_form, compression, evidence, on_error })
     }
 
     /// The parts of this file, the number `file` of all; `start` counts the records before each.
@@ -132,7 +144,7 @@ impl Opened {
     /// Records of a part.
     fn points_of(&self, place: &PartPlace) -> u64 {
         match &self.input.storage {
-            Storage::Plain => place.count,
+            Storage::Plain(_) => place.count,
             Storage::Laz(_, Chunks::InARow { all, .. }) => all.points,
             Storage::Laz(_, Chunks::Known(chunks)) => {
                 chunks.part(place.first as usize).iter().map(|chunk| chunk.points).sum()
@@ -166,7 +178,7 @@ impl Opened {
         let file = self.input.reopen()?;
         let (shift, source) = (self.shift, place.file as u32);
         let (before, chunks, in_a_row): (u64, Vec<Chunk>, _) = match &self.input.storage {
-            Storage::Plain => {
+            Storage::Plain(_) => {
                 let header = self.input.own_header();
                 let each = u64::from(header.point_data_record_length);
                 let at = u64::from(header.offset_to_point_data) + place.first * each;
@@ -186,6 +198,7 @@ impl Opened {
             .ok_or_else(|| Error::internal("a LAZ file without its compression"))?;
         let chunks = (before, chunks);
         let part = LazPart::new(file, (source, shift), compression, chunks, in_a_row);
+        let part = part.mend(self.on_error);
         Ok(Box::new(part.select(selection).tell(self.evidence.clone())))
     }
 }
@@ -193,7 +206,7 @@ impl Opened {
 /// The stretches that the parts of a file are: first and count of records, or a part of its chunks.
 fn stretches(input: &LasInput) -> Vec<(u64, u64)> {
     match &input.storage {
-        Storage::Plain => {
+        Storage::Plain(_) => {
             let points = input.points();
             (0..points.div_ceil(PLAIN_POINTS))
                 .map(|i| i * PLAIN_POINTS)
@@ -229,7 +242,7 @@ impl Source for LasSource {
     fn inputs(&self) -> Vec<stage::Input> {
         let input = |f: &Opened| stage::Input {
             path: f.input.path.clone(),
-            points: f.input.points(),
+            points: f.input.points() - f.evidence.lost_while_read(),
             beside: f.input.waveforms.clone().map(|file| (file, waveforms::EXTENSION)),
         };
         self.files.iter().map(input).collect()
@@ -271,8 +284,15 @@ impl Source for LasSource {
 
     fn warnings(&self) -> Vec<String> {
         let rounded = |file: &Opened| file.to_one_form.as_ref()?.told(&file.input.path);
-        let told = |file: &Opened| file.evidence.warnings().into_iter().chain(rounded(file));
+        let told = |file: &Opened| {
+            let lost = damage::told(&file.evidence.lost());
+            lost.into_iter().chain(file.evidence.warnings()).chain(rounded(file))
+        };
         self.warnings.iter().cloned().chain(self.files.iter().flat_map(told)).collect()
+    }
+
+    fn lost(&self) -> Vec<LostPoints> {
+        self.files.iter().flat_map(|file| file.evidence.lost()).collect()
     }
 
     fn contradictions(&self) -> Vec<stage::Contradiction> {

@@ -155,6 +155,14 @@ impl ChunkList {
         self.parts.get(index).map_or(self.chunks, |part| part.before)
     }
 
+    /// The last chunk has but so many points.
+    pub fn shorten_last(&mut self, points: u64) {
+        if let Some(last) = &mut self.last {
+            self.points -= last.points - points.min(last.points);
+            last.points = points.min(last.points);
+        }
+    }
+
     /// The last chunk, to be corrected.
     pub fn last(&mut self) -> Option<&mut Chunk> {
         self.last.as_mut()

@@ -2,6 +2,7 @@
 //! inside a chunk decodes to other points, which the header's box and counts can tell. Knows what
 //! was found, not what a run does about it.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
@@ -10,7 +11,7 @@ use super::header::Header;
 use crate::Result;
 use crate::host::lock;
 use crate::point::PointBatch;
-use crate::report::Grouped;
+use crate::report::{Grouped, LostPoints};
 use crate::stage::{Contradiction, Part};
 
 /// Steps that a point may lie outside of the box: writers compute it before or after they round.
@@ -101,13 +102,19 @@ struct VerifiedSoFar {
     /// Which parts were read to their end.
     read: Vec<bool>,
     warnings: Vec<String>,
+    /// What is lost, each from a byte on, and of what is lost while points are read how much.
+    lost: BTreeMap<u64, (LostPoints, bool)>,
 }
 
 impl Evidence {
     /// Of a file with this header, which is read in `parts` parts.
     pub fn new(header: &Header, parts: usize) -> Evidence {
-        let gathered =
-            VerifiedSoFar { found: Found::NONE, read: vec![false; parts], warnings: Vec::new() };
+        let gathered = VerifiedSoFar {
+            found: Found::NONE,
+            read: vec![false; parts],
+            warnings: Vec::new(),
+            lost: BTreeMap::new(),
+        };
         Evidence {
             claimed: Claimed::of(header),
             compressed: header.compressed(),
@@ -122,6 +129,27 @@ impl Evidence {
         if !warnings.contains(&warning) {
             warnings.push(warning);
         }
+    }
+
+    /// Takes down points that the file does not have.
+    pub fn lose(&self, lost: LostPoints) {
+        lock(&self.gathered).lost.insert(lost.byte, (lost, false));
+    }
+
+    /// Takes down points that are lost as they are read: a part may be read more than once.
+    pub fn lose_while_read(&self, lost: LostPoints) {
+        lock(&self.gathered).lost.insert(lost.byte, (lost, true));
+    }
+
+    /// What is lost, in the order of the file.
+    pub fn lost(&self) -> Vec<LostPoints> {
+        lock(&self.gathered).lost.values().map(|(lost, _)| lost.clone()).collect()
+    }
+
+    /// How many points are lost of those that the parts were to have.
+    pub fn lost_while_read(&self) -> u64 {
+        let gathered = lock(&self.gathered);
+        gathered.lost.values().filter(|(_, is_read)| *is_read).map(|(lost, _)| lost.points).sum()
     }
 
     /// What turned up while the points were read.
@@ -139,6 +167,11 @@ impl Evidence {
                 claimed.holds(stored) && (number <= of || of == 0)
             })
         })
+    }
+
+    /// True unless one of `records` cannot be a point of this file, as far as its header tells.
+    pub fn are_possible(&self, records: &[u8], stride: usize) -> bool {
+        self.claimed.is_none() || self.are_likely(records, stride)
     }
 
     fn look(&self, found: &mut Found, records: &[u8], stride: usize, shift: [i64; 3]) {

@@ -6,12 +6,9 @@ use std::borrow::Cow;
 use std::cmp::Ordering;
 use std::sync::Arc;
 
-use super::fields::{at, encoding};
 use super::file::InputFile;
-use super::header::Header;
 use super::text::{field, text};
 use crate::budget::Bytes;
-use crate::error::shown;
 use crate::io::origin::Origin;
 use crate::{Error, ErrorKind, Result};
 
@@ -22,19 +19,9 @@ pub const EVLR_HEAD: usize = 60;
 /// Bytes of variable length records that are held in memory, of one file or as the union of
 /// several: a budget has room for them before it is known. More of those that mean something here
 /// are refused, more of others are left in their files.
-const BYTES_HELD: u64 = 8 << 20;
+pub const BYTES_HELD: u64 = 8 << 20;
 /// Variable length records, and as many extended ones, whose heads are held in memory.
-const RECORDS_HELD: usize = 1 << 14;
-/// Bytes between the records and the points that are carried; more are dropped with a warning.
-const GAP_CARRIED: u64 = 64 << 10;
-
-/// True for records whose payload means something here: systems, extra bytes, how points are
-/// compressed.
-fn is_read(user: &str, record: u16) -> bool {
-    let users = ["LASF_Projection", "liblas", "laszip encoded"];
-    users.contains(&user) || (user, record) == ("LASF_Spec", 4)
-}
-
+pub const RECORDS_HELD: usize = 1 << 14;
 /// A variable length record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Vlr {
@@ -52,6 +39,16 @@ enum Payload {
 }
 
 impl Vlr {
+    /// A record whose payload is in a file from byte `at` on.
+    pub fn left(head: [u8; VLR_HEAD], origin: Arc<Origin>, at: u64) -> Self {
+        Vlr { head, payload: Payload::Left(origin, at) }
+    }
+
+    /// Holds its payload.
+    pub fn hold(&mut self, payload: Vec<u8>) {
+        self.payload = Payload::Held(payload.into());
+    }
+
     /// A new record; `payload` must be shorter than 64 KiB.
     pub fn new(user: &str, record: u16, description: &str, payload: Vec<u8>) -> Self {
         let mut head = [0; VLR_HEAD];
@@ -115,7 +112,7 @@ impl Vlr {
     }
 
     /// Bytes that it takes in memory.
-    fn held(&self) -> u64 {
+    pub fn held(&self) -> u64 {
         (VLR_HEAD + self.payload().len()) as u64
     }
 
@@ -157,6 +154,11 @@ pub struct Evlr {
 }
 
 impl Evlr {
+    /// The record of this head, which begins at byte `start` of a file.
+    pub fn at(head: [u8; EVLR_HEAD], origin: Origin, start: u64) -> Self {
+        Evlr { head, origin, start }
+    }
+
     /// Who defined it.
     pub fn user(&self) -> String {
         text(&self.head[2..18])
@@ -245,88 +247,6 @@ impl Evlr {
     }
 }
 
-/// The variable length records of a file and the bytes between them and the points (a point start
-/// signature in LAS 1.0). The second value is a warning, if there is one.
-pub fn read_vlrs(file: &InputFile, header: &Header) -> Result<(Vec<Vlr>, Vec<u8>, Option<String>)> {
-    let start = u64::from(header.header_size);
-    let end = u64::from(header.offset_to_point_data);
-    let claimed = header.number_of_variable_length_records;
-    if u64::from(claimed) > (end - start) / VLR_HEAD as u64 {
-        return Err(file
-            .wrong(
-                at::VLRS as u64,
-                format!(
-                    "{claimed} variable length records do not fit between the header and the \
-                     points at byte {end}"
-                ),
-            )
-            .help("the record count or the start of the points is damaged"));
-    }
-    if claimed as usize > RECORDS_HELD {
-        return Err(too_many(file, at::VLRS as u64, claimed, ""));
-    }
-    let mut vlrs = Vec::new();
-    let (mut at, mut held) = (start, 0);
-    let (origin, room) = (Arc::new(file.origin().clone()), end - start <= BYTES_HELD);
-    for i in 0..claimed {
-        let head = read_head(file, at, end, i, claimed)?;
-        at += VLR_HEAD as u64;
-        let mut vlr = Vlr { head, payload: Payload::Left(origin.clone(), at) };
-        let len = vlr.payload_len();
-        if room || is_read(&vlr.user(), vlr.record()) {
-            vlr.payload = Payload::Held(file.bytes(at, usize::from(len))?.into());
-            held += vlr.held();
-        }
-        if held > BYTES_HELD {
-            let told = format!(
-                "the variable length records that say what points are exceed {}",
-                Bytes(BYTES_HELD)
-            );
-            return Err(file.wrong(at::VLRS as u64, told).help(NOT_HELD));
-        }
-        vlrs.push(vlr);
-        at += u64::from(len);
-    }
-    let gap = end - at;
-    if gap > GAP_CARRIED {
-        let warning = format!(
-            "{}: {gap} bytes between the records and the points are not carried",
-            shown(file.path())
-        );
-        return Ok((vlrs, Vec::new(), Some(warning)));
-    }
-    Ok((vlrs, file.bytes(at, gap as usize)?, None))
-}
-
-/// The head of record `i` of `claimed`, which begins at byte `at` and has room up to byte `end`.
-fn read_head(file: &InputFile, at: u64, end: u64, i: u32, claimed: u32) -> Result<[u8; VLR_HEAD]> {
-    let Some(room) = (end - at).checked_sub(VLR_HEAD as u64) else {
-        return Err(file
-            .wrong(at, format!("record {i} of {claimed} begins behind the points"))
-            .help("the record count or the start of the points is damaged"));
-    };
-    let mut head = [0; VLR_HEAD];
-    file.read_at(&mut head, at)?;
-    let len = u16::from_le_bytes([head[20], head[21]]);
-    if u64::from(len) > room {
-        return Err(file
-            .wrong(at, format!("record {i} of {claimed} has {len} bytes and runs into the points"))
-            .help("the record count, this length or the start of the points is damaged"));
-    }
-    Ok(head)
-}
-
-/// What is to be done about records that are not held.
-const NOT_HELD: &str = "no scan needs that many: the count is damaged, or another program has to \
-                        remove those without a meaning first";
-
-fn too_many(file: &InputFile, field: u64, claimed: u32, extended: &str) -> Error {
-    let told = format!(
-        "{claimed} {extended}variable length records are more than the {RECORDS_HELD} held"
-    );
-    file.wrong(field, told).help(NOT_HELD)
-}
-
 /// Refuses a union of records of several files that is more than is held of one.
 pub fn check_held(vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<()> {
     let bytes: u64 = vlrs.iter().map(Vlr::held).sum();
@@ -340,54 +260,4 @@ pub fn check_held(vlrs: &[Vlr], evlrs: &[Evlr]) -> Result<()> {
         Bytes(bytes)
     );
     Err(Error::new(ErrorKind::Data, told).help("run them in several parts, or one by one"))
-}
-
-/// The extended records of a file. LAS 1.3 has at most one, the waveform packets.
-pub fn read_evlrs(file: &InputFile, header: &Header) -> Result<Vec<Evlr>> {
-    let (mut at, mut claimed) = header.evlrs();
-    let mut field = at::EVLRS as u64;
-    let internal = header.encoding() & encoding::WAVEFORM_INTERNAL != 0;
-    if header.minor() == 3 && internal && header.waveform_start() > 0 {
-        (at, claimed) = (header.waveform_start(), 1);
-        field = at::WAVEFORM_START as u64;
-    }
-    if claimed == 0 {
-        return Ok(Vec::new());
-    }
-    let room = file.len().saturating_sub(at);
-    if u64::from(claimed) > room / EVLR_HEAD as u64 || at < u64::from(header.header_size) {
-        return Err(file
-            .wrong(
-                field,
-                format!(
-                    "{claimed} extended records from byte {at} do not fit in a file of {} bytes",
-                    file.len()
-                ),
-            )
-            .help("the file is cut off, or its header is damaged"));
-    }
-    if claimed as usize > RECORDS_HELD {
-        return Err(too_many(file, field, claimed, "extended "));
-    }
-    let mut evlrs = Vec::new();
-    for i in 0..claimed {
-        let mut head = [0; EVLR_HEAD];
-        file.read_at(&mut head, at)?;
-        let evlr = Evlr { head, origin: file.origin().clone(), start: at };
-        let room = file.len().saturating_sub(at + EVLR_HEAD as u64);
-        if evlr.payload_len() > room {
-            return Err(file
-                .wrong(
-                    at + 20,
-                    format!(
-                        "extended record {i} of {claimed} claims {} bytes and the file has {room}",
-                        evlr.payload_len()
-                    ),
-                )
-                .help("the file is cut off, or this length is damaged"));
-        }
-        at += evlr.len();
-        evlrs.push(evlr);
-    }
-    Ok(evlrs)
 }
