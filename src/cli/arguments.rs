@@ -67,7 +67,7 @@ pub(super) enum Command {
     Cut(CutArguments),
     /// Check that a scan is a reduction of another, and how far removed points are from its surface
     Verify(Box<VerifyArguments>),
-    /// Compare two scans as depth images: sum of squared differences and their RMS
+    /// Compare two scans: are the records the same, how far apart are the points
     Compare(Box<CompareArguments>),
     /// Run again what made a file, and say whether the bytes are the same
     Reproduce(ReproduceArguments),

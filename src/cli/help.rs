@@ -180,9 +180,18 @@ removed is farther away than it may be.",
         "\
 Examples:
   pointmill compare before.laz after.laz
+  pointmill compare before.laz after.copc.laz --accept same
+  pointmill compare survey/ reduced.ply --distances --accept 'subset, max <= 20cm'
   pointmill compare front.ply reduced.ply --axis x --pixels 512 --json
 
-Pixels that have points of one scan alone are counted and not compared.",
+Records are compared byte for byte where both scans have one layout, and by the values of the
+dimensions that both have elsewhere.
+
+Rules of --accept, between commas: same, same-order, subset (of the records of SECOND in FIRST),
+ordered-subset; and max, mean, rms, p50, p95 or p99 of the distances, with <= or < and a length,
+which imply --distances: the larger figure of both ways counts.
+
+In depth images, pixels that have points of one scan alone are counted and not compared.",
     ),
     (
         "reproduce",
@@ -255,6 +264,10 @@ What it prints is a pipeline file that does the same. Inputs are not opened.",
     ("man", "Examples:\n  pointmill man | man -l -\n  pointmill man ~/.local/share/man/man1"),
 ];
 
+/// What `--accept` of `compare` is about.
+const COMPARE_ACCEPT: &str = "What the two scans must be, such as \"same\" or \"subset, max <= 5mm\", by the rules below: the \
+     exit code is 3 if they are not";
+
 /// The command line with its flags in groups and its examples.
 pub(super) fn command() -> Command {
     let grouped = GROUPS.iter().fold(Arguments::command(), |all, (command, heading, flags)| {
@@ -267,8 +280,9 @@ pub(super) fn command() -> Command {
             ["report", "no_clobber", "no_provenance"].into_iter().fold(sub, hide)
         })
     });
-    let hide = |of: Command| of.mut_arg("accept", |a| a.hide(true));
-    let hidden = hidden.mut_subcommand("verify", hide).mut_subcommand("compare", hide);
+    let hidden = hidden
+        .mut_subcommand("verify", |of| of.mut_arg("accept", |a| a.hide(true)))
+        .mut_subcommand("compare", |of| of.mut_arg("accept", |a| a.help(COMPARE_ACCEPT)));
     EXAMPLES.iter().fold(hidden, |all, (command, examples)| {
         all.mut_subcommand(*command, |sub| sub.after_help(*examples))
     })

@@ -132,7 +132,7 @@ fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<
         Command::Synth(arguments) => run::synth(arguments, registry, console),
         Command::Cut(arguments) => run::cut(arguments, registry, console),
         Command::Verify(arguments) => verify::check_reduction(arguments, registry, console),
-        Command::Compare(arguments) => compare::compare(arguments, registry, console),
+        Command::Compare(arguments) => compare::compare_scans(arguments, registry, console),
         Command::Reproduce(arguments) => reproduce::make_again(arguments, registry, console),
         Command::Plan(arguments) => check::plan(arguments, registry, console),
         Command::Check(arguments) => check::check(arguments, registry, console),

@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex};
 
 use serde::Serialize;
 
+use super::left_out::looked_at;
 use crate::engine::Watch;
 use crate::geom::depth::{DepthSums, Raster};
 use crate::graph::{Graph, Nonfinite, Overrides, RunSettings};
@@ -17,7 +18,7 @@ use crate::host::process::default_memory;
 use crate::io::ends::{Discard, Read};
 use crate::language::Registry;
 use crate::ops::Axis;
-use crate::point::{Bounds, PointBatch, Position};
+use crate::point::{Bounds, PointBatch, Position, Selection};
 use crate::report::{Grouped, Short, Tally};
 use crate::stage::{Needs, Role, Transform};
 use crate::{Error, ErrorKind, Result};
@@ -126,7 +127,8 @@ pub fn depth_errors(
         let open = Read { path: paths.to_vec(), ..Read::default() }.source(registry.formats())?;
         let mut graph = Graph::new(run.clone());
         let source = graph.add("read", Role::Source(open), &[]);
-        let stage = See { seen: seen.clone(), pass, nonfinite: run.nonfinite };
+        let looked = looked_at(run.noise, Some(run.withheld));
+        let stage = See { seen: seen.clone(), pass, looked, nonfinite: run.nonfinite };
         let stage = graph.add("compare", Role::Transform(Box::new(stage)), &[source]);
         graph.add("discard", Role::Sink(Box::new(Discard {})), &[stage]);
         graph.plan(&Overrides::default())?.run(watch)?;
@@ -184,20 +186,24 @@ impl SeenDepths {
 struct See {
     seen: Arc<Mutex<SeenDepths>>,
     pass: DepthPass,
+    /// The points that are looked at.
+    looked: Selection,
     /// What becomes of points that are not finite.
     nonfinite: Nonfinite,
 }
 
 impl Transform for See {
     fn needs(&self) -> Needs {
-        Needs::none().looks_at(crate::point::names::XYZ)
+        let needs = Needs::none().looks_at(crate::point::names::XYZ);
+        needs.looks_at_if_there(self.looked.names())
     }
 
     fn apply(&self, batch: &mut PointBatch, _: &mut Tally) -> Result<()> {
         let schema = batch.schema();
         let axes = schema.coordinates().ok_or_else(|| Error::internal("no coordinates"))?;
         let mut positions: Vec<Position> = Vec::with_capacity(batch.len());
-        for record in batch.iter() {
+        let chosen = self.looked.of(schema);
+        for record in batch.iter().filter(|record| chosen.holds(record)) {
             let world = axes.map(|axis| axis.world(record, schema.endian));
             if world.iter().all(|v| v.is_finite()) {
                 positions.push(rounded(world)?);

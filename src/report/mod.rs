@@ -12,7 +12,7 @@ pub(crate) mod lot;
 mod machine;
 pub(crate) mod moments;
 mod stats;
-mod sums;
+pub(crate) mod sums;
 pub(crate) mod survey;
 mod table;
 mod tally;

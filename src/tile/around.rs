@@ -41,14 +41,28 @@ pub struct Around {
 struct Beyond {
     tiles: Arc<SealedTiles>,
     sieve: Sieve,
-    /// The box that is loaded, without limits where the scan has nothing beyond.
-    loaded: Bounds,
+    /// The box that is loaded.
+    loaded: LoadedBox,
 }
 
 impl Beyond {
     /// None if the scan has nothing beyond `loaded`.
     fn new(tiles: &Arc<SealedTiles>, sieve: &Sieve, loaded: Bounds) -> Option<Beyond> {
         let scan = tiles.bounds();
+        let open = LoadedBox::of(&scan, loaded);
+        let beyond = || Beyond { tiles: tiles.clone(), sieve: sieve.clone(), loaded: open };
+        (!loaded.holds(&scan)).then(beyond)
+    }
+}
+
+/// A box of which all positions of a scan are loaded, without limits where the scan has nothing
+/// beyond.
+#[derive(Debug, Clone, Copy)]
+pub struct LoadedBox(Bounds);
+
+impl LoadedBox {
+    /// All of a scan in the box `scan` that is in the box `loaded`.
+    pub fn of(scan: &Bounds, loaded: Bounds) -> LoadedBox {
         let mut open = loaded;
         for axis in 0..3 {
             if loaded.lo[axis] <= scan.lo[axis] {
@@ -58,15 +72,14 @@ impl Beyond {
                 open.hi[axis] = i64::MAX;
             }
         }
-        let beyond = || Beyond { tiles: tiles.clone(), sieve: sieve.clone(), loaded: open };
-        (!loaded.holds(&scan)).then(beyond)
+        LoadedBox(open)
     }
 
     /// True if no position that is not loaded can be among the nearest of `p`, of which the
     /// farthest found is at squared distance `d2`: on the first plane not loaded, one at exactly
     /// the same distance might win the tie.
-    fn proves(&self, p: Position, d2: u128) -> bool {
-        let Bounds { lo, hi } = self.loaded;
+    pub fn proves(&self, p: Position, d2: u128) -> bool {
+        let Bounds { lo, hi } = self.0;
         let gap = (0..3).fold(u64::MAX, |gap, axis| {
             gap.min(p[axis].abs_diff(lo[axis])).min(p[axis].abs_diff(hi[axis]))
         });
@@ -133,7 +146,7 @@ impl Around {
             let enough = neighbors.len() == k;
             offsets.clear();
             if let Some(beyond) = beyond
-                && !(enough && beyond.proves(p, d2))
+                && !(enough && beyond.loaded.proves(p, d2))
             {
                 *unproven += 1;
                 let scan = (&*beyond.tiles, &beyond.sieve);

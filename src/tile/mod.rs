@@ -14,8 +14,8 @@ mod remote;
 pub(crate) mod sieve;
 mod values;
 
-pub(crate) use around::Around;
 pub use around::Neighborhood;
+pub(crate) use around::{Around, LoadedBox};
 pub(crate) use load::{Core, Loader};
 pub(crate) use numbered::{NumberedPositions, NumberedReader};
 pub(crate) use only::{Cover, Only};

@@ -72,6 +72,33 @@ impl Remote {
         k: usize,
         bound: Option<u128>,
     ) -> Result<&[FoundPosition]> {
+        self.search((tiles, sieve), p, k, bound, false)?;
+        Ok(&self.found)
+    }
+
+    /// The `k` positions of all of a scan that are nearest to `p`, which need not be one of them,
+    /// in the order of [`nearest`](Remote::nearest): `p` itself first if the scan has it.
+    pub fn nearest_to<'f>(
+        &mut self,
+        tiles: &SealedTiles,
+        p: Position,
+        k: usize,
+        found: &'f mut Vec<Position>,
+    ) -> Result<&'f [Position]> {
+        self.search((tiles, &Sieve::default()), p, k, None, true)?;
+        found.clear();
+        found.extend(self.found.iter().map(|found| found.position));
+        Ok(found)
+    }
+
+    fn search(
+        &mut self,
+        (tiles, sieve): (&SealedTiles, &Sieve),
+        p: Position,
+        k: usize,
+        bound: Option<u128>,
+        itself: bool,
+    ) -> Result<()> {
         self.found.clear();
         self.open.clear();
         let root = tiles.root();
@@ -83,7 +110,7 @@ impl Remote {
                 break;
             }
             if height == 0 {
-                self.look_into((tiles, sieve), node, p, k, bound)?;
+                self.look_into((tiles, sieve), node, (p, itself), k, bound)?;
                 continue;
             }
             for child in tiles.children((height, node)) {
@@ -94,7 +121,7 @@ impl Remote {
                 }
             }
         }
-        Ok(&self.found)
+        Ok(())
     }
 
     /// Squared distance beyond which nothing matters; what lies exactly there may still win a tie.
@@ -107,7 +134,7 @@ impl Remote {
         &mut self,
         (tiles, sieve): (&SealedTiles, &Sieve),
         block: usize,
-        p: Position,
+        (p, itself): (Position, bool),
         k: usize,
         bound: Option<u128>,
     ) -> Result<()> {
@@ -128,7 +155,7 @@ impl Remote {
         for i in 0..self.cache[block % CACHED].positions.len() {
             let (q, index) = self.cache[block % CACHED].positions[i];
             let distance = distance2(p, q);
-            if q == p || distance > self.farthest(k, bound) {
+            if q == p && !itself || distance > self.farthest(k, bound) {
                 continue;
             }
             let nearer = |found: &FoundPosition| {

@@ -2,6 +2,7 @@
 
 mod accept;
 mod check;
+mod compare;
 mod errors;
 mod events;
 mod interrupt;

@@ -225,6 +225,11 @@ fn the_formats_that_are_documented_are_those_that_are_written() {
         assert_eq!(code, 0, "{told}");
         agree(&serde_json::from_str(&printed).unwrap(), command);
     }
+    let all = ["compare", "scan.laz", "reduced.laz", "--distances", "--depth", "--json"];
+    let all = [&all[..], &["--accept", "subset, max <= 100"]].concat();
+    let (code, printed, told) = pointmill(folder.path(), &all);
+    assert_eq!(code, 0, "{told}");
+    agree(&serde_json::from_str(&printed).unwrap(), "compare");
     for (output, section) in [
         ("reduced.ply", "info: PLY"),
         ("reduced.pcd", "info: PCD"),

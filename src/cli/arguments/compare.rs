@@ -12,23 +12,33 @@ pub(crate) struct CompareArguments {
     /// A scan: a file of points, a pattern or a folder
     #[arg(value_name = "FIRST")]
     pub first: String,
-    /// Another, over the same place
+    /// Another, of the same format or another one
     #[arg(value_name = "SECOND")]
     pub second: String,
-    /// The axis that one looks along
-    #[arg(long, value_name = "AXIS", default_value = "z")]
-    pub axis: AxisName,
-    /// Pixels along the longer side of the box of both, 1 to 32768
-    #[arg(long, value_name = "N", default_value = "1024", value_parser = pixels)]
-    pub pixels: u64,
+    /// Measure how far the points of each scan are from the nearest of the other, and from the
+    /// plane of its 8 nearest; exact, whatever the size of the scans
+    #[arg(long)]
+    pub distances: bool,
+    /// Compare both as depth images, too: sum of squared differences and their RMS
+    #[arg(long)]
+    pub depth: bool,
+    /// The axis that depth images look along, instead of z; implies --depth
+    #[arg(long, value_name = "AXIS")]
+    pub axis: Option<AxisName>,
+    /// Pixels along the longer side of the box of both, 1 to 32768, instead of 1024; implies
+    /// --depth
+    #[arg(long, value_name = "N", value_parser = pixels)]
+    pub pixels: Option<u64>,
     /// Points of classes 7 and 18, which are noise: drop, so that they are not looked at, or keep
-    /// [default: drop]
+    /// [default: keep for records, drop for distances and depth]
     #[arg(long, value_name = "HOW")]
     pub noise: Option<String>,
-    /// Points with the withheld flag: drop, so that they are not looked at, or keep [default: drop]
+    /// Points with the withheld flag: drop, so that they are not looked at, or keep [default: as
+    /// --noise]
     #[arg(long, value_name = "HOW")]
     pub withheld: Option<String>,
-    /// Points whose coordinates are not finite: refuse the scan, or drop them [default: refuse]
+    /// Points whose coordinates are not finite, where distances or depth are measured: refuse the
+    /// scan, or drop them, from the records too [default: refuse]
     #[arg(long, value_name = "HOW")]
     pub nonfinite: Option<String>,
     /// Print JSON
@@ -36,6 +46,15 @@ pub(crate) struct CompareArguments {
     pub json: bool,
     #[command(flatten)]
     pub common: CommonArguments,
+}
+
+impl CompareArguments {
+    /// The axis and the pixels of depth images, if they are asked for.
+    pub fn depth(&self) -> Option<(Axis, usize)> {
+        let is_asked = self.depth || self.axis.is_some() || self.pixels.is_some();
+        let axis = self.axis.unwrap_or(AxisName::Z).into();
+        is_asked.then(|| (axis, self.pixels.unwrap_or(1024) as usize))
+    }
 }
 
 /// An axis as it is typed.
