@@ -290,6 +290,11 @@ impl Error {
         self
     }
 
+    /// What it says, without its place.
+    pub(crate) fn message(&self) -> &str {
+        &self.0.message
+    }
+
     /// What kind of failure this is.
     pub fn kind(&self) -> ErrorKind {
         self.0.kind

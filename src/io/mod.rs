@@ -2,6 +2,7 @@
 //! the stages that name files. Knows nothing of tiles.
 
 pub(crate) mod convert;
+pub(crate) mod deep;
 mod describe;
 pub mod e57;
 pub(crate) mod ends;
@@ -15,6 +16,7 @@ mod project;
 pub(crate) mod rows;
 pub(crate) mod sniff;
 pub mod text;
+mod validate;
 pub mod vertices;
 mod wkt;
 
@@ -24,3 +26,4 @@ pub(crate) use describe::note;
 pub use ends::{Discard, Mesh, OutputOrder, Read, Write};
 pub(crate) use origin::{Origin, open_plain};
 pub use project::Projected;
+pub use validate::validate;

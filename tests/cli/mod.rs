@@ -2,6 +2,7 @@
 
 mod accept;
 mod check;
+mod deep;
 mod errors;
 mod events;
 mod interrupt;
@@ -13,6 +14,7 @@ mod preview;
 mod reproduce;
 mod size;
 mod tools;
+mod validate;
 mod values;
 mod verify;
 mod words;

@@ -71,7 +71,9 @@ pub struct LasInput {
     pub waveforms: Option<PathBuf>,
     /// How the points are stored.
     pub storage: Storage,
-    /// What the user should know.
+    /// What the user should know of how the points are stored.
+    pub stored: Vec<String>,
+    /// What the user should know, of that too.
     pub warnings: Vec<String>,
 }
 
@@ -84,7 +86,9 @@ impl LasInput {
         let mut warnings: Vec<String> = warning.into_iter().collect();
         let evlrs = read_evlrs(&file, &header)?;
         let behind = evlrs.iter().map(Evlr::position).min();
-        let storage = storage(&file, &header, &vlrs, behind, &mut warnings)?;
+        let mut stored = Vec::new();
+        let storage = storage(&file, &header, &vlrs, behind, &mut stored)?;
+        warnings.extend(stored.iter().cloned());
         let path_said = |odd: String| format!("{}: {odd}", shown(path));
         warnings.extend(header.odd_scales().into_iter().chain(header.odd_counts()).map(path_said));
         let named = vlrs.iter().map(|v| (v.user(), v.record()));
@@ -114,6 +118,7 @@ impl LasInput {
             described,
             waveforms: waveforms.there,
             storage,
+            stored,
             warnings,
         })
     }

@@ -33,6 +33,7 @@ mod table;
 mod target;
 mod text;
 mod union;
+mod validate;
 mod verify;
 mod vlr;
 mod waveforms;

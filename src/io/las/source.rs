@@ -12,7 +12,7 @@ use super::merge::LasMerge;
 use super::native::Native;
 use super::read::{LazPart, PlainPart, Shift};
 use super::table::is_held;
-use super::verify::{Evidence, Watched};
+use super::verify::{Evidence, Found, Watched};
 use super::waveforms;
 use crate::point::{Metadata, Schema};
 use crate::stage::{self, Part, Source};
@@ -29,6 +29,10 @@ const PLAIN_POINTS: u64 = 1 << 18;
 /// byte; files that do not agree (point format, record length, extra bytes, scale, GPS time type,
 /// CRS; offsets apart from whole steps) are named both.
 pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
+    Ok(Box::new(LasSource::open(paths)?))
+}
+
+fn opened(paths: &[PathBuf]) -> Result<LasSource> {
     let Some((first, others)) = paths.split_first() else {
         return Err(Error::pipeline("there is no input file"));
     };
@@ -61,16 +65,33 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
     let files: Vec<Opened> = inputs.into_iter().zip(shifts).map(Opened::new).collect();
     let mut start = 0;
     let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i, &mut start)).collect();
-    Ok(Box::new(LasSource { files, parts, schema: Arc::new(schema), metadata, warnings }))
+    Ok(LasSource { files, parts, schema: Arc::new(schema), metadata, warnings })
 }
 
 /// LAS and LAZ files opened together.
-struct LasSource {
+pub struct LasSource {
     files: Vec<Opened>,
     parts: Vec<PartPlace>,
     schema: Arc<Schema>,
     metadata: Metadata,
     warnings: Vec<String>,
+}
+
+impl LasSource {
+    /// As [`open`].
+    pub fn open(paths: &[PathBuf]) -> Result<LasSource> {
+        opened(paths)
+    }
+
+    /// What the points of the first file come to; None before all of them were read.
+    pub fn found(&self) -> Option<Found> {
+        self.files.first()?.evidence.found()
+    }
+
+    /// What turned up behind the points that the headers count, while points were read.
+    pub fn found_behind(&self) -> Vec<String> {
+        self.files.iter().flat_map(|file| file.evidence.warnings()).collect()
+    }
 }
 
 struct Opened {
