@@ -290,6 +290,11 @@ impl Error {
         self
     }
 
+    /// What it says, without its place.
+    pub(crate) fn message(&self) -> &str {
+        &self.0.message
+    }
+
     /// What kind of failure this is.
     pub fn kind(&self) -> ErrorKind {
         self.0.kind
@@ -303,11 +308,6 @@ impl Error {
     /// The byte of that file, where one can be named.
     pub fn byte(&self) -> Option<u64> {
         self.0.offset
-    }
-
-    /// What is wrong, without the place.
-    pub(crate) fn message(&self) -> &str {
-        &self.0.message
     }
 
     /// What the user can do, where something can be done.

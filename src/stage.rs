@@ -1,6 +1,7 @@
 //! The roles a stage can play and what it tells the plan. Roles are closed, stages are open: an
 //! embedding program adds its own by implementing one of these traits.
 
+mod findings;
 mod format;
 mod keys;
 mod kind;
@@ -11,6 +12,8 @@ mod sink;
 mod source;
 mod tile_op;
 mod unread;
+mod walk;
+mod whole;
 
 use std::path::PathBuf;
 
@@ -21,6 +24,7 @@ use crate::report::Tally;
 
 pub use crate::geom::lattice::{Lattice, Misplaced};
 pub use crate::store::{KeptPoints, KeptReader, Levels};
+pub use findings::{Finding, Findings, FoundPlace, PLACES_TOLD, Rule, Severity};
 pub use format::{CreateFor, Format, FormatName, Formats, foreign};
 pub use keys::{Assumption, Colors, OnError, OutputEncoding, ReadKeys, Separator, WriteKeys};
 pub use kind::{StageKind, StagePlace};
@@ -37,6 +41,9 @@ pub use sink::{
 pub use source::{Contradiction, Input, OpenSource, Part, Source};
 pub use tile_op::{Forecast, ScanFacts, TileOp};
 pub use unread::Unread;
+pub use walk::PointWalk;
+pub(crate) use whole::enter_error;
+pub use whole::{WHOLE_RULES, read_whole};
 
 /// Changes or removes points as they stream by; knows no neighbours.
 ///

@@ -2,6 +2,7 @@
 
 mod compare;
 mod cut;
+mod look;
 mod pipeline;
 mod plain;
 mod reduce;
@@ -14,21 +15,19 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 use super::exit::EXIT_CODES;
-use crate::graph::MOST_THREADS;
 use crate::picture::{ColorBy, View};
-use crate::quantity::parse_count;
 
 pub(super) use compare::CompareArguments;
 pub(super) use cut::CutArguments;
+pub(super) use look::{InfoArguments, ValidateArguments};
 pub(super) use pipeline::{Drawing, ExplainArguments, GraphArguments, PipelineArguments};
-pub(super) use plain::{
-    CompletionsArguments, InfoArguments, ManArguments, NewArguments, StagesArguments,
-};
+pub(super) use plain::{CompletionsArguments, ManArguments, NewArguments, StagesArguments};
 pub(super) use reduce::ReduceArguments;
 pub(super) use reproduce::ReproduceArguments;
 pub(super) use shared::{
     BulkArguments, CommonArguments, FilterArguments, Progress, ReadArguments, WrittenArguments,
 };
+use shared::{parse_threads, within};
 pub(super) use verify::VerifyArguments;
 
 /// Reduces laser scans that do not fit in memory to the points that matter.
@@ -47,8 +46,10 @@ pub(super) enum Command {
     Reduce(Box<ReduceArguments>),
     /// Convert between LAS, LAZ, COPC, PLY, PCD, E57 and texts
     Convert(Box<ConvertArguments>),
-    /// Show what files contain, from their headers
+    /// Show what files contain, from their headers or, with --deep, from all points
     Info(InfoArguments),
+    /// Hold files to the rules of their formats, and tell each that does not hold
+    Validate(ValidateArguments),
     /// Show how a pipeline would be run and what the run would use, without running it
     Plan(PredictArguments),
     /// Check a pipeline and tell every mistake; reads its inputs' headers, writes nothing
@@ -106,21 +107,12 @@ impl Command {
             | Command::Plan(PredictArguments { planned: PlanArguments { common, .. }, .. })
             | Command::Check(PlanArguments { common, .. })
             | Command::Synth(SynthArguments { common, .. }) => Some(common),
-            Command::Info(_) | Command::Picture(_) | Command::Stages(_) => None,
+            Command::Info(_) | Command::Validate(_) | Command::Picture(_) => None,
+            Command::Stages(_) => None,
             Command::Graph(_) | Command::Explain(_) | Command::New(_) | Command::Schema => None,
             Command::Completions(_) | Command::Man(_) => None,
         }
     }
-}
-
-/// A whole number within bounds, as the keys of a pipeline take it.
-fn within(text: &str, least: u64, most: u64) -> Result<u64, String> {
-    let right = parse_count(text).ok().filter(|number| (least..=most).contains(number));
-    right.ok_or_else(|| format!("takes a whole number from {least} to {most}"))
-}
-
-fn parse_threads(text: &str) -> Result<usize, String> {
-    within(text, 1, MOST_THREADS as u64).map(|threads| threads as usize)
 }
 
 /// Of commands that plan a pipeline, or run it.

@@ -1,34 +1,49 @@
-//! `info`: what the headers of files say, as tables or JSON.
+//! `info`: what the headers of files say, or all their points, as tables or JSON.
+
+use std::path::PathBuf;
 
 use serde_json::Value;
 
 use super::arguments::InfoArguments;
 use super::console::Console;
-use super::{print, table};
+use super::{deep, print, table};
 use crate::error::shown;
+use crate::io::deep::{DeepFigures, deep};
 use crate::io::ends::expand;
 use crate::report::Coordinate;
 use crate::stage::Formats;
 use crate::{Error, Result, io};
 
-/// Prints what the headers of files say. A file that cannot be read is told, the others are shown.
+/// Prints what the headers of files say, and their points if that is wanted. A file that cannot be
+/// read is told, the others are shown.
 pub(super) fn info(arguments: &InfoArguments, formats: &Formats, console: &Console) -> Result<()> {
     let files = expand(&arguments.files, formats)?;
     let total = files.len();
     let mut described = Vec::new();
     let mut failures = Vec::new();
     for file in files {
-        match io::describe(&file, formats) {
-            Ok(facts) => described.push((file, facts)),
+        let facts = io::describe(&file, formats);
+        let facts = facts.and_then(|facts| match arguments.deep {
+            true => Ok((facts, Some(deep(&file, formats, &arguments.walk.walk())?))),
+            false => Ok((facts, None)),
+        });
+        match facts {
+            Ok((facts, figures)) => described.push((file, facts, figures)),
             Err(error) => failures.push(error.at(file)),
         }
     }
     if arguments.json {
-        let all = Value::Array(described.into_iter().map(|(_, facts)| facts).collect());
+        let all: Result<Vec<Value>> =
+            described.into_iter().map(|(_, facts, figures)| with_figures(facts, figures)).collect();
+        let all = Value::Array(all?);
         print::json(&format!("{all:#}"))?;
     } else {
-        let text = |(file, facts): (std::path::PathBuf, Value)| {
-            format!("{}\n{}", shown(&file), table::render(&in_short(facts), 2))
+        let text = |(file, facts, figures): (PathBuf, Value, Option<DeepFigures>)| {
+            let mut facts = in_short(facts);
+            if let Some(figures) = figures {
+                facts["deep"] = deep::shown(&figures, &numbers(&facts["scale"]));
+            }
+            format!("{}\n{}", shown(&file), table::render(&facts, 2))
         };
         let all: Vec<String> = described.into_iter().map(text).collect();
         if !all.is_empty() {
@@ -44,6 +59,15 @@ pub(super) fn info(arguments: &InfoArguments, formats: &Formats, console: &Conso
             Err(Error::new(kind, format!("{n} of {total} files cannot be described")))
         }
     }
+}
+
+/// The facts of a file and, below `deep`, what its points come to.
+fn with_figures(mut facts: Value, figures: Option<DeepFigures>) -> Result<Value> {
+    if let Some(figures) = figures {
+        let failed = |e| Error::internal("figures could not be written as JSON").because(e);
+        facts["deep"] = serde_json::to_value(figures).map_err(failed)?;
+    }
+    Ok(facts)
 }
 
 /// The facts of a file with the corners of its box in as many digits as its scale tells apart:

@@ -206,7 +206,25 @@ and must have the SHA-256 that the output says. Nothing is written but scratch b
 
 The exit code is 0 if the bytes are the same, 1 if they are not, and 2 if it cannot be tried.",
     ),
-    ("info", "Examples:\n  pointmill info scan.laz\n  pointmill info --json survey/*.laz"),
+    (
+        "info",
+        "\
+Examples:
+  pointmill info scan.laz
+  pointmill info --deep scan.laz
+  pointmill info --json survey/*.laz",
+    ),
+    (
+        "validate",
+        "\
+Examples:
+  pointmill validate scan.laz
+  pointmill validate --json survey/*.laz > findings.json
+  pointmill validate survey --quiet
+
+What the rules are is in docs/validate.md. The exit code is 1 if a file has a fault; the others are
+looked at all the same.",
+    ),
     (
         "picture",
         "\

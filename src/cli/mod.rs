@@ -11,6 +11,7 @@ mod classes;
 mod compare;
 mod console;
 mod convert;
+mod deep;
 mod describe;
 mod draw;
 mod events;
@@ -36,6 +37,7 @@ mod seen;
 mod size;
 mod stages;
 mod table;
+mod validate;
 mod verify;
 mod words;
 
@@ -142,6 +144,7 @@ fn execute(command: &Command, registry: &Registry, console: &Console) -> Result<
         Command::New(arguments) => jobs::new(arguments),
         Command::Schema => stages::schema(registry),
         Command::Info(arguments) => describe::info(arguments, registry.formats(), console),
+        Command::Validate(arguments) => validate::validate(arguments, registry.formats()),
         Command::Picture(arguments) => picture::picture(arguments, registry.formats()),
         Command::Completions(arguments) => help::completions(arguments),
         Command::Man(arguments) => help::man(arguments),

@@ -28,7 +28,9 @@ impl Words {
             Command::Cut(cut) => cut_flags(cut),
             Command::Convert(convert) => convert_flags(convert, None, None),
             Command::Synth(synth) => synth_flags(synth),
-            Command::Info(_) | Command::Picture(_) | Command::Stages(_) => Vec::new(),
+            Command::Info(_) | Command::Validate(_) | Command::Picture(_) | Command::Stages(_) => {
+                Vec::new()
+            }
             Command::Reproduce(_) => Vec::new(),
             Command::Graph(_) | Command::Explain(_) => Vec::new(),
             Command::New(_) | Command::Schema => Vec::new(),

@@ -17,23 +17,28 @@ use crate::{Error, Result};
 ///
 /// Files of no format among them, and headers that their format does not allow.
 pub fn describe(path: &Path, formats: &Formats) -> Result<serde_json::Value> {
-    let first = sniff::first_bytes(path)?;
-    match found(path, &first, formats) {
-        Some(format) => {
-            let told = |error| sniff::told(error, &**format, formats);
-            let mut facts = format.describe(path).map_err(told)?;
-            if let (Some(facts), Some(told)) = (facts.as_object_mut(), format.note(path)?) {
-                // What is no JSON is shown as it is: whoever wrote it.
-                let told = serde_json::from_str(&told).unwrap_or(told.into());
-                facts.insert("provenance".to_owned(), told);
-            }
-            Ok(facts)
-        }
-        None => {
-            let known = listed(sniff::upper(formats), "or");
-            Err(sniff::not(&format!("a {known} file"), path, &first, formats))
-        }
+    let format = format_of(path, formats)?;
+    let told = |error| sniff::told(error, &**format, formats);
+    let mut facts = format.describe(path).map_err(told)?;
+    if let (Some(facts), Some(told)) = (facts.as_object_mut(), format.note(path)?) {
+        // What is no JSON is shown as it is: whoever wrote it.
+        let told = serde_json::from_str(&told).unwrap_or(told.into());
+        facts.insert("provenance".to_owned(), told);
     }
+    Ok(facts)
+}
+
+/// The format of the file at `path`, as its first bytes tell.
+///
+/// # Errors
+///
+/// A file of no format among `formats`.
+pub(super) fn format_of<'a>(path: &Path, formats: &'a Formats) -> Result<&'a Arc<dyn Format>> {
+    let first = sniff::first_bytes(path)?;
+    found(path, &first, formats).ok_or_else(|| {
+        let known = listed(sniff::upper(formats), "or");
+        sniff::not(&format!("a {known} file"), path, &first, formats)
+    })
 }
 
 /// The format of a file that begins with `first`: among those that begin so, that of its extension;

@@ -2,6 +2,7 @@
 //! the stages that name files. Knows nothing of tiles.
 
 pub(crate) mod convert;
+pub(crate) mod deep;
 mod describe;
 pub mod e57;
 pub(crate) mod ends;
@@ -17,6 +18,7 @@ pub(crate) mod sniff;
 mod systems;
 pub mod text;
 mod united;
+mod validate;
 pub mod vertices;
 mod wkt;
 
@@ -26,3 +28,4 @@ pub(crate) use describe::note;
 pub use ends::{Discard, Mesh, OutputOrder, Read, Write};
 pub(crate) use origin::{Origin, open_plain};
 pub use project::Projected;
+pub use validate::validate;

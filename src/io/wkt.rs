@@ -82,6 +82,17 @@ pub fn is_wkt(text: &str) -> bool {
     is_system && word.len() < text.trim_start().len()
 }
 
+/// True if all brackets of `text` are closed, and there is nothing outside of them.
+pub fn is_closed(text: &str) -> bool {
+    parse(text).is_some()
+}
+
+/// True if `text` begins with a keyword that WKT 2 has, and WKT 1 has not.
+pub fn is_second(text: &str) -> bool {
+    let word = text.trim_start().split(['[', '(']).next().unwrap_or_default();
+    word.trim_end().to_ascii_uppercase().ends_with("CRS")
+}
+
 /// `WORD["text", number, WORD[…], …]`.
 #[derive(Debug, Default)]
 struct WktNode {

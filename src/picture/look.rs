@@ -1,18 +1,13 @@
 //! The first look at a scan: its points, its extent as seen from somewhere, and the range of what
 //! it is coloured by; and the frame that follows from it.
 
-use std::sync::{Mutex, PoisonError};
-
 use super::settings::{ColorBy, NARROWEST, Settings, View};
-use crate::host::{Threads, lock};
 use crate::point::{Dimension, PointBatch};
-use crate::stage::{Part, Source};
+use crate::stage::{PointWalk, Source};
 use crate::{Error, ErrorKind, Result};
 
 /// Points of which the middle range of figures is found, about.
 const SAMPLE: u64 = 100_000;
-/// Records read at once.
-const BATCH: usize = 8192;
 
 /// Calls `visit` with every point of `source` that is somewhere: its number in its part, its world
 /// coordinates, and the values that it is coloured by; and `nowhere` for each of the others. Each
@@ -29,42 +24,23 @@ pub(super) fn each_point<S: Send>(
     let no_place = || Error::pipeline("the scan has no coordinates");
     let axes = schema.coordinates().ok_or_else(no_place)?;
     let fields: Vec<&Dimension> = by.dimensions(schema)?;
-    let begin = || (begin(), PointBatch::new(schema.clone(), BATCH), vec![0.0; fields.len()]);
-    let draw = |(state, batch, values): &mut (S, PointBatch, Vec<f64>), index| {
-        let mut part = source.part(index)?;
-        let mut number = 0;
-        while refill(&mut *part, batch)? {
-            for record in batch.iter() {
-                let point = axes.map(|a| a.world(record, schema.endian));
-                if point.iter().all(|v| v.is_finite()) {
-                    for (value, field) in values.iter_mut().zip(&fields) {
-                        *value = field.world(record, schema.endian);
-                    }
-                    visit(state, number, point, values);
-                } else {
-                    nowhere(state);
+    let look = |(state, values): &mut (S, Vec<f64>), _, before: u64, batch: &PointBatch| {
+        for (number, record) in (before..).zip(batch.iter()) {
+            let point = axes.map(|a| a.world(record, schema.endian));
+            if point.iter().all(|v| v.is_finite()) {
+                for (value, field) in values.iter_mut().zip(&fields) {
+                    *value = field.world(record, schema.endian);
                 }
-                number += 1;
+                visit(state, number, point, values);
+            } else {
+                nowhere(state);
             }
         }
-        Ok(())
     };
-    let states = Mutex::new(Vec::new());
-    let end = |(state, ..): (S, _, _)| {
-        lock(&states).push(state);
-        Ok(())
-    };
-    Threads::start(threads, |threads| {
-        threads.items(source.parts(), || {}).run(begin, draw, |()| {}, end)
-    })?;
-    Ok(states.into_inner().unwrap_or_else(PoisonError::into_inner))
-}
-
-/// Reads the next batch; false at the end.
-fn refill(part: &mut dyn Part, batch: &mut PointBatch) -> Result<bool> {
-    batch.clear();
-    part.read(batch)?;
-    Ok(!batch.is_empty())
+    let walk = PointWalk { threads, memory: u64::MAX };
+    let begin = || (begin(), vec![0.0; fields.len()]);
+    let states = walk.each_batch(source, 0, begin, look, |_, _, error| Err(error))?;
+    Ok(states.into_iter().map(|(state, _)| state).collect())
 }
 
 /// A range that holds nothing.

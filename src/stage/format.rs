@@ -15,9 +15,12 @@ use std::sync::Arc;
 use schemars::{JsonSchema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
+use super::findings::{Findings, Rule};
 use super::keys::{ReadKeys, WriteKeys};
 use super::sink::{ChunkSize, Sink};
 use super::source::Source;
+use super::walk::PointWalk;
+use super::whole::{WHOLE_RULES, read_whole};
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::{Error, Result};
 
@@ -88,6 +91,23 @@ pub trait Format: Send + Sync {
     /// What the header refutes, with its byte; a file that does not begin as one of the family is
     /// [`foreign`].
     fn describe(&self, path: &Path) -> Result<serde_json::Value>;
+
+    /// Holds the file at `path` to the rules of its specification and enters those that do not
+    /// hold, the points looked at as `walk` says. Without a specification to go by, a file is to be
+    /// read to its end and to have as many points as it says.
+    ///
+    /// # Errors
+    ///
+    /// What ends the look at the file; the caller enters it as a fault.
+    fn validate(&self, path: &Path, walk: &PointWalk, findings: &mut Findings) -> Result<()> {
+        let source = self.open(&[path.to_owned()], &ReadKeys::default())?;
+        read_whole(&*source, walk, findings)
+    }
+
+    /// The rules that [`validate`](Format::validate) holds files to.
+    fn rules(&self) -> Vec<&'static Rule> {
+        WHOLE_RULES.to_vec()
+    }
 
     /// What the file at `path` says of how it was made, as its sink wrote [`Metadata::note`]; None
     /// if it says nothing.

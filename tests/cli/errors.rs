@@ -38,8 +38,8 @@ fn help_names_commands_and_exit_codes() {
     let help = pointmill(at.path(), &["--help"]);
     assert_eq!((help.code, help.stderr.as_str()), (0, ""));
     for command in [
-        "run", "reduce", "convert", "info", "plan", "check", "stages", "graph", "new", "synth",
-        "compare",
+        "run", "reduce", "convert", "info", "validate", "plan", "check", "stages", "graph", "new",
+        "synth", "compare",
     ] {
         assert!(help.stdout.contains(&format!("\n  {command} ")), "{command}");
         let own = pointmill(at.path(), &[command, "--help"]);

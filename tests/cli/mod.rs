@@ -3,6 +3,7 @@
 mod accept;
 mod check;
 mod compare;
+mod deep;
 mod errors;
 mod events;
 mod interrupt;
@@ -14,6 +15,7 @@ mod preview;
 mod reproduce;
 mod size;
 mod tools;
+mod validate;
 mod values;
 mod verify;
 mod words;

@@ -7,6 +7,7 @@ mod dimensions;
 pub mod examples;
 mod formats;
 mod keys;
+mod rules;
 mod schema;
 mod worked;
 
@@ -215,6 +216,13 @@ fn the_formats_that_are_documented_are_those_that_are_written() {
         &pointmill::io::describe(&folder.path().join("reduced.laz"), registry.formats()).unwrap(),
         "info: LAS and LAZ",
     );
+    for (command, pointer) in [(&["info", "--deep"][..], "/0/deep"), (&["validate"], "/0")] {
+        let arguments = [command, &["--json", "scan.laz"]].concat();
+        let (code, printed, told) = pointmill(folder.path(), &arguments);
+        assert_eq!(code, 0, "{told}");
+        let printed: Value = serde_json::from_str(&printed).unwrap();
+        agree(printed.pointer(pointer).unwrap(), &command.join(" "));
+    }
     let text = "[params]\nout = 'o.laz'\n[[stage]]\nkind = 'read'\npath = 'scan.laz'\n\
                 [[stage]]\nkind = 'drop'\nclasses = [7]\n[[stage]]\nkind = 'grid'\nside = 2\n\
                 [[stage]]\nkind = 'filter'\nwhere = 'Intensity > 40'\n\

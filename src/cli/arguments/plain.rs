@@ -38,13 +38,3 @@ pub(crate) struct ManArguments {
     #[arg(value_name = "DIR")]
     pub folder: Option<String>,
 }
-
-#[derive(Debug, Args)]
-pub(crate) struct InfoArguments {
-    /// Files of points, patterns or folders
-    #[arg(value_name = "FILE", required = true)]
-    pub files: Vec<String>,
-    /// Print a JSON list with one object a file
-    #[arg(long)]
-    pub json: bool,
-}

@@ -6,7 +6,19 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use crate::cli::classes::{Classes, parse_classes};
+use crate::graph::MOST_THREADS;
 use crate::quantity::parse_count;
+
+/// A whole number within bounds, as the keys of a pipeline take it.
+pub(crate) fn within(text: &str, least: u64, most: u64) -> Result<u64, String> {
+    let right = parse_count(text).ok().filter(|number| (least..=most).contains(number));
+    right.ok_or_else(|| format!("takes a whole number from {least} to {most}"))
+}
+
+/// A number of threads.
+pub(crate) fn parse_threads(text: &str) -> Result<usize, String> {
+    within(text, 1, MOST_THREADS as u64).map(|threads| threads as usize)
+}
 
 /// Common to all commands that run a pipeline.
 #[derive(Debug, Clone, Args)]

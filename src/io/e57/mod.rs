@@ -14,5 +14,6 @@ mod reading;
 mod registered;
 pub(crate) mod sink;
 mod source;
+mod validate;
 
 pub use registered::{E57, E57Format};

@@ -4,10 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::names::{CALLED, FAMILY, MAGIC, RECORDS};
-use super::{info, sink, source};
+use super::{info, sink, source, validate};
 use crate::Result;
 use crate::point::{Metadata, Schema};
-use crate::stage::{ChunkSize, Format, ReadKeys, Sink, Source, WriteKeys};
+use crate::stage::{
+    ChunkSize, Findings, Format, PointWalk, ReadKeys, Rule, Sink, Source, WriteKeys,
+};
 
 /// The format of E57 files.
 #[derive(Debug, Clone, Copy)]
@@ -47,6 +49,14 @@ impl Format for E57Format {
 
     fn describe(&self, path: &Path) -> Result<serde_json::Value> {
         info::describe(path)
+    }
+
+    fn validate(&self, path: &Path, walk: &PointWalk, findings: &mut Findings) -> Result<()> {
+        validate::validate(path, walk, findings)
+    }
+
+    fn rules(&self) -> Vec<&'static Rule> {
+        validate::rules()
     }
 
     fn note(&self, path: &Path) -> Result<Option<String>> {

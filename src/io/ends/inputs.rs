@@ -31,7 +31,7 @@ pub fn unreadable(file: &Path) -> Error {
 ///
 /// # Errors
 /// Those of [`expand`] but for such names.
-fn expand_any<P: AsRef<str>>(paths: &[P], formats: &Formats) -> Result<Vec<PathBuf>> {
+pub fn expand_any<P: AsRef<str>>(paths: &[P], formats: &Formats) -> Result<Vec<PathBuf>> {
     let means = each(paths, formats)?;
     once(&means)?;
     Ok(means.into_iter().flat_map(|(_, files)| files).collect())

@@ -17,7 +17,7 @@ mod values;
 pub(crate) use discard::CountedSink;
 pub use discard::Discard;
 #[cfg(feature = "cli")]
-pub(crate) use inputs::{expand, unreadable};
+pub(crate) use inputs::{expand, expand_any, unreadable};
 pub use kinds::{OutputOrder, Read, Write};
 pub use mesh::Mesh;
 #[cfg(feature = "cli")]

@@ -76,7 +76,9 @@ pub struct LasInput {
     pub waveforms: Option<PathBuf>,
     /// How the points are stored.
     pub storage: Storage,
-    /// What the user should know.
+    /// What the user should know of how the points are stored.
+    pub stored: Vec<String>,
+    /// What the user should know, of that too.
     pub warnings: Vec<String>,
     /// What of its points is lost.
     pub lost: Vec<LostPoints>,
@@ -91,7 +93,9 @@ impl LasInput {
         let (vlrs, gap) = read_vlrs(&file, &header, &mut mending)?;
         let evlrs = read_evlrs(&file, &header, &mut mending)?;
         let behind = evlrs.iter().map(Evlr::position).min();
+        let before = mending.warnings.len();
         let storage = storage(&file, &header, &vlrs, behind, &mut mending)?;
+        let stored = mending.warnings[before..].to_vec();
         let Mending { mut warnings, lost, .. } = mending;
         let path_said = |odd: String| format!("{}: {odd}", shown(path));
         warnings.extend(header.odd_scales().into_iter().chain(header.odd_counts()).map(path_said));
@@ -123,6 +127,7 @@ impl LasInput {
             described,
             waveforms: waveforms.there,
             storage,
+            stored,
             warnings,
             lost,
         })

@@ -37,6 +37,7 @@ mod table;
 mod target;
 mod text;
 mod union;
+mod validate;
 mod verify;
 mod vlr;
 mod waveforms;

@@ -12,12 +12,14 @@ use super::noted;
 use super::own::{Shifted, own_form};
 use super::sink::{self, LasOptions};
 use super::target::Target;
-use super::{describe, source, waveforms};
+use super::{describe, source, validate, waveforms};
 use crate::Result;
 use crate::io::describe::json;
 use crate::io::project::Projected;
 use crate::point::{Metadata, PointBatch, Schema};
-use crate::stage::{ChunkSize, Format, ReadKeys, Sink, Source, WriteKeys};
+use crate::stage::{
+    ChunkSize, Findings, Format, PointWalk, ReadKeys, Rule, Sink, Source, WriteKeys,
+};
 
 /// One of the formats of LAS records.
 #[derive(Debug, Clone, Copy)]
@@ -82,6 +84,14 @@ impl Format for LasFormat {
 
     fn describe(&self, path: &Path) -> Result<serde_json::Value> {
         json(&describe::describe(path)?)
+    }
+
+    fn validate(&self, path: &Path, walk: &PointWalk, findings: &mut Findings) -> Result<()> {
+        validate::validate(path, self.form == Form::Octree, walk, findings)
+    }
+
+    fn rules(&self) -> Vec<&'static Rule> {
+        validate::rules(self.form == Form::Octree)
     }
 
     fn note(&self, path: &Path) -> Result<Option<String>> {

@@ -15,7 +15,7 @@ use super::merge::LasMerge;
 use super::native::Native;
 use super::read::{PlainPart, Shift};
 use super::table::is_held;
-use super::verify::{Evidence, Watched};
+use super::verify::{Evidence, Found, Watched};
 use super::waveforms;
 use crate::io::united::{LARGEST_BATCH, ToOneForm};
 use crate::point::{Metadata, Schema};
@@ -39,6 +39,10 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
 
 /// The same as `keys` want it: inputs that differ may be brought to one form.
 pub(super) fn open_with(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
+    Ok(Box::new(LasSource::open(paths, keys)?))
+}
+
+fn opened(paths: &[PathBuf], keys: &ReadKeys) -> Result<LasSource> {
     let Some((first, others)) = paths.split_first() else {
         return Err(Error::pipeline("there is no input file"));
     };
@@ -76,17 +80,34 @@ pub(super) fn open_with(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn So
     let files = each.map(open).collect::<Result<Vec<Opened>>>()?;
     let mut start = 0;
     let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i, &mut start)).collect();
-    Ok(Box::new(LasSource { files, parts, schema: Arc::new(schema), metadata, form, warnings }))
+    Ok(LasSource { files, parts, schema: Arc::new(schema), metadata, form, warnings })
 }
 
 /// LAS and LAZ files opened together.
-struct LasSource {
+pub struct LasSource {
     files: Vec<Opened>,
     parts: Vec<PartPlace>,
     schema: Arc<Schema>,
     metadata: Metadata,
     form: Form,
     warnings: Vec<String>,
+}
+
+impl LasSource {
+    /// As [`open_with`].
+    pub fn open(paths: &[PathBuf], keys: &ReadKeys) -> Result<LasSource> {
+        opened(paths, keys)
+    }
+
+    /// What the points of the first file come to; None before all of them were read.
+    pub fn found(&self) -> Option<Found> {
+        self.files.first()?.evidence.found()
+    }
+
+    /// What turned up behind the points that the headers count, while points were read.
+    pub fn found_behind(&self) -> Vec<String> {
+        self.files.iter().flat_map(|file| file.evidence.warnings()).collect()
+    }
 }
 
 struct Opened {

@@ -52,14 +52,17 @@ impl Claimed {
 
 /// What points are, in figures that a header has.
 #[derive(Debug, Clone)]
-struct Found {
-    points: u64,
+pub struct Found {
+    /// How many there are.
+    pub points: u64,
     /// Points outside of the header's box.
     outside: u64,
-    lo: [i64; 3],
-    hi: [i64; 3],
+    /// Smallest stored coordinates.
+    pub lo: [i64; 3],
+    /// Largest stored coordinates.
+    pub hi: [i64; 3],
     /// Points by return number, 0 included.
-    returns: [u64; 16],
+    pub returns: [u64; 16],
 }
 
 impl Found {
@@ -155,6 +158,12 @@ impl Evidence {
     /// What turned up while the points were read.
     pub fn warnings(&self) -> Vec<String> {
         lock(&self.gathered).warnings.clone()
+    }
+
+    /// What all points come to; None before all of them were read.
+    pub fn found(&self) -> Option<Found> {
+        let gathered = lock(&self.gathered);
+        (!gathered.read.contains(&false)).then(|| gathered.found.clone())
     }
 
     /// True if `records`, which no header counts, can be points of this file: they are in its box

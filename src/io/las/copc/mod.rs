@@ -3,13 +3,16 @@
 
 mod hierarchy;
 mod names;
+mod nodes;
 mod octree;
 mod overflow;
 mod packing;
 mod placed;
+pub mod rules;
 pub mod sink;
+pub mod validate;
 
-pub use names::{EXTENSION, POINT_FORMATS};
+pub use names::{EXTENSION, POINT_FORMATS, USER};
 pub use placed::PlacedSink;
 
 use crate::point::{Schema, names as n};

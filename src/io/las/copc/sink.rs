@@ -14,7 +14,7 @@ use crate::io::las::format::format_of;
 use crate::io::las::laz::{CHUNK_POINTS, Compression};
 use crate::io::las::sink::{LasForm, LasOptions, LasSink, record_length};
 use crate::io::las::vlr::{EVLR_HEAD, Vlr};
-use crate::point::{Metadata, Schema};
+use crate::point::{Bounds, Metadata, Schema};
 use crate::stage::{ChunkSize, Encode, Encoded, Extent, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -39,6 +39,7 @@ pub fn create(
         encoder: Arc::new(encoder),
         path: staged.to_owned(),
         stride,
+        scale: schema.coordinates().map_or([1.0; 3], |axes| axes.map(|axis| axis.scale)),
         ground: None,
         hierarchy: Hierarchy::default(),
         times: [f64::INFINITY, f64::NEG_INFINITY],
@@ -77,6 +78,8 @@ struct CopcSink {
     encoder: Arc<CopcEncoder>,
     path: PathBuf,
     stride: usize,
+    /// World units of a stored one.
+    scale: [f64; 3],
     ground: Option<Ground>,
     hierarchy: Hierarchy,
     /// The smallest and the largest GPS time.
@@ -84,6 +87,20 @@ struct CopcSink {
 }
 
 impl CopcSink {
+    /// The box of all points as they are written: those of other formats are rounded to steps of
+    /// the scale, half of one up or down.
+    fn written(&self, extent: &Extent) -> Bounds {
+        let mut bounds = extent.bounds;
+        for axis in 0..3 {
+            let half = self.scale[axis].abs() / extent.lattice.step / 2.0;
+            // On a lattice of the scale's own steps nothing is rounded.
+            let more = if half < 0.75 { 0 } else { half.ceil() as i64 };
+            bounds.lo[axis] = bounds.lo[axis].saturating_sub(more);
+            bounds.hi[axis] = bounds.hi[axis].saturating_add(more);
+        }
+        bounds
+    }
+
     /// Writes the chunks that are done and next.
     fn write_packed(&mut self) -> Result<()> {
         while let Some(PackedNode { key, points, chunk }) = self.encoder.packing.take() {
@@ -136,7 +153,7 @@ impl Sink for CopcSink {
             return Err(Error::pipeline(told).help("leave `run.z_scale` out, or write LAZ"));
         }
         if !extent.bounds.is_empty() {
-            let root = RootCube::around(&extent.bounds);
+            let root = RootCube::around(&self.written(extent));
             let overflow = Overflow::at(&self.path.with_extension("nodes"));
             let octree = Octree::new(root, self.stride, overflow);
             self.ground = Some(Ground { lattice: extent.lattice.clone(), root, octree });
