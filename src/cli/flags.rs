@@ -265,6 +265,8 @@ fn read(arguments: &ReadArguments) -> Vec<CommandFlag> {
         ("--columns", "read.columns", columns),
         ("--scans", "read.scans", scans),
         ("--crs", "read.crs", arguments.crs.clone().map(FlagValue::from)),
+        ("--box", "read.box", arguments.bounds.as_deref().map(numbers_or_text)),
+        ("--resolution", "read.resolution", arguments.resolution.as_deref().map(number_or_text)),
         ("--on-error", "read.on_error", arguments.on_error.clone().map(FlagValue::from)),
         ("--assume", "read.assume", assumed.then(|| json!(arguments.assume).into())),
     ])

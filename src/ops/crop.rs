@@ -1,6 +1,5 @@
 //! The stage `crop`: what is inside of a box or of polygons stays, or what is outside.
 
-mod corners;
 mod outline;
 mod shape;
 
@@ -17,7 +16,7 @@ use crate::report::Tally;
 use crate::stage::{Needs, Role, RoleName, StageKind, StagePlace, Transform, Unread};
 use crate::{Error, Result};
 
-pub use corners::CropBox;
+pub use crate::quantity::CropBox;
 
 use outline::AreaOutline;
 use shape::{AreaShape, Fitted};

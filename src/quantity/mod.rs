@@ -3,6 +3,7 @@
 
 mod angle;
 mod axis;
+mod corners;
 mod count;
 mod figure;
 mod fraction;
@@ -14,6 +15,7 @@ mod whole;
 
 pub use angle::Angle;
 pub use axis::Axis;
+pub use corners::CropBox;
 pub use count::parse_count;
 pub(crate) use figure::Figure;
 pub use fraction::Fraction;

@@ -156,6 +156,12 @@ impl Findings {
         self.add(rule, FoundPlace { point: None, byte: error.byte(), found });
     }
 
+    /// The first place of the first rule that is broken, in words.
+    pub fn first_fault(&self) -> Option<String> {
+        let fault = self.0.iter().find(|finding| finding.rule.severity == Severity::Fault)?;
+        fault.places.first().map(|place| place.found.clone())
+    }
+
     /// Adds what was found elsewhere.
     pub fn merge(&mut self, other: Findings) {
         for theirs in other.0 {

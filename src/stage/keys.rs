@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::quantity::CropBox;
+
 /// How inputs are to be read, as far as formats need to know: keys of `read`.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
@@ -20,6 +22,10 @@ pub struct ReadKeys {
     pub assume: Vec<Assumption>,
     /// What is done about damage.
     pub on_error: OnError,
+    /// The box that points are read from, both of whose corners belong to it; none: everywhere.
+    pub bounds: Option<CropBox>,
+    /// Distance between points, in world units, down to which levels of an octree are read.
+    pub resolution: Option<f64>,
     /// Scale that LAS inputs of different scales or offsets are brought to.
     pub scale: Option<[f64; 3]>,
     /// Offset that they are brought to.
@@ -35,6 +41,8 @@ impl ReadKeys {
             ("columns", self.columns.is_some()),
             ("scans", self.scans.is_some()),
             ("on_error", self.on_error != OnError::Fail),
+            ("box", self.bounds.is_some()),
+            ("resolution", self.resolution.is_some()),
             ("scale", self.scale.is_some()),
             ("offset", self.offset.is_some()),
             ("point_format", self.point_format.is_some()),

@@ -1,5 +1,6 @@
 //! The command `convert`, and what becomes of fields, colours and units.
 
+mod boxed;
 mod bulk;
 mod colors;
 mod damage;

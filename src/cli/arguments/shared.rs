@@ -95,6 +95,14 @@ pub(crate) struct ReadArguments {
     /// vertical one EPSG:25832+7837, or WKT; nothing is reprojected [default: as they say]
     #[arg(long, value_name = "CRS")]
     pub crs: Option<String>,
+    /// Where points of LAS, LAZ and COPC are read, in their coordinates; of COPC only that is read:
+    /// X0,Y0,X1,Y1 or X0,Y0,Z0,X1,Y1,Z1 [default: everywhere]
+    #[arg(long = "box", value_name = "CORNERS", allow_hyphen_values = true)]
+    pub bounds: Option<String>,
+    /// Distance between points down to which COPC is read, in their unit, such as 0.5 [default: all
+    /// points]
+    #[arg(long, value_name = "LENGTH")]
+    pub resolution: Option<String>,
     /// What is done about damaged LAS and LAZ: fail; skip what is damaged, of LAZ whole chunks; or
     /// salvage what can be read, also of damaged chunks. What is lost is told [default: fail]
     #[arg(long, value_name = "HOW")]

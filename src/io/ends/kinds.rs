@@ -6,12 +6,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::values::{
-    names_once, one_or_more, one_or_three, some_columns, some_crs, some_offset, some_scale,
-    some_scans, texts,
+    names_once, one_or_more, one_or_three, some_columns, some_crs, some_offset, some_positive,
+    some_scale, some_scans, texts,
 };
 use crate::error::{listed, shown};
 use crate::io::sniff::{of_extension, upper};
-use crate::quantity::{Length, Whole};
+use crate::quantity::{CropBox, Length, Whole};
 use crate::stage::{
     Assumption, Colors, Format, FormatName, Formats, OnError, Order, OutputEncoding, ReadKeys,
     Separator, WriteKeys,
@@ -117,6 +117,15 @@ pub struct Read {
     /// told, and counted in the report.
     #[serde(default)]
     pub on_error: OnError,
+    /// Where points of LAS, LAZ and COPC are read: `[x0, y0, x1, y1]`, or
+    /// `[x0, y0, z0, x1, y1, z1]`, both of whose corners belong to it; none: everywhere. Of COPC
+    /// only the nodes that meet it are read.
+    #[serde(default, rename = "box")]
+    pub bounds: Option<CropBox>,
+    /// Distance between points, in the unit of the coordinates, down to which COPC is read: levels
+    /// of its octree up to the first that is as fine; none: all levels.
+    #[serde(default, deserialize_with = "some_positive")]
+    pub resolution: Option<f64>,
     /// Scale that LAS inputs are brought to as they are read, where their scales differ or their
     /// offsets are not whole steps apart; none: such inputs are refused.
     #[serde(default, deserialize_with = "some_scale")]
@@ -312,6 +321,8 @@ impl Read {
         keys.crs.clone_from(&self.crs);
         keys.assume.clone_from(&self.assume);
         keys.on_error = self.on_error;
+        keys.bounds.clone_from(&self.bounds);
+        keys.resolution = self.resolution;
         (keys.scale, keys.offset) = (self.scale, self.offset);
         keys.point_format = self.point_format.map(|format| format.get() as u8);
         keys

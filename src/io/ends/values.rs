@@ -118,6 +118,11 @@ pub(super) fn some_offset<'de, D: Deserializer<'de>>(
 /// A number above 0, refused at its own place.
 struct Positive(f64);
 
+/// A number above 0.
+pub(super) fn some_positive<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    Positive::deserialize(from).map(|number| Some(number.0))
+}
+
 impl<'de> Deserialize<'de> for Positive {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let number = f64::deserialize(from)?;

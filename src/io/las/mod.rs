@@ -4,6 +4,7 @@
 //! [`open`] reads one or several files as a source; [`LAS`], [`LAZ`] and [`COPC`] are the
 //! formats as a registry takes them. A COPC file is read as the LAZ it is.
 
+mod boxed;
 mod chunked;
 mod chunks;
 mod copc;

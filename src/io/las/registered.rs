@@ -75,7 +75,7 @@ impl Format for LasFormat {
     }
 
     fn read_keys(&self) -> &'static [&'static str] {
-        &["on_error", "scale", "offset", "point_format"]
+        &["on_error", "box", "resolution", "scale", "offset", "point_format"]
     }
 
     fn open(&self, files: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::boxed::Wanted;
 use super::chunked::LazPart;
 use super::chunks::{Chunk, Chunks};
 use super::crs;
@@ -46,15 +47,20 @@ fn opened(paths: &[PathBuf], keys: &ReadKeys) -> Result<LasSource> {
     let Some((first, others)) = paths.split_first() else {
         return Err(Error::pipeline("there is no input file"));
     };
-    let form = Form::of(keys, paths)?;
-    let first = form.bring(LasInput::open(first, form.on_error)?)?;
+    let (form, wanted) = (Form::of(keys, paths)?, Wanted::of(keys));
+    let open = |path: &PathBuf| {
+        let mut input = LasInput::open(path, form.on_error)?;
+        wanted.apply(&mut input)?;
+        form.bring(input)
+    };
+    let first = open(first)?;
     let mut schema = first.schema();
     let mut own = vec![first.own.as_ref().map(|_| first.own_schema())];
     let mut inputs = vec![first.clone().without_records()];
     let (mut tables, mut points) = (first.table_bytes(), first.points());
     let mut merge = LasMerge::of(first, &form)?;
     for path in others {
-        let input = form.bring(LasInput::open(path, form.on_error)?)?;
+        let input = open(path)?;
         own.push(input.own.as_ref().map(|_| input.own_schema()));
         tables = tables.saturating_add(input.table_bytes());
         points = points.saturating_add(input.points());
@@ -69,7 +75,8 @@ fn opened(paths: &[PathBuf], keys: &ReadKeys) -> Result<LasSource> {
     for (axis, dimension) in schema.dimensions.iter_mut().take(3).enumerate() {
         dimension.origin = native.header.offset()[axis];
     }
-    let warnings = inputs.iter().flat_map(|i| i.warnings.clone()).collect();
+    let told = |i: &LasInput| i.warnings.clone().into_iter().chain(wanted.told(i));
+    let warnings = inputs.iter().flat_map(told).collect();
     let (crs, units) =
         (crs::text(&native.vlrs, &native.evlrs)?, crs::units(&native.vlrs, &native.evlrs)?);
     let gps_time = has_gps_time(native.header.format()).then(|| native.header.gps_time());
@@ -80,7 +87,8 @@ fn opened(paths: &[PathBuf], keys: &ReadKeys) -> Result<LasSource> {
     let files = each.map(open).collect::<Result<Vec<Opened>>>()?;
     let mut start = 0;
     let parts = files.iter().enumerate().flat_map(|(i, file)| file.parts(i, &mut start)).collect();
-    Ok(LasSource { files, parts, schema: Arc::new(schema), metadata, form, warnings })
+    let schema = Arc::new(schema);
+    Ok(LasSource { files, parts, schema, metadata, form, wanted, warnings })
 }
 
 /// LAS and LAZ files opened together.
@@ -90,6 +98,7 @@ pub struct LasSource {
     schema: Arc<Schema>,
     metadata: Metadata,
     form: Form,
+    wanted: Wanted,
     warnings: Vec<String>,
 }
 
@@ -186,8 +195,14 @@ impl Opened {
 
     /// Opens a part, its points looked at. Coordinates and returns are in layers that are always
     /// decoded.
-    fn open(&self, place: &PartPlace, selection: Layers) -> Result<Box<dyn Part + '_>> {
+    fn open(
+        &self,
+        place: &PartPlace,
+        selection: Layers,
+        wanted: &Wanted,
+    ) -> Result<Box<dyn Part + '_>> {
         let part = self.unwatched(place, selection)?;
+        let part = wanted.part(part, self.input.own_header(), self.shift);
         let part = Watched::new(part, self.evidence.clone(), place.number, self.shift.0);
         Ok(match &self.to_one_form {
             Some(form) => form.part(Box::new(part), &self.input.path),
@@ -252,18 +267,23 @@ impl Source for LasSource {
 
     fn claimed_box(&self) -> Option<[[f64; 3]; 2]> {
         let filled = self.files.iter().filter(|file| file.input.points() > 0);
-        filled.map(|file| file.input.header.bounds()).reduce(|[lo, hi], [other_lo, other_hi]| {
+        let all = filled.map(|file| file.input.header.bounds());
+        let all = all.reduce(|[lo, hi], [other_lo, other_hi]| {
             let each = |of: fn(f64, f64) -> f64, a: [f64; 3], b: [f64; 3]| {
                 [of(a[0], b[0]), of(a[1], b[1]), of(a[2], b[2])]
             };
             [each(f64::min, lo, other_lo), each(f64::max, hi, other_hi)]
-        })
+        });
+        all.map(|corners| self.wanted.within(corners))
     }
 
     fn inputs(&self) -> Vec<stage::Input> {
         let input = |f: &Opened| stage::Input {
             path: f.input.path.clone(),
-            points: f.input.points() - f.evidence.lost_while_read(),
+            points: match self.wanted.is_some() {
+                true => f.evidence.found().map_or(f.input.points(), |found| found.points),
+                false => f.input.points() - f.evidence.lost_while_read(),
+            },
             beside: f.input.waveforms.clone().map(|file| (file, waveforms::EXTENSION)),
         };
         self.files.iter().map(input).collect()
@@ -291,6 +311,11 @@ impl Source for LasSource {
     }
 
     fn first_record(&self, index: usize) -> Option<u64> {
+        // What is left out is known once it is read.
+        let is_known = self.form.on_error == OnError::Fail && !self.wanted.is_some();
+        if index > 0 && !is_known {
+            return None;
+        }
         self.parts.get(index).map(|place| place.start)
     }
 
@@ -300,7 +325,7 @@ impl Source for LasSource {
 
     fn part_without(&self, index: usize, unread: &[String]) -> Result<Box<dyn Part + '_>> {
         let place = &self.parts[index];
-        self.files[place.file].open(place, selection(&self.schema, unread))
+        self.files[place.file].open(place, selection(&self.schema, unread), &self.wanted)
     }
 
     fn warnings(&self) -> Vec<String> {

@@ -1,8 +1,8 @@
 //! The area of a crop, in world units and in the steps in which records store coordinates.
 
-use super::corners::CropBox;
 use crate::geom::polygon::{Area, PolygonCorner, PolygonRings};
 use crate::point::{Dimension, Endian, Schema};
+use crate::quantity::CropBox;
 use crate::{Error, Result};
 
 /// An area in world units.

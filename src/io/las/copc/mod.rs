@@ -9,6 +9,7 @@ mod overflow;
 mod packing;
 mod placed;
 pub mod rules;
+pub mod selected;
 pub mod sink;
 pub mod validate;
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::quantity::has_schema;
+use super::has_schema;
 
 /// A box in world units, both of whose corners belong to it: `[x0, y0, x1, y1]`, or
 /// `[x0, y0, z0, x1, y1, z1]`.
