@@ -41,7 +41,7 @@ use crate::{Error, Result};
 ///
 /// # Formats
 ///
-/// - LAS 1.0 to 1.4, and LAZ; COPC (`.copc.laz`) is read whole, as the LAZ that it is.
+/// - LAS 1.0 to 1.5, and LAZ; COPC (`.copc.laz`) is read whole, as the LAZ that it is.
 /// - PLY, whatever its vertices hold; lists of theirs are passed over, and told.
 /// - PCD as text, as bytes or packed (`binary_compressed`). A cell of a grid (`HEIGHT` above 1) has
 ///   its `Row` and `Column`. A point of which a coordinate is NaN is none, as the library has it:

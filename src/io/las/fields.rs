@@ -16,6 +16,7 @@ pub mod at {
     pub const EVLR_START: usize = 235;
     pub const EVLRS: usize = 243;
     pub const RETURNS: usize = 255;
+    pub const TIME_OFFSET: usize = 391;
 }
 
 /// Bits of the global encoding field.
@@ -28,4 +29,6 @@ pub mod encoding {
     pub const WAVEFORM_EXTERNAL: u16 = 4;
     /// The CRS is WKT.
     pub const WKT: u16 = 16;
+    /// GPS times are less by the time offset of the header (LAS 1.5).
+    pub const TIME_OFFSET: u16 = 64;
 }

@@ -8,9 +8,10 @@ use std::ops::{Deref, DerefMut};
 use las::raw::header::{Evlr, LargeFile};
 use las::{Version, raw};
 
-use super::fields::{at, encoding};
+use super::fields::at;
 use super::file::InputFile;
 use super::format;
+use super::las15::OF_1_5;
 use crate::point::GpsTime;
 use crate::stage::foreign;
 use crate::{Error, Result};
@@ -48,7 +49,8 @@ impl DerefMut for Header {
 impl Header {
     /// Bytes of the header of LAS 1.`minor`.
     fn size_of(minor: u8) -> usize {
-        usize::from(Version::new(1, minor).header_size())
+        let own = if minor >= 5 { OF_1_5 } else { 0 };
+        usize::from(Version::new(1, minor.min(4)).header_size()) + own
     }
 
     /// A header of LAS 1.4 of zeros but for signature, version, size, format and record length.
@@ -64,7 +66,7 @@ impl Header {
     /// Reads the header of `file` and checks it against the file's length.
     pub fn read(file: &InputFile) -> Result<Self> {
         let smallest = Self::size_of(0);
-        let first = file.bytes(0, file.len().min(Self::size_of(4) as u64) as usize)?;
+        let first = file.bytes(0, file.len().min(Self::size_of(5) as u64) as usize)?;
         if !first.starts_with(SIGNATURE) {
             return Err(foreign(file.path(), CALLED));
         }
@@ -75,10 +77,10 @@ impl Header {
         }
         let bytes = first;
         let (major, minor) = (bytes[at::VERSION], bytes[at::VERSION + 1]);
-        if major != 1 || minor > 4 {
+        if major != 1 || minor > 5 {
             return Err(file
                 .wrong(at::VERSION as u64, format!("LAS {major}.{minor} is not read"))
-                .help("LAS 1.0 to 1.4 are read: convert it with the program that wrote it"));
+                .help("LAS 1.0 to 1.5 are read: convert it with the program that wrote it"));
         }
         let size = u16::from_le_bytes([bytes[at::HEADER_SIZE], bytes[at::HEADER_SIZE + 1]]);
         let needed = Self::size_of(minor);
@@ -94,9 +96,12 @@ impl Header {
                 )
                 .help(DAMAGED));
         }
-        let bytes = file.bytes(0, usize::from(size))?;
+        let mut bytes = file.bytes(0, usize::from(size))?;
+        // The crate takes versions that it does not know for old ones.
+        bytes[at::VERSION + 1] = minor.min(4);
         let changed = |e| file.wrong(0, "the header changed while it was read").because(e);
         let mut header = Header(raw::Header::read_from(&bytes[..]).map_err(changed)?);
+        header.version = Version::new(1, minor);
         // The crate leaves out a place without a count and a count without a place.
         header.evlr = (minor >= 4).then(|| Evlr {
             start_of_first_evlr: u64::from_le_bytes(array::from_fn(|i| bytes[at::EVLR_START + i])),
@@ -120,6 +125,7 @@ impl Header {
                 )
                 .help(DAMAGED));
         }
+        self.check_times(file)?;
         let Some(least) = format::record_size(self.format()) else {
             return Err(file
                 .wrong(at::FORMAT as u64, format!("point format {} is not known", self.format()))
@@ -261,9 +267,9 @@ impl Header {
 
     /// What GPS times count.
     pub fn gps_time(&self) -> GpsTime {
-        match self.encoding() & encoding::GPS_STANDARD {
-            0 => GpsTime::Week,
-            _ => GpsTime::AdjustedStandard,
+        match self.is_standard() {
+            false => GpsTime::Week,
+            true => GpsTime::AdjustedStandard,
         }
     }
 

@@ -164,8 +164,9 @@ fn shifts(inputs: &[LasInput], wanted: Option<[f64; 3]>) -> Result<([f64; 3], Ve
 /// Fields that all inputs share are carried; the others become neutral, the version and the date
 /// the largest.
 fn header(inputs: &[LasInput]) -> Header {
-    let headers = || inputs.iter().map(|i| &i.header);
-    let first = &inputs[0].header;
+    let all: Vec<Header> = inputs.iter().map(|i| i.header.for_outputs()).collect();
+    let headers = || all.iter();
+    let first = &all[0];
     let minor = headers().map(Header::minor).max().unwrap_or(4);
     let custom = &first.padding[..];
     let custom = if headers().all(|h| h.padding == custom) { custom } else { &[] };

@@ -1,4 +1,4 @@
-//! LAS 1.0 to 1.4 and LAZ, every point format: records byte for byte, headers and variable length
+//! LAS 1.0 to 1.5 and LAZ, every point format: records byte for byte, headers and variable length
 //! records carried. Knows no tiles and no stages but the two roles it plays.
 //!
 //! [`open`] reads one or several files as a source; [`LAS`], [`LAZ`] and [`COPC`] are the
@@ -23,6 +23,7 @@ mod guard;
 mod header;
 pub(crate) mod holding;
 mod input;
+mod las15;
 mod laz;
 mod merge;
 mod native;

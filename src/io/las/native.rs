@@ -43,7 +43,7 @@ impl Native {
     pub fn of(input: &LasInput) -> Self {
         let (vlrs, evlrs) = input.carried();
         Native {
-            header: input.header.clone(),
+            header: input.header.for_outputs(),
             vlrs,
             gap: input.gap.clone(),
             evlrs,
@@ -76,7 +76,7 @@ impl Native {
             header.offset(),
         );
         let waveforms = Waveforms::of(file.path(), header).there;
-        let header = form.header(&now, &schema)?;
+        let header = form.header(&now, &schema)?.for_outputs();
         Ok(Native { header, vlrs, gap, evlrs, waveforms, made: false })
     }
 
