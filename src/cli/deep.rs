@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::io::deep::{ClassCount, DeepDimension, DeepFigures, DensityFigures};
+use crate::io::{ClassCount, DeepDimension, DeepFigures, DensityFigures, ReturnCount};
 use crate::report::{Coordinate, Grouped, Short};
 
 /// Letters of the longest bar.
@@ -25,7 +25,7 @@ pub(super) fn shown(figures: &DeepFigures, scales: &[f64]) -> Value {
         of_dimension(dimension, if n < 3 { step(n) } else { 0.0 })
     };
     put("dimensions", dimensions.iter().enumerate().map(row).collect());
-    let row = |count: &crate::io::deep::ReturnCount| {
+    let row = |count: &ReturnCount| {
         json!({
             "return": count.number,
             "points": Grouped(count.points).to_string(),

@@ -8,7 +8,7 @@ use super::arguments::InfoArguments;
 use super::console::Console;
 use super::{deep, print, table};
 use crate::error::shown;
-use crate::io::deep::{DeepFigures, deep};
+use crate::io::DeepFigures;
 use crate::io::ends::expand;
 use crate::report::Coordinate;
 use crate::stage::Formats;
@@ -24,7 +24,7 @@ pub(super) fn info(arguments: &InfoArguments, formats: &Formats, console: &Conso
     for file in files {
         let facts = io::describe(&file, formats);
         let facts = facts.and_then(|facts| match arguments.deep {
-            true => Ok((facts, Some(deep(&file, formats, &arguments.walk.walk())?))),
+            true => Ok((facts, Some(io::deep(&file, formats, &arguments.walk.walk())?))),
             false => Ok((facts, None)),
         });
         match facts {

@@ -2,7 +2,7 @@
 //! the stages that name files. Knows nothing of tiles.
 
 pub(crate) mod convert;
-pub(crate) mod deep;
+mod deep;
 mod describe;
 pub mod e57;
 pub(crate) mod ends;
@@ -23,6 +23,9 @@ pub mod vertices;
 mod wkt;
 
 pub use convert::{Projection, Rounding};
+pub use deep::{
+    ClassCount, DeepDimension, DeepFigures, DensityFigures, QuantileFigures, ReturnCount, deep,
+};
 pub use describe::describe;
 pub(crate) use describe::note;
 pub use ends::{Discard, Mesh, OutputOrder, Read, Write};

@@ -13,6 +13,7 @@ mod picture;
 mod plan;
 mod preview;
 mod reproduce;
+mod rules;
 mod size;
 mod tools;
 mod validate;

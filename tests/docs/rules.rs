@@ -21,9 +21,9 @@ A *fault* is what the specification forbids, or what makes a file unreadable. A 
 allowed or common and trips programs up. A *note* is worth knowing. The faults are those of
 [lasvalidate](https://github.com/LASvalidator/lasvalidate) and
 [copc-validator](https://github.com/hobuinc/copc-validator), with these differences: a date that is
-not set, a file without points, and point formats of waveforms without any are warnings here; legacy counts of point formats 6 to 10 must be
-0, as LAS 1.4 R15 says; the order of GPS times inside of a COPC node is no rule of COPC 1.0 and is
-not looked at. LAS 1.0 to 1.4 are checked.
+not set, a file without points, and point formats of waveforms without any are warnings here; legacy
+counts of point formats 6 to 10 must be 0, as LAS 1.4 R15 says; the order of GPS times inside of a
+COPC node is no rule of COPC 1.0 and is not looked at. LAS 1.0 to 1.4 are checked.
 
 Points are read once, by as many threads as `--threads` says, in a memory that `--memory` bounds;
 what is told is the same for any number of them.

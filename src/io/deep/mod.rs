@@ -20,10 +20,11 @@ use spread::{SPREAD_BYTES, ValueSpread};
 /// Returns that a point can be one of, 0 included.
 const RETURNS: usize = 16;
 /// Shares of points of which quantiles tell, 0 to 1.
-pub const QUANTILES: [f64; 9] = [0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0];
+const QUANTILES: [f64; 9] = [0.0, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0];
 
 /// What all points of a file come to.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct DeepFigures {
     /// How many there are.
     pub points: u64,
@@ -42,6 +43,7 @@ pub struct DeepFigures {
 
 /// How dense points are, as seen from above.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct DensityFigures {
     /// Points in a square of one unit, of the squares that have points.
     pub points_per_square: f64,
@@ -57,6 +59,7 @@ pub struct DensityFigures {
 
 /// What the numbers of a dimension come to.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct DeepDimension {
     /// Its name.
     pub name: String,
@@ -78,6 +81,7 @@ pub struct DeepDimension {
 
 /// Points by return.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ReturnCount {
     /// The number.
     pub number: usize,
@@ -89,6 +93,7 @@ pub struct ReturnCount {
 
 /// Points of a class.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ClassCount {
     /// The class.
     pub class: u8,
@@ -100,6 +105,7 @@ pub struct ClassCount {
 
 /// The shares of points below values of a dimension.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct QuantileFigures {
     /// The dimension.
     pub name: &'static str,
@@ -107,12 +113,25 @@ pub struct QuantileFigures {
     pub values: Vec<[f64; 2]>,
 }
 
-/// Reads all points of the file at `path` and says what they come to.
+/// Reads all points of the file at `path` and says what they come to; which of `formats` it is, its
+/// first bytes tell.
+///
+/// ```
+/// use pointmill::stage::PointWalk;
+/// use pointmill::{Registry, io};
+///
+/// let path = std::env::temp_dir().join(format!("pointmill-deep-{}.csv", std::process::id()));
+/// std::fs::write(&path, "x,y,z\n0,0,1\n1,0,2\n0,1,6\n")?;
+/// let figures = io::deep(&path, Registry::builtin().formats(), &PointWalk::default())?;
+/// assert_eq!((figures.points, figures.dimensions[2].mean), (3, Some(3.0)));
+/// # std::fs::remove_file(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 ///
 /// A file of no format among `formats`, points that cannot be read, a memory that does not do.
-pub(crate) fn deep(path: &Path, formats: &Formats, walk: &PointWalk) -> Result<DeepFigures> {
+pub fn deep(path: &Path, formats: &Formats, walk: &PointWalk) -> Result<DeepFigures> {
     let format = describe::format_of(path, formats)?;
     let told = |error| sniff::told(error, &**format, formats);
     let files: [PathBuf; 1] = [path.to_owned()];

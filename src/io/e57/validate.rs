@@ -93,7 +93,7 @@ fn header(head: &[u8; HEADER], length: u64, findings: &mut Findings) {
     if (major, minor) != (1, 0) {
         findings.at(&VERSION, 8, format!("{major}.{minor}"));
     }
-    if long(16) != length || length % PAGE != 0 {
+    if long(16) != length || !length.is_multiple_of(PAGE) {
         findings.at(&LENGTH, 16, format!("{}, and the file has {length}", long(16)));
     }
     if long(40) != PAGE {

@@ -93,8 +93,8 @@ impl PlyFile {
         behind.iter().all(|e| e.count == 0 || e.properties.is_empty())
     }
 
-    /// A warning for what is behind the last element that the header names. Of a text file it is
-    /// known once all is read; of elements with lists never.
+    /// What is to be said of bytes behind the last element that the header names. Of a text file it
+    /// is known once all is read; of elements with lists never.
     pub fn unread(&self) -> Option<String> {
         let what = if self.header.encoding == Encoding::Ascii {
             self.more_lines.load(Ordering::Relaxed).then(|| "lines".to_owned())?
@@ -107,8 +107,7 @@ impl PlyFile {
             format!("{bytes} bytes")
         };
         Some(format!(
-            "{}: {what} behind the {} vertices that the header counts are not read",
-            crate::error::shown(&self.path),
+            "{what} behind the {} vertices that the header counts are not read",
             self.points
         ))
     }

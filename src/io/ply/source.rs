@@ -15,7 +15,7 @@ use crate::io::rows::parts::PartEnds;
 use crate::io::systems;
 use crate::io::united::{LARGEST_BATCH, ToOneForm};
 use crate::point::{Metadata, Schema};
-use crate::stage::{Input, Part, ReadKeys, Source};
+use crate::stage::{Contradiction, Input, Part, ReadKeys, Source};
 use crate::{Error, Result};
 
 /// Vertices of one part of a binary file.
@@ -288,7 +288,12 @@ impl Source for PlySource {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let found = |file: &PlyFile| file.unread().into_iter().chain(file.rounded());
-        self.warnings.iter().cloned().chain(self.files.iter().flat_map(found)).collect()
+        let found = self.files.iter().filter_map(PlyFile::rounded);
+        self.warnings.iter().cloned().chain(found).collect()
+    }
+
+    fn contradictions(&self) -> Vec<Contradiction> {
+        let found = |file: &PlyFile| Some(Contradiction::new(&file.path, 0, file.unread()?));
+        self.files.iter().filter_map(found).collect()
     }
 }

@@ -20,7 +20,7 @@ use crate::io::rows::schema::placed;
 use crate::io::systems;
 use crate::point::names::{BLUE, COLUMN, GREEN, INTENSITY, NIR, POINT_SOURCE_ID, RED, ROW, XYZ};
 use crate::point::{Dimension, Endian, Layout, Metadata, PointBatch, Scalar, Schema};
-use crate::stage::{Input, Part, ReadKeys, Source};
+use crate::stage::{Contradiction, Input, Part, ReadKeys, Source};
 use crate::{Error, Result};
 
 /// Kinds of texts.
@@ -43,6 +43,8 @@ struct TextFile {
     columns: Vec<Option<String>>,
     scans: Vec<PtxScan>,
     found: TextSurvey,
+    /// What it says of its points, and is not so.
+    belied: Option<String>,
     warnings: Vec<String>,
 }
 
@@ -103,20 +105,19 @@ impl TextFile {
                 names.into_iter().map(|name| Some(name.to_owned())).collect()
             }
         };
-        let (points, claimed) = (found.points, found.claimed.unwrap_or(found.points));
-        if claimed > points {
-            let told = format!("it says that it has {claimed} points, and ends after {points}");
-            return Err(Error::data(path, told)
-                .at_byte(length)
-                .help("the file is cut short, or the number is wrong: correct it"));
-        }
-        if claimed < points {
-            let said = "it says that it has";
-            warnings.push(format!("{}: {said} {claimed} points, and has {points}", shown(path)));
-        }
+        let belied = belied(path, length, &found)?;
         let (path, origin) = (path.to_owned(), origin.clone());
         let separator = head.separator;
-        Ok(TextFile { path, origin, separator, columns, scans: Vec::new(), found, warnings })
+        Ok(TextFile {
+            path,
+            origin,
+            separator,
+            columns,
+            scans: Vec::new(),
+            found,
+            belied,
+            warnings,
+        })
     }
 
     fn ptx(file: File, path: &Path, origin: &Origin) -> Result<TextFile> {
@@ -138,7 +139,8 @@ impl TextFile {
         let told = format!("{}: {empty} of {cells} cells have no point", shown(path));
         let warnings = if empty > 0 { vec![told] } else { Vec::new() };
         let (path, origin) = (path.to_owned(), origin.clone());
-        Ok(TextFile { path, origin, separator: Delimiter::Blanks, columns, scans, found, warnings })
+        let (separator, belied) = (Delimiter::Blanks, None);
+        Ok(TextFile { path, origin, separator, columns, scans, found, belied, warnings })
     }
 }
 
@@ -260,6 +262,25 @@ impl Source for TextSource {
     fn warnings(&self) -> Vec<String> {
         self.files.iter().flat_map(|file| file.warnings.clone()).collect()
     }
+
+    fn contradictions(&self) -> Vec<Contradiction> {
+        // The count of points stands in the first line.
+        let of = |file: &TextFile| Some(Contradiction::new(&file.path, 0, file.belied.clone()?));
+        self.files.iter().filter_map(of).collect()
+    }
+}
+
+/// What a text says of the number of its points, if it has more; fewer are an error.
+fn belied(path: &Path, length: u64, found: &TextSurvey) -> Result<Option<String>> {
+    let (points, claimed) = (found.points, found.claimed.unwrap_or(found.points));
+    if claimed > points {
+        let told = format!("it says that it has {claimed} points, and ends after {points}");
+        return Err(Error::data(path, told)
+            .at_byte(length)
+            .help("the file is cut short, or the number is wrong: correct it"));
+    }
+    let told = || format!("it says that it has {claimed} points, and has {points}");
+    Ok((claimed < points).then(told))
 }
 
 /// Where a part of PTX is in its scan.

@@ -59,7 +59,7 @@ impl NodeWalk<'_> {
                  {end}"
             );
             self.findings.at(&r::PAGES, start, told);
-        } else if bytes == 0 || bytes % ENTRY_BYTES as u64 != 0 {
+        } else if bytes == 0 || !bytes.is_multiple_of(ENTRY_BYTES as u64) {
             self.findings.at(&r::PAGES, start, format!("a page of {bytes} bytes"));
         }
         is_inside

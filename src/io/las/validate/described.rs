@@ -101,7 +101,7 @@ pub fn check(raw: &RawHeader, records: &[FoundRecord], findings: &mut Findings) 
     }
     let (mut described, mut names) = (0, BTreeSet::new());
     for record in ours {
-        if record.length % DESCRIPTOR_BYTES as u64 != 0 {
+        if !record.length.is_multiple_of(DESCRIPTOR_BYTES as u64) {
             let told = format!("{} bytes, no whole number of descriptors", record.length);
             findings.at(&r::EXTRA_LENGTH, record.payload_at, told);
         }

@@ -72,7 +72,7 @@ fn identity(raw: &RawHeader, findings: &mut Findings) {
 
 fn date(raw: &RawHeader, findings: &mut Findings) {
     let (day, year) = (raw.short(90), raw.short(92));
-    let is_leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
+    let is_leap = year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
     if day == 0 || year == 0 {
         findings.at(&r::NO_DATE, 90, format!("day {day} of year {year}"));
     }
