@@ -287,8 +287,9 @@ What it prints is a pipeline file that does the same. Inputs are not opened.",
 ];
 
 /// What `--accept` of `compare` is about.
-const COMPARE_ACCEPT: &str = "What the two scans must be, such as \"same\" or \"subset, max <= 5mm\", by the rules below: the \
-     exit code is 3 if they are not";
+const COMPARE_ACCEPT: &str = "What the two scans must be, such as \"same\" or \
+                              \"subset, max <= 5mm\", by the rules below: the exit code is 3 if \
+                              they are not";
 
 /// The command line with its flags in groups and its examples.
 pub(super) fn command() -> Command {

@@ -90,7 +90,7 @@ impl ScanComparison {
 /// assert_eq!(distances.second_to_first.unwrap().nearest.max, 0.0);
 /// assert!(distances.first_to_second.unwrap().nearest.max > 0.0);
 /// std::fs::remove_dir_all(&at)?;
-/// # Ok::<(), pointmill::Error>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors

@@ -14,8 +14,9 @@ pub const OTHER_BYTES: &str = "other bytes";
 /// Whether two scans have the same records.
 ///
 /// Records are compared byte for byte where both scans have one layout, and by the values of the
-/// dimensions that both have elsewhere. Of equal records of one scan the first ones are those that
-/// the other has, too. Records are numbered from 0, over all files of a scan.
+/// dimensions that both have elsewhere. Of equal records that one scan has more often, the first is
+/// told. Records are numbered from 0, over all files of a scan; those that are left out are not
+/// counted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct RecordsComparison {
