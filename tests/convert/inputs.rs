@@ -186,3 +186,33 @@ fn ply_files_of_other_types_encodings_and_orders_are_one() {
     write("e.ply", "ascii", &format!("{text_of}property uchar more\n"), b"0 0 0 1 1\n");
     fails(at, &["convert", "a.ply", "e.ply", "-o", "o.ply"], 1, &["vertex properties"]);
 }
+
+#[test]
+fn las_1_5_is_read_and_its_outputs_are_las_1_4_of_the_same_meaning() {
+    let at = inputs(&["103-las15.las"]);
+    let at = at.path();
+    done(at, &["convert", "103-las15.las", "-o", "o.las", "--quiet", "--no-provenance"]);
+    let (old, new) = (info(at, "103-las15.las"), info(at, "o.las"));
+    assert_eq!((&old["version"], &new["version"]), (&"1.5".into(), &"1.4".into()));
+    for key in ["points", "point_format", "gps_time", "scale", "min", "max"] {
+        assert_eq!(old[key], new[key], "{key}");
+    }
+    assert_eq!(new["gps_time"], "adjusted standard GPS time");
+    let whole = std::fs::read(at.join("103-las15.las")).unwrap();
+    let written = std::fs::read(at.join("o.las")).unwrap();
+    let points = 100 * 30;
+    assert!(written[written.len() - points..] == whole[whole.len() - points..]);
+    assert_eq!(u16::from_le_bytes([written[94], written[95]]), 375);
+    assert_eq!(u16::from_le_bytes([written[6], written[7]]) & 0b100_0001, 1);
+    // Twice the same is one scan; another offset of times has no meaning in LAS 1.4.
+    std::fs::copy(at.join("103-las15.las"), at.join("b.las")).unwrap();
+    done(at, &["convert", "103-las15.las", "b.las", "-o", "two.laz", "--quiet"]);
+    assert_eq!(info(at, "two.laz")["points"], 200);
+    let mut other = whole;
+    other[391..393].copy_from_slice(&1_400u16.to_le_bytes());
+    std::fs::write(at.join("c.las"), &other).unwrap();
+    fails(at, &["convert", "c.las", "-o", "o.las"], 1, &["byte 391", "1400 million seconds"]);
+    other.truncate(380);
+    std::fs::write(at.join("c.las"), &other).unwrap();
+    fails(at, &["convert", "c.las", "-o", "o.las"], 1, &["c.las", "header"]);
+}

@@ -23,7 +23,7 @@ allowed or common and trips programs up. A *note* is worth knowing. The faults a
 [copc-validator](https://github.com/hobuinc/copc-validator), with these differences: a date that is
 not set, a file without points, and point formats of waveforms without any are warnings here; legacy
 counts of point formats 6 to 10 must be 0, as LAS 1.4 R15 says; the order of GPS times inside of a
-COPC node is no rule of COPC 1.0 and is not looked at. LAS 1.0 to 1.4 are checked.
+COPC node is no rule of COPC 1.0 and is not looked at. LAS 1.0 to 1.5 are checked.
 
 Points are read once, by as many threads as `--threads` says, in a memory that `--memory` bounds;
 what is told is the same for any number of them.

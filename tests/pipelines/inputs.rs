@@ -23,7 +23,6 @@ fn other_formats_under_a_known_name_are_called_what_they_are() {
         ("160-empty.ply", "this is an empty file", "make or copy it again"),
         ("160-lfs.laz", "this is a Git LFS pointer", "git lfs pull"),
         ("160-welllog.las", "this is a well log", "convert it"),
-        ("103-las15.las", "LAS 1.5 is not read", "1.0 to 1.4"),
         ("118-vlrcount.las", "3 variable length records do not fit", "record count"),
         ("20a-count-too-many.las", "ends after 5 of the 9 points", "header's count"),
     ] {

@@ -8,10 +8,16 @@ use crate::stage::foreign;
 
 /// What a version of LAS has: bytes of its header, its highest point format, the bits of the global
 /// encoding that it defines. A version that is to be checked is a row here.
-const VERSIONS: [(u16, u8, u16); 5] =
-    [(227, 1, 0), (227, 1, 0), (227, 3, 0b1), (235, 5, 0b1111), (375, 10, 0b1_1111)];
+const VERSIONS: [(u16, u8, u16); 6] = [
+    (227, 1, 0),
+    (227, 1, 0),
+    (227, 3, 0b1),
+    (235, 5, 0b1111),
+    (375, 10, 0b1_1111),
+    (393, 10, 0b101_1111),
+];
 /// Bytes of the longest of these headers.
-const LONGEST: usize = 375;
+const LONGEST: usize = 393;
 
 /// The header of a file, zeros where the file or its version ends before.
 pub struct RawHeader {

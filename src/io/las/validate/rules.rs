@@ -79,7 +79,7 @@ pub static UNREAD: Rule = Rule::note(
     "a file that is right so far: the points of this one were not looked at",
 );
 pub static VERSION: Rule =
-    Rule::fault("version", "LAS 1.4 R15, 2.4 Version Major and Version Minor", "1.0 to 1.4");
+    Rule::fault("version", "LAS 1.4 R15, 2.4 Version Major and Version Minor", "1.0 to 1.5");
 pub static RESERVED: Rule = Rule::warning(
     "reserved",
     "LAS 1.1, Public Header Block, Reserved",
