@@ -42,7 +42,7 @@ pub(super) enum BatchWork {
 }
 
 /// What became of an input.
-enum Outcome {
+enum BatchOutcome {
     Done(Box<Done>),
     Current,
     /// Converted or not, it is not what was wanted.
@@ -52,7 +52,7 @@ enum Outcome {
 
 /// What became of all.
 pub(super) struct BatchDone {
-    files: Vec<(PathBuf, Option<PathBuf>, Outcome)>,
+    files: Vec<(PathBuf, Option<PathBuf>, BatchOutcome)>,
     seconds: f64,
 }
 
@@ -82,7 +82,7 @@ pub(super) fn run_all(runs: Vec<BatchRun>, jobs: usize, console: &Console) -> Ba
     let (mut places, mut works) = (Vec::new(), Vec::new());
     for BatchRun { input, output, work } in runs {
         places.push((input, output));
-        works.push(Mutex::new((Some(work), Outcome::NotBegun)));
+        works.push(Mutex::new((Some(work), BatchOutcome::NotBegun)));
     }
     let work = || {
         loop {
@@ -103,9 +103,9 @@ pub(super) fn run_all(runs: Vec<BatchRun>, jobs: usize, console: &Console) -> Ba
         work();
         drop(helpers);
     });
-    let outcome = |slot: Mutex<(_, Outcome)>| match slot.into_inner() {
+    let outcome = |slot: Mutex<(_, BatchOutcome)>| match slot.into_inner() {
         Ok((_, outcome)) => outcome,
-        Err(_) => Outcome::NotBegun,
+        Err(_) => BatchOutcome::NotBegun,
     };
     let files = places.into_iter().zip(works);
     let files = files.map(|((input, output), slot)| (input, output, outcome(slot))).collect();
@@ -118,26 +118,26 @@ fn one(
     input: &Path,
     (jobs, is_alone): (usize, bool),
     console: &Console,
-) -> Outcome {
+) -> BatchOutcome {
     let named = (!is_alone).then_some(input);
     let done = match work {
-        BatchWork::Current => return Outcome::Current,
+        BatchWork::Current => return BatchOutcome::Current,
         BatchWork::Refused(error) => Err(error),
         BatchWork::Convert(graph) => mill(graph, named, jobs, console),
     };
     let (done, error) = match done {
         Ok(done) => match done.accepted() {
-            Ok(()) => return Outcome::Done(Box::new(done)),
+            Ok(()) => return BatchOutcome::Done(Box::new(done)),
             Err(error) => (Some(Box::new(done)), error),
         },
-        Err(error) if error.kind() == ErrorKind::Interrupted => return Outcome::NotBegun,
+        Err(error) if error.kind() == ErrorKind::Interrupted => return BatchOutcome::NotBegun,
         Err(error) => (None, error),
     };
     let error = if is_alone { error } else { error.at(input) };
     if !is_alone {
         console.error(&error);
     }
-    Outcome::Failed(done, error)
+    BatchOutcome::Failed(done, error)
 }
 
 /// Plans and runs a pipeline, of `jobs` at once; warnings name the input.
@@ -156,29 +156,29 @@ fn mill(graph: Graph, named: Option<&Path>, jobs: usize, console: &Console) -> R
 impl BatchDone {
     fn done(&self) -> impl Iterator<Item = &Done> {
         self.files.iter().filter_map(|(.., outcome)| match outcome {
-            Outcome::Done(done) | Outcome::Failed(Some(done), _) => Some(&**done),
+            BatchOutcome::Done(done) | BatchOutcome::Failed(Some(done), _) => Some(&**done),
             _ => None,
         })
     }
 
     fn failures(&self) -> impl Iterator<Item = (&Path, &Error)> {
         self.files.iter().filter_map(|(input, _, outcome)| match outcome {
-            Outcome::Failed(_, error) => Some((&**input, error)),
+            BatchOutcome::Failed(_, error) => Some((&**input, error)),
             _ => None,
         })
     }
 
-    fn count(&self, is_it: impl Fn(&Outcome) -> bool) -> usize {
+    fn count(&self, is_it: impl Fn(&BatchOutcome) -> bool) -> usize {
         self.files.iter().filter(|(.., outcome)| is_it(outcome)).count()
     }
 
     fn left(&self) -> usize {
-        self.count(|outcome| matches!(outcome, Outcome::NotBegun))
+        self.count(|outcome| matches!(outcome, BatchOutcome::NotBegun))
     }
 
     /// True if any output is in place.
     pub fn has_outputs(&self) -> bool {
-        self.done().next().is_some() || self.count(|one| matches!(one, Outcome::Current)) > 0
+        self.done().next().is_some() || self.count(|one| matches!(one, BatchOutcome::Current)) > 0
     }
 
     /// The error in the end, of the first failure's kind, rather than that a result is not
@@ -190,7 +190,7 @@ impl BatchDone {
         let all = self.files.len();
         let mut failures: Vec<(PathBuf, Error)> = Vec::new();
         for (input, _, outcome) in self.files {
-            if let Outcome::Failed(_, error) = outcome {
+            if let BatchOutcome::Failed(_, error) = outcome {
                 failures.push((input, error));
             }
         }
@@ -216,7 +216,7 @@ impl BatchDone {
         let points = self.done().map(|done| done.report.result.ledger.kept).sum();
         let bytes = outputs().filter_map(|output| output.bytes).sum();
         let mut told = format!("files      {}\n", self.done().count());
-        let current = self.count(|one| matches!(one, Outcome::Current));
+        let current = self.count(|one| matches!(one, BatchOutcome::Current));
         let failed = self.failures().count();
         for (name, count) in [("unchanged ", current), ("failed    ", failed)] {
             if count > 0 {
@@ -239,16 +239,16 @@ impl BatchDone {
     pub fn summary(&self, console: &Console) -> Value {
         let text = |path: &Path| path.to_string_lossy().into_owned();
         let error = |error: &Error| console.in_words(error);
-        let file = |(input, output, outcome): &(PathBuf, Option<PathBuf>, Outcome)| {
+        let file = |(input, output, outcome): &(PathBuf, Option<PathBuf>, BatchOutcome)| {
             let mut told = json!({ "input": text(input) });
             if let Some(output) = output {
                 told["output"] = text(output).into();
             }
             let (name, done) = match outcome {
-                Outcome::Done(done) => ("converted", Some(done)),
-                Outcome::Current => ("unchanged", None),
-                Outcome::NotBegun => ("not converted", None),
-                Outcome::Failed(done, failure) => {
+                BatchOutcome::Done(done) => ("converted", Some(done)),
+                BatchOutcome::Current => ("unchanged", None),
+                BatchOutcome::NotBegun => ("not converted", None),
+                BatchOutcome::Failed(done, failure) => {
                     told["error"] = error(failure);
                     ("failed", done.as_ref())
                 }
@@ -266,8 +266,8 @@ impl BatchDone {
         json!({
             "pointmill": env!("CARGO_PKG_VERSION"),
             "inputs": self.files.len(),
-            "converted": self.count(|one| matches!(one, Outcome::Done(_))),
-            "unchanged": self.count(|one| matches!(one, Outcome::Current)),
+            "converted": self.count(|one| matches!(one, BatchOutcome::Done(_))),
+            "unchanged": self.count(|one| matches!(one, BatchOutcome::Current)),
             "failed": self.failures().count(),
             "not_converted": self.left(),
             "seconds": self.seconds,

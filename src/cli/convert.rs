@@ -190,8 +190,8 @@ fn paths(inputs: &Value) -> Vec<String> {
     }
 }
 
-/// The output in `folder` of every input: its way from the folder that was named, with the extension
-/// of the format that is asked for, or its own. No two may be the same.
+/// The output in `folder` of every input: its way from the folder that was named, with the
+/// extension of the format that is asked for, or its own. No two may be the same.
 fn outputs(
     inputs: &[MirroredFile],
     folder: &Path,

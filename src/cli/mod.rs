@@ -19,6 +19,7 @@ mod exit;
 mod explain;
 mod flags;
 mod graph;
+mod groups;
 mod help;
 mod interrupt;
 mod jobs;

@@ -27,6 +27,7 @@ fn survey() -> tempfile::TempDir {
     for name in ["scan.laz", "more.laz", "a.laz", "b.laz", "scan.las", "scan.ply"] {
         done(at.path(), &[&als[..], &[name]].concat());
     }
+    done(at.path(), &["convert", "a.laz", "-o", "city.copc.laz", "--quiet"]);
     fs::create_dir(at.path().join("survey")).unwrap();
     for (name, seed) in [("survey/1.laz", "1"), ("survey/2.laz", "2")] {
         done(at.path(), &[&als[..], &[name, "--seed", seed]].concat());

@@ -124,8 +124,8 @@ pub(crate) struct WrittenArguments {
     /// [default: the input's, or 0]
     #[arg(long, value_name = "X,Y,Z")]
     pub offset: Option<String>,
-    /// Point format of LAS, 0 to 10; LAS inputs that differ are brought to it [default: the input's,
-    /// or the smallest that holds what there is]
+    /// Point format of LAS, 0 to 10; LAS inputs that differ are brought to it [default: the
+    /// input's, or the smallest that holds what there is]
     #[arg(long, value_name = "N")]
     pub point_format: Option<String>,
     /// Dimensions that may get lost, such as GpsTime,UserData

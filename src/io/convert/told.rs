@@ -22,8 +22,8 @@ pub(super) fn placed(stage: &str, world: Option<[f64; 3]>, to: &Dimension, value
              `{stage}.scale`"
         ),
         _ => format!(
-            "give a larger `{stage}.scale`: with this one coordinates reach {} from the offset, and \
-             no farther",
+            "give a larger `{stage}.scale`: with this one coordinates reach {} from the offset, \
+             and no farther",
             Short(reach)
         ),
     }

@@ -1,5 +1,5 @@
-//! Reading compressed records chunk by chunk straight into a batch. A chunk that is damaged ends the
-//! run, or costs its points, or those behind the damage.
+//! Reading compressed records chunk by chunk straight into a batch. A chunk that is damaged ends
+//! the run, or costs its points, or those behind the damage.
 
 use std::sync::Arc;
 

@@ -1,5 +1,8 @@
 //! Where the fields of the public header block are (LAS 1.4 R15, section 2.4).
 
+/// Bytes of the header of LAS 1.5 behind those of 1.4: the largest and the smallest GPS time, and
+/// their offset.
+pub const OF_1_5: usize = 18;
 /// Byte offsets of the fields that messages name.
 pub mod at {
     pub const VERSION: usize = 24;

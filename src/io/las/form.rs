@@ -23,7 +23,7 @@ const WHOLE: f64 = 1e-6;
 
 /// What inputs are brought to, where they differ.
 #[derive(Debug, Clone, Default)]
-pub struct Form {
+pub struct OneForm {
     format: Option<u8>,
     scale: Option<[f64; 3]>,
     offset: Option<[f64; 3]>,
@@ -34,14 +34,14 @@ pub struct Form {
     pub assumes_crs: bool,
 }
 
-impl Form {
+impl OneForm {
     /// The form that `keys` ask for, for these files: their headers are read if it depends on them.
-    pub fn of(keys: &ReadKeys, paths: &[PathBuf]) -> Result<Form> {
+    pub fn of(keys: &ReadKeys, paths: &[PathBuf]) -> Result<OneForm> {
         let record = keys.crs.as_ref().map(|text| crs::record(text)).transpose();
         let crs = record.map_err(|why| Error::pipeline(format!("`read.crs`: {why}")))?;
         let assumes_crs = keys.assume.contains(&Assumption::Crs);
         let on_error = keys.on_error;
-        let mut form = Form { crs, assumes_crs, on_error, ..Form::default() };
+        let mut form = OneForm { crs, assumes_crs, on_error, ..OneForm::default() };
         let places = keys.scale.is_some() || keys.offset.is_some();
         if paths.len() < 2 || !places && keys.point_format.is_none() {
             return Ok(form);

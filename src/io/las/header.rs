@@ -8,10 +8,9 @@ use std::ops::{Deref, DerefMut};
 use las::raw::header::{Evlr, LargeFile};
 use las::{Version, raw};
 
-use super::fields::at;
+use super::fields::{OF_1_5, at};
 use super::file::InputFile;
 use super::format;
-use super::las15::OF_1_5;
 use crate::point::GpsTime;
 use crate::stage::foreign;
 use crate::{Error, Result};

@@ -1,14 +1,11 @@
 //! LAS 1.5 (ASPRS, 2025): what its header says more than that of LAS 1.4, of which the records are
 //! the same. Outputs are LAS 1.4, which many more programs read.
 
-use super::fields::{at, encoding};
+use super::fields::{OF_1_5, at, encoding};
 use super::file::InputFile;
 use super::header::Header;
 use crate::Result;
 
-/// Bytes of the header of LAS 1.5 behind those of 1.4: the largest and the smallest GPS time, and
-/// their offset.
-pub const OF_1_5: usize = 18;
 /// The offset of GPS times that earlier versions have, in millions of seconds.
 const ADJUSTED: u16 = 1000;
 

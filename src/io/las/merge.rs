@@ -2,7 +2,7 @@
 //! depends on the order of the inputs.
 
 use super::fields::encoding;
-use super::form::{Form, help, holding, smallest, whole_steps};
+use super::form::{OneForm, help, holding, smallest, whole_steps};
 use super::format::{has_gps_time, has_waveforms};
 use super::header::Header;
 use super::input::LasInput;
@@ -23,13 +23,13 @@ pub struct LasMerge {
     first: LasInput,
     /// The first that names a system, and how, where others need not name it.
     named: Option<(LasInput, CrsRecords)>,
-    form: Form,
+    form: OneForm,
     records: UnionRecords,
 }
 
 impl LasMerge {
     /// Begins with one file, which is in the form already.
-    pub fn of(first: LasInput, form: &Form) -> Result<Self> {
+    pub fn of(first: LasInput, form: &OneForm) -> Result<Self> {
         let (records, form) = (UnionRecords::of(&first)?, form.clone());
         let mut merge = LasMerge { records, named: None, form, first };
         merge.named = merge.naming(&merge.first)?;

@@ -8,7 +8,7 @@ use super::described::{Described, EXTRA_BYTES, describe};
 use super::extra::Descriptor;
 use super::fields::encoding;
 use super::file::InputFile;
-use super::form::{Form, reform};
+use super::form::{OneForm, reform};
 use super::format::{self, format_of, has_waveforms, record_size};
 use super::header::Header;
 use super::input::{LasInput, extra_len, is_carried, is_carried_extended};
@@ -55,7 +55,7 @@ impl Native {
     /// Of a file that was opened before with `header`, read again and brought to `form`.
     ///
     /// Fails if the file is another by now.
-    pub fn again(file: &InputFile, header: &Header, form: &Form) -> Result<Self> {
+    pub fn again(file: &InputFile, header: &Header, form: &OneForm) -> Result<Self> {
         let now = Header::read(file)?;
         if now.bytes()? != header.bytes()? {
             return Err(file.wrong(0, "the header changed while the file was read"));

@@ -31,24 +31,7 @@ pub fn read_vlrs(
 ) -> Result<(Vec<Vlr>, Vec<u8>)> {
     let start = u64::from(header.header_size);
     let end = u64::from(header.offset_to_point_data);
-    let mut claimed = header.number_of_variable_length_records;
-    let room = (end - start) / VLR_HEAD as u64;
-    if u64::from(claimed) > room {
-        let error = file
-            .wrong(
-                at::VLRS as u64,
-                format!(
-                    "{claimed} variable length records do not fit between the header and the \
-                     points at byte {end}"
-                ),
-            )
-            .help("the record count or the start of the points is damaged");
-        mending.tell(error)?;
-        claimed = room as u32; // less than it was
-    }
-    if claimed as usize > RECORDS_HELD {
-        return Err(too_many(file, at::VLRS as u64, claimed, ""));
-    }
+    let claimed = claimed(file, header, mending)?;
     let mut vlrs = Vec::new();
     let (mut at, mut held) = (start, 0);
     let (origin, room) = (Arc::new(file.origin().clone()), end - start <= BYTES_HELD);
@@ -88,6 +71,31 @@ pub fn read_vlrs(
     Ok((vlrs, file.bytes(at, gap as usize)?))
 }
 
+/// How many records the header claims, which must have room in front of the points.
+fn claimed(file: &InputFile, header: &Header, mending: &mut Mending) -> Result<u32> {
+    let end = u64::from(header.offset_to_point_data);
+    let start = u64::from(header.header_size);
+    let mut claimed = header.number_of_variable_length_records;
+    let room = (end - start) / VLR_HEAD as u64;
+    if u64::from(claimed) > room {
+        let error = file
+            .wrong(
+                at::VLRS as u64,
+                format!(
+                    "{claimed} variable length records do not fit between the header and the \
+                     points at byte {end}"
+                ),
+            )
+            .help("the record count or the start of the points is damaged");
+        mending.tell(error)?;
+        claimed = room as u32; // less than it was
+    }
+    if claimed as usize > RECORDS_HELD {
+        return Err(too_many(file, at::VLRS as u64, claimed, ""));
+    }
+    Ok(claimed)
+}
+
 /// The head of record `i` of `claimed`, which begins at byte `at` and has room up to byte `end`.
 fn read_head(file: &InputFile, at: u64, end: u64, i: u32, claimed: u32) -> Result<[u8; VLR_HEAD]> {
     let Some(room) = (end - at).checked_sub(VLR_HEAD as u64) else {
@@ -117,8 +125,8 @@ fn too_many(file: &InputFile, field: u64, claimed: u32, extended: &str) -> Error
     file.wrong(field, told).help(NOT_HELD)
 }
 
-/// The extended records of a file. LAS 1.3 has at most one, the waveform packets. Those that are cut
-/// off are left out if that is wanted.
+/// The extended records of a file. LAS 1.3 has at most one, the waveform packets. Those that are
+/// cut off are left out if that is wanted.
 pub fn read_evlrs(file: &InputFile, header: &Header, mending: &mut Mending) -> Result<Vec<Evlr>> {
     let (mut at, mut claimed) = header.evlrs();
     let mut field = at::EVLRS as u64;

@@ -8,7 +8,7 @@ use super::chunked::LazPart;
 use super::chunks::{Chunk, Chunks};
 use super::crs;
 use super::damage;
-use super::form::Form;
+use super::form::OneForm;
 use super::format::{has_gps_time, selection};
 use super::input::{LasInput, Storage};
 use super::laz::Layers;
@@ -47,7 +47,7 @@ fn opened(paths: &[PathBuf], keys: &ReadKeys) -> Result<LasSource> {
     let Some((first, others)) = paths.split_first() else {
         return Err(Error::pipeline("there is no input file"));
     };
-    let (form, wanted) = (Form::of(keys, paths)?, Wanted::of(keys));
+    let (form, wanted) = (OneForm::of(keys, paths)?, Wanted::of(keys));
     let open = |path: &PathBuf| {
         let mut input = LasInput::open(path, form.on_error)?;
         wanted.apply(&mut input)?;
@@ -97,7 +97,7 @@ pub struct LasSource {
     parts: Vec<PartPlace>,
     schema: Arc<Schema>,
     metadata: Metadata,
-    form: Form,
+    form: OneForm,
     wanted: Wanted,
     warnings: Vec<String>,
 }

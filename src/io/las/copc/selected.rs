@@ -1,6 +1,6 @@
-//! The chunks of a COPC file that hold the points of a box, down to a resolution: those of the nodes
-//! of its octree that meet the box, on the levels down to the first that is as fine (COPC 1.0, "info
-//! VLR" and "COPC hierarchy VLR").
+//! The chunks of a COPC file that hold the points of a box, down to a resolution: those of the
+//! nodes of its octree that meet the box, on the levels down to the first that is as fine (COPC
+//! 1.0, "info VLR" and "COPC hierarchy VLR").
 
 use super::hierarchy::VoxelKey;
 use super::names::{HIERARCHY, INFO, INFO_AT, INFO_BYTES, USER};
