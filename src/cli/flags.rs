@@ -81,6 +81,11 @@ pub(super) fn common_flags(common: &CommonArguments) -> Vec<CommandFlag> {
     ])
 }
 
+/// The flags of commands that read points without a run.
+pub(super) fn walk_flags() -> Vec<CommandFlag> {
+    flags([("--memory", "run.memory", None), ("--threads", "run.threads", None)])
+}
+
 impl FilterArguments {
     /// True if any points are to be left out.
     pub fn is_given(&self) -> bool {

@@ -4,7 +4,7 @@
 use super::arguments::Command;
 use super::flags::{
     common_flags, compare_flags, convert_flags, cut_flags, reduce_flags, synth_flags, united,
-    verify_flags,
+    verify_flags, walk_flags,
 };
 use crate::Error;
 use crate::language::Registry;
@@ -28,9 +28,8 @@ impl Words {
             Command::Cut(cut) => cut_flags(cut),
             Command::Convert(convert) => convert_flags(convert, None, None),
             Command::Synth(synth) => synth_flags(synth),
-            Command::Info(_) | Command::Validate(_) | Command::Picture(_) | Command::Stages(_) => {
-                Vec::new()
-            }
+            Command::Info(_) | Command::Validate(_) => walk_flags(),
+            Command::Picture(_) | Command::Stages(_) => Vec::new(),
             Command::Reproduce(_) => Vec::new(),
             Command::Graph(_) | Command::Explain(_) => Vec::new(),
             Command::New(_) | Command::Schema => Vec::new(),

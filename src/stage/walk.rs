@@ -40,7 +40,8 @@ impl PointWalk {
         if room == 0 {
             let enough = whole_mebibytes((each + Bytes(BESIDE)).0);
             let told = "the memory does not do for one thread that reads the points";
-            return Err(Error::memory(told).help(format!("give `--memory {enough}` or more")));
+            let help = format!("give `run.memory = \"{enough}\"` or more");
+            return Err(Error::memory(told).help(help));
         }
         Ok(self.threads.clamp(1, usize::try_from(room).unwrap_or(usize::MAX)))
     }

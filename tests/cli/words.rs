@@ -588,7 +588,7 @@ fn one_report_for_several_outputs_is_told_with_what_to_do() {
     assert_eq!(
         told(at.path(), &several, 2),
         "error: --report: is for one output, and this makes several\n   | r.json\n   | ^^^^^^\n   = \
-         leave --report out, or convert the files one by one\n"
+         leave --report out, or convert the files one by one; --summary tells of all\n"
     );
 }
 

@@ -107,7 +107,7 @@ pub struct Read {
     pub crs: Option<String>,
     /// What is taken for granted: `["crs"]`, that inputs which name no coordinate reference system
     /// are in the one that the others name.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub assume: Vec<Assumption>,
     /// What is done about damage in LAS and LAZ: `"fail"`; `"skip"`, which leaves out what is
     /// damaged, of LAZ whole chunks; `"salvage"`, which reads what can be read, also of a damaged
@@ -115,8 +115,8 @@ pub struct Read {
     /// too early has as many points as it holds, one whose header counts too few has those behind
     /// them as well, and variable length records that are cut off are left out. What is lost is
     /// told, and counted in the report.
-    #[serde(default)]
-    pub on_error: OnError,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub on_error: Option<OnError>,
     /// Where points of LAS, LAZ and COPC are read: `[x0, y0, x1, y1]`, or
     /// `[x0, y0, z0, x1, y1, z1]`, both of whose corners belong to it; none: everywhere. Of COPC
     /// only the nodes that meet it are read.
@@ -320,7 +320,7 @@ impl Read {
         keys.scans = scans.map(|scans| scans.iter().map(|number| number.get()).collect());
         keys.crs.clone_from(&self.crs);
         keys.assume.clone_from(&self.assume);
-        keys.on_error = self.on_error;
+        keys.on_error = self.on_error.unwrap_or_default();
         keys.bounds.clone_from(&self.bounds);
         keys.resolution = self.resolution;
         (keys.scale, keys.offset) = (self.scale, self.offset);

@@ -184,10 +184,11 @@ fn table(
     entries(file, at, room, compression, entry)?;
     if left > 0 {
         let why = "the chunk table holds fewer points than the header claims";
-        if !mending.mends() {
+        let error = file.wrong(at, why);
+        if !mending.mends(&error) {
             return Err(why.into());
         }
-        mending.lose(file, at, left, file.wrong(at, why)).map_err(Unusable::Failed)?;
+        mending.lose(file, at, left, error).map_err(Unusable::Failed)?;
     }
     if unread > 0 {
         let what = if variable { "points" } else { "chunks" };

@@ -5,7 +5,7 @@ use super::file::InputFile;
 use crate::error::shown;
 use crate::report::{Grouped, LostPoints};
 use crate::stage::OnError;
-use crate::{Error, Result};
+use crate::{Error, ErrorKind, Result};
 
 /// Losses of one file that are told one by one.
 const TOLD: usize = 3;
@@ -27,14 +27,14 @@ impl Mending {
         Mending { on_error, ..Mending::default() }
     }
 
-    /// True if damage does not end the run.
-    pub fn mends(&self) -> bool {
-        self.on_error != OnError::Fail
+    /// True if this does not end the run: damage, and not that a file cannot be read.
+    pub fn mends(&self, error: &Error) -> bool {
+        self.on_error != OnError::Fail && error.kind() == ErrorKind::Data
     }
 
     /// Goes on behind `error`, which is told, if that is wanted; else fails with it.
     pub fn tell(&mut self, error: Error) -> Result<()> {
-        if !self.mends() {
+        if !self.mends(&error) {
             return Err(advised(error));
         }
         self.warnings.push(error.to_string());
@@ -44,7 +44,7 @@ impl Mending {
     /// Goes on without `points` points from `byte` on, if that is wanted; else fails with `error`,
     /// which says why they are lost.
     pub fn lose(&mut self, file: &InputFile, byte: u64, points: u64, error: Error) -> Result<()> {
-        if !self.mends() {
+        if !self.mends(&error) {
             return Err(advised(error));
         }
         self.lost.push(lost(file, byte, points, error.message()));
@@ -57,6 +57,9 @@ const ADVICE: &str = "`read.on_error = \"salvage\"` reads what can be read, and 
 
 /// `error`, with what helps besides.
 pub fn advised(error: Error) -> Error {
+    if error.kind() != ErrorKind::Data {
+        return error;
+    }
     let help = match error.remedy() {
         Some(help) => format!("{help}; {ADVICE}"),
         None => ADVICE.to_owned(),

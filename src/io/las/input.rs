@@ -336,9 +336,11 @@ fn check_last(
 ) -> Result<()> {
     let Chunks::Known(chunks) = chunks else { return Ok(()) };
     let Some(last) = chunks.last().filter(|_| compression.layers > 0) else { return Ok(()) };
-    let Ok(head) = chunks::layered_head(file, last.start, last.end, compression) else {
-        // It is told where it is read.
-        return Ok(());
+    let head = match chunks::layered_head(file, last.start, last.end, compression) {
+        Ok(head) => head,
+        // It is lost where it is read.
+        Err(error) if mending.mends(&error) => return Ok(()),
+        Err(error) => return Err(advised(error)),
     };
     if head.points < last.points {
         let error = file
