@@ -35,7 +35,7 @@ pub(super) struct BatchRun {
 
 /// What is to be done about an input.
 pub(super) enum BatchWork {
-    Convert(Graph),
+    Convert(Box<Graph>),
     /// Its output is what the conversion would write.
     Current,
     Refused(Error),
@@ -123,7 +123,7 @@ fn one(
     let done = match work {
         BatchWork::Current => return BatchOutcome::Current,
         BatchWork::Refused(error) => Err(error),
-        BatchWork::Convert(graph) => mill(graph, named, jobs, console),
+        BatchWork::Convert(graph) => mill(*graph, named, jobs, console),
     };
     let (done, error) = match done {
         Ok(done) => match done.accepted() {

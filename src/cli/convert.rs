@@ -61,7 +61,8 @@ pub(super) fn convert(
         let text = |path: &Path| json!(path.to_string_lossy());
         let graph = pipeline(arguments, text(&input), text(&output), registry)?;
         let is_current = arguments.bulk.resume && is_current(&graph, &output, formats);
-        let work = if is_current { BatchWork::Current } else { BatchWork::Convert(graph) };
+        let work =
+            if is_current { BatchWork::Current } else { BatchWork::Convert(Box::new(graph)) };
         runs.push(BatchRun { input, output: Some(output), work });
     }
     check_files(&runs, arguments, formats)?;
