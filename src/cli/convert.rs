@@ -216,7 +216,8 @@ fn outputs(
             let (a, b, output) = (shown(other), shown(input), shown(&output));
             let told = format!("{a} and {b} would both become {output}");
             return Err(Error::pipeline(told).help(
-                "a quoted pattern, such as 'survey/**/*.laz', keeps folders apart; so does @LIST",
+                "convert them into two folders; a quoted pattern, such as 'survey/**/*.laz', keeps \
+                 folders apart, and so does @LIST",
             ));
         }
         all.push((input.clone(), output));

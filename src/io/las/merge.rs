@@ -1,6 +1,8 @@
 //! Several files as one: what they must share, and what becomes of what they do not. Nothing here
 //! depends on the order of the inputs.
 
+use std::path::{Path, PathBuf};
+
 use super::fields::encoding;
 use super::form::{OneForm, help, holding, smallest, whole_steps};
 use super::format::{has_gps_time, has_waveforms};
@@ -21,8 +23,8 @@ use crate::{Error, Result};
 pub struct LasMerge {
     /// The first, with its records: the others are compared with it.
     first: LasInput,
-    /// The first that names a system, and how, where others need not name it.
-    named: Option<(LasInput, CrsRecords)>,
+    /// Where the first is that names a system, and how, where others need not name it.
+    named: Option<(PathBuf, CrsRecords)>,
     form: OneForm,
     records: UnionRecords,
 }
@@ -43,17 +45,17 @@ impl LasMerge {
         self.records.add(other)
     }
 
-    /// The file and its records, if it names a system.
-    fn naming(&self, input: &LasInput) -> Result<Option<(LasInput, CrsRecords)>> {
+    /// Where the file is and its records, if it names a system.
+    fn naming(&self, input: &LasInput) -> Result<Option<(PathBuf, CrsRecords)>> {
         let records = input.crs_records()?;
         let is_named = !self.form.assumes_crs || records.text()?.is_some();
-        Ok(is_named.then(|| (input.clone().without_records(), records)))
+        Ok(is_named.then(|| (input.path.clone(), records)))
     }
 
     fn agree_on_crs(&mut self, other: &LasInput) -> Result<()> {
-        let Some((input, records)) = self.naming(other)? else { return Ok(()) };
+        let Some((path, records)) = self.naming(other)? else { return Ok(()) };
         let Some((first, named)) = &self.named else {
-            self.named = Some((input, records));
+            self.named = Some((path, records));
             return Ok(());
         };
         if named.same_system(&records)? {
@@ -61,7 +63,7 @@ impl LasMerge {
         }
         let (one, two) = (named.text()?, records.text()?);
         let both = told_apart(one.as_deref(), two.as_deref());
-        let error = refuse(first, other, format!("their CRS differ: {both}"));
+        let error = refused(first, &other.path, format!("their CRS differ: {both}"));
         Err(error.help(remedy(one.is_none() || two.is_none())))
     }
 
@@ -125,8 +127,12 @@ fn differ<T: std::fmt::Debug>(a: &LasInput, b: &LasInput, what: &str, one: T, tw
 }
 
 fn refuse(a: &LasInput, b: &LasInput, why: String) -> Error {
-    let (one, two) = (shown(&a.path), shown(&b.path));
-    Error::data(&b.path, format!("{one} and {two} cannot be read as one scan: {why}"))
+    refused(&a.path, &b.path, why)
+}
+
+fn refused(a: &Path, b: &Path, why: String) -> Error {
+    let (one, two) = (shown(a), shown(b));
+    Error::data(b, format!("{one} and {two} cannot be read as one scan: {why}"))
         .help("bring the files to one form first, or run them one by one")
 }
 
