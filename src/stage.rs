@@ -38,6 +38,7 @@ pub use sink::{
     ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Extent, Order, Sink, SinkSummary,
     Triangle, Triangulation,
 };
+pub(crate) use source::BATCH;
 pub use source::{Contradiction, Input, OpenSource, Part, Source};
 pub use tile_op::{Forecast, ScanFacts, TileOp};
 pub use unread::Unread;

@@ -14,7 +14,7 @@ use crate::budget::Bytes;
 use crate::engine::{Done, Trouble, publish_bytes};
 use crate::error::shown;
 use crate::graph::{Graph, Overrides, RunSettings};
-use crate::host::process::default_memory;
+use crate::host::process::{default_memory, processors};
 use crate::report::Grouped;
 use crate::{Error, ErrorKind, Result};
 
@@ -67,8 +67,7 @@ pub(super) fn jobs_for(inputs: &[PathBuf], threads: usize) -> usize {
 
 /// The threads of a run with these settings.
 pub(super) fn threads_of(settings: &RunSettings) -> usize {
-    let all = || std::thread::available_parallelism().map_or(1, usize::from);
-    settings.threads.map_or_else(all, NonZeroUsize::get)
+    settings.threads.map_or_else(processors, NonZeroUsize::get)
 }
 
 /// Runs all, `jobs` at once, which share memory and threads.

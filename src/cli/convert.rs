@@ -82,10 +82,7 @@ fn run_batch(
     };
     let threads = runs.iter().find_map(graph).unwrap_or(1);
     let inputs: Vec<PathBuf> = runs.iter().map(|run| run.input.clone()).collect();
-    let jobs = match arguments.bulk.jobs {
-        Some(jobs) => jobs.get(),
-        None => jobs_for(&inputs, threads),
-    };
+    let jobs = arguments.bulk.jobs.unwrap_or_else(|| jobs_for(&inputs, threads));
     let mut made = make_folder(folder)?;
     let parents = runs.iter().filter_map(|run| run.output.as_ref()?.parent());
     for parent in parents.collect::<BTreeSet<_>>() {

@@ -284,6 +284,10 @@ pub(super) fn one_form(
     arguments: &WrittenArguments,
     registry: &Registry,
 ) -> Vec<CommandFlag> {
+    let form = united(arguments);
+    if form.iter().all(|flag| flag.given.is_none()) {
+        return form;
+    }
     let formats = registry.formats();
     let named = from.and_then(|name| formats.iter().find(|format| format.name() == name));
     let has_scale = |file: &PathBuf| {
@@ -293,23 +297,19 @@ pub(super) fn one_form(
     // What is wrong with the names, the run tells.
     let files = expand(inputs, formats).unwrap_or_default();
     match files.len() > 1 && files.iter().all(has_scale) {
-        true => united(arguments),
+        true => form,
         false => Vec::new(),
     }
 }
 
 /// The one form that several LAS inputs are brought to, as keys of `read`: that of the output.
 pub(super) fn united(arguments: &WrittenArguments) -> Vec<CommandFlag> {
-    let form = ["--scale", "--offset", "--point-format"];
-    let mut all = written(arguments);
-    all.retain(|flag| form.contains(&flag.name));
-    let address = |name| match name {
-        "--scale" => "read.scale",
-        "--offset" => "read.offset",
-        _ => "read.point_format",
-    };
-    all.iter_mut().for_each(|flag| flag.address = address(flag.name));
-    all
+    let format = arguments.point_format.as_deref();
+    flags([
+        ("--scale", "read.scale", arguments.scale.as_deref().map(numbers_or_text)),
+        ("--offset", "read.offset", arguments.offset.as_deref().map(numbers_or_text)),
+        ("--point-format", "read.point_format", format.map(whole_or_text)),
+    ])
 }
 
 /// How the output is written, as the keys of `write`.

@@ -1,5 +1,22 @@
 //! Which flags of a command stand together in its help.
 
+/// How inputs are read: the fields of `ReadArguments`.
+const READ: &[&str] =
+    &["from", "columns", "scans", "crs", "assume", "on_error", "bounds", "resolution"];
+
+/// How outputs are written: the fields of `WrittenArguments`.
+const WRITTEN: &[&str] = &[
+    "scale",
+    "offset",
+    "point_format",
+    "drop",
+    "encoding",
+    "colors",
+    "separator",
+    "decimals",
+    "header",
+];
+
 /// Groups of flags: the command, the heading, and the fields of its arguments.
 pub(super) const GROUPS: &[(&str, &str, &[&str])] = &[
     (
@@ -28,19 +45,12 @@ pub(super) const GROUPS: &[(&str, &str, &[&str])] = &[
         ],
     ),
     ("reduce", "How the surface is measured", &["neighbors", "method", "z_scale", "lattice"]),
+    ("reduce", "Which points", READ),
     (
         "reduce",
         "Which points",
         &[
             "outliers",
-            "from",
-            "columns",
-            "scans",
-            "crs",
-            "assume",
-            "on_error",
-            "bounds",
-            "resolution",
             "classes",
             "keep_classes",
             "drop_classes",
@@ -50,60 +60,11 @@ pub(super) const GROUPS: &[(&str, &str, &[&str])] = &[
             "headers",
         ],
     ),
-    (
-        "reduce",
-        "Output",
-        &[
-            "output",
-            "outdir",
-            "to",
-            "mark",
-            "order",
-            "scale",
-            "offset",
-            "point_format",
-            "drop",
-            "encoding",
-            "colors",
-            "separator",
-            "decimals",
-            "header",
-        ],
-    ),
-    (
-        "convert",
-        "Which points",
-        &[
-            "from",
-            "columns",
-            "scans",
-            "crs",
-            "assume",
-            "on_error",
-            "bounds",
-            "resolution",
-            "keep_classes",
-            "drop_classes",
-            "nonfinite",
-            "headers",
-        ],
-    ),
+    ("reduce", "Output", WRITTEN),
+    ("reduce", "Output", &["output", "outdir", "to", "mark", "order"]),
+    ("convert", "Which points", READ),
+    ("convert", "Which points", &["keep_classes", "drop_classes", "nonfinite", "headers"]),
     ("convert", "Many files", &["jobs", "resume", "summary"]),
-    (
-        "convert",
-        "Output",
-        &[
-            "output",
-            "to",
-            "scale",
-            "offset",
-            "point_format",
-            "drop",
-            "encoding",
-            "colors",
-            "separator",
-            "decimals",
-            "header",
-        ],
-    ),
+    ("convert", "Output", WRITTEN),
+    ("convert", "Output", &["output", "to"]),
 ];

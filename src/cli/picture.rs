@@ -11,6 +11,7 @@ use crate::budget::Bytes;
 use crate::engine::{Trouble, publish_bytes};
 use crate::error::{listed, shown};
 use crate::host::lock;
+use crate::host::process::processors;
 use crate::host::{Files, Use};
 use crate::io::ends::Read;
 use crate::picture::{ColorBy, Picture, Settings};
@@ -38,7 +39,6 @@ pub(super) fn picture(arguments: &PictureArguments, formats: &Formats) -> Result
     let mut all = Files::default();
     files.iter().for_each(|file| all.read(file, Use::Input));
     all.write(path).map_err(|clash| Error::pipeline(format!("this {clash}")).at(path))?;
-    let processors = || std::thread::available_parallelism().map_or(1, usize::from);
     let settings = Settings {
         view: arguments.from,
         by: arguments.by,

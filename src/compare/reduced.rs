@@ -7,15 +7,13 @@ use super::records::{Beginnings, Comparison, RecordKeys};
 use crate::budget::{Bytes, whole_mebibytes};
 use crate::geom::hash::PlaceHashes;
 use crate::point::{PointBatch, Scalar, Schema, names};
-use crate::stage::Source;
+use crate::stage::{BATCH, Source};
 use crate::{Error, ErrorKind, Result};
 
 /// The dimension that tells surface points from exceptions.
 const KEEP_RANK: &str = "KeepRank";
 /// Its value for exceptions: kept, and no part of the surface.
 const EXCEPTION: f64 = 65535.0;
-/// Records that are read at once.
-const BATCH: usize = 8192;
 /// Bytes of a record while it is looked at: its place, its positions as they are searched, and its
 /// entry in a table that is at most half empty, and its first bits.
 const BYTES: usize = size_of::<[f64; 3]>() + 3 * size_of::<[i64; 3]>() + 90;

@@ -10,11 +10,8 @@ use super::same::{PartOf, RecordsComparison, open};
 use crate::expression::ExpressionFault;
 use crate::language::Registry;
 use crate::quantity::{Figure, Length};
-use crate::report::Long;
+use crate::report::{ACCEPT_RULES, Long, RuleText, length};
 use crate::{Error, ErrorKind, Result};
-
-/// The address of the rules, as messages name settings.
-const RULES: &str = "accept.rules";
 
 /// What two scans must be beside each other, as rules between commas:
 ///
@@ -90,12 +87,8 @@ impl CompareRules {
     }
 
     fn read(text: &str) -> Result<CompareRules, ExpressionFault> {
-        let (mut rules, mut at) = (Vec::new(), 0);
-        for part in text.split(',') {
-            rules.push(CompareRule::read(part, at)?);
-            at += part.len() + 1;
-        }
-        Ok(CompareRules(rules))
+        let example = "`same` or `max <= 5mm`";
+        RuleText::each(text, example, CompareRule::read).map(CompareRules)
     }
 
     /// True if a rule is on distances.
@@ -116,7 +109,7 @@ impl CompareRules {
                 let name = rule.text.split(['<', ' ']).next().unwrap_or_default();
                 let help = format!("write a number: `{name} <= {metres}` where it is metres");
                 let told = |error: Error| error.help(help.clone());
-                *bound = bound.in_scan(&source.metadata().units, RULES).map_err(told)?;
+                *bound = bound.in_scan(&source.metadata().units, ACCEPT_RULES).map_err(told)?;
             }
         }
         Ok(rules)
@@ -158,47 +151,24 @@ impl RecordsWord {
 }
 
 impl CompareRule {
-    /// Reads `part` of a text, which begins at byte `at` of it.
-    fn read(part: &str, at: usize) -> Result<CompareRule, ExpressionFault> {
-        let text = part.trim();
-        let start = at + part.len() - part.trim_start().len();
-        let span = |from: usize, to: usize| start + from..start + to;
-        let end = text.find(['<', '>', '=', '!']).unwrap_or(text.len());
-        let name = text[..end].trim_end();
-        if name.is_empty() {
-            let told = if text.is_empty() { "a rule is missing" } else { "a rule has no figure" };
-            let all = span(0, text.len().max(usize::from(!part.is_empty())));
-            let help = "write a rule such as `same` or `max <= 5mm`";
-            return Err(ExpressionFault::new(all, told).help(help));
-        }
-        let written = |of| CompareRule { text: text.to_owned(), of };
+    fn read(rule: &RuleText<'_>) -> Result<CompareRule, ExpressionFault> {
+        let name = rule.name;
+        let written = |of| CompareRule { text: rule.text.to_owned(), of };
         if let Some((_, word)) = RECORDS.iter().find(|(known, _)| *known == name) {
-            if end == text.len() {
-                return Ok(written(RuleOf::Records(*word)));
-            }
-            let told = format!("`{name}` has no bound");
-            let help = format!("write `{name}` alone");
-            return Err(ExpressionFault::new(span(end, text.len()), told).help(help));
+            return rule.alone(written(RuleOf::Records(*word)));
         }
         let Some((_, figure)) = DISTANCES.iter().find(|(known, _)| *known == name) else {
             let told = format!("there is no rule `{name}`");
             let records = RECORDS.iter().map(|(name, _)| (*name).to_owned());
             let distances = DISTANCES.iter().map(|(name, _)| (*name).to_owned());
             let all: Vec<String> = records.chain(distances).collect();
-            return Err(ExpressionFault::word(span(0, name.len()), told, name, "rules", &all));
+            return Err(ExpressionFault::word(rule.name_place(), told, name, "rules", &all));
         };
-        let (may_be_equal, behind) = sign(name, &text[end..], span(end, text.len()))?;
-        let rest = text[end + behind..].trim();
-        let number = rest.parse().ok().and_then(Length::of);
-        match number.or_else(|| Length::read(rest)) {
-            Some(bound) => Ok(written(RuleOf::Distance(*figure, may_be_equal, bound))),
-            None => {
-                let told = format!("`{name}` is bounded by a length above 0");
-                let help = "write it in the scan's unit, or with mm, cm, m, km, in, ft or us-ft";
-                let from = text.len() - rest.len();
-                Err(ExpressionFault::new(span(from, text.len()), told).help(help))
-            }
-        }
+        let (behind, place) = rule.behind();
+        let (may_be_equal, sign) = sign(name, behind, place)?;
+        let (behind, place) = rule.bound(sign);
+        let bound = length(name, behind, place)?;
+        Ok(written(RuleOf::Distance(*figure, may_be_equal, bound)))
     }
 }
 

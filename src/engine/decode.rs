@@ -9,13 +9,14 @@
 
 use super::by_rank::{Starts, place};
 use super::job::Job;
-use super::placed::{BATCH, Placed};
+use super::placed::Placed;
 use super::tagger::NOT_FINITE;
 use super::task::Task;
 use crate::Result;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::point::PointBatch;
 use crate::report::Tally;
+use crate::stage::BATCH;
 use crate::store::{Intake, TileStore};
 
 pub(crate) fn decode(job: &Job<'_>, lattice: &Lattice) -> Result<(TileStore, Starts, Tally)> {

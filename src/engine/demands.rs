@@ -11,14 +11,14 @@ use super::encoding::ChunkEncoder;
 use super::filtering::Filtering;
 use super::outlet::A_THREAD;
 use super::pass::{ColumnBytes, decides_by_normals};
-use super::placed::{BATCH, Placed};
+use super::placed::Placed;
 use super::product::Product;
 use super::shares::{Demands, Shares};
 use super::survey::survey_bytes;
 use crate::budget::{Bytes, Holders};
 use crate::geom::nearest::Nearest;
 use crate::report::Baseline;
-use crate::stage::Needs;
+use crate::stage::{BATCH, Needs};
 use crate::store::{FATE_BYTES, Intake, Pieces, RecordState, SealedTiles, merge_bytes, ref_bytes};
 use crate::tile::{Loader, Remote};
 

@@ -9,9 +9,6 @@ use std::collections::BTreeMap;
 use crate::point::Position;
 use crate::store::Tag;
 
-/// Records that a batch of the decode and of a stream takes.
-pub const BATCH: usize = 8192;
-
 /// What of a batch goes to the intake; keeps its memory.
 #[derive(Default)]
 pub(crate) struct Placed {

@@ -9,13 +9,12 @@ use std::sync::{Arc, Mutex};
 use super::finished::{Finished, FinishedBranch};
 use super::job::Job;
 use super::outlet::{Outlet, finished};
-use super::placed::BATCH;
 use super::tagger::NOT_FINITE;
 use crate::geom::lattice::{Lattice, Misplaced};
 use crate::host::lock;
 use crate::point::{PointBatch, Schema, Spare};
 use crate::report::Tally;
-use crate::stage::{Encode, Encoded, Sink};
+use crate::stage::{BATCH, Encode, Encoded, Sink};
 use crate::{Error, Result};
 
 /// Streams all parts of the source into each of `sinks`. With a lattice, points that have no

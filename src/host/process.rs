@@ -40,6 +40,11 @@ pub fn field<'a>(text: &'a str, name: &str) -> Option<&'a str> {
         .map(|(_, value)| value.trim())
 }
 
+/// Threads that the machine runs at once; 1 where it does not tell.
+pub fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
 /// The budget of a run that names none: half of the machine's memory or of the smallest limit of a
 /// control group around this process, whichever is less.
 pub fn default_memory() -> u64 {

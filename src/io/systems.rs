@@ -43,9 +43,14 @@ pub fn checked(text: &str) -> std::result::Result<String, String> {
 /// True if both texts mean one system: the same text, WKT of one wording, or the same EPSG codes
 /// with the same units.
 pub fn are_same(one: &str, two: &str) -> bool {
+    one == two || are_alike(one, two) && wkt::units(one) == wkt::units(two)
+}
+
+/// True if both texts are WKT of one wording, or have the same EPSG codes; what units they name may
+/// differ.
+pub fn are_alike(one: &str, two: &str) -> bool {
     let codes = wkt::codes(one);
-    let same_codes = codes.is_some() && codes == wkt::codes(two);
-    one == two || (wkt::alike(one, two) || same_codes) && wkt::units(one) == wkt::units(two)
+    wkt::alike(one, two) || codes.is_some() && codes == wkt::codes(two)
 }
 
 /// The system of all inputs: what `keys` say, else what those that name one agree on. Of several

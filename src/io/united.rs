@@ -9,10 +9,7 @@ use crate::Result;
 use crate::error::shown;
 use crate::point::{PointBatch, Schema};
 use crate::report::Short;
-use crate::stage::Part;
-
-/// The most records that are asked of a part at once: those of the engine's batches.
-pub const LARGEST_BATCH: usize = 8192;
+use crate::stage::{BATCH, Part};
 
 /// How the records of one input become those of all.
 #[derive(Debug)]
@@ -34,9 +31,9 @@ impl ToOneForm {
         Ok(Some(ToOneForm { own: Arc::new(own), projection, rounded: AtomicU64::new(0) }))
     }
 
-    /// Bytes that a part takes for batches of so many records.
-    pub fn bytes(&self, records: usize) -> u64 {
-        (records * self.own.stride) as u64
+    /// Bytes that a part takes for the file's own records.
+    pub fn part_bytes(&self) -> u64 {
+        (BATCH * self.own.stride) as u64
     }
 
     /// The part `inner` of the file at `path`, whose records are brought to the form.

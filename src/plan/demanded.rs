@@ -11,7 +11,7 @@ use crate::engine::pass::{ColumnBytes, Op, Pass, standings};
 use crate::engine::shares::Demands;
 use crate::engine::{by_input, by_rank, by_square};
 use crate::graph::{MOST_THREADS, RunSettings};
-use crate::host::process::default_memory;
+use crate::host::process::{default_memory, processors};
 use crate::point::{ComputedDimension, Metadata, Schema};
 use crate::stage::{ChunkSize, CreateSink, Source};
 use crate::{Error, Result};
@@ -76,10 +76,7 @@ fn threads(settings: &RunSettings) -> Result<usize> {
             Err(Error::pipeline(told).help("leave `run.threads` out: all processors work"))
         }
         Some(threads) => Ok(threads),
-        None => {
-            let processors = std::thread::available_parallelism().map_or(1, usize::from);
-            Ok(processors.min(MOST_THREADS))
-        }
+        None => Ok(processors().min(MOST_THREADS)),
     }
 }
 

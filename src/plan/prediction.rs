@@ -16,6 +16,7 @@ use crate::engine::phase::LOOK;
 use crate::engine::shares::Shares;
 use crate::error::shown;
 use crate::graph::Graph;
+use crate::host::process::processors;
 use crate::report::{Grouped, Short};
 use crate::stage::CreateSink;
 
@@ -230,8 +231,7 @@ impl Extrapolation<'_> {
 
 /// How many CPU seconds a run of so many threads takes in a second, where it is alone.
 fn at_once(threads: usize) -> f64 {
-    let processors = std::thread::available_parallelism().map_or(1, usize::from);
-    match threads.min(processors) {
+    match threads.min(processors()) {
         1 => 1.0,
         several => several as f64 * BUSY,
     }

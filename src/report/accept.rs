@@ -6,6 +6,7 @@ use std::ops::Range;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::rule_text::{RuleText, length};
 use crate::expression::{ExpressionFault, FromText, OneOrSeveral, is_its_text};
 use crate::point::Units;
 use crate::quantity::{Figure, Length, parse_count};
@@ -81,12 +82,7 @@ impl FromText for AcceptRules {
     const EXPECTED: &'static str = "rules in quotes, such as \"max <= 5mm, lossless\"";
 
     fn read(text: &str) -> Result<Self, ExpressionFault> {
-        let mut rules = Vec::new();
-        let mut at = 0;
-        for part in text.split(',') {
-            rules.push(AcceptRule::read(part, at)?);
-            at += part.len() + 1;
-        }
+        let rules = RuleText::each(text, "`max <= 5mm`", AcceptRule::read)?;
         Ok(AcceptRules { text: text.to_owned(), rules })
     }
 }
@@ -197,45 +193,23 @@ pub(crate) enum AcceptBound {
 }
 
 impl AcceptRule {
-    /// Reads `part` of a text, which begins at byte `at` of it.
-    fn read(part: &str, at: usize) -> Result<AcceptRule, ExpressionFault> {
-        let text = part.trim();
-        let start = at + part.len() - part.trim_start().len();
-        let span = |from: usize, to: usize| start + from..start + to;
-        let end = text.find(['<', '>', '=', '!']).unwrap_or(text.len());
-        let name = text[..end].trim_end();
-        if name.is_empty() {
-            let told = if text.is_empty() { "a rule is missing" } else { "a rule has no figure" };
-            let all = span(0, text.len().max(usize::from(!part.is_empty())));
-            return Err(ExpressionFault::new(all, told).help("write a rule such as `max <= 5mm`"));
-        }
+    fn read(rule: &RuleText<'_>) -> Result<AcceptRule, ExpressionFault> {
+        let name = rule.name;
         let figure = AcceptFigure::ALL.iter().find(|(known, _)| *known == name);
         let Some(&(_, figure)) = figure else {
             let told = format!("there is no figure `{name}`");
             let all = AcceptFigure::ALL.map(|(name, _)| name.to_owned());
-            return Err(ExpressionFault::word(span(0, name.len()), told, name, "figures", &all));
+            return Err(ExpressionFault::word(rule.name_place(), told, name, "figures", &all));
         };
-        let written = text.to_owned();
+        let text = rule.text.to_owned();
         if figure == AcceptFigure::Lossless {
-            return match end == text.len() {
-                true => {
-                    let (sign, bound) = (AcceptSign::AtLeast, AcceptBound::None);
-                    Ok(AcceptRule { text: written, figure, sign, bound })
-                }
-                false => {
-                    let told = "`lossless` has no bound";
-                    let fault = ExpressionFault::new(span(end, text.len()), told);
-                    Err(fault.help("write `lossless` alone"))
-                }
-            };
+            let (sign, bound) = (AcceptSign::AtLeast, AcceptBound::None);
+            return rule.alone(AcceptRule { text, figure, sign, bound });
         }
-        let (sign, behind) = sign(figure, &text[end..], span(end, text.len()))?;
-        let from = end + behind;
-        let rest = text[from..].trim();
-        let from = from + text[from..].len() - text[from..].trim_start().len();
-        let place = span(from.min(text.len()), text.len());
-        let bound = bound(figure, rest, place)?;
-        Ok(AcceptRule { text: written, figure, sign, bound })
+        let (behind, place) = rule.behind();
+        let (sign, length) = sign(figure, behind, place)?;
+        let (behind, place) = rule.bound(length);
+        Ok(AcceptRule { text, figure, sign, bound: bound(figure, behind, place)? })
     }
 }
 
@@ -274,13 +248,7 @@ fn bound(
     place: Range<usize>,
 ) -> Result<AcceptBound, ExpressionFault> {
     if figure.is_deviation() {
-        let number = text.parse().ok().and_then(Length::of);
-        let length = number.or_else(|| Length::read(text)).map(AcceptBound::Length);
-        return length.ok_or_else(|| {
-            let told = format!("`{}` is bounded by a length above 0", figure.name());
-            let help = "write it in the scan's unit, or with mm, cm, m, km, in, ft or us-ft";
-            ExpressionFault::new(place, told).help(help)
-        });
+        return length(figure.name(), text, place).map(AcceptBound::Length);
     }
     let part = text.strip_suffix('%').and_then(|number| number.trim().parse::<f64>().ok());
     let part = part.filter(|part| (0.0..=100.0).contains(part));

@@ -4,7 +4,7 @@ use std::fs;
 
 use serde::Serialize;
 
-use crate::host::process::field;
+use crate::host::process::{field, processors};
 
 /// Where a run took place.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
@@ -25,7 +25,7 @@ impl Machine {
         Machine {
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             processor: processor.and_then(|text| field(&text, "model name").map(str::to_owned)),
-            cores: std::thread::available_parallelism().map_or(1, |n| n.get()),
+            cores: processors(),
         }
     }
 }

@@ -149,6 +149,9 @@ pub trait Source: Send + Sync {
     }
 }
 
+/// Records that a part is asked for at once, by whoever reads points.
+pub(crate) const BATCH: usize = 8192;
+
 /// A file that a source reads.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]

@@ -3,15 +3,13 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::source::Source;
+use super::source::{BATCH, Source};
 use crate::budget::{Bytes, whole_mebibytes};
-use crate::host::process::default_memory;
+use crate::host::process::{default_memory, processors};
 use crate::host::{Threads, lock};
 use crate::point::PointBatch;
 use crate::{Error, Result};
 
-/// Records read at once.
-const BATCH: usize = 8192;
 /// Bytes of the process besides what threads hold: the program, headers, tables of chunks.
 const BESIDE: u64 = 64 << 20;
 
@@ -26,8 +24,7 @@ pub struct PointWalk {
 
 impl Default for PointWalk {
     fn default() -> Self {
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        PointWalk { threads, memory: default_memory() }
+        PointWalk { threads: processors(), memory: default_memory() }
     }
 }
 

@@ -1,6 +1,5 @@
 //! The arguments that several commands have.
 
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
@@ -151,6 +150,9 @@ pub(crate) struct WrittenArguments {
     pub header: Option<bool>,
 }
 
+/// Files that are converted at once, at most.
+const MOST_JOBS: u64 = 256;
+
 /// How many files are converted, each by itself.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Many files")]
@@ -158,7 +160,7 @@ pub(crate) struct BulkArguments {
     /// Files that are converted at once, which share memory and threads [default: as many as
     /// threads where there are many small files, else 1]
     #[arg(long, value_name = "N", value_parser = parse_jobs)]
-    pub jobs: Option<NonZeroUsize>,
+    pub jobs: Option<usize>,
     /// Leave outputs that say that they were made so, of inputs that have not changed since; those
     /// of another version, or that do not say how they were made (texts), are made again
     #[arg(long, conflicts_with = "no_provenance")]
@@ -168,9 +170,6 @@ pub(crate) struct BulkArguments {
     pub summary: Option<PathBuf>,
 }
 
-fn parse_jobs(text: &str) -> Result<NonZeroUsize, String> {
-    match parse_count(text).ok().and_then(|jobs| NonZeroUsize::new(usize::try_from(jobs).ok()?)) {
-        Some(jobs) if jobs.get() <= 256 => Ok(jobs),
-        _ => Err("is a whole number from 1 to 256".to_owned()),
-    }
+fn parse_jobs(text: &str) -> Result<usize, String> {
+    within(text, 1, MOST_JOBS).map(|jobs| jobs as usize)
 }

@@ -14,11 +14,11 @@ use crate::engine::Watch;
 use crate::engine::scratch::{Scratch, Trouble, memory_warning};
 use crate::geom::simd::Simd;
 use crate::graph::{MixedUnits, RunSettings, SpillSetting};
-use crate::host::process::{default_memory, resident_now};
+use crate::host::process::{default_memory, processors, resident_now};
 use crate::host::{Threads, lock};
 use crate::language::Registry;
 use crate::point::{Selection, Units};
-use crate::stage::{Lattice, Source};
+use crate::stage::{BATCH, Lattice, Source};
 use crate::store::{Intake, Pieces, SealedTiles, SpillArea, ref_bytes};
 use crate::{Error, ErrorKind, Result};
 use sealed::{Placing, STRIDE, SealSettings};
@@ -47,7 +47,6 @@ pub(super) fn cloud_distances(
         refuse_units(units)?;
     }
     let trouble = Trouble::default();
-    let processors = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = run.threads.map_or_else(processors, usize::from);
     let outcome = Threads::start(threads, |threads| {
         measure(&sources, left_out, run, threads, &trouble, watch)
@@ -175,7 +174,7 @@ impl CloudShares {
         let largest = points[0].max(points[1]);
         let reading = sources
             .iter()
-            .map(|source| source.part_bytes() + (8192 * (source.schema().stride + 64)) as u64);
+            .map(|source| source.part_bytes() + (BATCH * (source.schema().stride + 64)) as u64);
         let reading = reading.max().unwrap_or(0);
         let fixed = Intake::fixed_bytes(STRIDE).0 + reading;
         let each = Intake::bytes_per_record(STRIDE, false, false).0.max(1);

@@ -12,14 +12,12 @@ use crate::point::{
     Chooser, Dimension, Endian, Layout, PointBatch, Position, Scalar, Schema, Selection, names,
 };
 use crate::report::Grouped;
-use crate::stage::Source;
+use crate::stage::{BATCH, Source};
 use crate::store::{Intake, SealedTiles, SpillArea, TileStore, seal};
 use crate::{Error, ErrorKind, Result};
 
 /// Bytes of a record in the store, whose place is all that is kept of it.
 pub const STRIDE: usize = 1;
-/// Records that are read at once.
-const BATCH: usize = 8192;
 /// What is stored of records.
 const NOTHING: [u8; BATCH * STRIDE] = [0; BATCH * STRIDE];
 

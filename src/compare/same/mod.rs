@@ -20,7 +20,7 @@ use crate::budget::{Budget, Bytes, whole_mebibytes};
 use crate::engine::Watch;
 use crate::engine::scratch::{Scratch, Trouble, memory_warning};
 use crate::graph::{RunSettings, SpillSetting};
-use crate::host::process::default_memory;
+use crate::host::process::{default_memory, processors};
 use crate::host::{disk, lock};
 use crate::io::ends::Read;
 use crate::language::Registry;
@@ -70,7 +70,6 @@ pub(super) fn compare_records(
     let sources = [open(paths[0], registry)?.open()?, open(paths[1], registry)?.open()?];
     let schemas = [sources[0].schema().clone(), sources[1].schema().clone()];
     drop(sources);
-    let processors = || std::thread::available_parallelism().map_or(1, usize::from);
     let job = RecordsJob {
         paths,
         compared: ComparedSchemas::of([&schemas[0], &schemas[1]])?,

@@ -86,7 +86,7 @@ fn one(path: &str, formats: &Formats) -> Result<Vec<PathBuf>> {
     if literal.is_dir() {
         return folder(literal, formats);
     }
-    let pattern = path.contains(['*', '?', '[']);
+    let pattern = path.contains(WILD);
     if !pattern || literal.exists() {
         return match path {
             "" => Err(Error::pipeline("a path is empty")),
@@ -133,7 +133,7 @@ fn steps(path: &str) -> Result<Vec<Step<'_>>> {
         steps.push(match part {
             "**" if matches!(steps.last(), Some(Step::Below)) => continue,
             "**" => Step::Below,
-            _ if !part.contains(['*', '?', '[']) => Step::Name(part),
+            _ if !part.contains(WILD) => Step::Name(part),
             _ => Step::Matching(glob::Pattern::new(part).map_err(|e| {
                 let path = shown(Path::new(path));
                 Error::pipeline(format!("`{path}` is no pattern: {}", e.msg))
@@ -143,6 +143,8 @@ fn steps(path: &str) -> Result<Vec<Step<'_>>> {
     Ok(steps)
 }
 
+/// What makes a path a pattern.
+pub(super) const WILD: [char; 3] = ['*', '?', '['];
 /// Bytes of the longest pattern: the system's longest path.
 const LONGEST: usize = 4096;
 /// Names that a pattern may look at.

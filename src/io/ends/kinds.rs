@@ -27,7 +27,7 @@ use crate::{Error, Result};
 /// inputs in vertex properties, GPS time type and coordinate reference system. Systems agree if
 /// they mean the same: in WKT of one wording, spaces and zeros aside, or by equal EPSG codes; the
 /// output has the WKT. LAS offsets may differ by whole steps; the output has the smallest. PLY
-/// properties may differ in type, where one of two types holds all numbers of the other.
+/// properties may differ in type, where some type holds all numbers of both.
 ///
 /// What differs is brought to one form where that is asked for: point formats by `point_format`,
 /// scales and offsets by `scale` and `offset` (coordinates that these round are told), systems by
@@ -41,7 +41,8 @@ use crate::{Error, Result};
 ///
 /// # Formats
 ///
-/// - LAS 1.0 to 1.5, and LAZ; COPC (`.copc.laz`) is read whole, as the LAZ that it is.
+/// - LAS 1.0 to 1.5, and LAZ; COPC (`.copc.laz`) is read as the LAZ that it is, whole or by `box`
+///   and `resolution`.
 /// - PLY, whatever its vertices hold; lists of theirs are passed over, and told.
 /// - PCD as text, as bytes or packed (`binary_compressed`). A cell of a grid (`HEIGHT` above 1) has
 ///   its `Row` and `Column`. A point of which a coordinate is NaN is none, as the library has it:

@@ -3,7 +3,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use super::inputs::{each, once};
+use super::inputs::{WILD, each, once};
 use crate::Result;
 use crate::stage::Formats;
 
@@ -48,9 +48,8 @@ fn base(path: &str, files: &[PathBuf]) -> Option<PathBuf> {
     if path.starts_with('@') {
         return shared(files);
     }
-    let wild = |part: &Component<'_>| {
-        part.as_os_str().to_str().is_some_and(|part| part.contains(['*', '?', '[']))
-    };
+    let wild =
+        |part: &Component<'_>| part.as_os_str().to_str().is_some_and(|part| part.contains(WILD));
     Some(literal.components().take_while(|part| !wild(part)).collect())
 }
 

@@ -9,11 +9,10 @@ use std::path::PathBuf;
 use super::crs;
 use super::fields::encoding;
 use super::file::InputFile;
-use super::format::{has_waveforms, reformed};
+use super::format::{has_waveforms, record_size, reformed};
 use super::header::Header;
-use super::input::LasInput;
+use super::input::{LasInput, extra_len};
 use super::vlr::{Evlr, Vlr};
-use crate::point::Schema;
 use crate::stage::{Assumption, OnError, ReadKeys};
 use crate::{Error, Result};
 
@@ -73,7 +72,10 @@ impl OneForm {
     /// records must change.
     pub fn bring(&self, mut input: LasInput) -> Result<LasInput> {
         self.put_crs(&mut input.vlrs, &mut input.evlrs);
-        let formed = self.header(&input.header, &input.schema())?;
+        if let Some(format) = self.other_format(&input.header) {
+            reformed(&input.schema(), format)?; // its names may be taken there
+        }
+        let formed = self.header(&input.header);
         let is_other = (formed.format(), formed.scale(), formed.offset())
             != (input.header.format(), input.header.scale(), input.header.offset());
         if is_other {
@@ -82,12 +84,17 @@ impl OneForm {
         Ok(input)
     }
 
-    /// The header that a file with this one, and records of `schema`, has in this form.
-    pub fn header(&self, input: &Header, schema: &Schema) -> Result<Header> {
+    /// The point format that records of a file with this header are brought to.
+    fn other_format(&self, input: &Header) -> Option<u8> {
+        self.format.filter(|format| *format != input.format())
+    }
+
+    /// The header that a file with this one has in this form.
+    pub fn header(&self, input: &Header) -> Header {
         let mut header = input.clone();
-        if let Some(format) = self.format.filter(|format| *format != input.format()) {
-            let stride = reformed(schema, format)?.stride;
-            reform(&mut header, format, stride);
+        if let Some(format) = self.other_format(input) {
+            let fields = usize::from(record_size(format).unwrap_or(0));
+            reform(&mut header, format, fields + extra_len(input));
         }
         if let (Some(scale), Some(offset)) = (self.scale, self.offset)
             && !(header.scale() == scale && are_whole_steps(offset, &header, scale))
@@ -95,7 +102,7 @@ impl OneForm {
             header.put_scale(scale);
             header.put_offset(offset);
         }
-        Ok(header)
+        header
     }
 
     /// Gives records the system that all inputs are said to be in.

@@ -16,6 +16,7 @@ use super::union::{UnionRecords, described};
 use super::vlr::Evlr;
 use crate::error::shown;
 use crate::io::systems::{remedy, told_apart};
+use crate::point::GpsTime;
 use crate::{Error, Result};
 
 /// Files that are to be read as one scan, taken in one by one: of each only its header is kept, and
@@ -100,9 +101,9 @@ fn agree(a: &LasInput, b: &LasInput) -> Result<()> {
         return Err(differ(a, b, "scale", one.scale(), two.scale()).help(help(a, b)));
     }
     if has_gps_time(one.format()) {
-        let kind = |h: &Header| match h.encoding() & encoding::GPS_STANDARD {
-            0 => "GPS week time",
-            _ => "adjusted standard GPS time",
+        let kind = |h: &Header| match h.gps_time() {
+            GpsTime::Week => "GPS week time",
+            GpsTime::AdjustedStandard => "adjusted standard GPS time",
         };
         same(a, b, "GPS time type", kind(one), kind(two))?;
     }

@@ -9,7 +9,7 @@ use super::extra::Descriptor;
 use super::fields::encoding;
 use super::file::InputFile;
 use super::form::{OneForm, reform};
-use super::format::{self, format_of, has_waveforms, record_size};
+use super::format::{format_of, has_waveforms, record_size};
 use super::header::Header;
 use super::input::{LasInput, extra_len, is_carried, is_carried_extended};
 use super::records::{read_evlrs, read_vlrs};
@@ -68,15 +68,8 @@ impl Native {
         evlrs.retain(is_carried_extended);
         described.carried(&mut vlrs, &mut evlrs);
         form.put_crs(&mut vlrs, &mut evlrs);
-        let schema = format::schema(
-            header.format(),
-            &described.descriptors,
-            extra_len(header),
-            header.scale(),
-            header.offset(),
-        );
         let waveforms = Waveforms::of(file.path(), header).there;
-        let header = form.header(&now, &schema)?.for_outputs();
+        let header = form.header(&now).for_outputs();
         Ok(Native { header, vlrs, gap, evlrs, waveforms, made: false })
     }
 

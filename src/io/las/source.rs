@@ -18,7 +18,7 @@ use super::read::{PlainPart, Shift};
 use super::table::is_held;
 use super::verify::{Evidence, Found, Watched};
 use super::waveforms;
-use crate::io::united::{LARGEST_BATCH, ToOneForm};
+use crate::io::united::ToOneForm;
 use crate::point::{Metadata, Schema};
 use crate::report::LostPoints;
 use crate::stage::{self, OnError, Part, ReadKeys, Source};
@@ -40,10 +40,11 @@ pub fn open(paths: &[PathBuf]) -> Result<Box<dyn Source>> {
 
 /// The same as `keys` want it: inputs that differ may be brought to one form.
 pub(super) fn open_with(paths: &[PathBuf], keys: &ReadKeys) -> Result<Box<dyn Source>> {
-    Ok(Box::new(LasSource::open(paths, keys)?))
+    Ok(Box::new(opened(paths, keys)?))
 }
 
-fn opened(paths: &[PathBuf], keys: &ReadKeys) -> Result<LasSource> {
+/// As [`open_with`].
+pub fn opened(paths: &[PathBuf], keys: &ReadKeys) -> Result<LasSource> {
     let Some((first, others)) = paths.split_first() else {
         return Err(Error::pipeline("there is no input file"));
     };
@@ -103,11 +104,6 @@ pub struct LasSource {
 }
 
 impl LasSource {
-    /// As [`open_with`].
-    pub fn open(paths: &[PathBuf], keys: &ReadKeys) -> Result<LasSource> {
-        opened(paths, keys)
-    }
-
     /// What the points of the first file come to; None before all of them were read.
     pub fn found(&self) -> Option<Found> {
         self.files.first()?.evidence.found()
@@ -183,8 +179,7 @@ impl Opened {
     }
 
     fn part_bytes(&self) -> u64 {
-        let batch = |form: &ToOneForm| form.bytes(LARGEST_BATCH);
-        let formed = self.to_one_form.as_ref().map_or(0, batch);
+        let formed = self.to_one_form.as_ref().map_or(0, ToOneForm::part_bytes);
         let Some(compression) = &self.compression else { return formed };
         let list = match &self.input.storage {
             Storage::Laz(_, Chunks::Known(chunks)) => chunks.part_bytes(),

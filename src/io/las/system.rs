@@ -6,7 +6,7 @@ use std::cmp::Ordering;
 use super::crs::{WKT_LIMIT, has_wkt, is_record, text, units};
 use super::vlr::{Evlr, Vlr};
 use crate::Result;
-use crate::io::wkt;
+use crate::io::systems;
 
 /// The records that say in which system a file's points are.
 #[derive(Clone)]
@@ -54,8 +54,7 @@ impl CrsRecords {
             return Ok(true);
         }
         let (Some(one), Some(two)) = (self.text()?, other.text()?) else { return Ok(false) };
-        let codes = wkt::codes(&one);
-        let same = wkt::alike(&one, &two) || (codes.is_some() && codes == wkt::codes(&two));
+        let same = systems::are_alike(&one, &two);
         Ok(same && units(&self.vlrs, &self.evlrs)? == units(&other.vlrs, &other.evlrs)?)
     }
 

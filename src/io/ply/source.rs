@@ -13,7 +13,7 @@ use crate::io::rows::Encoding;
 use crate::io::rows::lines::shown;
 use crate::io::rows::parts::PartEnds;
 use crate::io::systems;
-use crate::io::united::{LARGEST_BATCH, ToOneForm};
+use crate::io::united::ToOneForm;
 use crate::point::{Metadata, Schema};
 use crate::stage::{Contradiction, Input, Part, ReadKeys, Source};
 use crate::{Error, Result};
@@ -257,7 +257,7 @@ impl Source for PlySource {
 
     fn part_bytes(&self) -> u64 {
         let of = |((file, own), form): ((&PlyFile, &Arc<Schema>), &Option<ToOneForm>)| {
-            let formed = form.as_ref().map_or(0, |form| form.bytes(LARGEST_BATCH));
+            let formed = form.as_ref().map_or(0, ToOneForm::part_bytes);
             formed
                 + match file.header.encoding {
                     Encoding::Ascii => AsciiPart::bytes(own),

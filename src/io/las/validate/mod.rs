@@ -16,7 +16,7 @@ use super::copc::{self, rules as copc_rules};
 use super::fields::{at, encoding};
 use super::file::InputFile;
 use super::input::{LasInput, Storage};
-use super::source::LasSource;
+use super::source::{LasSource, opened};
 use super::verify::Found;
 use crate::Result;
 use crate::report::Coordinate;
@@ -62,8 +62,8 @@ pub fn validate(
     described::check(&raw, &records, findings);
     let tree = octree(&file, &raw, &records, is_octree, findings)?;
     room(&raw, &records, findings);
-    let opened = LasSource::open(&[path.to_owned()], &ReadKeys::default());
-    match opened.and_then(|source| Ok((LasInput::open(path, OnError::Fail)?, source))) {
+    let source = opened(&[path.to_owned()], &ReadKeys::default());
+    match source.and_then(|source| Ok((LasInput::open(path, OnError::Fail)?, source))) {
         Ok((input, source)) => look(&raw, &input, &source, tree, walk, findings),
         Err(error) => {
             // What is wrong was told field by field, as far as it was met there.
