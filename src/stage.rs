@@ -6,6 +6,7 @@ mod format;
 mod keys;
 mod kind;
 mod needs;
+mod renamed;
 mod rounds;
 mod scan;
 mod sink;
@@ -26,9 +27,12 @@ pub use crate::geom::lattice::{Lattice, Misplaced};
 pub use crate::store::{KeptPoints, KeptReader, Levels};
 pub use findings::{Finding, Findings, FoundPlace, PLACES_TOLD, Rule, Severity};
 pub use format::{CreateFor, Format, FormatName, Formats, foreign};
-pub use keys::{Assumption, Colors, OnError, OutputEncoding, ReadKeys, Separator, WriteKeys};
+pub use keys::{
+    Assumption, Colors, FloatIntensity, OnError, OutputEncoding, ReadKeys, Separator, WriteKeys,
+};
 pub use kind::{StageKind, StagePlace};
 pub use needs::Needs;
+pub use renamed::{Renamed, Retyped};
 pub use rounds::{
     GridBeside, Looks, NextRound, Offer, Round, RoundBefore, RoundChoice, RoundFound, RoundOp,
     RoundTile, SoFar,

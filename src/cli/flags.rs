@@ -314,7 +314,8 @@ pub(super) fn united(arguments: &WrittenArguments) -> Vec<CommandFlag> {
 
 /// How the output is written, as the keys of `write`.
 fn written(arguments: &WrittenArguments) -> Vec<CommandFlag> {
-    let names = (!arguments.drop.is_empty()).then(|| json!(arguments.drop).into());
+    let list = |given: &[String]| (!given.is_empty()).then(|| json!(given).into());
+    let names = list(&arguments.drop);
     flags([
         ("--scale", "write.scale", arguments.scale.as_deref().map(numbers_or_text)),
         ("--offset", "write.offset", arguments.offset.as_deref().map(numbers_or_text)),
@@ -324,6 +325,9 @@ fn written(arguments: &WrittenArguments) -> Vec<CommandFlag> {
             arguments.point_format.as_deref().map(whole_or_text),
         ),
         ("--drop", "write.drop", names),
+        ("--map", "write.map", list(&arguments.map)),
+        ("--type", "write.types", list(&arguments.types)),
+        ("--intensity", "write.intensity", arguments.intensity.clone().map(FlagValue::from)),
         ("--encoding", "write.encoding", arguments.encoding.clone().map(FlagValue::from)),
         ("--colors", "write.colors", arguments.colors.clone().map(FlagValue::from)),
         ("--separator", "write.separator", arguments.separator.clone().map(FlagValue::from)),

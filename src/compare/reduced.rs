@@ -10,9 +10,7 @@ use crate::point::{PointBatch, Scalar, Schema, names};
 use crate::stage::{BATCH, Source};
 use crate::{Error, ErrorKind, Result};
 
-/// The dimension that tells surface points from exceptions.
-const KEEP_RANK: &str = "KeepRank";
-/// Its value for exceptions: kept, and no part of the surface.
+/// The rank of exceptions: kept, and no part of the surface.
 const EXCEPTION: f64 = 65535.0;
 /// Bytes of a record while it is looked at: its place, its positions as they are searched, and its
 /// entry in a table that is at most half empty, and its first bits.
@@ -71,7 +69,7 @@ impl Reduced {
         let mut records = HashMap::<u128, Occurrences, PlaceHashes>::default();
         let keys = &comparison.reduced;
         let schema = source.schema();
-        let rank = schema.find(KEEP_RANK).filter(|rank| rank.scalar == Scalar::U16);
+        let rank = schema.find(names::KEEP_RANK).filter(|rank| rank.scalar == Scalar::U16);
         each_record(source, |_, world, record| {
             let is_surface = rank.is_none_or(|d| d.world(record, schema.endian) != EXCEPTION);
             points.push((world, is_surface));

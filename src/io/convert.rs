@@ -1,16 +1,20 @@
 //! Records of one format as records of another: every dimension goes where its name is, and what
 //! the target cannot hold is told, never changed. Knows no files.
 
+mod asked;
 mod columns;
 mod step;
 mod told;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+pub(crate) use asked::AskedValues;
+use asked::SCALE;
+pub(super) use asked::TYPES;
 use columns::{BLOCK, ColumnStep, RecordBytes, TargetBytes};
 use step::{Move, push, slack, step};
 pub(super) use told::{check_drop, quoted};
-use told::{placed, room};
+use told::{kept_otherwise, placed, room};
 
 use crate::point::names::{BLUE, GREEN, NIR, RED, XYZ};
 use crate::point::{Dimension, Endian, Scalar, Schema, Value};
@@ -39,6 +43,8 @@ pub struct Projection {
     columns: Vec<Option<ColumnStep>>,
     /// The stage whose keys messages advise.
     stage: &'static str,
+    /// Dimensions of the target whose types were asked for.
+    typed: Vec<String>,
 }
 
 impl Projection {
@@ -50,6 +56,17 @@ impl Projection {
     /// A dimension of `from` that `to` lacks and `drop` does not name, a name in `drop` that `from`
     /// lacks, and coordinates, which cannot be dropped.
     pub fn new(from: &Schema, to: &Schema, drop: &[String]) -> Result<Projection> {
+        let drop = drop.to_vec();
+        Projection::asked(from, to, &AskedValues { drop, ..AskedValues::default() })
+    }
+
+    /// The same with values as they were asked for.
+    ///
+    /// # Errors
+    ///
+    /// As [`new`](Projection::new).
+    pub(crate) fn asked(from: &Schema, to: &Schema, asked: &AskedValues) -> Result<Projection> {
+        let drop = &asked.drop;
         check_drop(from, drop)?;
         let held: BTreeSet<&str> = to.dimensions.iter().map(|d| d.name.as_str()).collect();
         let lost: Vec<&str> = from
@@ -72,7 +89,10 @@ impl Projection {
         let mut moves = Vec::new();
         for target in to.dimensions.iter().filter(|d| !drop.contains(&d.name)) {
             if let Some(source) = sources.get(target.name.as_str()) {
-                if widens(from, source, to, target) {
+                let families = [from.layout.family, to.layout.family];
+                if let Some(step) = asked.step(families, source, target) {
+                    push(&mut moves, step);
+                } else if widens(from, source, to, target) {
                     // 257 times a byte is the byte twice.
                     for to in [target.offset, target.offset + 1] {
                         push(&mut moves, Move::Copy { from: source.offset, to, length: 1 });
@@ -87,12 +107,22 @@ impl Projection {
         let (to_endian, to_stride) = (to.endian, to.stride);
         let blank = vec![0; to_stride];
         let (from, stage) = (from.clone(), "write");
-        Ok(Projection { from, to_endian, to_stride, moves, blank, columns, stage })
+        let typed = asked.typed.clone();
+        Ok(Projection { from, to_endian, to_stride, moves, blank, columns, stage, typed })
     }
 
     /// The same for records that are brought to another form as they are read.
     pub(crate) fn reading(from: &Schema, to: &Schema) -> Result<Projection> {
         Ok(Projection { stage: "read", ..Projection::new(from, to, &[])? })
+    }
+
+    /// What it rounds values to, in words.
+    pub(crate) fn rounded_to(&self) -> &'static str {
+        let is_other = |step: &Move| match step {
+            Move::Rounded { to, .. } => !XYZ.contains(&to.name.as_str()),
+            _ => false,
+        };
+        if self.moves.iter().any(is_other) { TYPES } else { SCALE }
     }
 
     /// Leaves room behind each record: records become `stride` bytes long, the new ones 0.
@@ -101,11 +131,11 @@ impl Projection {
         self.blank.resize(self.to_stride, 0);
     }
 
-    /// Gives the dimension `to` of the target, which the source lacks, this number instead of 0.
+    /// Gives the dimension `to` of the target, which the source lacks, this value instead of 0.
     /// False if it cannot hold it.
     #[must_use]
-    pub(crate) fn preset(&mut self, to: &Dimension, number: u64) -> bool {
-        to.put(&mut self.blank, self.to_endian, Value::Unsigned(number))
+    pub(crate) fn preset(&mut self, to: &Dimension, value: Value) -> bool {
+        to.put(&mut self.blank, self.to_endian, value)
     }
 
     fn clear(&self, targets: &mut [u8]) {
@@ -235,6 +265,12 @@ impl Projection {
                 *byte = *byte & !(mask << shift) | bits << shift;
                 Ok(0.0)
             }
+            Move::Part { from, to } => {
+                let (stored, _) = nearest(to, from.world(record, endian));
+                let held = to.put(target, self.to_endian, stored);
+                let value = || Dimension { scale: 1.0, ..from.clone() }.get(record, endian);
+                if held { Ok(0.0) } else { Err(UnfitValue { to, value: value() }) }
+            }
             Move::Rounded { from, to } => {
                 let world = from.world(record, endian);
                 let (stored, back) = nearest(to, world);
@@ -278,6 +314,9 @@ impl Projection {
             ErrorKind::Data,
             format!("{name} = {text} of {place} does not fit {}", room(to)),
         );
+        if self.typed.contains(name) && value.as_f64().is_finite() {
+            return error.help("give it a type in `write.types` that holds it, such as `f64`");
+        }
         if XYZ.contains(&name.as_str()) {
             if !value.as_f64().is_finite() {
                 return error.help("`run.nonfinite = \"drop\"` leaves such points out");
@@ -288,8 +327,9 @@ impl Projection {
                 .map(|axes| axes.map(|axis| axis.world(record, self.from.endian)));
             return error.help(placed(self.stage, world, to, value.as_f64()));
         }
+        let is_fraction = matches!(value, Value::Single(_) | Value::Double(_));
         match self.stage {
-            "write" => error.help(format!("`write.drop = [{name:?}]` leaves the dimension out")),
+            "write" => error.help(kept_otherwise(to, is_fraction)),
             _ => error.help("give a point format that has room for it, or convert it by itself"),
         }
     }

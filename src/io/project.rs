@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::convert::Projection;
+use super::convert::{Projection, TYPES};
 use crate::point::{PointBatch, Schema, Spare};
 use crate::report::{Grouped, Short};
 use crate::stage::{ChunkSize, Encode, Encoded, Extent, Sink, SinkSummary};
@@ -14,6 +14,8 @@ pub struct Projected {
     inner: Box<dyn Sink>,
     encoder: Arc<ProjectingEncoder>,
     rounded: (u64, f64),
+    /// What values are rounded to.
+    rounded_to: &'static str,
 }
 
 struct ProjectingEncoder {
@@ -29,9 +31,10 @@ impl Projected {
     /// `path` is the output's, to be named where a value does not fit.
     pub fn new(inner: Box<dyn Sink>, projection: Projection, to: Arc<Schema>, path: &Path) -> Self {
         let path = path.to_owned();
+        let rounded_to = projection.rounded_to();
         let (spare, inner_encoder) = (Spare::default(), inner.encoder());
         let encoder = ProjectingEncoder { path, projection, to, inner: inner_encoder, spare };
-        Projected { inner, encoder: Arc::new(encoder), rounded: (0, 0.0) }
+        Projected { inner, encoder: Arc::new(encoder), rounded: (0, 0.0), rounded_to }
     }
 
     /// The chunks of such a sink around one of the chunks `inner`, which takes records of `to`.
@@ -86,18 +89,19 @@ impl Sink for Projected {
     }
 
     fn finish(self: Box<Self>) -> Result<SinkSummary> {
-        let (points, largest) = self.rounded;
         let mut summary = self.inner.finish()?;
-        if points > 0 {
-            let whose = match points {
-                1 => "the coordinates of 1 point".to_owned(),
-                _ => format!("the coordinates of {} points", Grouped(points)),
-            };
-            summary.notes.push(format!(
-                "{whose} were rounded to the output's scale, by at most {}",
-                Short(largest)
-            ));
-        }
+        summary.notes.extend(rounded(self.rounded, self.rounded_to));
         Ok(summary)
     }
+}
+
+/// Tells of so many points that values were rounded `to` something, by so much at most.
+pub(super) fn rounded((points, largest): (u64, f64), to: &str) -> Option<String> {
+    let of = if to == TYPES { "values" } else { "the coordinates" };
+    let points = match points {
+        0 => return None,
+        1 => "1 point".to_owned(),
+        _ => format!("{} points", Grouped(points)),
+    };
+    Some(format!("{of} of {points} were rounded to {to}, by at most {}", Short(largest)))
 }

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::convert::{Projection, Rounding};
-use crate::Result;
 use crate::error::shown;
-use crate::point::{PointBatch, Schema};
+use crate::point::{Dimension, PointBatch, Schema, Value};
 use crate::report::Short;
 use crate::stage::{BATCH, Part};
+use crate::{Error, Result};
 
 /// How the records of one input become those of all.
 #[derive(Debug)]
@@ -22,12 +22,23 @@ pub struct ToOneForm {
 }
 
 impl ToOneForm {
-    /// Records of `own` become such of `to`; None where they are alike.
-    pub fn of(own: Schema, to: &Schema) -> Result<Option<ToOneForm>> {
+    /// Records of `own` become such of `to`, with these values in dimensions that `own` lacks and 0
+    /// in the others; None where they are alike.
+    pub fn of(
+        own: Schema,
+        to: &Schema,
+        absent: &[(Dimension, Value)],
+    ) -> Result<Option<ToOneForm>> {
         if own == *to {
             return Ok(None);
         }
-        let projection = Projection::reading(&own, to)?;
+        let mut projection = Projection::reading(&own, to)?;
+        for (dimension, value) in absent {
+            if !projection.preset(dimension, *value) {
+                let told = format!("`{}` does not hold its own value for no data", dimension.name);
+                return Err(Error::pipeline(told));
+            }
+        }
         Ok(Some(ToOneForm { own: Arc::new(own), projection, rounded: AtomicU64::new(0) }))
     }
 

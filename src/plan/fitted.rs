@@ -1,6 +1,7 @@
 //! A pipeline that fits: its source open, its lattice fixed, its stages in passes, its memory
 //! divided.
 
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use rayon::ThreadPool;
@@ -32,7 +33,7 @@ use crate::host::Threads;
 use crate::point::{Schema, Units};
 use crate::quantity::Figure;
 use crate::report::AcceptTable;
-use crate::stage::{CreateSink, Source};
+use crate::stage::{CreateSink, PointWalk, Source};
 use crate::store::CLASSED_INPUTS;
 use crate::{Error, Result};
 
@@ -111,6 +112,7 @@ impl Graph {
         let (_, wrong) = places(&sorted.source.1.paths(), &sorted.sinks);
         let FittedStages { source, schemas, choices, passes, given, accept } =
             fit_stages(&mut sorted, rules, wrong)?;
+        settle(&mut sorted, &*source, &settings)?;
         let schema = &schemas.last;
         let read = all_read(&*sorted.source.1, &*source);
         let mut files = right(places(&read, &sorted.sinks))?;
@@ -214,6 +216,23 @@ fn fit_stages(
     let accept = accepted(rules, sorted, (&*source, &schemas.last), &mut wrong);
     Error::all(wrong)?;
     Ok(FittedStages { source, schemas, choices, passes, given, accept })
+}
+
+/// Has sinks find in the points what they are asked to find there.
+fn settle(sorted: &mut Sorted, source: &dyn Source, settings: &RunSettings) -> Result<()> {
+    let usual = PointWalk::default();
+    let walk = PointWalk {
+        threads: settings.threads.map_or(usual.threads, NonZeroUsize::get),
+        memory: settings.memory.unwrap_or(usual.memory),
+    };
+    let mut streaming = sorted.transforms.iter().chain(&sorted.filters);
+    let mover = streaming.find(|stage| stage.moves()).map(|stage| stage.kind.as_str());
+    for sink in &mut sorted.sinks {
+        if let Some(settled) = sink.settled(source, &walk, mover)? {
+            *sink = settled;
+        }
+    }
+    Ok(())
 }
 
 /// Fits tile stages to the units of the scan: lengths with a unit of their own are converted. What

@@ -14,7 +14,7 @@ use crate::io::ends::CountedSink;
 use crate::memory::Records;
 use crate::point::{Metadata, Schema, Units};
 use crate::stage::{
-    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Extent, Order, Role, Sink,
+    ChunkSize, CreateSink, Encode, EncodeTriangles, Encoded, Extent, Order, PointWalk, Role, Sink,
     SinkSummary, Source, Triangulation,
 };
 
@@ -114,6 +114,19 @@ impl CreateSink for RehearsedSink {
 
     fn is_file(&self) -> bool {
         false
+    }
+
+    fn settled(
+        &self,
+        source: &dyn Source,
+        walk: &PointWalk,
+        moved_by: Option<&str>,
+    ) -> Result<Option<Box<dyn CreateSink>>> {
+        let Some(sink) = self.sink.settled(source, walk, moved_by)? else { return Ok(None) };
+        let of_one = self.of_one.as_ref().map(|one| one.settled(source, walk, moved_by));
+        let of_one = of_one.transpose()?.flatten();
+        let (scratch, written) = (self.scratch.clone(), self.written.clone());
+        Ok(Some(Box::new(RehearsedSink { sink, of_one, number: self.number, scratch, written })))
     }
 
     fn order(&self) -> Order {

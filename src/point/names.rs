@@ -24,6 +24,8 @@ pub const SCAN_ANGLE: &str = "ScanAngle";
 pub const USER_DATA: &str = "UserData";
 pub const POINT_SOURCE_ID: &str = "PointSourceId";
 pub const GPS_TIME: &str = "GpsTime";
+/// When a reduction kept the point: those of lower ranks are a coarser reduction.
+pub const KEEP_RANK: &str = "KeepRank";
 /// Row of an organised scan, such as the pixels of a depth camera.
 pub const ROW: &str = "Row";
 /// Column of an organised scan.

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::quantity::CropBox;
+use super::renamed::{Renamed, Retyped};
+use crate::point::Scalar;
+use crate::quantity::{CropBox, Setting};
 
 /// How inputs are to be read, as far as formats need to know: keys of `read`.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -27,11 +29,11 @@ pub struct ReadKeys {
     /// Distance between points, in world units, down to which levels of an octree are read.
     pub resolution: Option<f64>,
     /// Scale that LAS inputs of different scales or offsets are brought to.
-    pub scale: Option<[f64; 3]>,
+    pub scale: Option<Setting<[f64; 3]>>,
     /// Offset that they are brought to.
-    pub offset: Option<[f64; 3]>,
+    pub offset: Option<Setting<[f64; 3]>>,
     /// Point data record format that LAS inputs of different ones are brought to.
-    pub point_format: Option<u8>,
+    pub point_format: Option<Setting<u8>>,
 }
 
 impl ReadKeys {
@@ -58,6 +60,10 @@ impl ReadKeys {
 pub enum Assumption {
     /// They are in the coordinate reference system that the other inputs name.
     Crs,
+    /// Extra dimensions that other inputs have hold nothing in their points: the no-data value that
+    /// their description has, else 0.
+    #[serde(rename = "extra-bytes")]
+    ExtraBytes,
 }
 
 /// What is done about damage in an input.
@@ -86,12 +92,20 @@ pub struct WriteKeys {
     pub computed: Vec<String>,
     /// Dimensions that the output need not hold.
     pub drop: Vec<String>,
-    /// Scale of stored coordinates.
-    pub scale: Option<[f64; 3]>,
-    /// Offset of stored coordinates.
-    pub offset: Option<[f64; 3]>,
+    /// Dimensions that have other names in the output. A format gets records under those names, and
+    /// the other keys speak of them: it has nothing to do for these but to copy no records as they
+    /// are.
+    pub map: Vec<Renamed>,
+    /// Types that dimensions have in the output, by their names there.
+    pub types: Vec<Retyped>,
+    /// Scale of stored coordinates. A format gets one that is given, or none.
+    pub scale: Option<Setting<[f64; 3]>>,
+    /// Offset of stored coordinates, likewise.
+    pub offset: Option<Setting<[f64; 3]>>,
     /// Point data record format of LAS.
-    pub point_format: Option<u8>,
+    pub point_format: Option<Setting<u8>>,
+    /// What intensities of floating-point numbers mean.
+    pub intensity: Option<FloatIntensity>,
     /// Text or bytes.
     pub encoding: Option<OutputEncoding>,
     /// Bits of a colour.
@@ -105,12 +119,34 @@ pub struct WriteKeys {
 }
 
 impl WriteKeys {
+    /// The scale, if one is given.
+    pub fn given_scale(&self) -> Option<[f64; 3]> {
+        self.scale.and_then(Setting::given)
+    }
+
+    /// The offset, if one is given.
+    pub fn given_offset(&self) -> Option<[f64; 3]> {
+        self.offset.and_then(Setting::given)
+    }
+
+    /// The point format, if one is given.
+    pub fn given_point_format(&self) -> Option<u8> {
+        self.point_format.and_then(Setting::given)
+    }
+
+    /// The type that a dimension of this name is to have in the output, if one is given.
+    pub fn type_of(&self, name: &str) -> Option<Scalar> {
+        self.types.iter().find(|retyped| retyped.name == name).map(|retyped| retyped.scalar)
+    }
+
     /// The keys that are given and that not every format has.
     pub fn given(&self) -> impl Iterator<Item = &'static str> {
         let all = [
+            ("types", !self.types.is_empty()),
             ("scale", self.scale.is_some()),
             ("offset", self.offset.is_some()),
             ("point_format", self.point_format.is_some()),
+            ("intensity", self.intensity.is_some()),
             ("encoding", self.encoding.is_some()),
             ("colors", self.colors.is_some()),
             ("separator", self.separator.is_some()),
@@ -119,6 +155,15 @@ impl WriteKeys {
         ];
         all.into_iter().filter(|(_, is_given)| *is_given).map(|(key, _)| key)
     }
+}
+
+/// What intensities of floating-point numbers mean where they become whole ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum FloatIntensity {
+    /// Parts of the largest: 1 is 65535.
+    Unit,
 }
 
 /// Encoding of a PLY file.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::source::{Input, Source};
+use super::walk::PointWalk;
 use crate::geom::lattice::Lattice;
 use crate::point::{Bounds, Metadata, PointBatch, Position, Schema, Units};
 use crate::{Error, Result};
@@ -257,6 +258,22 @@ pub trait CreateSink: Send + Sync {
     ///
     /// A length in a unit of its own where that of the scan is not known.
     fn triangulation(&self, _units: &Units) -> Result<Option<Triangulation>> {
+        Ok(None)
+    }
+
+    /// The same sink, where some of what it was asked for depends on the points of `source`: with
+    /// what it found there. Called once, before anything else that is told of the records. Of a
+    /// stage that moves the points on their way here, `moved_by` is the kind.
+    ///
+    /// # Errors
+    ///
+    /// What cannot be found, and what reading the points fails with.
+    fn settled(
+        &self,
+        _source: &dyn Source,
+        _walk: &PointWalk,
+        _moved_by: Option<&str>,
+    ) -> Result<Option<Box<dyn CreateSink>>> {
         Ok(None)
     }
 

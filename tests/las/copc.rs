@@ -120,6 +120,39 @@ fn what_a_reduction_leaves_is_written_and_made_again() {
     assert_eq!(levels(&at.join("c.COPC.LAZ")), levels(&at.join("r.copc.laz")));
 }
 
+/// The mean of the ranks that a reduction gave the points of a file, and how many there are.
+fn mean_rank(path: &Path) -> (f64, usize) {
+    let (schema, records) = read(path);
+    let rank = schema.find("KeepRank").unwrap();
+    let ranks = records.chunks_exact(schema.stride).map(|r| rank.world(r, schema.endian));
+    let (sum, count) = ranks.fold((0.0, 0), |(sum, count), rank| (sum + rank, count + 1));
+    (sum / count as f64, count)
+}
+
+#[test]
+fn a_coarse_level_is_a_coarse_reduction_where_points_have_ranks() {
+    let at = tempfile::tempdir().unwrap();
+    let at = at.path();
+    done(at, &["synth", "als", "-n", "400000", "-o", "a.laz", "--quiet"]);
+    let reduce = ["reduce", "a.laz", "--keep", "50%", "--ranks", "--quiet", "-o"];
+    let (code, _, told) = pointmill(at, &[&reduce[..], &["r.copc.laz"]].concat());
+    assert_eq!(code, 0, "{told}");
+    levels(&at.join("r.copc.laz"));
+    let root = ["convert", "r.copc.laz", "-o", "root.laz", "--resolution", "1000", "--quiet"];
+    done(at, &root);
+    let (all, root) = (mean_rank(&at.join("r.copc.laz")), mean_rank(&at.join("root.laz")));
+    assert!(root.1 < all.1 / 2, "{root:?} of {all:?}");
+    // Where a hash decides, points of all ranks come as often.
+    assert!(root.0 < 0.8 * all.0, "{root:?} of {all:?}");
+    // From a file that has ranks, the same nodes.
+    for to in ["b.copc.laz", "c.copc.laz"] {
+        let from = if to == "b.copc.laz" { "r.copc.laz" } else { "b.copc.laz" };
+        done(at, &["convert", from, "-o", to, "--quiet", "--no-provenance"]);
+    }
+    let bytes = |name: &str| std::fs::read(at.join(name)).unwrap();
+    assert!(bytes("b.copc.laz") == bytes("c.copc.laz"));
+}
+
 #[test]
 fn other_point_formats_and_formats_become_those_of_copc() {
     let at = tempfile::tempdir().unwrap();

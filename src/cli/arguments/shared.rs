@@ -107,7 +107,8 @@ pub(crate) struct ReadArguments {
     #[arg(long, value_name = "HOW")]
     pub on_error: Option<String>,
     /// What is taken for granted: crs, that inputs which name no coordinate reference system are in
-    /// the one that the others name
+    /// the one that the others name; extra-bytes, that LAS inputs without extra bytes that others
+    /// have hold nothing there
     #[arg(long, value_name = "WHAT", value_delimiter = ',')]
     pub assume: Vec<String>,
 }
@@ -115,21 +116,31 @@ pub(crate) struct ReadArguments {
 /// How the output is written.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct WrittenArguments {
-    /// Scale of LAS coordinates, or three for X, Y and Z; LAS inputs that differ are brought to it
-    /// [default: the input's; PLY to LAS must say it]
+    /// Scale of LAS coordinates, or three for X, Y and Z, or auto: one that rounds nothing; LAS
+    /// inputs that differ are brought to it [default: the input's; PLY to LAS must say it]
     #[arg(long, value_name = "SCALE")]
     pub scale: Option<String>,
-    /// Offset of LAS coordinates on each axis, to which LAS inputs that differ are brought, too
-    /// [default: the input's, or 0]
+    /// Offset of LAS coordinates on each axis, to which LAS inputs that differ are brought, too; or
+    /// auto: one near the points where they are out of reach [default: the input's, or 0]
     #[arg(long, value_name = "X,Y,Z")]
     pub offset: Option<String>,
-    /// Point format of LAS, 0 to 10; LAS inputs that differ are brought to it [default: the
-    /// input's, or the smallest that holds what there is]
+    /// Point format of LAS, 0 to 10, or auto; LAS inputs that differ are brought to it [default:
+    /// the input's, or the smallest that holds what there is]
     #[arg(long, value_name = "N")]
     pub point_format: Option<String>,
     /// Dimensions that may get lost, such as GpsTime,UserData
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub drop: Vec<String>,
+    /// Dimensions that get another name, such as Amplitude=Intensity
+    #[arg(long, value_name = "OLD=NEW", value_delimiter = ',')]
+    pub map: Vec<String>,
+    /// Types of dimensions in the output, to which values are rounded, such as X=f32: u8 to u64, i8
+    /// to i64, f32, f64
+    #[arg(long = "type", value_name = "NAME=TYPE", value_delimiter = ',')]
+    pub types: Vec<String>,
+    /// What intensities with fractions are in LAS: unit, parts of 65535 [default: refused]
+    #[arg(long, value_name = "HOW")]
+    pub intensity: Option<String>,
     /// Encoding of PLY: ascii or binary [default: the input's]
     #[arg(long, value_name = "HOW")]
     pub encoding: Option<String>,

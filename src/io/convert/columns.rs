@@ -41,6 +41,7 @@ enum NumberRule {
     Stored,
     Rounded,
     Exact,
+    Part,
 }
 
 /// Records and how long each is.
@@ -79,6 +80,7 @@ impl ColumnStep {
             }
             Move::Rounded { from, to } => (from, to, NumberRule::Rounded),
             Move::Exact { from, to } => (from, to, NumberRule::Exact),
+            Move::Part { from, to } => (from, to, NumberRule::Part),
         };
         if let (Scalar::U8, Some(bits), NumberRule::Stored) = (from.scalar, from.bits, rule)
             && to.scalar == Scalar::U8
@@ -214,6 +216,10 @@ impl Number {
         let single = from.scalar == Scalar::F32 && from.scale == 1.0 && from.origin == 0.0;
         match (rule, single) {
             (NumberRule::Rounded, _) => self.rounding(values, rounded, to_stored),
+            (NumberRule::Part, _) => {
+                let mut untold = [0.0; BLOCK];
+                self.rounding(values, &mut untold[..rounded.len()], to_stored)
+            }
             (_, true) => self.exactly::<true>(values, to_stored),
             (_, false) => self.exactly::<false>(values, to_stored),
         }

@@ -18,6 +18,9 @@ pub(super) enum Move {
     Rounded { from: Dimension, to: Dimension },
     /// A world value that the target must hold.
     Exact { from: Dimension, to: Dimension },
+    /// A part of the most that the other side holds: `from` is scaled, and what that rounds is not
+    /// told.
+    Part { from: Dimension, to: Dimension },
 }
 
 /// The step from one dimension to another.
@@ -42,6 +45,30 @@ pub(super) fn step(
         return Move::Rounded { from: from.clone(), to: to.clone() };
     }
     Move::Exact { from: from.clone(), to: to.clone() }
+}
+
+/// The step of a dimension whose type was asked for, or that is a part where `is_part`: between
+/// floating-point numbers from 0 to 1 and whole ones up to the most of their type. None where both
+/// mean the same numbers anyway.
+pub(super) fn asked_step(from: &Dimension, to: &Dimension, is_part: bool) -> Option<Move> {
+    let is_plain = |d: &Dimension| d.scale == 1.0 && d.origin == 0.0 && d.bits.is_none();
+    let most = |d: &Dimension| match d.scalar {
+        Scalar::U8 => Some(f64::from(u8::MAX)),
+        Scalar::U16 => Some(f64::from(u16::MAX)),
+        Scalar::U32 => Some(f64::from(u32::MAX)),
+        _ => None,
+    };
+    let as_part = |scale: f64| Move::Part { from: from.clone().scaled(scale, 0.0), to: to.clone() };
+    if is_part && is_plain(from) && is_plain(to) {
+        match (most(from), most(to)) {
+            (None, Some(most)) if from.scalar.is_float() => return Some(as_part(most)),
+            (Some(most), None) if to.scalar.is_float() => return Some(as_part(1.0 / most)),
+            (Some(one), Some(other)) if one != other => return Some(as_part(other / one)),
+            _ => {}
+        }
+    }
+    let is_rounded = to.bits.is_none() && (from.scalar, from.scale) != (to.scalar, to.scale);
+    is_rounded.then(|| Move::Rounded { from: from.clone(), to: to.clone() })
 }
 
 /// How far the target's value may be from the source's where the target must hold it: half a step

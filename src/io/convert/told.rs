@@ -1,6 +1,6 @@
 //! The words for values that do not fit, and for dimensions that would get lost.
 
-use crate::point::names::XYZ;
+use crate::point::names::{BLUE, GREEN, INTENSITY, NIR, RED, XYZ};
 use crate::point::{Dimension, Scalar, Schema};
 use crate::report::Short;
 use crate::{Error, Result};
@@ -26,6 +26,25 @@ pub(super) fn placed(stage: &str, world: Option<[f64; 3]>, to: &Dimension, value
              and no farther",
             Short(reach)
         ),
+    }
+}
+
+/// What helps where a value of a dimension does not fit `to`; `is_fraction` for floating-point
+/// numbers.
+pub(super) fn kept_otherwise(to: &Dimension, is_fraction: bool) -> String {
+    let name = &to.name;
+    let dropped = format!("`write.drop = [{name:?}]` leaves the dimension out");
+    match name.as_str() {
+        _ if !is_fraction || to.scalar.is_float() => dropped,
+        INTENSITY => format!(
+            "`write.intensity = \"unit\"` takes intensities for parts of 65535, from 0 to 1, \
+             `write.map = [\"{name}=Amplitude\"]` keeps them as they are under another name, and \
+             {dropped}"
+        ),
+        RED | GREEN | BLUE | NIR => {
+            format!("colours of floating-point numbers go from 0 to 1 here; {dropped}")
+        }
+        _ => dropped,
     }
 }
 

@@ -64,7 +64,7 @@ impl Format for E57Format {
     }
 
     fn keys(&self) -> &'static [&'static str] {
-        &["colors"]
+        &["types", "colors"]
     }
 
     fn chunk(

@@ -1,16 +1,20 @@
 //! From checked keys to sources and sinks of registered formats: what is alike for all of them.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::reshaped::Reshaped;
+use super::settled::settled;
 use crate::error::shown;
 use crate::io::sniff;
 use crate::point::names::GPS_TIME;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{
-    ChunkSize, CreateSink, Format, Formats, OpenSource, Order, ReadKeys, Sink, Source, WriteKeys,
+    ChunkSize, CreateSink, Format, Formats, OpenSource, Order, PointWalk, ReadKeys, Sink, Source,
+    WriteKeys,
 };
 use crate::{Error, Result};
 
@@ -83,6 +87,16 @@ impl CreateSink for OutputFile {
         format.map(|format| OsStr::new(format.extension())).or(self.keys.path.extension())
     }
 
+    fn settled(
+        &self,
+        source: &dyn Source,
+        walk: &PointWalk,
+        moved_by: Option<&str>,
+    ) -> Result<Option<Box<dyn CreateSink>>> {
+        let keys = self.settled_keys(source, walk, moved_by)?;
+        Ok(keys.map(|keys| Box::new(OutputFile { keys, ..self.clone() }) as Box<dyn CreateSink>))
+    }
+
     fn order(&self) -> Order {
         self.order
     }
@@ -104,17 +118,20 @@ impl CreateSink for OutputFile {
     }
 
     fn chunk(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<ChunkSize> {
-        let chunk = self.format.chunk(&self.keys, schema, metadata);
+        let chunk = Reshaped::of(&self.keys, schema)
+            .and_then(|asked| self.format.chunk(&asked.keys, &asked.schema, metadata));
         let chunk = chunk.map_err(|error| error.at(&self.keys.path))?;
         Ok(if self.of_one { chunk.and_records(schema.stride) } else { chunk })
     }
 
     fn disk_bytes(&self, schema: &Arc<Schema>, metadata: &Metadata) -> Result<[u64; 2]> {
-        self.format.disk_bytes(&self.keys, schema, metadata)
+        let asked = Reshaped::of(&self.keys, schema)?;
+        self.format.disk_bytes(&asked.keys, &asked.schema, metadata)
     }
 
     fn carries(&self, schema: &Schema) -> bool {
-        self.format.carries(&self.keys, schema)
+        let is_reshaped = !self.keys.map.is_empty() || !self.keys.types.is_empty();
+        !is_reshaped && self.format.carries(&self.keys, schema)
     }
 
     fn warnings(&self, schema: &Schema, metadata: &Metadata) -> Vec<String> {
@@ -139,7 +156,11 @@ impl CreateSink for OutputFile {
     }
 
     fn check(&self, metadata: &Metadata, records: &PointBatch) -> Result<()> {
-        self.format.check(&self.keys, metadata, records)
+        let asked = Reshaped::of(&self.keys, records.schema())?;
+        match asked.schema {
+            Cow::Borrowed(_) => self.format.check(&asked.keys, metadata, records),
+            Cow::Owned(_) => self.format.check(&asked.keys, metadata, &asked.records(records)),
+        }
     }
 
     fn reopen(&self, staged: &[PathBuf]) -> Result<Option<Box<dyn Source>>> {
@@ -153,8 +174,10 @@ impl CreateSink for OutputFile {
         metadata: &Metadata,
         whole: bool,
     ) -> Result<Box<dyn Sink>> {
-        let create =
-            |schema: &Arc<Schema>| self.format.create(staged, &self.keys, schema, metadata, whole);
+        let create = |schema: &Arc<Schema>| {
+            let asked = Reshaped::of(&self.keys, schema)?;
+            self.format.create(staged, &asked.keys, &asked.schema, metadata, whole)
+        };
         let created = match self.from(schema).filter(|_| self.of_one) {
             Some(from) => from.of_one(staged, schema, metadata, &create),
             None => create(schema),
@@ -172,6 +195,16 @@ pub(super) fn of_output(error: Error, staged: &Path, path: &Path) -> Error {
 }
 
 impl OutputFile {
+    /// Its keys with what they ask to be found of `source`, if that is anything.
+    pub(super) fn settled_keys(
+        &self,
+        source: &dyn Source,
+        walk: &PointWalk,
+        moved_by: Option<&str>,
+    ) -> Result<Option<WriteKeys>> {
+        settled(&self.keys, source, walk, moved_by).map_err(|error| error.at(&self.keys.path))
+    }
+
     /// A format of the files that records of `schema` come from.
     fn from(&self, schema: &Schema) -> Option<&Arc<dyn Format>> {
         self.formats.of_family(schema.layout.family).next()

@@ -1,22 +1,19 @@
 //! The stage kinds at both ends of a pipeline, `read`, `synth` and `write`: their keys.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::values::{
-    names_once, one_or_more, one_or_three, some_columns, some_crs, some_offset, some_positive,
-    some_scale, some_scans, texts,
+    names_once, offset_or_auto, one_or_more, one_or_three, some_columns, some_crs, some_positive,
+    some_scale, some_scans, texts, three_or_auto,
 };
-use crate::error::{listed, shown};
-use crate::io::sniff::{of_extension, upper};
-use crate::quantity::{CropBox, Length, Whole};
+use crate::quantity::{CropBox, Length, Setting, Whole};
 use crate::stage::{
-    Assumption, Colors, Format, FormatName, Formats, OnError, Order, OutputEncoding, ReadKeys,
-    Separator, WriteKeys,
+    Assumption, Colors, FloatIntensity, FormatName, OnError, Order, OutputEncoding, ReadKeys,
+    Renamed, Retyped, Separator, WriteKeys,
 };
-use crate::{Error, Result};
 
 /// The source of most pipelines. Several files are one scan, all of one format; LAS and LAZ count
 /// as one, and so do texts.
@@ -106,8 +103,10 @@ pub struct Read {
     /// is reprojected.
     #[serde(default, deserialize_with = "some_crs")]
     pub crs: Option<String>,
-    /// What is taken for granted: `["crs"]`, that inputs which name no coordinate reference system
-    /// are in the one that the others name.
+    /// What is taken for granted: `"crs"`, that inputs which name no coordinate reference system
+    /// are in the one that the others name; `"extra-bytes"`, that extra bytes which not all LAS
+    /// inputs have hold nothing in the points of the others: the no-data value of their
+    /// description, else 0.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub assume: Vec<Assumption>,
     /// What is done about damage in LAS and LAZ: `"fail"`; `"skip"`, which leaves out what is
@@ -128,17 +127,21 @@ pub struct Read {
     #[serde(default, deserialize_with = "some_positive")]
     pub resolution: Option<f64>,
     /// Scale that LAS inputs are brought to as they are read, where their scales differ or their
-    /// offsets are not whole steps apart; none: such inputs are refused.
+    /// offsets are not whole steps apart; `"auto"`: the largest that rounds nothing; none: such
+    /// inputs are refused.
     #[serde(default, deserialize_with = "some_scale")]
     #[schemars(schema_with = "one_or_three")]
-    pub scale: Option<[f64; 3]>,
-    /// Offset that they are brought to; none: the smallest of theirs.
-    #[serde(default, deserialize_with = "some_offset")]
-    pub offset: Option<[f64; 3]>,
+    pub scale: Option<Setting<[f64; 3]>>,
+    /// Offset that they are brought to; none: the smallest of theirs; `"auto"`: that, or one from
+    /// which the steps reach all points.
+    #[serde(default, deserialize_with = "offset_or_auto")]
+    #[schemars(schema_with = "three_or_auto")]
+    pub offset: Option<Setting<[f64; 3]>>,
     /// Point data record format that LAS inputs are brought to as they are read, where theirs
-    /// differ: one that has the fields of all; none: such inputs are refused.
+    /// differ: one that has the fields of all; `"auto"`: the smallest that has; none: such inputs
+    /// are refused.
     #[serde(default)]
-    pub point_format: Option<PointFormat>,
+    pub point_format: Option<Setting<PointFormat>>,
 }
 
 /// The number of a scan in a file.
@@ -170,8 +173,8 @@ pub type ScanNumber = Whole<1, 65_535>;
 /// COPC 1.0 (`.copc.laz`) is written from any pipeline that does not move points behind its tiles:
 /// as one file, in point format 6, 7 or 8 (older ones become these; waveforms must be dropped).
 /// Each level of its octree is a picture of the whole: of the points of a cell, of which a node has
-/// 128 a side, one that a hash of the positions chooses stands for the cell in the node or above
-/// it. A subtree of up to 65,536 points is one node. The bytes are a function of the points alone,
+/// 128 a side, one stands for the cell in the node or above it: the one that `graded` kept
+/// first, where the points have its `KeepRank`, else one that a hash of the positions chooses. A subtree of up to 65,536 points is one node. The bytes are a function of the points alone,
 /// and records within a node are ordered by GPS time.
 ///
 /// LAS header fields that depend on the points are computed again. The generating software is
@@ -222,19 +225,36 @@ pub struct Write {
     /// Dimensions that the output need not hold.
     #[serde(default)]
     pub drop: Vec<String>,
-    /// Scale of LAS coordinates per axis, in world units; none: the input's.
+    /// Dimensions that have another name in the output, as `"Amplitude=Intensity"`. One that the
+    /// input has under that name must be named in `drop`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub map: Vec<Renamed>,
+    /// Types that dimensions have in the output, as `"Intensity=f32"`: `u8` to `u64`, `i8` to
+    /// `i64`, `f32` and `f64`. Values are rounded to it, which is told; those beyond it are refused.
+    /// Of LAS, extra bytes alone have a type to choose.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub types: Vec<Retyped>,
+    /// Scale of LAS coordinates per axis, in world units; `"auto"`: the input's, or, of one that is
+    /// not LAS, the largest power of ten that rounds no coordinate: all points are read once for
+    /// that before the run; none: the input's.
     #[serde(default, deserialize_with = "some_scale")]
     #[schemars(schema_with = "one_or_three")]
-    pub scale: Option<[f64; 3]>,
-    /// Offset of LAS coordinates per axis, in world units; none: the input's, or 0.
-    #[serde(default, deserialize_with = "some_offset")]
-    pub offset: Option<[f64; 3]>,
+    pub scale: Option<Setting<[f64; 3]>>,
+    /// Offset of LAS coordinates per axis, in world units; `"auto"`: one from which the steps reach
+    /// all points, 0 or the input's where that does; none: the input's, or 0.
+    #[serde(default, deserialize_with = "offset_or_auto")]
+    #[schemars(schema_with = "three_or_auto")]
+    pub offset: Option<Setting<[f64; 3]>>,
     /// Point data record format of LAS, 0 to 10; none: the input's, or the smallest that holds the
     /// dimensions of an input that is not LAS. Fields that it lacks must be named in `drop`, and
     /// values that it has no room for are refused; whole degrees of a scan angle become the nearest
-    /// of 0.006°, which read back as the same whole degrees.
+    /// of 0.006°, which read back as the same whole degrees. `"auto"` is as none.
     #[serde(default)]
-    pub point_format: Option<PointFormat>,
+    pub point_format: Option<Setting<PointFormat>>,
+    /// What intensities of floating-point numbers are in LAS: `"unit"`, parts of 65535; none: whole
+    /// numbers, and others are refused.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intensity: Option<FloatIntensity>,
     /// Order of the records; none: canonical, in the chunks of LAZ (50,000 records) by GPS time and
     /// return number, which compresses better; or the input's where the pipeline streams.
     #[serde(default)]
@@ -300,9 +320,12 @@ impl Write {
             path,
             computed: self.dimensions.clone(),
             drop: self.drop.clone(),
+            map: self.map.clone(),
+            types: self.types.clone(),
             scale: self.scale,
             offset: self.offset,
-            point_format: self.point_format.map(|format| format.get() as u8),
+            point_format: self.point_format.map(format_number),
+            intensity: self.intensity,
             encoding: self.encoding,
             colors: self.colors,
             separator: self.separator,
@@ -325,72 +348,14 @@ impl Read {
         keys.bounds.clone_from(&self.bounds);
         keys.resolution = self.resolution;
         (keys.scale, keys.offset) = (self.scale, self.offset);
-        keys.point_format = self.point_format.map(|format| format.get() as u8);
+        keys.point_format = self.point_format.map(format_number);
         keys
     }
 }
 
-/// Refuses keys that inputs of `format` do not have; tells which.
-pub(super) fn check_read(
-    keys: &ReadKeys,
-    format: &dyn Format,
-    formats: &Formats,
-) -> Result<(), (&'static str, Error)> {
-    let Some(key) = keys.given().find(|key| !format.read_keys().contains(key)) else {
-        return Ok(());
-    };
-    let having = formats.iter().filter(|format| format.read_keys().contains(&key));
-    let having = listed(having.map(|format| format.name()), "and");
-    let told = format!("`read.{key}` is for {having}, the input is {}", format.name());
-    Err((key, Error::pipeline(told)))
-}
-
-/// Refuses keys that an output of `format` does not have; tells which.
-pub(super) fn check(
-    keys: &WriteKeys,
-    format: &dyn Format,
-    formats: &Formats,
-) -> Result<(), (&'static str, Error)> {
-    if let Some(help) = format.unwritten() {
-        let told = format!("{} files are read and not written", format.name().to_uppercase());
-        return Err(("path", Error::pipeline(told).help(help)));
-    }
-    if let Some(key) = keys.given().find(|key| !format.keys().contains(key)) {
-        let having = formats.iter().filter(|format| format.keys().contains(&key));
-        let having = listed(having.map(|format| format.name()), "and");
-        let is = format.name();
-        let told = format!("`write.{key}` is for {having}, the output is {is}");
-        return Err((key, Error::pipeline(told)));
-    }
-    if let Some(name) = keys.computed.first().filter(|_| !format.holds_computed()) {
-        let is = format.name();
-        let told = format!("`write.dimensions` asks for {name}, and {is} holds nothing computed");
-        return Err(("dimensions", Error::pipeline(told).help("write LAS, PLY or another")));
-    }
-    match keys.offset.is_some_and(|offset| offset.iter().any(|v| !v.is_finite())) {
-        true => Err(("offset", Error::pipeline("an offset is three finite numbers"))),
-        false => Ok(()),
-    }
-}
-
-/// The error of a file of which neither its extension nor `setting` says the format.
-pub(super) fn unknown_extension(path: &Path, setting: &str, formats: &Formats) -> Error {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let name = shown(path);
-    let is_read = setting.starts_with("read");
-    let can = if is_read { "read" } else { "written" };
-    let known = formats.iter().filter(|format| is_read || format.unwritten().is_none());
-    let dotted = listed(known.map(|format| format!(".{}", format.extension())), "or");
-    match of_extension(&extension) {
-        Some(format) => {
-            let told = format!("by its extension `{name}` is {format}, which is not {can}");
-            let known = listed(upper(formats), "or");
-            Error::pipeline(told).help(match is_read {
-                true => format!("convert it to {known} with another program first"),
-                false => format!("name it {dotted}"),
-            })
-        }
-        None => Error::pipeline(format!("the extension of `{name}` names no format"))
-            .help(format!("name it {dotted}, or give `{setting}`")),
+fn format_number(format: Setting<PointFormat>) -> Setting<u8> {
+    match format {
+        Setting::Auto => Setting::Auto,
+        Setting::Given(format) => Setting::Given(format.get() as u8),
     }
 }

@@ -10,7 +10,10 @@ mod mesh;
 #[cfg(feature = "cli")]
 mod mirror;
 mod outputs;
+mod refused;
+mod reshaped;
 mod roles;
+mod settled;
 mod squares;
 mod values;
 

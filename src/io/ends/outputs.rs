@@ -6,11 +6,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::connect::OutputFile;
-use super::kinds::{check, unknown_extension};
+use super::refused::{check, unknown_extension};
+use super::settled::settled;
 use crate::error::shown;
 use crate::point::{Metadata, PointBatch, Schema};
 use crate::stage::{
-    ChunkSize, CreateSink, Format, Formats, Input, Order, ReadKeys, Sink, Source, WriteKeys,
+    ChunkSize, CreateSink, Format, Formats, Input, Order, PointWalk, ReadKeys, Sink, Source,
+    WriteKeys,
 };
 use crate::{Error, ErrorKind, Result};
 
@@ -123,6 +125,18 @@ impl CreateSink for Outputs {
             all.push(Box::new(output));
         }
         Ok(Some(all))
+    }
+
+    fn settled(
+        &self,
+        source: &dyn Source,
+        walk: &PointWalk,
+        moved_by: Option<&str>,
+    ) -> Result<Option<Box<dyn CreateSink>>> {
+        let keys = settled(&self.keys, source, walk, moved_by);
+        let Some(keys) = keys.map_err(|error| error.at(&self.keys.path))? else { return Ok(None) };
+        let (order, format, formats) = (self.order, self.format.clone(), self.formats.clone());
+        Ok(Some(Box::new(Outputs { keys, order, format, formats })))
     }
 
     fn order(&self) -> Order {

@@ -4,10 +4,11 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::kinds::{OutputOrder, Read, Write, unknown_extension};
+use super::kinds::{OutputOrder, Read, Write};
 use super::outputs::Outputs;
+use super::refused::{check, check_read, unknown_extension};
 use super::squares::Squares;
-use super::{connect, inputs, kinds};
+use super::{connect, inputs};
 use crate::error::shown;
 use crate::io::sniff::first_bytes;
 use crate::stage::{
@@ -24,7 +25,7 @@ impl Read {
     /// files of which the records are not alike.
     pub fn source(&self, formats: &Formats) -> Result<Box<dyn OpenSource>> {
         let format = self.files(formats)?;
-        kinds::check_read(&self.keys(), &*format.1, formats).map_err(|(_, error)| error)?;
+        check_read(&self.keys(), &*format.1, formats).map_err(|(_, error)| error)?;
         Ok(self.opened(format, formats))
     }
 
@@ -82,7 +83,7 @@ impl StageKind for Read {
         }
         let formats = at.formats();
         let found = self.files(formats).map_err(|error| at.blame("path", error))?;
-        let checked = kinds::check_read(&self.keys(), &*found.1, formats);
+        let checked = check_read(&self.keys(), &*found.1, formats);
         checked.map_err(|(key, error)| at.blame(key, error))?;
         Ok(Role::Source(self.opened(found, formats)))
     }
@@ -143,7 +144,7 @@ impl Write {
             }
         }
         let keys = self.keys(path);
-        let checked = kinds::check(&keys, &**format, formats);
+        let checked = check(&keys, &**format, formats);
         checked.map_err(|(key, error)| at.blame(key, error))?;
         let (format, formats) = (format.clone(), formats.clone());
         let order = match format.arranged() {
@@ -184,7 +185,7 @@ impl Write {
             return Err(at.blame("folder", Error::pipeline(told).help(help)));
         }
         if let Some(format) = asked {
-            let checked = kinds::check(&keys, &**format, formats);
+            let checked = check(&keys, &**format, formats);
             checked.map_err(|(key, error)| at.blame(key, error))?;
         }
         let (order, format) = (self.stage_order(), asked.cloned());

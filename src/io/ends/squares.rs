@@ -8,7 +8,7 @@ use super::outputs::check_folder;
 use crate::error::shown;
 use crate::point::{Metadata, PointBatch, Schema, Units};
 use crate::quantity::Length;
-use crate::stage::{ChunkSize, CreateSink, Order, Sink, Source, WriteKeys};
+use crate::stage::{ChunkSize, CreateSink, Order, PointWalk, Sink, Source, WriteKeys};
 use crate::{Error, Result};
 
 /// What stands in a path for the corner of a square.
@@ -130,6 +130,17 @@ impl CreateSink for Squares {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let same = || matches!((folder(path), folder(self.path())), (Ok(a), Ok(b)) if a == b);
         matches(&self.name(), &name) && same()
+    }
+
+    fn settled(
+        &self,
+        source: &dyn Source,
+        walk: &PointWalk,
+        moved_by: Option<&str>,
+    ) -> Result<Option<Box<dyn CreateSink>>> {
+        let Some(keys) = self.file.settled_keys(source, walk, moved_by)? else { return Ok(None) };
+        let file = OutputFile { keys, ..self.file.clone() };
+        Ok(Some(Box::new(Squares { file, side: self.side })))
     }
 
     fn order(&self) -> Order {

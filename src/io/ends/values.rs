@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, de};
 
 use crate::io::systems;
 use crate::io::text::check_columns;
-use crate::quantity::Whole;
+use crate::quantity::{Setting, Whole, or_word};
 
 pub(super) fn texts(_: &mut SchemaGenerator) -> Schema {
     let text = json_schema!({ "type": "string" });
@@ -46,7 +46,13 @@ pub(super) fn some_columns<'de, D: Deserializer<'de>>(
 pub(super) fn one_or_three(_: &mut SchemaGenerator) -> Schema {
     let above_0 = json_schema!({ "type": "number", "exclusiveMinimum": 0 });
     let three = json_schema!({ "type": "array", "items": above_0, "minItems": 3, "maxItems": 3 });
-    json_schema!({ "anyOf": [above_0, three] })
+    json_schema!({ "anyOf": [above_0, three, { "const": "auto" }] })
+}
+
+pub(super) fn three_or_auto(_: &mut SchemaGenerator) -> Schema {
+    let number = json_schema!({ "type": "number" });
+    let three = json_schema!({ "type": "array", "items": number, "minItems": 3, "maxItems": 3 });
+    or_word(three, "auto")
 }
 
 pub(super) fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
@@ -73,13 +79,22 @@ pub(super) fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Stri
     from.deserialize_any(Paths)
 }
 
-pub(super) fn some_scale<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D::Error> {
+pub(super) fn some_scale<'de, D: Deserializer<'de>>(
+    from: D,
+) -> Result<Option<Setting<[f64; 3]>>, D::Error> {
     struct Scale;
     impl<'de> de::Visitor<'de> for Scale {
-        type Value = [f64; 3];
+        type Value = Setting<[f64; 3]>;
 
         fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("a number above 0 without a unit, or three of them")
+            f.write_str("a number above 0 without a unit, three of them, or \"auto\"")
+        }
+
+        fn visit_str<E: de::Error>(self, text: &str) -> Result<Self::Value, E> {
+            match text {
+                "auto" => Ok(Setting::Auto),
+                _ => Err(E::invalid_value(de::Unexpected::Str(text), &self)),
+            }
         }
 
         fn visit_i64<E: de::Error>(self, scale: i64) -> Result<Self::Value, E> {
@@ -88,7 +103,7 @@ pub(super) fn some_scale<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f
 
         fn visit_f64<E: de::Error>(self, scale: f64) -> Result<Self::Value, E> {
             match scale.is_finite() && scale > 0.0 {
-                true => Ok([scale; 3]),
+                true => Ok(Setting::Given([scale; 3])),
                 false => Err(E::invalid_value(de::Unexpected::Float(scale), &self)),
             }
         }
@@ -99,7 +114,7 @@ pub(super) fn some_scale<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f
                 let next: Option<Positive> = list.next_element()?;
                 *axis = next.ok_or_else(|| de::Error::invalid_length(i, &Scale))?.0;
             }
-            Ok(scale)
+            Ok(Setting::Given(scale))
         }
     }
     from.deserialize_any(Scale).map(Some)
@@ -113,6 +128,35 @@ pub(super) fn some_offset<'de, D: Deserializer<'de>>(
         Some(&v) => Err(de::Error::invalid_value(de::Unexpected::Float(v), &"finite numbers")),
         None => Ok(Some(offset)),
     }
+}
+
+pub(super) fn offset_or_auto<'de, D: Deserializer<'de>>(
+    from: D,
+) -> Result<Option<Setting<[f64; 3]>>, D::Error> {
+    struct Offset;
+    impl<'de> de::Visitor<'de> for Offset {
+        type Value = Setting<[f64; 3]>;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("three finite numbers, or \"auto\"")
+        }
+
+        fn visit_str<E: de::Error>(self, text: &str) -> Result<Self::Value, E> {
+            match text {
+                "auto" => Ok(Setting::Auto),
+                _ => Err(E::invalid_value(de::Unexpected::Str(text), &self)),
+            }
+        }
+
+        fn visit_seq<A: de::SeqAccess<'de>>(self, list: A) -> Result<Self::Value, A::Error> {
+            let offset = <[f64; 3]>::deserialize(de::value::SeqAccessDeserializer::new(list))?;
+            match offset.iter().find(|v| !v.is_finite()) {
+                Some(&v) => Err(de::Error::invalid_value(de::Unexpected::Float(v), &self)),
+                None => Ok(Setting::Given(offset)),
+            }
+        }
+    }
+    from.deserialize_any(Offset).map(Some)
 }
 
 /// A number above 0, refused at its own place.

@@ -31,6 +31,17 @@ impl ComputedFields {
         fields
     }
 
+    /// Where the dimension `name` is in records of `schema` with these.
+    pub fn place_of(&self, schema: &Schema, name: &str) -> Option<Dimension> {
+        let mut at = schema.stride;
+        let appended = self.appended.iter().find_map(|dimension| {
+            let field = Dimension::new(dimension.name, dimension.scalar(), at);
+            at += dimension.scalar().size();
+            (dimension.name == name).then_some(field)
+        });
+        appended.or_else(|| schema.find(name).cloned())
+    }
+
     /// True if there are none.
     fn is_empty(&self) -> bool {
         self.in_place.is_empty() && self.appended.is_empty()

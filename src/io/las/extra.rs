@@ -2,7 +2,7 @@
 //! fields mean.
 
 use super::text::{field, split_at_room, text};
-use crate::point::{ComputedDimension, Dimension, Scalar};
+use crate::point::{ComputedDimension, Dimension, Scalar, Value};
 
 /// Bytes of one descriptor.
 pub const DESCRIPTOR_BYTES: usize = 192;
@@ -14,12 +14,15 @@ mod at {
     pub const KIND: usize = 2;
     pub const OPTIONS: usize = 3;
     pub const NAME: usize = 4;
+    pub const NO_DATA: usize = 40;
     pub const MIN: usize = 64;
     pub const SCALE: usize = 112;
     pub const OFFSET: usize = 136;
     pub const DESCRIPTION: usize = 160;
 }
 
+/// Options: the descriptor's value for no data counts.
+const HAS_NO_DATA: u8 = 0b0_0001;
 /// Options: the descriptor's minimum and maximum count.
 const HAS_RANGE: u8 = 0b0_0110;
 const HAS_SCALE: u8 = 0b0_1000;
@@ -69,6 +72,13 @@ impl Descriptor {
             descriptor.put(at::OFFSET, dimension.origin);
         }
         descriptor
+    }
+
+    /// The same under another name, of at most 32 bytes.
+    pub fn named(&self, name: &str) -> Self {
+        let mut named = self.clone();
+        named.0[at::NAME..at::NAME + LONGEST_NAME].copy_from_slice(&field::<LONGEST_NAME>(name));
+        named
     }
 
     /// Bytes without a meaning, to reach the described ones behind them.
@@ -130,6 +140,24 @@ impl Descriptor {
         } else {
             (1.0, 0.0)
         }
+    }
+
+    /// The stored number that means that there is no data, of the dimension number `i` that it
+    /// names, if it says one.
+    pub fn no_data(&self, i: usize) -> Option<Value> {
+        let (scalar, _) = self.number()?;
+        if self.0[at::OPTIONS] & HAS_NO_DATA == 0 || i >= 3 {
+            return None;
+        }
+        let mut bytes = [0; 8];
+        bytes.copy_from_slice(&self.0[at::NO_DATA + 8 * i..at::NO_DATA + 8 * i + 8]);
+        Some(match scalar {
+            Scalar::F32 | Scalar::F64 => Value::Double(f64::from_le_bytes(bytes)),
+            Scalar::I8 | Scalar::I16 | Scalar::I32 | Scalar::I64 => {
+                Value::Signed(i64::from_le_bytes(bytes))
+            }
+            _ => Value::Unsigned(u64::from_le_bytes(bytes)),
+        })
     }
 
     /// The descriptor without its range, which is a statistic of one file's points.

@@ -7,12 +7,18 @@
 use std::path::PathBuf;
 
 use super::crs;
+use super::described::describe;
+use super::extra::Descriptor;
+use super::extras;
 use super::fields::encoding;
 use super::file::InputFile;
 use super::format::{has_waveforms, record_size, reformed};
+use super::found;
 use super::header::Header;
 use super::input::{LasInput, extra_len};
+use super::union::described;
 use super::vlr::{Evlr, Vlr};
+use crate::quantity::Setting;
 use crate::stage::{Assumption, OnError, ReadKeys};
 use crate::{Error, Result};
 
@@ -27,6 +33,8 @@ pub struct OneForm {
     scale: Option<[f64; 3]>,
     offset: Option<[f64; 3]>,
     crs: Option<Vlr>,
+    /// The descriptors of all extra bytes, where some lack some.
+    extra: Option<Vec<Descriptor>>,
     /// What is done about damage.
     pub on_error: OnError,
     /// True if inputs that name no system are in that of the others.
@@ -41,6 +49,9 @@ impl OneForm {
         let assumes_crs = keys.assume.contains(&Assumption::Crs);
         let on_error = keys.on_error;
         let mut form = OneForm { crs, assumes_crs, on_error, ..OneForm::default() };
+        if keys.assume.contains(&Assumption::ExtraBytes) && paths.len() > 1 {
+            form.extra = extras::of_all(paths, on_error)?;
+        }
         let places = keys.scale.is_some() || keys.offset.is_some();
         if paths.len() < 2 || !places && keys.point_format.is_none() {
             return Ok(form);
@@ -49,16 +60,26 @@ impl OneForm {
         let headers = paths.iter().map(read).collect::<Result<Vec<_>>>()?;
         let first = &headers[0];
         if headers.iter().any(|header| header.format() != first.format()) {
-            form.format = keys.point_format;
+            form.format = match keys.point_format {
+                Some(Setting::Auto) => found::point_format(&headers),
+                given => given.and_then(Setting::given),
+            };
         }
         let smallest = smallest(headers.iter());
         let differ = |header: &Header| {
             header.scale() != first.scale() || !are_whole_steps(smallest, header, first.scale())
         };
         if places && headers.iter().any(differ) {
-            let scale = keys.scale.or_else(|| same_scale(&headers));
+            let scale = match keys.scale {
+                Some(Setting::Auto) => Some(found::scale(&headers, paths)?),
+                Some(Setting::Given(scale)) => Some(scale),
+                None => same_scale(&headers),
+            };
+            let is_found = [keys.scale, keys.offset].contains(&Some(Setting::Auto));
+            let found = scale.filter(|_| is_found).and_then(|scale| found::offset(&headers, scale));
+            let given = keys.offset.and_then(Setting::given);
             form.scale = scale;
-            form.offset = scale.and(keys.offset.or(Some(smallest)));
+            form.offset = scale.and(given.or(found).or(Some(smallest)));
         }
         Ok(form)
     }
@@ -78,7 +99,11 @@ impl OneForm {
         let formed = self.header(&input.header);
         let is_other = (formed.format(), formed.scale(), formed.offset())
             != (input.header.format(), input.header.scale(), input.header.offset());
-        if is_other {
+        let has_others = self.extra.as_ref().is_some_and(|extra| *extra != described(&input));
+        if let Some(extra) = self.extra.clone().filter(|_| has_others) {
+            input.describe_as(extra);
+        }
+        if is_other || has_others {
             input.own = Some(Box::new(std::mem::replace(&mut input.header, formed)));
         }
         Ok(input)
@@ -92,9 +117,12 @@ impl OneForm {
     /// The header that a file with this one has in this form.
     pub fn header(&self, input: &Header) -> Header {
         let mut header = input.clone();
-        if let Some(format) = self.other_format(input) {
+        let format = self.other_format(input).unwrap_or(input.format());
+        let extra = self.extra.as_ref().map(|all| all.iter().map(Descriptor::size).sum());
+        let extra = extra.unwrap_or(extra_len(input));
+        if format != input.format() || extra != extra_len(input) {
             let fields = usize::from(record_size(format).unwrap_or(0));
-            reform(&mut header, format, fields + extra_len(input));
+            reform(&mut header, format, fields + extra);
         }
         if let (Some(scale), Some(offset)) = (self.scale, self.offset)
             && !(header.scale() == scale && are_whole_steps(offset, &header, scale))
@@ -103,6 +131,13 @@ impl OneForm {
             header.put_offset(offset);
         }
         header
+    }
+
+    /// Gives records the descriptors of all extra bytes.
+    pub fn put_extra(&self, vlrs: &mut Vec<Vlr>, evlrs: &mut Vec<Evlr>) {
+        if let Some(extra) = &self.extra {
+            describe(vlrs, evlrs, extra);
+        }
     }
 
     /// Gives records the system that all inputs are said to be in.

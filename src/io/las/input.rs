@@ -9,6 +9,7 @@ use super::crs;
 use super::damage::{Mending, advised};
 use super::described::Described;
 use super::extra::Descriptor;
+use super::extras::absent;
 use super::fields::encoding;
 use super::file::InputFile;
 use super::format;
@@ -21,7 +22,7 @@ use super::vlr::{Evlr, VLR_HEAD, Vlr};
 use super::waveforms::Waveforms;
 use crate::error::shown;
 use crate::io::origin::Origin;
-use crate::point::Schema;
+use crate::point::{Dimension, Schema, Value};
 use crate::report::{Grouped, LostPoints};
 use crate::stage::OnError;
 use crate::{Error, Result};
@@ -72,6 +73,8 @@ pub struct LasInput {
     pub evlrs: Vec<Evlr>,
     /// What describes the extra bytes.
     described: Described,
+    /// What describes those of the file, where its records are brought to others.
+    own_descriptors: Option<Vec<Descriptor>>,
     /// The file beside it that its records refer to for their waveforms.
     pub waveforms: Option<PathBuf>,
     /// How the points are stored.
@@ -125,6 +128,7 @@ impl LasInput {
             gap,
             evlrs,
             described,
+            own_descriptors: None,
             waveforms: waveforms.there,
             storage,
             stored,
@@ -161,19 +165,19 @@ impl LasInput {
 
     /// What records hold, in the form that they are brought to.
     pub fn schema(&self) -> Schema {
-        self.schema_of(&self.header)
+        self.schema_of(&self.header, self.descriptors())
     }
 
     /// What the file's own records hold.
     pub fn own_schema(&self) -> Schema {
-        self.schema_of(self.own_header())
+        self.schema_of(self.own_header(), self.own_descriptors())
     }
 
-    fn schema_of(&self, header: &Header) -> Schema {
+    fn schema_of(&self, header: &Header, descriptors: &[Descriptor]) -> Schema {
         format::schema(
             header.format(),
-            self.descriptors(),
-            self.extra_len(),
+            descriptors,
+            extra_len(header),
             header.scale(),
             header.offset(),
         )
@@ -182,6 +186,24 @@ impl LasInput {
     /// The header as it is in the file.
     pub fn own_header(&self) -> &Header {
         self.own.as_deref().unwrap_or(&self.header)
+    }
+
+    /// The descriptors of the extra bytes in the file.
+    pub fn own_descriptors(&self) -> &[Descriptor] {
+        self.own_descriptors.as_deref().unwrap_or(self.descriptors())
+    }
+
+    /// Has its records brought to extra bytes of these descriptors.
+    pub fn describe_as(&mut self, descriptors: Vec<Descriptor>) {
+        let formed = Described { descriptors, as_they_are: false, warning: None };
+        let own = std::mem::replace(&mut self.described, formed);
+        self.own_descriptors.get_or_insert(own.descriptors);
+    }
+
+    /// What stands in the values of its records that the file lacks, where that is not 0.
+    pub fn absent(&self) -> Vec<(Dimension, Value)> {
+        let start = usize::from(format::record_size(self.header.format()).unwrap_or(0));
+        absent(self.own_descriptors(), self.descriptors(), start)
     }
 
     /// The descriptors of the extra bytes.
@@ -201,7 +223,8 @@ impl LasInput {
     /// The same without the records, whose payloads of thousands of files would add up.
     pub fn without_records(self) -> Self {
         let described = Described::default();
-        LasInput { vlrs: Vec::new(), gap: Vec::new(), evlrs: Vec::new(), described, ..self }
+        let (vlrs, gap, evlrs) = (Vec::new(), Vec::new(), Vec::new());
+        LasInput { vlrs, gap, evlrs, described, own_descriptors: None, ..self }
     }
 
     /// The records that say in which coordinate reference system the points are.

@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::extra::Descriptor;
 use super::fields::encoding;
 use super::form::{OneForm, help, holding, smallest, whole_steps};
 use super::format::{has_gps_time, has_waveforms};
@@ -96,6 +97,9 @@ fn agree(a: &LasInput, b: &LasInput) -> Result<()> {
             None => error,
         });
     }
+    if described(a) != described(b) {
+        return Err(other_extras(a, b));
+    }
     same(a, b, "record length", one.point_data_record_length, two.point_data_record_length)?;
     if one.scale() != two.scale() {
         return Err(differ(a, b, "scale", one.scale(), two.scale()).help(help(a, b)));
@@ -107,10 +111,23 @@ fn agree(a: &LasInput, b: &LasInput) -> Result<()> {
         };
         same(a, b, "GPS time type", kind(one), kind(two))?;
     }
-    if described(a) != described(b) {
-        return Err(refuse(a, b, "their extra bytes are described differently".to_owned()));
-    }
     Ok(())
+}
+
+fn other_extras(a: &LasInput, b: &LasInput) -> Error {
+    let names = |input: &LasInput| {
+        let all: Vec<String> = described(input).iter().map(Descriptor::name).collect();
+        if all.is_empty() { "none".to_owned() } else { all.join(", ") }
+    };
+    let (one, two) = (names(a), names(b));
+    let why = match one == two {
+        true => format!("their extra bytes, {one}, are described differently"),
+        false => format!("their extra bytes differ: {one} and {two}"),
+    };
+    refuse(a, b, why).help(
+        "`read.assume = [\"extra-bytes\"]` brings both to all extra bytes that there are: those that \
+         a file lacks are 0 there, or what their description has for no data",
+    )
 }
 
 fn same<T: PartialEq + std::fmt::Debug>(

@@ -67,6 +67,7 @@ impl Native {
         vlrs.retain(is_carried);
         evlrs.retain(is_carried_extended);
         described.carried(&mut vlrs, &mut evlrs);
+        form.put_extra(&mut vlrs, &mut evlrs);
         form.put_crs(&mut vlrs, &mut evlrs);
         let waveforms = Waveforms::of(file.path(), header).there;
         let header = form.header(&now).for_outputs();

@@ -11,7 +11,7 @@ use super::native::lost;
 use super::noted;
 use super::own::{Shifted, own_form};
 use super::sink::{self, LasOptions};
-use super::target::Target;
+use super::target::{Target, reshapes};
 use super::{describe, source, validate, waveforms};
 use crate::Result;
 use crate::io::describe::json;
@@ -124,7 +124,7 @@ impl Format for LasFormat {
     }
 
     fn keys(&self) -> &'static [&'static str] {
-        &["scale", "offset", "point_format"]
+        &["types", "scale", "offset", "point_format", "intensity"]
     }
 
     fn chunk(
@@ -218,7 +218,7 @@ impl LasFormat {
 
     /// The point format of records of `schema` in an output, if it is not their own.
     fn format(&self, keys: &WriteKeys, schema: &Schema) -> Result<Option<u8>> {
-        let asked = keys.point_format;
+        let asked = keys.given_point_format();
         let format = match self.form {
             Form::Octree => Some(copc::point_format(asked, schema, &keys.drop)?),
             _ => asked,
@@ -238,6 +238,6 @@ impl LasFormat {
     /// True if records of LAS are not written as they come.
     fn changes(&self, keys: &WriteKeys, schema: &Schema) -> bool {
         let reforms = !matches!(self.format(keys, schema), Ok(None));
-        keys.scale.is_some() || keys.offset.is_some() || reforms
+        keys.given_scale().is_some() || keys.given_offset().is_some() || reforms || reshapes(keys)
     }
 }

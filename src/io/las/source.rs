@@ -19,7 +19,7 @@ use super::table::is_held;
 use super::verify::{Evidence, Found, Watched};
 use super::waveforms;
 use crate::io::united::ToOneForm;
-use crate::point::{Metadata, Schema};
+use crate::point::{Dimension, Metadata, Schema, Value};
 use crate::report::LostPoints;
 use crate::stage::{self, OnError, Part, ReadKeys, Source};
 use crate::{Error, Result};
@@ -56,13 +56,15 @@ pub fn opened(paths: &[PathBuf], keys: &ReadKeys) -> Result<LasSource> {
     };
     let first = open(first)?;
     let mut schema = first.schema();
-    let mut own = vec![first.own.as_ref().map(|_| first.own_schema())];
+    let own_form =
+        |input: &LasInput| input.own.as_ref().map(|_| (input.own_schema(), input.absent()));
+    let mut own = vec![own_form(&first)];
     let mut inputs = vec![first.clone().without_records()];
     let (mut tables, mut points) = (first.table_bytes(), first.points());
     let mut merge = LasMerge::of(first, &form)?;
     for path in others {
         let input = open(path)?;
-        own.push(input.own.as_ref().map(|_| input.own_schema()));
+        own.push(own_form(&input));
         tables = tables.saturating_add(input.table_bytes());
         points = points.saturating_add(input.points());
         if !is_held(tables, points) {
@@ -115,6 +117,9 @@ impl LasSource {
     }
 }
 
+/// What the records of a file are, and what stands in the values of all that it lacks.
+type OwnForm = (Schema, Vec<(Dimension, Value)>);
+
 struct Opened {
     input: LasInput,
     shift: Shift,
@@ -137,11 +142,12 @@ struct PartPlace {
 }
 
 impl Opened {
-    /// `own` is what its records are, where they must become such of `schema`.
+    /// `own` is what its records are, where they must become such of `schema`, and what these have
+    /// that it lacks.
     fn new(
         input: LasInput,
         shift: Shift,
-        own: Option<Schema>,
+        own: Option<OwnForm>,
         schema: &Schema,
         on_error: OnError,
     ) -> Result<Self> {
@@ -152,7 +158,7 @@ impl Opened {
         let evidence = Evidence::new(input.own_header(), stretches(&input).len());
         input.lost.iter().cloned().for_each(|lost| evidence.lose(lost));
         let evidence = Arc::new(evidence);
-        let formed = own.map(|own| ToOneForm::of(own, schema)).transpose();
+        let formed = own.map(|(own, absent)| ToOneForm::of(own, schema, &absent)).transpose();
         let to_one_form = formed.map_err(|error| error.at(&input.path))?.flatten();
         Ok(Opened { input, shift, to_one_form, compression, evidence, on_error })
     }

@@ -51,7 +51,7 @@ impl Format for PcdFormat {
     }
 
     fn keys(&self) -> &'static [&'static str] {
-        &["encoding", "colors"]
+        &["types", "encoding", "colors"]
     }
 
     fn chunk(

@@ -55,7 +55,7 @@ impl Format for PlyFormat {
     }
 
     fn keys(&self) -> &'static [&'static str] {
-        &["encoding", "colors"]
+        &["types", "encoding", "colors"]
     }
 
     fn chunk(
@@ -111,6 +111,7 @@ pub(crate) fn options(keys: &WriteKeys, metadata: &Metadata, whole: bool) -> Ply
         encoding,
         computed: metadata.computed.clone(),
         drop: keys.drop.clone(),
+        types: keys.types.clone(),
         colors: keys.colors,
         carry_rest: whole,
         triangles: false,

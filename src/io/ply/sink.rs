@@ -13,10 +13,11 @@ use crate::io::rows::Encoding;
 use crate::io::rows::file::{Heading, RowFile};
 use crate::io::rows::noted::NotedLines;
 use crate::io::rows::plan::{RowOptions, RowPlan};
-use crate::io::rows::print::TextStyle;
 use crate::io::rows::schema::{RowShape, row_schema};
 use crate::point::{ComputedDimension, Endian, Metadata, Schema};
-use crate::stage::{ChunkSize, Colors, Encode, EncodeTriangles, Encoded, Sink, SinkSummary};
+use crate::stage::{
+    ChunkSize, Colors, Encode, EncodeTriangles, Encoded, Retyped, Sink, SinkSummary, WriteKeys,
+};
 use crate::{Error, Result};
 
 /// Bytes carried at once.
@@ -32,6 +33,8 @@ pub struct PlyOptions {
     pub computed: Vec<ComputedDimension>,
     /// Dimensions that are left out.
     pub drop: Vec<String>,
+    /// Types that properties have in the output, by their dimensions' names there.
+    pub types: Vec<Retyped>,
     /// How many bits the colours of LAS records have; as for [`Colors::Auto`] when not said. From
     /// PLY to PLY they stay as they are, and saying it is an error.
     pub colors: Option<Colors>,
@@ -85,14 +88,13 @@ fn row_plan(options: &PlyOptions, schema: &Schema, native: Option<&PlyNative>) -
             _ => Encoding::BinaryLittleEndian,
         }
     });
-    let rows = RowOptions {
-        encoding,
-        computed: options.computed.clone(),
+    let keys = WriteKeys {
         drop: options.drop.clone(),
+        types: options.types.clone(),
         colors: options.colors,
-        style: TextStyle::BLANKS,
+        ..WriteKeys::default()
     };
-    RowPlan::new(&rows, FORM, schema)
+    RowPlan::new(&RowOptions::of(&keys, encoding, &options.computed), FORM, schema)
 }
 
 /// Writes a PLY file: rows and what stands around them.

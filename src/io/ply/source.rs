@@ -88,7 +88,7 @@ impl PlySource {
         let said = files.iter().zip(&texts).map(|(file, text)| (&*file.path, text.crs.clone()));
         let crs = systems::of_all(keys, &said.collect::<Vec<_>>())?;
         let form = |(own, file): (&Arc<Schema>, &PlyFile)| {
-            ToOneForm::of((**own).clone(), &schema).map_err(|error| error.at(&file.path))
+            ToOneForm::of((**own).clone(), &schema, &[]).map_err(|error| error.at(&file.path))
         };
         let forms = own.iter().zip(&files).map(form).collect::<Result<Vec<_>>>()?;
         let metadata = metadata(&files, texts, crs.clone());

@@ -116,9 +116,14 @@ impl Depth {
     }
 }
 
+/// True for the name of a colour.
+pub(super) fn is_color_name(name: &str) -> bool {
+    [RED, GREEN, BLUE].contains(&name)
+}
+
 /// True for a dimension that has 16 bits in LAS records and may have 8 in a vertex.
 fn is_color(dimension: &Dimension) -> bool {
-    [RED, GREEN, BLUE].contains(&dimension.name.as_str()) && dimension.scalar == Scalar::U16
+    is_color_name(&dimension.name) && dimension.scalar == Scalar::U16
 }
 
 /// Byte offsets of the colours of 16 bits in records of `schema`, but for those of `drop`; none in

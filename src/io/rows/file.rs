@@ -15,6 +15,7 @@ use super::Encoding;
 use super::colors::{Depth, Recoloring, WrittenColors, note};
 use super::plan::{CHUNK_POINTS, FULL, RowPlan, WIDE};
 use super::schema::RowShape;
+use crate::io::project::rounded;
 use crate::stage::{Colors, Encode, Encoded, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -51,6 +52,8 @@ pub(crate) struct RowFile<H> {
     depth: Depth,
     pub points: u64,
     pub bytes: u64,
+    /// Points of which values were rounded, and by how much at most.
+    rounded: (u64, f64),
     /// What the user should know of it.
     pub notes: Vec<String>,
 }
@@ -80,6 +83,7 @@ impl<H: Heading> RowFile<H> {
             depth: Depth::default(),
             points: 0,
             bytes: text.len() as u64,
+            rounded: (0, 0.0),
             notes: Vec::new(),
         })
     }
@@ -93,6 +97,8 @@ impl<H: Heading> RowFile<H> {
     pub fn append(&mut self, mut chunk: Encoded) -> Result<()> {
         self.fit_colors(&mut chunk)?;
         self.file.write_all(&chunk.bytes).map_err(|e| Error::io(&self.path, "write points", e))?;
+        let (points, largest) = chunk.rounded.unwrap_or_default();
+        self.rounded = (self.rounded.0 + points, self.rounded.1.max(largest));
         self.points += chunk.points;
         self.bytes += chunk.bytes.len() as u64;
         if self.plan.encoding != Encoding::Ascii {
@@ -178,6 +184,8 @@ impl<H: Heading> RowFile<H> {
         let family = self.plan.form.layout.family;
         let narrow = self.plan.narrow.as_ref();
         self.notes.extend(narrow.and_then(|narrow| note(narrow.asked, self.depth, family)));
+        let rounded_to = self.plan.rounded_to();
+        self.notes.extend(rounded_to.and_then(|to| rounded(self.rounded, to)));
         let notes = std::mem::take(&mut self.notes);
         Ok(SinkSummary { points: self.points, bytes: self.bytes, notes })
     }

@@ -6,9 +6,9 @@ use super::colors::{self, Depth, Recoloring, WrittenColors};
 use super::print::{Printer, TextStyle};
 use super::schema::{RowShape, place, row_schema};
 use super::{Encoding, RowForm};
-use crate::io::convert::{Projection, Rounding};
+use crate::io::convert::{AskedValues, Projection, Rounding};
 use crate::point::{ComputedDimension, Dimension, PointBatch, Scalar, Schema, Spare, Value};
-use crate::stage::{ChunkSize, Colors, Encode, Encoded, WriteKeys};
+use crate::stage::{ChunkSize, Colors, Encode, Encoded, Retyped, WriteKeys};
 use crate::{Error, ErrorKind, Result};
 
 /// How the rows of an output are written.
@@ -18,8 +18,10 @@ pub(crate) struct RowOptions {
     /// Dimensions that stages computed and that are written, in place where the input has them as
     /// floating-point numbers, else behind the others.
     pub computed: Vec<ComputedDimension>,
-    /// Dimensions that are left out.
-    pub drop: Vec<String>,
+    /// What was asked of values.
+    pub asked: AskedValues,
+    /// Types that were asked for.
+    pub types: Vec<Retyped>,
     /// How many bits colours of other formats have; as for [`Colors::Auto`] when not said.
     pub colors: Option<Colors>,
     /// How texts are written.
@@ -28,8 +30,14 @@ pub(crate) struct RowOptions {
 
 impl RowOptions {
     pub fn of(keys: &WriteKeys, encoding: Encoding, computed: &[ComputedDimension]) -> Self {
-        let (drop, colors) = (keys.drop.clone(), keys.colors);
-        RowOptions { encoding, computed: computed.to_vec(), drop, colors, style: TextStyle::BLANKS }
+        RowOptions {
+            encoding,
+            computed: computed.to_vec(),
+            asked: AskedValues::of(keys),
+            types: keys.types.clone(),
+            colors: keys.colors,
+            style: TextStyle::BLANKS,
+        }
     }
 }
 
@@ -51,6 +59,8 @@ pub(crate) struct RowPlan {
     /// [`WIDE`] once the file has colours of 16 bits, so that no chunk needs to have 8, and
     /// [`FULL`] once they are known to need them, so that nobody needs to look.
     pub widened: AtomicU8,
+    /// True if types were asked for.
+    has_types: bool,
     /// For the rows of chunks; the thread that has written them puts them back.
     pub spare: Spare<Vec<u8>>,
 }
@@ -77,8 +87,9 @@ pub(crate) struct Narrow {
 
 impl Narrow {
     fn of(options: &RowOptions, form: &RowForm, schema: &Schema) -> Result<Option<Narrow>> {
-        let fields = colors::fields(schema, form, &options.drop);
-        if fields.is_empty() || options.colors == Some(Colors::Sixteen) {
+        let fields = colors::fields(schema, form, &options.asked.drop);
+        let is_typed = options.types.iter().any(|retyped| colors::is_color_name(&retyped.name));
+        if fields.is_empty() || is_typed || options.colors == Some(Colors::Sixteen) {
             return Ok(None);
         }
         let rows = |place| RowKind::new(options, form, &colors::bytes_of(schema, place));
@@ -106,10 +117,11 @@ impl RowKind {
     fn new(options: &RowOptions, form: &RowForm, schema: &Schema) -> Result<RowKind> {
         let mut row = row_schema(schema, form);
         row.endian = options.encoding.endian();
-        row.dimensions.retain(|d| !options.drop.contains(&d.name));
+        row.dimensions.retain(|d| !options.asked.drop.contains(&d.name));
+        options.types.iter().try_for_each(|retyped| retype(&mut row, form, retyped))?;
         place(&mut row, form);
         // Made before computed dimensions are added: the records need not have them.
-        let mut projection = Projection::new(schema, &row, &options.drop)?;
+        let mut projection = Projection::asked(schema, &row, &options.asked)?;
         let added = options.computed.iter().map(|d| Ok((*d, add_computed(&mut row, form, d)?)));
         let computed: Vec<_> = added.collect::<Result<_>>()?;
         projection.widen(row.stride);
@@ -178,8 +190,16 @@ impl RowPlan {
             full: RowKind::new(options, &form, schema)?,
             narrow: Narrow::of(options, &form, schema)?,
             widened: AtomicU8::new(0),
+            has_types: !options.types.is_empty(),
             spare: Spare::default(),
         })
+    }
+
+    /// What was asked for and rounds values, in words.
+    pub fn rounded_to(&self) -> Option<&'static str> {
+        let of_types = self.full.projection.as_ref().filter(|_| self.has_types);
+        let of_types = of_types.map(Projection::rounded_to);
+        of_types.or(self.style.decimals.map(|_| "as many decimals as were asked for"))
     }
 
     pub fn chunk(&self) -> ChunkSize {
@@ -260,6 +280,20 @@ impl RowPlan {
             None => full(depth),
         }
     }
+}
+
+/// Gives a field of a row another type.
+fn retype(row: &mut Schema, form: &RowForm, retyped: &Retyped) -> Result<()> {
+    if matches!(retyped.scalar, Scalar::U64 | Scalar::I64) && !form.holds_long {
+        let family = form.layout.family;
+        let told =
+            format!("`write.types` has `{retyped}`, and {family} has no whole numbers of 64 bits");
+        return Err(Error::pipeline(told).help("give `u32`, `i32` or `f64`"));
+    }
+    for field in row.dimensions.iter_mut().filter(|field| field.name == retyped.name) {
+        *field = Dimension::new(&retyped.name, retyped.scalar, 0);
+    }
+    Ok(())
 }
 
 /// The field of a computed dimension, added if it is not there; fails on one that holds whole

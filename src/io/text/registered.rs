@@ -116,7 +116,7 @@ impl Format for TextFormat {
     fn keys(&self) -> &'static [&'static str] {
         match self.habit.kind {
             TextKind::Ptx => &[],
-            _ => &["colors", "separator", "decimals", "header"],
+            _ => &["types", "colors", "separator", "decimals", "header"],
         }
     }
 

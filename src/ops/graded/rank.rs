@@ -4,11 +4,11 @@
 //! of the ladder are powers of √2 of the scan's unit, and each has eight ranks. So a reduction can
 //! be cut off at a length, by whoever has nothing but its points.
 
-use crate::point::Column;
+use crate::point::{Column, names};
 
 /// When each point was kept: points of lower ranks are a coarser reduction of the same scan. 65535
 /// are exceptions, which are kept and no part of the surface.
-pub const KEEP_RANK: Column<u16> = Column::new("KeepRank", &[]).computed_by("graded");
+pub const KEEP_RANK: Column<u16> = Column::new(names::KEEP_RANK, &[]).computed_by("graded");
 /// The rank of exceptions.
 pub(super) const EXCEPTION: u16 = u16::MAX;
 

@@ -6,7 +6,8 @@
 //! grid of occupied cells for every node, or goes over the scan once for each level.
 //!
 //! Here cells hold a contest. A node has 2^7 cells a side; of the points in a cell the one of the
-//! smallest rank (a hash of its position) stands for it. Of the eight cells that make a cell of the
+//! smallest rank stands for it: the one that a reduction gave it, where the records have such, so
+//! that a coarse level is a coarse reduction, and a hash of its position. Of the eight cells that make a cell of the
 //! next level their winners meet again, so that whoever wins there has won in all cells below. A
 //! point belongs to the level whose cells are the largest that it wins. So the levels down to any
 //! one together have exactly one point in each occupied cell of that level.
@@ -140,8 +141,9 @@ impl Octree {
         }
     }
 
-    /// Adds a point; it must not come before the last in Morton order.
-    pub fn push(&mut self, position: Position, record: &[u8]) -> Result<()> {
+    /// Adds a point; it must not come before the last in Morton order. In contests the smallest
+    /// rank wins.
+    pub fn push(&mut self, position: Position, rank: u64, record: &[u8]) -> Result<()> {
         if let Some(last) = self.last {
             self.close(split_level(last, position).map_or(0, |bit| bit + 1))?;
         }
@@ -151,7 +153,7 @@ impl Octree {
             self.slots.len() / self.stride - 1
         });
         self.slots[slot * self.stride..(slot + 1) * self.stride].copy_from_slice(record);
-        self.contest(0, Winner { rank: rank(position), slot }, 0)
+        self.contest(0, Winner { rank, slot }, 0)
     }
 
     /// True if no point was added.
@@ -309,8 +311,14 @@ impl Octree {
     }
 }
 
-/// What decides contests: as good as random, and of a position alone.
-fn rank(position: Position) -> u64 {
+/// What decides contests: the rank that a reduction gave the point, if it did, and what is as good
+/// as random and of a position alone.
+pub fn rank(kept: Option<u16>, position: Position) -> u64 {
+    let chance = chance(position);
+    kept.map_or(chance, |kept| u64::from(kept) << 48 | chance >> 16)
+}
+
+fn chance(position: Position) -> u64 {
     let mut z = 0u64;
     for at in position {
         z = (z ^ at as u64).wrapping_add(0x9e37_79b9_7f4a_7c15);

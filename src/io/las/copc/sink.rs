@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::hierarchy::{Hierarchy, NodeChunk, ROOT, extended};
 use super::names::{HIERARCHY, INFO, INFO_AT, INFO_BYTES, POINT_FORMATS, TIME, USER};
-use super::octree::{LEAF_POINTS, Octree, RootCube};
+use super::octree::{LEAF_POINTS, Octree, RootCube, rank};
 use super::overflow::Overflow;
 use super::packing::{CopcEncoder, PackedNode, Packing};
 use crate::geom::lattice::Lattice;
@@ -14,7 +14,7 @@ use crate::io::las::format::format_of;
 use crate::io::las::laz::{CHUNK_POINTS, Compression};
 use crate::io::las::sink::{LasForm, LasOptions, LasSink, record_length};
 use crate::io::las::vlr::{EVLR_HEAD, Vlr};
-use crate::point::{Bounds, Metadata, Schema};
+use crate::point::{Bounds, Dimension, Endian, Metadata, Scalar, Schema, Value, names};
 use crate::stage::{ChunkSize, Encode, Encoded, Extent, Sink, SinkSummary};
 use crate::{Error, Result};
 
@@ -31,6 +31,7 @@ pub fn create(
 ) -> Result<Box<dyn Sink>> {
     let (encoder, laszip) = encoder(options, schema)?;
     let stride = encoder.packing.stride();
+    let kept = encoder.records.computed.place_of(schema, names::KEEP_RANK);
     let info = Vlr::new(USER, INFO, "COPC info VLR", vec![0; INFO_BYTES]);
     let form = LasForm { encoder: encoder.records.clone(), laszip: Some(laszip), copc: Some(info) };
     let inner = LasSink::open(staged, schema, metadata, form)?;
@@ -39,6 +40,7 @@ pub fn create(
         encoder: Arc::new(encoder),
         path: staged.to_owned(),
         stride,
+        kept: kept.filter(|kept| kept.scalar == Scalar::U16),
         scale: schema.coordinates().map_or([1.0; 3], |axes| axes.map(|axis| axis.scale)),
         ground: None,
         hierarchy: Hierarchy::default(),
@@ -78,6 +80,8 @@ struct CopcSink {
     encoder: Arc<CopcEncoder>,
     path: PathBuf,
     stride: usize,
+    /// The rank that a reduction gave a record, where it has one.
+    kept: Option<Dimension>,
     /// World units of a stored one.
     scale: [f64; 3],
     ground: Option<Ground>,
@@ -175,7 +179,12 @@ impl Sink for CopcSink {
             if !ground.octree.takes(place) {
                 return Err(misplaced(ground.lattice.world(place)));
             }
-            ground.octree.push(place, record)?;
+            let kept = self.kept.as_ref().map(|kept| kept.get(record, Endian::Little));
+            let kept = match kept {
+                Some(Value::Unsigned(kept)) => Some(kept as u16),
+                _ => None,
+            };
+            ground.octree.push(place, rank(kept, place), record)?;
             if let Some(bytes) = record.get(TIME..).and_then(<[u8]>::first_chunk) {
                 let time = f64::from_le_bytes(*bytes);
                 self.times = [self.times[0].min(time), self.times[1].max(time)];

@@ -30,7 +30,7 @@ fn nodes(points: &[Position]) -> (RootCube, BTreeMap<VoxelKey, Vec<(Position, u6
     for (n, p) in points.iter().enumerate() {
         let record: Vec<u8> =
             p.iter().copied().chain([n as i64]).flat_map(i64::to_le_bytes).collect();
-        octree.push(*p, &record).unwrap();
+        octree.push(*p, rank(None, *p), &record).unwrap();
         keep(&mut octree);
     }
     octree.finish().unwrap();
@@ -74,7 +74,7 @@ fn check(points: &[Position]) {
 
 fn random(seed: &mut u64) -> u64 {
     *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-    rank([*seed as i64, 0, 0])
+    rank(None, [*seed as i64, 0, 0])
 }
 
 #[test]
@@ -90,6 +90,15 @@ fn every_level_of_a_dense_scan_covers_what_the_whole_covers() {
     }
     points.extend((0..80_000).map(|_| [12_345, -54_321, 7]));
     check(&points);
+}
+
+#[test]
+fn a_point_that_was_kept_earlier_comes_first() {
+    let places = [[0, 0, 0], [-5, 9, 1 << 40]];
+    for (one, two) in places.into_iter().flat_map(|p| places.map(|q| (p, q))) {
+        assert!(rank(Some(3), one) < rank(Some(4), two));
+        assert!(rank(Some(u16::MAX - 1), one) < rank(Some(u16::MAX), two));
+    }
 }
 
 #[test]

@@ -1,0 +1,302 @@
+//! Scale and offset of an output that are found: those that round no coordinate and reach every
+//! point.
+//!
+//! A coordinate has so many decimals if it is the number nearest to them that its type holds: 0.1
+//! as `f32` has one, though its digits go on. So the points are read once before the run, and the
+//! most decimals of an axis are its step.
+
+use crate::point::{Dimension, Endian, PointBatch, Scalar};
+use crate::quantity::{Figure, Setting};
+use crate::stage::{PointWalk, Source, WriteKeys};
+use crate::{Error, Result};
+
+/// Decimals that are looked for.
+const MOST_DECIMALS: u8 = 12;
+/// Stored coordinates are i32.
+const REACH: f64 = i32::MAX as f64;
+/// The step of a scan without points.
+const STEP_OF_NONE: f64 = 1e-3;
+
+/// `keys` with a scale and an offset in the place of `"auto"`, for points of `source`; None where
+/// nothing is to be found.
+///
+/// # Errors
+///
+/// Points that no scale holds without rounding, points that stages move, and what reading them
+/// fails with.
+pub(super) fn settled(
+    keys: &WriteKeys,
+    source: &dyn Source,
+    walk: &PointWalk,
+    moved_by: Option<&str>,
+) -> Result<Option<WriteKeys>> {
+    let is_auto = |key: Option<Setting<[f64; 3]>>| key.is_some_and(Setting::is_auto);
+    let (scale_is_auto, offset_is_auto) = (is_auto(keys.scale), is_auto(keys.offset));
+    if !scale_is_auto && !offset_is_auto {
+        return Ok(None);
+    }
+    let mut keys = keys.clone();
+    let key = if scale_is_auto { "write.scale" } else { "write.offset" };
+    if source.schema().layout.steps && keys.scale.is_none_or(Setting::is_auto) {
+        // The records have steps, which stay as they are.
+        keys.scale = None;
+        keys.offset = keys.offset.filter(|offset| !offset.is_auto());
+        return Ok(Some(keys));
+    }
+    if let Some(stage) = moved_by {
+        let told = format!(
+            "`{key} = \"auto\"` looks at points where they are read, and `{stage}` moves them"
+        );
+        return Err(Error::pipeline(told).help("give a scale and an offset"));
+    }
+    if source.is_read_once() {
+        let told = format!("`{key} = \"auto\"` reads the points twice, and these come once");
+        return Err(Error::pipeline(told).help("give a scale and an offset"));
+    }
+    let spread = Spread::of(source, walk)?;
+    let offset = keys.offset.and_then(Setting::given);
+    let scale = match keys.scale.and_then(Setting::given) {
+        Some(scale) => scale,
+        None => spread.scale(offset)?,
+    };
+    if offset.is_none() {
+        keys.offset = Some(Setting::Given(spread.offset(scale)?));
+    }
+    keys.scale = Some(Setting::Given(scale));
+    Ok(Some(keys))
+}
+
+/// Where the points are on an axis, and on what grid.
+#[derive(Debug, Clone, Copy)]
+struct AxisSpread {
+    lo: f64,
+    hi: f64,
+    /// The most decimals of a coordinate; one more than are looked for where one has more.
+    decimals: u8,
+    /// Step and origin where the records have steps.
+    grid: Option<(f64, f64)>,
+}
+
+/// Where the points are.
+#[derive(Debug, Clone, Copy)]
+struct Spread([AxisSpread; 3]);
+
+impl Spread {
+    fn none(axes: [&Dimension; 3]) -> Self {
+        Spread(axes.map(|axis| {
+            let grid = (axis.scalar, axis.scale, axis.origin);
+            let grid = Some(grid).filter(|(scalar, ..)| !scalar.is_float());
+            AxisSpread {
+                lo: f64::INFINITY,
+                hi: f64::NEG_INFINITY,
+                decimals: 0,
+                grid: grid.map(|(_, scale, origin)| (scale.abs(), origin)),
+            }
+        }))
+    }
+
+    /// That of all points whose coordinates are finite.
+    fn of(source: &dyn Source, walk: &PointWalk) -> Result<Self> {
+        let schema = source.schema();
+        let axes = schema.coordinates().ok_or_else(|| Error::internal("a scan without places"))?;
+        let look = |spread: &mut Spread, _: usize, _: u64, batch: &PointBatch| {
+            for (seen, axis) in spread.0.iter_mut().zip(axes) {
+                seen.look(axis, schema.endian, batch);
+            }
+        };
+        let failed = |_: &mut Spread, _: usize, error: Error| Err(error);
+        let all = walk.each_batch(source, 0, || Spread::none(axes), look, failed)?;
+        Ok(all.into_iter().fold(Spread::none(axes), Spread::joined))
+    }
+
+    fn joined(self, other: Spread) -> Spread {
+        Spread(std::array::from_fn(|axis| {
+            let (a, b) = (self.0[axis], other.0[axis]);
+            let decimals = a.decimals.max(b.decimals);
+            AxisSpread { lo: a.lo.min(b.lo), hi: a.hi.max(b.hi), decimals, grid: a.grid }
+        }))
+    }
+
+    /// The largest steps that round nothing and reach all points, from `offset` where one is given:
+    /// one for all axes where that reaches.
+    fn scale(&self, offset: Option<[f64; 3]>) -> Result<[f64; 3]> {
+        let mut steps = [0.0; 3];
+        for (axis, spread) in self.0.iter().enumerate() {
+            let offset = offset.map(|offset| offset[axis]);
+            steps[axis] = spread.step(offset).ok_or_else(|| self.too_fine(axis))?;
+        }
+        let finest = steps.into_iter().fold(f64::INFINITY, f64::min);
+        let reaches = |scale: [f64; 3]| {
+            let mut each = self.0.iter().zip(scale).enumerate();
+            each.all(|(axis, (spread, step))| match offset {
+                Some(offset) => spread.reaches(offset[axis], step),
+                None => spread.offset(step).is_some(),
+            })
+        };
+        let is_one_grid = self.0.iter().all(|spread| spread.grid.is_none());
+        if is_one_grid && reaches([finest; 3]) {
+            return Ok([finest; 3]);
+        }
+        match reaches(steps) {
+            true => Ok(steps),
+            false => Err(self.too_far(offset)),
+        }
+    }
+
+    /// An offset from which steps of `scale` reach all points.
+    fn offset(&self, scale: [f64; 3]) -> Result<[f64; 3]> {
+        let mut offset = [0.0; 3];
+        for (axis, spread) in self.0.iter().enumerate() {
+            offset[axis] = spread.offset(scale[axis]).ok_or_else(|| self.too_far(None))?;
+        }
+        Ok(offset)
+    }
+
+    fn too_fine(&self, axis: usize) -> Error {
+        let name = ["x", "y", "z"][axis];
+        let told = format!(
+            "`write.scale = \"auto\"` rounds nothing, and the {name} of some points has more than \
+             {MOST_DECIMALS} decimals"
+        );
+        Error::pipeline(told).help(self.finest())
+    }
+
+    fn too_far(&self, offset: Option<[f64; 3]>) -> Error {
+        let told = match offset {
+            None => "the points reach farther than 2^32 of the steps that round no coordinate",
+            Some(_) => {
+                "from `write.offset` the points reach farther than 2^31 of the steps that round no \
+                 coordinate"
+            }
+        };
+        Error::pipeline(told).help(self.finest())
+    }
+
+    /// The finest power of ten that reaches all points.
+    fn finest(&self) -> String {
+        let power = |exponent: &i32| format!("1e{exponent}").parse().unwrap_or(f64::MAX);
+        let reaches = |step: &f64| self.0.iter().all(|spread| spread.offset(*step).is_some());
+        match (-15..300).map(|exponent| power(&exponent)).find(reaches) {
+            Some(step) => format!(
+                "`write.scale = {}` with `write.offset = \"auto\"` reaches all points and moves \
+                 coordinates by {} at most",
+                Figure(step),
+                Figure(step / 2.0)
+            ),
+            None => "no scale reaches all points: some lie far from all others".to_owned(),
+        }
+    }
+}
+
+impl AxisSpread {
+    fn look(&mut self, axis: &Dimension, endian: Endian, batch: &PointBatch) {
+        let is_single = axis.scalar == Scalar::F32;
+        for record in batch.iter() {
+            let at = axis.world(record, endian);
+            if !at.is_finite() {
+                continue;
+            }
+            (self.lo, self.hi) = (self.lo.min(at), self.hi.max(at));
+            while self.decimals <= MOST_DECIMALS && !has_decimals(at, self.decimals, is_single) {
+                self.decimals += 1;
+            }
+        }
+    }
+
+    /// The largest step that rounds none of the coordinates, nor `offset`.
+    fn step(&self, offset: Option<f64>) -> Option<f64> {
+        if self.lo > self.hi {
+            return Some(STEP_OF_NONE);
+        }
+        if let Some((step, _)) = self.grid {
+            return Some(step);
+        }
+        let suits = |d: &u8| offset.is_none_or(|offset| has_decimals(offset, *d, false));
+        let decimals = (self.decimals..=MOST_DECIMALS).find(suits)?;
+        format!("1e-{decimals}").parse().ok()
+    }
+
+    fn reaches(&self, offset: f64, step: f64) -> bool {
+        self.lo > self.hi || (self.lo - offset).abs().max((self.hi - offset).abs()) / step < REACH
+    }
+
+    /// An offset from which all points are within reach: 0 or that of the records if it is one.
+    fn offset(&self, step: f64) -> Option<f64> {
+        let own = self.grid.map_or(0.0, |(_, origin)| origin);
+        if self.reaches(own, step) {
+            return Some(own);
+        }
+        let middle = f64::midpoint(self.lo, self.hi);
+        // Whole thousands where the steps reach that far: their digits stay readable.
+        let units = [1e6, 1e3, 1.0].into_iter().filter(|unit| *unit <= step * REACH / 4.0);
+        let near = units.map(|unit| (middle / unit).round() * unit);
+        let stepped = own + ((middle - own) / step).round() * step;
+        let mut all = near.filter(|_| self.grid.is_none()).chain([stepped]);
+        all.find(|offset| self.reaches(*offset, step))
+    }
+}
+
+/// True if `at` is the number that is nearest to so many decimals.
+fn has_decimals(at: f64, decimals: u8, is_single: bool) -> bool {
+    const POWERS: [f64; MOST_DECIMALS as usize + 1] =
+        [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12];
+    let power = POWERS[usize::from(decimals.min(MOST_DECIMALS))];
+    let near = (at * power).round() / power;
+    if is_single { near as f32 == at as f32 } else { near == at }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spread(coordinates: &[f64], is_single: bool) -> AxisSpread {
+        let mut all =
+            AxisSpread { lo: f64::INFINITY, hi: f64::NEG_INFINITY, decimals: 0, grid: None };
+        for &at in coordinates {
+            let single = if is_single { f64::from(at as f32) } else { at };
+            (all.lo, all.hi) = (all.lo.min(single), all.hi.max(single));
+            while all.decimals <= MOST_DECIMALS && !has_decimals(single, all.decimals, is_single) {
+                all.decimals += 1;
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn the_step_is_that_of_the_most_decimals() {
+        for (coordinates, step) in [
+            (&[638_000.125, 1.5, -3.0][..], Some(1e-3)),
+            (&[1.0, 2.0], Some(1.0)),
+            (&[0.1, 0.2], Some(1e-1)),
+            (&[], Some(STEP_OF_NONE)),
+        ] {
+            assert_eq!(spread(coordinates, false).step(None), step, "{coordinates:?}");
+            assert_eq!(spread(coordinates, true).step(None), step, "{coordinates:?} as f32");
+        }
+        assert_eq!(spread(&[1.0 / 3.0], false).step(None), None);
+        assert_eq!(spread(&[0.5], false).step(Some(0.125)), Some(1e-3));
+    }
+
+    #[test]
+    fn the_offset_is_0_or_near_the_points() {
+        let of = |coordinates: &[f64], step| spread(coordinates, false).offset(step);
+        assert_eq!(of(&[638_000.0], 1e-3), Some(0.0));
+        assert_eq!(of(&[5_638_123.456], 1e-3), Some(6_000_000.0 - 362_000.0));
+        assert_eq!(of(&[-1e9, 1e9], 1e-3), None);
+        assert_eq!(of(&[], 1e-9), Some(0.0));
+    }
+
+    #[test]
+    fn one_scale_is_for_all_axes_where_it_reaches() {
+        let [fine, coarse] = [spread(&[0.001], false), spread(&[12.5], false)];
+        assert_eq!(Spread([fine, coarse, coarse]).scale(None).unwrap(), [1e-3; 3]);
+        let [degrees, metres] = [spread(&[7.000_000_1], false), spread(&[0.5, 8_848.5], false)];
+        assert_eq!(Spread([degrees, degrees, metres]).scale(None).unwrap(), [1e-7, 1e-7, 1e-7]);
+        let far = spread(&[-9e5, 9e5], false);
+        assert_eq!(Spread([degrees, degrees, far]).scale(None).unwrap(), [1e-7, 1e-7, 1.0]);
+        let third = spread(&[1.0 / 3.0], false);
+        let told = Spread([coarse, third, coarse]).scale(None).unwrap_err();
+        assert!(told.to_string().contains("y of some points"), "{told}");
+        assert!(told.remedy().unwrap().contains("`write.scale = 1e-"), "{:?}", told.remedy());
+    }
+}
