@@ -50,7 +50,8 @@ Examples:
   pointmill convert survey/*.las -o survey.laz
   pointmill convert survey/*.las -o compressed/ --to laz
   pointmill convert 'survey/**/*.las' -o compressed/ --to laz --resume --summary done.json
-  pointmill convert scan.ply -o scan.laz --scale 0.001 --drop confidence",
+  pointmill convert scan.ply -o scan.laz --scale auto --drop confidence
+  pointmill convert scan.laz -o scan.ply --map Amplitude=Intensity --drop Intensity --type X=f32",
     ),
     (
         "cut",

@@ -12,7 +12,7 @@ pub(crate) use asked::AskedValues;
 use asked::SCALE;
 pub(super) use asked::TYPES;
 use columns::{BLOCK, ColumnStep, RecordBytes, TargetBytes};
-use step::{Move, push, slack, step};
+use step::{Move, is_single, push, slack, step};
 pub(super) use told::{check_drop, quoted};
 use told::{kept_otherwise, placed, room};
 
@@ -278,7 +278,8 @@ impl Projection {
                     // What the arithmetic of scales and offsets rounds is not the point's place.
                     let largest = world.abs().max(from.origin.abs()).max(to.origin.abs());
                     let rounded = (back - world).abs();
-                    let told = rounded > 4.0 * f64::EPSILON * largest;
+                    let same = is_single(from) && back as f32 == world as f32;
+                    let told = rounded > 4.0 * f64::EPSILON * largest && !same;
                     return Ok(if told { rounded } else { 0.0 });
                 }
                 Err(UnfitValue { to, value: Value::Double(world) })
@@ -353,7 +354,7 @@ fn nearest(to: &Dimension, world: f64) -> (Value, f64) {
 /// True if `back`, what the target holds, is the source's value but for the rounding of arithmetic:
 /// the same f32 where the source is one.
 fn same(from: &Dimension, to: &Dimension, world: f64, back: f64) -> bool {
-    let single = from.scalar == Scalar::F32 && from.scale == 1.0 && from.origin == 0.0;
+    let single = is_single(from);
     let near = f64::max(1e-9 * world.abs().max(to.scale.abs()), slack(from, to));
     (single && back as f32 == world as f32) || (back - world).abs() <= near
 }

@@ -1,5 +1,6 @@
 //! Inputs that are wrong.
 
+mod cases;
 mod headers;
 mod places;
 mod points;

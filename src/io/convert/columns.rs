@@ -2,7 +2,7 @@
 //! strided loads and stores. What a step finds unfit it leaves to the road that goes record by
 //! record.
 
-use super::step::{Move, slack};
+use super::step::{Move, is_single, slack};
 use crate::point::{Dimension, Endian, Scalar};
 
 /// Records that the steps take at once: with their targets and a column of numbers they stay in the
@@ -213,7 +213,7 @@ impl Number {
         to_stored: impl Fn(f64) -> (f64, bool),
     ) -> bool {
         let from = &self.from;
-        let single = from.scalar == Scalar::F32 && from.scale == 1.0 && from.origin == 0.0;
+        let single = is_single(from);
         match (rule, single) {
             (NumberRule::Rounded, _) => self.rounding(values, rounded, to_stored),
             (NumberRule::Part, _) => {
@@ -237,14 +237,17 @@ impl Number {
     ) -> bool {
         let (from, to) = (&self.from, &self.to);
         let origins = from.origin.abs().max(to.origin.abs());
+        let single = is_single(from);
         let mut unfit = 0;
         for (value, rounded) in values.iter_mut().zip(rounded) {
             let world = *value * from.scale + from.origin;
             let (stored, fits) = to_stored((world - to.origin) / to.scale);
-            let by = (stored * to.scale + to.origin - world).abs();
+            let back = stored * to.scale + to.origin;
+            let by = (back - world).abs();
             // What the arithmetic of scales and offsets rounds is not the point's place.
             let largest = if world.abs() > origins { world.abs() } else { origins };
-            let told = (by > 4.0 * f64::EPSILON * largest) & (by > *rounded);
+            let same = single & (back as f32 == world as f32);
+            let told = (by > 4.0 * f64::EPSILON * largest) & (by > *rounded) & !same;
             *rounded = if told { by } else { *rounded };
             *value = stored;
             unfit |= u64::from(!fits);

@@ -71,6 +71,11 @@ pub(super) fn asked_step(from: &Dimension, to: &Dimension, is_part: bool) -> Opt
     is_rounded.then(|| Move::Rounded { from: from.clone(), to: to.clone() })
 }
 
+/// True for plain numbers of single precision: others that are nearest to the same one are as good.
+pub(super) fn is_single(from: &Dimension) -> bool {
+    from.scalar == Scalar::F32 && from.scale == 1.0 && from.origin == 0.0
+}
+
 /// How far the target's value may be from the source's where the target must hold it: half a step
 /// for scan angles, whose whole degrees are steps of 0.006° in newer point formats of LAS and none
 /// of them exactly. They are the same whole degrees again when they come back.
