@@ -1,25 +1,27 @@
 //! The stage kinds at both ends of a pipeline, `read`, `synth` and `write`: their keys.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::split::SplitBy;
 use super::values::{
     names_once, one_or_more, one_or_three, some_columns, some_crs, some_offset, some_positive,
     some_scale, some_scans, texts,
 };
-use crate::error::{listed, shown};
-use crate::io::sniff::{of_extension, upper};
-use crate::quantity::{CropBox, Length, Whole};
+use crate::quantity::{CropBox, Length, SizeText, Whole, some_bytes};
 use crate::stage::{
-    Assumption, Colors, Format, FormatName, Formats, OnError, Order, OutputEncoding, ReadKeys,
-    Separator, WriteKeys,
+    Assumption, Colors, FormatName, OnError, Order, OutputEncoding, ReadKeys, Separator, WriteKeys,
 };
-use crate::{Error, Result};
 
 /// The source of most pipelines. Several files are one scan, all of one format; LAS and LAZ count
 /// as one, and so do texts.
+///
+/// The path `-` is standard input. What a pipe gives is set down first, in a file of no name in the
+/// folder that `TMPDIR` names, or `/tmp`, which needs room for all of it: a scan is read at many
+/// places. A file that the shell opens (`< scan.laz`) is read where it is. The first bytes say the
+/// format, of a text `format` does.
 ///
 /// Headers are read, compared and held against the files' lengths before any point is. Files that
 /// do not fit together are refused by name: their points hold the same. LAS inputs agree in point
@@ -85,7 +87,7 @@ use crate::{Error, Result};
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Read {
-    /// A file, a pattern, a folder, or a list of them.
+    /// A file, a pattern, a folder, `-` for standard input, or a list of them.
     #[serde(deserialize_with = "one_or_more")]
     #[schemars(schema_with = "texts")]
     pub path: Vec<String>,
@@ -147,6 +149,10 @@ pub type ScanNumber = Whole<1, 65_535>;
 /// The end of every pipeline. The file grows in a scratch folder beside its place and appears under
 /// its name when it is complete; it never replaces an input.
 ///
+/// The path `-` is standard output; `format` says what is written. The file grows in the folder
+/// that `TMPDIR` names, or `/tmp`, and is sent when it is complete, so that every format can be
+/// sent, and nothing of a run that fails is.
+///
 /// A record that is kept is the input's, byte for byte, wherever the format can hold it. From one
 /// format to another every field keeps its name; one that cannot be held is an error unless `drop`
 /// names it. A point of which a file tells no returns is return 1 of 1 in LAS. Variable length
@@ -194,16 +200,33 @@ pub type ScanNumber = Whole<1, 65_535>;
 /// inputs are one scan all the same: neighbourhoods and cells go on from file to file, and the
 /// outputs together have the points that the one file would have.
 ///
-/// With `side` the output is cut into a file for each square of the plane that has points, of which
-/// `path` is the pattern: `path = "tiles/{x}_{y}.laz"` with `side = "500 m"` writes
-/// `tiles/638000_4851500.laz` and so on, named by the smallest x and y of each square. A point on a
-/// border is in the square of larger coordinates. Squares begin at the origin of the coordinates,
-/// so that those of neighbouring scans fit together. The points of a square have the order that
-/// they would have in one file. Up to 16,384 squares may have points.
+/// # Splitting
+///
+/// An output may be split into several files, of which `path` is the pattern; the folder is made if
+/// it does not exist. Records that are split have the order that they would have in one file, and
+/// the files have all of them. There may be up to 16,384 files. Records are set down in scratch by
+/// file before the files are written, so that the disk needs room for them once more.
+///
+/// With `side` there is a file for each square of the plane that has points:
+/// `path = "tiles/{x}_{y}.laz"` with `side = "500 m"` writes `tiles/638000_4851500.laz` and so on,
+/// named by the smallest x and y of each square. A point on a border is in the square of larger
+/// coordinates. Squares begin at the origin of the coordinates, so that those of neighbouring scans
+/// fit together.
+///
+/// With `by` there is a file for each value of a dimension whose numbers are whole:
+/// `path = "lines/{value}.laz"` with `by = "PointSourceId"` writes a file for each flight line, and
+/// with `by = "Classification"` one for each class.
+///
+/// With `points` a file has so many points, and the last what is left: `path = "part_{number}.laz"`
+/// with `points = "10M"` writes `part_0001.laz` and so on. With `bytes` a file is no longer than
+/// that, as it lies on the disk: it has as many of the chunks that the format is written in (50,000
+/// points of LAS and LAZ, fewer of others) as fit, with 256 KiB and a hundredth to spare. Chunks
+/// are encoded twice for that: once to see how long they are.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Write {
-    /// The file; it appears under this name when it is complete. Either this or `folder` is given.
+    /// The file, which appears under this name when it is complete; `-` for standard output. Either
+    /// this or `folder` is given.
     #[serde(default)]
     #[schemars(title = "a path")]
     pub path: Option<PathBuf>,
@@ -215,6 +238,19 @@ pub struct Write {
     /// the corner of a square is to stand.
     #[serde(default)]
     pub side: Option<Length>,
+    /// Dimension of the records whose values get a file each, such as `PointSourceId`; none: one
+    /// file. `path` has `{value}` where the value is to stand.
+    #[serde(default)]
+    pub by: Option<String>,
+    /// Points of a file, where there is to be one after another; none: one file. `path` has
+    /// `{number}` where the number of the file is to stand, from 1.
+    #[serde(default)]
+    pub points: Option<FilePoints>,
+    /// Bytes of a file at most, where there is to be one after another; none: one file. `path` has
+    /// `{number}` where the number of the file is to stand, from 1.
+    #[serde(default, deserialize_with = "some_bytes")]
+    #[schemars(with = "Option<SizeText>")]
+    pub bytes: Option<u64>,
     /// The format; none: as the extension says, in a folder that of the input. A file whose
     /// extension says another is written, with a warning.
     #[serde(default)]
@@ -263,6 +299,9 @@ pub struct Write {
     pub header: Option<bool>,
 }
 
+/// How many points a file gets.
+pub type FilePoints = Whole<1, 1_000_000_000_000>;
+
 /// The number of a point data record format.
 pub type PointFormat = Whole<0, 10>;
 
@@ -294,6 +333,17 @@ impl Write {
 }
 
 impl Write {
+    /// What the output is split by, each with the key that says it.
+    pub(super) fn splits(&self) -> Vec<(&'static str, SplitBy)> {
+        let by = [
+            self.side.map(SplitBy::Side),
+            self.by.clone().map(SplitBy::Dimension),
+            self.points.map(|points| SplitBy::Points(points.get())),
+            self.bytes.map(SplitBy::Bytes),
+        ];
+        by.into_iter().flatten().map(|by| (by.key(), by)).collect()
+    }
+
     /// What formats know of it.
     pub(super) fn keys(&self, path: PathBuf) -> WriteKeys {
         WriteKeys {
@@ -327,70 +377,5 @@ impl Read {
         (keys.scale, keys.offset) = (self.scale, self.offset);
         keys.point_format = self.point_format.map(|format| format.get() as u8);
         keys
-    }
-}
-
-/// Refuses keys that inputs of `format` do not have; tells which.
-pub(super) fn check_read(
-    keys: &ReadKeys,
-    format: &dyn Format,
-    formats: &Formats,
-) -> Result<(), (&'static str, Error)> {
-    let Some(key) = keys.given().find(|key| !format.read_keys().contains(key)) else {
-        return Ok(());
-    };
-    let having = formats.iter().filter(|format| format.read_keys().contains(&key));
-    let having = listed(having.map(|format| format.name()), "and");
-    let told = format!("`read.{key}` is for {having}, the input is {}", format.name());
-    Err((key, Error::pipeline(told)))
-}
-
-/// Refuses keys that an output of `format` does not have; tells which.
-pub(super) fn check(
-    keys: &WriteKeys,
-    format: &dyn Format,
-    formats: &Formats,
-) -> Result<(), (&'static str, Error)> {
-    if let Some(help) = format.unwritten() {
-        let told = format!("{} files are read and not written", format.name().to_uppercase());
-        return Err(("path", Error::pipeline(told).help(help)));
-    }
-    if let Some(key) = keys.given().find(|key| !format.keys().contains(key)) {
-        let having = formats.iter().filter(|format| format.keys().contains(&key));
-        let having = listed(having.map(|format| format.name()), "and");
-        let is = format.name();
-        let told = format!("`write.{key}` is for {having}, the output is {is}");
-        return Err((key, Error::pipeline(told)));
-    }
-    if let Some(name) = keys.computed.first().filter(|_| !format.holds_computed()) {
-        let is = format.name();
-        let told = format!("`write.dimensions` asks for {name}, and {is} holds nothing computed");
-        return Err(("dimensions", Error::pipeline(told).help("write LAS, PLY or another")));
-    }
-    match keys.offset.is_some_and(|offset| offset.iter().any(|v| !v.is_finite())) {
-        true => Err(("offset", Error::pipeline("an offset is three finite numbers"))),
-        false => Ok(()),
-    }
-}
-
-/// The error of a file of which neither its extension nor `setting` says the format.
-pub(super) fn unknown_extension(path: &Path, setting: &str, formats: &Formats) -> Error {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let name = shown(path);
-    let is_read = setting.starts_with("read");
-    let can = if is_read { "read" } else { "written" };
-    let known = formats.iter().filter(|format| is_read || format.unwritten().is_none());
-    let dotted = listed(known.map(|format| format!(".{}", format.extension())), "or");
-    match of_extension(&extension) {
-        Some(format) => {
-            let told = format!("by its extension `{name}` is {format}, which is not {can}");
-            let known = listed(upper(formats), "or");
-            Error::pipeline(told).help(match is_read {
-                true => format!("convert it to {known} with another program first"),
-                false => format!("name it {dotted}"),
-            })
-        }
-        None => Error::pipeline(format!("the extension of `{name}` names no format"))
-            .help(format!("name it {dotted}, or give `{setting}`")),
     }
 }

@@ -1,6 +1,7 @@
 //! The stages at both ends of a pipeline that name files, `read` and `write`: from their keys to
 //! sources and sinks of formats.
 
+mod checked;
 mod connect;
 mod discard;
 mod inputs;
@@ -11,7 +12,7 @@ mod mesh;
 mod mirror;
 mod outputs;
 mod roles;
-mod squares;
+mod split;
 mod values;
 
 pub(crate) use discard::CountedSink;
