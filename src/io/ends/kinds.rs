@@ -112,12 +112,13 @@ pub struct Read {
     /// are in the one that the others name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub assume: Vec<Assumption>,
-    /// What is done about damage in LAS and LAZ: `"fail"`; `"skip"`, which leaves out what is
-    /// damaged, of LAZ whole chunks; `"salvage"`, which reads what can be read, also of a damaged
-    /// chunk the points before the damage shows, of which the last may be wrong. A file that ends
-    /// too early has as many points as it holds, one whose header counts too few has those behind
-    /// them as well, and variable length records that are cut off are left out. What is lost is
-    /// told, and counted in the report.
+    /// What is done about damage: `"fail"`; `"skip"`, which leaves out what is damaged, of LAZ
+    /// whole chunks; `"salvage"`, which reads what can be read, also of a damaged chunk the points
+    /// before the damage shows, of which the last may be wrong. A file that ends too early has as
+    /// many points as it holds; LAS and LAZ whose header counts too few have those behind them as
+    /// well, and variable length records that are cut off are left out. Of a text a line that is no
+    /// point is left out, of an E57 file the rest of the scan. What is lost is told, and counted in
+    /// the report.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub on_error: Option<OnError>,
     /// Where points of LAS, LAZ and COPC are read: `[x0, y0, x1, y1]`, or

@@ -21,6 +21,7 @@ mod form;
 pub(crate) mod format;
 mod guard;
 mod header;
+mod held;
 pub(crate) mod holding;
 mod input;
 mod las15;
